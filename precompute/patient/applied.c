@@ -15,8 +15,8 @@ enum { COLUMNS = SUPINE_PATIENT_COLUMNS, HEIGHT = COLUMNS, FORCE, ALL };
 
 static const double damping_per_rms_direction = 0.1;
 
-/* Compute the force of the displacement law at every vertex [N], plus the force that would move the
- * displaced vertex onto the other surface. */
+/* Write into spread [vertices] the force of the displacement law at each vertex, plus the extra
+ * force that would move the displaced vertex onto the other surface. */
 static void find_spread_force(supine_patient_matching *m, const supine_patient *patient,
                               double *spread) {
   supine_patient law = *patient;
@@ -39,8 +39,9 @@ static void find_spread_force(supine_patient_matching *m, const supine_patient *
   }
 }
 
-/* Average the terms of the force, the height along gravity and the force over each block of
- * vertices. Sum the products of every two averages over all blocks. Areas are the weights. */
+/* For each block of vertices, compute the area-weighted means of the force, of the height along
+ * gravity, and of the terms 1, X - 1/2, Y - 1/2 and Z - 1/2 of the force. Sum the products of every
+ * two means over all blocks, weighted by the areas of the blocks. */
 static void add_blocks(const supine_patient_matching *m, const double *force,
                        const double gravity[3], const double *vertex_area, size_t blocks,
                        double *means, double products[ALL * ALL]) {
@@ -60,12 +61,13 @@ static void add_blocks(const supine_patient_matching *m, const double *force,
   }
 }
 
-/* Compute the covariance of quantities a and b from sums of products; quantity 0 is always 1. */
+/* Compute the covariance of quantities a and b. products[i * ALL + j] is the sum of the products of
+ * quantities i and j, and quantity 0 is 1. */
 static double covariance(const double products[ALL * ALL], size_t a, size_t b) {
   return (products[a * ALL + b] - products[a] * products[b] / products[0]) / products[0];
 }
 
-/* Fit the slopes of the force along X, Y and Z to the block averages; return false on failure. */
+/* Fit the slopes of the force along X, Y and Z by least squares; return false on failure. */
 static bool fit_blocks(const double products[ALL * ALL], supine_patient_applied *applied) {
   double matrix[ALL * ALL];
   double k[COLUMNS];

@@ -12,24 +12,22 @@ static const double vertex_to_centre_most = 35.0; /* mm */
 static const double radius_over_distance = 1.5;
 
 enum {
-  CANDIDATES = 8192, /* largest number of vertices tried as centres of regions */
-  LANES = 16,        /* number of regions for each call of the equilibrium solver */
-  ROUNDS = 5         /* rounds of fitting and matching */
+  CANDIDATES = 8192, /* largest number of vertices tried as the centre of a region */
+  LANES = 16,        /* largest number of regions in one call of the equilibrium solver */
+  ROUNDS = 5         /* number of rounds; each fits the law, then matches the surfaces */
 };
 
-/* Prior standard deviation of the difference in expandability of two neighbouring regions. */
+/* Prior standard deviation of the difference between two neighbouring regions' expandabilities. */
 static const double neighbour_deviation = 0.3;
-/* Prior standard deviation of the expandability of one region; the prior mean is 1. */
-static const double region_deviation = 1.0;
-
-static const double noise_least = 0.3;     /* lower bound on the noise of a distance, mm */
-static const double rows_per_error = 10.0; /* number of nearby vertices that share one error */
+static const double region_deviation = 1.0; /* prior standard deviation of an expandability */
+static const double noise_least = 0.3;      /* lower bound on a distance's standard deviation, mm */
+static const double rows_per_error = 10.0;  /* neighbouring vertices whose errors count as one */
 
 /* Two regions are neighbours if their centres are closer than this multiple of the smallest
  * distance between any two centres. */
 static const double neighbour_ratio = 1.7;
 
-/* Largest held-out error with regions / held-out error without, at which regions are kept. */
+/* Regions are kept if the held-out error with them is below this multiple of the one without. */
 static const double kept_ratio = 0.95;
 
 /* Find the vertex of one lung that is farthest from its nearest region centre. */
@@ -54,7 +52,7 @@ static size_t farthest(const supine_lungs *lungs, const supine_patient_stiffness
   return found;
 }
 
-/* Add regions of expandability 1 until every vertex is near the centre of a region. */
+/* Add regions (expandability 1) until all vertices are near a centre or the array is full. */
 static void place_regions(const supine_lungs *lungs, supine_patient_stiffness *stiffness) {
   *stiffness = (supine_patient_stiffness){0};
   for (int side = 1; side >= -1; side -= 2) {
@@ -94,8 +92,8 @@ static void find_prior_precision(const supine_patient_stiffness *regions, double
   }
 }
 
-/* Compute response [m->count, regions->count]: the force that reaches a chosen vertex from one
- * region, if the expandability of that region is 1. */
+/* Write into response [m->count, regions->count] the force that each region of expandability 1
+ * causes at each chosen vertex. */
 static supine_status find_responses(const supine_patient_matching *m,
                                     const supine_patient_stiffness *regions,
                                     const double gravity[3], double *response,
@@ -139,7 +137,8 @@ cleanup:
   return status;
 }
 
-/* Set the force on each chosen vertex from the expandabilities a [count], or from 1 if NULL. */
+/* Set the force on each chosen vertex to the sum of the vertex's responses [count], each multiplied
+ * by the expandability a [count] of the region, or by 1 if `a` is NULL. */
 static void set_forces(supine_patient_matching *m, size_t count, const double *response,
                        const double *a) {
   for (size_t i = 0; i < m->count; ++i) {

@@ -15,33 +15,31 @@
 
 enum {
   EXPECTED_MAX = 200, /* largest number of points at which the expected error is computed */
-  FOLDS = 5,          /* number of folds; the blocks of a fold are held out together */
-  SEEDS = 3,          /* number of random divisions into blocks and folds */
+  FOLDS = 5,          /* number of folds of the cross-validation */
+  SEEDS = 3,          /* number of cross-validations, each with new random folds */
   AFFINE = 12,        /* number of constants of an affine map */
   ITEMS = SEEDS * FOLDS,
   SCORES = SUPINE_PATIENT_SCORES
 };
 
-/* Half-width of the 95 % band / expected error: of a 3-D position, and of one component of it. */
-static const double band_point = 1.8;
-static const double band_component = 1.96;
-
-/* Measured error / expected error of points within 8 mm of the surface, in ten patients. */
+static const double band_point = 1.8;      /* 95 % half-width of a point / expected error */
+static const double band_component = 1.96; /* 95 % half-width of a coordinate / expected error */
+/* Measured error / expected error, for points within 8 mm of the surface, in ten patients. */
 static const double near_surface = 1.3;
 
 typedef struct squares {
-  double residual[SCORES]; /* sums of weighted squared residuals, mm^2 */
-  double expected;         /* sum of weighted expected variances, mm^2 */
+  double residual[SCORES]; /* for each predictor, weighted sum of squared residuals, mm^2 */
+  double expected;         /* weighted sum of expected variances, mm^2 */
   double weight;
-  double points, within; /* number of points, and of points within the 95 % band */
+  double points, within; /* number of points, and of those within the 95 % band */
 } squares;
 
 typedef struct study {
   supine_patient_fit_options options;
   const supine_patient_row *rows;
   size_t row_count, components;
-  size_t *fold;            /* [SEEDS, row_count] index of each row's fold */
-  squares held_out[ITEMS]; /* sums over each held-out fold */
+  size_t *fold;            /* [SEEDS, row_count] index of the fold that contains each row */
+  squares held_out[ITEMS]; /* for each cross-validation and fold, sums over the held-out rows */
   supine_status failed[ITEMS];
 } study;
 
@@ -56,7 +54,8 @@ static void affine_design(const supine_patient_row *row, double x[AFFINE]) {
   }
 }
 
-/* Fit a translation t, or t + M p (affine_design). `map` becomes t and M, or zeros on failure. */
+/* Fit a translation t or, if `translation` is false, the map t + M p of affine_design. Write t and
+ * M into map, or zeros on failure. */
 static void affine_fit(const supine_patient_row *rows, size_t count, bool translation,
                        double map[AFFINE]) {
   double matrix[AFFINE * AFFINE] = {0.0};
@@ -84,8 +83,8 @@ static double affine_residual(const double map[AFFINE], const supine_patient_row
   return cblas_ddot(AFFINE, x, 1, map, 1) - row->value;
 }
 
-/* Assign each row to a block, and each block at random to a fold. Write the index of each row's
- * fold into fold [count]. Return the number of blocks, or 0 if out of memory. */
+/* Group the rows into cubes of space (blocks), and assign each block at random to a fold. Write
+ * each row's fold into fold [count]. Return the number of blocks, or 0 if out of memory. */
 static size_t assign_folds(const supine_patient_frame *frame, supine_patient_row *rows,
                            size_t count, unsigned long seed, size_t *fold) {
   const size_t blocks = supine_patient_rows_block(frame, rows, count, seed + 1);
@@ -108,7 +107,7 @@ static size_t assign_folds(const supine_patient_frame *frame, supine_patient_row
   return able ? blocks : 0;
 }
 
-/* Predict each row by all predictors, fitted to krige->rows; add the squared residuals to sums. */
+/* Predict `rows` with predictors fitted to krige->rows, and add the squared residuals to sums. */
 static void add_residuals(const study *s, const supine_patient_row *rows, size_t count,
                           supine_patient_krige *krige, squares *sums) {
   const double band = s->components == 3 ? band_point : band_component;
@@ -144,7 +143,7 @@ static void add_residuals(const study *s, const supine_patient_row *rows, size_t
 
 static supine_status hold_out(const study *s, const size_t *fold, size_t which, squares *sums) {
   const size_t n = s->row_count;
-  supine_patient_row *rows = malloc(n * sizeof *rows); /* fitted rows, then held-out rows */
+  supine_patient_row *rows = malloc(n * sizeof *rows); /* rows to fit, then held-out rows */
   supine_patient_krige krige = {0};
   supine_status status = rows == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
   size_t fitted_count = 0;
@@ -193,8 +192,8 @@ static supine_status hold_all_out(study *s, squares *held_out, supine_error *err
   return SUPINE_OK;
 }
 
-/* Write the 3-D RMS error, mm, that `krige` predicts for points near the surface into `expected`;
- * for landmarks, write 0. Return the mean length of the displacement of the points by `law`, mm. */
+/* Write into `expected` the RMS error in 3-D, mm, that `krige` predicts near the surface, or 0 if
+ * the rows are landmarks. Return the mean length of the displacements by `law`, mm. */
 static double find_expected_error(const study *s, const supine_patient_power *law,
                                   supine_patient_krige *krige, double *expected) {
   const size_t step = s->components * (1 + s->row_count / (s->components * EXPECTED_MAX));
@@ -225,7 +224,7 @@ static supine_patient_score baseline_of(const study *s) {
 }
 
 /* Convert sums of squared residuals to the RMS error of each predictor. Return by how many percent
- * the squared error of the corrected law is below that of the baseline. */
+ * the squared error of the corrected law is below that of the baseline predictor. */
 static double find_rms(const study *s, const squares *sums, double score[SCORES]) {
   for (size_t k = 0; k < SCORES; ++k) {
     score[k] = sqrt(sums->residual[k] * (double)s->components / sums->weight);
@@ -233,7 +232,7 @@ static double find_rms(const study *s, const squares *sums, double score[SCORES]
   return 100.0 * (1.0 - pow(score[SUPINE_PATIENT_SCORE_CORRECTED] / score[baseline_of(s)], 2.0));
 }
 
-/* Fit all rows, then fit again without each fold in turn. */
+/* Fit all rows. Then hold out each fold in turn, and fit the other folds. */
 static supine_status run(study *s, size_t triples, supine_patient *patient,
                          supine_patient_fit_report *report, supine_error *error) {
   squares fitted = {.points = 0};
@@ -241,7 +240,7 @@ static supine_status run(study *s, size_t triples, supine_patient *patient,
   double mean_displacement = 0.0;
   supine_patient_krige krige = {0};
   const bool sliding_unseen = triples == 0 && s->options.region_count == 0;
-  supine_patient_krige population = {0}; /* fit with the covariance found in other patients */
+  supine_patient_krige population = {0}; /* a fit with the covariance found in other patients */
   supine_status status =
       supine_patient_krige_fit(&s->options, s->rows, s->row_count, &krige, error);
   if (status == SUPINE_OK) {
@@ -307,7 +306,7 @@ supine_status supine_patient_fit(const supine_patient_fit_options *options,
                        : assign_folds(&patient->frame, rows, count, seed, s.fold + seed * count);
     report->blocks = (double)blocks;
     if (blocks == 0) {
-      status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu rows", count);
+      status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu values", count);
     }
   }
   if (status == SUPINE_OK) {

@@ -11,31 +11,31 @@
 #include "sh/base/vec3.h"
 
 static const double gain_least = 0.01, gain_most = 2.0; /* range of accepted gains */
-static const double same_posture = 0.05;  /* distance between unit vectors 3 degrees apart */
-static const double converged = 1e-4;     /* change of scales and gain below which the fit ends */
+static const double same_posture = 0.05; /* directions of gravity closer than this count as equal */
+static const double converged = 1e-4;    /* change of scales and gain below which the fit ends */
 static const double not_converged = 1e-2; /* change of scales and gain above which the fit fails */
-static const double force_least = 0.2;    /* lower bound on a force that is divided by */
+static const double force_least = 0.2; /* before a division, smaller forces are replaced by this */
 enum { ROUNDS = 100, VERTICES_MAX = 2000, EIGHTHS = 8, GAIN = 5, UNKNOWNS = 6 };
 
 typedef struct field {
   double u[3];         /* displacement from full inflation to rest, mm */
-  double force_change; /* relative change of the force with posture, if the gain is 1 */
+  double force_change; /* relative change of the force in the further posture, for a gain of 1 */
 } field;
 
-/* Fit to a scan in a further state. The displacement from full inflation along the axis of a row is
- * axis . (s (1 + gain force_change) u + t), with u and force_change of `field`. Unknown are a scale
- * s for each lung, the gain, and the translation t between the scans. */
+/* Fit to a scan in a further state. Along the axis of a row, the displacement from full inflation
+ * is axis . (s (1 + gain force_change) u + t), with u and force_change of `field`. The unknowns are
+ * a scale s for each lung, the gain, and the translation t between the scans. */
 typedef struct work {
   const supine_patient_record *record;
   bool fits_translation;
   double gains[2][3]; /* gains of the fuller and the emptier state (supine_patient_path) */
-  supine_patient_matching matching; /* each row's block is one of 8 eighths of the lungs */
-  field *field;                     /* [matching.count] */
+  supine_patient_matching matching; /* rows to fit, in four blocks for each lung */
+  field *field;                     /* [matching.count] displacement at each row */
   double x[UNKNOWNS]; /* scales of the left and right lung, translation t (x, y, z; mm), gain */
 } work;
 
-/* Fit the unknowns w->x by linear least squares. In the product of scale and gain, the scale keeps
- * its previous value. Return the RMS residual, mm.
+/* Fit the unknowns w->x by least squares. To keep the fit linear, use the previous scale in the
+ * product of scale and gain. Return the RMS residual, mm.
  * @param without  block of rows to leave out, or EIGHTHS to use all rows */
 static double fit(work *w, bool fits_gain, size_t without) {
   double matrix[UNKNOWNS * UNKNOWNS] = {0.0};
@@ -51,7 +51,7 @@ static double fit(work *w, bool fits_gain, size_t without) {
     double x[UNKNOWNS] = {0.0};
     x[lung] = along;
     x[GAIN] = fits_gain ? scale[lung] * w->field[i].force_change * along : 0.0;
-    double value = row->value; /* measured displacement from full inflation, mm */
+    double value = row->value;
     for (size_t a = 0; a < 3; ++a) {
       x[2 + a] = w->fits_translation ? row->axis[a] : 0.0;
       value += w->gains[0][a] * row->axis[a] * w->field[i].u[a];
@@ -62,7 +62,8 @@ static double fit(work *w, bool fits_gain, size_t without) {
     weights += weight;
   }
   memcpy(w->x, right, sizeof right);
-  for (size_t t = 0; t < UNKNOWNS; ++t) { /* an unknown that is not fitted becomes 0 */
+  /* Replace zeros on the diagonal by 1, so that unknowns that are not fitted become 0. */
+  for (size_t t = 0; t < UNKNOWNS; ++t) {
     matrix[t * UNKNOWNS + t] += matrix[t * UNKNOWNS + t] == 0.0 ? 1.0 : 0.0;
   }
   if (LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', UNKNOWNS, 1, matrix, UNKNOWNS, w->x, UNKNOWNS) != 0) {
@@ -72,7 +73,7 @@ static double fit(work *w, bool fits_gain, size_t without) {
   return sqrt(squares * (w->matching.state == NULL ? 3.0 : 1.0) / weights);
 }
 
-/* Compute the height of a place along gravity: 0 at the top, 1 at the bottom of the box. */
+/* Compute the height of a place along gravity: 0 at the top of the box, 1 at the bottom. */
 static double height_at(const supine_patient_frame *frame, const supine_patient_place *place,
                         const double gravity[3]) {
   const double outer = place->side > 0.0 ? frame->maximum[0] : frame->minimum[0];
@@ -89,8 +90,8 @@ static double height_at(const supine_patient_frame *frame, const supine_patient_
   return height / range;
 }
 
-/* Make three rows for each pair of points or, if `pairs` is NULL, one row for each chosen vertex of
- * the surface `rest`. */
+/* Make three rows for each pair of points or, if `pairs` is NULL, one row for each of at most
+ * VERTICES_MAX vertices of the surface `rest`. */
 static supine_status make_rows(work *w, const supine_lungs *rest, const supine_patient_pairs *pairs,
                                const supine_mesh *surface, supine_error *error) {
   supine_status status = SUPINE_OK;
@@ -103,7 +104,8 @@ static supine_status make_rows(work *w, const supine_lungs *rest, const supine_p
   }
   w->field = malloc(w->matching.count * sizeof *w->field);
   if (status == SUPINE_OK && (w->matching.rows == NULL || w->field == NULL)) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a further state");
+    status =
+        supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the fit to a further state");
   } else if (status == SUPINE_OK && pairs != NULL) {
     supine_patient_rows_of_pairs(&w->record->patient.frame, pairs, w->matching.rows);
   }
@@ -136,7 +138,7 @@ static void find_motion(work *w, const double gravity[3]) {
   }
 }
 
-/* Displace the chosen vertices by the unknowns w->x, and match them to the other surface. */
+/* Displace vertices by the scales, gain and translation w->x; match them to the other surface. */
 static supine_status match_surface(work *w, supine_error *error) {
   supine_patient_matching *m = &w->matching;
   for (size_t i = 0; i < m->count; ++i) {
@@ -151,8 +153,8 @@ static supine_status match_surface(work *w, supine_error *error) {
   return supine_patient_matching_weigh(m, 0.0, error);
 }
 
-/* Match and fit in turn until the unknowns hardly change. Then estimate the standard error of the
- * gain by the jackknife: each fit leaves one of the 8 blocks out. */
+/* Match the surfaces and fit the unknowns in turn until the unknowns hardly change. Then estimate
+ * the gain's standard error by the jackknife: leave out each of the 8 blocks of rows in turn. */
 static supine_status iterate(work *w, supine_patient_further *further, supine_error *error) {
   supine_status status = SUPINE_OK;
   double change = INFINITY;

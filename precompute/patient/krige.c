@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fit a displacement law together with the kriging of its residual. */
+/* Fit a displacement law and, by kriging, a correction of its residual. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,21 +13,22 @@
 
 enum {
   TERMS = SUPINE_PATIENT_TERMS,
-  MOTION = SUPINE_PATIENT_CONSTANTS, /* index of the first term of the motion between the scans */
+  MOTION = SUPINE_PATIENT_CONSTANTS, /* index of the first term for the motion between the scans */
   SCALE = TERMS - 1,                 /* index of the term that scales the whole displacement law */
   TERMS_MAX = TERMS + SUPINE_PATIENT_REGIONS_MAX,
   STEPS = 60
 };
 
 static const double size_deviation = 0.3; /* prior standard deviation of the term SCALE */
-static const double converged = 1e-10;    /* relative decrease of k->squares that ends a fit */
-static const double damping_most = 1e10;  /* damping of steps above which a fit ends */
+static const double converged = 1e-10;    /* a smaller relative decrease of k->squares ends a fit */
+static const double damping_most = 1e10;  /* a larger damping of the steps ends a fit */
 static const double expandability_least = 0.02;
 
-/* Bounds of the law's constants c2, c4 and c6 (exponents), and of |c7|, |c8| and |c9| (slopes). */
+/* Bounds of the law's exponents c2, c4 and c6, and of the absolute slopes |c7|, |c8| and |c9|. */
 static const double exponent_least = 0.5, exponent_most = 4.0, slope_most = 2.5;
 
-/* Prior standard deviations by law: of c1, c3, c5 / mean; log c2, log c4, log c6; c7, c8, c9. */
+/* For each law, prior standard deviations: [0] of c1, c3 and c5, relative to their prior means; [1]
+ * of log c2, log c4 and log c6; [2] of c7, c8 and c9. */
 static const double law_deviation[SUPINE_PATIENT_LAW_COUNT][3] = {{0.3, 0.3, 0.3}, {3.0, 1.0, 1.0}};
 
 static supine_patient_centre centre_of(const supine_patient_power *law,
@@ -44,7 +45,7 @@ static bool shape_is_fixed(const supine_patient_krige *k) {
   return k->options.size_only || (k->options.law == SUPINE_PATIENT_DEEP && k->sill >= 1.0);
 }
 
-/* Return a term's prior standard deviation: 0 if it is not fitted, INFINITY if it has no prior. */
+/* Return a term's prior standard deviation: 0 if not fitted, INFINITY if fitted without a prior. */
 static double prior_deviation(const supine_patient_krige *k, size_t term) {
   const double unit = term < 3 ? fabs(k->mean.c[2 * term]) : 1.0;
   const bool shape_fixed = shape_is_fixed(k);
@@ -78,7 +79,7 @@ static supine_patient_power take_step(const supine_patient_power *law, const dou
   return stepped;
 }
 
-/* Extend supine_patient_power_design by derivatives with respect to k->region. */
+/* Call supine_patient_power_design, and append derivatives with respect to the expandabilities. */
 static double design_row(const supine_patient_krige *k, const supine_patient_row *row, double *x) {
   if (k->options.region_count == 0) {
     return supine_patient_power_design(&k->law, row, x);
@@ -96,9 +97,9 @@ static double noise_of(const supine_patient_krige *k, const supine_patient_row *
   return k->noise * row->noise / sqrt(fmin(1.0, fmax(1e-12, row->weight)));
 }
 
-/* Factorise the covariance matrix of the rows: the sum of the covariance of the noise and the
- * covariance of the correction, which grows with the displacement. If only a factor on the whole
- * displacement law is fitted, the covariance of the correction does not depend on that factor.
+/* Factorise the covariance matrix of the rows, to which noise and correction contribute. The part
+ * from the correction grows with the displacement; but if only a factor on the whole displacement
+ * law is fitted, this part does not depend on the factor.
  * @return half the logarithm of the determinant; NAN if the matrix is not positive definite */
 static double factor(supine_patient_krige *k) {
   const size_t n = k->count;
@@ -131,7 +132,7 @@ static void add_prior(supine_patient_krige *k) {
   const size_t terms = k->terms;
   for (size_t t = 0; t < TERMS; ++t) {
     const double deviation = prior_deviation(k, t);
-    if (deviation == 0.0) { /* a term that is not fitted: its step becomes 0 */
+    if (deviation == 0.0) { /* the term is not fitted: make its step 0 */
       k->right_side[t] = 0.0;
       for (size_t s = 0; s < terms; ++s) {
         k->normal[s < t ? t * terms + s : s * terms + t] = s == t ? 1.0 : 0.0;
@@ -195,7 +196,7 @@ static bool factor_terms(supine_patient_krige *k) {
   return LAPACKE_dpotrf(LAPACK_COL_MAJOR, 'U', terms, k->normal, terms) == 0;
 }
 
-/* Minimise k->squares over all terms. Return false if the rows do not determine the terms. */
+/* Minimise k->squares over all unknowns. Return false if the rows do not determine them. */
 static bool descend(supine_patient_krige *k) {
   double damping = 0.0;
   linearise(k);
@@ -227,7 +228,7 @@ static bool descend(supine_patient_krige *k) {
   return true;
 }
 
-/* Return the restricted log likelihood of the rows for these factors, without its constant. */
+/* Return the restricted log likelihood of the rows, up to a constant, for a sill and a noise. */
 static double likelihood_of(supine_patient_krige *k, double sill, double noise) {
   const supine_patient_power before = k->law;
   k->sill = sill;
@@ -245,7 +246,7 @@ static double likelihood_of(supine_patient_krige *k, double sill, double noise) 
   return likelihood - 0.5 * k->squares;
 }
 
-/* Choose the most likely k->sill, k->noise and again k->sill. Keep a factor in `options`. */
+/* Choose the most likely k->sill, k->noise and k->sill again; keep values given in `options`. */
 static void choose_factors(supine_patient_krige *k, const supine_patient_fit_options *options) {
   static const double choices[2][5] = {{1.0, 0.03, 0.003, 0.0}, {1.0, 0.5, 0.25, 1.5, 2.0}};
   static const size_t count[2] = {4, 5};
@@ -306,7 +307,7 @@ static supine_status krige_create(supine_patient_krige *k,
   }
   return k->centre == NULL || (corrected && k->factor == NULL) || k->design == NULL ||
                  k->normal == NULL || k->weight == NULL || k->scratch == NULL
-             ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu rows", count)
+             ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu values", count)
              : SUPINE_OK;
 }
 

@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fit a displacement law, the motion of the body between two scans and a correction of the residual
- * to measured rows:
+/* Fit measured displacements by a displacement law, the motion of the body between two scans, and a
+ * correction r of the residual. Each row is one component, measured along the unit vector `axis`:
  *
  *     value = axis . (u(c) + motion + r) + noise
  *
  * A landmark gives three rows, one for each axis. A point of a surface gives one row, along the
  * normal of the other surface. u(c) is the displacement by the law with nine constants c
- * (patient.h). The prior of c is a normal distribution about the constants of a known law: narrow
- * to keep that law, or wide to find a new one. The correction r is found by kriging; its covariance
- * is a multiple of the covariance in runtime/kriging.h. The most likely c are found by generalised
- * least squares (damped Gauss-Newton). */
+ * (patient.h). The prior of c is a normal distribution about the constants of the default law
+ * (deep); it is narrow to keep that law, or wide to find a new one. The correction r is found by
+ * kriging; its covariance is a multiple of the covariance in runtime/kriging.h. The most likely c
+ * are found by generalised least squares (damped Gauss-Newton). */
 #ifndef SUPINE_PATIENT_KRIGE_H
 #define SUPINE_PATIENT_KRIGE_H
 
@@ -22,15 +22,15 @@
 typedef struct supine_patient_row {
   supine_patient_place place;
   double axis[3]; /* unit vector */
-  double value;   /* displacement along the axis, mm */
+  double value;   /* measured displacement along `axis`, mm */
   double weight;  /* factor on the squared residual */
   double noise;   /* standard deviation of `value`, mm */
   size_t block;   /* index of the block of rows that are held out together */
-  /* [regions] force that reaches the row from each region of expandability 1, or NULL */
+  /* [regions] force that each region of expandability 1 causes at the row's vertex; may be NULL */
   const double *response;
 } supine_patient_row;
 
-/* Make three rows from each pair of points, one for each axis, in rows [3 pairs->count]. */
+/* Write three rows for each pair of points, one for each axis, into rows [3 pairs->count]. */
 void supine_patient_rows_of_pairs(const supine_patient_frame *frame,
                                   const supine_patient_pairs *pairs, supine_patient_row *rows);
 
@@ -44,22 +44,22 @@ size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patie
  * expandabilities of regions are fitted, they follow as further terms. */
 enum { SUPINE_PATIENT_TERMS = 16, SUPINE_PATIENT_REGIONS_MAX = 256 };
 
-/* Compute the derivatives x of the displacement along the row's axis with respect to the 16 terms.
- * Return the displacement by the law and the motion minus the measured displacement, mm. */
+/* Compute the derivatives x of the predicted displacement (law plus motion) along the row's axis
+ * with respect to the 16 unknowns. Return the predicted minus the measured displacement, mm. */
 double supine_patient_power_design(const supine_patient_power *law, const supine_patient_row *row,
                                    double x[SUPINE_PATIENT_TERMS]);
 
-/* Options of the fit. If all are 0, the deep law and a correction are fitted, without a motion. */
+/* Options of the fit. If all are 0, the default law (deep) and a correction are fitted. */
 typedef struct supine_patient_fit_options {
   supine_patient_law law;
   supine_patient_scan_motion scan_motion;
   bool uncorrected;
-  bool size_only;      /* fit only the motion, and a factor on the whole deep law */
-  double gravity[3];   /* unit vector in the emptier state; 0,0,0 counts as supine */
-  double path_span[3]; /* see supine_patient_deep */
-  double sill;  /* factor on the covariance of the correction; 0: choose the most likely factor */
-  double noise; /* factor on the noise of every row; 0: choose the most likely factor */
-  size_t region_count;     /* number of regions whose expandability is fitted, or 0 */
+  bool size_only;      /* fit only the motion and one factor on the default law (deep) */
+  double gravity[3];   /* direction of gravity in the emptier state; 0,0,0 counts as supine */
+  double path_span[3]; /* gains of the emptier minus those of the fuller state */
+  double sill;         /* factor on the covariance of the correction; 0 to choose the most likely */
+  double noise;        /* factor on the noise of every row; 0 to choose the most likely */
+  size_t region_count; /* number of regions whose expandability is fitted, or 0 */
   const double *precision; /* [region_count, region_count] prior precision of the expandabilities */
 } supine_patient_fit_options;
 
@@ -73,21 +73,21 @@ typedef struct supine_patient_krige {
   supine_patient_power mean; /* prior mean of the constants */
   supine_patient_power uncorrected_law;
   supine_patient_power law;
-  double scaled_sill; /* sill, divided by the factor on the whole law if only that is fitted */
-  supine_patient_centre *centre; /* [count] kernel of each row, without its weight */
+  double scaled_sill;            /* sill, or sill / factor if only a factor on the law is fitted */
+  supine_patient_centre *centre; /* [count] kernel of each row; the kernel's weight is not set */
   double *factor;  /* [count, count] Cholesky factor of the rows' covariance, or NULL */
   double *design;  /* [count, terms + 1] derivatives and residual of each row, whitened */
   double *weight;  /* [count] weight of each row's kernel */
   double *scratch; /* [count] */
-  double *normal;  /* [2, terms, terms] normal matrix, after the fit its factor; then work space */
-  double squares;  /* whitened squared residual plus squared deviation from the prior mean */
+  double *normal;  /* [0] normal matrix, or after the fit its Cholesky factor; [1] work space */
+  double squares;  /* whitened squared residuals plus squared deviations from the prior */
   double right_side[SUPINE_PATIENT_TERMS + SUPINE_PATIENT_REGIONS_MAX];
 } supine_patient_krige;
 
-/* Fit a factor on the whole deep law; the product becomes the prior mean. Then fit the displacement
- * law and its correction. For SUPINE_PATIENT_DEEP and a sill of at least 1, the law changes only by
- * such a factor; with a smaller sill, each of the nine constants has a prior standard deviation of
- * about 30 %. For SUPINE_PATIENT_PAPER, the prior is wider. Rows of weight 0 do not count.
+/* Fit one factor on the default law (deep); the scaled law becomes the prior mean. Then fit the law
+ * and its correction. With SUPINE_PATIENT_DEEP and a sill of at least 1, the second fit changes the
+ * law only by another factor. With a smaller sill, it fits all nine constants, whose prior standard
+ * deviations are about 30 %. SUPINE_PATIENT_PAPER has a wider prior. Rows of weight 0 do not count.
  * @param rows   [count], must outlive the fit
  * @param krige  release with supine_patient_krige_free, also after a failure
  * @retval SUPINE_ERROR_NUMERICAL  the rows do not determine the displacement law
@@ -106,12 +106,12 @@ void supine_patient_krige_errors(const supine_patient_krige *krige,
                                  double error[SUPINE_PATIENT_CONSTANTS]);
 
 /* Predict the displacement along the row's axis, mm. Not thread-safe: overwrites krige->scratch.
- * @param variance  written: variance of the prediction without noise, mm^2 */
+ * @param variance  written: variance of the prediction, without measurement noise, mm^2 */
 double supine_patient_krige_predict(supine_patient_krige *krige, const supine_patient_row *row,
                                     double *variance);
 void supine_patient_krige_copy_law(const supine_patient_krige *krige, supine_patient *patient);
 
-/** Predictors of a displacement: three baselines, the law, and the law with its correction. */
+/** Predictors of a displacement: three baselines, a law, and the law with its correction. */
 typedef enum supine_patient_score {
   SUPINE_PATIENT_SCORE_NONE,
   SUPINE_PATIENT_SCORE_TRANSLATION,
@@ -124,14 +124,14 @@ typedef enum supine_patient_score {
 /** Result of a fit; errors are RMS, in mm. */
 typedef struct supine_patient_fit_report {
   double points;                          /**< number of landmarks, or of matched vertices */
-  double blocks;                          /**< number of blocks of 40 mm that contain points */
-  double fitted[SUPINE_PATIENT_SCORES];   /**< error at the fitted points */
-  double held_out[SUPINE_PATIENT_SCORES]; /**< error at held-out points */
-  /** Held-out error of a translation if a motion is fitted, otherwise of no displacement. */
+  double blocks;                          /**< number of cubes of 40 mm that contain points */
+  double fitted[SUPINE_PATIENT_SCORES];   /**< errors of the predictors at fitted points */
+  double held_out[SUPINE_PATIENT_SCORES]; /**< errors of the predictors at held-out points */
+  /** Held-out error of predicting a translation or, without a fitted motion, no displacement. */
   double baseline;
   double band;              /**< share of the held-out points within the 95 % band, % */
   double explained;         /**< 100 (1 - (held-out error of the corrected law / baseline)^2), % */
-  double expected_point;    /**< expected error of a point, in three dimensions */
+  double expected_point;    /**< expected error of a point in 3-D, mm */
   double expected_constant; /**< expected_point^2 / mean displacement, mm */
   double error[SUPINE_PATIENT_CONSTANTS]; /**< standard errors of c1 to c9 */
 } supine_patient_fit_report;

@@ -15,11 +15,11 @@
 
 enum { GRAIN = 64 };
 
-static const double compatible = 0.5; /* smallest cosine between the normals of a match */
+static const double compatible = 0.5; /* a match with a smaller cosine of the normals is dropped */
 static const double biweight = 4.685; /* cutoff of Tukey's biweight, in units of the robust scale */
-static const double surface_noise = 0.5; /* noise of a measured distance, mm */
+static const double surface_noise = 0.5; /* standard deviation of a measured distance, mm */
 static const double scale_least = 0.02;  /* lower bound on the robust scale of the distances, mm */
-static const double matched_least = 0.3; /* smallest accepted share of vertices with a match */
+static const double matched_least = 0.3; /* a smaller share of matched vertices is an error */
 
 static void match_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;

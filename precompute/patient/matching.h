@@ -11,7 +11,7 @@
 typedef struct supine_patient_match {
   size_t vertex;      /* index in the reference surface */
   double position[3]; /* position after the latest displacement, mm */
-  double distance;    /* signed distance from `position` to `nearest` along the normal, mm */
+  double distance;    /* from `position` to `nearest`, along the other surface's normal, mm */
   supine_inside_place nearest; /* nearest point of the other surface */
 } supine_patient_match;
 
@@ -21,17 +21,17 @@ typedef struct supine_patient_matching {
   supine_patient_frame frame;
   supine_inside_surface *tree;
   supine_equilibrium *equilibrium;
-  double *spread;                /* [N, COLUMNS] terms of the force, spread over the surface */
-  double *rest_normals;          /* [N, 3] unit vectors */
+  double *spread;                /* [N, 4] terms of the force after spreading, at N vertices */
+  double *rest_normals;          /* [rest->mesh.vertex_count, 3] unit vectors */
   double *state_normals;         /* [state->vertex_count, 3] unit vectors */
   size_t count;                  /* number of chosen vertices */
   supine_patient_match *match;   /* [count] chosen vertices and their matches */
-  supine_patient_row *rows;      /* [count + landmark_row_count] */
-  double *space;                 /* [count] */
-  double matched;                /* share of the vertices with a match that faces the same way */
-  double rms;                    /* weighted RMS distance of the matches, mm */
+  supine_patient_row *rows;      /* [count + landmark_row_count] rows to fit */
+  double *space;                 /* [count] work space */
+  double matched;                /* share of the vertices whose match faces the same way */
+  double rms;                    /* weighted RMS of match->distance, mm */
   const supine_patient *patient; /* displacement law that last displaced the vertices */
-  size_t landmark_row_count;     /* three for each landmark */
+  size_t landmark_row_count;     /* number of rows, three for each landmark */
 } supine_patient_matching;
 
 /* Spread the terms of the force over the surface `rest`, choose at most `limit` vertices of it, and
@@ -56,13 +56,13 @@ supine_status supine_patient_matching_solve(supine_patient_matching *matching,
                                             const supine_patient_stiffness *stiffness,
                                             supine_error *error);
 
-/* Displace the chosen vertices by a displacement law. Return the RMS change of position, mm. */
+/* Displace the chosen vertices by a displacement law. Return the RMS distance moved, mm. */
 double supine_patient_matching_place(supine_patient_matching *matching,
                                      const supine_patient *patient);
 
 /* Match each displaced vertex to the nearest point of the other surface. The vertex's row becomes
- * the displacement along the normal there, with weight 1, or 0 if the normals differ by over 60
- * degrees. */
+ * the displacement to that point along the normal there. The row's weight is 1, or 0 if the normals
+ * of the vertex and the point differ by more than 60 degrees. */
 void supine_patient_matching_find(supine_patient_matching *matching);
 
 /* Weight the rows by Tukey's biweight, which is 0 beyond 4.7 times a robust scale of the distances.
@@ -72,11 +72,11 @@ void supine_patient_matching_find(supine_patient_matching *matching);
 supine_status supine_patient_matching_weigh(supine_patient_matching *matching, double scale,
                                             supine_error *error);
 
-/** Compute the weight of each region at a vertex into shares [stiffness->count], with sum 1. */
+/** Write each region's weight at a vertex into shares [stiffness->count]; the weights sum to 1. */
 void supine_patient_stiffness_shares(const supine_patient_stiffness *stiffness,
                                      const supine_lungs *lungs, size_t vertex, double *shares);
 
-/** Compute the relative stiffness e [N] of every vertex. */
+/** Write the relative stiffness at every vertex into e [vertices]. */
 void supine_patient_stiffness_of(const supine_patient_stiffness *stiffness,
                                  const supine_lungs *lungs, double *e);
 
@@ -84,14 +84,14 @@ void supine_patient_stiffness_of(const supine_patient_stiffness *stiffness,
  * ([Santhanam2008] VI).
  *
  * The displacement depends only on the product a f of expandability and force, so f is set to the
- * force of the deep law. The spread force F (equilibrium.h) is then linear in the expandabilities
- * a_k of the regions: F = sum over k of a_k F_k, where F_k is the spread force if only region k has
- * force and its expandability is 1. The a_k are fitted together with the constants of the paper's
- * law and the motion between the scans (krige.h), under a prior that a is near 1 and similar in
- * neighbouring regions. After each fit, the surfaces are matched again.
+ * force of the default law (deep). The spread force F (equilibrium.h) is then linear in the
+ * expandabilities a_k of the regions: F = sum over k of a_k F_k, where F_k is the spread force if
+ * only region k has force and its expandability is 1. The a_k are fitted together with the
+ * constants of the paper's law and the motion between the scans (krige.h), under a prior that a is
+ * near 1 and similar in neighbouring regions. After each fit, the surfaces are matched again.
  *
  * The regions are kept only if they reduce the error on held-out blocks of 40 mm.
- * @param matching   without landmarks; on return its force is spread by the stiffness found
+ * @param matching   without landmarks; on return, its force is spread with the fitted stiffness
  * @param options    the paper's law, and gravity in the other state
  * @param patient    in: the frame; out: the fitted law
  * @param stiffness  written; without regions if they are not kept

@@ -12,12 +12,11 @@
 
 enum { GRAIN = 64 };
 
-/* Largest accepted distance between a face of a surface's box and the same face of the box of a
- * fitted state, relative to the width of the state's box. [0] applies to boxes of landmarks, [1] to
- * boxes of surfaces. */
+/* A surface is refused if a face of its bounding box is farther than this from the same face of a
+ * scanned state's box, relative to the width of the state's box: [0] if the state's box is that of
+ * landmarks, [1] if it is that of a surface. */
 static const double apart_most[2] = {0.45, 0.2};
-
-/* Lower bound on a force that a displacement is divided by; the mean force is 1. */
+/* When a displacement is divided by a force, smaller forces count as this. The mean force is 1. */
 static const double force_least = 0.2;
 
 /* If the patient's two scanned states are closer than this share of the path from full inflation to
@@ -27,7 +26,7 @@ static const double part_least = 0.02;
 /* Plausible range of the volume at rest divided by the volume at full inflation. */
 static const double share_least = 0.15, share_most = 0.95;
 
-/* Compute the volume at full inflation, mL, from that of one scanned state; 0 if unknown. */
+/* Compute the volume at full inflation, mL, from one scanned state; return 0 if it is unknown. */
 static double full_volume(const supine_patient_record *record, size_t state,
                           const supine_resting *resting) {
   const supine_state *shown = &record->state[state];
@@ -67,8 +66,8 @@ static void find_parts(const supine_patient_record *record, double part[2]) {
   }
 }
 
-/* Compute the gains along x, y and z at two points of the path from full inflation (0) to rest (1).
- * A gain is a multiple of the displacement at rest. */
+/* Compute the gains along x, y and z at two positions on the path from full inflation (0) to rest
+ * (1). A gain is the displacement from full inflation, divided by that displacement at rest. */
 static void find_gains(const double part[2], double gains[2][3]) {
   const supine_model deep = supine_physics_model(SUPINE_LAW_DEEP);
   supine_volume_bend(deep.bend, part[0], gains[0]);
@@ -85,12 +84,12 @@ typedef struct work {
   const supine_patient_record *record;
   supine_lungs lungs;   /* estimate of the lungs in the fuller state */
   const double *scan;   /* [N, 3] vertices of a scan in the emptier state, or NULL */
-  double *ratio;        /* [N] force after spreading over the surface / force before */
-  double *displacement; /* [N, 3] from the fuller to the emptier state, mm */
+  double *ratio;        /* [N] force after spreading / force before spreading */
+  double *displacement; /* [N, 3] displacement from the fuller to the emptier state, mm */
 } work;
 
 /* Compute the displacement of each vertex from the fuller to the emptier state. If the scan shows
- * the emptier state, also compute the position in the fuller state. */
+ * the emptier state, also compute the vertex's position in the fuller state. */
 static void move_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const work *w = context;
@@ -133,8 +132,8 @@ static supine_status find_ratio(const work *w, double *stiffness, supine_error *
   return status;
 }
 
-/* Compute the change of volume, mL, from the fuller state to full inflation (end 0) or to rest (end
- * 1), if the displacement between the two states is scaled to lead there. */
+/* Compute the change of volume, mL, from the fuller scanned state to full inflation (end 0) or to
+ * rest (end 1). The displacement between the scanned states is scaled to lead to this end. */
 static double volume_to_end(const supine_volume_form *form, const double part[2], size_t end) {
   double gains[2][3];
   double towards[3];
@@ -145,9 +144,9 @@ static double volume_to_end(const supine_volume_form *form, const double part[2]
   return supine_volume_form_at(form, towards);
 }
 
-/* Find the gains of the emptier state minus those of the fuller state, along x, y and z. With them,
- * the ends of the path must have the volumes of full inflation and of rest.
- * @param ones  [N] 1 for each vertex */
+/* Find path_span: along x, y and z, the gain of the emptier state minus that of the fuller state.
+ * The states are placed so that the path ends at the known volumes of full inflation and of rest.
+ * @param ones  [vertices] 1 for each vertex */
 static void find_path_span(const work *w, const supine_resting *resting, const double *ones,
                            double path_span[3]) {
   enum { ROUNDS = 30 };
@@ -172,7 +171,7 @@ static void find_path_span(const work *w, const supine_resting *resting, const d
     const size_t k = (size_t)round % 2;
     const supine_volume *stated = &record->state[k].volume;
     if (stated->ml == 0.0 && stated->kind == (k == 0 ? SUPINE_VOLUME_FULL : SUPINE_VOLUME_REST)) {
-      continue; /* the state is exactly at this end of the path */
+      continue; /* a state that is exactly at this end stays there */
     }
     const double off = volume_to_end(form, part, k) - (volume[k] - lung_volume);
     part[k] += step;
@@ -245,7 +244,7 @@ supine_status supine_patient_check_place(const supine_patient_record *record,
   const int only_side = lungs->lung_count == 1 ? lungs->side[0] : 0;
   const double *low[2] = {frame->minimum, record->emptier[0]};
   const double *high[2] = {frame->maximum, record->emptier[1]};
-  double off[2] = {0.0, 0.0}; /* [state] largest distance of faces / width of the box */
+  double off[2] = {0.0, 0.0}; /* [state] largest distance of faces, relative to the state's box */
   size_t axis[2] = {0};
   if (frame->only_side != 0 && frame->only_side != only_side) {
     return supine_error_set(
@@ -254,7 +253,8 @@ supine_status supine_patient_check_place(const supine_patient_record *record,
         "the law to both lungs",
         frame->only_side > 0 ? "left" : "right");
   }
-  for (size_t s = 0; s < 2; ++s) { /* if one of two fitted lungs is missing, x is not compared */
+  for (size_t s = 0; s < 2; ++s) {
+    /* If the surface lacks one of two fitted lungs, x is not compared. */
     for (size_t k = only_side != frame->only_side ? 1 : 0; k < 3; ++k) {
       const double apart =
           fmax(fabs(lungs->minimum[k] - low[s][k]), fabs(lungs->maximum[k] - high[s][k])) /

@@ -15,15 +15,15 @@
 enum {
   COLUMNS = 12,
   COORDINATES = 6,
-  PAIRS_LEAST = 12 /* smallest number of pairs: three times what an affine map needs */
+  PAIRS_LEAST = 12 /* fewer pairs are refused; an affine map needs 4 */
 };
 
-static const double flat_least = 1.0; /* smallest RMS distance of points from a plane, mm */
-static const double displacement_least = 0.05; /* smallest accepted RMS displacement, mm */
-static const double rotation_most = 25.0;      /* largest rotation between two scans, degrees */
-static const double box_overlap_least = 0.5;   /* smallest overlap / side of the larger box */
-/* Largest translation, and largest residual of an affine map, divided by the RMS distance of the
- * points from their mean. */
+static const double flat_least = 1.0; /* points closer to a plane (RMS, mm) count as flat */
+static const double displacement_least = 0.05; /* a smaller RMS displacement is refused, mm */
+static const double rotation_most = 25.0;      /* a larger rotation is refused, degrees */
+static const double box_overlap_least = 0.5;   /* boxes must overlap by at least this share */
+/* A larger translation, or a larger residual of an affine map, is refused. Both are divided by the
+ * RMS distance of the points from their mean. */
 static const double apart_most = 0.5, residual_most = 0.7;
 
 static const char *const columns[COLUMNS] = {"x",     "y",     "z",     "to_x",  "to_y",  "to_z",
@@ -33,7 +33,8 @@ static const char *const columns[COLUMNS] = {"x",     "y",     "z",     "to_x", 
 static supine_status find_columns(const supine_csv *csv, bool reverse, size_t column[COORDINATES],
                                   supine_error *error) {
   const size_t first = supine_csv_text(csv, 0) != NULL ? 0 : COORDINATES;
-  const bool swap = (first == COORDINATES) != reverse; /* the im1 columns are the second state */
+  /* The columns im1 are the second state, and im2 the first, unless `reverse` exchanges them. */
+  const bool swap = (first == COORDINATES) != reverse;
   for (size_t k = 0; k < COORDINATES; ++k) {
     column[k] = first + (swap ? (k + 3) % COORDINATES : k);
     if (supine_csv_text(csv, first + k) == NULL) {
@@ -107,8 +108,8 @@ void supine_patient_map_apply(const supine_patient_affinity *map, const double f
 bool supine_patient_map_fit(supine_patient_map kind, size_t count, const double *from,
                             const double *to, supine_patient_affinity *map) {
   double mean[2][3] = {{0.0}};
-  double cross[3][3] = {{0.0}};   /* [a][b] count times the covariance of from[a], to[b] */
-  double scatter[3][3] = {{0.0}}; /* [a][b] count times the covariance of from[a], from[b] */
+  double cross[3][3] = {{0.0}};   /* [a][b] count times the covariance of from[a] and to[b] */
+  double scatter[3][3] = {{0.0}}; /* [a][b] count times the covariance of from[a] and from[b] */
   double mapped[3];
   bool determined = true;
   *map = (supine_patient_affinity){.m = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0}};
@@ -129,7 +130,7 @@ bool supine_patient_map_fit(supine_patient_map kind, size_t count, const double 
   if (kind == SUPINE_PATIENT_MAP_RIGID) {
     supine_rigid_rotation((const double(*)[3])cross, map->m);
   } else if (kind == SUPINE_PATIENT_MAP_AFFINE) {
-    for (size_t k = 0; k < 9; ++k) { /* column-major: LAPACKE copies row-major matrices */
+    for (size_t k = 0; k < 9; ++k) { /* column-major, because LAPACKE copies row-major matrices */
       map->m[k] = cross[k % 3][k / 3];
     }
     determined = LAPACKE_dposv(LAPACK_COL_MAJOR, 'L', 3, 3, scatter[0], 3, map->m, 3) == 0;
@@ -157,12 +158,12 @@ double supine_patient_pairs_growth(const supine_patient_pairs *pairs) {
 typedef struct summary {
   double spread[2];    /* RMS distance of each state's points from their mean, mm */
   double size[2];      /* longest side of each state's box, mm */
-  double translation;  /* distance between the means of the two states, mm */
+  double translation;  /* distance between the mean points of the two states, mm */
   double rotation;     /* angle of the best-fitting rotation, degrees */
   bool flat;           /* whether the points of the first state lie in a plane */
   double growth;       /* determinant of the best-fitting affine map, negative for a reflection */
   double residual;     /* RMS residual of this affine map, mm */
-  double displacement; /* RMS displacement, or its standard deviation if the scans moved, mm */
+  double displacement; /* RMS displacement, mm; if the scans moved, without the mean */
 } summary;
 
 static summary measure(const supine_patient_pairs *pairs, bool scans_moved) {

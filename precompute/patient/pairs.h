@@ -12,8 +12,8 @@
 /** Positions of the same points in two states, mm, LPS. Initialise to zero. */
 typedef struct supine_patient_pairs {
   size_t count;
-  double *from; /**< [count, 3] in the first state */
-  double *to;   /**< [count, 3] in the second state */
+  double *from; /**< [count, 3] points in the first state */
+  double *to;   /**< [count, 3] points in the second state */
   double *side; /**< [count] +1 left lung, -1 right lung; NULL if the midline decides */
 } supine_patient_pairs;
 
@@ -37,8 +37,8 @@ double supine_patient_pairs_growth(const supine_patient_pairs *pairs);
 
 /** Check that the pairs can be two states of one chest.
  * @param scans_moved  the body may have moved between the scans
- * @retval SUPINE_ERROR_FORMAT  fewer than 12 pairs, points in one plane, units other than mm, sides
- *   or axes that differ, frames that do not overlap (unless scans_moved), or no displacement */
+ * @retval SUPINE_ERROR_FORMAT  fewer than 12 pairs, points in one plane, units other than mm,
+ *   exchanged sides or axes, frames that do not overlap (unless scans_moved), or no displacement */
 supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool scans_moved,
                                          supine_error *error);
 

@@ -75,7 +75,7 @@ supine_patient_power supine_patient_deep(const double gravity[3], const double p
   for (size_t k = 0; k < 3; ++k) {
     law.c[2 * k] = model.direction.c[2 * k] * (supine_length(path_span) > 0.0 ? path_span[k] : 1.0);
     law.c[2 * k + 1] = model.direction.c[2 * k + 1];
-    /* Y and Z decrease along +y and +z (lungs.h), hence the minus sign. */
+    /* The minus sign is there because the box coordinates Y and Z decrease along +y and +z. */
     law.c[6 + k] = model.force.box[k] - (k > 0 ? model.force.gain * g[k] : 0.0);
   }
   return law;
@@ -102,8 +102,8 @@ void supine_patient_motion(const supine_patient_power *power, const supine_patie
   }
 }
 
-/* Compute exp(-a) of kriging.h as the 64th power of exp(-a / 64), which a polynomial of degree 8
- * approximates; the error is below 1e-13 of the covariance at a = 0. */
+/* The covariance contains exp(-a) (kriging.h). Compute it as the 64th power of exp(-a / 64), which
+ * a polynomial of degree 8 approximates. The error is below 1e-13 of the covariance at a = 0. */
 SUPINE_CLONES void supine_patient_covariances(const supine_patient_centre *here, size_t count,
                                               const supine_patient_centre *centre,
                                               double *covariance) {
@@ -174,7 +174,7 @@ supine_force_law supine_patient_force(const supine_patient_power *power, double 
                                       const double gravity[3]) {
   supine_force_law law = {.gain = gain, .pair = true};
   const double *slope = power->c + 6;
-  /* Gravity along x gives no slope: heights grow with X in one lung and fall in the other. */
+  /* Gravity along x adds no slope, as heights grow with X in one lung and fall in the other. */
   law.box[0] = slope[0];
   law.box[1] = slope[1] + gain * gravity[1];
   law.box[2] = slope[2] + gain * gravity[2];

@@ -20,15 +20,14 @@
 #include "precompute/physics/force.h"
 
 typedef enum supine_patient_law {
-  SUPINE_PATIENT_DEEP = 0, /**< the deep law of model.h, or a law close to it (krige.h) */
+  SUPINE_PATIENT_DEEP = 0, /**< the default law (deep, model.h) or one close to it */
   SUPINE_PATIENT_PAPER,    /**< all nine constants are fitted */
   SUPINE_PATIENT_LAW_COUNT
 } supine_patient_law;
 
-/** Names of the displacement laws, "deep" and "paper". */
 extern const char *const supine_patient_law_names[SUPINE_PATIENT_LAW_COUNT + 1];
 
-/** Motion of the body between the scans. Each value is the number of fitted unknowns. */
+/** Motion of the body that is fitted between two scans; the value is the number of unknowns. */
 typedef enum supine_patient_scan_motion {
   SUPINE_PATIENT_STILL = 0,
   SUPINE_PATIENT_TRANSLATION = 3,
@@ -38,7 +37,7 @@ typedef enum supine_patient_scan_motion {
 /** Bounding box of the lungs in the fuller of a patient's two scanned states, mm. */
 typedef struct supine_patient_frame {
   double minimum[3], maximum[3];
-  double midline; /**< x of the plane between the lungs */
+  double midline; /**< x of the plane between the lungs, mm */
   int only_side;  /**< +1 if only the left lung is given, -1 if only the right, 0 for both lungs */
 } supine_patient_frame;
 
@@ -59,7 +58,7 @@ typedef struct supine_patient_centre {
   double offset[3]; /**< position from the box's centre, mm */
   double side;      /**< +1 left lung, -1 right lung */
   double size;      /**< length of the displacement without the correction, mm */
-  double weight[3]; /**< factor of the covariance with this kernel, for each axis, 1/mm */
+  double weight[3]; /**< x, y, z: factors on the covariance with this kernel, 1/mm */
 } supine_patient_centre;
 
 typedef struct supine_patient {
@@ -78,8 +77,8 @@ typedef struct supine_patient_place {
   double force[SUPINE_PATIENT_COLUMNS]; /**< terms of the force at this point */
 } supine_patient_place;
 
-/** Convert a point to a place. The terms of the force are not spread over the surface. Outside the
- * box, they are those of the nearest point of the box.
+/** Convert a point to a place, whose `force` is not spread over the surface. Outside the box,
+ * `force` is that of the nearest point of the box.
  * @param point  mm
  * @param side   +1 left lung, -1 right lung, 0 to let the midline decide */
 supine_patient_place supine_patient_find(const supine_patient_frame *frame, const double point[3],
@@ -98,7 +97,7 @@ int supine_patient_side_of(const supine_lungs *lungs, size_t vertex);
 
 supine_patient_place supine_patient_find_vertex(const supine_lungs *lungs, size_t vertex);
 
-/** Express the deep law (model.h) by nine constants.
+/** Express the default law (deep, model.h) by nine constants.
  * @param gravity    unit vector, or 0,0,0 for supine
  * @param path_span  gains of the emptier state minus those of the fuller state, along x, y and z
  *   (supine_patient_path); 0,0,0 counts as 1,1,1 */

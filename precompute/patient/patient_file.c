@@ -82,7 +82,7 @@ static json_t *array_of(const double *values, size_t count) {
   return array;
 }
 
-/* Return the root if `key` is NULL, otherwise its member `key`, added if it is missing. */
+/* Return the root if `key` is NULL. Otherwise, return its member `key`; add it if missing. */
 static json_t *group_of(json_t *root, const char *key) {
   if (key != NULL && json_object_get(root, key) == NULL) {
     (void)json_object_set_new(root, key, json_object());
@@ -225,7 +225,7 @@ static bool read_frame(const json_t *root, supine_patient_record *record) {
           (frame->midline > frame->minimum[0] && frame->midline < frame->maximum[0]));
 }
 
-/* Read an array of at most `limit` arrays of `width` numbers. */
+/* Read an array that contains at most `limit` arrays, each with `width` numbers. */
 static bool read_list(const json_t *from, size_t width, size_t limit, void *values, size_t *count) {
   bool valid = json_is_array(from) && json_array_size(from) <= limit;
   *count = 0;

@@ -12,7 +12,7 @@ enum { SUPINE_PATIENT_TEXT = 48, SUPINE_PATIENT_OTHERS_MAX = 8, SUPINE_PATIENT_S
 /** The fit to a further state of the same lungs. */
 typedef struct supine_patient_further {
   supine_state state;
-  bool fits_gain; /**< whether the gain is fitted: only in a posture other than the fitted one */
+  bool fits_gain; /**< whether the gain is fitted: only if the posture is not the fitted one */
   /** Factors of the left and the right lung on the displacement from full inflation to rest. */
   double scale[2];
   double residual;              /**< RMS residual, mm; along the normals for a surface */
@@ -21,7 +21,7 @@ typedef struct supine_patient_further {
 } supine_patient_further;
 
 /** A region of a lung. The expandability a = 1/E at a point p ([Santhanam2008] VI) is a weighted
- * mean of the expandabilities a_k of all regions k of the lung:
+ * mean of the expandabilities a_k of all regions k in the same lung:
  *
  *     a(p) = sum over k of w(|p - centre_k| / radius_k) a_k
  *            / sum over k of w(|p - centre_k| / radius_k)
@@ -40,8 +40,7 @@ typedef struct supine_patient_stiffness {
   supine_patient_region region[SUPINE_PATIENT_REGIONS_MAX];
 } supine_patient_stiffness;
 
-/** Smallest `seen` at which a region counts as determined. */
-#define SUPINE_PATIENT_SEEN 0.5
+#define SUPINE_PATIENT_SEEN 0.5 /**< smallest `seen` of a region that counts as determined */
 
 /** Errors with uniform tissue [0] and with the fitted regions of expandability [1]. */
 typedef struct supine_patient_expand_report {
@@ -63,13 +62,13 @@ typedef struct supine_patient_applied {
   double blocks;      /**< number of blocks, or 0 if the force was not computed */
   double correlation; /**< correlation of force and height along gravity */
   double slopes[3];   /**< slopes c7 to c9 of the force along X, Y and Z */
-  double residual;    /**< RMS residual of the fit of the slopes / force at the box's centre */
-  double spread; /**< standard deviation of the force over blocks / force at the box's centre */
+  double residual;    /**< RMS residual of the fitted slopes / force at the box's centre */
+  double spread;      /**< standard deviation of the blocks' forces / force at the box's centre */
 } supine_patient_applied;
 
 typedef struct supine_patient_surface_report {
   double vertices;      /**< number of matched vertices, or 0 without surfaces */
-  double matched;       /**< share of the vertices with a match that faces the same way */
+  double matched;       /**< share of the vertices whose match faces the same way */
   double before, after; /**< RMS distance of the surfaces before and after the fit, mm */
 } supine_patient_surface_report;
 
@@ -89,7 +88,7 @@ typedef struct supine_patient_record {
   double gain_error;    /**< standard error of the gain, or 0 if it was not fitted */
   size_t further_count; /**< number of further states; 0 after supine_patient_read */
   supine_patient_further further[SUPINE_PATIENT_OTHERS_MAX];
-  bool gain_undetermined; /**< whether the fitted gain is ignored: it is not between 0.01 and 2 */
+  bool gain_undetermined; /**< whether the fitted gain is outside 0.01 to 2 and therefore ignored */
 } supine_patient_record;
 
 /** Write the record to a file. A failure leaves no incomplete file.
@@ -133,14 +132,14 @@ supine_status supine_patient_check_place(const supine_patient_record *record,
                                          const supine_lungs *lungs, size_t *state,
                                          supine_error *error);
 
-/** Compute the gains of the two scanned states along x, y and z on the path of the deep law from
- * full inflation to rest (supine_volume_bend). A state that is neither full inflation nor rest is
- * placed on the path by the cube root of its volume. If this volume is unknown, the fuller state
- * counts as full inflation, and the emptier one as rest. */
+/** Compute the gains of the two scanned states along x, y and z on the path of the default law
+ * (deep) from full inflation to rest (supine_volume_bend). A state that is neither full inflation
+ * nor rest is placed on the path by the cube root of its volume. If this volume is unknown, the
+ * fuller state counts as full inflation, and the emptier one as rest. */
 void supine_patient_path(const supine_patient_record *record, double gains[2][3]);
 
-/** Scale the volumes at rest to the patient's, if one scanned state is given relative to rest and
- * the other relative to full inflation. */
+/** Scale the volumes at rest to those of the patient. Leave them unchanged unless one scanned
+ * state is given relative to rest and the other relative to full inflation. */
 void supine_patient_resting(const supine_patient_record *record, supine_resting *resting);
 
 /** Describe a scan that shows one of the patient's two states.
@@ -161,7 +160,7 @@ supine_scan supine_patient_scan(const supine_patient_record *record, size_t stat
  * along the surface is not observed.
  * @param rest           the reference surface, in the fuller state
  * @param state          the same lungs in the emptier state, mm, in the same frame
- * @param landmarks      pairs to fit as well; ignored with `expandability`
+ * @param landmarks      pairs to fit as well; ignored if `expandability` is true
  * @param expandability  also fit the expandability (supine_patient_expand), with the paper's law
  *   and no correction
  * @retval SUPINE_ERROR_MESH  no overlap (frames, units or sides differ), equal surfaces, or too few
@@ -180,8 +179,8 @@ supine_status supine_patient_fit_surface(const supine_lungs *rest, const supine_
  * u is the fitted displacement, scaled to lead from full inflation to rest (supine_patient_path).
  * s_j is a scale for each lung. h_j and h are the heights along gravity in the posture of state j
  * and in the fitted posture; f is the fitted force. On a surface, heights and force are spread
- * (equilibrium.h). Scales, gain and t_j are fitted by least squares, in rounds that match a surface
- * again.
+ * (equilibrium.h). Scales, gain and t_j are fitted by least squares. A surface is matched again
+ * before each fit.
  * @param rest     the surface of the fuller state; NULL if `surface` is NULL
  * @param pairs    points in the fuller state and in state j; NULL if `surface` is given
  * @param scans_moved  also fit a translation t_j between the scans

@@ -63,7 +63,7 @@ size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patie
 double supine_patient_power_design(const supine_patient_power *law, const supine_patient_row *row,
                                    double x[SUPINE_PATIENT_TERMS]) {
   const double force = supine_patient_force_at(law, &row->place);
-  double along[3]; /* derivatives of unit_force with respect to c1, c3 and c5 */
+  double along[3]; /* displacement along the row's axis per mm of c1, c3 and c5, at force 1 */
   double motion[3];
   double turned[3];
   double unit_force = 0.0; /* displacement along the row's axis if the force is 1, mm */

@@ -7,19 +7,17 @@
 #include "precompute/patient/matching.h"
 
 enum {
-  VERTICES_MAX = 600,  /* number of matched vertices */
-  EXPANDED_MAX = 2000, /* number of matched vertices if the expandability is fitted */
+  VERTICES_MAX = 600,  /* largest number of matched vertices */
+  EXPANDED_MAX = 2000, /* largest number of matched vertices if expandability is fitted */
   ROUNDS_MAX = 60
 };
 
-static const double converged = 2e-3;     /* RMS movement below which the fit ends, mm */
-static const double size_converged = 0.5; /* RMS movement below which the first rounds end, mm */
+static const double converged = 2e-3;     /* RMS movement of the vertices, mm, that ends the fit */
+static const double size_converged = 0.5; /* RMS movement, mm, that ends the fit of one factor */
+static const double scale_least = 1.0;    /* lower bound on the robust scale of the distances, mm */
+static const double same_state = 0.02;    /* surfaces closer than this (RMS, mm) count as equal */
 
-/* Lower bound on the robust scale of the distances, mm. Kriging fits smaller distances. */
-static const double scale_least = 1.0;
-static const double same_state = 0.02; /* RMS distance below which surfaces count as equal, mm */
-
-/* Set each row to the displacement that maps the reference surface's box onto the other box. */
+/* Set each row to the displacement, along one axis, from one surface's box to the other's. */
 static void start_rows(supine_patient_matching *m) {
   const double *low = m->rest->minimum;
   double to[2][3];
@@ -36,7 +34,7 @@ static void start_rows(supine_patient_matching *m) {
   }
 }
 
-/* If `shaped`, fit the law and its correction; if not, only a factor on the whole deep law. */
+/* Fit the law and its correction or, if `shaped` is false, one factor on the default law (deep). */
 static supine_status refit(const supine_patient_matching *m, bool shaped,
                            supine_patient_fit_options *options, supine_patient *patient,
                            supine_error *error) {
@@ -56,8 +54,8 @@ static supine_status refit(const supine_patient_matching *m, bool shaped,
   return status;
 }
 
-/* Fit the law and match the surfaces in turn. The first rounds fit only a factor on the whole deep
- * law. Displacement along the surface, which matches do not show, then starts from that law. */
+/* Fit the law and match the surfaces in turn. Until the vertices move little, fit only a factor on
+ * the default law (deep), because matches do not show displacement along the surface. */
 static supine_status iterate(supine_patient_matching *m, const supine_patient_fit_options *wanted,
                              supine_patient *patient, supine_patient_surface_report *report,
                              supine_error *error) {
@@ -120,7 +118,7 @@ static supine_status run(supine_patient_matching *m, const supine_patient_fit_op
   if (status == SUPINE_OK && expandability) {
     status = supine_patient_expand(m, wanted, &record->patient, &record->stiffness, &record->expand,
                                    error);
-    if (status == SUPINE_OK) { /* the fitted stiffness changes how the force spreads */
+    if (status == SUPINE_OK) { /* fit again, because the stiffness changes the forces */
       status = iterate(m, wanted, &record->patient, &record->surface, error);
     }
   }
@@ -135,7 +133,7 @@ supine_status supine_patient_fit_surface(const supine_lungs *rest, const supine_
   const size_t landmark_count = expandability ? 0 : landmarks->count;
   supine_patient_matching m = {0};
   supine_patient_fit_options wanted = *options;
-  if (expandability) { /* regions of expandability replace the correction */
+  if (expandability) { /* fit expandabilities instead of a correction */
     wanted.law = SUPINE_PATIENT_PAPER;
     wanted.uncorrected = true;
   }
@@ -149,7 +147,7 @@ supine_status supine_patient_fit_surface(const supine_lungs *rest, const supine_
   if (status == SUPINE_OK && landmark_count > 0) {
     supine_patient_rows_of_pairs(&m.frame, landmarks, m.rows + m.count);
     m.landmark_row_count = 3 * landmark_count;
-    /* All landmarks together have the same weight as all matched vertices. */
+    /* Give all landmarks together the same weight as all matched vertices. */
     for (size_t i = 0; i < m.landmark_row_count; ++i) {
       m.rows[m.count + i].weight = (double)m.count / (double)m.landmark_row_count;
     }

@@ -35,7 +35,7 @@ supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,
 /* Return the volume of all lungs together in a pose, mL. */
 double supine_options_basis_volume(const supine_basis *basis, const supine_pose *pose);
 
-/* Return the positions [N, 3] of a pose, or NULL if out of memory. The caller frees them. */
+/* Return all vertices [N, 3] in a pose, mm, or NULL if out of memory. The caller frees them. */
 double *supine_options_basis_positions(const supine_basis *basis, const supine_pose *pose);
 
 /* Copy the reference surface into a mesh; release the mesh with supine_mesh_free.
@@ -51,7 +51,7 @@ supine_status supine_options_basis_mesh(const supine_basis *basis, supine_mesh *
 
 /* Expected errors. Initialise with zeros, and release with supine_options_expected_free. */
 typedef struct supine_expected {
-  float *sigma;        /* [N] expected error of each displacement, mm; NULL if unknown */
+  float *sigma;        /* expected error of each vertex's displacement, mm; NULL if unknown */
   double rms, largest; /* RMS and maximum of `sigma` over the vertices, mm */
   bool turned;         /* whether the two states differ in posture */
 } supine_expected;

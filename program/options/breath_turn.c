@@ -17,7 +17,7 @@ static void find_quarter(const breath_turn *turn, double quarter[3]) {
   double axis[3];
   supine_cross(from, turn->to, axis);
   const double sine = supine_length(axis);
-  if (sine < 1e-9) { /* opposite directions do not determine the axis */
+  if (sine < 1e-9) { /* opposite directions do not determine the axis of the turn */
     const double *over = fabs(from[2]) > 0.5 ? back : left;
     supine_cross(from, over, axis);
     if (supine_dot(axis, axis) < 1e-9) { /* `from` is parallel to `left` */

@@ -123,9 +123,9 @@ const char *supine_options_suggest(const char *text, const char *const *candidat
 static volatile sig_atomic_t command_polls, interrupted;
 static volatile time_t interrupted_at; /* s since 1970 */
 
-/* Handle a signal. A command that polls supine_options_interrupted is told to stop; any other
- * command ends at once. A later signal always ends the program, except within about a second,
- * because timeout(1) sends each signal twice. */
+/* Handle a signal. A command that polls supine_options_interrupted is told to stop, and only a
+ * later signal ends it. Signals within about a second of the first are ignored, because timeout(1)
+ * sends each signal twice. Any other command ends at once. */
 static void on_signal(int number) {
   const time_t now = time(NULL);
   if (command_polls != 0 && interrupted == 0) {
@@ -137,7 +137,7 @@ static void on_signal(int number) {
   }
   supine_output_abandon_all();
   (void)signal(number, SIG_DFL);
-  (void)raise(number); /* the signal is delivered when this handler returns */
+  (void)raise(number); /* ends the program when this handler returns */
 }
 
 void supine_options_signals_catch(bool orderly_end) {

@@ -33,7 +33,7 @@ extern const supine_command *const supine_command_list[];
 /* Print "supine COMMAND: MESSAGE" to stderr. */
 void supine_options_say(const char *command, const char *format, ...) SUPINE_PRINTF(2, 3);
 
-/* Print the message of an error, or its status if the message is empty; return the exit code. */
+/* Print the message of `error` or, if that is empty, the name of `status`; return the exit code. */
 int supine_options_fail(const char *command, supine_status status, const supine_error *error);
 
 /* Flush standard output; return SUPINE_EXIT_OUTPUT if the disk is full or the pipe is closed. */
@@ -67,8 +67,8 @@ const char *supine_options_suggest(const char *text, const char *const *candidat
 /* Progress and remaining time, shown in one line of stderr if stderr is a terminal. */
 typedef struct supine_progress {
   const char *label;
-  double start;    /* time at which the work began, s by supine_clock_seconds */
-  double shown_at; /* time at which the line was last written, s */
+  double start;    /* start of the work, s (supine_clock_seconds) */
+  double shown_at; /* time at which the line was last written, s (supine_clock_seconds) */
   bool stderr_is_terminal;
 } supine_progress;
 

@@ -24,7 +24,7 @@ typedef struct reading {
   char *request;
   size_t count;
   row rows[ROWS_MAX];
-  char standard_output[16]; /* output name "-" followed by an ending, such as "-.ply" */
+  char standard_output[16]; /* the output name "-" with an ending, such as "-.ply" */
   int help;                 /* 'h' or HELP_ALL to print help; 0 to run the command */
 } reading;
 

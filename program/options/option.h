@@ -133,7 +133,7 @@ supine_status supine_options_check_output(const char *output, const char *input,
                                           supine_error *error);
 
 /* Call `each` for every option and heading of a table and of the tables within it, in order. `base`
- * is the offset in the request of the struct that the option fills. */
+ * is the offset, within the request, of the struct that the option fills. */
 typedef void supine_option_visit(void *context, const supine_option *option, size_t base);
 void supine_options_visit(const supine_option *options, size_t base, supine_option_visit *each,
                           void *context);

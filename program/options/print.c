@@ -218,7 +218,7 @@ static void print_table(const json_t *rows) {
 
 static void print_object(const char *parent, json_t *object, int indent);
 
-/* Print a member: rows as a table, other objects one by one, any other value in one line. */
+/* Print a list of flat objects as a table, other objects one by one, other values in one line. */
 static void print_member(const char *parent, const char *name, json_t *value, int indent) {
   char text[TEXT_MAX];
   char heading[TEXT_MAX];
@@ -249,7 +249,7 @@ static void print_member(const char *parent, const char *name, json_t *value, in
 }
 
 /* Print the members of the object with the key `parent`. If each member is an object that fits in a
- * row, print them as one table, with a label for each row. */
+ * row, print all members as one table, with a label for each row. */
 static void print_object(const char *parent, json_t *object, int indent) {
   const char *name;
   json_t *member;

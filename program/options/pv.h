@@ -18,11 +18,11 @@ typedef struct supine_pv_sample {
   size_t line;     /**< line of the file, for messages */
 } supine_pv_sample;
 
-/** Quality of the fit of one limb. */
+/** Quality of the fit to one limb (inhale or exhale). */
 typedef struct supine_pv_report {
   size_t samples; /**< number of samples; 0 if the curve was copied from the other limb */
-  double control_interval[SUPINE_PV_CONTROLS]; /**< half-width of each confidence interval */
-  double volume_interval[2];                   /**< half-width of the interval of each volume, mL */
+  double control_interval[SUPINE_PV_CONTROLS]; /**< half-widths of confidence intervals */
+  double volume_interval[2];                   /**< half-widths for V_low and V_high, mL */
   double rms;                                  /**< root mean square residual, mL */
   double rms_percent; /**< rms as a percentage of the samples' range of volumes */
 } supine_pv_report;

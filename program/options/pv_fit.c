@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fit a limb to samples by least squares, with the confidence intervals of its parameters. */
+/* Fit a pressure-volume curve to samples by least squares, with confidence intervals. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
@@ -44,7 +44,7 @@ static supine_status refuse_fall(const problem *limb, const supine_pv_sample *sa
   return refuse(limb, sample, why, error);
 }
 
-/* Check that pressures keep rising or keep falling, and copy the samples by rising pressure. */
+/* Check that pressures keep rising or keep falling, and sort the samples by rising pressure. */
 static supine_status sort(problem *limb, const supine_pv_sample *samples, supine_error *error) {
   const size_t count = limb->count;
   supine_pv_sample *sorted = limb->sample;
@@ -69,7 +69,7 @@ static supine_status sort(problem *limb, const supine_pv_sample *samples, supine
              : refuse_fall(limb, &sorted[count - 1], sorted[0].volume, error);
 }
 
-/* Refuse a volume that is less than one at a lower pressure by more than noise explains. */
+/* Refuse samples if a volume is less than one at a lower pressure by more than noise explains. */
 static supine_status check_falls(const problem *limb, double span, supine_error *error) {
   static const double allowed = 0.1; /* largest fall, as a fraction of the range of volumes */
   double peak = limb->sample[0].volume;
@@ -83,7 +83,7 @@ static supine_status check_falls(const problem *limb, double span, supine_error 
   return SUPINE_OK;
 }
 
-/* Compute the curve, from 0 to 1, at the samples. Return false if a parameter is out of bounds. */
+/* Compute q, the curve scaled to rise from 0 to 1. Return false for parameters out of bounds. */
 static bool find_shape(const problem *limb, const double *control, double *q) {
   supine_pv_curve curve = {{-1.0, 1.0}, {0.0, 1.0}, {0.0}};
   memcpy(curve.control, control, sizeof curve.control);
@@ -144,7 +144,7 @@ static void describe(const problem *limb, double span, double confidence,
   const double misfit = cblas_dnrm2((int)count, residual->data, (int)residual->stride);
   const double share = misfit / sqrt((double)count);
   *report = (supine_pv_report){.samples = count, .rms = span * share, .rms_percent = 100.0 * share};
-  /* The covariance of the unknowns is sigma^2 (J^T J)^-1, where sigma^2 = misfit^2 / freedom. */
+  /* The covariance of the unknowns is (J^T J)^-1 misfit^2 / freedom, where J is the Jacobian. */
   (void)gsl_multifit_nlinear_covar(jacobian, 0.0, limb->covariance);
   const double t = gsl_cdf_tdist_Pinv(0.5 + 0.5 * confidence, freedom);
   for (size_t i = 0; i < SUPINE_PV_UNKNOWNS; ++i) {
@@ -154,7 +154,7 @@ static void describe(const problem *limb, double span, double confidence,
   }
 }
 
-/* Minimise by Levenberg-Marquardt, starting from the line from the first to the last sample. */
+/* Minimise the residuals, starting from the straight line from the first to the last sample. */
 static supine_status minimise(problem *limb) {
   enum { STEPS_MAX = 300 };
   static const double tolerance = 1e-13;

@@ -7,11 +7,10 @@
 #include "program/options/basis_input.h"
 #include "program/options/state_options.h"
 
-/* Limits of plausible volumes, as fractions of full inflation. Tissue alone fills about 0.1. */
+/* Limits of plausible volumes, as fractions of full inflation; tissue alone fills about 0.1. */
 static const double least_of_full = 0.1;
 static const double most_of_full = 1.2;
-/* Largest plausible fraction of triangles that turn over. */
-static const double folded_limit = 0.01;
+static const double folded_limit = 0.01; /* largest plausible share of triangles turned over */
 
 supine_status supine_options_posture(const char *text, double gravity[3], supine_error *error) {
   supine_state state;
@@ -26,7 +25,7 @@ static supine_status read_posture(const char *text, void *field, supine_error *e
   return supine_options_posture(text, field, error);
 }
 
-/* Read X,Y,Z as the posture X:Y:Z. */
+/* Read the direction X,Y,Z of gravity, by parsing it as the posture X:Y:Z. */
 static supine_status read_gravity(const char *text, void *field, supine_error *error) {
   char posture[128];
   double numbers[3];
@@ -107,7 +106,7 @@ supine_status supine_options_read_volume(const char *text, void *field, supine_e
 
 static supine_status read_from(const char *text, void *field, supine_error *error) {
   supine_state *state = field;
-  *state = (supine_state){.gravity = {0.0}}; /* supine_options_reference sets the posture later */
+  *state = (supine_state){.gravity = {0.0}}; /* stays zero if the text names no posture */
   return supine_state_parse(text, state, error);
 }
 
@@ -149,7 +148,8 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
     const double *g = from->state.gravity;
     const bool posed = g[0] != 0.0 || g[1] != 0.0 || g[2] != 0.0;
     state = from->state;
-    if (!posed) { /* the volume `scan` implies the posture of the scan; other volumes, supine */
+    /* Without a posture, take that of the scan for the volume `scan`, and supine for any other. */
+    if (!posed) {
       const bool own = state.lung_count == 0 && state.volume.kind == SUPINE_VOLUME_SCAN;
       const supine_state in = supine_basis_scan(basis);
       const double supine[3] = {0.0, 1.0, 0.0};

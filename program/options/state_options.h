@@ -70,7 +70,7 @@ typedef struct supine_volume_options {
   "(the volume in the scan), each alone or with +ML or -ML, such as rest+500; or the absolute "    \
   "volume of gas and tissue in all lungs, as measured in a CT, such as 2600mL"
 
-/* Tables of --from, which fill a supine_from: the default is supine at rest, or the scan. */
+/* Two tables of --from, which fill a supine_from; their defaults are supine:rest and scan. */
 extern const supine_option supine_options_from[], supine_options_from_scan[];
 
 typedef struct supine_from {
@@ -85,16 +85,16 @@ typedef struct supine_reference_pose {
   char name[96]; /* such as "the scan" or "supine at rest" */
 } supine_reference_pose;
 
-/* Choose the state that displacements are measured from. If --from is given, use its state. If not,
- * use supine at rest if the command compares postures and rest is known; otherwise, use the scan.
- * Statuses as supine_basis_pose. */
+/* Choose the state that displacements are measured from: the state of --from if it is given; supine
+ * at rest if the command compares postures and rest is known; the scan in all other cases. Statuses
+ * as supine_basis_pose. */
 supine_status supine_options_reference(const supine_basis *basis, const supine_from *from,
                                        bool compares, supine_reference_pose *reference,
                                        supine_error *error);
 
 /* Check that a pose is plausible: its surface must not fold, and if rest is known, its volume must
  * be 10 % to 120 % of full inflation. An implausible pose is an error (SUPINE_ERROR_NUMERICAL) if
- * rest is known and `allow_folds` is false; if not, only a warning is printed. */
+ * rest is known and `allow_folds` is false. In all other cases, only a warning is printed. */
 supine_status supine_options_pose_check(const supine_basis *basis, const char *command,
                                         bool allow_folds, const supine_pose *pose,
                                         supine_error *error);
