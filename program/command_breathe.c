@@ -33,7 +33,7 @@ typedef struct request {
   double duration; /* s; 0 if not given */
 } request;
 
-/* Names of the courses of pressure or volume in a breath, indexed by supine_pv_course. */
+/* Names of the shapes that a breath can have over time, indexed by supine_pv_course. */
 static const char *const courses[] = {"cosine", "ramp", "flow", NULL};
 
 static const supine_option table[] = {
@@ -121,12 +121,12 @@ typedef struct playing {
   supine_basis *basis;
   size_t frame_count, lung_count;
   double *time;     /* [frames] s */
-  double *above;    /* [frames] mL above the volume at rest or, if that is unknown, in the scan */
+  double *above;    /* [frames] mL above the volume at rest (in the scan if rest is unknown) */
   double *gravity;  /* [frames, 3] unit vectors */
   double *volumes;  /* [frames, lungs] volume of gas and tissue, mL */
   supine_mesh mesh; /* triangles; for VTP output, also the positions of the current frame */
   float *normals;   /* [N, 3] normals of the current frame, for VTP output */
-  float *positions; /* [N, 3] mm: the current frame; for safetensors output, all frames follow it */
+  float *positions; /* mm: current frame [N, 3]; then, unless for VTP, all frames [frames, N, 3] */
   double *compute_time; /* [frames] s */
   double *origin;       /* [N, 3] positions from which displacements are measured, mm */
   char vtp_comment[512];
@@ -142,7 +142,7 @@ static void end(playing *p) {
   supine_basis_close(p->basis);
 }
 
-/* Allocate memory for `count` frames. A VTP `series` keeps only the current frame in memory. */
+/* Allocate memory for `count` frames; for a VTP `series`, keep positions of one frame only. */
 static supine_status begin_frames(playing *p, size_t count, bool series, supine_error *error) {
   const size_t frame = 3 * supine_basis_get_info(p->basis)->vertex_count;
   p->frame_count = count;
@@ -195,7 +195,6 @@ static supine_status find_volumes(playing *p, const supine_pv *pv, supine_error 
   return status;
 }
 
-/* Return the total volume of the lungs in frame t, mL. */
 static double volume_at(const playing *p, size_t t) {
   double sum = 0.0;
   for (size_t lung = 0; lung < p->lung_count; ++lung) {
@@ -225,7 +224,7 @@ static void report(const playing *p) {
                1e3 * gsl_stats_max(p->compute_time, 1, p->frame_count), 1e3 * budget);
 }
 
-/* Compute all frames. find_volumes must have computed their poses without an error.
+/* Compute all frames. Call find_volumes first; it checks that each frame has a pose.
  * @param series  receives each frame; NULL to store all frames in p->positions */
 static supine_status play_frames(playing *p, supine_mesh_series *series, supine_error *error) {
   const size_t frame = 3 * p->mesh.vertex_count;
@@ -258,8 +257,7 @@ static supine_status play_frames(playing *p, supine_mesh_series *series, supine_
 /* Compute the frames, and write them as VTP.
  * @param save  axes, unit and comment of the output; the other options are set here */
 static supine_status write_series(playing *p, supine_mesh_save_options save, supine_error *error) {
-  /* Positions are rounded to multiples of this length, mm; a basis itself errs by up to 0.005
-   * mm. */
+  /* Positions are rounded to multiples of this length, mm. */
   static const double rounding = 1.0 / 256.0;
   const supine_tensor *lung = supine_basis_tensor(p->basis, "lung");
   const supine_mesh_field fields[] = {{"gravity_LPS", 3, p->gravity},

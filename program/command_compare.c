@@ -190,7 +190,7 @@ static supine_status compare(const char *path, const char *made_by, const supine
   if (status != SUPINE_OK) {
     return status;
   }
-  if (supine_basis_metadata(basis, "content") != NULL) { /* the basis was made by 'supine embed' */
+  if (supine_basis_metadata(basis, "content") != NULL) { /* only 'supine embed' writes this key */
     return wanted->html != NULL
                ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                                   "%s holds structures inside the lungs, but -o needs the lungs: "

@@ -109,7 +109,7 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
   }
   supine_basis_volumes(basis, &moved->pose, volumes);
   save->from = from.vertices;
-  save->normals = mesh.triangle_count > 0 ? normals : NULL; /* points have no normals */
+  save->normals = mesh.triangle_count > 0 ? normals : NULL;
   save->expected_error = moved->expected.sigma;
   save->lung = lung == NULL ? NULL : lung->data;
   save->fields = fields;
@@ -160,7 +160,7 @@ static supine_status read_row(const supine_csv *csv, request *row, supine_error 
   const char *const volume = supine_csv_text(csv, 2);
   supine_state *state = &row->volume.state;
   supine_error reason;
-  state->gravity[1] = 1.0; /* supine, unless the row names another posture */
+  state->gravity[1] = 1.0; /* the default posture is supine */
   supine_status status = supine_state_parse(supine_csv_text(csv, 0), state, &reason);
   if (status == SUPINE_OK && volume != NULL && volume[0] != '\0') {
     status = supine_state_parse_volume(volume, state, &reason);

@@ -112,7 +112,7 @@ static const supine_option table[] = {
     {"json", 0, NULL, "print JSON instead of text", FILLS(json)},
     {.name = NULL}};
 
-/* Print the fitted model. The text leaves out kriging centres and the regions' expandability. */
+/* Print the fitted model as JSON, or as text without kriging centres and local expandability. */
 static supine_status print(const supine_patient_record *record, const char *made_by, bool json,
                            supine_error *error) {
   json_t *root = supine_patient_encode(record, made_by);
@@ -201,10 +201,10 @@ static int named_order(const supine_state *first, const supine_state *second) {
                                                                           : 0;
 }
 
-/* Put the fuller scan first. If the options do not tell which it is, use the volumes of the
- * surfaces or, without two surfaces, the change of volume in an affine map of the landmarks. */
+/* Put the fuller scan first. If the options do not tell which it is, compare the volumes of the
+ * surfaces. Without two surfaces, use the volume change of an affine map of the landmarks. */
 static supine_status order_states(const request *wanted, scan_data *data, supine_error *error) {
-  /* Relative error of volumes; scans that differ by less do not contradict the options. */
+  /* The volumes contradict the options only if they differ by more than this share. */
   static const double volume_error = 0.02;
   const double volume[2] = {volume_of(&data->lungs[0]), volume_of(&data->lungs[1])};
   const double growth = volume[0] > 0.0 && volume[1] > 0.0 ? volume[1] / volume[0]
@@ -273,12 +273,13 @@ static supine_status fit_further(const request *wanted, const scan_data *data, s
   return status;
 }
 
-/* Fit the states of --state, and compute the part of the force that depends on gravity. */
+/* Fit the states of --state, and compute the part of the force that depends on gravity. If the
+ * fuller scan has no surface, move the surface of the emptier scan to the fuller scan. */
 static supine_status find_gain(const request *wanted, scan_data *data,
                                supine_patient_record *record, supine_error *error) {
   supine_lungs *from = &data->lungs[0];
   supine_status status = SUPINE_OK;
-  if (from->mesh.vertex_count == 0) { /* the fuller scan has no surface */
+  if (from->mesh.vertex_count == 0) {
     from = &data->lungs[1];
     supine_patient_points_to_fuller(&record->patient, from->mesh.vertex_count, from->mesh.vertices);
     supine_mesh_box(&from->mesh, from->minimum, from->maximum);
@@ -290,8 +291,8 @@ static supine_status find_gain(const request *wanted, scan_data *data,
   return status;
 }
 
-/* If state k (0 or 1) has no volume, take its surface's volume: relative to rest or to full
- * inflation if the other state's volume is, otherwise absolute. */
+/* If state k (0 or 1) has no volume, give it the volume of its surface. Count it from rest or from
+ * full inflation if the other state's volume is counted from there; otherwise from 0. */
 static void complete_state(supine_patient_record *record, size_t k) {
   supine_volume *of = &record->state[k].volume;
   const supine_state *other = &record->state[1 - k];
@@ -334,8 +335,8 @@ static void set_states(const request *wanted, const scan_data *data,
 
 /* Warn if the volume at rest in the scans differs from the volume at rest of healthy people. */
 static void warn_of_rest(const supine_patient_record *record) {
-  /* Difference between the volumes at rest, as a share of the volume at full inflation, from which
-   * on a warning is printed. The standard deviation among healthy people is 0.04. */
+  /* A warning is printed if the two volumes at rest differ by more than this share of the volume at
+   * full inflation. The standard deviation among healthy people is 0.04. */
   static const double reported_from = 0.07;
   const supine_resting usual = supine_reference_resting_default();
   const double *g = record->state[1].gravity;

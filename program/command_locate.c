@@ -130,14 +130,14 @@ static const char *const postures[POSTURES] = {"supine", "prone",   "left",
                                                "right",  "upright", "inverted"};
 
 static const double negligible = 0.01; /* probability below which a posture is ignored */
-static const double determined = 0.95; /* from this probability on, a posture is determined */
+static const double determined = 0.95; /* postures at least this probable count as determined */
 
 typedef struct lungs_found {
   size_t count; /* number of postures tried */
   supine_location location[POSTURES];
   double probability[POSTURES];
-  const supine_location *best;       /* the element of `location` for the most probable posture */
-  supine_locate_residual *residuals; /* [postures, points] */
+  const supine_location *best;       /* location in the most probable posture */
+  supine_locate_residual *residuals; /* [postures, points] residual of each fitted point */
   float *xyz;                        /* [N, 3] positions in the most probable posture, mm */
   float *sigma;                      /* [N] expected errors of the positions, mm */
   void *space;                       /* a workspace of supine_locate for each posture */
@@ -180,10 +180,10 @@ static supine_status try_postures(const supine_locate_task *task, bool posture_g
   return SUPINE_OK;
 }
 
-/* Compute the positions x in the most probable posture, and the expected errors sigma. If posture k
- * has probability p_k, positions x_k and expected errors sigma_k, then sigma^2 is the mean of
- * sigma_k^2 + |x_k - x|^2 over all k, weighted by p_k.
- * @param xyz, sigma  [N, 3] and [N], workspace */
+/* Compute located->xyz, the positions x in the most probable posture, and located->sigma. If
+ * posture k has probability p_k, positions x_k and expected errors s_k, then located->sigma squared
+ * is the mean of s_k^2 + |x_k - x|^2 over all k, weighted by p_k.
+ * @param xyz, sigma  workspace, [N, 3] and [N] */
 static supine_status find_positions(const supine_basis *shown, float *xyz, float *sigma,
                                     lungs_found *located, supine_error *error) {
   const size_t n = supine_basis_get_info(shown)->vertex_count;
@@ -365,7 +365,7 @@ static supine_status locate(const request *wanted, const supine_basis *lungs,
                                    .rigid = wanted->rigid};
   supine_status status = find(&task, wanted->orientation.given, shown, &located, error);
   if (status == SUPINE_ERROR_ARGUMENT && wanted->rigid) {
-    /* The points do not determine a rotation. This is an error in the file, not in an option. */
+    /* The points in the file do not determine a rotation, so blame the file, not an option. */
     status = error->status = SUPINE_ERROR_FORMAT;
   }
   if (status == SUPINE_OK) {

@@ -104,12 +104,12 @@ static void report_result(const char *path, const supine_lungs *lungs,
         "six\npostures. %s\n",
         100.0 * report->turned_over, state,
         options->model.reach == 0.0
-            ? "The paper law spreads forces over a few links of any length: give --reach 10"
+            ? "The paper law spreads forces over a few mesh links, however short: give --reach 10"
             : "Give a longer --reach");
   }
 }
 
-/* Print which bands the directions determine, and the leave-one-out error of each band. */
+/* Print the bands that the gravity directions determine, and each leave-one-out error. */
 static void report_fit(const char *path, const supine_fields *fields,
                        const supine_fit_report *fit) {
   const size_t highest = fit->band_highest;
@@ -185,7 +185,7 @@ static supine_status take_patient(request *wanted, supine_patient_record *record
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %s", wanted->patient);
   }
   wanted->model.patient = record;
-  /* The patient's constants will replace those of this law. */
+  /* Later, the constants of this law are replaced by those of the patient. */
   wanted->model.choice.law = SUPINE_LAW_DEEP;
   wanted->basis.patient = *text;
   const supine_patient_fit_report *report = &record->report;
@@ -206,16 +206,17 @@ static void begin(void *chosen) {
   supine_command_model_options_begin(&((request *)chosen)->model);
 }
 
-/* Refuse options that set constants of the law, because the patient's model has constants of its
- * own. Call this before supine_command_model_load, which sets all constants that were not given. */
+/* Refuse options that set constants of the displacement law, as the patient's model has its own.
+ * Call this before supine_command_model_load, which sets all constants that were not given. */
 static supine_status check_patient(const supine_model_choice *choice, supine_error *error) {
   const supine_model *model = &choice->model;
   const bool given = choice->law != SUPINE_LAW_COUNT || !isnan(model->force.base) ||
                      !isnan(model->force.gain) || !isnan(model->force.box[0]) ||
                      !isnan(model->direction.c[0]) || !isnan(model->reach);
-  return given ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                  "--patient has its own law and force: leave --law, --base, "
-                                  "--gain, --box-force, --constants and --reach out")
+  return given ? supine_error_set(
+                     error, SUPINE_ERROR_ARGUMENT,
+                     "the model of --patient has its own law and force: leave --law, --base, "
+                     "--gain, --box-force, --constants and --reach out")
                : SUPINE_OK;
 }
 

@@ -26,7 +26,7 @@ typedef struct request {
   supine_volume_options volume;
   supine_from from;     /* state from which displacements are measured */
   const char *inside;   /* file of structures inside the lungs; NULL if not given */
-  double largest;       /* end of the colour bar, mm; 0 if automatic */
+  double largest;       /* value at the end of the colour bar, mm; 0 if automatic */
   double opacity;       /* opacity of the lungs, 0 to 1; 0 if not given */
   size_t width, height; /* size of the picture, pixels; 0 if automatic */
   supine_view view[SUPINE_VIEWS_MAX];
@@ -55,7 +55,8 @@ typedef struct studio {
   supine_posture_list postures; /* posture of each panel */
   drawn shown[SUPINE_PANELS_MAX];
   supine_panel panel[SUPINE_PANELS_MAX];
-  double p95, max; /* largest 95th percentile and largest displacement of any panel so far, mm */
+  double p95,
+      max; /* 95th percentile and maximum of displacement, mm; largest of all panels so far */
   char label[128];
 } studio;
 
@@ -170,7 +171,7 @@ static supine_status draw_postures(studio *s, supine_error *error) {
   return status;
 }
 
-/* Fill the only panel of an animation for one of the `count` frames of a turn of gravity. */
+/* Fill the only panel of an animation for frame `frame` of the `count` frames of a turn. */
 static supine_status find_frame(studio *s, size_t frame, size_t count, supine_error *error) {
   const breath_turn *turn = &s->wanted->turn;
   supine_posture_item *item = &s->postures.item[0];

@@ -43,7 +43,7 @@ static const supine_option table[] = {
     {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
     {.name = NULL}};
 
-/* Write the response of every vertex to a unit force on the vertex of --unit-force as CSV. */
+/* Write as CSV the response of every vertex to a unit force on the vertex of --unit-force. */
 static supine_status write_column(const supine_lungs *lungs, const request *wanted,
                                   supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
@@ -77,7 +77,7 @@ cleanup:
   return status;
 }
 
-/* Compute each lung's volume minus that of its reference surface, mL, as if none were collapsed. */
+/* Compute each lung's volume minus the volume of its reference surface, mL, before any collapse. */
 static supine_status find_volumes(const supine_reference *reference, const supine_state *state,
                                   double *ml, supine_error *error) {
   const double *g = state->gravity;
@@ -114,8 +114,8 @@ static void fill(double gains[2][3], double gain) {
   }
 }
 
-/* Find the gains that give each lung its volume. All gains are equal if rest is unknown, and 1 if
- * no volume is given either. */
+/* Find the gains (factors on each lung's displacement along x, y and z) that give each lung its
+ * volume. If the volume at rest is unknown, all gains are equal, and 1 if --volume is missing. */
 static supine_status find_gains(const supine_lungs *lungs, const request *wanted,
                                 const supine_solution *solution, double gains[2][3],
                                 supine_error *error) {
@@ -152,10 +152,10 @@ static supine_status find_gains(const supine_lungs *lungs, const request *wanted
   return status;
 }
 
-/* Share of the largest force; iteration stops when no vertex has more force left to distribute. */
+/* Iteration stops when no vertex has more force left than this share of the largest force. */
 static const double pitcher_tolerance = 1e-6;
 
-/* Print the share of force that remains, each time the steps per vertex have doubled. */
+/* Print the share of force that remains, each time the number of steps per vertex has doubled. */
 static void report_remaining(void *context, size_t steps, double remaining) {
   const size_t per_vertex = steps / *(const size_t *)context;
   if ((per_vertex & (per_vertex - 1)) == 0) {
@@ -164,7 +164,7 @@ static void report_remaining(void *context, size_t steps, double remaining) {
   }
 }
 
-/* Replace the solved forces by those of Santhanam's iteration; print the largest difference. */
+/* Replace the solved forces by those of Santhanam's iteration, and print how far both differ. */
 static supine_status iterate(const supine_lungs *lungs, const supine_model *model,
                              const double g[3], supine_solution *solution, supine_error *error) {
   size_t n = lungs->mesh.vertex_count;

@@ -23,7 +23,7 @@ static const double budget = 15e-3; /* time allowed from receiving a pose to sen
 typedef struct request {
   supine_stream_options options;
   double world_down[3], body_from_tracker[4];
-  int space; /* index in `spaces` */
+  int space; /* axes of the points, as an index in `spaces` */
   supine_state volume;
   bool has_volume;
   const char *pv;

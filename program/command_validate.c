@@ -85,7 +85,7 @@ static json_t *encode(const supine_command_distance of[SUPINE_PATIENT_MAP_COUNT]
   for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT; ++k) {
     json_t *row = json_pack("{s:f, s:f, s:f, s:f}", "mean_mm", of[k].mean, "rms_mm", of[k].rms,
                             "p95_mm", of[k].p95, "largest_mm", of[k].largest);
-    (void)json_object_set_new(row, "explained_percent", /* null if the tissue did not move */
+    (void)json_object_set_new(row, "explained_percent",
                               isnan(of[k].explained) ? json_null()
                                                      : json_real(100.0 * of[k].explained));
     (void)json_object_set_new(all, supine_command_map_names[k], row);

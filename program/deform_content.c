@@ -232,8 +232,8 @@ static supine_status invert(const supine_field *forward, supine_field *inverse,
 }
 
 /* Replace `second`, the field from the scan to a state B, by the field u from a state A to B.
- * `first` is the field from the scan to A, and v is its inverse: u(x) = v(x) + second(x + v(x)).
- * Its depth becomes the depth of the nodes in state A. */
+ * `first` is the field from the scan to A, and v is the inverse of `first`. The displacements are
+ * u(x) = v(x) + second(x + v(x)), and the depths are those of the nodes in state A. */
 static supine_status join_fields(const supine_field *first, supine_field *second,
                                  supine_error *error) {
   supine_field back = {0};

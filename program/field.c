@@ -37,7 +37,8 @@ void supine_field_interpolate(const supine_image *image, const supine_field_cell
       const size_t up = corner >> a & 1U;
       weight[a] = up ? cell->share[a] : 1.0 - cell->share[a];
       at[a] = cell->corner[a] + up;
-      at[a] -= at[a] == image->size[a]; /* on an axis of one voxel, the upper corner has weight 0 */
+      /* On an axis of one voxel, the upper corner is outside the image, and its weight is 0. */
+      at[a] -= at[a] == image->size[a];
     }
     const size_t voxel = at[0] + image->size[0] * (at[1] + image->size[1] * at[2]);
     for (size_t c = 0; c < image->channels; ++c) {
@@ -86,7 +87,8 @@ static supine_status read_grid(const supine_basis *basis, supine_image *nodes,
   }
   double axes[3] = {0.0, 0.0, 0.0};
   if (valid) {
-    supine_image_locate(nodes, axes, axes); /* axes is finite only if the steps are independent */
+    /* The result is finite only if the axes of the grid are linearly independent. */
+    supine_image_locate(nodes, axes, axes);
   }
   if (!valid || !isfinite(axes[0] + axes[1] + axes[2])) {
     return supine_error_set(
@@ -128,8 +130,8 @@ static bool mean_neighbour(const supine_image *nodes, const unsigned char *known
 }
 
 /* Extend the field outwards in layers of nodes, so that it falls linearly to 0 over `fade` mm.
- * `known` holds a mark for each node: at first 1 for a node of the basis, else 0. The nodes of the
- * newest layer are marked 2 or 3, in turn; when the next layer is set, their mark becomes 1. */
+ * `known` marks each node: 1 if it is in the basis or in an earlier layer, 2 or 3 (in turn) if it
+ * is in the newest layer, 0 if its displacement has not been set. */
 static void fade_out(supine_image *nodes, unsigned char *known, double fade) {
   float *u = nodes->values;
   const size_t count = nodes->size[0] * nodes->size[1] * nodes->size[2];
@@ -188,7 +190,7 @@ supine_status supine_field_create(const supine_basis *basis, const supine_pose *
   } else {
     supine_displace_range(basis, pose, 0, n, moved);
     for (size_t i = 0; i < count; ++i) {
-      below[i] = (float)-fade; /* nodes that are not in the basis lie outside the lungs */
+      below[i] = (float)-fade; /* nodes not in the basis count as `fade` mm outside the lungs */
     }
     /* The field gives displacements from the scan, but info->vertices are at full inflation. */
     for (size_t i = 0; i < n; ++i) {

@@ -65,8 +65,8 @@ typedef struct supine_field_cell {
 void supine_field_find_cell(const supine_image *image, const double point[3],
                             supine_field_cell *cell);
 
-/* Interpolate all channels of an F32 image. Unless `slope` is NULL, compute the derivatives with
- * respect to cell->share too, [channels, 3]. */
+/* Interpolate all channels of an F32 image. Unless `slope` is NULL, also compute their
+ * derivatives with respect to cell->share, [channels, 3]. */
 void supine_field_interpolate(const supine_image *image, const supine_field_cell *cell,
                               double *values, double (*slope)[3]);
 

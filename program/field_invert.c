@@ -31,7 +31,7 @@ static double misfit(const supine_field *field, const double x[3], const double 
 
 /* Compute the Newton step, counted in steps of the grid. Return false if `slope` is singular. */
 static bool newton(const double slope[3][3], const double residual[3], double step[3]) {
-  supine_image equations = {.origin = {0.0}}; /* solved by supine_image_locate */
+  supine_image equations = {.origin = {0.0}};
   for (size_t k = 0; k < 9; ++k) {
     equations.step[k % 3][k / 3] = -slope[k / 3][k % 3];
   }
@@ -39,8 +39,8 @@ static bool newton(const double slope[3][3], const double residual[3], double st
   return isfinite(step[0] + step[1] + step[2]);
 }
 
-/* Find x with x + u(x) = y, starting from the given x, and return the length of the residual. Each
- * Newton step is halved until it reduces the residual, as the derivative jumps between cells. */
+/* Find x with x + u(x) = y for the field u by Newton's method, starting from the given x. Return
+ * the length of the residual, mm. Halve each step until the residual falls, as u has kinks. */
 static double solve(const supine_field *field, const double y[3], double x[3]) {
   enum { STEPS = 40, HALVINGS = 6 };
   double residual[3];
@@ -95,7 +95,7 @@ static void invert_rows(void *context, size_t begin, size_t end, size_t thread) 
         x[k] = y[k] - u[k];
       }
       double off = solve(work->field, y, x);
-      if (off > lost_beyond) { /* start again with x = y */
+      if (off > lost_beyond) { /* also try y as the starting point */
         double other[3];
         memcpy(other, y, sizeof other);
         const double again = solve(work->field, y, other);

@@ -17,7 +17,7 @@ enum { RUN = 128 };
 
 typedef struct resampling {
   const supine_field *inverse;
-  const supine_image *depth; /* mm below the lungs' surface; NULL if densities are not scaled */
+  const supine_image *depth; /* depth below the lungs' surface, mm; NULL if densities are kept */
   supine_image inside; /* 1 for voxels of `from` inside the lungs, else 0; unused without `depth` */
   const supine_image *from;
   supine_image *to;
@@ -64,13 +64,13 @@ INLINE void find_cells(const supine_image *image, double (*point)[RUN], cells *f
 }
 
 /* Compute the weights of the corners of each cell, and the offset of each corner's value from the
- * value of the lowest corner. */
+ * value of the lowest corner. On an axis of one voxel, the upper corner has weight 0. */
 INLINE void weigh_corners(const supine_image *image, const cells *in, double (*weight)[RUN],
                           size_t *offset) {
   for (size_t corner = 0; corner < 8; ++corner) {
     size_t stride = image->channels;
     offset[corner] = 0;
-    for (size_t a = 0; a < 3; ++a) { /* on an axis of one voxel, the upper corner has weight 0 */
+    for (size_t a = 0; a < 3; ++a) {
       offset[corner] += (corner >> a & 1U) != 0 && image->size[a] > 1 ? stride : 0;
       stride *= image->size[a];
     }

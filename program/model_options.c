@@ -97,7 +97,6 @@ static supine_status read_lung(const char *text, void *field, supine_error *erro
   return SUPINE_OK;
 }
 
-/* Names of the sexes, indexed by supine_sex. */
 static const char *const sexes[] = {"unknown", "female", "male", NULL};
 
 /* Parts of help texts: a line that describes each law, and the default constants of each law. */

@@ -13,10 +13,10 @@
 
 enum { MEASURED_VERTICES_MAX = 1500, GOLDEN_SECTION_STEPS = 24 };
 
-/* Half-width of the range in which the best scale is searched, in units of max(1, |scale|). */
+/* The best scale is sought within search_span * max(1, |s|) of the predicted scale s. */
 static const double search_span = 0.5;
 static const double golden = 0.6180339887498949; /* (sqrt(5) - 1) / 2 */
-static const double same_posture = 1e-9; /* directions of gravity that differ by less are equal */
+static const double same_posture = 1e-9; /* gravity directions that differ by less count as equal */
 
 void supine_command_subject_free(supine_command_subject *subject) {
   supine_basis_close(subject->basis);
@@ -56,7 +56,7 @@ supine_status supine_command_subject_open(const char *path, supine_command_subje
   if (s->from.text[0] == '\0') {
     s->from.state = supine_basis_scan(s->basis);
   }
-  /* If rest is unknown, a state without a volume gets the volume of the scan. */
+  /* If the volume at rest is unknown, a state without a volume gets the volume of the scan. */
   if (s->from.state.volume.kind == SUPINE_VOLUME_DEFAULT &&
       !supine_basis_get_info(s->basis)->has_rest) {
     s->from.state.volume.kind = SUPINE_VOLUME_SCAN;
@@ -74,7 +74,8 @@ supine_status supine_command_subject_open(const char *path, supine_command_subje
   return status;
 }
 
-/* Compute the gains for the volume of a state or, if it has none, for the volume of its surface. */
+/* Compute the gains (factors on the displacement of each lung) that give the volume of a state or,
+ * if the state has no volume, the volume of its surface. */
 static supine_status find_gains(const supine_command_subject *s, const supine_command_state *state,
                                 const supine_mesh *mesh, supine_command_outcome *outcome,
                                 supine_error *error) {
@@ -120,7 +121,7 @@ typedef struct search {
   double *distance; /* [measured_count] distances from the scanned surface, mm */
 } search;
 
-/* Multiply all gains by one factor, so that the first gain becomes `scale`. Compute the RMS
+/* Multiply all gains by one factor, so that the first gain becomes `scale`. Then compute the RMS
  * distance of the predicted vertices from the scanned surface, mm. */
 static supine_status distance_at(const supine_command_subject *s,
                                  const supine_command_outcome *outcome, double scale,
@@ -152,7 +153,7 @@ static supine_status distance_at(const supine_command_subject *s,
   return SUPINE_OK;
 }
 
-/* Find by golden-section search the displacement scale at which prediction and scan are nearest. */
+/* Find the displacement scale that brings the prediction nearest to the scan (golden section). */
 static supine_status find_best(const supine_command_subject *s, const supine_mesh *mesh,
                                supine_command_outcome *outcome, supine_error *error) {
   const size_t n = s->start.vertex_count;

@@ -29,22 +29,22 @@ typedef struct supine_command_distance {
 /* A predicted state, and the distances of the prediction from the scan of that state. */
 typedef struct supine_command_outcome {
   supine_pose pose;
-  double scale;       /* first gain of `pose` */
-  double millilitres; /* volume minus from_millilitres, mL */
+  double scale;       /* pose.gains[0][0], the factor on the first lung's displacement along x */
+  double millilitres; /* volume minus that of the state where motion starts, mL */
   double *predicted;  /* [N, 3] predicted positions, mm */
   double *nearest;    /* [N, 3] nearest points of the scanned surface, mm */
   bool has_surface, has_points, has_best;
   supine_command_distance surface[SUPINE_PATIENT_MAP_COUNT];
   supine_command_distance points[SUPINE_PATIENT_MAP_COUNT];
-  double best_scale; /* first gain at which the prediction is nearest to the scanned surface */
+  double best_scale; /* `scale` at which the prediction would be nearest to the scan */
   double best_rms;   /* RMS distance from the scanned surface at best_scale, mm */
 } supine_command_outcome;
 
 typedef struct supine_command_subject {
   supine_basis *basis;
-  supine_patient_scan_motion moved; /* motion between the scans, removed before they are compared */
+  supine_patient_scan_motion moved; /* body motion between the scans, removed before comparing */
   supine_command_state from;
-  double from_scale;       /* first gain in the state where motion starts */
+  double from_scale; /* factor on the first lung's displacement along x, where motion starts */
   double from_millilitres; /* volume in the state where motion starts, mL */
   supine_mesh start;       /* surface in the state where motion starts */
   size_t count;
@@ -52,7 +52,7 @@ typedef struct supine_command_subject {
   supine_command_outcome outcome[SUPINE_COMMAND_STATES_MAX];
   size_t line_count; /* number of states to which the line is fitted */
   double line_slope; /* slope of the line fitted to best_scale as a function of volume, 1/mL */
-  double line_off; /* largest deviation from the fitted line / largest |best_scale - from_scale| */
+  double line_off;   /* largest deviation from the line, divided by max |best_scale - from_scale| */
 } supine_command_subject;
 
 void supine_command_subject_free(supine_command_subject *subject);
@@ -72,8 +72,8 @@ supine_status supine_command_validate_state(supine_command_subject *subject, siz
                                             const char *landmarks, bool reverse,
                                             supine_error *error);
 
-/* Fit a straight line to the best_scale of all states in the posture of the first state, as a
- * function of volume. The line passes through the state where motion starts. */
+/* Fit a straight line to best_scale as a function of volume, over all states in the posture of the
+ * first state. The line passes through the state where motion starts. */
 void supine_command_find_line(supine_command_subject *subject);
 
 /* Draw the distance between prediction and scanned surface, in one panel for each state.

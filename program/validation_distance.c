@@ -17,7 +17,7 @@ const char *const supine_command_map_names[SUPINE_PATIENT_MAP_COUNT] = {"predict
 
 enum { ROUNDS = 20, FITTED_MAX = 2000 };
 
-/* Smallest RMS motion that counts as motion, mm; landmarks and surfaces are less precise. */
+/* A motion whose RMS is below this, mm, counts as none: scans and landmarks are less precise. */
 static const double still = 0.05;
 
 static void summarise(double *distances, size_t count, supine_command_distance *of) {
@@ -38,7 +38,7 @@ static void explain(supine_patient_scan_motion moved,
   }
 }
 
-/* Return the map to fit: for the prediction, the motion between the scans; otherwise `kind`. */
+/* Return the kind of map to fit: `kind` or, for the prediction, the motion between the scans. */
 static supine_patient_map map_of(int kind, supine_patient_scan_motion moved) {
   return kind != SUPINE_PATIENT_MAP_PREDICTED  ? (supine_patient_map)kind
          : moved == SUPINE_PATIENT_RIGID       ? SUPINE_PATIENT_MAP_RIGID
@@ -77,7 +77,7 @@ supine_status supine_command_compare_points(
   return SUPINE_OK;
 }
 
-/* Compute statistics of the distances from the vertices of each of two surfaces to the other. */
+/* Compute statistics of the distances from the vertices of one surface to the other, both ways. */
 static supine_status surface_distance(const supine_mesh *start, const double *moved,
                                       const supine_mesh *state,
                                       const supine_inside_surface *state_tree, double *nearest,
@@ -99,7 +99,7 @@ static supine_status surface_distance(const supine_mesh *start, const double *mo
   return status;
 }
 
-/* Fit a map of vertices to a surface by iterated nearest points, and apply it to all n vertices.
+/* Fit a map from vertices onto a surface by iterated nearest points; apply it to all n vertices.
  * Return false if the map is undetermined. `space` holds 10 * FITTED_MAX numbers. */
 static bool fit_map(supine_patient_map kind, size_t n, const double *vertices,
                     const supine_inside_surface *tree, double *space, double *moved) {

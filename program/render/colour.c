@@ -30,7 +30,6 @@ static const double curves[SUPINE_COLOURS_COUNT][KNOTS][3] = {
 static double colours[SUPINE_COLOURS_COUNT][COLOURS][3]; /* written once, by make_colours */
 static pthread_once_t made = PTHREAD_ONCE_INIT;
 
-/* Convert an OKLab colour to linear sRGB. */
 static void linear_rgb(const double lab[3], double rgb[3]) {
   const double l = pow(lab[0] + 0.3963377774 * lab[1] + 0.2158037573 * lab[2], 3);
   const double m = pow(lab[0] - 0.1055613458 * lab[1] - 0.0638541728 * lab[2], 3);

@@ -37,8 +37,8 @@ void supine_render_view_axes(supine_view view, double axes[3][3]) {
 enum { OVERSAMPLE = 2, SIDE_MAX = 16384, SHADES = 4096, NOTHING = UINT32_MAX, GRAIN = 16 };
 
 static const double distance_in_radii = 5.0; /* distance from the viewer to the lungs' centre */
-static const double depth_in_radii = 3.0;    /* depth drawn in front of the lungs' centre */
-static const double margin = 1.03; /* ratio of the picture's size to the size of the lungs in it */
+static const double depth_in_radii = 3.0;    /* largest drawn depth in front of the lungs' centre */
+static const double margin = 1.03; /* size of the picture divided by the size of the lungs in it */
 static const float gamma_exponent = 2.2F;
 
 typedef struct corner {
@@ -53,7 +53,7 @@ struct supine_renderer {
   const supine_basis *basis;
   const supine_basis_info *info;
   float *scratch;  /* [2, N, 3] positions, mm, then unit normals */
-  corner *corners; /* [N] */
+  corner *corners; /* [N] the projected vertices */
 };
 
 supine_status supine_render_create(const supine_basis *basis, supine_renderer **renderer,
@@ -177,7 +177,6 @@ void supine_render_project(supine_renderer *r, const supine_scene *scene, const 
   }
 }
 
-/* Data shared by the drawing threads. */
 typedef struct canvas {
   supine_renderer *renderer;
   const supine_scene *scene;

@@ -33,7 +33,6 @@ static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cairo;
 
 static const double pi = 3.14159265358979323846;
 
-/* Colours of the upper and lower end of the background, cells, their edges, text, and gravity. */
 static const double ground_top[3] = {0.985, 0.988, 0.992};
 static const double ground_bottom[3] = {0.925, 0.941, 0.957};
 static const double card[3] = {1, 1, 1};

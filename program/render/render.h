@@ -128,8 +128,8 @@ typedef struct supine_picture {
   const supine_view *view;
   size_t view_count; /**< 1 to SUPINE_VIEWS_MAX */
   const char *bar_label;
-  double largest;      /**< value that the last colour shows, mm */
-  double transparency; /**< 0: coloured lungs; above 0: grey shells, which fade from 0.5 to 1 */
+  double largest;            /**< value that the last colour shows, mm */
+  double transparency;       /**< 0 for coloured lungs; above 0 for grey shells, invisible at 1 */
   const double (*extent)[4]; /**< [view_count] made by supine_render_picture_extent; NULL for the
                                 extents of this picture */
   supine_colours colours;
