@@ -29,7 +29,7 @@ supine_status supine_export_source_open(const char *path, export_source *source,
 /** Close a source. A source that is all zeros is allowed. */
 void supine_export_source_close(export_source *source);
 
-/** Extend the box from `low` to `high`, mm, to contain all vertices of the reference surface. */
+/** Enlarge a box, with the corners `low` and `high`, mm, to contain the whole reference surface. */
 void supine_export_box(const export_source *source, double low[3], double high[3]);
 
 /** Compute the displacement `u`, mm, that one mode causes at a vertex, at weight 1 and gain 1. */
@@ -37,7 +37,7 @@ void supine_export_field(const export_source *source, size_t vertex, size_t mode
 
 /** Compute the pose during a breath of `breath` mL, with gravity along the unit vector `g`. The
  * `fraction` is 0 at rest (in the scan if rest is unknown) and 1 at the end of inspiration.
- * @retval SUPINE_ERROR_NUMERICAL  the surface folds before it reaches that volume */
+ * @retval SUPINE_ERROR_NUMERICAL  the surface folds before it reaches the volume of the pose */
 supine_status supine_export_breath_pose(const export_source *source, double breath,
                                         const double g[3], double fraction, supine_pose *pose,
                                         supine_error *error);
@@ -45,22 +45,22 @@ supine_status supine_export_breath_pose(const export_source *source, double brea
 /** Parts inside the lungs, with the names that 'supine embed' has stored. */
 typedef struct export_parts {
   size_t count;       /**< at least 1 */
-  char *const *name;  /**< [count] */
-  const uint32_t *of; /**< [N] index in `name` of the part that each vertex belongs to */
+  char *const *name;  /**< [count] names of the parts */
+  const uint32_t *of; /**< [N] for each vertex, the index of its part's name in `name` */
 } export_parts;
 
 /** Options of a glTF file. */
 typedef struct export_glb_options {
-  bool plain;   /**< true: store floats, with vertices in the order of the basis. false: store
-                   compressed integers (KHR_mesh_quantization, EXT_meshopt_compression). Positions are
-                   then multiples of 0.045 mm (of a larger unit for lungs longer than 1.47 m), and
-                   differ from the library's by at most 0.1 mm up to 500 mL above rest */
+  bool plain;   /**< If true, store floats, with vertices in the order of the basis. If false, store
+                   compressed integers (KHR_mesh_quantization, EXT_meshopt_compression). This rounds
+                   positions to 0.045 mm (more coarsely in lungs longer than 1.47 m); they then err by
+                   at most 0.1 mm up to 500 mL above rest */
   bool animate; /**< true: add five animations of breathing, one while the patient turns, and one in
                    each of the four lying postures */
-  double breath; /**< tidal volume, mL; until its end, all weights are between 0 and 1 */
+  double breath; /**< tidal volume, mL; during the breath, all weights are between 0 and 1 */
 } export_glb_options;
 
-/** Write a glTF 2.0 binary file. Each lung is a mesh with morph targets j, which place vertex i at
+/** Write a glTF 2.0 binary file. Each lung is a mesh whose morph targets j move vertex i to
  *
  *     position_i = base_i + sum over j of weight_j target_ij     0 <= weight_j <= 1
  *
@@ -87,7 +87,7 @@ typedef struct export_page {
   const supine_pose *from; /**< pose from which displacements are measured */
   const char *from_name;   /**< name of `from`, for example "supine at rest" */
   const char *title;       /**< UTF-8 */
-  /** Content of the lungs: a basis with the same modes and vector displacements; NULL for none. */
+  /** Basis that 'supine embed' has made for parts inside the lungs; NULL to show no parts. */
   const export_source *inside;
   const export_parts *parts; /**< parts of `inside`; unused if `inside` is NULL */
   bool live;                 /**< true to show also the states that 'supine stream' sends */
@@ -95,9 +95,8 @@ typedef struct export_page {
 
 /** Print one self-contained HTML page that shows the lungs in a browser (WebGL 2) without a
  * network. Vertices, displacements and triangles are compressed by meshoptimizer. In lungs up to
- * 650 mm long, positions differ from the library's by at most 0.02 mm. A write error sets the error
- * indicator of `file`.
- * @retval SUPINE_ERROR_UNSUPPORTED  displacements are vectors, there are more modes than
+ * 650 mm long, positions err by at most 0.02 mm. A write error sets the error indicator of `file`.
+ * @retval SUPINE_ERROR_UNSUPPORTED  the basis has vector displacements or more modes than
  *                                   EXPORT_PAGE_MODES_MAX, or meshoptimizer is not installed
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_export_html_print(FILE *file, const export_source *source,

@@ -10,10 +10,10 @@
 #include "program/render/render.h"
 #include "sh/base/output.h"
 
-static const double step_mm = 0.045; /* smallest unit of quantized positions */
+static const double step_mm = 0.045; /* unit of quantized positions; larger for huge lungs */
 
 /* Compute the largest displacement of each vertex, mm, from supine to another lying posture at the
- * start of a breath. Return the maximum over all vertices. Overwrites glb.xyz and glb.normals. */
+ * start of a breath. Return the maximum over all vertices. Overwrite g->xyz and g->normals. */
 static double find_displacements(const glb *g, float *displacement) {
   static const double lying[][3] = {{0, 1, 0}, {1, 0, 0}, {0, -1, 0}, {-1, 0, 0}};
   float *from = g->normals;
@@ -35,7 +35,7 @@ static double find_displacements(const glb *g, float *displacement) {
   return largest;
 }
 
-/* Compute vertex colours, linear RGBA. The last colour shows a displacement of `end` mm. */
+/* Compute linear RGBA colours from displacements, mm, on a scale of 0 to `end` mm. */
 static void colour(const float *displacement, size_t count, double end, uint8_t *colours) {
   for (size_t i = 0; i < count; ++i) {
     double rgb[3];
@@ -48,8 +48,8 @@ static void colour(const float *displacement, size_t count, double end, uint8_t 
   }
 }
 
-/* Compute vertex colours and normals, and `end`, the displacement that the last colour shows, mm.
- */
+/* Compute the normals and colours of vertices. Set `end` to the displacement, mm, at which the
+ * colour scale ends. */
 static supine_status prepare(glb *g, double *end, supine_error *error) {
   const size_t n = g->source->info->vertex_count;
   float *displacement = calloc(n, sizeof *displacement);
@@ -74,7 +74,7 @@ static supine_status prepare(glb *g, double *end, supine_error *error) {
 }
 
 /* Append the patient with the lungs, the animations, the table and the arrow. Set `roots` to the
- * root nodes of the scene, and `end` to the displacement that the last colour shows, mm. */
+ * root nodes of the scene, and `end` to the displacement, mm, at which the colour scale ends. */
 static supine_status add_all(glb *g, double *end, json_t **roots, supine_error *error) {
   float q[4];
   const supine_status status = prepare(g, end, error);
@@ -172,7 +172,7 @@ static supine_status make_and_write(glb *g, const char *path, size_t *total, sup
     char *text = json_dumps(root, JSON_COMPACT | JSON_REAL_PRECISION(9));
     status = text == NULL ? supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path)
                           : write_file(path, text, numbers, bytes, total, error);
-    free(text); /* jansson allocates with malloc by default */
+    free(text);
     json_decref(root);
   }
   free(numbers);

@@ -29,23 +29,23 @@ typedef struct glb {
   const export_glb_options *options;
   export_targets targets;
   export_order order;
-  float *xyz;       /**< [N, 3] workspace */
-  float *normals;   /**< [N, 3] unit normals of the base mesh */
-  float *added;     /**< [targets.count, N, 3] vectors that a target at weight 1 adds to normals */
+  float *xyz;     /**< [N, 3] workspace */
+  float *normals; /**< [N, 3] unit normals of the base mesh */
+  float *added;   /**< [targets.count, N, 3] vectors that each target at weight 1 adds to normals */
   uint8_t *colours; /**< [N, 4] linear RGBA of vertices */
   double step;      /**< unit of GLB_PLACES, mm; 1 if options->plain */
   json_t *views, *accessors, *meshes, *nodes, *materials, *animations;
   FILE *numbers;        /**< binary chunk of the file */
-  size_t unpacked;      /**< size of all compressed arrays after decompression, bytes */
+  size_t unpacked;      /**< total size of the compressed arrays after decompression, bytes */
   supine_status status; /**< SUPINE_ERROR_MEMORY if an allocation failed */
 } glb;
 
 /** Append an array of `count` rows and return the index of its accessor.
- * @param order  [count] indices in `rows` of the rows to append; NULL for 0, 1, 2, ... */
+ * @param order  [count] indices of the rows to append; NULL for 0, 1, 2, ... */
 json_int_t supine_export_glb_put(glb *g, glb_kind kind, const void *rows, const uint32_t *order,
                                  size_t count);
 
-/** Append an accessor of `count` zero rows, which the file does not store; return its index. */
+/** Append an accessor of `count` rows of zeros without storing them; return its index. */
 json_int_t supine_export_glb_put_zeros(glb *g, glb_kind kind, size_t count);
 
 /** Append a mesh and a node that shows it; return the node's index. Positions of the mesh are in
@@ -61,7 +61,7 @@ json_int_t supine_export_glb_add(glb *g, size_t lung);
 json_int_t supine_export_glb_material(glb *g, const char *name, const double rgb[3]);
 
 /** Return the `extras` of the file, which say how to compute weights from gravity and volume.
- * @param end  displacement that the last colour of the colour map shows, mm */
+ * @param end  displacement at which the colour scale ends, mm */
 json_t *supine_export_glb_extras(const glb *g, double end);
 
 /** Return the `extras` of a lung's mesh: constants for the formulas in the `extras` of the file. */
@@ -71,7 +71,7 @@ json_t *supine_export_glb_lung_extras(const glb *g, size_t lung);
  * table, turned by `roll` radians about the body's long axis: 0 is supine, pi / 2 the left side. */
 void supine_export_glb_rotation(double roll, float q[4]);
 
-/** Append the animations of breathing. Node 0 must be the patient, node 1 + i lung i. */
+/** Append the animations of breathing. Node 0 must be the patient, node 1 + i must be lung i. */
 void supine_export_glb_animate(glb *g);
 
 /** Append a table and an arrow that shows gravity. Return the root nodes of the scene: the patient,

@@ -20,15 +20,15 @@ void supine_export_glb_rotation(double roll, float q[4]) {
   q[3] = (float)c;
 }
 
-/* Return the patient's roll, radians, in the animation of turning. Each posture takes SECONDS: the
- * patient keeps it for the first half, then turns to the next posture. */
+/* Return the patient's roll, radians, in the animation of turning. Each posture takes SECONDS. For
+ * the first half of this time the patient lies still, then turns to the next posture. */
 static double roll_at(double seconds) {
   const double stage = floor(seconds / SECONDS);
   const double x = fmax(0, 2 * (seconds / SECONDS - stage) - 1);
   return pi / 2 * (stage + x * x * (3 - 2 * x));
 }
 
-/* Compute one frame: the weights of all lungs' targets, `seconds` after the start of a breath.
+/* Compute one frame: the weights of all morph targets, `seconds` after the start of a breath.
  * `rows` points to this frame of lung 0 in an array [lungs, frames, targets]. */
 static void make_frame(glb *g, double roll, double seconds, float *rows, size_t frames) {
   const double gravity[3] = {sin(roll), cos(roll), 0};

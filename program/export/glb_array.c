@@ -43,7 +43,7 @@ static layout layout_of(const glb *g, glb_kind kind) {
   }
 }
 
-/* Return the rows in the format of the file; NULL if out of memory. The caller frees them. */
+/* Return the rows in the format of the file, or NULL if out of memory. The caller frees them. */
 static unsigned char *store(glb_kind kind, const layout *l, const void *rows, const uint32_t *order,
                             size_t count) {
   unsigned char *stored = calloc(count + 1, l->stride);
@@ -63,7 +63,7 @@ static unsigned char *store(glb_kind kind, const layout *l, const void *rows, co
       const size_t bytes = l->stride / (l->columns == 3 ? 4 : 1);
       const double value = (double)values[k] * (kind == GLB_PLACES ? 1 : l->limit);
       const int32_t counts = (int32_t)rint(fmax(-l->limit, fmin(l->limit, value)));
-      memcpy(row + k * bytes, &counts, bytes); /* low bytes, because the machine is little-endian */
+      memcpy(row + k * bytes, &counts, bytes);
     }
   }
   return stored;
@@ -106,7 +106,7 @@ static json_t *write_rows(glb *g, glb_kind kind, const layout *l, const unsigned
   return view;
 }
 
-/* Set `min` and `max` of an accessor to the extremes of each column of the stored rows. */
+/* Set `min` and `max` of an accessor to the extreme values in each column of the stored rows. */
 static void set_bounds(json_t *accessor, const layout *l, const unsigned char *stored,
                        size_t count) {
   double low[3] = {INFINITY, INFINITY, INFINITY};

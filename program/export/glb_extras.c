@@ -6,7 +6,7 @@
 #include "program/export/glb.h"
 #include "program/export/template.h"
 
-/* With more targets, the extras omit the volume's formula, which has K^3 constants for K modes. */
+/* With more morph targets, the extras omit the formula of the volume, which is then too long. */
 enum { VOLUME_TARGETS_MAX = 32 };
 
 static const char frame_text[] =
@@ -25,7 +25,7 @@ static const char volume_text[] =
     "A[1] A[2] + Q[1] A[0] A[2] + Q[2] A[0] A[1] + C A[0] A[1] A[2], where L[a] = sum "
     "linear[a][k] v[k], Q[a] = sum quadratic[a][k][l] v[k] v[l], C = sum cubic[k][l][m] v[k] "
     "v[l] v[m]. Arrays are flat, last index fastest. If linear has only K numbers, all gains are "
-    "s and the volume is L s + Q s^2 + C s^3. To reach a volume without bend, solve for s on the "
+    "s and the volume is L s + Q s^2 + C s^3. To reach a volume if bend is 0, solve for s on the "
     "branch through s = 0. With bend, first find r, the s of the volume at rest with t = 0; then "
     "find the q at which s = r q, t = 2 r e(q) give the volume, where e = (q^3 - q) / 2 for q <= "
     "1, else (q - 1) / q^6.";

@@ -16,7 +16,7 @@ static json_int_t sweep(glb *g, const char *name, const double profile[RINGS][2]
   for (size_t ring = 0; ring < RINGS; ++ring) {
     for (size_t i = 0; i < sides; ++i) {
       const double angle = 6.28318530717958648 * ((double)i + 0.5) / (double)sides;
-      float *place = places[ring * sides + i]; /* z up; supine_export_glb_show makes it y up */
+      float *place = places[ring * sides + i];
       place[0] = (float)(profile[ring][0] * cos(angle) / g->step);
       place[1] = (float)(profile[ring][0] * sin(angle) / g->step);
       place[2] = (float)(profile[ring][1] / g->step);

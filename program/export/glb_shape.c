@@ -35,7 +35,7 @@ static void place_target(const glb *g, size_t lung, size_t j, size_t vertex, dou
 }
 
 /* Compute the position of a vertex of the base mesh, in units of glb.step. If the file rounds the
- * targets, correct the position so that their rounding errors cancel at the weights `rest`. */
+ * targets, correct the position so that the deformed vertex is exact at the weights `rest`. */
 static void place_base(const glb *g, size_t lung, const double *rest, size_t vertex,
                        double xyz[3]) {
   supine_export_targets_base(g->source, &g->targets, lung, vertex, xyz);
@@ -87,7 +87,7 @@ static json_int_t put_changes(glb *g, size_t lung, size_t j) {
   return supine_export_glb_put_zeros(g, GLB_CHANGES, begin[1] - begin[0]);
 }
 
-/* Append a lung's triangles; their vertices count from the first vertex of the lung. */
+/* Append a lung's triangles. Their vertex indices count from the lung's first vertex. */
 static json_int_t put_corners(glb *g, size_t lung) {
   const size_t *begin = g->order.corner_begin + lung;
   uint32_t *corners = g->order.corners + begin[0];

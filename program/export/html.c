@@ -20,11 +20,11 @@ enum { COUNT_MAX = 32767, NORMAL_WORDS = (SUPINE_NORMAL_MODES_MAX + 2) / 3, NORM
 typedef struct page {
   const export_source *source;
   const export_page *shown;
-  double middle[3];   /* centre of the bounding box of all vertices, mm: origin of positions */
+  double middle[3];   /* origin of stored positions, mm: centre of the bounding box */
   double place_unit;  /* unit of stored positions, mm */
-  double unit;        /* unit of the surface's coefficients, mm; directions are unit vectors */
+  double unit;        /* unit of the surface's coefficients, mm */
   double inside_unit; /* unit of the coefficients of shown->inside, mm */
-  export_order order; /* order of the surface's vertices and triangles */
+  export_order order; /* order of stored vertices and triangles of the surface */
   supine_status *status;
 } page;
 
@@ -84,17 +84,17 @@ static void inside_row(const page *p, const export_source *s, size_t vertex, int
   }
 }
 
-/* Divide a number of at most +-(1 << bits) by 1 << shift, round it, and add NORMAL_BIAS, so that
- * small positive and negative numbers have the same high byte, which compresses well. */
+/* Divide a number between -(1 << bits) and 1 << bits by 1 << shift, and round it. Add NORMAL_BIAS,
+ * so that small positive and negative numbers share a high byte, which compresses well. */
 static int16_t coarse(int32_t number, int bits, int shift) {
   const int32_t most = (1 << (bits - shift)) - 1;
   const int32_t steps = (number + (1 << shift) / 2) >> shift;
   return (int16_t)((steps < most ? steps : most) + NORMAL_BIAS);
 }
 
-/* Fill a row with the normals of a vertex, from supine_gl_pack_normals' words of three numbers. The
- * row has the first numbers of all words, then the second, then the third ones, without their
- * lowest 2, 2 and 1 bits, respectively. takeNormals in basis.js reads the row. */
+/* Fill a row, which takeNormals in basis.js reads, with the normals of a vertex. Each word from
+ * supine_gl_pack_normals has three numbers. The row has the first number of every word, then every
+ * second, then every third number, without their lowest 2, 2 and 1 bits, respectively. */
 static void normal_row(const page *p, const export_source *s, size_t vertex, int16_t *row) {
   uint32_t words[3 * NORMAL_WORDS];
   const size_t count = (s->info->normal_count + 2) / 3 * 3;
@@ -166,7 +166,7 @@ static void find_units(page *p) {
   p->inside_unit = fmax(2 * step / (double)k, largest_inside / COUNT_MAX);
 }
 
-/* Write those tensors in `names` that the basis has, as doubles without compression. */
+/* Write the modes, the weights of normals and the volume tensors of the basis, uncompressed. */
 static void write_doubles(FILE *file, const supine_basis *basis) {
   static const char *const names[] = {"modes",         "normal_weights",   "resting_volume",
                                       "volume_linear", "volume_quadratic", "volume_cubic"};
@@ -210,7 +210,7 @@ static json_t *begins(const export_source *s, const size_t *begin) {
   return list;
 }
 
-/* Return the size, the parts and the unit of the lungs' content as JSON; null without content. */
+/* Return the size, the names and the unit of the parts inside the lungs as JSON. */
 static json_t *describe_inside(const page *p) {
   if (p->shown->inside == NULL) {
     return json_null();

@@ -40,9 +40,9 @@ typedef struct export_order {
 } export_order;
 
 /** Choose an order; free it with supine_export_order_free, also after a failure.
- * @param packed  true to choose an order that compresses well: triangles are sorted, and vertices
- *                are in the order in which the triangles first use them; call
- *                supine_export_pack_begin before. If false, keep the order of the basis
+ * @param packed  false to keep the order of the basis; true to sort the triangles, and to put the
+ *                vertices in the order in which the triangles first use them, because this order
+ *                compresses well. If true, call supine_export_pack_begin first
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_export_order_make(const export_source *source, bool packed,
                                        export_order *order, supine_error *error);

@@ -7,7 +7,7 @@
 #include "sh/base/vec3.h"
 
 enum { DIRECTIONS = 4096 }; /* number of sampled directions of gravity */
-/* Fraction by which each weight's range grows at both ends, for directions between samples. */
+/* The range of each weight in the sampled directions is extended by this fraction at both ends. */
 static const double margin = 0.02;
 
 /* Set `split` to {s, t}, such that gains[axis] = s + t bend[axis] along the axes with the smallest
@@ -23,7 +23,7 @@ static void split_gains(const double bend[3], const double gains[3], double spli
   split[0] = gains[low] - split[1] * bend[low];
 }
 
-/* Compute amount_j of export_weights for each field j of a lung. */
+/* Compute amount_j, which targets.h defines, for each field j of a lung. */
 static void find_amounts(const export_source *source, size_t count, const supine_pose *pose,
                          size_t lung, double *amounts) {
   const size_t k = source->info->mode_count;
@@ -43,9 +43,9 @@ void supine_export_targets_weights(const export_source *source, const export_tar
   }
 }
 
-/* Set each offset to the smallest amount of its field during a breath in any sampled direction of
- * gravity, and each unit to the difference between the largest and the smallest amount. Gains are
- * monotonic in the volume, so that the start and the end of the breath suffice. */
+/* For each field of targets.h, find the smallest and the largest amount in any sampled direction of
+ * gravity, at the start and at the end of a breath. These suffice, because gains are monotonic in
+ * the volume. Set the offset to the smallest amount, and the unit to the difference of the two. */
 static supine_status find_ranges(const export_source *source, double breath,
                                  export_targets *targets, supine_error *error) {
   double amounts[EXPORT_TARGETS_MAX];
@@ -151,11 +151,11 @@ static void find_normals(const export_source *source, const export_targets *targ
   supine_normals(source->basis, xyz, normals);
 }
 
-/* Divide each base normal by its length, because glTF requires unit normals, and the vectors that
- * targets add to it by the same length, because engines normalise the sum. */
+/* Divide each base normal by its length, because glTF requires unit normals. Divide the vectors
+ * that targets add to a normal by the same length: engines normalise the sum. */
 static void make_unit(const export_source *source, const export_targets *targets, float *base,
                       float *added) {
-  static const double least = 0.2; /* smallest divisor of added vectors, to keep them short */
+  static const double least = 0.2; /* added vectors are divided by at least this */
   const size_t n = source->info->vertex_count;
   for (size_t i = 0; i < n; ++i) {
     float *b = base + 3 * i;
@@ -207,7 +207,7 @@ supine_status supine_export_targets_normals(const export_source *source, double 
                                             float *base, float *added, supine_error *error) {
   static const double supine[3] = {0, 1, 0};
   static const double step = 0.2;    /* change of a weight for central differences */
-  static const double least = 0.044; /* smaller RMS changes of normals, radians, become 0 */
+  static const double least = 0.044; /* RMS changes of normals below this, radians, become 0 */
   const size_t n = source->info->vertex_count;
   supine_pose pose;
   double(*weights)[EXPORT_TARGETS_MAX] = malloc(source->info->lung_count * sizeof *weights);

@@ -39,7 +39,7 @@ supine_status supine_export_targets_choose(const export_source *source, double b
 void supine_export_targets_weights(const export_source *source, const export_targets *targets,
                                    const supine_pose *pose, size_t lung, double *weights);
 
-/** Compute field_j of export_weights at a vertex, mm. */
+/** Compute field_j, which export_weights defines, at a vertex, mm. */
 void supine_export_targets_field(const export_source *source, size_t vertex, size_t j, double u[3]);
 
 /** Compute the position of a vertex in a lung's base mesh, mm, relative to `targets->middle`. */
@@ -48,8 +48,8 @@ void supine_export_targets_base(const export_source *source, const export_target
 
 /** Linearise the surface's normals about the supine posture: compute the normals `base` [N, 3] of
  * the base mesh, and the vectors `added` [count, N, 3] that each target adds to them at weight 1.
- * @param order  [N] order in which the file stores vertices. Vectors are rounded so that they
- *               compress well in this order, and become 0 for a target that turns a lung's normals
+ * @param order  [N] order in which the file stores vertices. `added` is rounded so that it
+ *               compresses well in this order, and is 0 for a target that turns a lung's normals
  *               by less than 2.5 degrees (RMS). NULL for exact vectors
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_export_targets_normals(const export_source *source, double breath,

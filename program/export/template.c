@@ -88,7 +88,7 @@ static void write_named(const supine_template *t, const tag *named, const scope 
   if (value != NULL) {
     write_value(value, file);
   } else if (asset != NULL && strstr(asset->name, ".html") != NULL) {
-    /* Omit the last newline of the asset, because another one follows the tag. */
+    /* Omit the last newline of the asset, because the template has a newline after the tag. */
     const size_t size = asset->size - (asset->bytes[asset->size - 1] == '\n');
     fill(t, asset->bytes, asset->bytes + size, around, file);
   } else if (asset != NULL) {

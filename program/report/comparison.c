@@ -7,8 +7,8 @@
 #include "program/report/comparison.h"
 #include "sh/base/vec3.h"
 
-/* Compute the volume that each lung and each slab gains in a breath, which begins at the volume of
- * the posture. `xyz` [2][N, 3] is workspace. */
+/* Compute the volume that each lung and each slab gains in a breath that begins at the volume
+ * of the posture. `xyz` [2][N, 3] is workspace. */
 static supine_status find_breath(const supine_comparison *c, const supine_posture_item *item,
                                  float *xyz[2], supine_compared_posture *posture,
                                  supine_error *error) {
@@ -93,8 +93,8 @@ double supine_report_from_supine(const supine_comparison *c, const double gravit
   return supine_compare_rms(c->compare, &pose[1], &pose[0]);
 }
 
-/* Find the direction of gravity in which the surface has the largest RMS distance from supine,
- * among 2048 directions that cover the sphere evenly, about 4.5 degrees apart. */
+/* Among 2048 directions of gravity, evenly spread about 4.5 degrees apart, find the one in which
+ * the surface is farthest (RMS) from its supine position. */
 static void find_farthest(supine_comparison *c) {
   enum { DIRECTIONS = 2048 };
   for (size_t i = 0; i < DIRECTIONS; ++i) {

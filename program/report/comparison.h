@@ -20,8 +20,8 @@ typedef struct supine_compared_posture {
   double volume[SUPINE_LUNGS_MAX];           /* volume of each lung, gas and tissue, mL */
   double gain[SUPINE_LUNGS_MAX];             /* volume that each lung gains in the breath, mL */
   supine_slab slab[SUPINE_COMPARISON_SLABS]; /* horizontal slabs, uppermost first */
-  double expansion[SUPINE_COMPARISON_SLABS]; /* each slab's gain divided by the slab's volume */
-  double share[SUPINE_COMPARISON_SLABS];     /* each slab's gain divided by all lungs' gain */
+  double expansion[SUPINE_COMPARISON_SLABS]; /* volume that each slab gains / volume of the slab */
+  double share[SUPINE_COMPARISON_SLABS];     /* volume that each slab gains / gain of all lungs */
 } supine_compared_posture;
 
 typedef struct supine_comparison {
@@ -30,16 +30,16 @@ typedef struct supine_comparison {
   const char *made_by; /* command line, which the report prints */
   bool allow_folds;
   const supine_basis *basis;
-  supine_state state; /* supine state; all postures have its volume */
+  supine_state state; /* supine, at the volume used for all postures */
   supine_from from;
   double breath; /* volume that a breath adds, mL */
   supine_posture_list postures;
   supine_reference_pose reference; /* pose from which displacements are measured */
   supine_compare *compare;
   supine_compared_posture *posture; /* [postures.count] */
-  size_t directions;                /* number of sampled directions that allow state.volume */
-  double farthest[3];  /* direction of gravity with the largest RMS distance from supine */
-  double farthest_rms; /* RMS distance from supine at `farthest`, mm */
+  size_t directions;                /* number of sampled directions of gravity with a valid pose */
+  double farthest[3];  /* direction of gravity that moves the lungs farthest from supine */
+  double farthest_rms; /* RMS distance from the supine surface, with gravity `farthest`, mm */
 } supine_comparison;
 
 /* Compute `reference` and the members after it. Free them with supine_report_free, also after a
@@ -59,7 +59,7 @@ double supine_report_from_supine(const supine_comparison *comparison, const doub
 /* Return whether the expected error of any posture is known. */
 bool supine_report_has_errors(const supine_comparison *comparison);
 
-/* Return the volume by which a breath in a posture expands all lungs together, mL. */
+/* Return the volume that all lungs together gain by a breath in a posture, mL. */
 double supine_report_gain(const supine_comparison *comparison, size_t posture);
 
 /* Print the comparison to standard output, as JSON or as text with tables of the postures. */

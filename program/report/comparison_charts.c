@@ -12,7 +12,7 @@
 
 static const double pi = 3.14159265358979323846;
 
-/* Return a slab's share of the breath, or its regional expansion, %. */
+/* Return a slab's share of the breath, %, if `share` is true; otherwise its expansion, %. */
 static double percent(const supine_comparison *c, bool share, size_t posture, size_t slab) {
   const supine_compared_posture *p = &c->posture[posture];
   return 100.0 * (share ? p->share : p->expansion)[slab];
@@ -126,7 +126,7 @@ json_t *supine_report_direction(const double g[3]) {
     double named[3];
     (void)supine_posture_gravity(supine_posture_name(i), named);
     const double cosine = supine_dot(named, g);
-    /* If two postures are equally near, keep the first: a name precedes its DICOM code. */
+    /* If two postures are equally near, keep the first: names are listed before DICOM codes. */
     if (cosine > nearest + 1e-9) {
       nearest = cosine;
       name = supine_posture_name(i);

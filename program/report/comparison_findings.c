@@ -106,10 +106,10 @@ json_t *supine_report_findings(const supine_comparison *c) {
   return list;
 }
 
-/* Print the title of a profile: a heading, then name and value of the postures 0 to `last`. */
+/* Print the title of a profile: a heading, then the name and value of each posture up to `last`. */
 static void print_profile(const supine_comparison *c, size_t last, bool share, FILE *to) {
   (void)fputs(share ? "Share of the lower half in a breath:"
-                    : "Expansion of the lowest 30 % of the height over that of the uppermost:",
+                    : "Expansion, lowest 30 % of the height divided by uppermost 30 %:",
               to);
   for (size_t i = 0; i <= last; ++i) {
     double gain = 0;

@@ -15,11 +15,11 @@ json_t *supine_report_hex(supine_colours map, double t);
 const char *supine_report_line(size_t posture);
 
 /* Return the data of bar.html, a colour bar from 0 to `largest` with the caption `words`. If
- * `beyond` is true, some values are larger, and the bar has a pointed end. */
+ * `beyond` is true, some values exceed `largest`, and the bar has a pointed end. */
 json_t *supine_report_bar(supine_colours map, double largest, bool beyond, const char *words);
 
-/* Return a direction of gravity as text: the name of its posture, or its angle from the nearest
- * named posture and its vector in the notation of --posture. */
+/* Return a direction of gravity as text: the name of its posture. If the posture has no name,
+ * return the angle from the nearest named posture, and the vector as --posture takes it. */
 json_t *supine_report_direction(const double g[3]);
 
 /* Return {{findings}}: a sentence on each of the first three postures that differ from the

@@ -20,7 +20,7 @@ static supine_scene make_scene(const supine_comparison *c, size_t posture, const
 
 /* Draw a scene and return it as PNG in base64, or NULL on failure. */
 static json_t *draw(supine_renderer *renderer, const supine_scene *scene, supine_error *error) {
-  char *bytes[2] = {NULL, NULL}; /* the PNG, and its base64 */
+  char *bytes[2] = {NULL, NULL}; /* [0] PNG; [1] the same PNG as base64 */
   size_t size[2] = {0, 0};
   FILE *file[2] = {open_memstream(&bytes[0], &size[0]), open_memstream(&bytes[1], &size[1])};
   json_t *made = NULL;
@@ -38,9 +38,9 @@ static json_t *draw(supine_renderer *renderer, const supine_scene *scene, supine
   return made;
 }
 
-/* Add gravity to `shot`, the data of a picture: its angle {{along}} in degrees clockwise from the
- * right, and the clockwise rotation {{turn}} that makes it point down. If gravity is almost normal
- * to the picture, add {{towards}} or {{away}} (the viewer) instead. */
+/* Add the direction of gravity to `shot`, the data of a picture. {{along}} is the angle, degrees
+ * clockwise from the right. {{turn}} is the clockwise rotation, degrees, after which gravity points
+ * down. If gravity is nearly normal to the picture, {{towards}} or {{away}} replaces both. */
 static void set_gravity(const double g[3], json_t *shot) {
   double axes[3][3];
   double seen[3] = {0.0, 0.0, 0.0};

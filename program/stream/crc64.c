@@ -10,9 +10,9 @@
 
 #include "program/stream/message.h"
 
-static const uint64_t polynomial = 0x42F0E1EBA9EA3693u; /* P of message.h without its term x^64 */
+static const uint64_t polynomial = 0x42F0E1EBA9EA3693u; /* polynomial P of message.h, less x^64 */
 
-/* Indices of `distance`: by how many bytes fold() moves a part of the message. */
+/* Indices of `distance`, which has the numbers of bytes by which fold() moves data. */
 enum { NEAR, FAR, FARTHEST, STEPS };
 static const size_t distance[STEPS] = {16, 64, 256};
 
@@ -86,8 +86,8 @@ WIDE static lanes take_wide(const void *at) {
   return _mm512_shuffle_epi8(_mm512_loadu_si512(at), _mm512_broadcast_i32x4(REVERSED));
 }
 
-/* Return 128 bits congruent to a x^n + next mod P. `powers` has the factors of the low and the high
- * half of `a`: x^n and x^(n + 64). */
+/* Return 128 bits that equal a x^n + next modulo P. `powers` has the factors of the low and the
+ * high half of `a`: x^n and x^(n + 64). */
 CARRY_LESS static lane fold(lane a, lane powers, lane next) {
   return _mm_xor_si128(next, _mm_xor_si128(_mm_clmulepi64_si128(a, powers, 0x11),
                                            _mm_clmulepi64_si128(a, powers, 0x00)));

@@ -187,7 +187,7 @@ static void compute_range(void *context, size_t begin, size_t end, size_t thread
   }
 }
 
-/* Compute a frame's points from snapshot.location; if NULL or unusable, from snapshot.pose. */
+/* Compute a frame's points from snapshot.location, or from snapshot.pose if that is unusable. */
 static void compute_points(supine_stream_frames *f, supine_stream_frame *frame) {
   points_work p = {.frames = f, .frame = frame};
   if (frame->snapshot.location != NULL && compute_located_points(f, frame)) {

@@ -31,7 +31,7 @@ extern const char *const supine_stream_content_names[SUPINE_STREAM_CONTENT_COUNT
 typedef struct supine_stream_snapshot {
   double gravity[3]; /**< direction of gravity, a unit vector in body axes */
   double volume;     /**< volume of all lungs together, gas and tissue, mL */
-  double above;      /**< volume minus that at rest (in the scan if rest is unknown), mL */
+  double above;      /**< volume above rest (above the scan if rest is unknown), mL */
   uint64_t stamp;    /**< stamp of the newest pose or observed point, as in supine_stream_header */
   double received;   /**< time of receipt of the newest message, s by supine_clock_seconds; negative
                         if none was received since the previous frame */
@@ -48,7 +48,7 @@ typedef struct supine_stream_frame {
   bool has_points; /**< true if `points` and `points_crc` are computed */
   float *points;   /**< [N, 3] positions as sent, big-endian */
   uint64_t points_crc;
-  unsigned char *errors; /**< expected errors as sent; valid unless snapshot.location is NULL */
+  unsigned char *errors; /**< encoded expected errors; unused if snapshot.location is NULL */
   struct supine_stream_frame *next; /**< next frame in the list of unused frames */
 } supine_stream_frame;
 

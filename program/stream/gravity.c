@@ -8,7 +8,7 @@
 #include "program/options/breath_turn.h"
 #include "program/stream/gravity.h"
 
-/* Largest deviation from a rotation with which a matrix counts as exact. Rounding to 32-bit floats
+/* A matrix that deviates from a rotation by at most this counts as exact. Rounding to 32-bit floats
  * causes deviations of 1e-6, the arithmetic of trackers up to about 1e-4. */
 static const double exact_max = 1e-3;
 static const double repaired_max = 0.1; /* largest stretch or shear that is repaired */
@@ -42,7 +42,7 @@ static void apply_transpose(const double m[9], const double v[3], double out[3])
 supine_stream_verdict supine_stream_gravity_rotation(const supine_stream_setup *setup,
                                                      const double rotation[9], double gravity[3],
                                                      const char **why) {
-  double product[9]; /* R^T R, which is the squared scale times I for a scaled rotation */
+  double product[9]; /* R^T R, where R is `rotation` */
   for (int i = 0; i < 3; ++i) {
     const double column[3] = {rotation[i], rotation[3 + i], rotation[6 + i]};
     apply_transpose(rotation, column, product + 3 * i);

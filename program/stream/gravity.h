@@ -31,8 +31,8 @@ typedef enum supine_stream_verdict {
 } supine_stream_verdict;
 
 /** Compute the direction of gravity from the matrix R, row by row. A matrix within 0.001 of a
- * rotation is exact. A matrix with another scale, or with stretch or shear of at most a tenth, is
- * repaired; the direction then errs by less than 13 degrees. A matrix that is not finite, is
+ * rotation is exact. A matrix with a scale other than 1, or with stretch or shear of at most 0.1,
+ * is repaired; the direction then errs by less than 13 degrees. A matrix that is not finite, is
  * singular, contains a reflection, or has more stretch or shear is refused.
  * @param why  set to the reason if the matrix is repaired or refused, otherwise to NULL */
 supine_stream_verdict supine_stream_gravity_rotation(const supine_stream_setup *setup,

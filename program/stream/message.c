@@ -54,7 +54,7 @@ void supine_stream_header_write(const supine_stream_header *header,
 }
 
 size_t supine_stream_ndarray_head(size_t count, unsigned char *bytes) {
-  bytes[0] = 10; /* type: 32-bit floats */
+  bytes[0] = 10; /* type 10: 32-bit floats */
   bytes[1] = 1;  /* number of dimensions */
   put(bytes + 2, 2, count);
   return 4;
@@ -89,7 +89,7 @@ SUPINE_CLONES void supine_stream_encode_floats(size_t count, float *values) {
   }
 }
 
-/* Unread part of a body. Reading beyond its end returns zeros and sets `overrun`. */
+/* Unread part of a body. Reading beyond the end returns zeros and sets `overrun`. */
 typedef struct cursor {
   const unsigned char *at;
   size_t left;
@@ -194,7 +194,7 @@ static void array(cursor *c, supine_stream_message *m, supine_stream_kind kind, 
   uint64_t count = 1;
   for (uint64_t i = 0; i < dimension; ++i) {
     const uint64_t size = whole(c, 2);
-    count = count > SUPINE_STREAM_BODY_MAX ? count : count * size; /* the product is below 2^32 */
+    count = count > SUPINE_STREAM_BODY_MAX ? count : count * size; /* cannot overflow */
   }
   if (count != expected || (type != 10 && type != 11)) {
     return;
@@ -276,7 +276,7 @@ supine_status supine_stream_message_read(const supine_stream_header *header,
     transform(&c, header->device, ours, message);
   } else if (type == POINT) {
     points(&c, message);
-  } else if (type == POSITION && ours && size > 12) { /* a body of 12 bytes has no quaternion */
+  } else if (type == POSITION && ours && size > 12) { /* a shorter body has no quaternion */
     (void)pass(&c, 12);
     quaternion(&c, message);
   } else if (type == NDARRAY && ours) {

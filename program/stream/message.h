@@ -7,7 +7,7 @@
  *     body       in version 1: content; in version 2: extension, content, metadata
  *     extension  its size (2), metadata index size (2), metadata size (4), message number (4)
  *
- * The extension has this layout in the protocol's library; the specification differs. Its size is
+ * The extension has this layout in the OpenIGTLink library; the specification differs. Its size is
  * at least 12. Every length in a message is checked against the bytes received. */
 #ifndef SUPINE_STREAM_MESSAGE_H
 #define SUPINE_STREAM_MESSAGE_H
@@ -45,7 +45,7 @@ typedef enum supine_stream_kind {
   SUPINE_STREAM_NOTHING = 0, /**< message that is ignored because of its type or device */
   SUPINE_STREAM_ROTATION,    /**< number[0..8]: matrix from tracker to world axes, row by row;
                                   number[9..11]: position, mm; text: name of the device */
-  SUPINE_STREAM_POSITION,    /**< like ROTATION, but only the position is to be used */
+  SUPINE_STREAM_POSITION,    /**< like SUPINE_STREAM_ROTATION, but only the position is used */
   SUPINE_STREAM_POINT_LIST,  /**< points: supine_stream_message_point reads one of them */
   SUPINE_STREAM_QUATERNION,  /**< number[0..3]: w, x, y, z of the tracker-to-world rotation */
   SUPINE_STREAM_DOWN,        /**< number[0..2]: direction of gravity in tracker axes */
@@ -58,7 +58,7 @@ typedef struct supine_stream_message {
   supine_stream_kind kind;
   double number[12];
   char text[64];
-  const unsigned char *points; /**< [point_count] points as received, which lie in the body */
+  const unsigned char *points; /**< [point_count] points as received, within the body */
   size_t point_count;
 } supine_stream_message;
 
@@ -87,7 +87,7 @@ supine_status supine_stream_message_read(const supine_stream_header *header,
 size_t supine_stream_ndarray_head(size_t count, unsigned char *bytes);
 
 /** Write the first 40 bytes of a POLYDATA, which precede its points; return 40.
- * @param points, strips  number of points, number of triangle strips
+ * @param points, strips  numbers of points and of triangle strips
  * @param size            size of the triangle strips, bytes
  * @param attributes      number of attributes after the triangle strips, 0 or 1 */
 size_t supine_stream_polydata_head(size_t points, size_t strips, size_t size, size_t attributes,
@@ -110,8 +110,8 @@ void supine_stream_encode_floats(size_t count, float *values);
 /** Extend `crc`, the checksum of the bytes so far, by `size` bytes; begin with 0. Thread-safe. */
 uint64_t supine_stream_crc64(uint64_t crc, const void *bytes, size_t size);
 
-/** Return the checksum of bytes A and then B from `first` = crc(A), `second` = crc(B) and the
- * `size` of B: crc(A) x^(8 size) + crc(B) mod P. */
+/** Return the checksum of the bytes A followed by the bytes B from `first` = crc(A), `second` =
+ * crc(B) and the `size` of B: crc(A) x^(8 size) + crc(B) mod P. */
 uint64_t supine_stream_crc64_join(uint64_t first, uint64_t second, size_t size);
 
 #endif

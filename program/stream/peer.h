@@ -37,11 +37,11 @@ typedef struct supine_stream_peer {
   bool connecting;
   /* received data */
   unsigned char header_bytes[SUPINE_STREAM_HEADER];
-  size_t received; /**< bytes received, of the body if `in_body`, otherwise of the header */
+  size_t received; /**< bytes received of the body if `in_body` is true, else of the header */
   bool in_body;
   supine_stream_header header;
   uint64_t to_skip;    /**< bytes of a skipped body that are still to be received */
-  unsigned char *body; /**< [SUPINE_STREAM_BODY_MAX] */
+  unsigned char *body; /**< [SUPINE_STREAM_BODY_MAX] body of the message */
   double emptied;      /**< time at which the socket last had no data, s by supine_clock_seconds */
   /* data to send */
   supine_stream_content content;
@@ -52,7 +52,7 @@ typedef struct supine_stream_peer {
 } supine_stream_peer;
 
 typedef enum supine_stream_outcome {
-  SUPINE_STREAM_DONE = 0, /**< no bytes are left to read, or the message is sent */
+  SUPINE_STREAM_DONE = 0, /**< all bytes are read, or the whole message is sent */
   SUPINE_STREAM_MORE,     /**< bytes are left to read or to send: call again */
   SUPINE_STREAM_LOST      /**< the peer closed the connection, or sent invalid data */
 } supine_stream_outcome;

@@ -14,10 +14,10 @@
 #include "program/stream/tracked_patient.h"
 #include "sh/base/clock.h"
 
-static const double frame_interval = 15e-3; /* s between frames if lungs move without new poses */
-static const double send_interval = 20e-3;  /* s between checks whether a frame has left */
-static const double connect_interval = 1.0; /* s before the next attempt to connect a peer */
-static const double stop_interval = 0.1;    /* s between calls of options->stop */
+static const double frame_interval = 15e-3; /* time between frames without new messages, s */
+static const double send_interval = 20e-3;  /* time between checks whether a frame is sent, s */
+static const double connect_interval = 1.0; /* time between attempts to connect to a peer, s */
+static const double stop_interval = 0.1;    /* time between calls of options->stop, s */
 
 /* All times are in seconds by supine_clock_seconds. */
 struct supine_stream_server {
@@ -33,17 +33,17 @@ struct supine_stream_server {
   double connect_at;              /* time of the next attempt to connect; INFINITY if none */
   double accept_at;               /* time at which to accept peers again after a failure */
   supine_stream_peer *connected;  /* peer of --connect, connected or connecting; NULL if none */
-  supine_stream_peer *peer;       /* [options->peers] */
+  supine_stream_peer *peer;       /* [options->peers] connected peers and free slots */
   struct pollfd *polled;          /* [options->peers + 2] peers, listener, live page */
   supine_stream_peer **owner;     /* [options->peers + 2] peer of each polled socket, or NULL */
   size_t replayed;                /* number of recorded poses replayed so far */
   double replay_begun;            /* time at which the replay began; negative before that */
   double wait_begun;              /* time at which ppoll() was last called */
   double woke;                    /* time at which ppoll() last returned */
-  supine_stream_latency *latency; /* [2] for weights; for points and surfaces */
+  supine_stream_latency *latency; /* [0] of weights; [1] of points and surfaces */
 };
 
-/* Return whether a peer is ready for a frame and has not been sent the newest one. */
+/* Return whether a peer waits for a frame, and has not been sent the newest frame. */
 static bool needs_frame(const supine_stream_server *s, const supine_stream_peer *peer) {
   return peer->socket >= 0 && !peer->connecting && peer->frame == NULL &&
          peer->content != SUPINE_STREAM_SILENCE && s->latest != NULL &&
@@ -173,7 +173,7 @@ static void replay_poses(supine_stream_server *s) {
   }
 }
 
-/* Return the time at which to make the next frame; INFINITY if the lungs do not move. */
+/* Return the time at which to make the next frame; INFINITY if no frame is needed. */
 static double frame_due(const supine_stream_server *s) {
   const double soonest = s->latest == NULL ? 0.0 : s->frame_time + 1.0 / s->options->rate;
   if (s->patient.pending || s->latest == NULL) {
@@ -182,7 +182,7 @@ static double frame_due(const supine_stream_server *s) {
   if (!supine_stream_patient_moves(&s->patient)) {
     return (double)INFINITY;
   }
-  /* While messages arrive, each one triggers a frame: allow two intervals for the next message. */
+  /* Each message triggers a frame. After a recent message, wait two intervals for the next one. */
   const bool driven = s->woke - s->patient.received < 2.0 * frame_interval;
   return fmax(soonest, s->frame_time + (driven ? 2.0 : 1.0) * frame_interval);
 }
@@ -222,7 +222,7 @@ double supine_stream_latency_quantile(const supine_stream_latency *latency, doub
   return latency->worst;
 }
 
-/* Send a peer the rest of its frame, or the newest frame if the peer is ready for it. */
+/* Send the unsent rest of a frame to a peer. If there is none, send the newest frame. */
 static void send_peer(supine_stream_server *s, supine_stream_peer *peer) {
   if (needs_frame(s, peer) && supine_stream_peer_ready(peer)) {
     supine_stream_peer_give(peer, s->frames, s->latest);

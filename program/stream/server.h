@@ -83,8 +83,8 @@ typedef struct supine_stream_options {
   const char *listen;  /**< "PORT" (for this machine alone) or "ADDRESS:PORT"; port 0 chooses a free
                           port; NULL if the server does not listen */
   const char *connect; /**< "HOST:PORT" of a peer, tried until it accepts; NULL if none */
-  const char *device;  /**< device that gives the patient's pose; NULL if every device does */
-  const char *name;    /**< device name in the messages sent */
+  const char *device;  /**< device that sends the pose of the patient; NULL for any device */
+  const char *name;    /**< device name in sent messages */
   supine_stream_setup setup;
   supine_stream_volume *volume;      /**< volume or breath at the start; messages may change it */
   supine_stream_observed *observed;  /**< points whose positions come in messages; NULL if none */
@@ -92,8 +92,8 @@ typedef struct supine_stream_options {
   bool ras;                          /**< send points in RAS */
   double rate;                       /**< maximum number of frames a second */
   size_t peers;                      /**< maximum number of peers, 1 to 1000 */
-  double smooth;                     /**< time constant of smoothing, s; 0 for no smoothing */
-  double seconds;                    /**< duration of the run; 0 to run until `stop` returns true */
+  double smooth;                     /**< time constant for smoothing gravity, s; 0 to turn off */
+  double seconds;                    /**< duration, s; 0 to run until `stop` returns true */
   const supine_stream_poses *replay; /**< recorded poses, replayed once a peer or viewer has
                                         connected; NULL if none */
   FILE *record;                      /**< file to which each pose is written; NULL if none */

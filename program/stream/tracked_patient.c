@@ -247,7 +247,7 @@ static void find_gains(supine_stream_patient *patient, double now,
   snapshot->above += snapshot->volume;
 }
 
-/* Fit the pose to the observed points that are seen. Fit the volume too, unless it is fixed. */
+/* Locate the lungs from the observed points that are seen. Find their volume unless it is fixed. */
 static void find_location(supine_stream_patient *patient, double now,
                           supine_stream_snapshot *snapshot) {
   const supine_stream_volume *volume = patient->options->volume;
@@ -293,7 +293,7 @@ void supine_stream_patient_snapshot(supine_stream_patient *patient, double now,
                                    patient->options->smooth, patient->smoothed_gravity);
   *snapshot = (supine_stream_snapshot){0};
   patient->smoothed_at = now;
-  patient->turning = angle > 1e-6; /* a smaller angle displaces points by less than 1 um */
+  patient->turning = angle > 1e-6; /* a smaller rotation moves points by less than 1 um */
   memcpy(snapshot->gravity, patient->smoothed_gravity, sizeof snapshot->gravity);
   snapshot->received = patient->pending ? patient->received : -1.0;
   snapshot->pose_received = patient->pose_received;

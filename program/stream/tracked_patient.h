@@ -9,13 +9,13 @@
 
 /** How the volume is determined. */
 struct supine_stream_volume {
-  bool breathes;      /**< the volume follows `pv` and `breath`; otherwise it is `fixed` */
-  supine_state fixed; /**< fixed volume; its gravity is not used */
+  bool breathes;      /**< true if the volume follows `breath`, false if it is `fixed` */
+  supine_state fixed; /**< fixed volume; the field `gravity` is not used */
   supine_pv pv;
   supine_pv_breath breath;
 };
 
-/** Let the volume follow a breath that begins at time 0. Return as supine_breath_evaluate does. */
+/** Let the volume follow a breath from time 0. Return the status of supine_breath_evaluate. */
 supine_status supine_stream_volume_breathe(supine_stream_volume *volume, const supine_pv *pv,
                                            const supine_pv_breath *breath, supine_error *error);
 
@@ -24,7 +24,7 @@ supine_status supine_stream_volume_breathe(supine_stream_volume *volume, const s
 supine_status supine_stream_volume_fix(supine_stream_volume *volume, const char *text,
                                        supine_error *error);
 
-/** Return the state at `time`, s, for a direction of gravity (unit vector). */
+/** Return the state for the unit vector `gravity`, `time` seconds after the breath begins. */
 supine_state supine_stream_volume_at(const supine_stream_volume *volume, const supine_basis *basis,
                                      const double gravity[3], double time);
 

@@ -81,7 +81,7 @@ static bool is_ours(struct lws *wsi) {
   return from != NULL && strcmp(from + 3, host) == 0;
 }
 
-/* Pass the pose of a message {"gravity":[x,y,z]} to the pipe, unless it is full; ignore others. */
+/* Write the pose in a message {"gravity":[x,y,z]} to the pipe. Ignore all other messages. */
 static void receive(supine_stream_web *web, const char *bytes, size_t size) {
   json_t *pose = json_loadb(bytes, size, 0, NULL);
   const json_t *gravity = json_object_get(pose, "gravity");
@@ -140,7 +140,7 @@ static int view(struct lws *wsi, enum lws_callback_reasons reason, void *user, v
     return 0;
   case LWS_CALLBACK_SERVER_WRITEABLE:
     return send_state(web, wsi, s);
-  case LWS_CALLBACK_RECEIVE: /* ignore messages in fragments, which are too long */
+  case LWS_CALLBACK_RECEIVE: /* ignore messages that are split into fragments */
     if (lws.is_first_fragment(wsi) != 0 && lws.is_final_fragment(wsi) != 0) {
       receive(web, in, size);
     }
@@ -237,7 +237,7 @@ supine_status supine_stream_web_create(const supine_stream_site *site, supine_st
   if (strchr(info.iface, ':') == NULL) {
     info.options |= LWS_SERVER_OPTION_DISABLE_IPV6;
   }
-  info.fd_limit_per_thread = (unsigned)site->viewers + 64; /* 64: connections that load the page */
+  info.fd_limit_per_thread = (unsigned)site->viewers + 64; /* 64 more may load the page */
   if (site->certificate != NULL) {
     info.options |= LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT;
     info.ssl_cert_filepath = site->certificate;

@@ -5,7 +5,7 @@
  *
  * Viewers receive the newest state: {"gravity":[x,y,z],"volume":mL,"above":mL,"age":s}
  *   above: volume above rest in the posture, or above the scan if rest is unknown
- *   age: time since the newest pose or observed point was received; -1 if none was
+ *   age: time since the newest pose or observed point was received; -1 if none was received
  * A phone sends its pose: {"gravity":[x,y,z]} */
 #ifndef SUPINE_STREAM_WEB_H
 #define SUPINE_STREAM_WEB_H
@@ -16,7 +16,7 @@
 
 typedef struct supine_stream_web supine_stream_web;
 
-/** Address and content of the server. There is no access control. */
+/** Address and content of the web server. There is no access control. */
 typedef struct supine_stream_site {
   const char *address;           /**< numeric address to listen on */
   int port;                      /**< 0 to choose a free port */
