@@ -22,7 +22,7 @@ enum { ENTRIES_MAX = 64 };
 typedef struct entries {
   size_t count;
   supine_metadata metadata[ENTRIES_MAX];
-  bool failed; /* memory ran out, or there are more than ENTRIES_MAX entries */
+  bool failed; /* whether memory ran out, or more than ENTRIES_MAX entries were added */
 } entries;
 
 SUPINE_PRINTF(3, 4)
@@ -60,7 +60,7 @@ static void add_accuracy(entries *list, const supine_accuracy *accuracy, bool at
   }
 }
 
-/* Add the number of vertices in lesions, and the range of the factors on their stiffness. */
+/* Add the number of vertices in lesions, and the range of the factors on stiffness. */
 static void add_lesions(entries *list, size_t count, const double *factors) {
   size_t changed = 0;
   double low = 1.0;
@@ -97,7 +97,7 @@ static void add_model(entries *list, const supine_lungs *lungs, const supine_mod
   }
 }
 
-/* Add an entry that holds one number for each lung, separated by a comma. */
+/* Add an entry with one number for each lung; a comma separates the numbers. */
 static void add_by_lung(entries *list, const char *key, size_t count, const double values[2]) {
   if (count == 2) {
     add(list, key, "%.9g,%.9g", values[0], values[1]);
@@ -130,7 +130,7 @@ static void add_reference(entries *list, const supine_reference *reference, cons
   add(list, "resting_shares", "%s", shares);
 }
 
-/* Add the constant of the expected error, and a mark if the volumes at rest are not the default. */
+/* Add the constant of the expected error, and whether the volumes at rest are not the default. */
 static void add_expected_error(entries *list, const supine_basis_content *content) {
   const supine_resting usual = supine_reference_resting_default();
   if (content->fit == NULL) {
@@ -177,7 +177,7 @@ static float *to_float(const double *values, size_t count) {
   return out;
 }
 
-/* Find modes of the normals from the vertices and directions in single precision. */
+/* Find the modes of the normals. Vertices and directions have the precision of the file. */
 static supine_status find_normals(const supine_basis_content *content, const float *vertices,
                                   const float *directions, supine_normals_modes *normals,
                                   supine_error *error) {

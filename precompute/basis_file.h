@@ -12,7 +12,7 @@ typedef struct supine_basis_content {
   const supine_lungs *lungs;
   const supine_precompute_options *options; /**< options->model is unused if `fit` is not NULL */
   const supine_fit_report *fit;             /**< NULL if the basis is made from a physical model */
-  const double *directions; /**< [N, 3] directions, mm; NULL if coefficients are vectors */
+  const double *directions; /**< [N, 3] displacement directions, mm; NULL for vector fields */
   const supine_compression *compression;
   const supine_volume_forms *forms;
   const supine_accuracy *accuracy;
@@ -20,7 +20,7 @@ typedef struct supine_basis_content {
   /** [G, 9] volume of each lung at rest minus that of its reference surface, mL, as harmonics of
    * the direction of gravity; NULL if `reference` is NULL */
   const double *resting;
-  const double *turned_over;       /**< result of supine_accuracy_turned_over, or NULL */
+  const double *turned_over;       /**< share of triangles that turn over, or NULL */
   const supine_error_table *table; /**< may be NULL */
 } supine_basis_content;
 

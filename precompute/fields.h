@@ -42,10 +42,10 @@ void supine_fields_free(supine_fields *fields);
 enum { SUPINE_FIT_BAND_MAX = 11 };
 
 typedef struct supine_fit_report {
-  size_t band_highest; /**< highest band whose coefficients the directions determine */
-  size_t band;         /**< chosen band */
-  double condition;    /**< condition number of the matrix of harmonics at all directions */
-  size_t mode_count;   /**< set only by supine_precompute_fields */
+  size_t band_highest;                   /**< highest band for which there are enough directions */
+  size_t band;                           /**< chosen band */
+  double condition;                      /**< condition number of the matrix of harmonics */
+  size_t mode_count;                     /**< set only by supine_precompute_fields */
   double error[SUPINE_FIT_BAND_MAX + 1]; /**< relative RMS leave-one-out error of each band */
   supine_accuracy accuracy; /**< leave-one-out errors of the chosen band; accuracy.volume is 0 */
 } supine_fit_report;

@@ -12,15 +12,15 @@
 #include "sh/base/vec3.h"
 #include <supine/sh.h>
 
-/* The directions determine a band if the condition number of its matrix of harmonics and the
- * leverage of each direction are within these limits. With leverage 1, the fit would reproduce the
- * field of that direction whatever it is. */
+/* The directions suffice for a band if the condition number of the matrix of harmonics and the
+ * leverage of each direction are within these limits. The fit reproduces any field whose direction
+ * has leverage 1. */
 static const double condition_max = 100.0;
 static const double leverage_max = 0.999;
 
 /* A higher band replaces the chosen one if its leave-one-out error is below `worthwhile` times that
- * of the chosen band. An error of at most `exact` is rounding error: such a band is not
- * replaced. */
+ * of the chosen band. A chosen band with an error of at most `exact` is kept, because such an error
+ * is rounding error. */
 static const double worthwhile = 0.99;
 static const double exact = 1e-6;
 
@@ -28,28 +28,28 @@ static const double exact = 1e-6;
  * harmonics at the directions. With its singular value decomposition Y = U S V^T, the coefficients
  * are A times the fields, where A = V S^-1 U^T. */
 typedef struct fit {
-  size_t count; /* M */
-  size_t terms; /* P */
-  double *y;    /* [M, P] */
-  double *a;    /* [P, M] */
+  size_t count; /* number M of directions */
+  size_t terms; /* number P of harmonics */
+  double *y;    /* [M, P] matrix Y of harmonics */
+  double *a;    /* [P, M] matrix A, which turns fields into coefficients */
   double condition;
 } fit;
 
 /* Work space of predict(). */
 typedef struct prediction {
   double *a;        /* [P, M] matrix A of the fit without one direction */
-  double *part;     /* [P, M] */
+  double *part;     /* [P, M] product of `a` and the scalar products of the fields */
   double *gram;     /* [P, P] scalar products of the P coefficient fields, mm^2 */
   double *values;   /* [P] eigenvalues of `gram` */
   double *vectors;  /* [P, P] eigenvectors of `gram` */
   double *target;   /* [P] harmonics at the predicted direction, projected onto the modes */
   double *residual; /* [M] weight of each field in the sum that gives the residual field */
-  double *product;  /* [M] */
+  double *product;  /* [M] product of the scalar products of the fields and `residual` */
 } prediction;
 
 typedef struct fitting {
   const supine_fields *fields;
-  size_t rows;  /* 3 N */
+  size_t rows;  /* 3 x number of vertices */
   double *gram; /* [M, M] scalar products of the M fields, mm^2 */
   fit chosen;
   prediction work;
@@ -135,9 +135,9 @@ static supine_status allocate(fitting *w, supine_error *error) {
 }
 
 /* Predict the field of direction d from all other fields. The residual is the true field minus the
- * prediction. It is a sum of all fields, whose weights are written to w->work.residual; its squared
- * norm, mm^2, is written to `square`. If `modes` is 0, predict with the harmonics; otherwise
- * predict with that number of leading modes of their coefficients.
+ * prediction. It is a weighted sum of all fields. Write the weights to w->work.residual, and the
+ * squared norm of the residual, mm^2, to `square`. If `modes` is 0, predict with the harmonics;
+ * otherwise predict with that number of leading modes of their coefficients.
  *
  * The fit without direction d has the matrix A_d instead of A. e_d is unit vector d, h is row d of
  * Y A:
@@ -225,18 +225,19 @@ static supine_status choose_band(fitting *w, int wanted, supine_fit_report *repo
     }
   }
   if (w->chosen.y == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%zu directions do not determine band %d (%d harmonics), but only the "
-                            "bands up to %d: give more directions, or leave --band out",
-                            m, wanted, (wanted + 1) * (wanted + 1), (int)determined_count - 1);
+    return supine_error_set(
+        error, SUPINE_ERROR_ARGUMENT,
+        "%zu directions do not determine band %d (%d harmonics); the highest "
+        "band that they determine is %d: give more directions, or leave --band out",
+        m, wanted, (wanted + 1) * (wanted + 1), (int)determined_count - 1);
   }
   report->band_highest = determined_count - 1;
   report->condition = w->chosen.condition;
   return SUPINE_OK;
 }
 
-/* Make a projection from the chosen fit: its columns are the M fields, and its functions [M, P] are
- * the transpose of the fit's matrix A. */
+/* Make a projection from the chosen fit. The columns are the M fields, the functions [M, P] are the
+ * transpose of the fit's matrix A. */
 static supine_status project(const fitting *w, size_t band, supine_projection *made,
                              supine_error *error) {
   const size_t m = w->chosen.count;

@@ -32,9 +32,9 @@ typedef struct pipeline {
   const supine_precompute_options *options;
   supine_lungs anchored; /* `given` with vertices moved by anchor(), or empty */
   supine_reference reference;
-  double *directions; /* [N, 3] mm */
-  /* [N] squared length of each direction, so that the modes minimise the error of the displacement:
-   * 0.34 % RMS for a left lung, without weights 0.40 % */
+  double *directions; /* [N, 3] directions of displacement, mm */
+  /* [N] squared length of each direction: with these weights, the modes minimise the error of the
+   * displacement. For a left lung it is then 0.34 % RMS instead of 0.40 %. */
   double *weight;
   supine_projection projection;
   supine_compression compression;
@@ -46,7 +46,7 @@ typedef struct pipeline {
   double turned_over;
   double resting[2][9]; /* volume of each lung at rest minus that of its reference surface, mL, as
                            harmonics */
-  /* Volume beyond the reference surface at which errors in mm are measured, mL, as harmonics. */
+  /* Volume minus that of the reference surface at which errors are measured, mL, as harmonics. */
   double volume[9];
   supine_error_table table;
 } pipeline;
@@ -94,7 +94,7 @@ static supine_status compress(pipeline *p, supine_error *error) {
  *
  *     p_j = scan_j - A_j F d_j
  *
- * along axis j. d are the directions of displacement. The gains A keep the volumes. */
+ * along axis j, with directions of displacement d, and gains A that give each lung its volumes. */
 static supine_status anchor(pipeline *p, supine_error *error) {
   const supine_lungs *lungs = p->given;
   const supine_compression *field = &p->compression;
@@ -193,7 +193,7 @@ static supine_status find_rest(pipeline *p, supine_error *error) {
   const supine_status status = rest_harmonics(&p->reference, options->model.share, &p->compression,
                                               &p->forms, p->resting, error);
   for (size_t t = 0; t < 9; ++t) {
-    p->volume[t] = p->resting[0][t] + p->resting[1][t]; /* resting[1] is 0 for a single lung */
+    p->volume[t] = p->resting[0][t] + p->resting[1][t];
   }
   return status;
 }
@@ -233,7 +233,6 @@ static size_t modes_needed(const pipeline *p) {
   return count;
 }
 
-/* Tabulate the error for each band and each number of modes, before modes are dropped. */
 static supine_status tabulate(pipeline *p, supine_error *error) {
   const supine_status status = supine_accuracy_error_table_create(
       &p->truth, &p->projection, &p->compression, p->directions, &p->table);
@@ -241,7 +240,6 @@ static supine_status tabulate(pipeline *p, supine_error *error) {
                              : supine_error_set(error, status, "no memory for the table of errors");
 }
 
-/* Drop modes that are not needed, and measure the error again. */
 static supine_status drop_modes(pipeline *p, supine_error *error) {
   const size_t needed = modes_needed(p);
   if (p->options->modes == 0 || needed == p->compression.mode_count) {

@@ -16,8 +16,8 @@ typedef struct supine_precompute_options {
   size_t band;                       /**< highest degree of the harmonics */
   size_t modes;          /**< largest number of modes; 0 uses the harmonics instead of modes */
   size_t held_out;       /**< number of held-out directions, or 0 for the default */
-  double expected_error; /**< constant c of supine/locate.h, mm; the default if 0 or above the
-                            default */
+  double expected_error; /**< constant c of the expected error (supine/locate.h), mm; 0 or a
+                            value above the default selects the default */
   supine_scan_frame frame;
   /** @{ Metadata of the file. Each may be NULL. */
   const char *made_by;         /**< command line */

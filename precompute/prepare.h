@@ -14,11 +14,11 @@ enum { SUPINE_LESIONS_MAX = 64 };
 
 /** The user's choices for the model and the scan. */
 typedef struct supine_model_choice {
-  int law;            /**< a supine_law; SUPINE_LAW_COUNT: `deep`, or `paper` with --scanned none */
-  supine_model model; /**< a constant that is NAN is taken from the law */
+  int law;                 /**< a supine_law, or SUPINE_LAW_COUNT to use the default law */
+  supine_model model;      /**< constants that the user gave; NAN selects the constant of the law */
   const char *patient_law; /**< name of the patient's law in `model`, or NULL if there is none */
   const double *stiffness; /**< [N] stiffness E of the patient's law, or NULL */
-  bool has_scan; /**< whether the user gave `scan`; if not, `deep` assumes full inflation */
+  bool has_scan; /**< whether the user gave `scan`; if not, the law `deep` assumes "full" */
   supine_scan scan;
   supine_resting resting;
   supine_person person;
@@ -26,14 +26,14 @@ typedef struct supine_model_choice {
   supine_expandability_law expandability_law;
   size_t lesion_count;
   supine_lesion lesions[SUPINE_LESIONS_MAX];
-  double share[2]; /**< volume of the collapsed left or right lung / healthy volume; 0 if healthy */
+  double share[2]; /**< volume / healthy volume, left and right; 0 for a lung without collapse */
 } supine_model_choice;
 
 supine_model_choice supine_precompute_choice_default(void);
 
 /** A physical model, the volumes of the lungs, and the assumptions about both. */
 typedef struct supine_prepared {
-  supine_model model; /**< points to `stiffness` and `lesions` */
+  supine_model model; /**< its arrays are `stiffness` and `lesions` below */
   supine_reference reference;
   char summary[512]; /**< the assumed law, scan and volumes in words */
   double *stiffness; /**< [N] stiffness E, or NULL */

@@ -127,8 +127,8 @@ static supine_status find_lobes(const char *folder, lobe_files *found, supine_er
                                 folder);
 }
 
-/* Load label maps. Without a given midline, a single lung gets the face of its box that is turned
- * towards the other lung. */
+/* Load label maps. The default midline of a single lung is the side of its bounding box that faces
+ * the other lung. */
 static supine_status load_maps(reading *r, supine_source *source, supine_findings *findings,
                                supine_error *error) {
   supine_labels_options wanted = r->options->labels;
@@ -142,7 +142,7 @@ static supine_status load_maps(reading *r, supine_source *source, supine_finding
   if (r->options->load.millimetres_per_unit != 0.0) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "--units is for surfaces: leave it out, as a label map's header states "
-                            "them");
+                            "its unit");
   }
   const supine_status status = supine_labels_surfaces(
       (const char *const *)(folder ? lobes.list : r->paths), folder ? lobes.count : r->count,

@@ -39,10 +39,10 @@ static const double least_new = 1e-7;
 /* The modes of the normals of one lung, before rounding. normal_modes.h defines N, n and V. */
 typedef struct fit {
   size_t count;                     /* number of modes, at most MOST */
-  size_t snapshot_count;            /* R */
+  size_t snapshot_count;            /* number R of snapshots */
   size_t state[SNAPSHOTS];          /* [R] index of the state of each snapshot */
-  float share[1 + SNAPSHOTS][MOST]; /* [1 + r][j] weight of snapshot r in mode j; [0] is zero */
-  double *weights;                  /* [MOST, 3, terms] by mode, axis and monomial */
+  float share[1 + SNAPSHOTS][MOST]; /* [1 + r][j] weight of snapshot r in mode j; row 0 is 0 */
+  double *weights;                  /* [MOST, 3, terms] weights V by mode, axis and monomial */
   supine_normals_rows rows;         /* polynomials for the normals of held-out vertices */
   float *modes;                     /* [rows, 3, MOST] modes of the held-out vertices */
 } fit;
@@ -83,7 +83,7 @@ static void apply_gram(const supine_normals_rows *rows, size_t terms, const doub
 }
 
 /* Choose the snapshots among s states, and find the best modes as weighted sums of the R snapshots.
- * product [s, s] holds the scalar products of the normals in each two states, scaled to 1 on the
+ * product [s, s] holds the scalar products of the normals of any two states, scaled to 1 on the
  * diagonal. Its pivoted Cholesky factorisation L L^T, which overwrites it, picks the snapshots.
  * Write the weight of snapshot r in mode j to coefficients[j R + r]. */
 static supine_status choose_snapshots(size_t s, double *product, fit *made,
@@ -277,7 +277,7 @@ static void measure(const normals_work *work, size_t lung, size_t count, const i
   const size_t states = work->held_out.count;
   const double *phi = work->held_out.phi + lung * work->held_out.room * all;
   double v[HELD_OUT * MOST];
-  double exact[BLOCK * 3 * HELD_OUT]; /* [BLOCK, 3, states] */
+  double exact[BLOCK * 3 * HELD_OUT]; /* exact normals [BLOCK, 3, states] */
   double normals[3 * HELD_OUT];
   double angles[HELD_OUT];
   cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)states, (int)count, (int)all, 1.0, phi,
@@ -343,7 +343,7 @@ typedef struct planes_work {
   size_t count; /* number of modes */
   size_t first; /* index of the state in the first lane: 0 is the reference surface, 1 + r is
                    snapshot r */
-  float (*steer)[3][SUPINE_NORMALS_FIELD_MAX][LANES]; /* [G] gain times weight */
+  float (*steer)[3][SUPINE_NORMALS_FIELD_MAX][LANES]; /* gain times weight */
   float *at;                                          /* [N, 3, LANES] positions, mm */
   float *modes;   /* [N, 3, count] sums over the snapshots so far */
   float *lengths; /* [N] length of each normal on the reference surface */
@@ -418,8 +418,8 @@ SUPINE_CLONES static void sum_range(void *context, size_t begin, size_t end, siz
   }
 }
 
-/* Set planes->steer from the sampled monomials: with K modes of the field, monomials 1 to K along
- * axis (a + 2) mod 3 are the weights times the gain of axis a. */
+/* Set planes->steer, the products of gain and weight, from the sampled monomials: with K modes of
+ * the field, monomials 1 to K along axis (a + 2) mod 3 are the weights times the gain of axis a. */
 static void find_steer(const planes_work *planes) {
   const normals_work *work = planes->work;
   for (size_t lung = 0; lung < work->surface->lung_count; ++lung) {

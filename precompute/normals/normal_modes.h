@@ -32,7 +32,7 @@ typedef struct supine_normals_surface {
   const size_t *lung_begin;  /**< [G + 1] first vertex of each lung; the last entry is N */
   const float *vertices;     /**< [N, 3] reference surface, mm */
   const uint32_t *triangles; /**< [M, 3] indices of vertices */
-  const float *directions;   /**< [N, 3] directions, mm; NULL if coefficients are vectors */
+  const float *directions;   /**< [N, 3] displacement directions, mm; NULL for vector fields */
   const supine_compression *field;
   /** [G, 9] volume of each lung at rest minus that of its reference surface, mL, as harmonics of
    * the direction of gravity; NULL if rest is unknown */
@@ -45,9 +45,9 @@ typedef struct supine_normals_surface {
 typedef struct supine_normals_modes {
   size_t count;    /**< number Q of modes; may be 0 */
   int16_t *modes;  /**< [N, 3, Q] modes scaled to integers; `weights` include the inverse scale */
-  double *weights; /**< [G, Q, 3, 1 + 2 K + K (K + 1) / 2] V_jc, for K modes of the field */
-  /** Range of the states: volume of all lungs minus that of the reference surface, mL; if rest is
-   * unknown, largest displacement, mm, negative in deflated states */
+  double *weights; /**< [lungs, Q, 3, 1 + 2 K + K (K + 1) / 2] V_jc; the field has K modes */
+  /** Range of the sampled states. If rest is known: volume of all lungs minus that of the reference
+   * surface, mL. If not: largest displacement of a vertex, mm, with the sign of the gain. */
   double range[2];
   double mean; /**< mean angle between exact and approximate normals at held-out vertices and
                   states, degrees */

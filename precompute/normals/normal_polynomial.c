@@ -67,8 +67,8 @@ void supine_normals_fans_free(supine_normals_fans *fans) {
   *fans = (supine_normals_fans){0};
 }
 
-/* Write the differences of vertex `to` minus vertex `from` to side [3, COLUMNS]: of their positions
- * on the reference surface in column 0, of their displacements by mode k in column k + 1. */
+/* Write vertex `to` minus vertex `from` to side [3, COLUMNS]: the difference of their positions on
+ * the reference surface to column 0, that of their displacements by mode k to column k + 1. */
 static void read_side(const supine_normals_surface *s, size_t from, size_t to,
                       double (*side)[COLUMNS]) {
   const size_t modes = s->field->mode_count;

@@ -42,8 +42,8 @@ static inline void supine_normals_fan_others(const uint32_t *triangles, uint32_t
 
 /* The polynomials for the normals of some vertices of one lung. */
 typedef struct supine_normals_rows {
-  size_t count;     /* R */
-  uint32_t *vertex; /* [R] */
+  size_t count;     /* number R of vertices */
+  uint32_t *vertex; /* [R] indices of the vertices */
   double *terms;    /* [R, 3, terms] coefficients A_i / |N_i(0)| (normal_modes.h) */
 } supine_normals_rows;
 

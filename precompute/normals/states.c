@@ -9,7 +9,8 @@
 
 #include "precompute/normals/polynomial.h"
 
-/* Range of the largest displacement in a state if rest is unknown, mm; negative if it deflates. */
+/* If rest is unknown, states are sampled so that the largest displacement of a vertex, with the
+ * sign of the gain, spans this range, mm. */
 static const double lowest_mm = -15.0;
 static const double highest_mm = 60.0;
 
@@ -76,7 +77,7 @@ static bool common_gain(const supine_normals_surface *s, const double *w, double
 
 supine_status supine_normals_states_create(const supine_normals_surface *surface, size_t count,
                                            double shift, supine_normals_states *states) {
-  static const double share_step = 0.4142135623730950488; /* sqrt 2 - 1, an irrational number */
+  static const double share_step = 0.4142135623730950488;
   const size_t terms = 3 * supine_normals_terms(surface->field->mode_count);
   double low[9];
   double w[SUPINE_MODES_MAX];

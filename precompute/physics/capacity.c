@@ -6,8 +6,9 @@
  * capacities upright, so the code divides them by 1 + SUPINE_FULL_UPRIGHT_GAIN, and adds 0.86 L of
  * tissue (Denison 1986, Thorax 41:620, n 12: 431 mL in each lung). The coefficients were checked
  * against an R implementation of the ECSC table (getQuanjerPred, getQuanjerLLN), not against the
- * paper. For men of 1.60 to 1.95 m and women of 1.50 to 1.80 m, they are within 5 % of the medians
- * of Hall et al. at age 40 (Eur Respir J 57: 2000289, 2021, without their splines). */
+ * paper. For men of 1.60 to 1.95 m and women of 1.50 to 1.80 m, the capacities are within 5 % of
+ * the medians of Hall et al. at age 40 (Eur Respir J 57: 2000289, 2021; their splines are left
+ * out). */
 #include <math.h>
 
 #include "precompute/physics/reference.h"
@@ -21,7 +22,8 @@ static const double least_share = 0.75;
 static const double least_ml = 3500.0;
 static const double most_ml = 10000.0;
 
-/* Largest accepted relative difference between the scan's volume and the one the options imply. */
+/* Largest accepted relative difference between the scan's volume and that which the options imply.
+ */
 static const double agreement = 0.05;
 
 void supine_reference_capacity(const supine_person *person, double range[2]) {
@@ -45,7 +47,7 @@ void supine_reference_capacity(const supine_person *person, double range[2]) {
   }
 }
 
-/* Return the usual share of the given lungs in the volume of a pair: 1 if both are given. */
+/* Return the usual volume of the given lungs divided by that of two lungs: 1 if both are given. */
 static double part_of_pair(const supine_reference *reference) {
   return reference->lung_count == 2 ? 1.0
          : reference->side[0] > 0   ? SUPINE_LEFT_SHARE

@@ -30,14 +30,14 @@ enum { BATCH = 8, LARGE = 100000 };
  * h, rounding errors alone cause about 1e-16 (R / h)^2. */
 static const double residual_limit = 1e-8;
 
-/* A part of the mesh without edges to other parts, such as one lung. Each part is solved in its own
- * thread, unless the first part has more than LARGE vertices. */
+/* A part of the mesh without edges to other parts, such as one lung. Parts are solved in parallel,
+ * but in one thread if the first part has more than LARGE vertices. */
 typedef struct part {
   size_t vertex, vertex_count; /* index of the first vertex, and number of vertices */
   size_t edge, edge_count;
   bool factorised;        /* whether `factor` matches the values of `matrix` */
-  cholmod_sparse *matrix; /* lower triangle; column i has the diagonal element, then one for each
-                             edge from vertex i */
+  cholmod_sparse *matrix; /* lower triangle; column i has the diagonal element, then one element for
+                             each edge from vertex i */
   cholmod_factor *factor;
   cholmod_common common;
 } part;
@@ -45,12 +45,12 @@ typedef struct part {
 struct supine_equilibrium {
   size_t vertex_count;
   const supine_topology *topology;
-  double reach; /* reach R (equilibrium.h), mm, or 0 */
-  double *area; /* [N] area of each vertex divided by the mean area; NULL without a reach */
-  double *link; /* [edges] distance from mass to spring, mm; with a reach, w / 2 (equilibrium.h) */
+  double reach;    /* reach R (equilibrium.h), mm, or 0 */
+  double *area;    /* [N] area of each vertex divided by the mean area; NULL if reach is 0 */
+  double *link;    /* [edges] mm from mass to spring; if reach > 0, w / 2 of equilibrium.h */
   double *lesions; /* [N] factors by which lesions multiply the normalised stiffness, or NULL */
-  double *mass_s;  /* [N] S of each mass (equilibrium.h); 1 with a reach */
-  double *load;    /* [N] right-hand side of the system for a unit force */
+  double *mass_s;  /* [N] weight S of each mass (equilibrium.h); 1 if reach > 0 */
+  double *load;    /* [N] right-hand side of the linear system / force on the vertex */
   size_t part_count;
   part parts[2];
 };
@@ -164,7 +164,6 @@ static bool create_matrices(supine_equilibrium *eq) {
   return made;
 }
 
-/* Find the index of the edge between two vertices of a triangle. */
 static size_t find_edge(const supine_equilibrium *eq, uint32_t a, uint32_t b) {
   const uint32_t first = a < b ? a : b;
   const part *p = &eq->parts[first < eq->parts[0].vertex_count ? 0 : 1];
@@ -178,12 +177,12 @@ static size_t find_edge(const supine_equilibrium *eq, uint32_t a, uint32_t b) {
 
 /* Compute the areas of vertices and the weights of edges for a reach R.
  *
- * The system of equilibrium.h with a reach is the weak form of (1 - R^2 Laplacian) F = a f on the
- * surface, divided by the mean vertex area A. Its weights are w = 2 R^2 c / A. The factors c should
- * make the sum of c (F_i - F_j)^2 over all edges ij equal to the integral of |grad F|^2. If edges
- * run equally in all directions, this holds for c = 2 s / h^2, where h is the length of the edge
- * and s a third of the area of its triangles. Unlike cotangent weights, these weights are never
- * negative, but R^2 is accurate only to about 10 %. */
+ * With a reach, the system of equilibrium.h, which also defines F, a and f, is the weak form of
+ * (1 - R^2 Laplacian) F = a f, divided by the mean vertex area A. Its weights are w = 2 R^2 c / A.
+ * The factors c should make the sum of c (F_i - F_j)^2 over all edges ij equal to the integral of
+ * |grad F|^2. If edges run equally in all directions, this holds for c = 2 s / h^2, where h is the
+ * length of the edge and s a third of the area of its triangles. Unlike cotangent weights, these
+ * weights are never negative, but R^2 is accurate only to about 10 %. */
 static void set_reach(supine_equilibrium *eq, const supine_mesh *mesh) {
   const size_t n = eq->vertex_count;
   const double *p = mesh->vertices;
@@ -192,7 +191,7 @@ static void set_reach(supine_equilibrium *eq, const supine_mesh *mesh) {
   for (size_t i = 0; i < n; ++i) {
     mean += eq->area[i] / (double)n;
   }
-  /* Smaller areas, mm^2, count as this one, so that degenerate triangles give no zero weights. */
+  /* Raise smaller areas to this area, mm^2, so that degenerate triangles have no zero weights. */
   const double least = 1e-6 * mean;
   for (size_t i = 0; i < n; ++i) {
     eq->area[i] = fmax(eq->area[i], least) / mean;
@@ -200,7 +199,7 @@ static void set_reach(supine_equilibrium *eq, const supine_mesh *mesh) {
   memset(eq->link, 0, eq->topology->edge_count * sizeof *eq->link);
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
     const uint32_t *corner = mesh->triangles + 3 * t;
-    double normal[3]; /* its length is twice the triangle's area */
+    double normal[3]; /* the length of this vector is twice the area of the triangle */
     supine_normal(p + 3 * (size_t)corner[0], p + 3 * (size_t)corner[1], p + 3 * (size_t)corner[2],
                   normal);
     for (size_t k = 0; k < 3; ++k) {
@@ -319,13 +318,12 @@ supine_status supine_physics_equilibrium_set_shape(supine_equilibrium *equilibri
 typedef struct solve {
   supine_equilibrium *eq;
   size_t count;
-  const double *force; /* [N, count] */
-  double *catch_;      /* [N, count] */
+  const double *force; /* [N, count] applied force */
+  double *catch_;      /* [N, count] force that each vertex keeps */
   supine_status status[2];
   double residual[2]; /* largest relative residual of each part */
 } solve;
 
-/* Factorise the matrix of a part unless its factor is current. */
 static supine_status factorise(part *p) {
   if (!p->factorised) {
     if (p->factor == NULL) {

@@ -70,9 +70,9 @@ supine_status supine_physics_directions(const supine_lungs *lungs, const supine_
   const size_t n = lungs->mesh.vertex_count;
   for (size_t k = 0; k < 6; ++k) {
     if (!isfinite(law->c[k]) || (k % 2 == 1 && !(law->c[k] > 0.0))) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "direction constant c%zu is %g: %s",
-                              k + 1, law->c[k],
-                              k % 2 == 1 ? "give a positive exponent" : "give a finite number");
+      return supine_error_set(
+          error, SUPINE_ERROR_ARGUMENT, "direction constant c%zu is %g: %s", k + 1, law->c[k],
+          k % 2 == 1 ? "it is an exponent: give a number above 0" : "give a finite number");
     }
   }
   for (size_t i = 0; i < n && law->vectors == NULL; ++i) {

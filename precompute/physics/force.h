@@ -10,7 +10,7 @@
  *     f_i(g) = (base + gain h_i(g) + cx X_i + cy Y_i + cz Z_i) exp(soften (h_i(g) - mean h(g)))
  *
  * X, Y and Z are the box coordinates of lungs.h. If soften > 0, the exponential makes lower tissue
- * more expandable, like a factor on a = 1/E (equilibrium.h); its geometric mean is 1. */
+ * more expandable; the geometric mean of the exponential over all vertices is 1. */
 #ifndef SUPINE_FORCE_H
 #define SUPINE_FORCE_H
 
@@ -38,8 +38,8 @@ supine_status supine_physics_height_range(const supine_lungs *lungs, bool pair, 
 typedef struct supine_gravities {
   size_t count;
   const double *directions; /**< [count, 3] unit vectors g */
-  const double *minimum;    /**< [count] mm */
-  const double *maximum;    /**< [count] mm */
+  const double *minimum;    /**< [count] smallest coordinate of a vertex along each direction, mm */
+  const double *maximum;    /**< [count] largest coordinate of a vertex along each direction, mm */
 } supine_gravities;
 
 /** Compute the force f on the given vertices for every direction of gravity, into force
@@ -52,8 +52,8 @@ void supine_physics_force(const supine_lungs *lungs, const supine_force_law *law
 /** Directions of displacement: d = (+-c1 X^c2, -c3 Y^c4, -c5 Z^c6) in mm, with + in the left lung
  * and box coordinates X, Y and Z (15)-(17), or directions fitted to a patient. */
 typedef struct supine_direction_law {
-  double c[6];           /**< c1 to c6 (model.h) */
-  const double *vectors; /**< [N, 3] directions that replace c, mm, or NULL; not owned */
+  double c[6];           /**< factors and exponents c1 to c6 of (15)-(17) */
+  const double *vectors; /**< [N, 3] fitted directions, mm, or NULL to use c; not owned */
 } supine_direction_law;
 
 /** Compute the directions d of all vertices into directions [N, 3], mm, not normalised.

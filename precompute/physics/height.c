@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Find the range of heights g.p over all vertices p for many directions g, for (18) in force.h. */
+/* Find the smallest and largest height g.p of vertices p along many directions g, for force.h. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -49,12 +49,12 @@ static block_box box_of(const double *vertices, size_t count) {
       high = x > high ? x : high;
     }
     box.centre[k] = 0.5 * (low + high);
-    box.half[k] = 0.5 * (high - low) * (1.0 + 1e-12) + 1e-9; /* margin for rounding */
+    box.half[k] = 0.5 * (high - low) * (1.0 + 1e-12) + 1e-9;
   }
   return box;
 }
 
-/* Return whether a box may contain a vertex that is higher than `best` in some lane. */
+/* Return whether a box may contain a vertex whose height exceeds `best` in some lane. */
 static inline bool may_improve(const block_box *box, const lanes *at) {
   const block_box b = *box;
   int64_t any = 0;
@@ -177,7 +177,7 @@ supine_status supine_physics_height_range(const supine_lungs *lungs, bool pair, 
   if (boxes != NULL && groups != NULL && vertices != NULL && sorted != NULL && begin != NULL) {
     range_work work = {n, sorted, boxes, groups, box_count, count, directions, minimum, maximum};
     memcpy(vertices, lungs->mesh.vertices, 3 * single * sizeof *vertices);
-    for (size_t i = 3 * single; i < 3 * n; ++i) { /* append the mirror image in the midline */
+    for (size_t i = 3 * single; i < 3 * n; ++i) { /* append the mirror image of a single lung */
       const double at = vertices[i - 3 * single];
       vertices[i] = i % 3 == 0 ? 2.0 * lungs->midline - at : at;
     }

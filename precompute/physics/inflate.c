@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Move a scan to full inflation. The surface p at full inflation is the fixed point of the image
  * scan_j - A_j F(g; p) d_j(p), as reference.h explains. It is found by Anderson acceleration (D. G.
- * Anderson, J. ACM 12, 1965): the next p is the combination of the last few images for which the
- * residual, image - p, is predicted to be smallest. */
+ * Anderson, J. ACM 12, 1965): the next p is that combination of the last few images whose residual
+ * (image - p) is predicted to be smallest. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -23,7 +23,7 @@ enum { SOLVES_MAX = 30, DEPTH = 4 };
 static const double converged = 5e-4;
 static const double stalled = 5e-3;
 static const double folded_share = 0.01; /* largest accepted share of triangles that turn over */
-static const double ridge = 1e-12;       /* relative increase of the diagonal against singularity */
+static const double ridge = 1e-12; /* relative increase of the diagonal, to avoid singularity */
 
 typedef struct ascent {
   supine_lungs lungs; /* current estimate of full inflation; the caller owns its vertices */
@@ -31,17 +31,16 @@ typedef struct ascent {
   supine_model model;
   supine_reference *found;
   supine_solution field;     /* solution for the current estimate */
-  size_t size;               /* 3 N */
+  size_t size;               /* 3 x number of vertices */
   double *image;             /* [size] image of the current estimate, mm */
   double *previous_image;    /* [size] mm */
   double *previous_residual; /* [size] mm */
   double rms;                /* RMS residual of the current estimate, mm */
   double *image_changes;     /* [DEPTH, size] differences between successive images, mm */
   double *residual_changes;  /* [DEPTH, size] mm */
-  size_t stored, history;    /* number of changes stored so far, and of changes in use */
+  size_t stored, history;    /* number of stored changes, and of those in use */
 } ascent;
 
-/* Check that few triangles turn over between the scan and full inflation. */
 static supine_status check_folds(const ascent *a, supine_error *error) {
   const double share = supine_mesh_turned_over(&a->scan.mesh, a->lungs.mesh.vertices);
   return share <= folded_share
@@ -55,10 +54,10 @@ static supine_status check_folds(const ascent *a, supine_error *error) {
 }
 
 /* Find the gains A of one lung in the scan. The path of supine/volume.h leads from full inflation
- * (sigma = 0) to rest (sigma = 1). Its gains at sigma are s (sigma + 2 bend e(sigma)), with a scale
- * s. Two volumes determine s and the sigma of the scan. The gains -A, applied to the scan, lead to
- * full inflation and must add `to_full` mL; the gains s - A lead to rest and must add `to_rest` mL.
- * For any sigma, `to_full` gives s; secant steps find the sigma that satisfies `to_rest`.
+ * (sigma = 0) to rest (sigma = 1), with gains of s times the ratios of supine_volume_bend() at
+ * sigma. Applied to the scan, gains of -A lead to full inflation and must add `to_full` mL; gains
+ * of s - A lead to rest and must add `to_rest` mL. These two conditions determine s and the scan's
+ * sigma: the first gives s for any sigma; secant steps find the sigma that satisfies the second.
  * @param form  volume that the displacement field adds to the lung in the scan */
 static supine_status find_lung_gains(const supine_volume_form *form, const double bend[3],
                                      bool at_rest, double to_full, double to_rest, double gains[3],
@@ -116,9 +115,8 @@ supine_status supine_reference_find_gains(const supine_lungs *scan, const double
   return status;
 }
 
-/* Compute the image of the current estimate: subtract the displacements that follow from the
- * estimate from the vertices of the scan. Choose the gains so that each lung gets its reference
- * volume. */
+/* Compute the image of the current estimate: the vertices of the scan minus the displacements that
+ * the estimate predicts. Choose the gains so that each lung gets its reference volume. */
 static supine_status find_image(ascent *a, supine_error *error) {
   supine_solution *field = &a->field;
   a->rms = 0.0;
@@ -169,7 +167,7 @@ static void store_differences(ascent *a) {
   }
 }
 
-/* Replace the estimate by the combination of images with the smallest predicted residual. */
+/* Replace the estimate by that combination of images whose predicted residual is smallest. */
 static supine_status advance(ascent *a, supine_error *error) {
   double matrix[DEPTH * DEPTH];
   double weights[DEPTH] = {0.0};
@@ -245,7 +243,7 @@ supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *
               .size = 3 * lungs->mesh.vertex_count};
   const size_t bytes = a.size * sizeof(double);
   supine_status status = SUPINE_OK;
-  a.model.share[0] = a.model.share[1] = 1.0; /* as if healthy; collapse is applied later */
+  a.model.share[0] = a.model.share[1] = 1.0; /* healthy lungs; collapse is applied later */
   a.scan.mesh.vertices = malloc(bytes);
   a.image = malloc(bytes);
   a.previous_image = calloc(a.size, sizeof *a.previous_image);

@@ -8,23 +8,23 @@
 #include "precompute/physics/force.h"
 
 /* clang-format off */
-/** The laws, one per row: identifier, name, base, gain, (cx, cy, cz), (c1, ..., c6), bend, reach in
- * mm (0 for the paper's transfer over links), pair (supine_force_law), description for the user.
+/** The displacement laws: identifier, name, base, gain, (cx, cy, cz), (c1, ..., c6), bend, reach in
+ * mm (0 for the paper's transfer of force), pair (supine_force_law), description for the user.
  *
  * The paper's constants (Table I) are not available: c1..c6 of `paper` are fits to 4-D CT landmarks
  * of ten patients (DIR-Lab), c1..c6 of `deep` to the full breaths of ten others (DIR-Lab COPDgene).
- * Those scans are supine, where h = 1 - Y, so base, cy and gain cannot be determined separately.
- * The gain of `deep` is an assumption: with cy Y at its mean the force is 0.8 on the uppermost
- * tissue and 1.2 on the lowest, a ratio of 1.5. That lower tissue moves more agrees with
+ * These scans are supine, where h = 1 - Y (force.h), so base, cy and gain cannot be determined
+ * separately. The gain of `deep` is an assumption: with cy Y at its mean, the force is 0.8 on the
+ * uppermost tissue and 1.2 on the lowest, a ratio of 1.5. That lower tissue moves more agrees with
  * Milic-Emili (J Appl Physiol 1966), who found lower regions emptier.
  *
- * The bend has one free number, 0.45, chosen on ten quiet breaths (DIR-Lab 4-D CT). With it, one
- * gain for each patient explains a median of 78 % (53 to 87) of the squared displacement; without
- * it, 47 %.
+ * The bend has one free number, 0.45, chosen on ten quiet breaths (DIR-Lab 4-D CT). With the
+ * bend, one gain for each patient explains 78 % of the squared displacement (median; 53 to 87 %),
+ * without it 47 %.
  *
- * The weight of the heart on the lung below it is left out. A weight that raises the left lung's
- * share of a breath, lying on the left, from 48 to 49.5 % (published: 58) also raises the ratio of
- * ventilation of the lowest to the uppermost quarter, prone, from 1.4 to 1.6 (expected: 1). */
+ * The weight of the heart on the lung below it is left out. If it raised the left lung's share
+ * of a breath, lying on the left, from 48 to 49.5 % (published: 58), the ratio of ventilation of
+ * the lowest to that of the uppermost quarter, prone, would rise from 1.4 to 1.6 (expected: 1). */
 #define SUPINE_LAWS(LAW)                                                                           \
   LAW(DEEP, "deep", 0.9, 0.4, (0, -0.2, 0), (6, 2.6, 15, 1, 16, 1.3), (0, -0.45, 0.45), 10, true,  \
       "displacement from full inflation, for any posture and volume")                              \

@@ -14,8 +14,9 @@ typedef struct iteration {
   double *te_self;      /* [nodes] share of its force that each node keeps */
   double *pitcher;      /* [nodes] force that is yet to be distributed; may be negative */
   double *catcher;      /* [nodes] force kept so far */
-  size_t *largest; /* [2 nodes] binary tree of nodes. Entry 1 is the root, entry nodes + j is node
-                      j, entry k is the one of entries 2 k and 2 k + 1 with the larger |pitcher| */
+  /* [2 nodes] binary tree of node indices: entry nodes + j is node j. A smaller entry k is that one
+   * of entries 2 k and 2 k + 1 whose node has the larger |pitcher|. */
+  size_t *largest;
 } iteration;
 
 static void iteration_free(iteration *it) {

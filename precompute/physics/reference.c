@@ -30,7 +30,7 @@ supine_status supine_reference_scan_parse(const char *text, supine_scan *scan,
   return SUPINE_OK;
 }
 
-/* Compute a lung's volume at the filling t of resting.h from those at rest and full inflation. */
+/* Compute a lung's volume at filling t (resting.h) from its volumes at rest and full inflation. */
 static double volume_at(double rest, double full, double t) {
   return t < 0.0 ? rest * (1.0 + t) : rest * (1.0 - t) + full * t;
 }
@@ -67,7 +67,7 @@ void supine_reference_share_out(const supine_reference *reference, const double 
   }
 }
 
-/* Find the volume F of the reference surface of each lung from the volumes in the scan, volume
+/* Find each lung's volume F at the reference surface from the volumes in the scan, volume
  * [lung_count], mL. Each degree of filling t (resting.h) gives an F for each lung. Bisect t until
  * the volume in the scan differs from the volume at rest, or at full inflation, by as many mL as
  * the state of the scan says. */

@@ -43,7 +43,7 @@ typedef struct supine_scan_frame {
 
 /** State of the scan, and volumes of healthy lungs: gas and tissue, mL. */
 typedef struct supine_reference {
-  bool known; /**< whether the volume at rest is known; if not, volumes count from the scan */
+  bool known; /**< whether the volume at rest is known; if not, volumes refer to the scan */
   supine_scan scan;
   supine_resting resting; /**< volumes at rest as shares of full_volume */
   size_t lung_count;
@@ -51,7 +51,7 @@ typedef struct supine_reference {
   double full_volume[2]; /**< volume F of the reference surface */
   double scan_volume[2]; /**< volume of the scan minus full_volume; negative below full inflation */
   double scan_rest[2];   /**< volume at rest in the posture of the scan; 0 for a full scan */
-  double scan_gains[2][3]; /**< gains x, y, z of each lung in the scan, from full inflation */
+  double scan_gains[2][3]; /**< gains x, y, z that take each lung from full inflation to the scan */
   size_t solves; /**< number of solves of the full physics to find the surface at full inflation */
 } supine_reference;
 
@@ -76,15 +76,15 @@ double supine_reference_full(const supine_reference *reference, const double g[3
 void supine_reference_share_out(const supine_reference *reference, const double g[3], double total,
                                 double *ml);
 
-/** Move the vertices of scanned lungs to full inflation, in place. Each lung then has its volume
+/** Move the vertices of scanned lungs to full inflation, in place. Each lung then has the volume
  * reference->full_volume. lungs->scanned receives the vertices of the scan. Statuses as
  * supine_reference_find.
  * @param reference  has the scan and the volumes; scan_gains and solves are written */
 supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *model,
                                        supine_reference *reference, supine_error *error);
 
-/** Find the gains A of each lung in the scan. If s is the gain at rest, gains of -A applied to the
- * scan must lead to the volume at full inflation, and gains of s - A to the volume at rest.
+/** Find the gains A of each lung in the scan. Let s be the gain at rest. Applied to the scan, gains
+ * of -A must lead to the volume at full inflation, gains of s - A must lead to that at rest.
  * @param scan        closed lungs with the scan's vertices
  * @param directions  [N, 3] directions d of displacement, mm
  * @param amounts     [N] catch F, with gravity as in the scan

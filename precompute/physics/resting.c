@@ -80,7 +80,7 @@ supine_status supine_reference_resting_set(supine_resting *resting, const char *
                             "--resting: '%s' is not a posture; did you mean '%s'?", posture,
                             supine_posture_nearest(posture));
   }
-  for (size_t k = 0; k < 3; ++k) { /* named postures lie along the axes */
+  for (size_t k = 0; k < 3; ++k) {
     if (g[k] != 0.0 && !read_value(&set, 2 * k + (g[k] < 0.0), value)) {
       return supine_error_set(
           error, SUPINE_ERROR_ARGUMENT,
@@ -106,7 +106,7 @@ void supine_reference_resting_print(const supine_resting *resting, char *text, s
 supine_status supine_reference_resting_settle(supine_resting *resting, size_t count,
                                               const int *side, const double *full,
                                               supine_error *error) {
-  double sum = 0.0; /* sum over postures of the given volume divided by the default volume */
+  double sum = 0.0; /* sum of given volume / default volume over postures */
   size_t known = 0;
   for (size_t axis = 0; axis < 6; ++axis) {
     double rest = 0.0;
@@ -174,7 +174,8 @@ double supine_reference_along_axes(const double values[6], const double g[3]) {
  *
  *     m + (e_z - m) (3 z^2 - 1) / 2 + (e_x - e_y) / 2 (x^2 - y^2)
  *
- * 1, 3 z^2 - 1 and x^2 - y^2 are harmonics divided by factors, which divide their coefficients. */
+ * The functions 1, 3 z^2 - 1 and x^2 - y^2 are harmonics divided by constants. The coefficient of
+ * each function is divided by the same constant. */
 void supine_reference_harmonics(const double values[6], double harmonics[9]) {
   static const size_t axis_term[3] = {3, 1, 2}; /* harmonics proportional to x, y and z */
   double even[3];

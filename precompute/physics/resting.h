@@ -26,7 +26,7 @@
 /** Volumes at rest with gravity along +x, -x, +y, -y, +z, -z: lying on the left, on the right,
  * supine, prone, head down, upright. */
 typedef struct supine_resting {
-  double share[2][6]; /**< volume at rest / reference volume of the left, the right lung */
+  double share[2][6]; /**< volume at rest / reference volume; [0] left lung, [1] right lung */
   double ml[6];       /**< volume of both lungs together, mL; 0 where a share was given */
 } supine_resting;
 

@@ -12,7 +12,7 @@
 /** Solution for one direction of gravity: displacements u_i = s F_i d_i at scale s. */
 typedef struct supine_solution {
   size_t vertex_count;
-  supine_equilibrium *equilibrium; /**< kept for the next solve of the same lungs */
+  supine_equilibrium *equilibrium; /**< matrix of the lungs, kept for their next solve */
   double *catch_;                  /**< [N] catch F (equilibrium.h) */
   double *directions;              /**< [N, 3] directions, mm, for collapsed lungs as in
                                       supine_tissue_collapse_directions */

@@ -30,9 +30,9 @@ typedef struct lung_work {
   size_t count;             /* number of columns */
   size_t lung;
   double centre[3]; /* centre of the box of all lungs, mm, subtracted from each vertex */
-  double *sums;     /* [PARTS, size] */
+  double *sums;     /* [PARTS, size] sums of each part */
   size_t size;      /* number of sums of one part */
-  double *space;    /* [threads, room] */
+  double *space;    /* [threads, room] work space */
   size_t room;
 } lung_work;
 
@@ -46,7 +46,7 @@ static lung_work begin_lung(const supine_lungs *lungs, const double *directions,
   return work;
 }
 
-/* Read a triangle's corners, mm from work->centre. Return their vertex indices. */
+/* Read a triangle's corners, mm, relative to work->centre. Return their vertex indices. */
 static const uint32_t *read_corners(const lung_work *work, size_t triangle, double p[3][3]) {
   const uint32_t *corner = work->lungs->mesh.triangles + 3 * triangle;
   for (size_t v = 0; v < 3; ++v) {
@@ -67,7 +67,7 @@ static size_t pair_of(size_t k, size_t l) {
   return k > l ? k * (k + 1) / 2 + l : l * (l + 1) / 2 + k;
 }
 
-/* Add factor (a_k b_l + a_l b_k) for all k >= l to pairs, a lower triangle stored by rows. */
+/* Add factor * (a_k b_l + a_l b_k), k >= l, to element (k, l) of the lower triangle `pairs`. */
 static void add_pairs(size_t count, double factor, const double *a, const double *b,
                       double *pairs) {
   for (size_t k = 0; k < count; ++k) {
@@ -79,10 +79,10 @@ static void add_pairs(size_t count, double factor, const double *a, const double
   }
 }
 
-/* Add the cubic terms of n triangles to sums [pairs, count]: a row is a pair of columns at corners
- * 0 and 1, a column is one at corner 2. The term of a triangle is det(u0, u1, u2) of the
- * displacements of its corners, averaged over both orders of a pair. With directions d and columns
- * c, it is det(d0, d1, d2) c0 c1 c2. x is work space. */
+/* Add the cubic terms of n triangles to sums [pairs, count]. The first index counts pairs of
+ * columns, taken at corners 0 and 1; the second counts columns, taken at corner 2. A triangle adds
+ * det(u0, u1, u2) of its corners' displacements u, averaged over both orders of the pair. With
+ * directions d and columns c, it is det(d0, d1, d2) c0 c1 c2. x is work space. */
 SUPINE_CLONES static void add_cubic(const lung_work *work, size_t begin, size_t n, const double *u,
                                     double *x, double *sums) {
   const size_t count = work->count;
@@ -115,10 +115,10 @@ SUPINE_CLONES static void add_cubic(const lung_work *work, size_t begin, size_t 
   }
 }
 
-/* Add the terms of the determinants det(p0 + u0, p1 + u1, p2 + u2) of n triangles, at most BLOCK,
- * to `sums`. p are the corners of a triangle and u their displacements. Terms linear in u have a
- * sum for each axis of u, terms quadratic in u have one for each axis of p. The arrays u, area and
- * at hold the first corners of all n triangles, then the second corners, then the third. */
+/* Expand the determinants det(p0 + u0, p1 + u1, p2 + u2) of n triangles, at most BLOCK, with
+ * corners p and displacements u, and add the terms to `sums`. Terms linear in u have a sum for each
+ * axis of u, terms quadratic in u have one for each axis of p. The arrays u, area and at hold the
+ * first corners of all n triangles, then the second corners, then the third. */
 SUPINE_CLONES static void add_block(const lung_work *work, size_t begin, size_t n, double *u,
                                     double *sums) {
   const size_t count = work->count;

@@ -20,7 +20,7 @@ enum { SUPINE_MODES_MADE_MAX = 64 };
 typedef struct supine_volume_forms {
   size_t lung_count;
   size_t column_count;
-  double *linear;    /**< [G, 3, K] */
+  double *linear;    /**< [G, 3, K] by lung, axis and weight */
   double *quadratic; /**< [G, 3, K, K] symmetric in the last two indices */
   double *cubic;     /**< [G, K, K, K] symmetric in the last three indices */
 } supine_volume_forms;
@@ -43,7 +43,8 @@ supine_status supine_physics_volume_forms_create(const supine_lungs *lungs, cons
 /** Largest number of fields in one call of supine_physics_volume_of_fields. */
 enum { SUPINE_VOLUME_FIELDS = 16 };
 
-/** Compute the volume form of each closed lung for each of `count` fields u_ij = A_j f_i d_ij.
+/** Compute the volume form of each closed lung for each of `count` fields f, which move vertex i by
+ * u_ij = A_j f_i d_ij.
  * @param share, directions  as in supine_physics_volume_forms_create; directions are not NULL
  * @param count   at most SUPINE_VOLUME_FIELDS
  * @param fields  [N, count] f
@@ -61,7 +62,7 @@ void supine_physics_volume_forms_contract_lung(const supine_volume_forms *forms,
 void supine_physics_volume_forms_contract(const supine_volume_forms *forms, const double *weights,
                                           double cubic[3]);
 
-/** Evaluate a form at equal gains s. Add its coefficients of s, s^2 and s^3, mL, to cubic [3]. */
+/** Set all gains of a form to s. Add its coefficients of s, s^2 and s^3, mL, to cubic [3]. */
 void supine_physics_volume_form_add(const supine_volume_form *form, double cubic[3]);
 
 #endif

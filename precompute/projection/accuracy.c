@@ -21,7 +21,6 @@
  * cannot reach a volume, it is halved, at most VOLUME_HALVINGS times. */
 enum { BLOCK = 128, PARTS = 16, VOLUME_HALVINGS = 10 };
 
-/* Sums over one of the PARTS of the vertices. */
 typedef struct tally {
   double field2;         /* sum of the squared displacements at gain 1, mm^2 */
   supine_tally error;    /* errors of displacements at gain 1, mm */
@@ -31,11 +30,11 @@ typedef struct tally {
 typedef struct accuracy_work {
   const supine_truth *truth;
   const supine_compression *compression;
-  const double *directions; /* [N, 3] mm */
-  const double *weights;    /* [D, K] */
-  const double *scales;     /* [D, 2] gains of the exact and the compressed field */
-  tally *tallies;           /* [PARTS] */
-  double *space;            /* [threads, BLOCK, K + 2 D] */
+  const double *directions; /* [N, 3] directions of displacement, mm */
+  const double *weights;    /* [directions, modes] weights of the modes */
+  const double *scales;     /* [directions, 2] gains of the exact and of the compressed field */
+  tally *tallies;
+  double *space; /* work space of all threads */
 } accuracy_work;
 
 /* Compute the errors |a approximate - b exact| length, mm, of n displacements. a and b are the
@@ -54,7 +53,7 @@ static void compare_block(const accuracy_work *work, size_t begin, size_t n, dou
   const int count = (int)truth->direction_count;
   const size_t modes = work->compression->mode_count;
   double *coefficients = space;
-  double *approximate = coefficients + modes * BLOCK; /* [D, n] */
+  double *approximate = coefficients + modes * BLOCK; /* [directions, n] */
   double *exact = approximate + truth->direction_count * BLOCK;
   double length[BLOCK];
   double errors[BLOCK];

@@ -27,11 +27,11 @@ typedef struct supine_accuracy {
  * direction d is sum over k of columns[i, k] functions[d, k], up to the tolerance of span.c. */
 typedef struct supine_truth {
   size_t direction_count;
-  double *directions; /**< [D, 3] unit vectors */
+  double *directions; /**< [D, 3] unit vectors along gravity */
   size_t rank;
   const double *columns; /**< [N, rank] owned by the projection */
   double *functions;     /**< [D, rank] weights of the columns */
-  double *cubic; /**< [D, 3] coefficients of the gained volume, mL, as a cubic of the gain */
+  double *cubic; /**< [D, 3] gained volume, mL: coefficients of the gain, its square and its cube */
 } supine_truth;
 
 /** Solve the full physics for `count` held-out directions of gravity. The projection must outlive
@@ -78,7 +78,7 @@ supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const doubl
 
 /** Relative RMS errors for the held-out directions, over at most 4096 evenly chosen vertices. */
 typedef struct supine_error_table {
-  size_t band_count;                        /**< number of bands, L + 1 */
+  size_t band_count; /**< number of bands: highest degree of the harmonics + 1 */
   double harmonics[SUPINE_SH_BAND_MAX + 1]; /**< [l] error with the first (l + 1)^2 harmonics */
   size_t mode_count;                        /**< number K of modes */
   double modes[SUPINE_MODES_MADE_MAX];      /**< [k] error with the first k + 1 modes */

@@ -98,7 +98,7 @@ void supine_projection_compression_truncate(supine_compression *compression, siz
   if (count < width) {
     keep_columns(compression->coefficients, compression->vertex_count, width, count, sizeof(float));
     keep_columns(compression->mix, rank, width, count, sizeof(double));
-    compression->mode_count = count; /* the rows of `modes` stay in place */
+    compression->mode_count = count;
   }
 }
 

@@ -13,9 +13,9 @@
 
 enum { VERTICES_MAX = 4096 };
 
-/* Compute the scalar products gram [R, R] of the columns over evenly chosen vertices. Each vertex
- * has the weight |d|^2, where d is its direction of displacement. For a field columns x w, the sum
- * of the squared displacements is then w^T gram w. */
+/* Compute the scalar products gram [R, R] of the R columns over evenly chosen vertices. Each vertex
+ * has the weight |d|^2, where d is its direction of displacement. If a field is columns x w, the
+ * sum of its squared displacements is then w^T gram w. */
 static void find_gram(const supine_truth *truth, size_t vertex_count, const double *directions,
                       double *gram) {
   const size_t rank = truth->rank;
@@ -64,7 +64,7 @@ supine_status supine_accuracy_error_table_create(const supine_truth *truth,
   find_gram(truth, compression->vertex_count, directions, gram);
   for (size_t d = 0; d < truth->direction_count; ++d) {
     const double *functions = truth->functions + d * rank;
-    (void)supine_sh_evaluate(projection->band, truth->directions + 3 * d, y); /* cannot fail */
+    (void)supine_sh_evaluate(projection->band, truth->directions + 3 * d, y);
     supine_projection_compression_weights(compression, truth->directions + 3 * d, weights);
     all += square_of(gram, rank, functions);
     memcpy(residual, functions, rank * sizeof *residual);

@@ -9,7 +9,7 @@
 #include "precompute/projection/accuracy.h"
 
 void supine_accuracy_held_out_directions(size_t count, double *directions) {
-  static const double off_the_grids = 0.3; /* longitude, rad; grids have a node at longitude 0 */
+  static const double off_the_grids = 0.3; /* longitude of direction 0, rad */
   for (size_t i = 0; i < count; ++i) {
     supine_spiral((double)i, (double)count, off_the_grids, directions + 3 * i);
   }
@@ -22,8 +22,9 @@ void supine_accuracy_truth_free(supine_truth *truth) {
   *truth = (supine_truth){0};
 }
 
-/* Find the volume gained for each held-out direction as a cubic of the gain. Use volume forms of
- * the columns if there are at most FEW columns; otherwise compute AT_ONCE fields at a time. */
+/* Find the volume gained for each held-out direction as a cubic polynomial of the gain. Use volume
+ * forms of the columns if there are at most FEW columns; otherwise compute AT_ONCE fields at a
+ * time. */
 static supine_status find_cubics(const supine_lungs *lungs, const double *share,
                                  const double *directions, const supine_truth *truth) {
   enum { FEW = 8, AT_ONCE = SUPINE_VOLUME_FIELDS };

@@ -9,7 +9,7 @@
 #include <supine/sh.h>
 
 enum {
-  LATITUDES_PER_BAND = 8, /* the grid has twice as many longitudes as latitudes */
+  LATITUDES_PER_BAND = 8, /* latitudes of the grid for each degree of the harmonics */
   LATITUDES_MIN = 32
 };
 
@@ -26,7 +26,7 @@ typedef struct grid_heights {
 } grid_heights;
 
 /* Find the range of g.p over all vertices p for half of the directions g. For the opposite
- * directions, negate and swap its ends. */
+ * directions, negate and swap the ends of the range. */
 static supine_status find_heights(const supine_lungs *lungs, bool pair, const supine_sh_grid *grid,
                                   grid_heights *made) {
   const size_t width = grid->longitudes;

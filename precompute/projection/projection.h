@@ -19,7 +19,7 @@
 typedef struct supine_projection {
   size_t vertex_count;
   size_t band;
-  supine_span *span; /**< directions of the columns; NULL for another simulator's fields */
+  supine_span *span; /**< NULL for the fields of another simulator */
   size_t rank;       /**< number R of columns */
   double *columns;   /**< [N, R] fields for R directions of gravity */
   double *functions; /**< [R, (band + 1)^2] expansion of the weight of each column in harmonics */
@@ -43,9 +43,9 @@ typedef struct supine_compression {
   size_t vertex_count;
   size_t band;
   size_t mode_count;   /**< number K of modes */
-  float *coefficients; /**< [N, K] */
+  float *coefficients; /**< [N, K] coefficients of the modes at each vertex */
   double *modes;       /**< [K, (band + 1)^2] expansion of each mode in harmonics */
-  double *mix;         /**< [R, K], so that coefficients = columns x mix */
+  double *mix;         /**< [R, K] matrix; coefficients = columns x mix */
 } supine_compression;
 
 void supine_projection_compression_free(supine_compression *compression);

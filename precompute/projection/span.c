@@ -9,12 +9,12 @@
 #include "sh/base/lapack.h"
 #include "sh/base/vec3.h"
 
-/* The cross approximation examines at most VERTICES vertices, in DIRECTIONS directions. */
+/* The cross approximation (span.h) examines at most VERTICES vertices in DIRECTIONS directions. */
 enum { VERTICES = 1024, DIRECTIONS = 512 };
 
 /* Largest accepted residual force as a share of the largest force: `tolerance` with softening, and
- * `rounding` without. With `tolerance`, the RMS residual is 6e-5 of the RMS force, a hundredth of
- * the error of 16 modes. */
+ * `rounding` without. With `tolerance`, the RMS residual is 6e-5 of the RMS force. That is a
+ * hundredth of the error that compression to 16 modes causes. */
 static const double tolerance = 3e-4;
 static const double rounding = 1e-12;
 
@@ -41,7 +41,6 @@ static size_t largest_of(const double *force, size_t count) {
   return at;
 }
 
-/* Invert a matrix in place. Its storage order does not matter. */
 static supine_status invert(double *matrix, size_t rank) {
   lapack_int pivots[SUPINE_SPAN_MAX];
   const lapack_int n = (lapack_int)rank;

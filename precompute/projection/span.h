@@ -12,7 +12,7 @@
 
 #include "precompute/physics/force.h"
 
-/* Largest number R of directions: enough for supine_force_law.soften of about 12. */
+/* Largest number R of directions; values of supine_force_law.soften up to about 12 need no more. */
 enum { SUPINE_SPAN_MAX = 128 };
 
 typedef struct supine_span {
