@@ -29,8 +29,8 @@ static supine_status SUPINE_PRINTF(2, 3) refuse(const check *c, const char *form
                           c->name, detail, embedded ? "supine embed" : "supine precompute");
 }
 
-/* Return whether all numbers are finite and below 2^30 in magnitude, as all numbers of a lung are.
- * Infinity and NaN have the largest exponent bits, so that one comparison of bits suffices. */
+/* Return whether all numbers are finite and below 2^30 in magnitude, as all numbers of a valid file
+ * are. Infinity and NaN have larger exponent bits, so that one comparison of bits suffices. */
 static bool finite_floats(const float *values, size_t count) {
   size_t bad = 0;
   for (size_t i = 0; i < count; ++i) {
@@ -79,8 +79,8 @@ static const void *require(const check *c, const char *name, supine_dtype dtype,
   return tensor->data;
 }
 
-/* Check the metadata "format", "version" and "kind", and the checksum. Do not check the older
- * checksum of 16 digits in files of version 1. */
+/* Check the metadata "format", "version" and "kind", and the checksum. Do not check a checksum of
+ * 16 digits in a file of version 1: it has an older form. */
 static supine_status check_metadata(const check *c, supine_basis_info *info) {
   const char *format = supine_safetensors_metadata(c->file, "format");
   const char *version = supine_safetensors_metadata(c->file, "version");
@@ -205,7 +205,7 @@ static size_t name_lungs(const check *c, supine_basis *basis) {
 }
 
 /* Check that tensor 'lung' groups the vertices by lung (0 ... 0 1 ... 1 2 ...), and find where each
- * lung begins. A lung that the metadata name may have no vertices. */
+ * lung begins. A lung named in the metadata may have no vertices. */
 static supine_status check_lungs(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
   size_t n = info->vertex_count;
@@ -241,8 +241,8 @@ static supine_status check_lungs(const check *c, supine_basis *basis) {
   return SUPINE_OK;
 }
 
-/* Check the three tensors of the volumes. All or none of them must exist. In files of version 3,
- * `volume_linear` and `volume_quadratic` have an additional axis for x, y and z. */
+/* Check the tensors volume_linear, volume_quadratic and volume_cubic. Either all or none must
+ * exist. In files of version 3, the first two have an additional axis for x, y and z. */
 static supine_status check_volume(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
   const size_t g = info->lung_count;
@@ -283,7 +283,7 @@ static supine_status read_numbers(const check *c, const char *key, size_t count,
   return SUPINE_OK;
 }
 
-/* Add the volume, mL, that the reference surface of each lung encloses to `reference_volume`. */
+/* For each lung, add the volume that the reference surface encloses, mL, to `reference_volume`. */
 static void measure_lungs(supine_basis *basis) {
   const supine_basis_info *info = &basis->info;
   for (size_t t = 0; t < info->triangle_count;) {
@@ -311,8 +311,8 @@ static void measure_lungs(supine_basis *basis) {
   }
 }
 
-/* Set the volume of the reference surface of each lung, mL. For embedded content, whose file lacks
- * these surfaces, read the volumes from the metadata. Otherwise, measure them. */
+/* Set the volume of the reference surface of each lung, mL. Files of 'supine embed' lack this
+ * surface: read the volume from their metadata. Otherwise, measure the volume. */
 static supine_status check_reference(const check *c, supine_basis *basis) {
   basis->info.reference_volume = basis->reference_volume;
   if (!basis->info.has_volume) {
@@ -326,8 +326,8 @@ static supine_status check_reference(const check *c, supine_basis *basis) {
   return read_numbers(c, "reference_volume_ml", basis->info.lung_count, basis->reference_volume);
 }
 
-/* Read the metadata on the state of the scan and on full inflation. Without these metadata, the
- * scan shows the reference surface, in the posture supine. */
+/* Read the metadata on the state of the scan and on full inflation. A file without them counts as
+ * scanned in the posture supine, at the volume of the reference surface. */
 static supine_status check_scan(const check *c, supine_basis *basis) {
   const char *volume = supine_safetensors_metadata(c->file, "scan_volume_ml");
   const char *scanned = supine_safetensors_metadata(c->file, "scanned");
@@ -352,7 +352,7 @@ static supine_status check_scan(const check *c, supine_basis *basis) {
                       "metadata 'bend' requires tensor 'resting_volume' with a row for each lung");
 }
 
-/* Check the optional tensor 'resting_volume': a row for each lung, or one row for all lungs. */
+/* Check the optional tensor 'resting_volume', which has one row, or a row for each lung. */
 static supine_status check_rest(const check *c, supine_basis *basis) {
   const supine_tensor *tensor = supine_safetensors_find(c->file, "resting_volume");
   if (tensor == NULL) {
@@ -464,7 +464,7 @@ static supine_status take_options(const check *c, const supine_basis_options *op
   return SUPINE_OK;
 }
 
-/* Check the optional tensor 'rigid'. Each row is a range of vertices of one lung. */
+/* Check the optional tensor 'rigid'. Each row must be a range of vertices of one lung. */
 static supine_status check_rigid(const check *c, supine_basis *basis) {
   const supine_tensor *rigid = supine_safetensors_find(c->file, "rigid");
   if (rigid == NULL) {

@@ -107,8 +107,8 @@ static double limb_volume(const integrated *of, double pressure, double *complia
   return curve->volume[0] + gain * (of->sum[part] + within);
 }
 
-/* Find the pressure, cmH2O, at which a limb has the volume `volume`, mL, which must be within the
- * range of the limb. The volume at the result differs from `volume` by at most 1e-11 of this range.
+/* Find the pressure, cmH2O, at which a limb has the volume `volume`, mL, within the range of the
+ * limb. At the pressure found, the volume is accurate to 1e-11 of this range.
  * @retval SUPINE_ERROR_NUMERICAL  no pressure was found */
 static supine_status limb_pressure(const integrated *of, double volume, double *pressure) {
   enum { STEPS_MAX = 200 };
@@ -170,11 +170,12 @@ supine_status supine_breath_curve_evaluate(const supine_pv_curve *curve, size_t 
 
 const supine_pv *supine_breath_normal(void) {
   static const supine_pv normal = {
-      /* Inhale limb, fitted to a + b / (1 + exp(-(P - 10) / 6)) from 0 to 6000 mL, P in cmH2O. */
+      /* Inhale limb from 0 to 6000 mL. Its control parameters are fitted to the sigmoid
+       * a + b / (1 + exp(-(P - 10) / 6)) of the pressure P, cmH2O. */
       {{{0.0, 30.0},
         {0.0, 6000.0},
         {-0.697448914, -2.22791741, 0.470886417, 0.269525392, -0.132010658}},
-       /* Exhale limb: the first parameter is -15 cmH2O k, k = ln 2 / (7.58 cmH2O) [Salazar1964]. */
+       /* Exhale limb: the first parameter is -15 cmH2O ln 2 / (7.58 cmH2O) [Salazar1964]. */
        {{0.0, 30.0}, {0.0, 6000.0}, {-1.3716632861, 0.0, 0.0, 0.0, 0.0}}}};
   return &normal;
 }
@@ -209,8 +210,8 @@ static supine_status breath_check(const supine_pv_breath *breath, supine_error *
   return SUPINE_OK;
 }
 
-/* Write the limb that a breath follows at a time, s. Return 0 at rest, 1 at the peak of the breath,
- * and a number that is linear in time on each limb. */
+/* Write the limb that a breath follows at `time`, s. Return a number that rises linearly in time
+ * from 0 at rest to 1 at the peak of the breath, and then falls linearly to 0. */
 static double breath_share(const supine_pv_breath *breath, double time, supine_pv_limb *limb) {
   const double turns = time * (breath->rate / 60.0);
   const double phase = turns - floor(turns);
@@ -229,7 +230,7 @@ typedef struct loop {
   double gain[SUPINE_PV_LIMB_COUNT];   /* volume that each limb gains from rest to the peak, mL */
 } loop;
 
-/* Check both limbs, and that a pressure, called `what` in messages, is in the range of each. */
+/* Check both limbs, and check that the pressure, which messages call `what`, is in their ranges. */
 static supine_status limb_holds(const supine_pv *pv, const char *what, double pressure,
                                 supine_error *error) {
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute deformed positions, if possible for many whole tiles of a lung at once. */
+/* Compute deformed positions. Call the kernel once for all consecutive whole tiles of a lung. */
 #include <string.h>
 
 #include "runtime/rigid.h"
 
-/* Write the factors that a kernel takes for one lung: the weight of each mode times the unit of the
- * packed coefficients of this mode, then the three gains of the lung.
+/* Write the factors that a kernel takes for one lung: for each mode, the weight times
+ * supine_basis.mode_scale, and then the three gains of the lung.
  * @param folded  [modes + 3], written */
 static void fold(const supine_basis *basis, const supine_pose *pose, size_t lung, float *folded) {
   const size_t modes = basis->info.mode_count;
@@ -23,7 +23,7 @@ supine_target supine_target_after(const supine_target *target, size_t count) {
   return moved;
 }
 
-/* Evaluate vertices begin <= i < end of one tile by way of a buffer for the whole tile. */
+/* Evaluate one tile into a buffer, and copy the vertices begin <= i < end of this tile. */
 static void deform_part(supine_deform_tiles *kernel, const supine_tiles *tiles, const float *folded,
                         size_t begin, size_t end, const supine_target *target) {
   float aside[TILE_NUMBERS];
@@ -52,7 +52,7 @@ void supine_deform_lung(supine_deform_tiles *kernel, const supine_tiles *tiles, 
 
 enum { RIGID_BLOCK = 256 };
 
-/* Move vertices begin <= i < end of rigid parts by the rigid motions of the parts (rigid.h). */
+/* Move the vertices begin <= i < end of rigid parts by the rigid motion of each part (rigid.h). */
 static void deform_rigid(const supine_basis *basis, const supine_pose *pose, size_t begin,
                          size_t end, const supine_target *target) {
   for (size_t part = 0; part < basis->rigid_count; ++part) {
@@ -122,7 +122,7 @@ void supine_deform(const supine_basis *basis, const supine_pose *pose, float *xy
 
 void supine_deform_batch(const supine_basis *basis, size_t count, const supine_pose *poses,
                          size_t begin, size_t end, float *xyz) {
-  enum { BLOCK_BYTES = 1 << 18 }; /* size of tiles that stay in the cache for all poses */
+  enum { BLOCK_BYTES = 1 << 18 }; /* number of bytes of tiles, few enough to stay in the cache */
   const size_t block = BLOCK_BYTES / basis->tiles.stride * TILE;
   const size_t apart = 3 * (end - begin);
   supine_target target = {.add_reference = true,

@@ -42,15 +42,15 @@ static double largest_displacement(const supine_basis *basis, const supine_pose 
 }
 
 double supine_basis_storage_error(const supine_basis *basis) {
-  static const double volume = 500;  /* volume added to that of the reference surface, mL */
-  static const double distance = 20; /* largest displacement of an open surface, mm */
+  static const double volume = 500;  /* volume above that of the reference surface, mL */
+  static const double distance = 20; /* open surfaces are scaled to this largest displacement, mm */
   double worst = 0;
   for (int number = 0; number < 27; ++number) {
     supine_pose pose;
     const int cell[3] = {number % 3 - 1, number / 3 % 3 - 1, number / 9 - 1};
     const supine_state state = {.gravity = {cell[0], cell[1], cell[2]}};
     if (supine_basis_weights(basis, state.gravity, pose.weights) != SUPINE_OK) {
-      continue; /* the vector in the centre of the cube has no direction */
+      continue; /* the zero vector has no direction */
     }
     if (basis->info.has_volume) {
       if (supine_basis_add_volume(basis, volume, &pose) != SUPINE_OK) {

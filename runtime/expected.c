@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute the expected errors of the positions that the displacement law predicts. */
+/* Compute the expected errors of predicted positions. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -77,9 +77,9 @@ supine_status supine_expected_shifted(const supine_basis *basis, const supine_st
   return supine_basis_pose(basis, &shifted, pose, error);
 }
 
-/* Poses of a state (`at`) and of the reference of displacements (`from`). `fuller_at` and
- * `fuller_from` have 1 % of the reference volume more if their volume is relative to an assumed
- * rest. */
+/* Poses of a state (`at`), and of the state from which displacements are measured (`from`). If the
+ * volume of such a state is relative to an assumed rest, `fuller_at` or `fuller_from` is its pose
+ * with 1 % of the reference volume added. Otherwise, it equals `at` or `from`. */
 typedef struct poses {
   supine_pose at, from, fuller_at, fuller_from;
   bool assumed; /* the volume of `at` or `from` is relative to an assumed rest */

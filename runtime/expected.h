@@ -8,10 +8,9 @@
 
 #include "runtime/kriging.h"
 
-/** Number of vertices evaluated at once. */
-enum { LOCATE_BLOCK = 256 };
+enum { LOCATE_BLOCK = 256 }; /**< number of vertices evaluated at once */
 
-/** The result of kriging in supine_locate, at the start of the caller's work space. */
+/** The result of kriging in supine_locate. It lies at the start of the caller's work space. */
 typedef struct supine_locate_fit {
   supine_kriging kriging;
   supine_kriging_options options;
@@ -34,8 +33,8 @@ extern const double supine_expected_shift;
 double supine_expected_rms(const supine_basis *basis, const supine_pose *pose,
                            const supine_pose *from);
 
-/** Compute the pose of a state with 1 % of the reference volume added. If the state names lungs,
- * each named lung gets an equal part of this volume. Statuses: as supine_basis_pose. */
+/** Add 1 % of the reference volume to the volume of a state, and compute the pose. Named lungs get
+ * equal parts of the addition. Statuses: as supine_basis_pose. */
 supine_status supine_expected_shifted(const supine_basis *basis, const supine_state *state,
                                       supine_pose *pose, supine_error *error);
 

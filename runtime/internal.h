@@ -17,8 +17,7 @@ enum { RESTING_TERMS = 9 };
  * caller is likely to read it. */
 enum { STREAM_BYTES = 1 << 22, STREAM_BATCH_BYTES = 1 << 24, STREAM_RANGE = 1 << 13 };
 
-/** Largest size of a lung's name in bytes, with its NUL. */
-enum { LUNG_NAME_SIZE = 32 };
+enum { LUNG_NAME_SIZE = 32 }; /**< largest size of a lung's name in bytes, with its NUL */
 
 struct supine_basis {
   supine_basis_info info;
@@ -39,14 +38,15 @@ struct supine_basis {
    * mm. */
   double mode_error[SUPINE_MODES_MAX], mode_size[SUPINE_MODES_MAX];
   double reference_volume[SUPINE_LUNGS_MAX]; /**< array that info.reference_volume points to, mL */
-  /** Coefficients of the volume at rest minus the reference volume, mL, in spherical harmonics of
-   * the direction of gravity. A row for each lung, or one row for all lungs; NULL without rest. */
+  /** (Volume at rest - reference volume), mL, as spherical-harmonic coefficients over directions of
+   * gravity. A row for each lung, or one row for all lungs; NULL if the file has no volume at
+   * rest. */
   const double *resting;
   bool rest_by_lung;   /**< `resting` has a row for each lung */
-  double upright_gain; /**< full volume upright minus supine, divided by the reference volume */
+  double upright_gain; /**< (full volume upright - full volume supine) / reference volume */
   double scan_volume;  /**< volume of all lungs in the scan minus the reference volume, mL */
   double scan_gravity[3];
-  const uint32_t *rigid; /**< [rigid_count, 2] ranges of vertices (rigid.h) */
+  const uint32_t *rigid; /**< [rigid_count, 2] range of vertices of each rigid part (rigid.h) */
   size_t rigid_count;
   double reference_error; /**< largest packing error of a reference position, mm */
   double reference_size;  /**< bound on the distance of a reference position from the origin, mm */
@@ -60,13 +60,12 @@ supine_status supine_basis_pack(supine_basis *basis, supine_storage storage);
  * @retval SUPINE_ERROR_MEMORY  an allocation failed */
 supine_status supine_basis_pack_normals(supine_basis *basis);
 
-/** Return the number of elements of the vectors in the formula of supine_basis_normal_weights. For
- * K modes, these are the elements
+/** Return the number of elements of the vector by which supine_basis_normal_weights multiplies V on
+ * one axis. For K modes, the elements are
  *
  *     1,  a w_k,  b w_k,  a b w_k w_l    for all k and all l >= k
  *
- * of each axis. In files of versions 1 and 2, which have one gain, a w_k and b w_k are one
- * element. */
+ * In files of versions 1 and 2, which have one gain, a w_k and b w_k are a single element. */
 static inline size_t supine_basis_normal_terms(const supine_basis *basis) {
   const size_t k = basis->info.mode_count;
   return 1 + (basis->info.volume_axes == 3 ? 2 : 1) * k + k * (k + 1) / 2;

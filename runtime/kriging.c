@@ -57,7 +57,7 @@ size_t supine_kriging_space(size_t count) {
 }
 
 /* Return the column of supine_kriging.whitened that a term multiplies on an axis. Write the sign of
- * this product, or 0 if the term does not change the axis. */
+ * this product, or 0 if the term changes no coordinate on this axis. */
 static int column_of(size_t term, size_t axis, double *sign) {
   *sign = 1;
   if (term < 3) {
@@ -112,8 +112,8 @@ static bool is_known(const supine_kriging_options *options, size_t term) {
  *     A = X' K^-1 X + P        right = X' K^-1 y + P m
  *
  * X has the columns that the terms multiply, K is the covariance of the points, and y are the
- * residuals. The prior has the inverse covariance P and the mean m. A row of A for a known term is
- * a row of the identity. */
+ * residuals. The prior has the inverse covariance P and the mean m. If a term is not fitted,
+ * its row of A is a row of the identity. */
 static void normal_equations(const supine_kriging *fit, const supine_kriging_options *options,
                              double a[TERMS * TERMS], double right[TERMS]) {
   const size_t n = fit->count;
@@ -135,8 +135,8 @@ static void normal_equations(const supine_kriging *fit, const supine_kriging_opt
   }
 }
 
-/* Return whether the points determine all terms: whether each pivot of `factor`, the Cholesky
- * factor of `a`, exceeds the rounding error of this pivot. */
+/* Return whether the points determine all fitted terms. They do if each pivot of `factor`, the
+ * Cholesky factor of `a`, exceeds the rounding error of this pivot. */
 static bool determined(const double a[TERMS * TERMS], const double factor[TERMS * TERMS]) {
   for (size_t k = 0; k < TERMS; ++k) {
     const double pivot = factor[k * TERMS + k];
@@ -147,7 +147,7 @@ static bool determined(const double a[TERMS * TERMS], const double factor[TERMS 
   return true;
 }
 
-/* Compute the terms, their covariance and supine_kriging.spread from the normal equations. */
+/* Solve the normal equations for the fitted terms, their covariance and supine_kriging.spread. */
 static void solve_terms(supine_kriging *fit, const supine_kriging_options *options,
                         const double factor[TERMS * TERMS], const double right[TERMS]) {
   double inverse[TERMS][TERMS];

@@ -2,8 +2,8 @@
 /** @file
  * Kriging of the residuals of a displacement law at observed points.
  *
- * The residual y_j of point j, mm, is the observed position minus the position that the law
- * predicts. The model of the residual is
+ * The residual y_j of point j, mm, is the observed position minus the position that this
+ * law predicts. The model of the residual is
  *
  *     y_j = t + b v_j + r x (p_j - c) + g(p_j) + noise
  *
@@ -39,10 +39,10 @@ typedef struct supine_kriging_model {
   double sill;   /**< 3-D variance of the random field, mm^2, for each mm of displacement */
   double length; /**< correlation length of the random field, mm */
   double across; /**< factor of the covariance between points of two lungs, 0 to 1 */
-  double least;  /**< length, mm, that replaces the length of shorter displacements */
+  double least;  /**< shorter displacements count as displacements of this length, mm */
 } supine_kriging_model;
 
-/** Model of full breaths of 15 patients. */
+/** Model estimated from full breaths of 15 patients. */
 extern const supine_kriging_model supine_kriging_default;
 
 typedef struct supine_kriging_point {
@@ -54,7 +54,7 @@ typedef struct supine_kriging_point {
   size_t lung;
 } supine_kriging_point;
 
-/** The model. `volume` and `rotation` select terms to fit in addition to the translation. */
+/** Options of a fit. `volume` and `rotation` select terms to fit in addition to the translation. */
 typedef struct supine_kriging_options {
   supine_kriging_model model;
   bool volume, rotation;
@@ -67,15 +67,15 @@ typedef struct supine_kriging {
   size_t count;
   double centre[3]; /**< mean position of the points, mm */
   double *factor;   /**< [count, count] lower triangle L of the covariance matrix L L' */
-  /** [SUPINE_KRIGING_COLUMNS, count] the inverse of `factor` times columns. For each point, these
-   * hold 1, supine_kriging_point.volume, position - `centre`, and residual. */
+  /** [SUPINE_KRIGING_COLUMNS, count] the inverse of `factor` times ten columns with one number for
+   * each point: 1, supine_kriging_point.volume [3], position - `centre` [3], residual [3]. */
   double *whitened;
   double *weights; /**< [3, count] the inverse of `factor` times (residuals - fitted terms) */
-  double terms[SUPINE_KRIGING_TERMS]; /**< fitted translation, volume and rotation; 0 if known */
-  /** Covariance matrix of `terms`; 0 for known terms. */
+  double terms[SUPINE_KRIGING_TERMS]; /**< translation, volume and rotation; 0 if not fitted */
+  /** Covariance matrix of `terms`. Rows and columns of terms that are not fitted are 0. */
   double covariance[SUPINE_KRIGING_TERMS][SUPINE_KRIGING_TERMS];
-  /** Matrix S of the variance m' S m, mm^2, that errors of the terms add to a prediction. m is 1,
-   * the point's supine_kriging_point.volume [3], and the point's position minus `centre` [3]. */
+  /** Matrix S for which errors of the fitted terms add the variance m' S m, mm^2, to a prediction.
+   * m is 1, the point's supine_kriging_point.volume [3], and position - `centre` [3]. */
   double spread[SUPINE_KRIGING_TERMS][SUPINE_KRIGING_TERMS];
   double log_likelihood; /**< restricted log likelihood of the residuals, up to a constant */
 } supine_kriging;
@@ -94,14 +94,14 @@ size_t supine_kriging_space(size_t count);
  * @param count   1 to SUPINE_KRIGING_POINTS_MAX
  * @param points  [count]; keep them as long as the fit is used
  * @param space   [supine_kriging_space(count)]; keep it as long as the fit is used
- * @retval SUPINE_ERROR_ARGUMENT   a rotation is unknown and the points lie on one line
+ * @retval SUPINE_ERROR_ARGUMENT   a rotation is to be fitted, but the points lie on one line
  * @retval SUPINE_ERROR_NUMERICAL  the covariance of the points is not positive definite: a number
  *                                 is not finite, or points at one position have a noise of 0 */
 supine_status supine_kriging_fit(const supine_kriging_options *options, size_t count,
                                  const supine_kriging_point *points, double *space,
                                  supine_kriging *fit, supine_error *error);
 
-/** Write the residual of an observed point minus the prediction from all other points.
+/** Predict the residual of an observed point from all other points. Write residual - prediction.
  * @param residual  [3] mm, written
  * @param scratch   [count] work space
  * @return expected 3-D standard deviation of `residual`, mm; 0 if no prediction is possible */
@@ -113,7 +113,7 @@ typedef struct supine_kriging_target {
   size_t count, lung;
   const float *position; /**< [count, 3] positions in the scan, mm */
   const float *size;     /**< [count] lengths of the displacements, mm */
-  const float *volume;   /**< [count, 3] supine_kriging_point.volume; NULL if the volume is known */
+  const float *volume;   /**< [count, 3] supine_kriging_point.volume; NULL if no volume is fitted */
 } supine_kriging_target;
 
 /** Predict the residual at every point of a target, and compute the 3-D variance of the prediction.

@@ -67,8 +67,8 @@ static void project(size_t count, float (*w)[RUN], const double *numbers, float 
   }
 }
 
-/* For each point of a run, solve L w = k with the lower triangle L = fit->factor. k are the
- * covariances of the random field between this point and the observed points. */
+/* For each point of a run, solve L w = k with the lower triangle L = fit->factor. k holds
+ * the covariances of the random field between this point and the observed points. */
 static void solve(const supine_kriging *fit, size_t lung, const run *in, float (*w)[RUN]) {
   const size_t n = fit->count;
   for (size_t j = 0; j < n; ++j) {

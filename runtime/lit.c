@@ -108,7 +108,7 @@ static void light(const supine_basis *basis, const supine_pose *pose, size_t beg
   const supine_target target = {.xyz = normals,
                                 .stream = stream,
                                 .prefetch = stream ? basis->prefetch : SUPINE_PREFETCH_NONE};
-  float folded[SUPINE_NORMAL_MODES_MAX + 2] = {0}; /* 0 for modes that the last word lacks */
+  float folded[SUPINE_NORMAL_MODES_MAX + 2] = {0}; /* the factors of absent modes are 0 */
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     const size_t first = basis->lung_begin[lung] > begin ? basis->lung_begin[lung] : begin;
     const size_t last = basis->lung_begin[lung + 1] < end ? basis->lung_begin[lung + 1] : end;

@@ -13,9 +13,9 @@ _Static_assert((int)SUPINE_LOCATE_POINTS_MAX == (int)SUPINE_KRIGING_POINTS_MAX,
  * the difference between the volumes at full inflation (1) and at rest (0.43). */
 static const double prior_spread = 0.17;
 static const double outlier_limit = 3.0; /* outliers exceed this number of standard deviations */
-static const double outlier_noise = 300; /* standard deviation given to an outlier, mm */
-static const double volume_step = 1;     /* change of the volume below which the search ends, mL */
-static const double angle_step = 1e-4;   /* rotation in a step below which the search ends, rad */
+static const double outlier_noise = 300; /* noise assigned to an outlier, mm */
+static const double volume_step = 1;     /* the search ends when steps are smaller than this, mL */
+static const double angle_step = 1e-4;   /* the search ends when steps are smaller than this, rad */
 /* Ratio of supine_kriging_model.sill, 6 mm, to the constant of the expected error, 4.5 mm. The
  * constant is smaller because it was measured after the best translation. */
 static const double sill_of_error = 4.0 / 3;
@@ -27,10 +27,10 @@ typedef struct workspace {
   const supine_locate_task *task;
   supine_location *found;
   supine_locate_fit *fit;
-  supine_kriging_point *points; /* [task->count] */
+  supine_kriging_point *points; /* [task->count] observed points */
   double *law;     /* [task->count, 3] positions that the displacement law predicts, mm */
-  double *kriging; /* [supine_kriging_space(task->count)] */
-  double *scratch; /* [task->count] */
+  double *kriging; /* [supine_kriging_space(task->count)] work space of supine_kriging_fit */
+  double *scratch; /* [task->count] work space of supine_kriging_leave_out */
 } workspace;
 
 static size_t doubles_of(size_t bytes) {
@@ -85,8 +85,8 @@ static void position(const supine_basis *basis, const supine_pose *pose, size_t 
   }
 }
 
-/* Set all members that do not depend on the state: the position in the scan, the lung and the noise
- * of each point, and the options of the fit. */
+/* Set all parts of the workspace that do not depend on the state: the position in the scan, the
+ * lung and the noise of each point, and the options of the fit. */
 static supine_status initialise(workspace *s, supine_error *error) {
   const supine_locate_task *task = s->task;
   const supine_basis *basis = task->inside;
@@ -181,11 +181,11 @@ static void find_residuals(workspace *s) {
   }
 }
 
-/* Set the rotation to the one that fits the predicted positions to the observed positions best. */
+/* Set the rotation to the one that moves the predicted positions closest to the observed ones. */
 static void rotate_roughly(workspace *s) {
   double h[3][3] = {{0}};
   find_residuals(s);
-  const double *c = s->fit->origin; /* observed mean minus predicted mean without rotation */
+  const double *c = s->fit->origin; /* mean observed position - mean predicted position, mm */
   double mean[3] = {0};
   const size_t n = s->task->count;
   for (size_t j = 0; j < 3 * n; ++j) {

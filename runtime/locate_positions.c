@@ -68,7 +68,7 @@ static void predict(const supine_location *found, const supine_basis *basis, con
 /* Convert the corrected positions to the frame of the observations, and write the expected errors.
  * If at least three points were observed and no rotation was fitted, limit each expected error to
  * the error without observations. With two points, this limit would be 0.85 of the true error; with
- * a rotation, it would lack the error of the rotation. */
+ * a rotation, it would omit the error of the rotation. */
 static void finish(const supine_location *found, const poses *p, const block *b, size_t count,
                    float *xyz, float *sigma) {
   const supine_locate_fit *fit = found->fit;

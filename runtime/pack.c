@@ -9,7 +9,7 @@
 #include "sh/base/clones.h"
 
 enum {
-  FIXED_TOP = INT32_MAX / 4096 * 4096, /* packed value of 1, in the range of fixed_narrow */
+  FIXED_TOP = INT32_MAX / 4096 * 4096, /* packed form of 1, within the range of fixed_narrow */
   FLOAT_FRACTION_BITS = 23
 };
 
@@ -90,8 +90,8 @@ static void largest_coefficients(const supine_basis *basis, float *top) {
   }
 }
 
-/* Return the power of two u for which top / u is 2^30 to 2^31. Limit u to values for which products
- * with u are normal floats. */
+/* Return the power of two u for which top / u is from 2^30 to 2^31. Limit u so that products with u
+ * are normal floats. */
 static double reference_unit(float top) {
   const int exponent = flush(top) > 0 ? ilogbf(top) - 30 : -130;
   return ldexp(1, exponent < 96 ? exponent : 96);
@@ -107,7 +107,7 @@ static int word_bits(const supine_tiles *tiles, size_t k) {
  * packed coefficient errs by half of its lowest bit and by the rounding of its word to a float. */
 static void choose_units(supine_basis *basis, work *w) {
   const bool compact = supine_tiles_compact(basis->tiles.storage);
-  const double axes = sqrt((double)basis->tiles.axes); /* length if all coordinates are 1 */
+  const double axes = sqrt((double)basis->tiles.axes); /* length of (1, 1, 1) or of (1) */
   float top[SUPINE_MODES_MAX];
   float farthest = 0;
   for (size_t i = 0; i < 6 * basis->info.lung_count; ++i) {
@@ -122,7 +122,7 @@ static void choose_units(supine_basis *basis, work *w) {
   for (size_t k = 0; k < basis->info.mode_count; ++k) {
     const int bits = word_bits(&basis->tiles, k);
     w->mode[k] = 1;
-    if (flush(top[k]) > 0 && compact) { /* the largest coefficient fills all of its bits */
+    if (flush(top[k]) > 0 && compact) { /* let the largest coefficient fill all bits */
       w->mode[k] = (double)top[k] / (0x1p31 - ldexp(1, 32 - bits));
     }
     basis->mode_scale[k] = w->mode[k] * w->direction;
@@ -159,8 +159,8 @@ static void pack_coefficients(const supine_tiles *tiles, const double *unit, con
   }
 }
 
-/* Pack the 48 coordinates of a tile. If a vertex has a squared packing error above *square, write
- * the error to *square. */
+/* Pack the 48 coordinates of a tile. Replace *square by the largest squared packing error of a
+ * vertex if this error is larger. */
 static void pack_numbers(const supine_tiles *tiles, double unit, const float *numbers,
                          unsigned char *at, float *square) {
   float error[TILE_NUMBERS];

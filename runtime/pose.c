@@ -101,7 +101,7 @@ static supine_status refuse(const char *what, supine_error *error) {
                           what);
 }
 
-/* Convert any volume to the volume of all lungs together minus the reference volume, mL. */
+/* Convert a volume of any kind to the volume of all lungs minus the reference volume, mL. */
 static supine_status total_of(const supine_basis *basis, const volumes *v,
                               const supine_volume *volume, double *total, supine_error *error) {
   switch (volume->kind) {
@@ -178,9 +178,9 @@ static supine_status total_gains(const supine_basis *basis, const volumes *v, do
   return status;
 }
 
-/* Find the gains of each lung from the lung's own volume. If this is relative to rest, full
- * inflation or the scan, add it to the volume that the lung holds if all lungs are at this
- * reference. */
+/* Find the gains of each named lung. A volume relative to rest counts from the volume that this
+ * lung holds when all lungs together are at rest. Volumes relative to full inflation or the scan
+ * are treated in the same way. */
 static supine_status named_gains(const supine_basis *basis, const volumes *v,
                                  const supine_state *state, supine_pose *pose,
                                  supine_error *error) {
@@ -225,7 +225,7 @@ static supine_status named_gains(const supine_basis *basis, const volumes *v,
   return SUPINE_OK;
 }
 
-/* Set all gains to 0 for the reference surface. Refuse other states, which need volumes. */
+/* Set all gains to 0 for the reference surface. Refuse all other states: they need volumes. */
 static supine_status open_gains(const supine_basis *basis, const supine_state *state,
                                 supine_pose *pose, supine_error *error) {
   const supine_volume *volume = &state->volume;

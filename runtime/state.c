@@ -173,7 +173,7 @@ supine_status supine_state_parse(const char *text, supine_state *state, supine_e
     return SUPINE_OK;
   }
   const char *equals = strchr(text, '=');
-  if (equals != NULL && colon != NULL && colon > equals) { /* no posture precedes the colon */
+  if (equals != NULL && colon != NULL && colon > equals) { /* a colon after '=' ends no posture */
     colon = NULL;
   }
   if (colon == NULL) {
@@ -229,7 +229,7 @@ static void add_posture(writer *out, const double gravity[3], bool described) {
       return;
     }
   }
-  if (g[0] == 0) { /* a posture tilted from supine or prone, whichever is nearer */
+  if (g[0] == 0) { /* print gravity without a lateral part as tilted supine or prone */
     const double degrees = atan2(g[2], fabs(g[1])) * (180 / 3.14159265358979323846);
     add(out, "%s%+.9g", g[1] >= 0 ? "supine" : "prone", g[1] >= 0 ? degrees : -degrees);
     return;

@@ -9,7 +9,7 @@
 /* Return whether two words are the same, ignoring the case of ASCII letters in every locale. */
 bool supine_words_same(const char *a, const char *b);
 
-/* Number of characters of `word` that supine_words_distance compares. */
+/* Largest number of characters of `word` that supine_words_distance compares. */
 enum { SUPINE_WORD_MAX = 63 };
 
 /* Return the smallest number of characters to insert, delete or replace to turn `text`, of any

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Compare poses of a basis by the distances of vertices, and compute the energy of each band of
- * harmonics. Gram matrices avoid a pass over the vertices. */
+/* Compare poses by the distances of vertices, and compute the energy of each band of harmonics. RMS
+ * distances and energies come from Gram matrices, without a pass over the vertices. */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -16,7 +16,7 @@ struct supine_compare {
   const supine_basis *basis;
   double area;  /* area of the reference surface, mm^2 */
   float *share; /* [N] fraction of the area that belongs to each vertex */
-  double *gram; /* [lungs, 3, modes, modes] Gram matrix of each lung and axis, mm^2 */
+  double *gram; /* [lungs, 3, modes, modes] Gram matrix of the modes for each lung and axis, mm^2 */
   double *sum;  /* [modes, modes] sum of all Gram matrices, mm^2 */
 };
 
@@ -160,8 +160,8 @@ static double product(const double *gram, const double *q, const double *p, size
   return sum;
 }
 
-/* For each lung, axis and mode, write the product of the gain and the weight in a pose to `q`.
- * Unless `from` is NULL, subtract the product in the pose `from`. */
+/* For each lung, axis and mode, write the gain times the weight of `pose` to `q`. Unless `from` is
+ * NULL, subtract the gain times the weight of `from`. */
 static void products_of(const supine_compare *compare, const supine_pose *pose,
                         const supine_pose *from, double *q) {
   for (size_t i = 0; i < 3 * compare->basis->info.lung_count; ++i) {
@@ -238,9 +238,9 @@ void supine_compare_distances(const supine_compare *compare, const supine_pose *
   }
 }
 
-/* Find the smallest distance d for which a fraction `target` of the area has distances of at most
- * d. Non-negative floats have the same order as their bits. Three histograms of the area, each with
- * 2^11 bins, therefore determine the upper, middle and lower bits of d. */
+/* Find the smallest d such that the vertices with distances of at most d have at least the fraction
+ * `target` of the area. Non-negative floats have the same order as their bits. Three histograms of
+ * the area, each with 2^11 bins, thus determine the upper, middle and lower bits of d. */
 static double percentile(const supine_compare *compare, const float *distance, double target) {
   enum { ROUNDS = 3, BITS = 11, BINS = 1 << BITS };
   const size_t n = compare->basis->info.vertex_count;
@@ -257,7 +257,7 @@ static double percentile(const supine_compare *compare, const float *distance, d
       }
     }
     uint32_t at = 0;
-    uint32_t last = 0; /* last bin with area, if rounding makes `target` too large */
+    uint32_t last = 0; /* last bin with area; used if `target` exceeds the sum of all bins */
     for (; at < BINS && (bin[at] == 0 || below + bin[at] < target); ++at) {
       below += bin[at];
       last = bin[at] > 0 ? at : last;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute ventilation by height: the volume that the tissue between two heights gains. */
+/* Compute ventilation by height: the volume that a breath adds between two heights. */
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -24,12 +24,12 @@ typedef struct polygon {
   corner corner[6];
 } polygon;
 
-/* Sums over the edges of the outline that a horizontal plane cuts from the surface. Edges have the
- * direction that they have in the polygons above the plane. */
+/* Sums over the edges of the outline along which a horizontal plane cuts the surface. Each edge has
+ * the same direction as in the polygon above the plane. */
 typedef struct outline {
   double length;           /* total length of the edges before the breath, mm */
-  double middle[TIMES][3]; /* sum of edge midpoints times edge lengths, mm^2 */
-  double area[TIMES][3];   /* sum over the edges of the cross product of start and end, mm^2 */
+  double middle[TIMES][3]; /* sum over edges: midpoint times length before the breath, mm^2 */
+  double area[TIMES][3];   /* sum over edges: cross product of start and end, mm^2 */
 } outline;
 
 /* The slabs, and the outlines of one lung at the planes between the slabs. */
@@ -37,11 +37,11 @@ typedef struct cutter {
   const float *from;                  /* [N, 3] positions before the breath, mm */
   double down[3];                     /* unit vector along gravity */
   size_t count;                       /* number of slabs */
-  double level[SUPINE_SLABS_MAX + 1]; /* levels of the slabs' tops and of the lowest bottom, mm */
+  double level[SUPINE_SLABS_MAX + 1]; /* level of each slab's top, then of the last bottom, mm */
   outline cut[SUPINE_SLABS_MAX + 1];
 } cutter;
 
-/* Read a vertex. For precision, positions are relative to the first vertex before the breath. */
+/* Read a vertex. For precision, make positions relative to vertex 0 before the breath. */
 static corner read_corner(const cutter *c, const float *xyz, size_t vertex) {
   corner out;
   for (size_t i = 0; i < 3; ++i) {
@@ -52,8 +52,8 @@ static corner read_corner(const cutter *c, const float *xyz, size_t vertex) {
   return out;
 }
 
-/* Add the volume of a cone to the volume of `slab`, mL, and the change of this volume in the breath
- * to the gain of `slab`. The apex of the cone is the origin, and the polygon is the base. */
+/* Add the volume, mL, of the cone between the origin and a polygon to slab->volume. Add the change
+ * of this volume in the breath to slab->gain. */
 static void add_polygon(const polygon *p, supine_slab *slab) {
   double volume[TIMES] = {0};
   for (size_t i = 1; i + 1 < p->count; ++i) {

@@ -57,7 +57,7 @@ static inline uint32_t normal_narrow(double first, double second, double third) 
 }
 
 /** Return the factor that converts numbers of normal_narrow to the 16-bit numbers of a file. It
- * takes 255 x 2^23, the largest number that 9 bits can hold, to 32767. */
+ * converts 255 x 2^23, the largest number whose lowest 23 bits are 0, to 32767. */
 static inline double normal_unit(void) {
   return INT16_MAX / (255 * 0x1p23);
 }

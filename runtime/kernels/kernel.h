@@ -21,7 +21,7 @@ typedef uint32_t vu __attribute__((vector_size(4 * LANES)));
 enum {
   GROUPS = TILE / LANES,         /* number of vectors that hold a `row` */
   PIECES = TILE_NUMBERS / LANES, /* number of vectors that hold `triples` */
-  CHAINS = GROUPS == 1 ? 2 : 1,  /* number of partial sums over modes; two hide FMA's latency */
+  CHAINS = GROUPS == 1 ? 2 : 1,  /* number of partial sums of dot(); two hide the latency of FMA */
   KNOWN_MODES = 16               /* largest number of modes whose weights stay in registers */
 };
 
@@ -89,7 +89,7 @@ INLINE void add_mode(row *sum, vf w, const unsigned char *at, int shift, bool co
   }
 }
 
-/* Return the sum of weight times coefficient over all modes, for each vertex of a tile. */
+/* For each vertex of a tile, return the sum over all modes of weight times coefficient. */
 INLINE row dot(const supine_tiles *tiles, const unsigned char *at, const weights *w, form f) {
   const bool compact = supine_tiles_compact(f.storage);
   const bool known = f.modes > 0;
@@ -119,7 +119,7 @@ INLINE row dot(const supine_tiles *tiles, const unsigned char *at, const weights
   return *even;
 }
 
-/* Load the 48 coordinates of directions or reference positions in their stored unit. */
+/* Load 48 coordinates, of directions or of reference positions, in their stored unit. */
 INLINE triples numbers(const unsigned char *at, bool compact) {
   triples n;
   for (size_t j = 0; j < PIECES && !compact; ++j) {

@@ -27,15 +27,15 @@ enum {
 typedef struct supine_tiles {
   supine_storage storage;
   size_t modes;
-  size_t axes;            /**< axes with their own coefficients: 3 for vector fields, else 1 */
+  size_t axes;            /**< number of axes with coefficients: 3 for vector fields, else 1 */
   size_t axis_bytes;      /**< bytes of the coefficients of one axis in one tile */
   size_t direction_begin; /**< byte offset of the directions in a tile */
   size_t reference_begin; /**< byte offset of the reference positions in a tile */
   size_t stride;          /**< size of a tile in bytes */
   size_t count;
-  /** Addend to the bits of a float that multiplies the float by the unit of reference positions. */
+  /** Added to the bits of a float, this multiplies the float by the unit of reference positions. */
   uint32_t reference_unit;
-  unsigned char *bytes; /**< [count, stride] */
+  unsigned char *bytes; /**< [count, stride] bytes of the tiles */
 } supine_tiles;
 
 /** Return whether a storage is compact. In a compact storage, two or three coefficients share a
@@ -44,7 +44,7 @@ static inline bool supine_tiles_compact(supine_storage storage) {
   return storage != SUPINE_STORAGE_EXACT;
 }
 
-/** Return the number of words per vertex in which three coefficients share one word. */
+/** Return the number of words per vertex that hold three coefficients each. */
 static inline size_t supine_tiles_thirds(supine_storage storage, size_t modes) {
   return storage == SUPINE_STORAGE_MIXED ? modes / 8 : 0;
 }
@@ -89,12 +89,12 @@ static inline void supine_tiles_layout_lit(supine_tiles *tiles, size_t modes, si
 }
 
 typedef enum supine_prefetch {
-  SUPINE_PREFETCH_NONE, /**< none, because the tiles are in the cache */
-  SUPINE_PREFETCH_NEAR, /**< every other line, 640 bytes ahead, to the second-level cache */
-  SUPINE_PREFETCH_FAR,  /**< every line, 8192 bytes ahead, without filling the outer caches */
+  SUPINE_PREFETCH_NONE, /**< no prefetching, because the tiles are in the cache */
+  SUPINE_PREFETCH_NEAR, /**< every other cache line, 640 bytes ahead, to the second-level cache */
+  SUPINE_PREFETCH_FAR,  /**< every cache line, 8192 bytes ahead, without filling the outer caches */
 } supine_prefetch;
 
-/** Prefetch `stride` bytes at a distance after `tile`. `how` determines the distance. */
+/** Prefetch `stride` bytes at the distance after `tile` that `how` selects. */
 static inline __attribute__((always_inline)) void
 supine_prefetch_tile(const unsigned char *tile, size_t stride, supine_prefetch how) {
   enum { PAST_CACHES = 0, SECOND_LEVEL = 2 }; /* locality arguments of __builtin_prefetch */
@@ -141,8 +141,8 @@ typedef struct supine_kernels {
 } supine_kernels;
 
 extern const supine_kernels supine_kernels_portable;
-extern const supine_kernels supine_kernels_avx2;   /**< members are NULL without AVX2 */
-extern const supine_kernels supine_kernels_avx512; /**< members are NULL without AVX-512 */
+extern const supine_kernels supine_kernels_avx2;   /**< members are NULL if built without AVX2 */
+extern const supine_kernels supine_kernels_avx512; /**< members are NULL if built without AVX-512 */
 
 /** Return the kernels of an instruction set, or NULL if the processor or the build lacks it.
  * Replace AUTO in *simd by the widest set of this processor. */

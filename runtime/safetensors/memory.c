@@ -8,7 +8,7 @@ supine_status supine_platform_map(const char *path, supine_platform_file *file,
                                   supine_error *error) {
   *file = (supine_platform_file){NULL, 0};
   return supine_error_set(error, SUPINE_ERROR_READ,
-                          "%s: this system has no files: open the bytes of the file in memory",
+                          "%s: this system cannot open files: pass the bytes of the file instead",
                           path);
 }
 

@@ -22,7 +22,7 @@ supine_status supine_platform_map(const char *path, supine_platform_file *file,
   } else if (!S_ISREG(about.st_mode)) {
     status = supine_error_set(error, SUPINE_ERROR_READ,
                               "%s: not a regular file: give the path of a safetensors file", path);
-  } else if (about.st_size > 0) { /* an empty file cannot be mapped */
+  } else if (about.st_size > 0) { /* do not map an empty file: mapping would fail */
     void *bytes = mmap(NULL, (size_t)about.st_size, PROT_READ, MAP_PRIVATE, descriptor, 0);
     if (bytes == MAP_FAILED) {
       status =

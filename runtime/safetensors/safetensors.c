@@ -104,7 +104,7 @@ supine_status supine_safetensors_verify(const supine_safetensors *file, supine_e
   if (stated == NULL) {
     return supine_error_set(
         error, SUPINE_ERROR_FORMAT,
-        "%s: no checksum, so Supine did not write it: write it again with Supine", file->name);
+        "%s: no checksum, so another program wrote the file: make it with Supine", file->name);
   }
   char found[CHECKSUM_SIZE];
   (void)snprintf(found, sizeof found, CHECKSUM_FORMAT,

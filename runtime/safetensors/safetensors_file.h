@@ -20,8 +20,8 @@ struct supine_safetensors {
   size_t size;
   supine_platform_file mapping; /**< mapping that contains `bytes`; zero if the caller owns them */
   char *header;                 /**< a copy of the header, in which strings are decoded */
-  supine_tensor *tensors;       /**< sorted by the position of their data */
-  void **copies;                /**< [tensor_count] aligned copies of misaligned data, or NULL */
+  supine_tensor *tensors;       /**< tensors, sorted by the position of their data */
+  void **copies;                /**< [tensor_count] aligned copy; NULL if data are aligned */
   size_t tensor_count;
   supine_metadata *metadata;
   size_t metadata_count;

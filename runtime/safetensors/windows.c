@@ -44,7 +44,7 @@ supine_status supine_platform_map(const char *path, supine_platform_file *file,
       GetFileType(handle) != FILE_TYPE_DISK) {
     status = supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: Windows error %lu", path,
                               (unsigned long)GetLastError());
-  } else if (size.QuadPart > 0) { /* an empty file cannot be mapped */
+  } else if (size.QuadPart > 0) { /* do not map an empty file: mapping would fail */
     file->bytes = (uint64_t)size.QuadPart <= SIZE_MAX ? map_handle(handle) : NULL;
     file->size = (size_t)size.QuadPart;
     if (file->bytes == NULL) {

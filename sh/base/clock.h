@@ -5,7 +5,7 @@
 
 #include <time.h>
 
-/** Return the seconds since an arbitrary moment in the past; they never decrease. */
+/** Return the time in seconds since an arbitrary moment. It never decreases. */
 static inline double supine_clock_seconds(void) {
   struct timespec time;
   (void)clock_gettime(CLOCK_MONOTONIC, &time);

@@ -12,8 +12,8 @@
 enum { SUPINE_CSV_FIELDS_MAX = 64 };
 
 /* A CSV file being read. It has a header, and may have comments (#), blank lines and quoted fields.
- * The header tells the separator: ',', ';' or tab. With ';', numbers may have a decimal comma.
- * Zero-initialise. */
+ * The separator of the header, ',', ';' or tab, holds for all lines. With ';', numbers may have a
+ * decimal comma. Zero-initialise. */
 typedef struct supine_csv {
   const char *path;
   FILE *file;
@@ -24,7 +24,7 @@ typedef struct supine_csv {
   size_t field_count;
   char *field[SUPINE_CSV_FIELDS_MAX];   /* fields of the current row */
   size_t column_count;                  /* number of fields of the header */
-  size_t column[SUPINE_CSV_FIELDS_MAX]; /* index of each expected column in `field`, or SIZE_MAX */
+  size_t column[SUPINE_CSV_FIELDS_MAX]; /* index of each expected column; SIZE_MAX if absent */
 } supine_csv;
 
 /* Open a file and read its header. Of the `count` expected columns in `names`, the first `required`

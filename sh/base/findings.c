@@ -18,7 +18,7 @@ void supine_findings_add(supine_findings *findings, const char *format, ...) {
     findings->text[used] = '\0';
     return;
   }
-  for (char *c = findings->text + used; *c != '\0'; ++c) { /* file names may have line feeds */
+  for (char *c = findings->text + used; *c != '\0'; ++c) { /* replace line feeds of file names */
     *c = *c == '\n' ? ' ' : *c;
   }
   (void)supine_text_make_utf8(findings->text + used);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute real spherical harmonics of a direction (x, y, z), for m >= 0:
+/* Compute real spherical harmonics of a unit vector (x, y, z), for m >= 0:
  *
  *     Y(l, m) = q(l, m) Re (x + i y)^m        Y(l, -m) = q(l, m) Im (x + i y)^m
  *
@@ -22,11 +22,11 @@ size_t supine_sh_index(size_t l, int m) {
   return (size_t)((ptrdiff_t)(l * l + l) + m);
 }
 
-/* Compute Y(l, m) and Y(l, -m) for l = m to band. `top` is q(m, m) of the recurrence above, `re`
- * and `im` are the real and the imaginary part of (x + i y)^m. */
+/* Compute Y(l, m) and Y(l, -m) for l = m to band. `top` is q(m, m) of the recurrence at the top of
+ * this file. `re` and `im` are the real and the imaginary part of (x + i y)^m. */
 static void evaluate_order(size_t band, size_t m, double z, double top, double re, double im,
                            double *y) {
-  double before = 0; /* second term in the parentheses of the recurrence above */
+  double before = 0; /* q(l - 1, m) / a(l, m) of the recurrence at the top of this file */
   double q = top;
   for (size_t l = m;; ++l) {
     double *centre = y + l * l + l;

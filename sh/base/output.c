@@ -76,7 +76,7 @@ char *supine_path_beside(const char *path, const char *name) {
   return made;
 }
 
-/* Resolve symbolic links in the last part of a path, which need not exist. */
+/* If the last part of a path is a symbolic link, replace it by the target, which need not exist. */
 static char *follow_links(const char *path) {
   enum { LINKS_MAX = 40 }; /* largest number of links that Linux follows */
   char *at = strdup(path);
@@ -141,7 +141,7 @@ static int open_regular(supine_output *output) {
     if (access(link, F_OK) == 0) {
       return descriptor;
     }
-    (void)close(descriptor); /* without /proc the file cannot be named later */
+    (void)close(descriptor); /* discard the file: it needs /proc to be named later */
   }
   return take_temporary(output, NULL);
 }
@@ -270,7 +270,7 @@ supine_status supine_output_try(const char *path, supine_error *error) {
   supine_output output;
   struct stat old;
   if (supine_output_is_standard(path) || (stat(path, &old) == 0 && S_ISFIFO(old.st_mode))) {
-    return SUPINE_OK; /* closing a pipe would tell its reader that the output is complete */
+    return SUPINE_OK; /* do not close a pipe: its reader would take the output as complete */
   }
   const supine_status status = supine_output_open(path, &output, error);
   supine_output_abandon(&output);

@@ -45,14 +45,14 @@ bool supine_output_is_standard(const char *path);
  * error. Return false if standard output is closed. */
 bool supine_output_take_standard(void);
 
-/** Check that a file can be written, without leaving one. Statuses: as supine_output_open. */
+/** Check that a file can be written. Leave no new file. Statuses: as supine_output_open. */
 supine_status supine_output_try(const char *path, supine_error *error);
 
 /** Return the path of `name` in the folder of the file `path`, or `name` if it is absolute; the
  * caller frees it. Return NULL if out of memory. */
 char *supine_path_beside(const char *path, const char *name);
 
-/** Remove the temporary files of all outputs of the process. For handlers of fatal signals. */
+/** Remove the temporary files of all outputs of the process. Safe in signal handlers. */
 void supine_output_abandon_all(void);
 
 #endif

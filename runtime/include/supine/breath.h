@@ -16,7 +16,7 @@
  *     x = (2 P - P_low - P_high) / (P_high - P_low)      V(-1) = V_low      V(1) = V_high
  *
  * [Santhanam2008] states such an equation with five parameters, but does not define the control
- * function. It has the form above for these reasons:
+ * function. The control function has the form above for these reasons:
  * - V' is the compliance, so u is the relative rate at which compliance changes as the lung
  *   inflates. Compliance is positive for all parameters. V therefore rises with P everywhere, and
  *   P(V) exists. In the equation V'' = u, noisy data could make V fall while P rises, and a
@@ -26,10 +26,10 @@
  *   [Venegas1998], u is proportional to -tanh((P - c) / (2 d)). A few polynomials approximate this
  *   function, as it is smooth and bounded.
  * - Legendre polynomials are orthogonal over the range of x, so that the parameters hardly depend
- *   on each other if samples are spread evenly. c_1 is half the logarithm of the compliance at
- *   P_high divided by the compliance at P_low; it is negative if the lung is stiffer when full. A
- *   negative c_2 makes a sigmoid: the compliance is greatest inside the range. c_3 skews the
- *   sigmoid, and c_4 and c_5 sharpen its knees.
+ *   on each other if samples are spread evenly. c_1 is half of
+ *   log(compliance at P_high / compliance at P_low). It is negative if the lung is stiffer at
+ *   P_high. A negative c_2 makes a sigmoid: the compliance is greatest inside the range. c_3 skews
+ *   the sigmoid, and c_4 and c_5 sharpen its knees.
  *
  * Pressures are in cmH2O: transpulmonary pressures for a lung alone, airway pressures for lung and
  * chest wall together. Volumes are in mL. A limb is not defined outside its range. Every function
@@ -142,15 +142,15 @@ SUPINE_API supine_pv_breath supine_breath_default(void);
  *
  *     V(t) = tidal (V_limb(P(t)) - V_limb(P_rest)) / (V_limb(P_peak) - V_limb(P_rest))
  *
- * V_limb is the volume of the limb at a pressure. V is 0 at rest and the tidal volume at the peak,
- * to rounding.
+ * V_limb is the volume of the limb at a pressure. Up to rounding, V is 0 at rest, and equals
+ * the tidal volume at the peak.
  * @param pv         P-V loop; may be NULL for constant flow if `pressures` is NULL
  * @param times      [count] s, finite
  * @param volumes    [count] mL above rest, written; may be NULL
  * @param pressures  [count] cmH2O, written; may be NULL
  * @retval SUPINE_ERROR_ARGUMENT   a time or a member of `breath` is out of range, a limb fails
- *                                 supine_breath_curve_check, or a limb ends before the rest
- *                                 pressure, the peak pressure or the tidal volume
+ *                                 supine_breath_curve_check, or the rest pressure, the peak
+ *                                 pressure or the tidal volume is outside the range of a limb
  * @retval SUPINE_ERROR_NUMERICAL  a limb is so flat that its volume does not rise between rest and
  *                                 peak
  * Cost: about 20 microseconds, and less than 1 microsecond for each time. */

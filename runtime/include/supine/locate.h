@@ -2,7 +2,7 @@
 /** @file
  * Expected errors of positions, and lungs found from a few observed points.
  *
- * After the best translation, the error of vertex i has the expected 3-D variance
+ * After the translation that fits best, the error of vertex i has the expected 3-D variance
  *
  *     sigma_i^2 = |u_i| min(c, RMS of |u|) + (|dx_i/dV| 0.05 V_full)^2
  *
@@ -56,14 +56,14 @@ enum { SUPINE_LOCATE_POINTS_MAX = 300 };
 typedef struct supine_observation {
   size_t vertex;      /**< vertex of the basis supine_locate_task.inside */
   double position[3]; /**< observed position, mm */
-  double noise; /**< standard deviation of `position` on each axis, mm, above 0; 2 if unknown */
+  double noise; /**< standard deviation of `position` per axis, mm, above 0; give 2 if unknown */
 } supine_observation;
 
 /** The input of supine_locate. */
 typedef struct supine_locate_task {
   const supine_basis *inside; /**< basis whose vertices were observed */
   size_t count; /**< number of points, 1 to SUPINE_LOCATE_POINTS_MAX; at least 3 if `rigid` */
-  const supine_observation *observed; /**< [count] */
+  const supine_observation *observed; /**< [count] observed points */
   supine_state state; /**< posture and volume; SUPINE_VOLUME_DEFAULT if the volume is unknown */
   bool rigid;         /**< find a rotation in addition to the translation */
 } supine_locate_task;
@@ -96,16 +96,16 @@ SUPINE_API size_t supine_locate_space(size_t count);
  *
  * An unknown volume has a prior. The mean of the prior is the volume at rest or, if the basis has
  * none, the volume in the scan. The standard deviation is 0.17 of the volume of the reference
- * surface. Points whose distance from the prediction by all other points exceeds 3
- * times its standard deviation are outliers. They
- * are left out, the worst first, as long as at least four fifths of the points remain.
+ * surface. A point is an outlier if its distance from the prediction by all other points exceeds 3
+ * standard deviations of this distance. Outliers are left out, the worst first, as long as at least
+ * four fifths of the points remain.
  * @param residuals  [count], written
  * @param space      [supine_locate_space(count)]; keep it as long as `found` is used
  * @param found      written
  * @retval SUPINE_ERROR_ARGUMENT   a count, vertex, position or noise is out of range, or a rotation
  *                                 is to be found from fewer than three points or from points on one
  *                                 line
- * @retval SUPINE_ERROR_NUMERICAL  the fit needs a volume that the lungs cannot reach
+ * @retval SUPINE_ERROR_NUMERICAL  the fit needs a volume that the lungs cannot hold
  * Other statuses: as supine_basis_pose. Cost: about 0.2 ms for 20 points, 0.1 s for 300. */
 SUPINE_API supine_status supine_locate(const supine_locate_task *task,
                                        supine_locate_residual *residuals, double *space,

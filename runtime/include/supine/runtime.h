@@ -87,7 +87,7 @@ typedef struct supine_basis_info {
    * the faces, edges and corners of a cube. In each pose, the lungs have 500 mL more than the
    * reference surface or, if the surface is open, the largest displacement is 20 mm. */
   double storage_error;
-  const char *const *lung_names; /**< [lung_count] such as "left"; the index if there is no name */
+  const char *const *lung_names; /**< [lung_count] such as "left"; the index of an unnamed lung */
   const float *bounds;   /**< [lung_count, 2, 3] lowest and highest corner of each lung's box, mm */
   const float *vertices; /**< [vertex_count, 3] reference positions, mm, LPS */
   const uint32_t *triangles; /**< [triangle_count, 3] vertices of each triangle */
@@ -117,7 +117,7 @@ typedef struct supine_basis_info {
 
 typedef struct supine_pose {
   double weights[SUPINE_MODES_MAX];  /**< weight of each mode */
-  double gains[SUPINE_LUNGS_MAX][3]; /**< gain of each lung and axis; 0 in the reference surface */
+  double gains[SUPINE_LUNGS_MAX][3]; /**< gain of each lung and axis; 0 for the reference surface */
 } supine_pose;
 
 /** Open a basis from a file, or from `size` bytes in memory. Check all of it, and pack it for
@@ -177,12 +177,13 @@ SUPINE_API supine_status supine_basis_weights(const supine_basis *basis, const d
  * a path from full inflation through rest (supine_volume_bend). Files of versions 1 and 2 have one
  * gain for all lungs and axes.
  *
- * SUPINE_VOLUME_DEFAULT means rest if the basis has it. If not, it means gain 1 for another
- * simulator's fields, and 500 mL above the scan for any other basis.
+ * SUPINE_VOLUME_DEFAULT means rest if the basis has a volume at rest. If not, it means gain 1 for
+ * another simulator's fields, and 500 mL above the scan for any other basis.
  * @param state  its gravity has any length but 0
  * @param pose   written
- * @retval SUPINE_ERROR_ARGUMENT      gravity is zero or not finite, the basis lacks the reference
- *                                    of the volume, or named lungs are not those of the basis
+ * @retval SUPINE_ERROR_ARGUMENT      gravity is zero or not finite, the basis lacks the volume to
+ *                                    which the state's volume is relative, or named lungs are not
+ *                                    those of the basis
  * @retval SUPINE_ERROR_OPEN_SURFACE  the surface is open and has no volumes
  * @retval SUPINE_ERROR_NUMERICAL     the surface folds before it holds that volume; single
  *                                    triangles that turn over earlier are not detected
@@ -200,7 +201,7 @@ SUPINE_API supine_status supine_basis_gains(const supine_basis *basis, const sup
                                             supine_pose *pose, supine_error *error);
 
 /** Return the volume that replaces SUPINE_VOLUME_DEFAULT in a state (supine_basis_pose). If gain 1
- * replaces it, return SUPINE_VOLUME_DEFAULT. */
+ * replaces it, return a volume of the kind SUPINE_VOLUME_DEFAULT. */
 SUPINE_API supine_volume supine_basis_default_volume(const supine_basis *basis);
 
 /** Set all gains of a pose to `gain`, for open surfaces or another simulator's fields. */

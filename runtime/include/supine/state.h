@@ -12,8 +12,8 @@
  *              left=VOLUME,right=VOLUME for each lung
  *     STATE    POSTURE, VOLUME or POSTURE:VOLUME
  *
- * A number alone is refused, as it does not say what it counts from. Volumes are in mL, of all
- * lungs together unless lungs are named. */
+ * A number alone is refused, because it does not say to which volume it is relative. Volumes are in
+ * mL, of all lungs together unless lungs are named. */
 #ifndef SUPINE_STATE_H
 #define SUPINE_STATE_H
 

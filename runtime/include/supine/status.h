@@ -36,7 +36,7 @@ typedef enum supine_status {
   SUPINE_ERROR_OPEN_SURFACE, /**< a volume is needed, but the surface is open */
   SUPINE_ERROR_UNSUPPORTED,  /**< this build, processor or file lacks the feature */
   SUPINE_ERROR_WRITE,        /**< an output cannot be written */
-  SUPINE_ERROR_NUMERICAL,    /**< a computation did not converge or left its range */
+  SUPINE_ERROR_NUMERICAL,    /**< a computation did not converge or has no solution */
   SUPINE_ERROR_INTERRUPTED,  /**< the caller's progress function asked to stop */
   SUPINE_STATUS_COUNT        /**< sentinel: the number of codes above */
 } supine_status;

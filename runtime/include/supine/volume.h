@@ -29,8 +29,8 @@ typedef struct supine_volume_form {
  *     of[3 + j] += sum_kl Q_jkl w_k w_l       for the product of the gains of the other two axes
  *     of[6]     += sum_klm T_klm w_k w_l w_m
  * @param count      number K of weights
- * @param axes       3; or 1 if one gain serves all axes: only the coefficients of x, yz and xyz
- *                   then change
+ * @param axes       3, or 1 if one gain serves all axes. With 1, only the coefficients of x, yz and
+ *                   xyz change.
  * @param linear     [axes, K] L, mL
  * @param quadratic  [axes, K, K] Q, mL
  * @param third      [K, K, K] T, mL
@@ -42,8 +42,8 @@ SUPINE_API void supine_volume_contract(size_t count, size_t axes, const double *
 /** Return the volume of a lung at given gains minus that of the reference surface, mL. */
 SUPINE_API double supine_volume_form_at(const supine_volume_form *form, const double gains[3]);
 
-/** Compute the coefficients with which V - F of supine_volume_form, mL, at the gains s ratio[0],
- * s ratio[1] and s ratio[2] is cubic[0] s + cubic[1] s^2 + cubic[2] s^3. */
+/** For the gains s ratio[0], s ratio[1] and s ratio[2], V - F of supine_volume_form is the
+ * polynomial cubic[0] s + cubic[1] s^2 + cubic[2] s^3. Compute its three coefficients, mL. */
 SUPINE_API void supine_volume_form_along(const supine_volume_form *form, const double ratio[3],
                                          double cubic[3]);
 
