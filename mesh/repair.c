@@ -9,8 +9,8 @@
 
 #include "mesh/repair.h"
 
-/* Triangles without an edge that belongs to exactly two triangles are dropped if they are at most
- * this share of all triangles. A mesh with more of them is no surface. */
+/* A triangle is loose if none of its edges belongs to exactly two triangles. Loose triangles are
+ * dropped up to this share of all triangles; a mesh with more of them is refused. */
 static const double most_loose = 0.01;
 
 typedef struct links {
@@ -78,7 +78,7 @@ static uint32_t find_root(const links *l, uint32_t t, uint8_t *turned) {
     root = l->parent[root];
   }
   *turned = sum;
-  while (l->parent[t] != root && t != root) { /* make the root the parent of all on the way */
+  while (l->parent[t] != root && t != root) { /* make the root the parent of each on the path */
     const uint32_t next = l->parent[t];
     const uint8_t here = l->turned[t];
     l->parent[t] = root;

@@ -183,7 +183,7 @@ static double square_sum(const fitting *w) {
   return sum;
 }
 
-/* Compute the relative RMS leave-one-out error of a fit that uses the harmonics without modes. */
+/* Compute the relative RMS leave-one-out error of a fit by all harmonics of its band. */
 static double leave_one_out(const fitting *w, const fit *f) {
   double sum = 0.0;
   for (size_t d = 0; d < f->count; ++d) {

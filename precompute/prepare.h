@@ -16,7 +16,7 @@ enum { SUPINE_LESIONS_MAX = 64 };
 typedef struct supine_model_choice {
   int law;                 /**< a supine_law, or SUPINE_LAW_COUNT to use the default law */
   supine_model model;      /**< constants that the user gave; NAN selects the constant of the law */
-  const char *patient_law; /**< name of the patient's law in `model`, or NULL if there is none */
+  const char *patient_law; /**< name of the law fitted to the patient; NULL if none */
   const double *stiffness; /**< [N] stiffness E of the patient's law, or NULL */
   bool has_scan; /**< whether the user gave `scan`; if not, the law `deep` assumes "full" */
   supine_scan scan;

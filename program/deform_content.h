@@ -23,7 +23,7 @@ extern const supine_option supine_command_deform_content_options[];
 typedef struct supine_deformation {
   supine_state state;
   supine_pose pose;
-  supine_reference_pose from; /* displacements are 0 in this state; the input image shows it */
+  supine_reference_pose from; /* state in the input image, where displacements are 0 */
   bool from_given;            /* whether --from was given; otherwise `from` is the scan */
   supine_expected expected;
   supine_mesh_save_options save; /* axes, unit and comment of the output */

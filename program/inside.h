@@ -33,7 +33,7 @@ supine_status supine_command_inside_open(const supine_basis *lungs, const char *
                                          supine_basis **inside, supine_command_names *names,
                                          supine_error *error);
 
-/* Marks of a picture: the vertices of each structure, and its name with its mean displacement. */
+/* Marks of a picture: the vertices of each structure, and a label with name and displacement. */
 typedef struct supine_command_marks {
   supine_marks marks;
   supine_mark *mark;

@@ -132,8 +132,9 @@ supine_status supine_expected_error(const supine_basis *basis, const supine_stat
   const supine_state scan = supine_basis_scan(basis);
   poses p;
   if (info->is_fields) {
-    return supine_error_set(error, SUPINE_ERROR_UNSUPPORTED,
-                            "the error of another simulator's displacements is not known");
+    return supine_error_set(
+        error, SUPINE_ERROR_UNSUPPORTED,
+        "the basis holds another simulator's displacements, whose error is unknown");
   }
   const supine_status status = find_poses(basis, state, from == NULL ? &scan : from, &p, error);
   if (status != SUPINE_OK) {

@@ -24,7 +24,7 @@ typedef struct image_storage {
 typedef supine_status image_describe(const char *path, supine_image *image, image_storage *storage,
                                      supine_error *error);
 /* Write the header and the voxels. The caller checks the stream for write errors.
- * Return SUPINE_ERROR_ARGUMENT or SUPINE_ERROR_MEMORY. */
+ * On failure, return SUPINE_ERROR_ARGUMENT or SUPINE_ERROR_MEMORY. */
 typedef supine_status image_write(const char *path, const supine_image *image, const char *note,
                                   FILE *file, supine_error *error);
 

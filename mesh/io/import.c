@@ -63,7 +63,7 @@ static supine_status import_fail(const char *path, const char *words, supine_err
                           path, length == 0 ? "assimp gives no reason" : line);
 }
 
-/* Import the file at file->path or, unless `kind` is NULL, file->bytes in the format `kind`. */
+/* If `kind` is NULL, import the file at file->path, else file->bytes in the format `kind`. */
 static const struct aiScene *import(const assimp *ai, const mesh_file *file, const char *kind) {
   struct aiPropertyStore *properties = ai->CreatePropertyStore();
   /* Without this, importers add a surface to files that hold only a skeleton. */

@@ -15,7 +15,7 @@
  * are inside and some outside. */
 typedef struct surface_net {
   size_t count;
-  uint32_t (*cell)[3];      /* [count] index along x, y and z of the cell's first cube */
+  uint32_t (*cell)[3];      /* [count] x, y, z indices of the cube at the cell's lowest corner */
   double (*at)[3];          /* [count] position of the vertex in its cell, 0 to 1 along each axis */
   uint32_t (*neighbour)[6]; /* [count] vertices across the cell's faces -x, +x, -y, ..., or NONE */
   size_t quad_count;

@@ -137,7 +137,8 @@ cleanup:
   free(squares);
   free(eroded.at);
   if (status != SUPINE_OK) {
-    return supine_error_set(error, status, "%s: no memory to split %zu voxels", path, count);
+    return supine_error_set(error, status, "%s: no memory for a label map of %zu voxels", path,
+                            count);
   }
   return found_pair
              ? SUPINE_OK

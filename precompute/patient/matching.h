@@ -28,7 +28,7 @@ typedef struct supine_patient_matching {
   supine_patient_match *match;   /* [count] chosen vertices and their matches */
   supine_patient_row *rows;      /* [count + landmark_row_count] rows to fit */
   double *space;                 /* [count] work space */
-  double matched;                /* share of the vertices whose match faces the same way */
+  double matched;                /* share of vertices whose nearest point faces the same way */
   double rms;                    /* weighted RMS of match->distance, mm */
   const supine_patient *patient; /* displacement law that last displaced the vertices */
   size_t landmark_row_count;     /* number of rows, three for each landmark */

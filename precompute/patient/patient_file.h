@@ -68,7 +68,7 @@ typedef struct supine_patient_applied {
 
 typedef struct supine_patient_surface_report {
   double vertices;      /**< number of matched vertices, or 0 without surfaces */
-  double matched;       /**< share of the vertices whose match faces the same way */
+  double matched;       /**< share of vertices whose nearest point faces the same way */
   double before, after; /**< RMS distance of the surfaces before and after the fit, mm */
 } supine_patient_surface_report;
 

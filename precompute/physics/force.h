@@ -53,7 +53,7 @@ void supine_physics_force(const supine_lungs *lungs, const supine_force_law *law
  * and box coordinates X, Y and Z (15)-(17), or directions fitted to a patient. */
 typedef struct supine_direction_law {
   double c[6];           /**< factors and exponents c1 to c6 of (15)-(17) */
-  const double *vectors; /**< [N, 3] fitted directions, mm, or NULL to use c; not owned */
+  const double *vectors; /**< [N, 3] fitted to a patient, mm; NULL: use c1 to c6; not owned */
 } supine_direction_law;
 
 /** Compute the directions d of all vertices into directions [N, 3], mm, not normalised.

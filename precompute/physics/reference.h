@@ -83,11 +83,12 @@ void supine_reference_share_out(const supine_reference *reference, const double 
 supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *model,
                                        supine_reference *reference, supine_error *error);
 
-/** Find the gains A of each lung in the scan. Let s be the gain at rest. Applied to the scan, gains
- * of -A must lead to the volume at full inflation, gains of s - A must lead to that at rest.
+/** Find the gains A of each lung in the scan, where gain 0 is full inflation and gain s is rest.
+ * Displacing the scan with gains -A must give the volume at full inflation. Displacing it with
+ * gains s - A must give the volume at rest.
  * @param scan        closed lungs with the scan's vertices
  * @param directions  [N, 3] directions d of displacement, mm
- * @param amounts     [N] catch F, with gravity as in the scan
+ * @param amounts     [N] catch F (force that each vertex keeps), with gravity as in the scan
  * @param reference   has the volumes; scan_gains are written
  * @retval SUPINE_ERROR_NUMERICAL  no gains give these volumes */
 supine_status supine_reference_find_gains(const supine_lungs *scan, const double bend[3],

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute the volume that closed lungs gain as linear, quadratic and cubic forms of weights. */
+/* Compute the change of closed lungs' volume as linear, quadratic and cubic forms of weights. */
 #include <cblas.h>
 #include <stdlib.h>
 #include <string.h>

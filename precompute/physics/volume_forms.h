@@ -53,7 +53,7 @@ void supine_physics_volume_of_fields(const supine_lungs *lungs, const double *sh
                                      const double *directions, const double *fields, size_t count,
                                      supine_volume_form *forms);
 
-/** Compute the volume that one lung gains at weights [K], mL, as a polynomial of its gains. */
+/** Compute the change of one lung's volume, mL, as a polynomial of the gains, at weights [K]. */
 void supine_physics_volume_forms_contract_lung(const supine_volume_forms *forms, size_t lung,
                                                const double *weights, supine_volume_form *form);
 

@@ -53,7 +53,7 @@ static void compare_block(const accuracy_work *work, size_t begin, size_t n, dou
   const int count = (int)truth->direction_count;
   const size_t modes = work->compression->mode_count;
   double *coefficients = space;
-  double *approximate = coefficients + modes * BLOCK; /* [directions, n] */
+  double *approximate = coefficients + modes * BLOCK; /* [direction_count, n] mm */
   double *exact = approximate + truth->direction_count * BLOCK;
   double length[BLOCK];
   double errors[BLOCK];

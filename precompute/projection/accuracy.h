@@ -34,9 +34,9 @@ typedef struct supine_truth {
   double *cubic; /**< [D, 3] gained volume, mL: coefficients of the gain, its square and its cube */
 } supine_truth;
 
-/** Solve the full physics for `count` held-out directions of gravity. The projection must outlive
- * `truth`.
- * @param directions  [N, 3] directions of displacement, mm
+/** Solve the full physics for `count` held-out directions of gravity. `truth` refers to
+ * `projection`, which must outlive it.
+ * @param directions  [N, 3] displacement of each vertex for a force of 1, mm
  * @param truth       release with supine_accuracy_truth_free
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_accuracy_truth_create(const supine_lungs *lungs, const supine_model *model,

@@ -22,7 +22,7 @@ typedef struct supine_projection {
   supine_span *span; /**< NULL for the fields of another simulator */
   size_t rank;       /**< number R of columns */
   double *columns;   /**< [N, R] fields for R directions of gravity */
-  double *functions; /**< [R, (band + 1)^2] expansion of the weight of each column in harmonics */
+  double *functions; /**< [R, (band + 1)^2] row r: harmonics of column r's weight */
 } supine_projection;
 
 void supine_projection_free(supine_projection *projection);

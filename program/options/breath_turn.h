@@ -20,7 +20,7 @@ void supine_breath_turn_gravity(const breath_turn *turn, double time, double gra
 /* Read a text such as "supine:left:10s" into the breath_turn `turn`. */
 supine_status supine_breath_turn_read(const char *text, void *turn, supine_error *error);
 
-/* Return the state with `ml` mL above rest in the posture, or above the scan if rest is unknown. */
+/* Return the state `ml` mL above the volume at rest or, if that is unknown, above the scan's. */
 supine_state supine_breath_state(const supine_basis *basis, const double gravity[3], double ml);
 
 #endif

@@ -231,7 +231,8 @@ int supine_stream_message_is_known(const supine_stream_header *header) {
   return type_of(header) != TYPES;
 }
 
-/* Skip the extension and cut off the metadata of a body; return 0 if their sizes are wrong. */
+/* Skip the extended header of a message body and cut off its metadata; return 0 if a size is bad.
+ */
 static int unwrap(cursor *c) {
   const size_t all = c->left;
   const uint64_t extension = whole(c, 2);

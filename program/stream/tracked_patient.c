@@ -98,7 +98,7 @@ static void store_pose(supine_stream_patient *p, const double gravity[3], double
   }
 }
 
-/* Store a pose unless it is refused; warn unless it is exact. */
+/* Store a pose unless `verdict` refuses it. Warn if the pose is refused or repaired. */
 static void accept_pose(supine_stream_patient *p, supine_stream_verdict verdict, const char *why,
                         const double gravity[3], double received, uint64_t stamp) {
   if (verdict == SUPINE_STREAM_REFUSED) {

@@ -41,7 +41,7 @@ typedef struct cutter {
   outline cut[SUPINE_SLABS_MAX + 1];
 } cutter;
 
-/* Read a vertex. For precision, make positions relative to vertex 0 before the breath. */
+/* Read a vertex. For precision, subtract the position that vertex 0 has before the breath. */
 static corner read_corner(const cutter *c, const float *xyz, size_t vertex) {
   corner out;
   for (size_t i = 0; i < 3; ++i) {

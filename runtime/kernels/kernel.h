@@ -161,7 +161,7 @@ INLINE triples interleave(const row *x, const row *y, const row *z) {
 #undef PIECE
 }
 
-/* Repeat the number of each vertex three times, for x, y and z. */
+/* Repeat the value of each vertex three times, for x, y and z. */
 INLINE triples spread(const row *a) {
   triples t;
   for (size_t q = 0; q < GROUPS; ++q) {

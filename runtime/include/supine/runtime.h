@@ -195,8 +195,8 @@ SUPINE_API supine_status supine_basis_weights(const supine_basis *basis, const d
 SUPINE_API supine_status supine_basis_pose(const supine_basis *basis, const supine_state *state,
                                            supine_pose *pose, supine_error *error);
 
-/** Compute only the gains of a state, for example in a breath. `pose` must already have the weights
- * for the gravity of the state. Statuses: as supine_basis_pose. */
+/** Compute only the gains of a state, as gravity stays the same during a breath. `pose` must
+ * already have the weights for the gravity of the state. Statuses: as supine_basis_pose. */
 SUPINE_API supine_status supine_basis_gains(const supine_basis *basis, const supine_state *state,
                                             supine_pose *pose, supine_error *error);
 
