@@ -65,8 +65,8 @@ static const supine_option table[] = {
     {"pv", 0, "FILE", "pressure-volume relation made by 'supine pv fit'; default a normal adult's",
      SUPINE_FILLS(request, pv), .file = SUPINE_FILE_IN},
     {"rest-pressure", 0, "P",
-     "pressure at the end of an exhalation, in cmH2O, of the kind that --pv relates to volume "
-     "(transpulmonary by default); default 5",
+     "pressure at the end of an exhalation, in cmH2O: the same kind of pressure as in --pv, "
+     "transpulmonary without --pv; default 5",
      SUPINE_FILLS(request, breath.rest_pressure), .wants = "a number of cmH2O", .more = true},
     {"course", 0, "NAME",
      "cosine: pressure follows a cosine; ramp: pressure is linear in time; flow: inflow and "

@@ -82,8 +82,9 @@ static const supine_option table[] = {
      FILLS(first), .read = read_state, .standard = "supine:rest"},
     {"other", 0, "STATE",
      "state of the second scan, in the same form; either scan may be the fuller one. A missing "
-     "volume is taken from the surfaces; with landmarks alone, the fuller scan then counts as full "
-     "inflation and the emptier one as rest",
+     "volume is taken from the surfaces. With landmarks alone, give both volumes; without them, "
+     "the "
+     "fuller scan counts as full inflation and the emptier one as rest",
      FILLS(second), .read = read_state, .standard = "supine"},
     {"law", 0, "LAW",
      "constants that are fitted\ndeep: the size of the displacement; the other constants stay "

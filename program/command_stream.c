@@ -85,8 +85,9 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, pv), .file = SUPINE_FILE_IN, .more = true},
     {.help = "Output:"},
     {"send", 0, "WHAT",
-     "what a peer receives\nweights: an NDARRAY of the weights of the modes, then the factors of "
-     "each lung's displacement along x, y and z, from which the peer computes the surface\n"
+     "what a peer receives\nweights: an NDARRAY with a weight for each mode, then three factors "
+     "for each lung, which multiply its displacement along x, y and z. The peer computes the "
+     "surface from these numbers and the basis\n"
      "surface: a POLYDATA of points and triangle strips\npoints: a POLYDATA whose triangles are "
      "sent once\nA peer can change this by a STRING of device SEND with one of these words",
      SUPINE_FILLS(request, options.content), .choices = supine_stream_content_names,

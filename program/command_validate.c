@@ -61,16 +61,16 @@ static const supine_option table[] = {
      .wants = "SURFACE, POSTURE:SURFACE or POSTURE:VOLUME:SURFACE (at most 8 times)"},
     {.table = supine_options_landmarks, FILLS(landmarks)},
     {"from", 0, "POSTURE[:VOLUME]",
-     "state that the motion starts from, the first state of the landmarks; default the scan",
+     "state in which the motion starts, with the first points of landmarks; default the scan",
      FILLS(from), .read = read_state, .wants = "a state, such as supine:rest"},
     {"to", 0, "POSTURE[:VOLUME]",
-     "state of the second landmarks, if --state is not given; with --state, the posture and volume "
-     "of each --state that names none; default supine, with the volume of the surface",
+     "without --state, the state of the second landmarks; with --state, the posture and volume of "
+     "every --state that gives only a file; default supine, with the volume of the surface",
      FILLS(to), .read = read_state, .wants = "a state, such as prone:rest+500"},
     {.table = supine_options_surface_frame, FILLS(source.load)},
     {"output", 'o', "FILE",
      "file of local errors to write. .png: a picture of every state; .ply or .vtp: the predicted "
-     "surface of the first state, with its displacement from the nearest points of the scanned "
+     "surface of the first --state, with its displacement from the nearest points of the scanned "
      "surface, in mm",
      FILLS(path), .file = SUPINE_FILE_OUT, .endings = ".png, .ply or .vtp"},
     {"json", 0, NULL, "print JSON instead of text", FILLS(json)},
@@ -244,10 +244,11 @@ const supine_command supine_command_validate = {
         "'explained' is 1 minus the ratio of the mean squared distances with and without the "
         "motion. A small distance between surfaces does not prove that the motion inside is right; "
         "landmarks measure that. Santhanam 2008 reported surfaces 2 mm apart in smaller "
-        "breaths, and constants recovered within 1 %.\nWith several states, each displacement is "
-        "also scaled to come nearest to its surface. A straight line through the start of motion "
-        "is fitted to these scales against volume, for the states in the posture of the first "
-        "state. The largest deviation from the line is given in percent of the largest scale.\n"
+        "breaths, and constants recovered within 1 %.\nWith several states, each predicted "
+        "displacement is also multiplied by the factor that brings it nearest to its surface. For "
+        "states in the posture of the first --state, a straight line of factor against volume is "
+        "fitted, which is 0 at the start of the motion. The largest deviation from the line is "
+        "given in percent of the largest factor.\n"
         "\n"
         "Examples:\n"
         "  supine validate lungs.safetensors --state prone:prone.ply -o errors.png\n"

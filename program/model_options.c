@@ -163,7 +163,7 @@ const supine_option supine_command_model_options[] = {
              "from back to front, Z from apex to base."},
     {"law", 0, "LAW",
      "how gravity and volume move the surface\n" SUPINE_LAWS(
-         LAW_HELP) "--base to --reach change the constants of the law. Default deep",
+         LAW_HELP) "The options from --base to --reach change constants of the law. Default deep",
      FILLS(choice.law), .choices = supine_physics_law_names, .more = true},
     {"base", 0, "B", "part of the force that is equal everywhere" SUPINE_LAWS(LAW_BASE),
      FILLS(choice.model.force.base), .more = true},

@@ -41,8 +41,8 @@ const supine_option supine_options_surface_frame[] = {
 const supine_option supine_options_landmarks[] = {
     {"landmarks", 0, "FILE",
      "matched points, in mm and LPS: CSV with the columns x,y,z (a point in the first state) and "
-     "to_x,to_y,to_z (the same point in the second state); or im1_x,im1_y,im1_z (image 1, inhaled) "
-     "and im2_x,im2_y,im2_z (image 2, exhaled), of which image 2 is the first state",
+     "to_x,to_y,to_z (the same point in the second state); or with im2_x,im2_y,im2_z (exhaled, the "
+     "first state) and im1_x,im1_y,im1_z (inhaled, the second state)",
      FILLS(path), .file = SUPINE_FILE_IN},
     {"reverse", 0, NULL, "exchange the two states of the landmarks", FILLS(reverse)},
     {"translation", 0, NULL, "also fit a translation between the frames of the scans",
