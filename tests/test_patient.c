@@ -104,8 +104,7 @@ TEST(test_covariances_any_distance_equal_those_of_kriging) {
   for (size_t i = 0; i < 200; ++i) {
     supine_kriging_point q = {.size = centre[i].size, .lung = centre[i].side > 0.0 ? 0U : 1U};
     memcpy(q.position, centre[i].offset, sizeof q.position);
-    assert_true(fabs(covariance[i] - supine_kriging_covariance(&supine_kriging_default, &p, &q)) <
-                1e-12);
+    assert_close(covariance[i], supine_kriging_covariance(&supine_kriging_default, &p, &q), 1e-12);
   }
 }
 
