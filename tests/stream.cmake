@@ -1,12 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # supine_stream_test(NAME LIBRARIES...): add the cmocka program stream/test_stream_NAME.c as a test.
 function(supine_stream_test name)
-  add_executable(test_stream_${name} stream/test_stream_${name}.c)
-  target_link_libraries(test_stream_${name} PRIVATE supine_build runtime_fixture supine_stream
-    ${ARGN} supine_gsl test_main)
-  add_test(NAME stream_${name} COMMAND test_stream_${name})
-  set_tests_properties(stream_${name} PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77
-    ENVIRONMENT "TSAN_OPTIONS=suppressions=${CMAKE_CURRENT_SOURCE_DIR}/tsan.supp")
+  supine_test(stream/stream_${name} runtime_fixture supine_stream ${ARGN} supine_gsl)
 endfunction()
 
 supine_stream_test(gravity)
