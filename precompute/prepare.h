@@ -33,7 +33,7 @@ supine_model_choice supine_precompute_choice_default(void);
 
 /** A physical model, the volumes of the lungs, and the assumptions about both. */
 typedef struct supine_prepared {
-  supine_model model; /**< its arrays are `stiffness` and `lesions` below */
+  supine_model model; /**< uses the arrays `stiffness` and `lesions` of this struct */
   supine_reference reference;
   char summary[512]; /**< the assumed law, scan and volumes in words */
   double *stiffness; /**< [N] stiffness E, or NULL */

@@ -18,7 +18,7 @@ enum { STATES = 192 };
 /* Documented limits of the mean and the 99.9th percentile of the angles, degrees. */
 static const double mean_most = 0.1;
 static const double p999_most = 1.0;
-/* Largest relative rounding error of a number with two digits, like those in the file. */
+/* Largest relative error of a number rounded to two digits, as the metadata of a basis are. */
 static const double printed = 0.05;
 /* Tolerance for the mean over the STATES random states, in standard errors. */
 static const double sigmas = 4.0;

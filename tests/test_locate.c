@@ -251,7 +251,7 @@ TEST(test_locate_bad_task_refused) {
                    SUPINE_ERROR_ARGUMENT);
 }
 
-/* The expected error is sqrt(c |u|). Here u is the displacement of a vertex from the scan, and c is
+/* The expected error of a vertex is sqrt(c |u|), where u is its displacement from the scan and c is
  * 4.5 mm or the RMS displacement of all vertices, whichever is less. If the volume is given
  * relative to rest, the volume at rest is uncertain by 5 % of full inflation, and the resulting
  * displacement is added to the expected error in quadrature. */

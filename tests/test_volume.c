@@ -180,8 +180,8 @@ TEST(test_pose_open_surface_refused) {
   fixture_destroy(f);
 }
 
-/* Volume form of a box of 3000 mL at full inflation. Gains of -1 shorten its sides by 20, 25 and 30
- * percent. */
+/* Change of volume of a box that holds 3000 mL at full inflation. A gain of -1 on an axis shortens
+ * the side along x by 20 %, along y by 25 %, and along z by 30 %. */
 static const supine_volume_form box_form = {{3000 * 0.2, 3000 * 0.25, 3000 * 0.3, 3000 * 0.25 * 0.3,
                                              3000 * 0.2 * 0.3, 3000 * 0.2 * 0.25,
                                              3000 * 0.2 * 0.25 * 0.3}};

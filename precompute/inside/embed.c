@@ -23,10 +23,10 @@ typedef struct embedding {
   supine_inside_place *place; /* place of each point in its lung, in the content's order */
   unsigned char *lung;        /* lung of each point, in the content's order */
   size_t *order;              /* indices of the content's points, lung by lung */
-  float *vertices;      /* [points, 3] at full inflation, mm; sorted by `order`, as are all below */
-  float *coefficients;  /* [points, 3, modes] displacement by each mode, mm */
-  float *depth;         /* [points] mm below the surface; negative outside */
-  uint32_t *part;       /* [points] index of the part */
+  float *vertices;     /* [points, 3] at full inflation, mm; this and later arrays follow `order` */
+  float *coefficients; /* [points, 3, modes] displacement by each mode, mm */
+  float *depth;        /* [points] mm below the surface; negative outside */
+  uint32_t *part;      /* [points] index of the part */
   unsigned char *group; /* [points] index of the lung */
   uint32_t *triangles;  /* [triangles, 3] indices of vertices */
   uint32_t *rigid;      /* [rigid_count, 2] begin and end of the vertices of each rigid part */

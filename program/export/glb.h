@@ -48,9 +48,9 @@ json_int_t supine_export_glb_put(glb *g, glb_kind kind, const void *rows, const 
 /** Append an accessor of `count` rows of zeros without storing them; return its index. */
 json_int_t supine_export_glb_put_zeros(glb *g, glb_kind kind, size_t count);
 
-/** Append a mesh and a node that shows it; return the node's index. Positions of the mesh are in
- * LPS axes, relative to the centre of the lungs, in units of glb.step. The node converts them to
- * metres with y up.
+/** Append a mesh and a node that refers to it, and return the index of the node. Positions in the
+ * mesh are in LPS axes, relative to the centre of the lungs, in units of glb.step. The node
+ * converts them to metres with y up.
  * @param mesh  JSON of the mesh, which `g` then owns */
 json_int_t supine_export_glb_show(glb *g, const char *name, json_t *mesh);
 

@@ -33,7 +33,7 @@ supine_status supine_export_pack_corners(const uint32_t *corners, size_t count, 
 
 /** Order in which vertices and triangles are written, lung by lung. */
 typedef struct export_order {
-  uint32_t *vertex;  /**< [N] vertex[i] is the index in the basis of vertex i in the file */
+  uint32_t *vertex;  /**< [N] index in the basis of each vertex in the file */
   uint32_t *corners; /**< [triangles, 3] vertices of each triangle, by their indices in the file */
   size_t corner_begin[SUPINE_LUNGS_MAX + 1]; /**< index in `corners` at which each lung begins, then
                                                 the end of the last lung */

@@ -42,7 +42,7 @@ struct supine_stream_web {
   bool running;
   atomic_bool ending;
   atomic_size_t viewers;
-  pthread_mutex_t lock; /* protects the fields below */
+  pthread_mutex_t lock; /* protects the following fields of this struct */
   uint64_t number;      /* serial number of the state in `text`: 1, 2, ... */
   char text[TEXT];      /* state as JSON, without the age and the final brace */
   double pose_received; /* as in supine_stream_snapshot */

@@ -25,8 +25,8 @@ static inline double nearest_integer(double value) {
   return (value + 0x1.8p52) - 0x1.8p52;
 }
 
-/** Among the words that end in the lowest `bits` bits of `low`, return the word that is nearest to
- * `value` as a signed integer. For NaN, return the smallest of these words. */
+/** Return the signed 32-bit integer nearest to `value` whose lowest `bits` bits are those of `low`.
+ * For NaN, return the smallest of these integers. */
 static inline uint32_t word_nearest(double value, uint32_t low, int bits) {
   const double step = (double)(UINT32_C(1) << bits);
   const double top = 0x1p31 / step - 1;
