@@ -120,13 +120,13 @@ typedef struct playing {
   const request *wanted;
   supine_basis *basis;
   size_t frame_count, lung_count;
-  double *time;     /* [frames] s */
-  double *above;    /* [frames] mL above the volume at rest (in the scan if rest is unknown) */
+  double *time;     /* [frames] time since the start, s */
+  double *above;    /* [frames] volume minus that at rest (in the scan if rest is unknown), mL */
   double *gravity;  /* [frames, 3] unit vectors */
   double *volumes;  /* [frames, lungs] volume of gas and tissue, mL */
   supine_mesh mesh; /* triangles; for VTP output, also the positions of the current frame */
   float *normals;   /* [N, 3] normals of the current frame, for VTP output */
-  float *positions; /* mm: current frame [N, 3]; then, unless for VTP, all frames [frames, N, 3] */
+  float *positions; /* [N, 3] current frame, mm; followed by all frames unless the output is VTP */
   double *compute_time; /* [frames] s */
   double *origin;       /* [N, 3] positions from which displacements are measured, mm */
   char vtp_comment[512];
@@ -142,7 +142,7 @@ static void end(playing *p) {
   supine_basis_close(p->basis);
 }
 
-/* Allocate memory for `count` frames; for a VTP `series`, keep positions of one frame only. */
+/* Allocate memory for `count` frames. If `series` is true, keep positions of one frame only. */
 static supine_status begin_frames(playing *p, size_t count, bool series, supine_error *error) {
   const size_t frame = 3 * supine_basis_get_info(p->basis)->vertex_count;
   p->frame_count = count;
@@ -203,7 +203,7 @@ static double volume_at(const playing *p, size_t t) {
   return sum;
 }
 
-/* Set ends[0] to the frame of smallest total volume, and ends[1] to the frame of largest. */
+/* Set ends[0] to the frame with the smallest total volume, and ends[1] to that with the largest. */
 static void find_ends(const playing *p, size_t ends[2]) {
   ends[0] = ends[1] = 0;
   for (size_t t = 1; t < p->frame_count; ++t) {
@@ -224,7 +224,7 @@ static void report(const playing *p) {
                1e3 * gsl_stats_max(p->compute_time, 1, p->frame_count), 1e3 * budget);
 }
 
-/* Compute all frames. Call find_volumes first; it checks that each frame has a pose.
+/* Compute all frames. Call find_volumes first: it checks that each frame has a valid pose.
  * @param series  receives each frame; NULL to store all frames in p->positions */
 static supine_status play_frames(playing *p, supine_mesh_series *series, supine_error *error) {
   const size_t frame = 3 * p->mesh.vertex_count;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine compare: compare displacements and ventilation by height between postures. */
+/* supine compare: compute the displacement and the ventilation by height in several postures. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -23,7 +23,7 @@ enum { LABELS_MOST = 64 };
 /* Labels given by --labels, and a name for each. */
 typedef struct label_list {
   bool given;
-  size_t count; /* 0 for all labels of the label map */
+  size_t count; /* number of labels; 0: all labels of the label map */
   unsigned label[LABELS_MOST];
   char name[LABELS_MOST][32];
 } label_list;
@@ -34,7 +34,7 @@ typedef struct request {
   bool has_grid;
   double grid_spacing; /* mm */
   bool clamp;
-  const char *rigid; /* names of rigid parts, or "all" */
+  const char *rigid; /* names of rigid structures, or "all" */
   supine_mesh_load_options load;
 } request;
 
@@ -91,7 +91,8 @@ static const supine_option table[] = {
     {.table = supine_options_surface_frame, SUPINE_FILLS(request, load)},
     {.name = NULL}};
 
-/* Make the nodes of a regular grid or, unless `image_path` is NULL, take voxels of that image. */
+/* Make a grid of points: the voxels of the image `image_path` or, if it is NULL, equally spaced
+ * nodes. */
 static supine_status read_grid(const supine_inside_shells *shells, const request *wanted,
                                const char *image_path, supine_inside_content *content,
                                supine_error *error) {

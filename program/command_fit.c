@@ -202,10 +202,11 @@ static int named_order(const supine_state *first, const supine_state *second) {
                                                                           : 0;
 }
 
-/* Put the fuller scan first. If the options do not tell which it is, compare the volumes of the
- * surfaces. Without two surfaces, use the volume change of an affine map of the landmarks. */
+/* Put the fuller scan first. If the options do not tell which scan is fuller, compare the volumes
+ * of the surfaces or, without two surfaces, use the volume change of an affine map of the
+ * landmarks. */
 static supine_status order_states(const request *wanted, scan_data *data, supine_error *error) {
-  /* The volumes contradict the options only if they differ by more than this share. */
+  /* The measured volumes contradict the options only if they differ by more than this fraction. */
   static const double volume_error = 0.02;
   const double volume[2] = {volume_of(&data->lungs[0]), volume_of(&data->lungs[1])};
   const double growth = volume[0] > 0.0 && volume[1] > 0.0 ? volume[1] / volume[0]
@@ -247,8 +248,9 @@ static supine_status fit_landmarks(const request *wanted, const supine_patient_p
   return status;
 }
 
-/* Fit a state of --state. Its landmarks start in the first scan; if that is the emptier scan, their
- * starting points are moved to the fuller scan. */
+/* Fit one further scan, given by --state. Its landmarks pair points of the first scan with points
+ * of the further scan. If the first scan is the emptier one, move the points of the first scan to
+ * the fuller scan. */
 static supine_status fit_further(const request *wanted, const scan_data *data, size_t which,
                                  const supine_lungs *from, supine_patient_record *record,
                                  supine_error *error) {
@@ -274,10 +276,11 @@ static supine_status fit_further(const request *wanted, const scan_data *data, s
   return status;
 }
 
-/* Fit the states of --state, and compute the part of the force that depends on gravity. If the
- * fuller scan has no surface, move the surface of the emptier scan to the fuller scan. */
-static supine_status find_gain(const request *wanted, scan_data *data,
-                               supine_patient_record *record, supine_error *error) {
+/* Fit the further scans of --state, and set the factor of the part of the force that depends on
+ * gravity. If the fuller scan has no surface, move the surface of the emptier scan to the fuller
+ * scan. */
+static supine_status fit_gravity_factor(const request *wanted, scan_data *data,
+                                        supine_patient_record *record, supine_error *error) {
   supine_lungs *from = &data->lungs[0];
   supine_status status = SUPINE_OK;
   if (from->mesh.vertex_count == 0) {
@@ -292,8 +295,9 @@ static supine_status find_gain(const request *wanted, scan_data *data,
   return status;
 }
 
-/* If state k (0 or 1) has no volume, give it the volume of its surface. Count it from rest or from
- * full inflation if the other state's volume is counted from there; otherwise from 0. */
+/* Set the volume of scan k (0 or 1), if it was not given, to that of its surface. If the volume of
+ * the other scan is relative to full inflation, or to rest in the same posture, make this one
+ * relative too; otherwise absolute. */
 static void complete_state(supine_patient_record *record, size_t k) {
   supine_volume *of = &record->state[k].volume;
   const supine_state *other = &record->state[1 - k];
@@ -336,8 +340,9 @@ static void set_states(const request *wanted, const scan_data *data,
 
 /* Warn if the volume at rest in the scans differs from the volume at rest of healthy people. */
 static void warn_of_rest(const supine_patient_record *record) {
-  /* A warning is printed if the two volumes at rest differ by more than this share of the volume at
-   * full inflation. The standard deviation among healthy people is 0.04. */
+  /* Warn if the ratio of the volumes at rest and at full inflation differs by more than this
+   * between the scans and healthy people. Among healthy people, the standard deviation of the ratio
+   * is 0.04. */
   static const double reported_from = 0.07;
   const supine_resting usual = supine_reference_resting_default();
   const double *g = record->state[1].gravity;
@@ -394,7 +399,7 @@ static supine_status fit(const request *wanted, supine_patient_record *record,
   }
   if (status == SUPINE_OK) {
     set_name_and_force(wanted, record);
-    status = find_gain(wanted, &data, record, error);
+    status = fit_gravity_factor(wanted, &data, record, error);
   }
   scan_data_free(&data);
   return status;

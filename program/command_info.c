@@ -10,7 +10,8 @@
 
 #include "program/options/basis_input.h"
 
-/* Compute each harmonic band's share of the squared displacement; 0 if the surface has no area. */
+/* Compute the share of each spherical-harmonic band (degree) in the squared displacement; 0 if the
+ * surface has no area. */
 static supine_status band_energy(const supine_basis *basis, double *energy, supine_error *error) {
   supine_compare *compare = NULL;
   const supine_status status = supine_compare_create(basis, &compare, error);
@@ -56,7 +57,7 @@ static void add_fact(json_t *object, const char *name, const supine_basis *basis
   }
 }
 
-/* Add the counts of embedded vertices in each lung and outside the lungs, and of rigid parts. */
+/* Add the numbers of embedded vertices in each lung and outside, and of rigid structures. */
 static void add_content(json_t *root, const supine_basis *basis) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const supine_tensor *depth = supine_basis_tensor(basis, "depth");

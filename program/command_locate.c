@@ -136,7 +136,7 @@ typedef struct lungs_found {
   size_t count; /* number of postures tried */
   supine_location location[POSTURES];
   double probability[POSTURES];
-  const supine_location *best;       /* location in the most probable posture */
+  const supine_location *best;       /* fit in the most probable posture */
   supine_locate_residual *residuals; /* [postures, points] residual of each fitted point */
   float *xyz;                        /* [N, 3] positions in the most probable posture, mm */
   float *sigma;                      /* [N] expected errors of the positions, mm */
@@ -365,7 +365,7 @@ static supine_status locate(const request *wanted, const supine_basis *lungs,
                                    .rigid = wanted->rigid};
   supine_status status = find(&task, wanted->orientation.given, shown, &located, error);
   if (status == SUPINE_ERROR_ARGUMENT && wanted->rigid) {
-    /* The points in the file do not determine a rotation, so blame the file, not an option. */
+    /* The error is one of the file: its points do not determine a rotation. */
     status = error->status = SUPINE_ERROR_FORMAT;
   }
   if (status == SUPINE_OK) {

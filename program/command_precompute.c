@@ -60,7 +60,7 @@ static const supine_option table[] = {
     {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
     {.name = NULL}};
 
-/* Share of turned-over triangles above which the surface is reported as torn. */
+/* Fraction of turned-over triangles above which a warning is printed. */
 static const double turned_over_limit = 0.01;
 
 static const char *plural(size_t count) {
@@ -109,7 +109,8 @@ static void report_result(const char *path, const supine_lungs *lungs,
   }
 }
 
-/* Print the bands that the gravity directions determine, and each leave-one-out error. */
+/* Print the highest band (degree) of spherical harmonics that the given directions of gravity
+ * determine, and the leave-one-out error of each band. */
 static void report_fit(const char *path, const supine_fields *fields,
                        const supine_fit_report *fit) {
   const size_t highest = fit->band_highest;

@@ -43,7 +43,7 @@ typedef struct drawn {
   supine_command_marks marks;
 } drawn;
 
-/* The panels of a picture or of the current frame of a turn, and the objects that draw them. */
+/* The panels of a picture or of one frame of an animation, and the objects that draw them. */
 typedef struct studio {
   const request *wanted;
   supine_basis *basis;
@@ -171,7 +171,7 @@ static supine_status draw_postures(studio *s, supine_error *error) {
   return status;
 }
 
-/* Fill the only panel of an animation for frame `frame` of the `count` frames of a turn. */
+/* Compute frame `frame` of the `count` frames of an animation, and fill its only panel. */
 static supine_status find_frame(studio *s, size_t frame, size_t count, supine_error *error) {
   const breath_turn *turn = &s->wanted->turn;
   supine_posture_item *item = &s->postures.item[0];
@@ -184,8 +184,8 @@ static supine_status find_frame(studio *s, size_t frame, size_t count, supine_er
   return fill_panel(s, 0, error);
 }
 
-/* Append all frames of a turn to an animation.
- * @param extent  for each view, the extent of the lungs over the whole turn */
+/* Append all frames of a body's turn to an animation.
+ * @param extent  for each view, the limits of x and y of the lungs over the whole turn, mm */
 static supine_status add_frames(studio *s, size_t count, const double (*extent)[4],
                                 supine_animation *animation, supine_error *error) {
   supine_progress progress = supine_options_progress_begin(name);
@@ -208,8 +208,9 @@ static supine_status add_frames(studio *s, size_t count, const double (*extent)[
   return status;
 }
 
-/* Draw a turn as an animation. A first pass over the frames finds the largest displacement and the
- * extents of the lungs, so that the colour bar and the scale are the same in all frames. */
+/* Draw an animation of the body's turn from one posture to another. A first pass over the frames
+ * finds the largest displacement and the extents of the lungs, so that the colour bar and the scale
+ * are the same in all frames. */
 static supine_status draw_turn(studio *s, supine_error *error) {
   static const double none[4] = SUPINE_EXTENT_NONE;
   const char *path = s->wanted->output;

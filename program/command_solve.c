@@ -16,7 +16,7 @@ typedef struct request {
   supine_model_options model;
   supine_orientation orientation;
   const char *path;
-  supine_state state; /* if no volume is given, its kind is SUPINE_VOLUME_DEFAULT */
+  supine_state state; /* the kind of its volume is SUPINE_VOLUME_DEFAULT if none is given */
   bool has_vertex, pitcher_catcher;
   size_t vertex;
 } request;
@@ -43,7 +43,8 @@ static const supine_option table[] = {
     {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
     {.name = NULL}};
 
-/* Write as CSV the response of every vertex to a unit force on the vertex of --unit-force. */
+/* Write a CSV file of the response of every vertex to a unit force on the vertex that --unit-force
+ * gives. */
 static supine_status write_column(const supine_lungs *lungs, const request *wanted,
                                   supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
@@ -77,7 +78,8 @@ cleanup:
   return status;
 }
 
-/* Compute each lung's volume minus the volume of its reference surface, mL, before any collapse. */
+/* Compute each lung's volume minus the volume of its reference surface, mL, as if no lung had
+ * collapsed. */
 static supine_status find_volumes(const supine_reference *reference, const supine_state *state,
                                   double *ml, supine_error *error) {
   const double *g = state->gravity;
@@ -152,10 +154,12 @@ static supine_status find_gains(const supine_lungs *lungs, const request *wanted
   return status;
 }
 
-/* Iteration stops when no vertex has more force left than this share of the largest force. */
+/* The Pitcher/Catcher iteration of [Santhanam2008] stops when the force that remains on each vertex
+ * is at most this fraction of the largest applied force. */
 static const double pitcher_tolerance = 1e-6;
 
-/* Print the share of force that remains, each time the number of steps per vertex has doubled. */
+/* Print the fraction of the force that is not yet distributed, each time the number of steps per
+ * vertex has doubled. */
 static void report_remaining(void *context, size_t steps, double remaining) {
   const size_t per_vertex = steps / *(const size_t *)context;
   if ((per_vertex & (per_vertex - 1)) == 0) {
@@ -164,7 +168,7 @@ static void report_remaining(void *context, size_t steps, double remaining) {
   }
 }
 
-/* Replace the solved forces by those of Santhanam's iteration, and print how far both differ. */
+/* Replace the solved forces by those of Santhanam's iteration, and print the largest difference. */
 static supine_status iterate(const supine_lungs *lungs, const supine_model *model,
                              const double g[3], supine_solution *solution, supine_error *error) {
   size_t n = lungs->mesh.vertex_count;

@@ -172,7 +172,8 @@ typedef struct observed_points {
   supine_stream_observed observed;
 } observed_points;
 
-/* Open the file of --points, and list the single points in it. None has been observed yet. */
+/* Open the file of --points, and list as points the structures that have a single vertex. Mark all
+ * points as not yet observed. */
 static supine_status open_points(const supine_basis *basis, const request *wanted,
                                  observed_points *points, supine_error *error) {
   const supine_command_names *names = &points->names;

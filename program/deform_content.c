@@ -106,8 +106,8 @@ static void in_frame(supine_axes axes, double unit, const double lps[3], double 
   }
 }
 
-/* Write the name, lung, position, displacement and expected error of each point as CSV. The ten
- * columns take more than 60 lines of code. */
+/* Write the name, lung, position, displacement and expected error of each point as CSV. The
+ * function has more than 60 lines, as each of the ten columns needs some. */
 static supine_status write_points(const char *path, const supine_basis *basis,
                                   const supine_deformation *moved, supine_error *error) {
   const supine_mesh_save_options *frame = &moved->save;
@@ -232,8 +232,8 @@ static supine_status invert(const supine_field *forward, supine_field *inverse,
 }
 
 /* Replace `second`, the field from the scan to a state B, by the field u from a state A to B.
- * `first` is the field from the scan to A, and v is the inverse of `first`. The displacements are
- * u(x) = v(x) + second(x + v(x)), and the depths are those of the nodes in state A. */
+ * `first` is the field from the scan to A, and v is its inverse: u(x) = v(x) + second(x + v(x)).
+ * The depth of each node below the lungs' surface becomes that in state A. */
 static supine_status join_fields(const supine_field *first, supine_field *second,
                                  supine_error *error) {
   supine_field back = {0};
@@ -272,7 +272,7 @@ static supine_status join_fields(const supine_field *first, supine_field *second
   return status;
 }
 
-/* Compute the displacement field from the scan, or from the state of --from, to the pose. */
+/* Compute the displacement field to the pose `moved`, from the scan or the state of --from. */
 static supine_status find_field(const supine_basis *basis, const supine_deformation *moved,
                                 supine_field *field, supine_error *error) {
   supine_field first = {0};

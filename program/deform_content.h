@@ -19,7 +19,7 @@ typedef struct supine_deform_content {
 
 extern const supine_option supine_command_deform_content_options[];
 
-/* A state of the lungs to write, and what its output files need. */
+/* A state of the lungs to write, and the settings of its output files. */
 typedef struct supine_deformation {
   supine_state state;
   supine_pose pose;

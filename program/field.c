@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute the displacement field on the grid of a basis, and reduce it to 0 around the lungs. */
+/* Compute the displacement field on the grid of a basis, and let it fall to 0 outside the lungs. */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -100,8 +100,8 @@ static supine_status read_grid(const supine_basis *basis, supine_image *nodes,
   return SUPINE_OK;
 }
 
-/* Average the displacements of the neighbours of node i whose mark in `known` is neither 0 nor
- * `now`, the mark of the layer that is being set. Return false if there are no such neighbours. */
+/* Average the displacements of the neighbours of node i that were set before the current layer:
+ * their mark in `known` is neither 0 nor `now`. Return false if there are no such neighbours. */
 static bool mean_neighbour(const supine_image *nodes, const unsigned char *known, unsigned char now,
                            size_t i, float mean[3]) {
   const float *u = nodes->values;
@@ -130,8 +130,8 @@ static bool mean_neighbour(const supine_image *nodes, const unsigned char *known
 }
 
 /* Extend the field outwards in layers of nodes, so that it falls linearly to 0 over `fade` mm.
- * `known` marks each node: 1 if it is in the basis or in an earlier layer, 2 or 3 (in turn) if it
- * is in the newest layer, 0 if its displacement has not been set. */
+ * `known` holds a mark for each node: 0 if its displacement is not set, 1 if it was set before the
+ * newest layer, and 2 or 3 (in odd or even layers) if it was set in the newest layer. */
 static void fade_out(supine_image *nodes, unsigned char *known, double fade) {
   float *u = nodes->values;
   const size_t count = nodes->size[0] * nodes->size[1] * nodes->size[2];

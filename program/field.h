@@ -65,8 +65,9 @@ typedef struct supine_field_cell {
 void supine_field_find_cell(const supine_image *image, const double point[3],
                             supine_field_cell *cell);
 
-/* Interpolate all channels of an F32 image. Unless `slope` is NULL, also compute their
- * derivatives with respect to cell->share, [channels, 3]. */
+/* Interpolate all channels of an F32 image at a point in a cell. Unless `slope` is NULL, also
+ * compute the derivatives [channels, 3] with respect to cell->share, the position of the point in
+ * the cell. */
 void supine_field_interpolate(const supine_image *image, const supine_field_cell *cell,
                               double *values, double (*slope)[3]);
 

@@ -13,7 +13,7 @@ static const double tolerance = 1e-5;   /* residual at which iteration stops, mm
 static const double lost_beyond = 0.01; /* residual above which a node has no inverse, mm */
 
 /* Compute the residual x + u(x) - y, mm, and return its length. Unless `slope` is NULL, compute the
- * derivative of the residual with respect to x, where x is counted in steps of the grid. */
+ * derivative of the residual with respect to x, counted in grid spacings along each axis. */
 static double misfit(const supine_field *field, const double x[3], const double y[3],
                      double residual[3], double (*slope)[3]) {
   supine_field_cell cell;
@@ -29,7 +29,8 @@ static double misfit(const supine_field *field, const double x[3], const double 
   return supine_length(residual);
 }
 
-/* Compute the Newton step, counted in steps of the grid. Return false if `slope` is singular. */
+/* Compute the step of Newton's method along each axis of the grid, in grid spacings. Return false
+ * if the derivative `slope` is singular. */
 static bool newton(const double slope[3][3], const double residual[3], double step[3]) {
   supine_image equations = {.origin = {0.0}};
   for (size_t k = 0; k < 9; ++k) {
@@ -95,7 +96,7 @@ static void invert_rows(void *context, size_t begin, size_t end, size_t thread) 
         x[k] = y[k] - u[k];
       }
       double off = solve(work->field, y, x);
-      if (off > lost_beyond) { /* also try y as the starting point */
+      if (off > lost_beyond) { /* solve again, starting from x = y */
         double other[3];
         memcpy(other, y, sizeof other);
         const double again = solve(work->field, y, other);

@@ -17,17 +17,17 @@ enum { RUN = 128 };
 
 typedef struct resampling {
   const supine_field *inverse;
-  const supine_image *depth; /* depth below the lungs' surface, mm; NULL if densities are kept */
-  supine_image inside; /* 1 for voxels of `from` inside the lungs, else 0; unused without `depth` */
+  const supine_image *depth; /* depth below the lungs' surface, mm; NULL: densities not scaled */
+  supine_image inside;       /* 1 at voxels of `from` in the lungs, else 0; for scaling densities */
   const supine_image *from;
   supine_image *to;
   bool labels;
 } resampling;
 
-/* The cells of an image that contain RUN points. */
+/* For each of RUN points, the cell of an image that contains it. */
 typedef struct cells {
-  size_t first[RUN];    /* index of the first value at the cell's lowest corner */
-  double share[3][RUN]; /* position of the point in the cell, 0 to 1 along each axis */
+  size_t first[RUN];    /* index of the first channel of the voxel at the cell's lowest corner */
+  double share[3][RUN]; /* position of each point in its cell, 0 to 1 along each axis */
 } cells;
 
 /* Find the cells that contain points, mm. The operations and their order are those of
@@ -130,7 +130,8 @@ INLINE void take_nearest(const supine_image *image, cells in, double *values) {
   supine_image_gather(image, 0, in.first, RUN, values);
 }
 
-/* Compute det(I + dv/dy) of the inverse field v at a voxel y; 0 if the field folds there. */
+/* Return the volume of the tissue at a voxel y before the motion, divided by its volume after it.
+ * This is det(I + dv/dy) for the inverse field v; return 0 if the field folds at y. */
 static double volume_ratio(const supine_image *nodes, const supine_image *image, size_t index) {
   double point[3];
   double v[3];
@@ -147,9 +148,10 @@ static double volume_ratio(const supine_image *nodes, const supine_image *image,
                        supine_triple(nodes->step[0], nodes->step[1], nodes->step[2]));
 }
 
-/* Interpolate densities, and multiply those inside the lungs by the ratio of volumes. A point uses
- * only the corners on the same side of the lungs' surface as its nearest voxel, so that the chest
- * wall adds no mass to the lungs.
+/* Interpolate densities, and multiply those inside the lungs by the volume of the tissue before the
+ * motion, divided by its volume after the motion. Of the corners of its cell, each point uses only
+ * those on the same side of the lungs' surface as the nearest corner, so that the chest wall adds
+ * no mass to the lungs.
  * @param first  index of the first of the RUN voxels in the moved image */
 INLINE void interpolate_density(const resampling *work, const cells *in, size_t first,
                                 double *values) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Read the names of structures made by 'supine embed', and make marks that show them. */
+/* Read the names of the structures in a file of 'supine embed', and make marks that show them. */
 #ifndef SUPINE_COMMAND_INSIDE_H
 #define SUPINE_COMMAND_INSIDE_H
 
@@ -27,8 +27,9 @@ size_t supine_command_lung_of(const supine_basis_info *info, size_t vertex);
 supine_status supine_command_inside_check(const supine_basis *lungs, const supine_basis *inside,
                                           const char *path, supine_error *error);
 
-/* Open structures and their names, and check that they were embedded in `lungs`. Initialise *inside
- * and *names to zero before the call; close both after it, even if it fails. */
+/* Open the basis file of embedded structures, read their names, and check that they were embedded
+ * in `lungs`. Initialise *inside and *names to zero before the call; close both after it, even if
+ * it fails. */
 supine_status supine_command_inside_open(const supine_basis *lungs, const char *path,
                                          supine_basis **inside, supine_command_names *names,
                                          supine_error *error);

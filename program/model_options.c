@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Options that choose the lungs and the model. */
+/* Options that choose the lungs and the model of their mechanics. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -34,7 +34,8 @@ static supine_status read_resting(const char *text, void *field, supine_error *e
   return status;
 }
 
-/* Read "uniform", "linear:z:0.5:1.5" or "exp:z:0.5:1.5"; any other text names a file. */
+/* Read "uniform", or "linear:AXIS:FROM:TO" or "exp:AXIS:FROM:TO" with the expandability at both
+ * ends of an axis x, y or z; any other text names a file. */
 static supine_status read_expandability(const char *text, void *field, supine_error *error) {
   supine_model_choice *choice = field;
   (void)error;
@@ -99,7 +100,8 @@ static supine_status read_lung(const char *text, void *field, supine_error *erro
 
 static const char *const sexes[] = {"unknown", "female", "male", NULL};
 
-/* Parts of help texts: a line that describes each law, and the default constants of each law. */
+/* Parts of help texts: a line that describes each displacement law, and the defaults of its
+ * constants. */
 #define LAW_HELP(id, name, base, gain, box, constants, bend, reach, pair, what) name ": " what "\n"
 #define LAW_BASE(id, name, base, ...) "; default " #base " for " name
 #define LAW_GAIN(id, name, base, gain, ...) "; default " #gain " for " name
@@ -240,7 +242,8 @@ static void print_map(const char *path, const supine_source *source) {
   }
 }
 
-/* Copy a patient's law and force to options->choice, and set the scan's state if not given. */
+/* Set options->choice to the displacement law and the force that were fitted to a patient. If the
+ * state of the scan is not given, use the state in the fit. */
 static supine_status take_patient(supine_model_options *options, supine_error *error) {
   const supine_patient_record *record = options->patient;
   const supine_lungs *lungs = &options->made_from.lungs;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Options that choose the lungs and the model, shared by commands that run the physics. */
+/* Options that choose the lungs and the model of their mechanics, for commands that solve it. */
 #ifndef SUPINE_MODEL_OPTIONS_H
 #define SUPINE_MODEL_OPTIONS_H
 
@@ -11,14 +11,14 @@
 
 #include "program/options/command.h"
 
-/* Table of the options that fill a supine_model_options. */
+/* Option table that fills a supine_model_options. */
 extern const supine_option supine_command_model_options[];
 
 typedef struct supine_model_options {
   supine_source_options source;
   supine_model_choice choice;
   const supine_patient_record *patient; /* owned by the caller; NULL if there is no patient model */
-  double *patient_arrays;               /* [4, N] memory that supine_patient_model fills */
+  double *patient_arrays;  /* [4 N] directions of displacement [N, 3], mm; relative stiffness [N] */
   supine_source made_from; /* the loaded lungs, with the axes and units of their files */
   supine_prepared prepared;
   char assumed[800]; /* assumptions about the scan and the model, in words */
@@ -28,12 +28,14 @@ typedef struct supine_model_options {
 /* Set the defaults. `options` must be initialised to zero. */
 void supine_command_model_options_begin(supine_model_options *options);
 
-/* Load the files, print the findings and prepare the model.
- * @param keep  whether to ignore --scanned and use the loaded surface as the reference surface */
+/* Load the lungs from the files `paths`, print what the checks of the files found, and prepare the
+ * model.
+ * @param keep  whether to use the loaded surface as the reference surface, and ignore --scanned */
 supine_status supine_command_model_load(supine_model_options *options, const char *command,
                                         char **paths, size_t count, bool keep, supine_error *error);
 
-/* Load one or two surfaces, such as "left.ply,right.ply", or a label map; print the findings.
+/* Load lungs from one or two surfaces, such as "left.ply,right.ply", or from a label map, and print
+ * what the checks of the files found.
  * @param lungs  must be initialised to zero */
 supine_status supine_command_load_lungs(const char *command, const char *operand,
                                         const supine_source_options *options, supine_lungs *lungs,

@@ -13,7 +13,8 @@
 
 enum { MEASURED_VERTICES_MAX = 1500, GOLDEN_SECTION_STEPS = 24 };
 
-/* The best scale is sought within search_span * max(1, |s|) of the predicted scale s. */
+/* The best factor of the displacement is sought within search_span * max(1, |s|) of the predicted
+ * factor s. */
 static const double search_span = 0.5;
 static const double golden = 0.6180339887498949; /* (sqrt(5) - 1) / 2 */
 static const double same_posture = 1e-9; /* gravity directions that differ by less count as equal */

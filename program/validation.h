@@ -15,22 +15,24 @@ typedef struct supine_command_state {
   supine_state state;                 /* if no volume is given, its kind is SUPINE_VOLUME_DEFAULT */
 } supine_command_state;
 
-/* Names of the compared maps: "predicted" (by the basis), "none", "translation" and "affine". */
+/* Names of the compared predictions: by the basis ("predicted"), without motion ("none"), and by a
+ * fitted translation and affine map. */
 extern const char *const supine_command_map_names[SUPINE_PATIENT_MAP_COUNT];
 
 /* Statistics of distances, mm. */
 typedef struct supine_command_distance {
   double mean, rms, p95;
-  double largest;   /* largest distance; between surfaces, the Hausdorff distance */
-  double explained; /* 1 - (rms / r)^2, where r is the rms of the map "none" or, if motion between
-                       the scans is removed, of the map "translation"; NAN if nothing moved */
+  double largest; /* largest distance; between surfaces, the Hausdorff distance */
+  double
+      explained; /* 1 - (rms / r)^2, where r is the RMS distance of the prediction "none" (no
+                    motion) or, if body motion is removed, of "translation"; NAN if r is nearly 0 */
 } supine_command_distance;
 
 /* A predicted state, and the distances of the prediction from the scan of that state. */
 typedef struct supine_command_outcome {
   supine_pose pose;
   double scale;       /* pose.gains[0][0], the factor on the first lung's displacement along x */
-  double millilitres; /* volume minus that of the state where motion starts, mL */
+  double millilitres; /* volume minus the volume before the predicted motion, mL */
   double *predicted;  /* [N, 3] predicted positions, mm */
   double *nearest;    /* [N, 3] nearest points of the scanned surface, mm */
   bool has_surface, has_points, has_best;
@@ -42,23 +44,24 @@ typedef struct supine_command_outcome {
 
 typedef struct supine_command_subject {
   supine_basis *basis;
-  supine_patient_scan_motion moved; /* body motion between the scans, removed before comparing */
-  supine_command_state from;
-  double from_scale; /* factor on the first lung's displacement along x, where motion starts */
-  double from_millilitres; /* volume in the state where motion starts, mL */
-  supine_mesh start;       /* surface in the state where motion starts */
+  supine_patient_scan_motion moved; /* kind of body motion to remove before comparing */
+  supine_command_state from;        /* state in which the motion starts */
+  double from_scale;       /* factor on the first lung's displacement along x in the state `from` */
+  double from_millilitres; /* volume in the state `from`, mL */
+  supine_mesh start;       /* surface in the state `from` */
   size_t count;
   supine_command_state state[SUPINE_COMMAND_STATES_MAX];
   supine_command_outcome outcome[SUPINE_COMMAND_STATES_MAX];
-  size_t line_count; /* number of states to which the line is fitted */
-  double line_slope; /* slope of the line fitted to best_scale as a function of volume, 1/mL */
-  double line_off;   /* largest deviation from the line, divided by max |best_scale - from_scale| */
+  size_t line_count; /* number of states to which best_scale = from_scale + line_slope * volume is
+                        fitted */
+  double line_slope; /* fitted change of best_scale per volume, 1/mL */
+  double line_off;   /* largest |best_scale - fitted line| / largest |best_scale - from_scale| */
 } supine_command_subject;
 
 void supine_command_subject_free(supine_command_subject *subject);
 
-/* Open a basis and compute the surface that motion starts from: the surface in the state `from`, or
- * in the scan if `from` was not given.
+/* Open a basis and compute the surface in the state `from`, in which the motion starts: the scan,
+ * if `from` was not given.
  * @retval any status of the run-time library */
 supine_status supine_command_subject_open(const char *path, supine_command_subject *subject,
                                           supine_error *error);
@@ -72,8 +75,9 @@ supine_status supine_command_validate_state(supine_command_subject *subject, siz
                                             const char *landmarks, bool reverse,
                                             supine_error *error);
 
-/* Fit a straight line to best_scale as a function of volume, over all states in the posture of the
- * first state. The line passes through the state where motion starts. */
+/* Fit the line best_scale = from_scale + line_slope * volume to all states in the posture of the
+ * first state. best_scale is the factor of the displacement at which the prediction is nearest to
+ * the scan, from_scale is the factor in the state `from`, and the volume counts from that state. */
 void supine_command_find_line(supine_command_subject *subject);
 
 /* Draw the distance between prediction and scanned surface, in one panel for each state.
@@ -81,9 +85,10 @@ void supine_command_find_line(supine_command_subject *subject);
 supine_status supine_command_draw_errors(const supine_command_subject *subject, const char *path,
                                          supine_error *error);
 
-/* For each map in supine_command_map_names, compute the distances between the second points of
- * pairs and their predictions.
- * @param moved      motion between the scans, which is fitted to the prediction and removed
+/* Compute the distances of the second points of pairs from each of the predictions in
+ * supine_command_map_names.
+ * @param moved      kind of body motion between the scans; fitted from the predicted to the
+ *   second points, and applied to the predicted points before the comparison
  * @param predicted  [count, 3] positions predicted from the first points of the pairs, mm
  * @retval SUPINE_ERROR_NUMERICAL  the points lie in one plane
  * @retval SUPINE_ERROR_MEMORY */
@@ -91,12 +96,13 @@ supine_status supine_command_compare_points(
     const supine_patient_pairs *pairs, const double *predicted, supine_patient_scan_motion moved,
     supine_command_distance distance[SUPINE_PATIENT_MAP_COUNT], supine_error *error);
 
-/* For each map in supine_command_map_names, compute the distances between a scanned surface and its
- * prediction, from the vertices of each surface to the other. The maps are fitted by iterated
- * nearest points.
- * @param start      surface that motion starts from, with N vertices
- * @param moved      motion between the scans, which is fitted to the prediction and removed
- * @param predicted  [N, 3] predicted positions, mm, from which the motion is then removed
+/* Compute the distances between a scanned surface and each of the predictions in
+ * supine_command_map_names, from the vertices of each surface to the other. Maps and body motion
+ * are fitted by the iterative closest point (ICP) method.
+ * @param start      surface before the motion, N vertices
+ * @param moved      kind of body motion between the scans; fitted from the predicted to the
+ *   scanned surface, and applied to the predicted surface before the comparison
+ * @param predicted  [N, 3] predicted positions, mm; on return, after the fitted body motion
  * @param state      scanned surface
  * @param nearest    [N, 3] nearest points of the scanned surface, mm; output, or NULL
  * @retval SUPINE_ERROR_MESH  as supine_patient_check_boxes

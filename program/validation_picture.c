@@ -12,16 +12,17 @@
 /* Least value at the end of the colour bar, mm. */
 static const double end_least = 1.0;
 
-/* Compute the distance of each predicted vertex from the scanned surface, mm. Raise *largest to the
- * largest of these distances, and *end to the 95th percentile in outcome->surface. */
+/* Set value[i] to the distance of predicted vertex i from the scanned surface, mm. Raise *largest
+ * to the largest of these distances, and *bar_end to the 95th percentile of the distances between
+ * the two surfaces. */
 static void find_values(const supine_command_subject *s, const supine_command_outcome *outcome,
-                        float *value, double *largest, double *end) {
+                        float *value, double *largest, double *bar_end) {
   for (size_t i = 0; i < s->start.vertex_count; ++i) {
     const double off = supine_distance(outcome->predicted + 3 * i, outcome->nearest + 3 * i);
     value[i] = (float)off;
     *largest = fmax(*largest, off);
   }
-  *end = fmax(*end, outcome->surface[SUPINE_PATIENT_MAP_PREDICTED].p95);
+  *bar_end = fmax(*bar_end, outcome->surface[SUPINE_PATIENT_MAP_PREDICTED].p95);
 }
 
 supine_status supine_command_draw_errors(const supine_command_subject *subject, const char *path,
@@ -33,7 +34,7 @@ supine_status supine_command_draw_errors(const supine_command_subject *subject, 
   char subtitle[SUPINE_COMMAND_STATES_MAX][96];
   supine_renderer *renderer = NULL;
   double largest = 0.0;
-  double end = end_least;
+  double bar_end = end_least;
   size_t count = 0;
   float *values = malloc(SUPINE_COMMAND_STATES_MAX * n * sizeof *values);
   if (values == NULL) {
@@ -44,7 +45,7 @@ supine_status supine_command_draw_errors(const supine_command_subject *subject, 
     if (!outcome->has_surface) {
       continue;
     }
-    find_values(s, outcome, values + count * n, &largest, &end);
+    find_values(s, outcome, values + count * n, &largest, &bar_end);
     const supine_command_distance *off = &outcome->surface[SUPINE_PATIENT_MAP_PREDICTED];
     (void)snprintf(subtitle[count], sizeof subtitle[count], "%+.0f mL, RMS %.1f, Hausdorff %.1f mm",
                    outcome->millilitres, off->rms, off->largest);
@@ -62,7 +63,7 @@ supine_status supine_command_draw_errors(const supine_command_subject *subject, 
                             .view_count = 2,
                             .bar_label = "distance of the prediction from the scan, mm",
                             .colours = SUPINE_COLOURS_DIFFERENCE,
-                            .largest = supine_render_bar_end(end),
+                            .largest = supine_render_bar_end(bar_end),
                             .width = 20 + 440 * count,
                             .height = 120 + 480 * 2};
   picture.beyond = largest > picture.largest;

@@ -241,7 +241,7 @@ TEST(test_thread_count_invalid_variable_ignored) {
   const size_t own = supine_thread_count();
   static const struct {
     const char *text;
-    size_t count; /* expected number of threads; 0 if the value is ignored */
+    size_t count; /* expected number of threads; 0: `text` is invalid and ignored */
   } cases[] = {{"1", 1},   {"7", 7},          {"255", 255}, {"256", 256}, {"257", 0},
                {"0", 0},   {"-1", 0},         {"2 x", 0},   {"", 0},      {"many", 0},
                {"1e2", 0}, {"4294967297", 0}, {"3.", 0},    {"0x10", 0}};

@@ -19,7 +19,7 @@ static char folder[] = "/tmp/supine-breathe-XXXXXX";
 static char basis[64], breath[64], series[64];
 static char text[16384]; /* output of the last command on stdout and stderr together */
 
-/* Write a basis of the lungs, the left of which is collapsed to `left_share` of its volume. */
+/* Write a basis of the lungs with the left lung collapsed to `left_share` of its volume. */
 static supine_status make_basis(const supine_lungs *lungs, double left_share, const char *path) {
   supine_precompute_options options = {
       .model = supine_physics_model(SUPINE_LAW_PAPER), .band = 5, .modes = 16, .held_out = 5};

@@ -68,7 +68,7 @@ def checksum(path):
     return f"xxh64:{total & MASK:016x}", metadata["checksum"]
 
 
-# Values published with XXH64, by which this implementation is tested.
+# Test values published with XXH64.
 assert xxh64(b"") == 0xEF46DB3751D8E999
 assert xxh64(b"a") == 0xD24EC4F1A98C6E5B
 assert xxh64(b"Nobody inspects the spammish repetition") == 0xFBCEA83C8A378BF1

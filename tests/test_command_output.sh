@@ -19,7 +19,7 @@ ln -s "$program" "$work/bin/supine"
 cat >"$work/bin/rounded" <<'END'
 #!/bin/sh
 # rounded [DIGITS] [FILE]: round decimal numbers to DIGITS significant digits (default 4), and numbers below 1e-7 to 0.
-# Use fewer digits if a number is nearly halfway between two numbers of four digits.
+# A test passes fewer digits if rounding to four could go either way for one of its numbers.
 digits=4
 case ${1-} in [1-9]) digits=$1; shift ;; esac
 exec awk -v digits="$digits" '{

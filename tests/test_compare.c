@@ -346,9 +346,9 @@ TEST(test_slabs_bipyramid_volumes_grow_with_cube_of_height) {
 /* Displacing every point x by M x + shift multiplies the volume of each slab by det(I + M). */
 TEST(test_slabs_affine_displacement_gains_equal_determinant) {
   static const double matrices[][3][3] = {
-      {{0}},                                        /* M = 0 */
-      {{0.1, 0, 0}, {0, 0.1, 0}, {0, 0, 0.1}},      /* I + M expands by 10 % */
-      {{-0.2, -0.6, 0}, {0.6, -0.2, 0}, {0, 0, 0}}, /* I + M is a rotation */
+      {{0}},                                        /* only the shift */
+      {{0.1, 0, 0}, {0, 0.1, 0}, {0, 0, 0.1}},      /* expansion by 10 % */
+      {{-0.2, -0.6, 0}, {0.6, -0.2, 0}, {0, 0, 0}}, /* rotation by 37 degrees */
       {{0.04, 0.08, -0.3}, {0.02, -0.06, 0.05}, {-0.09, 0.01, 0.07}}};
   static const double shift[3] = {1.7, -2.9, 3.3};
   made m = make(902, 4, 2, 2, false, true);

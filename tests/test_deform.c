@@ -212,7 +212,8 @@ TEST(test_storage_auto_small_last_modes_chooses_mixed) {
   drop(&o);
 }
 
-/* Numbers just below 2^30 give finite error bounds. A file with the number 2^30 is refused. */
+/* Directions and coefficients of modes just below 2^30 give finite error bounds. A file with a
+ * coefficient of 2^30 is refused. */
 TEST(test_storage_error_largest_numbers_finite) {
   fixture *f = fixture_create(50, 16, 3, 1, false, false, 11, 5);
   for (size_t i = 0; i < 3; ++i) {
@@ -429,7 +430,7 @@ TEST(test_deform_batch_each_orientation_within_stated_error) {
   check_batch(700, 16, false, 64, 0, 700);
   check_batch(700, 16, false, 1, 3, 691);
   check_batch(24000, 16, false, 64, 0, 24000); /* the output exceeds the cache */
-  check_batch(23999, 16, false, 64, 1, 23998); /* adjacent orientations share cache lines */
+  check_batch(23999, 16, false, 64, 1, 23998); /* orientations share cache lines of the output */
   check_batch(90, 16, false, 300, 0, 90);
   check_batch(90, 3, false, 5, 17, 60);
   check_batch(90, 3, false, 5, 17, 18);
@@ -438,7 +439,7 @@ TEST(test_deform_batch_each_orientation_within_stated_error) {
   check_batch(90, 256, true, 3, 1, 90);
 }
 
-/* The weights of five modes leave three components of two vec4s, which are set to 0. */
+/* Five weights leave three components of two vec4s unused; these are set to 0. */
 TEST(test_gl_weights_unused_slots_zero) {
   enum { VERTICES = 40, MODES = 5, SLOTS = 8, FLOATS = SUPINE_GL_FLOATS + MODES };
   opened o = made(fixture_create(VERTICES, MODES, 1, 2, false, false, 11, 8));

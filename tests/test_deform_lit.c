@@ -58,8 +58,9 @@ static void drop(opened *o) {
   fixture_destroy(o->f);
 }
 
-/* Compute the weights v [Q] of a lung's Q modes of normals, as polynomials of degree 2 in s w. Here
- * w are the weights of the displacement modes, and s is the gain. */
+/* Compute the weights v of a lung's modes of normals, as polynomials of degree 2 in the products s
+ * w[k]. Here w are the weights of the displacement modes, and the lung's displacement is multiplied
+ * by s. */
 static void expected_weights(const fixture *f, size_t lung, const double *w, double s, double *v) {
   const size_t terms = (MODES + 1) * (MODES + 2) / 2;
   for (size_t j = 0; j < f->normals; ++j) {
@@ -97,7 +98,8 @@ static double expected_normal(const fixture *f, size_t i, const double *w, const
   for (size_t axis = 0; axis < 3; ++axis) {
     n[axis] = length > 0 ? n[axis] / length : 0;
   }
-  /* The unit vectors along a and b differ by at most 2 |a - b| / |a|. */
+  /* If two vectors differ by d, their unit vectors differ by at most 2 |d| / length of the first.
+   * Here no coordinate of d exceeds `off`, so |d| <= sqrt(3) off. */
   return length > 0 ? 2 * sqrt(3.0) * off / length + rounding : 0;
 }
 

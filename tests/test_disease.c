@@ -56,10 +56,10 @@ static const double *side_of(const supine_lungs *lungs) {
   return lungs->mesh.vertices + 3 * found;
 }
 
-/* Smallest and largest ratio of the displacement with a lesion to the displacement without it. */
+/* Ratio of the displacement with a lesion to the displacement without it. */
 typedef struct change {
-  double inside[2]; /* at most half a radius from the centre of the lesion */
-  double far[2];    /* more than 50 mm outside the lesion */
+  double inside[2]; /* smallest and largest ratio within half a radius of the lesion's centre */
+  double far[2];    /* smallest and largest ratio more than 50 mm outside the lesion */
 } change;
 
 static void widen(double range[2], double value) {

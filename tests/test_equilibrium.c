@@ -13,7 +13,7 @@ typedef struct fixture {
   supine_mesh mesh;
   supine_topology topology;
   double *stiffness; /* [N] with a geometric mean far from 1 */
-  double *force;     /* [N, 3] one applied force in each column */
+  double *force;     /* [N, 3] three sets of forces on the N vertices, one in each column */
 } fixture;
 
 static int setup(void **state) {
@@ -73,8 +73,8 @@ static double *normalised(size_t count, const double *stiffness) {
   return out;
 }
 
-/* Compute the catch (the force kept) of each spring from the catch of each mass [N] by (8) and
- * (12)-(14) of [Santhanam2008] (malloc). */
+/* Compute the force that ends up on each spring from the force that ends up on each mass [N], by
+ * (8) and (12)-(14) of [Santhanam2008]. The caller frees the result. */
 static double *spring_catch(const fixture *f, const double *masses) {
   const size_t edges = f->topology.edge_count;
   double *e = normalised(f->mesh.vertex_count, f->stiffness);
@@ -167,8 +167,9 @@ TEST(test_pitcher_catcher_forces_of_both_signs_equals_solve) {
   free(slow);
 }
 
-/* The matrix T, from applied forces to the forces that masses keep, has no negative entry. For the
- * stiffness E it is reciprocal: T[i, j] E_i^2 = T[j, i] E_j^2. */
+/* Entry T[i, j] of the transfer matrix is the force that ends up on vertex i for a unit force on
+ * vertex j. It is not negative, and T[i, j] E[i]^2 = T[j, i] E[j]^2 for the stiffness E of the
+ * vertices. */
 TEST(test_transfer_column_two_vertices_reciprocal) {
   const fixture *f = *state;
   const size_t n = f->mesh.vertex_count;
@@ -200,7 +201,8 @@ TEST(test_transfer_column_all_vertices_superpose_to_solution) {
   double *column = malloc(n * sizeof *column);
   double *sum = calloc(n, sizeof *sum);
   double *whole = solve_of(f, f->stiffness, 3);
-  for (size_t j = 0; j < n; ++j) { /* by (2), columns times forces add up to the solution */
+  /* The sum of all columns, each times the force on its vertex, is the solution. */
+  for (size_t j = 0; j < n; ++j) {
     assert_int_equal(supine_physics_transfer_column(eq, j, column, NULL), SUPINE_OK);
     for (size_t i = 0; i < n; ++i) {
       sum[i] += column[i] * f->force[3 * j + 1];

@@ -99,8 +99,9 @@ static double real(const json_t *object, const char *key, size_t index) {
   return json_number_value(child(object, key, index));
 }
 
-/* Assert that morph weights by the formula in `extras` give the positions of supine_deform. Along
- * axis a, lung i has the gain s[i] + t[i] * bend[a]. */
+/* Assert that the morph weights given by the formula in `extras` reproduce the positions of
+ * supine_deform. The pose multiplies the displacement of lung i along axis a by
+ * s[i] + t[i] * bend[a], where bend[a] is a constant of the basis. */
 static void check_pose(const supine_pose *given, const double s[2], const double t[2]) {
   unsigned char *bytes = NULL;
   const unsigned char *numbers = NULL;
@@ -244,7 +245,7 @@ TEST(test_glb_postures_one_animation_each) {
 TEST(test_glb_without_triangles_refused) {
   char path[256];
   (void)snprintf(path, sizeof path, "%s/points", folder);
-  fixture *f = fixture_create(4, 2, 1, 1, false, true, 5, 5); /* too small for triangles */
+  fixture *f = fixture_create(4, 2, 1, 1, false, true, 5, 5); /* 4 vertices and no triangle */
   fixture_write(f, path);
   fixture_destroy(f);
   assert_int_equal(EXPORT_RUN(text, path, "-o", out), 2);

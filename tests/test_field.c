@@ -117,8 +117,8 @@ TEST(test_field_at_nodes_and_cells_interpolates_basis) {
   supine_field_free(&field);
 }
 
-/* A field has displacements from the scan, so it is 0 in the state of the scan. In another state it
- * equals the displacement of an embedded point. */
+/* The displacements of a field are relative to the scan: they are 0 in the state of the scan. In
+ * another state they equal those of a point that was embedded in the lungs. */
 TEST(test_field_scan_below_full_measured_from_scan) {
   supine_inside_shells below;
   supine_inside_report report;
@@ -141,7 +141,7 @@ TEST(test_field_scan_below_full_measured_from_scan) {
     assert_true(fabs((double)((const float *)field.nodes.values)[i]) < 1e-4);
   }
   supine_field_free(&field);
-  /* Embed a point at a grid node that is inside the lungs. */
+  /* Find a grid node inside the lungs, and embed it as a point. */
   assert_int_equal(supine_field_create(grid, POSED(grid, weights, scales), 60.0, &field, &error),
                    SUPINE_OK);
   size_t node = count / 2;
@@ -188,7 +188,8 @@ TEST(test_field_invert_residual_within_a_tenth_of_a_mm) {
                 residual.rms, residual.largest);
   assert_true(residual.largest <= 0.1);
   assert_true(residual.rms > 0.0 && residual.rms < residual.largest);
-  /* Between nodes, moving a point forth and back may miss it by 1.5 times the largest residual. */
+  /* Between grid nodes, moving a point by the field and then by its inverse may miss the start
+   * by 1.5 times the largest residual at a node. */
   const supine_basis_info *info = supine_basis_get_info(surface);
   uint64_t seed = 3;
   double largest = 0.0;
@@ -312,7 +313,8 @@ static void moved_landmarks(double out[LANDMARKS][3]) {
   supine_inside_shells_free(&shells);
 }
 
-/* Assert that landmarks in a warped image are within 2 mm (a voxel) of the embedded points. */
+/* Assert that each landmark in a warped image is within 2 mm (a voxel) of where an embedded point
+ * at the landmark moves. */
 static void check_landmarks(const supine_image *image, bool labels) {
   double moved[LANDMARKS][3];
   double largest = 0.0;
@@ -368,9 +370,9 @@ static double mass_of(const supine_image *image, const supine_image *mask, doubl
   return 1e-6 * sum * pow(image->step[0][0], 3.0);
 }
 
-/* If density is scaled by the change of volume, the mass within the warped mask of a lung changes
- * by less than 1 %. If not, the mass of a lung in air changes by more than 5 %. The lungs have
- * about -850 to -550 HU, a chest wall has 40 HU. */
+/* Move a CT of lungs of about -850 to -550 HU, in air or in a chest wall of 40 HU. If densities are
+ * scaled by the change of volume, the mass within the moved mask of a lung changes by less than 1
+ * %. If not, the mass of a lung in air changes by more than 5 %. */
 TEST(test_resample_scaled_density_keeps_mass) {
   supine_field field;
   supine_field inverse;
@@ -438,8 +440,8 @@ TEST(test_resample_scaled_density_keeps_mass) {
   supine_field_free(&inverse);
 }
 
-/* Run `command`, by which another program warps balls.nrrd by the field v.nrrd to warped.nrrd, and
- * check the result. If the command `probe` fails, skip the test. */
+/* Run `command`, which warps balls.nrrd by the field v.nrrd to warped.nrrd with another program,
+ * and check the result. If the command `probe` fails, skip the test. */
 static void check_warped_by(const char *probe, const char *command) {
   char text[512];
   (void)snprintf(text, sizeof text, "%s >/dev/null 2>&1", probe);

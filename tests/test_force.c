@@ -52,7 +52,8 @@ TEST(test_height_range_random_directions_equals_brute_force) {
   }
 }
 
-/* Compute the force [N] for gravity g, along which the lungs extend from `low` to `high`. */
+/* Compute the force on each vertex for gravity g. The lungs extend from `low` to `high` along g,
+ * mm. */
 static void force_along(const supine_lungs *lungs, const supine_force_law *law, const double g[3],
                         double low, double high, double *force) {
   const supine_gravities gravity = {1, g, &low, &high};
@@ -78,7 +79,8 @@ TEST(test_force_paper_law_equals_height_from_0_to_1) {
     least = fmin(least, down[i]);
     most = fmax(most, down[i]);
     assert_close(down[i], (height(lungs, g, i) - low) / (high - low), 4 * DBL_EPSILON);
-    assert_close(down[i] + up[i], 1.0, 8 * DBL_EPSILON); /* opposite gravity: 1 - height */
+    /* With opposite gravity, the force is 1 - height. */
+    assert_close(down[i] + up[i], 1.0, 8 * DBL_EPSILON);
   }
   assert_close(least, 0.0, 4 * DBL_EPSILON);
   assert_close(most, 1.0, 4 * DBL_EPSILON);
@@ -100,8 +102,8 @@ TEST(test_force_box_part_uses_box_coordinates) {
   free(force);
 }
 
-/* Softening multiplies the force at each vertex by a factor. The factors have geometric mean 1, and
- * their logarithm grows linearly with height. */
+/* The constant `soften` multiplies the force at each vertex by a factor. The factors have geometric
+ * mean 1, and their logarithm grows linearly with height. */
 TEST(test_force_softened_logarithm_linear_in_height) {
   const supine_lungs *lungs = *state;
   const size_t n = lungs->mesh.vertex_count;
@@ -162,11 +164,11 @@ TEST(test_directions_box_model_literal_values) {
   assert_close(lungs.midline, 10.0, 0.0);
   assert_int_equal(lungs.side[0], 1);
   assert_int_equal(supine_physics_directions(&lungs, &law, d, NULL), SUPINE_OK);
-  /* vertex 1: at the outer side, front and base, so X = Y = Z = 1 */
+  /* vertex 1 has X = Y = Z = 1 (outer side, front, base), so it moves by (c1, -c3, -c5) */
   assert_close(d[3], 2.0, 1e-14);
   assert_close(d[4], -1.5, 1e-14);
   assert_close(d[5], -16.0, 1e-14);
-  /* a vertex at the back, the apex or the midline moves only within that plane */
+  /* a vertex on the midline, back or apex face of the box does not leave that face */
   assert_close(d[7], 0.0, 0.0);
   assert_close(d[11], 0.0, 0.0);
   assert_close(d[0], 0.0, 0.0);

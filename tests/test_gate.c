@@ -118,7 +118,8 @@ TEST(test_gate_clean_lungs_no_message) {
   supine_mesh_free((supine_mesh *)&before);
 }
 
-/* Lungs in each of the 47 axes other than LPS are read as if the axes were LPS. */
+/* A mesh whose axes are any of the 47 other than LPS is read as if they were LPS. The warning
+ * proposes the true axes. */
 TEST(test_gate_any_wrong_axes_proposes_correct_ones) {
   for (int code = 2; code < SUPINE_AXES_COUNT; ++code) {
     supine_mesh mesh = phantom();
@@ -135,7 +136,7 @@ TEST(test_gate_any_wrong_axes_proposes_correct_ones) {
   }
 }
 
-/* A wrong --axes has converted the coordinates. The axes of the file are proposed. */
+/* --axes RAS is given for a file whose axes are LPS. The warning proposes LPS. */
 TEST(test_gate_wrong_axes_option_proposes_correct_one) {
   supine_mesh mesh = phantom();
   const supine_lungs_source ras = {.name = "x", .axes = SUPINE_AXES_RAS, .axes_given = true};
@@ -242,7 +243,7 @@ TEST(test_gate_many_pieces_reported) {
 TEST(test_gate_touching_lungs_separated) {
   supine_mesh mesh = phantom();
   const size_t half = mesh.vertex_count / 2;
-  /* The innermost vertex has the least x in the left lung, the largest x in the right lung. */
+  /* The innermost vertex has the least x in the left lung and the largest x in the right lung. */
   size_t inner[2] = {0, half};
   for (size_t i = 0; i < mesh.vertex_count; ++i) {
     const double x = mesh.vertices[3 * i];

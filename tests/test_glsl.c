@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Run supine.glsl without a window, in GLSL ES 3.00 and GLSL 3.30 core. Assert that positions and
  * normals, read back by transform feedback, equal those of the C library except for rounding. The
- * lungs have different gains in one draw. The tests are skipped if EGL has no context without a
- * surface. */
+ * displacements of the lungs have different factors in one draw. The tests are skipped if EGL has
+ * no context without a surface. */
 #include <EGL/egl.h>
 #include <EGL/eglext.h>
 #include <GLES3/gl3.h>
@@ -162,7 +162,7 @@ static GLuint make_program(const gl_api *gl, const char *version, const char *li
   return program;
 }
 
-/* Create a framebuffer, which drawing needs and a context without a surface lacks. */
+/* Create a framebuffer to draw into, as a context without a surface has none. */
 static void make_framebuffer(const gl_api *gl) {
   GLuint framebuffer = 0;
   GLuint renderbuffer = 0;
@@ -177,8 +177,9 @@ static void make_framebuffer(const gl_api *gl) {
 /* Inputs of the vertex shader. */
 typedef struct model {
   size_t modes;
-  float *attributes; /* [VERTICES, SUPINE_GL_FLOATS + modes] from supine_gl_pack */
-  uint32_t *words;   /* [VERTICES, WORDS, 3] from supine_gl_pack_normals */
+  float
+      *attributes; /* [VERTICES, SUPINE_GL_FLOATS + modes] vertex attributes from supine_gl_pack */
+  uint32_t *words; /* [VERTICES, WORDS, 3] packed normals from supine_gl_pack_normals */
   float weights[SUPINE_GL_MODES];
   float gains[3 * LUNGS];
   float normal_weights[LUNGS * WORDS * 3];

@@ -6,8 +6,8 @@
 
 #include "tests/poses.h"
 
-/* Assert that a basis file has the numbers that version 0.1.0 printed for it. The golden files of
- * all versions of the format hold the same synthetic lungs. */
+/* Assert that a basis file gives the same results as in version 0.1.0. The golden files of all
+ * versions of the format hold the same synthetic lungs. */
 static void check_golden(const char *path, const char *version, const char *checksum) {
   supine_basis *basis = NULL;
   supine_error error = {0};

@@ -50,7 +50,8 @@ TEST(test_image_write_then_read_same) {
           supine_image_read(in_folder(names[i]), &back, &error) != SUPINE_OK) {
         fail_msg("%s", error.message);
       }
-      check_same(&image, &back, 0x1p-23 * 256.0); /* for float32 positions in NIfTI-1 */
+      /* NIfTI-1 stores positions as float32; here they are below 256 mm. */
+      check_same(&image, &back, 0x1p-23 * 256.0);
       supine_image_free(&image);
       supine_image_free(&back);
     }

@@ -127,7 +127,7 @@ TEST(test_surface_find_random_points_side_and_distance_correct) {
     assert_int_equal(place.depth > 0.0, share < 1.0);
     assert_true(fabs(distance(p, place.nearest) - fabs(place.depth)) < 1e-9);
     if (i < 40) {
-      /* slow_distance ends within 1e-10 edge lengths of the nearest point. */
+      /* slow_distance finds the nearest point to within 1e-10 edge lengths. */
       assert_true(fabs(slow_distance(&shells.shell[0], p) - fabs(place.depth)) < 1e-6);
     }
   }
@@ -138,7 +138,7 @@ TEST(test_surface_find_with_hint_same_answer) {
   supine_inside_place near = {0};
   for (int i = 0; i < 500; ++i) {
     double p[3];
-    if (i % 50 == 0) { /* a new random point; the hint is far from it */
+    if (i % 50 == 0) { /* a random point, far from the last one, which is the hint */
       point_at_share(0, &seed, 1.4 * helper_random(&seed), p);
     } else {
       for (int k = 0; k < 3; ++k) {
@@ -243,7 +243,8 @@ static supine_inside_report embed(const supine_inside_content *content, bool cla
   return report;
 }
 
-/* Move embedded points by one mode. Return the largest error, mm, relative to helper_motion. */
+/* Move embedded points by one mode. Return the largest distance, mm, from the positions that
+ * helper_motion gives. */
 static double farthest_from(const supine_inside_content *content, int mode) {
   supine_basis *inside = helper_open(inside_path);
   const double scales[2] = {1.3, 1.3};
@@ -270,8 +271,8 @@ static double farthest_from(const supine_inside_content *content, int mode) {
 }
 
 /* Points inside the lungs follow an affine motion of the surface exactly, except for rounding to
- * float32. The motion of the surface does not determine a quadratic motion inside. Points then err
- * by less than 6.5 % of the largest displacement. */
+ * float32. If the motion is quadratic, the surface does not determine it inside, and points err by
+ * less than 6.5 % of the largest displacement. */
 TEST(test_embed_affine_motion_exact_quadratic_approximate) {
   supine_inside_content content = made_points(800, 0.0, 0.97, 21);
   const supine_inside_report report = embed(&content, false, 0);
@@ -683,8 +684,8 @@ static double misfit_turned(size_t count, const float *from, const float *to, si
 }
 
 /* One tumour is rigid and another is soft. In the state of the scan, the rigid tumour has its given
- * position. In every pose it keeps its volume, and it moves by the rigid motion nearest to its soft
- * displacement. All functions that compute positions agree. */
+ * position. In every pose it keeps its volume, and moves by the rigid motion nearest to the
+ * displacement that it would have if it were soft. All functions that compute positions agree. */
 TEST(test_embed_rigid_part_keeps_volume_and_follows_field) {
   char path[80];
   (void)snprintf(path, sizeof path, "%s/scanned-rigid", folder);
@@ -721,7 +722,7 @@ TEST(test_embed_rigid_part_keeps_volume_and_follows_field) {
   const uint32_t end = ((const uint32_t *)supine_basis_tensor(inside, "rigid")->data)[1];
   assert_int_equal(end, n / 2);
   float *xyz = malloc(4 * 3 * n * sizeof *xyz);
-  float *others = xyz + 3 * n; /* [3, N, 3] */
+  float *others = xyz + 3 * n; /* workspace [3, N, 3] */
   const supine_pose *scan = &moved_shells.scan;
   supine_deform(inside, scan, xyz);
   const uint32_t *part = supine_basis_tensor(inside, "part")->data;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Test that the applied force can be computed from the catch (the force that each mass keeps). */
+/* Test that the force applied to each vertex can be computed from the force that ends up on it. */
 #include "precompute/physics/model.h"
 #include "test.h"
 
@@ -7,7 +7,7 @@
 
 typedef struct fixture {
   supine_lungs lungs;
-  supine_equilibrium *equilibrium[2]; /* without and with a reach, over which forces spread */
+  supine_equilibrium *equilibrium[2]; /* without and with a distance over which forces are spread */
   double *stiffness, *force, *lesions;
 } fixture;
 
@@ -68,7 +68,7 @@ TEST(test_equilibrium_force_from_catch_recovered) {
       solve(f, k, stiffness, catch_);
       assert_int_equal(supine_physics_equilibrium_force(f->equilibrium[k], catch_, force, NULL),
                        SUPINE_OK);
-      /* The test would prove nothing if the catch equalled the force. */
+      /* The test would prove nothing if the solution equalled the applied force. */
       assert_true(helper_difference(n, catch_, f->force) > 0.01);
       assert_true(helper_difference(n, force, f->force) < 1e-10);
     }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Test kriging: omitting a point by formula equals a fit without the point, and for data of the
- * kriging model the predicted error is correct. */
+/* Test kriging. The formula for leaving a point out equals a fit without the point. For data drawn
+ * from the kriging model, the predicted error is correct. */
 #include "runtime/kriging.h"
 #include "test.h"
 

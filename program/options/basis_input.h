@@ -12,7 +12,7 @@
 
 #include "program/options/command.h"
 
-/* Table of the option --as-scanned, which sets a bool. */
+/* Option table that holds only --as-scanned, which sets a bool. */
 extern const supine_option supine_options_as_scanned[];
 
 /* Open a basis without its stored normals, and check that its surface is closed. The caller must
@@ -49,11 +49,12 @@ supine_status supine_options_basis_mesh(const supine_basis *basis, supine_mesh *
   "The expected error was measured on full breaths in one posture; for a change of posture it is " \
   "an extrapolation."
 
-/* Expected errors. Initialise with zeros, and release with supine_options_expected_free. */
+/* Expected errors of the displacements from one state to another. Initialise with zeros, and
+ * release with supine_options_expected_free. */
 typedef struct supine_expected {
   float *sigma;        /* expected error of each vertex's displacement, mm; NULL if unknown */
   double rms, largest; /* RMS and maximum of `sigma` over the vertices, mm */
-  bool turned;         /* whether the two states differ in posture */
+  bool turned;         /* whether the displacements include a change of posture */
 } supine_expected;
 
 /* Compute the expected errors of the displacements from one state to another. They are unknown for

@@ -9,7 +9,7 @@
 /* A turn from one posture to another at constant speed. */
 typedef struct breath_turn {
   double from[3], to[3]; /* unit vectors along gravity, in body axes */
-  double seconds;        /* duration, s; gravity then stays at `to` */
+  double seconds;        /* duration of the turn, s; after it, gravity stays at `to` */
 } breath_turn;
 
 /* Compute the direction of gravity at a time, s, on the shorter arc from turn->from to turn->to.
@@ -20,7 +20,8 @@ void supine_breath_turn_gravity(const breath_turn *turn, double time, double gra
 /* Read a text such as "supine:left:10s" into the breath_turn `turn`. */
 supine_status supine_breath_turn_read(const char *text, void *turn, supine_error *error);
 
-/* Return the state `ml` mL above the volume at rest or, if that is unknown, above the scan's. */
+/* Return the state whose volume is `ml` mL above that at rest or, if that is unknown, above that in
+ * the scan. */
 supine_state supine_breath_state(const supine_basis *basis, const double gravity[3], double ml);
 
 #endif

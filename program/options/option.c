@@ -10,11 +10,12 @@
 
 #include "program/options/command.h"
 
-enum { ROWS_MAX = 64, HELP_ALL = 256, FIRST_LONG }; /* getopt() returns FIRST_LONG + i for row i */
+/* getopt() returns FIRST_LONG + i for the long option of rows[i]. */
+enum { ROWS_MAX = 64, HELP_ALL = 256, FIRST_LONG };
 
 typedef struct row {
   const supine_option *option;
-  char *filled; /* struct within the request that the option fills */
+  char *filled; /* struct that the option's table fills */
   bool given;
   const char *value;
 } row;

@@ -30,13 +30,14 @@
 
 #include <supine/status.h>
 
-/* Kind of a value; SUPINE_FILLS derives it from the type of the field. */
+/* Type of an option's value; SUPINE_FILLS derives it from the C type of the member that the option
+ * sets. */
 typedef enum supine_option_kind {
   SUPINE_OPTION_OWN,     /* any other type, for which the option must set `read` */
   SUPINE_OPTION_FLAG,    /* bool, without a value: true if the option is given */
-  SUPINE_OPTION_NUMBER,  /* double: a finite number within the range */
+  SUPINE_OPTION_NUMBER,  /* double: a finite number within the option's `range` */
   SUPINE_OPTION_NUMBERS, /* double[n]: n numbers separated by commas */
-  SUPINE_OPTION_COUNT,   /* size_t: a whole number within the range */
+  SUPINE_OPTION_COUNT,   /* size_t: a whole number within the option's `range` */
   SUPINE_OPTION_TEXT,    /* const char *: the argument itself, which lives as long as argv */
   SUPINE_OPTION_CHOICE   /* enum: the index of the word among the choices */
 } supine_option_kind;
@@ -49,8 +50,8 @@ typedef enum supine_option_file {
   SUPINE_FILE_OUT
 } supine_option_file;
 
-/* Read `text` into the field of an option or, if the option has no field, into the struct that its
- * table fills.
+/* Read `text` into `field`: the member that the option sets (SUPINE_FILLS) or, if it names no
+ * member, the struct that the option's table fills.
  * @retval SUPINE_ERROR_ARGUMENT  the text is invalid. The user sees "--NAME: MESSAGE" or, if the
  *   message is empty, "--NAME takes WANTS, not 'TEXT'" */
 typedef supine_status supine_option_reader(const char *text, void *field, supine_error *error);
@@ -58,27 +59,29 @@ static inline supine_status supine_options_fits(bool fits) {
   return fits ? SUPINE_OK : SUPINE_ERROR_ARGUMENT;
 }
 
-/* Row of a table: an option, a heading or another table. A row of zeros ends the table. */
+/* Row of an option table: an option, a heading, or another table to include. A row of zeros ends
+ * the table. */
 typedef struct supine_option {
-  const char *name;     /* long name; NULL if the row is a heading or a table */
+  const char *name;     /* long name; NULL in a row that is a heading or includes another table */
   char letter;          /* short name, or 0 */
   const char *argument; /* name of the value in the help; NULL if there is no value */
-  const char *help;     /* description, or the heading; "\n" begins a new line */
+  const char *help;     /* description of the option, or text of the heading; "\n" begins a line */
   supine_option_kind kind;
-  size_t offset, size; /* offset and size of the field in its struct, bytes */
-  size_t given;        /* 1 + offset of a bool that records that the option is given; or 0 */
+  size_t offset, size; /* offset and size of the struct member that the option sets, bytes */
+  size_t given;        /* 1 + offset of a bool member that is set if the option is given; 0: none */
   supine_option_reader *read;
   const char *standard; /* default, as the user would write it; NULL if none */
   double range[2];      /* limits of numbers and counts; {0, 0} if there are none */
   bool open;            /* true if values equal to a limit are invalid */
   const char *wants;    /* description of valid values; NULL to derive it from kind and range */
   const char *const *choices; /* valid words, then NULL; if `read` is set, for completion only */
-  const char *rivals;         /* name of a group; at most one of its options may be given, once */
+  const char *rivals; /* name of a group of options; at most one of them may be given, once */
   bool required;
   bool more; /* shown by --help-all only */
   supine_option_file file;
   const char *endings; /* valid endings of the file name, such as ".ply, .obj or .stl" */
-  const struct supine_option *table; /* a shared table, which fills the struct at `offset` */
+  /* A table whose options this row includes. They fill the struct at `offset`. */
+  const struct supine_option *table;
 } supine_option;
 
 #define SUPINE_FILLS(type, member)                                                                 \
@@ -132,8 +135,9 @@ int supine_options_run(const supine_command *command, int argc, char **argv);
 supine_status supine_options_check_output(const char *output, const char *input,
                                           supine_error *error);
 
-/* Call `each` for every option and heading of a table and of the tables within it, in order. `base`
- * is the offset, within the request, of the struct that the option fills. */
+/* Call `each` for every option and heading of a table and of the tables that it includes, in order.
+ * `base` is the position of the struct that the option's table fills: bytes from the start of the
+ * struct of all options of the command. */
 typedef void supine_option_visit(void *context, const supine_option *option, size_t base);
 void supine_options_visit(const supine_option *options, size_t base, supine_option_visit *each,
                           void *context);

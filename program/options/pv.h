@@ -9,7 +9,7 @@
 
 #include <supine/breath.h>
 
-/** Number of unknowns of a fit: control parameters, and the volume at each end of the curve. */
+/** Number of unknowns of a fit: the control parameters and the two end volumes of a curve. */
 enum { SUPINE_PV_UNKNOWNS = SUPINE_PV_CONTROLS + 2 };
 
 typedef struct supine_pv_sample {
@@ -21,20 +21,23 @@ typedef struct supine_pv_sample {
 /** Quality of the fit to one limb (inhale or exhale). */
 typedef struct supine_pv_report {
   size_t samples; /**< number of samples; 0 if the curve was copied from the other limb */
-  double control_interval[SUPINE_PV_CONTROLS]; /**< half-widths of confidence intervals */
-  double volume_interval[2];                   /**< half-widths for V_low and V_high, mL */
-  double rms;                                  /**< root mean square residual, mL */
-  double rms_percent; /**< rms as a percentage of the samples' range of volumes */
+  double control_interval[SUPINE_PV_CONTROLS]; /**< half-widths of confidence intervals of the
+                                                  control parameters */
+  double volume_interval[2]; /**< half-widths of confidence intervals of the end volumes V_low and
+                                V_high, mL */
+  double rms;                /**< root mean square residual, mL */
+  double rms_percent;        /**< rms as a percentage of the samples' range of volumes */
 } supine_pv_report;
 
 /** Fit the curve V of one limb (inhale or exhale) to samples (P_j, V_j) by Levenberg-Marquardt:
  *
  *     minimise over c, V_low, V_high:  sum of (V(P_j) - V_j)^2
  *
- * The curve has the control parameters c, covers the range of the samples' pressures, and rises
- * from V_low to V_high. Confidence intervals use Student's t and the covariance at the minimum. If
- * the curve is nearly flat over much of its range, the samples determine some parameters poorly;
- * these parameters stay within +-SUPINE_PV_CONTROL_MAX and have wide intervals.
+ * The curve is defined in supine/breath.h. It has the control parameters c = (c_1, ..., c_5),
+ * covers the range of the samples' pressures, and rises from V_low to V_high. Confidence intervals
+ * use Student's t and the covariance at the minimum. If the curve is nearly flat over much of its
+ * range, the samples determine some parameters poorly; these parameters stay within
+ * +-SUPINE_PV_CONTROL_MAX and have wide intervals.
  *
  * Pressures must keep rising or keep falling. Volumes must rise with pressure, except for noise: a
  * volume may be less than the volume at a lower pressure by at most 10 % of the range of volumes.

@@ -13,7 +13,7 @@
 #include "program/options/pv.h"
 
 enum {
-  LOW = SUPINE_PV_CONTROLS, /* indices of V_low and V_high among the unknowns */
+  LOW = SUPINE_PV_CONTROLS, /* indices of the end volumes V_low and V_high among the unknowns */
   HIGH
 };
 
@@ -23,9 +23,9 @@ typedef struct problem {
   supine_pv_sample *sample; /* [count] sorted by rising pressure */
   gsl_multifit_nlinear_workspace *work;
   gsl_matrix *covariance;
-  double *x; /* [count] pressures, mapped linearly to -1 to 1 */
+  double *x; /* [count] pressures, mapped linearly to the range -1 to 1 */
   double *v; /* [count] (volume - first volume) / range of volumes */
-  double *q; /* [count] curve at `x`, scaled to rise from 0 to 1 */
+  double *q; /* [count] volumes of the curve at the pressures x, scaled to rise from 0 to 1 */
 } problem;
 
 static supine_status refuse(const problem *limb, const supine_pv_sample *sample, const char *why,
@@ -83,14 +83,16 @@ static supine_status check_falls(const problem *limb, double span, supine_error 
   return SUPINE_OK;
 }
 
-/* Compute q, the curve scaled to rise from 0 to 1. Return false for parameters out of bounds. */
+/* Compute q, the volumes of the curve scaled to rise from 0 to 1. Return false for parameters out
+ * of bounds. */
 static bool find_shape(const problem *limb, const double *control, double *q) {
   supine_pv_curve curve = {{-1.0, 1.0}, {0.0, 1.0}, {0.0}};
   memcpy(curve.control, control, sizeof curve.control);
   return supine_breath_curve_evaluate(&curve, limb->count, limb->x, q, NULL, NULL) == SUPINE_OK;
 }
 
-/* Compute the residuals (1 - q) V_low + q V_high - v for the curve q and the samples' volumes v. */
+/* Compute the residuals (1 - q) V_low + q V_high - v. Here q is the curve scaled to rise from 0 to
+ * 1, V_low and V_high are the volumes at its ends, and v are the volumes of the samples. */
 static int find_residuals(const gsl_vector *unknowns, void *context, gsl_vector *residual) {
   static const double wall = 1e6; /* residual for parameters that are out of bounds */
   const problem *limb = context;
@@ -106,8 +108,9 @@ static int find_residuals(const gsl_vector *unknowns, void *context, gsl_vector 
   return GSL_SUCCESS;
 }
 
-/* Compute the derivatives of the residuals: with respect to the control parameters by central
- * differences, accurate to about 1e-10; with respect to V_low and V_high exactly. */
+/* Compute the derivatives of the residuals. Those with respect to the curve's control parameters
+ * (supine/breath.h) are central differences, accurate to about 1e-10. Those with respect to the
+ * volumes V_low and V_high at the curve's ends are exact. */
 static int find_jacobian(const gsl_vector *unknowns, void *context, gsl_matrix *jacobian) {
   static const double step = 1e-5;
   const problem *limb = context;

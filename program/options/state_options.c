@@ -148,7 +148,7 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
     const double *g = from->state.gravity;
     const bool posed = g[0] != 0.0 || g[1] != 0.0 || g[2] != 0.0;
     state = from->state;
-    /* Without a posture, take that of the scan for the volume `scan`, and supine for any other. */
+    /* If --from gives no posture, use supine or, for the volume `scan`, the posture of the scan. */
     if (!posed) {
       const bool own = state.lung_count == 0 && state.volume.kind == SUPINE_VOLUME_SCAN;
       const supine_state in = supine_basis_scan(basis);

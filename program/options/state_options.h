@@ -7,7 +7,7 @@
 
 #include "program/options/command.h"
 
-/* Table of --posture and --gravity, which fills a supine_orientation. */
+/* Option table of --posture and --gravity, which fill a supine_orientation. */
 extern const supine_option supine_options_orientation[];
 
 typedef struct supine_orientation {
@@ -51,13 +51,13 @@ supine_status supine_options_posture_list_parse(const char *text, supine_posture
 /* Return "left side" for "left", "right side" for "right", and any other name unchanged. */
 const char *supine_options_posture_label(const char *name);
 
-/* Table of --volume and --allow-folds, which fills a supine_volume_options. */
+/* Option table of --volume and --allow-folds, which fill a supine_volume_options. */
 extern const supine_option supine_options_volume[];
 
 /* Read the value of --volume into a supine_state. */
 supine_status supine_options_read_volume(const char *text, void *field, supine_error *error);
 
-/* Table of --allow-folds alone, which sets a bool. */
+/* Option table that holds only --allow-folds, which sets a bool. */
 extern const supine_option supine_options_folds[];
 
 typedef struct supine_volume_options {
@@ -70,7 +70,8 @@ typedef struct supine_volume_options {
   "(the volume in the scan), each alone or with +ML or -ML, such as rest+500; or the absolute "    \
   "volume of gas and tissue in all lungs, as measured in a CT, such as 2600mL"
 
-/* Two tables of --from, which fill a supine_from; their defaults are supine:rest and scan. */
+/* Two tables of the option --from, which fills a supine_from. The default is supine:rest in the
+ * first table, and scan in the second. */
 extern const supine_option supine_options_from[], supine_options_from_scan[];
 
 typedef struct supine_from {

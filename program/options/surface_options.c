@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Declare the options for axes, units and landmarks, of commands that read surfaces. */
+/* Declare the options for axes, units and landmarks, for commands that read surfaces. */
 #include <ctype.h>
 #include <string.h>
 

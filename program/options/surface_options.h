@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Declare the options for axes, units and landmarks, of commands that read surfaces. */
+/* Declare the options for axes, units and landmarks, for commands that read surfaces. */
 #ifndef SUPINE_SURFACE_OPTIONS_H
 #define SUPINE_SURFACE_OPTIONS_H
 
@@ -9,7 +9,7 @@
 
 #include "program/options/command.h"
 
-/* Table of --axes and --units, which fills a supine_mesh_load_options. */
+/* Option table of --axes and --units, which fill a supine_mesh_load_options. */
 extern const supine_option supine_options_surface_frame[];
 
 /* Matched points in two scans of one person, and the kind of motion to fit between the scans. */
@@ -18,7 +18,7 @@ typedef struct supine_landmark_options {
   bool reverse, translation, rigid;
 } supine_landmark_options;
 
-/* Table of --landmarks, --reverse, --translation and --rigid, which fills a
+/* Option table of --landmarks, --reverse, --translation and --rigid, which fill a
  * supine_landmark_options. */
 extern const supine_option supine_options_landmarks[];
 

@@ -36,8 +36,10 @@ void supine_render_view_axes(supine_view view, double axes[3][3]) {
 /* Each pixel is the mean of OVERSAMPLE x OVERSAMPLE samples. */
 enum { OVERSAMPLE = 2, SIDE_MAX = 16384, SHADES = 4096, NOTHING = UINT32_MAX, GRAIN = 16 };
 
-static const double distance_in_radii = 5.0; /* distance from the viewer to the lungs' centre */
-static const double depth_in_radii = 3.0;    /* largest drawn depth in front of the lungs' centre */
+/* Distance from the viewer to the lungs' centre, and the largest distance in front of this centre
+ * that is drawn, in half diagonals of the lungs' bounding box. */
+static const double distance_in_radii = 5.0;
+static const double depth_in_radii = 3.0;
 static const double margin = 1.03; /* size of the picture divided by the size of the lungs in it */
 static const float gamma_exponent = 2.2F;
 

@@ -28,7 +28,8 @@
   EACH(cairo_, text_extents) EACH(cairo_, text_path)
 /* clang-format on */
 
-/* Functions of cairo. They are loaded at the first use, because cairo needs the X11 libraries. */
+/* Functions of cairo. They are loaded at the first use, so that all commands that draw nothing run
+ * without cairo and the X11 libraries that it needs. */
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cairo;
 
 static const double pi = 3.14159265358979323846;
@@ -46,8 +47,8 @@ typedef struct layout {
   double font;
   double margin;
   double cell_width, cell_height;
-  double strip; /* height of a cell's heading */
-  double bar;   /* height of the part below the cells, with the colour bar */
+  double heading_height;
+  double footer_height; /* height of the area below the cells, which holds the colour bar */
 } layout;
 
 typedef struct bar_scale {
@@ -106,8 +107,9 @@ static void ground(cairo_t *cr, const supine_picture *picture) {
   cairo.pattern_destroy(fade);
 }
 
-/* Draw gravity on the ball: an arrow, a circle with a dot if it points towards the viewer, or a
- * circle with a cross if it points away. `seen` is gravity's unit vector in the viewer's axes. */
+/* Draw gravity on the ball that shows the body's axes: as a circle with a dot if it points nearly
+ * towards the viewer, as a circle with a cross if it points nearly away, else as an arrow. `seen`
+ * is gravity's unit vector in the viewer's axes. */
 static void gravity_arrow(cairo_t *cr, double x, double y, double radius, const double seen[3]) {
   const double flat = hypot(seen[0], seen[1]);
   cairo.new_path(cr);
@@ -262,7 +264,7 @@ static supine_status draw_scene(supine_renderer *renderer, const supine_scene *s
 }
 
 /* Draw the lungs and the marks of a panel in a box whose upper left corner is (x, y); `size` is the
- * size of the font; all in pixels. The 13 parameters say what to draw, and where. */
+ * size of the font; all in pixels. A struct for the 13 parameters would have no other use. */
 static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
                            const supine_panel *panel, supine_view view, const bar_scale *bar,
                            double x, double y, double width, double height, double size,
@@ -291,8 +293,8 @@ static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_
   return status;
 }
 
-/* Draw the cell of the posture `column` from the view `row`. The nine parameters are the picture,
- * its layout and scales, and the cell. */
+/* Draw the cell of the picture that shows the posture `column` from the view `row`. A struct for
+ * the nine parameters would have no other use. */
 static supine_status cell(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
                           const layout *at, const bar_scale *bar, size_t column, size_t row,
                           const double extent[4], supine_error *error) {
@@ -301,7 +303,7 @@ static supine_status cell(cairo_t *cr, supine_renderer *renderer, const supine_p
   const double gap = at->margin / 2;
   const double x = at->margin + (double)column * (at->cell_width + gap);
   const double y = at->margin + (double)row * (at->cell_height + gap);
-  const double radius = at->strip * 0.4;
+  const double radius = at->heading_height * 0.4;
   const double words = x + 2 * radius + at->font * 1.5;
   const double room = x + at->cell_width - words - at->font;
   rounded(cr, x, y, at->cell_width, at->cell_height, at->font * 0.7);
@@ -310,19 +312,19 @@ static supine_status cell(cairo_t *cr, supine_renderer *renderer, const supine_p
   colour(cr, edge);
   cairo.set_line_width(cr, 1);
   cairo.stroke(cr);
-  ball(cr, x + radius + at->font * 0.7, y + at->strip / 2 + at->font * 0.2, radius, view,
+  ball(cr, x + radius + at->font * 0.7, y + at->heading_height / 2 + at->font * 0.2, radius, view,
        panel->gravity);
   colour(cr, ink);
-  fitted_text(cr, words, y + at->strip / 2 - at->font * 0.25, at->font * 1.3, true, room,
+  fitted_text(cr, words, y + at->heading_height / 2 - at->font * 0.25, at->font * 1.3, true, room,
               panel->title);
   colour(cr, faint);
-  fitted_text(cr, words, y + at->strip / 2 + at->font * 0.95, at->font * 0.82, false, room,
+  fitted_text(cr, words, y + at->heading_height / 2 + at->font * 0.95, at->font * 0.82, false, room,
               panel->subtitle);
-  fitted_text(cr, words, y + at->strip / 2 + at->font * 2.0, at->font * 0.82, false, room,
+  fitted_text(cr, words, y + at->heading_height / 2 + at->font * 2.0, at->font * 0.82, false, room,
               supine_render_view_name(view));
-  return lungs(cr, renderer, picture, panel, view, bar, x + at->font * 0.5, y + at->strip,
-               at->cell_width - at->font, at->cell_height - at->strip - at->font * 0.5, at->font,
-               extent, error);
+  return lungs(cr, renderer, picture, panel, view, bar, x + at->font * 0.5, y + at->heading_height,
+               at->cell_width - at->font, at->cell_height - at->heading_height - at->font * 0.5,
+               at->font, extent, error);
 }
 
 static void colour_bar(cairo_t *cr, const supine_picture *picture, const layout *at,
@@ -330,7 +332,7 @@ static void colour_bar(cairo_t *cr, const supine_picture *picture, const layout 
   enum { STOPS = 64 };
   const double width = fmin((double)picture->width - 2 * at->margin, 34 * at->font);
   const double x = ((double)picture->width - width) / 2;
-  const double y = (double)picture->height - at->bar + at->font * 1.65;
+  const double y = (double)picture->height - at->footer_height + at->font * 1.65;
   const double height = at->font * 0.8;
   cairo_pattern_t *fade = cairo.pattern_create_linear(x, 0, x + width, 0);
   for (int i = 0; i <= STOPS; ++i) {
@@ -371,13 +373,14 @@ static layout make_layout(const supine_picture *picture) {
       fmin(width / (double)picture->panel_count / 19, height / (double)picture->view_count / 24);
   at.font = fmin(28, at.font);
   at.margin = at.font * 0.9;
-  at.strip = at.font * 5.2;
-  at.bar = at.font * 4.6;
+  at.heading_height = at.font * 5.2;
+  at.footer_height = at.font * 4.6;
   const double gap = at.margin / 2;
   at.cell_width = (width - 2 * at.margin - gap * (double)(picture->panel_count - 1)) /
                   (double)picture->panel_count;
-  at.cell_height = (height - at.margin - at.bar - gap * (double)(picture->view_count - 1)) /
-                   (double)picture->view_count;
+  at.cell_height =
+      (height - at.margin - at.footer_height - gap * (double)(picture->view_count - 1)) /
+      (double)picture->view_count;
   return at;
 }
 

@@ -66,7 +66,7 @@ typedef struct supine_scene {
   supine_view view;
   bool shell; /**< whether to draw a grey, transparent shell with an outline instead of colours */
   size_t width, height; /**< size of the drawing, pixels */
-  const double *extent; /**< [4] made by supine_render_extent; NULL for the extent of this scene */
+  const double *extent; /**< [4] smallest and largest x, then y, mm; NULL: those of this scene */
 } supine_scene;
 
 /** Empty extent, to be enlarged by supine_render_extent. */
@@ -95,7 +95,7 @@ supine_status supine_render_png(supine_renderer *renderer, const supine_scene *s
 typedef struct supine_mark {
   float xyz[3]; /**< position, mm */
   float value;  /**< value that the colour shows, mm */
-  bool point;   /**< whether the mark is a point, drawn as a disc; a vertex is drawn as a dot */
+  bool point;   /**< true: a point, drawn as a disc; false: a vertex of a mesh, drawn as a dot */
   const char *label; /**< text written beside the mark, or NULL */
 } supine_mark;
 
@@ -109,7 +109,7 @@ typedef struct supine_marks {
 void supine_render_project(supine_renderer *renderer, const supine_scene *scene,
                            const supine_marks *marks, double (*pixel)[2]);
 
-/** One posture of a picture. */
+/** A column of a picture: the lungs in one posture. */
 typedef struct supine_panel {
   const char *title;
   const char *subtitle;
@@ -130,8 +130,8 @@ typedef struct supine_picture {
   const char *bar_label;
   double largest;            /**< value that the last colour shows, mm */
   double transparency;       /**< 0 for coloured lungs; above 0 for grey shells, invisible at 1 */
-  const double (*extent)[4]; /**< [view_count] made by supine_render_picture_extent; NULL for the
-                                extents of this picture */
+  const double (*extent)[4]; /**< [view_count] smallest and largest x, then y, of each view, mm;
+                                NULL: those of this picture */
   supine_colours colours;
   bool beyond; /**< whether values exceed `largest`, so that the colour bar has a pointed end */
   size_t width, height; /**< size of the picture, pixels */
@@ -142,9 +142,9 @@ double supine_render_bar_step(double value);
 /** Return the end of a colour bar: `value` rounded up to a tick. */
 double supine_render_bar_end(double value);
 
-/** Enlarge the extent of each view by supine_render_extent to contain a picture, so that several
- * pictures can be drawn at one scale.
- * @param extent  [view_count, 4] extents, mm */
+/** Enlarge the extents of all views (see supine_render_extent) so that they contain a picture.
+ * Several pictures can then be drawn at one scale.
+ * @param extent  [view_count, 4] smallest and largest x, then y, of each view, mm */
 void supine_render_picture_extent(supine_renderer *renderer, const supine_picture *picture,
                                   double (*extent)[4]);
 

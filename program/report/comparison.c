@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compare postures with a reference state, and every direction of gravity with supine. */
+/* Compute the displacement of the lungs in each posture from a reference state, and find the
+ * direction of gravity that moves the lungs farthest from supine. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,8 +8,8 @@
 #include "program/report/comparison.h"
 #include "sh/base/vec3.h"
 
-/* Compute the volume that each lung and each slab gains in a breath that begins at the volume
- * of the posture. `xyz` [2][N, 3] is workspace. */
+/* Compute the volume that each lung and each of ten horizontal slabs gains in a breath. The breath
+ * begins at the lung volumes in the posture. `xyz` [2][N, 3] is workspace. */
 static supine_status find_breath(const supine_comparison *c, const supine_posture_item *item,
                                  float *xyz[2], supine_compared_posture *posture,
                                  supine_error *error) {

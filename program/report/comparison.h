@@ -20,7 +20,7 @@ typedef struct supine_compared_posture {
   double volume[SUPINE_LUNGS_MAX];           /* volume of each lung, gas and tissue, mL */
   double gain[SUPINE_LUNGS_MAX];             /* volume that each lung gains in the breath, mL */
   supine_slab slab[SUPINE_COMPARISON_SLABS]; /* horizontal slabs, uppermost first */
-  double expansion[SUPINE_COMPARISON_SLABS]; /* volume that each slab gains / volume of the slab */
+  double expansion[SUPINE_COMPARISON_SLABS]; /* volume that each slab gains / its volume before */
   double share[SUPINE_COMPARISON_SLABS];     /* volume that each slab gains / gain of all lungs */
 } supine_compared_posture;
 
@@ -39,7 +39,7 @@ typedef struct supine_comparison {
   supine_compared_posture *posture; /* [postures.count] */
   size_t directions;                /* number of sampled directions of gravity with a valid pose */
   double farthest[3];  /* direction of gravity that moves the lungs farthest from supine */
-  double farthest_rms; /* RMS distance from the supine surface, with gravity `farthest`, mm */
+  double farthest_rms; /* RMS distance from supine to the surface for `farthest`, mm */
 } supine_comparison;
 
 /* Compute `reference` and the members after it. Free them with supine_report_free, also after a
@@ -59,7 +59,7 @@ double supine_report_from_supine(const supine_comparison *comparison, const doub
 /* Return whether the expected error of any posture is known. */
 bool supine_report_has_errors(const supine_comparison *comparison);
 
-/* Return the volume that all lungs together gain by a breath in a posture, mL. */
+/* Return the volume of the breath in one of the compared postures, summed over all lungs, mL. */
 double supine_report_gain(const supine_comparison *comparison, size_t posture);
 
 /* Print the comparison to standard output, as JSON or as text with tables of the postures. */

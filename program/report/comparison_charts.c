@@ -126,7 +126,7 @@ json_t *supine_report_direction(const double g[3]) {
     double named[3];
     (void)supine_posture_gravity(supine_posture_name(i), named);
     const double cosine = supine_dot(named, g);
-    /* If two postures are equally near, keep the first: names are listed before DICOM codes. */
+    /* On a tie, keep the first posture: the list has names before DICOM codes. */
     if (cosine > nearest + 1e-9) {
       nearest = cosine;
       name = supine_posture_name(i);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Build the first sentences and the first table of the report, and the titles of its profiles. */
+/* Build the first sentences and the first table of the report, and the titles of its charts by
+ * height. */
 #include <ctype.h>
 #include <math.h>
 #include <stdlib.h>
@@ -7,7 +8,7 @@
 
 #include "program/report/comparison_parts.h"
 
-/* Published values for rows of the table of postures; report.html names their sources. */
+/* Values from publications for the row of a posture; report.html names their sources. */
 static const struct {
   const char *posture, *words;
 } published[] = {
@@ -106,7 +107,10 @@ json_t *supine_report_findings(const supine_comparison *c) {
   return list;
 }
 
-/* Print the title of a profile: a heading, then the name and value of each posture up to `last`. */
+/* Print the title of a chart by height: a heading, then the name and value of each posture up to
+ * index `last`. If `share` is true, the value is the share of the lower half of the lungs in the
+ * breath. Otherwise it is the expansion of the three lowest slabs divided by that of the three
+ * uppermost. */
 static void print_profile(const supine_comparison *c, size_t last, bool share, FILE *to) {
   (void)fputs(share ? "Share of the lower half in a breath:"
                     : "Expansion, lowest 30 % of the height divided by uppermost 30 %:",

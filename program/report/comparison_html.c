@@ -57,7 +57,8 @@ static json_t *provenance(const supine_comparison *c, json_t *file) {
   return list;
 }
 
-/* Return {{provenance}}, and the data of the report's heading and section on all directions. */
+/* Return the values of these tags of report.html: {{provenance}}, those in the heading, and those
+ * in the section on all directions of gravity. */
 static json_t *facts(const supine_comparison *c) {
   const char *slash = strrchr(c->path, '/');
   json_t *file = supine_options_json_text(slash != NULL ? slash + 1 : c->path);

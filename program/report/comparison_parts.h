@@ -22,30 +22,32 @@ json_t *supine_report_bar(supine_colours map, double largest, bool beyond, const
  * return the angle from the nearest named posture, and the vector as --posture takes it. */
 json_t *supine_report_direction(const double g[3]);
 
-/* Return {{findings}}: a sentence on each of the first three postures that differ from the
- * reference pose. */
+/* Return the value of the tag {{findings}}: a sentence on each of the first three postures that
+ * differ from the reference pose. */
 json_t *supine_report_findings(const supine_comparison *comparison);
 
-/* Return {{postures}}: for each posture a table row of volumes, their changes, displacements and
- * published values. */
+/* Return the value of the tag {{postures}}: for each posture a table row of lung volumes, their
+ * changes, displacements, and values from publications. */
 json_t *supine_report_postures(const supine_comparison *comparison);
 
-/* Return the title of a profile, with a value for each of the first four postures. If `share` is
- * true, the value is the share of the breath in the lower half of the lungs. Otherwise it is the
- * expansion of the three lowest slabs divided by that of the three uppermost slabs. */
+/* Return the title of a chart by height, with a value for each of the first four postures. If
+ * `share` is true, the value is the share of the breath in the lower half of the lungs. Otherwise
+ * it is the expansion of the three lowest slabs divided by that of the three uppermost slabs. */
 json_t *supine_report_profile_finding(const supine_comparison *comparison, bool share);
 
-/* Return {{profiles}}: two charts by height, regional expansion and share of the breath. */
+/* Return the value of the tag {{profiles}}: two charts by height, one of regional expansion and one
+ * of the share of the breath. */
 json_t *supine_report_profiles(const supine_comparison *comparison);
 
-/* Return {{map}}: the RMS distance from supine for all directions of gravity. */
+/* Return the value of the tag {{map}}: the RMS distance from supine by direction of gravity. */
 json_t *supine_report_map(const supine_comparison *comparison);
 
-/* Return {{outlines}}: for each slice, the outlines in all postures and in the reference pose. */
+/* Return the value of the tag {{outlines}}: for each slice, the outlines in all postures and in the
+ * reference pose. */
 json_t *supine_report_outlines(const supine_comparison *comparison);
 
-/* Return {{pictures}}: a picture of each posture from the front, and a colour bar. If pictures
- * cannot be drawn, set `error` and return NULL. */
+/* Return the value of the tag {{pictures}}: a picture of each posture from the front, and a colour
+ * bar. If pictures cannot be drawn, set `error` and return NULL. */
 json_t *supine_report_pictures(const supine_comparison *comparison, supine_error *error);
 
 #endif

@@ -38,9 +38,10 @@ static json_t *draw(supine_renderer *renderer, const supine_scene *scene, supine
   return made;
 }
 
-/* Add the direction of gravity to `shot`, the data of a picture. {{along}} is the angle, degrees
- * clockwise from the right. {{turn}} is the clockwise rotation, degrees, after which gravity points
- * down. If gravity is nearly normal to the picture, {{towards}} or {{away}} replaces both. */
+/* Add the direction of gravity to `shot`, the data of a picture. {{along}} is the angle of gravity
+ * in the picture, degrees clockwise from the right. {{turn}} is the clockwise rotation of the
+ * picture, degrees, after which gravity points down. If gravity is nearly normal to the picture,
+ * {{towards}} or {{away}} replaces both. */
 static void set_gravity(const double g[3], json_t *shot) {
   double axes[3][3];
   double seen[3] = {0.0, 0.0, 0.0};
