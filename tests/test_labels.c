@@ -77,7 +77,8 @@ static void check_closed(const supine_mesh *mesh) {
   assert_true(supine_mesh_volume(mesh) > 0.0);
 }
 
-/* Return the RMS distance, mm, from vertices of both surfaces to the true surface. */
+/* Return the RMS distance, mm, of vertices of the left and the right lung's surface in `out` from
+ * the true surface. */
 static double rms_from(const supine_inside_surface *truth, const made *out) {
   enum { EVERY = 29 };
   double sum = 0.0;
@@ -141,9 +142,8 @@ TEST(test_labels_phantom_volume_and_surface_recovered) {
   supine_mesh_free(&phantom);
 }
 
-/* Return a map in which the left lung has the labels left[0], left[1] and the right lung right[0],
- * right[1], right[2], in layers from the feet up. In the map `from`, the left lung has the label 2
- * and the right lung the label 1. */
+/* Return a copy of the map `from` with other labels. From the feet up, the left lung, 2 in `from`,
+ * gets left[0] and left[1]. The right lung, 1 in `from`, gets right[0], right[1] and right[2]. */
 static supine_image relabelled(const supine_image *from, const uint8_t left[2],
                                const uint8_t right[3]) {
   supine_image image = *from;
@@ -162,7 +162,7 @@ static supine_image relabelled(const supine_image *from, const uint8_t left[2],
 TEST(test_labels_any_convention_same_lungs) {
   static const struct {
     uint8_t left[2], right[3];
-    const char *options[3]; /* values of --labels; NULL means none */
+    const char *options[3]; /* values of --labels to try; a NULL in front omits it */
     const char *said;
   } maps[] = {
       {{2, 2}, {1, 1, 1}, {NULL, "lungmask", "left=2,right=1"}, "2 left; 1 right"},
@@ -195,7 +195,8 @@ TEST(test_labels_any_convention_same_lungs) {
   supine_image_free(&image);
 }
 
-/* A map with lobes and other organs gives the same lungs as one file for each lobe. */
+/* One map of all lobes, one file for each lobe, and a map that also has other organs give the same
+ * lungs. */
 TEST(test_labels_other_organs_ignored_and_files_of_lobes_joined) {
   static const uint8_t left[2] = {11, 10};
   static const uint8_t right[3] = {14, 13, 12};
@@ -238,7 +239,7 @@ TEST(test_labels_other_organs_ignored_and_files_of_lobes_joined) {
   supine_image_free(&image);
 }
 
-/* A map of one lung is accepted if --labels names its side. */
+/* If --labels names the label of one lung only, the result is this lung alone. */
 TEST(test_labels_one_lung_of_given_side_accepted) {
   supine_image image = helper_two_lungs(4.0);
   const supine_labels_options left = {.labels = "left=2", .edge = 5.0};
@@ -272,7 +273,7 @@ TEST(test_labels_touching_lungs_separated) {
   for (size_t i = 0; i < voxels(&image); ++i) {
     ((uint8_t *)image.values)[i] = ((uint8_t *)image.values)[i] != 0;
   }
-  /* Join the lungs by a bridge across the midline, 5 x 4 voxels in cross-section. */
+  /* Join the lungs by a bridge of voxels across the midline, 9 x 5 x 4 voxels along x, y and z. */
   const size_t low[3] = {image.size[0] / 2 - 5, image.size[1] / 2 - 2, image.size[2] / 2 - 2};
   const size_t high[3] = {image.size[0] / 2 + 4, image.size[1] / 2 + 3, image.size[2] / 2 + 2};
   box_set(&image, low, high, 1);
@@ -281,7 +282,7 @@ TEST(test_labels_touching_lungs_separated) {
   made out = surfaces_of_image(&image, "touch.nrrd", &options);
   assert_int_equal(out.report.lung_count, 2);
   assert_true(out.report.neck >= 16.0 && out.report.neck <= 24.0);
-  /* The bridge is divided between the lungs. No other voxel moves to the other lung. */
+  /* The bridge that joins the lungs is divided between them. No other voxel changes lungs. */
   assert_true(out.report.lung[0].mask >= 0.064 * (double)left - added &&
               out.report.lung[0].mask <= 0.064 * (double)left + added);
   assert_true(fabs(out.report.lung[0].mask + out.report.lung[1].mask -
@@ -297,7 +298,7 @@ TEST(test_labels_islands_cavities_tunnels_counted) {
   const double left = voxel * (double)count_label(&image, 2);
   const size_t middle[3] = {(size_t)((66.0 - image.origin[0]) / 4.0), image.size[1] / 2,
                             image.size[2] / 2};
-  /* Cavities of 8, 1 and 1 voxels. Two meet only at an edge, so they are not joined. */
+  /* Add cavities of 8, 1 and 1 voxels. Two share only an edge, so they count as two. */
   for (size_t c = 0; c < 3; ++c) {
     const size_t low[3] = {middle[0] + (c == 2 ? 1 : 4 * c) - 2, middle[1] + (c == 2 ? 1 : 0),
                            middle[2] + (c == 0 ? 4 : 0)};
@@ -342,7 +343,7 @@ TEST(test_labels_islands_cavities_tunnels_counted) {
   supine_image_free(&image);
 }
 
-/* If the header is wrong, the shape of the lungs shows the axes that the voxels have. */
+/* The shape of the lungs shows which axes a wrong header has reversed. */
 TEST(test_labels_flipped_header_axes_found_by_anatomy) {
   static const double spacing[3] = {4.0, 4.0, 4.0};
   const supine_labels_options options = {.labels = "one", .edge = 5.0};
@@ -357,7 +358,7 @@ TEST(test_labels_flipped_header_axes_found_by_anatomy) {
     static const char *const ways[3][2] = {{"left", "right"}, {"back", "front"}, {"head", "feet"}};
     char wanted[64];
     supine_image map = image;
-    for (int a = 0; a < 3; ++a) { /* changes only the header, not the voxels */
+    for (int a = 0; a < 3; ++a) { /* reverses axes in the header only, not in the voxels */
       const bool flip = (flips >> a & 1) != 0;
       map.step[a][a] = flip ? -4.0 : 4.0;
       map.origin[a] = flip ? image.origin[a] + 4.0 * (double)(image.size[a] - 1) : image.origin[a];
@@ -373,11 +374,12 @@ TEST(test_labels_flipped_header_axes_found_by_anatomy) {
     supine_mesh_axes_letters(anatomy.axes, found);
     assert_string_equal(found, letters);
     for (size_t lung = 0; lung < 2; ++lung) {
-      check_closed(&out.surface[lung]); /* triangles face outwards for left-handed axes, too */
+      /* Triangles face outwards even if the axes are left-handed. */
+      check_closed(&out.surface[lung]);
     }
     release(&out);
   }
-  /* If --labels gives the sides, a mirrored header is refused. */
+  /* If --labels names the sides of the lungs, a header that mirrors left and right is refused. */
   supine_image map = image;
   map.step[0][0] = -4.0;
   const supine_labels_options named = {.labels = "lungmask"};
@@ -448,7 +450,7 @@ TEST(test_labels_surface_within_half_a_voxel_of_the_mask) {
   supine_image_free(&image);
 }
 
-/* The surface of a lung whose voxels are noise is one closed manifold. */
+/* Random voxels give a closed manifold surface for each lung. */
 TEST(test_labels_noise_closed_manifold) {
   uint64_t seed = 7;
   for (int trial = 0; trial < 6; ++trial) {
@@ -464,7 +466,7 @@ TEST(test_labels_noise_closed_manifold) {
       const bool is = 0.5 + 0.5 * random_signed(&seed) < density;
       at[i] = !is || i % 31 == 15 ? 0 : i % 31 < 15 ? 1 : 2;
     }
-    /* an edge of 4 mm keeps the voxels, 8 mm averages eight voxels, 2.7 mm interpolates */
+    /* Edges of cubes, mm: 4 keeps the voxels, 8 averages eight voxels, 2.7 interpolates. */
     const double edges[] = {4.0, 8.0, 2.7};
     for (size_t e = 0; e < 3; ++e) {
       const supine_labels_options options = {.edge = edges[e]};
@@ -476,7 +478,7 @@ TEST(test_labels_noise_closed_manifold) {
       if (status == SUPINE_OK) {
         check_closed(&out.surface[0]);
         check_closed(&out.surface[1]);
-      } else { /* averaging may remove sparse noise */
+      } else { /* refused, because averaging has removed sparse noise */
         assert_int_equal(status, SUPINE_ERROR_MESH);
         assert_true(density < 0.5);
       }
@@ -528,8 +530,8 @@ static void refused(const char *name, const supine_labels_options *options, supi
   assert_null(out.surface[1].vertices);
 }
 
-/* Each label gives one surface, also if its voxels are in two pieces or have a hole. Label 700 is
- * two balls, label 9 is a tube. The voxels have unequal sides. */
+/* Each label gives one surface, even if its voxels form two balls (label 700) or a tube (label 9).
+ * The voxels have unequal sides. */
 TEST(test_labels_shapes_any_label_one_surface_each) {
   supine_image image = {.voxel = SUPINE_VOXEL_U16, .channels = 1, .size = {60, 50, 40}};
   static const double spacing[3] = {0.8, 0.9, 1.3};
@@ -569,7 +571,8 @@ TEST(test_labels_shapes_any_label_one_surface_each) {
     assert_true(fabs(surface - ml) < 0.06 * ml);
     assert_int_equal(supine_mesh_topology_create(&shapes[s].surface, &topology), SUPINE_OK);
     assert_true(topology.closed);
-    assert_int_equal(topology.component_count, s == 0 ? 1 : 2); /* a tube, and two balls */
+    /* shapes[0] is one tube, shapes[1] is two balls */
+    assert_int_equal(topology.component_count, s == 0 ? 1 : 2);
     supine_mesh_topology_free(&topology);
   }
   double low[3];
@@ -694,7 +697,8 @@ TEST(test_labels_impossible_voxels_refused) {
     }
     assert_int_equal(supine_image_write(in_folder("none.nrrd"), &map, NULL, NULL), SUPINE_OK);
     const char *path = in_folder("none.nrrd");
-    made out = surfaces_of(&path, 1, &plain); /* whole numbers of any type are labels */
+    /* Whole numbers of any voxel type are accepted as labels. */
+    made out = surfaces_of(&path, 1, &plain);
     assert_int_equal(out.report.lung_count, 2);
     release(&out);
     supine_image_put(&map, voxels(&image) - 1, 1, &(double){wrong[w].value});

@@ -27,7 +27,7 @@ faults = 0
 
 def made_map():
     """Return a label map of two ellipsoids with the labels of lungmask, and its affine matrix. The axes are RAS. The right
-    lung is larger. Both lungs are wider and lie further back towards the feet."""
+    lung is larger. Towards the feet, both lungs become wider and lie further back."""
     affine = numpy.diag([*SPACING, 1.0])
     affine[:3, 3] = [-141.3, -85.7, -113.9]
     index = numpy.stack(numpy.meshgrid(*map(numpy.arange, SIZE), indexing="ij"), -1)
@@ -95,7 +95,7 @@ def check_header(labels, affine, flips, folder):
 
 
 def turned(labels, affine, order, flips):
-    """Return the same lungs at the same position, stored along permuted and reversed axes: labels and affine matrix."""
+    """Return (labels, affine matrix) of the same lungs in the same place, stored along permuted and reversed axes."""
     change = numpy.zeros((4, 4))
     change[3, 3] = 1
     for new, old in enumerate(order):
@@ -126,7 +126,8 @@ def centres(labels, affine):
 
 
 def by_vtk(path):
-    """Return centres and volumes as read by VTK, whose matrices apply to mm along the image axes, not to voxel indices."""
+    """Return the centre (LPS, mm) and the volume (mL) of each lung as VTK reads the file. VTK's matrix applies to
+    mm along the image axes, not to voxel indices."""
     reader = vtk.vtkNIFTIImageReader()
     reader.SetFileName(path)
     reader.Update()
@@ -139,8 +140,8 @@ def by_vtk(path):
 
 
 def by_supine(path, folder):
-    """Return a list with the centre (LPS, mm) and the volume (mL) of each surface that supine makes from the map, the left
-    lung first, and what supine prints. The list is None if supine fails."""
+    """Return a list with the centre (LPS, mm) and the volume (mL) of each surface that supine makes from the label map
+    `path`, the left lung first, and the text that supine prints. The list is None if supine fails."""
     out = os.path.join(folder, "surfaces.ply")
     result = subprocess.run([supine, "solve", path, "--labels", "lungmask", "--edge", "5",
                              "--posture", "prone", "--surfaces-out", out,

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compare normals by supine_deform_lit (from modes) with those by supine_normals (from triangles),
- * in random states from rest to full inflation. The angles between both are within the documented
- * limits, and as large as the basis file says. */
+/* Compare the normals of supine_deform_lit, approximated by modes, with those of supine_normals,
+ * computed from triangles, in random states from rest to full inflation. The angles between the two
+ * normals are within the documented limits, and as large as the basis file states. */
 #include "test.h"
 
 #include <supine/runtime.h>
@@ -15,17 +15,19 @@
 
 enum { STATES = 192 };
 
-/* Documented limits of the mean and the 99.9th percentile of the angles, degrees. */
+/* Documented limits of the mean and the 99.9th percentile of the angle between the approximate and
+ * the exact normal, degrees. */
 static const double mean_most = 0.1;
 static const double p999_most = 1.0;
-/* Largest relative error of a number rounded to two digits, as the metadata of a basis are. */
+/* Largest relative rounding error of the angles stated in a basis file, which have two digits. */
 static const double printed = 0.05;
-/* Tolerance for the mean over the STATES random states, in standard errors. */
+/* Tolerance of the mean angle over all random states, in standard errors. */
 static const double sigmas = 4.0;
-/* Tolerance for the 99.9th percentile, as a ratio, large because few states determine it. */
+/* Largest ratio of the measured to the stated 99.9th percentile of the angle, and of the stated to
+ * the measured. It is large because few states determine the percentile. */
 static const double p999_ratio_most = 1.4;
 
-/* Make a basis of lungs scanned at full inflation, with the given softening of the force. */
+/* Make a basis of lungs scanned at full inflation. If `soften` > 0, lower tissue is softer. */
 static supine_basis *make_basis(supine_lungs *lungs, double soften, size_t modes) {
   static const supine_scan full = {true, {.gravity = {0, 1, 0}, .volume = {SUPINE_VOLUME_FULL, 0}}};
   const supine_resting resting = supine_reference_resting_default();
@@ -40,7 +42,7 @@ static supine_basis *make_basis(supine_lungs *lungs, double soften, size_t modes
   assert_true(file >= 0 && close(file) == 0);
   options.model.force.soften = soften;
   options.reference = &reference;
-  /* Rounded reference positions would turn small triangles and their normals. */
+  /* Use exact storage: rounded positions would change the normals of small triangles. */
   const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
   if (supine_reference_find(lungs, &options.model, &full, &resting, &reference, &error) !=
           SUPINE_OK ||
@@ -58,8 +60,8 @@ static int compare_floats(const void *left, const void *right) {
   return a < b ? -1 : a > b;
 }
 
-/* Set angles [N] to the angle, degrees, between both kinds of normal at each vertex in a random
- * state. Return the mean angle. */
+/* Set angles [N] to the angle, degrees, between the approximate normal (`lit`) and the exact normal
+ * of each vertex in a random state. Return the mean angle. */
 static double measure(const supine_basis *basis, uint64_t *seed, float *xyz, float *lit,
                       float *exact, float *angles) {
   const supine_basis_info *info = supine_basis_get_info(basis);

@@ -78,14 +78,15 @@ static void observe(world *w, const supine_state *state, bool turned) {
   float xyz[3 * VERTICES];
   deform(w->basis, state, xyz);
   for (size_t j = 0; j < SEEN; ++j) {
-    const size_t at = j * VERTICES / SEEN + (j % 2) * 19; /* the +19 includes a tip of each lung */
+    /* The offset 19 makes the sample include a tip of each lung. */
+    const size_t at = j * VERTICES / SEEN + (j % 2) * 19;
     const double x[3] = {(double)xyz[3 * at], (double)xyz[3 * at + 1], (double)xyz[3 * at + 2]};
     w->seen[j] = (supine_observation){.vertex = at, .noise = 1};
     move(turned, x, w->seen[j].position);
   }
 }
 
-/* Return the RMS distance of all vertices between their located and their true positions, mm. */
+/* Return the RMS distance between the located and the true positions of all vertices, mm. */
 static double miss(const world *w, const supine_location *found, const supine_state *state,
                    bool turned) {
   float truth[3 * VERTICES];
@@ -193,8 +194,9 @@ TEST(test_locate_any_number_of_points_error_at_most_prior) {
     assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, NULL), SUPINE_OK);
     assert_int_equal(supine_locate_positions(&found, w->basis, xyz, sigma, NULL), SUPINE_OK);
     for (size_t i = 0; i < VERTICES; ++i) {
-      /* Observing points must not increase the expected error. An error below 3 mm may rise to 3
-       * mm, because supine_locate assumes displacements of at least 2 mm. */
+      /* Observing points must not increase the expected error. Only an error below 3 mm may rise,
+       * up to 3 mm: supine_locate treats displacements below 2 mm as 2 mm, for which the expected
+       * error is sqrt(4.5 mm * 2 mm) = 3 mm. */
       assert_true(sigma[i] <= fmaxf(3.01F, 1.0001F * expected[i]));
     }
   }
@@ -252,9 +254,9 @@ TEST(test_locate_bad_task_refused) {
 }
 
 /* The expected error of a vertex is sqrt(c |u|), where u is its displacement from the scan and c is
- * 4.5 mm or the RMS displacement of all vertices, whichever is less. If the volume is given
- * relative to rest, the volume at rest is uncertain by 5 % of full inflation, and the resulting
- * displacement is added to the expected error in quadrature. */
+ * the smaller of 4.5 mm and the RMS displacement of all vertices. If the volume is given relative
+ * to rest, the volume at rest is uncertain by 5 % of full inflation. The resulting displacement is
+ * added to the error in quadrature. */
 TEST(test_expected_error_any_state_equals_formula) {
   world *w = *state;
   const supine_basis_info *info = supine_basis_get_info(w->basis);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Test the sides of lungs, synthetic lungs, and the volumes of displaced lungs. */
+/* Test the distinction of left and right lung, synthetic lungs, and volumes of displaced lungs. */
 
 #include "precompute/lungs/phantom.h"
 #include "precompute/physics/model.h"
@@ -84,7 +84,7 @@ TEST(test_lungs_single_lung_midline_at_inner_face) {
   }
 }
 
-/* The box coordinate X of either lung is 0 at the midline and 1 at the outer side. */
+/* The box coordinate X is 0 at the midline and 1 at the outermost point of either lung. */
 TEST(test_lungs_box_either_lung_increases_outwards) {
   supine_mesh lumps[2] = {helper_lump(5, 90.0, 3), helper_lump(5, -80.0, 4)};
   supine_lungs lungs = {0};
@@ -124,7 +124,8 @@ static void turn_inwards(supine_mesh *mesh, size_t first) {
 }
 
 TEST(test_lungs_inward_triangles_reversed_and_reported) {
-  for (int which = 0; which < 4; ++which) { /* bit 0 reverses the left lung, bit 1 the right */
+  /* Bit 0 of `which` reverses the left lung, bit 1 the right. */
+  for (int which = 0; which < 4; ++which) {
     supine_mesh lumps[2] = {helper_lump(5, 90.0, 3), helper_lump(6, -80.0, 4)};
     const double volume = supine_mesh_volume(&lumps[0]) + supine_mesh_volume(&lumps[1]);
     for (int lung = 0; lung < 2; ++lung) {
@@ -255,13 +256,13 @@ TEST(test_phantom_create_same_shape_as_first_version) {
         sum += sin((double)(v + 1) * (double)(a + 1)) * mesh.vertices[3 * v + a];
       }
     }
-    /* mm; each coefficient of the shape changes `sum` by at least 0.01 mm */
+    /* Each coefficient of the shape changes `sum` by at least 0.01 mm, more than this tolerance. */
     assert_true(fabs(sum - made[lung]) < 1e-4);
   }
   supine_mesh_free(&mesh);
 }
 
-/* Return the volume that one of two lungs gains, mL, measured on the displaced surface. */
+/* Return the volume that a lung gains when its surface is displaced, mL. */
 static double gained(const supine_lungs *lungs, size_t lung, const double *d, const double *columns,
                      size_t count, const double *weights, const double gains[3]) {
   const size_t n = lungs->mesh.vertex_count;
@@ -300,7 +301,8 @@ TEST(test_volume_forms_any_scale_equal_measured_volume) {
   for (size_t i = 0; i < n * COLUMNS; ++i) {
     columns[i] = helper_random(&seed);
   }
-  for (size_t i = 0; i < 3 * n * COLUMNS; ++i) { /* the same displacements as vectors */
+  /* `vectors` are the same displacements, `columns` along the direction d, as xyz vectors. */
+  for (size_t i = 0; i < 3 * n * COLUMNS; ++i) {
     vectors[i] = columns[i / (3 * COLUMNS) * COLUMNS + i % COLUMNS] * d[i / COLUMNS];
   }
   supine_volume_forms forms[2] = {{0}};

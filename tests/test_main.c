@@ -5,10 +5,10 @@
 
 #include <gsl/gsl_errno.h>
 
-/* NULL if the program is linked without GSL */
+/* The address of this function is NULL if the program is linked without GSL. */
 #pragma weak gsl_set_error_handler_off
 
-enum { SKIPPED = 77 }; /* SKIP_RETURN_CODE in CMakeLists.txt */
+enum { SKIPPED = 77 }; /* exit code of a skipped program, as SKIP_RETURN_CODE in CMakeLists.txt */
 
 static struct CMUnitTest tests[64];
 static size_t test_count;
@@ -27,8 +27,7 @@ void test_set_group(CMFixtureFunction setup, CMFixtureFunction teardown) {
   group_teardown = teardown;
 }
 
-/* NOLINTBEGIN(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp): names that ld --wrap sets
- */
+/* NOLINTBEGIN(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp): names for ld --wrap */
 _Noreturn void __real__skip(const char *file, int line);
 _Noreturn void __wrap__skip(const char *file, int line);
 

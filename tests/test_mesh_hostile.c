@@ -50,7 +50,7 @@ static void expect_bytes(void **state, const char *name, const void *bytes, size
   assert_int_equal(unlink(path), 0);
 }
 
-/* Return the bytes of the box saved as `name` (malloc). */
+/* Save a box as `name`, and return the bytes of the file (malloc). */
 static unsigned char *saved_box(void **state, const char *name, size_t *size) {
   char path[256];
   supine_mesh box = sample_box();
@@ -304,7 +304,7 @@ TEST(test_load_stl_and_obj_garbage_refused) {
   expect_bytes(state, "a.obj", utf16, sizeof utf16, SUPINE_ERROR_FORMAT);
 }
 
-/* Load every file of a folder of the test data; return their number. */
+/* Load every file in a folder of the test data; return the number of files. */
 static size_t sweep(const char *name) {
   char folder[256];
   (void)snprintf(folder, sizeof folder, "%s/defects/%s", SUPINE_TEST_DATA, name);
@@ -318,7 +318,7 @@ static size_t sweep(const char *name) {
       char path[640];
       (void)snprintf(path, sizeof path, "%s/%s", folder, entry->d_name);
       const supine_status status = attempt(path);
-      /* In the folder `invalid`, only the file that lacks its material can be read. */
+      /* In the folder `invalid`, only malformed2.obj, without its material, can be read. */
       if (strcmp(name, "invalid") == 0) {
         assert_int_equal(
             status, strcmp(entry->d_name, "malformed2.obj") == 0 ? SUPINE_OK : SUPINE_ERROR_FORMAT);

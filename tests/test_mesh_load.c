@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Small files of every format: merging of equal corners, dropped elements, orientation, axes,
+/* Test small files of every format: merging of equal corners, dropped elements, orientation, axes,
  * units. */
 #include <float.h>
 #include <pthread.h>
@@ -71,7 +71,7 @@ TEST(test_load_stl_equal_corners_become_one_vertex) {
   expect_tetrahedron(&soup);
   assert_int_equal(report.degenerate_faces, 0);
   assert_int_equal(report.unreferenced_vertices, 0);
-  /* Vertices are in order of first appearance. */
+  /* Vertices are numbered in the order in which they first appear in the file. */
   static const double vertices[] = {0, 0, 0, 0, 120, 0, 120, 0, 0, 0, 0, 120};
   static const uint32_t triangles[] = {0, 1, 2, 0, 2, 3, 0, 3, 1, 2, 1, 3};
   assert_memory_equal(soup.vertices, vertices, sizeof vertices);
@@ -200,8 +200,8 @@ TEST(test_load_face_of_too_many_corners_refused) {
   refuse_text(state, "a.ply", text, SUPINE_ERROR_FORMAT, "face 0 has 1025 corners");
 }
 
-/* Two nodes of a scene use one tetrahedron; the second mirrors it. The triangles of both face
- * outwards. */
+/* Two nodes of a scene show the same tetrahedron, and the second node mirrors it. The triangles of
+ * both copies face outwards. */
 TEST(test_load_mirrored_node_triangles_face_outwards) {
   static const char text[] =
       "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"nodes\":["
@@ -238,8 +238,8 @@ TEST(test_load_mirrored_node_triangles_face_outwards) {
   supine_mesh_free(&mesh);
 }
 
-/* Load the tetrahedron from a file whose first line is `head`, read with these axes. Return the
- * only x coordinate that is not 0: 120 or -120. */
+/* Load a tetrahedron with the option `axes`, from a file that begins with the line `head`. Return
+ * its only x coordinate that is not 0: 120 or -120. */
 static double x_under(void **state, const char *name, const char *head, supine_axes axes,
                       supine_mesh_report *report) {
   char text[512];
@@ -364,7 +364,7 @@ TEST(test_load_unreadable_path_reports_read_error) {
   expect_refused("/dev/null", NULL, SUPINE_ERROR_READ, "not a regular file");
   (void)sample_text(state, "a.obj", tetrahedron_obj, path);
   assert_int_equal(chmod(path, 0), 0);
-  if (access(path, R_OK) != 0) { /* root reads any file */
+  if (access(path, R_OK) != 0) { /* false for root, who may read any file */
     expect_refused(path, NULL, SUPINE_ERROR_READ, "Permission denied");
   }
   assert_int_equal(unlink(path), 0);
@@ -540,7 +540,8 @@ TEST(test_load_vtp_bad_files_refused) {
        "strips"},
       {VTP("compressor=\"vtkLZ4DataCompressor\"", "", "", ""), "compressor is not zlib"},
       {"<VTKFile type=\"PolyData\"></VTKFile>", "no element Piece"},
-      {"<VTKFile type=\"PolyData\"><Piece ></Piece><Piece ></Piece></VTKFile>", "several Piece elements"},
+      {"<VTKFile type=\"PolyData\"><Piece ></Piece><Piece ></Piece></VTKFile>",
+       "several Piece elements"},
       {"<VTKFile type=\"PolyData\"><Piece NumberOfPoints=\"-3\"></Piece></VTKFile>", "invalid"},
       {VTP("", "", "", ""), "no array of points"},
       {VTP_ASCII("0 0 0 1 0 0 0 1", "0 1 2", "3"), "truncated or damaged"},

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Real lungs (tests/README.md) have known sizes, topology and volumes. */
+/* Test that real lungs (tests/README.md) have known sizes, topology and volumes. */
 #include "mesh_samples.h"
 
 /* Load a file of the test data; skip the test if the file is missing. */
@@ -30,7 +30,7 @@ TEST(test_load_real_lungs_known_counts_and_volumes) {
     size_t vertices;
     size_t triangles;
     long genus;
-    double litres; /* tolerance 0.05 */
+    double litres; /* volume, accurate to 0.05 litres */
   } cases[] = {
       {"lungs/chaste_left_5k.obj", 5001, 9998, 0, 3.4},
       {"lungs/chaste_right_5k.obj", 5001, 9998, 0, 4.2},
@@ -92,7 +92,7 @@ TEST(test_topology_damaged_real_lung_edges_counted) {
   supine_mesh_free(&mesh);
 }
 
-/* An STL file repeats a vertex in each of its triangles. */
+/* An STL file repeats a vertex in every triangle that has it. Loading merges these copies. */
 TEST(test_save_real_lung_as_stl_loads_same_surface) {
   supine_mesh mesh = lung_load("lungs/chaste_left.ply", NULL);
   char path[256];
@@ -104,7 +104,8 @@ TEST(test_save_real_lung_as_stl_loads_same_surface) {
   assert_int_equal(unlink(path), 0);
   assert_int_equal(again.vertex_count, mesh.vertex_count);
   assert_int_equal(again.triangle_count, mesh.triangle_count);
-  for (size_t c = 0; c < 3 * mesh.triangle_count; ++c) { /* exact, as the mesh came from float32 */
+  /* The coordinates were float32 before, so they are exact. */
+  for (size_t c = 0; c < 3 * mesh.triangle_count; ++c) {
     assert_memory_equal(again.vertices + 3 * (size_t)again.triangles[c],
                         mesh.vertices + 3 * (size_t)mesh.triangles[c], 3 * sizeof(double));
   }

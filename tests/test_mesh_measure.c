@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Volume, box and areas of surfaces, compared with closed forms. */
+/* Compare the volume, box and areas of surfaces with closed forms. */
 #include <float.h>
 
 #include "mesh_samples.h"
@@ -29,10 +29,12 @@ TEST(test_volume_reversed_triangles_negative) {
   supine_mesh_free(&box);
 }
 
-/* The volume of a torus with corners (R + r cos b) cos a, (R + r cos b) sin a, r sin b, for N
- * angles a and M angles b, is N sin(2 pi / N) R (M / 2) r^2 sin(2 pi / M), as any horizontal
- * section is a ring between two regular polygons. The torus is far from the origin, where sums
- * about the origin cancel. */
+/* The vertices of the torus are ((R + r cos b) cos a, (R + r cos b) sin a, r sin b), for N angles a
+ * and M angles b. Any horizontal section is a ring between two regular polygons, so the volume is
+ *
+ *     N sin(2 pi / N) R (M / 2) r^2 sin(2 pi / M)
+ *
+ * The torus is far from the origin, where the terms of the volume are large and cancel. */
 TEST(test_volume_torus_far_from_origin_closed_form) {
   enum { N = 37, M = 23 };
   const double R = 83.0;
@@ -57,7 +59,7 @@ TEST(test_volume_torus_far_from_origin_closed_form) {
   }
   supine_mesh torus = sample_make(N * M, vertices, 2 * N * M, triangles);
   const double expected = N * sin(2.0 * M_PI / N) * R * 0.5 * M * r * r * sin(2.0 * M_PI / M);
-  /* Coordinates are rounded by 5e6 epsilon mm, over a surface of about 96000 mm^2. */
+  /* Tolerance: rounding error of coordinates near 5e6 mm, times the area of about 96000 mm^2. */
   assert_close(supine_mesh_volume(&torus), expected, 5.0e6 * DBL_EPSILON * 96000.0);
   supine_mesh_free(&torus);
 }

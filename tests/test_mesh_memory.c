@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* When any allocation of loading, measuring or saving fails, the function reports an error or does
- * without the memory. A leak sanitizer checks that nothing leaks. The linker option --wrap
+/* If any allocation fails while a mesh is loaded, measured or saved, the function reports an error
+ * or does without the memory. A leak sanitizer checks that nothing leaks. The linker option --wrap
  * redirects allocations to this file. */
 #include <errno.h>
 #include <sys/mman.h>
@@ -9,7 +9,8 @@
 
 /* number of allocations that still succeed before one fails; negative if none shall fail */
 static int allocations_left = -1;
-static int *allocations_failed; /* in shared memory, as assimp runs in another process */
+/* number of failed allocations, in memory shared with the process in which assimp runs */
+static int *allocations_failed;
 
 static int allocation_fails(void) {
   const int fails = allocations_left >= 0 && allocations_left-- == 0;
@@ -20,8 +21,7 @@ static int allocation_fails(void) {
   return fails;
 }
 
-/* NOLINTBEGIN(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp): names that ld --wrap sets
- */
+/* NOLINTBEGIN(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp): names for ld --wrap */
 void *__real_malloc(size_t size);
 void *__real_calloc(size_t count, size_t size);
 void *__real_realloc(void *old, size_t size);
@@ -42,8 +42,9 @@ void *__wrap_realloc(void *old, size_t size) {
 }
 /* NOLINTEND(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp) */
 
-/* Run `work` again and again; allocation n of run n fails. Stop at the first run with at most n
- * allocations, and assert that n is at least `least`. */
+/* Call `work` repeatedly. Let the first allocation fail in the first call, the second in the second
+ * call, and so on. Stop when a call makes too few allocations for one to fail, and assert that it
+ * made at least `least`. */
 static void fail_each(supine_status (*work)(const char *path, supine_error *error),
                       const char *path, int least) {
   for (int nth = 0;; ++nth) {
@@ -63,7 +64,7 @@ static void fail_each(supine_status (*work)(const char *path, supine_error *erro
     if (status == SUPINE_OK) {
       continue; /* the memory was optional, such as a buffer */
     }
-    /* Opening an output without memory gives a write error, whose message names memory. */
+    /* Without memory, opening an output gives a write error, and the message names memory. */
     if ((status != SUPINE_ERROR_MEMORY && status != SUPINE_ERROR_WRITE) || error.status != status ||
         strstr(error.message, "memory") == NULL) {
       fail_msg("%s: allocation %d: status %d, \"%s\"", path, nth, (int)status, error.message);
@@ -92,7 +93,7 @@ TEST(test_load_each_allocation_failing_reports_memory_error) {
   for (size_t i = 0; i < sizeof files / sizeof *files; ++i) {
     char path[256];
     (void)sample_text(state, files[i].name, files[i].text, path);
-    /* arrays of bytes, vertices and triangles, and two to merge vertices */
+    /* 5 allocations: arrays of bytes, vertices and triangles, and two arrays to merge vertices. */
     fail_each(load, path, 5);
     assert_int_equal(unlink(path), 0);
   }
@@ -133,8 +134,8 @@ static supine_status save(const char *path, supine_error *error) {
   return status;
 }
 
-/* Only opening an output and writing VTP allocate. A file left behind would keep the folder from
- * being removed. */
+/* Only opening an output and writing VTP allocate memory. If a file were left behind, removing the
+ * folder at the end would fail. */
 TEST(test_save_each_allocation_failing_reports_memory_error) {
   static const char *const names[] = {"a.ply", "a.obj", "a.stl", "a.vtp"};
   for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
@@ -163,8 +164,8 @@ static supine_status save_series(const char *path, supine_error *error) {
 
 TEST(test_series_each_allocation_failing_reports_memory_error) {
   char path[256];
-  fail_each(save_series, sample_path(state, "a.vtp", path),
-            5); /* the series and four of its arrays */
+  /* 5 allocations: the series and four of its arrays. */
+  fail_each(save_series, sample_path(state, "a.vtp", path), 5);
 }
 
 static int setup(void **state) {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Saved files: equal when read again, with displacements and expected errors, never incomplete. */
+/* Test that saved files are equal when read again, that they hold displacements and expected
+ * errors, and that no incomplete file is left. */
 #include <fcntl.h>
 #include <float.h>
 #include <sys/stat.h>
@@ -9,7 +10,7 @@
 
 static const char *const endings[] = {"a.ply", "a.obj", "a.stl", "a.VTP"};
 
-/* Make a box with coordinates that float32 rounds. */
+/* Make a box with coordinates that are not exact in float32. */
 static supine_mesh make_crooked(void) {
   supine_mesh mesh = sample_box();
   for (size_t i = 0; i < 3 * mesh.vertex_count; ++i) {
@@ -26,8 +27,8 @@ static void save(const char *path, const supine_mesh *mesh,
   }
 }
 
-/* Return the vertex nearest to a position, and its distance. Loaded vertices have another order, so
- * tests compare positions. */
+/* Return the vertex nearest to a position, and set `distance` to their largest difference in x, y
+ * or z. Loaded vertices have another order, so tests compare positions. */
 static size_t nearest(const supine_mesh *mesh, const double position[3], double *distance) {
   size_t found = 0;
   *distance = INFINITY;
@@ -70,7 +71,7 @@ TEST(test_save_load_round_trip_each_format_and_axes) {
       if (supine_mesh_load(path, NULL, &again, &report, &error) != SUPINE_OK) {
         fail_msg("%s", error.message);
       }
-      /* Positions are float32, assimp may round text again, and VTP has steps of 1/256 mm. */
+      /* Positions are float32. assimp may round text again. VTP has multiples of 1/256 mm. */
       static const double tolerance[] = {64.0 * FLT_EPSILON, 512.0 * FLT_EPSILON,
                                          64.0 * FLT_EPSILON, 0.5 / 256.0};
       expect_same(&again, &mesh, tolerance[k]);
@@ -113,7 +114,7 @@ static const char *find(const unsigned char *bytes, size_t size, const char *tex
   return found + strlen(text);
 }
 
-/* Vertex 2 moves by (3, 4, 12) mm, 13 mm in length; in RAS by (-3, -4, 12). */
+/* Vertex 2 is displaced by (3, 4, 12) mm, 13 mm in length. In RAS axes, this is (-3, -4, 12). */
 TEST(test_save_ply_displacement_in_each_row) {
   supine_mesh mesh = sample_tetrahedron();
   double rest[12];
@@ -184,8 +185,8 @@ TEST(test_save_stl_header_and_normals_literal) {
   assert_int_equal(size, 84 + 4 * 50);
   assert_memory_equal(bytes, "SPACE=LPS", 9);
   assert_int_equal(bytes[80], 4);
-  static const double third = 0.57735026918962576; /* 1 / sqrt(3) */
-  const double normals[4][3] = {{0, 0, -1}, {0, -1, 0}, {-1, 0, 0}, {third, third, third}};
+  static const double diagonal = 0.57735026918962576; /* 1 / sqrt(3) */
+  const double normals[4][3] = {{0, 0, -1}, {0, -1, 0}, {-1, 0, 0}, {diagonal, diagonal, diagonal}};
   for (size_t t = 0; t < 4; ++t) {
     for (size_t axis = 0; axis < 3; ++axis) {
       const double found = (double)float_at(bytes + 84 + 50 * t + 4 * axis);
@@ -205,8 +206,8 @@ static uint64_t size_at(const unsigned char *bytes) {
   return value;
 }
 
-/* Decompress an array of one block; assert that it has `expected` bytes, at most 64. Return the
- * start of the next array. */
+/* Decompress an array that was compressed as one block; assert that it has `expected` bytes, at
+ * most 64. Return the start of the next array. */
 static const unsigned char *unpack(const unsigned char *at, unsigned char *array, size_t expected) {
   uLongf size = 64;
   assert_int_equal(size_at(at), 1);
@@ -339,8 +340,8 @@ TEST(test_series_impossible_or_uncommitted_leaves_no_file) {
   supine_mesh_free(&mesh);
 }
 
-/* Axes and units apply to all arrays. Lengths are multiples of a power of two in the unit of the
- * file. */
+/* Axes and units apply to all arrays. Lengths are rounded to multiples of a power of two in the
+ * unit of the file. */
 TEST(test_save_vtp_axes_units_and_rounding_applied) {
   supine_mesh mesh = sample_tetrahedron();
   double rest[12];
@@ -369,7 +370,8 @@ TEST(test_save_vtp_axes_units_and_rounding_applied) {
   for (size_t i = 0; i < 6; ++i) {
     at = unpack(at, arrays[i], sizes[i]);
   }
-  static const double step = 1.0 / 262144.0; /* in m: the largest power of two below 1/256 mm */
+  /* The largest power of two in metres that is below 1/256 mm is 2^-18 m. */
+  static const double step = 1.0 / 262144.0;
   for (size_t i = 0; i < 12; ++i) {
     const double sign = i % 3 == 2 ? 1.0 : -1.0;
     const double point = (double)float_at(arrays[0] + 4 * i);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Edges, components, genus and defects of known surfaces. */
+/* Test the edges, components, genus and defects of known surfaces. */
 #include "mesh_samples.h"
 
 static supine_topology topology_of(const supine_mesh *mesh) {
@@ -8,7 +8,7 @@ static supine_topology topology_of(const supine_mesh *mesh) {
   return topology;
 }
 
-/* Assert the properties of a closed surface; free it. */
+/* Assert the properties of a closed surface; free the surface. */
 static void expect_closed(supine_mesh mesh, size_t vertices, size_t edges, size_t triangles,
                           size_t components, long genus) {
   supine_topology topology = topology_of(&mesh);
@@ -90,7 +90,7 @@ TEST(test_topology_open_sheet_boundary_counted) {
 }
 
 TEST(test_topology_two_tetrahedra_components_in_order) {
-  /* The vertices of the two components alternate. */
+  /* Even vertices form one tetrahedron, odd ones the other. Positions do not matter. */
   static const double vertices[24] = {0};
   static const uint32_t triangles[] = {1, 5, 3, 1, 3, 7, 1, 7, 5, 3, 5, 7,
                                        0, 4, 2, 0, 2, 6, 0, 6, 4, 2, 4, 6};
@@ -107,7 +107,7 @@ TEST(test_topology_two_tetrahedra_components_in_order) {
 }
 
 TEST(test_topology_components_joined_late_count_as_one) {
-  /* The first three triangles have no common vertex. The last two join them. */
+  /* Three separate triangles, joined by two more. Positions do not matter. */
   static const double vertices[27] = {0};
   static const uint32_t triangles[] = {8, 7, 6, 5, 4, 3, 2, 1, 0, 6, 5, 7, 3, 2, 4};
   supine_mesh mesh = sample_make(9, vertices, 5, triangles);
@@ -166,7 +166,7 @@ TEST(test_topology_flipped_triangle_inconsistent) {
 }
 
 TEST(test_topology_hub_of_many_edges_sorted) {
-  /* a disc around vertex 0; its rim takes every 331st of the other vertices */
+  /* A fan of triangles around vertex 0. Successive vertices of its rim are 331 apart in number. */
   enum { RIM = 997 };
   static double vertices[3 * (RIM + 1)];
   static uint32_t triangles[3 * RIM];

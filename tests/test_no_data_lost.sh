@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Check that no command loses data: test_no_data_lost.sh PROGRAM [KILLS [SIGNALS]]
 #
-# An output that is also an input is refused under any name. A missing folder is reported before the inputs are read.
-# A full disk, a size limit or a signal leaves no incomplete file. Each of the SIGNALS (default KILL TERM INT) ends each
-# command that writes a file at KILLS (default 1) random moments.
+# An output that is also an input is refused, even if it is named by a link. A missing folder is reported before the
+# inputs are read. A full disk, a size limit or a signal leaves no incomplete file. Each command that writes a file is
+# ended by each of the SIGNALS (default KILL TERM INT) at KILLS random moments (default 1).
 set -u
 export SOURCE_DATE_EPOCH=0 # so that a report made again is the same, even after midnight
 supine=$1
@@ -27,8 +27,8 @@ fail() {
 awk 'BEGIN { print "name,x,y,z"; for (i = 0; i < 300; ++i) printf "p%d,%d,%d,%d\n", i, 60 + i % 50, i % 40, i % 60 }' >points.csv
 "$supine" embed lungs.safetensors points.csv -o points.safetensors >/dev/null 2>&1 || exit 1
 
-# refused INPUT ENDING COMMAND...: copy INPUT to "input" with this ending, and run the command with each name of this
-# copy as its output. Check that the command refuses, and that the copy is unchanged.
+# refused INPUT ENDING COMMAND...: copy INPUT to "input" with this ending. Run the command with the copy as its output,
+# named by its path, a hard link or a symbolic link. Check that the command refuses, and that the copy is unchanged.
 refused() {
   input=$1
   ending=$2

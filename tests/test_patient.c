@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A patient's law fitted to landmarks: held-out errors, recovery of known constants, records,
- * refused input. */
+/* Test the fit of a displacement law to a patient's landmarks: held-out errors, recovery of known
+ * constants, files of fitted laws, refused input. */
 #include "test.h"
 
 #include <gsl/gsl_randist.h>
@@ -13,7 +13,7 @@
 #include "program/validation.h"
 #include "runtime/kriging.h"
 
-/* Fit a law to pairs of points, like `supine fit`. */
+/* Fit a displacement law to pairs of points, as `supine fit` does. */
 static void fit_pairs(const supine_patient_pairs *pairs, supine_patient_law law,
                       supine_patient_scan_motion moved, supine_patient *patient,
                       supine_patient_fit_report *report) {
@@ -45,15 +45,15 @@ static supine_patient_pairs scatter(size_t count, unsigned long seed) {
   return pairs;
 }
 
-/* Compute the displacement u of a point by a law, mm. The point belongs to the lung on its side of
- * the midline. */
+/* Compute the displacement u, mm, of a point by the displacement law of `patient`. The point
+ * belongs to the lung on its side of the midline. */
 static void displace(const supine_patient *patient, const double point[3], double u[3]) {
   const supine_patient_place place = supine_patient_find(&patient->frame, point, 0.0);
   supine_patient_displacement(patient, &place, 1.0, u);
 }
 
-/* Move points by a law, and add Gaussian noise with a standard deviation of `noise` mm to each
- * coordinate. */
+/* Displace points by the displacement law of `truth`, and add Gaussian noise with a standard
+ * deviation of `noise` mm to each coordinate. */
 static void move(supine_patient_pairs *pairs, const supine_patient *truth, double noise,
                  unsigned long seed) {
   gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
@@ -108,12 +108,12 @@ TEST(test_covariances_any_distance_equal_those_of_kriging) {
   }
 }
 
-/* Held-out errors of five public pairs of images, fitted from either image, are below those of a
- * quadratic law (commit 220ee0d) on the same blocks of points. */
+/* For five public pairs of images, each fitted in both directions, the cross-validated errors are
+ * below `quadratic_rms`, those of a quadratic law (commit 220ee0d) on the same folds of points. */
 TEST(test_fit_public_landmarks_err_less_than_quadratic_law) {
   static const struct {
     const char *name;
-    double quadratic_rms[2]; /* mm: inhaled to exhaled image, exhaled to inhaled image */
+    double quadratic_rms[2]; /* mm: inhaled to exhaled image, and the reverse */
   } cases[] = {{"054", {3.01, 3.30}},
                {"055", {8.07, 9.83}},
                {"056", {3.83, 4.44}},
@@ -167,7 +167,8 @@ TEST(test_correct_fitted_points_leave_reported_residual) {
   supine_patient_fit_report report;
   double square = 0.0;
   move(&pairs, &truth, 0.4, 5);
-  for (size_t i = 0; i < pairs.count; ++i) { /* a motion that the law cannot describe */
+  /* Add a motion that the displacement law cannot describe. */
+  for (size_t i = 0; i < pairs.count; ++i) {
     pairs.to[3 * i] += 6.0 * sin(pairs.from[3 * i + 2] / 30.0);
   }
   fit_pairs(&pairs, SUPINE_PATIENT_DEEP, SUPINE_PATIENT_RIGID, &found, &report);
@@ -199,7 +200,8 @@ TEST(test_find_side_given_overrides_midline) {
   assert_true(place.side == 1.0 && place.box[0] < 0.0);
   double u[3];
   supine_patient_displacement(&patient, &place, 1.0, u);
-  assert_true(u[0] == 0.0); /* where box[0] <= 0, the law does not move points along x */
+  /* Where the box coordinate X is at most 0, the displacement law has no x component. */
+  assert_true(u[0] == 0.0);
   supine_patient_pairs_free(&pairs);
 }
 
@@ -245,12 +247,12 @@ TEST(test_fit_noisy_landmarks_recover_constants) {
     displace(&found, pairs.from + 3 * i, v);
     worst = fmax(worst, hypot(hypot(u[0] - v[0], u[1] - v[1]), u[2] - v[2]));
   }
-  assert_true(worst < 0.5); /* mm */
+  assert_true(worst < 0.5);
   supine_patient_pairs_free(&pairs);
 }
 
 /* Each entry of a row of the design matrix is the derivative of a displacement with respect to one
- * unknown. It equals a difference quotient. */
+ * constant of the displacement law. It equals a difference quotient. */
 TEST(test_power_design_each_unknown_matches_difference_quotient) {
   supine_patient_pairs pairs = scatter(20, 3);
   const supine_patient truth = known(&pairs);
@@ -333,7 +335,8 @@ TEST(test_pairs_load_image_columns_start_at_second_image) {
   supine_patient_pairs pairs = {0};
   supine_error error;
   for (int reverse = 0; reverse < 2; ++reverse) {
-    for (int file = 0; file < 2; ++file) { /* image 1 is inhaled, image 2 is at rest */
+    /* Columns im1 are the inhaled image, columns im2 the image at rest, from which pairs start. */
+    for (int file = 0; file < 2; ++file) {
       assert_int_equal(load_text(file == 0 ? plain : images, reverse == 1, &pairs, &error),
                        SUPINE_OK);
       assert_int_equal((int)pairs.count, 1);
@@ -379,7 +382,7 @@ TEST(test_record_written_then_read_same) {
   assert_memory_equal(before.report.error, after.report.error, sizeof before.report.error);
   assert_true(after.report.baseline == 10.5 && after.report.points == 300);
   assert_true(after.expand.fitted[0] == 0.75 && after.applied.blocks == 0.0);
-  /* A file that lacks one of these parts is refused. */
+  /* A file that lacks one of these keys is refused. */
   static const char *const parts[] = {"frame",      "law",     "force",         "fuller",
                                       "emptier",    "motion",  "format",        "centres",
                                       "correction", "version", "emptier_frame", "c1_to_c9"};
@@ -404,7 +407,8 @@ TEST(test_record_written_then_read_same) {
   supine_patient_pairs_free(&pairs);
 }
 
-/* The two fitted states give the volume at rest. A scan in one of them needs no --scanned. */
+/* The volumes of the two fitted states determine the volume at rest. If a scan is in one of these
+ * states, --scanned may be omitted. */
 TEST(test_scan_fitted_states_known_without_option) {
   supine_patient_pairs pairs = scatter(30, 2);
   const supine_patient patient = known(&pairs);
@@ -419,10 +423,12 @@ TEST(test_scan_fitted_states_known_without_option) {
   assert_true(scan.known && scan.state.volume.kind == SUPINE_VOLUME_REST);
   double gains[2][3];
   supine_patient_path(&record, gains);
-  for (size_t k = 0; k < 3; ++k) { /* gains at full inflation are 0, at rest 1 */
+  /* Gains, the factors on the displacement, are 0 at full inflation and 1 at rest. */
+  for (size_t k = 0; k < 3; ++k) {
     assert_true(gains[0][k] == 0.0 && fabs(gains[1][k] - 1.0) < 1e-12);
   }
-  /* If the fuller state is rest + 500 mL, the default share at rest gives full inflation. */
+  /* If the fuller state is rest + 500 mL, full inflation follows from the default ratio of the
+   * volume at rest to that at full inflation. */
   record.state[0].volume = (supine_volume){SUPINE_VOLUME_REST, 500.0};
   record.volume[0] = 2910.25;
   resting = supine_reference_resting_default();
@@ -438,7 +444,7 @@ TEST(test_scan_fitted_states_known_without_option) {
   for (size_t k = 0; k < 3; ++k) {
     assert_true(fabs(gains[0][k] - expected[k]) < 1e-9 && fabs(gains[1][k] - 1.0) < 1e-12);
   }
-  /* Two volumes without a reference do not define rest. */
+  /* From two absolute volumes, the volume at rest cannot be computed. */
   record.state[0].volume = (supine_volume){SUPINE_VOLUME_ABSOLUTE, 2910.25};
   record.state[1].volume = (supine_volume){SUPINE_VOLUME_ABSOLUTE, 2410.25};
   assert_false(supine_patient_scan(&record, 1, 2410.25, &resting).known);
@@ -466,16 +472,17 @@ TEST(test_force_in_fitted_posture_linear_in_box) {
       assert_true(fabs(force - expected) < 1e-14);
     }
   }
-  /* The deep law gives a force of 0.9 plus -0.2 times the y coordinate of the lungs' box. */
+  /* Under the law `deep`, the force in the supine posture is 0.9 + 0.4 times the height - 0.2 Y,
+   * where Y is the y coordinate in the lungs' bounding box. */
   const supine_patient_power shape = supine_patient_deep(postures[0], (const double[3]){0});
   const supine_force_law deep = supine_patient_force(&shape, 0.4, postures[0]);
   assert_true(fabs(deep.base - 0.9) < 1e-14 && fabs(deep.box[1] + 0.2) < 1e-14);
   supine_patient_pairs_free(&pairs);
 }
 
-/* A third scan, prone or upright, determines the scale of each lung, and the gain of the force
- * along gravity within three standard errors. A scan in the fitted posture does not determine the
- * gain. */
+/* Fit a third scan, prone or upright. It determines a factor on the displacement of each lung. It
+ * also determines the gain, the coefficient of height in the force, within three standard errors. A
+ * third scan in the posture of the other two does not determine the gain. */
 TEST(test_gain_fit_third_scan_recovers_gain) {
   static const double postures[2][3] = {{0.0, -1.0, 0.0}, {0.0, 0.0, -1.0}};
   static const double gains[2] = {0.23, 0.71};
@@ -491,7 +498,7 @@ TEST(test_gain_fit_third_scan_recovers_gain) {
     const double *g = postures[c % 2];
     const double gain = gains[c / 2];
     const bool moved = c % 2 == 1;
-    const double scale[2] = {0.8, 0.63}; /* left, right */
+    const double scale[2] = {0.8, 0.63}; /* factors on the displacement: left, right lung */
     const supine_force_law law =
         supine_patient_force(&patient.power, gain, record.state[1].gravity);
     for (size_t i = 0; i < pairs.count; ++i) {
@@ -567,7 +574,7 @@ TEST(test_compare_points_each_map_explains_its_motions) {
       supine_command_compare_points(&pairs, pairs.from, SUPINE_PATIENT_STILL, distance, &error),
       SUPINE_OK);
   assert_true(distance[SUPINE_PATIENT_MAP_AFFINE].largest < 1e-9 * none);
-  /* A prediction of no motion explains nothing. */
+  /* If the predicted displacement is 0, the error equals that without a prediction. */
   assert_true(distance[SUPINE_PATIENT_MAP_PREDICTED].rms == distance[SUPINE_PATIENT_MAP_NONE].rms);
   assert_true(distance[SUPINE_PATIENT_MAP_PREDICTED].explained == 0.0);
   /* SUPINE_PATIENT_RIGID removes a rotation and a shift between the scans;
@@ -587,7 +594,7 @@ TEST(test_compare_points_each_map_explains_its_motions) {
                    SUPINE_OK);
   assert_true(distance[SUPINE_PATIENT_MAP_PREDICTED].rms > 10.0);
   assert_true(distance[SUPINE_PATIENT_MAP_TRANSLATION].explained == 0.0);
-  /* Without motion there is nothing to explain. */
+  /* Without motion, the explained fraction of the motion is undefined. */
   memcpy(pairs.to, pairs.from, 3 * pairs.count * sizeof *pairs.to);
   assert_int_equal(
       supine_command_compare_points(&pairs, turned_by, SUPINE_PATIENT_STILL, distance, &error),

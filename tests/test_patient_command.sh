@@ -1,10 +1,10 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Fit a patient's law and use it: test_patient_command.sh PROGRAM
+# Fit a displacement law to a patient and use it: test_patient_command.sh PROGRAM
 #
-# Synthetic lungs are moved by a known law. `supine fit` recovers the law from surfaces and from landmarks,
-# `precompute` makes a basis with it, and `validate` compares the basis with other states of the person. Bad input is
-# refused.
+# Synthetic lungs are moved by a known displacement law. `supine fit` recovers this law from surfaces and from
+# landmarks, `precompute` makes a basis with the fitted law, and `validate` compares the basis with other states of the
+# person. Bad input is refused.
 set -u
 supine=$1
 work=$(mktemp -d) || exit 1
@@ -35,12 +35,12 @@ pairs() {
     vertices "$2.obj" | paste -d, from.csv - | awk 'NR % 25 == 1'
   } >"$3.csv"
 }
-# surfaces FILE: print the distance of the surfaces in the first state of `validate`, mm RMS.
+# surfaces FILE: print the RMS distance, mm, of the predicted from the scanned surface in the first state of `validate`.
 surfaces() {
   number rms_mm "$1"
 }
 
-# One person in several states, with three meshes and a law far from the default.
+# Make synthetic lungs of one person in five states, with three meshes. Their displacement law is far from the default.
 for mesh in p:20000 q:14000 s:5000; do
   name=${mesh%:*}
   "$supine" phantom -o $name.ply --vertices ${mesh#*:} >/dev/null || fail phantom
@@ -59,9 +59,9 @@ pairs s_supine_rest s_prone_rest prone
 pairs s_supine_full s_prone_rest down
 mv prone.csv prone.CSV
 
-# The gain of 0.70 is recovered for either order of the two states, and the basis of the scan at rest reaches
-# the true prone surface.
-# turns NAME ARGUMENTS...: fit with these arguments, and check the gain and the prone surface.
+# The fit finds a gain (the coefficient of height in the force) of 0.70 for either order of the two states. The basis of
+# the scan at rest predicts the true prone surface.
+# turns NAME ARGUMENTS...: fit with these arguments, and check the gain and the predicted prone surface.
 turns() {
   name=$1
   shift
@@ -88,10 +88,10 @@ grep -q 'state *supine:full' fit.txt || fail "the states are not stated: $(cat f
 "$supine" info points.safetensors | grep -q 'patient.* expected error [0-9.]* mm RMS' ||
   fail "info does not state the fit's error"
 
-# With default options and two meshes, the basis of either scan reaches the other within 0.2 mm RMS, and
-# within 0.6 mm at four times the volume between them.
-# chain SCAN MESH [VOLUME ALLOWED]...: make a basis of the scan, and check its distances in mm RMS from the states of
-# a mesh at two volumes.
+# With default options and two meshes, the basis of either scan predicts the other scan within 0.2 mm RMS. Within
+# 0.6 mm, it predicts a state four times as far above rest as the fuller scan.
+# chain SCAN MESH [VOLUME ALLOWED]...: make a basis of the scan. Check that it predicts the surfaces of MESH at two
+# volumes within the ALLOWED distances, mm RMS.
 chain() {
   scan=$1
   mesh=$2
@@ -100,7 +100,7 @@ chain() {
     fail "precompute $scan: $(cat out)"
   states=$(printf -- "--state supine:%s:${mesh}_supine_%s.ply " "$1" "$1" "$3" "$3")
   "$supine" validate surface.safetensors $states --json >valid.json || fail "validate $scan"
-  for state in 1 5; do # index of the error of a state
+  for state in 1 5; do # which rms_mm: each state has four, the first is the prediction's
     echo "$scan at $1: $(number rms_mm valid.json $state) mm"
     near "$(number rms_mm valid.json $state)" 0 "$2" ||
       fail "$scan at $1: $(number rms_mm valid.json $state) mm"
@@ -123,7 +123,7 @@ chain q_supine_full p rest 0.2 rest+2000 0.2
   fail "validate where nothing moved"
 grep -q '"explained_percent": null' valid.json || fail "a share is explained where nothing moved"
 
-# A scan given as at rest gives a warning if it holds too much gas.
+# If a scan that is declared to be at rest holds too much gas, fit gives a warning.
 "$supine" fit s_supine_rest+500.ply q_supine_full.ply --other supine:full -o x.json >out 2>note ||
   fail "fit a fuller rest"
 grep -q 'the volume at rest is 51 % of full inflation' note || fail "no warning: $(cat note)"
@@ -144,14 +144,15 @@ done
   fail "validate volumes alone"
 near "$(surfaces valid.json)" 0 2 || fail "volumes alone: $(surfaces valid.json) mm"
 
-# A further state does not determine the gain if its posture is the same, or if the lungs did not move.
+# A third state that is called prone, but has the positions of a supine scan, does not determine the gain
+# (the coefficient of height in the force).
 "$supine" fit --landmarks full.csv --other supine:full --state prone:rest:full.csv -o x.json \
   --json >fit.json 2>&1 || fail "fit a state that did not turn"
 "$supine" fit s_supine_rest.ply s_supine_full.ply --other supine:full \
   --state prone:rest:s_supine_rest.ply --law paper >fit.txt || fail "fit a scan that did not turn"
 grep -q 'source of the gain.*other postures do not' fit.txt || fail "a gain at its bound: $(grep gain fit.txt)"
 
-# A stiff region is recovered, and a basis with it reaches the other state.
+# The fit recovers a stiff region. A basis with the fitted stiffness predicts the second state.
 "$supine" phantom -o rest.ply --vertices 400 >/dev/null || fail phantom
 "$supine" solve rest.ply --posture supine --scanned none --reach 10 --base 0.9 --gain 0.4 --box-force 0,-0.2,0 \
   --constants 5,2.2,9,1.1,20,1.4 --volume scan-1000 --lesion 97,-135,-190,65,3 -o stiff.ply >/dev/null ||
@@ -165,11 +166,11 @@ near "$(number left_rms stiff.json)" 0 0.035 || fail "the force: $(cat fit.txt)"
 "$supine" precompute rest.ply --patient stiff.json -o stiff.safetensors >/dev/null 2>&1 ||
   fail "precompute with stiffness"
 "$supine" validate stiff.safetensors --state stiff.ply --json >valid.json || fail "validate stiff"
-near "$(number explained_percent valid.json)" 100 2 || # not exactly, as regions do not have the shape of the lesion
+near "$(number explained_percent valid.json)" 100 2 || # not exactly 100, as regions do not have the lesion's shape
   fail "stiff: $(number explained_percent valid.json) % explained"
 
-# Validate with several states, measured from a state other than the scan. The basis made the states itself, so it
-# predicts them, and its scale is nearly linear in volume. A picture of the errors is written.
+# Validate with several states, relative to a state other than the scan. The states were computed with the same basis,
+# so it predicts them, and the factor on the displacement is nearly linear in volume. Write a picture of the errors.
 "$supine" precompute rest.ply --band 3 -o full.safetensors >/dev/null || fail "precompute"
 "$supine" deform full.safetensors --posture supine --volume rest -o scan.ply >/dev/null ||
   fail "deform to rest"
@@ -195,7 +196,7 @@ fi
 "$supine" validate scanned.safetensors --state supine:rest+400.ply --state supine:rest+900.ply \
   --state supine:rest+1500:rest+1500.ply --state prone:rest:prone.ply --from supine:rest --json >valid.json ||
   fail "validate several"
-for state in 1 5 9 13; do # index of the error of a prediction; the error without motion follows it
+for state in 1 5 9 13; do # which rms_mm: each state has four, for the prediction, without motion, ...
   near "$(number rms_mm valid.json $state)" 0 0.01 || fail "state $state is not predicted"
   near "$(number rms_mm valid.json $((state + 1)))" 0 0.5 && fail "state $state did not move"
 done
@@ -209,7 +210,7 @@ near "$(number nearest_scale valid.json 2)" "$(number scale valid.json 2)" 0.001
   >valid.json || fail "validate from another state"
 near "$(number volume_ml valid.json)" -500 1 || fail "from: $(number volume_ml valid.json)"
 
-# In a basis without a patient's law, landmarks move with the surface.
+# In a basis that is not fitted to a patient, landmarks move with the surface.
 for posture in supine prone; do
   "$supine" deform scanned.safetensors --posture $posture --volume rest -o $posture.obj >/dev/null ||
     fail "deform to OBJ"
@@ -232,7 +233,7 @@ near "$(surfaces valid.json)" 0 1 || fail "shift: $(surfaces valid.json) mm"
 "$supine" validate points.safetensors --from supine:rest --state supine:full:shifted.obj --json \
   >valid.json || fail "validate without a shift"
 near "$(surfaces valid.json)" 0 3 && fail "a shift was removed without --translation"
-# A further state of half a breath in the same posture gets about half the scale.
+# A third scan in the same posture, taken halfway through a breath, has about half the factor on the displacement.
 "$supine" deform s.safetensors --posture supine --volume rest+1500 -o half.ply >/dev/null ||
   fail deform
 "$supine" fit s_supine_rest.ply s_supine_full.ply --state supine:half.ply --other supine:full \

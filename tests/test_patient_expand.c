@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Expandability computed from motion: a lesion and a gradient are recovered from a noisy surface of
- * another mesh, and uniform tissue is found to be uniform. */
+/* Test the expandability of tissue computed from its motion: a lesion and a gradient are recovered
+ * from a noisy surface of another mesh, and uniform tissue is found to be uniform. */
 #include "test.h"
 
 #include <gsl/gsl_randist.h>
@@ -37,8 +37,8 @@ static double *gradient_of(const supine_lungs *lungs, const supine_expandability
   return e;
 }
 
-/* Return the vertices (malloc), moved by the true law with stiffness e [N], plus Gaussian noise of
- * `noise` mm in each coordinate. */
+/* Return the vertices (malloc), displaced by the model of truth() with the stiffness e of each
+ * vertex, plus Gaussian noise of `noise` mm in each coordinate. */
 static double *moved_by_truth(const supine_lungs *lungs, const double *e, double noise) {
   supine_model model = truth();
   supine_solution solution = {0};
@@ -81,7 +81,8 @@ static double contrast(const supine_lungs *lungs, const supine_patient_stiffness
   return exp(sum[1] / count[1] - sum[0] / count[0]);
 }
 
-/* Fit `rest` to `other`, the same shape moved by the true law with stiffness e; free e. */
+/* Fit `rest` to `other`, the same shape displaced by the model of truth() with the stiffness e of
+ * each vertex. Free the array e. */
 static void fit_uneven(const supine_lungs *rest, const supine_lungs *other, double *e,
                        supine_patient_record *found) {
   supine_mesh state = other->mesh;
@@ -115,7 +116,7 @@ static void expect_lesion(const supine_lungs *rest, const supine_lungs *other,
   assert_true(fabs(times / lesion->factor - 1.0) < 0.2);
   assert_true(found.expand.kept);
   assert_true(found.expand.held_out[1] < 0.5 * found.expand.held_out[0]);
-  /* The report gives the held-out error of the final fit, with the stiffness of regions. */
+  /* The report gives the held-out error of the final fit, which has the stiffness of regions. */
   assert_true(found.report.held_out[SUPINE_PATIENT_SCORE_CORRECTED] == found.expand.held_out[1]);
 }
 
@@ -165,7 +166,8 @@ TEST(test_fit_uniform_lungs_keeps_no_region) {
   supine_lungs_free(&other);
 }
 
-/* Check that an expandability that triples from apex to base is recovered where motion shows it. */
+/* Check that an expandability that triples from apex to base is recovered in regions that move
+ * enough to determine it. */
 static void check_gradient(const supine_lungs *rest, const supine_lungs *other) {
   const supine_expandability_law law = {SUPINE_EXPANDABILITY_LINEAR, 2, 0.5, 1.5};
   const size_t n = rest->mesh.vertex_count;

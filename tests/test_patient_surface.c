@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A patient's law fitted to surfaces: recovery of a known law, and refused input. */
+/* Test the fit of a displacement law to a patient's surfaces: recovery of known constants, expected
+ * errors, and refused input. */
 #include "test.h"
 
 #include <gsl/gsl_cdf.h>
@@ -17,7 +18,8 @@
 
 static const supine_patient_pairs no_landmarks;
 
-/* Return the vertices (malloc), moved by the true law; set the largest displacement, mm. */
+/* Return the vertices (malloc), displaced by the model of truth(). Set `largest` to the largest
+ * displacement, mm. */
 static double *moved_by_truth(const supine_lungs *lungs, double *largest) {
   const supine_model model = truth();
   supine_solution solution = {0};
@@ -86,8 +88,8 @@ TEST(test_fit_surface_known_law_recovered_on_another_mesh) {
   }
   printf("\n");
   assert_true(sqrt(square) <= 0.15);
-  /* The force has the terms 0.4 (1 - Y) and -0.2 Y, where 1 - Y is the height when supine. The
-   * slope along Y is therefore -0.6. */
+  /* The force has the terms 0.4 (1 - Y) and -0.2 Y, so its slope along Y is -0.6. Y is the y
+   * coordinate in the lungs' bounding box, and 1 - Y is the height if supine. */
   const supine_patient_applied *applied = &fit.applied;
   printf(
       "force: correlation with height %.3f, c7 to c9 %.3f %.3f %.3f, spread %.3f, residual %.3f, "
@@ -110,9 +112,9 @@ TEST(test_fit_surface_known_law_recovered_on_another_mesh) {
   supine_lungs_free(&other);
 }
 
-/* A law other than `deep` moves a surface of another mesh. The fit of `deep` with kriging
- * reproduces the moved surface. It also reproduces the volume, as the displacement along the normal
- * determines the volume change. */
+/* Displace a surface by a law other than the default, `deep`. Fit `deep` with kriging to it, on a
+ * coarser mesh. The fit reproduces the displaced surface and its volume, because the displacement
+ * along the normal determines the volume change. */
 TEST(test_fit_surface_other_law_reaches_state_and_volume) {
   supine_mesh coarse = helper_lump(9, 70.3, 5);
   supine_mesh fine = helper_lump(15, 70.3, 5);
@@ -158,7 +160,7 @@ TEST(test_fit_surface_other_law_reaches_state_and_volume) {
   supine_lungs_free(&other);
 }
 
-/* Add a random displacement along the surface to the positions. */
+/* Add a random displacement, tangential to the surface, to the positions. */
 static void slide(const supine_lungs *lungs, const supine_patient_power *law, unsigned long seed,
                   double *positions) {
   const size_t n = lungs->mesh.vertex_count;
@@ -201,9 +203,9 @@ static void slide(const supine_lungs *lungs, const supine_patient_power *law, un
   free(normals);
 }
 
-/* A surface does not show motion along itself. Here a random field adds such motion to the deep
- * law. The fit matches the surface to a fraction of a millimetre, but points err by millimetres,
- * which the expected error must state. */
+/* A surface does not show tangential motion. Add a random tangential displacement to that of the
+ * law `deep`. The fit then matches the surface to a fraction of a millimetre, although points err
+ * by millimetres. The expected error must include this error of points. */
 TEST(test_fit_surface_alone_expected_error_includes_sliding) {
   enum { SEEDS = 5 };
   supine_mesh lump = helper_lump(6, 70.3, 5);
@@ -318,7 +320,7 @@ TEST(test_matching_weigh_beyond_4_685_sigma_no_weight) {
   for (size_t k = 0; k < CHECKED; ++k) {
     const double t = checked_sigmas[k] / 4.685;
     const double expected = fabs(t) < 1.0 ? pow(1.0 - t * t, 2.0) : 0.0;
-    /* The outliers, 5 % of all rows, raise the median by 6 %. */
+    /* The outliers, 5 % of all rows, raise the median distance, and so the weights. */
     assert_true(fabs(m.rows[NORMAL + k].weight - expected) < 0.07);
     assert_true(k > 1 || m.rows[NORMAL + k].weight >= expected);
   }

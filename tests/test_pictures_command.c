@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The commands supine compare and supine render. */
+/* Test the commands `supine compare` and `supine render`. */
 #include "program_helpers.h"
 
 #include <jansson.h>
@@ -7,7 +7,7 @@
 #include <cairo.h>
 #include <webp/demux.h>
 
-/* A basis of an open surface, which an earlier version made. */
+/* Basis file of an open surface, made by an earlier version of the program. */
 #define OPEN "\"" SUPINE_GOLDEN "/open_surface.safetensors\""
 
 static size_t count_words(const char *text, const char *word) {
@@ -68,9 +68,9 @@ static void check_posture(const json_t *posture) {
     share += json_number_value(json_object_get(slab, "share"));
     volume += json_number_value(json_object_get(slab, "volume_ml"));
   }
-  assert_true(fabs(gain - 400) < 0.05); /* mL, the rounding of float positions */
+  assert_true(fabs(gain - 400) < 0.05); /* tolerance in mL, for positions rounded to float */
   assert_true(fabs(share - 1) < 1e-4);
-  /* The slabs hold the volume of both lungs. */
+  /* The volumes of the ten slabs add up to the volume of both lungs. */
   assert_true(fabs(volume - number(posture, "volume_ml", "left") -
                    number(posture, "volume_ml", "right")) < 0.05);
   const json_t *top = json_array_get(slabs, 1);
@@ -93,8 +93,8 @@ TEST(test_compare_json_has_stated_values) {
   for (size_t i = 0; i < 4; ++i) {
     const json_t *posture = json_array_get(postures, i);
     check_posture(posture);
-    assert_true(number(posture, "displacement_mm", "rms") <=
-                farthest * (1 + 1e-3)); /* 1e-3, as the directions are 4.5 degrees apart */
+    /* The tolerance is 1e-3, because `farthest` is sought in steps of 4.5 degrees. */
+    assert_true(number(posture, "displacement_mm", "rms") <= farthest * (1 + 1e-3));
   }
   const json_t *tilted = json_object_get(json_array_get(postures, 2), "gravity");
   assert_true(fabs(json_number_value(json_array_get(tilted, 2)) - 0.258819045) < 1e-8);
@@ -234,7 +234,7 @@ static bool render(const char *format, ...) {
   return true;
 }
 
-/* Return the mean difference of the colours of two pictures of one size, 0 to 255. */
+/* Return the mean difference of colour values, 0 to 255, between two pictures of equal size. */
 static double png_difference(const char *a, const char *b) {
   cairo_surface_t *image[2] = {cairo_image_surface_create_from_png(a),
                                cairo_image_surface_create_from_png(b)};
@@ -261,7 +261,7 @@ static double png_difference(const char *a, const char *b) {
   return sum / (3.0 * width * height);
 }
 
-/* Other versions of fonts change the picture less than another posture does. */
+/* The tolerance allows for other versions of fonts, but not for another posture. */
 TEST(test_render_same_as_golden_picture) {
   static const double tolerance = 1.5;
   if (!render("lungs.safetensors --posture prone --largest 40 --size 240x180 -o golden.png")) {
@@ -276,8 +276,8 @@ TEST(test_render_same_as_golden_picture) {
   assert_true(other > 2 * tolerance);
 }
 
-/* Find the arrow of gravity on the ball in the upper left of a picture: compute the mean position
- * of its orange pixels relative to the centre of the ball, in pixels. */
+/* Find the arrow of gravity on the ball in the upper left of a picture: set `place` to the mean
+ * position of its orange pixels relative to the centre of the ball, in pixels. */
 static void find_arrow(const char *path, double place[2]) {
   cairo_surface_t *image = cairo_image_surface_create_from_png(path);
   assert_int_equal(cairo_surface_status(image), CAIRO_STATUS_SUCCESS);
@@ -287,7 +287,7 @@ static void find_arrow(const char *path, double place[2]) {
   double count = 0;
   int low[2] = {width, width};
   int high[2] = {0, 0};
-  /* the area of the ball, which is left of the title */
+  /* Rows and columns of the ball, which is left of the title. */
   for (int y = width / 24; y < width / 5; ++y) {
     const unsigned char *row = cairo_image_surface_get_data(image) + (ptrdiff_t)y * stride;
     for (int x = width / 24; x < width / 5; ++x) {
@@ -309,12 +309,12 @@ static void find_arrow(const char *path, double place[2]) {
   }
 }
 
-/* Seen from the front, the left lung is on the right and the feet are below. Gravity is along the
- * view if the patient is supine or prone. */
+/* Seen from the front, the left lung is on the right and the feet are below. If the patient is
+ * supine or prone, gravity is along the line of sight. */
 TEST(test_render_arrow_points_along_gravity) {
   static const struct {
     const char *posture;
-    int toward[2]; /* direction of the arrow: right, down */
+    int toward[2]; /* direction of the arrow: to the right, downwards */
   } cases[] = {{"supine", {0, 0}}, {"prone", {0, 0}},   {"left", {1, 0}},
                {"right", {-1, 0}}, {"upright", {0, 1}}, {"inverted", {0, -1}}};
   for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
@@ -384,8 +384,8 @@ TEST(test_render_opacity_below_one_draws_a_grey_shell) {
   }
 }
 
-/* Return frame `wanted` of an animation as RGBA (malloc). Set the time at which it ends, ms, and
- * the properties of the animation. */
+/* Return frame number `wanted` of an animation as RGBA (malloc). Set `time` to the end of this
+ * frame, ms, and `info` to the properties of the animation. */
 static unsigned char *read_frame(const char *name, unsigned wanted, WebPAnimInfo *info, int *time) {
   size_t size = 0;
   char *bytes = test_read(in_folder(name), &size);
@@ -406,7 +406,7 @@ static unsigned char *read_frame(const char *name, unsigned wanted, WebPAnimInfo
   return copy;
 }
 
-/* Return the mean difference of the colours of two frames, 0 to 255. */
+/* Return the mean difference of colour values, 0 to 255, between two frames. */
 static double frame_difference(const unsigned char *a, const unsigned char *b, size_t area) {
   double sum = 0;
   for (size_t i = 0; i < 4 * area; ++i) {
@@ -415,11 +415,12 @@ static double frame_difference(const unsigned char *a, const unsigned char *b, s
   return sum / (3.0 * (double)area);
 }
 
-/* Successive frames differ, and the last is shown for a second. The reverse animation begins with
- * the last picture of this one. */
+/* Successive frames differ, and the last is shown for a second. The animation of the reverse turn
+ * begins with the last frame of this one. */
 TEST(test_render_turn_animates_between_postures) {
   enum { FRAMES = 7, WIDTH = 240, HEIGHT = 180 };
-  /* Largest difference of two frames of one posture, due to the codec and the text of the angle. */
+  /* Largest mean difference of colour values, 0 to 255, between frames of one posture. They differ
+   * because the codec is lossy and because the angle is printed. */
   static const double loss = 2.5;
   WebPAnimInfo info;
   int time = 0;
@@ -436,7 +437,7 @@ TEST(test_render_turn_animates_between_postures) {
   assert_int_equal(info.canvas_width, WIDTH);
   assert_int_equal(info.canvas_height, HEIGHT);
   assert_int_equal(info.frame_count, FRAMES);
-  assert_int_equal(info.loop_count, 0); /* repeats for ever */
+  assert_int_equal(info.loop_count, 0); /* 0: repeats for ever */
   unsigned char *first = read_frame("back.webp", 0, &info, &time);
   unsigned char *last = read_frame("back.webp", FRAMES - 1, &info, &time);
   assert_true(frame_difference(frame[0], last, WIDTH * HEIGHT) < loss);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Directions of gravity from names of postures, quaternions and tilts. */
+/* Test directions of gravity from names of postures, quaternions and tilts. */
 #include <float.h>
 
 #include "test.h"
@@ -87,8 +87,8 @@ TEST(test_quaternion_known_orientations_literal) {
   assert_int_equal(supine_posture_quaternion((double[]){1, 0, 0, 0}, g), SUPINE_OK);
   assert_vector(g, 0, 0, -1); /* upright: the axes of body and world are equal */
   assert_false(signbit(g[0]) || signbit(g[1]));
-  /* Prone: after a rotation by +90 degrees about x, the back (y of the body) points to z of the
-   * world. */
+  /* Prone: after a rotation by +90 degrees about x, the back (y of the body) points up (z of the
+   * world). */
   assert_int_equal(supine_posture_quaternion((double[]){h, h, 0, 0}, g), SUPINE_OK);
   assert_vector(g, 0, -1, 0);
   assert_int_equal(supine_posture_quaternion((double[]){-3 * h, 3 * h, 0, 0}, g), SUPINE_OK);

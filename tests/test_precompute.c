@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Bases of lungs: coefficients, stated errors and volumes, compared with the full physics. */
+/* Compare bases of lungs with the full physics: coefficients, stated errors and volumes. */
 #include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
@@ -53,7 +53,9 @@ static supine_lungs real_pair(void) {
   return lungs;
 }
 
-static double reach; /* mm; 0 selects links between neighbours only, as in the paper */
+/* Distance over which forces spread, mm. If 0, only neighbours exchange force, as in
+ * [Santhanam2008]. */
+static double reach;
 
 static supine_precompute_report make_basis(const supine_lungs *lungs, size_t band, size_t modes,
                                            double soften, size_t held_out) {
@@ -71,7 +73,7 @@ static supine_precompute_report make_basis(const supine_lungs *lungs, size_t ban
   return report;
 }
 
-/* Open the basis in exact storage, which adds no error to those measured. */
+/* Open the basis without quantisation, which would add to the measured errors. */
 static supine_basis *open_basis(void) {
   const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
   supine_basis *basis = NULL;
@@ -163,7 +165,7 @@ TEST(test_precompute_real_ras_lungs_coefficients_equal_direct_solution) {
   check_coefficients(names, SUPINE_AXES_RAS);
 }
 
-/* A mean over directions and its standard error. */
+/* A mean over directions of gravity, and its standard error. */
 typedef struct sample_mean {
   double mean, error;
 } sample_mean;
@@ -181,9 +183,11 @@ static sample_mean mean_of(size_t count, const double *values) {
 
 enum { CHECKED = 300 };
 
-/* For each direction, compute means over the vertices: error2, the squared distance between the
- * basis and supine_physics_solve at scale 1; field2, the squared displacement at scale 1;
- * error_mm2, the squared distance at `volume` mL, in mm^2. */
+/* Compare a basis with supine_physics_solve in `count` directions of gravity. For each direction,
+ * set three means over the vertices. The scale is a factor on the displacement.
+ * - error2: squared distance of both results at scale 1
+ * - field2: squared displacement at scale 1
+ * - error_mm2: squared distance at the scales that change the volume by `volume` mL, mm^2 */
 static void true_errors(const supine_lungs *lungs, const supine_model *model,
                         const supine_basis *basis, size_t count, const double *directions,
                         double volume, double *error2, double *field2, double *error_mm2) {
@@ -248,8 +252,8 @@ static double error_of_first(size_t kept, const supine_lungs *lungs, const supin
   return sqrt(error2 / field2);
 }
 
-/* Check the tables in the file: `error_modes` has the measured errors of the first modes, and
- * `error_harmonics` falls with the band. */
+/* Check the tables in the file: `error_modes` holds the errors measured if only the first modes are
+ * kept, and `error_harmonics` decreases as bands of harmonics are added. */
 static void check_error_table(const supine_lungs *lungs, const supine_model *model,
                               const supine_basis *basis, size_t count, const double *directions) {
   const supine_tensor *by_modes = supine_basis_tensor(basis, "error_modes");
@@ -270,8 +274,8 @@ static void check_error_table(const supine_lungs *lungs, const supine_model *mod
   }
 }
 
-/* Check that the error stated in the file equals the error measured in each held-out direction of
- * gravity. Softening adds the error of combining solves for a few directions. */
+/* Check that the error stated in the file equals the error measured in the held-out directions of
+ * gravity. With `soften`, superposing a few solves adds an error, so the tolerance is larger. */
 static void check_stated_error(const supine_lungs *lungs, size_t band, size_t modes,
                                double soften) {
   enum { HELD_OUT = 40 };
@@ -302,8 +306,8 @@ static void check_stated_error(const supine_lungs *lungs, size_t band, size_t mo
   supine_basis_close(basis);
 }
 
-/* Check that the stated error equals the error measured in random directions, within four standard
- * errors of this sample. */
+/* Check that the error stated in the file equals the error measured in random directions of
+ * gravity, within four standard errors of this sample. */
 static void check_error_elsewhere(const supine_lungs *lungs, size_t band, size_t modes,
                                   double soften, const char *what) {
   const supine_precompute_report report = make_basis(lungs, band, modes, soften, 0);
@@ -348,8 +352,8 @@ TEST(test_precompute_random_directions_error_as_stated) {
   supine_lungs_free(&lungs);
 }
 
-/* Check that the error of a basis of best modes is at most `most`, and that the 16 harmonics of the
- * paper err at least `least_ratio` times as much. */
+/* Check that the relative error of a basis of best modes is at most `most`. Check that the error of
+ * the 16 harmonics of [Santhanam2008] is at least `least_ratio` times as large. */
 static void check_best_modes(const char *name, supine_axes axes, double soften, double most,
                              double least_ratio) {
   supine_lungs lungs = {0};
@@ -437,7 +441,7 @@ static void check_volumes(const supine_lungs *lungs, size_t band, size_t modes, 
 TEST(test_precompute_volumes_exact_in_every_direction) {
   supine_lungs lungs = phantom(3000);
   check_volumes(&lungs, 3, 0, 0.0, -300.0);
-  /* Head down, a softened phantom folds at -299 mL. */
+  /* Head down, the surface of the softened phantom folds at -299 mL, so test down to -200 mL. */
   check_volumes(&lungs, 7, 10, 1.0, -200.0);
   supine_lungs_free(&lungs);
 }
@@ -468,7 +472,7 @@ static void normal_of(const float *xyz, const uint32_t *corner, double *normal) 
 }
 
 /* Return the share of triangles that are reversed when the library deforms the lungs to `volume`
- * mL, the largest of six postures. */
+ * mL: the largest share of six postures. */
 static double turned_over_at_run_time(double volume) {
   supine_basis *basis = open_basis();
   const supine_basis_info *info = supine_basis_get_info(basis);
@@ -523,11 +527,11 @@ TEST(test_turned_over_one_posture_emptied_finds_more_reversed) {
   static const int postures[] = {0, 1, 3};
   for (size_t p = 0; p < sizeof postures / sizeof *postures; ++p) {
     const int g = postures[p];
-    /* The volume at rest is unchanged at one end of the axis and changes by `part` mL at the other.
-     * The constants are the harmonics of bands 0 and 1 along the axis. */
-    static const size_t term[3] = {3, 1, 2};
+    static const size_t term[3] = {3, 1, 2}; /* index of the band-1 harmonic along x, y, z */
     const double part = -0.76 * full;
     const double sign = g < 3 ? 1.0 : -1.0;
+    /* Expand the volume at rest in harmonics: 0 mL at one end of the axis, `part` mL at the other.
+     * The divisors are the values of the harmonics of bands 0 and 1 on the axis. */
     double resting[9] = {0.5 * part / 0.28209479177387814};
     resting[term[g % 3]] = sign * 0.5 * part / 0.48860251190291992;
     const double even[9] = {resting[0]};
@@ -593,7 +597,8 @@ TEST(test_precompute_bad_options_refused) {
   options.modes = 65;
   assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error), SUPINE_ERROR_ARGUMENT);
   options.modes = 16;
-  options.model.force.soften = 1.0; /* softening is refused without a reach */
+  /* `soften` is refused if the reach of the model is 0. */
+  options.model.force.soften = 1.0;
   assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error), SUPINE_ERROR_ARGUMENT);
   supine_lungs_free(&lungs);
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The program: results, exit codes, messages, and refused input. */
+/* Test the program: results, exit codes, messages, and refused input. */
 #include "program_helpers.h"
 
 #include <ftw.h>
@@ -11,7 +11,8 @@ static void write_file(const char *name, const void *bytes, size_t size) {
   assert_int_equal(fclose(file), 0);
 }
 
-/* Read the beginning of a file of the folder into bytes [size]; return the number of bytes read. */
+/* Copy the beginning of a file in the test's folder to bytes [size]; return the number of bytes
+ * copied. */
 static size_t take_file(const char *name, char *bytes, size_t size) {
   size_t length = 0;
   char *text = test_read(in_folder(name), &length);
@@ -108,8 +109,8 @@ TEST(test_deform_volume_reached) {
          "deform lungs.safetensors --posture left --volume scan-5500 --allow-folds -o a.ply");
 }
 
-/* The volumes at rest and at full inflation follow from the shares in resting.h and from the
- * volumes of the synthetic lungs, 2714.1 and 3285.9 mL. */
+/* The volumes at rest and at full inflation follow from the shares of full volume in resting.h and
+ * from the volumes of the two synthetic lungs, 2714.1 and 3285.9 mL. */
 TEST(test_deform_rest_and_full_volumes_by_posture) {
   EXPECT(0, "-3419.71 mL", "deform lungs.safetensors --posture supine -o a.ply");
   EXPECT(0, "-3419.71 mL", "deform lungs.safetensors --posture inverted --volume rest -o a.ply");
@@ -183,7 +184,7 @@ TEST(test_precompute_scan_state_and_frame_reproduced) {
   EXPECT(0, "the file's tag", "precompute ras.ply --units cm --band 3 -o ras.safetensors");
   EXPECT(0, "again.ply",
          "deform ras.safetensors --posture left --volume scan --as-scanned -o again.ply");
-  /* mm, the rounding of float32 at 200 mm */
+  /* Tolerance in mm, for coordinates near 200 mm rounded to float32. */
   assert_true(positions_apart("ras.ply", "again.ply") < 2e-5);
   EXPECT(0, "breath",
          "breathe ras.safetensors --posture left --as-scanned --fps 0.2 -o breath.vtp");
@@ -191,7 +192,7 @@ TEST(test_precompute_scan_state_and_frame_reproduced) {
   assert_true(take_file("breath.vtp", text, sizeof text) > 0);
   assert_says(text, "RAS");
   EXPECT(0, "frames", "breathe ras.safetensors --posture left --fps 0.2 -o breath.vtp");
-  /* The file has the same arrays with and without --as-scanned. */
+  /* Without --as-scanned, the file has the same arrays. */
   assert_true(take_file("breath.vtp", text, sizeof text) > 0);
   assert_says(text, "Name=\"displacement_magnitude\"");
   EXPECT(1, "is for VTP files",
@@ -217,7 +218,7 @@ TEST(test_precompute_scan_state_and_frame_reproduced) {
   EXPECT(1, "deep or paper", "precompute low.ply --law shallow -o b.safetensors");
   EXPECT(1, "leave --scanned out",
          "precompute low.ply --law paper --scanned supine:rest -o b.safetensors");
-  /* The scan was taken at rest. */
+  /* The scan was taken at rest, so the surface at rest equals the scan. */
   EXPECT(0, "mL", "deform a.safetensors --posture supine -o rested.ply");
   assert_true(positions_apart("low.ply", "rested.ply") < 0.005);
   EXPECT(0, "paper law\n  scan taken as the reference",

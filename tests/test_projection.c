@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The projection onto harmonics, compared with full solves and plain quadrature, and modes,
- * compared with a dense singular value decomposition. */
+/* Test the projection onto harmonics against full solves and plain quadrature. Test the modes
+ * against a dense singular value decomposition. */
 #include "test.h"
 
 #include <gsl/gsl_linalg.h>
@@ -28,7 +28,7 @@ static int teardown(void **state) {
   return 0;
 }
 
-/* Return the coefficients [N, terms] of a projection, the product of its factors (malloc). */
+/* Return the product of a projection's factors (malloc): coefficients [N, number of harmonics]. */
 static double *coefficients_of(const supine_projection *projection) {
   const size_t terms = supine_sh_count(projection->band);
   double *c = calloc(projection->vertex_count * terms + 1, sizeof *c);
@@ -43,7 +43,8 @@ static double *coefficients_of(const supine_projection *projection) {
   return c;
 }
 
-/* Return the weight of each projection column for `count` directions, [count, rank] (malloc). */
+/* A projection is a sum of `rank` fields, whose weights depend on gravity. Return these weights
+ * [count, rank] for `count` directions of gravity (malloc). */
 static double *weights_at(const supine_lungs *lungs, const supine_model *model,
                           const supine_span *span, size_t count, const double *g) {
   double *range = malloc(2 * count * sizeof *range);
@@ -58,8 +59,9 @@ static double *weights_at(const supine_lungs *lungs, const supine_model *model,
   return weights;
 }
 
-/* A much finer grid of directions gives nearly the same functions, although heights have kinks
- * where the lowest or the highest vertex changes. */
+/* Expand the weights of a projection's fields in harmonics on a much finer grid of directions. The
+ * coefficients change little, although the weights have kinks where the lowest or the highest
+ * vertex changes. */
 TEST(test_projection_finer_grid_same_functions) {
   enum { LATITUDES = 512, LONGITUDES = 513 };
   static const size_t bands[] = {1, 15};
@@ -184,8 +186,8 @@ TEST(test_projection_impossible_softening_refused) {
   supine_mesh_free(&mesh);
 }
 
-/* Compare singular values, errors and functions of the modes with a dense decomposition of the
- * weighted matrix. */
+/* Compare the singular values, error and functions of the modes with a dense decomposition of the
+ * projection's coefficients, whose row i is multiplied by the square root of weight[i]. */
 static void check_modes(const supine_projection *projection, const double *weight, size_t most) {
   const size_t n = projection->vertex_count;
   const size_t terms = supine_sh_count(projection->band);
@@ -211,13 +213,14 @@ static void check_modes(const supine_projection *projection, const double *weigh
   double tail = 0.0;
   for (size_t k = 0; k < terms; ++k) {
     const double expected = gsl_vector_get(s, k);
-    if (k < modes.mode_count) { /* the Gram matrix loses half the digits of small values */
+    /* The Gram matrix loses half the digits of small singular values. */
+    if (k < modes.mode_count) {
       assert_close(singular[k], expected, 1e-7 * gsl_vector_get(s, 0));
     } else {
       tail += expected * expected;
     }
   }
-  double error = 0.0; /* squared error of the best approximation of this rank */
+  double error = 0.0; /* squared error of the modes, the best approximation of this rank */
   for (size_t i = 0; i < n; ++i) {
     for (size_t t = 0; t < terms; ++t) {
       double approximation = 0.0;
@@ -229,7 +232,7 @@ static void check_modes(const supine_projection *projection, const double *weigh
     }
   }
   assert_close(sqrt(error / energy), sqrt(tail / energy), 1e-6);
-  for (size_t a = 0; a < modes.mode_count; ++a) { /* the functions are orthonormal */
+  for (size_t a = 0; a < modes.mode_count; ++a) { /* modes are orthonormal */
     for (size_t b = 0; b <= a; ++b) {
       double dot = 0.0;
       for (size_t t = 0; t < terms; ++t) {
@@ -267,8 +270,8 @@ TEST(test_modes_equal_dense_decomposition) {
   free(weight);
 }
 
-/* A mode is kept if its singular value is 3e-7 times the first, and dropped if it is 3e-8 times the
- * first, below the rounding of the Gram matrix. */
+/* Modes with singular values of 3e-7 of the largest are kept. Modes of 3e-8, which is below the
+ * rounding error of the Gram matrix, are dropped. */
 TEST(test_modes_below_rounding_dropped) {
   enum { ROWS = 7, TERMS = 4 };
   static const double sizes[TERMS] = {2.0, 0.5, 2.0 * 3e-7, 2.0 * 3e-8};

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A breath: volume and pressure over time. */
+/* Test the volume and pressure of a breath over time. */
 #include <float.h>
 
 #include "test.h"
@@ -74,7 +74,8 @@ TEST(test_breath_each_course_rises_then_falls_and_repeats) {
   }
 }
 
-/* Pressure follows the course of the breath; the pressure-volume limbs give the volume. */
+/* Pressure follows the course of the breath. The inhale or exhale limb of the pressure-volume
+ * curve, scaled to the tidal volume, gives the volume. */
 TEST(test_breath_volume_follows_scaled_limbs) {
   const supine_pv *normal = supine_breath_normal();
   for (int course = 0; course < SUPINE_PV_COURSE_COUNT; ++course) {
@@ -107,8 +108,8 @@ TEST(test_breath_volume_follows_scaled_limbs) {
   }
 }
 
-/* At constant flow, each pressure of a breath gives its volume on the pressure-volume limb, even if
- * the limb has two steep parts. */
+/* At constant flow, the pressure-volume curve gives the volume of the breath at each of its
+ * pressures, even if the curve has two steep parts. */
 TEST(test_breath_constant_flow_stiff_limb_pressures_give_volumes) {
   enum { COUNT = 61 };
   const supine_pv_curve stiff = {{0.0, 45.0}, {0.0, 800.0}, {0.5, -4.5, -2.3, 12.0, 2.7}};
@@ -130,7 +131,7 @@ TEST(test_breath_constant_flow_stiff_limb_pressures_give_volumes) {
   }
 }
 
-/* 500 mL inhaled over 5 s change by 1.5 mL in each step of 15 ms, as in [Santhanam2008] V. */
+/* Inhaling 500 mL in 5 s adds 1.5 mL in each step of 15 ms, as in [Santhanam2008] V. */
 TEST(test_breath_constant_flow_has_volume_step_of_paper) {
   const supine_pv_breath breath = {
       .tidal = 500.0, .rate = 6.0, .inhale_fraction = 0.5, .course = SUPINE_PV_CONSTANT_FLOW};

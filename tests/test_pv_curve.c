@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The equation of a limb, and the built-in normal lung. */
+/* Test the equation of one limb of the pressure-volume curve (inhale or exhale), and the built-in
+ * normal lung. */
 #include <float.h>
 
 #include "test.h"
@@ -22,7 +23,8 @@ static void spread(double low, double high, double *at) {
 }
 
 TEST(test_evaluate_constant_control_gives_salazar_knowles) {
-  /* k per cmH2O, from emphysema to fibrosis, in V = Vmax (1 - exp(-k P)) */
+  /* Rates k, 1/cmH2O, from emphysema to fibrosis, of the volume V = Vmax (1 - exp(-k P)) at the
+   * pressure P. */
   static const double k[] = {0.31, 0.0914, 0.043};
   for (size_t i = 0; i < sizeof k / sizeof *k; ++i) {
     const double most = 6413.0;
@@ -62,8 +64,9 @@ TEST(test_evaluate_second_control_gives_gaussian_compliance) {
   }
 }
 
-/* The derivative of the log compliance with respect to x, from finite differences, equals the sum
- * u(x) of Legendre polynomials. */
+/* Let x be the pressure, scaled to -1 to 1 over the range of the curve. For any coefficients, the
+ * derivative of the logarithm of the compliance with respect to x, by finite differences, equals
+ * the sum u(x) of Legendre polynomials. */
 TEST(test_evaluate_any_controls_satisfy_equation) {
   const double half = 0.5 * (sigmoid.pressure[1] - sigmoid.pressure[0]);
   const double step = 1e-4;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Files of pressure-volume samples and of fitted curves. */
+/* Test files of pressure-volume samples and of fitted curves. */
 #include "test.h"
 
 #include "program/options/pv.h"

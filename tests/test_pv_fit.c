@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fits to pressure-volume samples: published curves, noise, confidence intervals, refused
+/* Test fits to pressure-volume samples: published curves, noise, confidence intervals, refused
  * samples. */
 #include "test.h"
 
@@ -10,19 +10,20 @@
 
 enum { SAMPLES = 33, HELD_OUT = 211 };
 
-/* A published curve: Venegas' sigmoid a + b / (1 + exp(-(P - c) / d)) if d > 0, else Salazar and
- * Knowles' exponential b (1 - exp(-c P)). */
+/* A published curve, the volume at the pressure P:
+ * - d > 0: Venegas' sigmoid a + b / (1 + exp(-(P - c) / d))
+ * - d = 0: Salazar and Knowles' exponential b (1 - exp(-c P)) */
 typedef struct truth {
   const char *name;
   double low, high;  /* range of pressures, cmH2O */
-  double a, b, c, d; /* a, b in mL; c, d in cmH2O, or c per cmH2O if d is 0 */
+  double a, b, c, d; /* a, b: mL; c, d: cmH2O, but c: 1/cmH2O if d = 0 */
 } truth;
 
-/* Salazar and Knowles: c = ln 2 / h, where h is 7.58 (SD 2.53) cmH2O in 20 normal subjects
- * [Salazar1964]. The first rows take the mean of h, and one or two deviations from it; then come
- * two and three times c (lost recoil) and half of c (fibrosis). Venegas: b d is between 10^3.3 and
- * 10^5 mL cmH2O, about the range of published curves (Narusawa, J. Appl. Physiol. 91, 2001). ARDS
- * has a small b and d and a large c. */
+/* Salazar and Knowles: c = ln 2 / h. The pressure h at half inflation was 7.58 (SD 2.53) cmH2O in
+ * 20 normal subjects [Salazar1964]. The first rows have the mean of h, and h one or two deviations
+ * away. Then follow two and three times the normal c (lost recoil), and half of it (fibrosis).
+ * Venegas: b d is between 10^3.3 and 10^5 mL cmH2O, about the range of published curves (Narusawa,
+ * J. Appl. Physiol. 91, 2001). ARDS has a small b and d and a large c. */
 static const truth truths[] = {
     {"Salazar-Knowles, normal mean", 0.0, 30.0, 0.0, 6413.0, 0.0914, 0.0},
     {"Salazar-Knowles, normal +1 SD", 0.0, 30.0, 0.0, 6413.0, 0.0686, 0.0},
@@ -106,7 +107,8 @@ TEST(test_fit_published_curves_error_below_one_percent) {
     assert_close(report.rms, 0.01 * report.rms_percent * truth_range(&truths[i]),
                  1e-9 * report.rms + 1e-12);
     assert_true(curve.pressure[0] == truths[i].low && curve.pressure[1] == truths[i].high);
-    /* An exponential 1 - exp(-c P) has one control parameter, -c (high - low) / 2. */
+    /* A d of 0 marks an exponential 1 - exp(-c P). The slope of its log compliance is constant:
+     * only the first control parameter, -c (high - low) / 2, is not 0. */
     if (truths[i].d == 0.0) {
       assert_close(curve.control[0], -0.5 * truths[i].c * truths[i].high, 1e-6);
       for (size_t c = 1; c < SUPINE_PV_CONTROLS; ++c) {
@@ -186,8 +188,8 @@ TEST(test_fit_data_of_model_recovers_parameters) {
   }
 }
 
-/* The number of 400 fits whose interval contains the true parameter is binomial, 380 (SD 4.4) at a
- * rate of 0.95. Five deviations are allowed. */
+/* If the rate is 0.95, 380 of 400 fits have an interval that contains the true parameter (binomial,
+ * SD 4.4). A difference of five deviations is allowed. */
 TEST(test_fit_intervals_cover_truth_at_nominal_rate) {
   enum { SEEDS = 400, COUNT = 21 };
   gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The reach, a distance in mm over which forces spread, has the same effect in any mesh. */
+/* Test that a reach, the distance in mm over which forces spread, acts alike in any mesh. */
 #include "test.h"
 
 #include <gsl/gsl_linalg.h>
@@ -10,9 +10,11 @@
 
 #include "lungs_helpers.h"
 
-static supine_model model; /* the paper's law with the reach of the current test */
+/* Model of [Santhanam2008] with the reach, the distance over which forces spread, of a test. */
+static supine_model model;
 
-/* Return the catch [N], the force that each vertex keeps, for a force and stiffness [N]. */
+/* Return, for each vertex, the part of the force that stays there, from the force and the stiffness
+ * of each vertex (malloc). */
 static double *solve(const supine_lungs *lungs, const double *stiffness, const double *force) {
   const size_t n = lungs->mesh.vertex_count;
   supine_equilibrium *equilibrium = NULL;
@@ -105,8 +107,9 @@ TEST(test_reach_solution_equals_dense_solution) {
       gsl_matrix_set(link_weight, n + k, edge[c], w);
     }
   }
-  /* The matrix I - A, where A[i, j] = s_i w_ij / z_j for link weights w, and z_j is the sum of s_l
-   * w_lj over l. */
+  /* The matrix I - A. A[i, j] = s_i w_ij / z_j is the share of the force at node j that goes to
+   * node i. w_ij is the weight of the link of both nodes, s_i that of node i. z_j is the sum of
+   * s_l w_lj over all nodes l. */
   gsl_matrix *matrix = gsl_matrix_alloc(nodes, nodes);
   gsl_vector *b = gsl_vector_calloc(nodes);
   gsl_vector *x = gsl_vector_alloc(nodes);
@@ -132,7 +135,7 @@ TEST(test_reach_solution_equals_dense_solution) {
   double given = 0.0;
   for (size_t i = 0; i < n; ++i) {
     const double own = area[i] / mean;
-    /* expected catch: the part of x_i that mass i keeps */
+    /* the part of the total force x_i that stays at mass i */
     const double expected = s[i] * own / z[i] * gsl_vector_get(x, i);
     assert_true(fabs(own * found[i] - expected) < 1e-10 * largest);
     balance += own * found[i];
@@ -167,7 +170,7 @@ TEST(test_reach_constant_force_gives_constant_catch) {
 }
 
 /* Make a sphere of radius 100 mm about the origin, whose vertices are shifted within the surface by
- * up to about `irregularity` times the length of a link. */
+ * up to about `irregularity` times the length of an edge. */
 static supine_mesh sphere(size_t frequency, double irregularity) {
   supine_mesh mesh = {.vertex_count = supine_phantom_geodesic_vertex_count(frequency),
                       .triangle_count = supine_phantom_geodesic_triangle_count(frequency)};
@@ -188,8 +191,10 @@ static supine_mesh sphere(size_t frequency, double irregularity) {
   return mesh;
 }
 
-/* Return the relative error of the damping of a harmonic on a sphere of radius r. For the reach R,
- * the solution of (1 - R^2 Laplacian) F = Y_lm is F = Y_lm / (1 + l (l + 1) R^2 / r^2). */
+/* Return the relative error with which a solve damps the harmonic Y_lm on a sphere of radius r. R
+ * is the reach. The exact solution of (1 - R^2 Laplacian) F = Y_lm is
+ *
+ *     F = Y_lm / (1 + l (l + 1) R^2 / r^2) */
 static double harmonic_error(size_t frequency, double irregularity, double reach, size_t l, int m) {
   supine_lungs lungs = lungs_of(sphere(frequency, irregularity), reach);
   const size_t n = lungs.mesh.vertex_count;
@@ -225,7 +230,7 @@ TEST(test_reach_sphere_damps_harmonics_as_laplacian) {
       printf("reach %2.0f mm, l = %zu: error %.2e with 642 vertices, %.2e with 5762, %.2e if "
              "irregular\n",
              reaches[r], l, coarse, fine, rough);
-      /* Some error remains even on a fine mesh, as links are not isotropic. */
+      /* Some error remains even on a fine mesh, as the springs of a vertex are not isotropic. */
       assert_true(coarse < 0.1);
       assert_true(fine < 0.1);
       assert_true(rough < 0.15);
@@ -260,8 +265,8 @@ static double spread(size_t frequency, double reach) {
   return sqrt(square / sum);
 }
 
-/* A point force spreads by twice the reach R (RMS distance) in any mesh: the response in the plane,
- * K_0(r / R), has the RMS radius 2 R. */
+/* In any mesh, a point force spreads over an RMS distance of 2 R, where R is the reach. This is the
+ * RMS radius of the response in the plane, the Bessel function K_0(r / R) at distance r. */
 TEST(test_reach_finer_mesh_spreads_same_distance) {
   double with[3];
   double without[3];

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The reference surface at full inflation, estimated from scans in any state, and the volume at
- * rest by posture. */
+/* Test the surface at full inflation, estimated from scans in any state, and the volume at rest in
+ * each posture. */
 #include "test.h"
 
 #include <supine/runtime.h>
@@ -120,8 +120,8 @@ TEST(test_resting_options_override_defaults) {
   supine_error error = {0};
   assert_memory_equal(resting.share[0], left, sizeof left);
   assert_memory_equal(resting.share[1], right, sizeof right);
-  /* If one share of full inflation is given for both lungs, the ratio of their shares stays. The
-   * mean of their shares is the given share if the lungs have the usual sizes. */
+  /* Set the volume at rest of both lungs together to 0.5 of the full volume. The shares of the
+   * single lungs keep their default ratio, and have the mean 0.5 for lungs of the usual sizes. */
   assert_int_equal(supine_reference_resting_set(&resting, "HFP", "0.5", &error), SUPINE_OK);
   assert_true(fabs(0.45 * resting.share[0][3] + 0.55 * resting.share[1][3] - 0.5) < 1e-15);
   assert_true(fabs(resting.share[0][3] / resting.share[1][3] - 0.464 / 0.475) < 1e-15);
@@ -141,8 +141,8 @@ TEST(test_resting_options_override_defaults) {
   }
 }
 
-/* A volume in mL becomes a share of the full volume of each lung. Postures without a given volume
- * or share change by the same factor. */
+/* A volume at rest in mL becomes a share of the full volume of each lung. In postures without a
+ * given value, the default share is multiplied by the ratio of given to default volume. */
 TEST(test_resting_volumes_become_shares) {
   static const int side[2] = {1, -1};
   static const double full[2] = {2500.0, 3100.0};
@@ -207,8 +207,9 @@ TEST(test_scan_parse_states_accepted_or_refused) {
   }
 }
 
-/* Between rest and full inflation, both lungs have gained the same fraction of their whole gain
- * (Milic-Emili). Below rest, their volumes keep the ratio that they have at rest. */
+/* Above rest, both lungs are inflated by the same fraction of the difference between their volumes
+ * at rest and at full inflation (Milic-Emili). Below rest, the ratio of their volumes is that at
+ * rest. */
 TEST(test_share_out_any_volume_divided_along_straight_lines) {
   static const double left_side[3] = {1.0, 0.0, 0.0};
   static const double upright[3] = {0.0, 0.0, -1.0};
@@ -254,7 +255,7 @@ TEST(test_law_constants_equal_table) {
 TEST(test_reference_scan_of_any_state_recovers_full_lungs) {
   static const struct {
     const char *scanned;
-    double volume; /* mL; above rest if `scanned` names rest */
+    double volume; /* mL: total, or relative to the volume at rest if `scanned` names rest */
   } scans[] = {
       {"supine:full-3000", 3000.0},    {"supine+15:full-2200", 3800.0}, {"prone:rest", 0.0},
       {"left:full-900", 5100.0},       {"right:rest+800", 800.0},       {"supine:rest-150", -150.0},
@@ -321,8 +322,8 @@ TEST(test_capacity_height_and_sex_literal) {
   }
 }
 
-/* The state of a scan is doubted if full inflation is not of an adult's size, or if the given rest
- * volume disagrees with the scan. */
+/* The given state of a scan is reported as doubtful if full inflation is not of an adult's size, or
+ * if the given volume at rest disagrees with the scan. */
 TEST(test_doubt_implausible_volume_names_option) {
   static const struct {
     const char *scanned;
@@ -356,7 +357,8 @@ TEST(test_doubt_implausible_volume_names_option) {
   }
 }
 
-/* Real lungs with a rest volume of 0.35 of the full volume inflate fully in at most 30 solves. */
+/* If the volume of real lungs at rest is 0.35 of the full volume, full inflation is found in at
+ * most 30 solves. */
 TEST(test_reference_real_scans_reach_full_inflation) {
   static const char *const pairs[][2] = {{"lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj"},
                                          {"covid/covid001_left.ply", "covid/covid001_right.ply"}};
@@ -386,7 +388,7 @@ TEST(test_reference_real_scans_reach_full_inflation) {
   }
 }
 
-/* Make a basis of lungs scanned in a state; set its RMS error, mm. */
+/* Make a basis of lungs scanned in a state, and write its RMS error, mm, to `rms_mm`. */
 static supine_basis *basis_of(supine_lungs *lungs, const supine_scan *scan, double *rms_mm) {
   const supine_resting resting = supine_reference_resting_default();
   supine_precompute_options options = {
@@ -407,7 +409,7 @@ static supine_basis *basis_of(supine_lungs *lungs, const supine_scan *scan, doub
   return basis;
 }
 
-/* Return the positions of a basis in a state (malloc), and set the volume of each lung, mL. */
+/* Return the vertices of a basis in a state (malloc). Set `ml` to the volume of each lung, mL. */
 static double *positions_in(const supine_basis *basis, const supine_state *state, double *ml) {
   const size_t n = supine_basis_get_info(basis)->vertex_count;
   supine_pose pose;
@@ -457,7 +459,7 @@ TEST(test_basis_of_any_scan_reproduces_scan_and_rest) {
     printf("%s: scan reproduced within %.4f and %.4f mm; error of the basis %.4f mm RMS\n",
            scans[s], farthest(placed, scanned, n), farthest(posed, scanned, n), rms);
     assert_true(farthest(placed, scanned, n) < promised);
-    /* The basis computes full inflation with an error of a few mL. */
+    /* Except at rest, an error of a few mL in the full volume moves vertices slightly. */
     assert_true(farthest(posed, scanned, n) <
                 (rests && scan.state.volume.ml == 0.0 ? promised : 0.15));
     free(placed);
@@ -496,7 +498,8 @@ TEST(test_reference_impossible_states_refused) {
     assert_says(error.message, "--scanned");
     assert_false(found.known);
   }
-  supine_model rough = model; /* the surface folds on the way to full inflation */
+  /* A model whose surface folds on the way to full inflation. */
+  supine_model rough = model;
   rough.reach = 0.0;
   double *stiffness = malloc(lungs.mesh.vertex_count * sizeof *stiffness);
   uint64_t seed = 5;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Pictures: views, colours, colour bars and drawings. */
+/* Test pictures: views, colours, colour bars and drawings. */
 #include "test.h"
 
 #include "program/render/render.h"
@@ -64,7 +64,8 @@ TEST(test_colours_increasing_value_even_steps_of_lightness) {
         assert_true(rgb[k] >= 0 && rgb[k] <= 1);
       }
       if (i > 0) {
-        /* All 64 steps together change the lightness by about 70. */
+        /* The 64 steps of a colour map together change L* by about 70, so each changes it by
+         * about 1.1. */
         assert_true(here - before > 0.5 && here - before < 1.8);
       }
       before = here;
@@ -221,7 +222,8 @@ TEST(test_project_outer_vertices_match_drawing) {
         drawn[2 * side + 1] = fmax(drawn[2 * side + 1], place[side] + 1);
       }
     }
-    for (int end = 0; end < 4; ++end) { /* the tip of a triangle may cover no pixel */
+    /* At the left, right, top or bottom end, a triangle may be too thin to cover a pixel. */
+    for (int end = 0; end < 4; ++end) {
       assert_true(fabs(projected[end] - drawn[end]) < 3);
     }
   }

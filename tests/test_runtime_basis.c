@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Basis files: valid files open, and damaged files are refused. */
+/* Test basis files: valid files open, and damaged files are refused. */
 #include "test.h"
 
 #include <supine/runtime.h>
@@ -123,7 +123,8 @@ TEST(test_open_every_flipped_bit_refused_or_same) {
     damaged[bit / 8] ^= (unsigned char)(1U << bit % 8);
     const supine_status status = open_copy(damaged, size, NULL);
     if (status == SUPINE_OK) {
-      assert_true(bit / 8 < 8 + header); /* changed data are always detected */
+      /* Only changes of the header or its length may go undetected, never of the data. */
+      assert_true(bit / 8 < 8 + header);
       assert_same_basis(bytes, damaged, size);
       ++accepted;
     } else {
@@ -131,7 +132,7 @@ TEST(test_open_every_flipped_bit_refused_or_same) {
     }
     damaged[bit / 8] ^= (unsigned char)(1U << bit % 8);
   }
-  /* Only white space in the padding may change unnoticed. */
+  /* Only the white space that pads the header may change unnoticed. */
   assert_true(accepted <= 8);
   /* Try other values of each byte of the header. */
   for (size_t i = 0; i < 8 + header; ++i) {
@@ -243,7 +244,7 @@ typedef struct parts {
   size_t tensor_count;
   supine_metadata metadata[4];
   size_t metadata_count;
-  const char *message; /* text that a refusal must contain; the path of the file if NULL */
+  const char *message; /* text that the error message must contain; NULL: the path */
 } parts;
 
 static const float zeros[64] = {0};
@@ -292,7 +293,7 @@ TEST(test_open_wrong_structure_refused) {
     p = sound();
     p.tensors[i].dtype = p.tensors[i].dtype == SUPINE_U8 ? SUPINE_U32 : SUPINE_U8;
     assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
-    /* Each axis in turn is longer or empty. */
+    /* Make each axis in turn too long or empty. */
     for (size_t axis = 0; axis < p.tensors[i].rank; ++axis) {
       p = sound();
       p.tensors[i].shape[axis] += 1;
@@ -323,12 +324,14 @@ TEST(test_open_wrong_structure_refused) {
   assert_int_equal(open_parts(&p), SUPINE_OK);
   p.tensors[9] = (supine_tensor){"resting_volume", SUPINE_F64, 2, {2, 9}, zeros64};
   assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
-  p = sound(); /* a basis of kind `vector` needs coefficients [N, 3, K] */
+  /* Kind `vector` needs three components: coefficients [N, 3, number of modes]. */
+  p = sound();
   p.metadata[2].value = "vector";
   assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
   p.tensors[3] = (supine_tensor){"coefficients", SUPINE_F32, 3, {4, 3, 1}, zeros};
   assert_int_equal(open_parts(&p), SUPINE_OK);
-  p = sound(); /* A basis without volume forms is valid. */
+  /* A basis without volume forms, the three tensors volume_linear to volume_cubic, is valid. */
+  p = sound();
   p.tensor_count = 6;
   assert_int_equal(open_parts(&p), SUPINE_OK);
   p.tensor_count = 7;

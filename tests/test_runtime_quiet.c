@@ -13,9 +13,9 @@
 
 #include "tests/poses.h"
 
-static size_t calls;    /* calls of the wrapped functions */
+static size_t calls;    /* calls of the functions that the linker wraps */
 static size_t live;     /* blocks allocated and not yet freed */
-static size_t fail_at;  /* which allocation to refuse, from 1; 0 refuses none */
+static size_t fail_at;  /* number of the allocation to refuse, from 1; 0: none */
 static size_t attempts; /* allocations so far */
 static bool counting;
 
@@ -25,7 +25,7 @@ static bool refuse(void) {
   return counting && attempts == fail_at;
 }
 
-/* NOLINTBEGIN(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp): the linker's names */
+/* NOLINTBEGIN(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp): names for ld --wrap */
 void *__real_malloc(size_t size);
 void *__real_calloc(size_t count, size_t size);
 void *__real_realloc(void *old, size_t size);
@@ -120,8 +120,8 @@ static void use_all(const supine_basis *basis, float *xyz) {
   (void)supine_state_describe(&state, text, sizeof text);
   (void)supine_basis_pose(basis, &state, &pose, &error);
   state = supine_basis_scan(basis);
-  for (state.volume.ml = 3; state.volume.ml < 1e10;
-       state.volume.ml *= 1e9) { /* 3 mL can be added, 3e9 mL cannot */
+  /* 3 mL can be added, 3e9 mL cannot. */
+  for (state.volume.ml = 3; state.volume.ml < 1e10; state.volume.ml *= 1e9) {
     if (supine_basis_pose(basis, &state, &pose, &error) == SUPINE_OK &&
         supine_basis_get_info(basis)->has_volume) {
       supine_basis_volumes(basis, &pose, scales);

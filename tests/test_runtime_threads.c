@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Several threads use one basis: each in its own orientation, and all together in a shared one. */
+/* Several threads use one basis: each in an orientation of its own, and all together in an
+ * orientation that they share. */
 #include <pthread.h>
 
 #include "test.h"

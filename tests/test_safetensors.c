@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Safetensors files: round trips, refused files and checksums. */
+/* Test safetensors files: round trips, refused files and checksums. */
 #include "test.h"
 
 #include <supine/safetensors.h>
@@ -169,8 +169,8 @@ TEST(test_open_valid_headers_accepted) {
       {"{ \n\t\"a\" : { \"shape\" : [ 2 ] , \"data_offsets\":[0, 2 ],\"dtype\":\"U8\"} }  ", 2},
       {"{\"__metadata__\":{}," A8 "}", 2},
       {"{\"__metadata__\":{\"\\u00e9\\ud83e\\udec1\\/\\b\\f\\n\\r\\t\":\"\"}," A8 "}", 2},
-      {"{\"b\":{\"dtype\":\"F32\",\"shape\":[1],\"data_offsets\":[2,6]}," A8 "}",
-       6}, /* misaligned data */
+      /* The data of `b` are not aligned to 4 bytes. */
+      {"{\"b\":{\"dtype\":\"F32\",\"shape\":[1],\"data_offsets\":[2,6]}," A8 "}", 6},
       {"{\"e\":{\"dtype\":\"F64\",\"shape\":[0,9],\"data_offsets\":[2,2]}," A8 "}", 2},
   };
   for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
@@ -190,17 +190,17 @@ TEST(test_open_bad_headers_refused) {
       {" {}", 0},
       {"{", 0},
       {"{}x", 0},
-      {"{" A8 "}", 1},        /* truncated data */
-      {"{" A8 "}", 3},        /* trailing data */
+      {"{" A8 "}", 1},        /* 1 byte of data, not 2 */
+      {"{" A8 "}", 3},        /* 3 bytes of data, not 2 */
       {"{" A8 ",}", 2},       /* trailing comma */
       {"{" A8 " " A8 "}", 2}, /* missing comma */
-      {"{" A8 "," A8 "}", 4}, /* repeated name */
-      {"{" A8 ",\"b\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[1,3]}}",
-       3}, /* overlapping data */
-      {"{" A8 ",\"b\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[3,5]}}",
-       5}, /* unused bytes */
-      {"{" A8 ",\"b\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[0,2]}}",
-       2}, /* shared data */
+      {"{" A8 "," A8 "}", 4}, /* two tensors named `a` */
+      /* tensors whose bytes overlap */
+      {"{" A8 ",\"b\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[1,3]}}", 3},
+      /* an unused byte between the tensors */
+      {"{" A8 ",\"b\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[3,5]}}", 5},
+      /* two tensors with the same bytes of data */
+      {"{" A8 ",\"b\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[0,2]}}", 2},
       {"{\"a\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[2,0]}}", 2},
       {"{\"a\":{\"dtype\":\"U8\",\"shape\":[3],\"data_offsets\":[0,2]}}", 2},
       {"{\"a\":{\"dtype\":\"F16\",\"shape\":[1],\"data_offsets\":[0,2]}}", 2},

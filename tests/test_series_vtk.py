@@ -85,7 +85,7 @@ with tempfile.TemporaryDirectory() as folder:
     points, triangles = exact["positions"].astype(float), exact["triangles"]
     rest, lung = basis["vertices"].astype(float), basis["lung"]
     frames = len(points)
-    assert frames == 11 and np.ptp(exact["volume"].sum(1)) > 50  # volumes vary by more than 50 mL
+    assert frames == 11 and np.ptp(exact["volume"].sum(1)) > 50
 
     # All frames have the same triangles; the file holds them once.
     for step in (0, 7, 3, 10):
@@ -108,11 +108,11 @@ with tempfile.TemporaryDirectory() as folder:
                       paper["vertices"].astype(float), paper["lung"])
         moved = np.abs(vtk_to_numpy(surface.GetPointData().GetArray("displacement"))).max()
         assert (moved > 1) == (step != 0), moved  # mm; only the first frame is the scan
-    # Size relative to uncompressed points, displacements, magnitudes, triangles and offsets.
+    # File size relative to that of uncompressed points, displacements, magnitudes, triangles and offsets.
     n, m = len(rest), len(triangles)
     share = os.path.getsize("breath.vtp") / (frames * (28 * n + 16 * m))
     print(f"{frames} frames of {n} vertices: {share:.3f} of the bytes without compression")
-    assert share <= 0.42  # at the fastest level of compression; the slowest gives 0.39
+    assert share <= 0.42  # file size at the fastest level of compression; the slowest level gives 0.39
 
     # A file with a single surface has the same arrays as a file with a breath.
     run("deform", "lungs.safetensors", "--posture", "prone", "-o", "prone.vtp")

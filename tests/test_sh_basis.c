@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Y_lm of a direction: closed forms, orthonormality, addition theorem, edge cases. */
+/* Test spherical harmonics Y_lm of a direction: closed forms, orthonormality, addition theorem,
+ * edge cases. */
 #include <float.h>
 
 #include "sh/grid.h"
@@ -121,8 +122,9 @@ TEST(test_evaluate_under_quadrature_rule_orthonormal) {
   }
 }
 
-/* All harmonics up to band 64 are orthonormal. The full Gram matrix would need 7e10 products, but
- * sums over a ring separate the orders m, so each order is integrated over latitude only. */
+/* All harmonics up to band 64 are orthonormal. The full Gram matrix would need 7e10 products.
+ * Harmonics of different order m are orthogonal on every ring of latitude, so only those of equal m
+ * are integrated, over latitude. */
 TEST(test_evaluate_band_64_orthonormal_in_latitude) {
   const size_t band = SUPINE_SH_BAND_MAX;
   supine_sh_grid *grid = NULL;
@@ -153,7 +155,8 @@ TEST(test_evaluate_band_64_orthonormal_in_latitude) {
   supine_sh_grid_destroy(grid);
 }
 
-/* The sum over m of Y_lm(a) Y_lm(b) is (2 l + 1) / (4 pi) P_l(a.b). */
+/* The sum over m of Y_lm(a) Y_lm(b) is (2 l + 1) / (4 pi) P_l(a.b), where P_l is a Legendre
+ * polynomial. */
 TEST(test_evaluate_two_directions_obey_addition_theorem) {
   const double tolerance = 2048 * DBL_EPSILON;
   static double ya[COUNT_MAX];

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The quadrature rule: literal nodes, exactness, directions, refused arguments. */
+/* Test the quadrature rule: tabulated nodes, exactness, directions, refused arguments. */
 #include <float.h>
 
 #include "sh/grid.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* States as text: every valid form is parsed, printed and parsed again; other text is refused with
- * a message. */
+/* Test states as text: every valid form is parsed, printed and parsed again; other text is refused
+ * with a message. */
 #include "test.h"
 
 #include <supine/state.h>

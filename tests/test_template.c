@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Templates: names, sections, included files, escapes. */
+/* Test templates: names, sections, included files, escapes. */
 #include "program/export/template.h"
 #include "test.h"
 

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A basis file has the same bytes for any number of threads. */
+/* Test that a basis file has the same bytes for any number of threads. */
 #include "precompute/lungs/phantom.h"
 #include "precompute/precompute.h"
 #include "test.h"
 
-enum { VERTICES = 9000 }; /* enough for several blocks of each parallel sum, the last one short */
+enum { VERTICES = 9000 }; /* several blocks of each parallel sum, the last incomplete */
 
 static supine_lungs phantom(void) {
   supine_mesh mesh = {0};

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Options of `solve` and `precompute` for tissue: accepted and refused values, warnings, output. */
+/* Test the options of `solve` and `precompute` for tissue: accepted and refused values, warnings,
+ * output. */
 #include "mesh/mesh.h"
 #include "precompute/lungs/phantom.h"
 #include "test.h"
@@ -150,7 +151,7 @@ TEST(test_solve_expandability_file_of_ones_equals_uniform) {
 /* If a lung is collapsed, the volumes of the deformed surface still equal the stated volumes of
  * each lung and of both. */
 TEST(test_precompute_collapsed_lung_volumes_exact) {
-  double volumes[2][2]; /* mL gained; first index 0 healthy, 1 collapsed left lung */
+  double volumes[2][2]; /* mL gained: [healthy, collapsed left lung][left, right] */
   double rests[2][2];
   supine_basis *healthy = NULL;
   static const char *const shares[] = {"left:1", "left:0.3"};
@@ -209,7 +210,9 @@ TEST(test_precompute_collapsed_lung_volumes_exact) {
     free(xyz);
     if (ill == 0) {
       healthy = basis;
-    } else { /* At equal scale, a collapsed lung gains 0.3 times as much volume. */
+    } else {
+      /* At equal factors on the displacement, a collapsed lung gains 0.3 times the volume of a
+       * healthy one. */
       const double healthy_gain = posed_lung_volume(healthy, 0, weights, scales[0]);
       assert_true(fabs(volumes[1][0] - 0.3 * healthy_gain) < 1e-4);
       supine_basis_close(basis);
@@ -218,7 +221,8 @@ TEST(test_precompute_collapsed_lung_volumes_exact) {
   supine_basis_close(healthy);
   assert_true(fabs(rests[1][0] - 0.3 * rests[0][0]) < 0.05);
   assert_true(fabs(rests[1][1] - rests[0][1]) < 0.05);
-  assert_true(volumes[1][1] > volumes[0][1] + 50.0); /* the other lung gains over 50 mL more */
+  /* The right lung gains over 50 mL more if the left lung is collapsed. */
+  assert_true(volumes[1][1] > volumes[0][1] + 50.0);
   assert_true(volumes[1][0] < 0.6 * volumes[0][0]);
 }
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Meshes and stiffness unlike those of lungs: the solver reaches the required residual. */
+/* Test that the solver reaches the required residual on meshes and stiffness unlike a lung's. */
 #include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
 #include "test.h"
@@ -13,7 +13,8 @@ static supine_mesh phantom(void) {
 }
 
 /* Return the largest difference between the applied force and the force computed back from a
- * solution, relative to the largest force. With a reach, first divide both by the stiffness. */
+ * solution, relative to the largest force. If the model spreads forces over a distance, its reach,
+ * first divide both by the stiffness. */
 static double residual(const supine_lungs *lungs, const supine_model *model, const double g[3],
                        const supine_solution *solution) {
   const size_t n = solution->vertex_count;
@@ -33,8 +34,9 @@ static double residual(const supine_lungs *lungs, const supine_model *model, con
   return relative;
 }
 
-/* Solve with and without a reach. Assert a small residual and a finite catch, the force that each
- * vertex keeps. Without a reach, no catch is negative. */
+/* Solve without and with a reach, a distance over which forces spread. Assert a small residual.
+ * Assert that the force that each vertex keeps, catch_, is finite, and not negative without a
+ * reach. */
 static void check(const char *what, supine_mesh *mesh, const double *stiffness) {
   static const double g[3] = {0.48, 0.64, -0.6};
   supine_lungs lungs = {0};

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The transform of fields on a grid: round trips, comparison with quadrature, refused arguments. */
+/* Test the transform of fields on a grid: round trips, comparison with quadrature, refused
+ * arguments. */
 #include <float.h>
 
 #include "sh/transform.h"
@@ -52,7 +53,7 @@ static double largest_difference(const double *a, const double *b, size_t count)
   double worst = 0;
   for (size_t i = 0; i < count; ++i) {
     const double off = fabs(a[i] - b[i]);
-    worst = off <= worst ? worst : off; /* any NaN makes the result NaN */
+    worst = off <= worst ? worst : off;
   }
   return worst;
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* [Santhanam2008] Figs. 7 to 9: a sheet, a ring and convergence, compared with a mass-spring-damper
- * system integrated until it is at rest. */
+/* Compare a sheet and a ring ([Santhanam2008] Figs. 7 to 9) with a mass-spring-damper system
+ * integrated until it is at rest. */
 #include "test.h"
 #include "validation.h"
 
@@ -33,7 +33,8 @@ TEST(test_solve_plane_equals_mass_spring_damper) {
   free(theirs);
 }
 
-/* The sheet may also have unequal links and stiffness that varies fourfold. */
+/* A sheet with springs of unequal length and stiffness that varies fourfold also moves like a
+ * mass-spring-damper system. */
 TEST(test_solve_irregular_plane_equals_mass_spring_damper) {
   frame f = frame_plane(15, 7.0);
   const size_t n = f.mesh.vertex_count;
@@ -79,7 +80,7 @@ TEST(test_solve_uniform_ring_stays_circle) {
     least_radius = fmin(least_radius, hypot(x, y));
     largest_radius = fmax(largest_radius, hypot(x, y));
   }
-  assert_true(least_radius > 51.0); /* the radius was 50 mm */
+  assert_true(least_radius > 51.0); /* before: 50 mm */
   assert_true(largest_radius - least_radius <= 1e-10);
   free(force);
   frame_free(&f);
@@ -100,7 +101,8 @@ TEST(test_solve_mixed_ring_stiff_part_moves_less) {
     printf("ring with a third %g times as stiff: the third moves %.4f, the opposite side %.4f\n",
            factors[k], middle, opposite);
     for (size_t i = 0; i < COUNT; ++i) {
-      assert_true(catch_[i] > 0.0); /* nothing moves inwards, as in a balloon */
+      /* As on an inflated balloon, every point moves outwards. */
+      assert_true(catch_[i] > 0.0);
     }
     assert_true(middle / opposite < last);
     assert_true(factors[k] == 1.0 ? fabs(middle / opposite - 1.0) < 1e-10
@@ -117,8 +119,8 @@ static void count_steps(void *context, size_t steps, double held) {
   *(size_t *)context = steps;
 }
 
-/* For an error of 1e-6, the paper's Pitcher/Catcher solver visits link ends less often than the
- * mass-spring-damper system ([Santhanam2008] Fig. 7). */
+/* To reach an error of 1e-6, the Pitcher/Catcher solver of [Santhanam2008] (Fig. 7) visits spring
+ * ends less often than the mass-spring-damper system. */
 TEST(test_pitcher_catcher_converges_before_mass_spring_damper) {
   frame f = frame_plane(15, 10.0);
   const size_t n = f.mesh.vertex_count;

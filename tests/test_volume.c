@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Volumes computed from polynomials in weights or gains (volume forms) equal those of the surface.
- * The scale or the gains for a given volume are found. */
+/* Test volume forms, polynomials that give a volume from the weights of modes or from factors on
+ * the displacement (gains). They equal the volume of the surface, and the gains for a given volume
+ * are found. */
 #include <float.h>
 
 #include "test.h"
@@ -91,8 +92,8 @@ TEST(test_scale_random_volumes_reached) {
   fixture_destroy(f);
 }
 
-/* Make a basis whose volume is exactly a s + b s^2 + c s^3 mL at scale s. It has one mode, whose
- * weight is 1 in any direction. */
+/* Make a basis whose volume change is a s + b s^2 + c s^3 mL if the displacement is multiplied by
+ * s. It has one mode, whose weight is 1 in any direction. */
 static supine_basis *open_cubic(double a, double b, double c, unsigned char **bytes) {
   fixture *f = fixture_create(5, 1, 0, 1, false, true, 1, 3);
   f->mode[0] = 1 / 0.28209479177387814;
@@ -106,14 +107,14 @@ static supine_basis *open_cubic(double a, double b, double c, unsigned char **by
 
 TEST(test_scale_cubic_volume_gives_root_connected_to_zero) {
   static const struct {
-    /* The scale s solves a s + b s^2 + c s^3 = volume; NAN if the volume is refused. */
+    /* `scale` is the s that solves a s + b s^2 + c s^3 = volume; NAN if the volume is refused. */
     double a, b, c, volume, scale;
   } cases[] = {
       {2, 0, 0, 10, 5},
       {2, 0, 0, -10, -5},
       {-2, 0, 0, 10, -5}, /* the displacement shrinks the lung */
       {0, 0, 0, 1, NAN},  /* the volume never changes */
-      {0, 0, 1, 8, NAN},  /* s^3 has the slope 0 at s = 0 */
+      {0, 0, 1, 8, NAN},  /* refused: s^3 has the slope 0 at s = 0 */
       {0, 0, 0, 0, 0},
       {2, 1, 0, 8, 2},        /* 2 s + s^2 = 8 at s = 2; s = -4 is beyond the minimum */
       {2, 1, 0, -0.75, -0.5}, /* 2 s + s^2 has the minimum -1 at s = -1 */
@@ -180,8 +181,8 @@ TEST(test_pose_open_surface_refused) {
   fixture_destroy(f);
 }
 
-/* Change of volume of a box that holds 3000 mL at full inflation. A gain of -1 on an axis shortens
- * the side along x by 20 %, along y by 25 %, and along z by 30 %. */
+/* Change of volume of a box that holds 3000 mL at full inflation, from the gains on its axes. A
+ * gain of -1 shortens the side along x by 20 %, along y by 25 %, and along z by 30 %. */
 static const supine_volume_form box_form = {{3000 * 0.2, 3000 * 0.25, 3000 * 0.3, 3000 * 0.25 * 0.3,
                                              3000 * 0.2 * 0.3, 3000 * 0.2 * 0.25,
                                              3000 * 0.2 * 0.25 * 0.3}};
@@ -199,7 +200,7 @@ TEST(test_volume_form_gains_any_volume_reached_on_path) {
     assert_int_equal(supine_volume_form_gains(&box_form, box_bend, rest, part * rest, gains, NULL),
                      SUPINE_OK);
     assert_true(fabs(box_volume(gains) - part * rest) <= 1e-9);
-    /* On the path, the gain of axis 0 is the mean of the gains of axes 1 and 2. */
+    /* `box_bend` makes the gain along x the mean of the gains along y and z. */
     assert_true(fabs(gains[1] + gains[2] - 2 * gains[0]) <= 1e-12);
     for (size_t axis = 0; axis < 3; ++axis) {
       assert_true(gains[axis] < last[axis]);
@@ -218,11 +219,13 @@ TEST(test_volume_form_gains_at_rest_equal_on_all_axes) {
   }
 }
 
-/* The gains change as 1 : 0.1 : 1.9 at rest, and as 1 : 1.45 : 0.55 at full inflation. */
+/* The gains along x, y and z change in the ratio 1 : 0.1 : 1.9 at rest, and 1 : 1.45 : 0.55 at full
+ * inflation. */
 TEST(test_volume_bend_path_has_stated_slopes) {
   static const double stated[2][3] = {{1, 1.45, 0.55}, {1, 0.1, 1.9}};
   for (size_t end = 0; end < 2; ++end) {
-    for (int side = -1; side <= 1; side += 2) { /* the slope is the same on both sides */
+    /* At full inflation and at rest, the slope is the same from both sides. */
+    for (int side = -1; side <= 1; side += 2) {
       double at[3];
       double near[3];
       supine_volume_bend(box_bend, (double)end, at);
