@@ -132,7 +132,7 @@ void supine_mesh_vertex_area(const supine_mesh *mesh, double *area);
 void supine_mesh_vertex_normals(const supine_mesh *mesh, double *normals);
 
 /** Return the share, 0 to 1, of triangles whose normal turns by more than a right angle when the
- * vertices move to `vertices`. Above a few in a thousand the surface looks torn. */
+ * vertices move to `vertices`. Above a few in a thousand the folds are visible. */
 double supine_mesh_turned_over(const supine_mesh *mesh, const double *vertices);
 
 /** Numbers that describe a whole surface, for the field data of VTP. */

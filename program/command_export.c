@@ -98,7 +98,7 @@ static supine_status write_page(const export_source *source, const request *want
   if (status == SUPINE_OK) {
     (void)printf("%s: a page of %zu vertices", wanted->path, source->info->vertex_count);
     if (page.inside != NULL) {
-      (void)printf(" and the structures inside, %zu name%s", parts.count,
+      (void)printf(" and %zu structure%s inside the lungs", parts.count,
                    parts.count == 1 ? "" : "s");
     }
     (void)puts("; open it in any browser");

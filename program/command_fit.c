@@ -214,10 +214,11 @@ static supine_status order_states(const request *wanted, scan_data *data, supine
                                                 : 1.0;
   const int named = named_order(&wanted->first, &wanted->second);
   if ((named > 0 && growth < 1.0 - volume_error) || (named < 0 && growth > 1.0 + volume_error)) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "the scan named as fuller has %.0f %% of the volume of the other scan: "
-                            "exchange --rest and --other, or give --reverse",
-                            100.0 * (named > 0 ? growth : 1.0 / growth));
+    return supine_error_set(
+        error, SUPINE_ERROR_FORMAT,
+        "the scan given as the fuller one has only %.0f %% of the volume of the "
+        "other scan: exchange --rest and --other, or give --reverse",
+        100.0 * (named > 0 ? growth : 1.0 / growth));
   }
   data->second_is_fuller = named > 0 || (named == 0 && growth > 1.0);
   if (data->second_is_fuller) {

@@ -77,7 +77,8 @@ static void report_result(const char *path, const supine_lungs *lungs,
   } else if (accuracy->volume == 1.0) {
     (void)snprintf(state, sizeof state, "rest");
   } else {
-    (void)snprintf(state, sizeof state, "%g of the way from full to rest", accuracy->volume);
+    (void)snprintf(state, sizeof state, "%g of the volume change from full to rest",
+                   accuracy->volume);
   }
   (void)printf("%s: %s, %zu vertices, band %zu, %zu %s%s\n", path,
                lungs->lung_count == 2 ? "two lungs" : "one lung", lungs->mesh.vertex_count,
@@ -100,8 +101,8 @@ static void report_result(const char *path, const supine_lungs *lungs,
   }
   if (report->turned_over > turned_over_limit) {
     (void)printf(
-        "the surface looks torn: %.3g %% of its triangles turn over at %s in the worst of "
-        "six\npostures. %s\n",
+        "the surface folds: %.3g %% of its triangles turn over at %s in the worst of six\n"
+        "postures. %s\n",
         100.0 * report->turned_over, state,
         options->model.reach == 0.0
             ? "The paper law spreads forces over a few mesh links, however short: give --reach 10"

@@ -180,8 +180,8 @@ static supine_status iterate(const supine_lungs *lungs, const supine_model *mode
   if (model->reach > 0.0 || model->lesions != NULL) {
     status =
         supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                         "--pitcher-catcher iterates the paper law without lesions: give --law "
-                         "paper, and leave --reach and --lesion out");
+                         "--pitcher-catcher needs --law paper, and cannot be combined with --reach "
+                         "or --lesion");
   } else if (force == NULL || caught == NULL ||
              supine_physics_height_range(lungs, model->force.pair, 1, g, range, range + 1) !=
                  SUPINE_OK) {
@@ -198,7 +198,7 @@ static supine_status iterate(const supine_lungs *lungs, const supine_model *mode
     solution->catch_[i] = caught[i];
   }
   if (status == SUPINE_OK) {
-    (void)printf("pitcher-catcher: largest difference from the direct solve %.2g\n", difference);
+    (void)printf("Pitcher/Catcher: largest difference from the direct solution %.2g\n", difference);
   }
   free(force);
   free(caught);

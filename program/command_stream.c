@@ -136,7 +136,7 @@ static bool stop(void *context) {
 static void report(const supine_stream_server *server, const request *wanted) {
   const supine_stream_counts *n = supine_stream_server_counts(server);
   if (wanted->points != NULL) {
-    (void)printf("positions of observed points: %llu\n", (unsigned long long)n->positions);
+    (void)printf("received positions of observed points: %llu\n", (unsigned long long)n->positions);
   }
   (void)printf(
       "poses: %llu (repaired: %llu; refused: %llu); frames: %llu (sent: %llu); peers: %llu\n",
@@ -161,7 +161,8 @@ static void report(const supine_stream_server *server, const request *wanted) {
     }
   }
   if (wanted->smooth > 0.0) {
-    (void)printf("--smooth delays a steady turn by another %.0f ms\n", wanted->smooth);
+    (void)printf("--smooth adds a delay of %.0f ms during a turn at constant speed\n",
+                 wanted->smooth);
   }
 }
 

@@ -7,7 +7,7 @@
 #include "runtime/rigid.h"
 
 _Static_assert((int)SUPINE_LOCATE_POINTS_MAX == (int)SUPINE_KRIGING_POINTS_MAX,
-               "both headers have the same limit of points");
+               "locate.h and kriging.h must allow the same number of points");
 
 /* Prior standard deviation of an unknown volume, divided by the reference volume. It is 0.3 times
  * the difference between the volumes at full inflation (1) and at rest (0.43). */

@@ -18,7 +18,7 @@ static const char *const kinds[] = {[SUPINE_VOLUME_DEFAULT] = "",
                                     [SUPINE_VOLUME_SCAN] = "scan",
                                     [SUPINE_VOLUME_ABSOLUTE] = ""};
 _Static_assert(sizeof kinds / sizeof *kinds == SUPINE_VOLUME_KIND_COUNT,
-               "each kind of volume has a name");
+               "each kind of volume needs a name");
 
 enum { PIECE = 64 }; /* largest size of a posture or volume as text, in bytes, with its NUL */
 

@@ -93,8 +93,8 @@ static double cubic_solve(const double c[3], double volume, double low, double h
 
 static supine_status refuse_constant(double volume, supine_error *error) {
   return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                          "a change of the reference volume by %g mL is out of reach: "
-                          "no gain changes the volume in this posture; choose another posture",
+                          "the lungs cannot change their volume by %g mL in this posture: "
+                          "no displacement of the basis changes it; choose another posture",
                           volume);
 }
 

@@ -157,10 +157,12 @@ static void expect_refused(const supine_mesh *meshes, size_t count, const double
 TEST(test_lungs_same_lung_twice_refused) {
   supine_mesh lumps[3] = {helper_lump(20, 90.0, 3), helper_lump(6, -80.0, 4),
                           helper_lump(20, 90.0, 3)};
-  expect_refused(lumps, 3, NULL, "surfaces 1 and 3 fill the same box: give each lung once");
+  expect_refused(lumps, 3, NULL,
+                 "surfaces 1 and 3 have the same bounding box: give each lung once");
   supine_mesh_free(&lumps[2]);
   lumps[2] = helper_lump(30, 90.0, 3);
-  expect_refused(lumps, 3, NULL, "surfaces 1 and 3 fill the same box: give each lung once");
+  expect_refused(lumps, 3, NULL,
+                 "surfaces 1 and 3 have the same bounding box: give each lung once");
   for (size_t m = 0; m < 3; ++m) {
     supine_mesh_free(&lumps[m]);
   }

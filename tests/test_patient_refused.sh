@@ -125,6 +125,6 @@ refused 2 'No such file' rest.obj absent.obj
 refused 2 'give each lung once' rest.obj,rest.obj state.obj
 refused 1 'more than two surfaces' rest.obj,other.obj,state.obj state.obj
 refused 1 'nothing to fit to' --state prone:state.obj
-refused 2 'the nearest point of the other surface faces the same way for only' rest.obj state.obj --state prone:far.obj
+refused 2 'of the vertices have a normal like that of the nearest point' rest.obj state.obj --state prone:far.obj
 refused 2 'mm apart' --landmarks apart.csv rest.obj state.obj
 echo passed

@@ -309,7 +309,7 @@ TEST(test_mesh_inward_lung_flipped_and_reported) {
              "v 0 0 0\nv 100 0 0\nv 0 100 0\nv 0 0 250\nf 1 2 3\nf 1 4 2\nf 2 4 3\nf 1 3 4\n");
   EXPECT(0, "note: the triangles of the left lung faced inwards: reversed",
          "solve in.obj --posture prone -o h.ply");
-  EXPECT(2, "surfaces 1 and 2 fill the same box: give each lung once",
+  EXPECT(2, "surfaces 1 and 2 have the same bounding box: give each lung once",
          "solve in.obj in.obj --posture prone -o h.ply");
   EXPECT(2, "runs through the right lung", "solve in.obj --midline 49 --posture prone -o h.ply");
 }

@@ -53,7 +53,8 @@ static double largest_difference(const double *a, const double *b, size_t count)
   double worst = 0;
   for (size_t i = 0; i < count; ++i) {
     const double off = fabs(a[i] - b[i]);
-    worst = off <= worst ? worst : off;
+    assert_true(isfinite(off));
+    worst = fmax(worst, off);
   }
   return worst;
 }

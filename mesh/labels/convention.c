@@ -170,8 +170,8 @@ static supine_status choose(const char *path, const supine_image *image, const l
   }
   if (!read_sides(labels, side)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--labels takes the word one, lungmask, lobes, totalsegmentator or "
-                            "totalsegmentator-v1, or left=LABEL+...,right=LABEL+..., not '%s'",
+                            "--labels must be 'one', 'lungmask', 'lobes', 'totalsegmentator', "
+                            "'totalsegmentator-v1' or left=LABEL+...,right=LABEL+..., not '%s'",
                             wanted);
   }
   return SUPINE_OK;

@@ -361,7 +361,7 @@ supine_status supine_inside_embed(const supine_inside_shells *shells,
   supine_status status = SUPINE_OK;
   *report = (supine_inside_report){0};
   if (content->count == 0) {
-    return supine_error_set(error, SUPINE_ERROR_MESH, "nothing to embed: give content with points");
+    return supine_error_set(error, SUPINE_ERROR_MESH, "nothing to embed: give at least one point");
   }
   if (!allocate(&e)) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY,

@@ -151,8 +151,8 @@ static supine_status judge(const supine_lungs *lungs, const supine_lungs_source 
   if (found.joined && source->midline == NULL) {
     return supine_error_set(
         error, SUPINE_ERROR_MESH,
-        "%s: this looks like both lungs in one piece: separate them (in a label "
-        "map by --labels one), or give --midline if it is one lung",
+        "%s: this surface looks like both lungs in one piece: separate them (for a label map by "
+        "--labels one). If it is a single lung, give --midline",
         source->name);
   }
   if (found.axes != SUPINE_AXES_LPS) {

@@ -181,9 +181,9 @@ static supine_status check_surfaces(const supine_mesh *meshes, size_t count, sup
         apart = fmax(apart, fabs(box[0][k / 3][k % 3] - box[1][k / 3][k % 3]));
       }
       if (apart <= same_box_share * fmax(side[0], side[1])) {
-        return supine_error_set(error, SUPINE_ERROR_MESH,
-                                "surfaces %zu and %zu fill the same box: give each lung once",
-                                i + 1, m + 1);
+        return supine_error_set(
+            error, SUPINE_ERROR_MESH,
+            "surfaces %zu and %zu have the same bounding box: give each lung once", i + 1, m + 1);
       }
       const bool first = side[0] < side[1];
       if (side[!first] < least_side_share * side[first]) {

@@ -67,9 +67,9 @@ supine_status supine_patient_matching_weigh(supine_patient_matching *matching, d
   matching->matched = (double)count / (double)matching->count;
   if (matching->matched < matched_least) {
     return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "the nearest point of the other surface faces the same way for only "
-                            "%.0f %% of the vertices: check that both surfaces have the same axes "
-                            "and show the same person, and that no triangles face inwards",
+                            "only %.0f %% of the vertices have a normal like that of the nearest "
+                            "point of the other surface: check that both surfaces have the same "
+                            "axes and show the same person, and that no triangles face inwards",
                             100.0 * matching->matched);
   }
   gsl_sort(matching->space, 1, count);

@@ -147,8 +147,8 @@ json_t *supine_patient_encode(const supine_patient_record *record, const char *m
   }
   (void)json_object_set_new(group_of(root, "force"), "gain_from",
                             json_string(record->gain_undetermined
-                                            ? "the deep law: the states in other postures do not "
-                                              "determine the gain"
+                                            ? "the deep law: the scans of --state do not determine "
+                                              "the gain"
                                         : record->gain_error > 0.0
                                             ? "the states in other postures"
                                             : "the deep law: scans in one posture do not determine "

@@ -226,7 +226,7 @@ supine_status supine_physics_volume_forms_create(const supine_lungs *lungs, cons
       forms->cubic == NULL) {
     supine_physics_volume_forms_free(forms);
     status = supine_error_set(error, SUPINE_ERROR_MEMORY,
-                              "no memory for volume forms of %zu columns", count);
+                              "no memory for volume coefficients of %zu columns", count);
   }
   for (size_t lung = 0; lung < lungs->lung_count && status == SUPINE_OK; ++lung) {
     lung_work work = begin_lung(lungs, directions, columns, count, lung);

@@ -179,12 +179,11 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
   }
   accuracy->volume = find_part(&work, forms, volumes, scales);
   if (accuracy->volume == 0.0) {
-    status =
-        supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                         "the error cannot be measured: the surface folds before the lungs "
-                         "change by a thousandth of %g mL; check the surface and the constants "
-                         "of the displacement law",
-                         volumes[0]);
+    status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                              "the error cannot be measured: the surface folds over at less than a "
+                              "thousandth of the volume change of %g mL; check the surface and the "
+                              "constants of the displacement law",
+                              volumes[0]);
     goto cleanup;
   }
   supine_parallel_for(PARTS, 1, threads, compare_range, &work);

@@ -133,8 +133,8 @@ supine_status supine_projection_compression_volume_forms(
   const size_t values = compression->vertex_count * count;
   double *columns = malloc(values * sizeof *columns);
   if (columns == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for volume forms of %zu modes",
-                            count);
+    return supine_error_set(error, SUPINE_ERROR_MEMORY,
+                            "no memory for volume coefficients of %zu modes", count);
   }
   for (size_t i = 0; i < values; ++i) {
     columns[i] = (double)compression->coefficients[i];

@@ -39,7 +39,7 @@ static supine_status refuse_fall(const problem *limb, const supine_pv_sample *sa
   char why[192];
   (void)snprintf(why, sizeof why,
                  "volume %g mL is not above the %g mL at a lower pressure: volume must rise with "
-                 "pressure, except for noise; correct or remove the sample",
+                 "pressure, apart from a little noise; correct or remove the sample",
                  sample->volume, larger);
   return refuse(limb, sample, why, error);
 }

@@ -112,7 +112,7 @@ json_t *supine_report_findings(const supine_comparison *c) {
  * breath. Otherwise it is the expansion of the three lowest slabs divided by that of the three
  * uppermost. */
 static void print_profile(const supine_comparison *c, size_t last, bool share, FILE *to) {
-  (void)fputs(share ? "Share of the lower half in a breath:"
+  (void)fputs(share ? "Share of a breath that goes to the lower half:"
                     : "Expansion, lowest 30 % of the height divided by uppermost 30 %:",
               to);
   for (size_t i = 0; i <= last; ++i) {

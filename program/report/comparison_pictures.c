@@ -108,9 +108,9 @@ json_t *supine_report_pictures(const supine_comparison *c, supine_error *error) 
     }
   }
   char words[192];
-  (void)snprintf(words, sizeof words, "displacement from %s, mm; lines at the ticks%s",
-                 c->reference.name,
-                 most > largest ? "; the last colour also stands for larger values" : "");
+  (void)snprintf(
+      words, sizeof words, "displacement from %s, mm; contour lines at the ticks of the bar%s",
+      c->reference.name, most > largest ? "; the last colour also stands for larger values" : "");
   pictures = supine_report_bar(SUPINE_COLOURS_DISPLACEMENT, largest, most > largest, words);
   (void)json_object_set(pictures, "cells", cells);
   (void)json_object_set_new(pictures, "widest", json_integer(WIDTH));

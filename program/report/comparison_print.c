@@ -66,7 +66,7 @@ static void add_row(json_t *tables, const char *heading, const char *name, const
 /* Add to `text` the tables that compare the postures. */
 static void add_tables(const supine_comparison *c, json_t *text) {
   char gained[64];
-  (void)snprintf(gained, sizeof gained, "gain of each lung in a breath of %.4g mL, mL",
+  (void)snprintf(gained, sizeof gained, "volume (mL) that each lung gains in a breath of %.4g mL",
                  supine_report_gain(c, 0));
   for (size_t i = 0; i < c->postures.count; ++i) {
     const char *name = supine_options_posture_label(c->postures.item[i].name);

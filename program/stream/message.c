@@ -73,7 +73,8 @@ size_t supine_stream_polydata_head(size_t points, size_t strips, size_t size, si
 size_t supine_stream_attribute_head(size_t points, unsigned char *bytes) {
   /* The protocol requires an even length; the text and its NUL have 18 bytes. */
   static const char text[] = "expected_error_mm";
-  _Static_assert(6 + sizeof text == SUPINE_STREAM_ATTRIBUTE, "size of type, count and name");
+  _Static_assert(6 + sizeof text == SUPINE_STREAM_ATTRIBUTE,
+                 "the size must be that of type, count and name");
   put(bytes, 2, 1); /* type 0 (a scalar) and 1 component */
   put(bytes + 2, 4, points);
   memcpy(bytes + 6, text, sizeof text);

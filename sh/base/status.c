@@ -11,7 +11,7 @@ const char *supine_status_string(supine_status status) {
       "malformed file", "unusable mesh",         "surface is open", "not supported here",
       "cannot write",   "numerical failure",     "interrupted"};
   _Static_assert(sizeof phrases / sizeof *phrases == SUPINE_STATUS_COUNT,
-                 "a phrase for each status");
+                 "each status needs a phrase");
   return (unsigned)status < SUPINE_STATUS_COUNT ? phrases[status] : "unknown status";
 }
 

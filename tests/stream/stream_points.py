@@ -97,7 +97,7 @@ with tempfile.TemporaryDirectory(prefix="supine-stream-") as folder:
         said = server.communicate(timeout=30)[0]
     print(said, end="")
     assert server.returncode == 0
-    assert said.startswith("positions of observed points: 81\n"), said
+    assert said.startswith("received positions of observed points: 81\n"), said
     assert "malformed messages: 2;" in said, said
     with open(at("poses.csv"), encoding="ascii") as file:
         assert float(next(csv.DictReader(file))["seconds"]) == 0
