@@ -190,9 +190,9 @@ static void check_gradient(const supine_lungs *rest, const supine_lungs *other) 
     double share = 0.0;
     supine_patient_stiffness_shares(&found.stiffness, rest, i, shares);
     for (size_t k = 0; k < found.stiffness.count; ++k) {
-      share += shares[k] * found.stiffness.region[k].seen;
+      share += shares[k] * found.stiffness.region[k].determined;
     }
-    if (share >= SUPINE_PATIENT_SEEN) {
+    if (share >= SUPINE_PATIENT_DETERMINED) {
       const double miss = log(found_stiffness[i]) - mean[1] - log(true_stiffness[i]) + mean[0];
       ++seen;
       squares += miss * miss;
@@ -201,7 +201,7 @@ static void check_gradient(const supine_lungs *rest, const supine_lungs *other) 
   }
   printf("%.0f of %zu regions unseen; stiffness within 15 %% at %.0f %% of the seen vertices "
          "(%.0f %% of all), error %.0f %% RMS\n",
-         found.expand.unseen, found.stiffness.count, 100.0 * (double)close / (double)seen,
+         found.expand.undetermined, found.stiffness.count, 100.0 * (double)close / (double)seen,
          100.0 * (double)seen / (double)n, 100.0 * sqrt(squares / (double)seen));
   assert_true(seen > n / 2);
   assert_true(sqrt(squares / (double)seen) < 0.15);

@@ -13,35 +13,35 @@
 
 enum { COLUMNS = SUPINE_PATIENT_COLUMNS, HEIGHT = COLUMNS, FORCE, ALL };
 
-static const double damping_per_rms_direction = 0.1;
+static const double damping_ratio = 0.1; /* damping length / RMS displacement for a force of 1 */
 
-/* Write into spread [vertices] the force of the displacement law at each vertex, plus the extra
- * force that would move the displaced vertex onto the other surface. */
-static void find_spread_force(supine_patient_matching *m, const supine_patient *patient,
-                              double *spread) {
+/* Compute smoothed_force [vertices], the applied force smoothed over the surface: the force of
+ * the displacement law, plus the force that would move the displaced vertex onto the emptier
+ * surface. */
+static void find_smoothed_force(supine_patient_matching *m, const supine_patient *patient,
+                                double *smoothed_force) {
   supine_patient law = *patient;
-  double damping = 0.0; /* mm^2 */
+  double damping = 0.0;
   double d[3];
   law.centre_count = 0;
   for (size_t v = 0; v < m->count; ++v) {
     supine_patient_direction(&law.power, &m->rows[v].place, 1.0, d);
-    damping +=
-        damping_per_rms_direction * damping_per_rms_direction * supine_dot(d, d) / (double)m->count;
+    damping += damping_ratio * damping_ratio * supine_dot(d, d) / (double)m->count;
   }
   (void)supine_patient_matching_place(m, &law);
   supine_patient_matching_find(m);
   for (size_t v = 0; v < m->count; ++v) {
     const supine_patient_row *row = &m->rows[v];
     supine_patient_direction(&law.power, &row->place, 1.0, d);
-    spread[v] = supine_patient_force_at(&law.power, &row->place) +
-                row->weight * m->match[v].distance * supine_dot(row->axis, d) /
-                    (supine_dot(d, d) + damping);
+    smoothed_force[v] = supine_patient_force_at(&law.power, &row->place) +
+                        row->weight * m->match[v].distance * supine_dot(row->axis, d) /
+                            (supine_dot(d, d) + damping);
   }
 }
 
-/* For each block of vertices, compute the area-weighted means of the force, of the height along
- * gravity, and of the terms 1, X - 1/2, Y - 1/2 and Z - 1/2 of the force. Sum the products of every
- * two means over all blocks, weighted by the areas of the blocks. */
+/* Average six quantities over the vertices in each cube of 40 mm (block), weighted by area: the
+ * force terms 1, X - 1/2, Y - 1/2 and Z - 1/2, the depth along gravity, and the applied force.
+ * For every two quantities, sum the products of their means over all blocks, weighted by area. */
 static void add_blocks(const supine_patient_matching *m, const double *force,
                        const double gravity[3], const double *vertex_area, size_t blocks,
                        double *means, double products[ALL * ALL]) {
@@ -61,13 +61,13 @@ static void add_blocks(const supine_patient_matching *m, const double *force,
   }
 }
 
-/* Compute the covariance of quantities a and b. products[i * ALL + j] is the sum of the products of
- * quantities i and j, and quantity 0 is 1. */
+/* Compute the covariance of quantities a and b. products[i * ALL + j] is the weighted sum of the
+ * products of quantities i and j; quantity 0 is 1. */
 static double covariance(const double products[ALL * ALL], size_t a, size_t b) {
   return (products[a * ALL + b] - products[a] * products[b] / products[0]) / products[0];
 }
 
-/* Fit the slopes of the force along X, Y and Z by least squares; return false on failure. */
+/* Fit the force by a linear function of the box coordinates X, Y and Z; return false on failure. */
 static bool fit_blocks(const double products[ALL * ALL], supine_patient_applied *applied) {
   double matrix[ALL * ALL];
   double k[COLUMNS];
@@ -107,7 +107,7 @@ supine_status supine_patient_applied_find(supine_patient_matching *matching,
           : SUPINE_OK;
   if (status == SUPINE_OK) {
     supine_patient_matching_choose(matching, n);
-    find_spread_force(matching, patient, spread);
+    find_smoothed_force(matching, patient, spread);
     status = supine_physics_equilibrium_force(matching->equilibrium, spread, spread + n, error);
   }
   if (status == SUPINE_OK) {

@@ -8,29 +8,28 @@
 
 #include "sh/base/vec3.h"
 
-static const double vertex_to_centre_most = 35.0; /* mm */
+static const double centre_distance_most = 35.0; /* from any vertex to the nearest centre, mm */
 static const double radius_over_distance = 1.5;
 
 enum {
   CANDIDATES = 8192, /* largest number of vertices tried as the centre of a region */
   LANES = 16,        /* largest number of regions in one call of the equilibrium solver */
-  ROUNDS = 5         /* number of rounds; each fits the law, then matches the surfaces */
+  ROUNDS = 5 /* number of times that a displacement law is fitted and the surfaces are matched */
 };
 
-/* Prior standard deviation of the difference between two neighbouring regions' expandabilities. */
+/* Prior standard deviation of the difference of expandability between neighbouring regions. */
 static const double neighbour_deviation = 0.3;
-static const double region_deviation = 1.0; /* prior standard deviation of an expandability */
-static const double noise_least = 0.3;      /* lower bound on a distance's standard deviation, mm */
-static const double rows_per_error = 10.0;  /* neighbouring vertices whose errors count as one */
+static const double region_deviation = 1.0; /* prior standard deviation of the expandability */
+static const double noise_least = 0.3; /* lower bound on the standard deviation of distances, mm */
+static const double vertices_per_error = 10.0; /* number of neighbours with correlated errors */
 
-/* Two regions are neighbours if their centres are closer than this multiple of the smallest
- * distance between any two centres. */
+/* Largest distance between the centres of neighbouring regions / smallest distance of any two. */
 static const double neighbour_ratio = 1.7;
 
-/* Regions are kept if the held-out error with them is below this multiple of the one without. */
+/* Regions are kept if the held-out error with them, divided by that without, is less than this. */
 static const double kept_ratio = 0.95;
 
-/* Find the vertex of one lung that is farthest from its nearest region centre. */
+/* Find the vertex of one lung farthest from its nearest region centre, and this distance. */
 static size_t farthest(const supine_lungs *lungs, const supine_patient_stiffness *stiffness,
                        int side, double *distance) {
   size_t found = 0;
@@ -52,17 +51,17 @@ static size_t farthest(const supine_lungs *lungs, const supine_patient_stiffness
   return found;
 }
 
-/* Add regions (expandability 1) until all vertices are near a centre or the array is full. */
+/* Add regions of expandability 1 until all vertices are near a centre, or the array is full. */
 static void place_regions(const supine_lungs *lungs, supine_patient_stiffness *stiffness) {
   *stiffness = (supine_patient_stiffness){0};
   for (int side = 1; side >= -1; side -= 2) {
     const size_t first = stiffness->count;
     double distance;
     size_t vertex = farthest(lungs, stiffness, side, &distance);
-    while (distance > vertex_to_centre_most &&
+    while (distance > centre_distance_most &&
            stiffness->count - first < SUPINE_PATIENT_REGIONS_MAX / 2) {
       supine_patient_region *region = &stiffness->region[stiffness->count++];
-      *region = (supine_patient_region){.side = side, .value = 1.0};
+      *region = (supine_patient_region){.side = side, .expandability = 1.0};
       memcpy(region->centre, lungs->mesh.vertices + 3 * vertex, sizeof region->centre);
       vertex = farthest(lungs, stiffness, side, &distance);
     }
@@ -92,8 +91,8 @@ static void find_prior_precision(const supine_patient_stiffness *regions, double
   }
 }
 
-/* Write into response [m->count, regions->count] the force that each region of expandability 1
- * causes at each chosen vertex. */
+/* Compute response [m->count, regions->count]: the smoothed force at each chosen vertex if one
+ * region has expandability 1 and all other regions have no force. */
 static supine_status find_responses(const supine_patient_matching *m,
                                     const supine_patient_stiffness *regions,
                                     const double gravity[3], double *response,
@@ -137,8 +136,8 @@ cleanup:
   return status;
 }
 
-/* Set the force on each chosen vertex to the sum of the vertex's responses [count], each multiplied
- * by the expandability a [count] of the region, or by 1 if `a` is NULL. */
+/* Set the force at each chosen vertex to the sum over all regions of response[vertex, region] *
+ * a[region], where `a` holds the expandabilities (1 everywhere if `a` is NULL). */
 static void set_forces(supine_patient_matching *m, size_t count, const double *response,
                        const double *a) {
   for (size_t i = 0; i < m->count; ++i) {
@@ -151,7 +150,7 @@ static void set_forces(supine_patient_matching *m, size_t count, const double *r
   }
 }
 
-/* Fit the expandabilities and match the surfaces in turn, without robust weights. */
+/* Fit the expandabilities of the regions and match the surfaces in turn, without robust weights. */
 static supine_status iterate(supine_patient_matching *m, const double *response,
                              supine_patient_fit_options *options, supine_patient *patient,
                              supine_patient_stiffness *regions, supine_error *error) {
@@ -160,15 +159,15 @@ static supine_status iterate(supine_patient_matching *m, const double *response,
   supine_patient_matching_find(m);
   supine_status status = supine_patient_matching_weigh(m, INFINITY, error);
   for (size_t round = 0; round < ROUNDS && status == SUPINE_OK; ++round) {
-    options->noise = sqrt(rows_per_error) * fmax(noise_least, m->rms) / m->rows[0].noise;
+    options->noise = sqrt(vertices_per_error) * fmax(noise_least, m->rms) / m->rows[0].noise;
     set_forces(m, regions->count, response, NULL);
     status = supine_patient_krige_fit(options, m->rows, m->count, &krige, error);
     if (status == SUPINE_OK) {
       supine_patient_krige_copy_law(&krige, patient);
       supine_patient_krige_resolution(&krige, share);
       for (size_t k = 0; k < regions->count; ++k) {
-        regions->region[k].value = krige.region[k];
-        regions->region[k].seen = share[k];
+        regions->region[k].expandability = krige.region[k];
+        regions->region[k].determined = share[k];
       }
       set_forces(m, regions->count, response, krige.region);
       (void)supine_patient_matching_place(m, patient);
@@ -200,7 +199,7 @@ supine_status supine_patient_expand(supine_patient_matching *matching,
   if (status == SUPINE_OK) {
     find_prior_precision(stiffness, precision);
     region_options.region_count = n;
-    region_options.precision = precision;
+    region_options.prior_precision = precision;
     status = iterate(m, response, &region_options, patient, stiffness, error);
   }
   if (status == SUPINE_OK) {
@@ -214,7 +213,8 @@ supine_status supine_patient_expand(supine_patient_matching *matching,
     report->kept = report->held_out[1] < kept_ratio * report->held_out[0];
     stiffness->count = report->kept ? n : 0;
     for (size_t k = 0; k < stiffness->count; ++k) {
-      report->unseen += stiffness->region[k].seen < SUPINE_PATIENT_SEEN ? 1.0 : 0.0;
+      report->undetermined +=
+          stiffness->region[k].determined < SUPINE_PATIENT_DETERMINED ? 1.0 : 0.0;
     }
     status = supine_patient_matching_solve(m, stiffness, error);
   }

@@ -14,37 +14,38 @@
 #include "sh/base/vec3.h"
 
 enum {
-  EXPECTED_MAX = 200, /* largest number of points at which the expected error is computed */
-  FOLDS = 5,          /* number of folds of the cross-validation */
-  SEEDS = 3,          /* number of cross-validations, each with new random folds */
-  AFFINE = 12,        /* number of constants of an affine map */
+  EXPECTED_MAX = 200, /* largest number of points used to compute the expected error */
+  FOLDS = 5,
+  SEEDS = 3,   /* number of cross-validations, each with new random folds */
+  AFFINE = 12, /* number of constants of an affine map */
   ITEMS = SEEDS * FOLDS,
   SCORES = SUPINE_PATIENT_SCORES
 };
 
-static const double band_point = 1.8;      /* 95 % half-width of a point / expected error */
-static const double band_component = 1.96; /* 95 % half-width of a coordinate / expected error */
-/* Measured error / expected error, for points within 8 mm of the surface, in ten patients. */
+/* Radius that contains 95 % of the errors of points in 3-D, and bound on 95 % of the errors along
+ * one axis, both divided by the expected error. */
+static const double band_point = 1.8, band_component = 1.96;
+/* Ratio of measured to expected error of points within 8 mm of the surface, in ten patients. */
 static const double near_surface = 1.3;
 
 typedef struct squares {
-  double residual[SCORES]; /* for each predictor, weighted sum of squared residuals, mm^2 */
-  double expected;         /* weighted sum of expected variances, mm^2 */
+  double residual[SCORES]; /* [predictor] weighted sum of squared residuals, mm^2 */
+  double expected;         /* weighted sum of the expected variances of the residuals, mm^2 */
   double weight;
-  double points, within; /* number of points, and of those within the 95 % band */
+  double points, within; /* number of points, and of those within the expected 95 % band */
 } squares;
 
 typedef struct study {
   supine_patient_fit_options options;
   const supine_patient_row *rows;
   size_t row_count, components;
-  size_t *fold;            /* [SEEDS, row_count] index of the fold that contains each row */
-  squares held_out[ITEMS]; /* for each cross-validation and fold, sums over the held-out rows */
+  size_t *fold;            /* [SEEDS, row_count] fold of each measurement */
+  squares held_out[ITEMS]; /* [SEEDS, FOLDS] sums over the held-out measurements */
   supine_status failed[ITEMS];
 } study;
 
-/* Compute the derivatives x of a . (t + M p) with respect to the 12 elements of t and M, where a is
- * the row's axis and p is the row's offset in units of 100 mm. */
+/* Compute the derivatives x of axis . (t + M p) with respect to the 12 elements of the vector t
+ * and the matrix M. p is row->place.offset in units of 100 mm. */
 static void affine_design(const supine_patient_row *row, double x[AFFINE]) {
   for (size_t a = 0; a < 3; ++a) {
     x[a] = row->axis[a];
@@ -54,8 +55,8 @@ static void affine_design(const supine_patient_row *row, double x[AFFINE]) {
   }
 }
 
-/* Fit a translation t or, if `translation` is false, the map t + M p of affine_design. Write t and
- * M into map, or zeros on failure. */
+/* Fit the affine map t + M p of a position p to measurements or, if `translation` is true, only t.
+ * Write t and M into map, or zeros on failure. */
 static void affine_fit(const supine_patient_row *rows, size_t count, bool translation,
                        double map[AFFINE]) {
   double matrix[AFFINE * AFFINE] = {0.0};
@@ -83,8 +84,9 @@ static double affine_residual(const double map[AFFINE], const supine_patient_row
   return cblas_ddot(AFFINE, x, 1, map, 1) - row->value;
 }
 
-/* Group the rows into cubes of space (blocks), and assign each block at random to a fold. Write
- * each row's fold into fold [count]. Return the number of blocks, or 0 if out of memory. */
+/* Group the measurements into cubes of 40 mm (blocks), and the blocks at random into folds.
+ * Write the folds of all measurements into fold [count]. Return the number of blocks; 0: out of
+ * memory. */
 static size_t assign_folds(const supine_patient_frame *frame, supine_patient_row *rows,
                            size_t count, unsigned long seed, size_t *fold) {
   const size_t blocks = supine_patient_rows_block(frame, rows, count, seed + 1);
@@ -107,7 +109,7 @@ static size_t assign_folds(const supine_patient_frame *frame, supine_patient_row
   return able ? blocks : 0;
 }
 
-/* Predict `rows` with predictors fitted to krige->rows, and add the squared residuals to sums. */
+/* Predict measurements by predictors fitted to krige->rows; add the squared residuals to sums. */
 static void add_residuals(const study *s, const supine_patient_row *rows, size_t count,
                           supine_patient_krige *krige, squares *sums) {
   const double band = s->components == 3 ? band_point : band_component;
@@ -143,7 +145,7 @@ static void add_residuals(const study *s, const supine_patient_row *rows, size_t
 
 static supine_status hold_out(const study *s, const size_t *fold, size_t which, squares *sums) {
   const size_t n = s->row_count;
-  supine_patient_row *rows = malloc(n * sizeof *rows); /* rows to fit, then held-out rows */
+  supine_patient_row *rows = malloc(n * sizeof *rows); /* fitted, then held-out measurements */
   supine_patient_krige krige = {0};
   supine_status status = rows == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
   size_t fitted_count = 0;
@@ -192,8 +194,8 @@ static supine_status hold_all_out(study *s, squares *held_out, supine_error *err
   return SUPINE_OK;
 }
 
-/* Write into `expected` the RMS error in 3-D, mm, that `krige` predicts near the surface, or 0 if
- * the rows are landmarks. Return the mean length of the displacements by `law`, mm. */
+/* Write into `expected` the RMS error in 3-D, mm, that `krige` expects near the surface, or 0 if
+ * the measurements are of landmarks. Return the mean length of the displacements by `law`, mm. */
 static double find_expected_error(const study *s, const supine_patient_power *law,
                                   supine_patient_krige *krige, double *expected) {
   const size_t step = s->components * (1 + s->row_count / (s->components * EXPECTED_MAX));
@@ -223,8 +225,8 @@ static supine_patient_score baseline_of(const study *s) {
                                                         : SUPINE_PATIENT_SCORE_NONE;
 }
 
-/* Convert sums of squared residuals to the RMS error of each predictor. Return by how many percent
- * the squared error of the corrected law is below that of the baseline predictor. */
+/* Convert sums of squared residuals to the RMS error of each predictor, mm. Return by how many
+ * percent the law with its correction reduces the squared error of the predictor baseline_of(s). */
 static double find_rms(const study *s, const squares *sums, double score[SCORES]) {
   for (size_t k = 0; k < SCORES; ++k) {
     score[k] = sqrt(sums->residual[k] * (double)s->components / sums->weight);
@@ -232,7 +234,7 @@ static double find_rms(const study *s, const squares *sums, double score[SCORES]
   return 100.0 * (1.0 - pow(score[SUPINE_PATIENT_SCORE_CORRECTED] / score[baseline_of(s)], 2.0));
 }
 
-/* Fit all rows. Then hold out each fold in turn, and fit the other folds. */
+/* Fit all measurements. Then fit without each fold in turn, and measure the error on this fold. */
 static supine_status run(study *s, size_t triples, supine_patient *patient,
                          supine_patient_fit_report *report, supine_error *error) {
   squares fitted = {.points = 0};

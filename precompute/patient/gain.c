@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fit the gain, the factor of gravity in the force on the lungs, to scans in other postures. */
+/* Fit how much the force on the lungs depends on gravity, to scans in other postures. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,33 +10,35 @@
 #include "precompute/patient/matching.h"
 #include "sh/base/vec3.h"
 
-static const double gain_least = 0.01, gain_most = 2.0; /* range of accepted gains */
-static const double same_posture = 0.05; /* directions of gravity closer than this count as equal */
-static const double converged = 1e-4;    /* change of scales and gain below which the fit ends */
-static const double not_converged = 1e-2; /* change of scales and gain above which the fit fails */
+static const double gain_least = 0.01, gain_most = 2.0; /* gains outside this range are ignored */
+static const double same_posture = 0.05; /* unit vectors closer than this count as equal */
+/* The fit ends if the sum of changes of scales and gain in a round is below `converged`. It fails
+ * if the last sum is above `not_converged`. */
+static const double converged = 1e-4, not_converged = 1e-2;
 static const double force_least = 0.2; /* before a division, smaller forces are replaced by this */
-enum { ROUNDS = 100, VERTICES_MAX = 2000, EIGHTHS = 8, GAIN = 5, UNKNOWNS = 6 };
+enum { ROUNDS = 100, VERTICES_MAX = 2000, BLOCKS = 8, GAIN = 5, UNKNOWNS = 6 };
 
-typedef struct field {
+typedef struct point_motion {
   double u[3];         /* displacement from full inflation to rest, mm */
-  double force_change; /* relative change of the force in the further posture, for a gain of 1 */
-} field;
+  double force_change; /* relative change of the force between the two postures, if the gain is 1 */
+} point_motion;
 
-/* Fit to a scan in a further state. Along the axis of a row, the displacement from full inflation
- * is axis . (s (1 + gain force_change) u + t), with u and force_change of `field`. The unknowns are
- * a scale s for each lung, the gain, and the translation t between the scans. */
+/* Fit to a further scan of the same lungs. The displacement from full inflation along the axis of a
+ * measurement is modelled as axis . (s (1 + gain force_change) u + t), with the u and force_change
+ * of point_motion. The unknowns are a scale s for each lung, the gain, and the translation t. */
 typedef struct work {
   const supine_patient_record *record;
   bool fits_translation;
-  double gains[2][3]; /* gains of the fuller and the emptier state (supine_patient_path) */
-  supine_patient_matching matching; /* rows to fit, in four blocks for each lung */
-  field *field;                     /* [matching.count] displacement at each row */
-  double x[UNKNOWNS]; /* scales of the left and right lung, translation t (x, y, z; mm), gain */
+  /* [fuller or emptier state, axis] displacement from full inflation / displacement at rest */
+  double state_share[2][3];
+  supine_patient_matching matching;
+  point_motion *motion; /* [matching.count] motion of each measured point */
+  double x[UNKNOWNS];   /* scales s of the left and right lung, translation t (x, y, z; mm), gain */
 } work;
 
-/* Fit the unknowns w->x by least squares. To keep the fit linear, use the previous scale in the
- * product of scale and gain. Return the RMS residual, mm.
- * @param without  block of rows to leave out, or EIGHTHS to use all rows */
+/* Fit the scales, translation and gain w->x by least squares. To keep the fit linear, use the
+ * previous scale in the product of scale and gain. Return the RMS residual, mm.
+ * @param without  index of the block of measurements to leave out, or BLOCKS to use all */
 static double fit(work *w, bool fits_gain, size_t without) {
   double matrix[UNKNOWNS * UNKNOWNS] = {0.0};
   double right[UNKNOWNS] = {0.0};
@@ -46,15 +48,15 @@ static double fit(work *w, bool fits_gain, size_t without) {
   for (size_t i = 0; i < w->matching.count; ++i) {
     const supine_patient_row *row = &w->matching.rows[i];
     const double weight = row->block == without ? 0.0 : row->weight;
-    const double along = supine_dot(row->axis, w->field[i].u);
+    const double along = supine_dot(row->axis, w->motion[i].u);
     const size_t lung = row->place.side > 0.0 ? 0U : 1U;
     double x[UNKNOWNS] = {0.0};
     x[lung] = along;
-    x[GAIN] = fits_gain ? scale[lung] * w->field[i].force_change * along : 0.0;
+    x[GAIN] = fits_gain ? scale[lung] * w->motion[i].force_change * along : 0.0;
     double value = row->value;
     for (size_t a = 0; a < 3; ++a) {
       x[2 + a] = w->fits_translation ? row->axis[a] : 0.0;
-      value += w->gains[0][a] * row->axis[a] * w->field[i].u[a];
+      value += w->state_share[0][a] * row->axis[a] * w->motion[i].u[a];
     }
     cblas_dsyr(CblasColMajor, CblasUpper, UNKNOWNS, weight, x, 1, matrix, UNKNOWNS);
     cblas_daxpy(UNKNOWNS, weight * value, x, 1, right, 1);
@@ -73,24 +75,24 @@ static double fit(work *w, bool fits_gain, size_t without) {
   return sqrt(squares * (w->matching.state == NULL ? 3.0 : 1.0) / weights);
 }
 
-/* Compute the height of a place along gravity: 0 at the top of the box, 1 at the bottom. */
-static double height_at(const supine_patient_frame *frame, const supine_patient_place *place,
-                        const double gravity[3]) {
+/* Compute the depth along gravity: 0 at the top of the lungs' bounding box, 1 at its bottom. */
+static double depth_at(const supine_patient_frame *frame, const supine_patient_place *place,
+                       const double gravity[3]) {
   const double outer = place->side > 0.0 ? frame->maximum[0] : frame->minimum[0];
-  double height = 0.0;
+  double depth = 0.0;
   double range = 0.0;
   for (int k = 0; k < 3; ++k) {
     const double from = k == 0 ? frame->midline : frame->maximum[k];
     const double size = (k == 0 ? outer : frame->minimum[k]) - from;
     const double ends[2] = {gravity[k] * frame->minimum[k], gravity[k] * frame->maximum[k]};
-    height += gravity[k] * ((from + 0.5 * size) * place->force[0] + size * place->force[1 + k]) -
-              fmin(ends[0], ends[1]) * place->force[0];
+    depth += gravity[k] * ((from + 0.5 * size) * place->force[0] + size * place->force[1 + k]) -
+             fmin(ends[0], ends[1]) * place->force[0];
     range += fabs(ends[1] - ends[0]);
   }
-  return height / range;
+  return depth / range;
 }
 
-/* Make three rows for each pair of points or, if `pairs` is NULL, one row for each of at most
+/* Make three measurements of each pair of points or, if `pairs` is NULL, one of each of at most
  * VERTICES_MAX vertices of the surface `rest`. */
 static supine_status make_rows(work *w, const supine_lungs *rest, const supine_patient_pairs *pairs,
                                const supine_mesh *surface, supine_error *error) {
@@ -102,8 +104,8 @@ static supine_status make_rows(work *w, const supine_lungs *rest, const supine_p
     status = supine_patient_matching_create(rest, surface, &w->record->stiffness, VERTICES_MAX, 0,
                                             &w->matching, error);
   }
-  w->field = malloc(w->matching.count * sizeof *w->field);
-  if (status == SUPINE_OK && (w->matching.rows == NULL || w->field == NULL)) {
+  w->motion = malloc(w->matching.count * sizeof *w->motion);
+  if (status == SUPINE_OK && (w->matching.rows == NULL || w->motion == NULL)) {
     status =
         supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the fit to a further state");
   } else if (status == SUPINE_OK && pairs != NULL) {
@@ -112,7 +114,7 @@ static supine_status make_rows(work *w, const supine_lungs *rest, const supine_p
   return status;
 }
 
-/* Compute w->field, and assign each row to one of four blocks in its lung. */
+/* Compute w->motion. Assign each measurement to a jackknife block: a quarter of its lung. */
 static void find_motion(work *w, const double gravity[3]) {
   supine_patient_matching *m = &w->matching;
   const supine_patient *patient = &w->record->patient;
@@ -121,32 +123,32 @@ static void find_motion(work *w, const double gravity[3]) {
   for (size_t i = 0; i < m->count; ++i) {
     supine_patient_place place = m->rows[i].place;
     const double *columns = place.force;
-    const double fitted_height = 0.5 * columns[0] - g[1] * columns[2] - g[2] * columns[3];
-    w->field[i].force_change = (height_at(frame, &place, gravity) - fitted_height) /
-                               fmax(force_least, supine_patient_force_at(&patient->power, &place));
+    const double fitted_depth = 0.5 * columns[0] - g[1] * columns[2] - g[2] * columns[3];
+    w->motion[i].force_change = (depth_at(frame, &place, gravity) - fitted_depth) /
+                                fmax(force_least, supine_patient_force_at(&patient->power, &place));
     m->rows[i].block = (place.side > 0.0 ? 4U : 0U) + (place.box[1] > 0.5 ? 2U : 0U) +
                        (place.box[2] > 0.5 ? 1U : 0U);
     if (m->state != NULL && !w->record->from_surface) {
-      /* The displacement law was fitted in the box of the landmarks, not in that of the surface. */
+      /* Find the box coordinates in the frame of the landmarks, to which the law was fitted. */
       place = supine_patient_find(&patient->frame, m->rest->mesh.vertices + 3 * m->match[i].vertex,
                                   place.side);
     }
-    supine_patient_displacement(patient, &place, 1.0, w->field[i].u);
+    supine_patient_displacement(patient, &place, 1.0, w->motion[i].u);
     for (size_t k = 0; k < 3; ++k) {
-      w->field[i].u[k] /= w->gains[1][k] - w->gains[0][k];
+      w->motion[i].u[k] /= w->state_share[1][k] - w->state_share[0][k];
     }
   }
 }
 
-/* Displace vertices by the scales, gain and translation w->x; match them to the other surface. */
+/* Displace vertices by the scales, gain and translation w->x; match them to the scanned surface. */
 static supine_status match_surface(work *w, supine_error *error) {
   supine_patient_matching *m = &w->matching;
   for (size_t i = 0; i < m->count; ++i) {
-    const double scale =
-        w->x[m->rows[i].place.side > 0.0 ? 0U : 1U] * (1.0 + w->x[GAIN] * w->field[i].force_change);
+    const double scale = w->x[m->rows[i].place.side > 0.0 ? 0U : 1U] *
+                         (1.0 + w->x[GAIN] * w->motion[i].force_change);
     for (size_t k = 0; k < 3; ++k) {
       m->match[i].position[k] = m->rest->mesh.vertices[3 * m->match[i].vertex + k] +
-                                (scale - w->gains[0][k]) * w->field[i].u[k] + w->x[2 + k];
+                                (scale - w->state_share[0][k]) * w->motion[i].u[k] + w->x[2 + k];
     }
   }
   supine_patient_matching_find(m);
@@ -154,7 +156,7 @@ static supine_status match_surface(work *w, supine_error *error) {
 }
 
 /* Match the surfaces and fit the unknowns in turn until the unknowns hardly change. Then estimate
- * the gain's standard error by the jackknife: leave out each of the 8 blocks of rows in turn. */
+ * the gain's standard error by the jackknife, which leaves out each of 8 blocks of measurements. */
 static supine_status iterate(work *w, supine_patient_further *further, supine_error *error) {
   supine_status status = SUPINE_OK;
   double change = INFINITY;
@@ -163,7 +165,7 @@ static supine_status iterate(work *w, supine_patient_further *further, supine_er
   for (size_t round = 0; round < ROUNDS && status == SUPINE_OK && change >= converged; ++round) {
     const double before[UNKNOWNS] = {w->x[0], w->x[1], [GAIN] = w->x[GAIN]};
     status = w->matching.state == NULL ? SUPINE_OK : match_surface(w, error);
-    further->residual = fit(w, further->fits_gain, EIGHTHS);
+    further->residual = fit(w, further->fits_gain, BLOCKS);
     change =
         fabs(w->x[0] - before[0]) + fabs(w->x[1] - before[1]) + fabs(w->x[GAIN] - before[GAIN]);
   }
@@ -179,15 +181,15 @@ static supine_status iterate(work *w, supine_patient_further *further, supine_er
   }
   memcpy(further->scale, w->x, sizeof further->scale);
   further->gain = w->x[GAIN];
-  for (size_t without = 0; without < EIGHTHS && further->fits_gain; ++without) {
+  for (size_t without = 0; without < BLOCKS && further->fits_gain; ++without) {
     memcpy(w->x, further->scale, sizeof further->scale);
     (void)fit(w, true, without);
     const double change_of_gain = w->x[GAIN] - further->gain;
     sum += change_of_gain;
     square += change_of_gain * change_of_gain;
   }
-  further->residual_without_gain = fit(w, false, EIGHTHS);
-  further->gain_error = sqrt(fmax(0.0, (EIGHTHS - 1.0) / EIGHTHS * (square - sum * sum / EIGHTHS)));
+  further->residual_without_gain = fit(w, false, BLOCKS);
+  further->gain_error = sqrt(fmax(0.0, (BLOCKS - 1.0) / BLOCKS * (square - sum * sum / BLOCKS)));
   return SUPINE_OK;
 }
 
@@ -198,14 +200,14 @@ supine_status supine_patient_gain_fit(const supine_patient_record *record, const
   work w = {.record = record, .fits_translation = scans_moved, .x = {1.0, 1.0}};
   further->fits_gain =
       supine_distance(further->state.gravity, record->state[1].gravity) >= same_posture;
-  supine_patient_path(record, w.gains);
+  supine_patient_path(record, w.state_share);
   supine_status status = make_rows(&w, rest, pairs, surface, error);
   if (status == SUPINE_OK) {
     find_motion(&w, further->state.gravity);
     status = iterate(&w, further, error);
   }
   supine_patient_matching_free(&w.matching);
-  free(w.field);
+  free(w.motion);
   return status;
 }
 

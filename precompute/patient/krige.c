@@ -13,22 +13,24 @@
 
 enum {
   TERMS = SUPINE_PATIENT_TERMS,
-  MOTION = SUPINE_PATIENT_CONSTANTS, /* index of the first term for the motion between the scans */
-  SCALE = TERMS - 1,                 /* index of the term that scales the whole displacement law */
+  MOTION = SUPINE_PATIENT_CONSTANTS, /* index of the first unknown of the body's motion */
+  SCALE = TERMS - 1,                 /* index of the unknown factor on the whole displacement law */
   TERMS_MAX = TERMS + SUPINE_PATIENT_REGIONS_MAX,
   STEPS = 60
 };
 
-static const double size_deviation = 0.3; /* prior standard deviation of the term SCALE */
-static const double converged = 1e-10;    /* a smaller relative decrease of k->squares ends a fit */
-static const double damping_most = 1e10;  /* a larger damping of the steps ends a fit */
+static const double scale_deviation = 0.3; /* prior standard deviation of the law's scale factor */
+static const double converged = 1e-10; /* a smaller relative decrease of k->objective ends a fit */
+static const double damping_most = 1e10; /* a larger damping of the steps ends a fit */
 static const double expandability_least = 0.02;
 
-/* Bounds of the law's exponents c2, c4 and c6, and of the absolute slopes |c7|, |c8| and |c9|. */
+/* Bounds of constants of the displacement law (patient.h): the exponents c2, c4 and c6, and the
+ * absolute values of the slopes c7, c8 and c9. */
 static const double exponent_least = 0.5, exponent_most = 4.0, slope_most = 2.5;
 
-/* For each law, prior standard deviations: [0] of c1, c3 and c5, relative to their prior means; [1]
- * of log c2, log c4 and log c6; [2] of c7, c8 and c9. */
+/* [law] prior standard deviations of the constants of the displacement law (patient.h): of the
+ * factors c1, c3 and c5, divided by their prior means; of the logarithms of the exponents c2, c4
+ * and c6; of the slopes c7, c8 and c9. */
 static const double law_deviation[SUPINE_PATIENT_LAW_COUNT][3] = {{0.3, 0.3, 0.3}, {3.0, 1.0, 1.0}};
 
 static supine_patient_centre centre_of(const supine_patient_power *law,
@@ -45,12 +47,12 @@ static bool shape_is_fixed(const supine_patient_krige *k) {
   return k->options.size_only || (k->options.law == SUPINE_PATIENT_DEEP && k->sill >= 1.0);
 }
 
-/* Return a term's prior standard deviation: 0 if not fitted, INFINITY if fitted without a prior. */
+/* Return an unknown's prior standard deviation: 0 if not fitted, INFINITY if without a prior. */
 static double prior_deviation(const supine_patient_krige *k, size_t term) {
   const double unit = term < 3 ? fabs(k->mean.c[2 * term]) : 1.0;
   const bool shape_fixed = shape_is_fixed(k);
   return term == SCALE   ? (k->options.size_only ? INFINITY
-                            : shape_fixed        ? size_deviation
+                            : shape_fixed        ? scale_deviation
                                                  : 0.0)
          : term < MOTION ? (shape_fixed ? 0.0 : law_deviation[k->options.law][term / 3] * unit)
          : term - MOTION < (size_t)k->options.scan_motion ? INFINITY
@@ -79,7 +81,8 @@ static supine_patient_power take_step(const supine_patient_power *law, const dou
   return stepped;
 }
 
-/* Call supine_patient_power_design, and append derivatives with respect to the expandabilities. */
+/* Predict a measurement by supine_patient_power_design. If expandabilities of lung regions are
+ * fitted, use the force that they cause, and append their derivatives to x. */
 static double design_row(const supine_patient_krige *k, const supine_patient_row *row, double *x) {
   if (k->options.region_count == 0) {
     return supine_patient_power_design(&k->law, row, x);
@@ -97,11 +100,11 @@ static double noise_of(const supine_patient_krige *k, const supine_patient_row *
   return k->noise * row->noise / sqrt(fmin(1.0, fmax(1e-12, row->weight)));
 }
 
-/* Factorise the covariance matrix of the rows, to which noise and correction contribute. The part
- * from the correction grows with the displacement; but if only a factor on the whole displacement
- * law is fitted, this part does not depend on the factor.
+/* Factorise the covariance matrix of the measurements, the sum of the covariances of their noise
+ * and of the kriging correction. The latter grows with the displacement by the law; but if only a
+ * factor on the law is fitted, it does not depend on the factor.
  * @return half the logarithm of the determinant; NAN if the matrix is not positive definite */
-static double factor(supine_patient_krige *k) {
+static double factor_covariance(supine_patient_krige *k) {
   const size_t n = k->count;
   double logarithm = 0.0;
   k->scaled_sill = k->sill * (shape_is_fixed(k) ? fabs(k->mean.c[0] / k->law.c[0]) : 1.0);
@@ -113,17 +116,17 @@ static double factor(supine_patient_krige *k) {
     return logarithm;
   }
   for (size_t i = 0; i < n; ++i) {
-    supine_patient_covariances(&k->centre[i], i + 1, k->centre, k->factor + i * n);
+    supine_patient_covariances(&k->centre[i], i + 1, k->centre, k->cholesky + i * n);
     for (size_t j = 0; j <= i; ++j) {
-      k->factor[i * n + j] *= k->scaled_sill * supine_dot(k->rows[i].axis, k->rows[j].axis);
+      k->cholesky[i * n + j] *= k->scaled_sill * supine_dot(k->rows[i].axis, k->rows[j].axis);
     }
-    k->factor[i * n + i] += pow(noise_of(k, &k->rows[i]), 2.0);
+    k->cholesky[i * n + i] += pow(noise_of(k, &k->rows[i]), 2.0);
   }
-  if (LAPACKE_dpotrf(LAPACK_COL_MAJOR, 'U', (lapack_int)n, k->factor, (lapack_int)n) != 0) {
+  if (LAPACKE_dpotrf(LAPACK_COL_MAJOR, 'U', (lapack_int)n, k->cholesky, (lapack_int)n) != 0) {
     return NAN;
   }
   for (size_t i = 0; i < n; ++i) {
-    logarithm += log(k->factor[i * n + i]);
+    logarithm += log(k->cholesky[i * n + i]);
   }
   return logarithm;
 }
@@ -132,34 +135,34 @@ static void add_prior(supine_patient_krige *k) {
   const size_t terms = k->terms;
   for (size_t t = 0; t < TERMS; ++t) {
     const double deviation = prior_deviation(k, t);
-    if (deviation == 0.0) { /* the term is not fitted: make its step 0 */
+    if (deviation == 0.0) { /* the unknown is not fitted: make its step 0 */
       k->right_side[t] = 0.0;
       for (size_t s = 0; s < terms; ++s) {
-        k->normal[s < t ? t * terms + s : s * terms + t] = s == t ? 1.0 : 0.0;
+        k->normal_matrix[s < t ? t * terms + s : s * terms + t] = s == t ? 1.0 : 0.0;
       }
     } else if (isfinite(deviation)) {
-      k->normal[t * terms + t] += pow(deviation, -2.0);
+      k->normal_matrix[t * terms + t] += pow(deviation, -2.0);
       k->right_side[t] -= offset_from_prior(k, t) * pow(deviation, -2.0);
-      k->squares += pow(offset_from_prior(k, t) / deviation, 2.0);
+      k->objective += pow(offset_from_prior(k, t) / deviation, 2.0);
     }
   }
   for (size_t t = TERMS; t < terms; ++t) {
-    const double *precision = k->options.precision + (t - TERMS) * k->options.region_count;
+    const double *precision = k->options.prior_precision + (t - TERMS) * k->options.region_count;
     double gradient = 0.0;
     for (size_t s = TERMS; s < terms; ++s) {
       gradient += precision[s - TERMS] * (k->region[s - TERMS] - 1.0);
-      k->normal[t * terms + s] += s <= t ? precision[s - TERMS] : 0.0;
+      k->normal_matrix[t * terms + s] += s <= t ? precision[s - TERMS] : 0.0;
     }
     k->right_side[t] -= gradient;
-    k->squares += gradient * (k->region[t - TERMS] - 1.0);
+    k->objective += gradient * (k->region[t - TERMS] - 1.0);
   }
 }
 
-/* Compute the normal equations and k->squares at the present k->law and k->region. */
+/* Compute the normal equations and k->objective at the present k->law and k->region. */
 static void linearise(supine_patient_krige *k) {
   const int n = (int)k->count;
   const int terms = (int)k->terms;
-  const int width = terms + 1; /* one column for each term, and one for the residual */
+  const int width = terms + 1; /* one column for each unknown, and one for the residual */
   for (size_t i = 0; i < k->count; ++i) {
     double *row = k->design + (size_t)width * i;
     row[terms] = -design_row(k, &k->rows[i], row);
@@ -169,21 +172,21 @@ static void linearise(supine_patient_krige *k) {
   }
   if (k->sill > 0.0) {
     cblas_dtrsm(CblasRowMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, n, width, 1.0,
-                k->factor, n, k->design, width);
+                k->cholesky, n, k->design, width);
   }
   cblas_dsyrk(CblasRowMajor, CblasLower, CblasTrans, terms, n, 1.0, k->design, width, 0.0,
-              k->normal, terms);
+              k->normal_matrix, terms);
   cblas_dgemv(CblasRowMajor, CblasTrans, n, terms, 1.0, k->design, width, k->design + terms, width,
               0.0, k->right_side, 1);
-  k->squares = cblas_ddot(n, k->design + terms, width, k->design + terms, width);
+  k->objective = cblas_ddot(n, k->design + terms, width, k->design + terms, width);
   add_prior(k);
 }
 
-/* Solve the damped normal equations for a step of all terms. Return false on failure. */
+/* Solve the damped normal equations for a step of all unknowns. Return false on failure. */
 static bool find_step(const supine_patient_krige *k, double damping, double step[TERMS_MAX]) {
   const lapack_int terms = (lapack_int)k->terms;
-  double *matrix = k->normal + k->terms * k->terms;
-  memcpy(matrix, k->normal, k->terms * k->terms * sizeof *matrix);
+  double *matrix = k->normal_matrix + k->terms * k->terms;
+  memcpy(matrix, k->normal_matrix, k->terms * k->terms * sizeof *matrix);
   memcpy(step, k->right_side, k->terms * sizeof *step);
   for (size_t t = 0; t < k->terms; ++t) {
     matrix[t * k->terms + t] *= 1.0 + damping;
@@ -191,18 +194,18 @@ static bool find_step(const supine_patient_krige *k, double damping, double step
   return LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', terms, 1, matrix, terms, step, terms) == 0;
 }
 
-static bool factor_terms(supine_patient_krige *k) {
+static bool factor_normal_matrix(supine_patient_krige *k) {
   const lapack_int terms = (lapack_int)k->terms;
-  return LAPACKE_dpotrf(LAPACK_COL_MAJOR, 'U', terms, k->normal, terms) == 0;
+  return LAPACKE_dpotrf(LAPACK_COL_MAJOR, 'U', terms, k->normal_matrix, terms) == 0;
 }
 
-/* Minimise k->squares over all unknowns. Return false if the rows do not determine them. */
+/* Minimise k->objective. Return false if the measurements do not determine the unknowns. */
 static bool descend(supine_patient_krige *k) {
   double damping = 0.0;
   linearise(k);
   for (size_t steps = 0; steps < STEPS && damping < damping_most; ++steps) {
     const supine_patient_power before = k->law;
-    const double squares = k->squares;
+    const double squares = k->objective;
     double region[SUPINE_PATIENT_REGIONS_MAX];
     double step[TERMS_MAX];
     memcpy(region, k->region, sizeof region);
@@ -214,10 +217,10 @@ static bool descend(supine_patient_krige *k) {
       k->region[t - TERMS] = fmax(expandability_least, region[t - TERMS] + step[t]);
     }
     linearise(k);
-    if (k->squares <= squares && squares - k->squares <= converged * squares) {
+    if (k->objective <= squares && squares - k->objective <= converged * squares) {
       break;
     }
-    const bool decreased = k->squares < squares;
+    const bool decreased = k->objective < squares;
     damping = decreased ? 0.1 * damping : fmax(1e-3, 10.0 * damping);
     if (!decreased) {
       k->law = before;
@@ -228,25 +231,26 @@ static bool descend(supine_patient_krige *k) {
   return true;
 }
 
-/* Return the restricted log likelihood of the rows, up to a constant, for a sill and a noise. */
+/* Return the restricted log likelihood of the measurements, up to a constant, if the covariance of
+ * the kriging correction is multiplied by `sill` and the noise by `noise`. */
 static double likelihood_of(supine_patient_krige *k, double sill, double noise) {
   const supine_patient_power before = k->law;
   k->sill = sill;
   k->noise = noise;
-  double likelihood = -factor(k);
-  if (!isfinite(likelihood) || !descend(k) || !factor_terms(k)) {
+  double likelihood = -factor_covariance(k);
+  if (!isfinite(likelihood) || !descend(k) || !factor_normal_matrix(k)) {
     likelihood = -INFINITY;
   }
   for (size_t t = 0; t < TERMS; ++t) {
     const double deviation = prior_deviation(k, t);
-    likelihood -= log(k->normal[t * k->terms + t]);
+    likelihood -= log(k->normal_matrix[t * k->terms + t]);
     likelihood -= deviation > 0.0 && isfinite(deviation) ? log(deviation) : 0.0;
   }
   k->law = before;
-  return likelihood - 0.5 * k->squares;
+  return likelihood - 0.5 * k->objective;
 }
 
-/* Choose the most likely k->sill, k->noise and k->sill again; keep values given in `options`. */
+/* Choose the most likely k->sill, then k->noise, then k->sill. Keep values given in `options`. */
 static void choose_factors(supine_patient_krige *k, const supine_patient_fit_options *options) {
   static const double choices[2][5] = {{1.0, 0.03, 0.003, 0.0}, {1.0, 0.5, 0.25, 1.5, 2.0}};
   static const size_t count[2] = {4, 5};
@@ -278,7 +282,7 @@ static bool fit_uncorrected(supine_patient_krige *k, bool size_only) {
   k->options.size_only = size_only;
   k->law = k->mean;
   k->terms = TERMS;
-  (void)factor(k);
+  (void)factor_covariance(k);
   const bool determined = descend(k);
   k->options.size_only = false;
   k->terms = TERMS + k->options.region_count;
@@ -297,26 +301,26 @@ static supine_status krige_create(supine_patient_krige *k,
                               .options = *options,
                               .mean = supine_patient_deep(options->gravity, options->path_span),
                               .centre = malloc(count * sizeof *k->centre),
-                              .factor = corrected ? malloc(count * count * sizeof(double)) : NULL,
+                              .cholesky = corrected ? malloc(count * count * sizeof(double)) : NULL,
                               .design = malloc((terms + 1) * count * sizeof *k->design),
-                              .normal = malloc(2 * terms * terms * sizeof *k->normal),
-                              .weight = malloc(count * sizeof *k->weight),
+                              .normal_matrix = malloc(2 * terms * terms * sizeof *k->normal_matrix),
+                              .kernel_weight = malloc(count * sizeof *k->kernel_weight),
                               .scratch = malloc(count * sizeof *k->scratch)};
   for (size_t r = 0; r < k->options.region_count; ++r) {
     k->region[r] = 1.0;
   }
-  return k->centre == NULL || (corrected && k->factor == NULL) || k->design == NULL ||
-                 k->normal == NULL || k->weight == NULL || k->scratch == NULL
+  return k->centre == NULL || (corrected && k->cholesky == NULL) || k->design == NULL ||
+                 k->normal_matrix == NULL || k->kernel_weight == NULL || k->scratch == NULL
              ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu values", count)
              : SUPINE_OK;
 }
 
 void supine_patient_krige_free(supine_patient_krige *krige) {
   free(krige->centre);
-  free(krige->factor);
+  free(krige->cholesky);
   free(krige->design);
-  free(krige->normal);
-  free(krige->weight);
+  free(krige->normal_matrix);
+  free(krige->kernel_weight);
   free(krige->scratch);
 }
 
@@ -347,22 +351,24 @@ supine_status supine_patient_krige_fit(const supine_patient_fit_options *options
   k->law = k->mean;
   choose_factors(k, options);
   /* Factorise again after the fit, because the covariance depends on the fitted displacement. */
-  determined = !isnan(factor(k)) && descend(k) && !isnan(factor(k));
+  determined = !isnan(factor_covariance(k)) && descend(k) && !isnan(factor_covariance(k));
   linearise(k);
-  if (!determined || !factor_terms(k)) {
+  if (!determined || !factor_normal_matrix(k)) {
     return undetermined(error);
   }
-  cblas_dcopy(n, k->design + k->terms, (int)k->terms + 1, k->weight, 1);
+  cblas_dcopy(n, k->design + k->terms, (int)k->terms + 1, k->kernel_weight, 1);
   if (k->sill > 0.0) {
-    cblas_dtrsv(CblasRowMajor, CblasLower, CblasTrans, CblasNonUnit, n, k->factor, n, k->weight, 1);
+    cblas_dtrsv(CblasRowMajor, CblasLower, CblasTrans, CblasNonUnit, n, k->cholesky, n,
+                k->kernel_weight, 1);
   }
   return SUPINE_OK;
 }
 
-/* Return x^T C x, where C is the posterior covariance matrix of the fitted terms. Overwrite x. */
+/* Return x^T C x, where C is the posterior covariance matrix of the unknowns. Overwrite x. */
 static double variance_of(const supine_patient_krige *k, double x[TERMS_MAX]) {
   const int terms = (int)k->terms;
-  cblas_dtrsv(CblasRowMajor, CblasLower, CblasNoTrans, CblasNonUnit, terms, k->normal, terms, x, 1);
+  cblas_dtrsv(CblasRowMajor, CblasLower, CblasNoTrans, CblasNonUnit, terms, k->normal_matrix, terms,
+              x, 1);
   return cblas_ddot(terms, x, 1, x, 1);
 }
 
@@ -370,9 +376,9 @@ void supine_patient_krige_resolution(const supine_patient_krige *krige, double *
   const lapack_int terms = (lapack_int)krige->terms;
   for (size_t r = 0; r < krige->options.region_count; ++r) {
     double x[TERMS_MAX] = {0.0};
-    memcpy(x + TERMS, krige->options.precision + r * krige->options.region_count,
+    memcpy(x + TERMS, krige->options.prior_precision + r * krige->options.region_count,
            krige->options.region_count * sizeof *x);
-    (void)LAPACKE_dpotrs(LAPACK_COL_MAJOR, 'U', terms, 1, krige->normal, terms, x, terms);
+    (void)LAPACKE_dpotrs(LAPACK_COL_MAJOR, 'U', terms, 1, krige->normal_matrix, terms, x, terms);
     share[r] = 1.0 - x[TERMS + r];
   }
 }
@@ -401,8 +407,8 @@ double supine_patient_krige_predict(supine_patient_krige *krige, const supine_pa
     for (size_t i = 0; i < krige->count; ++i) {
       krige->scratch[i] *= krige->scaled_sill * supine_dot(row->axis, krige->rows[i].axis);
     }
-    value += cblas_ddot(n, krige->scratch, 1, krige->weight, 1);
-    cblas_dtrsv(CblasRowMajor, CblasLower, CblasNoTrans, CblasNonUnit, n, krige->factor, n,
+    value += cblas_ddot(n, krige->scratch, 1, krige->kernel_weight, 1);
+    cblas_dtrsv(CblasRowMajor, CblasLower, CblasNoTrans, CblasNonUnit, n, krige->cholesky, n,
                 krige->scratch, 1);
     cblas_dgemv(CblasRowMajor, CblasTrans, n, (int)krige->terms, -1.0, krige->design,
                 (int)krige->terms + 1, krige->scratch, 1, 1.0, x, 1);
@@ -425,7 +431,7 @@ void supine_patient_krige_copy_law(const supine_patient_krige *krige, supine_pat
     if (krige->rows[i].weight <= 0.0) {
       continue;
     }
-    /* The three rows of a landmark share one kernel. */
+    /* The three measurements of a landmark share one element of patient->centre. */
     if ((patient->centre_count == 0 ||
          memcmp(last[-1].offset, centre.offset, sizeof centre.offset) != 0) &&
         patient->centre_count < SUPINE_PATIENT_CENTRES_MAX) {
@@ -433,7 +439,7 @@ void supine_patient_krige_copy_law(const supine_patient_krige *krige, supine_pat
       *last++ = centre;
     }
     for (size_t a = 0; a < 3; ++a) {
-      last[-1].weight[a] += krige->scaled_sill * krige->weight[i] * krige->rows[i].axis[a];
+      last[-1].weight[a] += krige->scaled_sill * krige->kernel_weight[i] * krige->rows[i].axis[a];
     }
   }
 }

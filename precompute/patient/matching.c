@@ -15,8 +15,8 @@
 
 enum { GRAIN = 64 };
 
-static const double compatible = 0.5; /* a match with a smaller cosine of the normals is dropped */
-static const double biweight = 4.685; /* cutoff of Tukey's biweight, in units of the robust scale */
+static const double compatible = 0.5; /* smallest cosine between the two normals of a match */
+static const double biweight = 4.685; /* cutoff of Tukey's biweight / robust scale of distances */
 static const double surface_noise = 0.5; /* standard deviation of a measured distance, mm */
 static const double scale_least = 0.02;  /* lower bound on the robust scale of the distances, mm */
 static const double matched_least = 0.3; /* a smaller share of matched vertices is an error */
@@ -114,7 +114,7 @@ void supine_patient_stiffness_of(const supine_patient_stiffness *stiffness,
     double a = stiffness->count == 0 ? 1.0 : 0.0;
     supine_patient_stiffness_shares(stiffness, lungs, i, shares);
     for (size_t k = 0; k < stiffness->count; ++k) {
-      a += stiffness->region[k].value * shares[k];
+      a += stiffness->region[k].expandability * shares[k];
     }
     e[i] = 1.0 / a;
   }
@@ -131,16 +131,16 @@ supine_status supine_patient_matching_solve(supine_patient_matching *matching,
   }
   for (size_t i = 0; i < n; ++i) {
     const supine_patient_place place = supine_patient_find_vertex(m->rest, i);
-    memcpy(m->spread + SUPINE_PATIENT_COLUMNS * i, place.force, sizeof place.force);
+    memcpy(m->smoothed_force + SUPINE_PATIENT_COLUMNS * i, place.force, sizeof place.force);
   }
   supine_patient_stiffness_of(stiffness, m->rest, e);
   supine_status status = supine_physics_equilibrium_set_stiffness(m->equilibrium, e, error);
   if (status == SUPINE_OK) {
-    status = supine_physics_equilibrium_solve(m->equilibrium, SUPINE_PATIENT_COLUMNS, m->spread,
-                                              m->spread, error);
+    status = supine_physics_equilibrium_solve(m->equilibrium, SUPINE_PATIENT_COLUMNS,
+                                              m->smoothed_force, m->smoothed_force, error);
   }
   for (size_t i = 0; i < m->count && status == SUPINE_OK; ++i) {
-    memcpy(m->rows[i].place.force, m->spread + SUPINE_PATIENT_COLUMNS * m->match[i].vertex,
+    memcpy(m->rows[i].place.force, m->smoothed_force + SUPINE_PATIENT_COLUMNS * m->match[i].vertex,
            sizeof m->rows[i].place.force);
   }
   free(e);
@@ -157,7 +157,7 @@ void supine_patient_matching_choose(supine_patient_matching *matching, size_t li
     m->match[i] = (supine_patient_match){.vertex = v, .nearest.depth = INFINITY};
     m->rows[i] = (supine_patient_row){.place = supine_patient_find_vertex(m->rest, v),
                                       .noise = surface_noise};
-    memcpy(m->rows[i].place.force, m->spread + SUPINE_PATIENT_COLUMNS * v,
+    memcpy(m->rows[i].place.force, m->smoothed_force + SUPINE_PATIENT_COLUMNS * v,
            sizeof m->rows[i].place.force);
     memcpy(m->match[i].position, m->rest->mesh.vertices + 3 * v, sizeof m->match[i].position);
   }
@@ -172,13 +172,13 @@ supine_status supine_patient_matching_create(const supine_lungs *rest, const sup
   supine_patient_matching *m = matching;
   *m = (supine_patient_matching){.rest = rest, .state = state};
   m->frame = supine_patient_frame_of_lungs(rest);
-  m->spread = malloc(SUPINE_PATIENT_COLUMNS * n * sizeof(double));
+  m->smoothed_force = malloc(SUPINE_PATIENT_COLUMNS * n * sizeof(double));
   m->rest_normals = malloc(3 * n * sizeof(double));
   m->state_normals = malloc(3 * state->vertex_count * sizeof(double));
   m->match = malloc(n * sizeof *m->match);
   m->rows = malloc((n + 3 * landmarks) * sizeof *m->rows);
   m->space = malloc(n * sizeof(double));
-  if (m->spread == NULL || m->rest_normals == NULL || m->state_normals == NULL ||
+  if (m->smoothed_force == NULL || m->rest_normals == NULL || m->state_normals == NULL ||
       m->match == NULL || m->rows == NULL || m->space == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
   }
@@ -200,7 +200,7 @@ supine_status supine_patient_matching_create(const supine_lungs *rest, const sup
 void supine_patient_matching_free(supine_patient_matching *matching) {
   supine_inside_surface_destroy(matching->tree);
   supine_physics_equilibrium_destroy(matching->equilibrium);
-  free(matching->spread);
+  free(matching->smoothed_force);
   free(matching->rest_normals);
   free(matching->state_normals);
   free(matching->match);

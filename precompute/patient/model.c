@@ -12,11 +12,10 @@
 
 enum { GRAIN = 64 };
 
-/* A surface is refused if a face of its bounding box is farther than this from the same face of a
- * scanned state's box, relative to the width of the state's box: [0] if the state's box is that of
- * landmarks, [1] if it is that of a surface. */
+/* Largest distance between the same faces of the bounding boxes of a surface and a scanned state /
+ * width of the latter. The state's box is that of landmarks [0] or of a surface [1]. */
 static const double apart_most[2] = {0.45, 0.2};
-/* When a displacement is divided by a force, smaller forces count as this. The mean force is 1. */
+/* Smaller forces are replaced by this before a division. The mean force is 1. */
 static const double force_least = 0.2;
 
 /* If the patient's two scanned states are closer than this share of the path from full inflation to
@@ -66,8 +65,8 @@ static void find_parts(const supine_patient_record *record, double part[2]) {
   }
 }
 
-/* Compute the gains along x, y and z at two positions on the path from full inflation (0) to rest
- * (1). A gain is the displacement from full inflation, divided by that displacement at rest. */
+/* Compute gains [position, axis]: the displacement from full inflation, divided by that at rest,
+ * along x, y and z, at two positions on the path from full inflation (0) to rest (1). */
 static void find_gains(const double part[2], double gains[2][3]) {
   const supine_model deep = supine_physics_model(SUPINE_LAW_DEEP);
   supine_volume_bend(deep.bend, part[0], gains[0]);
@@ -82,10 +81,10 @@ void supine_patient_path(const supine_patient_record *record, double gains[2][3]
 
 typedef struct work {
   const supine_patient_record *record;
-  supine_lungs lungs;   /* estimate of the lungs in the fuller state */
-  const double *scan;   /* [N, 3] vertices of a scan in the emptier state, or NULL */
-  double *ratio;        /* [N] force after spreading / force before spreading */
-  double *displacement; /* [N, 3] displacement from the fuller to the emptier state, mm */
+  supine_lungs lungs;      /* estimate of the lungs in the fuller state */
+  const double *scan;      /* [N, 3] vertices of a scan in the emptier state, or NULL */
+  double *smoothing_ratio; /* [N] force after smoothing over the surface / force before */
+  double *displacement;    /* [N, 3] displacement from the fuller to the emptier state, mm */
 } work;
 
 /* Compute the displacement of each vertex from the fuller to the emptier state. If the scan shows
@@ -96,14 +95,14 @@ static void move_range(void *context, size_t begin, size_t end, size_t thread) {
   const supine_patient *patient = &w->record->patient;
   for (size_t i = begin; i < end; ++i) {
     const double side = supine_patient_side_of(&w->lungs, i);
-    const double spread = w->record->from_surface ? w->ratio[i] : 1.0;
+    const double force_factor = w->record->from_surface ? w->smoothing_ratio[i] : 1.0;
     double *at = w->lungs.mesh.vertices + 3 * i;
     if (w->scan != NULL) {
-      supine_patient_find_in_fuller(patient, w->scan + 3 * i, side, spread, at,
+      supine_patient_find_in_fuller(patient, w->scan + 3 * i, side, force_factor, at,
                                     w->displacement + 3 * i);
     } else {
       const supine_patient_place place = supine_patient_find(&patient->frame, at, side);
-      supine_patient_displacement(patient, &place, spread, w->displacement + 3 * i);
+      supine_patient_displacement(patient, &place, force_factor, w->displacement + 3 * i);
     }
   }
 }
@@ -113,7 +112,7 @@ static void move(work *w) {
   supine_mesh_box(&w->lungs.mesh, w->lungs.minimum, w->lungs.maximum);
 }
 
-/* Compute w->ratio and stiffness [N], in the posture to which the displacement law was fitted. */
+/* Compute w->smoothing_ratio and the stiffness [N], in the posture to which the law was fitted. */
 static supine_status find_ratio(const work *w, double *stiffness, supine_error *error) {
   const supine_patient_record *record = w->record;
   supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
@@ -125,15 +124,17 @@ static supine_status find_ratio(const work *w, double *stiffness, supine_error *
       supine_physics_solve(&w->lungs, &model, record->state[1].gravity, &solution, error);
   for (size_t i = 0; i < w->lungs.mesh.vertex_count && status == SUPINE_OK; ++i) {
     const supine_patient_place place = supine_patient_find_vertex(&w->lungs, i);
-    w->ratio[i] = solution.catch_[i] /
-                  fmax(force_least, supine_patient_force_at(&record->patient.power, &place));
+    w->smoothing_ratio[i] =
+        solution.catch_[i] /
+        fmax(force_least, supine_patient_force_at(&record->patient.power, &place));
   }
   supine_physics_solution_free(&solution);
   return status;
 }
 
-/* Compute the change of volume, mL, from the fuller scanned state to full inflation (end 0) or to
- * rest (end 1). The displacement between the scanned states is scaled to lead to this end. */
+/* Compute the change of volume, mL, if the displacement between the two scanned states is scaled so
+ * that it leads from the fuller state to full inflation (end 0) or to rest (end 1).
+ * @param part  positions of the two states on the path from full inflation (0) to rest (1) */
 static double volume_to_end(const supine_volume_form *form, const double part[2], size_t end) {
   double gains[2][3];
   double towards[3];
@@ -144,8 +145,9 @@ static double volume_to_end(const supine_volume_form *form, const double part[2]
   return supine_volume_form_at(form, towards);
 }
 
-/* Find path_span: along x, y and z, the gain of the emptier state minus that of the fuller state.
- * The states are placed so that the path ends at the known volumes of full inflation and of rest.
+/* Compute path_span: along x, y and z, the share of the displacement from full inflation to rest
+ * that lies between the two scanned states. Move the states along the path from full inflation to
+ * rest until its ends have the known volumes.
  * @param ones  [vertices] 1 for each vertex */
 static void find_path_span(const work *w, const supine_resting *resting, const double *ones,
                            double path_span[3]) {
@@ -171,7 +173,7 @@ static void find_path_span(const work *w, const supine_resting *resting, const d
     const size_t k = (size_t)round % 2;
     const supine_volume *stated = &record->state[k].volume;
     if (stated->ml == 0.0 && stated->kind == (k == 0 ? SUPINE_VOLUME_FULL : SUPINE_VOLUME_REST)) {
-      continue; /* a state that is exactly at this end stays there */
+      continue; /* the state is exactly at an end of the path, and is not moved */
     }
     const double off = volume_to_end(form, part, k) - (volume[k] - lung_volume);
     part[k] += step;
@@ -194,18 +196,18 @@ supine_status supine_patient_model(const supine_patient_record *record,
   work w = {.record = record,
             .lungs = *lungs,
             .scan = state == 1 ? lungs->mesh.vertices : NULL,
-            .ratio = malloc(2 * n * sizeof(double)),
+            .smoothing_ratio = malloc(2 * n * sizeof(double)),
             .displacement = directions};
   double path_span[3];
   supine_status status = SUPINE_OK;
   w.lungs.mesh.vertices = malloc(3 * n * sizeof(double));
-  if (w.ratio == NULL || w.lungs.mesh.vertices == NULL) {
+  if (w.smoothing_ratio == NULL || w.lungs.mesh.vertices == NULL) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
     goto cleanup;
   }
   memcpy(w.lungs.mesh.vertices, lungs->mesh.vertices, 3 * n * sizeof(double));
   for (size_t i = 0; i < 2 * n; ++i) {
-    w.ratio[i] = 1.0;
+    w.smoothing_ratio[i] = 1.0;
   }
   if (w.scan != NULL) {
     move(&w);
@@ -214,12 +216,12 @@ supine_status supine_patient_model(const supine_patient_record *record,
     status = find_ratio(&w, stiffness, error);
     move(&w);
   }
-  find_path_span(&w, resting, w.ratio + n, path_span);
+  find_path_span(&w, resting, w.smoothing_ratio + n, path_span);
   for (size_t i = 0; i < n; ++i) {
     const supine_patient_place place = supine_patient_find_vertex(&w.lungs, i);
     const double force =
         fmax(force_least, supine_patient_force_at(&record->patient.power, &place)) *
-        fmax(force_least, w.ratio[i]);
+        fmax(force_least, w.smoothing_ratio[i]);
     for (size_t k = 0; k < 3; ++k) {
       directions[3 * i + k] /= -force * path_span[k];
     }
@@ -232,7 +234,7 @@ supine_status supine_patient_model(const supine_patient_record *record,
     model->direction.c[2 * k + 1] = record->patient.power.c[2 * k + 1];
   }
 cleanup:
-  free(w.ratio);
+  free(w.smoothing_ratio);
   free(w.lungs.mesh.vertices);
   return status;
 }
@@ -244,7 +246,7 @@ supine_status supine_patient_check_place(const supine_patient_record *record,
   const int only_side = lungs->lung_count == 1 ? lungs->side[0] : 0;
   const double *low[2] = {frame->minimum, record->emptier[0]};
   const double *high[2] = {frame->maximum, record->emptier[1]};
-  double off[2] = {0.0, 0.0}; /* [state] largest distance of faces, relative to the state's box */
+  double off[2] = {0.0, 0.0}; /* [state] largest distance between same faces of boxes / width */
   size_t axis[2] = {0};
   if (frame->only_side != 0 && frame->only_side != only_side) {
     return supine_error_set(
@@ -254,7 +256,7 @@ supine_status supine_patient_check_place(const supine_patient_record *record,
         frame->only_side > 0 ? "left" : "right");
   }
   for (size_t s = 0; s < 2; ++s) {
-    /* If the surface lacks one of two fitted lungs, x is not compared. */
+    /* Do not compare x if the surface lacks one of two fitted lungs. */
     for (size_t k = only_side != frame->only_side ? 1 : 0; k < 3; ++k) {
       const double apart =
           fmax(fabs(lungs->minimum[k] - low[s][k]), fabs(lungs->maximum[k] - high[s][k])) /

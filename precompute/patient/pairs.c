@@ -21,19 +21,19 @@ enum {
 static const double flat_least = 1.0; /* points closer to a plane (RMS, mm) count as flat */
 static const double displacement_least = 0.05; /* a smaller RMS displacement is refused, mm */
 static const double rotation_most = 25.0;      /* a larger rotation is refused, degrees */
-static const double box_overlap_least = 0.5;   /* boxes must overlap by at least this share */
-/* A larger translation, or a larger residual of an affine map, is refused. Both are divided by the
- * RMS distance of the points from their mean. */
+static const double box_overlap_least = 0.5; /* least overlap of boxes / width of the larger box */
+/* Largest translation, and largest residual of an affine map, between two states. Both are divided
+ * by the RMS distance of the points from their mean. */
 static const double apart_most = 0.5, residual_most = 0.7;
 
 static const char *const columns[COLUMNS] = {"x",     "y",     "z",     "to_x",  "to_y",  "to_z",
                                              "im1_x", "im1_y", "im1_z", "im2_x", "im2_y", "im2_z"};
 
-/* Find six columns: x, y, z of a point in the first state, then x, y, z in the second state. */
+/* Find the columns of x, y and z of the first state, then of x, y and z of the second state. */
 static supine_status find_columns(const supine_csv *csv, bool reverse, size_t column[COORDINATES],
                                   supine_error *error) {
   const size_t first = supine_csv_text(csv, 0) != NULL ? 0 : COORDINATES;
-  /* The columns im1 are the second state, and im2 the first, unless `reverse` exchanges them. */
+  /* Unless `reverse` is true, the columns im1_* hold the second state, and im2_* the first. */
   const bool swap = (first == COORDINATES) != reverse;
   for (size_t k = 0; k < COORDINATES; ++k) {
     column[k] = first + (swap ? (k + 3) % COORDINATES : k);
@@ -157,13 +157,13 @@ double supine_patient_pairs_growth(const supine_patient_pairs *pairs) {
 
 typedef struct summary {
   double spread[2];    /* RMS distance of each state's points from their mean, mm */
-  double size[2];      /* longest side of each state's box, mm */
+  double size[2];      /* longest side of the bounding box of each state's points, mm */
   double translation;  /* distance between the mean points of the two states, mm */
   double rotation;     /* angle of the best-fitting rotation, degrees */
   bool flat;           /* whether the points of the first state lie in a plane */
   double growth;       /* determinant of the best-fitting affine map, negative for a reflection */
-  double residual;     /* RMS residual of this affine map, mm */
-  double displacement; /* RMS displacement, mm; if the scans moved, without the mean */
+  double residual;     /* RMS residual of the best-fitting affine map, mm */
+  double displacement; /* RMS displacement, mm; its mean is subtracted if the body may have moved */
 } summary;
 
 static summary measure(const supine_patient_pairs *pairs, bool scans_moved) {

@@ -20,7 +20,6 @@ typedef struct supine_patient_pairs {
 /** Read pairs of points from a CSV file with the columns x,y,z,to_x,to_y,to_z (first and second
  * state) or im1_x,im1_y,im1_z,im2_x,im2_y,im2_z (image 1 is the second state, usually inhaled;
  * image 2 is the first).
- *
  * @param reverse  exchange the two states
  * @param pairs    initialised to zero; empty after a failure
  * @retval SUPINE_ERROR_READ    the file is missing or unreadable
@@ -65,8 +64,8 @@ bool supine_patient_map_fit(supine_patient_map kind, size_t count, const double 
 void supine_patient_map_apply(const supine_patient_affinity *map, const double from[3],
                               double to[3]);
 
-/** Check that two surfaces can be two states of the same lungs, by the overlap of their boxes.
- * @retval SUPINE_ERROR_MESH  along an axis, less than half of the larger box overlaps the other */
+/** Check by the overlap of bounding boxes that two surfaces can be two states of the same lungs.
+ * @retval SUPINE_ERROR_MESH  along an axis, they overlap by less than half of the larger box */
 supine_status supine_patient_check_boxes(const supine_mesh *rest, const supine_mesh *state,
                                          supine_error *error);
 

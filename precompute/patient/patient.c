@@ -12,7 +12,7 @@
 
 const char *const supine_patient_law_names[SUPINE_PATIENT_LAW_COUNT + 1] = {"deep", "paper", NULL};
 
-/* Distance by which a lung extends beyond its landmarks, mm: 5 to 15 in ten pairs of images. */
+/* Distance by which a lung extends beyond its outermost landmarks, mm: 5 to 15 in ten patients. */
 static const double landmark_margin = 10.0;
 
 static double clamp_to_box(double box) {
@@ -88,7 +88,7 @@ double supine_patient_force_at(const supine_patient_power *power,
 
 void supine_patient_direction(const supine_patient_power *power, const supine_patient_place *place,
                               double force, double d[3]) {
-  for (int k = 0; k < 3; ++k) { /* [Santhanam2008] (15)-(17) */
+  for (int k = 0; k < 3; ++k) { /* direction of displacement, [Santhanam2008] (15)-(17) */
     d[k] = force * (k == 0 ? place->side : -1.0) * power->c[2 * k] *
            pow(clamp_to_box(place->box[k]), power->c[2 * k + 1]);
   }
@@ -102,8 +102,9 @@ void supine_patient_motion(const supine_patient_power *power, const supine_patie
   }
 }
 
-/* The covariance contains exp(-a) (kriging.h). Compute it as the 64th power of exp(-a / 64), which
- * a polynomial of degree 8 approximates. The error is below 1e-13 of the covariance at a = 0. */
+/* The covariance contains exp(-a), where a is a scaled distance (kriging.h). Compute exp(-a) as
+ * the 64th power of exp(-a / 64), which a polynomial of degree 8 approximates. The error is
+ * below 1e-13 times the covariance at distance 0. */
 SUPINE_CLONES void supine_patient_covariances(const supine_patient_centre *here, size_t count,
                                               const supine_patient_centre *centre,
                                               double *covariance) {
@@ -129,10 +130,10 @@ SUPINE_CLONES void supine_patient_covariances(const supine_patient_centre *here,
 }
 
 void supine_patient_displacement(const supine_patient *patient, const supine_patient_place *place,
-                                 double spread, double u[3]) {
+                                 double force_factor, double u[3]) {
   const supine_patient_power *power = &patient->power;
   double covariance[SUPINE_PATIENT_CENTRES_MAX];
-  supine_patient_direction(power, place, spread * supine_patient_force_at(power, place), u);
+  supine_patient_direction(power, place, force_factor * supine_patient_force_at(power, place), u);
   supine_patient_centre here = {.side = place->side, .size = supine_length(u)};
   memcpy(here.offset, place->offset, sizeof here.offset);
   supine_patient_covariances(&here, patient->centre_count, patient->centre, covariance);
@@ -144,14 +145,14 @@ void supine_patient_displacement(const supine_patient *patient, const supine_pat
 }
 
 void supine_patient_find_in_fuller(const supine_patient *patient, const double point[3],
-                                   double side, double spread, double at[3], double u[3]) {
+                                   double side, double force_factor, double at[3], double u[3]) {
   enum { STEPS = 60 };
   static const double converged = 1e-4; /* change below which the iteration ends, mm */
   double change = INFINITY;
   for (int step = 0; step < STEPS && change >= converged; ++step) {
     const supine_patient_place place = supine_patient_find(&patient->frame, at, side);
     double motion[3];
-    supine_patient_displacement(patient, &place, spread, u);
+    supine_patient_displacement(patient, &place, force_factor, u);
     supine_patient_motion(&patient->power, &place, motion);
     change = 0.0;
     for (size_t k = 0; k < 3; ++k) {
@@ -174,7 +175,8 @@ supine_force_law supine_patient_force(const supine_patient_power *power, double 
                                       const double gravity[3]) {
   supine_force_law law = {.gain = gain, .pair = true};
   const double *slope = power->c + 6;
-  /* Gravity along x adds no slope, as heights grow with X in one lung and fall in the other. */
+  /* The part of the force that depends on gravity has no slope along X: X grows from the midline
+   * outwards, so that X grows downwards in one lung and upwards in the other. */
   law.box[0] = slope[0];
   law.box[1] = slope[1] + gain * gravity[1];
   law.box[2] = slope[2] + gain * gravity[2];

@@ -18,12 +18,12 @@ enum {
   REGION = sizeof(supine_patient_region) / sizeof(double)
 };
 
-/* Place of a number, or of an array of numbers, in a record and in its file. */
+/* Where a number or an array of numbers is in supine_patient_record and in the JSON file. */
 typedef struct numbers {
   const char *group; /* key of the enclosing object, or NULL for the root */
   const char *key;
   size_t count;  /* 1 for a number, more for an array */
-  size_t offset; /* position in the record, bytes */
+  size_t offset; /* offset of the first number in supine_patient_record, bytes */
   bool optional; /* may be missing in the file; not written if all numbers are 0 */
 } numbers;
 
@@ -65,7 +65,7 @@ static const numbers table[] = {
     {"surface", "matched_share", 1, AT(surface.matched), true},
     {"surface", "rms_before_mm", 1, AT(surface.before), true},
     {"surface", "rms_after_mm", 1, AT(surface.after), true},
-    {"expandability", "unseen_regions", 1, AT(expand.unseen), true},
+    {"expandability", "unseen_regions", 1, AT(expand.undetermined), true},
     {"expandability", "fitted_without_and_with_mm", 2, AT(expand.fitted), true},
     {"expandability", "held_out_without_and_with_mm", 2, AT(expand.held_out), true},
     {"applied_force", "blocks", 1, AT(applied.blocks), true},
@@ -250,12 +250,13 @@ static bool read_regions(const json_t *root, supine_patient_stiffness *stiffness
                                             stiffness->region, &stiffness->count);
   for (size_t k = 0; k < stiffness->count; ++k) {
     const supine_patient_region *region = &stiffness->region[k];
-    valid = valid && fabs(region->side) == 1.0 && region->value > 0.0 && region->radius > 0.0;
+    valid =
+        valid && fabs(region->side) == 1.0 && region->expandability > 0.0 && region->radius > 0.0;
   }
   return valid;
 }
 
-/* Read a record. Return the first key that is missing or invalid, or NULL if there is none. */
+/* Read a patient's record from JSON. Return the first key that is missing or invalid, or NULL. */
 static const char *read_record(const json_t *root, supine_patient_record *record) {
   supine_patient *patient = &record->patient;
   for (size_t i = 0; i < sizeof table / sizeof *table; ++i) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Make rows from landmarks, group rows into blocks, and evaluate a displacement law at a row. */
+/* Make measurements from landmarks, group them by position, and predict them. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -9,9 +9,9 @@
 
 #include "sh/base/vec3.h"
 
-/* Side of a block of rows that are held out together, mm. Landmarks that are a third of this
- * distance apart move alike to within a few mm. If single landmarks were held out, the error would
- * seem too small. */
+/* Side of the cubes of space whose measurements are held out together, mm. Landmarks a third of
+ * this distance apart have displacements that differ by only a few mm, so that holding out single
+ * landmarks would make the error seem too small. */
 static const double block_side = 40.0;
 
 /* Standard deviation of a landmark's measured displacement along each axis, mm. */
@@ -32,10 +32,10 @@ void supine_patient_rows_of_pairs(const supine_patient_frame *frame,
 
 size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patient_row *rows,
                                  size_t count, unsigned long seed) {
-  enum { CELLS = 64 }; /* number of cells along each axis */
+  enum { CELLS = 64 }; /* number of cubes of space along each axis */
   size_t blocks = 0;
   double origin[3] = {0.0};
-  /* For each cell, 1 plus the index of its block, or 0 if it has no block yet. */
+  /* [cube of space] 1 plus the index of its block, or 0 if it holds no measurement so far. */
   size_t *number = calloc((size_t)CELLS * CELLS * CELLS, sizeof *number);
   gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
   const bool able = number != NULL && random != NULL;
@@ -63,10 +63,10 @@ size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patie
 double supine_patient_power_design(const supine_patient_power *law, const supine_patient_row *row,
                                    double x[SUPINE_PATIENT_TERMS]) {
   const double force = supine_patient_force_at(law, &row->place);
-  double along[3]; /* displacement along the row's axis per mm of c1, c3 and c5, at force 1 */
+  double along[3]; /* [axis] displacement along row->axis for force 1 and c1, c3 or c5 of 1 mm */
   double motion[3];
   double turned[3];
-  double unit_force = 0.0; /* displacement along the row's axis if the force is 1, mm */
+  double unit_force = 0.0; /* displacement along row->axis for a force of 1, mm */
   supine_patient_power unit = *law;
   unit.c[0] = unit.c[2] = unit.c[4] = 1.0;
   supine_patient_direction(&unit, &row->place, 1.0, along);

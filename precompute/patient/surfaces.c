@@ -12,12 +12,14 @@ enum {
   ROUNDS_MAX = 60
 };
 
-static const double converged = 2e-3;     /* RMS movement of the vertices, mm, that ends the fit */
-static const double size_converged = 0.5; /* RMS movement, mm, that ends the fit of one factor */
-static const double scale_least = 1.0;    /* lower bound on the robust scale of the distances, mm */
-static const double same_state = 0.02;    /* surfaces closer than this (RMS, mm) count as equal */
+static const double converged = 2e-3; /* RMS movement of the vertices, mm, that ends the fit */
+/* RMS movement, mm, that ends the fit of a scale factor */
+static const double size_converged = 0.5;
+static const double scale_least = 1.0; /* lower bound on the robust scale of the distances, mm */
+static const double same_state = 0.02; /* surfaces closer than this (RMS, mm) are equal */
 
-/* Set each row to the displacement, along one axis, from one surface's box to the other's. */
+/* Initialise the measurement of each vertex: the displacement along one axis by the affine map from
+ * the bounding box of the reference surface to that of the surface in the emptier state. */
 static void start_rows(supine_patient_matching *m) {
   const double *low = m->rest->minimum;
   double to[2][3];
@@ -25,7 +27,7 @@ static void start_rows(supine_patient_matching *m) {
   for (size_t i = 0; i < m->count; ++i) {
     supine_patient_row *row = &m->rows[i];
     const double *from = m->rest->mesh.vertices + 3 * m->match[i].vertex;
-    const size_t k = i % 3; /* axis of the row */
+    const size_t k = i % 3;
     const double t = (from[k] - low[k]) / (m->rest->maximum[k] - low[k]);
     row->axis[0] = row->axis[1] = row->axis[2] = 0.0;
     row->axis[k] = 1.0;
@@ -34,7 +36,7 @@ static void start_rows(supine_patient_matching *m) {
   }
 }
 
-/* Fit the law and its correction or, if `shaped` is false, one factor on the default law (deep). */
+/* Fit the displacement law or, if `shaped` is false, only a scale factor of the default law. */
 static supine_status refit(const supine_patient_matching *m, bool shaped,
                            supine_patient_fit_options *options, supine_patient *patient,
                            supine_error *error) {
@@ -54,8 +56,8 @@ static supine_status refit(const supine_patient_matching *m, bool shaped,
   return status;
 }
 
-/* Fit the law and match the surfaces in turn. Until the vertices move little, fit only a factor on
- * the default law (deep), because matches do not show displacement along the surface. */
+/* Fit the displacement law and match the surfaces in turn. Until the vertices move little, fit only
+ * a factor on the default law, because matches do not show displacement along the surface. */
 static supine_status iterate(supine_patient_matching *m, const supine_patient_fit_options *wanted,
                              supine_patient *patient, supine_patient_surface_report *report,
                              supine_error *error) {
