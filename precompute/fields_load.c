@@ -80,7 +80,7 @@ static supine_status take_tensors(const char *path, const supine_tensor *gravity
   if (displacement->shape[1] != n) {
     return supine_error_set(
         error, SUPINE_ERROR_MESH,
-        "%s: has displacements of %zu vertices, but the reference surface has %zu vertices: give "
+        "%s: gives displacements of %zu vertices, but the reference surface has %zu vertices: give "
         "one displacement for each",
         path, displacement->shape[1], n);
   }

@@ -71,7 +71,7 @@ static void report_result(const char *path, const supine_lungs *lungs,
                           const supine_precompute_options *options,
                           const supine_precompute_report *report) {
   const supine_accuracy *accuracy = &report->accuracy;
-  char state[48];
+  char state[64];
   if (!options->reference->known) {
     (void)snprintf(state, sizeof state, "%g mL", accuracy->volume);
   } else if (accuracy->volume == 1.0) {

@@ -163,7 +163,7 @@ static const double pitcher_tolerance = 1e-6;
 static void report_remaining(void *context, size_t steps, double remaining) {
   const size_t per_vertex = steps / *(const size_t *)context;
   if ((per_vertex & (per_vertex - 1)) == 0) {
-    (void)printf("pitcher-catcher: %8zu distributions, %.3g of the force remains\n", steps,
+    (void)printf("Pitcher/Catcher: %8zu steps, %.3g of the force not yet balanced\n", steps,
                  remaining);
   }
 }

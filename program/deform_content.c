@@ -177,12 +177,12 @@ static supine_status write_field(const supine_deform_content *wanted, const char
                                  supine_error *error) {
   char note[256];
   const supine_image *nodes = wanted->inverse ? &inverse->nodes : &forward->nodes;
-  (void)snprintf(
-      note, sizeof note,
-      wanted->inverse
-          ? "displacement v(y), mm, LPS: the tissue at y, deformed, was at y + v(y) in %s"
-          : "displacement u(x), mm, LPS: the tissue at x, in %s, goes to x + u(x)",
-      from);
+  (void)snprintf(note, sizeof note,
+                 wanted->inverse
+                     ? "displacement v(y), mm, LPS: the tissue at y in the deformed lungs was at y "
+                       "+ v(y) in %s"
+                     : "displacement u(x), mm, LPS: the tissue at x, in %s, goes to x + u(x)",
+                 from);
   const supine_status status = supine_image_write(wanted->field, nodes, note, error);
   if (status == SUPINE_OK) {
     (void)printf("%s: %s field of %zu x %zu x %zu nodes\n", wanted->field,

@@ -262,10 +262,12 @@ static supine_status check_points(const supine_command_subject *s,
   }
   return 2 * outside <= pairs->count
              ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%zu of %zu landmarks lie outside the lungs' bounding box: check "
-                                "their frame, unit and person, or give --reverse",
-                                outside, pairs->count);
+             : supine_error_set(
+                   error, SUPINE_ERROR_FORMAT,
+                   "%zu of %zu landmarks lie outside the lungs' bounding box: check "
+                   "their frame, unit and patient, or exchange first and second points by "
+                   "--reverse",
+                   outside, pairs->count);
 }
 
 static supine_status validate_points(supine_command_subject *s, size_t which, const char *path,

@@ -348,8 +348,9 @@ static supine_status check_scan(const check *c, supine_basis *basis) {
   }
   return supine_safetensors_metadata(c->file, "bend") == NULL || basis->rest_by_lung
              ? SUPINE_OK
-             : refuse(c,
-                      "metadata 'bend' requires tensor 'resting_volume' with a row for each lung");
+             : refuse(
+                   c,
+                   "metadata 'bend' requires a tensor 'resting_volume' with a row for each lung");
 }
 
 /* Check the optional tensor 'resting_volume', which has one row, or a row for each lung. */
@@ -381,7 +382,7 @@ static supine_status check_normals(const check *c, supine_basis *basis) {
   }
   info->normal_count = shape[2];
   if (info->normal_count < 1 || info->normal_count > SUPINE_NORMAL_MODES_MAX) {
-    return refuse(c, "the number of modes of the normals is %zu, not 1 to %d", info->normal_count,
+    return refuse(c, "the basis of vertex normals has %zu modes, not 1 to %d", info->normal_count,
                   SUPINE_NORMAL_MODES_MAX);
   }
   size_t one[] = {info->lung_count, info->normal_count, terms};

@@ -272,7 +272,8 @@ static supine_status loop_begin(const supine_pv *pv, const supine_pv_breath *bre
   status = limb_pressure(&cycle->limbs[SUPINE_PV_INHALE], full, &cycle->peak);
   if (status != SUPINE_OK) {
     return supine_error_set(
-        error, status, "no pressure of the inhale limb gives %g mL: check the inhale limb", full);
+        error, status,
+        "no pressure found at which the inhale limb gives %g mL: check the inhale limb", full);
   }
   status = limb_holds(pv, "peak", cycle->peak, error);
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT && status == SUPINE_OK; ++limb) {

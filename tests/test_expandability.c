@@ -74,7 +74,7 @@ TEST(test_expandability_load_bad_file_message_names_line_or_vertex) {
       {"expandability\n1\nnan\n3\n", ":3:", "\"nan\" is not a finite number"},
       {"expandability\n1\n1e999\n3\n", ":3:", "\"1e999\" is not a finite number"},
       {"expandability\n1\n1e-320\n3\n", ":3:", "vertex 1"},
-      {"expandability\n1\n2\n", "", "vertex 2 of 3 has no expandability"},
+      {"expandability\n1\n2\n", "", "vertex 2 of 3 has no value"},
       {"expandability\n1\n2\n3\n4\n", ":5:", "vertex 3: there is no such vertex"},
       {"expandability\n1\ntwo\n3\n", ":3:", "\"two\" is not a finite number"},
       {"expandability\n1\n2 2\n3\n", ":3:", "\"2 2\" is not"},

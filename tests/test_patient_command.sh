@@ -275,6 +275,6 @@ awk -F, 'NR == 1 { print; next } { printf "%s,%s,%s,%s,%s,%s\n", $1+900, $2, $3,
   full.csv >far.csv
 "$supine" fit --landmarks far.csv --other supine:full -o far.json >/dev/null || fail "fit far away"
 refused 2 'check that it has the same coordinate frame and unit' precompute s.ply --patient far.json -o x.safetensors
-refused 2 'check their frame, unit and person' validate points.safetensors --to supine:full --landmarks far.csv
+refused 2 'check their frame, unit and patient' validate points.safetensors --to supine:full --landmarks far.csv
 [ ! -e x.safetensors ] || fail "a refused command left a file"
 echo passed

@@ -173,7 +173,7 @@ TEST(test_projection_impossible_softening_refused) {
   model.force.soften = 1.0;
   assert_int_equal(supine_projection_create(&lungs, &model, 5, &made, &error),
                    SUPINE_ERROR_ARGUMENT);
-  assert_says(error.message, "--soften needs a reach");
+  assert_says(error.message, "--soften needs the distance --reach");
   model = supine_physics_model(SUPINE_LAW_DEEP);
   model.force.soften = 18.0;
   assert_int_equal(supine_projection_create(&lungs, &model, 5, &made, &error),

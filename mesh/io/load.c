@@ -48,7 +48,7 @@ static supine_status check_file(const char *path, size_t *size, supine_error *er
   }
   if (!S_ISREG(about.st_mode)) {
     return supine_error_set(error, SUPINE_ERROR_READ,
-                            "%s: is not a regular file; save the mesh to a file first", path);
+                            "%s: not a regular file; save the mesh to a file first", path);
   }
   *size = (size_t)about.st_size;
   return *size == 0 ? supine_error_set(error, SUPINE_ERROR_FORMAT,

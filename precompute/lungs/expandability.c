@@ -77,8 +77,8 @@ static supine_status take_rows(supine_csv *csv, size_t count, double *a, supine_
   for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
     if (a[i] == 0.0) {
       status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%s: vertex %zu of %zu has no expandability: add it", csv->path, i,
-                                count);
+                                "%s: vertex %zu of %zu has no value: add its expandability",
+                                csv->path, i, count);
     }
   }
   return status;

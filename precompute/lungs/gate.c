@@ -44,15 +44,16 @@ static supine_status mend(supine_mesh *mesh, const char *name, supine_findings *
     }
   }
   if (specks > 0) {
-    supine_findings_add(findings,
-                        "%s: note: dropped %zu speck%s, each below %g %% of the volume; %zu "
-                        "piece%s left",
-                        name, specks, plural(specks), 100.0 * speck_share, pieces,
-                        pieces == 1 ? " is" : "s are");
+    supine_findings_add(
+        findings,
+        "%s: note: dropped %zu small component%s, each below %g %% of the volume; %zu "
+        "component%s",
+        name, specks, plural(specks), 100.0 * speck_share, pieces,
+        pieces == 1 ? " remains" : "s remain");
   }
   if (pieces > 6) { /* five lobes and one other piece are plausible */
-    supine_findings_add(findings, "%s: warning: %zu pieces; remove those that are not lung", name,
-                        pieces);
+    supine_findings_add(findings, "%s: warning: %zu components; remove those that are not lung",
+                        name, pieces);
   }
   return SUPINE_OK;
 }

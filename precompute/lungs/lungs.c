@@ -277,8 +277,8 @@ supine_status supine_lungs_create(const supine_mesh *meshes, size_t count, const
                                   supine_lungs *lungs, supine_error *error) {
   supine_lungs made = {0};
   if (midline != NULL && !isfinite(*midline)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "the midline is %g: give its x in mm",
-                            *midline);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "the midline must be a finite x in mm, not %g", *midline);
   }
   supine_status status = check_surfaces(meshes, count, error);
   status = status == SUPINE_OK ? join(meshes, count, &made.mesh, error) : status;

@@ -27,8 +27,9 @@ supine_status supine_physics_model_equilibrium(const supine_lungs *lungs, const 
                                                supine_equilibrium **equilibrium,
                                                supine_error *error) {
   if (model->force.soften != 0.0 && !(model->reach > 0.0)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--soften needs a reach: give --reach 10, or leave --soften out");
+    return supine_error_set(
+        error, SUPINE_ERROR_ARGUMENT,
+        "--soften needs the distance --reach: give --reach 10, or leave --soften out");
   }
   /* A longer reach would spread every force evenly and make the matrix singular. */
   const double longest = 0.5 * supine_distance(lungs->minimum, lungs->maximum);

@@ -131,7 +131,8 @@ supine_status supine_breath_load(const char *path, supine_pv *pv, supine_error *
   if (status == SUPINE_OK && limbs[0] == NULL && limbs[1] == NULL) {
     status = supine_error_set(
         error, SUPINE_ERROR_FORMAT,
-        "%s: has neither inhale nor exhale: make the file with 'supine pv fit'", path);
+        "%s: neither the limb inhale nor exhale is given: make the file with 'supine pv fit'",
+        path);
   }
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT && status == SUPINE_OK; ++limb) {
     pv->limb[limb] = found.limb[limbs[limb] != NULL ? limb : 1 - limb];

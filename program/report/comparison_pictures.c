@@ -107,7 +107,7 @@ json_t *supine_report_pictures(const supine_comparison *c, supine_error *error) 
       goto cleanup;
     }
   }
-  char words[192];
+  char words[224];
   (void)snprintf(
       words, sizeof words, "displacement from %s, mm; contour lines at the ticks of the bar%s",
       c->reference.name, most > largest ? "; the last colour also stands for larger values" : "");

@@ -117,9 +117,9 @@ static void take_request(supine_stream_server *s, supine_stream_peer *peer, cons
       return;
     }
   }
-  supine_stream_patient_warn(&s->patient, s->woke,
-                             "request '%s' is unknown: give weights, points, surface or nothing",
-                             text);
+  supine_stream_patient_warn(
+      &s->patient, s->woke,
+      "request '%s' is unknown: give weights, points or surface, or leave it empty", text);
 }
 
 static void receive(void *context, supine_stream_peer *peer) {

@@ -25,8 +25,8 @@ supine_status supine_platform_map(const char *path, supine_platform_file *file,
   } else if (about.st_size > 0) { /* do not map an empty file: mapping would fail */
     void *bytes = mmap(NULL, (size_t)about.st_size, PROT_READ, MAP_PRIVATE, descriptor, 0);
     if (bytes == MAP_FAILED) {
-      status =
-          supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot map: %s", path, strerror(errno));
+      status = supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot map the file into memory: %s",
+                                path, strerror(errno));
     } else {
       *file = (supine_platform_file){bytes, (size_t)about.st_size};
     }

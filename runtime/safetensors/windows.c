@@ -49,7 +49,8 @@ supine_status supine_platform_map(const char *path, supine_platform_file *file,
     file->size = (size_t)size.QuadPart;
     if (file->bytes == NULL) {
       file->size = 0;
-      status = supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot map: Windows error %lu", path,
+      status = supine_error_set(error, SUPINE_ERROR_READ,
+                                "%s: cannot map the file into memory: Windows error %lu", path,
                                 (unsigned long)GetLastError());
     }
   }
