@@ -60,7 +60,6 @@ static void add_accuracy(entries *list, const supine_accuracy *accuracy, bool at
   }
 }
 
-/* Add the number of vertices in lesions, and the range of the factors on stiffness. */
 static void add_lesions(entries *list, size_t count, const double *factors) {
   size_t changed = 0;
   double low = 1.0;
@@ -106,7 +105,6 @@ static void add_by_lung(entries *list, const char *key, size_t count, const doub
   }
 }
 
-/* Add the state and the volumes of the scan, and the volumes at full inflation and at rest. */
 static void add_reference(entries *list, const supine_reference *reference, const double share[2]) {
   const double *g = reference->scan.state.gravity;
   const bool full = reference->scan.state.volume.kind == SUPINE_VOLUME_FULL;
@@ -130,7 +128,8 @@ static void add_reference(entries *list, const supine_reference *reference, cons
   add(list, "resting_shares", "%s", shares);
 }
 
-/* Add the constant of the expected error, and whether the volumes at rest are not the default. */
+/* Add the constant c of the expected position error (supine/locate.h), and whether the resting
+ * volumes (FRC) differ from the defaults for healthy people. */
 static void add_expected_error(entries *list, const supine_basis_content *content) {
   const supine_resting usual = supine_reference_resting_default();
   if (content->fit == NULL) {
@@ -177,7 +176,7 @@ static float *to_float(const double *values, size_t count) {
   return out;
 }
 
-/* Find the modes of the normals. Vertices and directions have the precision of the file. */
+/* Find the modes of the vertex normals from vertices and displacements rounded as in the file. */
 static supine_status find_normals(const supine_basis_content *content, const float *vertices,
                                   const float *directions, supine_normals_modes *normals,
                                   supine_error *error) {

@@ -7,24 +7,27 @@
 
 #include "precompute/projection/accuracy.h"
 
-/** Content of a basis file, with N vertices and G lungs. */
+/** Content of a basis file with N vertices. */
 typedef struct supine_basis_content {
   const supine_lungs *lungs;
   const supine_precompute_options *options; /**< options->model is unused if `fit` is not NULL */
-  const supine_fit_report *fit;             /**< NULL if the basis is made from a physical model */
-  const double *directions; /**< [N, 3] displacement directions, mm; NULL for vector fields */
+  const supine_fit_report *fit;             /**< report on another simulator's fields, or NULL */
+  const double *directions; /**< [N, 3] displacement of each vertex per unit force, mm; NULL if
+                               `compression` holds vectors */
   const supine_compression *compression;
   const supine_volume_forms *forms;
   const supine_accuracy *accuracy;
-  const supine_reference *reference; /**< NULL if the volume at rest is unknown */
-  /** [G, 9] volume of each lung at rest minus that of its reference surface, mL, as harmonics of
-   * the direction of gravity; NULL if `reference` is NULL */
+  const supine_reference *reference; /**< NULL if the resting volume (FRC) is unknown */
+  /** [lungs, 9] resting volume (FRC) minus the volume of the reference surface, mL: coefficients of
+   * spherical harmonics of the direction of gravity, to degree 2; NULL if `reference` is NULL */
   const double *resting;
-  const double *turned_over;       /**< share of triangles that turn over, or NULL */
-  const supine_error_table *table; /**< may be NULL */
+  /** Share of triangles whose normals turn by more than 90 degrees; NULL if not measured. */
+  const double *turned_over;
+  /** Errors by number of modes and by number of harmonics, or NULL. */
+  const supine_error_table *table;
 } supine_basis_content;
 
-/** Write a basis file, whole or not at all.
+/** Write a basis file atomically: a failure leaves no partial file.
  * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */
 supine_status supine_writer_basis_write(const char *path, const supine_basis_content *content,
                                         supine_error *error);

@@ -15,23 +15,24 @@
 #include "precompute/lungs/lungs.h"
 #include "precompute/projection/accuracy.h"
 
-/** Displacements of N vertices for M directions of gravity. */
+/** Displacements of all vertices for several directions of gravity, made by another simulator. */
 typedef struct supine_fields {
-  size_t direction_count; /**< M */
-  size_t vertex_count;    /**< N */
-  double *directions;     /**< [M, 3] unit vectors */
-  double *displacement;   /**< [M, N, 3] mm */
+  size_t direction_count; /**< number of directions of gravity */
+  size_t vertex_count;
+  double *directions;   /**< [direction_count, 3] unit vectors along gravity */
+  double *displacement; /**< [direction_count, vertex_count, 3] displacement of each vertex, mm */
 } supine_fields;
 
-/** Read a safetensors file with gravity [M, 3] and displacement [M, N, 3], F32 or F64, in the order
- * of the reference surface's vertices.
+/** Read displacement fields from a safetensors file with two tensors, F32 or F64. The tensor
+ * gravity [M, 3] holds M directions of gravity. The tensor displacement [M, N, 3] holds the
+ * displacements of the N vertices of `lungs` for each direction.
  *
  * @param lungs    the reference surface
  * @param options  axes and unit of the displacements
  * @param fields   release with supine_fields_free
  * @retval SUPINE_ERROR_READ    the file is missing
  * @retval SUPINE_ERROR_FORMAT  malformed; a direction that is zero, repeated or not finite, or a
- * displacement that is not finite
+ *   displacement that is not finite
  * @retval SUPINE_ERROR_MESH    the number of vertices differs from that of the lungs
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_fields_load(const char *path, const supine_lungs *lungs,
@@ -42,24 +43,25 @@ void supine_fields_free(supine_fields *fields);
 enum { SUPINE_FIT_BAND_MAX = 11 };
 
 typedef struct supine_fit_report {
-  size_t band_highest;                   /**< highest band for which there are enough directions */
-  size_t band;                           /**< chosen band */
-  double condition;                      /**< condition number of the matrix of harmonics */
-  size_t mode_count;                     /**< set only by supine_precompute_fields */
-  double error[SUPINE_FIT_BAND_MAX + 1]; /**< relative RMS leave-one-out error of each band */
-  supine_accuracy accuracy; /**< leave-one-out errors of the chosen band; accuracy.volume is 0 */
+  size_t band_highest; /**< highest degree that the directions of gravity determine */
+  size_t band;         /**< highest degree of the harmonics in the chosen fit */
+  double condition;    /**< condition number of the matrix of harmonics */
+  size_t mode_count;   /**< number of modes in the file; set only by supine_precompute_fields */
+  /** [l] relative RMS leave-one-out error with harmonics to degree l. */
+  double error[SUPINE_FIT_BAND_MAX + 1];
+  supine_accuracy accuracy; /**< leave-one-out errors of the chosen fit; its member `volume` is 0 */
 } supine_fit_report;
 
 typedef struct supine_fit_options {
   int band; /**< highest degree of the harmonics; if negative, chosen by the leave-one-out error */
   size_t modes;         /**< largest number of modes; 0 uses the harmonics instead of modes */
   const char *findings; /**< notes on the surface for the metadata, one per line, or NULL */
-  const char *made_by;  /**< command line for the metadata, or NULL */
+  const char *made_by;  /**< command line that makes the basis, for the metadata, or NULL */
 } supine_fit_options;
 
 /** Fit harmonics to the fields, compress the fit, and measure its leave-one-out error.
  *
- * @param compression  written; it has 3 N rows, one for each coordinate of each vertex. Release it
+ * @param compression  written; it has one row for each coordinate of each vertex. Release it
  *   with supine_projection_compression_free
  * @retval SUPINE_ERROR_ARGUMENT   fewer than two directions, or too few to determine options->band
  * @retval SUPINE_ERROR_NUMERICAL  all displacements are zero, or a decomposition failed

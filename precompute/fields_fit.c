@@ -12,9 +12,9 @@
 #include "sh/base/vec3.h"
 #include <supine/sh.h>
 
-/* The directions suffice for a band if the condition number of the matrix of harmonics and the
- * leverage of each direction are within these limits. The fit reproduces any field whose direction
- * has leverage 1. */
+/* The directions of gravity determine a fit if the condition number of the matrix of harmonics and
+ * the leverage of each direction are at most these limits. At leverage 1, a direction always has
+ * residual 0, whatever its field. */
 static const double condition_max = 100.0;
 static const double leverage_max = 0.999;
 
@@ -24,40 +24,39 @@ static const double leverage_max = 0.999;
 static const double worthwhile = 0.99;
 static const double exact = 1e-6;
 
-/* A least-squares fit of P harmonics to the fields of M directions. Y holds the values of the
- * harmonics at the directions. With its singular value decomposition Y = U S V^T, the coefficients
- * are A times the fields, where A = V S^-1 U^T. */
+/* A least-squares fit of harmonics to the fields of several directions of gravity. The coefficients
+ * are `pinv` times the fields. */
 typedef struct fit {
-  size_t count; /* number M of directions */
-  size_t terms; /* number P of harmonics */
-  double *y;    /* [M, P] matrix Y of harmonics */
-  double *a;    /* [P, M] matrix A, which turns fields into coefficients */
-  double condition;
+  size_t count;      /* number of directions of gravity */
+  size_t terms;      /* number of harmonics */
+  double *harmonics; /* [count, terms] value of each harmonic at each direction */
+  double *pinv;      /* [terms, count] pseudo-inverse of `harmonics` */
+  double condition;  /* condition number of `harmonics` */
 } fit;
 
 /* Work space of predict(). */
 typedef struct prediction {
-  double *a;        /* [P, M] matrix A of the fit without one direction */
-  double *part;     /* [P, M] product of `a` and the scalar products of the fields */
-  double *gram;     /* [P, P] scalar products of the P coefficient fields, mm^2 */
-  double *values;   /* [P] eigenvalues of `gram` */
-  double *vectors;  /* [P, P] eigenvectors of `gram` */
-  double *target;   /* [P] harmonics at the predicted direction, projected onto the modes */
-  double *residual; /* [M] weight of each field in the sum that gives the residual field */
-  double *product;  /* [M] product of the scalar products of the fields and `residual` */
+  double *pinv;      /* [harmonics, directions] pseudo-inverse without the held-out direction */
+  double *half_gram; /* [harmonics, directions] product of `pinv` and fitting.gram */
+  double *fit_gram;  /* [harmonics, harmonics] scalar products of the fields they multiply, mm^2 */
+  double *eigenvalues;
+  double *eigenvectors;
+  double *target;        /* [harmonics] values at the held-out direction; with modes, projected */
+  double *residual;      /* [directions] weight of each given field in the residual field */
+  double *gram_residual; /* [directions] product of fitting.gram and `residual` */
 } prediction;
 
 typedef struct fitting {
   const supine_fields *fields;
   size_t rows;  /* 3 x number of vertices */
-  double *gram; /* [M, M] scalar products of the M fields, mm^2 */
+  double *gram; /* [directions, directions] scalar products of the given fields, mm^2 */
   fit chosen;
   prediction work;
 } fitting;
 
 static void fit_free(fit *f) {
-  free(f->y);
-  free(f->a);
+  free(f->harmonics);
+  free(f->pinv);
   *f = (fit){0};
 }
 
@@ -71,18 +70,19 @@ static supine_status fit_create(size_t band, size_t count, const double *directi
   const int m = (int)count;
   const int p = (int)terms;
   *f = (fit){.count = count, .terms = terms};
-  f->y = calloc(count * terms, sizeof *f->y);
-  f->a = malloc(terms * count * sizeof *f->a);
+  f->harmonics = calloc(count * terms, sizeof *f->harmonics);
+  f->pinv = malloc(terms * count * sizeof *f->pinv);
   double *a = malloc(count * terms * sizeof *a);
   double *u = malloc(count * terms * sizeof *u);
   double *vt = malloc(terms * terms * sizeof *vt);
   double *s = calloc(terms, sizeof *s);
   supine_status status = SUPINE_ERROR_MEMORY;
-  if (f->y != NULL && f->a != NULL && a != NULL && u != NULL && vt != NULL && s != NULL) {
-    status = supine_sh_evaluate_many(band, count, directions, f->y);
+  if (f->harmonics != NULL && f->pinv != NULL && a != NULL && u != NULL && vt != NULL &&
+      s != NULL) {
+    status = supine_sh_evaluate_many(band, count, directions, f->harmonics);
   }
   if (status == SUPINE_OK) {
-    memcpy(a, f->y, count * terms * sizeof *a);
+    memcpy(a, f->harmonics, count * terms * sizeof *a);
     status =
         supine_lapack_status(LAPACKE_dgesdd(LAPACK_ROW_MAJOR, 'S', m, p, a, p, s, u, p, vt, p));
   }
@@ -91,7 +91,7 @@ static supine_status fit_create(size_t band, size_t count, const double *directi
     for (size_t t = 0; t < terms; ++t) {
       cblas_dscal(p, 1.0 / s[t], vt + t * terms, 1);
     }
-    cblas_dgemm(CblasRowMajor, CblasTrans, CblasTrans, p, m, p, 1.0, vt, p, u, p, 0.0, f->a, m);
+    cblas_dgemm(CblasRowMajor, CblasTrans, CblasTrans, p, m, p, 1.0, vt, p, u, p, 0.0, f->pinv, m);
   } else {
     fit_free(f);
   }
@@ -103,7 +103,7 @@ static supine_status fit_create(size_t band, size_t count, const double *directi
 }
 
 static double leverage(const fit *f, size_t d) {
-  return cblas_ddot((int)f->terms, f->y + d * f->terms, 1, f->a + d, (int)f->count);
+  return cblas_ddot((int)f->terms, f->harmonics + d * f->terms, 1, f->pinv + d, (int)f->count);
 }
 
 static bool fit_is_determined(const fit *f) {
@@ -122,8 +122,10 @@ static supine_status allocate(fitting *w, supine_error *error) {
   if (next == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu fields", m);
   }
-  double **const squares[] = {&w->work.a, &w->work.part, &w->work.gram, &w->work.vectors};
-  double **const lists[] = {&w->work.values, &w->work.target, &w->work.residual, &w->work.product};
+  double **const squares[] = {&w->work.pinv, &w->work.half_gram, &w->work.fit_gram,
+                              &w->work.eigenvectors};
+  double **const lists[] = {&w->work.eigenvalues, &w->work.target, &w->work.residual,
+                            &w->work.gram_residual};
   for (size_t i = 0; i < 4; ++i) {
     *squares[i] = next += m * m;
   }
@@ -134,13 +136,13 @@ static supine_status allocate(fitting *w, supine_error *error) {
   return SUPINE_OK;
 }
 
-/* Predict the field of direction d from all other fields. The residual is the true field minus the
- * prediction. It is a weighted sum of all fields. Write the weights to w->work.residual, and the
- * squared norm of the residual, mm^2, to `square`. If `modes` is 0, predict with the harmonics;
- * otherwise predict with that number of leading modes of their coefficients.
+/* Predict the field of the held-out direction d from the fields of all other directions. If `modes`
+ * is 0, predict with the harmonics; otherwise predict with that number of leading modes of their
+ * coefficients. The residual field, true minus predicted, is a weighted sum of all given fields.
+ * Write its weights to w->work.residual, and its squared norm, mm^2, to `square`.
  *
- * The fit without direction d has the matrix A_d instead of A. e_d is unit vector d, h is row d of
- * Y A:
+ * With A = f->pinv, unit vector e_d, and h as row d of f->harmonics x A, the pseudo-inverse without
+ * d is
  *
  *     A_d = A - A e_d (e_d - h)^T / (1 - h_d) */
 static supine_status predict(const fitting *w, const fit *f, size_t d, size_t modes,
@@ -148,29 +150,32 @@ static supine_status predict(const fitting *w, const fit *f, size_t d, size_t mo
   const prediction *o = &w->work;
   const int m = (int)f->count;
   const int p = (int)f->terms;
-  const double *y = f->y + d * f->terms;
+  const double *y = f->harmonics + d * f->terms;
   supine_status status = SUPINE_OK;
-  cblas_dgemv(CblasRowMajor, CblasTrans, p, m, -1.0, f->a, m, y, 1, 0.0, o->residual, 1);
+  cblas_dgemv(CblasRowMajor, CblasTrans, p, m, -1.0, f->pinv, m, y, 1, 0.0, o->residual, 1);
   o->residual[d] += 1.0;
-  memcpy(o->a, f->a, f->terms * f->count * sizeof *o->a);
-  cblas_dger(CblasRowMajor, p, m, -1.0 / o->residual[d], f->a + d, m, o->residual, 1, o->a, m);
+  memcpy(o->pinv, f->pinv, f->terms * f->count * sizeof *o->pinv);
+  cblas_dger(CblasRowMajor, p, m, -1.0 / o->residual[d], f->pinv + d, m, o->residual, 1, o->pinv,
+             m);
   memcpy(o->target, y, f->terms * sizeof *o->target);
   if (modes > 0) {
-    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, p, m, m, 1.0, o->a, m, w->gram, m, 0.0,
-                o->part, m);
-    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, p, p, m, 1.0, o->part, m, o->a, m, 0.0,
-                o->gram, p);
-    status = supine_projection_leading_eigenpairs(f->terms, o->gram, modes, o->values, o->vectors);
+    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, p, m, m, 1.0, o->pinv, m, w->gram, m,
+                0.0, o->half_gram, m);
+    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, p, p, m, 1.0, o->half_gram, m, o->pinv, m,
+                0.0, o->fit_gram, p);
+    status = supine_projection_leading_eigenpairs(f->terms, o->fit_gram, modes, o->eigenvalues,
+                                                  o->eigenvectors);
     memset(o->target, 0, f->terms * sizeof *o->target);
     for (size_t k = 0; k < modes && status == SUPINE_OK; ++k) {
-      const double *mode = o->vectors + k * f->terms;
+      const double *mode = o->eigenvectors + k * f->terms;
       cblas_daxpy(p, cblas_ddot(p, mode, 1, y, 1), mode, 1, o->target, 1);
     }
   }
-  cblas_dgemv(CblasRowMajor, CblasTrans, p, m, -1.0, o->a, m, o->target, 1, 0.0, o->residual, 1);
+  cblas_dgemv(CblasRowMajor, CblasTrans, p, m, -1.0, o->pinv, m, o->target, 1, 0.0, o->residual, 1);
   o->residual[d] += 1.0;
-  cblas_dsymv(CblasRowMajor, CblasUpper, m, 1.0, w->gram, m, o->residual, 1, 0.0, o->product, 1);
-  *square = fmax(cblas_ddot(m, o->product, 1, o->residual, 1), 0.0);
+  cblas_dsymv(CblasRowMajor, CblasUpper, m, 1.0, w->gram, m, o->residual, 1, 0.0, o->gram_residual,
+              1);
+  *square = fmax(cblas_ddot(m, o->gram_residual, 1, o->residual, 1), 0.0);
   return status;
 }
 
@@ -183,7 +188,7 @@ static double square_sum(const fitting *w) {
   return sum;
 }
 
-/* Compute the relative RMS leave-one-out error of a fit by all harmonics of its band. */
+/* Compute the relative RMS leave-one-out error of a fit that uses all its harmonics, not modes. */
 static double leave_one_out(const fitting *w, const fit *f) {
   double sum = 0.0;
   for (size_t d = 0; d < f->count; ++d) {
@@ -194,8 +199,8 @@ static double leave_one_out(const fitting *w, const fit *f) {
   return sqrt(sum / square_sum(w));
 }
 
-/* Fit every band that the directions determine. Choose band `wanted`. If `wanted` is negative,
- * choose a band by the leave-one-out errors, as `worthwhile` says. */
+/* Fit harmonics to each degree (band) that the directions determine. Choose band `wanted` or, if
+ * that is negative, a higher band only for a leave-one-out error at least 1 % lower. */
 static supine_status choose_band(fitting *w, int wanted, supine_fit_report *report,
                                  supine_error *error) {
   const size_t m = w->fields->direction_count;
@@ -224,7 +229,7 @@ static supine_status choose_band(fitting *w, int wanted, supine_fit_report *repo
       fit_free(&trial);
     }
   }
-  if (w->chosen.y == NULL) {
+  if (w->chosen.harmonics == NULL) {
     return supine_error_set(
         error, SUPINE_ERROR_ARGUMENT,
         "%zu directions do not determine band %d (%d harmonics); the highest "
@@ -236,8 +241,8 @@ static supine_status choose_band(fitting *w, int wanted, supine_fit_report *repo
   return SUPINE_OK;
 }
 
-/* Make a projection from the chosen fit. The columns are the M fields, the functions [M, P] are the
- * transpose of the fit's matrix A. */
+/* Make a projection, the product columns x functions (projection.h), from the chosen fit. The
+ * columns are the given fields, the functions the transpose of the pseudo-inverse. */
 static supine_status project(const fitting *w, size_t band, supine_projection *made,
                              supine_error *error) {
   const size_t m = w->chosen.count;
@@ -253,7 +258,7 @@ static supine_status project(const fitting *w, size_t band, supine_projection *m
       made->columns[i * m + d] = w->fields->displacement[d * w->rows + i];
     }
     for (size_t t = 0; t < terms; ++t) {
-      made->functions[d * terms + t] = w->chosen.a[t * m + d];
+      made->functions[d * terms + t] = w->chosen.pinv[t * m + d];
     }
   }
   return SUPINE_OK;

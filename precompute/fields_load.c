@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Read the fields of another simulator from a safetensors file. */
+/* Read another simulator's displacement fields from a safetensors file. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -29,8 +29,8 @@ static supine_status allocate(size_t count, supine_fields *fields, supine_error 
                                 fields->vertex_count);
 }
 
-/* Normalise direction `at`. Refuse a repeated direction: when held out, it would be predicted from
- * its duplicate, and the leave-one-out error would be too small. */
+/* Normalise direction of gravity `at`. Refuse a repeated direction: when held out, it would be
+ * predicted from its duplicate, and the leave-one-out error would be too small. */
 static supine_status check_direction(const supine_fields *fields, size_t at, const char *path,
                                      supine_error *error) {
   double *g = fields->directions + 3 * at;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Make a basis: project, compress, measure the error and write the file. */
+/* Make a basis file: expand displacements in harmonics, compress, measure the error, and write. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,41 +12,42 @@
 #include "precompute/basis_file.h"
 #include "precompute/projection/projection.h"
 
-/* The default number of held-out directions is HELD_OUT_WORK divided by the number of vertices, but
- * at least HELD_OUT_MIN and at most HELD_OUT_MAX. With 100 directions, the measured error is
- * accurate to about 5 %, with 1000 to 1 or 2 %. */
+/* The default number of held-out directions of gravity is HELD_OUT_WORK divided by the number of
+ * vertices, but at least HELD_OUT_MIN and at most HELD_OUT_MAX. With 100 directions, the measured
+ * error is accurate to about 5 %, with 1000 to 1 or 2 %. */
 enum { HELD_OUT_MIN = 100, HELD_OUT_MAX = 1000, HELD_OUT_WORK = 20000000 };
 
-/* If rest is unknown, errors in mm are measured where the volume of the lungs is that of the
- * reference surface plus this, mL. */
+/* Errors in mm are measured at the resting volume (FRC). If it is unknown, they are measured at the
+ * volume of the reference surface plus `breath_volume`, mL. */
 static const double breath_volume = 500.0;
 static const double sqrt_4pi = 3.5449077018110321;
 
 /* Modes are dropped as long as the error stays below this multiple of the error with all modes. */
 static const double same_error = 1.01;
 
-/* Input and results of the steps of supine_precompute. */
 typedef struct pipeline {
   const supine_lungs *given;
-  const supine_lungs *lungs; /* `given` or `anchored` */
+  const supine_lungs *lungs; /* lungs in use: `given`, or `anchored` after anchor() */
   const supine_precompute_options *options;
-  supine_lungs anchored; /* `given` with vertices moved by anchor(), or empty */
+  supine_lungs anchored; /* copy of `given` with the vertices that anchor() corrects, or empty */
   supine_reference reference;
-  double *directions; /* [N, 3] directions of displacement, mm */
-  /* [N] squared length of each direction: with these weights, the modes minimise the error of the
-   * displacement. For a left lung it is then 0.34 % RMS instead of 0.40 %. */
+  double *directions; /* [N, 3] displacement of each vertex per unit force, mm */
+  /* [N] squared length of the vector in `directions`. With these weights, the modes minimise the
+   * error of the displacement: 0.34 % RMS for a left lung, 0.40 % without weights. */
   double *weight;
   supine_projection projection;
   supine_compression compression;
   double singular[SUPINE_MODES_MADE_MAX];
-  double energy; /* sum of the squares of all singular values */
+  double square_sum; /* sum of the squared singular values, also of modes left out */
   supine_volume_forms forms;
   supine_truth truth;
   supine_accuracy accuracy;
   double turned_over;
-  double resting[2][9]; /* volume of each lung at rest minus that of its reference surface, mL, as
-                           harmonics */
-  /* Volume minus that of the reference surface at which errors are measured, mL, as harmonics. */
+  /* [lungs, 9] resting volume (FRC) minus the volume of the reference surface, mL: coefficients of
+   * spherical harmonics of the direction of gravity, to degree 2 */
+  double resting[2][9];
+  /* Volume at which errors are measured, minus that of the reference surface, mL: coefficients of
+   * the 9 spherical harmonics, to degree 2, of the direction of gravity. */
   double volume[9];
   supine_error_table table;
 } pipeline;
@@ -86,15 +87,17 @@ static supine_status compress(pipeline *p, supine_error *error) {
   return p->options->modes == 0
              ? supine_projection_compress_harmonics(&p->projection, &p->compression, error)
              : supine_projection_compress_modes(&p->projection, p->weight, p->options->modes,
-                                                &p->compression, p->singular, &p->energy, error);
+                                                &p->compression, p->singular, &p->square_sum,
+                                                error);
 }
 
-/* Correct the vertices p of the reference surface so that the compressed field F takes them exactly
- * to the scan. For the scan's direction of gravity, this cancels the error of compression:
+/* Correct the vertices of the reference surface so that the compressed field displaces them exactly
+ * to the scan, in the posture of the scan. Along axis j, a vertex moves to
  *
  *     p_j = scan_j - A_j F d_j
  *
- * along axis j, with directions of displacement d, and gains A that give each lung its volumes. */
+ * where A are the gains (factors on the displacement) that give its lung the volume of the scan, F
+ * is the force on the vertex by the compressed field, and d its displacement per unit force. */
 static supine_status anchor(pipeline *p, supine_error *error) {
   const supine_lungs *lungs = p->given;
   const supine_compression *field = &p->compression;
@@ -132,8 +135,8 @@ static supine_status find_forms(pipeline *p, supine_error *error) {
       &p->compression, p->lungs, p->options->model.share, p->directions, &p->forms, error);
 }
 
-/* Check that some gains give each lung its volume at rest, with gravity along the unit vector g.
- * @param volume  [lungs] volume at rest minus that of the reference surface, mL */
+/* Check that each lung can reach its resting volume (FRC) with gravity along the unit vector g.
+ * @param volume  [lungs] resting volume minus that of the reference surface, mL */
 static supine_status check_rest(const supine_compression *compression,
                                 const supine_volume_forms *forms, const double g[3],
                                 const double *volume, supine_error *error) {
@@ -156,10 +159,11 @@ static supine_status check_rest(const supine_compression *compression,
   return SUPINE_OK;
 }
 
-/* Find the volume of each lung at rest minus that of its reference surface, mL, as real harmonics
- * of bands 0 to 2. They interpolate the volumes for gravity along the six axes.
+/* Find the resting volume (FRC) of each lung minus the volume of its reference surface, mL, as
+ * coefficients of spherical harmonics of the direction of gravity. They interpolate the volumes for
+ * gravity along the six axes.
  * @param share  volume of each lung divided by its healthy volume
- * @retval SUPINE_ERROR_NUMERICAL  the surface folds before a lung has its volume at rest */
+ * @retval SUPINE_ERROR_NUMERICAL  the surface folds before a lung reaches its resting volume */
 static supine_status rest_harmonics(const supine_reference *reference, const double share[2],
                                     const supine_compression *compression,
                                     const supine_volume_forms *forms, double harmonics[2][9],
@@ -183,7 +187,7 @@ static supine_status rest_harmonics(const supine_reference *reference, const dou
   return status;
 }
 
-/* Find the volumes at rest if known, and the volume at which errors in mm are measured. */
+/* Find the resting volumes (FRC) if known, and the volume at which errors in mm are measured. */
 static supine_status find_rest(pipeline *p, supine_error *error) {
   const supine_precompute_options *options = p->options;
   p->volume[0] = breath_volume * sqrt_4pi;
@@ -216,7 +220,7 @@ static supine_status measure(pipeline *p, supine_error *error) {
   return status;
 }
 
-/* Find the smallest number of modes with an error below `same_error` times that of all modes. */
+/* Find the smallest number of modes with an error below `same_error` times that with all modes. */
 static size_t modes_needed(const pipeline *p) {
   const size_t most = p->compression.mode_count;
   const double limit = pow(same_error, 2.0) - 1.0;
@@ -224,7 +228,7 @@ static size_t modes_needed(const pipeline *p) {
   double dropped = 0.0;
   size_t count = most;
   while (count > 1) {
-    dropped += p->singular[count - 1] * p->singular[count - 1] / p->energy;
+    dropped += p->singular[count - 1] * p->singular[count - 1] / p->square_sum;
     if (dropped > limit * error2) {
       break;
     }

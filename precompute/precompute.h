@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Make a basis file from lungs, or from another simulator's fields. */
+ * Make a basis file from lungs, or from another simulator's displacement fields. */
 #ifndef SUPINE_PRECOMPUTE_H
 #define SUPINE_PRECOMPUTE_H
 
@@ -12,18 +12,18 @@
 
 typedef struct supine_precompute_options {
   supine_model model;
-  const supine_reference *reference; /**< NULL if the volume at rest is unknown */
+  const supine_reference *reference; /**< NULL if the resting volume (FRC) is unknown */
   size_t band;                       /**< highest degree of the harmonics */
   size_t modes;          /**< largest number of modes; 0 uses the harmonics instead of modes */
-  size_t held_out;       /**< number of held-out directions, or 0 for the default */
-  double expected_error; /**< constant c of the expected error (supine/locate.h), mm; 0 or a
-                            value above the default selects the default */
+  size_t held_out;       /**< number of held-out directions of gravity, or 0 for the default */
+  double expected_error; /**< constant c of the expected position error (supine/locate.h), mm; 0 or
+                            a value above the default selects the default */
   supine_scan_frame frame;
-  /** @{ Metadata of the file. Each may be NULL. */
-  const char *made_by;         /**< command line */
-  const char *patient;         /**< patient's law as JSON */
-  const char *patient_summary; /**< name and held-out error of the patient's law */
-  const char *assumed;         /**< assumptions about the scan */
+  /** @{ Texts for the metadata of the basis file. Each may be NULL. */
+  const char *made_by;         /**< command line that makes the basis */
+  const char *patient;         /**< displacement law fitted to the patient, as JSON */
+  const char *patient_summary; /**< name of the fitted displacement law, and its held-out error */
+  const char *assumed;         /**< axes, unit, displacement law, scan state and volumes assumed */
   const char *findings;        /**< notes and warnings, one per line */
   /** @} */
 } supine_precompute_options;
@@ -31,17 +31,19 @@ typedef struct supine_precompute_options {
 typedef struct supine_precompute_report {
   size_t mode_count;
   supine_accuracy accuracy;
-  double turned_over; /**< share of triangles that turn over (supine_accuracy_turned_over) */
+  /** Share of triangles that turn over, 0 to 1 (supine_accuracy_turned_over). */
+  double turned_over;
 } supine_precompute_report;
 
-/** Make a basis from lungs and a model, measure its error, and write the file, whole or not at all.
+/** Make a basis from lungs and a physical model, measure its error, and write the file atomically.
  * @retval SUPINE_ERROR_WRITE, and those of projection.h and accuracy.h */
 supine_status supine_precompute(const supine_lungs *lungs, const supine_precompute_options *options,
                                 const char *path, supine_precompute_report *report,
                                 supine_error *error);
 
 /** Fit harmonics to another simulator's displacement fields, compress and cross-validate the fit,
- * and write a basis file. A gain of 1 reproduces the given displacements.
+ * and write a basis file. Gain 1 (the factor on the displacement) reproduces the given
+ * displacements.
  * @retval SUPINE_ERROR_WRITE, and those of supine_fields_fit */
 supine_status supine_precompute_fields(const supine_lungs *lungs, const supine_fields *fields,
                                        const supine_fit_options *options, const char *path,

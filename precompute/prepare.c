@@ -18,7 +18,7 @@ supine_model_choice supine_precompute_choice_default(void) {
   return choice;
 }
 
-/* Select the displacement law. Constants that the user gives override those of the law. */
+/* Select the displacement law. Constants that the user gives override its constants. */
 static supine_model choose_law(const supine_model_choice *choice) {
   const bool none = choice->has_scan && !choice->scan.known;
   const supine_model law = supine_physics_model(choice->law != SUPINE_LAW_COUNT
@@ -140,7 +140,6 @@ static supine_status set_shares(const supine_lungs *lungs, const supine_model_ch
   return status;
 }
 
-/* Describe the assumed law, scan state and volumes, so that the user can check them. */
 static void summarize(const supine_model_choice *choice, supine_prepared *p) {
   static const double supine[3] = {0.0, 1.0, 0.0};
   const supine_resting usual = supine_reference_resting_default();

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Make a model from the user's choices, and move lungs from the scan to the reference surface. */
+ * Make a physical model from the user's choices, and move lungs to the reference surface. */
 #ifndef SUPINE_PREPARE_H
 #define SUPINE_PREPARE_H
 
@@ -14,11 +14,11 @@ enum { SUPINE_LESIONS_MAX = 64 };
 
 /** The user's choices for the model and the scan. */
 typedef struct supine_model_choice {
-  int law;                 /**< a supine_law, or SUPINE_LAW_COUNT to use the default law */
-  supine_model model;      /**< constants that the user gave; NAN selects the constant of the law */
-  const char *patient_law; /**< name of the law fitted to the patient; NULL if none */
-  const double *stiffness; /**< [N] stiffness E of the patient's law, or NULL */
-  bool has_scan; /**< whether the user gave `scan`; if not, the law `deep` assumes "full" */
+  int law;            /**< displacement law: a supine_law, or SUPINE_LAW_COUNT for the default */
+  supine_model model; /**< constants that the user gave; NAN selects that of the displacement law */
+  const char *patient_law; /**< name of the displacement law fitted to the patient, or NULL */
+  const double *stiffness; /**< [N] relative stiffness fitted to the patient, or NULL */
+  bool has_scan; /**< whether `scan` was given; SUPINE_LAW_DEEP assumes full inflation if not */
   supine_scan scan;
   supine_resting resting;
   supine_person person;
@@ -31,21 +31,23 @@ typedef struct supine_model_choice {
 
 supine_model_choice supine_precompute_choice_default(void);
 
-/** A physical model, the volumes of the lungs, and the assumptions about both. */
+/** A physical model, the volumes of the lungs, and a description of the assumptions. */
 typedef struct supine_prepared {
   supine_model model; /**< uses the arrays `stiffness` and `lesions` of this struct */
   supine_reference reference;
-  char summary[512]; /**< the assumed law, scan and volumes in words */
-  double *stiffness; /**< [N] stiffness E, or NULL */
+  char summary[512]; /**< for the user: displacement law, state of the scan and volumes */
+  double *stiffness; /**< [N] relative stiffness of each vertex, or NULL if uniform */
   double *lesions;   /**< [N] factors by which lesions multiply the stiffness, or NULL */
 } supine_prepared;
 
-/** Select the law, set stiffness and lesions, and move the lungs to the reference surface.
+/** Select the displacement law, set stiffness and lesions, and move the vertices from the scan to
+ * the reference surface.
  * @param lungs     in: the scan; out: the reference surface
  * @param prepared  zeroed; release with supine_precompute_prepared_free, also after an error
  * @param findings  warnings are added
- * @retval SUPINE_ERROR_ARGUMENT  the paper's law with a scan state, or a share of a missing lung
- * Other statuses as supine_tissue_add_lesion and supine_reference_find */
+ * @retval SUPINE_ERROR_ARGUMENT  SUPINE_LAW_PAPER with a known state of the scan; expandability in
+ *   addition to a stiffness fitted to the patient; a volume share for a lung that the model lacks
+ * @retval the statuses of supine_tissue_add_lesion and supine_reference_find */
 supine_status supine_precompute_prepare(supine_lungs *lungs, const supine_model_choice *choice,
                                         supine_prepared *prepared, supine_findings *findings,
                                         supine_error *error);

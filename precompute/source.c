@@ -91,7 +91,7 @@ static bool is_folder(const char *path) {
 
 enum { LOBES = 5, LEFT_LOBES = 2 };
 
-/* The masks of lobes in a folder made by TotalSegmentator. */
+/* Masks of the lobes of the lungs, in a folder made by TotalSegmentator. */
 typedef struct lobe_files {
   char path[LOBES][PATH_MAX];
   char *list[LOBES];
@@ -127,8 +127,8 @@ static supine_status find_lobes(const char *folder, lobe_files *found, supine_er
                                 folder);
 }
 
-/* Load label maps. The default midline of a single lung is the side of its bounding box that faces
- * the other lung. */
+/* Load label maps. For a single lung without a given midline, take the side of its bounding box
+ * that faces the other lung. */
 static supine_status load_maps(reading *r, supine_source *source, supine_findings *findings,
                                supine_error *error) {
   supine_labels_options wanted = r->options->labels;
@@ -166,7 +166,7 @@ static supine_status load_maps(reading *r, supine_source *source, supine_finding
   return SUPINE_OK;
 }
 
-/* Return the axes and unit of the files, or zeros if the axes differ between files. */
+/* Return the axes and unit of the files, or zeros if files differ in their axes. */
 static supine_scan_frame frame_of(const reading *r) {
   for (size_t i = 1; i < r->count; ++i) {
     if (r->reports[i].axes != r->reports[0].axes) {
@@ -177,7 +177,6 @@ static supine_scan_frame frame_of(const reading *r) {
   return (supine_scan_frame){r->reports[0].axes, unit == 0.0 ? 1.0 : unit};
 }
 
-/* Describe how the files were read, so that the user can check it. */
 static void summarize(const reading *r, supine_source *source) {
   const supine_mesh_load_options *load = &r->options->load;
   const supine_mesh_report *report = &r->reports[0];
@@ -206,7 +205,7 @@ static void summarize(const reading *r, supine_source *source) {
   }
 }
 
-/* Check that all files are label maps, or are surfaces without options of label maps. */
+/* Check that the files are all label maps, or all surfaces without options for label maps. */
 static supine_status check_kinds(const supine_source_options *options, char **paths, size_t count,
                                  bool *is_map, supine_error *error) {
   const supine_labels_options *labels = &options->labels;

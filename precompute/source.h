@@ -22,16 +22,16 @@ typedef struct supine_source {
   supine_lungs lungs;
   supine_scan_frame frame;
   bool is_map;    /**< whether the files are label maps; if so, `report` is set */
-  bool axes_hold; /**< whether the shape of the lungs agrees with the axes */
+  bool axes_hold; /**< whether the shape of the lungs clearly confirms the axes */
   supine_labels_report report;
-  char summary[256]; /**< axes, unit and boxes of the lungs, in words */
+  char summary[256]; /**< for the user: axes, unit and bounding boxes of the lungs */
 } supine_source;
 
 /** Load surfaces (in parallel) or label maps, check them and join them into lungs.
  * @param source    zeroed; release with supine_precompute_source_free
  * @param findings  notes and warnings are added, also after a failure
  * @retval SUPINE_ERROR_ARGUMENT  both label maps and surfaces, or an option for the other kind
- * Other statuses as supine_mesh_load, supine_labels_surfaces and supine_lungs_gate */
+ * @retval the statuses of supine_mesh_load, supine_labels_surfaces and supine_lungs_gate */
 supine_status supine_precompute_source_load(const supine_source_options *options, char **paths,
                                             size_t count, supine_source *source,
                                             supine_findings *findings, supine_error *error);

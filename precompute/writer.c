@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Write safetensors files, whole or not at all. */
+/* Write safetensors files atomically. */
 #include "precompute/writer.h"
 #include "sh/base/output.h"
 

@@ -7,7 +7,7 @@
 
 #include "precompute/lungs/disease.h"
 
-/* Compute the weight w of a lesion at a distance: 1 up to half the radius, 0 from the radius on. */
+/* Compute the exponent w of a lesion (disease.h) at a distance. */
 static double lesion_weight(double distance, double radius) {
   if (distance >= radius) {
     return 0.0;
@@ -46,7 +46,7 @@ supine_status supine_tissue_add_lesion(const supine_lungs *lungs, const supine_l
   return SUPINE_OK;
 }
 
-/* Find the mean of the vertices in the quarter of the lung's width nearest the midline. */
+/* Estimate the hilum: the mean of the vertices in the quarter of the lung nearest the midline. */
 static void find_hilum(const supine_lungs *lungs, size_t lung, double hilum[3]) {
   const double *p = lungs->mesh.vertices;
   double low = INFINITY;

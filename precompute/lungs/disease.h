@@ -10,48 +10,48 @@
 
 #include "precompute/lungs/lungs.h"
 
-/** A region of changed stiffness. With r the distance to its centre, stiffness is multiplied by
+/** A region of changed stiffness. The stiffness at distance r from the centre is multiplied by
  *
  *     factor^w     w = 1 for r <= radius/2,  0 for r >= radius,  3 q^2 - 2 q^3 between
  *                  q = 2 (1 - r / radius)
  *
- * so that it changes smoothly, and not at all beyond the radius. The factors of several lesions
- * multiply. */
+ * so that the stiffness changes smoothly, and not at all beyond the radius. The factors of several
+ * lesions multiply. */
 typedef struct supine_lesion {
   double centre[3]; /**< mm, LPS; inside the lung or on its surface */
   double radius;    /**< mm, > 0 */
   double factor;    /**< > 0; above 1 stiffer, below 1 softer, 1 changes nothing */
 } supine_lesion;
 
-/** Multiply `factors` [N], which start as 1, by the stiffness factors of a lesion. The stiffness is
- * scaled to geometric mean 1 before it is multiplied by `factors`; the other order would soften all
- * other tissue, by 4 % for a lesion of factor 10 over 2 % of the vertices. So a stiff lesion does
- * not change how other tissue moves at a given depth of the breath; at a given volume of the lungs,
- * all displacements grow by one ratio, to make up for the lesion.
+/** Multiply `factors` [N], which start as 1, by the stiffness factors of a lesion. The factors
+ * multiply the stiffness after it is scaled to geometric mean 1. In the reverse order, a stiff
+ * lesion would soften all other tissue, by 4 % for a lesion of factor 10 over 2 % of the vertices.
+ * With the same gain (factor on the displacement), a lesion does not change how other tissue moves.
+ * At the same volume of the lungs, all displacements grow by one ratio, to make up for the
+ * lesion.
  *
  * @param reached  optional output: number of vertices nearer to the lesion's centre than the radius
- * @retval SUPINE_ERROR_ARGUMENT  a centre that is not finite, a radius or factor that is not
- *             positive and finite */
+ * @retval SUPINE_ERROR_ARGUMENT  a centre that is not finite; a radius or factor that is not
+ *   positive and finite */
 supine_status supine_tissue_add_lesion(const supine_lungs *lungs, const supine_lesion *lesion,
                                        double *factors, size_t *reached, supine_error *error);
 
-/** Compute the surface with collapsed lungs (pneumothorax). lungs->mesh keeps the healthy shape, on
- * which forces, heights and links are based.
+/** Compute the surface with collapsed lungs (pneumothorax). lungs->mesh keeps the healthy shape,
+ * from which displacements are computed.
  *
- * A lung of share < 1 is shrunk about its hilum, the mean of the vertices in the quarter of its
- * width nearest the midline. Its lengths and displacements are multiplied by share^(1/3) after the
- * displacements of the healthy shape were solved. So at depth s of the breath, lung j has the
- * volume
+ * A collapsed lung is shrunk about its hilum, taken as the mean of the vertices in the quarter of
+ * its width nearest the midline. Its lengths and its displacements are multiplied by share^(1/3).
+ * So with any gain s (factor on the displacement) and direction g of gravity, lung j has exactly
+ * the volume
  *
  *     V_j(s, g) = share x healthy V_j(s, g)
- *
- * exactly, for every direction g of gravity. The volume of `vertices` is scaled by `share`, too.
  *
  * @param share     [lungs] volume divided by healthy volume, 0 < share <= 1
  * @param vertices  [N, 3] output, mm */
 void supine_tissue_collapse(const supine_lungs *lungs, const double share[2], double *vertices);
 
-/** Multiply the displacement directions [N, 3] of each collapsed lung by share^(1/3), in place. */
+/** Multiply the displacement directions [N, 3] of each collapsed lung by share^(1/3), in place.
+ * `share` is the volume of each lung divided by its healthy volume. */
 void supine_tissue_collapse_directions(const supine_lungs *lungs, const double share[2],
                                        double *directions);
 

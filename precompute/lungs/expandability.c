@@ -32,7 +32,8 @@ static bool parse_vertex(const char *text, size_t *vertex) {
   return end != text && *end == '\0' && errno == 0 && text[0] != '-';
 }
 
-/* Read one row into `a` [count], where 0 marks the vertices without a value so far. */
+/* Read one CSV row into a [count]: its expandability is that of the vertex that it names or,
+ * without a column `vertex`, of vertex `row`. 0 marks vertices without a value so far. */
 static supine_status take_row(const supine_csv *csv, size_t row, size_t count, double *a,
                               supine_error *error) {
   const char *number = supine_csv_text(csv, 1);

@@ -1,31 +1,32 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
  * Regional alveolar expandability a ([Santhanam2008] III-E): how readily each part of a lung
- * expands. The stiffness of a mass node is E = 1/a.
+ * expands. The stiffness of a vertex is E = 1/a.
  *
  * Only ratios count, as E is scaled to geometric mean 1. Vertices are in the order of lungs.h: the
- * left lung's first, and within each lung in the order in which its file first names them. */
+ * left lung's first, and within each lung in the order in which its mesh file lists them. */
 #ifndef SUPINE_EXPANDABILITY_H
 #define SUPINE_EXPANDABILITY_H
 
 #include "precompute/lungs/lungs.h"
 
-/** Expandability a along a box coordinate t, 0 to 1, with the values `from` at 0 and `to` at 1. */
+/** How expandability depends on t, a coordinate from 0 to 1 in the bounding box of the lungs. */
 typedef enum supine_expandability_shape {
   SUPINE_EXPANDABILITY_UNIFORM = 0, /**< 1 everywhere */
-  SUPINE_EXPANDABILITY_LINEAR,      /**< from + (to - from) t at the box coordinate t */
-  SUPINE_EXPANDABILITY_EXPONENTIAL  /**< from (to / from)^t at the box coordinate t */
+  SUPINE_EXPANDABILITY_LINEAR,      /**< `from` + (`to` - `from`) t, with t 0 to 1 along an axis */
+  SUPINE_EXPANDABILITY_EXPONENTIAL  /**< `from` * (`to` / `from`)^t, with t 0 to 1 along an axis */
 } supine_expandability_shape;
 
-/** A regional model of expandability. t is a box coordinate (lungs.h), 0 to 1: axis 0 from the
- * midline outwards, 1 from the back to the front, 2 from the apex to the base. */
+/** Expandability as a function of the coordinate t, 0 to 1, of a vertex in the bounding box of the
+ * lungs (supine_lungs_box_coordinates). */
 typedef struct supine_expandability_law {
   supine_expandability_shape shape;
-  int axis;        /**< axis of t: 0, 1 or 2 */
-  double from, to; /**< expandability, > 0, at t = 0 and at t = 1 */
+  int axis;        /**< t grows along 0: midline to outside, 1: back to front, 2: apex to base */
+  double from, to; /**< expandability at t = 0 and at t = 1, the two ends of the axis; > 0 */
 } supine_expandability_law;
 
-/** Compute the expandability a [N] of all vertices by a regional model that is not UNIFORM. */
+/** Compute the expandability a [N] of all vertices by a law whose shape is not
+ * SUPINE_EXPANDABILITY_UNIFORM. */
 void supine_tissue_expandability_regional(const supine_lungs *lungs,
                                           const supine_expandability_law *law, double *a);
 

@@ -8,7 +8,7 @@
 #include "mesh/repair.h"
 #include "precompute/lungs/gate.h"
 
-/* Pieces with less than this share of the volume of their file are dropped. */
+/* Pieces with less than this share of the volume of their surface are dropped. */
 static const double speck_share = 0.01;
 
 static const char *plural(size_t count) {
@@ -95,9 +95,9 @@ static supine_status check_size(const supine_lungs *lungs, const supine_lungs_so
                           unit != NULL ? unit : "");
 }
 
-/* Separate the triangles of two lungs along the axis on which they overlap least. Return the number
- * of lungs, or 0 if out of memory.
- * @param parts  written; they share the lungs' vertices, and the caller frees their triangles */
+/* Divide the triangles between two lungs along the axis on which the two overlap least. Return the
+ * number of lungs, or 0 if out of memory.
+ * @param parts  written; the vertices are those of `lungs`; the caller frees the triangles */
 static size_t part_lungs(const supine_lungs *lungs, supine_mesh parts[2]) {
   const supine_mesh *mesh = &lungs->mesh;
   const supine_topology *topology = &lungs->topology;
@@ -133,10 +133,11 @@ static size_t part_lungs(const supine_lungs *lungs, supine_mesh parts[2]) {
   return failed ? 0 : along < 0 ? 1 : 2;
 }
 
-/* Judge the axes by the lungs' shape, and refuse two lungs in one piece.
- * @param side  written: the side of a single lung, +1 left, -1 right, 0 unknown */
-static supine_status judge(const supine_lungs *lungs, const supine_lungs_source *source, int *side,
-                           bool *axes_hold, supine_findings *findings, supine_error *error) {
+/* Compare the axes with the shape of the lungs, and refuse both lungs in one piece. Write whether
+ * the shape confirms the axes, and the side of a single lung: +1 left, -1 right, 0 unknown. */
+static supine_status check_shape(const supine_lungs *lungs, const supine_lungs_source *source,
+                                 int *side, bool *axes_hold, supine_findings *findings,
+                                 supine_error *error) {
   supine_mesh parts[2];
   const size_t count = part_lungs(lungs, parts);
   if (count == 0) {
@@ -218,7 +219,8 @@ supine_status supine_lungs_gate(supine_mesh *meshes, size_t count,
   }
   status = check_size(lungs, source, findings, error);
   status = status == SUPINE_OK ? check_closed(lungs, source->name, error) : status;
-  status = status == SUPINE_OK ? judge(lungs, source, &side, axes_hold, findings, error) : status;
+  status =
+      status == SUPINE_OK ? check_shape(lungs, source, &side, axes_hold, findings, error) : status;
   if (status == SUPINE_OK && lungs->lung_count == 1 && source->midline == NULL) {
     status = take_side(meshes, count, source, side, lungs, findings, error);
   }

@@ -8,10 +8,10 @@
 
 #include "precompute/lungs/lungs.h"
 
-/** Where the surfaces come from. */
+/** Origin of the surfaces, and what the user stated about them. */
 typedef struct supine_lungs_source {
   const char *name; /**< name of the first file, for messages */
-  supine_axes axes; /**< axes of all files; AUTO if they differ */
+  supine_axes axes; /**< axes of all files; SUPINE_AXES_AUTO if files differ in their axes */
   bool axes_given;
   bool units_given;
   const double *midline; /**< x of the midline, mm; NULL to find it from the lungs */
@@ -19,14 +19,16 @@ typedef struct supine_lungs_source {
 
 /** Repair and check surfaces, and join them into lungs.
  *
- * Repairs are those of supine_mesh_repair; pieces below 1 % of their file's volume are dropped. The
- * longest side must be possible for lungs (an impossible one is only a warning if the user gave the
- * axes or units). The axes are compared with the shape (supine_mesh_anatomy_find). The side of a
- * single lung follows from its shape or, if that is unclear, from its position. Notes and warnings
- * go to `findings`.
+ * - Surfaces are repaired by supine_mesh_repair. Pieces below 1 % of the volume of their surface
+ * are dropped.
+ * - The longest side of the bounding box must be plausible for lungs. If the user gave the axes or
+ *   units, an implausible size is only a warning.
+ * - Axes that the shape contradicts (supine_mesh_anatomy_find) are a warning.
+ * - The side of a single lung follows from its shape or, if that is unclear, from its position.
  *
  * @param meshes     [count] changed in place
- * @param axes_hold  output: whether the shape fits LPS clearly better than all other axes
+ * @param axes_hold  output: whether the shape fits the axes LPS clearly better than all other axes
+ * @param findings   notes and warnings are added
  * @retval SUPINE_ERROR_MESH  a size impossible for lungs, or both lungs in one piece
  * @retval SUPINE_ERROR_OPEN_SURFACE  a surface that is not closed
  * @retval the statuses of supine_lungs_create */

@@ -209,7 +209,7 @@ static supine_status check_midline(const supine_lungs *lungs, bool two_sided, su
                             0.5 * (lungs->minimum[0] + lungs->maximum[0]));
   }
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-    double inner = INFINITY; /* distances from the midline, positive on the lung's own side, mm */
+    double inner = INFINITY; /* smallest distance from the midline, mm; negative beyond it */
     double outer = -INFINITY;
     for (size_t i = lungs->lung_begin[lung]; i < lungs->lung_begin[lung + 1]; ++i) {
       const double x = lungs->side[lung] * (lungs->mesh.vertices[3 * i] - lungs->midline);
@@ -236,7 +236,7 @@ static void face_outwards(supine_lungs *lungs) {
   }
 }
 
-/* Find the topology, the lungs' box, the midline and the side of each lung. */
+/* Find the topology and the bounding box of the lungs, the midline, and the side of each lung. */
 static supine_status measure(supine_lungs *lungs, const double *midline, supine_error *error) {
   supine_mesh_box(&lungs->mesh, lungs->minimum, lungs->maximum);
   const double low = lungs->minimum[0];

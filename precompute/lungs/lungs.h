@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * The lungs of one model: join surfaces, sort them into left and right, and measure them. */
+ * The lungs of one person: join surfaces, sort them into left and right, and measure them. */
 #ifndef SUPINE_LUNGS_H
 #define SUPINE_LUNGS_H
 
@@ -20,22 +20,22 @@ typedef struct supine_lungs {
   double maximum[3];
   double *scanned; /**< [vertices, 3] positions in the scan, mm, if `mesh` shows full inflation
                       instead of the scan; otherwise NULL */
-  double midline;  /**< x of the sagittal plane where the box coordinate X is 0, mm */
+  double midline;  /**< x of the sagittal plane between left and right, mm */
 } supine_lungs;
 
 /** Join surfaces into one or two lungs.
  *
- * Components to the left and to the right of the box's centre are two lungs if the left ones hardly
- * overlap the right ones in x. Otherwise all components are one lung. The midline is the box's
- * centre for two lungs and the face of the box nearest x = 0 for one. If the triangles of a lung
- * face inwards, they are reversed.
+ * Components to the left and to the right of the centre of the common bounding box are two lungs if
+ * the left ones hardly overlap the right ones in x. Otherwise all components are one lung. Unless
+ * given, the midline is the centre of the bounding box for two lungs, and the face of the bounding
+ * box nearest x = 0 for one. If the triangles of a lung face inwards, they are reversed.
  *
  * @param meshes   [count] not changed
  * @param midline  x of the plane between left and right, mm; found if NULL
  * @param lungs    written on success; release with supine_lungs_free
- * @retval SUPINE_ERROR_MESH      no surface, no extent, or more vertices than 32-bit indices reach;
- *             one lung given twice, a tiny surface beside another; a midline through a lung, or
- *             with both lungs on one side of it
+ * @retval SUPINE_ERROR_MESH      no surface, or one without extent; more vertices than 32-bit
+ *   indices can address; one lung given twice; a surface much smaller than another; a midline that
+ *   runs through a lung, or leaves both lungs on one side
  * @retval SUPINE_ERROR_ARGUMENT  a midline that is not finite
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_lungs_create(const supine_mesh *meshes, size_t count, const double *midline,
@@ -48,11 +48,11 @@ void supine_lungs_free(supine_lungs *lungs);
  * of one lung overlap more. */
 #define SUPINE_LUNGS_MOST_OVERLAP 0.5
 
-/** Sort connected components to the two sides of `middle` along an axis, by the mean of their
- * vertices. The range of a side spans its components with at least 5 % of the vertices.
+/** Divide connected components between the two sides of `middle` along an axis, by the mean of
+ * their vertices. The range of a side spans its components with at least 5 % of all vertices.
  * @param above  [components] written: whether the mean is above `middle`
- * @return overlap of the two ranges as a share of the narrower one; INFINITY if a side has no
- *             range, NAN if out of memory */
+ * @return overlap of the ranges of the two sides as a share of the narrower range; INFINITY if a
+ *   side has no range, NAN if out of memory */
 double supine_lungs_sides(const supine_mesh *mesh, const supine_topology *topology, int axis,
                           double middle, uint8_t *above);
 
@@ -61,16 +61,17 @@ static inline const char *supine_lungs_name(const supine_lungs *lungs, size_t lu
   return lungs->side[lung] > 0 ? "left" : "right";
 }
 
-/** Return one lung as a mesh that shares the arrays; its triangles index the vertices of all
- * lungs. */
+/** Return one lung as a mesh that shares the arrays of `lungs`. Its triangles index the vertices of
+ * all lungs. */
 static inline supine_mesh supine_lungs_part(const supine_lungs *lungs, size_t lung) {
   const size_t begin = lungs->triangle_begin[lung];
   return (supine_mesh){lungs->mesh.vertex_count, lungs->mesh.vertices,
                        lungs->triangle_begin[lung + 1] - begin, lungs->mesh.triangles + 3 * begin};
 }
 
-/** Compute the box coordinates of [Santhanam2008] (15)-(18), each 0 to 1: X from the midline
- * outwards, Y from the back to the front, Z from the apex to the base. */
+/** Compute the coordinates of a vertex in the bounding box of the lungs, each 0 to 1
+ * ([Santhanam2008] (15)-(18)): X from the midline outwards, Y from the back to the front, Z from
+ * the apex to the base. */
 void supine_lungs_box_coordinates(const supine_lungs *lungs, size_t vertex, double box[3]);
 
 #endif

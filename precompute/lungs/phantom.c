@@ -31,7 +31,7 @@ size_t supine_phantom_geodesic_triangle_count(size_t frequency) {
 /* Compute a corner of the icosahedron: corners are cyclic permutations of (+-1, +-golden, 0). */
 static void corner(size_t index, double p[3]) {
   const double golden = 0.5 * (1.0 + sqrt(5.0));
-  const size_t axis = index / 4; /* coordinate that is +-1; the next one is +-golden */
+  const size_t axis = index / 4; /* index of the coordinate that is +-1; the next one is +-golden */
   const double one = index % 2 == 0 ? -1.0 : 1.0;
   const double far = index % 4 < 2 ? golden : -golden;
   p[axis % 3] = one;
@@ -39,7 +39,7 @@ static void corner(size_t index, double p[3]) {
   p[(axis + 2) % 3] = 0.0;
 }
 
-/* Find the index of the edge between two corners; edges are numbered in the order of the faces. */
+/* Find the index of the edge between two corners. Edges are numbered in the order of `faces`. */
 static size_t edge_index(unsigned a, unsigned b) {
   size_t count = 0;
   for (size_t f = 0; f < FACES; ++f) {
@@ -57,8 +57,9 @@ static size_t edge_index(unsigned a, unsigned b) {
   return count;
 }
 
-/* Return the index of the vertex of a face with barycentric coordinates (f - i - j, i, j) / f. */
-static size_t number(size_t face, size_t f, size_t i, size_t j) {
+/* Return the index of a vertex of the geodesic sphere. It lies at the barycentric coordinates (f -
+ * i - j, i, j) / f on a face of the icosahedron, whose edges are cut into f parts. */
+static size_t vertex_index(size_t face, size_t f, size_t i, size_t j) {
   const size_t step[3] = {f - i - j, i, j};
   size_t inside = 0;
   for (size_t k = 0; k < 3; ++k) {
@@ -73,7 +74,7 @@ static size_t number(size_t face, size_t f, size_t i, size_t j) {
       if (step[k] > 0 && step[next] > 0) {
         const unsigned a = faces[face][k];
         const unsigned b = faces[face][next];
-        /* number of steps from the corner with the lower index */
+        /* vertices are numbered along the edge from its corner with the lower index */
         const size_t along = a < b ? step[next] : step[k];
         return CORNERS + edge_index(a, b) * (f - 1) + along - 1;
       }
@@ -94,7 +95,7 @@ void supine_phantom_geodesic(size_t frequency, uint32_t base, double *vertices,
     }
     for (size_t i = 0; i <= f; ++i) {
       for (size_t j = 0; i + j <= f; ++j) {
-        double *v = vertices + 3 * number(face, f, i, j);
+        double *v = vertices + 3 * vertex_index(face, f, i, j);
         double square = 0.0;
         for (size_t k = 0; k < 3; ++k) {
           v[k] = (double)(f - i - j) * p[0][k] + (double)i * p[1][k] + (double)j * p[2][k];
@@ -104,14 +105,14 @@ void supine_phantom_geodesic(size_t frequency, uint32_t base, double *vertices,
           v[k] /= sqrt(square);
         }
         if (i + j < f) {
-          *out++ = (uint32_t)(base + number(face, f, i, j));
-          *out++ = (uint32_t)(base + number(face, f, i + 1, j));
-          *out++ = (uint32_t)(base + number(face, f, i, j + 1));
+          *out++ = (uint32_t)(base + vertex_index(face, f, i, j));
+          *out++ = (uint32_t)(base + vertex_index(face, f, i + 1, j));
+          *out++ = (uint32_t)(base + vertex_index(face, f, i, j + 1));
         }
         if (i + j + 1 < f) {
-          *out++ = (uint32_t)(base + number(face, f, i + 1, j));
-          *out++ = (uint32_t)(base + number(face, f, i + 1, j + 1));
-          *out++ = (uint32_t)(base + number(face, f, i, j + 1));
+          *out++ = (uint32_t)(base + vertex_index(face, f, i + 1, j));
+          *out++ = (uint32_t)(base + vertex_index(face, f, i + 1, j + 1));
+          *out++ = (uint32_t)(base + vertex_index(face, f, i, j + 1));
         }
       }
     }

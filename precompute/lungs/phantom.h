@@ -6,7 +6,7 @@
 
 #include "mesh/mesh.h"
 
-/** Fewest and most vertices of a phantom. */
+/** Fewest and most vertices of a pair of synthetic lungs. */
 enum { SUPINE_PHANTOM_VERTICES_MIN = 84, SUPINE_PHANTOM_VERTICES_MAX = 20000000 };
 
 /** Make two closed lungs, left first, of a given total volume.
@@ -22,8 +22,8 @@ enum { SUPINE_PHANTOM_VERTICES_MIN = 84, SUPINE_PHANTOM_VERTICES_MAX = 20000000 
 supine_status supine_phantom_create(size_t vertices, double millilitres, supine_mesh *mesh,
                                     supine_error *error);
 
-/** Return the number of vertices, 10 f^2 + 2, or triangles, 20 f^2, of a geodesic sphere of
- * frequency f, an icosahedron whose faces are cut into f^2 triangles each. */
+/** Return the number of vertices, 10 f^2 + 2, or of triangles, 20 f^2, of a geodesic sphere. It is
+ * an icosahedron with each face cut into f^2 triangles; f is the frequency. */
 size_t supine_phantom_geodesic_vertex_count(size_t frequency);
 size_t supine_phantom_geodesic_triangle_count(size_t frequency);
 

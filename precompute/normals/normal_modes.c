@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Find a small number of modes that approximate the normals of all vertices in all states. */
+/* Find a small number of modes that approximate all normals in all postures and volumes. */
 #include <cblas.h>
 #include <math.h>
 #include <stdlib.h>
@@ -16,13 +16,13 @@
 
 enum {
   ROWS = 4096,    /* modes are found from at most this many vertices of a lung */
-  STATES = 192,   /* modes are found from this many states */
+  STATES = 192,   /* modes are found from this many sampled states (posture and volume) */
   HELD_OUT = 256, /* errors are measured in this many other states */
   STEP = 3        /* number of modes that are added at a time */
 };
 
-/* Modes are weighted sums of the normals in at most SNAPSHOTS states. LANES states are evaluated
- * together. Lane 0 of the first batch holds the reference surface, which is not a snapshot. */
+/* Modes are weighted sums of snapshots, the normals in at most SNAPSHOTS states. LANES states are
+ * evaluated together. Lane 0 of the first of 6 batches holds the reference surface instead. */
 enum { LANES = 8, SNAPSHOTS = 6 * LANES - 1, MOST = SUPINE_NORMALS_MOST };
 
 /* Largest accepted mean and 99.9th percentile of the angle between an exact normal and its
@@ -32,19 +32,19 @@ static const double mean_wanted = 0.08;
 static const double p999_wanted = 0.8;
 static const double degrees_per_radian = 57.29577951308232;
 
-/* A state becomes a snapshot only if the snapshots chosen before it leave more than this share of
- * the sum of its squared normals unexplained. */
-static const double least_new = 1e-7;
+/* A state becomes a snapshot only if the earlier snapshots leave more than this share of the sum of
+ * its squared normals unexplained. */
+static const double least_unexplained = 1e-7;
 
-/* The modes of the normals of one lung, before rounding. normal_modes.h defines N, n and V. */
+/* Modes of the normals of one lung, before rounding. */
 typedef struct fit {
-  size_t count;                     /* number of modes, at most MOST */
-  size_t snapshot_count;            /* number R of snapshots */
-  size_t state[SNAPSHOTS];          /* [R] index of the state of each snapshot */
-  float share[1 + SNAPSHOTS][MOST]; /* [1 + r][j] weight of snapshot r in mode j; row 0 is 0 */
-  double *weights;                  /* [MOST, 3, terms] weights V by mode, axis and monomial */
-  supine_normals_rows rows;         /* polynomials for the normals of held-out vertices */
-  float *modes;                     /* [rows, 3, MOST] modes of the held-out vertices */
+  size_t count; /* number of modes, at most MOST */
+  size_t snapshot_count;
+  size_t state[SNAPSHOTS]; /* [snapshot_count] index of the state of each snapshot */
+  float snapshot_weights[1 + SNAPSHOTS][MOST]; /* [1 + snapshot][mode]; row 0 is zero */
+  double *weights; /* [mode, axis, monomial] coefficients of each mode's weight in a state */
+  supine_normals_rows rows; /* polynomials that give the normals of held-out vertices */
+  float *modes;             /* [rows.count, 3, MOST] modes at the held-out vertices */
 } fit;
 
 typedef struct normals_work {
@@ -68,8 +68,8 @@ static void apply_rows(const double *in, size_t count, size_t terms, const doubl
 }
 
 /* Compute out[i, c, t] = sum over u of in[i, c, u] G_c[u, t] for `in` and `out` [count, 3, terms].
- * Here G_c = A_c^T A_c, where A_c [rows->count, terms] holds the coefficients of the polynomials
- * `rows` along axis c. gram [terms, terms] is work space. */
+ * G_c = A_c^T A_c, where row r of A_c holds the polynomial coefficients along axis c of the normal
+ * of vertex r of `rows`. gram [terms, terms] is work space. */
 static void apply_gram(const supine_normals_rows *rows, size_t terms, const double *in,
                        size_t count, double *gram, double *out) {
   const int width = (int)terms;
@@ -82,10 +82,10 @@ static void apply_gram(const supine_normals_rows *rows, size_t terms, const doub
   }
 }
 
-/* Choose the snapshots among s states, and find the best modes as weighted sums of the R snapshots.
- * product [s, s] holds the scalar products of the normals of any two states, scaled to 1 on the
- * diagonal. Its pivoted Cholesky factorisation L L^T, which overwrites it, picks the snapshots.
- * Write the weight of snapshot r in mode j to coefficients[j R + r]. */
+/* Choose R snapshots among s states by pivoted Cholesky factorisation, and find the modes as
+ * weighted sums of snapshots with the least squared error. product [s, s] holds the scalar products
+ * of the normals of any two states, scaled to 1 on the diagonal, and is overwritten. Write the
+ * weight of snapshot r in mode j to coefficients[j R + r]. */
 static supine_status choose_snapshots(size_t s, double *product, fit *made,
                                       double coefficients[MOST * SNAPSHOTS]) {
   lapack_int pivots[STATES];
@@ -93,7 +93,7 @@ static supine_status choose_snapshots(size_t s, double *product, fit *made,
   double gram[SNAPSHOTS * SNAPSHOTS];
   double values[SNAPSHOTS];
   const lapack_int info = LAPACKE_dpstrf(LAPACK_COL_MAJOR, 'L', (lapack_int)s, product,
-                                         (lapack_int)s, pivots, &rank, least_new);
+                                         (lapack_int)s, pivots, &rank, least_unexplained);
   if (info < 0) { /* a positive result means a singular matrix, which is no error */
     return supine_lapack_status(info);
   }
@@ -113,11 +113,10 @@ static supine_status choose_snapshots(size_t s, double *product, fit *made,
   return status;
 }
 
-/* Find the modes n_j that approximate the normals in all sampled states best, with equal weights
- * for all states. The modes are orthonormal over the vertices of `rows`. Write V (normal_modes.h)
- * to made->weights. Write to mix [MOST, 3, terms] the matrix T that turns the polynomial
- * coefficients A of a vertex into its modes: along axis c, n_jc = sum over t of T[j, c, t] A[c, t].
- */
+/* Find the modes that approximate the normals of the vertices of `rows` in all sampled states with
+ * the least squared error. All states have equal weight. The modes are orthonormal over these
+ * vertices. Write to mix [MOST, 3, terms] the matrix that turns the coefficients A of a vertex's
+ * polynomial into its modes: mode j along axis c is sum over t of mix[j, c, t] A[c, t]. */
 static supine_status find_fit(const normals_work *work, size_t lung,
                               const supine_normals_rows *rows, double *mix, fit *made) {
   const size_t terms = work->terms;
@@ -128,14 +127,14 @@ static supine_status find_fit(const normals_work *work, size_t lung,
   double length[STATES];
   supine_status status = SUPINE_ERROR_MEMORY;
   double *gram = malloc(terms * terms * sizeof *gram);
-  double *image = malloc(s * all * sizeof *image);
+  double *gram_phi = malloc(s * all * sizeof *gram_phi);
   double *product = malloc(s * s * sizeof *product);
-  if (gram == NULL || image == NULL || product == NULL) {
+  if (gram == NULL || gram_phi == NULL || product == NULL) {
     goto cleanup;
   }
-  apply_gram(rows, terms, phi, s, gram, image);
+  apply_gram(rows, terms, phi, s, gram, gram_phi);
   cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)s, (int)s, (int)all, 1.0, phi, (int)all,
-              image, (int)all, 0.0, product, (int)s);
+              gram_phi, (int)all, 0.0, product, (int)s);
   for (size_t i = 0; i < s; ++i) {
     length[i] = product[i * s + i] > 0.0 ? sqrt(product[i * s + i]) : 1.0;
   }
@@ -151,19 +150,18 @@ static supine_status find_fit(const normals_work *work, size_t lung,
     for (size_t r = 0; r < made->snapshot_count; ++r) {
       const size_t state = made->state[r];
       const double share = coefficients[j * made->snapshot_count + r] / length[state];
-      made->share[1 + r][j] = (float)share;
+      made->snapshot_weights[1 + r][j] = (float)share;
       cblas_daxpy((int)all, share, phi + state * all, 1, mix + j * all, 1);
     }
   }
   apply_gram(rows, terms, mix, MOST, gram, made->weights);
 cleanup:
   free(gram);
-  free(image);
+  free(gram_phi);
   free(product);
   return status;
 }
 
-/* Find the modes of one lung, and evaluate them at held-out vertices. */
 static supine_status find_lung(const normals_work *work, size_t lung, fit *made) {
   const supine_normals_surface *s = work->surface;
   const size_t stride = 1 + (s->lung_begin[lung + 1] - s->lung_begin[lung]) / ROWS;
@@ -198,8 +196,8 @@ static supine_status find_lung(const normals_work *work, size_t lung, fit *made)
   return status;
 }
 
-/* Round the modes [count] of one vertex along one axis to the precision of an open basis, which
- * stores them with 13, 10 and 9 bits. */
+/* Round the modes [count] of one vertex along one axis as at run time, where three modes share a
+ * 32-bit word with 13, 10 and 9 bits. */
 static void pack(const int16_t *modes, size_t count, double *packed) {
   const size_t words = supine_tiles_normal_words(count);
   for (size_t j = 0; j < words; ++j) {
@@ -214,10 +212,10 @@ static void pack(const int16_t *modes, size_t count, double *packed) {
   }
 }
 
-/* Divide the modes of n vertices, values [n, 3, stride], in place by the lengths [n] of their
- * normals on the reference surface, unless `lengths` is NULL. Modes of a vertex with length 0
- * become 0. Round the first `count` modes to 16 bits in rounded [n, 3, count], and write the value
- * of an integer step of each mode to unit [count]. */
+/* Divide the modes [n, 3, stride] of each vertex in place by the length of its normal on the
+ * reference surface, unless `lengths` [n] is NULL. Modes of a vertex with length 0 become 0. Round
+ * the first `count` modes to multiples, rounded [n, 3, count], of the quantisation step of each
+ * mode, unit [count]. */
 static void round_modes(float *values, const float *lengths, size_t n, size_t stride, size_t count,
                         int16_t *rounded, double *unit) {
   float top[MOST] = {0.0f};
@@ -241,7 +239,7 @@ static void round_modes(float *values, const float *lengths, size_t n, size_t st
   }
 }
 
-/* Multiply the weights [count, 3, terms] of each mode by the unit [count] of that mode. */
+/* Multiply the weights [count, 3, terms] of each mode by its quantisation step. */
 static void scale_weights(const double *weights, const double *unit, size_t count, size_t terms,
                           double *scaled) {
   for (size_t i = 0; i < count * 3 * terms; ++i) {
@@ -266,9 +264,9 @@ SUPINE_CLONES static void find_angles(size_t count, const double *a, const doubl
   }
 }
 
-/* Add the angles between exact and approximate normals of the held-out vertices of a lung, in all
- * held-out states, to `tally` and `sum`. modes [rows, 3, count] and weights [count, 3, terms] hold
- * the same values as the basis file. */
+/* Measure the angles between exact and approximate normals at the held-out vertices of a lung, in
+ * all held-out states. Add them to the histogram `tally`, and their sum to `sum`. `modes`
+ * [vertices, 3, count] and `weights` [count, 3, terms] are those of the basis file. */
 static void measure(const normals_work *work, size_t lung, size_t count, const int16_t *modes,
                     const double *weights, supine_tally *tally, double *sum) {
   enum { BLOCK = 16 }; /* vertices whose exact normals are computed at a time */
@@ -277,7 +275,7 @@ static void measure(const normals_work *work, size_t lung, size_t count, const i
   const size_t states = work->held_out.count;
   const double *phi = work->held_out.phi + lung * work->held_out.room * all;
   double v[HELD_OUT * MOST];
-  double exact[BLOCK * 3 * HELD_OUT]; /* exact normals [BLOCK, 3, states] */
+  double exact[BLOCK * 3 * HELD_OUT]; /* [BLOCK, 3, states] exact normals */
   double normals[3 * HELD_OUT];
   double angles[HELD_OUT];
   cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)states, (int)count, (int)all, 1.0, phi,
@@ -343,10 +341,11 @@ typedef struct planes_work {
   size_t count; /* number of modes */
   size_t first; /* index of the state in the first lane: 0 is the reference surface, 1 + r is
                    snapshot r */
-  float (*steer)[3][SUPINE_NORMALS_FIELD_MAX][LANES]; /* gain times weight */
-  float *at;                                          /* [N, 3, LANES] positions, mm */
-  float *modes;   /* [N, 3, count] sums over the snapshots so far */
-  float *lengths; /* [N] length of each normal on the reference surface */
+  /* [lung][axis][mode][lane] gain of the axis times weight of the displacement mode. */
+  float (*mode_factors)[3][SUPINE_NORMALS_FIELD_MAX][LANES];
+  float *positions; /* [N, 3, LANES] positions, mm */
+  float *modes;     /* [N, 3, count] sums over the snapshots evaluated so far */
+  float *lengths;   /* [N] length of each normal on the reference surface */
 } planes_work;
 
 static size_t lung_of(const supine_normals_surface *s, size_t vertex) {
@@ -361,16 +360,17 @@ SUPINE_CLONES static void place_range(void *context, size_t begin, size_t end, s
   for (size_t row = begin; row < end; ++row) {
     const float *c = s->field->coefficients + (vector ? row : row / 3) * s->field->mode_count;
     const float d = vector ? 1.0f : s->directions[row];
-    const float(*steer)[LANES] = (const float(*)[LANES])planes->steer[lung_of(s, row / 3)][row % 3];
+    const float(*mode_factors)[LANES] =
+        (const float(*)[LANES])planes->mode_factors[lung_of(s, row / 3)][row % 3];
     float sum[LANES] = {0.0f};
     for (size_t k = 0; k < s->field->mode_count; ++k) {
 #pragma GCC unroll 1 /* full unrolling would prevent vectorisation */
       for (size_t l = 0; l < LANES; ++l) {
-        sum[l] += c[k] * steer[k][l];
+        sum[l] += c[k] * mode_factors[k][l];
       }
     }
     for (size_t l = 0; l < LANES; ++l) {
-      planes->at[row * LANES + l] = s->vertices[row] + d * sum[l];
+      planes->positions[row * LANES + l] = s->vertices[row] + d * sum[l];
     }
   }
 }
@@ -381,13 +381,13 @@ SUPINE_CLONES static void sum_range(void *context, size_t begin, size_t end, siz
   const supine_normals_fans *fans = &planes->work->fans;
   (void)thread;
   for (size_t i = begin; i < end; ++i) {
-    const float *p = planes->at + 3 * i * LANES;
+    const float *p = planes->positions + 3 * i * LANES;
     float normal[3][LANES] = {{0.0f}};
     for (size_t at = fans->begin[i]; at < fans->begin[i + 1]; ++at) {
       uint32_t others[2];
       supine_normals_fan_others(s->triangles, fans->corner[at], others);
-      const float *a = planes->at + 3 * (size_t)others[0] * LANES;
-      const float *b = planes->at + 3 * (size_t)others[1] * LANES;
+      const float *a = planes->positions + 3 * (size_t)others[0] * LANES;
+      const float *b = planes->positions + 3 * (size_t)others[1] * LANES;
       for (size_t axis = 0; axis < 3; ++axis) {
         const size_t y = (axis + 1) % 3 * LANES;
         const size_t z = (axis + 2) % 3 * LANES;
@@ -398,7 +398,7 @@ SUPINE_CLONES static void sum_range(void *context, size_t begin, size_t end, siz
       }
     }
     const float(*share)[MOST] =
-        (const float(*)[MOST])(planes->work->fits[lung_of(s, i)].share + planes->first);
+        (const float(*)[MOST])(planes->work->fits[lung_of(s, i)].snapshot_weights + planes->first);
     if (planes->first == 0) {
       planes->lengths[i] = sqrtf(normal[0][0] * normal[0][0] + normal[1][0] * normal[1][0] +
                                  normal[2][0] * normal[2][0]);
@@ -418,9 +418,10 @@ SUPINE_CLONES static void sum_range(void *context, size_t begin, size_t end, siz
   }
 }
 
-/* Set planes->steer, the products of gain and weight, from the sampled monomials: with K modes of
- * the field, monomials 1 to K along axis (a + 2) mod 3 are the weights times the gain of axis a. */
-static void find_steer(const planes_work *planes) {
+/* Set planes->mode_factors, the products of gain and weight, from the monomials of the sampled
+ * states. The products for the gain of axis a follow the constant 1 among the monomials along axis
+ * (a + 2) mod 3. */
+static void find_mode_factors(const planes_work *planes) {
   const normals_work *work = planes->work;
   for (size_t lung = 0; lung < work->surface->lung_count; ++lung) {
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -430,7 +431,7 @@ static void find_steer(const planes_work *planes) {
         const double *phi = work->states.phi +
                             ((lung * work->states.room + state) * 3 + (axis + 2) % 3) * work->terms;
         for (size_t k = 0; k < work->surface->field->mode_count; ++k) {
-          planes->steer[lung][axis][k][l] = lane > 0 ? (float)phi[1 + k] : 0.0f;
+          planes->mode_factors[lung][axis][k][l] = lane > 0 ? (float)phi[1 + k] : 0.0f;
         }
       }
     }
@@ -443,11 +444,11 @@ static supine_status make_modes(const normals_work *work, size_t count,
   const supine_normals_surface *s = work->surface;
   const size_t n = s->vertex_count;
   const size_t all = 3 * work->terms;
-  float steer[SUPINE_LUNGS_MAX][3][SUPINE_NORMALS_FIELD_MAX][LANES];
+  float mode_factors[SUPINE_LUNGS_MAX][3][SUPINE_NORMALS_FIELD_MAX][LANES];
   planes_work planes = {.work = work,
                         .count = count,
-                        .steer = steer,
-                        .at = malloc(3 * n * LANES * sizeof(float)),
+                        .mode_factors = mode_factors,
+                        .positions = malloc(3 * n * LANES * sizeof(float)),
                         .modes = calloc(3 * n * count, sizeof(float)),
                         .lengths = malloc(n * sizeof(float))};
   made->modes = malloc(3 * n * count * sizeof *made->modes);
@@ -458,10 +459,10 @@ static supine_status make_modes(const normals_work *work, size_t count,
     snapshots =
         work->fits[lung].snapshot_count > snapshots ? work->fits[lung].snapshot_count : snapshots;
   }
-  const bool memory = planes.at != NULL && planes.modes != NULL && planes.lengths != NULL &&
+  const bool memory = planes.positions != NULL && planes.modes != NULL && planes.lengths != NULL &&
                       made->modes != NULL && made->weights != NULL;
   for (; memory && planes.first <= snapshots; planes.first += LANES) {
-    find_steer(&planes);
+    find_mode_factors(&planes);
     supine_parallel_for(3 * n, 3 * GRAIN, 0, place_range, &planes);
     supine_parallel_for(n, GRAIN, 0, sum_range, &planes);
   }
@@ -474,7 +475,7 @@ static supine_status make_modes(const normals_work *work, size_t count,
     scale_weights(work->fits[lung].weights, unit, count, work->terms,
                   made->weights + lung * count * all);
   }
-  free(planes.at);
+  free(planes.positions);
   free(planes.modes);
   free(planes.lengths);
   return memory ? SUPINE_OK : SUPINE_ERROR_MEMORY;

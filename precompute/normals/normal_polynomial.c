@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Express normals, the sums of triangles' area vectors, as polynomials of weights and gains. */
+/* Express normals, the sums of triangles' area vectors, as polynomials of the weights of the
+ * displacement modes and the gains, which multiply the displacement along each axis. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,9 +9,9 @@
 
 enum { COLUMNS = SUPINE_NORMALS_FIELD_MAX + 1 };
 
-/* Find the index of the monomial for the product of column k along one axis and column l along the
- * next axis. Column 0 is the position on the reference surface; column k > 0 is the displacement by
- * mode k - 1. */
+/* Return the index of the monomial (supine_normals_terms) of column k along one axis times column l
+ * along the next axis. Columns describe a side of a triangle: column 0 is the side on the reference
+ * surface, column k > 0 its change by displacement mode k - 1. */
 static size_t term_of(size_t modes, size_t k, size_t l) {
   const size_t low = (k < l ? k : l) - 1;
   const size_t high = (k < l ? l : k) - 1;
@@ -85,8 +86,8 @@ static void read_side(const supine_normals_surface *s, size_t from, size_t to,
   }
 }
 
-/* Add to row [3, terms] the coefficients of the area vectors of all triangles around a vertex, as
- * polynomials of the weights and the gains. */
+/* Add to row [3, terms] the coefficients of the polynomial that gives the normal of a vertex: the
+ * sum of the area vectors of the triangles around it (normal_modes.h). */
 static void find_row(const supine_normals_surface *s, const supine_normals_fans *fans,
                      size_t vertex, size_t terms, double *row) {
   for (size_t at = fans->begin[vertex]; at < fans->begin[vertex + 1]; ++at) {

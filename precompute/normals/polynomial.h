@@ -1,28 +1,29 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Express the normal of a vertex as a polynomial of weights and gains (normal_modes.h), and sample
- * the states in which modes of the normals are found and measured. */
+/* Express the normal of a vertex as a polynomial of the weights and gains of the displacement
+ * (normal_modes.h), and sample the states in which modes of the normals are found and measured. */
 #ifndef SUPINE_NORMALS_POLYNOMIAL_H
 #define SUPINE_NORMALS_POLYNOMIAL_H
 
 #include "precompute/normals/normal_modes.h"
 
-/* Return the number of monomials in the component of a normal along one axis. Let a and b be the
- * gains of the next two axes in cyclic order, and w the weights of the modes. The monomials are
+/* Return the number of monomials in the component of a normal along one axis. With the weights w of
+ * the displacement modes, and the gains a and b (factors on the displacement) of the next two axes
+ * in cyclic order, they are
  *
  *     1, a w_k, b w_k, a b w_k w_l for k <= l */
 static inline size_t supine_normals_terms(size_t modes) {
   return 1 + 2 * modes + modes * (modes + 1) / 2;
 }
 
-/* Compute the monomials of supine_normals_terms() along x, y and z, phi [3, terms]. */
+/* Compute the monomials of supine_normals_terms() for the axes x, y and z, phi [3, terms]. */
 void supine_normals_monomials(size_t modes, const double *weights, const double gains[3],
                               double *phi);
 
 /* The triangles around each vertex. The array `triangles` of the surface contains vertex i at the
  * indices corner[begin[i]] to corner[begin[i + 1] - 1]. */
 typedef struct supine_normals_fans {
-  uint32_t *begin;  /* [N + 2]; the last entry is work space */
-  uint32_t *corner; /* [3 M] indices into `triangles` of a surface with M triangles */
+  uint32_t *begin;  /* [N + 2] first index into `corner` of each vertex; last: work space */
+  uint32_t *corner; /* [3 x triangle count] indices into `triangles`, grouped by vertex */
 } supine_normals_fans;
 
 /* Find the triangles around each vertex. Release them with supine_normals_fans_free.
@@ -40,11 +41,11 @@ static inline void supine_normals_fan_others(const uint32_t *triangles, uint32_t
   others[1] = triangles[corner - v + (v + 2) % 3];
 }
 
-/* The polynomials for the normals of some vertices of one lung. */
+/* Polynomials (normal_modes.h) that give the normals of some vertices of one lung. */
 typedef struct supine_normals_rows {
-  size_t count;     /* number R of vertices */
-  uint32_t *vertex; /* [R] indices of the vertices */
-  double *terms;    /* [R, 3, terms] coefficients A_i / |N_i(0)| (normal_modes.h) */
+  size_t count;     /* number of vertices */
+  uint32_t *vertex; /* [count] indices of the vertices */
+  double *terms;    /* [count, 3, terms] coefficients, for unit normals on the reference surface */
 } supine_normals_rows;
 
 /* Find the polynomials for the normals of every `stride`-th vertex of a lung. The first of these
@@ -56,18 +57,19 @@ supine_status supine_normals_rows_create(const supine_normals_surface *surface,
                                          size_t offset, size_t stride, supine_normals_rows *rows);
 void supine_normals_rows_free(supine_normals_rows *rows);
 
-/* Sampled states of the lungs, and the monomials of their weights and gains. */
+/* Sampled states (postures with a volume) of the lungs. */
 typedef struct supine_normals_states {
   size_t count;    /* number of sampled states, at most `room` */
   size_t room;     /* requested number of states */
-  double *phi;     /* [G, room, 3, terms] monomials of each lung in each state */
-  double range[2]; /* as in supine_normals_modes */
+  double *phi;     /* [lungs, room, 3, terms] monomials of supine_normals_terms() in each state */
+  double range[2]; /* least and largest volume, mL, or displacement, mm (supine_normals_modes) */
 } supine_normals_states;
 
 /* Sample up to `count` states with directions of gravity all over the sphere and volumes from rest
- * to the reference surface. If rest is unknown, their largest displacements range from -15 to 60
- * mm. States that the lungs cannot reach are left out. A different `shift`, 0 to 1, gives different
- * states. Release them with supine_normals_states_free.
+ * (FRC) to the reference surface. If the resting volume is unknown, the displacement of the vertex
+ * that moves most ranges from -15 to 60 mm, negative where the gain is negative. States that the
+ * lungs cannot reach are left out. A different `shift`, 0 to 1, gives different states. Release
+ * them with supine_normals_states_free.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_normals_states_create(const supine_normals_surface *surface, size_t count,
                                            double shift, supine_normals_states *states);

@@ -9,12 +9,12 @@
 
 #include "precompute/normals/polynomial.h"
 
-/* If rest is unknown, states are sampled so that the largest displacement of a vertex, with the
- * sign of the gain, spans this range, mm. */
+/* If the resting volume (FRC) is unknown, the displacement of the vertex that moves most spans this
+ * range in the sampled states, mm; it is negative where the gain is negative. */
 static const double lowest_mm = -15.0;
 static const double highest_mm = 60.0;
 
-/* Find the largest displacement at weights w and gain 1, mm, over evenly chosen vertices. */
+/* Find the largest displacement, mm, of evenly chosen vertices at mode weights w and gain 1. */
 static double largest(const supine_normals_surface *s, const double *w) {
   enum { SOME = 4096 };
   const size_t modes = s->field->mode_count;
@@ -39,10 +39,11 @@ static double largest(const supine_normals_surface *s, const double *w) {
   return sqrt(top);
 }
 
-/* Find the gains at which the volume of each lung lies at `share` between rest (0) and the
- * reference surface (1). Write the volume of all lungs minus that of the reference surface, mL, to
- * `amount`. y [9] are the harmonics of gravity, w the weights of the modes. Return false if a lung
- * folds before it holds its volume. */
+/* Find the gains of each lung (factors on the displacement along the axes) at which its volume lies
+ * at `share` between rest (0) and the reference surface (1). Write the volume of all lungs minus
+ * that of the reference surface, mL, to `amount`. y [9] holds the spherical harmonics at the
+ * direction of gravity, w the weights of the modes. Return false if the surface of a lung folds
+ * before it reaches this volume. */
 static bool gains_from_rest(const supine_normals_surface *s, const double *y, const double *w,
                             double share, double (*gains)[3], double *amount) {
   *amount = 0.0;
@@ -62,9 +63,9 @@ static bool gains_from_rest(const supine_normals_surface *s, const double *y, co
   return true;
 }
 
-/* Find the gain, equal for all axes and lungs, at which the largest displacement is lowest_mm +
- * share (highest_mm - lowest_mm). Write this displacement to `amount`. Return false if no vertex
- * moves. */
+/* Find the gain, equal for all axes and lungs, at which the displacement of the vertex that moves
+ * most is lowest_mm + share (highest_mm - lowest_mm). Write this displacement to `amount`. Return
+ * false if no vertex moves. */
 static bool common_gain(const supine_normals_surface *s, const double *w, double share,
                         double (*gains)[3], double *amount) {
   const double size = largest(s, w);

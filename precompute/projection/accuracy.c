@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Measure the error of a compressed field against the full physics for held-out directions of
- * gravity, and the share of triangles that turn over in a state. */
+/* Measure the error of a compressed displacement field against exact solutions of the physical
+ * model for held-out directions of gravity, and the share of triangles that turn over. */
 #include <cblas.h>
 #include <math.h>
 #include <stdlib.h>
@@ -17,32 +17,33 @@
 #include "precompute/projection/tally.h"
 
 /* The vertices are divided into PARTS parts, which are evaluated BLOCK vertices at a time. The
- * number of parts is fixed, so that sums do not depend on the number of threads. If the lungs
- * cannot reach a volume, it is halved, at most VOLUME_HALVINGS times. */
+ * number of parts is fixed, so that sums do not depend on the number of threads. A volume that the
+ * lungs cannot reach is halved, at most VOLUME_HALVINGS times. */
 enum { BLOCK = 128, PARTS = 16, VOLUME_HALVINGS = 10 };
 
 typedef struct tally {
-  double field2;         /* sum of the squared displacements at gain 1, mm^2 */
-  supine_tally error;    /* errors of displacements at gain 1, mm */
-  supine_tally error_mm; /* errors at equal volumes, mm */
+  double square_sum_mm2;    /* sum of the squared displacements at gain 1, mm^2 */
+  supine_tally same_gain;   /* errors where the exact and the compressed field have gain 1, mm */
+  supine_tally same_volume; /* errors where both fields have gains that give the same volume, mm */
 } tally;
 
 typedef struct accuracy_work {
   const supine_truth *truth;
   const supine_compression *compression;
-  const double *directions; /* [N, 3] directions of displacement, mm */
-  const double *weights;    /* [directions, modes] weights of the modes */
-  const double *scales;     /* [directions, 2] gains of the exact and of the compressed field */
+  const double *directions; /* [N, 3] displacement of each vertex per unit force, mm */
+  const double *weights;    /* [held-out directions, modes] weight of each mode */
+  const double *gains; /* [held-out directions, 2] gains of the exact and of the compressed field */
   tally *tallies;
   double *space; /* work space of all threads */
 } accuracy_work;
 
-/* Compute the errors |a approximate - b exact| length, mm, of n displacements. a and b are the
- * gains of the approximate and the exact field. */
+/* Compute the errors of n displacements, mm. The displacement of vertex i is the gain times the
+ * field, `approximate` or `exact`, times length[i], mm. */
 SUPINE_CLONES static void find_errors(size_t n, const double *approximate, const double *exact,
-                                      const double *length, double a, double b, double *out) {
+                                      const double *length, double approximate_gain,
+                                      double exact_gain, double *out) {
   for (size_t i = 0; i < n; ++i) {
-    out[i] = fabs(a * approximate[i] - b * exact[i]) * length[i];
+    out[i] = fabs(approximate_gain * approximate[i] - exact_gain * exact[i]) * length[i];
   }
 }
 
@@ -53,7 +54,7 @@ static void compare_block(const accuracy_work *work, size_t begin, size_t n, dou
   const int count = (int)truth->direction_count;
   const size_t modes = work->compression->mode_count;
   double *coefficients = space;
-  double *approximate = coefficients + modes * BLOCK; /* [direction_count, n] mm */
+  double *approximate = coefficients + modes * BLOCK; /* [direction_count, n] field */
   double *exact = approximate + truth->direction_count * BLOCK;
   double length[BLOCK];
   double errors[BLOCK];
@@ -70,13 +71,12 @@ static void compare_block(const accuracy_work *work, size_t begin, size_t n, dou
   for (size_t d = 0; d < truth->direction_count; ++d, approximate += n, exact += n) {
     for (size_t i = 0; i < n; ++i) {
       const double field = exact[i] * length[i];
-      sums->field2 += field * field;
+      sums->square_sum_mm2 += field * field;
     }
     find_errors(n, approximate, exact, length, 1.0, 1.0, errors);
-    supine_accuracy_tally_add(&sums->error, n, errors);
-    find_errors(n, approximate, exact, length, work->scales[2 * d + 1], work->scales[2 * d],
-                errors);
-    supine_accuracy_tally_add(&sums->error_mm, n, errors);
+    supine_accuracy_tally_add(&sums->same_gain, n, errors);
+    find_errors(n, approximate, exact, length, work->gains[2 * d + 1], work->gains[2 * d], errors);
+    supine_accuracy_tally_add(&sums->same_volume, n, errors);
   }
 }
 
@@ -93,24 +93,26 @@ static void compare_range(void *context, size_t begin, size_t end, size_t thread
   }
 }
 
-/* For each held-out direction, find the gains at which the exact and the compressed field change
- * the volume of the lungs by `part` times volumes [D]. Return false if no such gain exists for some
- * direction. */
-static bool find_scales(const supine_truth *truth, const supine_volume_forms *forms,
-                        const double *weights, const double *volumes, double part, double *scales) {
+/* For each held-out direction of gravity, find the gain of the exact field and the gain of the
+ * compressed field (factors on the displacement) at which the volume of the lungs changes by
+ * `fraction` times volumes [direction_count], mL. Write both to gains [direction_count, 2]. Return
+ * false if a direction has no such gain. */
+static bool find_gains(const supine_truth *truth, const supine_volume_forms *forms,
+                       const double *weights, const double *volumes, double fraction,
+                       double *gains) {
   for (size_t d = 0; d < truth->direction_count; ++d) {
-    const double volume = part * volumes[d];
+    const double volume = fraction * volumes[d];
     double cubic[3];
     supine_physics_volume_forms_contract(forms, weights + d * forms->column_count, cubic);
-    if (supine_volume_scale(truth->cubic + 3 * d, volume, &scales[2 * d], NULL) != SUPINE_OK ||
-        supine_volume_scale(cubic, volume, &scales[2 * d + 1], NULL) != SUPINE_OK) {
+    if (supine_volume_scale(truth->cubic + 3 * d, volume, &gains[2 * d], NULL) != SUPINE_OK ||
+        supine_volume_scale(cubic, volume, &gains[2 * d + 1], NULL) != SUPINE_OK) {
       return false;
     }
   }
   return true;
 }
 
-/* Compute a volume from its harmonics with gravity along the unit vector g. */
+/* Evaluate a volume, given by its harmonics, with gravity along the unit vector g. */
 static double volume_along(const double harmonics[9], const double g[3]) {
   double y[9];
   double volume = 0.0;
@@ -121,35 +123,34 @@ static double volume_along(const double harmonics[9], const double g[3]) {
   return volume;
 }
 
-/* Return the first of the parts 1, 1/2, 1/4, ... that find_scales() accepts, or 0 if none. */
-static double find_part(const accuracy_work *work, const supine_volume_forms *forms,
-                        const double *volumes, double *scales) {
-  double part = 1.0;
-  for (int i = 0; i <= VOLUME_HALVINGS; ++i, part *= 0.5) {
-    if (find_scales(work->truth, forms, work->weights, volumes, part, scales)) {
-      return part;
+/* Return the largest fraction 1, 1/2, 1/4, ... of `volumes` that find_gains() reaches, or 0. */
+static double find_fraction(const accuracy_work *work, const supine_volume_forms *forms,
+                            const double *volumes, double *gains) {
+  double fraction = 1.0;
+  for (int i = 0; i <= VOLUME_HALVINGS; ++i, fraction *= 0.5) {
+    if (find_gains(work->truth, forms, work->weights, volumes, fraction, gains)) {
+      return fraction;
     }
   }
   return 0.0;
 }
 
-/* Merge the sums of all parts of the vertices, and compute the errors from them. */
 static void conclude(const accuracy_work *work, supine_accuracy *made) {
   const double samples =
       (double)work->compression->vertex_count * (double)work->truth->direction_count;
   tally *all = &work->tallies[0];
   for (size_t t = 1; t < PARTS; ++t) {
-    all->field2 += work->tallies[t].field2;
-    supine_accuracy_tally_merge(&all->error, &work->tallies[t].error);
-    supine_accuracy_tally_merge(&all->error_mm, &work->tallies[t].error_mm);
+    all->square_sum_mm2 += work->tallies[t].square_sum_mm2;
+    supine_accuracy_tally_merge(&all->same_gain, &work->tallies[t].same_gain);
+    supine_accuracy_tally_merge(&all->same_volume, &work->tallies[t].same_volume);
   }
-  const double field = sqrt(all->field2 / samples);
-  made->relative_rms = sqrt(all->error.square_sum / samples) / field;
-  made->relative_p95 = supine_accuracy_tally_percentile(&all->error, 0.95) / field;
-  made->relative_max = all->error.largest / field;
-  made->rms_mm = sqrt(all->error_mm.square_sum / samples);
-  made->p95_mm = supine_accuracy_tally_percentile(&all->error_mm, 0.95);
-  made->max_mm = all->error_mm.largest;
+  const double field = sqrt(all->square_sum_mm2 / samples);
+  made->relative_rms = sqrt(all->same_gain.square_sum / samples) / field;
+  made->relative_p95 = supine_accuracy_tally_percentile(&all->same_gain, 0.95) / field;
+  made->relative_max = all->same_gain.largest / field;
+  made->rms_mm = sqrt(all->same_volume.square_sum / samples);
+  made->p95_mm = supine_accuracy_tally_percentile(&all->same_volume, 0.95);
+  made->max_mm = all->same_volume.largest;
 }
 
 supine_status supine_accuracy_measure(const supine_truth *truth,
@@ -169,15 +170,15 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to measure the error");
     goto cleanup;
   }
-  double *scales = weights + count * modes;
-  double *volumes = scales + 2 * count;
-  accuracy_work work = {truth, compression, directions, weights, scales, tallies, space};
+  double *gains = weights + count * modes;
+  double *volumes = gains + 2 * count;
+  accuracy_work work = {truth, compression, directions, weights, gains, tallies, space};
   for (size_t d = 0; d < count; ++d) {
     const double *g = truth->directions + 3 * d;
     volumes[d] = volume_along(volume, g);
     supine_projection_compression_weights(compression, g, weights + d * modes);
   }
-  accuracy->volume = find_part(&work, forms, volumes, scales);
+  accuracy->volume = find_fraction(&work, forms, volumes, gains);
   if (accuracy->volume == 0.0) {
     status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
                               "the error cannot be measured: the surface folds over at less than a "

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Measure the error of a compressed field against the full physics for held-out directions of
- * gravity, and the share of triangles that the field turns over. */
+ * Measure the error of a compressed displacement field against exact solutions for held-out
+ * directions of gravity, and the share of triangles that the field turns over. */
 #ifndef SUPINE_ACCURACY_H
 #define SUPINE_ACCURACY_H
 
@@ -11,32 +11,37 @@
 #include "precompute/physics/volume_forms.h"
 #include "precompute/projection/projection.h"
 
-/** Errors of displacement over all vertices and held-out directions. */
+/** Errors of the displacement over all vertices and held-out directions of gravity. */
 typedef struct supine_accuracy {
   size_t direction_count;
-  /** Errors of states with equal gains, as fractions of the RMS displacement. */
+  /** Errors if the exact and the compressed field have the same gain (factor on the displacement),
+   * as fractions of the RMS displacement. */
   double relative_rms, relative_p95, relative_max;
-  /** Errors of states with equal volumes, or of the given fields of another simulator, mm. */
+  /** Errors if the exact and the compressed field give the lungs the same volume, mm. For another
+   * simulator's fields, leave-one-out errors. */
   double rms_mm, p95_mm, max_mm;
-  /** Fraction of the requested volume at which the errors in mm were measured. If rest is unknown,
-   * supine_precompute replaces it by the volume in mL. 0 for fields of another simulator. */
+  /** Fraction of the volume requested from supine_accuracy_measure at which the errors in mm were
+   * measured. If the resting volume (FRC) is unknown, supine_precompute replaces the fraction by
+   * the volume in mL. 0 for another simulator's fields. */
   double volume;
 } supine_accuracy;
 
-/** Solutions of the full physics for D held-out directions of gravity. At vertex i, the field for
+/** Solutions of the physical model for held-out directions of gravity. At vertex i, the field for
  * direction d is sum over k of columns[i, k] functions[d, k], up to the tolerance of span.c. */
 typedef struct supine_truth {
   size_t direction_count;
-  double *directions; /**< [D, 3] unit vectors along gravity */
+  double *directions; /**< [direction_count, 3] unit vectors along gravity */
   size_t rank;
-  const double *columns; /**< [N, rank] owned by the projection */
-  double *functions;     /**< [D, rank] weights of the columns */
-  double *cubic; /**< [D, 3] gained volume, mL: coefficients of the gain, its square and its cube */
+  const double *columns; /**< [N, rank] fields that are summed; owned by the projection */
+  double *functions;     /**< [direction_count, rank] weights of the columns in each solution */
+  /** [direction_count, 3] coefficients of s, s^2 and s^3 in the change of volume, mL, at gain s
+   * (factor on the displacement). */
+  double *cubic;
 } supine_truth;
 
-/** Solve the full physics for `count` held-out directions of gravity. `truth` refers to
+/** Solve the physical model for `count` held-out directions of gravity. `truth` refers to
  * `projection`, which must outlive it.
- * @param directions  [N, 3] displacement of each vertex for a force of 1, mm
+ * @param directions  [N, 3] displacement of each vertex per unit force, mm
  * @param truth       release with supine_accuracy_truth_free
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_accuracy_truth_create(const supine_lungs *lungs, const supine_model *model,
@@ -45,16 +50,18 @@ supine_status supine_accuracy_truth_create(const supine_lungs *lungs, const supi
                                            supine_truth *truth, supine_error *error);
 void supine_accuracy_truth_free(supine_truth *truth);
 
-/** Spread directions [count, 3] evenly along a golden-angle spiral that avoids the grid's nodes. */
+/** Compute `count` unit vectors along a golden-angle spiral that avoids the nodes of the grid from
+ * which harmonics are computed, into directions [count, 3]. */
 void supine_accuracy_held_out_directions(size_t count, double *directions);
 
-/** Measure the error of a compressed field. The 95th percentiles come from a histogram whose bins
- * are at most 0.4 % wide.
- * @param directions  [N, 3] directions of displacement, mm
- * @param forms       volume forms of the compression
- * @param volume      [9] harmonics of the volume minus that of the reference surface, mL, at which
- *   errors in mm are measured; halved until the field reaches it in every direction
- * @retval SUPINE_ERROR_NUMERICAL  not even a thousandth of the volume is reached
+/** Measure the error of a compressed field against the solutions `truth`. The 95th percentiles come
+ * from a histogram whose bins are at most 0.4 % wide.
+ * @param directions  [N, 3] displacement of each vertex per unit force, mm
+ * @param forms       volumes as polynomials of the weights of the modes (volume_forms.h)
+ * @param volume      [9] volume at which errors in mm are measured minus that of the reference
+ *   surface, mL: coefficients of spherical harmonics of the direction of gravity; halved until the
+ *   lungs can reach it in every held-out direction
+ * @retval SUPINE_ERROR_NUMERICAL  the lungs cannot reach a thousandth of the volume
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_accuracy_measure(const supine_truth *truth,
                                       const supine_compression *compression,
@@ -62,26 +69,26 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
                                       const double volume[9], supine_accuracy *accuracy,
                                       supine_error *error);
 
-/** Find the share, 0 to 1, of triangles whose normals on the reference surface and on the surface
- * at a given volume differ by more than a right angle. It is the largest share in the six postures
- * with gravity along an axis. Postures in which the field cannot reach the volume are left out. Up
- * to 50,000 evenly chosen triangles are examined. Above a few in a thousand, the surface looks
- * torn.
- * @param directions  [N, 3] directions of displacement, mm
- * @param forms       volume forms of the compression
- * @param volume      [9] harmonics of the volume minus that of the reference surface, mL
+/** Find the share of triangles, 0 to 1, whose normals turn by more than 90 degrees from the
+ * reference surface to a given volume. It is the largest share in the six postures with gravity
+ * along an axis. Postures in which the lungs cannot reach the volume are left out. Up to 50,000
+ * evenly chosen triangles are examined. Above a few in a thousand, the surface looks torn.
+ * @param directions  [N, 3] displacement of each vertex per unit force, mm
+ * @param forms       volumes as polynomials of the weights of the modes (volume_forms.h)
+ * @param volume      [9] as in supine_accuracy_measure
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const double *directions,
                                           const supine_compression *compression,
                                           const supine_volume_forms *forms, const double volume[9],
                                           double *share);
 
-/** Relative RMS errors for the held-out directions, over at most 4096 evenly chosen vertices. */
+/** Relative RMS errors for the held-out directions of gravity, over at most 4096 evenly chosen
+ * vertices. */
 typedef struct supine_error_table {
   size_t band_count; /**< number of bands: highest degree of the harmonics + 1 */
-  double harmonics[SUPINE_SH_BAND_MAX + 1]; /**< [l] error with the first (l + 1)^2 harmonics */
-  size_t mode_count;                        /**< number K of modes */
-  double modes[SUPINE_MODES_MADE_MAX];      /**< [k] error with the first k + 1 modes */
+  double harmonics[SUPINE_SH_BAND_MAX + 1]; /**< [l] error with harmonics to degree l */
+  size_t mode_count;
+  double modes[SUPINE_MODES_MADE_MAX]; /**< [k] error with the first k + 1 modes */
 } supine_error_table;
 
 /** Tabulate the error by the number of harmonics and by the number of modes.

@@ -13,9 +13,9 @@
 
 enum { VERTICES_MAX = 4096 };
 
-/* Compute the scalar products gram [R, R] of the R columns over evenly chosen vertices. Each vertex
- * has the weight |d|^2, where d is its direction of displacement. If a field is columns x w, the
- * sum of its squared displacements is then w^T gram w. */
+/* Compute the scalar products gram [rank, rank] of the columns of `truth` over evenly chosen
+ * vertices. Each vertex has the weight |d|^2, where d is its displacement per unit force. w^T gram
+ * w is then the sum of the squared displacements in the field columns x w. */
 static void find_gram(const supine_truth *truth, size_t vertex_count, const double *directions,
                       double *gram) {
   const size_t rank = truth->rank;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Solve the full physics for held-out directions of gravity. */
+/* Solve the physical model for held-out directions of gravity. */
 #include <cblas.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,9 +9,9 @@
 #include "precompute/projection/accuracy.h"
 
 void supine_accuracy_held_out_directions(size_t count, double *directions) {
-  static const double off_the_grids = 0.3; /* longitude of direction 0, rad */
+  static const double first_longitude = 0.3; /* rad; off the nodes of the harmonics' grid */
   for (size_t i = 0; i < count; ++i) {
-    supine_spiral((double)i, (double)count, off_the_grids, directions + 3 * i);
+    supine_spiral((double)i, (double)count, first_longitude, directions + 3 * i);
   }
 }
 
@@ -22,9 +22,9 @@ void supine_accuracy_truth_free(supine_truth *truth) {
   *truth = (supine_truth){0};
 }
 
-/* Find the volume gained for each held-out direction as a cubic polynomial of the gain. Use volume
- * forms of the columns if there are at most FEW columns; otherwise compute AT_ONCE fields at a
- * time. */
+/* Find the change of volume for each held-out direction of gravity as a cubic polynomial of the
+ * gain (factor on the displacement). With at most FEW columns, use the volume as a polynomial of
+ * their weights; otherwise compute AT_ONCE fields at a time. */
 static supine_status find_cubics(const supine_lungs *lungs, const double *share,
                                  const double *directions, const supine_truth *truth) {
   enum { FEW = 8, AT_ONCE = SUPINE_VOLUME_FIELDS };

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Find the best functions of orientation as singular vectors of the coefficient matrix. Only small
- * Gram matrices are decomposed. */
+/* Find the principal modes of a field: singular vectors of the matrix of its harmonic coefficients.
+ * Only small Gram matrices are decomposed. */
 #include <cblas.h>
 #include <math.h>
 #include <stdlib.h>
@@ -15,7 +15,8 @@
  * gives only their squares. */
 static const double rank_tolerance = 1e-7;
 
-/* Compute the lower triangle, by columns, of gram [R, R] = columns^T diag(weight) columns. */
+/* Compute gram [rank, rank] = columns^T diag(weight) columns for the columns [N, rank] of the
+ * projection. Write only the lower triangle, in column-major order. */
 static supine_status gram_matrix(const supine_projection *projection, const double *weight,
                                  double *gram) {
   enum { BLOCK = 1024 };
@@ -70,15 +71,16 @@ supine_status supine_projection_leading_eigenpairs(size_t n, double *matrix, siz
   return status;
 }
 
-/* Find the leading right singular vectors of the matrix C = sqrt(W) columns x functions, where W is
- * the diagonal matrix of the weights of the vertices. Write them to modes [count, (band + 1)^2],
- * the squares of all singular values to values [R], and the sum of these squares to `total`. gram
- * [R, R] is columns^T W columns, and is overwritten.
+/* Find the leading right singular vectors of C = sqrt(W) x columns x functions. W is the diagonal
+ * matrix of the weights of the vertices; columns [N, R] and functions [R, terms] are those of the
+ * projection to `terms` harmonics. Write the vectors to modes [count, terms], the squares of all
+ * singular values to values [R], and the sum of these squares to `total`. gram [R, R] = columns^T W
+ * columns is overwritten. Steps:
  *
- * Let the rows of H be the eigenvectors of gram, times the roots of their eigenvalues. Then H^T H =
- * gram, and A = H functions has the same singular values and right singular vectors as C, because
- * A^T A = C^T C. As A has only R rows, the R x R matrix A A^T gives them: its eigenvalues are
- * sigma_k^2, and with its eigenvectors U_k, mode k is A^T U_k / sigma_k. */
+ * - gram = H^T H, where the rows of H are its eigenvectors times the roots of their eigenvalues.
+ * - A = H x functions has the singular values and right singular vectors of C: A^T A = C^T C.
+ * - A A^T [R, R] has the eigenvalues sigma_k^2. With its eigenvectors U_k, mode k is
+ *   A^T U_k / sigma_k. */
 static supine_status find_modes(const supine_projection *projection, double *gram, size_t count,
                                 double *values, double *modes, double *total) {
   const size_t rank = projection->rank;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Expand the field of a model in harmonics of the direction of gravity: solve for a few directions,
- * and expand the weights with which these solutions sum to the solution for any direction. */
+/* Expand the field of a physical model in spherical harmonics: solve for a few directions of
+ * gravity, and expand the weights with which these solutions sum to that for any direction. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -8,10 +8,9 @@
 #include "sh/transform.h"
 #include <supine/sh.h>
 
-enum {
-  LATITUDES_PER_BAND = 8, /* latitudes of the grid for each degree of the harmonics */
-  LATITUDES_MIN = 32
-};
+/* The expanded functions have kinks where another vertex becomes the lowest or the highest. With
+ * eight latitudes for each degree of the harmonics, these kinks hardly alias. */
+enum { LATITUDES_PER_BAND = 8, LATITUDES_MIN = 32 };
 
 void supine_projection_free(supine_projection *projection) {
   free(projection->span);
@@ -20,13 +19,14 @@ void supine_projection_free(supine_projection *projection) {
   *projection = (supine_projection){0};
 }
 
-/* Directions g [count, 3] of the grid, and the range of g.p over all vertices p for each, mm. */
+/* Directions g of gravity on the grid of latitudes and longitudes, [count, 3], and the minimum and
+ * maximum of g.p over all vertices p for each, [count], mm. */
 typedef struct grid_heights {
   double *directions, *minimum, *maximum;
 } grid_heights;
 
-/* Find the range of g.p over all vertices p for half of the directions g. For the opposite
- * directions, negate and swap the ends of the range. */
+/* Find the directions g of the grid, and the minimum and maximum of g.p over all vertices p. Those
+ * of direction -g follow from those of g by negation. */
 static supine_status find_heights(const supine_lungs *lungs, bool pair, const supine_sh_grid *grid,
                                   grid_heights *made) {
   const size_t width = grid->longitudes;
@@ -45,8 +45,8 @@ static supine_status find_heights(const supine_lungs *lungs, bool pair, const su
   return status;
 }
 
-/* Expand the R weights of the span (span.h), which are functions of the direction of gravity, in
- * harmonics: functions [R, (band + 1)^2]. */
+/* Expand the weights of the span (span.h), functions of the direction of gravity, in spherical
+ * harmonics, functions [span->rank, (band + 1)^2]. */
 static supine_status transform(const supine_lungs *lungs, const supine_force_law *law, size_t band,
                                const supine_span *span, double *functions, supine_error *error) {
   const size_t least = LATITUDES_PER_BAND * (band + 1);
@@ -88,7 +88,7 @@ static supine_status transform(const supine_lungs *lungs, const supine_force_law
                                                 supine_status_string(status));
 }
 
-/* Solve the physics for each of the R directions of made->span, into made->columns [N, R]. */
+/* Solve the physical model for each direction of gravity of made->span, into made->columns. */
 static supine_status solve(const supine_lungs *lungs, const supine_model *model,
                            supine_projection *made, supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;

@@ -9,12 +9,14 @@
 #include "sh/base/lapack.h"
 #include "sh/base/vec3.h"
 
-/* The cross approximation (span.h) examines at most VERTICES vertices in DIRECTIONS directions. */
+/* The cross approximation (span.h) examines at most VERTICES vertices in DIRECTIONS directions of
+ * gravity. */
 enum { VERTICES = 1024, DIRECTIONS = 512 };
 
-/* Largest accepted residual force as a share of the largest force: `tolerance` with softening, and
- * `rounding` without. With `tolerance`, the RMS residual is 6e-5 of the RMS force. That is a
- * hundredth of the error that compression to 16 modes causes. */
+/* Largest accepted residual of the cross approximation of the force, as a share of the largest
+ * force: `rounding` if supine_force_law.soften is 0, otherwise `tolerance`. With `tolerance`, the
+ * RMS residual is 6e-5 of the RMS force. That is a hundredth of the error that compression to 16
+ * modes causes. */
 static const double tolerance = 3e-4;
 static const double rounding = 1e-12;
 
@@ -49,8 +51,9 @@ static supine_status invert(double *matrix, size_t rank) {
                                         : LAPACKE_dgetri(LAPACK_COL_MAJOR, n, matrix, n, pivots));
 }
 
-/* Choose rows and columns of force [count, DIRECTIONS], which is overwritten, until no residual
- * exceeds `share` of the largest force. Return false if SUPINE_SPAN_MAX of each do not suffice. */
+/* Choose rows (vertices) and columns (directions of gravity) of force [count, DIRECTIONS] whose
+ * cross approximation of the matrix leaves no residual above `share` of the largest force. The
+ * residual overwrites `force`. Return false if SUPINE_SPAN_MAX rows and columns do not suffice. */
 static bool choose(double *force, size_t count, double share, size_t *rank,
                    size_t rows[SUPINE_SPAN_MAX], size_t columns[SUPINE_SPAN_MAX]) {
   size_t at = largest_of(force, count * DIRECTIONS);

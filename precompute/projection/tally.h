@@ -7,7 +7,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Number of bins: one for each exponent and first 8 mantissa bits of a float, 0.2 to 0.4 % wide. */
+/* Number of bins: one for each combination of the 8 exponent bits and the upper 8 mantissa bits of
+ * a positive float. Bins are 0.2 to 0.4 % wide. */
 enum { SUPINE_TALLY_BINS = 1 << 16 };
 
 typedef struct supine_tally {
@@ -23,7 +24,7 @@ void supine_accuracy_tally_add(supine_tally *tally, size_t count, const double *
 void supine_accuracy_tally_merge(supine_tally *tally, const supine_tally *other);
 
 /* Return the value below which `share`, 0 to 1, of the numbers lie, rounded up to the edge of its
- * bin; 0 if there are no numbers. */
+ * bin. Return 0 if there are no numbers. */
 double supine_accuracy_tally_percentile(const supine_tally *tally, double share);
 
 #endif
