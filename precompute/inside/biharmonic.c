@@ -12,11 +12,11 @@
 
 #include "precompute/inside/biharmonic.h"
 
-/* AFFINE: number of affine terms. COLUMNS: number of matrix columns that are eliminated
- * together. POINTS, CENTRES: numbers of points and centres that are evaluated together. */
+/* AFFINE: number of affine terms (1, x, y, z). COLUMNS: number of matrix columns eliminated
+ * together. POINTS, CENTRES: numbers of points and centres evaluated together. */
 enum { AFFINE = 4, COLUMNS = 128, POINTS = 32, CENTRES = 64 };
 
-/* Set `middle` to the middle of the points' box, and `unit` to half its diagonal. */
+/* Set fit->middle to the centre of the points' bounding box, and fit->unit to half its diagonal. */
 static void frame(size_t count, const double *points, supine_inside_biharmonic *fit) {
   double square = 0.0;
   for (int k = 0; k < 3; ++k) {
@@ -32,8 +32,8 @@ static void frame(size_t count, const double *points, supine_inside_biharmonic *
   fit->unit = square > 0.0 ? sqrt(square) : 1.0;
 }
 
-/* Choose the centres: first the point farthest from the middle, then each time the point whose
- * nearest centre is farthest away. */
+/* Choose the centres: first the point farthest from fit->middle, then repeatedly the point whose
+ * distance from its nearest centre is largest. */
 SUPINE_CLONES static supine_status choose(size_t count, const double *points, size_t centre_max,
                                           supine_inside_biharmonic *fit) {
   double *distance = malloc(count * sizeof *distance);
@@ -71,14 +71,14 @@ SUPINE_CLONES static supine_status choose(size_t count, const double *points, si
   return SUPINE_OK;
 }
 
-/* The matrix K of the centres p_i, which is positive definite because |p_i| <= 1:
+/* The interpolation matrix K of the centres p_i, which is positive definite because |p_i| <= 1:
  *
  *     K_ij = alpha - |p_i - p_j|,    alpha > 2
  *
  * It may replace the matrix of -|p_i - p_j|, because alpha cancels for weights whose sum is 0. */
 typedef struct kernel {
-  size_t size;
-  double *matrix; /* [size, size], the lower triangle column by column */
+  size_t size;    /* number of centres */
+  double *matrix; /* [size, size] stored column by column; only the lower triangle is used */
   size_t done;    /* number of columns eliminated */
 } kernel;
 
@@ -91,8 +91,8 @@ SUPINE_CLONES static void fill(const double *c, const kernel *k) {
   }
 }
 
-/* Cholesky step: subtract the products of the COLUMNS columns eliminated last from all later
- * columns. Long and short blocks alternate, so that threads get equal work. */
+/* Do a Cholesky step: subtract the products of the last COLUMNS eliminated columns from all later
+ * columns. Blocks of long columns alternate with blocks of short ones to balance the threads. */
 static void update_blocks(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const kernel *k = context;
@@ -107,8 +107,8 @@ static void update_blocks(void *context, size_t begin, size_t end, size_t thread
   }
 }
 
-/* Factorise K by Cholesky, with a result that does not depend on the number of threads. Return 0,
- * or LAPACK's code if K is not positive definite. */
+/* Compute the Cholesky factor of the interpolation matrix, in place. The result does not depend on
+ * the number of threads. Return 0, or LAPACK's code if the matrix is not positive definite. */
 static lapack_int factorise(kernel *k) {
   const size_t n = k->size;
   lapack_int failed = 0;
@@ -127,14 +127,15 @@ static lapack_int factorise(kernel *k) {
   return failed;
 }
 
-/* Find the weights w, b of u(x) = -sum over j of w_j |x - p_j| + (1, x) b. With f the values at the
- * centres and P the matrix of the rows (1, p_j), u has these values if K w + P b = f and P^T w = 0:
+/* Find the vectors w and b of the function u(x) = -sum over j of w_j |x - p_j| + (1, x) b. Let K be
+ * the interpolation matrix, f the values at the centres p_j, and P the matrix with rows (1, p_j).
+ * The conditions are K w + P b = f and P^T w = 0. They are solved in three steps:
  *
- *     K y = f,    K z = P,    (P^T z) b = P^T y,    w = y - z b
+ *     K y = f and K Z = P,    (P^T Z) b = P^T y,    w = y - Z b
  *
- * The weights are stored as -w, then b.
- * @param p  P, then f, each column by column, size numbers in each; overwritten by z, then y
- * @retval SUPINE_ERROR_NUMERICAL  K or P^T z is singular: all centres lie in one plane */
+ * fit->weights receives -w, then b.
+ * @param p  in: P, then f, column by column, with k->size numbers in a column; out: Z, then y
+ * @retval SUPINE_ERROR_NUMERICAL  K or P^T Z is singular: all centres lie in one plane */
 static supine_status find_weights(supine_inside_biharmonic *fit, kernel *k, double *p) {
   static const double flat = 1e-5;
   const int n = (int)k->size;

@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Read the content that a basis moves. */
+/* Read the points and meshes inside the lungs that are to move with the lungs. */
 #include <stdlib.h>
 #include <string.h>
 
 #include "mesh/io/points.h"
 #include "precompute/inside/content.h"
 
-/* Make room for more points, triangles and bytes of names.
- * @retval SUPINE_ERROR_MEMORY */
+/* Make room for more points, triangles and bytes of names. */
 static supine_status reserve(supine_inside_content *content, size_t points, size_t triangles,
                              size_t names, const char *path, supine_error *error) {
   const size_t used = content->names != NULL ? strlen(content->names) : 0;
@@ -29,7 +28,7 @@ static supine_status reserve(supine_inside_content *content, size_t points, size
   return SUPINE_OK;
 }
 
-/* Append a name at the end of the names, and return their new end. */
+/* Append the name of a part to content->names at `end`. Return the new end. */
 static char *add_name(supine_inside_content *content, const char *name, size_t length, char *end) {
   if (content->part_count++ > 0) {
     *end++ = '\n';
@@ -63,7 +62,7 @@ supine_status supine_inside_content_points(const char *path,
   return status;
 }
 
-/* Find the name and its length in a mesh's path, such as "airways" in "/scans/airways.ply". */
+/* Return the name of a mesh and its length: "airways" for the path "/scans/airways.ply". */
 static const char *part_name(const char *path, size_t *length) {
   const char *slash = strrchr(path, '/');
   const char *name = slash != NULL ? slash + 1 : path;

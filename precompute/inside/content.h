@@ -1,33 +1,31 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/** @file Read the content that a basis moves: named points, meshes, or the nodes of a grid. */
+/** @file Read what is to move inside the lungs: named points, meshes, or the nodes of a grid. */
 #ifndef SUPINE_INSIDE_CONTENT_H
 #define SUPINE_INSIDE_CONTENT_H
 
 #include "mesh/io/image.h"
 #include "precompute/inside/shells.h"
 
-/** Points, some of which may be corners of triangles. Zero-initialise;
- * supine_inside_content_free releases it. */
+/** Points inside the lungs, some of which may be corners of triangles. Each named point and each
+ * mesh is one part. Zero-initialise; supine_inside_content_free releases it. */
 typedef struct supine_inside_content {
   size_t count;
   double *points; /**< [count, 3] mm, LPS */
-  uint32_t *part; /**< [count] index of the point's part or, in a grid, of its node */
+  uint32_t *part; /**< [count] index of the part of each point; in a grid, index of the node */
   size_t triangle_count;
   uint32_t *triangles; /**< [triangle_count, 3] indices of points */
-  size_t part_count;   /**< number of named parts; 0 for a grid */
+  size_t part_count;   /**< number of named points and meshes; 0 for a grid */
   char *names;         /**< names of the parts in order, separated by newlines */
   bool *rigid;         /**< [part_count] whether the part keeps its shape; NULL if none does */
-  supine_image grid;   /**< if the content is a grid: size, origin and step of its nodes */
+  supine_image grid;   /**< for a grid: numbers of nodes, position of the first node, and steps */
 } supine_inside_content;
 
-/** Append the points of a file, each as one part; for options and statuses see
- * supine_mesh_points_read. */
+/** Append each point of a file as one part. Options and statuses as supine_mesh_points_read. */
 supine_status supine_inside_content_points(const char *path,
                                            const supine_mesh_load_options *options,
                                            supine_inside_content *content, supine_error *error);
 
-/** Append a mesh as one part, named after its file; for options and statuses see
- * supine_mesh_load. */
+/** Append a mesh as one part, named after its file. Options and statuses as supine_mesh_load. */
 supine_status supine_inside_content_mesh(const char *path, const supine_mesh_load_options *options,
                                          supine_inside_content *content, supine_error *error);
 
@@ -36,19 +34,21 @@ supine_status supine_inside_content_mesh(const char *path, const supine_mesh_loa
 supine_status supine_inside_content_surface(const char *name, const supine_mesh *mesh,
                                             supine_inside_content *content, supine_error *error);
 
-/** Make parts rigid.
+/** Mark parts as rigid: they move, but keep their shape.
  * @param names  part names separated by commas, or "all"
  * @retval SUPINE_ERROR_ARGUMENT  no part has that name
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_inside_content_make_rigid(supine_inside_content *content, const char *names,
                                                supine_error *error);
 
-/** Make a grid of all nodes inside the lungs, and of the nodes outside that are nearer to a lung
- * than the sum of a cell's three edges, so that every point inside lies between nodes.
+/** Make a grid of nodes. Keep the nodes inside the lungs, and the nodes outside whose distance from
+ * a lung is less than the sum of the three edges of a grid cell. Then every point inside a lung
+ * lies between nodes.
  *
- * @param like     image of which every n-th voxel along each axis is a node; NULL: along x, y, z
+ * @param like     image whose voxels are the nodes, or every n-th voxel along an axis if `spacing`
+ *                 is n voxels; if NULL, the axes of the grid are x, y and z
  * @param spacing  distance between nodes, mm; with `like`, rounded to a multiple of its spacing
- * @param margin   distance, mm, by which the grid extends beyond the lungs' box
+ * @param margin   distance, mm, by which the grid extends beyond the lungs' bounding box
  * @param content  zero-initialised
  * @retval SUPINE_ERROR_ARGUMENT  a spacing that is not positive, more than 2^31 nodes
  * @retval SUPINE_ERROR_MESH      no node is inside a lung

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Choose the nodes of a grid that lie inside the lungs or just outside, row by row. */
+/* Make a grid of nodes inside the lungs and just outside them. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -10,7 +10,7 @@
 
 static const double nodes_max = 2147483648.0;
 
-/* Find the box of the lungs, extended by the margin, in voxel coordinates of `grid`. */
+/* Find the bounding box of the lungs, extended by the margin, in voxel coordinates of `grid`. */
 static void cover(const supine_inside_shells *shells, const supine_image *grid, double margin,
                   double low[3], double high[3]) {
   for (int k = 0; k < 3; ++k) {
@@ -34,7 +34,8 @@ static void cover(const supine_inside_shells *shells, const supine_image *grid, 
   }
 }
 
-/* Make the grid that covers the lungs: along x, y and z, or of every n-th voxel of `like`. */
+/* Make the grid that covers the lungs. Its nodes are voxels of `like`, at about the given spacing;
+ * if `like` is NULL, the axes of the grid are x, y and z. */
 static supine_status make_grid(const supine_inside_shells *shells, const supine_image *like,
                                double spacing, double margin, supine_image *grid,
                                supine_error *error) {
@@ -80,8 +81,8 @@ static supine_status make_grid(const supine_inside_shells *shells, const supine_
 typedef struct search {
   const supine_inside_shells *shells;
   const supine_image *grid;
-  double limit;        /* nodes farther from the lungs than this, mm, are dropped */
-  unsigned char *keep; /* [nodes] 2 inside a lung, 1 outside but within the limit, 0 dropped */
+  double limit; /* largest distance of a node from the lungs, mm; farther nodes are dropped */
+  unsigned char *keep; /* [nodes] 2: inside a lung; 1: outside, but within `limit`; 0: dropped */
 } search;
 
 static void search_rows(void *context, size_t begin, size_t end, size_t thread) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Embed content in the lungs, and write the vector basis that moves it. */
+/* Embed points and meshes in the lungs, and write a basis that moves them with the lungs. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,19 +14,19 @@
 
 enum { BLOCK = 1024 };
 
-/* The content sorted by lung, and its displacements. */
+/* The embedded points, sorted by lung, and their displacements. */
 typedef struct embedding {
   const supine_inside_shells *shells;
   const supine_inside_content *content;
   const supine_inside_options *options;
-  size_t columns;             /* numbers for each point: 3 for each mode */
-  supine_inside_place *place; /* place of each point in its lung, in the content's order */
-  unsigned char *lung;        /* lung of each point, in the content's order */
-  size_t *order;              /* indices of the content's points, lung by lung */
+  size_t columns;             /* number of coefficients of a point: 3 for each mode */
+  supine_inside_place *place; /* [points] position relative to its lung; order of content->points */
+  unsigned char *lung;        /* [points] index of the lung; order of content->points */
+  size_t *order;              /* [points] indices of content->points, sorted by lung */
   float *vertices;     /* [points, 3] at full inflation, mm; this and later arrays follow `order` */
   float *coefficients; /* [points, 3, modes] displacement by each mode, mm */
   float *depth;        /* [points] mm below the surface; negative outside */
-  uint32_t *part;      /* [points] index of the part */
+  uint32_t *part;      /* [points] copy of content->part */
   unsigned char *group; /* [points] index of the lung */
   uint32_t *triangles;  /* [triangles, 3] indices of vertices */
   uint32_t *rigid;      /* [rigid_count, 2] begin and end of the vertices of each rigid part */
@@ -63,7 +63,7 @@ static void gather_parts(embedding *e) {
   }
 }
 
-/* Sort the points by lung, keeping their order within each lung, and renumber the triangles. */
+/* Sort the points by lung, in stable order, and renumber the triangles. */
 static supine_status sort_points(embedding *e, supine_inside_report *report) {
   const size_t n = e->content->count;
   uint32_t *position = malloc(n * sizeof *position);
@@ -109,7 +109,7 @@ static supine_status sort_points(embedding *e, supine_inside_report *report) {
   return SUPINE_OK;
 }
 
-/* Interpolate the displacement by each mode at place->nearest from the corners of its triangle. */
+/* Interpolate the displacement by each mode at the surface point place->nearest. */
 static void surface_motion(const embedding *e, const supine_inside_shell *shell,
                            const double *displacement, const supine_inside_place *place,
                            double *motion) {
@@ -122,7 +122,8 @@ static void surface_motion(const embedding *e, const supine_inside_shell *shell,
   }
 }
 
-/* Compute vertices at full inflation: positions in the scan minus displacements in the scan. */
+/* Compute positions at full inflation: positions in the scan minus displacements to the scan.
+ * @param values  [end - begin, e->columns] displacement by each mode, mm */
 static void points_to_full(embedding *e, size_t lung, size_t begin, size_t end,
                            const double *values) {
   const size_t modes = e->columns / 3;
@@ -138,8 +139,10 @@ static void points_to_full(embedding *e, size_t lung, size_t begin, size_t end,
   }
 }
 
-/* Find the displacements of the points begin <= i < end of `order`, at most BLOCK, all in one lung.
- * @param space  work space: positions of 2 BLOCK points, then values of 2 BLOCK + 1 points */
+/* Find the displacements of the points order[begin] to order[end - 1], at most BLOCK, of one lung.
+ * @param displacement  [vertices of the lung, columns] displacement of the surface by each mode, mm
+ * @param reach  distance from the surface, mm, below which the interpolation `fit` is corrected
+ * @param space  work space: positions of 2 BLOCK points, displacements of 2 BLOCK + 1 points */
 static void move_block(embedding *e, const double *displacement,
                        const supine_inside_biharmonic *fit, double reach, size_t begin, size_t end,
                        double *space) {
@@ -183,7 +186,7 @@ static void move_block(embedding *e, const double *displacement,
 
 static supine_status embed_lung(embedding *e, size_t lung, size_t begin, size_t end,
                                 supine_error *error) {
-  /* `reach` of embed.h, divided by the sum of the centres' spacing and the surface's mean edge */
+  /* Corrections reach this many times the spacing of the centres plus the mean edge length. */
   static const double reach_spacings = 2.0;
   const supine_inside_shell *shell = &e->shells->shell[lung];
   const size_t centres =
@@ -212,9 +215,9 @@ cleanup:
   return status;
 }
 
-/* Rotate and shift a rigid part to full inflation, so that the pose of the scan moves the part to
- * the place that it has in the scan. Iterate, because the rotation by that pose depends on the
- * result. */
+/* Find the position of a rigid part at full inflation from which the pose of the scan moves the
+ * part to its position in the scan. Iterate, because the rotation of the part by that pose depends
+ * on the position that is sought. */
 static void rigid_to_full(embedding *e, size_t begin, size_t end) {
   enum { TURNS = 60 };
   const double count = (double)(end - begin);
@@ -247,7 +250,7 @@ static void rigid_to_full(embedding *e, size_t begin, size_t end) {
   }
 }
 
-/* Return whether metadata with this key is valid for the lungs' surface but not for the content. */
+/* Return whether metadata with this key apply to the basis of the lungs' surface only. */
 static bool is_of_surface(const char *key) {
   static const char *const keys[] = {"kind", "made_by", "checksum", "turned_over_percent",
                                      "mode_count"};
@@ -259,7 +262,7 @@ static bool is_of_surface(const char *key) {
   return false;
 }
 
-/* Write the file with the metadata of the surface, followed by that of the content. */
+/* Write the basis file. Its metadata are those of the surface, then those of the points. */
 static supine_status write_file(const embedding *e, const char *path, supine_tensor *tensors,
                                 size_t tensor_count, supine_error *error) {
   enum { OWN = 5 };

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Extract the surfaces of a basis, lung by lung, and find the lung that a point is in. */
+/* Extract the surface of each lung from a basis, and find the lung that contains a point. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -123,8 +123,10 @@ void supine_inside_shell_displacement(const supine_inside_shells *shells, size_t
   }
 }
 
-/* Update walk->place[lung] for a new point. Keep the old place if it proves that the new point is
- * on the same side of the surface as the old point, and farther than `far` from the surface. */
+/* Update walk->place[lung], the position of a point relative to the surface, for a new point. The
+ * distance of the old point from the surface minus the distance between the two points is a lower
+ * bound of the new distance. If it exceeds `far`, keep the position of the old point: the new point
+ * is then on the same side of the surface. */
 static void step_to(const supine_inside_shells *shells, const double point[3], size_t lung,
                     double far, supine_inside_walk *walk) {
   supine_inside_place *place = &walk->place[lung];

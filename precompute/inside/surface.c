@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Find nearest points and winding numbers by a tree of boxes over triangles. */
+/* Find nearest points and winding numbers with a tree of bounding boxes over triangles. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,27 +12,27 @@
 
 enum { LEAF = 8, DISTANCE_GRAIN = 64 };
 
-/* A dipole replaces the triangles of a box that is farther away than this many radii of the box.
+/* A dipole replaces the triangles of a tree node farther away than this multiple of dipole.radius.
  * The error of the winding number, which is compared with 0.5, is then less than 0.01. */
 static const double dipole_distance = 2.0;
-/* Points nearer than this, mm, count as on the surface, as positions are in float32. */
+/* Points nearer to the surface than this, mm, count as inside: positions are rounded to float32. */
 static const double on_surface = 1e-3;
 
 typedef struct node {
   double low[3], high[3];
-  uint32_t begin, end;
-  uint32_t right; /* index of the second child (the first is the next node); 0 in a leaf */
-  uint32_t leaf;  /* index of a leaf's boxes in `leaves` */
+  uint32_t begin, end; /* triangles of the node: order[begin] to order[end - 1] */
+  uint32_t right;      /* index of the second child (the first is the next node); 0 in a leaf */
+  uint32_t leaf;       /* of a leaf: index in supine_inside_surface.leaves */
 } node;
 
-/* The dipole that replaces the triangles of a node for a distant point. */
+/* The dipole that replaces the triangles of a tree node, seen from a distant point. */
 typedef struct dipole {
-  double area, centre[3]; /* area, mm^2, and its centre, mm */
-  double normal[3];       /* sum of the triangles' unit normals, each times its area, mm^2 */
-  double radius;          /* radius of a ball about `centre` that contains the box, mm */
+  double area, centre[3]; /* total area of the triangles, mm^2, and their centroid, mm */
+  double normal[3];       /* sum over the triangles of area times unit normal, mm^2 */
+  double radius;          /* radius of a ball about `centre` that contains the node's box, mm */
 } dipole;
 
-/* The boxes of a leaf's triangles, rounded outwards: least and greatest x, y and z. */
+/* Bounding boxes of the triangles of a leaf: least and greatest x, y and z, rounded outwards. */
 typedef struct boxes {
   float low[3][LEAF], high[3][LEAF];
 } boxes;
@@ -45,7 +45,7 @@ struct supine_inside_surface {
   node *nodes;
   dipole *dipoles; /* [nodes]; NULL if only distances are wanted */
   uint32_t node_count;
-  boxes *leaves; /* boxes of the triangles of each leaf */
+  boxes *leaves; /* [leaf_count] bounding boxes of the triangles of each leaf */
   uint32_t leaf_count;
 };
 
@@ -60,7 +60,7 @@ typedef struct keyed {
   uint32_t triangle;
 } keyed;
 
-/* Sort by key: a stable merge sort without a function call for each comparison.
+/* Sort by key with a stable merge sort, which needs no function call for a comparison.
  * @param space  [count / 2] work space */
 static void sort(keyed *item, size_t count, keyed *space) {
   const size_t half = count / 2;
@@ -99,7 +99,7 @@ static void triangle_box(const supine_inside_surface *s, size_t triangle, double
   }
 }
 
-/* Find the box of a node's triangles and, in a leaf, of each triangle. */
+/* Find the bounding box of a tree node and, if `leaf` is not NULL, of each of its triangles. */
 static void find_box(const supine_inside_surface *s, node *n, boxes *leaf) {
   for (int k = 0; k < 3; ++k) {
     n->low[k] = INFINITY;
@@ -120,7 +120,7 @@ static void find_box(const supine_inside_surface *s, node *n, boxes *leaf) {
   }
 }
 
-/* Add a part to a dipole. Until all parts are added, d->centre is a sum of area times centre. */
+/* Add triangles to a dipole. Until all are added, d->centre is the sum of area times centroid. */
 static void add_part(dipole *d, double area, const double centre[3], const double normal[3]) {
   d->area += area;
   for (int k = 0; k < 3; ++k) {
@@ -129,7 +129,7 @@ static void add_part(dipole *d, double area, const double centre[3], const doubl
   }
 }
 
-/* Find a node's dipole: from its triangles if it is a leaf, otherwise from its children. */
+/* Compute the dipole of a leaf from its triangles, or of another tree node from its children. */
 static void find_dipole(const supine_inside_surface *s, const node *n) {
   if (s->dipoles == NULL) {
     return;
@@ -163,7 +163,7 @@ static void find_dipole(const supine_inside_surface *s, const node *n) {
   d->radius = sqrt(square);
 }
 
-/* Build the node of the triangles order[begin, end), and its descendants. */
+/* Build the tree node of the triangles order[begin] to order[end - 1], and its descendants. */
 static void build(supine_inside_surface *s, keyed *space, uint32_t begin, uint32_t end) {
   node *n = &s->nodes[s->node_count++];
   n->begin = begin;
@@ -238,8 +238,8 @@ void supine_inside_surface_destroy(supine_inside_surface *surface) {
   }
 }
 
-/* Find where on an edge the point nearest to x lies: 0 at the start to 1 at the end. `offset` leads
- * from the start to x. */
+/* Return the position on an edge, from 0 at its start to 1 at its end, of the point nearest to x.
+ * `offset` is the vector from the start of the edge to x. */
 static double along(const double offset[3], const double edge[3]) {
   const double length = supine_dot(edge, edge);
   const double t = length > 0.0 ? supine_dot(offset, edge) / length : 0.0;
@@ -250,7 +250,7 @@ static double along(const double offset[3], const double edge[3]) {
  * undefined, if the triangle's squared distance from x certainly exceeds `best`. */
 static bool nearest_in_triangle(const double *const p[3], const double x[3], double best,
                                 double b[3]) {
-  /* If the squared sine of the angle at corner p[0] is below this, b is inexact. */
+  /* The coordinates b are inexact if the squared sine of the angle at p[0] is below this. */
   static const double slender = 1e-4;
   double u[3];
   double v[3];
@@ -272,7 +272,7 @@ static bool nearest_in_triangle(const double *const p[3], const double x[3], dou
   }
   const double ww = supine_dot(w, w);
   const double opposite_square[3] = {uu + vv - 2.0 * uv, vv, uu};
-  /* best minus the squared distance of x from the triangle's plane, plus a rounding margin */
+  /* `best` minus the squared distance of x from the triangle's plane, plus a margin for rounding */
   const double limit = best + 1e-9 * ww - (ww - b[1] * uw - b[2] * vw);
   bool farther = false;
   for (int k = 0; k < 3; ++k) {
@@ -328,7 +328,8 @@ SUPINE_CLONES static void boxes_squares(const boxes *leaf, const double x[3], do
   }
 }
 
-/* Search below node `at` for the triangle nearest to x, among those nearer than sqrt(*best). */
+/* Search tree node `at` and its descendants for the point nearest to x. Only points whose squared
+ * distance is below *best count. If one is found, update *best and `place`. */
 static void search(const supine_inside_surface *s, size_t at, const double x[3], double *best,
                    supine_inside_place *place) {
   const node *n = &s->nodes[at];
@@ -381,7 +382,7 @@ static void search(const supine_inside_surface *s, size_t at, const double x[3],
   }
 }
 
-/* Find the solid angle of a triangle seen from x; a whole sphere has 4 pi. */
+/* Return the solid angle of a triangle seen from x, positive if the triangle faces away from x. */
 static double solid_angle(const double *const p[3], const double x[3]) {
   double a[3];
   double b[3];
@@ -438,7 +439,7 @@ typedef struct distances {
   const supine_inside_surface *surface;
   const double *points;
   double *distance;
-  double *nearest; /* may be NULL */
+  double *nearest; /* [points, 3] nearest points of the surface, mm; NULL if not wanted */
 } distances;
 
 static void distance_range(void *context, size_t begin, size_t end, size_t thread) {

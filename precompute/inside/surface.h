@@ -11,19 +11,19 @@
 
 typedef struct supine_inside_surface supine_inside_surface;
 
-/** The place of a point relative to a surface. */
+/** The position of a point relative to a surface. */
 typedef struct supine_inside_place {
-  double point[3];       /**< the point, mm */
+  double point[3];       /**< mm */
   double depth;          /**< distance to the surface, mm; positive inside, negative outside */
-  double nearest[3];     /**< the surface's nearest point, mm */
-  size_t triangle;       /**< index of the triangle of the nearest point */
-  double barycentric[3]; /**< barycentric coordinates of `nearest` in the triangle */
+  double nearest[3];     /**< point of the surface nearest to `point`, mm */
+  size_t triangle;       /**< index of the triangle that contains `nearest` */
+  double barycentric[3]; /**< barycentric coordinates of `nearest` in this triangle */
 } supine_inside_place;
 
-/** Build a tree of boxes over the triangles.
+/** Build a tree of bounding boxes over the triangles of a surface.
  * @param vertices   [vertices, 3] mm, must outlive the tree
  * @param triangles  [count, 3], 0 < count < 2^31, facing outwards; must outlive the tree
- * @param sides      whether supine_inside_surface_find will be called, which needs more memory
+ * @param sides      whether to allow supine_inside_surface_find, which needs more memory
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_inside_surface_create(const double *vertices, size_t count,
                                            const uint32_t *triangles, bool sides,
@@ -31,24 +31,28 @@ supine_status supine_inside_surface_create(const double *vertices, size_t count,
 /** Free the tree; NULL is legal. */
 void supine_inside_surface_destroy(supine_inside_surface *surface);
 
-/** Find the surface point nearest to a point; its `depth` is positive on both sides. Thread-safe.
- * @param near  the place of a nearby point, which saves work, or NULL */
+/** Find the surface point nearest to a point. The result's `depth` is the distance, without a sign
+ * for the side of the surface. Thread-safe.
+ * @param near  result for a nearby point, which speeds up the search, or NULL */
 supine_inside_place supine_inside_surface_nearest(const supine_inside_surface *surface,
                                                   const double point[3],
                                                   const supine_inside_place *near);
 
-/** Find the distance of each point [count, 3] to the surface, mm, into distance [count], and the
- * surface point nearest to it into nearest [count, 3] unless `nearest` is NULL. Uses all cores. */
+/** Compute the distance of each point from the surface. Uses all cores.
+ * @param points    [count, 3] mm
+ * @param distance  [count] mm, written
+ * @param nearest   [count, 3] surface point nearest to each point, mm, written; may be NULL */
 void supine_inside_surface_distances(const supine_inside_surface *surface, size_t count,
                                      const double *points, double *distance, double *nearest);
 
-/** Find the surface point nearest to a point, and the side of the point by the generalised winding
- * number, which tolerates small holes: it is inside if
+/** Find the surface point nearest to a point, and whether the point is inside the surface. Small
+ * holes are tolerated, because the side follows from the generalised winding number. A point is
+ * inside if
  *
- *     (1 / 4 pi) sum over triangles of their solid angle seen from the point > 1/2
+ *     (sum over all triangles of their solid angle seen from the point) / (4 pi) > 1/2
  *
- * A dipole approximates the triangles of a distant box of the tree. Thread-safe.
- * @param near  the place of a nearby point, found by this function, which saves work, or NULL
+ * The triangles of a distant box of the tree are approximated by a dipole. Thread-safe.
+ * @param near  result of this function for a nearby point, which speeds up the search, or NULL
  * Sources: Jacobson, Kavan, Sorkine-Hornung, ACM Trans. Graph. 32(4), 2013; for the dipoles Barill,
  * Dickson, Schmidt, Levin, Jacobson, ACM Trans. Graph. 37(4), 2018. */
 supine_inside_place supine_inside_surface_find(const supine_inside_surface *surface,

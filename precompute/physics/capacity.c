@@ -2,13 +2,12 @@
 /* Estimate the volume at full inflation, and warn of an implausible scan state.
  *
  * The total lung capacity of adults of height H in m (ECSC: Quanjer et al., Eur Respir J 6 Suppl
- * 16, 1993) is 7.99 H - 7.08 L in men (SD 0.7 L) and 6.60 H - 5.79 L in women (SD 0.6 L). These are
- * capacities upright, so the code divides them by 1 + SUPINE_FULL_UPRIGHT_GAIN, and adds 0.86 L of
- * tissue (Denison 1986, Thorax 41:620, n 12: 431 mL in each lung). The coefficients were checked
- * against an R implementation of the ECSC table (getQuanjerPred, getQuanjerLLN), not against the
- * paper. For men of 1.60 to 1.95 m and women of 1.50 to 1.80 m, the capacities are within 5 % of
- * the medians of Hall et al. at age 40 (Eur Respir J 57: 2000289, 2021; their splines are left
- * out). */
+ * 16, 1993) is 7.99 H - 7.08 L in men (SD 0.7 L) and 6.60 H - 5.79 L in women (SD 0.6 L). This is
+ * the gas volume in upright posture. The code divides it by 1 + SUPINE_FULL_UPRIGHT_GAIN to get the
+ * volume in supine posture, and adds 0.86 L of tissue (Denison 1986, Thorax 41:620: 431 mL in each
+ * lung, 12 people). The coefficients were checked against an R implementation of the ECSC table
+ * (getQuanjerPred, getQuanjerLLN), not against the paper. For usual heights (below), capacities are
+ * within 5 % of the medians of Hall et al. at age 40 (Eur Respir J 57: 2000289, 2021). */
 #include <math.h>
 
 #include "precompute/physics/reference.h"
@@ -22,8 +21,7 @@ static const double least_share = 0.75;
 static const double least_ml = 3500.0;
 static const double most_ml = 10000.0;
 
-/* Largest accepted relative difference between the scan's volume and that which the options imply.
- */
+/* Largest accepted relative difference between the scan's volume and that given by --resting. */
 static const double agreement = 0.05;
 
 void supine_reference_capacity(const supine_person *person, double range[2]) {
@@ -47,7 +45,7 @@ void supine_reference_capacity(const supine_person *person, double range[2]) {
   }
 }
 
-/* Return the usual volume of the given lungs divided by that of two lungs: 1 if both are given. */
+/* Return the usual volume of the scanned lungs divided by that of two lungs: 1 for two lungs. */
 static double part_of_pair(const supine_reference *reference) {
   return reference->lung_count == 2 ? 1.0
          : reference->side[0] > 0   ? SUPINE_LEFT_SHARE

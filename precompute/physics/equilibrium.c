@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Solve for the equilibrium of [Santhanam2008], equations (5), (8) and (12)-(14): eliminate the
- * springs, make the matrix symmetric (equilibrium.h), and factorise it with CHOLMOD. */
+/* Solve for the equilibrium of [Santhanam2008], equations (5), (8) and (12)-(14): set up
+ * the symmetric matrix of equilibrium.h, and factorise it with CHOLMOD. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -22,22 +22,21 @@
 
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cholmod;
 
-/* Up to BATCH right-hand sides are solved together, which limits the work space. The Cholesky
- * factor of a part of the mesh with more than LARGE vertices is freed after each solve. */
+/* BATCH: largest number of right-hand sides that are solved together, which limits the work space.
+ * LARGE: largest number of vertices of a mesh part whose Cholesky factor is kept after a solve. */
 enum { BATCH = 8, LARGE = 100000 };
 
-/* Largest accepted relative residual of a solve. With a reach R (equilibrium.h) and edges of length
- * h, rounding errors alone cause about 1e-16 (R / h)^2. */
+/* Largest accepted relative residual of a solve. With a smoothing length R and edges of length h,
+ * rounding errors alone cause about 1e-16 (R / h)^2. */
 static const double residual_limit = 1e-8;
 
-/* A part of the mesh without edges to other parts, such as one lung. Parts are solved in parallel,
+/* A part of the mesh without edges to the rest, such as one lung. The parts are solved in parallel,
  * but in one thread if the first part has more than LARGE vertices. */
 typedef struct part {
   size_t vertex, vertex_count; /* index of the first vertex, and number of vertices */
-  size_t edge, edge_count;
-  bool factorised;        /* whether `factor` matches the values of `matrix` */
-  cholmod_sparse *matrix; /* lower triangle; column i has the diagonal element, then one element for
-                             each edge from vertex i */
+  size_t edge, edge_count;     /* index of the first edge, and number of edges */
+  bool factorised;             /* whether `factor` matches the values of `matrix` */
+  cholmod_sparse *matrix;      /* lower triangle, see create_matrix */
   cholmod_factor *factor;
   cholmod_common common;
 } part;
@@ -45,12 +44,13 @@ typedef struct part {
 struct supine_equilibrium {
   size_t vertex_count;
   const supine_topology *topology;
-  double reach;    /* reach R (equilibrium.h), mm, or 0 */
-  double *area;    /* [N] area of each vertex divided by the mean area; NULL if reach is 0 */
-  double *link;    /* [edges] mm from mass to spring; if reach > 0, w / 2 of equilibrium.h */
-  double *lesions; /* [N] factors by which lesions multiply the normalised stiffness, or NULL */
-  double *mass_s;  /* [N] weight S of each mass (equilibrium.h); 1 if reach > 0 */
-  double *load;    /* [N] right-hand side of the linear system / force on the vertex */
+  double reach;        /* smoothing length of force, mm; 0 for the method of [Santhanam2008] */
+  double *area;        /* [N] area of each vertex divided by the mean area; NULL if reach is 0 */
+  double *edge_term;   /* [edges] if reach is 0, half the edge length, mm, at least 1; otherwise the
+                          off-diagonal matrix element of the edge, times -1 */
+  double *lesions;     /* [N] factors by which lesions multiply the normalised stiffness, or NULL */
+  double *mass_weight; /* [N] if reach is 0, 1 / stiffness of each vertex; otherwise 1 */
+  double *load_factor; /* [N] factor that turns an applied force into a right-hand side */
   size_t part_count;
   part parts[2];
 };
@@ -64,10 +64,10 @@ void supine_physics_equilibrium_destroy(supine_equilibrium *equilibrium) {
       cholmod.finish(&p->common);
     }
     free(equilibrium->area);
-    free(equilibrium->link);
+    free(equilibrium->edge_term);
     free(equilibrium->lesions);
-    free(equilibrium->mass_s);
-    free(equilibrium->load);
+    free(equilibrium->mass_weight);
+    free(equilibrium->load_factor);
     free(equilibrium);
   }
 }
@@ -126,8 +126,9 @@ static void split(supine_equilibrium *eq) {
                         .edge_count = topology->edge_count - first->edge_count};
 }
 
-/* Create the matrix of a part, without values. Edges are sorted by their first vertex i, so edge e
- * is entry e + i + 1 of the matrix, with e and i counted within the part. */
+/* Create the sparsity pattern of the matrix of a mesh part: its lower triangle, column by column.
+ * Column i has the diagonal element, then one element for each edge from vertex i to a later
+ * vertex. Edges are sorted by their first vertex i, so element e + i + 1 belongs to edge e. */
 static bool create_matrix(const supine_topology *topology, part *p) {
   const size_t entries = p->vertex_count + p->edge_count;
   const uint32_t *edges = topology->edges + 2 * p->edge;
@@ -175,14 +176,14 @@ static size_t find_edge(const supine_equilibrium *eq, uint32_t a, uint32_t b) {
   return e;
 }
 
-/* Compute the areas of vertices and the weights of edges for a reach R.
+/* Compute eq->area and eq->edge_term for a smoothing length R = eq->reach > 0.
  *
- * With a reach, the system of equilibrium.h, which also defines F, a and f, is the weak form of
- * (1 - R^2 Laplacian) F = a f, divided by the mean vertex area A. Its weights are w = 2 R^2 c / A.
- * The factors c should make the sum of c (F_i - F_j)^2 over all edges ij equal to the integral of
- * |grad F|^2. If edges run equally in all directions, this holds for c = 2 s / h^2, where h is the
- * length of the edge and s a third of the area of its triangles. Unlike cotangent weights, these
- * weights are never negative, but R^2 is accurate only to about 10 %. */
+ * The linear system is the weak form of (1 - R^2 Laplacian) F = b on the surface, divided by the
+ * mean vertex area A. The term of the edge between vertices i and j is (R^2 c / A) (F_i - F_j),
+ * with a factor c such that the sum of c (F_i - F_j)^2 over all edges approximates the integral of
+ * |grad F|^2. Here c = 2 s / h^2, where h is the length of the edge, and s is the sum of a third of
+ * the area of each triangle at the edge. This is exact if edges run equally in all directions.
+ * Unlike cotangent weights, c is never negative, but R^2 is accurate only to about 10 %. */
 static void set_reach(supine_equilibrium *eq, const supine_mesh *mesh) {
   const size_t n = eq->vertex_count;
   const double *p = mesh->vertices;
@@ -191,27 +192,27 @@ static void set_reach(supine_equilibrium *eq, const supine_mesh *mesh) {
   for (size_t i = 0; i < n; ++i) {
     mean += eq->area[i] / (double)n;
   }
-  /* Raise smaller areas to this area, mm^2, so that degenerate triangles have no zero weights. */
+  /* Smallest area of a vertex or edge, mm^2, so that degenerate triangles give no zero weights. */
   const double least = 1e-6 * mean;
   for (size_t i = 0; i < n; ++i) {
     eq->area[i] = fmax(eq->area[i], least) / mean;
   }
-  memset(eq->link, 0, eq->topology->edge_count * sizeof *eq->link);
+  memset(eq->edge_term, 0, eq->topology->edge_count * sizeof *eq->edge_term);
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
     const uint32_t *corner = mesh->triangles + 3 * t;
     double normal[3]; /* the length of this vector is twice the area of the triangle */
     supine_normal(p + 3 * (size_t)corner[0], p + 3 * (size_t)corner[1], p + 3 * (size_t)corner[2],
                   normal);
     for (size_t k = 0; k < 3; ++k) {
-      eq->link[find_edge(eq, corner[k], corner[(k + 1) % 3])] += supine_length(normal) / 6.0;
+      eq->edge_term[find_edge(eq, corner[k], corner[(k + 1) % 3])] += supine_length(normal) / 6.0;
     }
   }
   for (size_t e = 0; e < eq->topology->edge_count; ++e) {
     const double *first = p + 3 * (size_t)eq->topology->edges[2 * e];
     const double *second = p + 3 * (size_t)eq->topology->edges[2 * e + 1];
     const double length = supine_distance(first, second);
-    eq->link[e] = 2.0 * eq->reach * eq->reach / mean * fmax(eq->link[e], least) /
-                  fmax(length * length, least);
+    eq->edge_term[e] = 2.0 * eq->reach * eq->reach / mean * fmax(eq->edge_term[e], least) /
+                       fmax(length * length, least);
   }
 }
 
@@ -233,11 +234,11 @@ supine_status supine_physics_equilibrium_create(const supine_mesh *mesh,
   made->vertex_count = n;
   made->topology = topology;
   made->area = reach > 0.0 ? malloc(n * sizeof *made->area) : NULL;
-  made->link = malloc((topology->edge_count + 1) * sizeof *made->link);
+  made->edge_term = malloc((topology->edge_count + 1) * sizeof *made->edge_term);
   made->lesions = lesions != NULL ? malloc(n * sizeof *made->lesions) : NULL;
-  made->mass_s = malloc(n * sizeof *made->mass_s);
-  made->load = malloc(n * sizeof *made->load);
-  if (made->link == NULL || made->mass_s == NULL || made->load == NULL ||
+  made->mass_weight = malloc(n * sizeof *made->mass_weight);
+  made->load_factor = malloc(n * sizeof *made->load_factor);
+  if (made->edge_term == NULL || made->mass_weight == NULL || made->load_factor == NULL ||
       (lesions != NULL && made->lesions == NULL) || (reach > 0.0 && made->area == NULL) ||
       !create_matrices(made)) {
     supine_physics_equilibrium_destroy(made);
@@ -254,17 +255,17 @@ static void set_values(const supine_equilibrium *eq, part *p) {
   const int *begin = p->matrix->p;
   double *value = p->matrix->x;
   for (size_t i = 0; i < p->vertex_count; ++i) {
-    const double s = eq->mass_s[p->vertex + i];
+    const double s = eq->mass_weight[p->vertex + i];
     value[begin[i]] = (eq->area != NULL ? eq->area[p->vertex + i] : 1.0) * s * s;
   }
   for (size_t e = 0; e < p->edge_count; ++e) {
     const uint32_t *edge = eq->topology->edges + 2 * (p->edge + e);
     double *first = &value[begin[edge[0] - p->vertex]];
     double *second = &value[begin[edge[1] - p->vertex]];
-    double c = eq->link[p->edge + e];
+    double c = eq->edge_term[p->edge + e];
     if (eq->area == NULL) {
-      const double d = eq->link[p->edge + e];
-      const double s[2] = {eq->mass_s[edge[0]], eq->mass_s[edge[1]]};
+      const double d = eq->edge_term[p->edge + e];
+      const double s[2] = {eq->mass_weight[edge[0]], eq->mass_weight[edge[1]]};
       const double wide = d + 2.0 * s[0] * s[1];
       c = s[0] * s[1] / (d * wide);
       *first += (s[0] + s[1]) / (2.0 * s[1] * wide);
@@ -282,11 +283,11 @@ supine_status supine_physics_equilibrium_set_stiffness(supine_equilibrium *equil
                                                        supine_error *error) {
   supine_equilibrium *eq = equilibrium;
   const supine_status status =
-      supine_physics_stiffness_normalise(eq->vertex_count, stiffness, eq->load, error);
+      supine_physics_stiffness_normalise(eq->vertex_count, stiffness, eq->load_factor, error);
   for (size_t i = 0; status == SUPINE_OK && i < eq->vertex_count; ++i) {
-    const double a = 1.0 / (eq->load[i] * (eq->lesions != NULL ? eq->lesions[i] : 1.0));
-    eq->mass_s[i] = eq->area != NULL ? 1.0 : a;
-    eq->load[i] = eq->area != NULL ? eq->area[i] * a : 1.0;
+    const double a = 1.0 / (eq->load_factor[i] * (eq->lesions != NULL ? eq->lesions[i] : 1.0));
+    eq->mass_weight[i] = eq->area != NULL ? 1.0 : a;
+    eq->load_factor[i] = eq->area != NULL ? eq->area[i] * a : 1.0;
   }
   for (size_t k = 0; k < eq->part_count && status == SUPINE_OK; ++k) {
     if (eq->area == NULL || !eq->parts[k].factorised) {
@@ -303,8 +304,8 @@ supine_status supine_physics_equilibrium_set_shape(supine_equilibrium *equilibri
   eq->reach = reach;
   for (size_t e = 0; e < eq->topology->edge_count && eq->area == NULL; ++e) {
     const uint32_t *edge = eq->topology->edges + 2 * e;
-    eq->link[e] = supine_physics_link_distance(mesh->vertices + 3 * (size_t)edge[0],
-                                               mesh->vertices + 3 * (size_t)edge[1]);
+    eq->edge_term[e] = supine_physics_link_distance(mesh->vertices + 3 * (size_t)edge[0],
+                                                    mesh->vertices + 3 * (size_t)edge[1]);
   }
   if (eq->area != NULL) {
     set_reach(eq, mesh);
@@ -318,10 +319,10 @@ supine_status supine_physics_equilibrium_set_shape(supine_equilibrium *equilibri
 typedef struct solve {
   supine_equilibrium *eq;
   size_t count;
-  const double *force; /* [N, count] applied force */
-  double *catch_;      /* [N, count] force that each vertex keeps */
+  const double *force; /* [N, count] force applied to each vertex, in each of `count` solves */
+  double *catch_;      /* [N, count] force that each vertex keeps in equilibrium */
   supine_status status[2];
-  double residual[2]; /* largest relative residual of each part */
+  double residual[2]; /* [part_count] largest relative residual of each mesh part */
 } solve;
 
 static supine_status factorise(part *p) {
@@ -340,12 +341,12 @@ static supine_status factorise(part *p) {
   return SUPINE_OK;
 }
 
-/* Solve part k for the right-hand sides r to r + count - 1. Update s->residual[k]. */
+/* Solve mesh part k for the right-hand sides r to r + count - 1. Update s->residual[k]. */
 static supine_status solve_columns(solve *s, size_t k, size_t r, size_t count) {
   part *p = &s->eq->parts[k];
   const size_t n = p->vertex_count;
-  const double *load = s->eq->load + p->vertex;
-  const double *mass_s = s->eq->mass_s + p->vertex;
+  const double *load = s->eq->load_factor + p->vertex;
+  const double *mass_s = s->eq->mass_weight + p->vertex;
   const double *force = s->force + p->vertex * s->count + r;
   double *catch_ = s->catch_ + p->vertex * s->count + r;
   double norm[BATCH] = {0.0};
@@ -430,7 +431,7 @@ supine_status supine_physics_equilibrium_force(supine_equilibrium *equilibrium,
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
   }
   for (size_t i = 0; i < n; ++i) {
-    t[i] = catch_[i] / (eq->mass_s[i] * eq->mass_s[i]);
+    t[i] = catch_[i] / (eq->mass_weight[i] * eq->mass_weight[i]);
   }
   for (size_t k = 0; k < eq->part_count; ++k) {
     part *p = &eq->parts[k];
@@ -440,7 +441,7 @@ supine_status supine_physics_equilibrium_force(supine_equilibrium *equilibrium,
     (void)cholmod.sdmult(p->matrix, 0, one, zero, &from, &to, &p->common);
   }
   for (size_t i = 0; i < n; ++i) {
-    force[i] /= eq->load[i];
+    force[i] /= eq->load_factor[i];
   }
   free(t);
   return SUPINE_OK;

@@ -37,7 +37,8 @@ static void force_range(void *context, size_t begin, size_t end, size_t thread) 
     for (size_t d = 0; d < gravities->count; ++d) {
       const double *g = gravities->directions + 3 * d;
       const double height = gravities->maximum[d] - gravities->minimum[d];
-      out[d] = fixed + law->gain * (supine_dot(g, p) - gravities->minimum[d]) / height; /* (18) */
+      /* [Santhanam2008] (18) */
+      out[d] = fixed + law->gain * (supine_dot(g, p) - gravities->minimum[d]) / height;
       if (law->soften != 0.0) {
         out[d] *= exp(law->soften * supine_dot(g, from_middle) / height);
       }
@@ -56,13 +57,14 @@ void supine_physics_force(const supine_lungs *lungs, const supine_force_law *law
   supine_parallel_for(vertex_count, GRAIN, 0, force_range, &work);
 }
 
+/* Compute a direction of displacement, [Santhanam2008] (15)-(17). */
 static void box_direction(const supine_lungs *lungs, const double c[6], size_t vertex, double *d) {
   double box[3];
   supine_lungs_box_coordinates(lungs, vertex, box);
   const size_t lung = vertex >= lungs->lung_begin[1] ? 1 : 0;
-  d[0] = lungs->side[lung] * c[0] * pow(box[0], c[1]); /* (15) */
-  d[1] = -c[2] * pow(box[1], c[3]);                    /* (16) */
-  d[2] = -c[4] * pow(box[2], c[5]);                    /* (17) */
+  d[0] = lungs->side[lung] * c[0] * pow(box[0], c[1]);
+  d[1] = -c[2] * pow(box[1], c[3]);
+  d[2] = -c[4] * pow(box[2], c[5]);
 }
 
 supine_status supine_physics_directions(const supine_lungs *lungs, const supine_direction_law *law,

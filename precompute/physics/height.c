@@ -12,7 +12,7 @@
 
 /* Vertices are sorted along a Morton curve (1966) through 32 x 32 x 32 cells. BLOCK consecutive
  * vertices form a block, and GROUP blocks form a group. The search skips blocks and groups whose
- * bounding boxes cannot contain a new greatest height. LANES directions are searched together. */
+ * bounding boxes cannot contain a new greatest height. It handles LANES directions together. */
 enum { BLOCK = 64, GROUP = 32, CELL_BITS = 5, CELLS = 1 << (3 * CELL_BITS), LANES = 8 };
 
 typedef struct block_box {
@@ -22,20 +22,20 @@ typedef struct block_box {
 
 typedef struct range_work {
   size_t vertex_count;
-  const double *vertices;  /* [vertex_count, 3] sorted along the curve, mm */
-  const block_box *boxes;  /* [box_count] bounding boxes of the blocks */
-  const block_box *groups; /* bounding boxes of GROUP blocks each */
+  const double *vertices;  /* [vertex_count, 3] sorted along a Morton curve, mm */
+  const block_box *boxes;  /* [box_count] bounding box of each block of BLOCK vertices */
+  const block_box *groups; /* bounding box of each group of GROUP blocks */
   size_t box_count;
   size_t direction_count;
   const double *directions;
   double *minimum, *maximum;
 } range_work;
 
-/* LANES directions that are searched together. */
+/* LANES directions along which the greatest heights of vertices are searched for together. */
 typedef struct lanes {
-  double g[3][LANES];    /* unit vectors */
-  double size[3][LANES]; /* absolute value of each component of g */
-  double best[LANES];    /* greatest height along g so far, mm */
+  double g[3][LANES];    /* components of the directions, which are unit vectors */
+  double size[3][LANES]; /* absolute values of the components */
+  double best[LANES];    /* greatest height found so far along each direction, mm */
 } lanes;
 
 static block_box box_of(const double *vertices, size_t count) {
@@ -54,7 +54,7 @@ static block_box box_of(const double *vertices, size_t count) {
   return box;
 }
 
-/* Return whether a box may contain a vertex whose height exceeds `best` in some lane. */
+/* Return whether a box may contain a vertex whose height along a direction exceeds at->best. */
 static inline bool may_improve(const block_box *box, const lanes *at) {
   const block_box b = *box;
   int64_t any = 0;
@@ -68,7 +68,7 @@ static inline bool may_improve(const block_box *box, const lanes *at) {
   return any != 0;
 }
 
-/* Raise `best` of each lane to the greatest height of a vertex in a block. */
+/* Update at->best, the greatest heights found so far, with the vertices of one block. */
 static inline void raise_best(const range_work *work, size_t block, lanes *at) {
   const size_t end =
       (block + 1) * BLOCK < work->vertex_count ? (block + 1) * BLOCK : work->vertex_count;
@@ -84,8 +84,8 @@ static inline void raise_best(const range_work *work, size_t block, lanes *at) {
   }
 }
 
-/* Find the greatest height in each lane. Search block `seed` first. Return the block searched last,
- * a good seed for similar directions. */
+/* Find the greatest height of a vertex along each direction. Search the block of vertices `seed`
+ * first. Return the block searched last, a good seed for similar directions. */
 static inline size_t search(const range_work *work, size_t seed, lanes *at) {
   raise_best(work, seed, at);
   for (size_t first = 0; first < work->box_count; first += GROUP) {
@@ -155,7 +155,6 @@ static void sort_vertices(const double *vertices, size_t count, size_t *begin, d
   }
 }
 
-/* Find the bounding box of every `size` consecutive vertices. */
 static void find_boxes(const double *vertices, size_t count, size_t size, block_box *boxes) {
   for (size_t i = 0; i < count; i += size) {
     boxes[i / size] = box_of(vertices + 3 * i, count - i < size ? count - i : size);

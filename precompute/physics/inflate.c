@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Move a scan to full inflation. The surface p at full inflation is the fixed point of the image
- * scan_j - A_j F(g; p) d_j(p), as reference.h explains. It is found by Anderson acceleration (D. G.
- * Anderson, J. ACM 12, 1965): the next p is that combination of the last few images whose residual
- * (image - p) is predicted to be smallest. */
+/* Move a scan to full inflation. From an estimate of the surface at full inflation, the physical
+ * model predicts the displacements to the scan. The fixed-point map replaces the estimate by the
+ * scan minus these displacements; the residual is the change that it makes. The fixed point is
+ * found by Anderson acceleration (D. G. Anderson, J. ACM 12, 1965): the next estimate is the linear
+ * combination of the last few values of the map with the smallest predicted residual. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,6 +16,7 @@
 #include "precompute/physics/solve.h"
 #include "precompute/physics/volume_forms.h"
 
+/* SOLVES_MAX: largest number of iterations. DEPTH: number of iterations that are combined. */
 enum { SOLVES_MAX = 30, DEPTH = 4 };
 
 /* RMS residuals, mm. The iteration ends if the residual is at most `converged`. It also ends if the
@@ -23,22 +25,23 @@ enum { SOLVES_MAX = 30, DEPTH = 4 };
 static const double converged = 5e-4;
 static const double stalled = 5e-3;
 static const double folded_share = 0.01; /* largest accepted share of triangles that turn over */
-static const double ridge = 1e-12; /* relative increase of the diagonal, to avoid singularity */
+static const double ridge = 1e-12; /* relative increase of a matrix diagonal against singularity */
 
 typedef struct ascent {
-  supine_lungs lungs; /* current estimate of full inflation; the caller owns its vertices */
+  supine_lungs lungs; /* current estimate of the lungs at full inflation; vertices not owned */
   supine_lungs scan;
   supine_model model;
   supine_reference *found;
-  supine_solution field;     /* solution for the current estimate */
+  supine_solution field;     /* displacement field predicted from the current estimate */
   size_t size;               /* 3 x number of vertices */
-  double *image;             /* [size] image of the current estimate, mm */
-  double *previous_image;    /* [size] mm */
-  double *previous_residual; /* [size] mm */
+  double *map;               /* [size] value of the fixed-point map at the current estimate, mm */
+  double *previous_map;      /* [size] value of the fixed-point map at the previous estimate, mm */
+  double *previous_residual; /* [size] previous_map minus the previous estimate, mm */
   double rms;                /* RMS residual of the current estimate, mm */
-  double *image_changes;     /* [DEPTH, size] differences between successive images, mm */
-  double *residual_changes;  /* [DEPTH, size] mm */
-  size_t stored, history;    /* number of stored changes, and of those in use */
+  double *map_changes;       /* [DEPTH, size] changes of `map` in the last iterations, mm */
+  double *residual_changes;  /* [DEPTH, size] changes of the residual in these iterations, mm */
+  size_t stored;             /* number of iterations whose changes were stored since a restart */
+  size_t history;            /* number of iterations whose changes are in use, at most DEPTH */
 } ascent;
 
 static supine_status check_folds(const ascent *a, supine_error *error) {
@@ -53,12 +56,15 @@ static supine_status check_folds(const ascent *a, supine_error *error) {
                                 100.0 * share);
 }
 
-/* Find the gains A of one lung in the scan. The path of supine/volume.h leads from full inflation
- * (sigma = 0) to rest (sigma = 1), with gains of s times the ratios of supine_volume_bend() at
- * sigma. Applied to the scan, gains of -A lead to full inflation and must add `to_full` mL; gains
- * of s - A lead to rest and must add `to_rest` mL. These two conditions determine s and the scan's
- * sigma: the first gives s for any sigma; secant steps find the sigma that satisfies the second.
- * @param form  volume that the displacement field adds to the lung in the scan */
+/* Find the gains A of one lung in the scan: the factors along x, y and z on its displacement from
+ * full inflation. They are A = s ratio(sigma), where ratio() is supine_volume_bend(), sigma is the
+ * position of the scan on the path from full inflation (0) to rest (1), and s is the gain at rest.
+ * Gains of -A lead from the scan to full inflation, and gains of s - A to rest:
+ *
+ *     form(-A) = to_full,    form(s - A) = to_rest
+ *
+ * where `form` is the volume that gains add to the scan, mL. The first equation gives s for any
+ * sigma. Secant steps find the sigma that satisfies the second. */
 static supine_status find_lung_gains(const supine_volume_form *form, const double bend[3],
                                      bool at_rest, double to_full, double to_rest, double gains[3],
                                      supine_error *error) {
@@ -115,9 +121,9 @@ supine_status supine_reference_find_gains(const supine_lungs *scan, const double
   return status;
 }
 
-/* Compute the image of the current estimate: the vertices of the scan minus the displacements that
- * the estimate predicts. Choose the gains so that each lung gets its reference volume. */
-static supine_status find_image(ascent *a, supine_error *error) {
+/* Set a->map to the vertices of the scan minus the displacements predicted from the current
+ * estimate, scaled so that each lung gets its volume at full inflation. */
+static supine_status find_map(ascent *a, supine_error *error) {
   supine_solution *field = &a->field;
   a->rms = 0.0;
   ++a->found->solves;
@@ -131,9 +137,9 @@ static supine_status find_image(ascent *a, supine_error *error) {
   for (size_t lung = 0; lung < a->scan.lung_count && status == SUPINE_OK; ++lung) {
     const double *gains = a->found->scan_gains[lung];
     for (size_t i = 3 * a->scan.lung_begin[lung]; i < 3 * a->scan.lung_begin[lung + 1]; ++i) {
-      a->image[i] =
+      a->map[i] =
           a->scan.mesh.vertices[i] - gains[i % 3] * field->catch_[i / 3] * field->directions[i];
-      const double residual = a->image[i] - a->lungs.mesh.vertices[i];
+      const double residual = a->map[i] - a->lungs.mesh.vertices[i];
       a->rms += residual * residual;
     }
   }
@@ -149,16 +155,16 @@ static double product(const double *a, const double *b, size_t size) {
   return sum;
 }
 
-/* Store image and residual of the current estimate, and their changes since the previous step. */
+/* Store a->map and the residual of the current estimate, and their changes in this iteration. */
 static void store_differences(ascent *a) {
-  double *images = a->image_changes + a->stored % DEPTH * a->size;
+  double *changes = a->map_changes + a->stored % DEPTH * a->size;
   double *residuals = a->residual_changes + a->stored % DEPTH * a->size;
   const bool first = a->found->solves == 1;
   for (size_t i = 0; i < a->size; ++i) {
-    const double residual = a->image[i] - a->lungs.mesh.vertices[i];
-    images[i] = a->image[i] - a->previous_image[i];
+    const double residual = a->map[i] - a->lungs.mesh.vertices[i];
+    changes[i] = a->map[i] - a->previous_map[i];
     residuals[i] = residual - a->previous_residual[i];
-    a->previous_image[i] = a->image[i];
+    a->previous_map[i] = a->map[i];
     a->previous_residual[i] = residual;
   }
   if (!first) {
@@ -167,7 +173,7 @@ static void store_differences(ascent *a) {
   }
 }
 
-/* Replace the estimate by that combination of images whose predicted residual is smallest. */
+/* Replace the estimate by the combination of map values with the smallest predicted residual. */
 static supine_status advance(ascent *a, supine_error *error) {
   double matrix[DEPTH * DEPTH];
   double weights[DEPTH] = {0.0};
@@ -193,11 +199,11 @@ static supine_status advance(ascent *a, supine_error *error) {
     }
   }
   double *to = a->lungs.mesh.vertices;
-  memcpy(to, a->image, a->size * sizeof *to);
+  memcpy(to, a->map, a->size * sizeof *to);
   for (size_t j = 0; j < n; ++j) {
-    const double *image = a->image_changes + j * a->size;
+    const double *change = a->map_changes + j * a->size;
     for (size_t i = 0; i < a->size; ++i) {
-      to[i] -= weights[j] * image[i];
+      to[i] -= weights[j] * change[i];
     }
   }
   return SUPINE_OK;
@@ -207,20 +213,20 @@ static supine_status iterate(ascent *a, supine_error *error) {
   supine_status status = SUPINE_OK;
   while (status == SUPINE_OK && a->found->solves < SOLVES_MAX) {
     const double before = a->rms;
-    status = find_image(a, error);
+    status = find_map(a, error);
     if (status == SUPINE_OK &&
         (a->rms <= converged || (a->rms <= stalled && a->rms > 0.5 * before))) {
-      memcpy(a->lungs.mesh.vertices, a->image, a->size * sizeof(double));
+      memcpy(a->lungs.mesh.vertices, a->map, a->size * sizeof(double));
       return SUPINE_OK;
     }
     if (status == SUPINE_OK) {
       store_differences(a);
       status = advance(a, error);
     } else if (status == SUPINE_ERROR_NUMERICAL && a->history > 0) {
-      /* The step was too long: restart from the last image. */
+      /* The step was too long: restart from the last value of the fixed-point map. */
       a->history = 0;
       a->stored = 0;
-      memcpy(a->lungs.mesh.vertices, a->previous_image, a->size * sizeof(double));
+      memcpy(a->lungs.mesh.vertices, a->previous_map, a->size * sizeof(double));
       status = SUPINE_OK;
     }
   }
@@ -245,13 +251,13 @@ supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *
   supine_status status = SUPINE_OK;
   a.model.share[0] = a.model.share[1] = 1.0; /* healthy lungs; collapse is applied later */
   a.scan.mesh.vertices = malloc(bytes);
-  a.image = malloc(bytes);
-  a.previous_image = calloc(a.size, sizeof *a.previous_image);
+  a.map = malloc(bytes);
+  a.previous_map = calloc(a.size, sizeof *a.previous_map);
   a.previous_residual = calloc(a.size, sizeof *a.previous_residual);
-  a.image_changes = malloc(DEPTH * bytes);
+  a.map_changes = malloc(DEPTH * bytes);
   a.residual_changes = malloc(DEPTH * bytes);
-  if (a.scan.mesh.vertices == NULL || a.image == NULL || a.previous_image == NULL ||
-      a.previous_residual == NULL || a.image_changes == NULL || a.residual_changes == NULL) {
+  if (a.scan.mesh.vertices == NULL || a.map == NULL || a.previous_map == NULL ||
+      a.previous_residual == NULL || a.map_changes == NULL || a.residual_changes == NULL) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", a.size / 3);
     goto cleanup;
   }
@@ -269,10 +275,10 @@ supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *
 cleanup:
   supine_physics_solution_free(&a.field);
   free(a.scan.mesh.vertices);
-  free(a.image);
-  free(a.previous_image);
+  free(a.map);
+  free(a.previous_map);
   free(a.previous_residual);
-  free(a.image_changes);
+  free(a.map_changes);
   free(a.residual_changes);
   return status;
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Select a law, and set up the equilibrium of a model. */
+/* Make the model of a displacement law, and set up the equilibrium of lungs with a model. */
 #include <math.h>
 
 #include "precompute/physics/model.h"
@@ -31,7 +31,7 @@ supine_status supine_physics_model_equilibrium(const supine_lungs *lungs, const 
         error, SUPINE_ERROR_ARGUMENT,
         "--soften needs the distance --reach: give --reach 10, or leave --soften out");
   }
-  /* A longer reach would spread every force evenly and make the matrix singular. */
+  /* A longer smoothing length would spread every force evenly and make the matrix singular. */
   const double longest = 0.5 * supine_distance(lungs->minimum, lungs->maximum);
   const double reach = fmin(model->reach, longest);
   if (*equilibrium != NULL) {

@@ -10,12 +10,12 @@ typedef struct iteration {
   size_t node_count;
   size_t *clique_begin; /* [nodes + 2] index in `clique` of each node's first neighbour */
   size_t *clique;       /* neighbours of every node, node by node */
-  double *te;           /* share of its force that a node passes to each neighbour */
-  double *te_self;      /* [nodes] share of its force that each node keeps */
-  double *pitcher;      /* [nodes] force that is yet to be distributed; may be negative */
-  double *catcher;      /* [nodes] force kept so far */
-  /* [2 nodes] binary tree of node indices: entry nodes + j is node j. A smaller entry k is that one
-   * of entries 2 k and 2 k + 1 whose node has the larger |pitcher|. */
+  double *te; /* for each entry of `clique`: share of a node's force that this neighbour gets */
+  double *te_self; /* [nodes] share of its force that each node keeps */
+  double *pitcher; /* [nodes] force that each node has yet to distribute; may be negative */
+  double *catcher; /* [nodes] total force that each node has kept in the steps so far */
+  /* [2 nodes] tournament tree to find the node with the largest |pitcher|. Leaf nodes + j holds j;
+   * the parent k of entries 2 k and 2 k + 1 holds the one with the larger |pitcher|. */
   size_t *largest;
 } iteration;
 
@@ -29,7 +29,7 @@ static void iteration_free(iteration *it) {
   free(it->largest);
 }
 
-/* Update the tree it->largest after the Pitcher of `node` has changed. */
+/* Update the tree it->largest after it->pitcher[node] has changed. */
 static void update(iteration *it, size_t node) {
   for (size_t k = (it->node_count + node) / 2; k > 0; k /= 2) {
     const size_t a = it->largest[2 * k];
@@ -38,7 +38,8 @@ static void update(iteration *it, size_t node) {
   }
 }
 
-/* Find the neighbours of every node and the shares Te of (8). Return false if out of memory. */
+/* Find the neighbours of every node, and the shares of force that nodes pass to them, (8) of
+ * [Santhanam2008]. Return false if out of memory. */
 static bool iteration_create(const supine_mesh *mesh, const supine_topology *topology,
                              const double *stiffness, iteration *it) {
   const size_t n = mesh->vertex_count;
@@ -91,7 +92,7 @@ static bool iteration_create(const supine_mesh *mesh, const supine_topology *top
   return true;
 }
 
-/* Distribute the Pitcher of node j over its clique, (5)-(7). */
+/* Distribute it->pitcher[j] over node j and its neighbours, (5)-(7) of [Santhanam2008]. */
 static void distribute(iteration *it, size_t j) {
   const double held = it->pitcher[j];
   it->catcher[j] += it->te_self[j] * held;
@@ -104,7 +105,7 @@ static void distribute(iteration *it, size_t j) {
   }
 }
 
-/* This function has nine parameters, the quantities of the paper's algorithm. */
+/* All nine parameters are inputs and outputs of the published algorithm. */
 supine_status
 supine_physics_pitcher_catcher(const supine_mesh *mesh, const supine_topology *topology,
                                const double *stiffness, const double *force, double tolerance,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Find the reference volumes from the state of a scan, and move the lungs to full inflation. */
+/* Find the volumes at full inflation from the state of a scan, and move the lungs there. */
 #include <string.h>
 
 #include <supine/volume.h>
@@ -30,7 +30,8 @@ supine_status supine_reference_scan_parse(const char *text, supine_scan *scan,
   return SUPINE_OK;
 }
 
-/* Compute a lung's volume at filling t (resting.h) from its volumes at rest and full inflation. */
+/* Compute the volume of a lung at degree of filling t, from its volumes at rest (t = 0) and at full
+ * inflation (t = 1). For t < 0, the volume is (1 + t) times that at rest. */
 static double volume_at(double rest, double full, double t) {
   return t < 0.0 ? rest * (1.0 + t) : rest * (1.0 - t) + full * t;
 }
@@ -67,10 +68,12 @@ void supine_reference_share_out(const supine_reference *reference, const double 
   }
 }
 
-/* Find each lung's volume F at the reference surface from the volumes in the scan, volume
- * [lung_count], mL. Each degree of filling t (resting.h) gives an F for each lung. Bisect t until
- * the volume in the scan differs from the volume at rest, or at full inflation, by as many mL as
- * the state of the scan says. */
+/* Find the volume of each lung's reference surface, found->full_volume.
+ *
+ * It follows from the lung's volume in the scan and the degree of filling t of the scan (0 at rest,
+ * 1 at full inflation). The state of the scan is rest or full inflation plus a number of mL. Bisect
+ * t until the volume in the scan minus that at rest or full inflation is this number of mL.
+ * @param volume  [lung_count] volume of each lung in the scan, mL */
 static supine_status find_full(supine_reference *found, const double *volume, supine_error *error) {
   const supine_state *state = &found->scan.state;
   const bool from_rest = state->volume.kind == SUPINE_VOLUME_REST;
@@ -79,7 +82,7 @@ static supine_status find_full(supine_reference *found, const double *volume, su
   double high = 1.0;
   double t = from_rest ? 0.0 : 1.0;
   for (int halving = 0; halving < 60; ++halving) {
-    double beyond = 0.0; /* scan volume minus the volume at rest or full inflation, mL */
+    double beyond = 0.0; /* volume in the scan minus that at rest (or full inflation), mL */
     for (size_t lung = 0; lung < found->lung_count; ++lung) {
       const double rest =
           supine_reference_resting_share(&found->resting, found->side[lung], state->gravity);

@@ -9,14 +9,14 @@
  *
  *     x_ij(g) = p_ij + A_j F_i(g) d_ij
  *
- * where p is the surface at full inflation, F the catch (equilibrium.h), d the direction (force.h)
- * and A the gains of the lung, which follow from its volume (supine_volume_form_gains). A scan
- * shows the lungs at such positions x. As F and d depend on p, the unknown p is the fixed point of
+ * where p is the surface at full inflation, F_i the force that the vertex keeps in equilibrium
+ * (equilibrium.h), d_i its direction of displacement (force.h), and A_j the gain of the lung along
+ * axis j, a factor that follows from its volume. A scan shows the lungs at such positions x. As F
+ * and d depend on p, p is the fixed point of
  *
- *     p_j = scan_j - A_j F(g_scan; p) d_j(p)
+ *     p_ij = scan_ij - A_j F_i(g_scan; p) d_ij(p)
  *
- * where A follows from the difference in volume between the scan and full inflation. For one
- * person, p is nearly the same whatever state was scanned. */
+ * For one person, p is nearly the same whatever state was scanned. */
 #ifndef SUPINE_REFERENCE_H
 #define SUPINE_REFERENCE_H
 
@@ -27,7 +27,7 @@
 
 typedef struct supine_scan {
   bool known;         /**< whether the state is known; if not, the scan is the reference surface */
-  supine_state state; /**< rest or full inflation, plus or minus a volume in mL */
+  supine_state state; /**< posture, and rest or full inflation plus or minus a volume in mL */
 } supine_scan;
 
 /** Parse a scan's state: "full", "supine:rest", "left:rest+300", "full-2000", or "none". The
@@ -41,55 +41,58 @@ typedef struct supine_scan_frame {
   double millimetres_per_unit;
 } supine_scan_frame;
 
-/** State of the scan, and volumes of healthy lungs: gas and tissue, mL. */
+/** State of the scan, and volumes of the lungs without collapse: gas and tissue, mL. */
 typedef struct supine_reference {
-  bool known; /**< whether the volume at rest is known; if not, volumes refer to the scan */
+  bool known; /**< whether the state of the scan and the volumes are known */
   supine_scan scan;
   supine_resting resting; /**< volumes at rest as shares of full_volume */
   size_t lung_count;
   int side[2];           /**< +1 left, -1 right */
-  double full_volume[2]; /**< volume F of the reference surface */
-  double scan_volume[2]; /**< volume of the scan minus full_volume; negative below full inflation */
-  double scan_rest[2];   /**< volume at rest in the posture of the scan; 0 for a full scan */
-  double scan_gains[2][3]; /**< gains x, y, z that take each lung from full inflation to the scan */
-  size_t solves; /**< number of solves of the full physics to find the surface at full inflation */
+  double full_volume[2]; /**< [lung] volume of the reference surface (full inflation), mL */
+  double scan_volume[2]; /**< [lung] volume in the scan minus full_volume, mL */
+  double scan_rest[2];   /**< [lung] volume at rest in the scan's posture, mL; 0 if unused */
+  /** [lung, axis] factors on the displacements that lead from full inflation to the scan */
+  double scan_gains[2][3];
+  size_t solves; /**< number of iterations to find the surface at full inflation */
 } supine_reference;
 
-/** Find the reference volumes of scanned lungs, and move the lungs to full inflation, in place.
- * @param lungs  vertices and box change; the midline stays
- * @retval SUPINE_ERROR_ARGUMENT      a scan below the volume of its tissue, or above full inflation
- * @retval SUPINE_ERROR_NUMERICAL     the surface folds on the way, or no fixed point is found
+/** Find the volumes of scanned lungs at full inflation, and move the lungs to full inflation.
+ * @param lungs  the vertices and the bounding box are changed, the midline is not
+ * @retval SUPINE_ERROR_ARGUMENT   the scan holds less than the tissue, or is above full inflation
+ * @retval SUPINE_ERROR_NUMERICAL  the surface folds on the way, or no fixed point is found
  * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_MESH */
 supine_status supine_reference_find(supine_lungs *lungs, const supine_model *model,
                                     const supine_scan *scan, const supine_resting *resting,
                                     supine_reference *reference, supine_error *error);
 
-/** Compute the volume of each lung at rest into ml [lung_count]. g is the direction of gravity.
- * Return the sum. */
+/** Compute the volume of each lung at rest into ml [lung_count]. Return their sum.
+ * @param g  direction of gravity */
 double supine_reference_rest(const supine_reference *reference, const double g[3], double *ml);
 
 /** Compute the volume of each lung at full inflation into ml [lung_count]. Return their sum. */
 double supine_reference_full(const supine_reference *reference, const double g[3], double *ml);
 
-/** Divide the volume `total`, mL, between the lungs so that all have the same degree of filling t
- * (resting.h). Write their volumes to ml [lung_count]. */
+/** Divide the volume `total`, mL, between the lungs so that both are filled to the same degree
+ * between rest and full inflation. Write their volumes to ml [lung_count]. */
 void supine_reference_share_out(const supine_reference *reference, const double g[3], double total,
                                 double *ml);
 
 /** Move the vertices of scanned lungs to full inflation, in place. Each lung then has the volume
  * reference->full_volume. lungs->scanned receives the vertices of the scan. Statuses as
  * supine_reference_find.
- * @param reference  has the scan and the volumes; scan_gains and solves are written */
+ * @param reference  in: scan and volumes; out: scan_gains and solves */
 supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *model,
                                        supine_reference *reference, supine_error *error);
 
-/** Find the gains A of each lung in the scan, where gain 0 is full inflation and gain s is rest.
- * Displacing the scan with gains -A must give the volume at full inflation. Displacing it with
- * gains s - A must give the volume at rest.
+/** Find the gains A of each lung in the scan: the factors along x, y and z on its displacement from
+ * full inflation to the scan. At full inflation the gains are 0; at rest they have one value s on
+ * all axes. Displacing the scan with gains -A must give the volume at full inflation. Displacing it
+ * with gains s - A must give the volume at rest.
  * @param scan        closed lungs with the scan's vertices
- * @param directions  [N, 3] directions d of displacement, mm
- * @param amounts     [N] catch F (force that each vertex keeps), with gravity as in the scan
- * @param reference   has the volumes; scan_gains are written
+ * @param bend        [3] curvature of the path from full inflation to rest (supine_volume_bend)
+ * @param directions  [N, 3] directions of displacement, mm
+ * @param amounts     [N] force that each vertex keeps in equilibrium, with gravity as in the scan
+ * @param reference   in: scan and volumes; out: scan_gains
  * @retval SUPINE_ERROR_NUMERICAL  no gains give these volumes */
 supine_status supine_reference_find_gains(const supine_lungs *scan, const double bend[3],
                                           const double *directions, const double *amounts,

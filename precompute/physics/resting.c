@@ -10,26 +10,30 @@
 
 #include "precompute/physics/resting.h"
 
-/* Volumes at rest of healthy people, gas and tissue, as shares of the volume at full inflation.
- * Sources, for both lungs together:
+/* Volumes at rest of healthy people divided by the volume at full inflation, both gas and tissue.
+ * Rows: left lung, right lung. Columns: lying on the left, on the right, supine, prone, head down,
+ * upright. Sources, for both lungs together:
  *
- *   supine     0.43 = (3.39 - 0.806 + 0.86) / (7.21 + 0.86): functional residual and total lung
- *              capacity upright, 3.39 L and 7.21 L (GLI 2021, Hall et al., Eur Respir J 57, man
- *              of 45 years, 1.78 m); decrease to supine 0.806 L (SD 0.293; Lumb & Nimmo 1991,
- *              Anesth Analg 73:422, n 13); tissue 0.86 L (Denison 1986, Thorax 41:620, n 12)
+ *   supine     0.43 = (3.39 L - 0.806 L + 0.86 L) / (7.21 L + 0.86 L)
+ *              3.39, 7.21  functional residual and total lung capacity upright, man of 45 years,
+ *                          1.78 m (GLI 2021, Hall et al., Eur Respir J 57)
+ *              0.806       decrease of the functional residual capacity from upright to supine
+ *                          (SD 0.293; Lumb & Nimmo 1991, Anesth Analg 73:422, 13 people)
+ *              0.86        tissue (Denison 1986, Thorax 41:620, 12 people)
  *   prone, on either side   0.47, 0.35 L above supine (Lumb & Nimmo; one figure for all three)
- *   upright    15 % above supine (Yamada 2020, Sci Rep 10, n 100: 3.2 L seated, 2.7 L supine)
+ *   upright    15 % above supine (Yamada 2020, Sci Rep 10, 100 people: 3.2 L seated, 2.7 L supine)
  *   head down  as supine, because no volume in litres was found; with the feet down, end-expiratory
  *              volume follows the sine of the tilt and is at or near its minimum when horizontal
  *              ("Effects of body tilting on respiratory mechanics", J Appl Physiol 1956)
  *
- * The ratio of the left to the right lung's share is taken from a table after Svanberg 1957, except
- * for the left lung's 0.563 when lying on the right, for which no source was found: it follows from
- * the lower lung's share of a breath in that posture. */
+ * The ratio of the left to the right lung's share is from a table after Svanberg 1957. The only
+ * exception is 0.563, the left lung when lying on the right. No source was found for it; it follows
+ * from the lower lung's share of a breath in that posture. */
 static const supine_resting usual = {.share = {{0.413, 0.563, 0.418, 0.464, 0.418, 0.481},
                                                {0.546, 0.435, 0.440, 0.475, 0.440, 0.506}}};
 
-static const double least_share = 0.1; /* volume of the tissue / full volume */
+/* Limits of a volume at rest divided by the volume at full inflation; the tissue alone has 0.1. */
+static const double least_share = 0.1;
 static const double most_share = 1.0;
 
 supine_resting supine_reference_resting_default(void) {
@@ -40,8 +44,9 @@ static bool is_share(double share) {
   return share > least_share && share <= most_share;
 }
 
-/* Read the volume at rest for an axis, "0.43", "0.42/0.44" or "2600mL". Return false if the text
- * has another form or is out of range. */
+/* Read the volume at rest with gravity along an axis: a share of the full volume of both lungs
+ * ("0.43") or of the left and the right lung ("0.42/0.44"), or mL of both lungs ("2600mL"). Return
+ * false if the text has another form or is out of range. */
 static bool read_value(supine_resting *resting, size_t axis, const char *text) {
   char *end = NULL;
   const double first = strtod(text, &end);
@@ -106,7 +111,7 @@ void supine_reference_resting_print(const supine_resting *resting, char *text, s
 supine_status supine_reference_resting_settle(supine_resting *resting, size_t count,
                                               const int *side, const double *full,
                                               supine_error *error) {
-  double sum = 0.0; /* sum of given volume / default volume over postures */
+  double sum = 0.0; /* sum of (given volume) / (default volume) over all postures given in mL */
   size_t known = 0;
   for (size_t axis = 0; axis < 6; ++axis) {
     double rest = 0.0;
@@ -169,13 +174,13 @@ double supine_reference_along_axes(const double values[6], const double g[3]) {
   return value;
 }
 
-/* Let e_k be the mean of the values along +k and -k for k = x, y, z, and m the mean of e_x, e_y,
- * e_z. At the unit vector g = (x, y, z), the sum of e_k g_k^2 is
+/* The linear terms of supine_reference_along_axes give the harmonics that are proportional to x, y
+ * and z. For its quadratic terms, let e_k be the mean of the values along +k and -k, and m the mean
+ * of e_x, e_y and e_z. At the unit vector (x, y, z), the sum of these terms is
  *
- *     m + (e_z - m) (3 z^2 - 1) / 2 + (e_x - e_y) / 2 (x^2 - y^2)
+ *     e_x x^2 + e_y y^2 + e_z z^2 = m + (e_z - m) (3 z^2 - 1) / 2 + (e_x - e_y) (x^2 - y^2) / 2
  *
- * The functions 1, 3 z^2 - 1 and x^2 - y^2 are harmonics divided by constants. The coefficient of
- * each function is divided by the same constant. */
+ * The functions 1, 3 z^2 - 1 and x^2 - y^2 times a constant each are harmonics. */
 void supine_reference_harmonics(const double values[6], double harmonics[9]) {
   static const size_t axis_term[3] = {3, 1, 2}; /* harmonics proportional to x, y and z */
   double even[3];

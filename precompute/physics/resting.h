@@ -2,10 +2,11 @@
 /** @file
  * Compute volumes at rest and at full inflation, by posture and by lung.
  *
- * With gravity along g, lung l at rest holds the share r_l(g) of F_l, the volume of its reference
- * surface, tissue included. At full inflation it holds phi(g) F_l with phi(g) = 1 + 0.109 max(0,
- * -g_z)^2, which is larger upright. Between these volumes, each lung fills linearly (Milic-Emili, J
- * Appl Physiol 1966), and both lungs have the same degree of filling t:
+ * Volumes are gas and tissue. F_l is the reference volume of lung l: the volume of its reference
+ * surface, which shows full inflation when supine. With gravity along g, the lung has the volume
+ * r_l(g) F_l at rest, and phi(g) F_l at full inflation, where phi(g) = 1 + 0.109 max(0, -g_z)^2 is
+ * larger upright. Between these volumes, each lung fills linearly (Milic-Emili, J Appl Physiol
+ * 1966), and both lungs have the same degree of filling t:
  *
  *     V_l = F_l [r_l + (phi - r_l) t]      for t >= 0; t is 0 at rest and 1 at full inflation
  *     V_l = F_l r_l (1 + t)                for t < 0; both lungs shrink in proportion */
@@ -16,21 +17,21 @@
 
 #include <supine/status.h>
 
-/** Relative increase of the volume at full inflation from supine to upright, both lungs, mean of 32
- * people; left lung 0.116, right lung 0.103 (Yamada et al., Respiration 99:598, 2020). */
+/** Relative increase of the volume of both lungs at full inflation from supine to upright (left
+ * 0.116, right 0.103; mean of 32 people; Yamada et al., Respiration 99:598, 2020). */
 #define SUPINE_FULL_UPRIGHT_GAIN 0.109
 
 /** Usual share of the left lung in the full volume of both lungs. */
 #define SUPINE_LEFT_SHARE 0.45
 
-/** Volumes at rest with gravity along +x, -x, +y, -y, +z, -z: lying on the left, on the right,
- * supine, prone, head down, upright. */
+/** Volumes at rest in six postures, with gravity along +x, -x, +y, -y, +z, -z: lying on the left,
+ * on the right, supine, prone, head down, upright. */
 typedef struct supine_resting {
-  double share[2][6]; /**< volume at rest / reference volume; [0] left lung, [1] right lung */
-  double ml[6];       /**< volume of both lungs together, mL; 0 where a share was given */
+  double share[2][6]; /**< [lung, posture] volume at rest / reference volume; left lung first */
+  double ml[6];       /**< [posture] volume of both lungs together, mL; 0 to use `share` */
 } supine_resting;
 
-/** Return the default shares, for healthy people; resting.c names their sources. */
+/** Return the default volumes at rest, those of healthy people; resting.c names their sources. */
 supine_resting supine_reference_resting_default(void);
 
 /** Set the volume at rest in a posture with gravity along an axis, such as "prone" (posture.h).
@@ -40,16 +41,16 @@ supine_resting supine_reference_resting_default(void);
 supine_status supine_reference_resting_set(supine_resting *resting, const char *posture,
                                            const char *value, supine_error *error);
 
-/** Print the shares so that --resting reads them back: "left=0.413/0.546,...,upright=0.481/0.506".
- * 256 characters are enough. */
+/** Print the volumes at rest as shares of the full volume, left lung/right lung, in the form of the
+ * option --resting: "left=0.413/0.546,...,upright=0.481/0.506". 256 characters are enough. */
 void supine_reference_resting_print(const supine_resting *resting, char *text, size_t size);
 
-/** Convert volumes at rest in mL into shares of the reference volumes F. If a volume was given in
- * mL for some posture, shares that still have their default are multiplied by the mean ratio of
- * given to default volume.
+/** Convert volumes at rest in mL into shares of the reference volumes. If volumes were given in mL,
+ * also scale the default shares of all other postures, by the mean over the given volumes of
+ * (given volume) / (default volume).
  * @param side  [count] +1: left lung, -1: right lung
- * @param full  [count] F, mL
- * @retval SUPINE_ERROR_ARGUMENT  a share out of range: less than the tissue alone, or above 1 */
+ * @param full  [count] reference volume of each lung, mL
+ * @retval SUPINE_ERROR_ARGUMENT  a share is below that of the tissue alone, or above 1 */
 supine_status supine_reference_resting_settle(supine_resting *resting, size_t count,
                                               const int *side, const double *full,
                                               supine_error *error);
@@ -61,16 +62,18 @@ double supine_reference_resting_share(const supine_resting *resting, int side, c
 /** Compute the volume at full inflation as a share of the reference volume, for gravity along g. */
 double supine_reference_full_share(const double g[3]);
 
-/** Compute the volume of both lungs at rest as a share of their reference volume, of which the left
- * lung has SUPINE_LEFT_SHARE. */
+/** Compute the volume of both lungs at rest divided by their reference volume, with gravity along
+ * g. Assume that the left lung has the share SUPINE_LEFT_SHARE of the reference volume. */
 double supine_reference_resting_total(const supine_resting *resting, const double g[3]);
 
-/** Interpolate the values v along the axes +x, -x, +y, -y, +z, -z at the unit vector g:
+/** Interpolate values v that are given along the axes +x, -x, +y, -y, +z, -z. At the unit vector g,
+ * with k for x, y and z, return
  *
- *     sum over k of (v(+k) - v(-k)) / 2 g_k + (v(+k) + v(-k)) / 2 g_k^2 */
+ *     sum over k of [(v(+k) - v(-k)) g_k + (v(+k) + v(-k)) g_k^2] / 2 */
 double supine_reference_along_axes(const double values[6], const double g[3]);
 
-/** Find the real harmonics [9] of bands 0 to 2 (sh.h) that sum to supine_reference_along_axes. */
+/** Find the coefficients [9] of the real spherical harmonics of bands 0 to 2 for the function that
+ * supine_reference_along_axes evaluates. */
 void supine_reference_harmonics(const double values[6], double harmonics[9]);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Solve the full physics for one direction of gravity. */
+/* Compute the displacements for one direction of gravity. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Solve the full physics for one direction of gravity, without a basis. */
+ * Compute the displacements for one direction of gravity with the model, without a basis. */
 #ifndef SUPINE_SOLVE_H
 #define SUPINE_SOLVE_H
 
@@ -9,33 +9,34 @@
 #include "precompute/physics/equilibrium.h"
 #include "precompute/physics/model.h"
 
-/** Solution for one direction of gravity: displacements u_i = s F_i d_i at scale s. */
+/** Displacements for one direction of gravity. Vertex i moves by scale * catch_[i] * directions[i],
+ * where the scale is one factor for all vertices. */
 typedef struct supine_solution {
   size_t vertex_count;
-  supine_equilibrium *equilibrium; /**< matrix of the lungs, kept for their next solve */
-  double *catch_;                  /**< [N] catch F (equilibrium.h) */
-  double *directions;              /**< [N, 3] directions, mm, for collapsed lungs as in
-                                      supine_tissue_collapse_directions */
-  double cubic[3]; /**< volume gained at scale s: cubic[0] s + cubic[1] s^2 + cubic[2] s^3, mL */
-  supine_volume_form form[2]; /**< volume gained by each lung, mL */
+  supine_equilibrium *equilibrium; /**< equations of the lungs, kept for their next solve */
+  double *catch_;                  /**< [N] force that each vertex keeps in equilibrium */
+  double *directions;              /**< [N, 3] direction of displacement of each vertex, mm, smaller
+                                      in a collapsed lung (supine_tissue_collapse_directions) */
+  double cubic[3]; /**< volume, mL, added at scale s: cubic[0] s + cubic[1] s^2 + cubic[2] s^3 */
+  supine_volume_form form[2]; /**< [lung] added volume, mL, as a polynomial of the lung's gains */
 } supine_solution;
 
-/** Solve for gravity along the unit vector `g`.
+/** Compute the displacements for gravity along the unit vector `g`.
  * @param solution  zero-initialised, or an earlier solution of the same lungs, whose memory is then
  *   reused; vertices may have moved. After an error it is empty. Release it with
- *   supine_physics_solution_free
+ *   supine_physics_solution_free.
  * @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MESH, SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
 supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model *model,
                                    const double g[3], supine_solution *solution,
                                    supine_error *error);
 void supine_physics_solution_free(supine_solution *solution);
 
-/** Find the largest displacement at scale 1, |F_i d_i|, mm. */
+/** Return the length, mm, of the largest displacement of a vertex at scale 1. */
 double supine_physics_solution_largest(const supine_solution *solution);
 
-/** Compute positions [N, 3] p + s F d, mm.
- * @param reference  p: the lungs' mesh; for collapsed lungs the surface of supine_tissue_collapse
- * @param scale      s */
+/** Compute the positions [N, 3] of displaced vertices, mm.
+ * @param reference  mesh of the lungs; for collapsed lungs the surface of supine_tissue_collapse
+ * @param scale      factor on the displacements */
 void supine_physics_solution_apply(const supine_solution *solution, const supine_mesh *reference,
                                    double scale, double *positions);
 

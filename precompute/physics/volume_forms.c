@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute the change of closed lungs' volume as linear, quadratic and cubic forms of weights. */
+/* Compute the change of volume of closed lungs as a polynomial of the weights of modes. */
 #include <cblas.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,12 +9,12 @@
 #include "sh/base/parallel.h"
 #include "sh/base/vec3.h"
 
-/* The triangles of each lung are summed in PARTS parts, BLOCK triangles at a time. The number of
- * parts is fixed, so that the sums do not depend on the number of threads. A supine_volume_form has
- * FORM terms. */
+/* The triangles of each lung are split into PARTS ranges, which are summed separately, BLOCK
+ * triangles at a time. The number of ranges is fixed, so that the sums do not depend on the number
+ * of threads. FORM: number of terms of a supine_volume_form. */
 enum { PARTS = 16, BLOCK = 128, FIELDS = SUPINE_VOLUME_FIELDS, FORM = 7 };
 
-static const double sixth_ml = 1e-3 / 6.0; /* volume of a tetrahedron in mL / determinant in mm^3 */
+static const double sixth_ml = 1e-3 / 6.0; /* mL of a tetrahedron per mm^3 of its determinant */
 
 void supine_physics_volume_forms_free(supine_volume_forms *forms) {
   free(forms->linear);
@@ -25,15 +25,16 @@ void supine_physics_volume_forms_free(supine_volume_forms *forms) {
 
 typedef struct lung_work {
   const supine_lungs *lungs;
-  const double *directions; /* [N, 3] mm; NULL if each column holds vectors */
-  const double *columns;    /* [N, count]; [N, 3, count] if directions is NULL */
-  size_t count;             /* number of columns */
+  const double *directions; /* [N, 3] direction of displacement of each vertex, mm, or NULL */
+  const double *columns;    /* [N, count] displacements by the modes, as multiples of `directions`;
+                               [N, 3, count] displacements, mm, if `directions` is NULL */
+  size_t count;             /* number of modes, or of fields */
   size_t lung;
   double centre[3]; /* centre of the box of all lungs, mm, subtracted from each vertex */
-  double *sums;     /* [PARTS, size] sums of each part */
-  size_t size;      /* number of sums of one part */
+  double *sums;     /* [PARTS, size] coefficients of the volume polynomial, by triangle range */
+  size_t size;      /* number of coefficients of the volume polynomial */
   double *space;    /* [threads, room] work space */
-  size_t room;
+  size_t room;      /* number of elements of the work space of one thread */
 } lung_work;
 
 static lung_work begin_lung(const supine_lungs *lungs, const double *directions,
@@ -62,7 +63,7 @@ static size_t part_begin(const lung_work *work, size_t part) {
   return begin[0] + (begin[1] - begin[0]) * part / PARTS;
 }
 
-/* Return the index of the pair of columns k and l, in either order, among all pairs of columns. */
+/* Return the index of the pair of modes k and l, in either order, among all pairs of modes. */
 static size_t pair_of(size_t k, size_t l) {
   return k > l ? k * (k + 1) / 2 + l : l * (l + 1) / 2 + k;
 }
@@ -79,10 +80,13 @@ static void add_pairs(size_t count, double factor, const double *a, const double
   }
 }
 
-/* Add the cubic terms of n triangles to sums [pairs, count]. The first index counts pairs of
- * columns, taken at corners 0 and 1; the second counts columns, taken at corner 2. A triangle adds
- * det(u0, u1, u2) of its corners' displacements u, averaged over both orders of the pair. With
- * directions d and columns c, it is det(d0, d1, d2) c0 c1 c2. x is work space. */
+/* Add the cubic terms of n triangles to sums [pairs of modes, modes]. For the pair of modes (k, l)
+ * and the mode m, a triangle adds
+ *
+ *     (det(u0k, u1l, u2m) + det(u0l, u1k, u2m)) / 2
+ *
+ * where uvk is the displacement of corner v by mode k. If modes are multiples c of directions d,
+ * det(u0k, u1l, u2m) = det(d0, d1, d2) c0k c1l c2m. x is work space. */
 SUPINE_CLONES static void add_cubic(const lung_work *work, size_t begin, size_t n, const double *u,
                                     double *x, double *sums) {
   const size_t count = work->count;
@@ -116,9 +120,14 @@ SUPINE_CLONES static void add_cubic(const lung_work *work, size_t begin, size_t 
 }
 
 /* Expand the determinants det(p0 + u0, p1 + u1, p2 + u2) of n triangles, at most BLOCK, with
- * corners p and displacements u, and add the terms to `sums`. Terms linear in u have a sum for each
- * axis of u, terms quadratic in u have one for each axis of p. The arrays u, area and at hold the
- * first corners of all n triangles, then the second corners, then the third. */
+ * corners p and displacements u, and add these terms to `sums`:
+ *
+ *     linear     sum over corners v of u_v . (p_v+1 x p_v+2), a sum for each axis of u
+ *     quadratic  sum over corners v of p_v . (u_v+1 x u_v+2), a sum for each axis of p
+ *     cubic      det(u0, u1, u2)
+ *
+ * The arrays u, area (cross products of corners) and at (corners) hold the first corners of all n
+ * triangles, then the second corners, then the third. */
 SUPINE_CLONES static void add_block(const lung_work *work, size_t begin, size_t n, double *u,
                                     double *sums) {
   const size_t count = work->count;
@@ -180,7 +189,8 @@ static void forms_range(void *context, size_t begin, size_t end, size_t thread) 
   }
 }
 
-/* Add the sums of all parts, times `unit`, to the forms of one lung. Make the forms symmetric. */
+/* Add the sums of all triangle ranges, times `unit` (mL per mm^3 of the determinants), to the
+ * coefficients of one lung's volume. Make these coefficients symmetric in the modes. */
 static void forms_collect(const lung_work *work, double unit, supine_volume_forms *forms) {
   const size_t n = work->count;
   double *linear = forms->linear + 3 * work->lung * n;

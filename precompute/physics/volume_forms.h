@@ -1,11 +1,17 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Compute the volume of a deformed lung without a pass over its vertices.
+ * Compute the volume of a deformed lung from weights and gains alone, not from its vertices.
  *
- * If vertex i moves by u_ij = A_j (sum over k of w_k c_ik) d_ij along axis j, with gains A, weights
- * w of K columns c, and directions d, the volume that a closed surface gains is a polynomial of A
- * and w (supine/volume.h). Its coefficients, the forms, are computed once for all gains and
- * weights. */
+ * Let vertex i move along axis j by
+ *
+ *     u_ij = A_j (sum over k of w_k c_ik) d_ij
+ *
+ *     A_j   gain along axis j: a factor on all displacements of the lung
+ *     w_k   weight of mode k
+ *     c_ik  displacement of vertex i by mode k, as a multiple of its direction d_i, mm
+ *
+ * Then the volume that a closed surface gains is a polynomial of A and w (supine/volume.h). Its
+ * coefficients, called volume forms, are computed once for all gains and weights. */
 #ifndef SUPINE_VOLUME_FORMS_H
 #define SUPINE_VOLUME_FORMS_H
 
@@ -16,24 +22,24 @@
 /** Largest number of modes that 'supine precompute' writes to a basis. */
 enum { SUPINE_MODES_MADE_MAX = 64 };
 
-/** Coefficients of the volumes that G lungs gain, mL, as polynomials of K weights and the gains. */
+/** Coefficients of each lung's change of volume, mL, in terms of mode weights and gains. */
 typedef struct supine_volume_forms {
   size_t lung_count;
-  size_t column_count;
-  double *linear;    /**< [G, 3, K] by lung, axis and weight */
-  double *quadratic; /**< [G, 3, K, K] symmetric in the last two indices */
-  double *cubic;     /**< [G, K, K, K] symmetric in the last three indices */
+  size_t column_count; /**< number of modes */
+  double *linear;      /**< [lungs, 3 axes, modes] coefficients for one weight */
+  double *quadratic;   /**< [lungs, 3 axes, modes, modes] for two weights; symmetric in the modes */
+  double *cubic; /**< [lungs, modes, modes, modes] for three weights; symmetric in the modes */
 } supine_volume_forms;
 
 void supine_physics_volume_forms_free(supine_volume_forms *forms);
 
-/** Compute the forms of closed lungs. Free them with supine_physics_volume_forms_free.
- * @param share       [G] volume of each lung divided by its healthy volume (disease.h); NULL for 1
- * @param directions  [N, 3] directions d for healthy lungs, mm; if NULL, each column holds vectors,
- *   and u_ij = A_j sum over k of w_k c_ijk
- * @param columns     [N, count] c; without directions [N, 3, count]
- * Cost: count^3 / 2 multiplications per triangle, three times that without directions. Uses all
- * cores.
+/** Compute the coefficients of the volume of closed lungs for `count` modes. Release them with
+ * supine_physics_volume_forms_free.
+ * @param share       [lungs] volume divided by healthy volume (disease.h); NULL for healthy lungs
+ * @param directions  [N, 3] directions of displacement in healthy lungs, mm, or NULL
+ * @param columns     [N, count] displacements by the modes, as multiples of the directions; without
+ *                    directions [N, 3, count] displacement vectors, mm
+ * Uses all cores. Cost: count^3 / 2 multiplications per triangle, without directions 3 times that.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_physics_volume_forms_create(const supine_lungs *lungs, const double *share,
                                                  const double *directions, const double *columns,
@@ -43,26 +49,26 @@ supine_status supine_physics_volume_forms_create(const supine_lungs *lungs, cons
 /** Largest number of fields in one call of supine_physics_volume_of_fields. */
 enum { SUPINE_VOLUME_FIELDS = 16 };
 
-/** Compute the volume form of each closed lung for each of `count` fields f, which move vertex i by
- * u_ij = A_j f_i d_ij.
+/** Compute the volume that each of `count` displacement fields adds to each closed lung, as a
+ * polynomial of the lung's gains.
  * @param share, directions  as in supine_physics_volume_forms_create; directions are not NULL
  * @param count   at most SUPINE_VOLUME_FIELDS
- * @param fields  [N, count] f
- * @param forms   [G, count] */
+ * @param fields  [N, count] displacement of each vertex, as a multiple of its direction
+ * @param forms   [lungs, count] output */
 void supine_physics_volume_of_fields(const supine_lungs *lungs, const double *share,
                                      const double *directions, const double *fields, size_t count,
                                      supine_volume_form *forms);
 
-/** Compute the change of one lung's volume, mL, as a polynomial of the gains, at weights [K]. */
+/** Compute one lung's change of volume at given mode weights, as a polynomial of its gains. */
 void supine_physics_volume_forms_contract_lung(const supine_volume_forms *forms, size_t lung,
                                                const double *weights, supine_volume_form *form);
 
-/** Compute the volume that all lungs gain at weights [K] with one gain s on all axes, as
- * coefficients cubic [3] of s, s^2 and s^3, mL. */
+/** Compute the change of volume of all lungs at given mode weights as a polynomial of one gain s of
+ * all axes: the coefficients cubic [3] of s, s^2 and s^3, mL. */
 void supine_physics_volume_forms_contract(const supine_volume_forms *forms, const double *weights,
                                           double cubic[3]);
 
-/** Set all gains of a form to s. Add its coefficients of s, s^2 and s^3, mL, to cubic [3]. */
+/** Add a lung's volume at equal gains s to cubic [3]: coefficients of s, s^2 and s^3, mL. */
 void supine_physics_volume_form_add(const supine_volume_form *form, double cubic[3]);
 
 #endif
