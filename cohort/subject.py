@@ -3,10 +3,10 @@
 
     python3 subject.py FOLDER/result.json VOLUME yes|no 'PRECOMPUTE OPTIONS' MESH...
 
-Write basis.safetensors, report.html (if yes) and result.json into the folder. If the program refuses
-the input or its numbers, write its message to result.json as the failure. If an output cannot be written or a
-signal ends the program, exit with 1, so that the next run computes the subject again. The program is $SUPINE
-(default: supine)."""
+Write basis.safetensors, report.html (if yes) and result.json into the folder. VOLUME is
+the volume of the lungs for the comparison, such as rest. If the program fails for these meshes and options, write its
+message to result.json as the failure. If an output cannot be written or a signal ends the program, exit with 1, so that
+the next run computes the subject again. The program is $SUPINE (default: supine)."""
 import json
 import os
 import shlex

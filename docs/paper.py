@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Print docs/paper.md, which compares this build with the paper row by row:
+"""Print docs/paper.md, a table that compares this build with [Santhanam2008]:
 
     python3 docs/paper.py build/release > docs/paper.md
 
@@ -21,7 +21,7 @@ def run(*words):
 
 
 def info(*options):
-    """Return the output of 'supine info --json' for a basis of the lungs made by the paper's law."""
+    """Return the output of 'supine info --json' for a basis made with the displacement law of [Santhanam2008]."""
     run("precompute", "lungs.ply", "--law", "paper", "-o", "basis.safetensors", *options)
     return json.loads(run("info", "basis.safetensors", "--json"))
 
@@ -32,7 +32,7 @@ def rows(name):
 
 
 def visits(method):
-    """Return the number of link visits after which the relative error is 1e-6."""
+    """Return how many times a method reads a link between two nodes until its relative error is 1e-6."""
     return next(round(float(row["link_visits"])) for row in rows("fig7_convergence")
                 if row["method"] == method and float(row["relative_rms_error"]) <= 1e-6)
 
@@ -46,7 +46,7 @@ def apart(name, a, b):
 def off_line():
     """Return the largest deviation of the displacement from the straight line through 0 and 500 mL, in four postures.
 
-    In percent of the displacement at 500 mL."""
+    The deviation is in percent of the displacement at 500 mL."""
     of = [row for row in rows("linearity") if float(row["volume_mL"]) <= 500]
     return max(100 * abs(float(row[p]) / float(of[-1][p]) - float(row["volume_mL"]) / 500) for row in of
                for p in ("supine", "prone", "left", "right"))

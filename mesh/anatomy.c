@@ -1,14 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /* Find which of the 48 possible assignments of coordinates to axes fits the shape of lungs best.
  *
- * The score of an assignment is the sum of the four terms below; for a single lung, the fourth is
- * left out. They contain third moments of a lung of volume V about the lung's centre,
+ * The score of an assignment is the sum of the four terms below. For a single lung, the fourth term
+ * is left out. The terms contain third moments of a lung about its centroid, normalised by its
+ * volume V and by standard deviations,
  *
  *     m_abc = integral of a b c dV / (V sd_a sd_b sd_c)
  *
  * where a, b and c are coordinates x (outwards from the midline), y (to the back) or z (to the
- * head), and sd_a is the standard deviation of a. The last column of the table shows the range of
- * each term in nine lungs of five people and in two synthetic lungs:
+ * head), and sd_a is the standard deviation of coordinate a over the volume. The last column of the
+ * table shows the range of each term in nine lungs of five people and in two synthetic lungs:
  *
  *     hollow towards the heart   m_xxx - m_xyy - m_xzz     0.23 to 0.59
  *     deepest at the back        m_yzz - m_yyy             0.49 to 0.89
@@ -23,11 +24,11 @@
 
 #include "mesh/anatomy.h"
 
-/* Axes fit clearly better than others if their score is higher by more than this. The score of the
- * true axes was higher by 0.35 to 0.7. */
+/* Axes fit clearly better than other axes if their score is higher by more than this. In the lungs
+ * of the table, the score of the true axes was higher by 0.35 to 0.7. */
 static const double least_lead = 0.2;
-/* Limit of |ln(V_right / V_left)| in the score, with the volumes V of the lungs, so that a
- * collapsed lung does not decide alone. */
+/* Largest contribution of ln(V_right / V_left) to the score, in magnitude, so that the axes do not
+ * depend on the volumes alone if a lung is collapsed. */
 static const double most_ratio = 0.25;
 /* Axes are refused for a single lung if its standard deviation along x (side to side) is more than
  * this times that along y or z. In real lungs it is 0.6 to 0.7 times that along y. */
@@ -36,14 +37,16 @@ static const double thin = 0.85;
  * the others and its kurtosis is less than `most_kurtosis`, that of a uniform distribution. */
 static const double wide = 1.15;
 static const double most_kurtosis = 1.8;
-/* A lung's side is unknown if the first term of its score (above) is below this in magnitude. */
+/* The side of a lung (left or right) is unknown if the first term of its score, see the table
+ * above, is below this in magnitude. */
 static const double least_side = 0.12;
 
 typedef struct shape {
-  double volume;                  /* mm^3 */
-  double centre[3], deviation[3]; /* centroid and standard deviation, mm */
+  double volume; /* mm^3 */
+  /* centroid of the volume, and standard deviation along each axis, mm */
+  double centre[3], deviation[3];
   double kurtosis[3];
-  double moments[3][3][3]; /* third moments, normalised by volume and deviations */
+  double moments[3][3][3]; /* [a][b][c] third moments m_abc, see the top of this file */
 } shape;
 
 static void add_point(const double p[3], double w, double sum[3], double square[3],
@@ -73,9 +76,10 @@ static double mean_fourth(double a, double b, double c) {
   return abc / 35.0;
 }
 
-/* Integrate moments about `origin` over the tetrahedra between `origin` and each triangle: those of
- * orders 1 to 3 by Keast's five-point rule, which is exact for cubic polynomials. Return the sum of
- * the tetrahedra's signed volumes. */
+/* Integrate moments about `origin` over the enclosed volume, as a sum over the tetrahedra between
+ * `origin` and each triangle: `sum` (first moments), `square` and `third` by Keast's five-point
+ * rule, which is exact for cubic polynomials, and `fourth` exactly. Return the volume, which is
+ * negative if the triangles face inwards. */
 static double integrate(const supine_mesh *mesh, const double origin[3], double sum[3],
                         double square[3], double third[3][3][3], double fourth[3]) {
   static const double rule[5][4] = {{-0.8, 0.25, 0.25, 0.25},
@@ -126,8 +130,9 @@ static void find_box(const supine_mesh *mesh, double low[3], double high[3]) {
   }
 }
 
-/* Measure a surface. Return false if it encloses less than 0.1 % of the volume of its box. */
-static bool measure(const supine_mesh *mesh, shape *s) {
+/* Compute the volume, centroid and normalised moments of a surface. Return false if the surface
+ * encloses less than 0.1 % of the volume of its bounding box. */
+static bool measure_shape(const supine_mesh *mesh, shape *s) {
   double sum[3];
   double square[3];
   double fourth[3];
@@ -137,7 +142,8 @@ static bool measure(const supine_mesh *mesh, shape *s) {
   for (int k = 0; k < 3; ++k) {
     s->centre[k] = 0.5 * (low[k] + high[k]);
   }
-  for (int pass = 0; pass < 2; ++pass) { /* moments about the box's centre, then the centroid */
+  /* first about the centre of the bounding box, then about the centroid */
+  for (int pass = 0; pass < 2; ++pass) {
     s->volume = integrate(mesh, s->centre, sum, square, s->moments, fourth);
     if (mesh->triangle_count == 0 ||
         fabs(s->volume) <= 1e-3 * (high[0] - low[0]) * (high[1] - low[1]) * (high[2] - low[2])) {
@@ -159,7 +165,7 @@ static bool measure(const supine_mesh *mesh, shape *s) {
   return isfinite(s->deviation[0]) && isfinite(s->deviation[1]) && isfinite(s->deviation[2]);
 }
 
-/* Axes to test: coordinate a in these axes is sign[a] times coordinate from[a] of the surface. */
+/* Axes to test. Coordinate a in these axes is sign[a] times coordinate from[a] of the surface. */
 typedef struct view {
   int from[3];
   double sign[3];
@@ -234,7 +240,7 @@ supine_mesh_anatomy supine_mesh_anatomy_find(const supine_mesh *lungs, size_t co
   double of_lps = -INFINITY;
   supine_axes which = SUPINE_AXES_LPS;
   for (size_t lung = 0; lung < count; ++lung) {
-    if (!measure(&lungs[lung], &s[lung])) {
+    if (!measure_shape(&lungs[lung], &s[lung])) {
       return found;
     }
   }

@@ -12,9 +12,9 @@ typedef struct supine_mesh_anatomy {
   bool joined;      /**< whether a single surface seems to hold both lungs */
 } supine_mesh_anatomy;
 
-/** Find the axes from third moments of volume: a lung is narrow at the head, reaches deepest at the
- * back and is hollow towards the heart; the right lung is larger, and the left lung leaves room for
- * the heart.
+/** Find the axes from third moments of the volume. A lung is narrow at the head, reaches lowest at
+ * the back, and is hollow towards the heart. The right lung is larger than the left lung, which
+ * leaves room for the heart.
  * @param lungs  [count] one or two surfaces, each a lung */
 supine_mesh_anatomy supine_mesh_anatomy_find(const supine_mesh *lungs, size_t count);
 

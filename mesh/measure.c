@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute volume, box, areas and normals of a surface. */
+/* Compute volume, bounding box, areas and normals of a surface. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -20,7 +20,7 @@ double supine_mesh_volume(const supine_mesh *mesh) {
   supine_mesh_box(mesh, minimum, maximum);
   double sum = 0.0;
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
-    double p[3][3]; /* corners relative to the box's centre, to avoid cancellation */
+    double p[3][3]; /* corners relative to the centre of the bounding box, to avoid cancellation */
     for (int k = 0; k < 3; ++k) {
       const double *vertex = mesh->vertices + 3 * (size_t)mesh->triangles[3 * t + (size_t)k];
       for (int axis = 0; axis < 3; ++axis) {

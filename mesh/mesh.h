@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * Triangle surfaces of lungs: load, weld, topology, measure, save.
+ * Load, measure and save triangle surfaces of lungs, and find their topology.
  *
- * Inside the program a mesh is in millimetres and in the DICOM patient axes, LPS: +x left,
- * +y posterior, +z head. */
+ * Inside the program a mesh is in millimetres and in the DICOM patient axes, LPS: +x left, +y
+ * posterior, +z head. */
 #ifndef SUPINE_MESH_H
 #define SUPINE_MESH_H
 
@@ -17,7 +17,8 @@
  * direction in which each coordinate grows (Left, Right, Posterior, Anterior, Superior, Inferior).
  * supine_mesh_axes_parse also returns values that have no name here. */
 typedef enum supine_axes {
-  SUPINE_AXES_AUTO = 0, /**< the axes of the file's SPACE tag, or LPS if it has none */
+  /** the axes that a SPACE tag in the file names, or LPS without such a tag */
+  SUPINE_AXES_AUTO = 0,
   SUPINE_AXES_LPS = 1,
   SUPINE_AXES_RAS = 4,
   SUPINE_AXES_COUNT = 49
@@ -31,7 +32,7 @@ void supine_mesh_axes_letters(supine_axes axes, char letters[4]);
 void supine_mesh_axes_matrix(supine_axes axes, double matrix[3][3]);
 /** Convert a point or vector to LPS in place, and multiply it by `scale`. */
 void supine_mesh_axes_apply(supine_axes axes, double scale, double point[3]);
-/** Find the axes whose matrix is the matrix of `then` times the matrix of `first`. */
+/** Combine two conversions: find the axes whose matrix is that of `then` times that of `first`. */
 supine_axes supine_mesh_axes_after(supine_axes first, supine_axes then);
 /** Return whether axes are left-handed, so that conversion to LPS reverses the triangles. */
 bool supine_mesh_axes_mirrored(supine_axes axes);
@@ -47,19 +48,19 @@ typedef struct supine_mesh {
 /** How to read a file. If all fields are 0, the file names the axes, and the unit is 1 mm. */
 typedef struct supine_mesh_load_options {
   supine_axes axes;
-  double millimetres_per_unit; /**< 0 stands for 1 */
+  double millimetres_per_unit; /**< length of the unit of coordinates, mm; 0 means 1 */
 } supine_mesh_load_options;
 
 typedef struct supine_mesh_report {
-  size_t degenerate_faces;      /**< dropped faces with fewer than three different corners */
-  size_t unreferenced_vertices; /**< dropped vertices that are part of no triangle */
+  size_t degenerate_faces; /**< number of dropped faces with fewer than three different corners */
+  size_t unreferenced_vertices; /**< number of dropped vertices that no triangle uses */
   supine_axes axes;             /**< axes assumed for the file */
-  bool axes_from_tag;           /**< whether the axes come from a SPACE tag */
+  bool axes_from_tag; /**< whether a SPACE tag in the file, as by 3D Slicer, gave the axes */
 } supine_mesh_report;
 
-/** Read one surface: PLY and VTP directly, OBJ, STL and other formats through assimp. Polygons are
- * cut into triangles, all nodes of a scene are joined, and vertices at the same position are
- * welded, in the order of their first appearance.
+/** Read one surface: PLY and VTP by readers of this folder, OBJ, STL and other formats by the
+ * library assimp. Polygons are cut into triangles, all nodes of a scene are joined, and vertices at
+ * the same position are welded, in the order of their first appearance.
  *
  * Counts are checked against the file's size, so truncated or corrupt files are refused. assimp
  * runs in its own process, so files on which an importer crashes or exceeds its limits are refused
@@ -87,7 +88,7 @@ bool supine_mesh_unit_find(const char *name, double *millimetres);
  * @param text  [24] output */
 void supine_mesh_unit_name(double millimetres, char *text);
 
-/** Free the arrays and zero the struct; a zeroed struct is legal. */
+/** Free the arrays and zero the struct, which may be zero already. */
 void supine_mesh_free(supine_mesh *mesh);
 
 /** The edges and connected components of a mesh. */
@@ -113,15 +114,16 @@ typedef struct supine_topology {
 supine_status supine_mesh_topology_create(const supine_mesh *mesh, supine_topology *topology);
 void supine_mesh_topology_free(supine_topology *topology);
 
-/** Compute the volume that a closed surface encloses, mm^3, as the sum of p0 . (p1 x p2) / 6
- * over all triangles, with corners p0, p1 and p2 relative to the box's centre. It is negative if
- * the triangles face inwards, and 0 if there are none. */
+/** Compute the volume that a closed surface encloses, mm^3, as the sum of p0 . (p1 x p2) / 6 over
+ * all triangles, with corners p0, p1 and p2 relative to the centre of the bounding box. The volume
+ * is negative if the triangles face inwards, and 0 without triangles. */
 double supine_mesh_volume(const supine_mesh *mesh);
 
-/** Find the axis-aligned box, mm, and return its longest side, mm. All are 0 without vertices. */
+/** Find the axis-aligned bounding box, mm, and return its longest side, mm. All are 0 without
+ * vertices. */
 double supine_mesh_box(const supine_mesh *mesh, double minimum[3], double maximum[3]);
 
-/** Reverse the triangles, so that they face the other way. */
+/** Reverse the order of the corners of each triangle, so that it faces the other way. */
 void supine_mesh_reverse(const supine_mesh *mesh);
 
 /** Compute the area of each vertex [vertex_count], mm^2: one third of the area of its triangles. */
@@ -131,7 +133,7 @@ void supine_mesh_vertex_area(const supine_mesh *mesh, double *area);
  * its triangles, weighted by area. It is 0 where the mean is 0. */
 void supine_mesh_vertex_normals(const supine_mesh *mesh, double *normals);
 
-/** Return the share, 0 to 1, of triangles whose normal turns by more than a right angle when the
+/** Return the fraction of triangles, 0 to 1, whose normal turns by more than a right angle when the
  * vertices move to `vertices`. Above a few in a thousand the folds are visible. */
 double supine_mesh_turned_over(const supine_mesh *mesh, const double *vertices);
 
@@ -139,16 +141,16 @@ double supine_mesh_turned_over(const supine_mesh *mesh, const double *vertices);
 typedef struct supine_mesh_field {
   const char *name; /**< name with a unit, such as "volume_mL" */
   size_t count;
-  const double *values; /**< [frames, count]; one frame except in a series */
+  const double *values; /**< [frames, count] values; only a series has more than one frame */
 } supine_mesh_field;
 
-/** How to write a file, and its optional content. */
+/** How to write a file, and its optional contents. */
 typedef struct supine_mesh_save_options {
-  supine_axes axes;    /**< axes of the file, written as its SPACE tag; AUTO for LPS */
+  supine_axes axes;    /**< axes of the file and of its SPACE tag; AUTO means LPS */
   const double *from;  /**< optional [vertex_count, 3] starting points of displacements, mm: VTP and
                           PLY files then hold displacements and their magnitudes */
   const char *comment; /**< optional note of one line */
-  double millimetres_per_unit; /**< unit of positions and displacements; 0 stands for 1 */
+  double millimetres_per_unit; /**< unit of positions and displacements; 0 means 1 */
   const float *expected_error; /**< optional [vertex_count], always in mm: point data
                                   "expected_error_mm" of VTP and PLY */
   /** @{ For VTP only, all optional. */
@@ -191,7 +193,7 @@ supine_status supine_mesh_series_open(const char *path, const supine_mesh *mesh,
 supine_status supine_mesh_series_add(supine_mesh_series *series, supine_error *error);
 /** Complete the file, which then appears at its path. Return SUPINE_ERROR_WRITE on failure. */
 supine_status supine_mesh_series_commit(supine_mesh_series *series, supine_error *error);
-/** Free a series; if it was not committed, no file appears. NULL is legal. */
+/** Free a series. If it was not committed, no file appears. NULL is allowed. */
 void supine_mesh_series_close(supine_mesh_series *series);
 
 /** The formats of supine_mesh_save, by ending; each has a function supine_mesh_save_NAME in

@@ -9,16 +9,16 @@
 
 #include "mesh/repair.h"
 
-/* A triangle is loose if none of its edges belongs to exactly two triangles. Loose triangles are
- * dropped up to this share of all triangles; a mesh with more of them is refused. */
+/* A triangle is loose if none of its edges belongs to exactly two triangles. Up to this fraction of
+ * all triangles, loose ones are dropped. A mesh with more of them is refused. */
 static const double most_loose = 0.01;
 
-typedef struct links {
-  uint32_t *parent; /* [triangles] union-find forest: a tree for each surface */
-  uint8_t *turned;  /* [triangles] 1 if a triangle faces the other way than its parent, else 0 */
-} links;
+typedef struct triangle_forest {
+  uint32_t *parent; /* [triangles] parent in a union-find tree; one tree for each surface */
+  uint8_t *turned;  /* [triangles] 1 if the triangle faces the other way than its parent, else 0 */
+} triangle_forest;
 
-/* Return the vertex of a triangle that is opposite one side. */
+/* Return the corner of a triangle that is opposite to a side. */
 static uint32_t opposite(const supine_mesh *mesh, const supine_mesh_side *s) {
   return mesh->triangles[s->at % 3 == 0 ? s->at + 2 : s->at - 1];
 }
@@ -39,8 +39,7 @@ static void mark_duplicates(const supine_mesh *mesh, const supine_mesh_side *sid
   }
 }
 
-/* Mark loose triangles, none of whose edges belongs to exactly two triangles. Mark none if their
- * share exceeds most_loose. */
+/* Mark loose triangles. Mark none if their fraction exceeds most_loose. */
 static void mark_loose(const supine_mesh *mesh, const supine_mesh_side *sides, uint8_t *drop) {
   const size_t count = 3 * mesh->triangle_count;
   size_t loose = mesh->triangle_count;
@@ -69,8 +68,9 @@ static size_t drop_marked(supine_mesh *mesh, const uint8_t *drop) {
   return dropped;
 }
 
-/* Return the first triangle of t's surface; set `turned` to 1 if t faces the opposite way. */
-static uint32_t find_root(const links *l, uint32_t t, uint8_t *turned) {
+/* Return the root of the tree of triangle t. Set `turned` to 1 if t and the root face opposite
+ * ways, otherwise to 0. */
+static uint32_t find_root(const triangle_forest *l, uint32_t t, uint8_t *turned) {
   uint8_t sum = 0;
   uint32_t root = t;
   while (l->parent[root] != root) {
@@ -78,7 +78,8 @@ static uint32_t find_root(const links *l, uint32_t t, uint8_t *turned) {
     root = l->parent[root];
   }
   *turned = sum;
-  while (l->parent[t] != root && t != root) { /* make the root the parent of each on the path */
+  /* make the root the parent of every triangle on the way to it */
+  while (l->parent[t] != root && t != root) {
     const uint32_t next = l->parent[t];
     const uint8_t here = l->turned[t];
     l->parent[t] = root;
@@ -89,10 +90,11 @@ static uint32_t find_root(const links *l, uint32_t t, uint8_t *turned) {
   return root;
 }
 
-/* Link triangles across edges that belong to two triangles; return false if they form a one-sided
- * surface. Set `closed` to whether every edge belongs to an even number of triangles. */
-static bool link_triangles(const supine_mesh *mesh, const supine_mesh_side *sides, const links *l,
-                           bool *closed) {
+/* Join the trees of triangles that share an edge of exactly two triangles. Return false if they
+ * form a one-sided surface. Set `closed` to whether every edge belongs to an even number of
+ * triangles. */
+static bool link_triangles(const supine_mesh *mesh, const supine_mesh_side *sides,
+                           const triangle_forest *l, bool *closed) {
   const size_t count = 3 * mesh->triangle_count;
   bool sound = true;
   *closed = true;
@@ -123,8 +125,9 @@ static bool link_triangles(const supine_mesh *mesh, const supine_mesh_side *side
   return sound;
 }
 
-/* In each surface, reverse the triangles that face the less frequent way; return their number. */
-static size_t turn_minority(supine_mesh *mesh, const links *l, uint32_t (*count)[2]) {
+/* In each surface, reverse the triangles that face the other way than the majority. Return the
+ * number of reversed triangles. */
+static size_t turn_minority(supine_mesh *mesh, const triangle_forest *l, uint32_t (*count)[2]) {
   size_t reversed = 0;
   uint8_t turned;
   for (uint32_t t = 0; t < mesh->triangle_count; ++t) {
@@ -144,16 +147,18 @@ static size_t turn_minority(supine_mesh *mesh, const links *l, uint32_t (*count)
   return reversed;
 }
 
-/* Copy the vertices that several surfaces share, so that each surface has its own vertices.
+/* Copy vertices that several surfaces share, so that each surface has its own vertices.
  * @param separated  output: number of copies */
-static supine_status separate_touching(supine_mesh *mesh, const links *l, size_t *separated) {
+static supine_status separate_touching(supine_mesh *mesh, const triangle_forest *l,
+                                       size_t *separated) {
   const size_t corners = 3 * mesh->triangle_count;
   size_t count = mesh->vertex_count;
   uint32_t *surface_of = malloc((count + corners + 1) * sizeof *surface_of);
   uint32_t *next_copy = calloc(count + corners + 1, sizeof *next_copy);
   supine_status status = surface_of == NULL || next_copy == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
   if (status == SUPINE_OK) {
-    memset(surface_of, 0xFF, (count + corners) * sizeof *surface_of); /* UINT32_MAX: unknown */
+    /* sets all to UINT32_MAX, which means unknown */
+    memset(surface_of, 0xFF, (count + corners) * sizeof *surface_of);
   }
   for (size_t i = 0; i < corners && status == SUPINE_OK; ++i) {
     uint8_t turned;
@@ -183,12 +188,12 @@ static supine_status separate_touching(supine_mesh *mesh, const links *l, size_t
   return status;
 }
 
-/* Reverse triangles that face the other way than most of their surface, and separate surfaces that
- * touch. */
+/* In each surface, reverse the triangles that face the other way than the majority. If every edge
+ * belongs to an even number of triangles, also separate surfaces that share vertices. */
 static supine_status mend_links(supine_mesh *mesh, const supine_mesh_side *sides,
                                 supine_mesh_repair_report *report) {
   const size_t n = mesh->triangle_count;
-  links l = {malloc((n + 1) * sizeof(uint32_t)), malloc(n + 1)};
+  triangle_forest l = {malloc((n + 1) * sizeof(uint32_t)), malloc(n + 1)};
   uint32_t(*count)[2] = calloc(n + 1, sizeof *count);
   supine_status status = SUPINE_ERROR_MEMORY;
   if (l.parent != NULL && l.turned != NULL && count != NULL) {

@@ -1,44 +1,45 @@
 /* SPDX-License-Identifier: MIT */
-/** @file Repair small, unambiguous defects of surfaces; sort the sides of triangles by edge. */
+/** @file Repair small, unambiguous defects of surfaces; list the sides of triangles by edge. */
 #ifndef SUPINE_MESH_REPAIR_H
 #define SUPINE_MESH_REPAIR_H
 
 #include "mesh/mesh.h"
 
 typedef struct supine_mesh_repair_report {
-  size_t duplicates; /**< dropped triangles with the corners of an earlier triangle */
-  size_t loose;      /**< dropped triangles without an edge that exactly two triangles share */
-  size_t reversed;   /**< triangles reversed to face like most of their surface */
-  size_t separated;  /**< vertices added where closed surfaces shared a vertex */
+  size_t duplicates; /**< number of dropped triangles with the corners of an earlier one */
+  size_t loose;      /**< number of dropped triangles that share no edge with exactly one other */
+  size_t reversed;   /**< number of triangles reversed to face like most of their surface */
+  size_t separated;  /**< number of vertices added where closed surfaces shared a vertex */
 } supine_mesh_repair_report;
 
 /** Repair a surface in place. A surface without defects is not changed.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_mesh_repair(supine_mesh *mesh, supine_mesh_repair_report *report);
 
-/** Drop vertices that are in no triangle, keeping the order of the others; return the number
- * dropped.
+/** Drop vertices that are in no triangle, and keep the order of the others. Return the number of
+ * dropped vertices.
  * @param space  [vertex_count] work space */
 size_t supine_mesh_drop_unreferenced(supine_mesh *mesh, uint32_t *space);
 
-/** Drop connected pieces with less than `share` of the volume of all pieces.
- * @param pieces  output: number of pieces kept
- * @param specks  output: number of pieces dropped
+/** Drop connected components with less than the fraction `share` of the total volume.
+ * @param pieces  output: number of components kept
+ * @param specks  output: number of components dropped
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_mesh_drop_specks(supine_mesh *mesh, double share, size_t *pieces,
                                       size_t *specks);
 
-/** One side of a triangle, between vertices low < high. */
+/** One side of a triangle, between the vertices with the indices low < high. */
 typedef struct supine_mesh_side {
   uint32_t low, high;
-  uint32_t at; /**< 3 * (index of the triangle) + (corner where the side starts, 0 to 2) */
+  uint32_t at; /**< position in mesh.triangles of the corner where the side starts */
 } supine_mesh_side;
 
-/** Return the sides of all triangles, sorted by `low`, then `high`, then `at`; NULL if out of
- * memory. The caller frees them. */
+/** Return the sides of all triangles, sorted by lower vertex, then higher vertex, then position in
+ * mesh->triangles. Return NULL if out of memory. The caller frees the array. */
 supine_mesh_side *supine_mesh_sides_sort(const supine_mesh *mesh);
 
-/** Return how many of `count` sorted sides are on the edge whose first side is sides[i]. */
+/** Return how many of the `count` sorted sides lie on the same edge as sides[i], the first side on
+ * this edge. */
 size_t supine_mesh_sides_of_edge(const supine_mesh_side *sides, size_t i, size_t count);
 
 #endif

@@ -4,7 +4,8 @@
 
 #include "mesh/repair.h"
 
-enum { FEW = 24 }; /* largest number of sides for which insertion sort is faster than qsort */
+/* largest number of triangle sides for which insertion sort is faster than qsort */
+enum { FEW = 24 };
 
 static int compare_sides(const void *left, const void *right) {
   const supine_mesh_side *a = left;
@@ -13,13 +14,14 @@ static int compare_sides(const void *left, const void *right) {
                             : (a->at > b->at) - (a->at < b->at);
 }
 
-/* Sort sides with the same lower vertex by their higher vertex, then by `at`. */
+/* Sort triangle sides that have the same lower vertex by their higher vertex. Sides on the same
+ * edge keep the order of their triangles. */
 static void sort_sides(supine_mesh_side *sides, size_t count) {
   if (count > FEW) {
     qsort(sides, count, sizeof *sides, compare_sides);
     return;
   }
-  for (size_t i = 1; i < count; ++i) { /* insertion sort, which keeps `at` ascending */
+  for (size_t i = 1; i < count; ++i) { /* a stable insertion sort */
     const supine_mesh_side side = sides[i];
     size_t j = i;
     for (; j > 0 && sides[j - 1].high > side.high; --j) {
@@ -38,7 +40,8 @@ supine_mesh_side *supine_mesh_sides_sort(const supine_mesh *mesh) {
     free(sides);
     return NULL;
   }
-  for (int pass = 0; pass < 2; ++pass) { /* first count each vertex's sides, then store them */
+  /* pass 0 counts the sides of each lower vertex, pass 1 stores them */
+  for (int pass = 0; pass < 2; ++pass) {
     for (size_t i = 0; i < count; ++i) {
       const uint32_t a = mesh->triangles[i];
       const uint32_t b = mesh->triangles[i % 3 == 2 ? i - 2 : i + 1];
@@ -109,7 +112,7 @@ static void components_find(size_t vertex_count, supine_topology *topology) {
     const uint32_t b = tree_root(parent, topology->edges[2 * e + 1]);
     parent[a > b ? a : b] = a < b ? a : b;
   }
-  /* Number the components: a vertex takes the number of its parent, whose index is lower. */
+  /* Number the components. Each vertex takes the number of its parent, whose index is lower. */
   for (size_t i = 0; i < vertex_count; ++i) {
     parent[i] = parent[i] == i ? (uint32_t)topology->component_count++ : parent[parent[i]];
   }

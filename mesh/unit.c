@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Convert units of length, and guess a file's unit from the size of its box. */
+/* Convert units of length, and guess a file's unit from the size of its bounding box. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -33,7 +33,8 @@ void supine_mesh_unit_name(double millimetres, char *text) {
 }
 
 bool supine_mesh_unit_is_likely(double side, const char **other) {
-  static const double least = 80.0; /* least, most and typical longest side of lungs, mm */
+  /* least, greatest and typical longest side of the bounding box of lungs, mm */
+  static const double least = 80.0;
   static const double most = 700.0;
   static const double typical = 280.0;
   double nearest = INFINITY;

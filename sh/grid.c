@@ -8,9 +8,9 @@
 
 #include "sh/grid.h"
 
-/* Refine the n nodes z and weights w to rounding error, by one Newton step on the Legendre
- * polynomial P_n. GSL tabulates some rules and computes the others to about 1e-11, an error that
- * one step reduces to 1e-22.
+/* Refine the n nodes z and the weights w to rounding error by one Newton step on the Legendre
+ * polynomial P_n. GSL tabulates some rules, and computes the others with errors up to about 1e-11.
+ * One step squares such an error.
  *
  *     w = 2 / ((1 - z^2) P_n'(z)^2)
  *

@@ -7,11 +7,11 @@
 
 #include <supine/status.h>
 
-/** Largest number of latitudes, and of longitudes, of a rule. */
+/** Largest number of latitudes, and of longitudes, of a quadrature rule on the sphere. */
 #define SUPINE_SH_GRID_MAX 16384
 
-/** A quadrature rule with latitudes x longitudes directions. Direction (j, k) has cos(colatitude) =
- * z[j] and longitude 2 pi k / longitudes. Its weight is weight[j] * 2 pi / longitudes. */
+/** A quadrature rule on the sphere. Its node (j, k) is the direction with cos(colatitude) = z[j]
+ * and longitude 2 pi k / longitudes. The weight of the node is weight[j] * 2 pi / longitudes. */
 typedef struct supine_sh_grid {
   size_t latitudes;
   size_t longitudes;
@@ -19,18 +19,18 @@ typedef struct supine_sh_grid {
   double *weight; /**< [latitudes] Gauss-Legendre weights, summing to 2 */
 } supine_sh_grid;
 
-/** Create the rule with given numbers of latitudes and longitudes, 1 to SUPINE_SH_GRID_MAX each. It
- * integrates products of two functions of bands up to L exactly if latitudes > L and longitudes > 2
- * L.
+/** Create a quadrature rule on the sphere with these numbers of latitudes and longitudes, 1 to
+ * SUPINE_SH_GRID_MAX each. It integrates products of two spherical harmonics of degrees up to L
+ * exactly if latitudes > L and longitudes > 2 L.
  * @param grid  written, NULL on failure; free it with supine_sh_grid_destroy
  * @retval SUPINE_ERROR_ARGUMENT  a number is out of range
  * @retval SUPINE_ERROR_MEMORY    an allocation failed (GSL first calls its error handler) */
 supine_status supine_sh_grid_create(size_t latitudes, size_t longitudes, supine_sh_grid **grid);
 
-/** Free a rule; NULL is legal. */
+/** Free a quadrature rule. NULL is allowed. */
 void supine_sh_grid_destroy(supine_sh_grid *grid);
 
-/** Compute direction (j, k) of the rule as a unit vector. */
+/** Compute the unit vector of the quadrature node at latitude j and longitude k. */
 void supine_sh_grid_direction(const supine_sh_grid *grid, size_t j, size_t k, double direction[3]);
 
 #endif

@@ -14,7 +14,7 @@
 struct supine_sh_transform {
   size_t band, fields;
   const supine_sh_grid *grid;
-  double *legendre;       /* Legendre functions at one latitude, in the order of GSL */
+  double *legendre; /* Legendre functions at one latitude, indexed by gsl_sf_legendre_array_index */
   fftw_complex *spectrum; /* [longitudes / 2 + 1, fields] FFT of one latitude */
   fftw_plan fft;
 };

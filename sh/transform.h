@@ -3,8 +3,8 @@
  *
  *     coefficient(l, m) = integral over all directions g of value(g) Y(l, m)(g)
  *
- * by the quadrature rule of a grid. The transform is exact to rounding for fields without bands
- * above the plan's band. Higher bands of a field alias into the coefficients of this field. */
+ * by the quadrature rule of a grid. The transform is exact to rounding for fields without harmonics
+ * of higher degree than the plan's band. Such harmonics of a field alias into its coefficients. */
 #ifndef SUPINE_TRANSFORM_H
 #define SUPINE_TRANSFORM_H
 
@@ -13,9 +13,9 @@
 #include "sh/grid.h"
 #include <supine/status.h>
 
-/** Plan for transforms of a fixed number of fields on one grid, up to a highest band. Only one
- * thread at a time may use a plan. Only one thread of the process may create or destroy plans,
- * because FFTW's planner has global state. */
+/** Plan for transforms of a fixed number of fields on one grid, up to a highest degree, the band.
+ * Only one thread at a time may use a plan. Only one thread of the process may create or destroy
+ * plans, because FFTW's planner has global state. */
 typedef struct supine_sh_transform supine_sh_transform;
 
 /** Create a plan.
@@ -28,13 +28,13 @@ typedef struct supine_sh_transform supine_sh_transform;
 supine_status supine_sh_transform_create(size_t band, const supine_sh_grid *grid, size_t fields,
                                          supine_sh_transform **plan, supine_error *error);
 
-/** Free a plan; NULL is legal. */
+/** Free a plan. NULL is allowed. */
 void supine_sh_transform_destroy(supine_sh_transform *plan);
 
-/** Add the contribution of latitude j to the coefficients. Zero the coefficients first, then add
- * each latitude once, in any order.
+/** Add the contribution of the values at latitude j of the grid to the coefficients. Zero the
+ * coefficients first, then add each latitude once, in any order.
  * @param ring          [longitudes, fields] values at latitude j
- * @param coefficients  [fields, (band + 1)^2] */
+ * @param coefficients  [fields, (band + 1)^2] input and output */
 void supine_sh_transform_ring(supine_sh_transform *plan, size_t j, const double *ring,
                               double *coefficients);
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The matrix I - A of [Santhanam2008] over all nodes (masses and springs), computed entry by entry
- * from equations (3) and (8), as an independent reference for the solver. */
+/* The matrix I - A of [Santhanam2008] over all nodes (masses and springs), where A is the fraction
+ * of the force on each node that passes to each neighbour. It is computed entry by entry from
+ * equations (3) and (8), as an independent reference for the solver. */
 #ifndef SUPINE_FULL_OPERATOR_H
 #define SUPINE_FULL_OPERATOR_H
 
@@ -13,13 +14,14 @@
 
 typedef struct full_operator {
   size_t node_count;  /* number of masses and springs; masses come first */
-  size_t entry_count; /* number of entries off the diagonal */
+  size_t entry_count; /* number of entries of A; its diagonal is 0 */
   size_t *row, *column;
-  double *value; /* [entries] share of the force on node `column` that it transfers to node `row` */
-  double *own;   /* [nodes] share of the force on a node that it keeps */
+  double *value; /* [entries] fraction of the force on node `column` that passes to node `row` */
+  double *own;   /* [nodes] fraction of the force on each node that stays on this node */
 } full_operator;
 
-/* Compute row, column, value and own from the stiffness e [N], without scaling e. */
+/* Compute the operator from the stiffness e [N] of each mass. Unlike the solver, do not scale e to
+ * a geometric mean of 1. */
 static inline full_operator full_operator_create(const supine_mesh *mesh,
                                                  const supine_topology *topology, const double *e) {
   const size_t n = mesh->vertex_count;
@@ -78,7 +80,7 @@ static inline void full_operator_free(full_operator *op) {
   free(op->own);
 }
 
-/* Sparse LU factorisation of I - A, by UMFPACK. */
+/* Sparse LU factorisation, by UMFPACK, of I - A, where A is the transfer of force between nodes. */
 typedef struct direct_solver {
   int *ap, *ai;
   double *ax, *right, *solution;
@@ -117,7 +119,8 @@ static inline direct_solver direct_solver_create(const full_operator *op) {
   return d;
 }
 
-/* Compute the catch (the force that each mass keeps) [masses] from the applied force [masses]. */
+/* Compute the force that stays on each mass at equilibrium, `catch_` [masses], when the force
+ * `force` [masses] is applied. */
 static inline void direct_solver_solve(direct_solver *d, const full_operator *op, size_t masses,
                                        const double *force, double *catch_) {
   for (size_t j = 0; j < op->node_count; ++j) {

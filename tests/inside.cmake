@@ -6,7 +6,7 @@ supine_test(field supine_inside supine_field supine_lungs)
 set_tests_properties(image labels PROPERTIES
   ENVIRONMENT "LSAN_OPTIONS=suppressions=${CMAKE_CURRENT_SOURCE_DIR}/lsan.supp:print_suppressions=0")
 
-# Compare with nibabel, VTK and other tools that are installed.
+# Compare results with those of nibabel, VTK and other tools that are installed.
 add_test(NAME labels_orientation COMMAND /usr/bin/python3
   ${CMAKE_CURRENT_SOURCE_DIR}/test_labels_orientation.py $<TARGET_FILE:supine>)
 add_test(NAME foreign_tools COMMAND /usr/bin/python3

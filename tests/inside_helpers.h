@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Synthetic bases of one or two irregular lungs, with displacements known in closed form. */
+/* Synthetic basis files of one or two irregular lungs, with displacements known in closed form. */
 #ifndef SUPINE_INSIDE_HELPERS_H
 #define SUPINE_INSIDE_HELPERS_H
 
@@ -32,9 +32,10 @@ static inline void helper_motion(int mode, const double p[3], double u[3]) {
   }
 }
 
-/* Write a basis of lungs that were scanned with the given direction of gravity and the given
- * volume, in mL beyond the volume in the file, both as text. If both are NULL, the file has the
- * lungs as scanned. */
+/* Write a basis of synthetic lungs. `scan_gravity` is the direction of gravity in the scan, and
+ * `scan_volume` the volume in the scan minus that of the reference surface, mL, both as text for
+ * the metadata. If both are NULL, the reference surface is the scan.
+ * @param frequency  each lung has 10 frequency^2 + 2 vertices */
 static inline void helper_write_scanned_basis(const char *path, size_t frequency, size_t lungs,
                                               const char *scan_gravity, const char *scan_volume) {
   supine_mesh mesh[2] = {helper_lump(frequency, 71.3, 3), helper_lump(frequency, -72.9, 4)};

@@ -90,7 +90,8 @@ static inline void helper_voxelise(const supine_mesh *mesh, size_t begin, size_t
 
 /* Return a label map of two ellipsoids side by side, with LPS axes and voxels with sides of
  * `spacing` mm. Label 1 is the right lung and label 2 the left lung, like in maps by lungmask. The
- * right ellipsoid is larger. Both ellipsoids are wider and lie further back towards the feet. */
+ * right ellipsoid is larger. Towards the feet, both ellipsoids become wider and lie further
+ * back. */
 static inline supine_image helper_two_lungs(double spacing) {
   const double size[3] = {280.0, 180.0, 240.0};
   supine_image image = {.voxel = SUPINE_VOXEL_U8, .channels = 1};

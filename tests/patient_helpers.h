@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The known displacement law with which tests of the fit to a patient deform lungs. */
+/* A known displacement law, with which tests deform lungs before they fit a law to the result. */
 #ifndef SUPINE_PATIENT_HELPERS_H
 #define SUPINE_PATIENT_HELPERS_H
 
@@ -9,7 +9,8 @@
 
 static const double supine_gravity[3] = {0.0, 1.0, 0.0};
 
-/* Return the constants of the force (18) and of the directions (15)-(17) in [Santhanam2008]. */
+/* Return a law with known constants for the force, equation (18) of [Santhanam2008], and for the
+ * direction of displacement, equations (15) to (17). */
 static supine_model truth(void) {
   supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   model.reach = 10.0;

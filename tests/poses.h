@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Poses from weights of modes and one gain (scale) for each lung, and volumes in such poses. */
+/* Make poses from weights of the modes and one gain for each lung, which is the factor of its
+ * displacement. Compute volumes in such poses. */
 #ifndef SUPINE_TESTS_POSES_H
 #define SUPINE_TESTS_POSES_H
 
@@ -8,7 +9,8 @@
 #include <supine/runtime.h>
 #include <supine/volume.h>
 
-/* Make a pose, valid within the caller's block, from weights [modes] and gains [lungs]. */
+/* Make a pose, valid within the caller's block, from `weights_` [modes] and gains `scales_`
+ * [lungs]. */
 #define POSED(basis_, weights_, scales_)                                                           \
   posed(basis_, weights_, scales_, &(supine_pose){.weights = {0}})
 
@@ -22,8 +24,8 @@ static inline supine_pose *posed(const supine_basis *basis, const double *weight
   return pose;
 }
 
-/* Return `count` poses (at most 512) from weights [count, modes] and gains [count, lungs]. The
- * poses are valid until the next call by the same thread. */
+/* Return `count` poses (at most 512) from `weights` [count, modes] and gains `scales` [count,
+ * lungs]. The poses are valid until the next call by the same thread. */
 static inline supine_pose *posed_batch(const supine_basis *basis, size_t count,
                                        const double *weights, const double *scales) {
   static _Thread_local supine_pose poses[512];
@@ -34,8 +36,8 @@ static inline supine_pose *posed_batch(const supine_basis *basis, size_t count,
   return poses;
 }
 
-/* At gain s, a lung exceeds its volume in the basis file by c1 s + c2 s^2 + c3 s^3 mL. Add c1, c2
- * and c3 to cubic [3]. */
+/* At gain s, which multiplies the displacements, the volume of a lung exceeds that of its reference
+ * surface in the basis by c1 s + c2 s^2 + c3 s^3 mL. Add c1, c2 and c3 to cubic [3]. */
 static inline void posed_cubic(const supine_basis *basis, size_t lung, const double *weights,
                                double cubic[3]) {
   const supine_basis_info *info = supine_basis_get_info(basis);
@@ -67,7 +69,8 @@ static inline supine_status posed_lung_scale(const supine_basis *basis, size_t l
   return supine_volume_scale(cubic, volume, scale, error);
 }
 
-/* Compute the gain at which all lungs exceed their volume in the file by `volume` mL in total. */
+/* Compute the gain `scale`, which multiplies the displacements, so that the total volume of all
+ * lungs exceeds that of the reference surface by `volume` mL. */
 static inline supine_status posed_scale(const supine_basis *basis, const double *weights,
                                         double volume, double *scale, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
@@ -78,7 +81,7 @@ static inline supine_status posed_scale(const supine_basis *basis, const double 
   return supine_volume_scale(cubic, volume, scale, error);
 }
 
-/* Set `beyond` to the volume, mL, by which all lungs in a state exceed their volume in the file.
+/* Set `beyond` to the total volume of all lungs in a state minus that of the reference surface, mL.
  * Return the status of supine_basis_pose. */
 static inline supine_status posed_volume(const supine_basis *basis, const double gravity[3],
                                          supine_volume volume, double *beyond) {

@@ -41,7 +41,7 @@ static void expect(int code, const char *words, int got) {
 /* Run "supine ARGUMENTS", and assert its exit code and that its output contains `words`. */
 #define EXPECT(code, words, ...) expect(code, words, run(__VA_ARGS__))
 
-/* Count the files of the folder whose names begin with `prefix`. */
+/* Count the files in the temporary folder whose names begin with `prefix`. */
 static size_t count_files(const char *prefix) {
   size_t count = 0;
   DIR *entries = opendir(folder);

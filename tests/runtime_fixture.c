@@ -20,7 +20,7 @@ double fixture_random(uint64_t *state) {
   return (double)((z ^ (z >> 31)) >> 11) * 0x1p-52 - 1;
 }
 
-/* Make a lung from the vertices begin to end - 1. Five or more vertices form a double pyramid. */
+/* Make a lung from the vertices begin <= i < end. Five or more vertices form a bipyramid. */
 static void make_lung(fixture *f, size_t lung, size_t begin, size_t end, uint64_t *state) {
   const size_t corners = end - begin >= 5 ? end - begin - 2 : 0;
   for (size_t i = begin; i < end; ++i) {
@@ -61,7 +61,7 @@ static double det(const double *a, const double *b, const double *c) {
 }
 
 /* Add the contribution of one triangle to the volume of a lung, mL: a sixth of the determinant of
- * its displaced corners, split into terms of degree 1, 2 and 3 in the weights of the modes. */
+ * its displaced corners. Split it into terms of degree 1, 2 and 3 in the weights of the modes. */
 static void add_forms(fixture *f, const uint32_t *corner, size_t lung) {
   const size_t K = f->modes;
   double r[3][3];

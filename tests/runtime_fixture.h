@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Synthetic bases: bipyramids with random displacements, evaluated in double precision. */
+/* Synthetic basis files: bipyramids with random displacements, evaluated in double precision. */
 #ifndef SUPINE_TEST_RUNTIME_FIXTURE_H
 #define SUPINE_TEST_RUNTIME_FIXTURE_H
 
@@ -8,22 +8,24 @@
 #include <stdint.h>
 
 typedef struct fixture {
-  size_t vertices, triangles, modes, band, lungs; /* N, M, K, L, G below */
+  size_t vertices, triangles, modes, lungs;
+  size_t band; /* largest degree of the spherical harmonics */
   bool vector, volume;
   size_t lung_begin[17];
-  float *vertex;       /* [N, 3], mm */
-  uint32_t *triangle;  /* [M, 3] */
-  float *direction;    /* [N, 3] */
-  float *coefficient;  /* [N, K] or [N, 3, K] */
-  double *mode;        /* [K, (L + 1)^2] spherical-harmonic coefficients of the modes' weights */
-  unsigned char *lung; /* [N] */
+  float *vertex;       /* [vertices, 3] mm */
+  uint32_t *triangle;  /* [triangles, 3] */
+  float *direction;    /* [vertices, 3] mm in which the vertex moves; not used if `vector` */
+  float *coefficient;  /* [vertices, modes] factor of `direction` for each mode; if `vector`,
+                          [vertices, 3, modes] mm */
+  double *mode;        /* [modes, (band + 1)^2] harmonic coefficients of the weight of each mode */
+  unsigned char *lung; /* [vertices] index of the lung */
   double *linear, *quadratic, *cubic;
-  /* [9] harmonic coefficients of the volume at rest; NULL if it is unknown */
+  /* [9] harmonic coefficients of the volume at rest, mL, over gravity; NULL if it is unknown */
   const double *resting;
   bool fields;     /* whether the metadata says that another simulator computed the displacements */
-  size_t normals;  /* number Q of modes of normals, set by fixture_add_normals */
-  int16_t *normal; /* [N, 3, Q] */
-  double *normal_weight; /* [G, Q, (K + 1)(K + 2) / 2] */
+  size_t normals;  /* number of modes from which normals are computed, set by fixture_add_normals */
+  int16_t *normal; /* [vertices, 3, normals] */
+  double *normal_weight; /* [lungs, normals, terms] terms of degree 0 to 2 in the modes' weights */
 } fixture;
 
 /* Return zeroed memory. Abort if the allocation fails. */
@@ -33,8 +35,9 @@ __attribute__((returns_nonnull)) void *fixture_allocate(size_t count, size_t siz
 double fixture_random(uint64_t *state);
 
 /* Create `lungs` lungs of about 10 cm radius, each with an equal share of the `vertices`. A lung of
- * at least 5 vertices is closed. Its displacements are random, of about `amplitude` mm. If
- * `volume`, call fixture_add_forms. */
+ * at least 5 vertices is closed. Its displacements are random, of about `amplitude` mm. If `volume`
+ * is true, call fixture_add_forms. If `vector` is true, each mode moves each vertex in a direction
+ * of its own. */
 fixture *fixture_create(size_t vertices, size_t modes, size_t band, size_t lungs, bool vector,
                         bool volume, double amplitude, uint64_t seed);
 void fixture_destroy(fixture *f);
@@ -42,10 +45,10 @@ void fixture_destroy(fixture *f);
 /* Create two closed lungs that shrink towards their apex, by a factor that depends on gravity. */
 fixture *fixture_create_shrinking(size_t vertices, size_t modes, uint64_t seed);
 
-/* Add the coefficients from which volumes are computed. */
+/* Compute the coefficients from which the library computes the volumes of lungs. */
 void fixture_add_forms(fixture *f);
 
-/* Add modes of random normals, which are not normal to the surface. */
+/* Add `modes` modes for normals, with random values that are not normal to the surface. */
 void fixture_add_normals(fixture *f, size_t modes, uint64_t seed);
 
 /* Write the basis file, and assert that this succeeds. */
@@ -54,10 +57,11 @@ void fixture_write(const fixture *f, const char *path);
 /* Return the content of the basis file (malloc), and set `size` to its size in bytes. */
 unsigned char *fixture_bytes(const fixture *f, size_t *size);
 
-/* Compute positions xyz [N, 3], mm, in double precision. `scales` has a gain for each lung. */
+/* Compute the positions xyz [N, 3], mm, in double precision. `scales` [lungs] are factors of the
+ * displacement. */
 void fixture_deform(const fixture *f, const double *weights, const double *scales, double *xyz);
 
-/* Return the volume of a lung, mL, whose vertices have the positions xyz [N, 3]. */
+/* Return the volume, mL, of a lung of the fixture whose vertices are at `xyz` [N, 3], mm. */
 double fixture_volume(const fixture *f, size_t lung, const double *xyz);
 
 /* Make a temporary folder and return its path (malloc). fixture_folder_remove deletes the folder

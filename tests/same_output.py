@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Compare the output of a session with its golden file: same_output.py GOLDEN OUTPUT.
 
-Numbers differ slightly between processors. If a command is piped through `rounded`, which keeps four digits of a number,
+Numbers differ slightly between processors. If a command is piped through `rounded`, which keeps four significant digits,
 the last of these digits may therefore differ by one. All other output must be identical."""
 import difflib
 import math
@@ -17,7 +17,7 @@ def lines_of(path):
 
 
 def close(a, b):
-    """Return whether two numbers differ by at most one in the fourth digit."""
+    """Return whether two numbers differ by at most one in the fourth significant digit."""
     a, b = float(a), float(b)
     largest = max(abs(a), abs(b))
     return a == b or abs(a - b) < 1.5 * 10.0 ** (math.floor(math.log10(largest)) - 3)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 supine_test(template supine_export)
 
-# A name in a template that nothing fills ends the build.
+# The build fails if a template has a placeholder for which there is no value.
 add_test(NAME template_unknown_name COMMAND ${CMAKE_COMMAND}
   -D FILES=${CMAKE_CURRENT_SOURCE_DIR}/golden/unknown_name.html
   -D SOURCES=${CMAKE_CURRENT_SOURCE_DIR}/test_template.c -D ARRAY=assets

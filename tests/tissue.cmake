@@ -7,7 +7,7 @@ supine_test(reach supine_precompute supine_lungs supine_mesh_io supine_gsl)
 supine_test(validation_network supine_precompute supine_lungs supine_mesh_io supine_gsl)
 supine_test(validation_lungs supine_precompute supine_lungs supine_mesh_io supine_gsl)
 
-# Read a breath by VTK, if Debian's Python has it.
+# Read the file of a breath (a series of surfaces) by VTK, if Debian's Python has VTK.
 add_test(NAME series_vtk COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/test_series_vtk.py
   $<TARGET_FILE:supine>)
 set_tests_properties(series_vtk PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)

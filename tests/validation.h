@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Validations of [Santhanam2008], section IV, shared by the tests and bench_validation. */
+/* The validation experiments of [Santhanam2008], section IV, shared by tests and
+ * bench_validation. */
 #ifndef SUPINE_VALIDATION_H
 #define SUPINE_VALIDATION_H
 
@@ -17,7 +18,7 @@
 #include "precompute/precompute.h"
 #include <supine/volume.h>
 
-/* A network of masses and links. A ring has no triangles. */
+/* A network of masses (vertices) and links (edges). A ring of masses has no triangles. */
 typedef struct frame {
   supine_mesh mesh;
   supine_topology topology;
@@ -53,7 +54,7 @@ static inline frame frame_plane(size_t side, double spacing) {
   return f;
 }
 
-/* Return a ring with this radius, mm, of evenly spaced masses. */
+/* Return a ring of evenly spaced masses, with neighbours linked. `radius` is in mm. */
 static inline frame frame_ring(size_t count, double radius) {
   frame f = {.mesh = {.vertex_count = count}, .topology = {.edge_count = count}};
   f.mesh.vertices = calloc(3 * count, sizeof *f.mesh.vertices);
@@ -63,7 +64,7 @@ static inline frame frame_ring(size_t count, double radius) {
     const double angle = 2.0 * M_PI * (double)i / (double)count;
     f.mesh.vertices[3 * i] = radius * cos(angle);
     f.mesh.vertices[3 * i + 1] = radius * sin(angle);
-    if (i > 0) { /* sorts the links: (0, 1), (0, count - 1), (1, 2), ... */
+    if (i > 0) { /* store the links in sorted order: (0, 1), (0, count - 1), (1, 2), ... */
       const size_t e = i == 1 ? 0 : i;
       f.topology.edges[2 * e] = (uint32_t)(i - 1);
       f.topology.edges[2 * e + 1] = (uint32_t)i;
@@ -72,7 +73,8 @@ static inline frame frame_ring(size_t count, double radius) {
   return f;
 }
 
-/* Compute the catch (the force that each mass keeps) [N] from the applied force [N]. */
+/* Compute the part of the force, `catch_` [masses], that each mass keeps at equilibrium when the
+ * force `force` [masses] is applied. */
 static inline supine_status frame_solve(const frame *f, const double *stiffness,
                                         const double *force, double *catch_) {
   supine_equilibrium *equilibrium = NULL;
@@ -91,27 +93,29 @@ static inline supine_status frame_solve(const frame *f, const double *stiffness,
 /* Masses of 1, linked by springs. Each mass is also tied to the ground by a damper and a spring.
  * The position y_i of mass i obeys
  *
- *     y_i'' = p_i - ground_i y_i - sum over links of k_ij (y_i - y_j) - damping y_i' */
+ *     y_i'' = push_i - ground_i y_i - sum over links (i, j) of spring_ij (y_i - y_j) - damping y_i'
+ *
+ * where push_i is the external force. All quantities are dimensionless. */
 typedef struct mass_spring_damper {
   size_t count;
   size_t links;
-  const uint32_t *ends; /* [links, 2] indices of the linked masses i, j */
-  double *k;            /* [links] k_ij */
-  double *ground;       /* [count] ground_i */
-  double *push;         /* [count] p_i */
+  const uint32_t *ends; /* [links, 2] indices of the linked masses */
+  double *spring;       /* [links] stiffness of the spring between the linked masses */
+  double *ground;       /* [count] stiffness of the spring from each mass to the ground */
+  double *push;         /* [count] external force on each mass */
   double damping;
-  size_t evaluations; /* number of evaluations of y'' */
+  size_t evaluations; /* number of evaluations of the accelerations */
 } mass_spring_damper;
 
-/* Create a system in whose equilibrium the position of each mass equals its stiffness times its
- * catch, the force that the mass keeps in [Santhanam2008]. The stiffness must have geometric mean
- * 1. */
+/* Create a mass-spring-damper system. In its equilibrium, the position of each mass divided by the
+ * stiffness of the mass is the force that the mass keeps in [Santhanam2008]. The geometric mean of
+ * `stiffness` must be 1. */
 static inline mass_spring_damper damper_create(const frame *f, const double *stiffness,
                                                const double *force) {
   const size_t n = f->mesh.vertex_count;
   mass_spring_damper system = {.count = n, .links = f->topology.edge_count, .damping = 2.5};
   system.ends = f->topology.edges;
-  system.k = calloc(system.links, sizeof *system.k);
+  system.spring = calloc(system.links, sizeof *system.spring);
   system.ground = calloc(n, sizeof *system.ground);
   system.push = calloc(n, sizeof *system.push);
   for (size_t i = 0; i < n; ++i) {
@@ -127,16 +131,16 @@ static inline mass_spring_damper damper_create(const frame *f, const double *sti
       square += step * step;
     }
     const double d = fmax(1.0, 0.5 * sqrt(square));
-    const double spring = 0.5 * (stiffness[i] + stiffness[j]);
-    system.k[e] = spring / (d * (d * spring + 1.0 / stiffness[i] + 1.0 / stiffness[j]));
-    system.ground[i] += stiffness[i] * spring / d - 2.0 * system.k[e];
-    system.ground[j] += stiffness[j] * spring / d - 2.0 * system.k[e];
+    const double mean = 0.5 * (stiffness[i] + stiffness[j]);
+    system.spring[e] = mean / (d * (d * mean + 1.0 / stiffness[i] + 1.0 / stiffness[j]));
+    system.ground[i] += stiffness[i] * mean / d - 2.0 * system.spring[e];
+    system.ground[j] += stiffness[j] * mean / d - 2.0 * system.spring[e];
   }
   return system;
 }
 
 static inline void damper_free(mass_spring_damper *system) {
-  free(system->k);
+  free(system->spring);
   free(system->ground);
   free(system->push);
 }
@@ -153,7 +157,7 @@ static inline int damper_slope(double time, const double *state, double *slope, 
   for (size_t e = 0; e < system->links; ++e) {
     const size_t i = system->ends[2 * e];
     const size_t j = system->ends[2 * e + 1];
-    const double pull = system->k[e] * (state[i] - state[j]);
+    const double pull = system->spring[e] * (state[i] - state[j]);
     slope[n + i] -= pull;
     slope[n + j] += pull;
   }
@@ -161,8 +165,8 @@ static inline int damper_slope(double time, const double *state, double *slope, 
   return GSL_SUCCESS;
 }
 
-/* Integrate for `seconds` from positions and velocities of 0. At each of `marks` evenly spaced
- * times, set catch_ to the positions divided by the stiffness, and call `seen` if it is not NULL.
+/* Integrate for `seconds`, from positions and velocities of 0. At each of `marks` evenly spaced
+ * times, set `catch_` to the positions divided by the stiffness, and call `seen` if it is not NULL.
  * Return false if GSL fails. */
 static inline bool damper_integrate(mass_spring_damper *system, const double *stiffness,
                                     double seconds, size_t marks, double *catch_,
@@ -204,8 +208,8 @@ static inline double relative_rms(size_t count, const double *a, const double *b
   return sqrt(difference / norm);
 }
 
-/* Return the force on each mass of a sheet (malloc): a Gaussian about the centre, whose radius is a
- * fifth of the side, plus a term that grows with y. */
+/* Return the force on each mass of a sheet (malloc): a Gaussian about the centre, with a radius of
+ * a fifth of the side, plus a term that grows with y. */
 static inline double *plane_force(const frame *f) {
   const size_t n = f->mesh.vertex_count;
   const double *last = f->mesh.vertices + 3 * (n - 1);
@@ -238,7 +242,8 @@ static inline void normalise_stiffness(size_t count, double *stiffness) {
   }
 }
 
-/* Return the stiffness of a ring (malloc): `factor` in one third of the ring, 1 elsewhere. */
+/* Return the stiffness of each mass of a ring (malloc): `factor` in one third of the ring, 1
+ * elsewhere. */
 static inline double *ring_stiffness(size_t count, double factor) {
   double *stiffness = calloc(count, sizeof *stiffness);
   for (size_t i = 0; i < count; ++i) {
@@ -247,17 +252,18 @@ static inline double *ring_stiffness(size_t count, double factor) {
   return stiffness;
 }
 
-/* number of horizontal slabs of equal height; slab 0 is the uppermost */
+/* number of horizontal slabs of equal height into which lungs are cut; slab 0 is the uppermost */
 enum { ZONES = 10 };
 
 typedef struct ventilation {
-  double index[ZONES]; /* mean catch (force kept) in a slab, divided by the mean of all slabs */
-  double swept[ZONES]; /* share of the inhaled volume, divided by the share of the area */
+  double index[ZONES]; /* mean force kept by a vertex at equilibrium, relative to all slabs */
+  double swept[ZONES]; /* fraction of the inhaled volume, divided by the fraction of the area */
   double slope;  /* slope of `index` against depth, which is 0 at the top and 1 at the bottom */
   double height; /* height of the lungs, mm */
 } ventilation;
 
-/* Measure the ventilation of slabs when the lungs inhale `volume` mL under gravity g. */
+/* Measure the ventilation of horizontal slabs of the lungs when they inhale `volume` mL under
+ * gravity g. */
 static inline supine_status ventilation_measure(const supine_lungs *lungs, const double g[3],
                                                 double volume, ventilation *found) {
   const size_t n = lungs->mesh.vertex_count;
@@ -293,7 +299,8 @@ static inline supine_status ventilation_measure(const supine_lungs *lungs, const
     areas[zone] += area[i];
     caught[zone] += area[i] * solution.catch_[i];
   }
-  /* A triangle sweeps its mean displacement times the mean of its old and new area vectors. */
+  /* The volume that a triangle sweeps is its mean displacement times the mean of its old and new
+   * area vectors. */
   for (size_t t = 0; t < lungs->mesh.triangle_count; ++t) {
     const uint32_t *c = lungs->mesh.triangles + 3 * t;
     double middle[3] = {0.0, 0.0, 0.0};
@@ -398,7 +405,8 @@ static inline void nearest_free(nearest_grid *grid) {
   free(grid->order);
 }
 
-/* Return the nearest vertex in the cell of p and adjacent cells, SIZE_MAX if these are empty. */
+/* Return the vertex nearest to p in its cell and the adjacent cells; SIZE_MAX if these are
+ * empty. */
 static inline size_t nearest_find(const nearest_grid *grid, const double *p) {
   long cell[3];
   size_t found = SIZE_MAX;
@@ -427,7 +435,9 @@ static inline size_t nearest_find(const nearest_grid *grid, const double *p) {
   return found;
 }
 
-/* Set moves [N, 3], mm, to the displacements if the lungs inhale `volume` mL under gravity g. */
+/* Compute the displacements `moves` [N, 3], mm, when lungs inhale `volume` mL under gravity g.
+ * `reach` is the distance over which a force spreads, mm; 0 for the transfer of force in
+ * [Santhanam2008]. */
 static inline supine_status breathe_at(const supine_lungs *lungs, double reach, const double g[3],
                                        double volume, double *moves) {
   supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
@@ -445,8 +455,8 @@ static inline supine_status breathe_at(const supine_lungs *lungs, double reach, 
   return status;
 }
 
-/* Compute the RMS distance, mm, from a vertex to the places that a unit force on it reaches,
- * weighted by force and area. */
+/* Compute the RMS distance, mm, between `vertex` and the vertices to which a unit force on it
+ * spreads, weighted by the force and the area of these vertices. `reach`: see breathe_at. */
 static inline supine_status spread_of(const supine_lungs *lungs, double reach, size_t vertex,
                                       double *spread) {
   const size_t n = lungs->mesh.vertex_count;

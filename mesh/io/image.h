@@ -34,7 +34,7 @@ typedef struct supine_image {
   supine_image_voxel voxel;
   size_t channels; /**< numbers per voxel: 1 when read from a file, 3 in a displacement field */
   void *values;
-  supine_axes axes;         /**< axes assumed for the header's coordinates */
+  supine_axes axes;         /**< axes assumed for the coordinates in the header */
   const char *frame_source; /**< header field that gives origin and steps, a string literal:
                                "sform", "qform", "space directions" or "TransformMatrix" */
   bool frames_differ; /**< whether a NIfTI file's qform and sform differ by half a voxel or more */

@@ -41,12 +41,12 @@ supine_status supine_image_read_voxels(const char *path, size_t file_size,
                                        const image_storage *storage, supine_image *image,
                                        supine_error *error);
 
-/* Compress `head` and the voxels `values` into the file, in the format IMAGE_ZLIB or IMAGE_GZIP.
- * Return SUPINE_ERROR_MEMORY on failure. */
+/* Compress `head` (the header) and the voxels `values` into the file, in the format IMAGE_ZLIB or
+ * IMAGE_GZIP. Return SUPINE_ERROR_MEMORY on failure. */
 supine_status supine_image_pack(int format, const void *head, size_t head_size,
                                 const supine_image *image, const void *values, FILE *file);
 
-/* Return the size of the voxels in bytes. */
+/* Return the size of all voxels together, bytes. */
 size_t supine_image_bytes(const supine_image *image);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Run assimp in a process of its own: on a corrupt file its importers may crash, leak memory, or
- * exceed their limits of time and memory. Then only that process ends. */
+/* Run the import library assimp in a process of its own. On a corrupt file, an importer may crash,
+ * leak memory, or exceed its limits of time and memory. Then only that process ends. */
 #include <errno.h>
 #include <signal.h>
 #include <stdio.h>
@@ -35,7 +35,7 @@ typedef struct assimp {
 /* Limits of one import, far above what a lung needs; the time grows with the file's size. */
 enum { SECONDS_LEAST = 8, SECONDS_PER_MEGABYTE = 1, GIGABYTES_MOST = 4 };
 
-/* Result of the child process; the vertices and triangles follow it in the stream. */
+/* Result of the child process. In the stream, the vertices and triangles follow it. */
 typedef struct outcome {
   supine_error error;
   size_t dropped, vertex_count, triangle_count;
@@ -99,7 +99,7 @@ static bool take_vertices(const struct aiMesh *part, const struct aiMatrix4x4 *t
   return true;
 }
 
-/* Add the faces of a part whose vertices have just been added to the mesh. */
+/* Add the faces of a part of the scene. The vertices of the part are the last ones in the mesh. */
 static bool take_faces(const struct aiMesh *part, bool mirrored, gathering *out) {
   const size_t first = out->mesh.vertex_count - part->mNumVertices;
   bool good = true;
@@ -142,9 +142,10 @@ static void confine(size_t bytes) {
 #endif
   static const int signals[] = {SIGINT, SIGTERM, SIGXCPU, SIGXFSZ, SIGALRM, SIGSEGV, SIGABRT};
   for (size_t i = 0; i < sizeof signals / sizeof *signals; ++i) {
-    (void)signal(signals[i], SIG_DFL); /* inherited handlers would delete the parent's outputs */
+    /* an inherited handler would delete the unfinished outputs of the parent */
+    (void)signal(signals[i], SIG_DFL);
   }
-  (void)alarm(10 * (unsigned)seconds); /* ends the process if it blocks */
+  (void)alarm(10 * (unsigned)seconds); /* ends the process if it hangs */
   (void)freopen("/dev/null", "w", stderr);
 }
 
@@ -269,7 +270,7 @@ supine_status supine_mesh_read_obj(mesh_file *file, supine_mesh *mesh, size_t *d
   return bad > 0 ? bad_line(file, bad, error) : import_file(file, "obj", mesh, dropped, error);
 }
 
-/* Read STL. Only text has no NUL byte; binary files, too, may begin with "solid". */
+/* Read STL, as text or binary. A file with a NUL byte is binary, even if it begins with "solid". */
 supine_status supine_mesh_read_stl(mesh_file *file, supine_mesh *mesh, size_t *dropped,
                                    supine_error *error) {
   mesh_text last = {0};

@@ -56,7 +56,8 @@ static supine_status check_file(const char *path, size_t *size, supine_error *er
                     : SUPINE_OK;
 }
 
-/* Find the axes near the start of the file, where 3D Slicer writes a tag such as SPACE=LPS. */
+/* Find the axes in the first 4095 bytes of the file, where 3D Slicer writes a tag such as
+ * SPACE=LPS. */
 static void find_space(mesh_file *file) {
   char head[4096];
   char letters[4] = "";
@@ -125,7 +126,7 @@ static supine_status choose_axes(const mesh_file *file, supine_axes asked,
   return SUPINE_OK;
 }
 
-/* Largest coordinate, mm, that single precision resolves to 1 mm. */
+/* Largest coordinate, mm. Single precision resolves it to 1 mm. */
 static const double farthest = 1e7;
 
 static supine_status convert(const char *path, double scale, supine_axes axes, supine_mesh *mesh,

@@ -36,7 +36,7 @@ typedef struct header {
   size_t length; /* bytes before the voxels */
 } header;
 
-/* Return the last value that has one of three keys, or "" if none has. Unused keys are "". */
+/* Return the last value with one of three keys, or "" if there is none. Unused keys are "". */
 static const char *value_of(const header *h, const char *key, const char *second,
                             const char *third) {
   const char *value = "";
@@ -157,7 +157,8 @@ static const char *describe(const header *h, supine_image *image, size_t *type_i
       framed = framed || matrix[a * n + k] != 0.0;
     }
   }
-  for (size_t a = 0; !framed && a < 3; ++a) { /* without a matrix, the axes are x, y and z */
+  /* if the header has no matrix, the axes of the image are x, y and z */
+  for (size_t a = 0; !framed && a < 3; ++a) {
     image->step[a][a] = spacing[a];
   }
   return NULL;

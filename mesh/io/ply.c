@@ -8,11 +8,11 @@ enum { ELEMENTS_MAX = 32, PROPERTIES_MAX = 256 };
 
 typedef enum encoding { ASCII, LITTLE, BIG, ENCODINGS } encoding;
 typedef enum kind { VERTICES, FACES, STRIPS, OTHER } kind;
-/* Use of a property: a coordinate, the corners of a face, or none. */
+/* Use of a property: a coordinate, the list of corners of a face, or none. */
 typedef enum role { X, Y, Z, CORNERS, NONE } role;
 
 typedef struct property {
-  const mesh_type *count; /* type of a list's length; NULL if the property is not a list */
+  const mesh_type *count; /* type of the length of a list; NULL if the property is not a list */
   const mesh_type *type;
   role role;
 } property;
@@ -30,7 +30,8 @@ typedef struct ply {
   encoding encoding;
   mesh_text text; /* part of the file not yet read */
   mesh_text line;
-  unsigned present; /* bit 1 << role is set if a nonempty element has a property of this role */
+  /* bit 1 << role is set if an element with entries has a property of this role */
+  unsigned present;
   size_t element_count;
   size_t property_count;
   element elements[ELEMENTS_MAX];

@@ -24,7 +24,7 @@ static supine_status no_memory(const reading *r) {
   return supine_error_set(r->error, SUPINE_ERROR_MEMORY, "%s: out of memory", r->path);
 }
 
-/* Append a point, given in the axes and unit of the file unless the options name others. */
+/* Append a point. Convert it from `axes` and `unit`, unless the options name others. */
 static supine_status add(reading *r, const double at[3], const char *name, supine_axes axes,
                          double unit) {
   supine_mesh_points *p = &r->points;

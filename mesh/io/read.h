@@ -33,7 +33,7 @@ bool supine_mesh_text_number(mesh_text *text, double *value);
  * failure. */
 bool supine_mesh_text_position(mesh_text *text, double position[3]);
 
-/** A type of binary numbers. */
+/** A number type of a binary file. */
 typedef struct mesh_type {
   const char *name;
   unsigned size; /**< size of a number, bytes */
@@ -50,8 +50,8 @@ typedef struct mesh_file {
   const char *path;
   unsigned char *bytes; /**< content of the file, then a NUL */
   size_t size;
-  bool tagged;       /**< whether the file has a SPACE tag */
-  supine_axes space; /**< axes that the tag names; AUTO if unknown */
+  bool tagged;       /**< whether the file names its axes in a SPACE tag, as 3D Slicer writes it */
+  supine_axes space; /**< axes named by the SPACE tag; AUTO if there is none or it is unknown */
 } mesh_file;
 
 /** Refuse a text with a NUL byte, or with a CR that no LF follows: other readers would split its
@@ -61,7 +61,7 @@ bool supine_mesh_guard_text(const mesh_file *file, supine_error *error);
 /* ---- faces.c: add faces to a mesh that already has its vertices. ---- */
 
 enum {
-  MESH_CORNERS_MAX = 1024, /**< limit per face: cutting a face takes quadratic time */
+  MESH_CORNERS_MAX = 1024, /**< largest number of corners of a face: cutting takes quadratic time */
   MESH_VERTICES_MAX = INT32_MAX,
   MESH_TRIANGLES_MAX = UINT32_MAX / 3
 };
@@ -69,7 +69,7 @@ enum {
 typedef struct mesh_faces {
   const char *path;
   supine_mesh *mesh;
-  size_t capacity; /**< number of triangles that have been allocated */
+  size_t capacity; /**< number of triangles for which memory is allocated */
   size_t count;    /**< number of faces read, including points and lines */
   size_t dropped;  /**< number of points and lines skipped */
 } mesh_faces;
@@ -84,14 +84,14 @@ supine_status supine_mesh_faces_add(mesh_faces *faces, const double *corners, si
 
 /** Read a surface in the file's units and axes, in single precision, without welding its vertices.
  * The caller frees `mesh`, even after a failure. `dropped` is set to the number of faces that are
- * points or lines. If the format has a place for a SPACE tag, the tag is stored in `file`. */
+ * points or lines. If the format can hold the axes in a SPACE tag, they are stored in `file`. */
 typedef supine_status mesh_reader(mesh_file *file, supine_mesh *mesh, size_t *dropped,
                                   supine_error *error);
 mesh_reader supine_mesh_read_ply;
 mesh_reader supine_mesh_read_vtp;
 mesh_reader supine_mesh_read_stl;
 mesh_reader supine_mesh_read_obj;
-/** Read a format without a reader above through assimp. */
+/** Import a format for which there is no reader above by the library assimp. */
 mesh_reader supine_mesh_import;
 /** Return whether assimp is installed and imports this ending. */
 bool supine_mesh_import_knows(const char *ending);

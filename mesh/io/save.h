@@ -13,11 +13,11 @@ typedef struct mesh_writer {
   const supine_mesh *mesh;
   supine_mesh_save_options options;
   unsigned char source[3]; /**< axis of `mesh`, 0 to 2, that gives each coordinate of the file */
-  double factor[3]; /**< sign of each coordinate (1 or -1), divided by the file's unit in mm */
-  bool mirrored; /**< whether axes are left-handed: triangles are then written in reverse order */
-  double step; /**< lengths are rounded to multiples of this, in the file's unit; 0: not rounded */
-  char space[4];     /**< letters of the axes: "LPS", "RAS", ... */
-  char unit[24];     /**< unit of lengths: "mm", "cm", ... */
+  double factor[3]; /**< sign of each coordinate of the file (1 or -1), divided by its unit in mm */
+  bool mirrored;    /**< whether the file's axes are left-handed: triangles are then reversed */
+  double step;   /**< lengths are rounded to multiples of this in the file's unit, unless it is 0 */
+  char space[4]; /**< letters of the file's axes: "LPS", "RAS", ... */
+  char unit[24]; /**< unit of lengths: "mm", "cm", ... */
   char comment[256]; /**< one printable line, or "" */
 } mesh_writer;
 
@@ -29,7 +29,7 @@ void supine_mesh_writer_displacement(const mesh_writer *writer, size_t i, float 
 /** Find the normal of vertex i in the file's axes. */
 void supine_mesh_writer_normal(const mesh_writer *writer, size_t i, float normal[3]);
 
-/** Find the corners of triangle t, in the file's order. */
+/** Find the corners of triangle t, in the order in which the file lists them. */
 void supine_mesh_writer_triangle(const mesh_writer *writer, size_t t, uint32_t corner[3]);
 
 /** Fill a writer, except `out`, from the arguments of supine_mesh_save. */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Write VTK XML PolyData with compressed appended arrays, for one surface, or for a series
- * of frames, which are surfaces with the same triangles. The arrays of a series are written frame
- * by frame. Then the head of the file is written a second time, with the offsets of the arrays. */
+/* Write VTK XML PolyData with compressed appended arrays, for one surface, or for a series of
+ * frames, which are surfaces with the same triangles. The arrays of a series are written frame by
+ * frame. Then the header of the file is written a second time, with the offsets of the arrays. */
 #include <stdlib.h>
 
 #include <libdeflate.h>
@@ -22,7 +22,7 @@ typedef struct vtp_array {
   const char *type;
   const char *name;
   unsigned components;
-  size_t item_size; /* bytes per point or triangle: 1, 4 or 12 */
+  size_t item_size; /* size of the data of one point or triangle, bytes: 1, 4 or 12 */
   size_t count;
   bool constant; /* whether the array is equal in all frames and written once */
   vtp_put *put;
@@ -34,13 +34,13 @@ struct vtp {
   size_t array_count;
   size_t frames;
   const double *times; /* [frames] in s; NULL for one surface without a time */
-  uint64_t *offsets;   /* [frames, array_count] bytes from the end of the head to each array */
+  uint64_t *offsets;   /* [frames, array_count] bytes from the end of the header to each array */
   size_t next_frame;
   uint64_t bytes_written;
   size_t threads;
-  unsigned char *raw;    /* [threads, BLOCK] a block of each thread, not compressed */
+  unsigned char *raw;    /* [threads, BLOCK] uncompressed bytes of one block for each thread */
   unsigned char *packed; /* compressed blocks of one array */
-  uint64_t *sizes;       /* header of an array: three numbers, then each block's compressed size */
+  uint64_t *sizes; /* header of one array: three numbers, then the compressed size of each block */
   const vtp_array *packing; /* array being compressed */
 };
 
@@ -150,7 +150,8 @@ static void put_sizes(FILE *out, const uint64_t *sizes, size_t count) {
   }
 }
 
-/* Fill and compress blocks begin <= i < end of file->packing. A size of 0 means out of memory. */
+/* Fill and compress blocks begin <= i < end of file->packing. A compressed size of 0 means out of
+ * memory. */
 static void pack_blocks(void *context, size_t begin, size_t end, size_t thread) {
   vtp *file = context;
   const vtp_array *array = file->packing;
@@ -210,7 +211,7 @@ static supine_status vtp_frame(vtp *file, FILE *out) {
 }
 
 /* Write the DataArray elements of an array, one for each frame. Offsets are padded to one length,
- * so that the head can be written again with other offsets. */
+ * so that the header of the file can be written again with other offsets. */
 static void write_array(const vtp *file, size_t number, FILE *out) {
   const vtp_array *array = &file->arrays[number];
   for (size_t frame = 0; frame < file->frames; ++frame) {
@@ -227,8 +228,9 @@ static void write_array(const vtp *file, size_t number, FILE *out) {
   }
 }
 
-/* Write the axes, the unit and a comment as one XML comment, with blanks between hyphens, as it
- * must not hold "--". Non-ASCII bytes become "?", as the comment may end within a character. */
+/* Write the axes, the unit and the user's text as an XML comment. Put blanks between hyphens,
+ * because an XML comment must not hold "--". Replace non-ASCII bytes by "?", because the text may
+ * have been cut within a character. */
 static void write_notes(const mesh_writer *writer, FILE *out) {
   (void)fprintf(out, "<!-- SPACE=%s %s ", writer->space, writer->unit);
   for (const char *c = writer->comment; *c != '\0'; ++c) {
@@ -276,7 +278,8 @@ static void write_field_data(const vtp *file, FILE *out) {
   (void)fputs("</FieldData>\n", out);
 }
 
-/* Write everything before the arrays. Its length does not depend on the offsets of the arrays. */
+/* Write the header of the file, which is everything before the arrays. Its length does not depend
+ * on the offsets of the arrays. */
 static void vtp_head(const vtp *file, FILE *out) {
   const mesh_writer *writer = &file->writer;
   (void)fputs("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n", out);
@@ -310,7 +313,7 @@ static void vtp_foot(FILE *out) {
   (void)fputs("\n</AppendedData>\n</VTKFile>\n", out);
 }
 
-/* Compress the arrays into memory first, because the head states their offsets. */
+/* Compress the arrays into memory first, because the header of the file states their offsets. */
 supine_status supine_mesh_save_vtp(const mesh_writer *writer) {
   vtp file = {.writer = *writer, .frames = 1};
   char *bytes = NULL;

@@ -8,8 +8,8 @@
 
 #include "mesh/labels/mask.h"
 
-/* Lung labels of segmenters: lungmask's models R231 and LTRCLobes, and TotalSegmentator's task
- * `total` in versions 2.0 and later and in version 1. */
+/* Labels of the lungs by segmentation programs: lungmask's models R231 and LTRCLobes, and
+ * TotalSegmentator's task `total` in versions 2.0 and later and in version 1. */
 static const struct {
   const char *name, *labels;
 } conventions[] = {{"lungmask", "left=2,right=1"},
@@ -19,7 +19,7 @@ static const struct {
 
 enum { CONVENTIONS = sizeof conventions / sizeof *conventions };
 
-/* Find the centre of all voxels of the side `wanted`, mm; return false if no voxel has that
+/* Find the centre of all voxels of the side `wanted`, mm. Return false if no voxel has that
  * side. */
 static bool centre_of(const supine_image *image, const labels_tally *tally, const uint8_t *side,
                       uint8_t wanted, double centre[3]) {
@@ -64,7 +64,8 @@ static void list_labels(const labels_tally *tally, const uint8_t *side, uint8_t 
   }
 }
 
-/* Parse labels such as "10+11", and set the side of each. Return their end; NULL if invalid. */
+/* Parse labels such as "10+11", and set the side of each. Return the end of the text parsed; NULL
+ * if it is invalid. */
 static const char *read_sum(const char *at, uint8_t value, uint8_t *side) {
   for (;; ++at) {
     char *end;
@@ -80,7 +81,8 @@ static const char *read_sum(const char *at, uint8_t value, uint8_t *side) {
   }
 }
 
-/* Parse a list such as "left=10+11,right=12" into `side`, initially 0; return false if invalid. */
+/* Parse a list such as "left=10+11,right=12" into `side`, which is 0 at first. Return false if the
+ * list is invalid. */
 static bool read_sides(const char *wanted, uint8_t *side) {
   const char *at = wanted;
   bool seen[2] = {false, false};
@@ -98,8 +100,9 @@ static bool read_sides(const char *wanted, uint8_t *side) {
   }
 }
 
-/* Choose by the labels present: a single label holds both lungs, two labels hold one lung each,
- * and three or more must be exactly the labels of a convention. Return false if they are not. */
+/* Choose the side of each label by the labels that are present. A single label holds both lungs.
+ * Two labels hold one lung each. Three or more must be exactly the labels of a known convention.
+ * Return false if they are not. */
 static bool choose_by_presence(const supine_image *image, const labels_tally *tally, uint8_t *side,
                                const char **name) {
   size_t present[2] = {0, 0};
@@ -142,7 +145,8 @@ static bool choose_by_presence(const supine_image *image, const labels_tally *ta
   return false;
 }
 
-/* Set the side of each label; set `name` to the convention used, if any. */
+/* Set the left or right side of each label. Set `name` to the labelling convention, such as
+ * "lungmask", if one was used. */
 static supine_status choose(const char *path, const supine_image *image, const labels_tally *tally,
                             const char *wanted, uint8_t *side, const char **name,
                             supine_error *error) {
@@ -177,8 +181,8 @@ static supine_status choose(const char *path, const supine_image *image, const l
   return SUPINE_OK;
 }
 
-/* Check that each lung that has labels also has voxels. If both lungs have voxels, set `doubted` to
- * false if the left lung lies mainly to the left of the right lung, and to true otherwise. */
+/* Check that each lung to which labels are assigned has voxels. If both lungs have voxels, set
+ * `doubted` to whether the left lung does not lie mainly to the left of the right lung. */
 static supine_status check(const char *path, const supine_image *image, const labels_tally *tally,
                            const uint8_t *side, bool *doubted, supine_error *error) {
   static const char *const names[] = {"left", "right"};

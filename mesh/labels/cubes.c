@@ -1,16 +1,17 @@
 /* SPDX-License-Identifier: MIT */
-/* Average a mask over cubes aligned with its axes. Fill cubes until no two cubes inside, and no two
- * outside, meet only in an edge or a corner: the surface is then a manifold [Latecki1995]. */
+/* Average a mask over a grid of cubes. A cube is inside if at least half of it is in the mask. Fill
+ * more cubes until no two cubes inside, and no two outside, meet only in an edge or a corner. The
+ * surface between cubes inside and outside is then a manifold [Latecki1995]. */
 #include <math.h>
 #include <stdlib.h>
 
 #include "mesh/labels/mask.h"
 
-enum { LAYERS = 2 }; /* layers of empty cubes around the mask */
+enum { LAYERS = 2 }; /* layers of empty cubes around the bounding box of the mask */
 
-/* Average `in` [outer, n, inner] along its middle axis over intervals of `ratio` voxels, into `out`
- * [outer, m, inner]. An interval shorter than a voxel is widened to one voxel, which interpolates
- * linearly between voxel centres. */
+/* Average `in` [outer, n, inner] along its middle axis, over intervals of `ratio` voxels, into
+ * `out` [outer, m, inner]. Intervals shorter than a voxel are widened to one voxel, so that the
+ * averages interpolate linearly between voxel centres. */
 static void average(const float *in, size_t outer, size_t n, size_t inner, size_t m, double ratio,
                     float *out) {
   const double width = fmax(1.0, ratio);
@@ -35,7 +36,7 @@ static void average(const float *in, size_t outer, size_t n, size_t inner, size_
   }
 }
 
-/* Average the mask [rows, n] along its rows like average() does, into `out` [rows, m]. */
+/* Average the mask [rows, n] along its rows, like average() does, into `out` [rows, m]. */
 static void average_rows(const labels_mask *mask, size_t m, double ratio, float *out) {
   const size_t n = mask->size[0];
   const double width = fmax(1.0, ratio);
@@ -54,12 +55,14 @@ static void average_rows(const labels_mask *mask, size_t m, double ratio, float 
   }
 }
 
-static const float half = 0.5F; /* a cube is inside if at least this share of it is in the mask */
-/* Shares are rounded to multiples of 1 / levels, so that they are equal on all processors. */
+/* a cube is inside if at least this fraction of it is in the mask */
+static const float half = 0.5F;
+/* The fraction of a cube in the mask is rounded to a multiple of 1 / levels, so that all processors
+ * give the same result. */
 static const float levels = 65536.0F;
 
-/* If only two opposite cubes of the four around an edge are inside, fill the fuller of the other
- * two. Return whether a cube was filled. */
+/* If exactly two of the four cubes around an edge are inside, and they touch only in this edge,
+ * fill the fuller of the other two. Return whether a cube was filled. */
 static bool mend_edge(float *share, const size_t at[4]) {
   const bool in[4] = {share[at[0]] >= half, share[at[1]] >= half, share[at[2]] >= half,
                       share[at[3]] >= half};
@@ -72,8 +75,9 @@ static bool mend_edge(float *share, const size_t at[4]) {
   return true;
 }
 
-/* If only two opposite cubes of the eight around a corner are inside, fill two that connect them;
- * if only two opposite ones are outside, fill one of them. Return whether a cube was filled. */
+/* If exactly two of the eight cubes around a corner are inside, and they touch only in this corner,
+ * fill two cubes that connect them. If exactly two are outside and touch only in this corner, fill
+ * one of them. Return whether a cube was filled. */
 static bool mend_corner(float *share, const size_t at[8]) {
   unsigned inside = 0;
   for (unsigned c = 0; c < 8; ++c) {
@@ -95,7 +99,7 @@ static bool mend_corner(float *share, const size_t at[8]) {
   return false;
 }
 
-/* Apply mend_edge and mend_corner everywhere; return whether a cube was filled. */
+/* Apply mend_edge and mend_corner everywhere. Return whether a cube was filled. */
 static bool mend(const size_t size[3], float *share) {
   const size_t stride[3] = {1, size[0], size[0] * size[1]};
   bool mended = false;
@@ -129,7 +133,7 @@ static bool mend(const size_t size[3], float *share) {
   return mended;
 }
 
-/* Remove islands, and fill cavities, that averaging and correction have left among the cubes. */
+/* Keep only the largest connected piece of the cubes inside, and fill its cavities. */
 static supine_status one_piece(labels_cubes *cubes) {
   labels_mask inside = {.size = {cubes->size[0], cubes->size[1], cubes->size[2]}};
   const size_t count = supine_labels_mask_count(&inside);

@@ -12,11 +12,11 @@ static const float far_away = 1e30F; /* stands for an infinite squared distance,
 
 typedef struct sweep {
   const labels_mask *mask;
-  bool zero; /* whether to find distances to zero voxels, rather than to nonzero voxels */
+  bool zero; /* whether to find distances to zero voxels instead of nonzero voxels */
   float *squares;
   int axis;
   size_t length; /* larger of the mask's size[1] and size[2] */
-  double *space; /* [threads, 3, length + 2] work space */
+  double *space; /* [threads, 3, length + 2] work space of each thread */
 } sweep;
 
 static void along_rows(void *context, size_t begin, size_t end, size_t thread) {
@@ -41,9 +41,10 @@ static void along_rows(void *context, size_t begin, size_t end, size_t thread) {
   }
 }
 
-/* Replace the n values f(x), `stride` apart in `line`, by the minimum over y of (x - y)^2 +
- * f(y). Work space: v, the index y of each parabola in the envelope; z, the x from which that
- * parabola is lowest, mm; f, the old values. */
+/* Replace the n values f(x), which are `stride` apart in `line`, by the minimum over y of (x - y)^2
+ * + f(y), the lower envelope of parabolas with their lowest points at (y, f(y)). Work space: v
+ * holds the index y of each parabola in the envelope; z the x from which that parabola is lowest,
+ * mm; f the old values. */
 static void envelope(float *line, size_t n, size_t stride, double step, double *v, double *z,
                      double *f) {
   size_t last = 0;
@@ -119,7 +120,8 @@ supine_status supine_labels_close(labels_mask *mask, double radius, size_t *adde
     free(squares);
     return SUPINE_ERROR_MEMORY;
   }
-  for (size_t i = 0; i < count; ++i) { /* 2: outside the mask but within `radius` */
+  /* set voxels outside the mask, but within `radius` of it, to 2 */
+  for (size_t i = 0; i < count; ++i) {
     mask->at[i] = mask->at[i] != 0 ? 1 : squares[i] <= reach ? 2 : 0;
   }
   const supine_status status = supine_labels_distance(mask, true, squares);

@@ -10,10 +10,10 @@
 #include "mesh/anatomy.h"
 #include "mesh/labels/mask.h"
 
-static const double least_edge = 0.2;           /* mm; makes some ten million vertices */
-static const double most_edge = 20.0;           /* mm; larger cubes leave little of a lung */
-static const double most_closing_radius = 20.0; /* mm */
-static const double least_volume = 1.0;         /* mL */
+static const double least_edge = 0.2; /* mm; makes about ten million vertices */
+static const double most_edge = 20.0; /* mm; with larger cubes, little of a lung remains */
+static const double most_closing_radius = 20.0; /* mm; half the width of gaps to close */
+static const double least_volume = 1.0;         /* mL; smaller lungs are refused */
 static const double longest_lung = 1000.0; /* mm; if a lung seems longer, the voxel size is wrong */
 
 typedef struct work {
@@ -21,9 +21,9 @@ typedef struct work {
   const supine_labels_options *options;
   supine_labels_report *report;
   double edge;
-  supine_image image; /* the label map; freed once `both` is cut from it */
+  supine_image image; /* the label map; freed when the lungs have been copied to `both` */
   labels_mask both;
-  bool doubted; /* whether the left lung does not lie left of the right lung */
+  bool doubted; /* whether the left lung does not lie mainly to the left of the right lung */
 } work;
 
 static supine_status advance(work *w, double fraction, supine_error *error) {
@@ -34,7 +34,7 @@ static supine_status advance(work *w, double fraction, supine_error *error) {
                                 "interrupted: nothing was written");
 }
 
-/* Return whether two images have the same size, and the same corners within 0.01 voxels. */
+/* Return whether two images have the same size, and corners that differ by at most 0.01 voxels. */
 static bool same_frame(const supine_image *a, const supine_image *b) {
   if (memcmp(a->size, b->size, sizeof a->size) != 0) {
     return false;
@@ -65,7 +65,7 @@ static supine_status read_image(const work *w, const char *path, supine_image *i
   return status;
 }
 
-/* Join masks into one map with the labels 1, 2, ...; where masks overlap, the first one counts. */
+/* Join masks into one map with the labels 1, 2, ... Where masks overlap, the first one counts. */
 static supine_status join_images(work *w, const char *const *paths, size_t count,
                                  supine_error *error) {
   const size_t voxels = w->image.size[0] * w->image.size[1] * w->image.size[2];
@@ -95,8 +95,8 @@ static supine_status join_images(work *w, const char *const *paths, size_t count
   return status;
 }
 
-/* Copy the box of the lungs to w->both; voxels become 0, LABELS_LEFT, LABELS_RIGHT or
- * LABELS_EITHER. */
+/* Copy the bounding box of the lungs from the label map to w->both. Its voxels become 0,
+ * LABELS_LEFT, LABELS_RIGHT or LABELS_EITHER. */
 static supine_status make_mask(work *w, const labels_tally *tally, const uint8_t *side,
                                supine_error *error) {
   size_t low[3] = {SIZE_MAX, SIZE_MAX, SIZE_MAX};
@@ -113,7 +113,8 @@ static supine_status make_mask(work *w, const labels_tally *tally, const uint8_t
   return SUPINE_OK;
 }
 
-/* Return whether a lung's box reaches the border of the image, which probably cuts the lung off. */
+/* Return whether the bounding box of a lung reaches the border of the image, which probably cuts
+ * off a part of the lung. */
 static bool is_cut(const work *w, const labels_mask *lung, size_t margin) {
   bool cut = false;
   for (int a = 0; a < 3; ++a) {
@@ -184,7 +185,7 @@ static supine_status read_map(work *w, const char *const *paths, size_t count,
   return status;
 }
 
-/* Clear the voxels that closing added to a lung but that belong to the other lung. */
+/* Clear the voxels that closing gaps added to one lung although they belong to the other lung. */
 static void leave_other(const labels_mask *both, uint8_t value, labels_mask *mask) {
   const long *offset = mask->from;
   for (long k = 0; k < (long)mask->size[2]; ++k) {
@@ -206,7 +207,8 @@ static void leave_other(const labels_mask *both, uint8_t value, labels_mask *mas
   }
 }
 
-/* Close gaps as the options say, keep the largest piece, and fill its cavities. */
+/* If the options say so, close gaps in a lung. Keep its largest connected piece, and fill the
+ * cavities in it. */
 static supine_status clean(const work *w, uint8_t value, labels_mask *mask,
                            supine_labels_lung *lung) {
   const double ml = supine_labels_voxel_ml(mask);
@@ -279,8 +281,8 @@ static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung,
                                 w->path, name, w->edge);
 }
 
-/* Report that the header does not put the left lung left of the right lung, and judge by the lungs'
- * shape whether the labels or the header's axes are wrong. */
+/* Report that the left lung does not lie left of the right lung if the header is right. Judge by
+ * the shape of the lungs whether the labels or the axes in the header are wrong. */
 static supine_status refuse_sides(const work *w, const supine_mesh *surfaces, supine_error *error) {
   const supine_labels_report *report = w->report;
   const supine_mesh_anatomy found = supine_mesh_anatomy_find(surfaces, report->lung_count);

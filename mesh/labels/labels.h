@@ -12,13 +12,15 @@
 #define SUPINE_LABELS_EDGE 2.0
 
 typedef struct supine_labels_options {
-  /** Labels of the lungs; if NULL, chosen by the labels present. "one": all labels but 0, split
-   * into two lungs. "lungmask", "lobes", "totalsegmentator", "totalsegmentator-v1": labels of a
-   * segmenter. Or a list such as "left=10+11,right=12+13+14", for one or both sides. */
+  /** Labels of the lungs, one of:
+   * - NULL: chosen by the labels that are present
+   * - "one": all labels but 0, split into two lungs
+   * - "lungmask", "lobes", "totalsegmentator" or "totalsegmentator-v1": labels of that segmenter
+   * - a list such as "left=10+11,right=12+13+14", for one or both sides */
   const char *labels;
-  supine_axes axes; /**< axes of the header's coordinates; AUTO for those that the header names */
-  double edge;      /**< approximate distance between vertices, mm; 0 for SUPINE_LABELS_EDGE */
-  double close;     /**< half the width of the widest gaps to close, mm; 0 closes none */
+  supine_axes axes; /**< axes of the header's coordinates; AUTO: as the header states */
+  double edge;      /**< approximate distance between vertices, mm; 0 means SUPINE_LABELS_EDGE */
+  double close;     /**< half the width of the widest gaps in a lung to close, mm; 0 closes none */
   /** Receive the fraction done, 0 to 1; return false to stop. Optional. */
   bool (*progress)(void *context, double fraction);
   void *progress_context;
@@ -29,7 +31,7 @@ typedef struct supine_labels_lung {
   int side;        /**< +1 left, -1 right */
   double mask;     /**< volume of the voxels that the surface is made from, mL */
   double closed;   /**< volume added by closing gaps, mL */
-  size_t islands;  /**< number of pieces dropped */
+  size_t islands;  /**< number of pieces dropped that were not connected to the lung */
   double dropped;  /**< volume of the pieces dropped, mL */
   size_t cavities; /**< number of cavities filled */
   double filled;   /**< volume of the cavities filled, mL */
@@ -55,21 +57,22 @@ typedef struct supine_labels_report {
 /** Make the surfaces of the lungs from a label map (.nrrd, .nii, .nii.gz, .mha), or from several
  * masks of one scan: nonzero voxels of the first get the label 1, of the second 2, and so on.
  *
- * The largest piece of each lung is kept and its cavities are filled. The map is averaged over
- * cubes with sides of `edge` along the map's axes. Cubes at least half filled are inside. Cubes are
- * corrected so that no two inside, and no two outside, meet only in an edge or a corner, which
- * makes the surface net [Gibson1998] a closed manifold. The net is smoothed without shrinking
- * [Taubin1995]; each vertex stays between the centres of eight neighbouring cubes.
+ * The largest piece of each lung is kept and its cavities are filled. The map is averaged over a
+ * grid of cubes with edges of `edge` mm along the map's axes. A cube is inside if at least half of
+ * it is filled. More cubes are filled until no two cubes inside, and no two outside, meet only in
+ * an edge or a corner: then the surface net [Gibson1998] is a closed manifold. The net is smoothed
+ * without shrinking [Taubin1995]; each vertex stays between the centres of eight neighbouring
+ * cubes.
  *
  * @param surfaces  [2] zero-initialised; surface i is that of report->lung[i] and faces outwards
- * @retval SUPINE_ERROR_ARGUMENT  an edge, closing distance or list of labels that is invalid
- * @retval SUPINE_ERROR_MESH      a lung without voxels; labels that do not show which ones are
- *             lungs; a left lung that does not lie left of the right lung; a lung too small or too
- *             large
- * @retval SUPINE_ERROR_FORMAT    voxels that are not labels, images that differ in size or frame
+ * @retval SUPINE_ERROR_ARGUMENT  the edge, the closing distance or the list of labels is invalid
+ * @retval SUPINE_ERROR_MESH      a lung has no voxels, or is too small or too large; it is unclear
+ *             which labels are lungs; or the left lung does not lie left of the right lung
+ * @retval SUPINE_ERROR_FORMAT    a voxel is not a whole number from 0 to 65535, or images differ in
+ *             size or position
  * @retval SUPINE_ERROR_INTERRUPTED, SUPINE_ERROR_MEMORY, and the statuses of supine_image_read
  * Memory: the map and 1 byte per voxel. Splitting lungs takes 10 bytes more per voxel of the
- * lungs' box, and closing gaps takes 4 bytes more. */
+ * bounding box of the lungs, and closing gaps takes 4 bytes more. */
 supine_status supine_labels_surfaces(const char *const *paths, size_t count,
                                      const supine_labels_options *options, supine_mesh *surfaces,
                                      supine_labels_report *report, supine_error *error);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Count the labels of an image, and extract boxes of voxels from images and masks. */
+/* Count the voxels of each label in an image, and cut boxes of voxels out of images and masks. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -23,7 +23,8 @@ void supine_labels_mask_place(const labels_mask *mask, const double voxel[3], do
   }
 }
 
-/* Find the first and last index of a value along each axis; return false if it is absent. */
+/* Find the first and the last index along each axis of the voxels with a value. Return false if
+ * there are none. */
 static bool box_of(const labels_mask *mask, uint8_t value, size_t low[3], size_t high[3]) {
   bool any = false;
   for (size_t row = 0; row < mask->size[1] * mask->size[2]; ++row) {

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Make the surface of a mask as a surface net [Gibson1998]: a vertex between eight neighbouring
- * cubes if only some are inside, and a quadrilateral between two neighbours if only one is
- * inside. */
+/* Make the surface of a mask as a surface net [Gibson1998]. There is a vertex between eight
+ * neighbouring cubes of a grid if some of the cubes are inside the mask and some outside. There is
+ * a quadrilateral around the edge between the centres of two neighbouring cubes if one of them is
+ * inside and the other outside. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -11,13 +12,13 @@
 
 #define NONE UINT32_MAX
 
-/* A surface net. A cell lies between the centres of eight cubes, and has a vertex if some of them
- * are inside and some outside. */
+/* A surface net. The eight corners of a cell are the centres of neighbouring cubes. The cell holds
+ * a vertex if some of these cubes are inside the mask and some outside. */
 typedef struct surface_net {
   size_t count;
-  uint32_t (*cell)[3];      /* [count] x, y, z indices of the cube at the cell's lowest corner */
-  double (*at)[3];          /* [count] position of the vertex in its cell, 0 to 1 along each axis */
-  uint32_t (*neighbour)[6]; /* [count] vertices across the cell's faces -x, +x, -y, ..., or NONE */
+  uint32_t (*cell)[3]; /* [count] x, y, z indices of the cube at the lowest corner of the cell */
+  double (*at)[3];     /* [count] position of the vertex in its cell, 0 to 1 along each axis */
+  uint32_t (*neighbour)[6]; /* [count] vertices of the cells beyond faces -x, +x, ..., or NONE */
   size_t quad_count;
   uint32_t (*quad)[4]; /* vertices; quads face outwards if the map's axes are right-handed */
 } surface_net;
@@ -26,8 +27,8 @@ static const float half = 0.5F;
 
 typedef struct build {
   const labels_cubes *cubes;
-  size_t stride[3]; /* index step from a cube to the next along each axis */
-  uint32_t *vertex; /* [cubes] vertex of the cell that starts at this cube; unset if it has none */
+  size_t stride[3]; /* difference of the indices of neighbouring cubes along each axis */
+  uint32_t *vertex; /* [cubes] vertex of the cell with its lowest corner in this cube, if any */
   surface_net *net;
 } build;
 
@@ -69,7 +70,8 @@ static bool crossing(const build *b, size_t cell, double mean[3]) {
   return true;
 }
 
-/* Count the cells that the surface runs through; if `write`, also fill the net's vertices. */
+/* Count the cells that the surface crosses. If `write` is true, also fill the vertices of the
+ * net. */
 static void find_vertices(build *b, bool write) {
   const size_t *size = b->cubes->size;
   surface_net *net = b->net;
@@ -95,15 +97,15 @@ static void find_vertices(build *b, bool write) {
   }
 }
 
-/* Add the quadrilateral around the edge between `cube` and the next cube along axis `a`, and link
- * its vertices; unless `write`, only count it. */
+/* Add the quadrilateral around the edge from the centre of `cube` to that of the next cube along
+ * axis `a`, and make its vertices neighbours. If `write` is false, only count it. */
 static void add_quad(build *b, size_t cube, size_t a, bool write) {
   surface_net *net = b->net;
   const size_t u = (a + 1) % 3;
   const size_t v = (a + 2) % 3;
   const size_t cells[4] = {cube - b->stride[u] - b->stride[v], cube - b->stride[v], cube,
                            cube - b->stride[u]};
-  /* Face through which each of `cells` touches the next: +u, +v, -u, -v. */
+  /* Face through which each of `cells` touches the next one: +u, +v, -u, -v. */
   const size_t face[4] = {2 * u + 1, 2 * v + 1, 2 * u, 2 * v};
   if (write) {
     const bool outwards = b->cubes->share[cube] >= half;
@@ -170,13 +172,15 @@ static supine_status create(const labels_cubes *cubes, surface_net *net) {
   return SUPINE_OK;
 }
 
-/* Factors of smoothing by shrinking and inflation. The filter's pass band, 1 / 0.5 - 1 / 0.51 =
- * 0.04, keeps waves longer than some 16 cubes and removes the steps between slices. */
+/* Factors of the smoothing steps [Taubin1995]: shrink by the first, then inflate by the second. The
+ * pass-band frequency 1 / 0.5 - 1 / 0.51 = 0.04 keeps waves longer than about 16 cubes, and removes
+ * the steps between slices of the image. */
 static const double shrink = 0.5;
 static const double swell = -0.51;
 enum { TURNS = 40 }; /* number of times that the net is shrunk and inflated */
 
-/* Move every vertex by a share of the way to its neighbours' mean, but not out of its cell. */
+/* Move every vertex by the fraction `share` of the way to the mean of its neighbours, but not out
+ * of its cell. */
 static void step(const surface_net *net, double share, double (*next)[3]) {
   for (size_t v = 0; v < net->count; ++v) {
     double sum[3] = {0.0, 0.0, 0.0};
@@ -196,8 +200,8 @@ static void step(const surface_net *net, double share, double (*next)[3]) {
   }
 }
 
-/* Smooth the net by alternate shrinking and inflation, which keeps long waves [Taubin1995]; every
- * vertex stays in its cell. */
+/* Smooth the net by alternate shrinking and inflation, which preserves long waves [Taubin1995].
+ * Every vertex stays in its cell. */
 static supine_status relax(surface_net *net) {
   double(*next)[3] = malloc((net->count + 1) * sizeof *next);
   if (next == NULL) {

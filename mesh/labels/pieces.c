@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Find connected pieces, whose voxels share faces, by joining runs of voxels in rows. */
+/* Find connected pieces of voxels that share faces, by joining runs of consecutive voxels in rows
+ * along x. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -13,14 +14,15 @@ static uint32_t root(labels_run *run, uint32_t i) {
   return i;
 }
 
-/* Unite the pieces of two runs; the earlier root becomes the root of both. */
+/* Unite the connected pieces of two runs. The earlier root becomes the root of both. */
 static void unite(labels_run *run, uint32_t a, uint32_t b) {
   a = root(run, a);
   b = root(run, b);
   run[a > b ? a : b].parent = a > b ? b : a;
 }
 
-/* Unite the runs [a, a_end) and [b, b_end) of two neighbouring rows where they overlap. */
+/* Unite the pieces of runs [a, a_end) and [b, b_end) of two neighbouring rows where these runs
+ * overlap. */
 static void unite_rows(labels_run *run, size_t a, size_t a_end, size_t b, size_t b_end) {
   while (a < a_end && b < b_end) {
     if (run[a].begin < run[b].end && run[b].begin < run[a].end) {
@@ -34,7 +36,8 @@ static void unite_rows(labels_run *run, size_t a, size_t a_end, size_t b, size_t
   }
 }
 
-/* Find the runs of zero or nonzero voxels of a row; if `run` is NULL, only return their number. */
+/* Find the runs of consecutive zero or nonzero voxels in a row, and return their number. If `run`
+ * is NULL, only count them. */
 static size_t runs_of_row(const uint8_t *at, size_t size, bool zero, labels_run *run) {
   size_t count = 0;
   for (size_t i = 0; i < size;) {
@@ -53,7 +56,8 @@ static size_t runs_of_row(const uint8_t *at, size_t size, bool zero, labels_run 
   return count;
 }
 
-/* Set the piece of every run, and the voxel count and index sums of every piece. */
+/* Set the connected piece of every run of voxels. Count the voxels of every piece, and sum their
+ * indices along each axis. */
 static void measure(const labels_mask *mask, labels_pieces *pieces) {
   for (size_t row = 0; row < mask->size[1] * mask->size[2]; ++row) {
     for (size_t r = pieces->row[row]; r < pieces->row[row + 1]; ++r) {
@@ -121,7 +125,8 @@ supine_status supine_labels_keep_one(labels_mask *mask, bool zero, size_t *other
   if (status != SUPINE_OK) {
     return status;
   }
-  uint32_t kept = 0; /* first run of the piece to keep; among zero voxels, run 0, in the margin */
+  /* first run of the piece to keep; for zero voxels this is run 0, in the margin */
+  uint32_t kept = 0;
   for (size_t r = 1; !zero && r < pieces.run_count; ++r) {
     kept = pieces.piece[r].count > pieces.piece[kept].count ? (uint32_t)r : kept;
   }

@@ -11,15 +11,15 @@ typedef struct supine_labels_shape {
   supine_mesh surface;
 } supine_labels_shape;
 
-/** Make the surfaces of labels of a map (.nrrd, .nii, .nii.gz, .mha), as supine_labels_surfaces
- * does, but keep all pieces and cavities. Vertices are about one voxel apart. In a large part, they
- * are 1/50 of the cube root of the part's volume apart.
+/** Make the surface of each wanted label of a map (.nrrd, .nii, .nii.gz, .mha), as
+ * supine_labels_surfaces does, but keep all connected pieces and cavities. The distance between
+ * vertices is about one voxel or, if that is larger, 1/50 of the cube root of the label's volume.
  * @param wanted  [wanted_count] labels, 1 to 65535; all labels present if the count is 0
  * @param parts   [*count] output in the order of `wanted`, or by ascending label; release with
  *             supine_labels_shapes_free
  * @retval SUPINE_ERROR_MESH    a label has no voxels, all voxels are 0, or more than 256 labels are
  *             present but none is named
- * @retval SUPINE_ERROR_FORMAT  voxels that are not labels
+ * @retval SUPINE_ERROR_FORMAT  a voxel is not a whole number from 0 to 65535
  * @retval SUPINE_ERROR_MEMORY, and the statuses of supine_image_read */
 supine_status supine_labels_shapes(const char *path, const unsigned *wanted, size_t wanted_count,
                                    supine_labels_shape **parts, size_t *count, supine_error *error);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Split a mask of two lungs. Where they touch, erode the mask until it falls into two pieces
- * beside each other; each voxel then belongs to the nearer piece. */
+/* Split a mask of two lungs. Where they touch, erode the mask until it falls into two connected
+ * pieces beside each other. Then assign each voxel to the nearer piece. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,11 +13,12 @@ static const double least_share = 0.1;
 static const double widest_neck = 40.0;
 
 typedef struct pair {
-  uint32_t piece[2]; /* index of each piece's first run, left piece first */
+  /* index of the first run of voxels of each connected piece, left piece first */
+  uint32_t piece[2];
 } pair;
 
-/* Find the two largest pieces. Return false unless they lie side by side along x and the smaller
- * one has at least `least_share` of the volume of the larger one. */
+/* Find the two largest connected pieces. Return false unless they lie side by side along x, and the
+ * smaller one has at least `least_share` of the volume of the larger one. */
 static bool find_pair(const labels_mask *mask, const labels_pieces *pieces, pair *found) {
   uint32_t top[2] = {0, 0};
   for (uint32_t r = 1; r < pieces->run_count; ++r) {
@@ -50,7 +51,7 @@ static bool find_pair(const labels_mask *mask, const labels_pieces *pieces, pair
          fabs(apart) > fabs(centre[0][2] - centre[1][2]);
 }
 
-/* Set `eroded` to 1 at the voxels of the mask that are deeper than `depth`, mm, and to 0 elsewhere.
+/* Set `eroded` to 1 at voxels that lie deeper than `depth`, mm, in the mask, and to 0 elsewhere.
  * @param squares  squared depth of each voxel, mm^2; not read if `depth` is 0 */
 static void erode(const labels_mask *both, const float *squares, double depth, uint8_t *eroded) {
   const size_t count = supine_labels_mask_count(both);
@@ -110,7 +111,7 @@ supine_status supine_labels_split(const char *path, labels_mask *both, double *n
     goto cleanup;
   }
   status = SUPINE_OK;
-  bool all = false; /* whether the two pieces hold all voxels of the mask */
+  bool all = false; /* whether the two pieces together hold all voxels of the mask */
   for (double depth = 0.0; status == SUPINE_OK && !found_pair && 2.0 * depth <= widest_neck;
        depth += step) {
     labels_pieces pieces = {0};

@@ -8,7 +8,7 @@
 #endif
 
 /** Mark a function to be compiled in several versions, one for each architecture level. Versions
- * for named processors would run on the processors of one manufacturer only. */
+ * for named processor models would run on the processors of one manufacturer only. */
 #if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && __GNUC__ >= 12 &&            \
     !defined(SUPINE_NO_CLONES)
 #define SUPINE_CLONES __attribute__((target_clones("default", "arch=x86-64-v3", "arch=x86-64-v4")))

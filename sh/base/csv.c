@@ -119,7 +119,7 @@ static supine_status csv_header(supine_csv *csv, const char *const *names, size_
                               "%s:%zu: repeated column \"%s\" in the header: delete or rename one",
                               csv->path, csv->line, csv->field[f]);
     }
-    if (c < count) { /* ignore columns that are not expected */
+    if (c < count) { /* columns that the caller does not expect are ignored */
       csv->column[c] = f;
     }
   }

@@ -27,8 +27,9 @@ typedef struct supine_csv {
   size_t column[SUPINE_CSV_FIELDS_MAX]; /* index of each expected column; SIZE_MAX if absent */
 } supine_csv;
 
-/* Open a file and read its header. Of the `count` expected columns in `names`, the first `required`
- * must be in the header, in any order, upper or lower case. Other columns are ignored.
+/* Open a file and read its header. `names` are the `count` columns that the caller expects. The
+ * file must have the first `required` of them, in any order, in upper or lower case. Columns that
+ * are not in `names` are ignored.
  * @param path  must outlive the reader */
 supine_status supine_csv_open(const char *path, const char *const *names, size_t count,
                               size_t required, supine_csv *csv, supine_error *error);
@@ -36,10 +37,12 @@ supine_status supine_csv_open(const char *path, const char *const *names, size_t
 /* Read the next row; set *more to false at the end. */
 supine_status supine_csv_next(supine_csv *csv, bool *more, supine_error *error);
 
-/* Return the text of an expected column in the current row; NULL if the file lacks the column. */
+/* Return the text of a column in the current row, or NULL if the file lacks the column. `column` is
+ * an index into the `names` of supine_csv_open. */
 const char *supine_csv_text(const supine_csv *csv, size_t column);
 
-/* Parse the number in an expected column of the current row. The file must have the column.
+/* Parse the number of a column in the current row. `column` is an index into the `names` of
+ * supine_csv_open. The file must have the column.
  * @param name    name of the column in messages
  * @param number  finite number, written */
 supine_status supine_csv_number(const supine_csv *csv, size_t column, const char *name,

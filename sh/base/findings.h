@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/** @file Warnings and notes about an input, kept to be shown again later. */
+/** @file Store warnings and notes about an input, to show them again later. */
 #ifndef SUPINE_FINDINGS_H
 #define SUPINE_FINDINGS_H
 
@@ -13,7 +13,7 @@ typedef struct supine_findings {
   char text[4096]; /**< each line ends with a line feed */
 } supine_findings;
 
-/** Add a line by a printf format. A line that does not fit is dropped. */
+/** Format a line like printf, and add it. A line that does not fit is dropped. */
 SUPINE_PRINTF(2, 3) void supine_findings_add(supine_findings *findings, const char *format, ...);
 
 /** Return the line at *at and move *at to the next line; return NULL after the last.

@@ -22,24 +22,25 @@ size_t supine_sh_index(size_t l, int m) {
   return (size_t)((ptrdiff_t)(l * l + l) + m);
 }
 
-/* Compute Y(l, m) and Y(l, -m) for l = m to band. `top` is q(m, m) of the recurrence at the top of
- * this file. `re` and `im` are the real and the imaginary part of (x + i y)^m. */
+/* Compute the harmonics Y(l, m) and Y(l, -m) for l = m to band, at a unit vector (x, y, z). `top`
+ * is q(m, m), with which the recurrence at the top of this file starts. `re` and `im` are the real
+ * and the imaginary part of (x + i y)^m. */
 static void evaluate_order(size_t band, size_t m, double z, double top, double re, double im,
                            double *y) {
-  double before = 0; /* q(l - 1, m) / a(l, m) of the recurrence at the top of this file */
+  double previous = 0; /* term q(l - 1, m) / a(l, m) in the recurrence for q(l + 1, m), see above */
   double q = top;
   for (size_t l = m;; ++l) {
     double *centre = y + l * l + l;
     centre[-(ptrdiff_t)m] = q * im;
-    centre[m] = q * re; /* replaces the sine term above if m = 0 */
+    centre[m] = q * re; /* if m = 0, this replaces the value of the line above */
     if (l == band) {
       return;
     }
     const double next = (double)(l + 1);
     const double order = (double)m;
     const double a = sqrt((4 * next * next - 1) / ((next - order) * (next + order)));
-    const double above = a * (z * q - before);
-    before = q / a;
+    const double above = a * (z * q - previous);
+    previous = q / a;
     q = above;
   }
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/** @file The status of a LAPACKE function. */
+/** @file Convert the result of a LAPACKE function to a status. */
 #ifndef SUPINE_LAPACK_H
 #define SUPINE_LAPACK_H
 
@@ -7,8 +7,8 @@
 
 #include <supine/status.h>
 
-/** Convert the result `info` of a LAPACKE function to a status: SUPINE_ERROR_MEMORY if a work array
- * could not be allocated, SUPINE_ERROR_NUMERICAL for all other errors. */
+/** Convert the return value `info` of a LAPACKE function to a status: SUPINE_ERROR_MEMORY if a work
+ * array could not be allocated, SUPINE_ERROR_NUMERICAL for all other errors. */
 static inline supine_status supine_lapack_status(lapack_int info) {
   return info == 0 ? SUPINE_OK
          : info == LAPACK_WORK_MEMORY_ERROR || info == LAPACK_TRANSPOSE_MEMORY_ERROR

@@ -16,7 +16,7 @@
 #include "sh/base/output.h"
 
 enum {
-  LIVE_MAX = 16,   /* largest number of temporary names that supine_output_abandon_all removes */
+  NAMES_MAX = 16,  /* largest number of temporary files that supine_output_abandon_all removes */
   BUFFER = 1 << 18 /* size of the buffer of an output in bytes */
 };
 
@@ -36,21 +36,21 @@ bool supine_output_take_standard(void) {
 }
 
 /* Names of existing temporary files; NULL in free entries. */
-static char *_Atomic live[LIVE_MAX];
+static char *_Atomic temporary_names[NAMES_MAX];
 
-/* Replace one entry of `live` that equals `from` by `to`. */
-static void set_live(char *from, char *to) {
-  for (int i = 0; i < LIVE_MAX; ++i) {
+/* Replace one entry of `temporary_names` that equals `from` by `to`. */
+static void replace_name(char *from, char *to) {
+  for (int i = 0; i < NAMES_MAX; ++i) {
     char *expected = from;
-    if (atomic_compare_exchange_strong(&live[i], &expected, to)) {
+    if (atomic_compare_exchange_strong(&temporary_names[i], &expected, to)) {
       return;
     }
   }
 }
 
 void supine_output_abandon_all(void) {
-  for (int i = 0; i < LIVE_MAX; ++i) {
-    const char *name = atomic_load(&live[i]);
+  for (int i = 0; i < NAMES_MAX; ++i) {
+    const char *name = atomic_load(&temporary_names[i]);
     if (name != NULL) {
       (void)unlink(name);
     }
@@ -113,7 +113,7 @@ static int take_temporary(supine_output *output, const char *link) {
     result = link != NULL ? linkat(AT_FDCWD, link, AT_FDCWD, output->temporary, AT_SYMLINK_FOLLOW)
                           : open(output->temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     if (result >= 0) {
-      set_live(NULL, output->temporary);
+      replace_name(NULL, output->temporary);
       return result;
     }
     if (errno != EEXIST) {
@@ -141,7 +141,7 @@ static int open_regular(supine_output *output) {
     if (access(link, F_OK) == 0) {
       return descriptor;
     }
-    (void)close(descriptor); /* discard the file: it needs /proc to be named later */
+    (void)close(descriptor); /* without /proc, the unnamed file cannot get a name later */
   }
   return take_temporary(output, NULL);
 }
@@ -197,7 +197,7 @@ supine_status supine_output_open(const char *path, supine_output *output, supine
   return SUPINE_OK;
 }
 
-/* Give the finished file its name; return false and set errno on failure. */
+/* Give the finished file its final name. Return false and set errno on failure. */
 static bool give_name(supine_output *output) {
   if (output->temporary == NULL) {
     char link[32];
@@ -205,7 +205,7 @@ static bool give_name(supine_output *output) {
     if (linkat(AT_FDCWD, link, AT_FDCWD, output->target, AT_SYMLINK_FOLLOW) == 0) {
       return true;
     }
-    /* linkat() does not replace an existing file: link to a temporary name, then rename it. */
+    /* If a file of that name exists, linkat() fails: link to a temporary name, then rename it. */
     if (errno != EEXIST || take_temporary(output, link) < 0) {
       return false;
     }
@@ -242,7 +242,7 @@ supine_status supine_output_commit(supine_output *output, supine_error *error) {
       return output_fail(output, error, "cannot replace");
     }
     if (output->temporary != NULL) {
-      set_live(output->temporary, NULL);
+      replace_name(output->temporary, NULL);
       output->temporary[0] = '\0'; /* the file was renamed: do not remove it */
     }
     sync_folder(output->target);
@@ -254,7 +254,7 @@ supine_status supine_output_commit(supine_output *output, supine_error *error) {
 void supine_output_abandon(supine_output *output) {
   if (output->temporary != NULL && output->temporary[0] != '\0') {
     (void)unlink(output->temporary);
-    set_live(output->temporary, NULL);
+    replace_name(output->temporary, NULL);
   }
   if (output->file != NULL) {
     __fpurge(output->file); /* keep fclose from writing the rest of the buffer */

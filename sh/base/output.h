@@ -35,7 +35,8 @@ supine_status supine_output_open(const char *path, supine_output *output, supine
  * @retval SUPINE_ERROR_WRITE  a write failed; the message says why, such as a full disk */
 supine_status supine_output_commit(supine_output *output, supine_error *error);
 
-/** Discard the file. Legal after a failed open, after commit, and on a zeroed struct. */
+/** Discard the file unless it was committed. This is allowed after a failed open, and for a zeroed
+ * struct. */
 void supine_output_abandon(supine_output *output);
 
 /** Return whether the path means standard output: "-", alone or with an ending ("-.ply"). */

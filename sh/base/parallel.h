@@ -6,7 +6,8 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/** A function for items begin <= i < end. `thread` is the index of its thread, from 0. */
+/** A function that processes the items begin <= i < end. `thread` is the index of its thread, from
+ * 0. */
 typedef void supine_range_function(void *context, size_t begin, size_t end, size_t thread);
 
 /** Return the default number of threads: the environment variable SUPINE_THREADS (1 to 256). If it
@@ -16,13 +17,14 @@ size_t supine_thread_count(void);
 /** Return whether the environment variable SUPINE_THREADS is unset or valid. */
 bool supine_thread_count_is_valid(void);
 
-/** Call `function` on consecutive pieces of 0 <= i < count, one for each thread, and wait.
+/** Split the items 0 <= i < count into consecutive ranges, one for each thread. Call `function` on
+ * each range, and wait.
  * @param count    number of items
  * @param grain    smallest number of items for a thread, at least 1; small counts use fewer threads
  * @param threads  largest number of threads; 0 selects supine_thread_count()
  *
- * Pieces begin at multiples of `grain` and depend only on the arguments and the number of threads.
- * If a thread cannot be started, its piece runs in the caller's thread. */
+ * Ranges begin at multiples of `grain`, and depend only on the arguments and the number of threads.
+ * If a thread cannot be started, its range runs in the caller's thread. */
 void supine_parallel_for(size_t count, size_t grain, size_t threads,
                          supine_range_function *function, void *context);
 

@@ -8,7 +8,8 @@
 
 #include <supine/status.h>
 
-/** Append text by a printf format to `text`, which has `size` bytes. Cut off what does not fit. */
+/** Format text like printf, and append it to `text`, which has room for `size` bytes. Cut off what
+ * does not fit. */
 SUPINE_PRINTF(3, 4)
 void supine_text_add(char *text, size_t size, const char *format, ...);
 

@@ -7,9 +7,10 @@
  *
  *     bench_locate [FOLDER OF LANDMARKS]
  *
- * Kriging corrects a displacement law, which is here proportional to the applied force instead of
- * the equilibrium. A scale multiplies the law. The prior mean of a person's scale is the mean of
- * the other four people's scales. The prior standard deviation is 30 % of the prior mean. */
+ * Kriging corrects the displacements by a displacement law. Here, the law is the applied force
+ * times a scale; the equilibrium of forces is not computed. The prior mean of a person's scale is
+ * the mean of the other four people's scales. The prior standard deviation is 30 % of the prior
+ * mean. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -33,11 +34,10 @@ enum { PEOPLE = 5, POINTS_MAX = 128, DRAWN = 10, DRAWS = 40, STEPS = 4 };
 static const double spread = 0.3; /* prior standard deviation of the scale, relative to its mean */
 
 typedef struct person {
-  size_t count; /* number n of landmarks */
-  /* [n, 3] mm: positions, displacements, and displacements by the law at scale 1 */
+  size_t count; /* number of landmarks */
+  /* [count, 3] mm: positions, displacements, and displacements by the law if its scale is 1 */
   double from[3 * POINTS_MAX], moved[3 * POINTS_MAX], law[3 * POINTS_MAX];
-  double central[POINTS_MAX]; /* [n] squared distance from the centre of the box, scaled to sides of
-                                 2 */
+  double centre_distance[POINTS_MAX]; /* [count] squared, in half sides of the bounding box */
   size_t lung[POINTS_MAX];
 } person;
 
@@ -67,11 +67,11 @@ static void find_law(person *p, const double *points) {
                            (high[1] - x[1]) / (high[1] - low[1]),
                            (high[2] - x[2]) / (high[2] - low[2])};
     double force = model.force.base + model.force.gain * (1 - box[1]);
-    p->central[j] = 0;
+    p->centre_distance[j] = 0;
     for (size_t i = 0; i < 3; ++i) {
       const double half = 0.5 * (high[i] - low[i]);
       force += model.force.box[i] * box[i];
-      p->central[j] += pow((x[i] - low[i] - half) / half, 2);
+      p->centre_distance[j] += pow((x[i] - low[i] - half) / half, 2);
     }
     const double sign[3] = {side, -1, -1};
     for (size_t i = 0; i < 3; ++i) {
@@ -124,8 +124,8 @@ static double fit_scale(const person *p) {
   return lu / ll;
 }
 
-/* Evaluate the displacement law at the inhaled position p of each landmark, whose exhaled position
- * x is known. Solve p = x + scale * law(p) by iteration from p = x. */
+/* Evaluate the displacement law at the inhaled position p of each landmark. p is not known, but the
+ * exhaled position x is. Solve p = x + scale * law(p) by iteration from p = x. */
 static void find_law_at_inhaled(person *p, double scale) {
   double full[3 * POINTS_MAX];
   for (int step = 0; step < 30; ++step) {
@@ -152,14 +152,14 @@ static void set_point(const person *p, size_t j, double scale, double prior,
   }
 }
 
-/* Sums over DRAWS random choices of observed landmarks, for one person. */
+/* Sums and counts over DRAWS random choices of observed landmarks, for one person. */
 typedef struct sums {
-  double error;    /* squared errors, mm^2 */
-  double stated;   /* variances predicted by kriging, mm^2 */
-  double points;   /* number of unobserved points */
-  double held;     /* number of unobserved points within the predicted 95 % band */
-  double left_out; /* number of observed points judged to be outliers */
-  double judged;   /* number of observed points */
+  double error;       /* sum of squared errors, mm^2 */
+  double variance;    /* sum of the variances predicted by kriging, mm^2 */
+  double points;      /* number of unobserved points */
+  double inside_band; /* number of unobserved points within the predicted 95 % band */
+  double left_out;    /* number of observed points that the others predict worse than 3 sigma */
+  double observed;    /* number of observed points */
 } sums;
 
 static void predict(const person *p, const size_t *drawn, size_t count, double prior, sums *s) {
@@ -184,7 +184,7 @@ static void predict(const person *p, const size_t *drawn, size_t count, double p
     double scratch[DRAWN];
     const double sigma = supine_kriging_leave_out(&fit, j, left, scratch);
     s->left_out += length(left) > 3.0 * sigma;
-    s->judged += 1;
+    s->observed += 1;
   }
   for (size_t j = 0; j < p->count; ++j) {
     bool seen = false;
@@ -208,8 +208,8 @@ static void predict(const person *p, const size_t *drawn, size_t count, double p
       square += pow(at.residual[i] - (double)shift[i], 2);
     }
     s->error += square;
-    s->stated += (double)variance;
-    s->held += square <= 1.8 * 1.8 * (double)variance;
+    s->variance += (double)variance;
+    s->inside_band += square <= 1.8 * 1.8 * (double)variance;
     s->points += 1;
   }
 }
@@ -229,7 +229,7 @@ static void study(const person *people, size_t number, double prior, bool centra
   for (size_t j = 0; j < p->count; ++j) {
     order[j] = j;
   }
-  qsort_r(order, p->count, sizeof *order, by_distance, (void *)p->central);
+  qsort_r(order, p->count, sizeof *order, by_distance, (void *)p->centre_distance);
   gsl_rng_set(random, 20260 + number);
   for (int draw = 0; draw < DRAWS; ++draw) {
     (void)gsl_ran_choose(random, drawn, DRAWN, order, central ? p->count / 3 : p->count,
@@ -331,8 +331,8 @@ int main(int argc, char **argv) {
       for (size_t k = 0; k < PEOPLE; ++k) {
         sums s = {0};
         study(people, k, prior[k], central == 1, &s);
-        const double own[4] = {sqrt(s.error / s.points), sqrt(s.stated / s.points),
-                               100 * s.held / s.points, 100 * s.left_out / s.judged};
+        const double own[4] = {sqrt(s.error / s.points), sqrt(s.variance / s.points),
+                               100 * s.inside_band / s.points, 100 * s.left_out / s.observed};
         for (int i = 0; i < 4; ++i) {
           of[i] += own[i] / PEOPLE;
           mean[i] += own[i] / (2 * PEOPLE);

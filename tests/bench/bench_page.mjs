@@ -50,7 +50,7 @@ const found = await page.evaluate(() => {
   };
   const times = Object.fromEntries(['script', ...Object.keys(passes)].map((name) => [name, Infinity]));
   const some = 20; // frames per measurement, because the clock of a browser has steps of 0.1 ms
-  for (let i = 0; i < 60; ++i) { // 1200 frames, so that the script is compiled and optimised
+  for (let i = 0; i < 60; ++i) { // 60 x 20 frames, so that the script is compiled and optimised
     const begin = performance.now();
     for (let j = 0; j < some; ++j) {
       tilt += 1;

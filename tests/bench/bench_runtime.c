@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compare the speed of the run-time library with OpenBLAS and plain loops, which take turns in one
- * process.
+/* Compare the speed of the run-time library with OpenBLAS and with plain loops. All run in turn in
+ * one process.
  *
  *     OPENBLAS_CORETYPE=SAPPHIRERAPIDS bench_runtime [VERTICES | BASIS]...
  *
- * VERTICES is the number of vertices of a random basis with 16 modes and 6 modes of normals. Each
- * entry is the fastest of nine runs. OpenBLAS 0.3.21 does not recognise newer processors, so that
- * OPENBLAS_CORETYPE must name a processor whose kernels it has. */
+ * VERTICES is the number of vertices of a random basis with 16 modes, and 6 modes for normals.
+ * Print the fastest of nine runs. OpenBLAS 0.3.21 does not recognise newer processors. Therefore,
+ * OPENBLAS_CORETYPE must name a processor that it supports. */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -35,12 +35,12 @@ typedef struct bench {
   supine_basis *storage[SUPINE_STORAGE_COUNT]; /* the basis for each way of storing coefficients */
   supine_basis *simd[SUPINE_SIMD_COUNT];       /* NULL if the processor lacks the instruction set */
   supine_pose pose;
-  float weights[SUPINE_MODES_MAX]; /* [K] weights times gain */
+  float weights[SUPINE_MODES_MAX]; /* [modes] weights of the modes, times the displacement factor */
   float *xyz, *normals;            /* [N, 3] positions, mm, and normals */
-  float *amount;                   /* [N] mm along the direction of displacement */
-  float *columns;                  /* [K, N] */
-  int16_t *counts;                 /* [K, N] coefficients as 16-bit integers */
-  float units[SUPINE_MODES_MAX];   /* [K] units of `counts`, mm, times the weights */
+  float *amount;                   /* [N] displacement along the direction of each vertex, mm */
+  float *columns;                  /* [modes, N] coefficients, mm */
+  int16_t *counts; /* [modes, N] coefficients, mm, as integer multiples of a unit for each mode */
+  float units[SUPINE_MODES_MAX]; /* [modes] unit of `counts`, mm, times the weight of the mode */
 } bench;
 
 typedef struct entry {
@@ -139,7 +139,7 @@ static void run_sgemv_columns(void *context, size_t begin, size_t end, size_t th
 
 enum { BLOCK = 16384 }; /* number of vertices whose displacements fit in the second-level cache */
 
-/* Add the displacements by mode k to `amount` of vertices begin <= i < end. */
+/* Add the displacements by mode k to work->amount[i] for begin <= i < end. */
 typedef void add_mode(const bench *work, size_t k, size_t begin, size_t end);
 
 static void add_column(const bench *work, size_t k, size_t begin, size_t end) {
@@ -160,7 +160,7 @@ static void add_counts(const bench *work, size_t k, size_t begin, size_t end) {
   }
 }
 
-/* Compute positions block by block, and in a block mode by mode. */
+/* Compute positions in blocks of vertices. In each block, add one mode after the other. */
 static void run_blocks(const bench *work, add_mode *add, size_t begin, size_t end) {
   for (size_t at = begin; at < end; at += BLOCK) {
     const size_t last = end - at < BLOCK ? end : at + BLOCK;
@@ -203,7 +203,7 @@ static void make_columns(bench *work) {
 }
 
 #if defined(__x86_64__)
-/* Load and store the same bytes as supine_deform, but compute nothing. */
+/* Load and store as many bytes as supine_deform, but compute nothing. */
 __attribute__((target("avx512f"))) static void run_traffic(void *context, size_t begin, size_t end,
                                                            size_t thread) {
   const entry *e = context;

@@ -8,8 +8,9 @@
  * receives frames of weights, points or surfaces (WHAT). Print a row for each kind, and below it a
  * row for a server that sends messages of the same size without any computation. A row has
  * - the numbers of poses sent and of frames received
- * - "old": the number of frames that arrived after a newer pose had been sent
- * - "oldest": the largest number of newer poses that had been sent when a frame arrived
+ * - "old": the number of frames that arrived when a newer pose than theirs had been sent
+ * - "oldest": the largest number of poses that had been sent after a frame's pose when the frame
+ *   arrived
  * - median, 99th percentile and maximum of the time from the first byte of a pose sent to the last
  *   byte of its frame received, ms
  * - memory of the server after 1 s and at the end, KiB
@@ -154,9 +155,10 @@ typedef struct tally {
   double *sent;    /* [poses] times at which poses were sent, s; pose i has the time stamp i + 1 */
   double *latency; /* [frames] times from sending a pose to receiving its frame, s */
   size_t poses, frames;
-  size_t old;    /* number of frames that arrived after a newer pose had been sent */
-  size_t oldest; /* largest number of newer poses that had been sent when a frame arrived */
-  /* numbers of bytes of the current message: arrived so far, needed to go on */
+  size_t old; /* number of frames that arrived when a newer pose than theirs had been sent */
+  /* largest number of poses sent between a frame's pose and the arrival of the frame */
+  size_t oldest;
+  /* bytes of the current message: number received, and number to receive before it is processed */
   size_t arrived, needed;
   unsigned char head[SUPINE_STREAM_HEADER];
   supine_stream_header header;

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Repeat the validations of [Santhanam2008]. Write the data of each figure as CSV and, if gnuplot
- * is installed, the figure as PNG.
+/* Repeat the validation experiments of [Santhanam2008]. Write the data of each figure as CSV and,
+ * if gnuplot is installed, the figure as PNG.
  *
  *     bench_validation [FOLDER [DATA]]
  *
  * FOLDER (default: validation) is created if it is missing. DATA is the folder of the real lungs
- * (default: the test data); without them, a synthetic pair at three resolutions is used. */
+ * (default: the test data). Without them, a synthetic pair at three resolutions is used. */
 #include <errno.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -55,13 +55,14 @@ static void end_figure(FILE *csv, const char *name, const char *commands) {
   (void)printf("%s/%s.csv%s\n", folder, name, code == 0 ? ", .png" : " (no PNG: install gnuplot)");
 }
 
-/* Convergence curve of one method. */
+/* Convergence of one method: the error of the displacements against the work, which is the number
+ * of times that a mass or spring reads the state of a neighbour over a link. */
 typedef struct curve {
   FILE *csv;
   const char *method;
   size_t count;        /* number of displacements */
-  const double *exact; /* [count] */
-  double links;        /* number of link visits in one step or evaluation of y'' */
+  const double *exact; /* [count] displacements without error */
+  double links;        /* number of links read in one step or evaluation of the accelerations */
 } curve;
 
 static void add_point(const curve *c, double work, const double *found) {
@@ -80,7 +81,8 @@ static void count_steps(void *context, size_t steps, double held) {
   *(size_t *)context = steps;
 }
 
-/* Draw Fig. 7: error against work. A visit of a link from one of its ends is a unit of work. */
+/* Draw Fig. 7 of [Santhanam2008]: error against the number of links read. A link read from both its
+ * ends counts twice. */
 static void convergence(void) {
   frame f = frame_plane(21, 10.0);
   const size_t n = f.mesh.vertex_count;
@@ -91,7 +93,7 @@ static void convergence(void) {
   double *found = calloc(n, sizeof *found);
   need(frame_solve(&f, NULL, force, exact) == SUPINE_OK, "no solution");
   FILE *csv = begin_csv("fig7_convergence", "method,link_visits,relative_rms_error");
-  /* mean number of links of the mass or spring that a step visits */
+  /* A step updates one mass or one spring; this is the mean number of links that it reads. */
   const double visits = 2.0 * links / (double)(n + f.topology.edge_count);
   curve c = {csv, "Pitcher/Catcher", n, exact, visits};
   for (int k = 1; k <= 13; ++k) {
@@ -119,7 +121,8 @@ static void convergence(void) {
   free(found);
 }
 
-/* Draw Fig. 8: a plane sheet, solved by Supine and by a mass-spring-damper system. */
+/* Draw Fig. 8 of [Santhanam2008]: a plane sheet, solved by Supine and by a mass-spring-damper
+ * system. */
 static void plane(void) {
   enum { SIDE = 31 };
   frame f = frame_plane(SIDE, 10.0);
@@ -149,7 +152,7 @@ static void plane(void) {
   free(theirs);
 }
 
-/* Draw Fig. 9: a ring of uniform stiffness, and rings of which one third is stiffer. */
+/* Draw Fig. 9 of [Santhanam2008]: a ring of uniform stiffness, and rings with one stiffer third. */
 static void ring(void) {
   enum { COUNT = 90 };
   static const double factors[] = {1.0, 2.0, 4.0};
@@ -275,7 +278,8 @@ static void regional_ventilation(const supine_lungs *lungs) {
       "plot for [i=2:5] csv using i:1 with linespoints title columnheader(i)");
 }
 
-/* Plot how displacements change with mesh resolution, and print how far a unit force spreads. */
+/* Plot how displacements change with the resolution of the mesh. Print how far a unit force on a
+ * vertex spreads. */
 static void resolution(void) {
   static const double reaches[] = {0.0, 3.0, 5.0, 10.0, 20.0};
   static const char *const names[] = {"5k", "20k", "250k"};

@@ -12,8 +12,8 @@ program's folder. --stream adds the median time from sending a pose to receiving
 least of R rounds.
 
 Expected differences from version 0.2.0:
-- deform --image, --labels: the gains of a lung now differ between axes, which changes the order in
-  which products are rounded. Displacements differ by one unit in the last place (3e-5 mm). About 1 %
+- deform --image, --labels: the factors of a lung's displacement now differ between axes, which changes
+  the order in which products are rounded. Displacements differ by one unit in the last place (3e-5 mm). About 1 %
   of the voxels of 16-bit noise therefore differ by 1, and 5 of 65 million labels differ.
 - embed: the version in the header has another value and position, and the checksum differs. In large
   grids, one coefficient in 200,000 differs in the last place: Cholesky's factorisation replaced LU.
@@ -80,14 +80,14 @@ def count_differences(first, second):
 
 
 def compare(name, programs, arguments, rounds, output=None):
-    """Run both programs in turn with these arguments, and print a row of times and memory."""
+    """Run both programs in turn with these arguments, of which `output` is the file written. Print a row of results."""
     best = [[float("inf"), float("inf"), 0.0] for _ in programs]
     for _ in range(rounds):
         for which, program in enumerate(programs):
             wall, cpu, memory = run([program] + arguments)
             best[which] = [min(best[which][0], wall), min(best[which][1], cpu),
                            max(best[which][2], memory)]
-            if output is not None:  # both programs run the same command, because outputs contain the command
+            if output is not None:  # the command names `output` for both programs, because outputs contain the command
                 os.replace(output, f"{which}-{output}")
     differing = 0 if output is None else count_differences("0-" + output, "1-" + output)
     old, new = best

@@ -7,7 +7,7 @@
 BUILD is the folder of the build. FOLDER holds pairs NAME_left.* and NAME_right.* of closed surfaces at full
 inflation. AXES, such as RAS, is passed to 'supine precompute --axes'. Every basis is made with default options.
 There is a column for each pair. Columns differ because lungs have different shapes; they do not show the uncertainty
-of the model. Only one constant of the model, the bend of the path between rest and full inflation, was fitted to
+of the model. Only one constant, the curvature of the vertices' paths between rest and full inflation, was fitted to
 data of this kind (quiet breaths of ten people). With --check, the exit code is 1 if a value is outside its range.
 The exit code is 77 if there is no pair.
 """
@@ -84,8 +84,8 @@ class Lungs:
         return np.cross(b - a, c - a) / 2
 
     def thirds(self, posture, before, after):
-        """Return the volume at positions `before`, and the gain until positions `after`, mL, of both lungs together, in the
-        upper, the middle and the lower third of their height."""
+        """Return the volume at positions `before`, and its increase from `before` to `after`, mL, of both lungs together,
+        in the upper, the middle and the lower third of their height."""
         slabs = (Slab * 6)()
         g = (ctypes.c_double * 3)(*self.gravity(posture))
         pointers = [ctypes.c_void_p(np.ascontiguousarray(x).ctypes.data) for x in (before, after)]
@@ -98,8 +98,8 @@ class Lungs:
         return int((np.einsum("ij,ij->i", self.area_vectors(xyz), self.reference) < 0).sum())
 
     def straight(self, posture, total):
-        """Return positions in a state of `total` mL without the bend: the gains of a lung are equal on all axes, but
-        chosen so that the lung has the same volume."""
+        """Return positions in a state of `total` mL if the vertices moved on straight lines: the factors of a lung's
+        displacement are equal along all axes, and each lung has the volume that it has in the state."""
         pose = self.basis.pose(f"{posture}:{total:.3f}mL")
         wanted = np.array(self.basis.volumes(pose))
         gains = self.basis.gains(pose)

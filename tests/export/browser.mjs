@@ -18,13 +18,13 @@ export const browser = await chromium.launch({
 export function listen(page, complaints) {
   page.on('console', (message) => {
     const text = message.text();
-    const ofCompositor = text.includes('GPU stall due to ReadPixels'); // it copies pictures, as it has no GPU
+    const ofCompositor = text.includes('GPU stall due to ReadPixels'); // without a GPU, Chromium itself reads pixels back, and warns of it
     if (['error', 'warning'].includes(message.type()) && !ofCompositor) complaints.push(text);
   });
   page.on('pageerror', (error) => complaints.push(error.stack));
 }
 
-const unused = new Map(); // closed pages by the properties of their device; a new page takes a second of processor time
+const unused = new Map(); // closed pages to use again, by device properties: a new page takes a second of processor time
 
 /** Open a file, and collect its errors and its requests for other files. */
 export async function open(path, { viewport = { width: 900, height: 640 }, colorScheme = 'light', forcedColors = 'none', reducedMotion = 'reduce', init, ...device } = {}, hash = '') {
@@ -43,7 +43,7 @@ export async function open(path, { viewport = { width: 900, height: 640 }, color
   return { page, complaints };
 }
 
-/** End the use of a page of open(). */
+/** Close a page that open() returned, or keep it to be used again. */
 export async function close(page) {
   if (page.kind === undefined) {
     await page.close();
@@ -78,7 +78,7 @@ export async function orderOf(page, basis) {
   return matchPoints(rest, evaluate(basis, [[[0, 1, 0], 0]])[0].xyz, 0.1);
 }
 
-/** Press a key on the picture, the only element that handles letters and digits. */
+/** Press a key on the picture, the only element that handles letter and digit keys. */
 export async function press(page, key) {
   await page.locator('#picture').focus();
   await page.keyboard.press(key);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Colours of pages, pictures and reports: even perceptual steps, increasing lightness, and round ends of ranges.
+// Test the colour maps of pages, pictures and reports: perceptual steps are even, lightness increases, and ranges end at
+// round numbers.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -31,7 +32,7 @@ function oklab(bytes) {
 for (const name of ['displacement', 'difference']) {
   const bytes = Buffer.from(colours[name], 'hex');
   const lab = Array.from({ length: 256 }, (_, i) => oklab(bytes.subarray(3 * i, 3 * i + 3)));
-  const steps = []; // distances of colours 15 apart, so that rounding to bytes matters little
+  const steps = []; // differences between entries i and i + 15, on which rounding to bytes has little effect
   for (let i = 0; i + 15 < 256; i += 15) {
     steps.push(Math.hypot(...lab[i].map((x, j) => x - lab[i + 15][j])));
     assert.ok(lab[i + 15][0] > lab[i][0] + 0.01, `${name}: lightness does not rise at ${i}`);
@@ -41,7 +42,8 @@ for (const name of ['displacement', 'difference']) {
   assert.ok(ratio < 1.1, `${name}: steps differ by a factor of ${ratio}`);
 }
 
-// Each bar of the report uses one of the two colour maps; its map of directions uses that of differences.
+// Each colour bar of the report shows one of the two colour maps. The map of all directions of gravity is coloured by the
+// colour map of differences.
 supine('compare', join(folder, 'lungs.safetensors'), '--postures', 'supine,prone', '-o', join(folder, 'report.html'));
 const report = readFileSync(join(folder, 'report.html'), 'utf8');
 const bytesOf = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));

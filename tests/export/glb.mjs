@@ -15,8 +15,8 @@ const { GLTFLoader } = await load('three/examples/jsm/loaders/GLTFLoader.js');
 const { MeshoptDecoder } = await load('three/examples/jsm/libs/meshopt_decoder.module.js');
 
 const PLAIN_MM = 0.001;
-const COUNTS_MM = 0.1; // positions and targets are rounded to 0.045 mm
-const BREATH = 1000; // mL
+const COUNTS_MM = 0.1; // tolerance: positions and targets are each rounded to 0.045 mm
+const BREATH = 1000; // largest volume above rest, mL
 
 /** Assert that the validator finds neither errors nor warnings. */
 async function validate(path) {
@@ -36,8 +36,8 @@ async function open(path) {
 const dot = (a, b) => a.reduce((sum, x, i) => sum + x * b[i], 0);
 const sum = (list) => list.reduce((total, x) => total + x, 0);
 
-/** Return the volume form f [7] of a lung at mode weights v, from its extras. With gains x, y, z
- * the lung gains f . (x, y, z, yz, xz, xy, xyz) mL. */
+/** Return coefficients f [7] for a lung with mode weights v, from its extras. If its displacements are multiplied by x, y
+ * and z along the axes, its volume grows by f . (x, y, z, yz, xz, xy, xyz) mL. */
 function volumeForm({ linear, quadratic, cubic }, v) {
   const k = v.length;
   const form = new Float64Array(7);
@@ -60,8 +60,8 @@ function root(f, from) {
   return b;
 }
 
-/** Find the gains [s, t] at which a lung gains `mL` beyond the reference. At rest it gains `rest`
- * mL. */
+/** Find [s, t] so that a lung whose displacements are multiplied by s + bend[a] t along axis a holds `mL` more than the
+ * reference surface. At rest it holds `rest` mL more. */
 function gainsFor(form, bend, rest, mL) {
   const even = (volume) => root((s) => formAt(form, [s, s, s]) - volume, volume / (form[0] + form[1] + form[2]));
   if (bend.every((c) => c === 0)) return [even(mL), 0];
@@ -71,7 +71,7 @@ function gainsFor(form, bend, rest, mL) {
   return [r * q, bent(q)];
 }
 
-/** Return the morph weights and the gain s of each lung for a gravity and a volume in mL above
+/** Return the morph weights of each lung and the factor s of its displacements, for a gravity and a volume in mL above
  * rest, as the extras describe. */
 function weightsFor(extras, lungs, gravity, mL) {
   const [y, y2] = [harmonics(extras.band, gravity), harmonics(2, gravity)];
@@ -110,7 +110,7 @@ function morphed(mesh, { middle, millimetresPerUnit }) {
 
 const together = (meshes, extras) => Float64Array.from(meshes.flatMap((mesh) => [...morphed(mesh, extras)]));
 
-/** Return the unit normal of each vertex, [N], from its triangles weighted by area. */
+/** Return the unit normal of each vertex, from its triangles weighted by area. */
 function exactNormals(xyz, corners) {
   const sums = Array.from({ length: xyz.length / 3 }, () => new three.Vector3());
   const at = (v) => new three.Vector3().fromArray(xyz, 3 * v);
@@ -137,7 +137,7 @@ function normalErrors(mesh, extras) {
 const mean = (list) => sum(list) / list.length;
 const at95 = (list) => list.sort((a, b) => a - b)[Math.floor(0.95 * list.length)];
 
-/** Check positions, gains and normals in random states. */
+/** Check positions, displacement factors and normals in random states. */
 async function check(basis, words, tolerance) {
   const path = join(folder, 'lungs.glb');
   supine('export', basis, '-o', path, '--breath', String(BREATH), ...words);
@@ -148,7 +148,7 @@ async function check(basis, words, tolerance) {
   const random = randomSource(77);
   const pairs = randomDirections(10, 20241).map((g, i) => [g, i % 2 ? BREATH * random() : BREATH]);
   const truth = evaluate(basis, [[[0, 1, 0], 0], ...pairs]);
-  // The stored weights give supine at rest.
+  // With the morph weights stored in the file, the lungs are supine at rest. Match their vertices to those of the basis.
   const order = words.includes('--plain') ? truth[0].xyz.map((_, i) => i).slice(0, truth[0].xyz.length / 3) : matchPoints(together(lungs, extras), truth[0].xyz, tolerance);
   let worst = largestDistance(together(lungs, extras), inOrder(truth[0].xyz, [...order]));
   const rest = lungs.flatMap((lung) => normalErrors(lung, extras));
@@ -165,12 +165,12 @@ async function check(basis, words, tolerance) {
   console.log(`${words.join(' ')}: ${lungs[0].morphTargetInfluences.length} targets, ${statSync(path).size} bytes, ${worst.toExponential(2)} mm, normals at ${BREATH} mL ${mean(angles).toFixed(2)} degrees mean, ${at95(angles).toFixed(2)} at the 95th percentile`);
   assert.ok(largestDistance(truth[0].xyz, truth[1].xyz) > 100 * tolerance, 'the lungs did not move, so nothing was tested');
   assert.ok(worst < tolerance, `${words.join(' ')}: ${worst} mm off`);
-  const least = words.includes('--plain') ? 1 : 1.25; // without --plain, normals are rounded to bytes and have fewer targets
+  const least = words.includes('--plain') ? 1 : 1.25; // largest mean error, degrees
   assert.ok(mean(angles) < least && at95(angles) < 3, 'normals are off');
 }
 
 /** Check that each clip turns gravity downwards, keeps the lungs above the table, and gives the
- * positions of the library. */
+ * same positions as the library. */
 async function checkAnimations(basis) {
   const path = join(folder, 'animated.glb');
   supine('export', basis, '-o', path, '--animate');
@@ -178,7 +178,7 @@ async function checkAnimations(basis) {
   const { gltf, lungs, extras } = await open(path);
   const order = matchPoints(together(lungs, extras), evaluate(basis, [[[0, 1, 0], 0]])[0].xyz, COUNTS_MM);
   assert.deepEqual(gltf.animations.map((clip) => clip.name), ['turning', 'supine', 'left side', 'prone', 'right side']);
-  // All clips are at the peak of a breath of 500 mL at 1.5 s. Then the first clip is supine; at 13.5 s it is prone.
+  // At 1.5 s, all clips are at the peak of a breath of 500 mL. The first clip is then supine, and at 13.5 s prone.
   for (const [clip, seconds, gravity] of [[0, 1.5, [0, 1, 0]], [0, 13.5, [0, -1, 0]], [1, 1.5, [0, 1, 0]], [2, 1.5, [1, 0, 0]], [3, 1.5, [0, -1, 0]], [4, 1.5, [-1, 0, 0]]]) {
     const mixer = new three.AnimationMixer(gltf.scene);
     mixer.clipAction(gltf.animations[clip]).play();
@@ -187,7 +187,7 @@ async function checkAnimations(basis) {
     const down = new three.Vector3(...gravity).transformDirection(lungs[0].matrixWorld);
     assert.ok(down.distanceTo(new three.Vector3(0, -1, 0)) < 1e-5, `${gltf.animations[clip].name}: gravity is not down`);
     const box = new three.Box3().setFromObject(gltf.scene.getObjectByName('patient'), true);
-    assert.ok(box.getCenter(new three.Vector3()).length() < 0.06, 'the lungs are not centred at the origin'); // resting lungs are smaller than full ones, so not exactly
+    assert.ok(box.getCenter(new three.Vector3()).length() < 0.06, 'the lungs are not centred at the origin'); // a tolerance, because full lungs are centred, and these are smaller
     assert.ok(box.min.y > new three.Box3().setFromObject(gltf.scene.getObjectByName('table')).max.y, 'the lungs are not above the table');
     const off = largestDistance(together(lungs, extras), inOrder(evaluate(basis, [[gravity, 500]])[0].xyz, order));
     assert.ok(off < COUNTS_MM, `${gltf.animations[clip].name} at ${seconds} s: ${off} mm off`);

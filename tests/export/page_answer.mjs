@@ -29,7 +29,7 @@ for (const [who, text, hidden] of bars) {
   assert.equal(hidden, false);
 }
 
-/* The areas of all axial outlines sum to the volume of the lungs, and so do those of coronal outlines. */
+/* The areas of all axial outlines times their distance sum to the volume of the lungs. So do those of coronal outlines. */
 const [summed, held] = await page.evaluate(() => {
   const { basis: b, state, linesAcross, placesOf } = window.supine;
   const places = placesOf(b, state.moment);
@@ -46,21 +46,21 @@ const [summed, held] = await page.evaluate(() => {
 });
 for (const ml of summed) assert.ok(Math.abs(ml - held) < 0.001 * held, `outlines enclose ${summed} mL, lungs ${held}`);
 
-/* Dragging the line in one picture of a slice, or pressing its arrow keys, moves the other slice. */
+/* Dragging the line in one of the two pictures of slices, or pressing arrow keys there, moves the slice of the other. */
 const slices = () => page.evaluate(() => [...window.supine.state.slices]);
 const before = await slices();
 const box = await page.locator('#outlines canvas').nth(1).boundingBox();
 await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
 await page.mouse.down();
-await page.mouse.move(box.x + box.width / 2 - 15, box.y + box.height / 2, { steps: 3 }); // lying on the left, the feet are at the left of the picture
+await page.mouse.move(box.x + box.width / 2 - 15, box.y + box.height / 2, { steps: 3 }); // towards the feet, which are at the left of the picture if the patient lies on the left side
 await page.mouse.up();
 const after = await slices();
 assert.ok(after[0] < before[0] - 5 && after[1] === before[1], `${before} to ${after}`);
 await page.locator('#outlines canvas').first().press('ArrowUp');
 assert.ok(Math.abs((await slices())[1] - after[1]) > 1);
 
-/* The value of a pixel's colour on the bar differs from the data by at most 3 % of the range at the median and 8 %
- * at the 90th percentile. The range of `expansion` is symmetric about 0. */
+/* Look up the colour of random pixels on the colour bar. The values found differ from the data by at most 3 % of the range
+ * at the median, and 8 % at the 90th percentile. The range of `expansion` is symmetric about 0. */
 for (const kind of ['displacement', 'expansion']) {
   await page.locator(`[name=kind][value=${kind}]`).check();
   await settled(page);
@@ -72,7 +72,7 @@ for (const kind of ['displacement', 'expansion']) {
     p.draw(panes());
     p.gl.readPixels(0, 0, width, height, p.gl.RGBA, p.gl.UNSIGNED_BYTE, pixels);
     const answer = p.picked.bind(p);
-    p.picked = () => undefined; // keeps the page itself from taking the answer
+    p.picked = () => undefined; // keeps the page from reading the picked value before this test does
     const bar = b.colours[pane.map];
     const found = [];
     for (let i = 0; found.length < 250 && i < 20000; ++i) {
@@ -99,7 +99,7 @@ for (const kind of ['displacement', 'expansion']) {
 }
 assert.deepEqual(await page.evaluate(() => { const { begin, end } = window.supine.state.range; return [begin, document.getElementById('colours').classList.contains('beneath')]; }), [-await page.evaluate(() => window.supine.state.range.end), await page.evaluate(() => window.supine.state.range.beyond)]);
 
-/* Keys of letters and digits act only where the picture has the focus. */
+/* Letter and digit keys act only while the picture has the focus. */
 await page.locator('#theme').focus();
 for (const key of ['2', 'g', 'c']) await page.keyboard.press(key);
 assert.deepEqual(await page.evaluate(() => { const { state: s } = window.supine; return [document.getElementById('posture-name').value, s.ghost, s.kind]; }), ['left', true, 'expansion']);
@@ -112,7 +112,7 @@ await close(page);
 /* In a window of 320 x 256 (1280 x 1024 at a zoom of 400 %) nothing is cut off, and the picture is at least 240 px
  * wide. */
 const { page: small } = await openLungs(html, { viewport: { width: 320, height: 256 } }, '#posture=left&depth=900');
-assert.equal(await small.evaluate(() => window.supine.state.measured), 900); // the range of colours includes the breath in the link
+assert.equal(await small.evaluate(() => window.supine.state.measured), 900); // the colour range holds for the 900 mL that depth= in the link gives
 const { width, height, wide } = await small.evaluate(() => ({ ...document.getElementById('picture').getBoundingClientRect().toJSON(), wide: document.documentElement.scrollWidth }));
 assert.ok(width >= 240 && height >= 120 && wide <= 320, `${width} x ${height} in ${wide}`);
 const targets = await small.evaluate(() => [...document.querySelectorAll('button, select, summary, input')].filter((e) => e.checkVisibility()).map((e) => { const target = (e.type === 'checkbox' && e.labels.length ? e.labels[0] : e).getBoundingClientRect(); return [e.id || e.textContent, target.width, target.height]; }).filter(([, w, h]) => w < 24 || h < 24));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The page by pointer, touch and keyboard: every key and button works, numbers can be typed, probes show what
+// Test the page with pointer, touch and keyboard: every key and button works, numbers can be typed, probes show what
 // the library computes, the arrow of gravity is visible from all sides, a breath has the right duration, and a
 // lost WebGL context is restored with camera, posture and probes.
 import assert from 'node:assert/strict';
@@ -9,7 +9,7 @@ import { assertPicture, close, evaluateFor, openLungs, orderOf, picture, press, 
 import { basis, html } from './lungs.mjs';
 import { folder, inOrder, supine } from './support.mjs';
 
-const PROBE_MM = 0.06; // probes show one decimal
+const PROBE_MM = 0.06; // tolerance of lengths at probes, which are shown with one decimal
 const state = (page, name) => page.evaluate((key) => window.supine.state[key], name);
 
 /** Check that keys have their documented effect, and that a second press or the opposite key undoes
@@ -193,11 +193,11 @@ async function checkNotation(page) {
     const said = [...readFileSync(moved, 'utf8').matchAll(/^v (\S+) (\S+) (\S+)/gm)].flatMap(([, ...v]) => v.map(Number));
     const found = await page.evaluate((g) => Array.from(window.supine.positions(g, 200)), gravity);
     const worst = inOrder(Float64Array.from(said), order).reduce((most, x, i) => Math.max(most, Math.abs(x - found[i])), 0);
-    assert.ok(worst < 0.05, `${text}: ${worst} mm`); // a degree of gravity moves lungs by more
+    assert.ok(worst < 0.05, `${text}: ${worst} mm`); // if the direction of gravity changes by a degree, lungs move by more
   }
 }
 
-/** Check touch: dragging with one finger rotates and keeps no probe, two fingers zoom and pan. */
+/** Check touch: dragging with one finger rotates and leaves no probe in the picture; two fingers zoom and pan. */
 async function checkTouch() {
   const { page, complaints } = await openLungs(html, { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });
   const cdp = await page.context().newCDPSession(page);
@@ -232,8 +232,8 @@ async function checkTouch() {
   await close(page);
 }
 
-/** Check that an animated change of posture ends in the right posture, and that slow frames do not slow the breath:
- * its steps sum to the time of the frames. */
+/** Check that an animated change of posture ends in the right posture, and that slow frames do not slow the breath: it
+ * advances by the time between frames. */
 async function checkMotion() {
   const { page, complaints } = await openLungs(html, { viewport: { width: 840, height: 630 }, reducedMotion: 'no-preference' });
   const frames = await page.evaluate(() => new Promise((done) => {
@@ -336,7 +336,7 @@ async function checkLegible(page) {
         if (!ground) return [element.id || element.className, 0];
         const [r, g, b, alpha = 1] = channels(getComputedStyle(ground).backgroundColor);
         const ink = luminance(channels(getComputedStyle(element).color));
-        const ratios = [0, 255].map((behind) => { // black and white lungs behind the background
+        const ratios = [0, 255].map((behind) => { // contrast if black or white lungs are behind it
           const paper = luminance([r, g, b].map((c) => alpha * c + (1 - alpha) * behind));
           return (Math.max(ink, paper) + 0.05) / (Math.min(ink, paper) + 0.05);
         });

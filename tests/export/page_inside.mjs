@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Content inside the lungs, on the page: it has the positions of `supine deform`, its name and displacement are
-// shown at the pointer and in a table usable by keyboard, and it can be hidden. Pictures are kept in the folder
-// page_inside of the working folder.
+// Test how the page shows structures inside the lungs: they have the positions of `supine deform`, their names and
+// displacements are shown at the pointer and in a table usable by keyboard, and they can be hidden. Pictures are kept in
+// the folder page_inside of the working folder.
 import assert from 'node:assert/strict';
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -11,8 +11,8 @@ import { folder, largestDistance, loadCommon, supine } from './support.mjs';
 
 const axe = loadCommon('axe-core').source;
 const TOLERANCE_MM = 0.02; // the page stores 16-bit numbers
-const PRINTED_MM = 0.001;   // resolution of numbers in text files
-const WRITTEN_MM = 0.051;   // resolution of displacements in the table
+const PRINTED_MM = 0.001;   // tolerance: numbers in text files have three decimals
+const WRITTEN_MM = 0.051;   // tolerance: displacements in the table have one decimal
 const NAMES = ['nodule <b>&amp;</data>', 'carina', 'upper lobe', 'lower lobe'];
 const PARTS = [...NAMES, 'tumour', 'metastasis'];
 const files = Object.fromEntries(['tumour.obj', 'metastasis.obj', 'points.csv', 'inside.safetensors', 'inside.html', 'many.html', 'moved.csv'].map((name) => [name, join(folder, name)]));
@@ -61,7 +61,7 @@ async function checkPositions(page) {
 const distance = (a, b) => Math.hypot(...a.map((x, i) => x - b[i]));
 const mean = (values) => values.reduce((sum, x) => sum + x, 0) / values.length;
 
-/** Check that displacements in the table are differences of positions by `supine deform`. */
+/** Check that displacements in the table equal those between positions that `supine deform` writes. */
 async function checkTable(page) {
   const rest = deformed('supine', 'rest');
   await press(page, '2');
@@ -87,7 +87,7 @@ async function checkTable(page) {
   return rest;
 }
 
-/** Return the place on the screen of the centre of a part. */
+/** Return where on the screen the centre of an embedded structure (point or mesh) is. */
 const onPage = (page, name) => page.evaluate((wanted) => {
   const { basis: { inside }, insidePositions, state, panes } = window.supine;
   const xyz = insidePositions(state.gravity, state.depth);
@@ -109,8 +109,8 @@ async function pointed(page, [x, y]) {
   return page.locator('#pointed').isVisible().then((shown) => (shown ? page.locator('#pointed').textContent() : ''));
 }
 
-/** Check that the name and displacement of the part at the pointer are shown through transparent lungs, but not
- * through opaque lungs or if content is hidden. */
+/** Check that the name and displacement of the structure at the pointer are shown through transparent lungs, but not
+ * through opaque lungs or if structures are hidden. */
 async function checkPointer(page, rest) {
   const depth = await page.evaluate(() => window.supine.state.depth);
   const now = deformed('prone', `rest+${depth}`);
@@ -130,8 +130,8 @@ async function checkPointer(page, rest) {
   await page.locator('#inside').check();
 }
 
-/** Check that names can be shown, hidden and kept by keyboard and pointer, and that a link restores
- * them. */
+/** Check that keyboard and pointer can show and hide the names of structures, and keep them visible, and that a link
+ * restores them. */
 async function checkControls(page) {
   await page.mouse.move(5, 5);
   const before = await picture(page);
@@ -144,7 +144,7 @@ async function checkControls(page) {
     await assertPicture(page, before, `${kind} does not change the picture`, false);
   }
   await page.locator('[name=kind][value=displacement]').check();
-  /* The keyboard alone reaches each name from the check box; Enter keeps it. */
+  /* From the check box `inside`, Tab reaches each name. Enter keeps the name visible. */
   await page.mouse.move(5, 5); // off the rows: a row under the pointer shows its name
   await page.locator('#inside').focus();
   const reached = [];
@@ -195,7 +195,7 @@ async function checkSizes() {
     await page.locator('#inside-section').scrollIntoViewIfNeeded();
     await settled(page);
     writeFileSync(join('page_inside', `${width}x${height}-${colorScheme}.png`), await page.screenshot());
-    if (width === 1400 || touch) { // once in each theme
+    if (width === 1400 || touch) { // one size with the light theme and one with the dark theme
       await page.evaluate(axe);
       const { violations } = await page.evaluate(() => window.axe.run(document, { runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'] }));
       assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.html.slice(0, 120)).join(' | ')}`), []);

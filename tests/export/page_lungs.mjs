@@ -9,11 +9,11 @@ import { basis, html } from './lungs.mjs';
 import { folder, inOrder, largestDistance, randomDirections, supine } from './support.mjs';
 
 const TOLERANCE_MM = 0.02; // the page stores 16-bit numbers
-const PRINTED_MM = 0.001; // resolution of numbers in text files
+const PRINTED_MM = 0.001; // tolerance: numbers in text files have three decimals
 
 const both = (page, gravity, depth) => page.evaluate(([g, mL]) => [Array.from(window.supine.positions(g, mL)), Array.from(window.supine.normals(g, mL))], [gravity, depth]);
 
-/** Check that page, library and program measure the volume of the breath from rest in the posture. */
+/** Check that page, library and program add the volume of the breath to the volume at rest in the same posture. */
 async function checkRest(page) {
   for (const gravity of [...randomDirections(4, 31), [1, 0, 0]]) {
     const [found] = await both(page, gravity, 320);
@@ -55,8 +55,8 @@ async function checkNormals(page) {
   assert.ok(mean < 0.1 && p999 < 1, `mean ${mean}, 99.9th percentile ${p999}`);
 }
 
-/** Check that a single right lung is named by its position, and that the letters L and R are on its
- * left and right. */
+/** Check that a single lung right of x = 0 is called "right lung", and that the letters L and R are on the patient's left
+ * and right. */
 async function checkRight(page) {
   const { xyz, corners } = await page.evaluate(() => {
     const { basis: b } = window.supine;

@@ -8,13 +8,13 @@ import { close, evaluateFor, openLungs, settled } from './browser.mjs';
 import { basis } from './lungs.mjs';
 import { folder, randomDirections, supine } from './support.mjs';
 
-const AGREE_MM = 0.051; // half a unit of the page's one decimal, and half a unit of the program's third
+const AGREE_MM = 0.051; // tolerance: the page rounds to one decimal, the program to three
 const [points, inside, html, moved, vtp] = ['nodule.csv', 'nodule.safetensors', 'numbers.html', 'nodules.csv', 'surface.vtp'].map((name) => join(folder, name));
 writeFileSync(points, 'name,x,y,z\nnodule,-80,-120,-90\n');
 supine('embed', basis, points, '-o', inside);
 
-/** Return the program's displacements for a posture at rest: of the nodule by `compare` and `deform`, of the surface
- * by `compare` (mean, largest) and `deform` (largest). */
+/** Run `compare` and `deform` for a posture at rest. Return the displacement of the nodule from both, the mean and largest
+ * displacement of the surface from `compare`, and the largest from `deform`. */
 function told(posture, from) {
   const pair = JSON.parse(supine('compare', inside, '--postures', `supine,${posture}`, '--json'))[0];
   const report = JSON.parse(supine('compare', basis, '--postures', posture, '--json', '--from', from).replace(/^[^{]*/, ''));

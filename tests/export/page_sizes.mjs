@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The page at four sizes in two themes: nothing is cut off, letters do not overlap, and a tap keeps a probe.
+// Test the page at four sizes in two themes: nothing is cut off, letters do not overlap, and a tap leaves a probe there.
 // Pictures are kept in the folder page_sizes of the working folder.
 import assert from 'node:assert/strict';
 import { mkdirSync, writeFileSync } from 'node:fs';
@@ -43,7 +43,7 @@ for (const [width, height] of [[1400, 900], [900, 600], [844, 390], [390, 844]])
   const touch = Math.min(width, height) < 400;
   const { page, complaints } = await openLungs(html, { viewport: { width, height }, ...(touch && { hasTouch: true }) }, '#posture=left');
   assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth && [...document.querySelectorAll('#panel button, #panel input')].every((e) => { const b = e.getBoundingClientRect(); return b.width === 0 || (b.left >= 0 && b.right <= innerWidth + 0.5); })), `${width} x ${height}: something is cut`);
-  if (touch) { // a tap keeps a probe and does not turn the camera
+  if (touch) { // a tap leaves a probe in the picture, and does not turn the camera
     const box = await page.locator('#picture').boundingBox();
     const azimuth = await page.evaluate(() => window.supine.state.camera.azimuth);
     await page.touchscreen.tap(box.x + box.width * 0.48, box.y + box.height * 0.36);

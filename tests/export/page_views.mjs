@@ -4,13 +4,13 @@ import assert from 'node:assert/strict';
 import { assertPicture, close, openLungs, picture, press, settled } from './browser.mjs';
 import { basis, html } from './lungs.mjs';
 
-/** Return the visible letters with their positions on the screen. */
+/** Return the visible orientation letters with their positions on the screen. */
 const letters = (page) => page.evaluate(() => Object.fromEntries([...document.querySelectorAll('.letter:not([hidden])')].map((e) => {
   const box = e.getBoundingClientRect();
   return [e.textContent, [box.x + box.width / 2, box.y + box.height / 2]];
 })));
 
-/** Check that in each view the letters are on the right sides. */
+/** Check that in each view the orientation letters (L, R, A, P, H, F) are on the correct sides. */
 async function checkViews(page) {
   const expected = { a: ['R', 'L', 'H', 'F'], p: ['L', 'R', 'H', 'F'], l: ['A', 'P', 'H', 'F'], r: ['P', 'A', 'H', 'F'], f: ['R', 'L', 'A', 'P'], h: ['R', 'L', 'P', 'A'] };
   for (const [key, [left, right, top, bottom]] of Object.entries(expected)) {
@@ -167,7 +167,7 @@ await checkFrames(page);
 await checkLoss(page);
 const bytes = await page.evaluate(async () => Array.from(new Uint8Array(await (await window.supine.picturePng()).arrayBuffer()).slice(0, 8)));
 assert.deepEqual(bytes, [0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a]);
-/* During a turn, the button `pin` takes the posture at its end as the reference. */
+/* If the button `pin` is pressed while the patient turns, the posture at the end of the turn becomes the reference. */
 const goal = await page.evaluate(() => {
   const { state, postureText, gravityOf, postureFrom } = window.supine;
   state.settle(postureFrom('prone').q, 0, 0.7);

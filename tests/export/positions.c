@@ -3,9 +3,10 @@
  *
  *     positions BASIS X,Y,Z,ML...
  *
- * For each argument, a direction of gravity and a volume in mL above rest (above the scan if the
- * basis has no rest volume), write to standard output the gain of the first lung (float64) and the
- * positions (float32, [N, 3]). For an open surface, give a gain in place of the volume. */
+ * X,Y,Z is the direction of gravity. ML is a volume, mL above rest (above the scan if the basis has
+ * no rest volume). For an open surface, ML is instead the gain, which is the factor of the
+ * displacements. For each argument, write to standard output the gain of the first lung along x
+ * (float64), and the positions (float32, [N, 3]). */
 #include <stdio.h>
 #include <stdlib.h>
 

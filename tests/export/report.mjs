@@ -110,7 +110,7 @@ for (const { title, paths } of outlines) {
   }
 }
 
-/* Each picture has four letters; the arrow of gravity and the picture are turned as the patient lies. */
+/* Each picture has four orientation letters. The picture and its arrow of gravity are rotated to the posture. */
 const shots = await page.evaluate(() => Object.fromEntries([...document.querySelectorAll('.shot')].map((shot) => [shot.querySelector('img').alt, {
   ends: Object.fromEntries([...shot.querySelectorAll('.end')].map((end) => [end.classList[1], end.textContent])),
   gravity: shot.querySelector('.gravity').innerHTML,
@@ -122,9 +122,9 @@ for (const [alt, { ends, gravity }] of Object.entries(shots)) {
   assert.ok(/<g|<circle/.test(gravity), alt);
 }
 const along = (name) => Number(/rotate\(([-\d.]+)\)/.exec(shots[`${name}, from the front`].gravity)?.[1]);
-assert.equal(Math.abs(along('left side')), 0); // lying on the left, gravity points to the right of the picture
+assert.equal(Math.abs(along('left side')), 0); // degrees: if the patient lies on the left side, gravity points to the right
 assert.equal(Math.abs(along('right side')), 180);
-assert.equal(along('upright'), 90); // upright, gravity points down
-assert.deepEqual(['left side', 'right side'].map((name) => shots[`${name}, from the front`].turn), [90, 270]); // after this turn, gravity points down
+assert.equal(along('upright'), 90); // degrees: if the patient is upright, gravity points down
+assert.deepEqual(['left side', 'right side'].map((name) => shots[`${name}, from the front`].turn), [90, 270]); // degrees by which a picture is rotated, so that gravity points down
 assert.deepEqual(complaints, []);
 assert.ok(!readFileSync(html, 'utf8').includes('0.000 %'));

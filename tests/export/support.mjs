@@ -62,8 +62,8 @@ export function randomDirections(count, seed) {
   });
 }
 
-/** Evaluate [gravity, mL] pairs in C: return {scale, xyz} for each, the gain of the first lung and
- * the positions, mm. */
+/** Evaluate [gravity, mL] pairs in C. Return {scale, xyz} for each: the factor of the first lung's displacement, and the
+ * positions, mm. */
 export function evaluate(basis, pairs) {
   const bytes = execFileSync(
     process.env.POSITIONS, [basis, ...pairs.map(([g, volume]) => [...g, volume].join(','))],

@@ -24,7 +24,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { RANGES = 64, BLOCKS = 1 << 21, FEW = 1 << 16 };
+enum { RANGES = 64, BLOCKS = 1 << 21, STATIC_MEMORY = 1 << 16 };
 
 typedef enum { NOTHING, MEMORY, FILES } fault_kind;
 
@@ -36,30 +36,31 @@ static long seen, failed;
 static pid_t process;
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 
-/* Addresses of blocks that were allocated by counted calls and are not freed. This is a hash table
- * with open addressing, in which 1 marks a freed entry. */
+/* Addresses of blocks that counted calls allocated and that are not freed. This is a hash table
+ * with open addressing; 1 marks a freed entry. */
 static uintptr_t blocks[BLOCKS];
 static long live;
 
 /* Functions of the C library, looked up once by dlsym. While dlsym allocates memory, it gets that
- * memory from `few`, which is never freed. */
+ * memory from `static_memory`, of which nothing is freed. */
 static void *(*next_malloc)(size_t);
 static void *(*next_calloc)(size_t, size_t);
 static void *(*next_realloc)(void *, size_t);
 static void *(*next_aligned_alloc)(size_t, size_t);
 static int (*next_posix_memalign)(void **, size_t, size_t);
 static void (*next_free)(void *);
-static _Alignas(64) char few[FEW];
-static size_t few_used;
+static _Alignas(64) char static_memory[STATIC_MEMORY];
+static size_t static_memory_used;
 
-static void *few_take(size_t size) {
-  void *taken = few + few_used;
-  few_used += (size + 63) / 64 * 64;
-  return few_used <= FEW ? taken : NULL;
+static void *static_memory_take(size_t size) {
+  void *taken = static_memory + static_memory_used;
+  static_memory_used += (size + 63) / 64 * 64;
+  return static_memory_used <= STATIC_MEMORY ? taken : NULL;
 }
 
-static bool is_few(const void *pointer) {
-  return (const char *)pointer >= few && (const char *)pointer < few + FEW;
+static bool is_static_memory(const void *pointer) {
+  return (const char *)pointer >= static_memory &&
+         (const char *)pointer < static_memory + STATIC_MEMORY;
 }
 
 static int note_object(struct dl_phdr_info *info, size_t size, void *context) {
@@ -181,7 +182,7 @@ static void find_memory(void) {
 void *malloc(size_t size) {
   find_memory();
   if (next_malloc == NULL) {
-    return few_take(size);
+    return static_memory_take(size);
   }
   return fails(MEMORY, CALLER, ENOMEM) ? NULL : taken(next_malloc(size), CALLER);
 }
@@ -189,7 +190,7 @@ void *malloc(size_t size) {
 void *calloc(size_t count, size_t size) {
   find_memory();
   if (next_calloc == NULL) {
-    return few_take(count * size); /* static memory is zero */
+    return static_memory_take(count * size); /* static memory is zero */
   }
   return fails(MEMORY, CALLER, ENOMEM) ? NULL : taken(next_calloc(count, size), CALLER);
 }
@@ -233,7 +234,7 @@ int posix_memalign(void **pointer, size_t alignment, size_t size) {
 
 void free(void *pointer) {
   find_memory();
-  if (is_few(pointer)) {
+  if (is_static_memory(pointer)) {
     return;
   }
   given(pointer);

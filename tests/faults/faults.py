@@ -169,7 +169,7 @@ def faultless(trial, arguments):
 
 
 def samples(folder):
-    """Write the input files that no command of BEFORE makes."""
+    """Write the input files that the commands in BEFORE do not make."""
     (folder / "points.csv").write_text("name,x,y,z\ncarina,60,-180,-60\nnodule,-80,-120,-90\n")
     (folder / "samples.csv").write_text("pressure_cmH2O,volume_mL\n" + "".join(
         f"{p},{3000 / (1 + 2.718281828 ** ((8 - p) / 5)):.3f}\n" for p in range(-10, 36, 2)))

@@ -7,8 +7,8 @@
 
 A mutant is the code of the last commit with one change, made in a copy in build/mutation. The mutant is killed if a test
 fails or exceeds its time limit. A mutant that does not compile does not count. For a random mutant, only tests that
-reach the changed line are run, quick ones first, until one fails or they have taken ENOUGH seconds. Which tests reach a
-line is found by an instrumented build, in which each test runs once alone, and is kept for other seeds of the same
+reach the changed line are run, quick ones first, until one fails or they have taken ENOUGH seconds. To find the tests
+that reach a line, each test runs once alone in an instrumented build; the results are kept for other seeds of the same
 commit. Tests that fail in the instrumented build, take longer than SLOW seconds there or are listed in LEFT_OUT are not
 used. Because some tests are not used, the number of survivors is an upper bound. The environment variable
 SUPINE_CMAKE_OPTIONS adds options for cmake, such as -DSUPINE_LUNGS=FOLDER.
@@ -68,7 +68,7 @@ def build(folder=BUILD):
 
 
 def failed_tests(names):
-    """Run these tests until one fails or exceeds its time limit. Return the names of the failed tests."""
+    """Run these tests in parallel until one fails or exceeds its time limit. Return the names of those that failed."""
     _, said = run("ctest", "-R", f"^({'|'.join(names)})$", "-j", JOBS, "--stop-on-failure") if names else (0, "")
     return re.findall(r"Test +#\d+: (\S+) \.*\*\*\*(?!Skipped)", said)
 

@@ -18,7 +18,7 @@ async function check(basis, states, ask) {
   }
 }
 
-/** Return the results of an open basis in each state. This function runs in node or in a browser. */
+/** Return positions, normals, volumes and errors of an open basis in each state. It runs in node or in a browser. */
 export function pose(lungs, states) {
   return states.map((state) => {
     lungs.pose(state).deformLit();

@@ -28,7 +28,7 @@ if (real.every(existsSync)) {
   supine('precompute', ...real, '-o', bases.at(-1)[0]);
 }
 
-/** Run npm_native for one state. Return its results; `expected` are the expected errors of vertices. */
+/** Run npm_native, the program in plain C, for one state. In its results, `expected` [N] are expected errors, mm. */
 export function native(basis, state, lungs) {
   const out = join(folder, 'native');
   execFileSync(process.env.NATIVE, [basis, state, out], { stdio: 'pipe' });

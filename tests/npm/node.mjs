@@ -63,7 +63,7 @@ assert.deepEqual(lungs.tensor('coefficients').shape[0], lungs.vertexCount);
 assert.equal(lungs.tensor('none'), undefined);
 assert.equal((await open(readFileSync(inside))).tensor('names').data.length > 0, true);
 
-/* A basis of an open surface, which an older version made, has no volumes. It can only be posed by a gain. */
+/* A basis of an open surface, made by an older version, has no volumes. A pose needs a gain, the displacement factor. */
 const opened = await open(readFileSync(join(dirname(process.env.GOLDEN), 'open_surface.safetensors')));
 assert.throws(() => opened.volumes, { status: 'open surface' });
 assert.throws(() => opened.pose('prone:rest+500'), SupineError);

@@ -145,7 +145,7 @@ refused(supine.ArgumentError, "three", lungs.locate, [0, 1], truth[:2], rigid=Tr
 refused(ValueError, "positions", lungs.locate, [0, 1], truth[:1])
 
 # Calls that compute all vertices release the interpreter's lock. The switch interval below is so long that another
-# thread runs only if a call releases the lock. `repr` must not release it.
+# thread runs only if a call releases the lock. As a control, `repr` must not release it.
 def lets_others_run(call, *arguments, tries=None):
     gate, ran = threading.Lock(), []
 
@@ -241,8 +241,8 @@ try:
 except KeyboardInterrupt:
     assert not os.path.exists(path + ".stopped")
 
-# Points with or without names, a mesh and a grid can be embedded into a basis, made from a file or from arrays. A point
-# on the surface moves with the surface.
+# Points with or without names, a mesh and a grid can be embedded into a basis. The basis can be made from a file or from
+# arrays. A point on the surface moves with the surface.
 place = lungs.vertices[7].astype(float)
 for basis in (lungs, made):
     inside = supine.embed(basis, {"on, the surface": place, "other": (-80, -120, -90)})

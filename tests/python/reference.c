@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* Compute reference results for the Python package.
  *
- *     reference BASIS STATE OUT    write as float32 the positions and the normals by
- *                                  supine_deform_lit, the normals by supine_normals, the positions
- *                                  by supine_deform_batch in STATE and in the state "supine"
- *     reference BASIS STATE        print the time of a call of supine_deform, s */
+ *     reference BASIS STATE        print the time of a call of supine_deform, s
+ *     reference BASIS STATE OUT    write as float32, in this order:
+ *
+ * - positions and normals by supine_deform_lit in STATE
+ * - normals of these positions by supine_normals
+ * - positions by supine_deform_batch in STATE, and in the state "supine" */
 #include <stdio.h>
 #include <stdlib.h>
 #include <time.h>

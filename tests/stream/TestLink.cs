@@ -55,13 +55,13 @@ static class TestLink
 
     static int Main(string[] words)
     {
-        // Rotation matrices, by rows; the columns are the directions of left, back and head in a room whose z is up.
+        // Rotation matrices of `postures`, by rows. The columns are the directions of left, back and head in a room with z up.
         float[][] rotations = {
             new float[] { 1, 0, 0, 0, 0, 1, 0, -1, 0 },
             new float[] { -1, 0, 0, 0, 0, 1, 0, 1, 0 },
             new float[] { 0, -1, 0, 0, 0, 1, -1, 0, 0 },
             new float[] { 0, 1, 0, 0, 0, 1, 1, 0, 0 } };
-        // The same postures as rotations of a standing object in Unity: supine and prone about x, left and right about z.
+        // Rotations of a standing Unity object to `postures`, by 90 degrees about x or z; h = sin(45 degrees) = cos(45 degrees).
         const float h = 0.70710678f;
         Quaternion[] turns = { new Quaternion(-h, 0, 0, h), new Quaternion(h, 0, 0, h),
                                new Quaternion(0, 0, h, h), new Quaternion(0, 0, -h, h) };

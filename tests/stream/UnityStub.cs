@@ -11,7 +11,7 @@ namespace UnityEngine
     {
         public float x, y, z, w;
         public Quaternion(float x, float y, float z, float w) { this.x = x; this.y = y; this.z = z; this.w = w; }
-        // v + 2 w (q x v) + 2 q x (q x v). The formula is the same in left-handed axes, where rotations are clockwise.
+        // Rotate v: v + 2 w (u x v) + 2 u x (u x v), u = (q.x, q.y, q.z), w = q.w; also in left-handed axes.
         public static Vector3 operator *(Quaternion q, Vector3 v)
         {
             Vector3 t = new Vector3(2 * (q.y * v.z - q.z * v.y), 2 * (q.z * v.x - q.x * v.z), 2 * (q.x * v.y - q.y * v.x));

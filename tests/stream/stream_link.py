@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Test the sample client in Python with a real server: stream_link.py SAMPLES PORT BASIS
 
-The client shares no code with the server: it was written from the descriptions of the protocol and the file."""
+The client shares no code with the server: it was written from the descriptions of the protocol and of the basis file."""
 import sys
 
 sys.path.insert(0, sys.argv[1])
@@ -53,7 +53,7 @@ for version in (1, 2):
         assert not strips
         assert far(points, basis.deform(frames[stamp - 100])) < TOLERANCE_MM
         assert far(points, basis.vertices) > 1.0
-    link.set_volume("full")  # Full inflation on the side equals the file's surface.
+    link.set_volume("full")  # Full inflation gives the basis file's surface in all postures.
     kind, _, _, content = answer(link, 203, lambda: link.send_pose(LEFT, stamp=203))
     assert far(unpack(kind, content)[0], basis.vertices) < TOLERANCE_MM
     link.send("STRING", "VOLUME", string("rest+400"))

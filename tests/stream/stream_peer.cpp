@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Test a server with the public OpenIGTLink library: stream_peer PORT BASIS
-// Send each posture as a message packed by that library. Unpack the frames by it, with their checksums, and compare
-// them with results of the run-time library.
+// Use OpenIGTLink to pack each posture as a message, and to unpack the frames and verify their checksums. Compare the
+// frames with results of the run-time library.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -96,7 +96,7 @@ static void expect_weights(const supine_basis *basis, const supine_pose &pose) {
 
 typedef std::array<uint32_t, 3> Triangle;
 
-// Return a triangle with its corners rotated so that the lowest comes first; orientation is kept.
+// Return a triangle with the lowest corner first, in the same cyclic order.
 static Triangle face(uint32_t a, uint32_t b, uint32_t c) {
   Triangle t = {a, b, c};
   std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
@@ -115,7 +115,7 @@ static void expect_surface(const supine_basis *basis, const supine_pose &pose) {
   for (unsigned i = 0; i < info->vertex_count; ++i) {
     float point[3];
     message->GetPoints()->GetPoint(i, point);
-    for (int k = 0; k < 3; ++k) { // the server uses the same library on the same machine
+    for (int k = 0; k < 3; ++k) { // equal: the server uses the same library on the same machine
       expect(std::fabs(point[k] - xyz[3 * i + k]) < 1e-3f, "positions");
       moved = std::fmax(moved, std::fabs(point[k] - supine_basis_vertices(basis)[3 * i + k]));
     }
@@ -126,7 +126,7 @@ static void expect_surface(const supine_basis *basis, const supine_pose &pose) {
   for (unsigned i = 0; i < message->GetTriangleStrips()->GetNumberOfCells(); ++i) {
     std::vector<igtlUint32> strip(message->GetTriangleStrips()->GetCellSize(i));
     message->GetTriangleStrips()->GetCell(i, strip.data());
-    for (size_t j = 0; j + 2 < strip.size(); ++j) { // every other triangle of a strip has the opposite orientation
+    for (size_t j = 0; j + 2 < strip.size(); ++j) { // odd triangles of a strip have the opposite orientation
       if (strip[j] != strip[j + 1] && strip[j + 1] != strip[j + 2] && strip[j] != strip[j + 2]) {
         received.push_back(face(strip[j], strip[j + 1 + j % 2], strip[j + 2 - j % 2]));
       }
@@ -141,7 +141,7 @@ static void expect_surface(const supine_basis *basis, const supine_pose &pose) {
   expect(received == wanted, "every triangle once, with its orientation");
 }
 
-// A posture, with the directions of the patient's left, back and head in a room whose z is up.
+// A posture, and the directions of the patient's left, back and head in a room with z upwards.
 struct Lie {
   const char *posture;
   float left[3], back[3], head[3];
@@ -184,7 +184,7 @@ int main(int count, char **word) {
     expect(supine_posture_gravity(lie.posture, gravity) == SUPINE_OK, lie.posture);
     expect_weights(basis, pose_of(basis, gravity, 400.0));
   }
-  // Quaternions: a standing body rotated backwards by 90 degrees about its left-right axis is supine.
+  // Send a quaternion. A standing body that rotates backwards by 90 degrees about its left-right axis becomes supine.
   const double supine[3] = {0, 1, 0};
   const float half = 0.70710678f;
   igtl::PositionMessage::Pointer position = igtl::PositionMessage::New();
@@ -194,7 +194,7 @@ int main(int count, char **word) {
   send(position, "Patient");
   expect_weights(basis, pose_of(basis, supine, 400.0));
   igtl::QuaternionTrackingDataMessage::Pointer tracked = igtl::QuaternionTrackingDataMessage::New();
-  for (int i = 0; i < 2; ++i) { // a probe, which is ignored, then the patient, prone
+  for (int i = 0; i < 2; ++i) { // element 0 is a probe, which is ignored; element 1 is the prone patient
     igtl::QuaternionTrackingDataElement::Pointer element =
         igtl::QuaternionTrackingDataElement::New();
     element->SetName(i == 0 ? "Probe" : "Patient");
@@ -212,7 +212,7 @@ int main(int count, char **word) {
     send_transform(lies[1]);
     expect_weights(basis, pose_of(basis, prone, 500.0));
   }
-  // Surfaces.
+  // Ask for surfaces instead of weights.
   say("VOLUME", "rest+250");
   say("SEND", "surface");
   for (const Lie &lie : lies) {

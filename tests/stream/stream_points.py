@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Send observed points, and receive the located lungs with their expected error: stream_points.py SUPINE SAMPLES
+"""Send observed points, and receive the located lungs with their expected error.
+
+    stream_points.py PROGRAM FOLDER_OF_SAMPLE_CLIENTS
 
 The observed points come from deformed and shifted lungs. They are sent as one TRANSFORM per sensor, then as one POINT."""
 import csv
@@ -17,7 +19,7 @@ from supine_link import Link, transform, unpack  # noqa: E402
 
 SHIFT = (12.0, -7.0, 20.0)
 LEFT = [[0, -1, 0], [0, 0, 1], [-1, 0, 0]]  # Rotation matrix, by rows, of a body on its left side.
-TURNED = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+TURNED = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]  # rotation of a sensor, which the server ignores
 
 
 def run(*words):
@@ -82,7 +84,7 @@ with tempfile.TemporaryDirectory(prefix="supine-stream-") as folder:
             if version == 1:  # Recorded times count from the first pose, even if a point arrived earlier.
                 answer(link, 4, lambda: link.send("TRANSFORM", names[0], transform(TURNED, seen[names[0]]), 4))
             link.send_pose(LEFT, stamp=5)
-            for name in names[:-1]:  # the rotation of a sensor is ignored
+            for name in names[:-1]:
                 link.send("TRANSFORM", name, transform(TURNED, seen[name]), 6)
             last = names[-1]
             check(answer(link, 7, lambda: link.send("TRANSFORM", last, transform(TURNED, seen[last]), 7)),

@@ -20,7 +20,7 @@ weights.ask_for("weights")
 TURNS = {
     "supine": ([1, 0, 0, 5, 0, 1, 0, 6, 0, 0, 1, 7, 0, 0, 0, 1], (0, 1, 0)),
     "prone": ([-1, 0, 0, 5, 0, -1, 0, 6, 0, 0, 1, 7, 0, 0, 0, 1], (0, -1, 0)),
-    # on the left side, the patient's right (x) points to the ceiling (+y) and the front (y) to -x of the room
+    # On the left side: the patient's right is the room's +y (ceiling), and the patient's front is the room's -x.
     "left": ([0, -1, 0, 5, 1, 0, 0, 6, 0, 0, 1, 7, 0, 0, 0, 1], (1, 0, 0)),
 }
 
@@ -47,7 +47,7 @@ for name, (matrix, gravity) in TURNS.items():
         assert abs(points[i] + wanted[i]) < 5e-3 and abs(points[i + 1] + wanted[i + 1]) < 5e-3
         assert abs(points[i + 2] - wanted[i + 2]) < 5e-3
     seen[name] = frame
-    # A tilt sensor in the patient's axes (RAS) gives the same direction.
+    # The same gravity, sent as the reading of a tilt sensor in the patient's axes (RAS), gives the same weights.
     weights.send("NDARRAY", "Patient", array((-gravity[0], -gravity[1], gravity[2])))
     _, same = settle(lambda: weights.newest(0.05))
     assert max(abs(a - b) for a, b in zip(same, frame)) < 1e-5, name

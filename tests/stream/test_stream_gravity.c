@@ -24,21 +24,23 @@ typedef struct placement {
 } placement;
 
 static const placement placements[] = {
-    /* Head at the head end, face up: seen from the feet, the patient's left is on the right. */
+    /* Head at the head end of the bed, face up: seen from the feet, the patient's left is on the
+     * right. */
     {"supine", {1, 0, 0}, {0, 0, -1}, {0, 1, 0}},
-    /* Head at the head end, face down: seen from the feet, the patient's left is on the left. */
+    /* Head at the head end of the bed, face down: seen from the feet, the patient's left is on the
+     * left. */
     {"prone", {-1, 0, 0}, {0, 0, 1}, {0, 1, 0}},
     /* On the left side: the patient's left points down, and the back to the left as seen from the
      * feet. */
     {"left", {0, 0, -1}, {-1, 0, 0}, {0, 1, 0}},
     /* On the right side: the patient's left points up, and the back to the right. */
     {"right", {0, 0, 1}, {1, 0, 0}, {0, 1, 0}},
-    /* Head at the foot end: the same postures, turned about the vertical. */
+    /* Head at the foot end of the bed: the four postures above, turned by 180 degrees about z. */
     {"supine", {-1, 0, 0}, {0, 0, -1}, {0, -1, 0}},
     {"prone", {1, 0, 0}, {0, 0, 1}, {0, -1, 0}},
     {"left", {0, 0, -1}, {1, 0, 0}, {0, -1, 0}},
     {"right", {0, 0, 1}, {-1, 0, 0}, {0, -1, 0}},
-    /* On the back across the bed. */
+    /* On the back across the bed, with the head towards -x. Then two standing postures. */
     {"supine", {0, 1, 0}, {0, 0, -1}, {-1, 0, 0}},
     {"upright", {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
     {"inverted", {1, 0, 0}, {0, -1, 0}, {0, 0, -1}},
@@ -88,7 +90,7 @@ TEST(test_gravity_tracker_quaternions_give_postures) {
       /* Upright, rotated backwards about x. */
       {"supine", {0.7071067811865476, -0.7071067811865476, 0, 0}},
       {"prone", {0.7071067811865476, 0.7071067811865476, 0, 0}}, /* rotated forwards about x */
-      /* rotated sideways about y, the head towards x */
+      /* rotated about y by 90 degrees (head to x) or -90 degrees (head to -x), or about x by 180 */
       {"left", {0.7071067811865476, 0, 0.7071067811865476, 0}},
       {"right", {0.7071067811865476, 0, -0.7071067811865476, 0}},
       {"inverted", {0, 1, 0, 0}},
@@ -115,14 +117,15 @@ TEST(test_gravity_setup_rotates_world_and_marker) {
   supine_stream_setup setup = {.down = {0, -1, 0}};
   const double half_turn[4] = {0, 0, 0, 1};
   supine_stream_rotation(half_turn, setup.body);
-  /* The patient lies on the back: the marker's x, y, z point along z, y, x of the world. */
+  /* The patient lies on the back: the marker's x, y, z axes point along -z, y, x of the world. */
   const double r[9] = {0, 0, 1, 0, 1, 0, -1, 0, 0};
   double gravity[3];
   const char *why = NULL;
   assert_true(fabs(determinant(r) - 1.0) < tolerance);
   assert_int_equal(supine_stream_gravity_rotation(&setup, r, gravity, &why), SUPINE_STREAM_EXACT);
   expect_gravity(gravity, "supine");
-  /* A tilt sensor with the marker's axes measures gravity towards the patient's right. */
+  /* A tilt sensor, whose axes are the marker's, reports a vector of any length towards the ground,
+   * here towards the patient's right. */
   const double down[3] = {3, 0, 0};
   assert_int_equal(supine_stream_gravity_down(&setup, down, gravity, &why), SUPINE_STREAM_EXACT);
   expect_gravity(gravity, "right");
@@ -143,7 +146,7 @@ TEST(test_gravity_invalid_rotations_refused) {
     matrix_of(&placements[i], r);
     scaled(r, 1.0001, 0.9999, 1.0, m); /* a small rounding error */
     assert_int_equal(take(m, gravity), SUPINE_STREAM_EXACT);
-    scaled(r, 25.4, 25.4, 25.4, m); /* a matrix scaled to inches */
+    scaled(r, 25.4, 25.4, 25.4, m); /* a uniform scale, as if lengths were in other units */
     assert_int_equal(take(m, gravity), SUPINE_STREAM_REPAIRED);
     expect_gravity(gravity, placements[i].posture);
     scaled(r, 1.0, 1.0, 1.05, m);
@@ -190,17 +193,17 @@ TEST(test_gravity_invalid_quaternions_and_vectors_refused) {
   expect_gravity(gravity, "supine");
 }
 
-/* The smoothed direction lags behind a steady turn of gravity by a given time. */
+/* The smoothed direction lags behind a steady turn of gravity by `seconds`. */
 TEST(test_gravity_smooth_steady_turn_has_stated_lag) {
   const double seconds = 0.2;
   const double step = 1e-3;
   const double speed = 0.5; /* rad/s */
   double smooth[3] = {0, 1, 0};
-  for (int i = 1; i <= 2000; ++i) { /* 2 s, ten times the lag */
+  for (int i = 1; i <= 2000; ++i) { /* for 2 s, ten times the lag of 0.2 s */
     const double angle = speed * step * i;
     const double gravity[3] = {sin(angle), cos(angle), 0};
     const double left = supine_stream_gravity_smooth(gravity, step, seconds, smooth);
-    if (i == 2000) { /* The lag may be wrong by up to one time step. */
+    if (i == 2000) { /* The last step: the lag may be wrong by up to one time step. */
       assert_true(fabs(left - speed * seconds) < speed * step);
       assert_true(fabs(atan2(smooth[0], smooth[1]) - (angle - left)) < 1e-12);
     }

@@ -94,7 +94,7 @@ TEST(test_volume_parse_each_form_literal) {
                                     "500", "+40",    "-1200", "0"};
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     assert_int_equal(supine_stream_volume_fix(volume, bad[i], &error), SUPINE_ERROR_ARGUMENT);
-    /* The refused text leaves the volume unchanged. */
+    /* The refused text `bad[i]` leaves the volume that the last good text has set. */
     expect_volume(volume, basis, gravity, 1.0, good[6].volume);
   }
   /* The volume follows the breathing model, within a thousandth of the tidal volume. */

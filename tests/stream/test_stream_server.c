@@ -65,7 +65,8 @@ static stage *stage_create(void) {
   size_t size = 0;
   supine_error error;
   s->made = fixture_create(VERTICES, MODES, 2, LUNGS, false, true, 15.0, 29);
-  /* Make the constant part of each mode dominate, to avoid poses with a folded surface. */
+  /* Make the constant (degree 0) coefficient of the weight of each mode dominate, so that no pose
+   * folds the surface. */
   for (size_t k = 0; k < MODES; ++k) {
     double *mode = s->made->mode + 9 * k;
     for (int i = 1; i < 9; ++i) {
@@ -367,8 +368,9 @@ TEST(test_server_send_request_switches_content) {
   supine_stream_header header;
   unsigned char body[4096];
   const size_t points = 40 + 12 * info->vertex_count;
-  size_t whole = 0;                          /* size of a body with points and triangles */
-  assert_true(send_pose(peer, poses[3], 1)); /* until a peer asks for content, it gets weights */
+  size_t whole = 0; /* size of a message body with points and triangles, bytes */
+  /* frames hold weights of modes until a peer requests something else */
+  assert_true(send_pose(peer, poses[3], 1));
   (void)receive_stamp(peer, 1, &header, body);
   const char *const requests[] = {"points", "surface"};
   for (uint64_t w = 0; w < 2; ++w) {
@@ -377,7 +379,7 @@ TEST(test_server_send_request_switches_content) {
     for (uint64_t i = 0; i < 4; ++i) {
       const uint64_t stamp = 10 * (w + 1) + i;
       assert_true(send_pose(peer, poses[i], stamp));
-      do { /* The server also answers the request itself, with the current pose. */
+      do { /* skip the answer to the request itself, which is a frame of the current pose */
         assert_true(receive(peer, &header, body));
         whole = whole == 0 ? header.size : whole;
         assert_true(whole > points);
@@ -731,7 +733,8 @@ TEST(test_server_moving_lungs_send_frames) {
   }
   const double supine[3] = {0, 1, 0};
   const double deep = pose_of(s, supine, 60.0).gains[0][0] - pose_of(s, supine, 0.0).gains[0][0];
-  /* Between rest and peak, the gains of the frames change as the volume demands, within 5 %. */
+  /* Between rest and peak inspiration, the gain (factor of the displacements) changes by as much as
+   * between poses at these two volumes, within 5 %. */
   assert_true(fabs((double)(high - low) - fabs(deep)) < 0.05 * fabs(deep));
   (void)close(other);
   stage_destroy(s);

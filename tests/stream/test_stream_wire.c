@@ -302,7 +302,8 @@ TEST(test_read_every_truncation_refused) {
                  {"STRING", "VOLUME", 34, {0, 3, 0, 30}}};
   for (size_t i = 0; i < sizeof content / sizeof *content; ++i) {
     for (size_t size = 0; size < content[i].whole; ++size) {
-      /* A block of this size lets a sanitizer see reads past the end of the body. */
+      /* One byte more than the body, because `size` may be 0. A sanitizer sees reads beyond this
+       * byte. */
       unsigned char *body = fixture_allocate(size + 1, 1);
       unsigned char *end = body + size;
       memcpy(body, content[i].begin, size < 8 ? size : 8);
@@ -434,7 +435,8 @@ static uint32_t word_at(const unsigned char *bytes) {
   return (uint32_t)bytes[0] << 24 | (uint32_t)bytes[1] << 16 | (uint32_t)bytes[2] << 8 | bytes[3];
 }
 
-/* Pack the surface by the library, with these triangle strips unless they are NULL; set `size`. */
+/* Pack the surface of a sample by the OpenIGTLink library, with `count` triangle strips if `strips`
+ * is not NULL. Multiply x and y by `sign`. Set `size` to the size of the result. */
 static unsigned char *make_polydata(const sample *s, const struct iovec *strips, uint32_t count,
                                     double sign, size_t *size) {
   const supine_basis_info *info = supine_basis_get_info(s->basis);
