@@ -15,10 +15,11 @@ typedef struct export_source {
   supine_basis *basis;
   const supine_basis_info *info;
   size_t terms; /**< number of spherical harmonics of bands 0 to info->band */
-  /** [resting_rows, EXPORT_RESTING_TERMS] volume at rest minus volume of the reference surface, mL,
-   * as coefficients of spherical harmonics of the direction of gravity; NULL if rest is unknown. */
+  /** [resting_rows, EXPORT_RESTING_TERMS] volume of each lung at rest minus volume of its reference
+   * surface, mL, as coefficients of spherical harmonics of the direction of gravity. A single row
+   * is the sum over all lungs. NULL if rest is unknown. */
   const double *resting;
-  size_t resting_rows; /**< number of lungs, or 1 if `resting` describes all lungs together */
+  size_t resting_rows; /**< number of lungs, or 1 for the sum over all lungs */
 } export_source;
 
 /** Open a basis file.
@@ -32,7 +33,8 @@ void supine_export_source_close(export_source *source);
 /** Enlarge a box, with the corners `low` and `high`, mm, to contain the whole reference surface. */
 void supine_export_box(const export_source *source, double low[3], double high[3]);
 
-/** Compute the displacement `u`, mm, that one mode causes at a vertex, at weight 1 and gain 1. */
+/** Compute the displacement `u`, mm, of a vertex in one mode, at weight 1 and at gain 1. Gains are
+ * the factors that multiply the displacement along each axis. */
 void supine_export_field(const export_source *source, size_t vertex, size_t mode, double u[3]);
 
 /** Compute the pose during a breath of `breath` mL, with gravity along the unit vector `g`. The
@@ -42,30 +44,31 @@ supine_status supine_export_breath_pose(const export_source *source, double brea
                                         const double g[3], double fraction, supine_pose *pose,
                                         supine_error *error);
 
-/** Parts inside the lungs, with the names that 'supine embed' has stored. */
+/** Structures inside the lungs, such as airways, with the names that 'supine embed' has stored. */
 typedef struct export_parts {
   size_t count;       /**< at least 1 */
-  char *const *name;  /**< [count] names of the parts */
-  const uint32_t *of; /**< [N] for each vertex, the index of its part's name in `name` */
+  char *const *name;  /**< [count] names of the structures */
+  const uint32_t *of; /**< [N] for each vertex, the index in `name` of its structure */
 } export_parts;
 
-/** Options of a glTF file. */
 typedef struct export_glb_options {
-  bool plain;   /**< If true, store floats, with vertices in the order of the basis. If false, store
+  bool plain;   /**< If true, store floats, and keep the basis's order of vertices. If false, store
                    compressed integers (KHR_mesh_quantization, EXT_meshopt_compression). This rounds
-                   positions to 0.045 mm (more coarsely in lungs longer than 1.47 m); they then err by
-                   at most 0.1 mm up to 500 mL above rest */
-  bool animate; /**< true: add five animations of breathing, one while the patient turns, and one in
-                   each of the four lying postures */
-  double breath; /**< tidal volume, mL; during the breath, all weights are between 0 and 1 */
+                   positions to 0.045 mm (more coarsely in lungs longer than 1.47 m). Up to 500 mL
+                   above rest, positions then err by at most 0.1 mm */
+  bool animate; /**< true: add five animations of breathing: one while the patient turns, and four
+                   in the lying postures */
+  double
+      breath; /**< tidal volume, mL; weights of morph targets are between 0 and 1 in this breath */
 } export_glb_options;
 
 /** Write a glTF 2.0 binary file. Each lung is a mesh whose morph targets j move vertex i to
  *
  *     position_i = base_i + sum over j of weight_j target_ij     0 <= weight_j <= 1
  *
- * The `extras` of the file and of each lung's mesh say how to compute the weights from gravity and
- * volume. Targets deform normals too. The colour of a vertex shows its largest displacement between
+ * base_i is the stored position, target_ij the displacement stored in target j. The `extras` of the
+ * file and of each lung's mesh say how to compute the weights from gravity and volume. Targets also
+ * change normals. The colour of a vertex shows its largest displacement between
  * supine and another lying posture, at the start of a breath. The node "patient" lies on a table
  * and rotates about the centre of the lungs; an arrow shows gravity. Units are metres, y points up.
  * @param bytes  output: size of the file
@@ -78,26 +81,27 @@ supine_status supine_export_glb_write(const char *path, const export_source *sou
                                       const export_glb_options *options, size_t *bytes,
                                       supine_error *error);
 
-/** Largest number of modes on a page: four vertex attributes hold four coefficients each. */
+/** Largest number of modes on an HTML page: four vertex attributes hold four coefficients each. */
 enum { EXPORT_PAGE_MODES_MAX = 16 };
 
-/** Options of a page. */
+/** Options of the exported HTML page. */
 typedef struct export_page {
   double breath;           /**< tidal volume, mL */
   const supine_pose *from; /**< pose from which displacements are measured */
   const char *from_name;   /**< name of `from`, for example "supine at rest" */
-  const char *title;       /**< UTF-8 */
-  /** Basis that 'supine embed' has made for parts inside the lungs; NULL to show no parts. */
+  const char *title;       /**< title of the page, UTF-8 */
+  /** Basis that 'supine embed' has made for structures inside the lungs; NULL to show none. */
   const export_source *inside;
-  const export_parts *parts; /**< parts of `inside`; unused if `inside` is NULL */
+  const export_parts *parts; /**< names of the structures of `inside`; unused if `inside` is NULL */
   bool live;                 /**< true to show also the states that 'supine stream' sends */
 } export_page;
 
 /** Print one self-contained HTML page that shows the lungs in a browser (WebGL 2) without a
  * network. Vertices, displacements and triangles are compressed by meshoptimizer. In lungs up to
  * 650 mm long, positions err by at most 0.02 mm. A write error sets the error indicator of `file`.
- * @retval SUPINE_ERROR_UNSUPPORTED  the basis has vector displacements or more modes than
- *                                   EXPORT_PAGE_MODES_MAX, or meshoptimizer is not installed
+ * @retval SUPINE_ERROR_UNSUPPORTED  the modes displace a vertex in different directions, there are
+ *                                   more than EXPORT_PAGE_MODES_MAX modes, or meshoptimizer is not
+ *                                   installed
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_export_html_print(FILE *file, const export_source *source,
                                        const export_page *shown, supine_error *error);

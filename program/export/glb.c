@@ -10,7 +10,8 @@
 #include "program/render/render.h"
 #include "sh/base/output.h"
 
-static const double step_mm = 0.045; /* unit of quantized positions; larger for huge lungs */
+/* Smallest quantisation step of positions. Lungs longer than 1.47 m need a larger one. */
+static const double step_min_mm = 0.045;
 
 /* Compute the largest displacement of each vertex, mm, from supine to another lying posture at the
  * start of a breath. Return the maximum over all vertices. Overwrite g->xyz and g->normals. */
@@ -73,8 +74,9 @@ static supine_status prepare(glb *g, double *end, supine_error *error) {
   return status;
 }
 
-/* Append the patient with the lungs, the animations, the table and the arrow. Set `roots` to the
- * root nodes of the scene, and `end` to the displacement, mm, at which the colour scale ends. */
+/* Append the patient with the lungs, the animations, the table under the patient and the arrow of
+ * gravity. Set `roots` to the root nodes of the scene, and `end` to the displacement, mm, at which
+ * the colour scale ends. */
 static supine_status add_all(glb *g, double *end, json_t **roots, supine_error *error) {
   float q[4];
   const supine_status status = prepare(g, end, error);
@@ -199,7 +201,7 @@ supine_status supine_export_glb_write(const char *path, const export_source *sou
     *parts[i] = json_array();
   }
   status = supine_export_targets_choose(source, options->breath, &g->targets, error);
-  g->step = options->plain ? 1 : fmax(step_mm, g->targets.half_extent / (INT16_MAX / 2));
+  g->step = options->plain ? 1 : fmax(step_min_mm, g->targets.half_extent / (INT16_MAX / 2));
   if (status == SUPINE_OK) {
     status = make_and_write(g, path, bytes, error);
   }

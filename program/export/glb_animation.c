@@ -9,8 +9,8 @@
 static const double pi = 3.14159265358979323846;
 enum { RATE = 6 /* frames per second */, POSTURES = 4, SECONDS = 6, BREATH_SECONDS = 3 };
 
-/* At a roll of t radians, gravity in the patient's axes is (sin t, cos t, 0). In glTF's axes the
- * patient turns by t about y, the body's long axis, then by -90 degrees about x to lie down. */
+/* At a roll of t radians, gravity in the patient's axes (LPS) is (sin t, cos t, 0). In glTF's axes
+ * the patient turns by t about y, the body's long axis, then by -90 degrees about x to lie down. */
 void supine_export_glb_rotation(double roll, float q[4]) {
   const double c = cos(roll / 2) * sqrt(0.5);
   const double s = sin(roll / 2) * sqrt(0.5);
@@ -20,8 +20,8 @@ void supine_export_glb_rotation(double roll, float q[4]) {
   q[3] = (float)c;
 }
 
-/* Return the patient's roll, radians, in the animation of turning. Each posture takes SECONDS. For
- * the first half of this time the patient lies still, then turns to the next posture. */
+/* Return the patient's roll, radians, in the animation "turning". Each posture takes SECONDS: the
+ * patient lies still for the first half of this time, then turns to the next posture. */
 static double roll_at(double seconds) {
   const double stage = floor(seconds / SECONDS);
   const double x = fmax(0, 2 * (seconds / SECONDS - stage) - 1);

@@ -12,9 +12,9 @@
 typedef struct layout {
   const char *type;
   size_t columns;
-  size_t stride; /* bytes per row */
+  size_t stride; /* bytes per element */
   int component; /* componentType of the accessor */
-  int limit;     /* largest integer to store; 0 if rows are not converted to integers */
+  int limit;     /* largest integer to store; 0 if the array is stored as it is in memory */
   int target;    /* `target` of the buffer view; 0 if it has none */
 } layout;
 
@@ -34,25 +34,26 @@ static layout layout_of(const glb *g, glb_kind kind) {
                  : (layout){"SCALAR", 1, 2, UNSIGNED_SHORT, UINT16_MAX, 0};
   case GLB_ROTATIONS:
     return (layout){"VEC4", 4, 16, FLOAT, 0, 0};
-  case GLB_PLACES:
+  case GLB_POSITIONS:
     return plain ? (layout){"VEC3", 3, 12, FLOAT, 0, VERTICES}
                  : (layout){"VEC3", 3, 8, SHORT, INT16_MAX, VERTICES};
-  default: /* GLB_NORMALS, GLB_CHANGES */
+  default: /* GLB_NORMALS, GLB_NORMAL_CHANGES */
     return plain ? (layout){"VEC3", 3, 12, FLOAT, 0, VERTICES}
                  : (layout){"VEC3", 3, 4, BYTE, INT8_MAX, VERTICES};
   }
 }
 
-/* Return the rows in the format of the file, or NULL if out of memory. The caller frees them. */
-static unsigned char *store(glb_kind kind, const layout *l, const void *rows, const uint32_t *order,
-                            size_t count) {
-  unsigned char *stored = calloc(count + 1, l->stride);
-  for (size_t i = 0; stored != NULL && i < count; ++i) {
-    unsigned char *row = stored + i * l->stride;
+/* Encode `count` elements, in the order `order`, as the file stores them. Return NULL if out of
+ * memory; the caller frees the result. */
+static unsigned char *encode(glb_kind kind, const layout *l, const void *elements,
+                             const uint32_t *order, size_t count) {
+  unsigned char *encoded = calloc(count + 1, l->stride);
+  for (size_t i = 0; encoded != NULL && i < count; ++i) {
+    unsigned char *row = encoded + i * l->stride;
     const size_t from = order != NULL ? order[i] : i;
-    const float *values = (const float *)rows + l->columns * from;
+    const float *values = (const float *)elements + l->columns * from;
     if (l->limit == 0) {
-      memcpy(row, (const unsigned char *)rows + from * l->stride, l->stride);
+      memcpy(row, (const unsigned char *)elements + from * l->stride, l->stride);
       continue;
     }
     if (kind == GLB_NORMALS) {
@@ -61,31 +62,31 @@ static unsigned char *store(glb_kind kind, const layout *l, const void *rows, co
     }
     for (size_t k = 0; k < l->columns; ++k) {
       const size_t bytes = l->stride / (l->columns == 3 ? 4 : 1);
-      const double value = (double)values[k] * (kind == GLB_PLACES ? 1 : l->limit);
+      const double value = (double)values[k] * (kind == GLB_POSITIONS ? 1 : l->limit);
       const int32_t counts = (int32_t)rint(fmax(-l->limit, fmin(l->limit, value)));
       memcpy(row + k * bytes, &counts, bytes);
     }
   }
-  return stored;
+  return encoded;
 }
 
-/* Write the rows that store() has returned, and return their buffer view. `mode` is the mode of
- * EXT_meshopt_compression, or NULL for no compression. */
-static json_t *write_rows(glb *g, glb_kind kind, const layout *l, const unsigned char *stored,
-                          size_t count, const char *mode) {
+/* Write the elements that encode() has returned, and return their buffer view. `mode` is the mode
+ * of EXT_meshopt_compression, or NULL for no compression. */
+static json_t *write_encoded(glb *g, glb_kind kind, const layout *l, const unsigned char *encoded,
+                             size_t count, const char *mode) {
   const size_t bytes = count * l->stride;
   const json_int_t begin = (json_int_t)ftell(g->numbers);
   export_packed packed = {0};
   if (mode == NULL) {
-    (void)fwrite(stored, 1, bytes, g->numbers);
+    (void)fwrite(encoded, 1, bytes, g->numbers);
     (void)fwrite("\0\0\0", 1, -bytes % 4, g->numbers);
     return json_pack("{s:i, s:I, s:I}", "buffer", 0, "byteOffset", begin, "byteLength",
                      (json_int_t)bytes);
   }
   const supine_status status =
       kind == GLB_CORNERS
-          ? supine_export_pack_corners((const uint32_t *)stored, count, count, &packed)
-          : supine_export_pack_rows(stored, count, l->stride, &packed);
+          ? supine_export_pack_corners((const uint32_t *)encoded, count, count, &packed)
+          : supine_export_pack_rows(encoded, count, l->stride, &packed);
   if (status != SUPINE_OK) {
     g->status = status;
     return NULL;
@@ -106,14 +107,14 @@ static json_t *write_rows(glb *g, glb_kind kind, const layout *l, const unsigned
   return view;
 }
 
-/* Set `min` and `max` of an accessor to the extreme values in each column of the stored rows. */
-static void set_bounds(json_t *accessor, const layout *l, const unsigned char *stored,
+/* Set `min` and `max` of an accessor to the extremes of each component of the encoded elements. */
+static void set_bounds(json_t *accessor, const layout *l, const unsigned char *encoded,
                        size_t count) {
   double low[3] = {INFINITY, INFINITY, INFINITY};
   double high[3] = {-INFINITY, -INFINITY, -INFINITY};
   for (size_t i = 0; i < count * l->columns; ++i) {
     const size_t axis = i % l->columns;
-    const unsigned char *row = stored + i / l->columns * l->stride;
+    const unsigned char *row = encoded + i / l->columns * l->stride;
     const double x =
         l->limit == 0 ? (double)((const float *)row)[axis] : (double)((const int16_t *)row)[axis];
     low[axis] = fmin(low[axis], x);
@@ -129,24 +130,24 @@ json_int_t supine_export_glb_put_zeros(glb *g, glb_kind kind, size_t count) {
                               json_pack("{s:i, s:I, s:s}", "componentType", l.component, "count",
                                         (json_int_t)count, "type", l.type));
   const size_t at = json_array_size(g->accessors) - 1;
-  if (kind == GLB_COLOURS || (l.limit != 0 && kind != GLB_PLACES)) {
+  if (kind == GLB_COLOURS || (l.limit != 0 && kind != GLB_POSITIONS)) {
     (void)json_object_set_new(json_array_get(g->accessors, at), "normalized", json_true());
   }
   return (json_int_t)at;
 }
 
-json_int_t supine_export_glb_put(glb *g, glb_kind kind, const void *rows, const uint32_t *order,
+json_int_t supine_export_glb_put(glb *g, glb_kind kind, const void *elements, const uint32_t *order,
                                  size_t count) {
   const layout l = layout_of(g, kind);
-  unsigned char *stored = store(kind, &l, rows, order, count);
-  if (stored == NULL) {
+  unsigned char *encoded = encode(kind, &l, elements, order, count);
+  if (encoded == NULL) {
     g->status = SUPINE_ERROR_MEMORY;
     return 0;
   }
-  json_t *view = write_rows(g, kind, &l, stored, count,
-                            g->options->plain || l.target == 0 ? NULL
-                            : kind == GLB_CORNERS              ? "TRIANGLES"
-                                                               : "ATTRIBUTES");
+  json_t *view = write_encoded(g, kind, &l, encoded, count,
+                               g->options->plain || l.target == 0 ? NULL
+                               : kind == GLB_CORNERS              ? "TRIANGLES"
+                                                                  : "ATTRIBUTES");
   if (l.target != 0) {
     (void)json_object_set_new(view, "target", json_integer(l.target));
   }
@@ -157,10 +158,10 @@ json_int_t supine_export_glb_put(glb *g, glb_kind kind, const void *rows, const 
   json_t *accessor = json_array_get(g->accessors, (size_t)at);
   (void)json_object_set_new(accessor, "bufferView",
                             json_integer((json_int_t)json_array_size(g->views)));
-  if (kind == GLB_PLACES || kind == GLB_TIMES) {
-    set_bounds(accessor, &l, stored, count);
+  if (kind == GLB_POSITIONS || kind == GLB_TIMES) {
+    set_bounds(accessor, &l, encoded, count);
   }
   (void)json_array_append_new(g->views, view);
-  free(stored);
+  free(encoded);
   return at;
 }

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Write the extras of a glTF file: formulas and constants to compute the weights of targets. */
+/* Write the extras of a glTF file: formulas and constants for the weights of morph targets. */
 #include <math.h>
 #include <stdlib.h>
 
 #include "program/export/glb.h"
 #include "program/export/template.h"
 
-/* With more morph targets, the extras omit the formula of the volume, which is then too long. */
+/* With more morph targets, the extras omit the volume formula: it has too many constants then. */
 enum { VOLUME_TARGETS_MAX = 32 };
 
 static const char frame_text[] =
@@ -63,7 +63,7 @@ static json_t *origin(const export_source *source) {
 json_t *supine_export_glb_extras(const glb *g, double end) {
   const export_source *s = g->source;
   const char *full = supine_basis_metadata(s->basis, "full_upright_gain");
-  const double unit = 1e-7; /* unit of the integers in `modes` */
+  const double unit = 1e-7; /* value of one integer step in `modes` */
   json_t *modes = json_array();
   for (size_t k = 0; k < s->info->mode_count; ++k) {
     json_t *row = json_array();

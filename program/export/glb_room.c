@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Append a table and an arrow that shows gravity to a glTF file. */
+/* Append a table under the patient and an arrow that shows gravity to a glTF file. */
 #include <math.h>
 
 #include "program/export/glb.h"
@@ -38,7 +38,7 @@ static json_int_t sweep(glb *g, const char *name, const double profile[RINGS][2]
   return supine_export_glb_show(
       g, name,
       json_pack("{s:[{s:{s:I}, s:I, s:I}]}", "primitives", "attributes", "POSITION",
-                supine_export_glb_put(g, GLB_PLACES, places, NULL, RINGS * sides), "indices",
+                supine_export_glb_put(g, GLB_POSITIONS, places, NULL, RINGS * sides), "indices",
                 indices, "material", material));
 }
 

@@ -26,7 +26,7 @@ json_int_t supine_export_glb_material(glb *g, const char *name, const double rgb
   return (json_int_t)json_array_size(g->materials) - 1;
 }
 
-/* Compute the displacement of a vertex by target `j` at weight 1, in units of glb.step. */
+/* Compute the displacement of a vertex by morph target `j` at weight 1, in units of glb.step. */
 static void place_target(const glb *g, size_t lung, size_t j, size_t vertex, double xyz[3]) {
   supine_export_targets_field(g->source, vertex, j, xyz);
   for (size_t axis = 0; axis < 3; ++axis) {
@@ -34,7 +34,7 @@ static void place_target(const glb *g, size_t lung, size_t j, size_t vertex, dou
   }
 }
 
-/* Compute the position of a vertex of the base mesh, in units of glb.step. If the file rounds the
+/* Compute the position of a vertex of the base mesh, in units of glb.step. If the file rounds morph
  * targets, correct the position so that the deformed vertex is exact at the weights `rest`. */
 static void place_base(const glb *g, size_t lung, const double *rest, size_t vertex,
                        double xyz[3]) {
@@ -57,7 +57,8 @@ static json_int_t put(glb *g, size_t lung, glb_kind kind, const void *rows) {
   return supine_export_glb_put(g, kind, rows, g->order.vertex + begin[0], begin[1] - begin[0]);
 }
 
-/* Append a lung's displacements by target `j`, or its base mesh if `j` is the number of targets. */
+/* Append a lung's displacements by morph target `j`, or the positions of its base mesh if `j` is
+ * the number of targets. */
 static json_int_t put_places(glb *g, size_t lung, size_t j, const double *rest) {
   const size_t *begin = g->source->info->lung_begin + lung;
   for (size_t i = begin[0]; i < begin[1]; ++i) {
@@ -71,20 +72,20 @@ static json_int_t put_places(glb *g, size_t lung, size_t j, const double *rest) 
       g->xyz[3 * i + axis] = (float)at[axis];
     }
   }
-  return put(g, lung, GLB_PLACES, g->xyz);
+  return put(g, lung, GLB_POSITIONS, g->xyz);
 }
 
-/* Append the vectors that target `j` adds to the normals of a lung. */
+/* Append the vectors that morph target `j` adds to the normals of a lung. */
 static json_int_t put_changes(glb *g, size_t lung, size_t j) {
   const supine_basis_info *info = g->source->info;
   const size_t *begin = info->lung_begin + lung;
   const float *added = g->added + 3 * j * info->vertex_count;
   for (size_t i = 3 * begin[0]; i < 3 * begin[1]; ++i) {
     if (added[i] != 0) {
-      return put(g, lung, GLB_CHANGES, added);
+      return put(g, lung, GLB_NORMAL_CHANGES, added);
     }
   }
-  return supine_export_glb_put_zeros(g, GLB_CHANGES, begin[1] - begin[0]);
+  return supine_export_glb_put_zeros(g, GLB_NORMAL_CHANGES, begin[1] - begin[0]);
 }
 
 /* Append a lung's triangles. Their vertex indices count from the lung's first vertex. */

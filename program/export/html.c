@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Write the page: fill page.html with scripts, shaders and the data of the basis. */
+/* Write the HTML page: fill page.html with scripts, shaders and the data of the basis. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,18 +13,18 @@
 
 extern const supine_asset supine_export_assets[]; /* the files of program/export/page */
 
-enum { COUNT_MAX = 32767, NORMAL_WORDS = (SUPINE_NORMAL_MODES_MAX + 2) / 3, NORMAL_BIAS = 128 };
+enum { STORED_MAX = 32767, NORMAL_WORDS = (SUPINE_NORMAL_MODES_MAX + 2) / 3, NORMAL_BIAS = 128 };
 
-/* State while a page is printed. The page stores positions and coefficients as counts: 16-bit
- * integers that are multiplied by a unit. */
+/* State while a page is printed. The page stores positions and coefficients as 16-bit integers,
+ * which the browser multiplies by a quantisation step. */
 typedef struct page {
   const export_source *source;
   const export_page *shown;
-  double middle[3];   /* origin of stored positions, mm: centre of the bounding box */
-  double place_unit;  /* unit of stored positions, mm */
-  double unit;        /* unit of the surface's coefficients, mm */
-  double inside_unit; /* unit of the coefficients of shown->inside, mm */
-  export_order order; /* order of stored vertices and triangles of the surface */
+  double middle[3];        /* origin of stored positions, mm: centre of the bounding box */
+  double position_step;    /* quantisation step of positions, mm */
+  double coefficient_step; /* quantisation step of the coefficients of the surface, mm */
+  double inside_step;      /* quantisation step of the coefficients of shown->inside, mm */
+  export_order order;      /* order of stored vertices and triangles of the surface */
   supine_status *status;
 } page;
 
@@ -44,8 +44,8 @@ static void write_packed(const page *p, FILE *file, const char *name, supine_sta
   }
 }
 
-static int16_t count_of(double value, double unit) {
-  return (int16_t)lrint(value / unit);
+static int16_t quantise(double value, double step) {
+  return (int16_t)lrint(value / step);
 }
 
 static double length_of(const float v[3]) {
@@ -55,7 +55,7 @@ static double length_of(const float v[3]) {
 static void place_row(const page *p, const export_source *s, size_t vertex, int16_t *row) {
   for (size_t axis = 0; axis < 3; ++axis) {
     row[axis] =
-        count_of((double)s->info->vertices[3 * vertex + axis] - p->middle[axis], p->place_unit);
+        quantise((double)s->info->vertices[3 * vertex + axis] - p->middle[axis], p->position_step);
   }
 }
 
@@ -71,45 +71,46 @@ static void direction_row(const page *p, const export_source *s, size_t vertex, 
 static void coefficient_row(const page *p, const export_source *s, size_t vertex, int16_t *row) {
   const size_t k = s->info->mode_count;
   for (size_t i = 0; i < k; ++i) {
-    row[i] = count_of((double)s->info->coefficients[vertex * k + i] *
+    row[i] = quantise((double)s->info->coefficients[vertex * k + i] *
                           length_of(s->info->direction + 3 * vertex),
-                      p->unit);
+                      p->coefficient_step);
   }
 }
 
 static void inside_row(const page *p, const export_source *s, size_t vertex, int16_t *row) {
   const size_t columns = 3 * s->info->mode_count;
   for (size_t i = 0; i < columns; ++i) {
-    row[i] = count_of((double)s->info->coefficients[vertex * columns + i], p->inside_unit);
+    row[i] = quantise((double)s->info->coefficients[vertex * columns + i], p->inside_step);
   }
 }
 
-/* Divide a number between -(1 << bits) and 1 << bits by 1 << shift, and round it. Add NORMAL_BIAS,
- * so that small positive and negative numbers share a high byte, which compresses well. */
+/* Divide a number between -(1 << bits) and 1 << bits by 1 << shift, round it and add NORMAL_BIAS.
+ * With the bias, small positive and negative numbers have the same high byte and compress well. */
 static int16_t coarse(int32_t number, int bits, int shift) {
   const int32_t most = (1 << (bits - shift)) - 1;
   const int32_t steps = (number + (1 << shift) / 2) >> shift;
   return (int16_t)((steps < most ? steps : most) + NORMAL_BIAS);
 }
 
-/* Fill a row, which takeNormals in basis.js reads, with the normals of a vertex. Each word from
- * supine_gl_pack_normals has three numbers. The row has the first number of every word, then every
- * second, then every third number, without their lowest 2, 2 and 1 bits, respectively. */
+/* Fill a row with the normals of a vertex in all modes, as takeNormals in basis.js reads them. Each
+ * of the `count` words from supine_gl_pack_normals has three signed numbers. The row has the first
+ * numbers of all words, then the second, then the third. They are rounded to fewer bits. */
 static void normal_row(const page *p, const export_source *s, size_t vertex, int16_t *row) {
   uint32_t words[3 * NORMAL_WORDS];
   const size_t count = (s->info->normal_count + 2) / 3 * 3;
   (void)p;
   (void)supine_gl_pack_normals(s->basis, vertex, vertex + 1, words);
   for (size_t i = 0; i < count; ++i) {
-    row[i] = coarse((int32_t)words[i] >> 19, 12, 2);
-    row[count + i] = coarse((int32_t)(words[i] << 13) >> 22, 9, 2);
-    row[2 * count + i] = coarse((int32_t)(words[i] << 23) >> 23, 8, 1);
+    row[i] = coarse((int32_t)words[i] >> 19, 12, 2);                    /* 13 bits to 11 */
+    row[count + i] = coarse((int32_t)(words[i] << 13) >> 22, 9, 2);     /* 10 bits to 8 */
+    row[2 * count + i] = coarse((int32_t)(words[i] << 23) >> 23, 8, 1); /* 9 bits to 8 */
   }
 }
 
 typedef void fill_row(const page *p, const export_source *s, size_t vertex, int16_t *row);
 
-/* Compress and write `columns` counts for each vertex, padded to an even number of columns. */
+/* Compress and write `columns` integers for each vertex of a basis, padded to an even number of
+ * columns. `fill` computes the integers of a vertex. */
 static void write_rows(const page *p, FILE *file, const char *name, const export_source *s,
                        size_t columns, fill_row *fill) {
   const size_t n = s->info->vertex_count;
@@ -135,9 +136,9 @@ static void write_corners(const page *p, FILE *file, const char *name, const exp
   write_packed(p, file, name, status, packed);
 }
 
-/* Choose the origin and the units of the counts. The units are so small that positions are exact to
- * 0.02 mm, unless a count would then exceed COUNT_MAX. */
-static void find_units(page *p) {
+/* Choose the origin of positions and the quantisation steps. Positions then err by at most 0.02 mm,
+ * unless larger steps are needed to keep the stored integers below STORED_MAX. */
+static void find_steps(page *p) {
   static const double step = 0.005;
   const export_source *s = p->source;
   const export_source *inside = p->shown->inside;
@@ -157,16 +158,16 @@ static void find_units(page *p) {
       largest_inside = fmax(largest_inside, fabs((double)inside->info->coefficients[i]));
     }
   }
-  p->place_unit = step;
+  p->position_step = step;
   for (size_t axis = 0; axis < 3; ++axis) {
     p->middle[axis] = (low[axis] + high[axis]) / 2;
-    p->place_unit = fmax(p->place_unit, (high[axis] - low[axis]) / (2 * COUNT_MAX));
+    p->position_step = fmax(p->position_step, (high[axis] - low[axis]) / (2 * STORED_MAX));
   }
-  p->unit = fmax(2 * step / (double)k, largest / COUNT_MAX);
-  p->inside_unit = fmax(2 * step / (double)k, largest_inside / COUNT_MAX);
+  p->coefficient_step = fmax(2 * step / (double)k, largest / STORED_MAX);
+  p->inside_step = fmax(2 * step / (double)k, largest_inside / STORED_MAX);
 }
 
-/* Write the modes, the weights of normals and the volume tensors of the basis, uncompressed. */
+/* Write the tensors of 64-bit floats, such as modes and volume coefficients, uncompressed. */
 static void write_doubles(FILE *file, const supine_basis *basis) {
   static const char *const names[] = {"modes",         "normal_weights",   "resting_volume",
                                       "volume_linear", "volume_quadratic", "volume_cubic"};
@@ -210,7 +211,7 @@ static json_t *begins(const export_source *s, const size_t *begin) {
   return list;
 }
 
-/* Return the size, the names and the unit of the parts inside the lungs as JSON. */
+/* Describe the structures inside the lungs as JSON: sizes, names and quantisation step. */
 static json_t *describe_inside(const page *p) {
   if (p->shown->inside == NULL) {
     return json_null();
@@ -230,7 +231,7 @@ static json_t *describe_inside(const page *p) {
   return json_pack("{s:I, s:I, s:o, s:o, s:o, s:f}", "vertices", (json_int_t)info->vertex_count,
                    "triangles", (json_int_t)info->triangle_count, "lungBegin",
                    begins(p->shown->inside, info->lung_begin), "names", names, "rigid", parts,
-                   "unit", p->inside_unit);
+                   "unit", p->inside_step);
 }
 
 /* Return the volume of all lungs in the scan minus that of the reference surface, mL; 0 if the pose
@@ -277,8 +278,8 @@ static json_t *describe(const page *p) {
       begins(p->source, p->order.corner_begin), "hasResting", (int)(p->source->info->has_rest),
       "colours", colours(), "breathVolume", p->shown->breath, "metadata", metadata, "title",
       title != NULL ? title : json_string("lungs"), "middle", supine_template_numbers(p->middle, 3),
-      "placeUnit", p->place_unit, "unit", p->unit, "inside", describe_inside(p), "from",
-      describe_from(p), "references",
+      "placeUnit", p->position_step, "unit", p->coefficient_step, "inside", describe_inside(p),
+      "from", describe_from(p), "references",
       supine_template_numbers(info->reference_volume, info->lung_count), "scanVolume",
       scan_volume(p->source), "volumeAxes", (json_int_t)info->volume_axes, "bend",
       supine_template_numbers(info->bend, 3));
@@ -333,7 +334,7 @@ supine_status supine_export_html_print(FILE *file, const export_source *source,
     supine_export_order_free(&p.order);
     return status;
   }
-  find_units(&p);
+  find_steps(&p);
   json_t *description = describe(&p);
   char *text = json_dumps(description, JSON_COMPACT);
   json_t *data = json_pack("{s:O, s:s, s:b}", "title", json_object_get(description, "title"),

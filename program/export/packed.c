@@ -55,8 +55,8 @@ supine_status supine_export_pack_corners(const uint32_t *corners, size_t count, 
 }
 
 /* Sort a lung's triangles from feet to head, then join them to strips, which run around the lung.
- * Along such strips the data change least, and so compress best. `level` [N, 3] has (z, 0, 0) for
- * each vertex at height z; `from` [count] is workspace. */
+ * Along such strips the data of vertices change least, and so compress best. `level` [N, 3] has
+ * (z, 0, 0) for each vertex at height z; `from` [count] is workspace. */
 static void sort_triangles(uint32_t *corners, size_t count, const float *level, size_t vertices,
                            uint32_t *from) {
   memcpy(from, corners, count * sizeof *from);

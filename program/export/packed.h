@@ -16,7 +16,8 @@ typedef struct export_packed {
  * @retval SUPINE_ERROR_UNSUPPORTED  meshoptimizer is not installed */
 supine_status supine_export_pack_begin(supine_error *error);
 
-/** Encode a unit vector as 4 signed integers, the last 0, for the decoder's filter OCTAHEDRAL.
+/** Encode a unit vector for the filter OCTAHEDRAL of EXT_meshopt_compression, as 4 signed integers,
+ * of which the last is 0.
  * @param size     size of all 4 integers together, bytes: 4 or 8
  * @param numbers  output: the integers */
 void supine_export_pack_direction(const float direction[3], size_t size, void *numbers);
@@ -33,16 +34,17 @@ supine_status supine_export_pack_corners(const uint32_t *corners, size_t count, 
 
 /** Order in which vertices and triangles are written, lung by lung. */
 typedef struct export_order {
-  uint32_t *vertex;  /**< [N] index in the basis of each vertex in the file */
-  uint32_t *corners; /**< [triangles, 3] vertices of each triangle, by their indices in the file */
-  size_t corner_begin[SUPINE_LUNGS_MAX + 1]; /**< index in `corners` at which each lung begins, then
-                                                the end of the last lung */
+  uint32_t *vertex; /**< [N] for each vertex in the file, its index in the basis */
+  uint32_t
+      *corners; /**< [triangles, 3] for each triangle, the indices in the file of its vertices */
+  size_t corner_begin[SUPINE_LUNGS_MAX + 1]; /**< for each lung, the index in `corners` of its first
+                                                corner; then the total number of corners */
 } export_order;
 
 /** Choose an order; free it with supine_export_order_free, also after a failure.
- * @param packed  false to keep the order of the basis; true to sort the triangles, and to put the
- *                vertices in the order in which the triangles first use them, because this order
- *                compresses well. If true, call supine_export_pack_begin first
+ * @param packed  false to keep the order of the basis. True for an order that compresses well:
+ *                triangles are sorted, and vertices are in the order in which the triangles first
+ *                use them; call supine_export_pack_begin first
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_export_order_make(const export_source *source, bool packed,
                                        export_order *order, supine_error *error);

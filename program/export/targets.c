@@ -10,8 +10,9 @@ enum { DIRECTIONS = 4096 }; /* number of sampled directions of gravity */
 /* The range of each weight in the sampled directions is extended by this fraction at both ends. */
 static const double margin = 0.02;
 
-/* Set `split` to {s, t}, such that gains[axis] = s + t bend[axis] along the axes with the smallest
- * and the largest bend. */
+/* Split a lung's gains, the factors of the displacement along each axis, into parts without and
+ * with the constants `bend` of the basis: set `split` to {s, t}, where gains[axis] = s + t
+ * bend[axis]. All gains have this form; use the axes with the smallest and the largest bend. */
 static void split_gains(const double bend[3], const double gains[3], double split[2]) {
   size_t low = 0;
   size_t high = 0;
@@ -23,7 +24,7 @@ static void split_gains(const double bend[3], const double gains[3], double spli
   split[0] = gains[low] - split[1] * bend[low];
 }
 
-/* Compute amount_j, which targets.h defines, for each field j of a lung. */
+/* Compute the factor of each displacement field of a lung in a pose (amount_j in targets.h). */
 static void find_amounts(const export_source *source, size_t count, const supine_pose *pose,
                          size_t lung, double *amounts) {
   const size_t k = source->info->mode_count;
@@ -43,9 +44,10 @@ void supine_export_targets_weights(const export_source *source, const export_tar
   }
 }
 
-/* For each field of targets.h, find the smallest and the largest amount in any sampled direction of
- * gravity, at the start and at the end of a breath. These suffice, because gains are monotonic in
- * the volume. Set the offset to the smallest amount, and the unit to the difference of the two. */
+/* Find the range of the factor of each displacement field: the smallest and the largest factor in
+ * any sampled direction of gravity, at the start and at the end of a breath. Volumes in between
+ * need no samples: unless a breath comes near full inflation, factors are monotonic in the volume.
+ * Set the offset of the morph target to the smallest factor, and its unit to the difference. */
 static supine_status find_ranges(const export_source *source, double breath,
                                  export_targets *targets, supine_error *error) {
   double amounts[EXPORT_TARGETS_MAX];
@@ -108,7 +110,8 @@ void supine_export_targets_field(const export_source *source, size_t vertex, siz
   }
 }
 
-/* Add amount[j] times field_j at a vertex to the position `xyz`, mm, for each j below `count`. */
+/* Add amount[j] times displacement field j at a vertex to the position `xyz`, mm, for each j below
+ * `count`. */
 static void add_fields(const export_source *source, size_t count, const double *amount,
                        size_t vertex, double xyz[3]) {
   for (size_t j = 0; j < count; ++j) {
@@ -155,7 +158,7 @@ static void find_normals(const export_source *source, const export_targets *targ
  * that targets add to a normal by the same length: engines normalise the sum. */
 static void make_unit(const export_source *source, const export_targets *targets, float *base,
                       float *added) {
-  static const double least = 0.2; /* added vectors are divided by at least this */
+  static const double least = 0.2; /* smallest length by which added vectors are divided */
   const size_t n = source->info->vertex_count;
   for (size_t i = 0; i < n; ++i) {
     float *b = base + 3 * i;
@@ -173,13 +176,15 @@ static void make_unit(const export_source *source, const export_targets *targets
   }
 }
 
-/* Round the vectors in `added` to multiples of 1 / INT8_MAX. Replace a component by that of the
- * previous vertex in `order` if both are nearly equal, because equal rows compress to almost
- * nothing. Correct `base` so that the normals at `weights` stay the same. */
+/* Round the vectors `added`, which morph targets add to normals, so that they compress well.
+ * Components become multiples of 1 / INT8_MAX. A component that is nearly equal to that of the
+ * previous vertex (in `order`) becomes equal to it. Then correct the normals `base` of the base
+ * mesh such that the normals at the targets' weights `weights` stay the same. */
 static void round_changes(const export_source *source, const export_targets *targets,
                           double (*weights)[EXPORT_TARGETS_MAX], const uint32_t *order, float *base,
                           float *added) {
-  static const float near = 2.0F / INT8_MAX; /* largest difference of nearly equal components */
+  static const float near =
+      2.0F / INT8_MAX; /* components that differ by this or less are made equal */
   const supine_basis_info *info = source->info;
   for (size_t i = 0, lung = 0; i < info->vertex_count; ++i) {
     lung += i == info->lung_begin[lung + 1];
@@ -206,8 +211,9 @@ supine_status supine_export_targets_normals(const export_source *source, double 
                                             const export_targets *targets, const uint32_t *order,
                                             float *base, float *added, supine_error *error) {
   static const double supine[3] = {0, 1, 0};
-  static const double step = 0.2;    /* change of a weight for central differences */
-  static const double least = 0.044; /* RMS changes of normals below this, radians, become 0 */
+  static const double step = 0.2; /* change of a weight for central differences */
+  /* RMS change of a lung's normals by a target, radians; smaller changes are set to 0. */
+  static const double least = 0.044;
   const size_t n = source->info->vertex_count;
   supine_pose pose;
   double(*weights)[EXPORT_TARGETS_MAX] = malloc(source->info->lung_count * sizeof *weights);

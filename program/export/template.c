@@ -13,7 +13,8 @@ static const supine_asset *find_asset(const supine_asset *assets, const char *na
   return NULL;
 }
 
-/* A value in whose members names are looked up, and the scope around it, which is searched next. */
+/* A value and its enclosing scope. A name is looked up in the members of the value first, then in
+ * the enclosing scope. */
 typedef struct scope {
   const json_t *value;
   const struct scope *outer;

@@ -4,12 +4,13 @@
  *
  *     {{name}}                a string or number of the data, escaped; or the asset of that name:
  *                             .html is filled with the same data, any other file is copied
- *     {{#name}} ... {{/name}} repeated for each element of a list; once for an object, a string, a
- *                             number or true; omitted for false, null or an unknown name
+ *     {{#name}} ... {{/name}} a section, written for each element of a list; written once for an
+ *                             object, a string, a number or true; omitted for false, null or an
+ *                             unknown name
  *     {{.}}                   the element of the list, or the value of the section
  *
- * Inside a section, names are looked up in its element first, then in the sections around it. A
- * newline right after the tag of a section is omitted. */
+ * Inside a section, a name is looked up in the element (or value) first, then in the enclosing
+ * sections. A newline right after the tag of a section is omitted. */
 #ifndef SUPINE_TEMPLATE_H
 #define SUPINE_TEMPLATE_H
 
@@ -38,7 +39,6 @@ typedef struct supine_template {
  * refuses such tags when the program is built. A write error sets the error indicator of `file`. */
 void supine_template_fill(const supine_template *filling, const char *name, FILE *file);
 
-/** Return `count` numbers as a JSON array. */
 json_t *supine_template_numbers(const double *values, size_t count);
 
 #endif

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Shows the lung in a Unity scene: add this script to an object with a MeshFilter, and set the basis file
+// Shows the lungs in a Unity scene. Add this script to an object with a MeshFilter, and set the basis file
 // and the server of 'supine stream'. The object is the patient: its rotation is sent to the server whenever
-// it changes. Unity's axes are left-handed, in metres, y up: an object without rotation is a standing
+// it changes. Unity's axes are left-handed, in metres, y up. An object without rotation is a standing
 // patient who faces +z, with left, back and head at -x, -z and +y.
 using UnityEngine;
 using UnityEngine.Rendering;
@@ -23,8 +23,7 @@ public class LungBehaviour : MonoBehaviour
         return new Vector3(-1e-3f * left, 1e-3f * head, -1e-3f * back);
     }
 
-    /// <summary>Reverses each triangle, in place, so that its front faces outwards in left-handed axes.
-    /// </summary>
+    /// <summary>Reverses triangles in place, so that they face outwards in left-handed axes.</summary>
     public static int[] ToUnity(int[] corners)
     {
         for (int i = 0; i < corners.Length; i += 3)
@@ -36,8 +35,7 @@ public class LungBehaviour : MonoBehaviour
         return corners;
     }
 
-    /// <summary>Converts an object's rotation to the rotation from the body (left, back, head) to a world
-    /// whose z points up, row by row.</summary>
+    /// <summary>Converts a rotation to the row-major matrix from body axes (LPS) to world axes, z up.</summary>
     public static float[] Pose(Quaternion rotation)
     {
         Vector3[] axes = { rotation * new Vector3(-1, 0, 0), rotation * new Vector3(0, 0, -1),

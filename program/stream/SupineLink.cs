@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// A peer of 'supine stream' for Unity, in one file: OpenIGTLink over a socket, read by another thread
-// that keeps the newest frame, and the run-time library by P/Invoke. Needs only .NET;
-// LungBehaviour.cs uses it in a scene.
+// A peer of 'supine stream' for Unity, in one file that needs only .NET. Link exchanges OpenIGTLink
+// messages with the server; its thread keeps the newest frame. Basis calls the run-time library by
+// P/Invoke. LungBehaviour.cs uses both in a scene.
 using System;
 using System.Net.Sockets;
 using System.Runtime.InteropServices;
@@ -10,7 +10,7 @@ using System.Threading;
 
 namespace Supine
 {
-    /// <summary>A connection to the server.</summary>
+    /// <summary>A connection to the server 'supine stream'.</summary>
     public sealed class Link : IDisposable
     {
         const int HeaderSize = 58;
@@ -36,8 +36,8 @@ namespace Supine
         /// <summary>Reason why reading ended; null while it continues.</summary>
         public Exception Failure { get; private set; }
 
-        /// <summary>Returns the newest frame: K weights, then the gains x, y, z of each lung; null if no
-        /// frame was received since the last call.</summary>
+        // Returns the newest frame: the weights of the modes, then the factors of each lung's displacement
+        // along x, y and z. Returns null if no frame was received since the last call.
         public float[] TakeNewest(out ulong poseStamp)
         {
             lock (guard)
@@ -49,8 +49,7 @@ namespace Supine
             }
         }
 
-        /// <summary>Sends a pose: rows of the rotation from the tracked body to a world whose z
-        /// points up.</summary>
+        /// <summary>Sends a pose: the row-major rotation from body axes to world axes, z up.</summary>
         public void SendPose(string device, float[] rotation, ulong poseStamp)
         {
             byte[] body = new byte[48];
@@ -60,8 +59,7 @@ namespace Supine
             Send("TRANSFORM", device, body, poseStamp);
         }
 
-        /// <summary>Sets the volume: rest, full or scan, also with +ML or -ML (rest+500), or an absolute
-        /// volume (2600mL).</summary>
+        /// <summary>Sets the volume: rest, full or scan, or these with mL (rest+500), or 2600mL.</summary>
         public void SetVolume(string volume)
         {
             byte[] text = Encoding.ASCII.GetBytes(volume);
@@ -183,8 +181,7 @@ namespace Supine
         }
     }
 
-    /// <summary>A basis file, read by the run-time library (libsupine_runtime), on little-endian 64-bit
-    /// machines.</summary>
+    /// <summary>A basis file, read by libsupine_runtime on little-endian 64-bit machines.</summary>
     public sealed class Basis : IDisposable
     {
         const string Library = "supine_runtime";
@@ -223,7 +220,7 @@ namespace Supine
         public int VertexCount { get; private set; }
         public int TriangleCount { get; private set; }
 
-        /// <summary>Computes the positions [3 N] of a frame, mm, LPS: left, back, head.</summary>
+        /// <summary>Computes the positions [3 N] of the vertices from a received frame, mm, LPS.</summary>
         public void Deform(float[] frame, float[] xyz)
         {
             if (frame.Length != modes + 3 * lungs || xyz.Length != 3 * VertexCount)
@@ -232,7 +229,7 @@ namespace Supine
             supine_deform(handle, pose, xyz);
         }
 
-        /// <summary>Computes the frame of a state, such as "left:rest+500", without a server.</summary>
+        /// <summary>Computes a frame, as the server would send it, from a state such as "left:rest+500".</summary>
         public float[] Frame(string text)
         {
             byte[] state = new byte[StateSize];
@@ -244,7 +241,7 @@ namespace Supine
             return frame;
         }
 
-        // Returns the index in supine_pose of the number with index i in a frame.
+        // Returns where number i of a frame is stored in `pose`.
         int PoseIndex(int i)
         {
             return i < modes ? i : ModesMax + i - modes;

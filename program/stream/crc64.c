@@ -10,14 +10,15 @@
 
 #include "program/stream/message.h"
 
-static const uint64_t polynomial = 0x42F0E1EBA9EA3693u; /* polynomial P of message.h, less x^64 */
+static const uint64_t polynomial = 0x42F0E1EBA9EA3693u; /* CRC polynomial without its term x^64 */
 
-/* Indices of `distance`, which has the numbers of bytes by which fold() moves data. */
+/* Distances, bytes, from 16 bytes of a message to the later 16 bytes to which fold() adds them. */
 enum { NEAR, FAR, FARTHEST, STEPS };
 static const size_t distance[STEPS] = {16, 64, 256};
 
-/* Tables modulo the polynomial P, computed once. table[b] = b(x) x^64, where b(x) has the bits of b
- * as coefficients. power[i] = {x^n, x^(n + 64)}, where n = 8 distance[i]. */
+/* Tables modulo the CRC polynomial, computed once:
+ *     table[b] = b(x) x^64   where b(x) has the bits of the byte b as coefficients
+ *     power[i] = {x^n, x^(n + 64)}   where n = 8 distance[i], the distance in bits; for fold() */
 static struct { uint64_t table[256], power[STEPS][2]; } known;
 static pthread_once_t once = PTHREAD_ONCE_INIT;
 
@@ -33,7 +34,8 @@ static uint64_t multiply(uint64_t a, uint64_t b) {
   return product;
 }
 
-/* Compute x^(8 size) mod P, the factor by which `size` appended zero bytes multiply a checksum. */
+/* Compute x^(8 size) modulo the CRC polynomial: the factor by which `size` appended zero bytes
+ * multiply a checksum. */
 static uint64_t power_of(size_t size) {
   uint64_t power = 1;
   uint64_t square = 1u << 8; /* in turn x^8, x^16, x^32, ... */
@@ -86,8 +88,9 @@ WIDE static lanes take_wide(const void *at) {
   return _mm512_shuffle_epi8(_mm512_loadu_si512(at), _mm512_broadcast_i32x4(REVERSED));
 }
 
-/* Return 128 bits that equal a x^n + next modulo P. `powers` has the factors of the low and the
- * high half of `a`: x^n and x^(n + 64). */
+/* Return 128 bits that equal a x^n + next modulo the CRC polynomial, where `next` follows `a` in
+ * the message after n bits. `powers` has the factors of the low and the high half of `a`: x^n and
+ * x^(n + 64). */
 CARRY_LESS static lane fold(lane a, lane powers, lane next) {
   return _mm_xor_si128(next, _mm_xor_si128(_mm_clmulepi64_si128(a, powers, 0x11),
                                            _mm_clmulepi64_si128(a, powers, 0x00)));

@@ -18,9 +18,12 @@
 /* clang-format on */
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } meshopt;
 
-/* BATCH: number of vertices computed together, so that they stay in the L1 cache. GRAIN: smallest
- * number of vertices for which a thread is worth starting. */
-enum { BATCH = 2048, GRAIN = 32 * BATCH, THREADS_MAX = 256, HUGE_PAGE = 1 << 21 /* bytes */ };
+enum {
+  BATCH = 2048,       /* number of vertices computed together, so that they stay in the L1 cache */
+  GRAIN = 32 * BATCH, /* smallest number of vertices for which a thread is worth starting */
+  THREADS_MAX = 256,
+  HUGE_PAGE = 1 << 21 /* bytes */
+};
 
 struct supine_stream_frames {
   const supine_basis *basis;
@@ -38,7 +41,8 @@ struct supine_stream_frames {
 const char *const supine_stream_content_names[] = {"weights", "points", "surface", "nothing", NULL};
 
 /* Convert the triangles to strips. Corners i, i + 1 and i + 2 of a strip form a triangle, whose
- * orientation is reversed if i is odd. Triangles with two equal corners only join the others. */
+ * orientation is reversed if i is odd. Triangles with two equal corners are not drawn; they only
+ * connect the others in one strip. */
 static supine_status make_strips(supine_stream_frames *f, supine_error *error) {
   static const uint32_t restart = UINT32_MAX; /* separates strips in the output of stripify() */
   const size_t corners = 3 * f->info->triangle_count;
@@ -144,7 +148,7 @@ void supine_stream_frame_release(supine_stream_frames *frames, supine_stream_fra
   }
 }
 
-/* Convert points in LPS to big-endian floats, in RAS if `f->ras` is true. */
+/* Convert points in LPS to big-endian floats, in place; also to RAS if `f->ras` is true. */
 static void encode_points(const supine_stream_frames *f, size_t count, float *xyz) {
   for (size_t i = 0; f->ras && i < count; ++i) {
     xyz[3 * i] = -xyz[3 * i];
@@ -153,7 +157,7 @@ static void encode_points(const supine_stream_frames *f, size_t count, float *xy
   supine_stream_encode_floats(3 * count, xyz);
 }
 
-/* Compute positions and expected errors from snapshot.location; return false on failure. */
+/* Compute positions and expected errors from the fit snapshot.location; return false on failure. */
 static bool compute_located_points(supine_stream_frames *f, supine_stream_frame *frame) {
   const size_t count = f->info->vertex_count;
   float *sigma = (void *)(frame->errors + supine_stream_attribute_head(count, frame->errors));
@@ -167,12 +171,13 @@ static bool compute_located_points(supine_stream_frames *f, supine_stream_frame 
   return true;
 }
 
-/* Data of the threads that compute points. Each thread writes the checksum and size of its part. */
+/* Data of the threads that compute points. Each thread computes a range of the vertices, and writes
+ * the checksum and the size of their positions. */
 typedef struct points_work {
   const supine_stream_frames *frames;
   const supine_stream_frame *frame;
   uint64_t crc[THREADS_MAX];
-  size_t size[THREADS_MAX]; /* size of each thread's part, bytes; 0 for threads without a part */
+  size_t size[THREADS_MAX]; /* size of each thread's positions, bytes; 0 for unused threads */
 } points_work;
 
 static void compute_range(void *context, size_t begin, size_t end, size_t thread) {
@@ -187,7 +192,8 @@ static void compute_range(void *context, size_t begin, size_t end, size_t thread
   }
 }
 
-/* Compute a frame's points from snapshot.location, or from snapshot.pose if that is unusable. */
+/* Compute a frame's points from the fit snapshot.location, or from snapshot.pose if there is no
+ * usable fit. */
 static void compute_points(supine_stream_frames *f, supine_stream_frame *frame) {
   points_work p = {.frames = f, .frame = frame};
   if (frame->snapshot.location != NULL && compute_located_points(f, frame)) {

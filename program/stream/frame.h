@@ -2,10 +2,11 @@
 /** @file
  * Encode a state of the lungs as OpenIGTLink messages, once for any number of peers.
  *
- * A weights message is an NDARRAY of floats: the weight of each mode, then the gains x, y, z of
- * each lung. A surface message is a POLYDATA; if the lungs were located from observed points, it
- * has the expected error of each vertex as an attribute. The triangle strips and their checksum are
- * computed once. The checksum of a message is combined from the checksums of its parts. */
+ * A message of weights is an NDARRAY of floats: the weight of each mode, then three gains of each
+ * lung, the factors that multiply the displacement along x, y and z. A message of points is a
+ * POLYDATA. If the lungs were fitted to observed points, it has the expected error of each vertex
+ * as an attribute. The triangle strips and their checksum are computed once. The checksum of a
+ * message is combined from the checksums of its parts. */
 #ifndef SUPINE_STREAM_FRAME_H
 #define SUPINE_STREAM_FRAME_H
 
@@ -17,9 +18,9 @@
 
 /** Content sent to a peer. */
 typedef enum supine_stream_content {
-  SUPINE_STREAM_WEIGHTS = 0,
-  SUPINE_STREAM_POINTS,  /**< POLYDATA, with triangles only in the first frame for a peer */
-  SUPINE_STREAM_SURFACE, /**< POLYDATA with triangles in every frame, as most viewers require */
+  SUPINE_STREAM_WEIGHTS = 0, /**< NDARRAY of weights and gains */
+  SUPINE_STREAM_POINTS,      /**< POLYDATA, with triangles only in the first frame for a peer */
+  SUPINE_STREAM_SURFACE,     /**< POLYDATA with triangles in every frame, as most viewers require */
   SUPINE_STREAM_SILENCE,
   SUPINE_STREAM_CONTENT_COUNT
 } supine_stream_content;
@@ -32,23 +33,26 @@ typedef struct supine_stream_snapshot {
   double gravity[3]; /**< direction of gravity, a unit vector in body axes */
   double volume;     /**< volume of all lungs together, gas and tissue, mL */
   double above;      /**< volume above rest (above the scan if rest is unknown), mL */
-  uint64_t stamp;    /**< stamp of the newest pose or observed point, as in supine_stream_header */
+  uint64_t stamp;    /**< time stamp of the newest pose or observed point, 2^-32 s since 1970 */
   double received;   /**< time of receipt of the newest message, s by supine_clock_seconds; negative
                         if none was received since the previous frame */
-  double pose_received; /**< time of receipt of the newest pose or observed point; -1 if none */
+  double pose_received; /**< time of receipt of the newest pose or observed point, s by
+                           supine_clock_seconds; -1 if none */
   supine_pose pose;
-  const supine_location *location; /**< location of the lungs from observed points, or NULL */
+  const supine_location *location; /**< fit of the lungs to observed points, or NULL */
 } supine_stream_snapshot;
 
 /** A state of the lungs, which is encoded once and sent to several peers. */
 typedef struct supine_stream_frame {
-  size_t users; /**< number of peers that are being sent the frame, plus 1 for the newest frame */
+  size_t
+      users; /**< number of peers to which the frame is being sent, plus 1 for the newest frame */
   uint64_t number; /**< serial number: 1, 2, ... */
   supine_stream_snapshot snapshot;
   bool has_points; /**< true if `points` and `points_crc` are computed */
   float *points;   /**< [N, 3] positions as sent, big-endian */
   uint64_t points_crc;
-  unsigned char *errors; /**< encoded expected errors; unused if snapshot.location is NULL */
+  unsigned char *errors; /**< attribute with the expected error of each vertex, as sent; unused if
+                            snapshot.location is NULL */
   struct supine_stream_frame *next; /**< next frame in the list of unused frames */
 } supine_stream_frame;
 
@@ -61,7 +65,7 @@ typedef struct supine_stream_frames supine_stream_frames;
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_stream_frames_create(const supine_basis *basis, const char *device, bool ras,
                                           supine_stream_frames **frames, supine_error *error);
-/** Release the data and every frame; NULL is legal. */
+/** Release the shared data and all frames, which must have no users; NULL is legal. */
 void supine_stream_frames_destroy(supine_stream_frames *frames);
 
 /** Return a new or reused frame that shows a snapshot and has one user; NULL if out of memory. */
@@ -70,14 +74,13 @@ supine_stream_frame *supine_stream_frame_acquire(supine_stream_frames *frames,
 /** Remove one user of a frame. A frame without users may be reused. NULL is legal. */
 void supine_stream_frame_release(supine_stream_frames *frames, supine_stream_frame *frame);
 
-/** Largest number of pieces of a message, and size of the first piece, bytes, which has room for a
- * whole message of weights. */
 enum {
-  SUPINE_STREAM_PIECES = 4,
+  SUPINE_STREAM_PIECES = 4, /* largest number of pieces (ranges of bytes) of a message */
+  /* Size of the first piece, bytes, with room for a whole message of weights. */
   SUPINE_STREAM_FRONT = SUPINE_STREAM_HEADER + 40 + 4 * (SUPINE_MODES_MAX + 3 * SUPINE_LUNGS_MAX)
 };
 
-/** A message to send, in pieces. `front` has the bytes of the first piece. */
+/** A message to send, as a list of ranges of bytes (pieces). The first piece is `front`. */
 typedef struct supine_stream_packet {
   unsigned char front[SUPINE_STREAM_FRONT];
   struct iovec piece[SUPINE_STREAM_PIECES];

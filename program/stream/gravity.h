@@ -2,9 +2,11 @@
 /** @file
  * Compute the direction of gravity in body axes from the messages of a tracker or tilt sensor.
  *
- *     gravity = B R^T down,  where v_world = R v_tracker and v_body = B v_tracker
+ *     gravity = B R^T down
  *
- * Body axes are DICOM LPS. Rotating the tracker about `down` does not change the result. */
+ * The rotation R maps vectors from tracker axes to world axes, and B from tracker axes to body
+ * axes, which are DICOM LPS. `down` is the direction of gravity in world axes. Rotating the tracker
+ * about `down` does not change the result. */
 #ifndef SUPINE_STREAM_GRAVITY_H
 #define SUPINE_STREAM_GRAVITY_H
 
@@ -30,10 +32,11 @@ typedef enum supine_stream_verdict {
   SUPINE_STREAM_REFUSED   /**< unusable; no direction of gravity is computed */
 } supine_stream_verdict;
 
-/** Compute the direction of gravity from the matrix R, row by row. A matrix within 0.001 of a
- * rotation is exact. A matrix with a scale other than 1, or with stretch or shear of at most 0.1,
- * is repaired; the direction then errs by less than 13 degrees. A matrix that is not finite, is
- * singular, contains a reflection, or has more stretch or shear is refused.
+/** Compute the direction of gravity from the matrix R from tracker to world axes, row by row. A
+ * matrix that deviates from a rotation by at most 0.001 is accepted as exact. A matrix with a scale
+ * other than 1, or with stretch or shear of at most 0.1, is repaired; the direction of gravity then
+ * errs by less than 13 degrees. A matrix that is not finite, is singular, contains a reflection, or
+ * has more stretch or shear is refused.
  * @param why  set to the reason if the matrix is repaired or refused, otherwise to NULL */
 supine_stream_verdict supine_stream_gravity_rotation(const supine_stream_setup *setup,
                                                      const double rotation[9], double gravity[3],

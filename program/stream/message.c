@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Read messages from untrusted bytes; write headers, floats, and the first fields of each type. */
+/* Read messages from untrusted bytes. Write headers, floats, and the first fields of a body. */
 #include <ctype.h>
 #include <endian.h>
 #include <string.h>
@@ -232,8 +232,7 @@ int supine_stream_message_is_known(const supine_stream_header *header) {
   return type_of(header) != TYPES;
 }
 
-/* Skip the extended header of a message body and cut off its metadata; return 0 if a size is bad.
- */
+/* Skip the extended header of a body and cut off its metadata; return 0 if a size is invalid. */
 static int unwrap(cursor *c) {
   const size_t all = c->left;
   const uint64_t extension = whole(c, 2);

@@ -40,12 +40,13 @@ supine_status supine_stream_header_read(const unsigned char bytes[SUPINE_STREAM_
 void supine_stream_header_write(const supine_stream_header *header,
                                 unsigned char bytes[SUPINE_STREAM_HEADER]);
 
-/** Content of a message. */
+/** Kinds of received messages. Each comment says what a supine_stream_message then contains. */
 typedef enum supine_stream_kind {
   SUPINE_STREAM_NOTHING = 0, /**< message that is ignored because of its type or device */
   SUPINE_STREAM_ROTATION,    /**< number[0..8]: matrix from tracker to world axes, row by row;
                                   number[9..11]: position, mm; text: name of the device */
-  SUPINE_STREAM_POSITION,    /**< like SUPINE_STREAM_ROTATION, but only the position is used */
+  SUPINE_STREAM_POSITION,    /**< number and text as for SUPINE_STREAM_ROTATION, but the matrix is
+                                  not used */
   SUPINE_STREAM_POINT_LIST,  /**< points: supine_stream_message_point reads one of them */
   SUPINE_STREAM_QUATERNION,  /**< number[0..3]: w, x, y, z of the tracker-to-world rotation */
   SUPINE_STREAM_DOWN,        /**< number[0..2]: direction of gravity in tracker axes */
@@ -58,11 +59,13 @@ typedef struct supine_stream_message {
   supine_stream_kind kind;
   double number[12];
   char text[64];
-  const unsigned char *points; /**< [point_count] points as received, within the body */
+  const unsigned char
+      *points; /**< [point_count] points as received, in the buffer of the message's body */
   size_t point_count;
 } supine_stream_message;
 
-/** Decode the name and position, mm, of one of message->points. The body must still exist. */
+/** Decode the name and position, mm, of one of message->points. The buffer of the message's body
+ * must still exist. */
 void supine_stream_message_point(const supine_stream_message *message, size_t point, char name[65],
                                  double position[3]);
 
@@ -70,12 +73,19 @@ void supine_stream_message_point(const supine_stream_message *message, size_t po
 int supine_stream_message_is_known(const supine_stream_header *header);
 
 /** Decode the body of a message. Its numbers may be infinite or not-a-number. These messages are
- * used, depending on the device that sends them:
+ * used, depending on the device name in the header:
  *
- *     `device`  TRANSFORM, POSITION, NDARRAY of 3 (direction of gravity), QTDATA (last instrument)
- *     any       TRANSFORM and POINT (observed points), QTDATA (instrument named `device`)
- *     "VOLUME"  NDARRAY of 1 (mL above rest), STRING (such as rest+500)
- *     "SEND"    STRING (name of the content that the peer asks for)
+ *     device name  type          meaning
+ *     `device`     TRANSFORM     rotation and position of the tracker
+ *     `device`     POSITION      rotation of the tracker, as a quaternion
+ *     `device`     NDARRAY of 3  direction of gravity
+ *     `device`     QTDATA        rotation of the last instrument
+ *     another      TRANSFORM     position of the observed point with this name
+ *     another      QTDATA        rotation of the instrument named `device`
+ *     any          POINT         positions of observed points
+ *     "VOLUME"     NDARRAY of 1  volume above rest, mL
+ *     "VOLUME"     STRING        volume such as rest+500
+ *     "SEND"       STRING        name of the content that the peer asks for
  *
  * @param device  device that gives the patient's pose; NULL if every device does
  * @retval SUPINE_ERROR_FORMAT  the checksum is wrong, or lengths contradict each other */
@@ -93,9 +103,10 @@ size_t supine_stream_ndarray_head(size_t count, unsigned char *bytes);
 size_t supine_stream_polydata_head(size_t points, size_t strips, size_t size, size_t attributes,
                                    unsigned char *bytes);
 
-/** Write the first SUPINE_STREAM_ATTRIBUTE bytes of the attribute "expected_error_mm", which
- * precede one float for each point; return SUPINE_STREAM_ATTRIBUTE. */
-enum { SUPINE_STREAM_ATTRIBUTE = 24 };
+enum { SUPINE_STREAM_ATTRIBUTE = 24 /* size of the head of an attribute of a POLYDATA, bytes */ };
+
+/** Write the head of the attribute "expected_error_mm", which precedes one float for each point;
+ * return its size, SUPINE_STREAM_ATTRIBUTE. */
 size_t supine_stream_attribute_head(size_t points, unsigned char *bytes);
 
 /** Convert floats to big-endian in place. */
@@ -110,8 +121,9 @@ void supine_stream_encode_floats(size_t count, float *values);
 /** Extend `crc`, the checksum of the bytes so far, by `size` bytes; begin with 0. Thread-safe. */
 uint64_t supine_stream_crc64(uint64_t crc, const void *bytes, size_t size);
 
-/** Return the checksum of the bytes A followed by the bytes B from `first` = crc(A), `second` =
- * crc(B) and the `size` of B: crc(A) x^(8 size) + crc(B) mod P. */
+/** Return the checksum of the bytes A followed by the bytes B. It is first x^(8 size) + second
+ * modulo the CRC polynomial, where `first` and `second` are the checksums of A and B, and `size` is
+ * the number of bytes of B. */
 uint64_t supine_stream_crc64_join(uint64_t first, uint64_t second, size_t size);
 
 #endif

@@ -35,18 +35,16 @@ int supine_stream_address_connect(const supine_stream_address *address);
 typedef struct supine_stream_peer {
   int socket; /**< -1 if there is no peer */
   bool connecting;
-  /* received data */
   unsigned char header_bytes[SUPINE_STREAM_HEADER];
   size_t received; /**< bytes received of the body if `in_body` is true, else of the header */
   bool in_body;
   supine_stream_header header;
   uint64_t to_skip;    /**< bytes of a skipped body that are still to be received */
-  unsigned char *body; /**< [SUPINE_STREAM_BODY_MAX] body of the message */
+  unsigned char *body; /**< [SUPINE_STREAM_BODY_MAX] body of the message being received */
   double emptied;      /**< time at which the socket last had no data, s by supine_clock_seconds */
-  /* data to send */
-  supine_stream_content content;
-  bool knows_triangles;        /**< true if POINTS messages may omit the triangles */
-  uint64_t last_frame;         /**< serial number of the last frame given to the peer */
+  supine_stream_content content; /**< kind of content that the peer is sent */
+  bool knows_triangles; /**< true if the peer has received the triangles with a frame of points */
+  uint64_t last_frame;  /**< serial number of the last frame given to the peer */
   supine_stream_frame *frame;  /**< frame being sent; NULL if none */
   supine_stream_packet packet; /**< unsent part of the message of `frame` */
 } supine_stream_peer;
@@ -64,7 +62,7 @@ typedef enum supine_stream_outcome {
 supine_status supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connecting,
                                        supine_stream_content content, double now,
                                        supine_error *error);
-/** Close the socket and release the frame and the body. */
+/** Close the socket, release the frame that was being sent, and free the buffer `peer->body`. */
 void supine_stream_peer_end(supine_stream_peer *peer, supine_stream_frames *frames);
 
 /** Function that is called for each message of a known type; the body is in `peer->body`. */

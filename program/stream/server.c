@@ -14,8 +14,9 @@
 #include "program/stream/tracked_patient.h"
 #include "sh/base/clock.h"
 
-static const double frame_interval = 15e-3; /* time between frames without new messages, s */
-static const double send_interval = 20e-3;  /* time between checks whether a frame is sent, s */
+static const double frame_interval = 15e-3; /* time between frames while no messages arrive, s */
+static const double send_interval =
+    20e-3; /* time between checks whether a peer can take a frame, s */
 static const double connect_interval = 1.0; /* time between attempts to connect to a peer, s */
 static const double stop_interval = 0.1;    /* time between calls of options->stop, s */
 
@@ -26,7 +27,7 @@ struct supine_stream_server {
   supine_stream_patient patient;
   supine_stream_frames *frames;
   supine_stream_frame *latest;
-  double frame_time; /* time at which `latest` was made */
+  double frame_time; /* time at which the newest frame, `latest`, was made */
   int listener;      /* listening socket; -1 if none */
   int port;
   supine_stream_address target;
@@ -40,10 +41,10 @@ struct supine_stream_server {
   double replay_begun;            /* time at which the replay began; negative before that */
   double wait_begun;              /* time at which ppoll() was last called */
   double woke;                    /* time at which ppoll() last returned */
-  supine_stream_latency *latency; /* [0] of weights; [1] of points and surfaces */
+  supine_stream_latency *latency; /* [2] latencies of frames of weights, and of frames of points */
 };
 
-/* Return whether a peer waits for a frame, and has not been sent the newest frame. */
+/* Return whether a peer wants frames, is sent none at the moment, and lacks the newest frame. */
 static bool needs_frame(const supine_stream_server *s, const supine_stream_peer *peer) {
   return peer->socket >= 0 && !peer->connecting && peer->frame == NULL &&
          peer->content != SUPINE_STREAM_SILENCE && s->latest != NULL &&
@@ -182,7 +183,8 @@ static double frame_due(const supine_stream_server *s) {
   if (!supine_stream_patient_moves(&s->patient)) {
     return (double)INFINITY;
   }
-  /* Each message triggers a frame. After a recent message, wait two intervals for the next one. */
+  /* Each message triggers a frame. After a recent message, wait two frame intervals for the next
+   * message before making a frame without one. */
   const bool driven = s->woke - s->patient.received < 2.0 * frame_interval;
   return fmax(soonest, s->frame_time + (driven ? 2.0 : 1.0) * frame_interval);
 }

@@ -3,14 +3,15 @@
  * Run a server that receives poses and sends deformed lungs, in one thread, without blocking.
  *
  * Each frame shows the newest pose and is sent to every peer that is ready; the other peers receive
- * a later frame. Peers that receive weights are served first. */
+ * a later frame. Peers that receive only weights of modes are served before those that receive
+ * points. */
 #ifndef SUPINE_STREAM_SERVER_H
 #define SUPINE_STREAM_SERVER_H
 
 #include "program/stream/gravity.h"
 #include "program/stream/web.h"
 
-/** Points observed inside the lungs, from which the lungs are located (supine/locate.h). */
+/** Points observed inside the lungs, to which the lungs are fitted (supine/locate.h). */
 typedef struct supine_stream_observed {
   const supine_basis *inside; /**< basis made by 'supine embed' */
   size_t count;
@@ -35,8 +36,8 @@ typedef struct supine_stream_poses {
 } supine_stream_poses;
 
 /** Read recorded poses from a file; release them with supine_stream_poses_free.
- * @retval SUPINE_ERROR_READ, SUPINE_ERROR_FORMAT (the message names the line), SUPINE_ERROR_MEMORY
- */
+ * @retval SUPINE_ERROR_FORMAT  the message names the line
+ * @retval SUPINE_ERROR_READ, SUPINE_ERROR_MEMORY */
 supine_status supine_stream_poses_load(const char *path, supine_stream_poses *poses,
                                        supine_error *error);
 void supine_stream_poses_free(supine_stream_poses *poses);
@@ -49,12 +50,12 @@ void supine_stream_poses_add(FILE *file, const supine_stream_pose *pose);
 /** Numbers of events since the server was created. */
 typedef struct supine_stream_counts {
   uint64_t poses;       /**< poses accepted, whether a frame showed them or not */
-  uint64_t positions;   /**< positions of observed points accepted */
+  uint64_t positions;   /**< accepted positions of observed points */
   uint64_t repaired;    /**< poses used although they were not exact rotations */
-  uint64_t refused;     /**< poses refused */
+  uint64_t refused;     /**< poses that were not used, such as matrices with a reflection */
   uint64_t malformed;   /**< messages with a wrong checksum or inconsistent lengths */
   uint64_t skipped;     /**< messages of unknown types, or too large */
-  uint64_t unreachable; /**< frames with the previous gains, because the volume was unreachable */
+  uint64_t unreachable; /**< frames without the wanted volume, because it was unreachable */
   uint64_t frames;
   uint64_t sent;        /**< frames sent, summed over peers */
   uint64_t peers;       /**< peers accepted */
@@ -62,7 +63,7 @@ typedef struct supine_stream_counts {
   uint64_t turned_away; /**< connections refused, as there were too many peers */
 } supine_stream_counts;
 
-/** Number of 1 us bins of a latency histogram; the last bin also counts longer latencies. */
+/** Number of bins of a latency histogram, 1 us each; the last bin also counts longer latencies. */
 enum { SUPINE_STREAM_LATENCY_BINS = 65536 };
 
 typedef struct supine_stream_latency {
@@ -86,7 +87,7 @@ typedef struct supine_stream_options {
   const char *device;  /**< device that sends the pose of the patient; NULL for any device */
   const char *name;    /**< device name in sent messages */
   supine_stream_setup setup;
-  supine_stream_volume *volume;      /**< volume or breath at the start; messages may change it */
+  supine_stream_volume *volume; /**< fixed volume or breath at the start; messages may change it */
   supine_stream_observed *observed;  /**< points whose positions come in messages; NULL if none */
   supine_stream_content content;     /**< content sent to peers that have not asked for any */
   bool ras;                          /**< send points in RAS */
@@ -123,10 +124,11 @@ supine_status supine_stream_server_run(supine_stream_server *server, supine_erro
 
 const supine_stream_counts *supine_stream_server_counts(const supine_stream_server *server);
 
-/** Return the latencies of frames of weights, or of points and surfaces together. A latency is the
- * time from receiving the newest message to passing the frame to the kernel. Frames without a new
- * message do not count. If a message may have waited unread, its latency begins when the peer's
- * socket was last found empty, so that no latency is underestimated. */
+/** Return the latencies of sent frames: those with the content SUPINE_STREAM_WEIGHTS, or, for any
+ * other `content`, those with points. A latency is the time from receiving the newest message to
+ * passing the frame to the kernel. Frames without a new message do not count. If a message may have
+ * waited unread, its latency begins when the peer's socket was last found empty, so that no latency
+ * is underestimated. */
 const supine_stream_latency *supine_stream_server_latency(const supine_stream_server *server,
                                                           supine_stream_content content);
 

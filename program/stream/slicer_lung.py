@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""3D Slicer: the lung follows a transform node.
+"""Show lungs in 3D Slicer that deform with the orientation of a transform node.
 
 Start the server with SERVER_OPTIONS:
 
@@ -27,7 +27,7 @@ def rotation_of(matrix):
 
 
 class Surface:
-    """Receives the newest points, and the triangles of the first frame."""
+    """Receives the newest vertex positions, and the triangles of the first frame."""
 
     def __init__(self, host="localhost", port=18944):
         self.link = Link(host, port)
@@ -38,7 +38,7 @@ class Surface:
         self.link.send_pose(rotation_of(matrix), DEVICE)
 
     def newest(self, timeout=0.0):
-        """Return (stamp, flat array of points) of the newest frame; None if there is no new frame."""
+        """Return (time stamp, flat array of vertex positions) of the newest frame; None if there is no new frame."""
         last = None
         self.link.receive(timeout)
         while True:
@@ -55,7 +55,7 @@ class Surface:
 
 
 class Follow:
-    """Sends the node's rotation whenever it changes, and shows the lungs received."""
+    """Sends the rotation of a transform node whenever it changes, and shows the lungs that the server returns."""
 
     def __init__(self, node, host="localhost", port=18944, interval=15):
         import qt
@@ -90,7 +90,7 @@ class Follow:
 
 
 def show_points(vtk, model, points, triangles):
-    """Set the points of a model; with the first frame also set its triangles."""
+    """Set the vertex positions of a model; on the first call also set its triangles."""
     import numpy
     from vtk.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
 

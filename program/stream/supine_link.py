@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""A peer of 'supine stream' in plain Python: OpenIGTLink over a socket, and the basis file.
+"""A peer of 'supine stream' in plain Python: exchange OpenIGTLink messages, and deform lungs by a basis file.
 
     link = Link("localhost", 18944)
-    link.send_pose(rotation)               # 3 x 3, row by row
-    stamp, frame = link.newest(timeout=1)  # weights and gains, or points
+    link.send_pose(rotation)               # rows of the 3 x 3 rotation from body axes to world axes
+    stamp, frame = link.newest(timeout=1)  # numbers for Basis.deform; positions after ask_for("points")
 """
 import array as arrays
 import json
@@ -39,7 +39,7 @@ def crc64(data, crc=0):
 
 
 def pack(kind, device, content, stamp=0, version=1, number=0):
-    """Return a whole message. Version 2 has an extension before the content, and metadata after it."""
+    """Return an OpenIGTLink message of type `kind`. Version 2 has an extension before the content, metadata after it."""
     if version == 2:
         content = EXTENSION.pack(12, 2, 0, number) + content + b"\0\0"
     return HEADER.pack(version, kind.encode(), device.encode(), stamp, len(content),
@@ -47,30 +47,30 @@ def pack(kind, device, content, stamp=0, version=1, number=0):
 
 
 def transform(rotation, position=(0, 0, 0)):
-    """Return the content of a TRANSFORM: the columns of the matrix, then the position."""
+    """Return the content of an OpenIGTLink TRANSFORM message: the columns of the matrix, then the position."""
     columns = [rotation[row][column] for column in range(3) for row in range(3)]
     return struct.pack(">12f", *columns, *position)
 
 
 def quaternion(wxyz, position=(0, 0, 0)):
-    """Return the content of a POSITION."""
+    """Return the content of an OpenIGTLink POSITION message: the position, then the quaternion as x, y, z, w."""
     w, x, y, z = wxyz
     return struct.pack(">7f", *position, x, y, z, w)
 
 
 def instruments(poses):
-    """Return the content of a QTDATA for {name: (w, x, y, z)}."""
+    """Return the content of an OpenIGTLink QTDATA message for {name of instrument: quaternion (w, x, y, z)}."""
     return b"".join(struct.pack(">20sBB", name.encode(), 2, 0) + quaternion(wxyz)
                     for name, wxyz in poses.items())
 
 
 def array(values):
-    """Return the content of an NDARRAY of one dimension, float64."""
+    """Return the content of an OpenIGTLink NDARRAY message with one dimension of 64-bit floats."""
     return struct.pack(f">BBH{len(values)}d", 11, 1, len(values), *values)
 
 
 def string(text):
-    """Return the content of a STRING, US-ASCII."""
+    """Return the content of an OpenIGTLink STRING message with a US-ASCII text."""
     return struct.pack(">HH", 3, len(text)) + text.encode("ascii")
 
 
@@ -83,20 +83,21 @@ def _numbers(kind, content):
 
 
 def corners(words):
-    """Yield three corners for each triangle. `words` has the length of each strip, then its corners."""
+    """Yield three vertex indices for each triangle. `words` has the length of each strip, then its vertices."""
     begin = 0
     while begin < len(words):
         strip = words[begin + 1:begin + 1 + words[begin]]
         begin += 1 + len(strip)
-        for i in range(len(strip) - 2):  # every second triangle is reversed
+        for i in range(len(strip) - 2):  # swap two corners of every second triangle
             triangle = (strip[i], strip[i + 1 + i % 2], strip[i + 2 - i % 2])
-            if len(set(triangle)) == 3:  # triangles with equal corners only join others
+            if len(set(triangle)) == 3:  # triangles with equal corners only connect others in a strip
                 yield from triangle
 
 
 def unpack(kind, content):
-    """Decode the content of a message: an NDARRAY to a tuple of floats, a POLYDATA to (flat array of x, y, z,
-    array of strips for `corners`), a STRING to text. Return the bytes of other types unchanged."""
+    """Decode the content of a message of type `kind`. Return a tuple of floats for NDARRAY, text for STRING, and for
+    POLYDATA (flat array of positions x, y, z, array of triangle strips as the function `corners` takes it). Return the
+    bytes of other types unchanged."""
     if kind == "NDARRAY":
         scalar, dimension = content[0], content[1]
         count = 1
@@ -114,7 +115,7 @@ def unpack(kind, content):
 
 
 class Link:
-    """A connection to the server. `newest` returns the last frame received and drops earlier frames."""
+    """A connection to the server 'supine stream'."""
 
     def __init__(self, host="localhost", port=18944, version=1, check=False):
         self.socket = socket.create_connection((host, port), timeout=10)
@@ -135,7 +136,7 @@ class Link:
         self.send("TRANSFORM", device, transform(rotation), stamp)
 
     def ask_for(self, what):
-        """Choose what the server sends: weights, points, surface or nothing."""
+        """Choose what the server sends: "weights", "points", "surface" or "nothing"."""
         self.send("STRING", "SEND", string(what))
 
     def set_volume(self, text):
@@ -169,7 +170,7 @@ class Link:
         return True
 
     def newest(self, timeout=1.0):
-        """Return (stamp, unpacked content) of the newest message; None if none arrives in time."""
+        """Return (time stamp, unpacked content) of the newest message and drop earlier ones; None after the timeout."""
         end = time.monotonic() + timeout
         last = None
         while True:
@@ -183,8 +184,8 @@ class Link:
 
 
 class Basis:
-    """A basis file, for peers that receive weights w and gains A. A vertex p moves to x_j = p_j + A_j (w . c) d_j on
-    each axis j. The file must store a direction d and the coefficients c of the modes for each vertex."""
+    """A basis file, for peers that receive the weights w of the modes and the gains A of each lung. On each axis j, a
+    vertex p moves to p_j + A_j (w . c) d_j. The file must store a direction d and coefficients c for each vertex."""
 
     def __init__(self, path):
         with open(path, "rb") as file:
@@ -207,7 +208,8 @@ class Basis:
         return memoryview(self._data[begin:end]).cast(kind)
 
     def deform(self, frame):
-        """Return the flat array of positions of a frame: K weights, then the gains A (x, y, z) of each lung."""
+        """Return the vertex positions x, y, z as a flat list. `frame` has the weights of the modes, then the
+        gains of each lung along x, y and z."""
         weights, gains = frame[:self.modes], frame[self.modes:]
         positions = []
         for i, lung in enumerate(self.lung):

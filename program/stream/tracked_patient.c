@@ -113,8 +113,8 @@ static void accept_pose(supine_stream_patient *p, supine_stream_verdict verdict,
   store_pose(p, gravity, received, stamp);
 }
 
-/* Store the position of an observed point, which is not-a-number if the point is not seen; return
- * false if no point has that name. */
+/* Store the position of an observed point; a not-a-number position means that the point is not
+ * seen. Return false if no point has that name. */
 static bool store_position(supine_stream_patient *p, const char *name, const double position[3],
                            double received, uint64_t stamp) {
   supine_stream_observed *observed = p->options->observed;
@@ -221,8 +221,8 @@ static uint64_t stamp_now(void) {
   return ((uint64_t)now.tv_sec << 32) | (((uint64_t)now.tv_nsec << 32) / 1000000000u);
 }
 
-/* Compute the gains for the current volume, or keep the last gains if the lungs cannot reach it.
- * Then compute the resulting volumes. */
+/* Compute the gains, the factors of each lung's displacement, for the current volume. If the lungs
+ * cannot reach this volume, keep the last gains. Then compute the resulting volumes. */
 static void find_gains(supine_stream_patient *patient, double now,
                        supine_stream_snapshot *snapshot) {
   const supine_basis *basis = patient->basis;
@@ -247,7 +247,7 @@ static void find_gains(supine_stream_patient *patient, double now,
   snapshot->above += snapshot->volume;
 }
 
-/* Locate the lungs from the observed points that are seen. Find their volume unless it is fixed. */
+/* Fit the lungs to the observed points that are seen. Also fit their volume unless it is fixed. */
 static void find_location(supine_stream_patient *patient, double now,
                           supine_stream_snapshot *snapshot) {
   const supine_stream_volume *volume = patient->options->volume;

@@ -7,7 +7,7 @@
 #include "program/options/breath_turn.h"
 #include "program/stream/server.h"
 
-/** How the volume is determined. */
+/** Volume of the lungs, either fixed or given by a breath. */
 struct supine_stream_volume {
   bool breathes;      /**< true if the volume follows `breath`, false if it is `fixed` */
   supine_state fixed; /**< fixed volume; the field `gravity` is not used */
@@ -28,23 +28,24 @@ supine_status supine_stream_volume_fix(supine_stream_volume *volume, const char 
 supine_state supine_stream_volume_at(const supine_stream_volume *volume, const supine_basis *basis,
                                      const double gravity[3], double time);
 
+/** Newest input, and what the next frame needs. Times are in seconds by supine_clock_seconds. */
 typedef struct supine_stream_patient {
   const supine_basis *basis;
   const supine_stream_options *options;
   supine_stream_counts *counts;
-  /* Times are in seconds by supine_clock_seconds. */
   double breath_begun;
-  double first_pose;          /* time of the first pose, at which a recording begins */
-  double pose_received;       /* time of receipt of the newest pose or observed point; -1 if none */
-  double received;            /* time of receipt of the newest message */
-  bool pending;               /* true until a frame shows the newest message */
-  uint64_t stamp;             /* time stamp in the header of the newest pose or point; 0 if none */
-  double gravity[3];          /* direction of gravity in the newest pose */
+  double first_pose;    /* time of the first pose, s, at which a recording begins */
+  double pose_received; /* time of receipt of the newest pose or observed point, s; -1 if none */
+  double received;      /* time of receipt of the newest message, s; -1 if none */
+  bool pending;         /* true until a frame shows the newest message */
+  uint64_t stamp;       /* time stamp of the newest pose or point, 2^-32 s since 1970; 0 if none */
+  double gravity[3];    /* direction of gravity in the newest pose */
   double smoothed_gravity[3]; /* direction of gravity that frames show */
   double smoothed_at;
   bool turning; /* true until `smoothed_gravity` reaches `gravity` */
   double warned_at;
-  double gains[SUPINE_LUNGS_MAX][3]; /* gains of the last volume that could be reached */
+  double gains[SUPINE_LUNGS_MAX][3]; /* factors of the displacement of each lung along x, y
+                                        and z, at the last volume that could be reached */
 } supine_stream_patient;
 
 /* Return a patient who lies supine until a pose is received. */

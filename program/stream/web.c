@@ -30,8 +30,11 @@
  * OpenSSL and three libraries of event loops. */
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } lws;
 
-/* Sizes, bytes. TEXT: a state as JSON; RECEIVED: a received message; CHUNK: a part of the page. */
-enum { TEXT = 256, RECEIVED = 512, CHUNK = 65536 };
+enum {
+  TEXT = 256,     /* size of a state as JSON, bytes */
+  RECEIVED = 512, /* size of a received message, bytes */
+  CHUNK = 65536   /* size of the pieces in which the page is sent, bytes */
+};
 
 struct supine_stream_web {
   supine_stream_site site;
@@ -44,11 +47,11 @@ struct supine_stream_web {
   atomic_size_t viewers;
   pthread_mutex_t lock; /* protects the following fields of this struct */
   uint64_t number;      /* serial number of the state in `text`: 1, 2, ... */
-  char text[TEXT];      /* state as JSON, without the age and the final brace */
-  double pose_received; /* as in supine_stream_snapshot */
+  char text[TEXT];      /* newest state as JSON; send_state() appends the age of the pose and "}" */
+  double pose_received; /* time of receipt of the newest pose or observed point, s; -1 if none */
 };
 
-/* A received pose, as written to the pipe. */
+/* A pose that a viewer has sent, as passed by `supine_stream_web.poses` to the server's thread. */
 typedef struct web_pose {
   double gravity[3];
   double received; /* time of receipt, s by supine_clock_seconds */
@@ -57,7 +60,7 @@ typedef struct web_pose {
 /* State of a connection to a viewer, or to a browser that loads the page. */
 typedef struct session {
   size_t sent;     /* bytes of the page sent so far */
-  uint64_t number; /* number of the last state sent */
+  uint64_t number; /* serial number of the last state sent */
   bool counted_in_viewers;
 } session;
 
@@ -81,7 +84,8 @@ static bool is_ours(struct lws *wsi) {
   return from != NULL && strcmp(from + 3, host) == 0;
 }
 
-/* Write the pose in a message {"gravity":[x,y,z]} to the pipe. Ignore all other messages. */
+/* Parse a viewer's message {"gravity":[x,y,z]} and pass its pose to the server's thread. Ignore all
+ * other messages. */
 static void receive(supine_stream_web *web, const char *bytes, size_t size) {
   json_t *pose = json_loadb(bytes, size, 0, NULL);
   const json_t *gravity = json_object_get(pose, "gravity");
@@ -135,7 +139,7 @@ static int view(struct lws *wsi, enum lws_callback_reasons reason, void *user, v
       (void)atomic_fetch_sub(&web->viewers, 1);
     }
     return 0;
-  case LWS_CALLBACK_EVENT_WAIT_CANCELLED: /* caused by supine_stream_web_send */
+  case LWS_CALLBACK_EVENT_WAIT_CANCELLED: /* supine_stream_web_send has stored a new state */
     (void)lws.callback_on_writable_all_protocol(web->context, lws.get_protocol(wsi));
     return 0;
   case LWS_CALLBACK_SERVER_WRITEABLE:
@@ -237,7 +241,8 @@ supine_status supine_stream_web_create(const supine_stream_site *site, supine_st
   if (strchr(info.iface, ':') == NULL) {
     info.options |= LWS_SERVER_OPTION_DISABLE_IPV6;
   }
-  info.fd_limit_per_thread = (unsigned)site->viewers + 64; /* 64 more may load the page */
+  info.fd_limit_per_thread =
+      (unsigned)site->viewers + 64; /* 64 more connections may load the page */
   if (site->certificate != NULL) {
     info.options |= LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT;
     info.ssl_cert_filepath = site->certificate;

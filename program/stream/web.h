@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Serve the live page and send each state to its viewers by WebSocket, in another thread, so that
- * no browser delays the peers.
+ * Serve the live page, and send the newest state of the lungs to its viewers (browsers) by
+ * WebSocket. A thread of its own does this, so that no browser delays the OpenIGTLink peers.
  *
- * Viewers receive the newest state: {"gravity":[x,y,z],"volume":mL,"above":mL,"age":s}
+ * A viewer receives {"gravity":[x,y,z],"volume":mL,"above":mL,"age":s}:
+ *   volume: volume of all lungs together
  *   above: volume above rest in the posture, or above the scan if rest is unknown
  *   age: time since the newest pose or observed point was received; -1 if none was received
- * A phone sends its pose: {"gravity":[x,y,z]} */
+ * A viewer, such as a phone on the patient, may send its pose: {"gravity":[x,y,z]} */
 #ifndef SUPINE_STREAM_WEB_H
 #define SUPINE_STREAM_WEB_H
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Read the basis from the page. Compute the weights of the modes from gravity, and the gains of the lungs from a
-// volume, like the run-time library.
+// Read the basis from the page. Compute the weights of the modes from gravity, and the gains of the lungs (factors
+// that multiply the displacement along each axis) from a volume, like the run-time library.
 
 function fromBase64(text) {
   if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);
@@ -24,7 +24,7 @@ function takeBytes(name) {
 
 const takeTensor = (name, Numbers) => new Numbers(takeBytes(name).buffer);
 
-/** Decompress a tensor of 16-bit integers (counts). Its rows are padded to an even number of columns. */
+/** Decompress a tensor of 16-bit integers. Its rows are padded to an even number of columns. */
 function takeCounts(name, rows, columns, filter) {
   const stride = 4 * Math.ceil(columns / 2);
   const bytes = new Uint8Array(rows * stride);
@@ -32,7 +32,7 @@ function takeCounts(name, rows, columns, filter) {
   return new Int16Array(bytes.buffer);
 }
 
-/** Return a tensor as numbers: the number in a column is middle[column] plus `unit` times the stored count. */
+/** Return a quantised tensor as numbers: middle[column] plus `unit` times the stored integer. */
 function takeRows(name, rows, columns, unit, middle = new Array(columns).fill(0)) {
   const counts = takeCounts(name, rows, columns);
   const numbers = new Float32Array(rows * columns);
@@ -48,8 +48,8 @@ function takeTriangles(name, count) {
   return corners;
 }
 
-/** Return the normals as the 32-bit words that supine.glsl reads. A word has three numbers, of 13, 10 and 9 bits.
- * The page has these numbers without their lowest 2, 2 and 1 bits, plus 128. */
+/** Return the normals as the 32-bit words that supine.glsl reads. A word has three signed numbers, of 13, 10 and 9
+ * bits. The page stores these numbers rounded to 11, 8 and 8 bits, with 128 added. */
 function takeNormals(vertices, words) {
   const columns = 3 * words;
   const counts = takeCounts('normals', vertices, 3 * columns);
@@ -62,7 +62,7 @@ function takeNormals(vertices, words) {
   return packed;
 }
 
-/** Convert colours in hexadecimal digits to RGBA bytes. */
+/** Convert RGB colours in hexadecimal digits to RGBA bytes. */
 function readColours(text) {
   const bytes = new Uint8Array((text.length / 6) * 4).fill(255);
   for (let i = 0; i < text.length; i += 2) bytes[4 * Math.floor(i / 6) + (i % 6) / 2] = parseInt(text.slice(i, i + 2), 16);
@@ -101,11 +101,12 @@ function readBasis() {
 }
 
 const recurrences = new Map(); // results of recurrenceOf for each band
-/** Return the factors of the recurrence in harmonics() for all bands up to `band`. They are computed once. */
+/** Return the factors of the recurrence in harmonics() for all bands up to `band`. They are computed once. tops[m] is
+ * the polynomial of order m in band m, a constant; `steps` has the factors of the steps to higher bands. */
 function recurrenceOf(band) {
   if (!recurrences.has(band)) {
     const tops = new Float64Array(band + 1);
-    const steps = new Float64Array((band + 1) ** 2); // the factor of Y_lm has the index l * l + l + m
+    const steps = new Float64Array((band + 1) ** 2); // index l * l + l + m: step from band l to band l + 1 at order m
     for (let m = 0; m <= band; ++m) {
       tops[m] = m === 0 ? Math.sqrt(1 / (4 * Math.PI)) : tops[m - 1] * (m === 1 ? Math.sqrt(3) : Math.sqrt((2 * m + 1) / (2 * m)));
       for (let l = m; l <= band; ++l) steps[l * l + l + m] = Math.sqrt((4 * (l + 1) ** 2 - 1) / ((l + 1 - m) * (l + 1 + m)));
@@ -154,8 +155,8 @@ function weightsFor(basis, gravity) {
 }
 
 /** Return the coefficients f of the volume of a lung at the weights `w` of the modes. At the gains x, y, z, the volume
- * of the lung minus that of its reference surface is f . (x, y, z, yz, xz, xy, xyz), mL. If all gains are equal
- * (volumeAxes 1), the coefficients of y, z, xz and xy are 0. */
+ * of the lung minus that of its reference surface is f . (x, y, z, yz, xz, xy, xyz), mL. If a lung has only one gain s
+ * (volumeAxes 1), the coefficients of x, yz and xyz are those of s, s^2 and s^3, and the others are 0. */
 function lungForm(basis, lung, w) {
   const k = basis.modes;
   const dot = (tensor, at) => { let sum = 0; for (let i = 0; i < k; ++i) sum += tensor[at + i] * w[i]; return sum; };
@@ -172,14 +173,14 @@ function lungForm(basis, lung, w) {
 
 const formAt = (f, [x, y, z]) => x * f[0] + y * f[1] + z * f[2] + y * z * f[3] + x * z * f[4] + x * y * f[5] + x * y * z * f[6];
 
-/** Return the coefficients c such that formAt(f, [s, s, s]) = c[0] s + c[1] s^2 + c[2] s^3. */
+/** Return the coefficients c of the volume at equal gains: formAt(f, [s, s, s]) = c[0] s + c[1] s^2 + c[2] s^3. */
 const cubicOf = (f) => [f[0] + f[1] + f[2], f[3] + f[4] + f[5], f[6]];
 
 const cubicAt = (c, s) => s * (c[0] + s * (c[1] + s * c[2]));
 const cubicSlope = (c, s) => c[0] + s * (2 * c[1] + 3 * s * c[2]);
 
-/** Return the s nearest to 0 at which cubicAt has an extremum, for s > 0 if `side` is 1 and for s < 0 if it is -1. If
- * there is none, return an infinite number. */
+/** Return the s nearest to 0 at which c[0] s + c[1] s^2 + c[2] s^3 has an extremum, among s > 0 if `side` is 1 and
+ * among s < 0 if it is -1. If there is none, return an infinite number. */
 function cubicTurn(c, side) {
   const discriminant = c[1] * c[1] - 3 * c[0] * c[2];
   if (discriminant < 0) return side * Infinity;
@@ -188,8 +189,8 @@ function cubicTurn(c, side) {
   return side * Math.min(Infinity, ...ahead);
 }
 
-/** Return the gain s at which cubicAt(c, s) is `volume`, mL, on the branch through s = 0; NaN if the surface
- * folds before it reaches that volume. */
+/** Return the gain s at which c[0] s + c[1] s^2 + c[2] s^3 is `volume`, mL, on the branch through s = 0; NaN if the
+ * surface folds before it reaches that volume. */
 function scaleForVolume(c, volume) {
   if (volume === 0) return 0;
   const side = volume / c[0] > 0 ? 1 : -1;
@@ -218,17 +219,18 @@ function scaleForVolume(c, volume) {
   return s;
 }
 
-/** Return the three gains, relative to the gain at rest, on the path from full inflation (sigma 0) through rest (sigma
- * 1) to lower volumes, like supine_volume_bend. */
+/** Return the gains along x, y and z, relative to the gain at rest, on the path from full inflation (sigma 0) through
+ * rest (sigma 1) to lower volumes (sigma > 1), like supine_volume_bend. `bend` has a constant for each axis: the
+ * relative gain is sigma + 2 bend e(sigma), where e is 0 at full inflation and at rest. */
 function pathAt(bend, sigma) {
   const cube = sigma * sigma * sigma;
   const e = sigma <= 1 ? (cube - sigma) / 2 : (sigma - 1) / (cube * cube);
   return bend.map((c) => sigma + 2 * c * e);
 }
 
-/** Return the three gains at which a lung with the coefficients `form` of lungForm has the volume `volume`. The gains
- * follow pathAt, with the volume `rest` at sigma 1. Both volumes are mL above the reference volume. Return NaN if the
- * surface folds before it reaches `volume`. */
+/** Return the gains along x, y and z at which a lung has the volume `volume`. The function pathAt gives their ratios
+ * at each volume, such that the volume is `rest` at rest. Both volumes are mL above the reference volume. `form` has
+ * the coefficients of the volume, from lungForm. Return NaN if the surface folds before it reaches `volume`. */
 function gainsForVolume(form, bend, rest, volume) {
   const straight = bend.every((c) => c === 0) || volume === rest;
   const scale = scaleForVolume(cubicOf(form), straight ? volume : rest);
@@ -254,9 +256,9 @@ function gainsForVolume(form, bend, rest, volume) {
 
 const sumOf = (values) => values.reduce((sum, x) => sum + x, 0);
 
-/** Return volumes for a direction of gravity, mL above the reference volumes. `full` has the volume of each lung at
- * full inflation, `rest` the volume of each lung at rest. If all lungs have the same gains, `rest` has one element, the
- * volume of all lungs together. If rest is unknown, `rest` is the volume in the scan. */
+/** Return {rest, full}: the volumes of the lungs at rest and at full inflation for a direction of gravity, mL above
+ * the reference volumes. `full` has an element for each lung. `rest` too, or one element for the volume of all lungs
+ * together if they have the same gains. If rest is unknown, `rest` is the volume of all lungs in the scan. */
 function volumesFor(basis, gravity) {
   const y = harmonics(2, gravity);
   const rows = basis.resting ? basis.resting.length / y.length : 1;
@@ -269,8 +271,8 @@ function volumesFor(basis, gravity) {
 const restFor = (basis, gravity) => sumOf(volumesFor(basis, gravity).rest);
 
 /** Return the volume of each lung if all lungs together have the volume `total`, mL above the reference volumes. Above
- * rest, all lungs have covered the same fraction of the way from rest to full inflation. Below rest, the volumes of all
- * lungs have shrunk by the same factor. */
+ * rest, every lung is inflated by the same fraction of the difference between its volumes at full inflation and at
+ * rest. Below rest, the volumes of all lungs have shrunk by the same factor. */
 function shareOut({ references }, { rest, full }, total) {
   const [all, resting] = [sumOf(references), sumOf(rest)];
   const part = (total - resting) / (sumOf(full) - resting);
@@ -278,17 +280,18 @@ function shareOut({ references }, { rest, full }, total) {
   return references.map((ml, lung) => (total >= resting ? rest[lung] + part * (full[lung] - rest[lung]) : (ml + rest[lung]) * shrunk - ml));
 }
 
-/** Return the gains [x, y, z] of each lung at which all lungs together have the volume `total`, mL above the
- * reference volume. */
+/** Return the gains [x, y, z] of each lung, the factors of its displacement along the axes, at which all lungs
+ * together have the volume `total`, mL above the reference volume. `forms` has the result of lungForm for each lung.
+ * */
 function gainsFor(basis, forms, volumes, total) {
   if (basis.byLung) return shareOut(basis, volumes, total).map((ml, lung) => gainsForVolume(forms[lung], basis.bend, volumes.rest[lung], ml));
   const gains = gainsForVolume(forms[0].map((_, i) => sumOf(forms.map((f) => f[i]))), [0, 0, 0], 0, total);
   return forms.map(() => gains);
 }
 
-/** Compute a moment: the state of the lungs for a direction of gravity and a volume `depth` mL above rest. It has a
- * weight for each mode in `weights`, three gains for each lung in `gains`, and the volume of each lung with its tissue,
- * mL, in `held`. `folds` is true if the surface folds before it reaches that volume. */
+/** Compute a moment: the state of the lungs for a direction of gravity and a volume `depth` mL above rest. `weights`
+ * has the weight of each mode, `gains` the three gains of each lung, and `held` the volume of each lung with its
+ * tissue, mL. `folds` is true if the surface folds before it reaches the volume. */
 function momentFor(basis, gravity, depth) {
   const weights = weightsFor(basis, gravity);
   const forms = basis.references.map((_, lung) => lungForm(basis, lung, weights));
@@ -298,11 +301,16 @@ function momentFor(basis, gravity, depth) {
   return { gravity, weights, gains: Float64Array.from(gains.flat()), held, folds: !gains.flat().every(Number.isFinite) };
 }
 
-/** Return the uniforms of supine.glsl: the weights w of the modes, three gains of each lung, and `turns`, the weights
- * of the modes of the normals. Vector j of a lung in `turns` has the weights of the modes j, j + words and j + 2 words.
- * Each of these weights is a sum over the axes of polynomials with the terms 1, a w_k, b w_k and a b w_k w_l, where a
- * and b are the gains along the other two axes. If all gains are equal, the weight is one polynomial, without the terms
- * b w_k. */
+/** Return the uniforms of supine.glsl for a state of the lungs:
+ *
+ *     weights  weight w_k of each mode k, in vectors of four
+ *     gains    factors of the displacement along x, y and z, for each lung
+ *     turns    weights of the modes of the normals, for each lung in `words` vectors of three: vector j has the weights
+ *              of the modes j, j + words and j + 2 words
+ *
+ * The weight of a mode of the normals is a sum over the axes of polynomials with the terms 1, a w_k, b w_k and
+ * a b w_k w_l, where a and b are the gains along the other two axes, and k and l are modes. If a lung has only one gain
+ * (volumeAxes 1), the weight is one polynomial, without the terms b w_k. */
 function uniformsOf(basis, moment) {
   const { modes: k, words, lungs, normalModes } = basis;
   const weights = new Float32Array(4 * Math.ceil(k / 4));
@@ -336,7 +344,7 @@ function lungOf({ lungBegin }, vertex) {
   return lung;
 }
 
-/** Compute the position of a vertex, mm. */
+/** Compute the position of a vertex in a state of the lungs, mm. */
 function placeOf(basis, { weights, gains }, vertex) {
   const lung = lungOf(basis, vertex);
   let amount = 0;
@@ -344,7 +352,7 @@ function placeOf(basis, { weights, gains }, vertex) {
   return [0, 1, 2].map((axis) => basis.surface[3 * vertex + axis] + gains[3 * lung + axis] * amount * basis.direction[3 * vertex + axis]);
 }
 
-/** Compute the positions of all vertices, mm. */
+/** Compute the positions of all vertices in a state of the lungs, mm. */
 function placesOf({ surface, direction, coefficients, modes, lungBegin, lungs }, { weights, gains }) {
   const places = new Float32Array(surface.length);
   for (let lung = 0; lung < lungs; ++lung) {
@@ -357,7 +365,8 @@ function placesOf({ surface, direction, coefficients, modes, lungBegin, lungs },
   return places;
 }
 
-/** Compute the positions of the corners of up to 3000 triangles, mm, to choose the range of the colours. */
+/** Compute the positions of the corners of up to 3000 triangles, mm. They suffice to choose the range of the colours.
+ * */
 function samplePlaces(basis, moment) {
   const stride = 3 * Math.max(1, Math.ceil(basis.corners.length / 3 / 3000));
   const places = [];

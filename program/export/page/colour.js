@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Compute colours, ranges and ticks, by the same rules as 'supine render' and 'supine compare'.
+// Compute colours, and ranges and ticks of colour bars, by the same rules as 'supine render' and 'supine compare'.
 
 /** Return the interval between the ticks of a scale that ends at `value`: a round number, 1/10 to 1/4 of `value`. */
 function tickStep(value) {
@@ -15,7 +15,7 @@ function rangeEnd(value) {
   return value > 0 ? step * Math.ceil(value / step - 1e-9) : 5 * step;
 }
 
-/** Quantities that colours can show. `measure` is the uniform `kind` of the shaders. */
+/** Quantities that colours can show. `measure` is the value of the shaders' uniform `kind`; `map` is a colour map. */
 const KINDS = {
   displacement: { measure: 0, map: 'displacement', unit: 'mm' },
   difference: { measure: 0, map: 'difference', unit: 'mm' },
@@ -23,7 +23,7 @@ const KINDS = {
   height: { measure: 2, map: 'displacement', unit: 'mm' },
 };
 
-/** Return the RGBA bytes of a diverging map: blue below its middle, orange above. */
+/** Return the RGBA bytes of a diverging colour map: blue below its middle, orange above. */
 function divergingMap() {
   const stops = [[19, 66, 138], [113, 161, 214], [243, 242, 238], [230, 147, 92], [140, 45, 4]];
   return Uint8Array.from({ length: 1024 }, (_, i) => {
@@ -33,7 +33,7 @@ function divergingMap() {
   });
 }
 
-/** Return a CSS gradient of a map. */
+/** Return a CSS gradient of a colour map, which is given as RGBA bytes. */
 function gradient(bytes) {
   const stops = Array.from({ length: 33 }, (_, i) => {
     const at = 4 * Math.round((i * 255) / 32);

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Project the content of the lungs: balls around points, and meshes. `ball` is 0 for the vertices of meshes.
+// Project the structures inside the lungs: meshes, and balls that show points. `ball` is the offset of a vertex from
+// the centre of its ball, in radii; 0 for the vertices of meshes.
 layout(location = 0) in vec3 ball;
 layout(location = 1) in vec3 normal;
 layout(location = 2) in vec3 moved;
 layout(location = 3) in vec3 origin; // position from which displacements are measured
-layout(location = 4) in float number; // index of the part
+layout(location = 4) in float number; // index of the structure
 uniform mat4 toEye;
 uniform mat4 projection;
 uniform vec4 lens;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Write what is under the pointer: a NaN whose low bits are the index of the part plus 1, and the position.
+// Write which structure inside the lungs is under the pointer, and the position, mm LPS. A NaN marks a structure; the
+// lowest bits of the NaN are the index of the structure plus 1.
 in vec3 body;
 flat in uint part;
 out uvec4 picked;

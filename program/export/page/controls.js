@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Handle pointers, and write to the panel's controls and the colour bar.
+// Handle the events of mouse and touch, and write to the controls of the panel and to the colour bar.
 
 const $ = (id) => document.getElementById(id);
 
@@ -41,7 +41,7 @@ function onDrag(element, drag, pinch, tap) {
 
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
-/** Draw the filled part of a slider. */
+/** Set the style of a slider's track: its filled part ends at the thumb. */
 function fill(slider) {
   slider.style.setProperty('--filled', `${(100 * (slider.value - slider.min)) / (slider.max - slider.min)}%`);
 }
@@ -100,7 +100,7 @@ function makePostureButtons(choose) {
   });
 }
 
-/** Show the colour bar and its ticks. The ends of the bar are pointed where values lie beyond the range. */
+/** Show the colour bar and its ticks. An end of the bar is pointed if values lie beyond it. */
 function drawLegend(kind, range, title, colours) {
   $('colours').style.background = gradient(colours);
   $('colours').classList.toggle('beyond', range.beyond);

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Draw the patient as a figure of ellipsoids on 2-D canvases: in the gravity ball, and as icons of the postures.
+// Draw the patient as a figure of ellipsoids on 2-D canvases: in the ball with which the user turns the patient, and
+// on the icons of the postures.
 
-// Centres, half axes and tones of the ellipsoids, in the patient's axes (x left, y back, z head).
+// Centres, half axes and tones of the ellipsoids that form the figure, in the patient's axes (x left, y back, z head).
 const BODY = [
   { at: [0, 0, 0.2], size: [0.25, 0.145, 0.3], tone: 'body' },
   { at: [0, 0.01, -0.14], size: [0.2, 0.14, 0.17], tone: 'body' },
@@ -24,9 +25,9 @@ for (const part of BODY) part.squares = part.size.map((x) => x * x);
 /** Direction of each end of the patient's axes. */
 const ENDS = { L: [1, 0, 0], R: [-1, 0, 0], A: [0, -1, 0], P: [0, 1, 0], H: [0, 0, 1], F: [0, 0, -1] };
 
-const lights = new WeakMap(); // results of lightsOf for each context
-/** Return the gradients that shade a ball of radius 1, one for each tone. They are made once for a canvas and a theme.
- */
+const lights = new WeakMap(); // for each context of a canvas, the last result of lightsOf
+/** Return the gradients that shade a ball of radius 1, one for each tone. They are made once for each canvas and
+ * colour theme. */
 function lightsOf(context, tones) {
   const made = lights.get(context);
   if (made?.tones === tones) return made;
@@ -52,13 +53,14 @@ function drawFigure(context, q, x, y, scale, tones) {
     xx: a * ex[0] * ex[0] + b * ey[0] * ey[0] + c * ez[0] * ez[0],
     xy: a * ex[0] * ex[1] + b * ey[0] * ey[1] + c * ez[0] * ez[1],
     yy: a * ex[1] * ex[1] + b * ey[1] * ey[1] + c * ez[1] * ez[1],
-    // Parts are sorted by the depth of the centre plus half of the extent towards the viewer.
+    // depth by which ellipsoids are sorted: that of the centre plus half of the extent towards the viewer
     front: at[0] * ex[2] + at[1] * ey[2] + at[2] * ez[2] + 0.5 * Math.sqrt(a * ex[2] * ex[2] + b * ey[2] * ey[2] + c * ez[2] * ez[2]),
   })).sort((a, b) => a.front - b.front);
   context.save();
   const { a: ratio } = context.getTransform(); // device pixels per CSS pixel, from freshContext
   for (const part of parts) {
-    // The symmetric square root of the ellipse's matrix maps the circle to the ellipse without rotating the shading.
+    // Draw the ellipsoid as a circle, mapped to its outline by the symmetric square root of the ellipse's matrix: this
+    // map does not rotate the shading.
     const det = Math.sqrt(Math.max(part.xx * part.yy - part.xy * part.xy, 0));
     const by = (ratio * scale) / Math.sqrt(part.xx + part.yy + 2 * det);
     context.setTransform(by * (part.xx + det), -by * part.xy, -by * part.xy, by * (part.yy + det), ratio * (x + scale * part.x), ratio * (y - scale * part.y));
@@ -109,8 +111,8 @@ const css = (name) => theme[name.slice(2)];
 const GLYPH = 18; // side of a letter's box, CSS pixels
 
 let glyphsMade = null;
-/** Return a canvas on which the letters of the ball are drawn: one row for letters in front, and one row for letters
- * behind. It is made once for a theme, because drawing text is slow. */
+/** Return a canvas with the letters on the gravity ball: one row for letters in front, and one row for letters behind.
+ * The letters are drawn once for each colour theme, because drawing text is slow. */
 function glyphsOf() {
   const ratio = Math.min(3, window.devicePixelRatio || 1);
   if (glyphsMade?.tones === theme.tones && glyphsMade.ratio === ratio) return glyphsMade;
@@ -130,10 +132,10 @@ function glyphsOf() {
   return glyphsMade;
 }
 
-let drawn = [];   // size, theme, rotation and gravity of the ball as drawn
-let glass = null; // gradient of the ball, made once for a size and theme
-/** Draw the ball with the patient inside and gravity as an arrow. The quaternion `toEye` rotates the patient's axes to
- * the eye's axes. */
+let drawn = [];   // size, theme, rotation and gravity with which the gravity ball was last drawn
+let glass = null; // gradient that shades the gravity ball, made once for each size and theme
+/** Draw the gravity ball: a sphere with the patient inside and gravity as an arrow. The quaternion `toEye` rotates the
+ * patient's axes to the eye's axes. */
 function drawBall(canvas, toEye, gravity) {
   const { width: size } = sizeOf(canvas);
   const now = [size, window.devicePixelRatio, theme.tones, ...toEye, ...gravity];
@@ -176,9 +178,10 @@ function drawBall(canvas, toEye, gravity) {
     context.lineWidth = 1;
     context.strokeStyle = css('--line');
     context.globalAlpha = front ? 1 : 0.4;
-    context.beginPath(); // one stroke for all three circles
+    context.beginPath(); // draw all three great circles by one stroke
     for (const n of [ends[0], ends[3], ends[4]]) { // L, P and H
-      // The great circle normal to n projects to an ellipse; its near half lies opposite to n.
+      // Draw the near or the far half of the great circle normal to n. The circle projects to an ellipse; if n points
+      // towards the viewer, the projection of the near half lies on the side away from n.
       const begin = n[2] > 0 === front ? -radius : radius;
       const angle = Math.atan2(-n[0], -n[1]);
       context.moveTo(centre + begin * Math.cos(angle), centre + begin * Math.sin(angle));
@@ -203,7 +206,7 @@ function drawBall(canvas, toEye, gravity) {
   graticule(true);
   letters(true);
   if (down[2] >= 0) arrow();
-  if (down[2] < 0) { // the arrow behind the patient shines through
+  if (down[2] < 0) { // show the arrow through the patient, who hides it
     context.save();
     context.globalAlpha = 0.6;
     arrow();
@@ -211,17 +214,17 @@ function drawBall(canvas, toEye, gravity) {
   }
 }
 
-/** Return the height of the lowest point of the figure rotated by the quaternion `q`. */
+/** Return the height of the lowest point of the patient's figure rotated by the quaternion `q`. */
 function lowestPart(q) {
   const up = rotate(inverse(q), [0, 1, 0]);
   return Math.min(...BODY.map((part) => dot(up, part.at) - Math.hypot(...part.size.map((s, i) => s * up[i]))));
 }
 
-/** Draw the icon of a posture: the figure in the room, on a table, seen from the side of the table. */
+/** Draw the icon of a posture: the patient's figure on a table, seen from the side of the table. */
 function drawIcon(canvas, bodyToRoom) {
   const context = freshContext(canvas);
   const { width, height } = sizeOf(canvas);
-  const camera = compose(turn([1, 0, 0], -1.45), turn([0, 0, 1], 0.35)); // rotation from the room to the eye's axes
+  const camera = compose(turn([1, 0, 0], -1.45), turn([0, 0, 1], 0.35)); // rotation from the room's to the eye's axes
   const q = compose(camera, bodyToRoom);
   const along = rotate(q, [0, 0, 0.86]);
   const scale = Math.min(width / 2 / (Math.abs(along[0]) + 0.12), height / 2 / (Math.abs(along[1]) + 0.2));

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Write findings in words: what each lung gains or loses, and how far the surface moves.
+// Write in words what each lung gains or loses, and how far the surface moves.
 
 const signed = (value) => `${value < 0 ? '\u2212' : value > 0 ? '+' : ''}${Math.abs(value)}`;
 
-/** Published changes of each lung's volume at rest from supine, %: mean and standard deviation, by posture. */
+/** Published changes, %, of the volume that each lung has at rest, relative to the supine posture: mean and standard
+ * deviation, by posture. */
 const PUBLISHED = { left: { source: 'Little 2021, n 10', 'left lung': [0, 44], 'right lung': [25, 11] } };
 
-/** Return the volume of each lung, gas and tissue, mL. */
+/** Return the volume (gas plus tissue) of each lung, mL. */
 const heldBy = (basis, { weights, gains }) => basis.references.map((ml, lung) => ml + formAt(lungForm(basis, lung, weights), gains.slice(3 * lung, 3 * lung + 3)));
 
 /** Return a weight for each vertex, proportional to the area of the triangles around it. */
@@ -21,7 +22,7 @@ function areasOf({ surface, corners, vertices }) {
 }
 
 /** Return statistics of the displacement from the state `from` to the state `now`, mm, over every `stride`th vertex:
- * the mean over the area, the 95th percentile (rounded up to a 2000th of the largest) and the largest. */
+ * the mean over the area, the 95th percentile (rounded up to a multiple of 1/2000 of the largest) and the largest. */
 function displacementBetween(basis, now, from, stride) {
   basis.areas ??= areasOf(basis);
   const { modes, coefficients, direction, areas } = basis;
@@ -65,8 +66,8 @@ function lungWords(basis, held, before) {
     .map(({ name, ml, percent }) => `the ${name} ${Math.abs(percent) < 2 ? 'keeps its volume' : `${ml < 0 ? 'loses' : 'gains'} ${Math.abs(ml)} mL`} (${signed(percent)} %)`);
 }
 
-/** Return two sentences on the state of the lungs, one on volumes and one on displacements. `volume` is a phrase such
- * as "500 mL above rest", or empty. */
+/** Return two sentences on the state of the lungs: one on volumes, one on displacements of every `stride`th vertex.
+ * `volume` is a phrase such as "500 mL above rest", or empty. */
 function findingOf(basis, moment, gravity, volume, stride) {
   const { from } = basis;
   const { mean, p95, largest } = displacementBetween(basis, moment, from, stride);
@@ -80,8 +81,8 @@ function findingOf(basis, moment, gravity, volume, stride) {
 
 /** Return the expected error of the displacement u from the state `from` to the state `now`, mm RMS over the vertices,
  * as the library defines it. The squared error of a vertex is |u| min(expected_error_mm, RMS of u). If the volume at
- * rest is assumed, add the squared change of u when that volume grows by 5 % of the reference volume. `fuller` has both
- * states with 1 % more volume, or is null if the volume at rest is known. */
+ * rest is assumed, add the squared change of u by 5 % more volume, estimated as 5 times the change by 1 %. `fuller`
+ * has both states with 1 % more volume (of the reference volume), or is null if the volume at rest is known. */
 function expectedError(basis, now, from, fuller) {
   const [a, b] = [placesOf(basis, now), placesOf(basis, from)];
   const more = fuller?.map((moment) => placesOf(basis, moment));
@@ -112,7 +113,8 @@ function errorWords(basis, moment, depth) {
   return `Expected error ${expectedError(basis, moment, from, fuller).toFixed(1)} mm (RMS), an extrapolation.`;
 }
 
-/** Return the changes of volume and the mean displacement for the card of a posture: "L \u22121 %, R +18 %, 6.9 mm". */
+/** Return the changes of volume and the mean displacement for the card of a posture: "L \u22121 %, R +18 %, 6.9 mm".
+ * */
 function answerOf(basis, moment) {
   const { mean, largest } = displacementBetween(basis, moment, basis.from, 1);
   if (largest < 0.05) return 'reference';
@@ -121,7 +123,7 @@ function answerOf(basis, moment) {
   return `${lungs.join('')}${mean.toFixed(1)}\u00a0mm`;
 }
 
-/** Write a finding and emphasise the changes of volume. */
+/** Write a text to an element, with the lungs' changes of volume emphasised. */
 function writeFinding(element, text) {
   if (element.written === text) return;
   element.written = text;
@@ -133,7 +135,7 @@ function writeFinding(element, text) {
   }));
 }
 
-/** Bars of the lungs' volumes: grey for the earlier volume, then orange for a gain or hatched for a loss. */
+/** Bars that show the lungs' volumes: grey for the earlier volume, then orange for a gain or hatched for a loss. */
 class Holds {
   constructor(parent, { lungNames }) {
     this.rows = lungNames.map(() => {
@@ -156,7 +158,7 @@ class Holds {
    * posture, if there is one. */
   show({ lungNames }, held, before, most, heights, measured) {
     const full = 1.06 * Math.max(most, ...held, ...before.map((ml, lung) => ml * (1 + (measured?.[lungNames[lung]] ?? [0, 0]).reduce((sum, x) => sum + x, 0) / 100)));
-    const apart = heights.length === 2 && Math.abs(heights[0] - heights[1]) > 30; // mm
+    const apart = heights.length === 2 && Math.abs(heights[0] - heights[1]) > 30; // one lung is > 30 mm higher
     this.rows.forEach(({ who, percent, was, change, published, ml }, lung) => {
       const [from, to] = [before[lung], held[lung]];
       const place = (part, begin, end) => {

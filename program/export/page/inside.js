@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Read and show the content of the lungs: named points and meshes. They follow the weights and gains of their lung
-// with a displacement field of their own, [vertex][axis][mode].
+// Read and show the structures inside the lungs: named parts, which are points or meshes. A part moves with the weights
+// of the modes and the gains of its lung. The coefficients of its modes are `fields`, [vertex][axis][mode].
 
 const BALL_RADIUS = 4; // radius of the ball drawn at a point, mm
 
-/** Read the content of the lungs from the page, and sort points before meshes, so that each needs one draw call. */
+/** Read the parts inside the lungs from the page. Sort points before meshes, so that each kind needs one draw call. */
 function takeInside({ inside, modes: k, placeUnit, middle }) {
   const { vertices: n } = inside;
   inside.modes = k;
@@ -12,7 +12,7 @@ function takeInside({ inside, modes: k, placeUnit, middle }) {
     takeTensor('inside-parts', Uint32Array), takeTriangles('inside-triangles', inside.triangles)];
   const meshed = new Uint8Array(n);
   for (const corner of corners) meshed[corner] = 1;
-  of.forEach((part, i) => { meshed[i] ||= Number(inside.rigid.includes(part)); }); // keeps the vertices of rigid parts together
+  of.forEach((part, i) => { meshed[i] ||= Number(inside.rigid.includes(part)); }); // so that the vertices of a rigid part stay contiguous
   const order = Uint32Array.from({ length: n }, (_, i) => i).sort((a, b) => meshed[a] - meshed[b] || a - b);
   const rank = new Uint32Array(n);
   order.forEach((from, to) => { rank[from] = to; });
@@ -31,7 +31,7 @@ function takeInside({ inside, modes: k, placeUnit, middle }) {
   inside.normals = normalsOf(inside);
 }
 
-/** Return the vertices' unit normals in the reference state; 0 for points. */
+/** Return the unit normals of the vertices of meshes on the reference surface; 0 for points. */
 function normalsOf({ reference, vertices, corners }) {
   const normals = new Float32Array(3 * vertices);
   const at = (v) => [...reference.subarray(4 * v, 4 * v + 3)];
@@ -47,7 +47,7 @@ function normalsOf({ reference, vertices, corners }) {
   return normals;
 }
 
-/** Return the position of a vertex, mm, that follows the displacement field. */
+/** Return the position, mm, of a vertex displaced by the modes, as if no part were rigid. */
 function fieldPlace({ reference, fields, modes: k }, { weights, gains }, vertex) {
   return [0, 1, 2].map((axis) => {
     let sum = 0;
@@ -57,8 +57,9 @@ function fieldPlace({ reference, fields, modes: k }, { weights, gains }, vertex)
 }
 
 /** Return the rows of the rotation that maps old to new positions of points with the least sum of squared distances.
- * `h` is the 3 x 3 sum of old times new positions, each relative to the mean. The quaternion of the rotation is the
- * eigenvector of the largest eigenvalue of a symmetric matrix, found by power iteration as in runtime/rigid.c. */
+ * `h` is the 3 x 3 sum of outer products of old and new positions, each relative to the mean position. The quaternion
+ * of the rotation is the eigenvector of the largest eigenvalue of a symmetric matrix, found by power iteration as in
+ * runtime/rigid.c. */
 function rotationOf(h) {
   const m = [[h[0] + h[4] + h[8], h[5] - h[7], h[6] - h[2], h[1] - h[3]], [h[5] - h[7], h[0] - h[4] - h[8], h[1] + h[3], h[6] + h[2]],
     [h[6] - h[2], h[1] + h[3], h[4] - h[0] - h[8], h[5] + h[7]], [h[1] - h[3], h[6] + h[2], h[5] + h[7], h[8] - h[0] - h[4]]];
@@ -73,8 +74,8 @@ function rotationOf(h) {
     [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]];
 }
 
-/** Return the positions of the vertices of a part, mm. A rigid part follows the rigid motion closest to the
- * displacement field. */
+/** Return the positions of the vertices of one part inside the lungs, mm. A rigid part moves by the rigid motion
+ * closest to the displacements of its vertices by the modes. */
 function insidePlaces(inside, moment, part) {
   const members = inside.members[part];
   const to = members.map((vertex) => fieldPlace(inside, moment, vertex));
@@ -87,7 +88,7 @@ function insidePlaces(inside, moment, part) {
   return from.map((p) => rotation.map((row, axis) => after[axis] + row.reduce((sum, x, k) => sum + x * (p[k] - before[k]), 0)));
 }
 
-/** Return the position of a vertex of any part, mm. */
+/** Return the position of a vertex of a rigid or deformable part, mm. */
 function insidePlace(inside, moment, vertex) {
   return inside.rigid.includes(inside.part[vertex]) ? insidePlaces(inside, moment, inside.part[vertex])[vertex - inside.members[inside.part[vertex]][0]] : fieldPlace(inside, moment, vertex);
 }
@@ -116,11 +117,12 @@ function insideNearest(inside, part, moment, place) {
   return best;
 }
 
-/** Largest number of rows shown; a search by name finds other parts. */
+/** Largest number of rows in the table of parts; a search by name finds other parts. */
 const ROWS_SHOWN = 200;
 
-/** Table of the content. The row of a part has its position, its displacement, and a button that shows or hides its
- * name in the picture. `state.named` lists the parts with names in the picture; `redraw` requests a new picture. */
+/** Table of the parts inside the lungs. A row has a part's position, its displacement, and a button that shows or
+ * hides its name in the picture. `state.named` lists the parts with names in the picture; `redraw` requests a new
+ * picture. */
 class InsideTable {
   constructor(inside, state, redraw) {
     Object.assign(this, { inside, state, redraw, rows: [], pointed: -1, written: null });
@@ -157,7 +159,7 @@ class InsideTable {
     return { part, row, button, place, displacement };
   }
 
-  /** Show a part's name in the picture, or hide it. */
+  /** Toggle whether a part's name stays visible in the picture. */
   keep(part) {
     const { state } = this;
     state.named = state.named.includes(part) ? state.named.filter((p) => p !== part) : [...state.named, part];
@@ -186,7 +188,7 @@ class InsideTable {
   }
 }
 
-/** Names of parts over the picture, beside the parts. */
+/** Labels with the names of parts inside the lungs, placed over the picture next to the parts. */
 class InsideNames {
   constructor(parent) {
     Object.assign(this, { parent, plates: [] });

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Write the view to a link and read it back; save the picture as PNG.
+// Write the view (posture, volume, colours, camera, ...) to the URL and read it back. Save the picture as PNG.
 
-/** Fields of State that a link lists under `show` if they are true. */
+/** Fields of State whose names the URL lists under `show` if they are true. */
 const SHOWN = ['contours', 'ghost', 'arrows', 'wires', 'beside'];
 
 const round = (x, digits = 3) => String(Number(x.toFixed(digits)));
 
-/** Return the view as the text of a link; empty values are omitted. */
+/** Return the view as the fragment of a URL; empty values are omitted. */
 function linkOf(state) {
   const { camera } = state;
   const all = {
@@ -22,7 +22,7 @@ function linkOf(state) {
   return new URLSearchParams(Object.entries(all).filter(([, value]) => value !== '')).toString().replaceAll('%3A', ':').replaceAll('%2B', '%2b');
 }
 
-/** Set the view from the text of a link; ignore invalid values. */
+/** Set the view from the fragment of a URL; ignore invalid values. */
 function takeLink(text, state) {
   const link = new URLSearchParams(text.replace(/^#/, ''));
   const numbers = (name, separator = ':') => (link.get(name) ?? '').split(separator).filter((x) => x !== '').map(Number);
@@ -55,8 +55,8 @@ function takeLink(text, state) {
   state.probes = numbers('probes', '.').filter((v) => Number.isInteger(v) && v >= 0 && v < state.basis.vertices).slice(0, 8);
 }
 
-/** Return the picture and its texts as a PNG blob. `draw` is called first, because the canvas keeps its pixels only
- * until the end of the frame. */
+/** Return the picture with title, `lines` of text, colour bar and labels as a PNG blob. `draw` is called first,
+ * because the canvas keeps its pixels only until the end of the frame. */
 function savePicture(canvas, draw, title, lines, range, colours, labels) {
   draw();
   const ratio = canvas.width / canvas.clientWidth;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Place labels over the picture: the ends of the body's axes, probes, and names.
+// Place labels over the picture: letters at the ends of the body's axes, marked vertices, and names of structures.
 
 /** Return the position on the canvas, CSS pixels, of a point in the patient's axes, mm; null if it is behind the
  * viewer. `ratio` is the number of pixels of the canvas for each CSS pixel. */
@@ -20,11 +20,11 @@ const placed = (element, at, shown) => {
   if (shown) element.style.transform = where;
 };
 
-const LETTER_RADIUS = 12; // radius of a letter and the space around it, CSS pixels
+const LETTER_RADIUS = 12; // radius of a letter with the space around it, CSS pixels
 const ARROW_RADIUS = 13;  // radius of the head of gravity's arrow, CSS pixels
 
-/** Return the position of a letter. If it would overlap a plate, which covers a part of the picture, move it up, down,
- * right or left, by the shortest way that stays in the picture. */
+/** Return the position of a letter, moved off a plate: a box, such as the colour bar, that covers a part of the
+ * picture. Of the moves up, down, right and left that stay in the picture, take the shortest. */
 function offPlate(at, plate, box) {
   const r = LETTER_RADIUS;
   if (at.x < plate.left - r || at.x > plate.right + r || at.y < plate.top - r || at.y > plate.bottom + r) return at;
@@ -34,8 +34,7 @@ function offPlate(at, plate, box) {
   return candidates.reduce((best, place) => (far(place) < far(best) ? place : best), candidates[0] ?? at);
 }
 
-/** Return the position of a letter. If the letter would overlap the arrow [from, to], move it to the side of the arrow.
- */
+/** Return the position of a letter, moved to the side of the arrow [from, to] if it would overlap the arrow. */
 function offArrow(at, [from, to], box) {
   const [dx, dy] = [to.x - from.x, to.y - from.y];
   const along = Math.max(0, Math.min(1, ((at.x - from.x) * dx + (at.y - from.y) * dy) / Math.max(dx * dx + dy * dy, 1e-9)));
@@ -49,8 +48,8 @@ function offArrow(at, [from, to], box) {
   return inside(beside(side)) ? beside(side) : beside(-side);
 }
 
-/** The letters L, R, A, P, H and F around the lungs of each pane. They stay in the picture, off the plates and the
- * arrow, and are hidden on axes that point towards the viewer or away. */
+/** The letters L, R, A, P, H and F around the lungs in each pane of the picture. They avoid the plates (boxes over the
+ * picture) and the arrow of gravity. They are hidden on axes that point towards the viewer or away. */
 class Letters {
   constructor(parent, panes) {
     this.sets = Array.from({ length: panes }, () => Object.keys(ENDS).map((letter) => {
@@ -63,21 +62,22 @@ class Letters {
     }));
   }
 
-  show(panes, { centre, half }, ratio, plates) { // half: half of each edge of the lungs' box, mm
+  show(panes, { centre, half }, ratio, plates) { // half: half of each edge of the lungs' bounding box, mm
     this.sets.forEach((set, i) => {
       const pane = panes[i];
       const middle = pane && project(pane, centre, ratio);
       const box = pane && { left: pane.box[0] / ratio, right: (pane.box[0] + pane.box[2]) / ratio, top: 0, bottom: pane.canvasHeight / ratio };
       const arrow = pane?.arrowEnds.map((end) => project(pane, end, ratio));
       Object.values(ENDS).forEach((end, j) => {
-        const beyond = pane && dot(end, pane.gravity) > 0.8 ? 0.95 : 0.26; // the letter along gravity is beyond the arrow
+        // distance of the letter from the lungs' box, in units of its longest half edge; larger beyond gravity's arrow
+        const beyond = pane && dot(end, pane.gravity) > 0.8 ? 0.95 : 0.26;
         let at = middle && project(pane, centre.map((c, k) => c + end[k] * (half[k] + beyond * Math.max(...half))), ratio);
         const far = at && Math.hypot(at.x - middle.x, at.y - middle.y) > 0.16 * Math.min(pane.box[2], pane.box[3]) / ratio;
-        if (at) { // clamp to the picture
+        if (at) { // keep the letter in the picture, and off plates and arrow
           at.x = Math.max(box.left + 15, Math.min(box.right - 15, at.x));
           at.y = Math.max(15, Math.min(box.bottom - 15, at.y));
           const off = () => { for (const plate of plates) at = offPlate(at, plate, box); };
-          off(); // once more below, because offArrow may move the letter onto a plate
+          off(); // again below, because offArrow may move the letter onto a plate
           if (arrow[0] && arrow[1]) at = offArrow(at, arrow, box);
           off();
         }
@@ -88,7 +88,6 @@ class Letters {
   }
 }
 
-/** Return the vertex nearest to a position. */
 function nearestVertex(basis, xyz, place) {
   let best = -1;
   let least = Infinity;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Show the states that the server of this page sends by WebSocket. If the user asks for it, send the tilt of this
-// device to the server.
+// Show the states of the lungs that the server of this page sends by WebSocket. If the user clicks a button, send the
+// tilt of this device to the server.
 
 window.supineLive = (() => {
   const said = document.createElement('p');
@@ -25,12 +25,13 @@ window.supineLive = (() => {
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 
-  /** Rotate the orientation q (x, y, z, w) by the least angle such that gravity gets the direction `gravity`. */
+  /** Return the quaternion q of the patient's orientation (x, y, z, w), rotated by the least angle that makes gravity,
+   * in the patient's axes, point along `gravity`. */
   function turned(q, gravity) {
     const now = window.supine.gravityOf(q);
     let [axis, w] = [cross(gravity, now), 1 + dot(gravity, now)];
-    if (w < 1e-9) [axis, w] = [Math.abs(now[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0], 0]; // opposite directions: turn about the long axis
-    const u = cross(q, axis); // part of the quaternion product q * (axis, w)
+    if (w < 1e-9) [axis, w] = [Math.abs(now[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0], 0]; // opposite directions: turn by 180 degrees about z or x
+    const u = cross(q, axis); // term of the quaternion product q * (axis, w)
     const product = [0, 1, 2].map((i) => q[3] * axis[i] + w * q[i] + u[i]);
     const all = [...product, q[3] * w - dot(q, axis)];
     const length = Math.hypot(...all);

@@ -2,8 +2,8 @@
 // Draw the outlines of the lungs in an axial and a coronal plane, over the outlines in the state from which
 // displacements are measured. Gravity points down in the pictures unless it is nearly normal to the plane.
 
-/** Return the closed lines along which the surface crosses the plane at `at` mm on an axis. A line is a list of
- * points [u, v] on the other two axes, mm; it stays open if it meets a hole of the surface. */
+/** Return the lines along which the surface crosses the plane at `at` mm on an axis. A line is a list of points [u, v]
+ * on the other two axes, mm. It is closed unless it meets a hole of the surface. */
 function linesAcross({ corners, vertices }, places, axis, at) {
   const [first, second] = [0, 1, 2].filter((i) => i !== axis);
   const links = new Map(); // for each edge that crosses the plane, the edges that share a triangle with it
@@ -36,16 +36,17 @@ function linesAcross({ corners, vertices }, places, axis, at) {
   return lines;
 }
 
-/** The two planes. `axis` is normal to the plane; `sign` is 1 if the plane's second axis points down in the picture,
- * -1 if it points up; `ends` are the letters at the ends of the plane's axes. A drag in the picture of one plane
- * moves the other plane. */
+/** The two section planes. A drag in the picture of one plane moves the other plane.
+ *     axis  index of the axis normal to the plane
+ *     sign  1 if the plane's second axis points down in the picture, -1 if it points up
+ *     ends  letters at the ends of the plane's axes */
 const PLANES = [
   { name: 'axial', axis: 2, sign: 1, ends: { L: [1, 0], R: [-1, 0], P: [0, 1], A: [0, -1] } },
   { name: 'coronal', axis: 1, sign: -1, ends: { L: [1, 0], R: [-1, 0], H: [0, 1], F: [0, -1] } },
 ];
 
 class Outlines {
-  /** Make the canvases. `redraw` requests a new drawing. */
+  /** Make a canvas for each plane. `redraw` requests a new drawing. */
   constructor(parent, basis, state, redraw) {
     Object.assign(this, { basis, state, kept: {} });
     this.canvases = PLANES.map((plane, i) => {
@@ -69,10 +70,10 @@ class Outlines {
       parent.append(canvas);
       return canvas;
     });
-    this.across = [[0, 1], [0, 1]]; // unit vector on each canvas along the plane's second axis
+    this.across = [[0, 1], [0, 1]]; // for each plane, its second axis as a unit vector on the canvas (x right, y down)
   }
 
-  /** Return the position of a plane as text. */
+  /** Return the position of plane `i` of PLANES as text. */
   placeWords(i) {
     const { state: { slices, body } } = this;
     return i === 0 ? `axial, ${(body.high[2] - slices[0]).toFixed(0)} mm from the apex` : `coronal, ${(slices[1] - body.low[1]).toFixed(0)} mm from the front`;
@@ -106,7 +107,8 @@ class Outlines {
     const { scale } = this;
     const along = [gravity[others[0]], sign * gravity[others[1]]];
     const size = Math.hypot(...along);
-    const [a, b] = size < 0.3 ? [0, 1] : along.map((x) => x / size); // unit vector in the plane that points down in the picture
+    // direction in the plane that is drawn downwards: gravity, unless it is nearly normal to the plane
+    const [a, b] = size < 0.3 ? [0, 1] : along.map((x) => x / size);
     const turned = (u, v) => [u * b - sign * v * a, u * a + sign * v * b];
     const place = ([u, v]) => {
       const [x, y] = turned(u - middle[0], v - middle[1]);
@@ -133,7 +135,7 @@ class Outlines {
     path(before);
     context.stroke();
     context.setLineDash([]);
-    context.strokeStyle = css('--accent'); // line of the other plane
+    context.strokeStyle = css('--accent'); // line where the other section plane crosses this one
     context.globalAlpha = 0.8;
     context.beginPath();
     for (const side of [-1, 1]) context[side < 0 ? 'moveTo' : 'lineTo'](...place([middle[0] + side * body.half[0] * 1.12, slices[1 - i]]));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Connect the state, the picture and the controls of the page.
+// Connect the state of the page, the picture and the controls.
 
 const CHECKBOXES = [...SHOWN, 'inside']; // ids of checkboxes; each sets the field of State with the same name
 const VIEW_ANGLE = 0.5; // vertical field of view of the camera, radians
@@ -21,7 +21,7 @@ function boundsOf(places) {
   return { centre, low, high, half: low.map((x, i) => (high[i] - x) / 2), radius: radius || 1 };
 }
 
-/** Return the rotation that turns the direction -z to a unit vector. */
+/** Return the quaternion of a rotation that maps the direction -z, along which arrows point, to a unit vector. */
 function arrowTurn(direction) {
   const axis = cross([0, 0, -1], direction);
   const w = 1 - direction[2];
@@ -39,7 +39,7 @@ function start() {
   const basis = readBasis();
   const state = new State(basis);
   takeLink(location.hash, state);
-  state.measure(); // the link may have a larger volume
+  state.measure(); // the URL may have set a larger volume, which changes the ranges of the colour bar
   const canvas = $('picture');
   let picture = pictureOn(canvas, basis);
   const letters = new Letters($('letters'), 2);
@@ -51,16 +51,16 @@ function start() {
   let stale = true;     // whether the vertices are out of date
   let unseen = true;    // whether the picture is out of date: the next frame draws it
   let pointer = null;   // position of the pointer on the canvas, CSS pixels
-  let asked = true;     // whether the value under the pointer was requested since the pointer or the picture changed
-  let wanted = null;    // {at, then}: position of a click, and the callback for the result
-  let question = null;  // {pane, then} of the request that the graphics card is working on
+  let asked = true;     // whether the point under the pointer was requested since the pointer or the picture changed
+  let wanted = null;    // {at, then}: position of a click, CSS pixels, and the callback for the point found there
+  let question = null;  // {pane, then}: pane and callback of the request for a point that the graphics card works on
   let before = null;    // time of the last frame, ms; null if the last frame was not drawn
   let streak = 0;       // number of frames drawn without a pause
   let frameTime = NaN;  // smoothed time between frames, ms
-  let idle = null;      // timer that writes the link
+  let idle = null;      // timer that writes the view to the URL
   let panes = [];
   const marks = [];
-  let tabled = -Infinity; // time when the sentences and the table of the content were written, ms
+  let tabled = -Infinity; // time when the texts and the table of structures inside the lungs were last written, ms
 
   const ratio = () => canvas.width / Math.max(1, sizeOf(canvas).width);
   const blend = () => state.roomBlend * state.roomBlend * (3 - 2 * state.roomBlend);
@@ -69,7 +69,7 @@ function start() {
   const isDark = () => document.documentElement.dataset.theme === 'dark';
 
   /** Return the largest coordinate of the lungs along a direction, mm. If colours show heights, use all vertices,
-   * otherwise about 400, which are enough to place the arrow and the table. */
+   * otherwise about 400, which are enough to place gravity's arrow and the table under the patient. */
   function reachAlong(moment, towards) {
     const { surface, direction, coefficients, modes } = basis;
     const { weights, gains } = moment;
@@ -97,7 +97,7 @@ function start() {
     const pivot = state.camera.pivot ?? centre;
     const toRoom = compose(cameraTurn(), modelTurn(q));
     const away = rotate(toRoom, pivot);
-    const offset = [pan[0] - away[0], pan[1] - away[1] + 0.2 * radius * blend(), -away[2] - distance]; // raises the lungs, to show the table
+    const offset = [pan[0] - away[0], pan[1] - away[1] + 0.2 * radius * blend(), -away[2] - distance]; // 0.2: raises the lungs, to show the table
     const { gravity } = moment;
     const lowestAt = pane_lowest(name, moment);
     const tail = lowestAt - dot(gravity, centre) + 0.08 * radius;
@@ -115,12 +115,14 @@ function start() {
       arrowToEye: arrow, arrowEnds: [tail, tail + length].map((far) => centre.map((c, i) => c + gravity[i] * far)), gravity, lowest: lowestAt, measure: kind.measure, map: kind.map, range: state.range,
       pixel: (2 * tangent * distance * ratio()) / box[3], inside: state.inside, contours: state.contours, dark: isDark(), tint: rgb(theme.gravity), ink: [...rgb(theme.ink), 1], radius,
       opacity: state.opacity, wires: state.wires, ghost: state.ghost, arrows: state.arrows,
-      tableToEye, tableTint: [...rgb(theme.table), tableToEye && tableToEye[10] < 0 ? 1 : 0.25], // a table seen from below is translucent
+      tableToEye, tableTint: [...rgb(theme.table), tableToEye && tableToEye[10] < 0 ? 1 : 0.25], // the table is opaque from above, translucent from below
       cut: axis < 0 ? NO_CUT : [...[0, 1, 2].map((i) => (i === axis ? 1 : 0)), low[axis] + at * (high[axis] - low[axis])],
     };
   }
 
-  const depths = {}; // depths of the lowest point and of the table in each state, kept until its moment changes
+  const depths = {}; // results of pane_depth for the state 'now' and for the other posture, 'pinned'
+  /** Return the coordinate along gravity of the lowest point (`value`), and the normal and coordinate of the table
+   * under the patient, mm. Keep the result until the state changes. */
   function pane_depth(name, moment) {
     const { kind } = state;
     if (depths[name]?.moment !== moment || depths[name].kind !== kind) {
@@ -133,8 +135,8 @@ function start() {
   }
   const pane_lowest = (name, moment) => pane_depth(name, moment).value;
 
-  /** Return the matrix that maps the box of makeTable to the table of a posture, in the eye's axes; null if there is no
-   * table. The table tilts with the patient. */
+  /** Return the matrix that maps the box of makeTable, in camera coordinates, to the table under the patient; null if
+   * the posture has no table. The table tilts with the patient. */
   function pane_table(name, moment, toRoom, offset) {
     const { down, table } = pane_depth(name, moment);
     if (!down) return null;
@@ -152,16 +154,16 @@ function start() {
     return [makePane('pinned', state.pinned, state.pinnedQ, [0, 0, half, h]), makePane('now', state.moment, state.q, [half, 0, w - half, h])];
   }
 
-  /** Return the pane at a position on the canvas, CSS pixels, and the coordinates x and y of the position in the pane,
-   * -1 to 1. */
+  /** Return the pane (the view of one state) at a position on the canvas, CSS pixels, and the coordinates x and y of
+   * the position in the pane, -1 to 1. */
   function paneAt({ x, y }) {
     const [px, py] = [x * ratio(), canvas.height - y * ratio()];
     const pane = panes.find(({ box }) => px >= box[0] && px < box[0] + box[2]) ?? panes[0];
     return { pane, x: (2 * (px - pane.box[0])) / pane.box[2] - 1, y: (2 * (py - pane.box[1])) / pane.box[3] - 1 };
   }
 
-  /** Show what is under the pointer if the graphics card has answered, and ask again if the picture or the pointer
-   * has changed since the last question. */
+  /** Show the point under the pointer if the graphics card has found it. Request it again if the picture or the pointer
+   * has changed since the last request. */
   function point() {
     const found = picture.picked();
     if (found) found.pane = question.pane;
@@ -199,8 +201,9 @@ function start() {
     $('needle').style.left = `${100 * Math.min(1, Math.max(0, (found.value - range.begin) / (range.end - range.begin)))}%`;
   }
 
-  /* Probes: marked vertices. */
+  /** Return the state from which displacements are measured. */
   const originMoment = () => (state.kind === 'difference' ? state.pinned : state.from);
+  /** Return the value that the colour at a marked vertex shows; null if it has none. */
   function probeValue(vertex) {
     const at = placeOf(basis, state.moment, vertex);
     if (state.kind === 'height') return pane_lowest('now', state.moment) - dot(state.gravity, at);
@@ -252,12 +255,11 @@ function start() {
     $('probes-clear').hidden = state.probes.length === 0;
   }
 
-  /* Content of the lungs: a table, and names in the picture. */
   const insideTable = inside && new InsideTable(inside, state, redraw);
   const insideNames = new InsideNames($('letters'));
 
-  /** Return the position of the content's vertex nearest to the pointer and its displacement, mm, and the value that
-   * its colour shows. */
+  /** Return the position and displacement, mm, of the vertex nearest to the position `at` in a part inside the lungs,
+   * and the value that its colour shows. */
   function insideAt({ part, at, pane }) {
     const moment = pane === 'pinned' ? state.pinned : state.moment;
     const vertex = insideNearest(inside, part, moment, at);
@@ -278,7 +280,7 @@ function start() {
     }));
   }
 
-  /** Request what is at a position on the canvas, CSS pixels; `then` receives the result of picked(). */
+  /** Request the point at a position on the canvas, CSS pixels; `then` receives the result of Picture.picked(). */
   function ask(at, then) {
     pointer = at;
     wanted = { at, then };
@@ -302,8 +304,8 @@ function start() {
   const holds = new Holds($('holds'), basis);
   const outlines = new Outlines($('outlines'), basis, state, () => { described = null; redraw(); });
 
-  let answered = { depth: null }; // volume above rest of the answers on the cards, and the largest volume of a lung, mL
-  /** Write the changes in each posture on its card. */
+  let answered = { depth: null }; // volume above rest for which the posture cards were written; largest volume of a lung, mL
+  /** Write the changes of the lungs' volumes and the displacement in each posture on its card. */
   function answerCards() {
     if (answered.depth === state.depth) return;
     answered = { depth: state.depth, most: 0 };
@@ -317,8 +319,9 @@ function start() {
   /** Return the height of the middle of each lung, against gravity, mm. */
   const lungHeights = (gravity) => basis.lungMiddles.map((middle) => -dot(gravity, middle));
 
-  let described = null; // the moment that the sentences describe, and the stride of the vertices that they use
-  /** Write the sentences, bars and outlines, with displacements over every `stride`th vertex. */
+  let described = null; // state of the lungs that the texts describe, and the stride of the vertices used
+  /** Write the texts, volume bars and outlines that describe the state of the lungs. Statistics of the displacement use
+   * every `stride`th vertex. */
   function tellFinding(stride) {
     if (described?.moment === state.moment && described.stride <= stride) return;
     described = { moment: state.moment, stride };
@@ -343,8 +346,8 @@ function start() {
   const volumeWords = () => (Math.round(state.depth) ? `${restOrScan} + ${amount(state.depth)}` : restOrScan); // for example "rest + 500 mL"
 
   const last = {};
-  /** Call act(value) if a value differs from the last one, which `last` stores because reading it from the page is
-   * slower. */
+  /** Call act(value) if `value` has changed since the last call for the same name `what`. `last` stores the values,
+   * because reading them from the page is slower. */
   const changed = (what, value, act) => {
     if (last[what] === value) return;
     last[what] = value;
@@ -411,7 +414,6 @@ function start() {
     for (const { icon, posture } of buttons) drawIcon(icon, tilted(posture.q, posture.tilt));
   }
 
-  /** Mark the vertices and the picture as out of date. */
   const touch = () => { stale = unseen = true; };
 
   function frame(now) {
@@ -440,7 +442,7 @@ function start() {
       deform();
     }
     if (state.moment) draw();
-    if (state.moment && now - tabled > 250) { // writing in every frame of a breath would be slow
+    if (state.moment && now - tabled > 250) { // to write texts in every frame of a breath would be slow
       if (inside) insideTable.show(state.moment, originMoment());
       tellFinding(Math.ceil(basis.vertices / 3000));
       tabled = now;
@@ -457,7 +459,7 @@ function start() {
     idle = setTimeout(keepLink, 400);
   }
 
-  let kept = null; // the Picture or Poster that has deformed the state `from`
+  let kept = null; // the Picture or Poster that stores the lungs in the state `from`
   function deform() {
     if (!state.moment) return;
     if (kept !== picture) {
@@ -468,7 +470,7 @@ function start() {
     if (state.kind === 'difference' || state.beside) picture.deform('pinned', state.pinned);
   }
 
-  let covers = null; // boxes of the legend and the ball, CSS pixels, measured when their sizes change
+  let covers = null; // boxes of colour bar and gravity ball over the picture, CSS pixels; null to measure them again
   const covered = new ResizeObserver(() => { covers = null; redraw(); });
   for (const plate of ['legend', 'ball']) covered.observe($(plate));
   function plates() {
@@ -504,25 +506,26 @@ function start() {
     try {
       history.replaceState(null, '', `#${linkOf(state)}`);
     } catch {
-      // Some browsers refuse to change the address of a page from disk.
+      // Some browsers refuse to change the URL of a page that was opened from a file.
     }
   }
 
-  /* The camera. */
+  /** Turn the camera about the lungs by angles, radians. */
   const orbit = (dx, dy) => {
     state.camera.azimuth += dx;
     state.camera.elevation = Math.max(-RIGHT_ANGLE, Math.min(RIGHT_ANGLE, state.camera.elevation + dy));
     redraw();
   };
   const boxSize = () => ({ width: sizeOf(canvas).width / (state.beside ? 2 : 1), height: sizeOf(canvas).height });
-  const shift = (dx, dy) => { // distances in CSS pixels
+  /** Shift the picture by distances in CSS pixels. */
+  const shift = (dx, dy) => {
     const { width, height } = boxSize();
     const mm = (2 * tangent * distanceNow(width / height)) / height;
     state.camera.pan = [state.camera.pan[0] + dx * mm, state.camera.pan[1] - dy * mm];
     redraw();
   };
-  /** Zoom by a ratio. The point that is seen at the position `at` on the canvas, at the depth of the pivot, does not
-   * move. */
+  /** Zoom by a ratio. What is seen at the position `at` on the canvas, CSS pixels, stays there if it is as far away as
+   * the pivot of the camera. */
   const zoom = (ratioOfSizes, at) => {
     const { width, height } = boxSize();
     const aspect = width / height;
@@ -574,12 +577,13 @@ function start() {
     if (arrow) event.preventDefault();
   });
   const lookFrom = (letter) => {
-    const [x, y, z] = rotate(modelTurn(state.goal), ENDS[letter]).map((part) => Math.round(1e9 * part) / 1e9); // direction to the viewer in the room
+    const [x, y, z] = rotate(modelTurn(state.goal), ENDS[letter]).map((part) => Math.round(1e9 * part) / 1e9); // direction to the viewer, in the room's axes
     Object.assign(state.camera, { azimuth: Math.atan2(0 - x, 0 - y), elevation: Math.asin(Math.max(-1, Math.min(1, z))), pan: [0, 0] });
     redraw();
   };
 
-  /* The ball: a drag turns the patient or, if the patient is still, gravity. */
+  /** Turn the patient (or gravity, if the view is fixed to the patient) by a drag of the gravity ball, angles in
+   * radians. */
   const spin = (dx, dy) => {
     const sense = state.room ? 1 : -1;
     for (const [axis, angle] of [[[0, 1, 0], dx], [[1, 0, 0], dy]]) {
@@ -597,7 +601,7 @@ function start() {
     spin(arrow[0] * step, arrow[1] * step);
   });
 
-  /* The panel. */
+  /** Update the ranges and the colour bar after a change of the volume. */
   const remeasure = () => { state.measure(); showLegend(); };
   const slide = (id, act) => onSlider(id, (value) => { act(value); touch(); });
   slide('tilt', (value) => state.settle(state.standing.q, value, 0));
@@ -614,7 +618,7 @@ function start() {
     state.settle(found.q, found.tilt, 0.7);
     touch();
   });
-  $('posture-name').addEventListener('blur', () => { last.posture = null; redraw(); }); // writes the posture again: the typed text may be invalid
+  $('posture-name').addEventListener('blur', () => { last.posture = null; redraw(); }); // replaces a typed text that may be invalid
   const play = () => {
     state.playing = !state.playing;
     remeasure();
@@ -761,14 +765,15 @@ function start() {
   return {
     get picture() { return picture; },
     panes: () => panes,
-    /** Return the positions that the graphics card computes, xyz of each vertex, mm LPS. */
+    /** Return the positions of the vertices, computed by the graphics card, mm LPS. */
     positions: (gravity, volume) => picture.read(momentFor(basis, unit(gravity), volume))[0],
-    /** Return the unit normals that the graphics card computes, xyz of each vertex. */
+    /** Return the unit normals of the vertices, computed by the graphics card. */
     normals: (gravity, volume) => picture.read(momentFor(basis, unit(gravity), volume))[1],
-    /** Return the positions of the content that the graphics card computes, mm LPS, in the order of takeInside. */
+    /** Return the positions of the vertices of structures inside the lungs, computed by the graphics card, mm LPS. They
+     * are in the order of basis.inside: points first, then meshes. */
     insidePositions: (gravity, volume) => picture.readInside(momentFor(basis, unit(gravity), volume)),
     moment: (gravity, volume) => momentFor(basis, unit(gravity), volume),
-    /** Run the part of a frame that does not use the graphics card. */
+    /** Do the work of one frame that does not use the graphics card. */
     frameScript: () => { state.compute(); panes = makePanes(); letters.show(panes, state.body, ratio(), plates()); showState(); },
     findingOf, linesAcross, placesOf, rangeEnd, tickStep, postureText, postureFrom, gravityOf, picturePng, basis, state, touch,
   };
@@ -784,7 +789,6 @@ function pictureOn(canvas, basis) {
   }
 }
 
-/** List facts about the basis on the page. */
 function showFacts(basis) {
   const { metadata } = basis;
   const facts = [

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Write what is under the pointer: the value with the index of the lung in its lowest 4 bits, and the position.
+// Write which point of the surface is under the pointer: the value that its colour shows, with the index of the lung
+// in the lowest 4 bits, and the position, mm LPS.
 in vec3 eye;
 in vec3 facing;
 in vec3 body;

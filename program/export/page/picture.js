@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Draw with WebGL 2. For each gravity and volume, one pass over the vertices stores positions and normals on the
-// graphics card by transform feedback; a change of the camera needs no such pass.
+// Draw with WebGL 2. For each state of the lungs (gravity and volume), one pass over the vertices stores positions and
+// normals on the graphics card by transform feedback. A change of the camera needs no such pass.
 
 const source = (id) => document.getElementById(id).textContent;
 
@@ -37,7 +37,8 @@ class Picture {
     return [`#define SUPINE_LUNGS ${basis.lungs}`, `#define SUPINE_VECTORS ${Math.ceil(basis.modes / 4)}`, `#define SUPINE_WORDS ${Math.max(1, basis.words)}`, source('supine.glsl')];
   }
 
-  /** Return the shader that deforms the surface. The attributes from location 6 on are the words of the normals. */
+  /** Return the shader that deforms the surface. The attributes from location 6 on hold packed vectors, of which a
+   * weighted sum is the normal. */
   library() {
     const all = Array.from({ length: this.basis.words }, (_, j) => j);
     return [...this.sized(), source('vertex.vert.glsl'),
@@ -45,8 +46,8 @@ class Picture {
       `vec3 turned_by_words() { return ${all.map((j) => `supine_normal(reference, ${j}, n${j})`).join(' + ') || 'vec3(0.0)'}; }`].join('\n');
   }
 
-  /** Return the shader that deforms the content. Each attribute from location 1 on has the coefficients for one axis
-   * and four modes. */
+  /** Return the shader that deforms the structures inside the lungs. Each attribute from location 1 on has the
+   * coefficients for one axis and four modes. */
   insideLibrary() {
     const vectors = Math.ceil(this.basis.modes / 4);
     const all = [0, 1, 2].flatMap((axis) => Array.from({ length: vectors }, (_, j) => ({ axis, j, name: `c${axis}_${j}` })));
@@ -105,9 +106,9 @@ class Picture {
     return made;
   }
 
-  /** Make the inputs of vertex.vert.glsl for all vertices, and for the few vertices that have arrows: reference
-   * position and lung, direction, up to 16 coefficients, and the words of the normals. Missing coefficients read as (0,
-   * 0, 0, 1), but their weights are 0. */
+  /** Make the inputs of vertex.vert.glsl, for all vertices and for the few vertices that have arrows: reference
+   * position and lung, direction, up to 16 coefficients, and packed vectors for the normals. If there are fewer
+   * coefficients, the shader reads the others as (0, 0, 0, 1), but their weights are 0. */
   makeInputs() {
     const { basis } = this;
     const k = basis.modes;
@@ -128,7 +129,8 @@ class Picture {
     this.fewInputs = inputs(few(reference, 4), few(basis.direction, 3), few(basis.coefficients, k), few(basis.normals, 3 * words));
   }
 
-  /** Make the programs and buffers of the content: coefficients, a ball, and meshes. */
+  /** Make the shader programs and buffers of the structures inside the lungs: their vertices, and a ball that is drawn
+   * at each point. */
   makeInside() {
     const { gl, basis: { inside, modes: k } } = this;
     this.insideMoving = this.program('inside.vert.glsl', null, ['moved'], this.insideLibrary());
@@ -167,7 +169,7 @@ class Picture {
   makeOutputs() {
     const { gl, basis } = this;
     this.indices = this.buffer(basis.corners, gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER);
-    this.unread = this.buffer(16 * basis.vertices, gl.DYNAMIC_COPY); // receives the arrows' normals, which are unused
+    this.unread = this.buffer(16 * basis.vertices, gl.DYNAMIC_COPY); // receives the normals of vertices with arrows, which are not used
     this.edges = null;
     this.states = {};
     this.arrays = {};
@@ -180,7 +182,7 @@ class Picture {
     return this.states[name];
   }
 
-  /** Return the vertex array that draws the state `name`, with displacements from the state `origin`. */
+  /** Return the vertex array that draws the stored state `name`, with displacements from the stored state `origin`. */
   shown(name, origin) {
     const { gl } = this;
     const key = `${name} ${origin}`;
@@ -192,7 +194,7 @@ class Picture {
   }
 
   /** Make the list of edges as pairs of vertices, lung by lung. The two triangles at an edge of a closed surface
-   * follow it in opposite directions; only the direction towards the larger index is listed. */
+   * contain it in opposite directions; only the pair with the larger index last is listed. */
   makeEdges() {
     const { gl, basis } = this;
     const { corners } = basis;
@@ -212,7 +214,7 @@ class Picture {
     this.edges = { buffer: this.buffer(pairs.subarray(0, count), gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER), begin: [...begin, count] };
   }
 
-  /** Make the framebuffer to which picking draws: one pixel that holds the bits of four floats. */
+  /** Make the framebuffer to which pick() draws the point under the pointer: one pixel with the bits of four floats. */
   makePick() {
     const { gl } = this;
     this.picking = null;
@@ -272,7 +274,8 @@ class Picture {
     return this.array([[this.buffer(new Float32Array(places)), 3, 12, 0], [this.buffer(new Float32Array(normals)), 3, 12, 0]]);
   }
 
-  /** Store what the program `moving` computes for `count` vertices of `array` in the buffers `targets`. */
+  /** Run the shader program `moving` on the `count` vertices of the vertex array `array`, for the state `moment` of the
+   * lungs, and store its outputs in the buffers `targets`. */
   capture(moment, array, targets, count, moving = this.moving) {
     const { gl } = this;
     gl.useProgram(moving.program);
@@ -294,7 +297,8 @@ class Picture {
     gl.bindVertexArray(null);
   }
 
-  /** Deform the surface and the content to a moment, and store both under the name `name`. */
+  /** Deform the surface and the structures inside the lungs to the state `moment`, and store both under the name
+   * `name`. */
   deform(name, moment) {
     const { moved, turned, few, inside } = this.state(name);
     this.capture(moment, this.inputs, [moved, turned], this.basis.vertices);
@@ -302,8 +306,8 @@ class Picture {
     if (inside) this.captureInside(moment, inside);
   }
 
-  /** Deform the content by its displacement field; then overwrite the rigid parts, whose motion depends on all
-   * vertices of a part. */
+  /** Deform the structures inside the lungs by the modes. Then overwrite the rigid ones, which the shader cannot move,
+   * because the motion of a vertex depends on all vertices of its structure. */
   captureInside(moment, target) {
     const { gl, basis: { inside } } = this;
     this.capture(moment, this.insideInputs, [target], inside.vertices, this.insideMoving);
@@ -312,7 +316,8 @@ class Picture {
     gl.bindBuffer(gl.ARRAY_BUFFER, null);
   }
 
-  /** Return the uniforms of a moment. The last result is kept for the next call. */
+  /** Return the uniforms of the deforming shaders for the state `moment` of the lungs. Keep the last result for the
+   * next call. */
   uniforms(moment) {
     if (this.uniformsMoment !== moment) {
       this.uniformsMoment = moment;
@@ -321,7 +326,8 @@ class Picture {
     return this.uniformsNow;
   }
 
-  /** Read back the positions, mm LPS, and unit normals of a moment, xyz of each vertex. */
+  /** Deform the surface to the state `moment`, and read back the positions, mm LPS, and unit normals of its vertices.
+   * */
   read(moment) {
     const { gl, basis } = this;
     const targets = [0, 1].map(() => this.buffer(16 * basis.vertices, gl.DYNAMIC_READ));
@@ -329,7 +335,8 @@ class Picture {
     return targets.map((target) => this.take(target, basis.vertices));
   }
 
-  /** Read back the positions of the content in a moment, mm LPS. */
+  /** Deform the structures inside the lungs to the state `moment`, and read back the positions of their vertices, mm
+   * LPS. */
   readInside(moment) {
     const { gl, basis: { inside } } = this;
     const target = this.buffer(16 * inside.vertices, gl.DYNAMIC_READ);
@@ -337,7 +344,7 @@ class Picture {
     return this.take(target, inside.vertices);
   }
 
-  /** Read the first three of every four floats of a buffer, and delete the buffer. */
+  /** Return the first three of every four floats of a buffer on the graphics card, and delete the buffer. */
   take(target, count) {
     const { gl } = this;
     const four = new Float32Array(4 * count);
@@ -347,7 +354,8 @@ class Picture {
     return new Float32Array(3 * count).map((_, i) => four[4 * Math.floor(i / 3) + (i % 3)]);
   }
 
-  /** Use a program for a pane of the picture, and set its uniforms. `lens` is described in surface.vert.glsl. */
+  /** Use a shader program for a pane of the picture, and set its uniforms. `lens` is the part of the pane to draw: x
+   * and y of its centre, -1 to 1, and magnifications in x and y. */
   usePane(program, pane, lens) {
     const { gl } = this;
     gl.useProgram(program.program);
@@ -375,7 +383,8 @@ class Picture {
     set('spacing', pane.contours ? pane.range.step : 0);
     set('dark', pane.dark ? 1 : 0);
     set('flatly', 0);
-    /** Draw the lungs in the state from which displacements are measured: as a shell (1) or as an outline (2). */
+    /** Draw the lungs in the state from which displacements are measured: a translucent shell (1) or its outline (2).
+     * */
     const ghost = (how) => {
       if (!pane.ghost) return;
       gl.bindVertexArray(this.shown('from', 'from'));
@@ -413,7 +422,8 @@ class Picture {
     ghost(2);
   }
 
-  /** Draw the content, balls of radius `radius`, mm, and meshes, by a program that usePane has set up. */
+  /** Draw the structures inside the lungs with a shader program that usePane has set up: meshes, and points as balls of
+   * radius `radius`, mm. */
   drawInside(program, pane, radius) {
     const { gl, basis: { inside } } = this;
     const [now, from] = [this.state(pane.state).inside, this.state(pane.origin).inside];
@@ -435,16 +445,17 @@ class Picture {
     }
   }
 
-  /** Draw the content in the colours of the lungs, or in grey if colours show expansion, which points do not have. */
+  /** Draw the structures inside the lungs in the colours of the lungs. If colours show expansion, draw them in grey,
+   * because points have no area. */
   drawContent(pane) {
     const { gl, content } = this;
     this.usePane(content, pane, [0, 0, 1, 1]);
     gl.bindTexture(gl.TEXTURE_2D, pane.measure === 1 ? this.plainMap : this.maps[pane.map]);
-    gl.uniform4fv(content.at.cut, NO_CUT); // the cut opens the lungs to show the content
+    gl.uniform4fv(content.at.cut, NO_CUT); // only the lungs are cut
     gl.uniform2f(content.at.range, pane.range.begin, pane.range.end);
     gl.uniform1f(content.at.dark, pane.dark ? 1 : 0);
     gl.uniform1f(content.at.opacity, 1);
-    this.drawInside(content, pane, Math.max(BALL_RADIUS, 4 * pane.pixel)); // balls of at least 4 pixels
+    this.drawInside(content, pane, Math.max(BALL_RADIUS, 4 * pane.pixel)); // radius of at least 4 pixels
   }
 
   /** Draw arrows that show displacements at some vertices. */
@@ -456,7 +467,7 @@ class Picture {
     this.usePane(solid, pane);
     gl.uniform1f(solid.at.thick, pane.radius * 0.09);
     gl.bindVertexArray(this.arrays[key]);
-    for (const [order, alpha] of [[gl.GREATER, 0.35], [gl.LEQUAL, 1]]) { // faint where the surface hides them
+    for (const [order, alpha] of [[gl.GREATER, 0.35], [gl.LEQUAL, 1]]) { // draw arrows faint where the surface hides them
       gl.depthFunc(order);
       gl.depthMask(order === gl.LEQUAL);
       gl.uniform4fv(solid.at.tint, [...pane.ink.slice(0, 3), alpha]);
@@ -491,7 +502,7 @@ class Picture {
     gl.drawArrays(gl.TRIANGLES, 0, 36);
   }
 
-  /** Draw panes on a framebuffer, or on the canvas if it is null. */
+  /** Draw panes (views of the lungs) to a framebuffer, or to the canvas if it is null. */
   draw(panes, framebuffer = null) {
     const { gl } = this;
     this.beginTiming();
@@ -505,7 +516,7 @@ class Picture {
       gl.viewport(...pane.box);
       gl.depthFunc(gl.LEQUAL);
       if (pane.tableToEye) this.drawTable(pane);
-      if (pane.inside) this.drawContent(pane); // first, because translucent lungs are blended over it
+      if (pane.inside) this.drawContent(pane); // before the lungs, which may be translucent
       gl.bindTexture(gl.TEXTURE_2D, this.maps[pane.map]);
       this.drawLungs(pane);
       if (pane.arrows) this.drawArrows(pane);
@@ -517,13 +528,13 @@ class Picture {
     this.endTiming();
   }
 
-  /** Ask what is at the position (x, y) in a pane, both from -1 to 1. The method picked() has the answer a frame or two
-   * later, so that no frame waits for it. */
+  /** Request the point that is seen at the position (x, y) in a pane, both from -1 to 1. The method picked() returns it
+   * a frame or two later, so that no frame waits for it. */
   pick(pane, x, y) {
     const { gl } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.pickPlace);
     gl.viewport(0, 0, 1, 1);
-    gl.clearBufferuiv(gl.COLOR, 0, [0x7fc00000, 0, 0, 0]); // a NaN whose part is 0 means that nothing is there
+    gl.clearBufferuiv(gl.COLOR, 0, [0x7fc00000, 0, 0, 0]); // NaN with low bits 0: nothing is seen
     gl.clearBufferfv(gl.DEPTH, 0, [1]);
     gl.enable(gl.DEPTH_TEST);
     this.usePane(this.picker, pane, [x, y, pane.box[2], pane.box[3]]);
@@ -534,7 +545,7 @@ class Picture {
       if (opacity > 0) this.drawLung(lung, gl.TRIANGLES);
     });
     if (pane.inside) {
-      gl.clearBufferfv(gl.DEPTH, 0, [1]); // translucent lungs do not hide the content
+      gl.clearBufferfv(gl.DEPTH, 0, [1]); // so that translucent lungs hide nothing inside them
       gl.colorMask(false, false, false, false);
       pane.opacity.forEach((opacity, lung) => { if (opacity === 1) this.drawLung(lung, gl.TRIANGLES); });
       gl.colorMask(true, true, true, true);
@@ -550,8 +561,10 @@ class Picture {
     gl.flush();
   }
 
-  /** Return the answer to pick(): {value, at, lung} on the surface, {part, at} on the content, null if nothing is
-   * there, or undefined if the answer has not arrived. `at` is the position, mm LPS. */
+  /** Return the point that pick() requested: null if nothing is seen there, undefined if the graphics card has not
+   * finished. `at` is its position, mm LPS. A point on the surface is {value, at, lung}, where `value` is the number
+   * that its colour shows. A point on a structure inside the lungs is {part, at}, where `part` is the structure's
+   * index. */
   picked() {
     const { gl } = this;
     if (!this.picking || gl.getSyncParameter(this.picking, gl.SYNC_STATUS) !== gl.SIGNALED) return undefined;

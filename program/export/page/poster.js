@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // If WebGL 2 is missing, draw the surface on a 2-D canvas, farthest triangles first. Unlike Picture, a Poster has no
-// shading, lines, arrows, content or picking.
+// shading, lines, arrows, structures inside the lungs or picking.
 
 class Poster {
   constructor(canvas, basis) {
@@ -54,7 +54,7 @@ class Poster {
       for (let i = 0; i < 3; ++i) context[i ? 'lineTo' : 'moveTo'](screen[3 * corners[t + i]], screen[3 * corners[t + i] + 1]);
       context.closePath();
       context.fill();
-      context.stroke(); // closes the gaps between neighbours
+      context.stroke(); // closes the gaps between neighbouring triangles
     }
   }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Shade the arrows and the table in one colour.
+// Shade arrows, or the table under the patient, in one colour.
 in vec3 facing;
 in vec3 body;
 uniform vec4 tint;

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Project the arrow of gravity, the table, or the arrows of displacements. `position` is on an arrow of length 1 from
-// the origin along -z, or on the table's box.
+// Project the arrow of gravity, the table under the patient, or the arrows that show displacements. `position` is on
+// an arrow of length 1 from the origin along -z, or on the table, a box from -1 to 1 along each axis.
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
-layout(location = 2) in vec3 tail;     // start of each arrow, mm
-layout(location = 3) in vec3 head;     // end of each arrow, mm
+layout(location = 2) in vec3 tail;     // start of each arrow of a displacement, mm
+layout(location = 3) in vec3 head;     // end of each arrow of a displacement, mm
 uniform mat4 toEye;
 uniform mat4 projection;
-uniform float thick; // largest width of an arrow from tail to head, mm; 0 for solids that toEye alone places
+uniform float thick; // largest width of the arrow of a displacement, mm; 0 for gravity's arrow and the table
 out vec3 facing;
 out vec3 body;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Compute with vectors, quaternions [x, y, z, w] and column-major 4 x 4 matrices.
+// Calculate with vectors, quaternions [x, y, z, w] and column-major 4 x 4 matrices.
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Keep the state of the page: posture, breath, colours, camera. A posture is a rotation from the patient's axes to a
-// room whose z points up. It determines gravity in the patient's axes.
+// Store the state of the page: posture, breath, colours, camera. A posture is a rotation from the patient's axes to
+// the axes of a room whose z axis points up. It determines the direction of gravity in the patient's axes.
 
 const RIGHT_ANGLE = Math.PI / 2;
 const LYING = compose(turn([0, 0, 1], RIGHT_ANGLE), turn([1, 0, 0], -RIGHT_ANGLE)); // supine
@@ -22,8 +22,8 @@ const gravityOf = (q) => rotate(inverse(q), [0, 0, -1]);
 const near = (a, b) => dot(a, b) > Math.cos(0.004);
 const NAMED = [...POSTURES.slice(0, 5), INVERTED].map((p) => ({ name: p.name, gravity: gravityOf(p.q) }));
 
-/** Return a direction of gravity in the notation of --posture: a name, a name with a tilt in degrees, or three
- * numbers. */
+/** Return a direction of gravity as text, in the notation of --posture: a name, a name with a tilt in degrees, or
+ * three numbers. */
 function postureText(gravity) {
   const named = NAMED.find((p) => near(p.gravity, gravity));
   if (named) return named.name;
@@ -36,10 +36,11 @@ function postureText(gravity) {
   return gravity.map((x) => x.toFixed(2).replace('-0.00', '0.00')).join(':');
 }
 
-/** Return a direction of gravity like postureText, but "left side" instead of "left". */
+/** Return a direction of gravity as text: like postureText, but "left side" instead of "left". */
 const postureWords = (gravity) => postureText(gravity).replace(/^(left|right)$/, '$1 side');
 
-/** Return {q, tilt} of a posture in the notation of --posture, or null if the text is not valid. */
+/** Return a posture from a text in the notation of --posture, or null if the text is not valid. {q, tilt} are the
+ * quaternion of the posture without its tilt, and the tilt, degrees. */
 function postureFrom(text) {
   const word = text.trim().replaceAll('\u2212', '-');
   const numbers = word.split(/[:,]/).map((part) => (part.trim() === '' ? NaN : Number(part)));
@@ -59,14 +60,14 @@ const FADED = 0.35; // opacity of translucent lungs
 
 const FIRST_CAMERA = { azimuth: -0.4, elevation: 0.16, zoom: 1, pan: [0, 0], pivot: null };
 
-/** Names of the views. Each key is the letter of the end of the axis that points to the viewer. */
+/** Names of the views. The key is the direction of the body that faces the viewer, such as A for anterior. */
 const VIEWS = { A: 'From the front', P: 'From the back', L: 'From the left', R: 'From the right', H: 'From the head', F: 'From the feet' };
 
 class State {
   constructor(basis) {
     this.basis = basis;
     this.standing = { q: POSTURES[2].q, tilt: 0 }; // chosen posture; tilt in degrees
-    this.q = POSTURES[2].q;                        // rotation shown, on its way to the chosen posture
+    this.q = POSTURES[2].q;                        // rotation shown in this frame of the turn to the chosen posture
     this.turning = null;
     this.tidal = basis.breathVolume;
     this.depth = 0;
@@ -81,17 +82,17 @@ class State {
     this.arrows = false;
     this.wires = false;
     this.beside = false;                           // whether the other posture is shown beside the chosen one
-    this.inside = Boolean(basis.inside);           // whether the content is shown
-    this.named = [];                               // parts of the content whose names are kept in the picture
+    this.inside = Boolean(basis.inside);           // whether structures inside the lungs are shown
+    this.named = [];                               // structures inside the lungs whose names stay visible
     this.opacity = Array(basis.lungs).fill(basis.inside ? FADED : 1);
-    this.cut = { axis: -1, at: 0.5 };              // plane of the cut: its axis, or -1 for no cut, and its position as a fraction of the lungs' extent
-    this.ownRanges = {};                           // ranges of the colours that the user typed: {begin, end} by kind
+    this.cut = { axis: -1, at: 0.5 };              // cutting plane: axis, or -1 for no cut; position as a fraction of the lungs' extent
+    this.ownRanges = {};                           // for each of KINDS, the range {begin, end} of the colour bar if the user typed one
     this.probes = [];                              // marked vertices
     this.room = true;
-    this.roomBlend = 1; // 0: the patient is still; 1: the room is still
+    this.roomBlend = 1; // 0: the view is fixed to the patient; 1: to the room; in between during the change
     this.camera = { ...FIRST_CAMERA };
     this.moment = null;
-    this.from = basis.from;                        // weights and gains from which displacements are measured
+    this.from = basis.from;                        // state of the lungs from which displacements are measured
     this.measure();
     this.slices = [this.body.high[2] - 80, (this.body.low[1] + this.body.high[1]) / 2]; // z of the axial and y of the coronal plane, mm
   }
@@ -104,7 +105,7 @@ class State {
     return tilted(this.standing.q, this.standing.tilt);
   }
 
-  /** Go to a posture, animated unless the user prefers reduced motion. */
+  /** Turn to a posture in `seconds`; at once if the user prefers reduced motion. */
   settle(q, tilt, seconds) {
     this.standing = { q, tilt };
     const still = seconds === 0 || matchMedia('(prefers-reduced-motion: reduce)').matches;
@@ -142,7 +143,8 @@ class State {
     return this.kind === 'difference' || this.beside;
   }
 
-  /** Compute the lungs' state `moment`. If the surface would fold, keep the old moment and return false. */
+  /** Compute the lungs' state for the current gravity and volume. If the surface would fold, keep the previous state
+   * and return false. */
   compute() {
     const moment = momentFor(this.basis, this.gravity, this.depth);
     if (moment.folds) return false;
@@ -154,8 +156,8 @@ class State {
     return true;
   }
 
-  /** Range of the colours: the range that the user typed, or one that contains 95 % of the surface in each of POSTURES
-   * at the largest volume in use. */
+  /** Range of values of the colour bar: the range that the user typed, or one that contains 95 % of the surface in
+   * each of POSTURES at the largest volume in use. */
   get range() {
     const own = this.ownRanges[this.kind];
     if (!own) return this.ranges[this.kind];
@@ -195,7 +197,7 @@ class State {
     this.ranges = Object.fromEntries(Object.keys(found).map((kind) => {
       const value = Math.max(...found[kind], 0);
       const end = rangeEnd(value > 1e-3 ? value : 0);
-      const begin = kind === 'expansion' ? -end : 0; // shrinkage has the same range as growth
+      const begin = kind === 'expansion' ? -end : 0; // -end: shrinkage of the area has the same range as growth
       return [kind, { begin, end, step: tickStep(end - begin), beyond: most[kind] > end, most: most[kind] }];
     }));
     this.body = boundsOf(all.flat());

@@ -5,10 +5,10 @@ in vec3 facing;
 in vec3 body;
 in float value;
 uniform sampler2D colours;
-uniform vec2 range;    // values at the ends of the colours
+uniform vec2 range;    // values at the two ends of the colour bar
 uniform float spacing; // difference of the value between contour lines; 0 for no lines
 uniform float dark;    // 1 on a dark background
-uniform vec4 cut;      // plane of the cut: the side dot(body, xyz) > w is not drawn
+uniform vec4 cut;      // cutting plane: points p in body axes with dot(p, xyz) > w, mm, are not drawn
 uniform float opacity;
 uniform float ghost;   // 0: surface in colours; 1: translucent shell; 2: only the outline of the shell
 uniform float flatly;  // 1 for colours without shading (the wireframe)
@@ -33,10 +33,10 @@ void main() {
     colour = vec4(mix(base, base * 0.7, 1.0 - dark), 1.0);
     return;
   }
-  if (!gl_FrontFacing && cut.w < 1e9) base = mix(base, vec3(0.55), 0.55); // the inner side, seen through the cut
+  if (!gl_FrontFacing && cut.w < 1e9) base = mix(base, vec3(0.55), 0.55); // inner side, visible through the cut: greyish
   vec3 key = normalize(vec3(-0.45, 0.65, 0.75));
   vec3 fill = normalize(vec3(0.8, -0.1, 0.45));
-  // Darker outlines show the shape.
+  // Shade with two lights, and darken the silhouette, to show the shape.
   float diffuse = 0.93 + 0.06 * max(dot(n, key), 0.0) + 0.02 * max(dot(n, fill), 0.0);
   vec3 lit = base * diffuse * (1.0 - 0.5 * pow(edge, 7.0));
   colour = vec4(clamp(lit, 0.0, 1.0) * opacity, opacity);

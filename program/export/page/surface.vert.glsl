@@ -3,10 +3,10 @@
 layout(location = 0) in vec3 moved;
 layout(location = 1) in vec4 turned; // unit normal; w: area relative to the reference surface
 layout(location = 2) in vec3 origin; // position from which displacements are measured
-layout(location = 3) in vec4 before; // `turned` in the state of `origin`
+layout(location = 3) in vec4 before; // `turned` in the state from which displacements are measured
 uniform mat4 toEye;
 uniform mat4 projection;
-uniform vec4 lens;    // part of the picture to draw: x and y of its centre, -1 to 1, and magnifications in x and y
+uniform vec4 lens;    // part of the picture to draw: x and y of its centre, -1 to 1; magnifications in x and y
 uniform int kind;     // meaning of `value`: 0 distance from `origin`, mm; 1 growth of the area, %; 2 height, mm
 uniform vec4 gravity; // unit vector; w: coordinate of the lowest point along gravity, mm
 out vec3 eye;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Show the lungs in a headset, at life size, if the browser has WebXR.
+// Show the lungs at life size in a virtual-reality headset, if the browser has WebXR.
 
 const XR_AWAY = 0.7; // distance of the lungs from the viewer's first position, m
 
@@ -10,7 +10,8 @@ const product = (a, b) => Float32Array.from({ length: 16 }, (_, i) => {
   return sum;
 });
 
-/** Return a pane as one eye of the headset sees it: in front of the viewer, in metres instead of millimetres. */
+/** Return a copy of a pane (a view to draw) for one eye of the headset: in front of the viewer, in metres instead of
+ * millimetres. */
 function xrPane(pane, view, { x, y, width, height }) {
   const room = Float32Array.from([1e-3, 0, 0, 0, 0, 1e-3, 0, 0, 0, 0, 1e-3, 0, 0, 0, 1e-3 * pane.distance - XR_AWAY, 1]);
   const toEye = product(view.transform.inverse.matrix, room);
@@ -20,8 +21,9 @@ function xrPane(pane, view, { x, y, width, height }) {
   };
 }
 
-/** If the browser supports a headset, show `button`, which starts and ends a session. frame(time) advances the state
- * and returns the pane to draw, or null. over() is called after a session. */
+/** If the browser supports a headset, show `button`, which starts and ends a session. getPicture() returns the Picture
+ * that draws. frame(time) advances the state and returns the pane (the view) to draw, or null if there is none yet.
+ * over() is called after a session. */
 async function offerXr(button, getPicture, frame, over) {
   if (!(await navigator.xr?.isSessionSupported('immersive-vr').catch(() => false))) return;
   button.hidden = false;
