@@ -302,9 +302,8 @@ TEST(test_read_every_truncation_refused) {
                  {"STRING", "VOLUME", 34, {0, 3, 0, 30}}};
   for (size_t i = 0; i < sizeof content / sizeof *content; ++i) {
     for (size_t size = 0; size < content[i].whole; ++size) {
-      /* One byte more than the body, because `size` may be 0. A sanitizer sees reads beyond this
-       * byte. */
-      unsigned char *body = fixture_allocate(size + 1, 1);
+      /* Of the exact size, so that a sanitizer sees any read beyond it. */
+      unsigned char *body = fixture_allocate(size > 0 ? size : 1, 1);
       unsigned char *end = body + size;
       memcpy(body, content[i].begin, size < 8 ? size : 8);
       supine_stream_header header =
