@@ -311,8 +311,8 @@ static void measure_lungs(supine_basis *basis) {
   }
 }
 
-/* Set the volume of the reference surface of each lung, mL. Files of 'supine embed' lack this
- * surface: read the volume from their metadata. Otherwise, measure the volume. */
+/* Set the volume of the reference surface of each lung, mL. Measure the volume, unless the file was
+ * made by 'supine embed': such a file lacks this surface and has the volume in its metadata. */
 static supine_status check_reference(const check *c, supine_basis *basis) {
   basis->info.reference_volume = basis->reference_volume;
   if (!basis->info.has_volume) {
@@ -326,8 +326,8 @@ static supine_status check_reference(const check *c, supine_basis *basis) {
   return read_numbers(c, "reference_volume_ml", basis->info.lung_count, basis->reference_volume);
 }
 
-/* Read the metadata on the state of the scan and on full inflation. A file without them counts as
- * scanned in the posture supine, at the volume of the reference surface. */
+/* Read the metadata about the state in the scan and at full inflation. A file without them counts
+ * as scanned in the posture supine, at the volume of the reference surface. */
 static supine_status check_scan(const check *c, supine_basis *basis) {
   const char *volume = supine_safetensors_metadata(c->file, "scan_volume_ml");
   const char *scanned = supine_safetensors_metadata(c->file, "scanned");
@@ -353,7 +353,8 @@ static supine_status check_scan(const check *c, supine_basis *basis) {
                    "metadata 'bend' requires a tensor 'resting_volume' with a row for each lung");
 }
 
-/* Check the optional tensor 'resting_volume', which has one row, or a row for each lung. */
+/* Check the optional tensor 'resting_volume': spherical-harmonic coefficients of the volume at
+ * rest, for each lung or for all lungs together. */
 static supine_status check_rest(const check *c, supine_basis *basis) {
   const supine_tensor *tensor = supine_safetensors_find(c->file, "resting_volume");
   if (tensor == NULL) {
@@ -393,8 +394,8 @@ static supine_status check_normals(const check *c, supine_basis *basis) {
   return info->normal_weights != NULL ? SUPINE_OK : SUPINE_ERROR_FORMAT;
 }
 
-/* Choose the kernels and pack the tensors. For SUPINE_STORAGE_AUTO, choose the smallest storage
- * whose error is at most error_limit_mm. */
+/* Choose the instruction set, and pack the tensors for evaluation. For SUPINE_STORAGE_AUTO, choose
+ * the smallest storage whose position error is at most error_limit_mm. */
 static supine_status prepare(const check *c, supine_basis *basis,
                              const supine_basis_options *options) {
   static const double error_limit_mm = 0.005;

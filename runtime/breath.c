@@ -5,9 +5,9 @@
 
 #include <supine/breath.h>
 
-/* Number of equal parts into which integration divides a limb's range of pressures. Over one part,
- * the compliance changes by a factor of at most e^16, so that a Gauss-Legendre rule of 16 points is
- * accurate to 1e-15. */
+/* Number of equal intervals of pressure for the integration of a pressure-volume limb. Over one
+ * interval, the compliance changes by a factor of at most e^16, so that a Gauss-Legendre rule of 16
+ * points is accurate to 1e-15. */
 enum { LIMB_PARTS = 32 };
 
 typedef struct integrated {
@@ -107,8 +107,8 @@ static double limb_volume(const integrated *of, double pressure, double *complia
   return curve->volume[0] + gain * (of->sum[part] + within);
 }
 
-/* Find the pressure, cmH2O, at which a limb has the volume `volume`, mL, within the range of the
- * limb. At the pressure found, the volume is accurate to 1e-11 of this range.
+/* Find the pressure, cmH2O, at which a P-V limb has a volume, mL, in its range. At the pressure
+ * found, the volume is accurate to 1e-11 of this range.
  * @retval SUPINE_ERROR_NUMERICAL  no pressure was found */
 static supine_status limb_pressure(const integrated *of, double volume, double *pressure) {
   enum { STEPS_MAX = 200 };
@@ -170,8 +170,8 @@ supine_status supine_breath_curve_evaluate(const supine_pv_curve *curve, size_t 
 
 const supine_pv *supine_breath_normal(void) {
   static const supine_pv normal = {
-      /* Inhale limb from 0 to 6000 mL. Its control parameters are fitted to the sigmoid
-       * a + b / (1 + exp(-(P - 10) / 6)) of the pressure P, cmH2O. */
+      /* Inhale limb: range of pressures, cmH2O, range of volumes, mL, and control parameters, which
+       * are fitted to the sigmoid a + b / (1 + exp(-(P - 10) / 6)) of the pressure P. */
       {{{0.0, 30.0},
         {0.0, 6000.0},
         {-0.697448914, -2.22791741, 0.470886417, 0.269525392, -0.132010658}},
@@ -210,8 +210,8 @@ static supine_status breath_check(const supine_pv_breath *breath, supine_error *
   return SUPINE_OK;
 }
 
-/* Write the limb that a breath follows at `time`, s. Return a number that rises linearly in time
- * from 0 at rest to 1 at the peak of the breath, and then falls linearly to 0. */
+/* Write whether the breath inhales or exhales at `time`, s. Return a number that rises linearly in
+ * time from 0 at rest to 1 at the peak of the breath, and then falls linearly to 0. */
 static double breath_share(const supine_pv_breath *breath, double time, supine_pv_limb *limb) {
   const double turns = time * (breath->rate / 60.0);
   const double phase = turns - floor(turns);
@@ -230,7 +230,8 @@ typedef struct loop {
   double gain[SUPINE_PV_LIMB_COUNT];   /* volume that each limb gains from rest to the peak, mL */
 } loop;
 
-/* Check both limbs, and check that the pressure, which messages call `what`, is in their ranges. */
+/* Check both limbs (inhale and exhale) of a pressure-volume relation, and that each contains the
+ * pressure, cmH2O, which messages call `what`. */
 static supine_status limb_holds(const supine_pv *pv, const char *what, double pressure,
                                 supine_error *error) {
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {

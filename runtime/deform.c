@@ -1,19 +1,20 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute deformed positions. Call the kernel once for all consecutive whole tiles of a lung. */
+/* Compute deformed positions. One call of a kernel evaluates many tiles of 16 vertices. */
 #include <string.h>
 
 #include "runtime/rigid.h"
 
-/* Write the factors that a kernel takes for one lung: for each mode, the weight times
- * supine_basis.mode_scale, and then the three gains of the lung.
- * @param folded  [modes + 3], written */
-static void fold(const supine_basis *basis, const supine_pose *pose, size_t lung, float *folded) {
+/* Compute the numbers by which a kernel multiplies packed numbers of a lung: for each mode, the
+ * weight times the quantisation steps (supine_basis.mode_scale), and then the three gains of the
+ * lung.
+ * @param scales  [modes + 3], written */
+static void weigh(const supine_basis *basis, const supine_pose *pose, size_t lung, float *scales) {
   const size_t modes = basis->info.mode_count;
   for (size_t k = 0; k < modes; ++k) {
-    folded[k] = (float)(pose->weights[k] * basis->mode_scale[k]);
+    scales[k] = (float)(pose->weights[k] * basis->mode_scale[k]);
   }
   for (size_t axis = 0; axis < 3; ++axis) {
-    folded[modes + axis] = (float)pose->gains[lung][axis];
+    scales[modes + axis] = (float)pose->gains[lung][axis];
   }
 }
 
@@ -24,27 +25,27 @@ supine_target supine_target_after(const supine_target *target, size_t count) {
 }
 
 /* Evaluate one tile into a buffer, and copy the vertices begin <= i < end of this tile. */
-static void deform_part(supine_deform_tiles *kernel, const supine_tiles *tiles, const float *folded,
+static void deform_part(supine_deform_tiles *kernel, const supine_tiles *tiles, const float *scales,
                         size_t begin, size_t end, const supine_target *target) {
   float aside[TILE_NUMBERS];
   const supine_target whole = {.xyz = aside, .add_reference = target->add_reference};
-  kernel(tiles, folded, begin / TILE, 1, &whole);
+  kernel(tiles, scales, begin / TILE, 1, &whole);
   memcpy(target->xyz, aside + 3 * (begin % TILE), 3 * (end - begin) * sizeof *aside);
 }
 
-void supine_deform_lung(supine_deform_tiles *kernel, const supine_tiles *tiles, const float *folded,
+void supine_deform_lung(supine_deform_tiles *kernel, const supine_tiles *tiles, const float *scales,
                         size_t begin, size_t end, const supine_target *target) {
   size_t at = begin;
   while (at < end) {
     const supine_target here = supine_target_after(target, at - begin);
     const size_t whole = at % TILE == 0 ? (end - at) / TILE : 0;
     if (whole > 0) {
-      kernel(tiles, folded, at / TILE, whole, &here);
+      kernel(tiles, scales, at / TILE, whole, &here);
       at += whole * TILE;
     } else {
       const size_t next = (at / TILE + 1) * TILE;
       const size_t last = next < end ? next : end;
-      deform_part(kernel, tiles, folded, at, last, &here);
+      deform_part(kernel, tiles, scales, at, last, &here);
       at = last;
     }
   }
@@ -52,7 +53,8 @@ void supine_deform_lung(supine_deform_tiles *kernel, const supine_tiles *tiles, 
 
 enum { RIGID_BLOCK = 256 };
 
-/* Move the vertices begin <= i < end of rigid parts by the rigid motion of each part (rigid.h). */
+/* Overwrite those of vertices begin <= i < end that belong to rigid parts: apply the rigid motion
+ * of each part (rigid.h). */
 static void deform_rigid(const supine_basis *basis, const supine_pose *pose, size_t begin,
                          size_t end, const supine_target *target) {
   for (size_t part = 0; part < basis->rigid_count; ++part) {
@@ -62,17 +64,17 @@ static void deform_rigid(const supine_basis *basis, const supine_pose *pose, siz
     if (first >= end || last <= begin) {
       continue;
     }
-    float folded[SUPINE_MODES_MAX + 3];
+    float scales[SUPINE_MODES_MAX + 3];
     size_t lung = 0;
     while (first >= basis->lung_begin[lung + 1]) {
       ++lung;
     }
-    fold(basis, pose, lung, folded);
+    weigh(basis, pose, lung, scales);
     for (size_t at = first; at < last; at += RIGID_BLOCK) {
       float x[3 * RIGID_BLOCK];
       const size_t next = last - at < RIGID_BLOCK ? last : at + RIGID_BLOCK;
       const supine_target block = {.xyz = x, .add_reference = true};
-      supine_deform_lung(basis->kernels->deform, &basis->tiles, folded, at, next, &block);
+      supine_deform_lung(basis->kernels->deform, &basis->tiles, scales, at, next, &block);
       supine_rigid_add(&m, basis->info.vertices + 3 * at, x, next - at);
     }
     supine_rigid_finish(&m);
@@ -90,14 +92,14 @@ static void deform_rigid(const supine_basis *basis, const supine_pose *pose, siz
 /* Evaluate vertices begin <= i < end of all lungs as if no part were rigid. */
 static void deform_lungs(const supine_basis *basis, const supine_pose *pose, size_t begin,
                          size_t end, const supine_target *target) {
-  float folded[SUPINE_MODES_MAX + 3];
+  float scales[SUPINE_MODES_MAX + 3];
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     const size_t first = basis->lung_begin[lung] > begin ? basis->lung_begin[lung] : begin;
     const size_t last = basis->lung_begin[lung + 1] < end ? basis->lung_begin[lung + 1] : end;
     if (first < last) {
       const supine_target here = supine_target_after(target, first - begin);
-      fold(basis, pose, lung, folded);
-      supine_deform_lung(basis->kernels->deform, &basis->tiles, folded, first, last, &here);
+      weigh(basis, pose, lung, scales);
+      supine_deform_lung(basis->kernels->deform, &basis->tiles, scales, first, last, &here);
     }
   }
 }
@@ -122,7 +124,7 @@ void supine_deform(const supine_basis *basis, const supine_pose *pose, float *xy
 
 void supine_deform_batch(const supine_basis *basis, size_t count, const supine_pose *poses,
                          size_t begin, size_t end, float *xyz) {
-  enum { BLOCK_BYTES = 1 << 18 }; /* number of bytes of tiles, few enough to stay in the cache */
+  enum { BLOCK_BYTES = 1 << 18 }; /* bytes of packed vertices, few enough for the cache */
   const size_t block = BLOCK_BYTES / basis->tiles.stride * TILE;
   const size_t apart = 3 * (end - begin);
   supine_target target = {.add_reference = true,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Bound the error that storage and rounding cause in positions, mm. */
+/* Bound the error that quantisation and rounding cause in positions, mm. */
 #include <math.h>
 
 #include "runtime/internal.h"
@@ -42,8 +42,8 @@ static double largest_displacement(const supine_basis *basis, const supine_pose 
 }
 
 double supine_basis_storage_error(const supine_basis *basis) {
-  static const double volume = 500;  /* volume above that of the reference surface, mL */
-  static const double distance = 20; /* open surfaces are scaled to this largest displacement, mm */
+  static const double volume = 500;  /* volume minus that of the reference surface, mL */
+  static const double distance = 20; /* largest displacement if the surface is open, mm */
   double worst = 0;
   for (int number = 0; number < 27; ++number) {
     supine_pose pose;

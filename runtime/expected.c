@@ -6,7 +6,7 @@
 
 #include "runtime/expected.h"
 
-/* Standard deviation of an assumed volume at rest, divided by the reference volume. */
+/* Standard deviation of an assumed volume at rest, as a fraction of the reference volume. */
 static const double resting_spread = 0.05;
 const double supine_expected_shift = 0.01;
 
@@ -53,7 +53,7 @@ static bool rest_is_assumed(const supine_basis *basis) {
          (state == NULL || strstr(state, "rest") == NULL);
 }
 
-/* Return whether a state gives the volume of all lungs or of one lung relative to rest. */
+/* Return whether the volume of a state, of all lungs or of one lung, is relative to rest. */
 static bool counts_from_rest(const supine_state *state) {
   bool rest = state->lung_count == 0 && (state->volume.kind == SUPINE_VOLUME_REST ||
                                          state->volume.kind == SUPINE_VOLUME_DEFAULT);
@@ -77,12 +77,14 @@ supine_status supine_expected_shifted(const supine_basis *basis, const supine_st
   return supine_basis_pose(basis, &shifted, pose, error);
 }
 
-/* Poses of a state (`at`), and of the state from which displacements are measured (`from`). If the
- * volume of such a state is relative to an assumed rest, `fuller_at` or `fuller_from` is its pose
- * with 1 % of the reference volume added. Otherwise, it equals `at` or `from`. */
+/* Poses from which the expected errors of a state are computed. */
 typedef struct poses {
-  supine_pose at, from, fuller_at, fuller_from;
-  bool assumed; /* the volume of `at` or `from` is relative to an assumed rest */
+  supine_pose at;   /* state whose errors are computed */
+  supine_pose from; /* state whose positions count as exact */
+  /* Both states with 1 % of the reference volume added if their volume is relative to an assumed
+   * volume at rest; otherwise unchanged. */
+  supine_pose fuller_at, fuller_from;
+  bool assumed; /* whether `fuller_at` or `fuller_from` differs from `at` or `from` */
 } poses;
 
 static supine_status find_poses(const supine_basis *basis, const supine_state *state,

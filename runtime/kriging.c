@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Fit the model of kriging.h to the residuals of observed points. */
+/* Fit translation, volume, rotation and a random field to the residuals of observed points. */
 #include <math.h>
 #include <string.h>
 
@@ -56,8 +56,9 @@ size_t supine_kriging_space(size_t count) {
   return count * (count + SUPINE_KRIGING_COLUMNS + 3);
 }
 
-/* Return the column of supine_kriging.whitened that a term multiplies on an axis. Write the sign of
- * this product, or 0 if the term changes no coordinate on this axis. */
+/* Return the column of supine_kriging.whitened by which a term (0 to 2: translation, 3: volume, 4
+ * to 6: rotation) is multiplied in the residual on an axis. Write the sign of this product, or 0 if
+ * the term does not change this coordinate. */
 static int column_of(size_t term, size_t axis, double *sign) {
   *sign = 1;
   if (term < 3) {
@@ -72,7 +73,8 @@ static int column_of(size_t term, size_t axis, double *sign) {
   return PLACE + (int)((6 - about - axis) % 3);
 }
 
-/* Compute the centre of the points, and fill in supine_kriging.whitened. */
+/* Compute the mean position of the points. Fill in the regressors and residuals of
+ * supine_kriging.whitened, and multiply them by the inverse of the Cholesky factor. */
 static void whiten(supine_kriging *fit) {
   const size_t n = fit->count;
   memset(fit->centre, 0, sizeof fit->centre);
@@ -107,13 +109,18 @@ static bool is_known(const supine_kriging_options *options, size_t term) {
   return term == 3 ? !options->volume : term > 3 && !options->rotation;
 }
 
-/* Compute A and the right side of the normal equations of the terms t, b and r (kriging.h):
+/* Compute A and the right side of the normal equations of the terms translation, volume and
+ * rotation:
  *
  *     A = X' K^-1 X + P        right = X' K^-1 y + P m
  *
- * X has the columns that the terms multiply, K is the covariance of the points, and y are the
- * residuals. The prior has the inverse covariance P and the mean m. If a term is not fitted,
- * its row of A is a row of the identity. */
+ *     X  regressors of the terms, for each coordinate of each point
+ *     K  covariance matrix of the coordinates of the points
+ *     y  residuals
+ *     P  inverse covariance of the prior; only the volume has one
+ *     m  mean of the prior
+ *
+ * If a term is not fitted, its row of A is a row of the identity. */
 static void normal_equations(const supine_kriging *fit, const supine_kriging_options *options,
                              double a[TERMS * TERMS], double right[TERMS]) {
   const size_t n = fit->count;
@@ -239,8 +246,10 @@ supine_status supine_kriging_fit(const supine_kriging_options *options, size_t c
 }
 
 /* Compute the inverse covariance [3, 3] of the error of predicting one point from all others. It is
- * the block of this point in K^-1 - K^-1 X A^-1 X' K^-1 with K, X and A of normal_equations().
- * @param row  [count] column of L^-1 for this point, where L = fit->factor */
+ * the block of this point in K^-1 - K^-1 X C X' K^-1. K is the covariance matrix of the coordinates
+ * of all points, X holds the regressors of the fitted terms, and C is the covariance of these
+ * terms.
+ * @param row  [count] column of L^-1 for this point, where K = L L' on each axis */
 static void leave_out_block(const supine_kriging *fit, const double *row, double block[9]) {
   const size_t n = fit->count;
   double column[VALUE];

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Predict residuals and their variance at many points, in runs of RUN points. */
+/* Predict residuals and their variance at many points, in blocks of RUN points. */
 #include <math.h>
 #include <string.h>
 
@@ -7,11 +7,12 @@
 
 enum { RUN = 32, COLUMNS = SUPINE_KRIGING_TERMS };
 
-/* RUN points of a target, stored by axis. Copies of the last point fill the last run. */
+/* RUN consecutive points at which to predict, with an array for each axis. If points are missing in
+ * the last block, the last point is repeated. */
 typedef struct run {
   float place[3][RUN];  /* position minus supine_kriging.centre, mm */
   float volume[3][RUN]; /* displacement if the volume grows by one prior standard deviation, mm */
-  float root[RUN];      /* standard deviation of the random field on one axis, mm */
+  float root[RUN];      /* standard deviation of one coordinate of the random field, mm */
 } run;
 
 static void fill(const supine_kriging *fit, const supine_kriging_target *target, size_t begin,
@@ -29,9 +30,9 @@ static void fill(const supine_kriging *fit, const supine_kriging_target *target,
   }
 }
 
-/* Compute the covariances, mm^2, of the random field between each point of a run and observed point
- * j. exp(-a) of kriging.h is the 64th power of exp(-a / 64), which a polynomial of degree 5
- * approximates. The relative error is 1e-6. */
+/* Compute the covariances, mm^2, of one coordinate of the random field between observed point j and
+ * each of RUN points. The exponential function of the distance is computed as the 64th power of a
+ * polynomial of degree 5; the relative error is 1e-6. */
 static void covary(const supine_kriging *fit, size_t j, size_t lung, const run *in, float *out) {
   const supine_kriging_point *p = &fit->points[j];
   const double size = p->size > fit->model.least ? p->size : fit->model.least;
@@ -56,7 +57,7 @@ static void covary(const supine_kriging *fit, size_t j, size_t lung, const run *
   }
 }
 
-/* For each point v of a run, compute the sum over j < count of numbers[j] w[j][v]. */
+/* Compute the sum over j < count of numbers[j] w[j][v] for each point v of RUN points. */
 static void project(size_t count, float (*w)[RUN], const double *numbers, float *sum) {
   memset(sum, 0, RUN * sizeof *sum);
   for (size_t j = 0; j < count; ++j) {
@@ -67,8 +68,8 @@ static void project(size_t count, float (*w)[RUN], const double *numbers, float 
   }
 }
 
-/* For each point of a run, solve L w = k with the lower triangle L = fit->factor. k holds
- * the covariances of the random field between this point and the observed points. */
+/* For each of RUN points, solve L w = k. L is the Cholesky factor of the covariance matrix of the
+ * observed points. k holds the covariances between this point and the observed points. */
 static void solve(const supine_kriging *fit, size_t lung, const run *in, float (*w)[RUN]) {
   const size_t n = fit->count;
   for (size_t j = 0; j < n; ++j) {
@@ -88,13 +89,15 @@ static void solve(const supine_kriging *fit, size_t lung, const run *in, float (
   }
 }
 
-/* Compute the 3-D variance of the prediction at each point of a run, mm^2:
+/* Compute the variance of the prediction, summed over x, y and z, at each of RUN points, mm^2:
  *
  *     3 (k - w'w) + m' S m
  *
- * k is the variance of the random field on one axis, and w is the result of solve(). S is
- * supine_kriging.spread. m is the vector that S multiplies, minus the sum over all observed points
- * j of w[j] times column j of supine_kriging.whitened. */
+ *     k  variance of one coordinate of the random field
+ *     w  L^-1 times the covariances with the observed points (solve)
+ *     S  covariance of the errors of the fitted terms (supine_kriging.spread)
+ *     m  (1, volume [3], position - centre [3]) of this point, minus the weighted sum of the same
+ *        vectors of the observed points: w times the rows of supine_kriging.whitened */
 static void vary(const supine_kriging *fit, const run *in, float (*w)[RUN], float *variance) {
   float column[COLUMNS][RUN];
   for (size_t v = 0; v < RUN; ++v) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute the normals of a deformed surface as weighted sums of modes. */
+/* Compute the normals of a deformed surface as weighted sums of vectors of the file. */
 #include <string.h>
 
 #include "runtime/internal.h"
@@ -7,8 +7,8 @@
 #include "runtime/safetensors/platform.h"
 #include "sh/base/clones.h"
 
-/* Pack the modes of the normals of 16 vertices into a tile. row[v] are the modes of vertex v. */
-SUPINE_CLONES static void pack_tile(const supine_tiles *tiles, const int16_t *const row[TILE],
+/* Pack the vectors of the normals of 16 vertices. rows[v] points to those of vertex v, by axis. */
+SUPINE_CLONES static void pack_tile(const supine_tiles *tiles, const int16_t *const rows[TILE],
                                     unsigned char *to) {
   const size_t words = supine_tiles_normal_words(tiles->modes);
   for (size_t at = 0; at < 3 * words; ++at, to += TILE * sizeof(uint32_t)) {
@@ -18,7 +18,7 @@ SUPINE_CLONES static void pack_tile(const supine_tiles *tiles, const int16_t *co
     uint32_t packed[TILE];
     for (size_t which = 0; which < 3 && word + which * words < tiles->modes; ++which) {
       for (size_t v = 0; v < TILE; ++v) {
-        three[which][v] = row[v][axis * tiles->modes + word + which * words] * (1 / normal_unit());
+        three[which][v] = rows[v][axis * tiles->modes + word + which * words] * (1 / normal_unit());
       }
     }
     for (size_t v = 0; v < TILE; ++v) {
@@ -37,12 +37,12 @@ supine_status supine_basis_pack_normals(supine_basis *basis) {
     return SUPINE_ERROR_MEMORY;
   }
   for (size_t t = 0; t < tiles->count; ++t) {
-    const int16_t *row[TILE];
+    const int16_t *rows[TILE];
     for (size_t v = 0; v < TILE; ++v) {
       const size_t i = t * TILE + v < last ? t * TILE + v : last;
-      row[v] = basis->info.normals + 3 * tiles->modes * i;
+      rows[v] = basis->info.normals + 3 * tiles->modes * i;
     }
-    pack_tile(tiles, row, tiles->bytes + t * tiles->stride);
+    pack_tile(tiles, rows, tiles->bytes + t * tiles->stride);
   }
   return SUPINE_OK;
 }
@@ -93,12 +93,13 @@ void supine_basis_normal_weights(const supine_basis *basis, const supine_pose *p
   }
 }
 
-/* Compute the factors of one lung by which supine_kernels.light multiplies packed modes. */
-static void fold(const supine_basis *basis, size_t lung, const supine_pose *pose, float *folded) {
+/* Compute the numbers by which the kernel supine_kernels.light multiplies the packed vectors of the
+ * normals of a lung: the weights of the vectors times normal_unit(). */
+static void weigh(const supine_basis *basis, size_t lung, const supine_pose *pose, float *scales) {
   double v[SUPINE_NORMAL_MODES_MAX];
   lung_weights(basis, lung, pose, v);
   for (size_t j = 0; j < basis->info.normal_count; ++j) {
-    folded[j] = (float)(normal_unit() * v[j]);
+    scales[j] = (float)(normal_unit() * v[j]);
   }
 }
 
@@ -108,14 +109,14 @@ static void light(const supine_basis *basis, const supine_pose *pose, size_t beg
   const supine_target target = {.xyz = normals,
                                 .stream = stream,
                                 .prefetch = stream ? basis->prefetch : SUPINE_PREFETCH_NONE};
-  float folded[SUPINE_NORMAL_MODES_MAX + 2] = {0}; /* the factors of absent modes are 0 */
+  float scales[SUPINE_NORMAL_MODES_MAX + 2] = {0}; /* padded with 0 for absent vectors */
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     const size_t first = basis->lung_begin[lung] > begin ? basis->lung_begin[lung] : begin;
     const size_t last = basis->lung_begin[lung + 1] < end ? basis->lung_begin[lung + 1] : end;
     if (first < last) {
       const supine_target here = supine_target_after(&target, first - begin);
-      fold(basis, lung, pose, folded);
-      supine_deform_lung(basis->kernels->light, &basis->lit, folded, first, last, &here);
+      weigh(basis, lung, pose, scales);
+      supine_deform_lung(basis->kernels->light, &basis->lit, scales, first, last, &here);
     }
   }
   supine_stream_fence(stream);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Find the state of the lungs, a rigid motion and a correction from observed points. */
+/* Find the volume of the lungs, a rigid motion and a correction of predicted positions from
+ * observed points. */
 #include <math.h>
 #include <string.h>
 
@@ -16,8 +17,9 @@ static const double outlier_limit = 3.0; /* outliers exceed this number of stand
 static const double outlier_noise = 300; /* noise assigned to an outlier, mm */
 static const double volume_step = 1;     /* the search ends when steps are smaller than this, mL */
 static const double angle_step = 1e-4;   /* the search ends when steps are smaller than this, rad */
-/* Ratio of supine_kriging_model.sill, 6 mm, to the constant of the expected error, 4.5 mm. The
- * constant is smaller because it was measured after the best translation. */
+/* Ratio of two variances per mm of displacement: of the random field (supine_kriging_model.sill, 6
+ * mm), and of the expected error (c in supine/locate.h, 4.5 mm). The second is smaller because the
+ * translation that fits best was subtracted before it was measured. */
 static const double sill_of_error = 4.0 / 3;
 
 /* Largest number of Gauss-Newton steps, and of halvings of one change of the volume. */
@@ -28,7 +30,7 @@ typedef struct workspace {
   supine_location *found;
   supine_locate_fit *fit;
   supine_kriging_point *points; /* [task->count] observed points */
-  double *law;     /* [task->count, 3] positions that the displacement law predicts, mm */
+  double *law;                  /* [task->count, 3] predicted positions before correction, mm */
   double *kriging; /* [supine_kriging_space(task->count)] work space of supine_kriging_fit */
   double *scratch; /* [task->count] work space of supine_kriging_leave_out */
 } workspace;
@@ -122,8 +124,8 @@ static void rotate(const double rotation[9], const double x[3], double rotated[3
   }
 }
 
-/* For each observed point, predict the position in the current state, and compute the distance from
- * the scan and the displacement if the volume grows by one prior standard deviation. */
+/* For each observed point, compute the predicted position in the current state, the length of its
+ * displacement from the scan, and its shift if the volume grows by one prior standard deviation. */
 static supine_status evaluate(workspace *s, supine_error *error) {
   const supine_locate_task *task = s->task;
   const double step = supine_expected_shift * supine_expected_reference(task->inside);
@@ -152,8 +154,8 @@ static supine_status evaluate(workspace *s, supine_error *error) {
   return status;
 }
 
-/* Compute supine_locate_fit.origin for the current rotation, and the residual of each observed
- * point in body axes. */
+/* Compute, for the current rotation, the translation between the mean positions
+ * (supine_locate_fit.origin), and the residual of each observed point in body axes. */
 static void find_residuals(workspace *s) {
   const size_t n = s->task->count;
   supine_location *found = s->found;
@@ -274,8 +276,8 @@ static supine_status iterate(workspace *s, supine_error *error) {
   }
 }
 
-/* Compare each observed point with the prediction by all other points. Return the worst new
- * outlier, or the number of points if there is none. */
+/* Compare each observed point with its prediction by all other points. Return the index of the
+ * worst new outlier, or the number of points if there is none. */
 static size_t find_worst(workspace *s, supine_locate_residual *residuals) {
   const size_t n = s->task->count;
   size_t worst = n;

@@ -5,12 +5,12 @@
 #include "runtime/expected.h"
 #include "runtime/rigid.h"
 
-/* Poses of the located state (`at`), of the scan, and of the located state with 1 % of the
- * reference volume added (`fuller`). */
+/* Poses of the found state (`at`), of the scan, and of the found state with 1 % of the reference
+ * volume added (`fuller`). */
 typedef struct poses {
   supine_pose at, scan, fuller;
-  double constant; /* min(c, max(2 mm, RMS displacement)) with the constant c of supine/locate.h */
-  double per_step; /* prior standard deviation of the volume / volume added in `fuller` */
+  double constant; /* squared expected error without observations / displacement, mm */
+  double per_step; /* prior standard deviation of the volume / (volume of `fuller` - of `at`) */
 } poses;
 
 static supine_status find_poses(const supine_location *found, const supine_basis *basis, poses *p,
@@ -66,9 +66,9 @@ static void predict(const supine_location *found, const supine_basis *basis, con
 }
 
 /* Convert the corrected positions to the frame of the observations, and write the expected errors.
- * If at least three points were observed and no rotation was fitted, limit each expected error to
- * the error without observations. With two points, this limit would be 0.85 of the true error; with
- * a rotation, it would omit the error of the rotation. */
+ * Kriging gives the expected errors. With at least three observed points and no fitted rotation,
+ * none exceeds the expected error without observations. With two points, this limit would be too
+ * small (0.85 of the true error); with a rotation, it would ignore the error of the rotation. */
 static void finish(const supine_location *found, const poses *p, const block *b, size_t count,
                    float *xyz, float *sigma) {
   const supine_locate_fit *fit = found->fit;

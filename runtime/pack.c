@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Pack a basis into tiles, and bound the error of packing. */
+/* Pack a basis into tiles of 16 vertices, and bound the quantisation errors. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -9,24 +9,24 @@
 #include "sh/base/clones.h"
 
 enum {
-  FIXED_TOP = INT32_MAX / 4096 * 4096, /* packed form of 1, within the range of fixed_narrow */
+  FIXED_TOP = INT32_MAX / 4096 * 4096, /* integer that means 1; fixed_narrow() does not clip it */
   FLOAT_FRACTION_BITS = 23
 };
 
-/* One tile before packing: coefficients [axes, modes, 16], directions, reference positions. */
+/* The numbers of 16 vertices before packing; coefficients are [axes, modes, 16]. */
 typedef struct source {
   float coefficients[3 * SUPINE_MODES_MAX * TILE];
   float direction[TILE_NUMBERS];
   float reference[TILE_NUMBERS];
 } source;
 
-/* Units of packed numbers, and the largest squared packing errors. */
+/* Work space of packing. */
 typedef struct work {
-  double mode[SUPINE_MODES_MAX]; /* unit of the coefficients of each mode, mm */
-  double direction;              /* unit of packed directions */
-  double reference;              /* unit of packed reference positions, mm, a power of two */
-  float direction_square;        /* largest squared error of a direction */
-  float reference_square;        /* largest squared error of a reference position, mm^2 */
+  double mode[SUPINE_MODES_MAX]; /* quantisation step of the coefficients of each mode, mm */
+  double direction;              /* quantisation step of directions */
+  double reference;              /* quantisation step of reference positions, mm, a power of two */
+  float direction_square;        /* largest squared quantisation error of a direction */
+  float reference_square;        /* largest squared quantisation error of a position, mm^2 */
   source source;
 } work;
 
@@ -35,9 +35,9 @@ static float flush(float value) {
   return fabsf(value) < 1e-30F ? 0 : value;
 }
 
-/* Return the length of the direction of vertex i, mm. Return 1 if the direction is 0 or the field
- * is a vector field. Compact storages divide the direction by this length and multiply the
- * coefficients by it, so that one unit suits all vertices. */
+/* Return the length of the vector along which vertex i moves, mm, or 1 if the vector is 0 or the
+ * basis has none. Compact storages divide the vector by this length and multiply the coefficients
+ * by it, so that one quantisation step suits all vertices. */
 static double direction_length(const supine_basis *basis, size_t i) {
   double square = 0;
   for (size_t axis = 0; axis < 3 && basis->info.direction != NULL; ++axis) {
@@ -90,9 +90,9 @@ static void largest_coefficients(const supine_basis *basis, float *top) {
   }
 }
 
-/* Return the power of two u for which top / u is from 2^30 to 2^31. Limit u so that products with u
- * are normal floats. */
-static double reference_unit(float top) {
+/* Return a quantisation step for numbers up to `top`: the power of two u for which top / u is from
+ * 2^30 to 2^31. Limit u so that products with u are normal floats. */
+static double reference_step(float top) {
   const int exponent = flush(top) > 0 ? ilogbf(top) - 30 : -130;
   return ldexp(1, exponent < 96 ? exponent : 96);
 }
@@ -103,11 +103,11 @@ static int word_bits(const supine_tiles *tiles, size_t k) {
   return k < paired ? 16 : (k - paired) % 3 == 2 ? 10 : 11;
 }
 
-/* Choose the units of packed numbers. Bound the displacement and the packing error of each mode. A
+/* Choose the quantisation steps. Bound the displacement and the quantisation error of each mode. A
  * packed coefficient errs by half of its lowest bit and by the rounding of its word to a float. */
-static void choose_units(supine_basis *basis, work *w) {
+static void choose_steps(supine_basis *basis, work *w) {
   const bool compact = supine_tiles_compact(basis->tiles.storage);
-  const double axes = sqrt((double)basis->tiles.axes); /* length of (1, 1, 1) or of (1) */
+  const double axes = sqrt((double)basis->tiles.axes); /* length of the vector (1, 1, 1) or (1) */
   float top[SUPINE_MODES_MAX];
   float farthest = 0;
   for (size_t i = 0; i < 6 * basis->info.lung_count; ++i) {
@@ -115,8 +115,8 @@ static void choose_units(supine_basis *basis, work *w) {
   }
   largest_coefficients(basis, top);
   basis->reference_size = sqrt(3) * (double)farthest;
-  w->reference = compact ? reference_unit(farthest) : 1;
-  /* Coordinates of directions are at most 1, as directions were divided by their lengths. */
+  w->reference = compact ? reference_step(farthest) : 1;
+  /* Coordinates are at most 1, as each direction was divided by its length. */
   w->direction = compact && basis->info.direction != NULL ? 1.0 / FIXED_TOP : 1;
   basis->tiles.reference_unit = (uint32_t)ilogb(w->reference) << FLOAT_FRACTION_BITS;
   for (size_t k = 0; k < basis->info.mode_count; ++k) {
@@ -131,8 +131,8 @@ static void choose_units(supine_basis *basis, work *w) {
   }
 }
 
-/* Pack the coefficients of one axis, a row of 16 for each mode. Of three modes in a word, the first
- * gets the uppermost bits, as its numbers tend to be the largest. */
+/* Pack the coefficients of 16 vertices on one axis, `rows` [modes, 16]. The first of three modes in
+ * a word gets the uppermost bits, as its coefficients tend to be the largest. */
 static void pack_coefficients(const supine_tiles *tiles, const double *unit, const float *rows,
                               unsigned char *at) {
   const size_t paired = supine_tiles_paired(tiles->storage, tiles->modes);
@@ -159,8 +159,8 @@ static void pack_coefficients(const supine_tiles *tiles, const double *unit, con
   }
 }
 
-/* Pack the 48 coordinates of a tile. Replace *square by the largest squared packing error of a
- * vertex if this error is larger. */
+/* Pack the coordinates of 16 directions or positions. Replace *square by the largest squared
+ * quantisation error of a vertex if this error is larger. */
 static void pack_numbers(const supine_tiles *tiles, double unit, const float *numbers,
                          unsigned char *at, float *square) {
   float error[TILE_NUMBERS];
@@ -220,7 +220,7 @@ supine_status supine_basis_pack(supine_basis *basis, supine_storage storage) {
     free(w);
     return SUPINE_ERROR_MEMORY;
   }
-  choose_units(basis, w);
+  choose_steps(basis, w);
   pack(basis, w);
   for (size_t k = 0; k < tiles->modes; ++k) {
     basis->mode_error[k] += basis->mode_size[k] * sqrt((double)w->direction_square);

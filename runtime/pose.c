@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute the weights and gains of a state. */
+/* Compute the pose of a state: the weights of the modes and the gains (factors of displacement). */
 #include <math.h>
 #include <string.h>
 
@@ -38,8 +38,9 @@ static void contract(const supine_basis *basis, size_t lung, const double *weigh
                          basis->info.volume_cubic + lung * k * k * k, weights, form);
 }
 
-/* Return the volume at rest minus the reference volume, mL, from the spherical harmonics y of
- * gravity. `row` is a lung, or 0 if the file has only one row for all lungs together. */
+/* Return the volume at rest minus that of the reference surface, mL, from the spherical harmonics y
+ * of the direction of gravity.
+ * @param row  row of the coefficients `resting`: a lung, or 0 if they are for all lungs together */
 static double resting(const supine_basis *basis, size_t row, const double *y) {
   double volume = 0;
   for (size_t t = 0; t < RESTING_TERMS; ++t) {
@@ -138,14 +139,16 @@ static void share_out(const supine_basis *basis, const volumes *v, double total,
   }
 }
 
-/* Find the gains at which one lung holds `ml` mL more than its reference surface. */
+/* Find the gains (factors of the displacement) at which one lung holds `ml` mL more than its
+ * reference surface. */
 static supine_status lung_gains(const supine_basis *basis, const volumes *v, size_t lung, double ml,
                                 supine_pose *pose, supine_error *error) {
   return supine_volume_form_gains(&v->form[lung], basis->info.bend, v->rest[lung], ml,
                                   pose->gains[lung], error);
 }
 
-/* Find the one gain at which all lungs together hold `total` mL more than the reference volume. */
+/* Find the gain (factor of the displacement), equal for all lungs and axes, at which the lungs
+ * together hold `total` mL more than the reference surface. */
 static supine_status common_gains(const volumes *v, double total, supine_pose *pose,
                                   supine_error *error) {
   static const double straight[3] = {0, 0, 0};
@@ -163,7 +166,8 @@ static supine_status common_gains(const volumes *v, double total, supine_pose *p
   return status;
 }
 
-/* Find the gains at which all lungs together hold `total` mL more than the reference surface. */
+/* Find the gains (factors of the displacement) at which all lungs together hold `total` mL more
+ * than the reference surface. */
 static supine_status total_gains(const supine_basis *basis, const volumes *v, double total,
                                  supine_pose *pose, supine_error *error) {
   if (!basis->rest_by_lung) {
@@ -178,9 +182,9 @@ static supine_status total_gains(const supine_basis *basis, const volumes *v, do
   return status;
 }
 
-/* Find the gains of each named lung. A volume relative to rest counts from the volume that this
- * lung holds when all lungs together are at rest. Volumes relative to full inflation or the scan
- * are treated in the same way. */
+/* Find the gains (factors of the displacement) of a state that gives a volume for each lung by its
+ * name. If this volume is relative to rest, full inflation or the scan, add it to the volume that
+ * this lung has when all lungs together are in that condition. */
 static supine_status named_gains(const supine_basis *basis, const volumes *v,
                                  const supine_state *state, supine_pose *pose,
                                  supine_error *error) {
@@ -225,7 +229,8 @@ static supine_status named_gains(const supine_basis *basis, const volumes *v,
   return SUPINE_OK;
 }
 
-/* Set all gains to 0 for the reference surface. Refuse all other states: they need volumes. */
+/* Set all gains (factors of the displacement) of an open surface to 0 if the state is that of the
+ * reference surface. Refuse all other states, because they need volumes. */
 static supine_status open_gains(const supine_basis *basis, const supine_state *state,
                                 supine_pose *pose, supine_error *error) {
   const supine_volume *volume = &state->volume;

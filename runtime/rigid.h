@@ -12,8 +12,9 @@
  * @param rotation  [3, 3] by rows, written */
 void supine_rigid_rotation(const double h[3][3], double rotation[9]);
 
-/** The rigid motion R (p - mean of p) + mean of x of a rigid part. p are the reference positions of
- * the part, x the positions that it would have if it were not rigid. Zero-initialise. */
+/** The rigid motion of a part, R (p - mean of p) + mean of x. R is a rotation, p are the reference
+ * positions of the part, and x the positions that it would have if it were not rigid.
+ * Zero-initialise. */
 typedef struct supine_rigid_motion {
   double count;          /**< number of vertices added */
   double from[3], to[3]; /**< sums, later means, of reference and deformed positions, mm */
@@ -28,8 +29,8 @@ void supine_rigid_finish(supine_rigid_motion *motion);
 /** Move one point p rigidly, and return coordinate `axis` of the result, mm. */
 double supine_rigid_move(const supine_rigid_motion *motion, const float *p, size_t axis);
 
-/** In `xyz` [N, 3], mm, replace the positions of each rigid part by a rigid motion of its reference
- * positions, the one that fits the replaced positions best. */
+/** Make the rigid parts keep their shape: in `xyz` [N, 3], mm, replace the positions of each part
+ * by the rigid motion of its reference positions that fits the replaced positions best. */
 void supine_rigid_restore(const supine_basis *basis, float *xyz);
 
 #endif

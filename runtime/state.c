@@ -20,7 +20,7 @@ static const char *const kinds[] = {[SUPINE_VOLUME_DEFAULT] = "",
 _Static_assert(sizeof kinds / sizeof *kinds == SUPINE_VOLUME_KIND_COUNT,
                "each kind of volume needs a name");
 
-enum { PIECE = 64 }; /* largest size of a posture or volume as text, in bytes, with its NUL */
+enum { PIECE = 64 }; /* size of a posture or volume as text, in bytes with its NUL */
 
 /* Read a number, with or without the unit "mL". */
 static bool read_number(const char *text, double *value, bool *has_unit) {
@@ -66,7 +66,7 @@ static supine_status read_volume(const char *text, supine_volume *volume, supine
                           text);
 }
 
-/* Read the volumes of named lungs, such as "left=rest,right=rest+300". */
+/* Read the volume of each lung from text such as "left=rest,right=rest+300". */
 static supine_status read_lungs(const char *text, supine_state *state, supine_error *error) {
   supine_state read = *state;
   read.lung_count = 0;
@@ -173,7 +173,7 @@ supine_status supine_state_parse(const char *text, supine_state *state, supine_e
     return SUPINE_OK;
   }
   const char *equals = strchr(text, '=');
-  if (equals != NULL && colon != NULL && colon > equals) { /* a colon after '=' ends no posture */
+  if (equals != NULL && colon != NULL && colon > equals) { /* no posture is before the colon */
     colon = NULL;
   }
   if (colon == NULL) {

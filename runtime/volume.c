@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute the volume of a lung from its gains, and the gains from the volume. */
+/* Compute the volume of a lung from its gains (factors of its displacement along x, y and z), and
+ * the gains from the volume. */
 #include <math.h>
 #include <stdbool.h>
 
@@ -171,8 +172,9 @@ static double volume_on_path(const supine_volume_form *form, const double bend[3
   return supine_volume_form_at(form, gains);
 }
 
-/* Find the gains on the path of supine_volume_bend at which the lung holds `volume`. Step along the
- * path until the volume is passed, then bisect the last step. */
+/* Find the gains of a lung (factors of its displacement) at which it holds `volume`, mL more than
+ * its reference surface. Step along the path from full inflation through rest (supine_volume_bend)
+ * until the volume is passed, then bisect the last step. */
 static supine_status follow_path(const supine_volume_form *form, const double bend[3], double scale,
                                  double rest, double volume, double gains[3], supine_error *error) {
   const double step = volume / rest > 0 ? 1.0 / 16 : -1.0 / 16;

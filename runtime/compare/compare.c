@@ -17,7 +17,7 @@ struct supine_compare {
   double area;  /* area of the reference surface, mm^2 */
   float *share; /* [N] fraction of the area that belongs to each vertex */
   double *gram; /* [lungs, 3, modes, modes] Gram matrix of the modes for each lung and axis, mm^2 */
-  double *sum;  /* [modes, modes] sum of all Gram matrices, mm^2 */
+  double *sum;  /* [modes, modes] sum of `gram` over lungs and axes, mm^2 */
 };
 
 static const double four_pi = 12.566370614359172954;

@@ -11,37 +11,37 @@
 
 enum { BEFORE, AFTER, TIMES };
 
-/* A point of the surface. `level` is the coordinate of the point along gravity before the breath,
- * mm. Lower points therefore have larger levels. */
+/* A point of the surface. */
 typedef struct corner {
   double at[TIMES][3]; /* positions before and after the breath, mm */
-  double level;
+  double level;        /* coordinate along gravity before the breath, mm; larger is lower */
 } corner;
 
-/* A triangle, or the part of a triangle between two levels, which has at most five corners. */
+/* A triangle of the surface, or its part between two horizontal planes: at most five corners. */
 typedef struct polygon {
   size_t count;
   corner corner[6];
 } polygon;
 
 /* Sums over the edges of the outline along which a horizontal plane cuts the surface. Each edge has
- * the same direction as in the polygon above the plane. */
+ * the direction that it has in the part of its triangle above the plane. */
 typedef struct outline {
   double length;           /* total length of the edges before the breath, mm */
-  double middle[TIMES][3]; /* sum over edges: midpoint times length before the breath, mm^2 */
+  double middle[TIMES][3]; /* sum of edge midpoint times edge length before the breath, mm^2 */
   double area[TIMES][3];   /* sum over edges: cross product of start and end, mm^2 */
 } outline;
 
-/* The slabs, and the outlines of one lung at the planes between the slabs. */
+/* Horizontal planes that cut the lungs into slabs, and the outlines of one lung in these planes. */
 typedef struct cutter {
   const float *from;                  /* [N, 3] positions before the breath, mm */
   double down[3];                     /* unit vector along gravity */
   size_t count;                       /* number of slabs */
-  double level[SUPINE_SLABS_MAX + 1]; /* level of each slab's top, then of the last bottom, mm */
-  outline cut[SUPINE_SLABS_MAX + 1];
+  double level[SUPINE_SLABS_MAX + 1]; /* coordinate of each plane along gravity, mm */
+  outline cut[SUPINE_SLABS_MAX + 1];  /* outline of the lung in each plane */
 } cutter;
 
-/* Read a vertex. For precision, subtract the position that vertex 0 has before the breath. */
+/* Read a vertex, before and after the breath. To reduce rounding errors, move the origin to the
+ * position of vertex 0 before the breath. */
 static corner read_corner(const cutter *c, const float *xyz, size_t vertex) {
   corner out;
   for (size_t i = 0; i < 3; ++i) {
@@ -90,7 +90,8 @@ static void add_edge(const corner *p, const corner *q, outline *cut) {
   }
 }
 
-/* Split a polygon at a level within its height, and add the new edge to `cut`.
+/* Split a polygon by a plane at `level`, a coordinate along gravity within the polygon's height.
+ * Add the new edge to `cut`.
  * @param above, below  written; must not be `p` */
 static void split(const polygon *p, double level, polygon *above, polygon *below, outline *cut) {
   corner end[2] = {{.level = level}, {.level = level}};

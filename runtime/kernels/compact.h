@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * Compact numbers: two or three numbers in a word of 32 bits, or three numbers in two words.
+ * Compact numbers: two or three numbers in a 32-bit word, or three numbers in two words.
  *
  * To read a number, shift its word left until the number has the uppermost bits, and convert the
- * whole word as a signed integer. The lower bits of this integer belong to numbers that were
- * packed before. Packing therefore chooses the bits of a number so that the whole word is as
- * near as possible to the number. */
+ * whole word as a signed integer. The bits below the number, which belong to other numbers, act as
+ * a rounding error. When a number is packed, the bits below it are already known. Packing chooses
+ * the bits of the number so that the integer read later is as near as possible to the number. */
 #ifndef SUPINE_COMPACT_H
 #define SUPINE_COMPACT_H
 
@@ -35,29 +35,31 @@ static inline uint32_t word_nearest(double value, uint32_t low, int bits) {
   return (uint32_t)(int32_t)(held * step) | low;
 }
 
-/** Pack two numbers between -2^31 and 2^31 into the lower and the upper half of a word. */
+/** Pack two numbers between -2^31 and 2^31 into a word, rounded to 16 bits each. The first number
+ * gets the lower half of the word. */
 static inline uint32_t pair_narrow(double first, double second) {
   return word_nearest(second, word_nearest(first, 0, 16) >> 16, 16);
 }
 
-/** Pack three numbers between -2^31 and 2^31 into the upper 11, next 11 and last 10 bits of a
- * word. */
+/** Pack three numbers between -2^31 and 2^31 into a word, rounded to 11, 11 and 10 bits. The first
+ * number gets the uppermost bits. */
 static inline uint32_t triple_narrow(double first, double second, double third) {
   const uint32_t low = word_nearest(third, 0, 22) >> 22;
   const uint32_t lower = word_nearest(second, low << 11, 21) >> 11;
   return word_nearest(first, lower, 21);
 }
 
-/** Pack three modes of a normal, between -2^31 and 2^31, into the upper 13, the next 10 and the
- * lowest 9 bits of a word. The first modes get more bits, as they are the largest. */
+/** Pack three numbers between -2^31 and 2^31, from three vectors of a normal, into a word. They
+ * are rounded to 13, 10 and 9 bits; the first, which tends to be the largest, gets the
+ * uppermost bits. */
 static inline uint32_t normal_narrow(double first, double second, double third) {
   const uint32_t low = word_nearest(third, 0, 23) >> 23;
   const uint32_t lower = word_nearest(second, low << 13, 22) >> 13;
   return word_nearest(first, lower, 19);
 }
 
-/** Return the factor that converts numbers of normal_narrow to the 16-bit numbers of a file. It
- * converts 255 x 2^23, the largest number whose lowest 23 bits are 0, to 32767. */
+/** Return the factor that converts a number that normal_narrow packed to the 16-bit number of the
+ * file. It converts 255 x 2^23, the largest number whose lowest 23 bits are 0, to 32767. */
 static inline double normal_unit(void) {
   return INT16_MAX / (255 * 0x1p23);
 }
@@ -69,8 +71,8 @@ static inline float normal_number(uint32_t word, size_t number) {
 
 /** Pack three numbers between -2^31 and 2^31 into two words. The first two numbers get the upper 21
  * bits of a word each, the third number gets the remaining 22 bits. A number that would become 0
- * becomes the smallest positive number, because the kernels scale floats by adding to the exponent
- * bits, which changes 0 to another number. */
+ * becomes the smallest positive number: the kernels multiply floats by powers of two by adding to
+ * the exponent bits, which does not leave 0 unchanged. */
 static inline void fixed_narrow(const double *numbers, uint32_t *words) {
   uint32_t third = word_nearest(numbers[2], 0, 10);
   third = third == 0 ? UINT32_C(1) << 10 : third;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * The loops that evaluate tiles, for vectors of LANES floats. Each kernel_*.c includes this file
- * once, after definitions of
+ * The loops that evaluate tiles (16 vertices each), for vectors of LANES floats. Each kernel_*.c
+ * includes this file once, after definitions of
  *
  *     KERNELS          the name of the supine_kernels that this file defines
  *     LANES            4, 8 or 16
@@ -19,23 +19,23 @@ typedef int32_t vi __attribute__((vector_size(4 * LANES)));
 typedef uint32_t vu __attribute__((vector_size(4 * LANES)));
 
 enum {
-  GROUPS = TILE / LANES,         /* number of vectors that hold a `row` */
-  PIECES = TILE_NUMBERS / LANES, /* number of vectors that hold `triples` */
-  CHAINS = GROUPS == 1 ? 2 : 1,  /* number of partial sums of dot(); two hide the latency of FMA */
+  GROUPS = TILE / LANES, /* number of SIMD vectors for one number of each vertex in a tile */
+  PIECES = TILE_NUMBERS / LANES, /* number of SIMD vectors for the 48 coordinates of a tile */
+  CHAINS = GROUPS == 1 ? 2 : 1,  /* partial sums in a dot product; two hide the latency of FMA */
   KNOWN_MODES = 16               /* largest number of modes whose weights stay in registers */
 };
 
-/* One number for each vertex of a tile. */
+/* One number for each of the 16 vertices of a tile. */
 typedef struct row {
   vf v[GROUPS];
 } row;
 
-/* The 48 coordinates of a tile, x y z x y z ... */
+/* The coordinates x y z x y z ... of the 16 vertices of a tile. */
 typedef struct triples {
   vf v[PIECES];
 } triples;
 
-/* EACH(F, j) is F(j, 0), F(j, 1), ... F(j, LANES - 1). */
+/* EACH(F, j) is the list F(j, 0), F(j, 1), ... F(j, LANES - 1). EACH4 makes four items of it. */
 #define EACH4(F, j, i) F(j, i), F(j, (i) + 1), F(j, (i) + 2), F(j, (i) + 3)
 #if LANES == 4
 #define EACH(F, j) EACH4(F, j, 0)
@@ -45,7 +45,8 @@ typedef struct triples {
 #define EACH(F, j) EACH4(F, j, 0), EACH4(F, j, 4), EACH4(F, j, 8), EACH4(F, j, 12)
 #endif
 
-/* In `triples`, lane i of vector j holds coordinate AXIS(j, i) of vertex VERTEX(j, i). */
+/* In the 48 coordinates x y z x y z ... of a tile, lane i of SIMD vector j holds coordinate
+ * AXIS(j, i) of vertex VERTEX(j, i). */
 #define VERTEX(j, i) (((j)*LANES + (i)) / 3)
 #define AXIS(j, i) (((j)*LANES + (i)) % 3)
 
@@ -73,16 +74,16 @@ INLINE vf weight(const weights *w, size_t k, bool known) {
   return known ? w->v[k] : splat(w->at[k]);
 }
 
-/* Constants for which the compiler specialises a loop. A loop for a fixed number of modes writes
- * only positions, not displacements. */
+/* Constants for which the compiler specialises a loop over tiles. If it knows the number of modes,
+ * the loop writes positions, never displacements. */
 typedef struct form {
   supine_storage storage;
-  size_t modes; /* 0 if the number of modes is not fixed */
+  size_t modes; /* number of modes if the compiler knows it, else 0 */
   bool vector;
 } form;
 
-/* Add w times the coefficients of one mode to `sum`, for the vertices of a tile. The coefficients
- * are floats or, if `compact`, words that integers() converts. */
+/* Add the coefficients of one mode, times its weight w, to the sums of the vertices of a tile. The
+ * coefficients are floats or, if `compact`, words that integers() converts. */
 INLINE void add_mode(row *sum, vf w, const unsigned char *at, int shift, bool compact) {
   for (size_t q = 0; q < GROUPS; ++q, at += sizeof(vf)) {
     sum->v[q] = FMA(w, compact ? integers((vu)load(at), shift) : load(at), sum->v[q]);
@@ -119,7 +120,8 @@ INLINE row dot(const supine_tiles *tiles, const unsigned char *at, const weights
   return *even;
 }
 
-/* Load 48 coordinates, of directions or of reference positions, in their stored unit. */
+/* Load the 48 coordinates of the directions or reference positions of a tile, as numbers of
+ * quantisation steps. */
 INLINE triples numbers(const unsigned char *at, bool compact) {
   triples n;
   for (size_t j = 0; j < PIECES && !compact; ++j) {
@@ -227,7 +229,7 @@ INLINE triples deform_tile(const supine_tiles *tiles, const unsigned char *tile,
   return amount;
 }
 
-INLINE void deform_tiles(const supine_tiles *any, const float *folded, size_t first, size_t count,
+INLINE void deform_tiles(const supine_tiles *any, const float *scales, size_t first, size_t count,
                          const supine_target *target, form f) {
   const bool add_reference = f.modes > 0 || target->add_reference;
   supine_tiles tiles = *any;
@@ -235,13 +237,13 @@ INLINE void deform_tiles(const supine_tiles *any, const float *folded, size_t fi
     supine_tiles_layout(&tiles, f.storage, f.modes, f.vector, any->count);
   }
   const unsigned char *tile = tiles.bytes + first * tiles.stride;
-  const float *g = folded + tiles.modes;
+  const float *g = scales + tiles.modes;
 #define GAIN(j, i) g[AXIS(j, i)]
   const vf gain[3] = {{EACH(GAIN, 0)}, {EACH(GAIN, 1)}, {EACH(GAIN, 2)}};
   writer out = writer_open(target);
-  weights w = {.at = folded};
+  weights w = {.at = scales};
   for (size_t k = 0; k < KNOWN_MODES; ++k) {
-    w.v[k] = splat(k < f.modes ? folded[k] : 0);
+    w.v[k] = splat(k < f.modes ? scales[k] : 0);
   }
   for (size_t t = 0; t < count; ++t, tile += tiles.stride) {
     supine_prefetch_tile(tile, tiles.stride, target->prefetch);
@@ -251,41 +253,42 @@ INLINE void deform_tiles(const supine_tiles *any, const float *folded, size_t fi
   writer_close(&out);
 }
 
-INLINE void deform_kind(const supine_tiles *tiles, const float *folded, size_t first, size_t count,
+INLINE void deform_kind(const supine_tiles *tiles, const float *scales, size_t first, size_t count,
                         const supine_target *target, supine_storage storage, size_t modes) {
   if (tiles->axes == 3) {
-    deform_tiles(tiles, folded, first, count, target, (form){storage, modes, true});
+    deform_tiles(tiles, scales, first, count, target, (form){storage, modes, true});
   } else {
-    deform_tiles(tiles, folded, first, count, target, (form){storage, modes, false});
+    deform_tiles(tiles, scales, first, count, target, (form){storage, modes, false});
   }
 }
 
-/* Call the loop for the storage of the tiles. If `modes` is 0, the loop for INT16 also serves
- * MIXED, because it reads the layout from `tiles`. */
-INLINE void deform_storage(const supine_tiles *tiles, const float *folded, size_t first,
+/* Call the loop for the storage (number format) of the tiles. `modes` is the number of modes if the
+ * compiler knows it, otherwise 0. In the second case, the INT16 loop also serves MIXED, because
+ * that loop reads the layout from `tiles`. */
+INLINE void deform_storage(const supine_tiles *tiles, const float *scales, size_t first,
                            size_t count, const supine_target *target, size_t modes) {
   if (tiles->storage == SUPINE_STORAGE_EXACT) {
-    deform_kind(tiles, folded, first, count, target, SUPINE_STORAGE_EXACT, modes);
+    deform_kind(tiles, scales, first, count, target, SUPINE_STORAGE_EXACT, modes);
   } else if (modes > 0 && tiles->storage == SUPINE_STORAGE_MIXED) {
-    deform_kind(tiles, folded, first, count, target, SUPINE_STORAGE_MIXED, modes);
+    deform_kind(tiles, scales, first, count, target, SUPINE_STORAGE_MIXED, modes);
   } else {
-    deform_kind(tiles, folded, first, count, target, SUPINE_STORAGE_INT16, modes);
+    deform_kind(tiles, scales, first, count, target, SUPINE_STORAGE_INT16, modes);
   }
 }
 
-static void deform(const supine_tiles *tiles, const float *folded, size_t first, size_t count,
+static void deform(const supine_tiles *tiles, const float *scales, size_t first, size_t count,
                    const supine_target *target) {
   const bool registers = LANES == 16 && target->add_reference;
   if (registers && tiles->modes == 4) { /* a basis has 4 modes by default */
-    deform_storage(tiles, folded, first, count, target, 4);
+    deform_storage(tiles, scales, first, count, target, 4);
   } else if (registers && tiles->modes == KNOWN_MODES) {
-    deform_storage(tiles, folded, first, count, target, KNOWN_MODES);
+    deform_storage(tiles, scales, first, count, target, KNOWN_MODES);
   } else {
-    deform_storage(tiles, folded, first, count, target, 0);
+    deform_storage(tiles, scales, first, count, target, 0);
   }
 }
 
-/* Compute one coordinate of the normals of LANES vertices before normalisation. */
+/* Compute one coordinate of the unnormalised normals of LANES vertices. */
 INLINE vf dot_normal(const unsigned char *at, const float *w, size_t words) {
   vf sum[3] = {{0}, {0}, {0}};
   for (size_t j = 0; j < words; ++j, at += 64) {
@@ -311,7 +314,7 @@ INLINE void light_words(const supine_tiles *tiles, const float *w, size_t first,
         v[axis] = dot_normal(tile + axis * axis_bytes + q * sizeof(vf), w, words);
       }
       /* Add FLT_MIN so that a zero vector does not become NaN. One Newton step doubles the number
-       * of correct bits of the estimate. */
+       * of correct bits of the estimated 1 / sqrt(square). */
       const vf square = FMA(v[0], v[0], FMA(v[1], v[1], v[2] * v[2])) + 0x1p-126F;
       const vf guess = RSQRT(square);
       const vf error = FMA(-(square * guess), guess, splat(1));

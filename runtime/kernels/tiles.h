@@ -2,18 +2,20 @@
 /** @file
  * Layout of a basis in memory for the kernels: tiles of 16 vertices, each of whole cache lines.
  *
- *     coefficients   for each axis (1 for scalar fields, 3 for vector fields)
- *                      EXACT  16 floats for each mode
- *                      INT16  16 words of 32 bits for every two modes (compact.h)
- *                      MIXED  like INT16, but 16 words for every three of the last modes
- *     direction      48 numbers x y z x y z ...; none for vector fields
+ *     coefficients   of each mode at the 16 vertices; in vector fields, those on x, then y, then z
+ *     direction      48 numbers x y z x y z ..., directions of displacement; not in vector fields
  *     reference      48 numbers x y z x y z ..., reference positions
  *
- * Tile t holds vertices 16 t to 16 t + 15; the last tile repeats the last vertex. Directions and
- * reference positions are floats (EXACT), or fixed-point numbers of which three share two words
- * (compact.h). The largest number determines their unit: within half a metre of the origin, a
- * position errs by at most 0.0005 mm in each coordinate. Once a frame, the weights are multiplied
- * by the units of coefficients and directions. */
+ * Tile t holds vertices 16 t to 16 t + 15; the last tile repeats the last vertex. The storage
+ * determines the types of numbers:
+ *
+ *     EXACT  floats
+ *     INT16  32-bit words (compact.h): one for two coefficients, two for three coordinates
+ *     MIXED  like INT16, but one word for three coefficients of the last modes
+ *
+ * Integers count quantisation steps, which are so large that the largest number just fits. Within
+ * half a metre of the origin, a reference position errs by at most 0.0005 mm in each coordinate.
+ * Once a frame, the weights are multiplied by the steps of coefficients and directions. */
 #ifndef SUPINE_TILES_H
 #define SUPINE_TILES_H
 
@@ -21,42 +23,43 @@
 
 enum {
   TILE = 16,         /**< number of vertices of a tile */
-  TILE_NUMBERS = 48, /**< number of coordinates of a tile */
+  TILE_NUMBERS = 48, /**< number of coordinates of the vertices of a tile */
 };
 
 typedef struct supine_tiles {
   supine_storage storage;
   size_t modes;
-  size_t axes;            /**< number of axes with coefficients: 3 for vector fields, else 1 */
-  size_t axis_bytes;      /**< bytes of the coefficients of one axis in one tile */
+  size_t axes;       /**< number of coefficients per vertex and mode: 3 in vector fields, else 1 */
+  size_t axis_bytes; /**< bytes of the coefficients of one axis in one tile */
   size_t direction_begin; /**< byte offset of the directions in a tile */
   size_t reference_begin; /**< byte offset of the reference positions in a tile */
   size_t stride;          /**< size of a tile in bytes */
   size_t count;
-  /** Added to the bits of a float, this multiplies the float by the unit of reference positions. */
+  /** Exponent of the quantisation step of reference positions, shifted to the exponent bits of a
+   * float: adding it to the bits of a float multiplies the float by the step. */
   uint32_t reference_unit;
-  unsigned char *bytes; /**< [count, stride] bytes of the tiles */
+  unsigned char *bytes;
 } supine_tiles;
 
-/** Return whether a storage is compact. In a compact storage, two or three coefficients share a
- * word, and directions and positions are fixed-point numbers. */
+/** Return whether a storage packs two or three coefficients into a word, and stores directions and
+ * positions as fixed-point numbers. */
 static inline bool supine_tiles_compact(supine_storage storage) {
   return storage != SUPINE_STORAGE_EXACT;
 }
 
-/** Return the number of words per vertex that hold three coefficients each. */
+/** Return the number of 32-bit words per vertex that hold the coefficients of three modes each. */
 static inline size_t supine_tiles_thirds(supine_storage storage, size_t modes) {
   return storage == SUPINE_STORAGE_MIXED ? modes / 8 : 0;
 }
 
-/** Return the number of modes that are not in the words of supine_tiles_thirds. In a compact
- * storage, two of these modes share a word. */
+/** Return the number of modes whose coefficients do not share a word by threes. In compact
+ * storages, the coefficients of two of these modes share a word. */
 static inline size_t supine_tiles_paired(supine_storage storage, size_t modes) {
   return modes - 3 * supine_tiles_thirds(storage, modes);
 }
 
 /** Fill in all members but `bytes` and `reference_unit` for a storage other than AUTO. The function
- * is inline, so that the layout is a constant where the number of modes is a constant. */
+ * is inline, so that the layout is a constant for a constant number of modes. */
 static inline void supine_tiles_layout(supine_tiles *tiles, supine_storage storage, size_t modes,
                                        bool vector, size_t count) {
   const bool compact = supine_tiles_compact(storage);
@@ -74,14 +77,15 @@ static inline void supine_tiles_layout(supine_tiles *tiles, supine_storage stora
   tiles->count = count;
 }
 
-/** Return the number W of words for one coordinate of a normal. Word j holds modes j, j + W and j +
- * 2 W (compact.h), with 0 for modes that do not exist. */
+/** Return the number W of 32-bit words for one coordinate of the vectors whose weighted sum is a
+ * normal. Word j holds vectors j, j + W and j + 2 W (compact.h), with 0 for absent vectors. */
 static inline size_t supine_tiles_normal_words(size_t modes) {
   return (modes + 2) / 3;
 }
 
-/** Fill in the layout of tiles of normals. Each axis has supine_tiles_normal_words rows of 16
- * words. */
+/** Fill in the layout of tiles that hold the vectors of normals. For each axis, a tile has
+ * supine_tiles_normal_words words for each of its 16 vertices.
+ * @param modes  number of vectors of a normal */
 static inline void supine_tiles_layout_lit(supine_tiles *tiles, size_t modes, size_t count) {
   *tiles = (supine_tiles){.modes = modes, .axes = 3, .count = count};
   tiles->axis_bytes = TILE * sizeof(uint32_t) * supine_tiles_normal_words(modes);
@@ -94,7 +98,7 @@ typedef enum supine_prefetch {
   SUPINE_PREFETCH_FAR,  /**< every cache line, 8192 bytes ahead, without filling the outer caches */
 } supine_prefetch;
 
-/** Prefetch `stride` bytes at the distance after `tile` that `how` selects. */
+/** Prefetch `stride` bytes at a distance after `tile`. `how` selects the distance. */
 static inline __attribute__((always_inline)) void
 supine_prefetch_tile(const unsigned char *tile, size_t stride, supine_prefetch how) {
   enum { PAST_CACHES = 0, SECOND_LEVEL = 2 }; /* locality arguments of __builtin_prefetch */
@@ -110,16 +114,17 @@ supine_prefetch_tile(const unsigned char *tile, size_t stride, supine_prefetch h
 }
 
 typedef struct supine_target {
-  float *xyz;         /**< positions, displacements or normals of all vertices of the tiles */
-  bool add_reference; /**< write positions, not displacements */
-  bool stream;        /**< use stores that bypass the caches */
+  float *xyz; /**< positions, displacements or normals of all vertices of the tiles, written */
+  bool add_reference; /**< true: write positions; false: write displacements */
+  bool stream;        /**< whether to use stores that bypass the caches */
   supine_prefetch prefetch;
 } supine_target;
 
 /** Evaluate tiles first <= t < first + count of one lung, and write their vertices to the target.
- * @param weights  [modes + 3] weights times units (top of this file), then the gains of the lung
+ * @param scales  [modes + 3] weight of each mode, times the quantisation steps of coefficients
+ *                 and directions; then the three gains of the lung (factors of its displacement)
  * @param count    at least 1 */
-typedef void supine_deform_tiles(const supine_tiles *tiles, const float *weights, size_t first,
+typedef void supine_deform_tiles(const supine_tiles *tiles, const float *scales, size_t first,
                                  size_t count, const supine_target *target);
 
 /** Make stores that bypass the caches visible to other threads. Call this after the last kernel. */
@@ -135,8 +140,8 @@ static inline void supine_stream_fence(bool stream) {
 
 typedef struct supine_kernels {
   supine_deform_tiles *deform;
-  /** Evaluate unit normals from tiles of supine_tiles_layout_lit. `weights` holds the weights of
-   * the modes, followed by zeros up to a length of 3 times supine_tiles_normal_words. */
+  /** Evaluate unit normals from packed vectors (supine_tiles_layout_lit). `scales` holds the
+   * weight of each vector, padded with zeros to a multiple of three. */
   supine_deform_tiles *light;
 } supine_kernels;
 

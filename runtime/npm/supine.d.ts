@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 /** A posture and a volume, as text ("prone", "left:rest+500", "full-300", "2600mL") or as an object. `gravity` is the
  * direction in which things fall, in the patient's axes; the default is supine, [0, 1, 0]. `volume` is a text; the
- * default is the volume of the basis. `gain` replaces the volume by one gain of all lungs; 0 is the reference surface. */
+ * default is rest if the basis has a volume at rest. `gain` replaces the volume: it multiplies all displacements from
+ * the reference surface. */
 export type State = string | { gravity?: ArrayLike<number>; volume?: string; gain?: number };
 
 /** The numbers of a tensor of the file: a view, row-major. */
@@ -27,7 +28,7 @@ export interface Basis {
   readonly normals: Float32Array;
   /** Volume of each lung in the pose, gas and tissue, mL. Throws if the surface is open. */
   readonly volumes: Record<string, number>;
-  /** Bound on the error of storage and rounding of any vertex in the pose, mm. */
+  /** Bound on the position error of any vertex that storage and rounding cause in the pose, mm. */
   readonly error: number;
   /** Get a tensor of the file by its name, such as "coefficients"; undefined if the file lacks it. */
   tensor(name: string): Tensor | undefined;
@@ -36,11 +37,11 @@ export interface Basis {
   pose(state: State): this;
   /** Compute `positions` of the pose and return them. */
   deform(): Float32Array;
-  /** Compute `positions` and `normals` of the pose and return `positions`. Normals come from the file's modes of normals
-   * or, if it has none, from the triangles. */
+  /** Compute `positions` and `normals` of the pose and return `positions`. Normals are weighted sums of the file's
+   * vectors for normals or, if it has none, are computed from the triangles. */
   deformLit(): Float32Array;
-  /** Compute the expected error [N] of each vertex in the pose, mm (3-D RMS), if the positions in the scan or in state
-   * `since` are exact. The next call overwrites the result.
+  /** Compute the expected position error [N] of the vertices in the pose, mm (3-D RMS), if the positions in state
+   * `since`, or in the scan, are exact. The next call overwrites the result.
    * @throws SupineError */
   expectedError(since?: State): Float32Array;
 }

@@ -2,8 +2,9 @@
 // Run the C library as WebAssembly, one instance for each basis. Nothing allocates after a basis is open, so that the
 // memory never grows and the arrays never move.
 
-// Bytes reserved for C structs and buffers, and byte offsets of members of supine_basis_info, which never change.
+// Bytes reserved for C structs and buffers.
 const STATE = 128, POSE = 8 * (256 + 3 * 16), VOLUMES = 8 * 16, TEXT = 512, ERROR = 4 + 512;
+// Byte offsets of members of the C struct supine_basis_info. Later versions of the library keep these offsets.
 const INFO = { vertices: 0, lungs: 16, begin: 20, hasVolume: 25, names: 56, normals: 100 };
 const TYPES = [Uint8Array, Uint32Array, Float32Array, Float64Array, Int16Array]; // in the order of supine_dtype
 const STATUS = ['ok', 'argument', 'memory', 'read', 'format', 'mesh', 'open surface', 'unsupported', 'write', 'numerical'];
@@ -23,7 +24,7 @@ class Basis {
     this.#c = instance.exports;
     this.#c._initialize();
     const size = 2 * (STATE + POSE) + VOLUMES + TEXT + ERROR;
-    this.#state = this.#allocate(size); // all sizes before TEXT are multiples of 8, to align doubles
+    this.#state = this.#allocate(size); // pieces with doubles come first; their sizes are multiples of 8, for alignment
     this.#pose = this.#state + STATE;
     this.#nextState = this.#pose + POSE;
     this.#nextPose = this.#nextState + STATE;
@@ -59,7 +60,7 @@ class Basis {
     for (let at = pairs, end = pairs + 8 * this.#word(this.#text); at < end; at += 8) {
       this.metadata[this.#string(this.#word(at))] = this.#string(this.#word(at + 4));
     }
-    this.deform(); // the pose is still all 0 and gives the reference surface
+    this.deform(); // the pose is still all 0: the reference surface
   }
 
   tensor(name) {
@@ -114,7 +115,7 @@ class Basis {
     return this.#view(Float32Array, this.#expected, this.vertexCount);
   }
 
-  /** Write a state to #nextState. The default posture is supine; the default volume is that of the basis. */
+  /** Write a state to #nextState. The default posture is supine; the default volume is the default of the basis. */
   #read(state) {
     const { gravity = [0, 1, 0], volume = '' } = typeof state === 'string' ? { volume: state } : state;
     this.#view(Uint8Array, this.#nextState, STATE).fill(0);

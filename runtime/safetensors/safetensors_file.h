@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * An open safetensors file, element types and checksums, for the files of this folder. */
+ * The struct of an open safetensors file, and functions that only its source files call. */
 #ifndef SUPINE_SAFETENSORS_FILE_H
 #define SUPINE_SAFETENSORS_FILE_H
 

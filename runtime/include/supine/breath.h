@@ -52,7 +52,7 @@ extern "C" {
 
 enum {
   SUPINE_PV_CONTROLS = 5,
-  SUPINE_PV_CONTROL_MAX = 50 /**< largest magnitude of a control parameter */
+  SUPINE_PV_CONTROL_MAX = 50 /**< largest magnitude of a control parameter of a P-V curve */
 };
 
 typedef enum supine_pv_limb {
@@ -61,11 +61,13 @@ typedef enum supine_pv_limb {
   SUPINE_PV_LIMB_COUNT
 } supine_pv_limb;
 
-/** One limb of a P-V loop. */
+/** One limb of a P-V loop: the curve of volume against pressure in inhalation or in exhalation. */
 typedef struct supine_pv_curve {
-  double pressure[2];                 /**< pressures P_low < P_high at the ends, cmH2O */
-  double volume[2];                   /**< volumes V_low < V_high at the ends, mL */
-  double control[SUPINE_PV_CONTROLS]; /**< control parameters c_1 to c_5 */
+  double pressure[2]; /**< pressures P_low < P_high at the ends, cmH2O */
+  double volume[2];   /**< volumes V_low < V_high at the ends, mL */
+  /** Control parameters c_1 to c_5 of the limb: coefficients of V''(x) / V'(x) in the Legendre
+   * polynomials of degrees 0 to 4. */
+  double control[SUPINE_PV_CONTROLS];
 } supine_pv_curve;
 
 /** The P-V loop of a lung: two limbs, which are equal if there is no hysteresis. */
@@ -81,10 +83,10 @@ SUPINE_API const char *supine_breath_limb_name(supine_pv_limb limb);
  *
  * The exhale limb is the exponential 1 - exp(-k P) of [Salazar1964], scaled to this range, with
  * k = ln 2 / (7.58 cmH2O); 7.58 cmH2O is the mean half-inflation pressure of 20 normal subjects.
- * The inhale limb is the sigmoid a + b / (1 + exp(-(P - c) / d)) of [Venegas1998] with c = 10 cmH2O
- * and d = 6 cmH2O, and stays below the exhale limb. The product b d is 44,600 mL cmH2O; Narusawa
- * (J. Appl. Physiol. 91, 2001, 201-210) found 10^4 to 10^5 in published curves. c and d are round
- * numbers, not means of measured lungs. */
+ * The inhale limb is the sigmoid a + b / (1 + exp(-(P - c) / d)) of [Venegas1998], and stays below
+ * the exhale limb. Its c = 10 cmH2O and d = 6 cmH2O are round numbers, not means of measured
+ * lungs. They are plausible, as b d is 44,600 mL cmH2O, and Narusawa (J. Appl. Physiol. 91, 2001,
+ * 201-210) found 10^4 to 10^5 in published curves. */
 SUPINE_API const supine_pv *supine_breath_normal(void);
 
 /** Check that the numbers of a limb are finite, that its pressures and its volumes rise from the
@@ -143,7 +145,7 @@ SUPINE_API supine_pv_breath supine_breath_default(void);
  *     V(t) = tidal (V_limb(P(t)) - V_limb(P_rest)) / (V_limb(P_peak) - V_limb(P_rest))
  *
  * V_limb is the volume of the limb at a pressure. Up to rounding, V is 0 at rest, and equals
- * the tidal volume at the peak.
+ * the tidal volume at the peak. Cost: about 20 microseconds, and less than 1 microsecond per time.
  * @param pv         P-V loop; may be NULL for constant flow if `pressures` is NULL
  * @param times      [count] s, finite
  * @param volumes    [count] mL above rest, written; may be NULL
@@ -152,8 +154,7 @@ SUPINE_API supine_pv_breath supine_breath_default(void);
  *                                 supine_breath_curve_check, or the rest pressure, the peak
  *                                 pressure or the tidal volume is outside the range of a limb
  * @retval SUPINE_ERROR_NUMERICAL  a limb is so flat that its volume does not rise between rest and
- *                                 peak
- * Cost: about 20 microseconds, and less than 1 microsecond for each time. */
+ *                                 peak */
 SUPINE_API supine_status supine_breath_evaluate(const supine_pv *pv, const supine_pv_breath *breath,
                                                 size_t count, const double *times, double *volumes,
                                                 double *pressures, supine_error *error);

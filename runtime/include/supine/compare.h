@@ -19,17 +19,18 @@ extern "C" {
 /** Constants of one basis for comparing poses. Any number of threads may share them. */
 typedef struct supine_compare supine_compare;
 
-/** Compute the weight a_i of each vertex i, and the Gram matrix G_j of each lung and each axis j:
+/** Compute the constants for comparing poses: the share a_i of each vertex i in the area of the
+ * reference surface (top of this file), and a Gram matrix of the modes for each lung and axis j:
  *
  *     G_j[k, l] = sum over the vertices i of the lung of a_i d_ij^2 c_ik c_il
  *
  * c_ik is the coefficient of mode k at vertex i, and d_ij is coordinate j of the direction of this
- * vertex. A vector field has the coefficients c_ijk in place of d_ij c_ik.
+ * vertex. A vector field has the coefficients c_ijk in place of d_ij c_ik. Cost: 3 N K^2 / 2
+ * multiplications for N vertices and K modes, in one pass over the vertices.
  * @param basis    must outlive the comparison
  * @param compare  written; free it with supine_compare_destroy
  * @retval SUPINE_ERROR_MESH    the area of the surface is 0 or not finite
- * @retval SUPINE_ERROR_MEMORY  an allocation failed
- * Cost: 3 N K^2 / 2 multiplications for N vertices and K modes, in one pass over the vertices. */
+ * @retval SUPINE_ERROR_MEMORY  an allocation failed */
 SUPINE_API supine_status supine_compare_create(const supine_basis *basis, supine_compare **compare,
                                                supine_error *error);
 /** Free a comparison; NULL is legal. */
@@ -38,21 +39,22 @@ SUPINE_API void supine_compare_destroy(supine_compare *compare);
 /** Return the area of the reference surface, mm^2. */
 SUPINE_API double supine_compare_area(const supine_compare *compare);
 
-/** Compute the RMS distance D between two poses, mm, from the Gram matrices alone:
+/** Compute the RMS distance D between the vertices in two poses, mm, from Gram matrices of the
+ * modes, without a pass over the vertices:
  *
  *     D^2 = sum over all lungs and axes of q^T G q,     q = A w - A' w'
  *
- * G is the Gram matrix of a lung and an axis. A is the gain of `pose` for this lung and axis, and w
- * are the weights of `pose`. A' and w' are the gain and the weights of `from`.
- * @param from  NULL for the reference surface
- * Cost: 3 K^2 multiplications for each lung and K modes, without a pass over the vertices. */
+ * G is the Gram matrix of a lung and an axis (supine_compare_create). A is the gain of `pose` for
+ * this lung and axis, and w are the weights of `pose`. A' and w' are the gain and the weights of
+ * `from`. Cost: 3 K^2 multiplications for each lung and K modes.
+ * @param from  NULL for the reference surface */
 SUPINE_API double supine_compare_rms(const supine_compare *compare, const supine_pose *pose,
                                      const supine_pose *from);
 
-/** Compute the distance between the positions of every vertex in two poses.
+/** Compute the distance between the positions of every vertex in two poses. Cost: one pass over the
+ * vertices, with 3 K + 6 multiplications per vertex for K modes.
  * @param from      NULL for the reference surface
- * @param distance  [N] mm, written
- * Cost: one pass over the vertices, with 3 K + 6 multiplications per vertex for K modes. */
+ * @param distance  [N] mm, written */
 SUPINE_API void supine_compare_distances(const supine_compare *compare, const supine_pose *pose,
                                          const supine_pose *from, float *distance);
 
@@ -70,19 +72,20 @@ typedef struct supine_distance_statistics {
 SUPINE_API void supine_compare_statistics(const supine_compare *compare, const float *distance,
                                           supine_distance_statistics *statistics);
 
-/** Compute the energy of each band l of harmonics. It is the part of band l in the squared
- * displacement at gain 1, averaged over the area and over all directions of gravity:
+/** Compute the energy of each band l of spherical harmonics: the part of band l in the squared
+ * displacement, averaged over the area and over all directions of gravity, at gains of 1:
  *
  *     energy[l] = 1 / (4 pi) * sum over m of  M_lm^T G M_lm
  *
- * M_lm is the column of supine_basis_info.modes for Y_lm, and G is the sum of all Gram matrices.
- * Reversed gravity reverses the displacements of odd bands, but not those of even bands.
+ * M_lm is the column of supine_basis_info.modes for the harmonic Y_lm, and G is the sum of the
+ * Gram matrices of all lungs and axes (supine_compare_create). Reversed gravity reverses the
+ * displacements of odd bands, but not those of even bands.
  * @param energy  [supine_basis_info.band + 1] mm^2, written */
 SUPINE_API void supine_compare_energy(const supine_compare *compare, double *energy);
 
-/** The part of one lung between two heights. */
+/** The part of one lung between two horizontal planes, and how much a breath inflates it. */
 typedef struct supine_slab {
-  double volume; /**< volume before the breath, mL */
+  double volume; /**< volume of the slab before the breath, mL */
   double gain;   /**< volume that the breath adds, mL; gain / volume is the regional expansion */
 } supine_slab;
 
@@ -98,15 +101,15 @@ enum { SUPINE_SLABS_MAX = 64 };
  * vertices inside the lung. Both before and after the breath, each cut therefore consists of
  * triangles, from the mean point of the outline of the cut to each edge of this outline. The gains
  * of a lung's slabs sum to the gain of the lung. They are exact if displacements are linear in
- * position: 0 for a rotation, and a constant gain / volume for a uniform expansion.
+ * position: 0 for a rotation, and a constant gain / volume for a uniform expansion. Cost: one pass
+ * over the triangles for each lung.
  * @param gravity  [3], any length but 0
  * @param from     [N, 3] positions before the breath, mm; NULL for the reference surface
  * @param xyz      [N, 3] positions after the breath (supine_deform), mm
  * @param count    number of slabs, 1 to SUPINE_SLABS_MAX
  * @param slabs    [number of lungs, count], uppermost first, written
  * @retval SUPINE_ERROR_ARGUMENT      gravity is zero or not finite, or the count is out of range
- * @retval SUPINE_ERROR_OPEN_SURFACE  the basis has no volumes
- * Cost: one pass over the triangles for each lung. */
+ * @retval SUPINE_ERROR_OPEN_SURFACE  the basis has no volumes */
 SUPINE_API supine_status supine_compare_slabs(const supine_basis *basis, const double gravity[3],
                                               const float *from, const float *xyz, size_t count,
                                               supine_slab *slabs, supine_error *error);

@@ -1,23 +1,28 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * Expected errors of positions, and lungs found from a few observed points.
+ * Expected errors of predicted positions, and lungs found from a few observed points.
  *
- * After the translation that fits best, the error of vertex i has the expected 3-D variance
+ * The expected error sigma_i of vertex i is the 3-D RMS distance between its true and its predicted
+ * position, after the translation that fits best:
  *
  *     sigma_i^2 = |u_i| min(c, RMS of |u|) + (|dx_i/dV| 0.05 V_full)^2
  *
- * where u_i is the displacement of the vertex from another state, x_i its position, V the volume of
- * all lungs, and V_full the volume of the reference surface. The second term applies only if the
- * volume of a state is given relative to rest and the volume at rest was assumed. The constant c
- * is 4.5 mm (95 % interval 3.7 to 5.7), measured on full breaths of 15 people in one posture; for a
- * change of posture it is an extrapolation. Half of all points lie within 0.9 sigma of the truth,
- * 95 % within 1.8 sigma.
+ *     u_i     displacement of the vertex from a state whose positions are exact, mm
+ *     c       4.5 mm (95 % interval 3.7 to 5.7), measured on full breaths of 15 people in one
+ *             posture; for a change of posture, this is an extrapolation
+ *     x_i     position of the vertex, mm
+ *     V       volume of all lungs, mL
+ *     V_full  volume of the reference surface, mL
  *
- * Observed points correct the positions by kriging, and reduce the expected errors near the points.
- * If there are at least three points and no rotation is fitted, the sigma above is an upper bound
- * on the expected errors, with two changes: 2 mm replaces every |u_i| and RMS below 2 mm, and 0.17
- * V_full replaces 0.05 V_full for an unknown volume. Fewer points do not determine the
- * translation. */
+ * The second term applies only if the volume of a state is given relative to rest and the volume at
+ * rest was assumed. Half of all points lie within 0.9 sigma of the truth, 95 % within 1.8 sigma.
+ *
+ * Observed points correct the predicted positions by kriging. This reduces the expected errors near
+ * the points. If at least three points were observed and no rotation is fitted, no expected error
+ * exceeds sigma, which is then computed with two changes:
+ * - |u_i| and the RMS count as at least 2 mm.
+ * - The second term is (|dx_i/dV| 0.17 V_full)^2 for an unknown volume, and 0 for a given
+ *   volume. */
 #ifndef SUPINE_LOCATE_H
 #define SUPINE_LOCATE_H
 
@@ -31,20 +36,21 @@
 extern "C" {
 #endif
 
-/** Default of the constant c in the expected error (top of this file), mm. */
+/** Default of c, mm: the square of an expected error is c times the displacement (top of this
+ * file). */
 #define SUPINE_EXPECTED_ERROR_MM 4.5
 
 /** Compute the expected error of every vertex in a state, if the positions in state `from` are
  * exact.
  *
- * The constant c (top of this file) is the metadata "expected_error_mm" of the file or, if the file
- * lacks it, SUPINE_EXPECTED_ERROR_MM. The volume at rest counts as measured if the
- * file has metadata "resting_known" or was scanned at rest.
+ * The constant c (top of this file) is the metadata "expected_error_mm" of the file or, if the
+ * file lacks it, SUPINE_EXPECTED_ERROR_MM. The volume at rest counts as measured if the file has
+ * metadata "resting_known" or was scanned at rest. Cost: four evaluations of every vertex, or six
+ * if the volume at rest was assumed.
  * @param from   NULL for the state of the scan
- * @param sigma  [N] mm, written
- * @retval SUPINE_ERROR_UNSUPPORTED  the basis was made from another simulator's fields
- * Other statuses: as supine_basis_pose. Cost: four evaluations of every vertex, or six if the
- * volume at rest was assumed. */
+ * @param sigma  [N] expected 3-D RMS errors, mm, written
+ * @return a status of supine_basis_pose, or one of these:
+ * @retval SUPINE_ERROR_UNSUPPORTED  the basis was made from another simulator's displacements */
 SUPINE_API supine_status supine_expected_error(const supine_basis *basis, const supine_state *state,
                                                const supine_state *from, float *sigma,
                                                supine_error *error);
@@ -54,18 +60,18 @@ enum { SUPINE_LOCATE_POINTS_MAX = 300 };
 /** One observed point, a vertex of a basis. The frame of all observed positions may be translated
  * from the frame of the basis and, if supine_locate_task.rigid is true, rotated. */
 typedef struct supine_observation {
-  size_t vertex;      /**< vertex of the basis supine_locate_task.inside */
+  size_t vertex;      /**< index of the observed vertex in the basis `inside` of the task */
   double position[3]; /**< observed position, mm */
   double noise; /**< standard deviation of `position` per axis, mm, above 0; give 2 if unknown */
 } supine_observation;
 
 /** The input of supine_locate. */
 typedef struct supine_locate_task {
-  const supine_basis *inside; /**< basis whose vertices were observed */
+  const supine_basis *inside; /**< basis that has the observed points as vertices */
   size_t count; /**< number of points, 1 to SUPINE_LOCATE_POINTS_MAX; at least 3 if `rigid` */
   const supine_observation *observed; /**< [count] observed points */
   supine_state state; /**< posture and volume; SUPINE_VOLUME_DEFAULT if the volume is unknown */
-  bool rigid;         /**< find a rotation in addition to the translation */
+  bool rigid;         /**< whether to find a rotation in addition to the translation */
 } supine_locate_task;
 
 /** The result of supine_locate. */
@@ -73,50 +79,52 @@ typedef struct supine_location {
   supine_state state; /**< state of the task; the volume found replaces an unknown volume */
   double volume;      /**< volume of all lungs, gas and tissue, mL; 0 if the basis has no volumes */
   double volume_error;       /**< standard deviation of `volume`, mL; 0 if the volume was given */
-  double volume_prior_error; /**< prior standard deviation of the volume, mL; 0 if it was given */
-  double rotation[9];        /**< R, by rows: observed = R (predicted + correction) + translation */
-  double translation[3];     /**< translation in the equation of `rotation`, mm */
-  double residual_rms;  /**< RMS distance of all points but outliers from their predictions, mm */
-  double log_evidence;  /**< log likelihood, for comparing tasks that differ only in the posture */
-  size_t outlier_count; /**< number of points that were left out as outliers */
+  double volume_prior_error; /**< prior standard deviation of `volume`, mL; 0 if known */
+  double rotation[9]; /**< rotation matrix R by rows: observed = R (predicted + correction) + t */
+  double translation[3]; /**< translation t in observed = R (predicted + correction) + t, mm */
+  double residual_rms;   /**< RMS distance of all points but outliers from their predictions, mm */
+  double log_evidence;   /**< log likelihood, for comparing tasks that differ only in the posture */
+  size_t outlier_count;  /**< number of points that were left out as outliers */
   const void *fit; /**< data for supine_locate_positions, in the `space` given to supine_locate */
 } supine_location;
 
 /** Comparison of an observed point with its prediction by all other points. */
 typedef struct supine_locate_residual {
   double distance; /**< distance from the prediction, mm; 0 if there is no prediction */
-  double sigma;    /**< expected 3-D standard deviation of `distance`, mm */
+  double sigma;    /**< expected RMS of `distance`, mm */
   bool outlier;    /**< the point was left out because it is too far from the prediction */
 } supine_locate_residual;
 
 /** Return the number of doubles that supine_locate needs for `count` points. */
 SUPINE_API size_t supine_locate_space(size_t count);
 
-/** Find the state, the rigid motion and the correction from observed points.
+/** Find the volume of the lungs, the rigid motion to the frame of the observations, and a
+ * correction of the predicted positions, from observed points.
  *
- * An unknown volume has a prior. The mean of the prior is the volume at rest or, if the basis has
- * none, the volume in the scan. The standard deviation is 0.17 of the volume of the reference
- * surface. A point is an outlier if its distance from the prediction by all other points exceeds 3
- * standard deviations of this distance. Outliers are left out, the worst first, as long as at least
- * four fifths of the points remain.
+ * An unknown volume has a normal distribution before the points are observed. Its mean is the
+ * volume at rest or, if the basis has none, the volume in the scan. Its standard deviation is 0.17
+ * of the volume of the reference surface.
+ *
+ * A point is an outlier if its distance from the prediction by all other points exceeds 3 standard
+ * deviations of this distance. Outliers are left out, the worst first, as long as at least four
+ * fifths of the points remain. Cost: about 0.2 ms for 20 points, 0.1 s for 300.
  * @param residuals  [count], written
  * @param space      [supine_locate_space(count)]; keep it as long as `found` is used
  * @param found      written
- * @retval SUPINE_ERROR_ARGUMENT   a count, vertex, position or noise is out of range, or a rotation
- *                                 is to be found from fewer than three points or from points on one
- *                                 line
- * @retval SUPINE_ERROR_NUMERICAL  the fit needs a volume that the lungs cannot hold
- * Other statuses: as supine_basis_pose. Cost: about 0.2 ms for 20 points, 0.1 s for 300. */
+ * @return a status of supine_basis_pose, or one of these:
+ * @retval SUPINE_ERROR_ARGUMENT   a count, vertex, position or noise is out of range, or a
+ *                                 rotation is to be found from fewer than three points or from
+ *                                 points on one line
+ * @retval SUPINE_ERROR_NUMERICAL  the fit needs a volume that the lungs cannot hold */
 SUPINE_API supine_status supine_locate(const supine_locate_task *task,
                                        supine_locate_residual *residuals, double *space,
                                        supine_location *found, supine_error *error);
 
 /** Compute the positions of all vertices in the frame of the observations, and their expected
- * errors. Statuses: as supine_basis_pose.
+ * errors. Statuses: as supine_basis_pose. Cost: about 3 ms for 25,000 vertices and 20 points.
  * @param basis  basis of the located lungs, or of structures inside them
  * @param xyz    [N, 3] mm, written
- * @param sigma  [N] expected errors, mm, written
- * Cost: about 3 ms for 25,000 vertices and 20 points. */
+ * @param sigma  [N] expected 3-D RMS errors, mm, written */
 SUPINE_API supine_status supine_locate_positions(const supine_location *found,
                                                  const supine_basis *basis, float *xyz,
                                                  float *sigma, supine_error *error);

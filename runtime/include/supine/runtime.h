@@ -5,12 +5,16 @@
  *     x_ij   = p_ij + A_j (sum over k of w_k(g) c_ik) d_ij
  *     w_k(g) = sum over l, m of modes[k, lm] Y_lm(g)
  *
- * x_ij is coordinate j (x, y, z) of vertex i in mm. p_ij is the reference position of this vertex,
- * d_ij its direction, and c_ik its coefficient of mode k. A vector field has c_ijk in place of
- * c_ik d_ij. The weights w_k depend on gravity g by the spherical harmonics Y_lm (supine/sh.h), and
- * the gains A_j of each lung on the volume of this lung. A program parses or fills in a
- * supine_state (posture and volume), calls supine_basis_pose for the weights and gains, and then
- * supine_deform for the positions.
+ *     x_ij       coordinate j (x, y, z) of vertex i, mm
+ *     p_ij       its coordinate on the reference surface, mm
+ *     A_j        gain: factor of the displacement of a lung along axis j, set by the lung's volume
+ *     w_k        weight of mode k, a function of the direction of gravity g
+ *     c_ik d_ij  coefficient of mode k at vertex i, times the vector along which the vertex moves;
+ *                a vector field has c_ijk instead
+ *     Y_lm       spherical harmonics (supine/sh.h)
+ *
+ * A program parses or fills in a supine_state (posture and volume), calls supine_basis_pose for the
+ * weights and gains, and then supine_deform for the positions.
  *
  * In the shapes of arrays, N is the number of vertices, and M the number of triangles.
  *
@@ -43,12 +47,12 @@ enum { SUPINE_NORMAL_MODES_MAX = 64 };
 
 typedef struct supine_basis supine_basis;
 
-/** How an open basis keeps coefficients, directions and reference positions in memory. */
+/** How an open basis stores coefficients, directions of displacement and reference positions. */
 typedef enum supine_storage {
   SUPINE_STORAGE_AUTO = 0, /**< the smallest storage with an error of at most 0.005 mm */
   SUPINE_STORAGE_EXACT,    /**< float32, as in the file */
-  SUPINE_STORAGE_INT16,    /**< coefficients of 16 bits, coordinates of 21 or 22 bits */
-  SUPINE_STORAGE_MIXED,    /**< like INT16, but only 10 or 11 bits for the last modes */
+  SUPINE_STORAGE_INT16,    /**< fixed point: 16 bits per coefficient, 21 or 22 per coordinate */
+  SUPINE_STORAGE_MIXED,    /**< like INT16, but 10 or 11 bits per coefficient of the last modes */
   SUPINE_STORAGE_COUNT
 } supine_storage;
 
@@ -78,66 +82,74 @@ typedef struct supine_basis_info {
   size_t band; /**< highest band of the spherical harmonics */
   size_t lung_count;
   const size_t *lung_begin; /**< [lung_count + 1] first vertex of each lung, then vertex_count */
-  bool vector;     /**< vector field: each vertex has 3 coefficients per mode, and no direction */
+  bool vector;     /**< each vertex has 3 coefficients per mode, instead of 1 along `direction` */
   bool has_volume; /**< the surface is closed, so that lungs have volumes */
   supine_storage storage;  /**< the storage in use, never AUTO */
   supine_simd simd;        /**< the instruction set in use, never AUTO */
   double bytes_per_vertex; /**< bytes that an evaluation reads for each vertex */
-  /** Largest supine_basis_error of 26 poses, mm. The directions of gravity of these poses point to
-   * the faces, edges and corners of a cube. In each pose, the lungs have 500 mL more than the
-   * reference surface or, if the surface is open, the largest displacement is 20 mm. */
+  /** Bound on the position error of any vertex from storage and rounding, mm: the largest
+   * supine_basis_error for 26 directions of gravity, towards the faces, edges and corners of a
+   * cube. The lungs hold 500 mL more than the reference surface or, if the surface is open, move
+   * by at most 20 mm. */
   double storage_error;
-  const char *const *lung_names; /**< [lung_count] such as "left"; the index of an unnamed lung */
+  const char *const *lung_names; /**< [lung_count] such as "left", or an index such as "0" */
   const float *bounds;   /**< [lung_count, 2, 3] lowest and highest corner of each lung's box, mm */
   const float *vertices; /**< [vertex_count, 3] reference positions, mm, LPS */
   const uint32_t *triangles; /**< [triangle_count, 3] vertices of each triangle */
-  const float *direction;    /**< [vertex_count, 3] directions, mm; NULL if `vector` */
-  /** [vertex_count, mode_count] coefficients; [vertex_count, 3, mode_count], mm, if `vector` */
+  const float *direction; /**< [vertex_count, 3] vectors along which vertices move, mm; or NULL */
+  /** Coefficients of the modes at each vertex: [vertex_count, mode_count], which multiply
+   * `direction`, or [vertex_count, 3, mode_count] along x, y and z, mm, if `vector` is true. */
   const float *coefficients;
-  const double *modes; /**< [mode_count, (band + 1)^2] harmonic coefficients of the weights */
-  /** Arrays L, Q and T of supine_volume_contract for each lung, mL. The first axis is the lung, the
-   * others are those of supine_volume_contract. NULL if the surface is open. */
+  /** [mode_count, (band + 1)^2] spherical-harmonic coefficients of the weight of each mode. */
+  const double *modes;
+  /** Coefficients of the polynomial that gives the volume of each lung from the weights and gains,
+   * mL: L, Q and T of supine_volume_contract, each with the lung as an additional first axis. NULL
+   * if the surface is open. */
   const double *volume_linear, *volume_quadratic, *volume_cubic;
-  /** The memory that an evaluation reads, in tiles of 16 vertices. Use it only to measure memory
-   * traffic, as the layout changes between versions. */
+  /** Memory that an evaluation reads, with the vertices in blocks of 16. Use it only to measure
+   * memory traffic, as the layout changes between versions. */
   const void *packed;
-  size_t normal_count;    /**< number of modes of the normals; 0 without normals */
-  const int16_t *normals; /**< [vertex_count, 3, normal_count] modes of the normals */
-  /** Coefficients V of supine_basis_normal_weights. With K = mode_count, the shape is [lung_count,
-   * normal_count, 3, 1 + 2 K + K (K + 1) / 2], or [lung_count, normal_count, (K + 1) (K + 2) / 2]
-   * in files of versions 1 and 2. */
+  size_t normal_count; /**< vectors per vertex whose weighted sum is the normal; 0 if none */
+  /** [vertex_count, 3, normal_count] vectors whose weighted and normalised sum is the normal. */
+  const int16_t *normals;
+  /** Coefficients of the polynomials that give the weights of the vectors in `normals` (V of
+   * supine_basis_normal_weights). With K = mode_count, the shape is [lung_count, normal_count, 3,
+   * 1 + 2 K + K (K + 1) / 2], or [lung_count, normal_count, (K + 1) (K + 2) / 2] in files of
+   * versions 1 and 2. */
   const double *normal_weights;
-  const double *reference_volume; /**< [lung_count] volume at gain 0, mL; 0 for open surfaces */
+  const double *reference_volume; /**< [lung_count] volume of reference surface, mL; 0 if open */
   bool has_rest;                  /**< the file has the volume at rest for every posture */
   bool has_full;                  /**< the reference surface is at full inflation */
-  bool is_fields; /**< the file was made from another simulator's fields; gain 1 reproduces them */
+  bool is_fields;     /**< made from another simulator's displacements, which gain 1 reproduces */
   size_t volume_axes; /**< number of gains of a lung: 3, or 1 in files of versions 1 and 2 */
-  double bend[3];     /**< parameter `bend` of supine_volume_bend */
+  double bend[3];     /**< curvature of the gains' path on x, y and z (supine_volume_bend) */
 } supine_basis_info;
 
 typedef struct supine_pose {
-  double weights[SUPINE_MODES_MAX];  /**< weight of each mode */
-  double gains[SUPINE_LUNGS_MAX][3]; /**< gain of each lung and axis; 0 for the reference surface */
+  double weights[SUPINE_MODES_MAX];
+  double gains[SUPINE_LUNGS_MAX][3]; /**< factor of each lung's displacement along x, y and z */
 } supine_pose;
 
-/** Open a basis from a file, or from `size` bytes in memory. Check all of it, and pack it for
- * evaluation. The bytes must outlive the basis.
+/** Open a basis from a file. Check all of it, and pack it for evaluation. Cost: a few passes over
+ * the file. Memory: the mapped file, and for each vertex supine_basis_info.bytes_per_vertex and
+ * 12 ceil(normal_count / 3) bytes.
  * @param options  NULL for the defaults
  * @param basis    written; NULL on failure
  * @retval SUPINE_ERROR_READ         the file is missing or unreadable
  * @retval SUPINE_ERROR_FORMAT       the file is truncated, corrupted or not a basis file
- * @retval SUPINE_ERROR_ARGUMENT     an option is out of range, or the size is not set
+ * @retval SUPINE_ERROR_ARGUMENT     an option is out of range, or options->size is not set
  * @retval SUPINE_ERROR_UNSUPPORTED  the processor or the library lacks the instruction set
- * @retval SUPINE_ERROR_MEMORY       an allocation failed
- * Cost: a few passes over the file. Memory: the mapped file, and for each vertex bytes_per_vertex
- * and 12 bytes for every three modes of the normals. */
+ * @retval SUPINE_ERROR_MEMORY       an allocation failed */
 SUPINE_API supine_status supine_basis_open_with(const char *path,
                                                 const supine_basis_options *options,
                                                 supine_basis **basis, supine_error *error);
+/** Open a basis from the `size` bytes of a file in memory, which must outlive the basis. Other
+ * parameters and statuses: as supine_basis_open_with. */
 SUPINE_API supine_status supine_basis_open_memory_with(const void *bytes, size_t size,
                                                        const supine_basis_options *options,
                                                        supine_basis **basis, supine_error *error);
-/** Open a basis with the default options. Statuses: as supine_basis_open_with. */
+/** Open a basis with the default options, from a file or from `size` bytes in memory. Statuses: as
+ * supine_basis_open_with. */
 SUPINE_API supine_status supine_basis_open(const char *path, supine_basis **basis,
                                            supine_error *error);
 SUPINE_API supine_status supine_basis_open_memory(const void *bytes, size_t size,
@@ -150,7 +162,7 @@ SUPINE_API const supine_basis_info *supine_basis_get_info(const supine_basis *ba
 /** Return the metadata string of a key, such as "format"; NULL if there is none. */
 SUPINE_API const char *supine_basis_metadata(const supine_basis *basis, const char *key);
 /** Return all metadata, in the order of the file.
- * @param count  number of strings, written */
+ * @param count  written: the number of metadata strings */
 SUPINE_API const supine_metadata *supine_basis_all_metadata(const supine_basis *basis,
                                                             size_t *count);
 /** Return a tensor of the file by its name, such as "error_modes"; NULL if there is none. */
@@ -160,54 +172,58 @@ SUPINE_API const float *supine_basis_vertices(const supine_basis *basis);
 /** Return the triangles [M, 3], each as three indices of vertices. */
 SUPINE_API const uint32_t *supine_basis_triangles(const supine_basis *basis);
 
-/** Compute the weights of the modes for a direction of gravity.
+/** Compute the weights of the modes for a direction of gravity, once a frame. Cost:
+ * mode_count (band + 1)^2 multiplications.
  * @param gravity  [3], any length but 0
  * @param weights  [mode_count] written
- * @retval SUPINE_ERROR_ARGUMENT  gravity is zero or not finite
- * Cost: mode_count (band + 1)^2 multiplications, once a frame. */
+ * @retval SUPINE_ERROR_ARGUMENT  gravity is zero or not finite */
 SUPINE_API supine_status supine_basis_weights(const supine_basis *basis, const double gravity[3],
                                               double *weights);
 
-/** Compute the weights and gains of a state, without a pass over the vertices. With these gains,
- * the lungs hold exactly the volume of the state.
+/** Compute the pose of a state: the weights of the modes for its gravity, and the gains (factors of
+ * the displacement of each lung along x, y and z) at which the lungs hold exactly its volume.
  *
- * A total volume is divided among the lungs. Above rest, every lung is inflated by the same
+ * A volume of all lungs is divided among them. Above rest, every lung is inflated by the same
  * fraction of the difference between its volumes at rest and at full inflation [MilicEmili1966].
- * Below rest, all lungs hold the same fraction of their volumes at rest. The gains of a lung lie on
- * a path from full inflation through rest (supine_volume_bend). Files of versions 1 and 2 have one
- * gain for all lungs and axes.
+ * Below rest, all lungs hold the same fraction of their volumes at rest. The three gains of a lung
+ * then follow from its volume (supine_volume_bend). Files of versions 1 and 2 have one gain for
+ * all lungs and axes.
  *
- * SUPINE_VOLUME_DEFAULT means rest if the basis has a volume at rest. If not, it means gain 1 for
- * another simulator's fields, and 500 mL above the scan for any other basis.
+ * SUPINE_VOLUME_DEFAULT means the volume at rest if the file has one. Otherwise, it means gains of
+ * 1 for a file made from another simulator's displacements, and 500 mL above the volume in the
+ * scan for all other files.
+ * Cost: mode_count (band + 1)^2 multiplications, and mode_count^3 for each lung, without a pass
+ * over the vertices.
  * @param state  its gravity has any length but 0
  * @param pose   written
- * @retval SUPINE_ERROR_ARGUMENT      gravity is zero or not finite, the basis lacks the volume to
- *                                    which the state's volume is relative, or named lungs are not
- *                                    those of the basis
+ * @retval SUPINE_ERROR_ARGUMENT      gravity is zero or not finite; the volume is relative to rest
+ *                                    or to full inflation, which the file lacks; or the lungs
+ *                                    named in the state are not exactly those of the basis
  * @retval SUPINE_ERROR_OPEN_SURFACE  the surface is open and has no volumes
  * @retval SUPINE_ERROR_NUMERICAL     the surface folds before it holds that volume; single
  *                                    triangles that turn over earlier are not detected
- * Cost: mode_count (band + 1)^2 multiplications for the weights and mode_count^3 for the gains of
- * each lung, once a frame.
  *
  * [MilicEmili1966]  Milic-Emili, Henderson, Dolovich, Trop, Kaneko, J. Appl. Physiol. 21, 1966,
  *                   749-759 */
 SUPINE_API supine_status supine_basis_pose(const supine_basis *basis, const supine_state *state,
                                            supine_pose *pose, supine_error *error);
 
-/** Compute only the gains of a state, as gravity stays the same during a breath. `pose` must
- * already have the weights for the gravity of the state. Statuses: as supine_basis_pose. */
+/** Compute only the gains of a state. `pose` must already have the weights for the gravity of the
+ * state. This is enough during a breath, as gravity stays the same. Statuses: as
+ * supine_basis_pose. */
 SUPINE_API supine_status supine_basis_gains(const supine_basis *basis, const supine_state *state,
                                             supine_pose *pose, supine_error *error);
 
-/** Return the volume that replaces SUPINE_VOLUME_DEFAULT in a state (supine_basis_pose). If gain 1
- * replaces it, return a volume of the kind SUPINE_VOLUME_DEFAULT. */
+/** Return the volume that SUPINE_VOLUME_DEFAULT means for this basis (supine_basis_pose). If it
+ * means gains of 1 instead of a volume, return a volume of the kind SUPINE_VOLUME_DEFAULT. */
 SUPINE_API supine_volume supine_basis_default_volume(const supine_basis *basis);
 
-/** Set all gains of a pose to `gain`, for open surfaces or another simulator's fields. */
+/** Multiply the displacements of a pose by `gain`: set its gains for all lungs and axes to this
+ * number. Use this where the gains do not follow from a volume: for open surfaces, or for
+ * displacements from another simulator, which a gain of 1 reproduces. */
 SUPINE_API void supine_pose_fill(supine_pose *pose, double gain);
 
-/** Return the state of the scan. Its volume is SUPINE_VOLUME_SCAN. */
+/** Return the gravity and the volume in the scan. The volume is of the kind SUPINE_VOLUME_SCAN. */
 SUPINE_API supine_state supine_basis_scan(const supine_basis *basis);
 
 /** Compute the volume of each lung in a pose. The basis must have volumes
@@ -216,8 +232,9 @@ SUPINE_API supine_state supine_basis_scan(const supine_basis *basis);
 SUPINE_API void supine_basis_volumes(const supine_basis *basis, const supine_pose *pose,
                                      double *volumes);
 
-/** Return a bound on the error of storage and rounding in a pose, mm. No deformed vertex is farther
- * than this from the position that exact arithmetic computes from the numbers of the file. */
+/** Return a bound, mm, on the position error that storage and rounding cause in a pose: the
+ * distance of any deformed vertex from the position that exact arithmetic computes from the
+ * numbers of the file. */
 SUPINE_API double supine_basis_error(const supine_basis *basis, const supine_pose *pose);
 
 /** Compute the deformed position of every vertex, in the caller's thread.
@@ -225,12 +242,13 @@ SUPINE_API double supine_basis_error(const supine_basis *basis, const supine_pos
  *     x_ij = p_ij + A_j (w . c_i) d_ij
  *
  * p are the reference positions, A the gains, w the weights, c the coefficients, d the directions.
- * Each row of the optional tensor "rigid" is the range of vertices of a rigid part. In this and all
- * following functions, such a part moves by the rigid motion that fits the positions x_ij best.
- * @param xyz  [N, 3] mm, LPS, written; aligned like a float
+ * The optional tensor "rigid" of the file lists ranges of vertices of parts that keep their shape.
+ * In this and all following functions, each such part moves by the rigid motion that fits the
+ * positions x_ij best.
  * Cost per vertex: K + 6 multiplications and K + 2 additions for K modes. If the positions and the
  * basis exceed 4 MiB, positions are written with stores that bypass the caches. These are fastest
- * if `xyz` is aligned to 64 bytes. */
+ * if `xyz` is aligned to 64 bytes.
+ * @param xyz  [N, 3] mm, LPS, written; aligned like a float */
 SUPINE_API void supine_deform(const supine_basis *basis, const supine_pose *pose, float *xyz);
 
 /** Compute supine_deform for vertices begin <= i < end, so that several threads can share the work.
@@ -245,10 +263,9 @@ SUPINE_API void supine_deform_range(const supine_basis *basis, const supine_pose
 SUPINE_API void supine_deform_batch(const supine_basis *basis, size_t count,
                                     const supine_pose *poses, size_t begin, size_t end, float *xyz);
 
-/** Compute the displacements of vertices begin <= i < end from the reference surface. Except in
- * rigid parts, displacements are linear in the gains. A pose whose gains are the differences
- * between two poses of the same weights therefore gives the displacements from one pose to the
- * other (supine_step).
+/** Compute the displacements of vertices begin <= i < end from the reference surface. For fixed
+ * weights, displacements are linear in the gains, except in rigid parts. For one step of a breath
+ * (supine_step), therefore pass a pose with the gains after the step minus the gains before it.
  * @param xyz  [end - begin, 3] mm, written */
 SUPINE_API void supine_displace_range(const supine_basis *basis, const supine_pose *pose,
                                       size_t begin, size_t end, float *xyz);
@@ -257,25 +274,26 @@ SUPINE_API void supine_displace_range(const supine_basis *basis, const supine_po
  * III-B, see supine/breath.h):
  *
  *     xyz += step
- * @param count  number of vertices
- * @param step   [count, 3] displacements of the step, mm, from supine_displace_range for the
- *               difference of the gains
- * @param xyz    [count, 3] mm, changed; must not overlap `step`
+ *
  * Each step rounds a coordinate by at most 2^-24 of its value. These errors add up, so begin each
- * breath with supine_deform. */
+ * breath with supine_deform.
+ * @param count  number of vertices
+ * @param step   [count, 3] displacement of each vertex in this step, mm (supine_displace_range)
+ * @param xyz    [count, 3] mm, changed; must not overlap `step` */
 SUPINE_API void supine_step(size_t count, const float *step, float *xyz);
 
-/** Compute the weights v of the modes of the normals for each lung. They are sums over the three
- * axes of a normal:
+/** Compute, for each lung, the weights of the vectors whose weighted sum is the normal of a vertex
+ * (supine_deform_lit). The weight of vector j is a sum over the axes c = x, y, z:
  *
- *     v_j = sum over axes c of V_jc . (1, a w_k, b w_k, a b w_k w_l (k <= l))
+ *     v_j = sum over c of V_jc . (1, a w_k, b w_k, a b w_k w_l)    for all k and all l >= k
  *
- * V is supine_basis_info.normal_weights of the lung, and w_k are the weights of the pose. a and b
- * are the gains on the two axes after c, cyclically. In files of versions 1 and 2, which have one
- * gain a, v_j = V_j . (1, a w_k, a^2 w_k w_l (k <= l)).
- * @param normal_weights  [lung_count, normal_count] v, written
- * Cost: 1.5 Q K^2 multiplications for each lung, once a frame, for K modes of the displacement and
- * Q modes of the normals. */
+ *     V_jc  coefficients for this lung (supine_basis_info.normal_weights)
+ *     w_k   weight of mode k of the pose
+ *     a, b  gains on the next two axes: y, z for c = x; z, x for c = y; x, y for c = z
+ *
+ * In files of versions 1 and 2, a lung has one gain a, and v_j = V_j . (1, a w_k, a^2 w_k w_l).
+ * Cost: 1.5 Q K^2 multiplications for each lung, once a frame, for K modes and Q vectors.
+ * @param normal_weights  [lung_count, normal_count] v, written */
 SUPINE_API void supine_basis_normal_weights(const supine_basis *basis, const supine_pose *pose,
                                             double *normal_weights);
 
@@ -283,17 +301,18 @@ SUPINE_API void supine_basis_normal_weights(const supine_basis *basis, const sup
  *
  *     n_i = sum over j of v_j n_ij, normalised
  *
- * n_ij is mode j of the normal of vertex i, and v_j is the weight of this mode
- * (supine_basis_normal_weights).
+ * The vectors n_ij of vertex i are supine_basis_info.normals. Their weights v_j in this pose are
+ * those of supine_basis_normal_weights. Cost of a normal: 3 Q + 8 multiplications for Q vectors,
+ * and as many additions.
  *
- * The angles between these normals and those of supine_normals were measured on held-out states.
- * Their mean and 99.9th percentile are metadata "normals_mean_degrees" and "normals_p999_degrees"
- * of the file. They hold for volumes in the range "normals_range_ml". In a basis without rest, they
- * hold if the largest displacement is in the range "normals_range_mm". Outside, angles are larger.
+ * The file states how far these normals turn away from those of supine_normals in states that did
+ * not serve to make the vectors: metadata "normals_mean_degrees" is the mean angle,
+ * "normals_p999_degrees" the 99.9th percentile. Both hold for volumes in the range
+ * "normals_range_ml" or, if the file has no volume at rest, for largest displacements in the range
+ * "normals_range_mm". Outside these ranges, angles are larger.
  * @param xyz      [N, 3] mm, written; NULL to compute only normals
  * @param normals  [N, 3], written; 0 for a vertex without triangles
- * @retval SUPINE_ERROR_UNSUPPORTED  the file has no normals, or it was opened without_normals
- * Cost of a normal: 3 Q + 8 multiplications for Q modes of the normals, and as many additions. */
+ * @retval SUPINE_ERROR_UNSUPPORTED  the file has no normals, or it was opened without_normals */
 SUPINE_API supine_status supine_deform_lit(const supine_basis *basis, const supine_pose *pose,
                                            float *xyz, float *normals);
 
@@ -303,15 +322,14 @@ SUPINE_API supine_status supine_deform_lit_range(const supine_basis *basis, cons
                                                  size_t begin, size_t end, float *xyz,
                                                  float *normals);
 
-/** Compute the unit normals of a deformed surface from its triangles. The normal of a vertex is the
- * mean of its triangles' normals, weighted by area.
+/** Compute the unit normals of a deformed surface in one pass over its triangles, in the caller's
+ * thread. The normal of a vertex is the mean of its triangles' normals, weighted by area.
  * @param xyz      [N, 3] positions of all vertices, mm
- * @param normals  [N, 3], written; 0 for a vertex without a triangle of positive area
- * Cost: one pass over the triangles, in the caller's thread. */
+ * @param normals  [N, 3], written; 0 for a vertex without a triangle of positive area */
 SUPINE_API void supine_normals(const supine_basis *basis, const float *xyz, float *normals);
 
-/** Largest number of modes that supine.glsl evaluates, and the number of floats before the
- * coefficients in the attributes of a vertex. */
+/** Limits of supine.glsl: the largest number of modes, and the number of floats of a vertex before
+ * its coefficients. */
 enum { SUPINE_GL_MODES = 16, SUPINE_GL_FLOATS = 7 };
 
 /** Fill a vertex buffer for supine.glsl with vertices begin <= i < end. With K modes, a vertex has
@@ -332,16 +350,17 @@ SUPINE_API supine_status supine_gl_pack(const supine_basis *basis, size_t begin,
 SUPINE_API supine_status supine_gl_weights(const supine_basis *basis, const supine_pose *pose,
                                            float *weights, float *gains);
 
-/** Pack the modes of the normals of vertices begin <= i < end for supine.glsl. Three modes share a
- * word, so that a vertex with Q modes of the normals needs W = ceil(Q / 3) attributes of type
- * uvec3. W is SUPINE_WORDS of supine.glsl.
+/** Pack the vectors whose weighted sum is the normal (supine_basis_info.normals) for supine.glsl,
+ * of vertices begin <= i < end. Three vectors share the words of a uvec3, so that Q vectors need
+ * W = ceil(Q / 3) attributes of type uvec3. W is SUPINE_WORDS of supine.glsl.
  * @param words  [end - begin, W, 3], written, for glVertexAttribIPointer; 24 bytes per vertex if Q
  *               is 6
  * @retval SUPINE_ERROR_UNSUPPORTED  the basis has no normals, or was opened without_normals */
 SUPINE_API supine_status supine_gl_pack_normals(const supine_basis *basis, size_t begin, size_t end,
                                                 uint32_t *words);
 
-/** Compute the uniform supine_normal_weights of supine.glsl. W is SUPINE_WORDS of supine.glsl.
+/** Compute the uniform supine_normal_weights of supine.glsl. W is the macro SUPINE_WORDS of
+ * supine.glsl, the number of uvec3 attributes for normals.
  * @param uniforms  [lung_count, W, 3], written, for glUniform3fv with a count of lung_count * W
  * @retval SUPINE_ERROR_UNSUPPORTED  as supine_gl_pack_normals */
 SUPINE_API supine_status supine_gl_normal_weights(const supine_basis *basis,

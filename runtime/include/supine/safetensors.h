@@ -90,13 +90,13 @@ SUPINE_API const supine_tensor *supine_safetensors_find(const supine_safetensors
 SUPINE_API const char *supine_safetensors_metadata(const supine_safetensors *file, const char *key);
 
 /** Return all metadata, in the order of the file.
- * @param count  number of strings, written */
+ * @param count  written: the number of metadata strings */
 SUPINE_API const supine_metadata *supine_safetensors_all_metadata(const supine_safetensors *file,
                                                                   size_t *count);
 
-/** Compare the checksum of the content with the metadata "checksum".
- * @retval SUPINE_ERROR_FORMAT  the file has no checksum, or its content has a different one
- * Cost: one pass over the file, at about the speed of memory. */
+/** Compare the checksum of the content with the metadata "checksum". Cost: one pass over the file,
+ * at about the speed of memory.
+ * @retval SUPINE_ERROR_FORMAT  the file has no checksum, or its content has a different one */
 SUPINE_API supine_status supine_safetensors_verify(const supine_safetensors *file,
                                                    supine_error *error);
 

@@ -13,7 +13,7 @@
  *     STATE    POSTURE, VOLUME or POSTURE:VOLUME
  *
  * A number alone is refused, because it does not say to which volume it is relative. Volumes are in
- * mL, of all lungs together unless lungs are named. */
+ * mL, of all lungs together unless they are given for each lung. */
 #ifndef SUPINE_STATE_H
 #define SUPINE_STATE_H
 
@@ -26,30 +26,30 @@
 extern "C" {
 #endif
 
-/** The reference relative to which a volume is given. */
+/** The reference from which a volume is measured. */
 typedef enum supine_volume_kind {
   SUPINE_VOLUME_DEFAULT = 0, /**< the default volume of a basis (supine_basis_pose) */
   SUPINE_VOLUME_REST,        /**< the end of a quiet expiration in the posture */
   SUPINE_VOLUME_FULL,        /**< full inflation */
   SUPINE_VOLUME_SCAN,        /**< the volume in the scan */
-  SUPINE_VOLUME_ABSOLUTE,    /**< 0 mL, so that `ml` is the whole volume of gas and tissue */
+  SUPINE_VOLUME_ABSOLUTE,    /**< relative to 0 mL: `ml` is the whole volume of gas and tissue */
   SUPINE_VOLUME_KIND_COUNT
 } supine_volume_kind;
 
-/** A volume relative to a reference. */
+/** A volume, given as the difference from a reference such as the volume at rest. */
 typedef struct supine_volume {
   supine_volume_kind kind;
-  double ml; /**< volume above the reference, mL; negative if below it */
+  double ml; /**< volume minus the reference volume that `kind` names, mL */
 } supine_volume;
 
-/** Largest number of named lungs, and size of a name in bytes with its NUL. */
+/** Largest number of lungs with volumes of their own, and size of a name in bytes with its NUL. */
 enum { SUPINE_STATE_LUNGS_MAX = 2, SUPINE_STATE_NAME_SIZE = 16 };
 
 /** A posture, and a volume of all lungs or of each lung. */
 typedef struct supine_state {
   double gravity[3];    /**< unit vector in body axes (LPS) that points where things fall */
-  supine_volume volume; /**< volume of all lungs together; unused if lungs are named */
-  size_t lung_count;    /**< number of named lungs, each with a volume of its own */
+  supine_volume volume; /**< volume of all lungs together; unused if lung_count is not 0 */
+  size_t lung_count;    /**< number of lungs in `lungs`; 0 to use `volume` */
   struct {
     char name[SUPINE_STATE_NAME_SIZE];
     supine_volume volume;
@@ -64,9 +64,10 @@ typedef struct supine_state {
 SUPINE_API supine_status supine_state_parse(const char *text, supine_state *state,
                                             supine_error *error);
 
-/** Parse a posture alone, or a volume alone. Statuses: as supine_state_parse. */
+/** Parse a posture without a volume. Statuses: as supine_state_parse. */
 SUPINE_API supine_status supine_state_parse_posture(const char *text, supine_state *state,
                                                     supine_error *error);
+/** Parse a volume without a posture. Statuses: as supine_state_parse. */
 SUPINE_API supine_status supine_state_parse_volume(const char *text, supine_state *state,
                                                    supine_error *error);
 

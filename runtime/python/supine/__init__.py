@@ -50,7 +50,7 @@ _VOXELS = {"int8": "int8", "uint8": "uint8", "int16": "int16", "uint16": "uint16
 
 
 def _three(gravity: Gravity) -> Any:
-    """Convert gravity, a posture's name or three numbers, to a C array."""
+    """Convert gravity to a C array. It is given as the name of a posture or as three numbers."""
     if isinstance(gravity, str):
         state = _c.State()
         _c.state_parse_posture(gravity.encode(), state)
@@ -71,8 +71,8 @@ def gravity(posture: Gravity) -> Doubles:
 
 
 def gravity_of_quaternion(quaternion: Sequence[float]) -> Doubles:
-    """Compute gravity for a body's orientation: a quaternion W, X, Y, Z that rotates from body axes to world axes, in
-    a world whose z points up."""
+    """Compute gravity for a body's orientation, given by a quaternion W, X, Y, Z. It rotates from body axes to world
+    axes, whose z points up."""
     out = (ctypes.c_double * 3)()
     status = _c.posture_quaternion(_numbers(quaternion, 4, "quaternion"), out)
     if status != 0:
@@ -97,16 +97,16 @@ def postures() -> tuple[str, ...]:
 def breath(times: ArrayLike, *, tidal: float = 500.0, rate: float = 12.0, inhale: float = 1 / 3,
            rest_pressure: float = 5.0, course: str = "cosine",
            pv: Optional[ArrayLike] = None) -> Doubles:
-    """Compute the volume in mL above rest at times in s, for repeated breaths as in `supine breathe`; the first breath
+    """Compute the volume in mL above rest at times in s, for repeated breaths as in `supine breathe`. The first breath
     begins at time 0.
 
-    tidal          volume of a breath, mL
-    rate           breaths per minute
-    inhale         fraction of the breath's time that is inhalation
-    rest_pressure  pressure at the end of an exhalation, cmH2O
-    course         course of the pressure, "cosine" or "ramp", or "flow" for a constant flow
-    pv             [2, 9], for inhalation and exhalation: P_low, P_high (cmH2O), V_low, V_high (mL) and the control
-                   parameters c1 to c5, as `supine pv fit` finds them; by default the limbs of a normal adult
+    tidal: volume of a breath, mL
+    rate: breaths per minute
+    inhale: fraction of the breath's time that is inhalation
+    rest_pressure: pressure at the end of an exhalation, cmH2O
+    course: course of the pressure, "cosine" or "ramp", or "flow" for a constant flow
+    pv: [2, 9], pressure-volume curves of inhalation and exhalation: P_low, P_high (cmH2O), V_low, V_high (mL) and the
+        control parameters c1 to c5, as `supine pv fit` finds them; by default the curves of a normal adult
     """
     times = np.asarray(times, np.float64)
     flat = np.ascontiguousarray(times).ravel()
@@ -118,10 +118,10 @@ def breath(times: ArrayLike, *, tidal: float = 500.0, rate: float = 12.0, inhale
 
 
 class Pose(_c.CPose):
-    """The weights and gains of one state of a basis, made by `Basis.pose`."""
+    """The weights of modes and the gains (factors of displacement) of a state of a basis, made by `Basis.pose`."""
 
     def fill(self, gain: float) -> Pose:
-        """Set every gain to one number, for open surfaces and displacements of another simulator."""
+        """Multiply all displacements by `gain`. Use this where no volume is known, such as for open surfaces."""
         np.ctypeslib.as_array(self.gains)[:] = gain
         return self
 
@@ -176,16 +176,16 @@ class _Owner:
 class Basis:
     """An open basis file, made by `supine.open`. It is closed when nothing uses it any more.
 
-    vertices      float32 [N, 3], reference positions, mm
-    triangles     uint32 [M, 3]
-    coefficients  float32 [N, K] for K modes, or [N, 3, K] if `vector`
-    direction     float32 [N, 3], mm; None if `vector`
-    modes         float64 [K, (band + 1)^2], coefficients of the weights in spherical harmonics
-    bounds        float32 [lungs, 2, 3], lowest and highest corner of the box around each lung, mm
-    lungs         the vertices of each lung: name -> slice
-    metadata      the metadata of the file: key -> text
-    storage_error bound on the error of storage and rounding with 500 mL more than the reference surface, mm
-    report        what the program printed when `precompute` or `embed` made the basis
+    vertices: float32 [N, 3], reference positions, mm
+    triangles: uint32 [M, 3], three vertices of each triangle
+    coefficients: float32 [N, K] for K modes, or [N, 3, K] if `vector` is true
+    direction: float32 [N, 3], vector along which each vertex moves, mm; None if `vector` is true
+    modes: float64 [K, (band + 1)^2], spherical-harmonic coefficients of the weight of each mode
+    bounds: float32 [lungs, 2, 3], lowest and highest corner of the box around each lung, mm
+    lungs: dict from the name of each lung to the slice of its vertices
+    metadata: dict from the keys of the file's metadata to the texts
+    storage_error: bound on position errors from storage and rounding, for 500 mL above the reference surface, mm
+    report: what the program printed when `precompute` or `embed` made the basis
     """
     report: str = ""
 
@@ -235,24 +235,26 @@ class Basis:
 
     @property
     def faces(self) -> NDArray[np.int64]:
-        """The triangles as a new array for pyvista.PolyData and vtkCellArray.ImportLegacyFormat: 3 and 3 vertices for each."""
+        """The triangles as a new array for pyvista.PolyData and vtkCellArray.ImportLegacyFormat. For each triangle, the
+        array has the number 3 and three vertices."""
         faces = np.empty((self.triangle_count, 4), np.int64)
         faces[:, 0] = 3
         faces[:, 1:] = self.triangles
         return faces.ravel()
 
     def pose(self, state: Gravity, volume: str = "", out: Optional[Pose] = None) -> Pose:
-        """Compute the weights and gains of a state: `pose("prone:rest+500")`, `pose("full-300")` (supine),
-        `pose((0, 0.6, -0.8), "rest")`. Without a volume, the state is at rest if the basis has rest. `out` is
-        a pose to write into."""
+        """Compute the pose of a state: `pose("prone:rest+500")`, `pose("full-300")` (supine),
+        `pose((0, 0.6, -0.8), "rest")`. The default volume is rest if the basis has a volume at rest. `out` is a
+        pose to write into."""
         out = Pose() if out is None else out
         _c.basis_pose(self._c, _state(state, volume), out)
         return out
 
     def expected_error(self, state: Gravity, volume: str = "", since: Optional[Gravity] = None) -> Floats:
-        """Compute the expected error [N] of the positions of a state, mm, 3-D RMS, if the positions in the scan or in
-        state `since` are exact. Half of all points lie within 0.9 times their expected error, 95 % within 1.8 times.
-        These errors were measured on full breaths in one posture; for a change of posture they are extrapolated."""
+        """Compute the expected position error [N] of the vertices in a state, mm (3-D RMS). This assumes that the
+        positions in state `since`, or in the scan, are exact. Half of all points lie within 0.9 times their expected
+        error, 95 % within 1.8 times. These errors were measured on full breaths in one posture; for a change of posture
+        they are extrapolated."""
         sigma = np.empty(self.vertex_count, _FLOAT)
         _c.expected_error(self._c, _state(state, volume), None if since is None else _state(since),
                           _address(sigma, self.vertex_count, "sigma"))
@@ -270,13 +272,13 @@ class Basis:
 
     def locate(self, vertices: Sequence[int], positions: ArrayLike, state: Gravity = _SUPINE, volume: str = "", *,
                noise: float = 2.0, rigid: bool = False) -> Location:
-        """Find the lungs from observed points of this basis, usually one made by `embed`.
+        """Find the lungs from observed positions of vertices of this basis, which `embed` usually made.
 
-        vertices   the vertex of each point
-        positions  [n, 3] observed positions, mm, in a frame that may be translated from the frame of the basis and,
-                   if `rigid`, rotated
-        volume     empty if the volume is unknown and must be found
-        noise      standard deviation of a position on each axis, mm"""
+        vertices: index of the vertex of each of the n observed points
+        positions: [n, 3] observed positions, mm, in a frame that may be translated from the frame of the basis and,
+            if `rigid` is true, rotated
+        volume: empty if the volume is unknown and must be found
+        noise: standard deviation of a position on each axis, mm"""
         return Location(self, vertices, positions, _state(state, volume), noise, rigid)
 
     def warp(self, image: NDArray[Any], states: Union[str, Sequence[str]], *, step: ArrayLike = (1.0, 1.0, 1.0),
@@ -285,11 +287,11 @@ class Basis:
         This basis must be a grid (`embed` with grid=...). Return an image on the same voxels and of the same type;
         for a list of states, a list of images.
 
-        step     distances (x, y, z) from voxel to voxel, mm; or a vector for each of the three axes, [3, 3], mm, LPS
-        origin   centre of the first voxel, mm, LPS
-        labels   take the nearest voxel instead of interpolating, for label maps
-        density  scale Hounsfield units by the change of volume, so that mass is kept
-        since    state of the image, if it is not that of the scan
+        step: distances (x, y, z) from voxel to voxel, mm; or a vector for each of the three axes, [3, 3], mm, LPS
+        origin: centre of the first voxel, mm, LPS
+        labels: whether to take the nearest voxel instead of interpolating, as label maps need
+        density: whether to scale densities by the change of volume, so that mass is kept
+        since: state of the image, if it is not that of the scan
         """
         image = np.ascontiguousarray(image, image.dtype.newbyteorder("<"))
         if image.ndim != 3 or image.dtype.name not in _VOXELS:
@@ -323,11 +325,11 @@ class Basis:
         return moved[0] if isinstance(states, str) else moved
 
     def weights(self, pose: Pose) -> Doubles:
-        """Return a view of the weights [K] of a pose."""
+        """Return a view of the weights of a pose, one for each mode."""
         return np.ctypeslib.as_array(pose.weights)[:self.mode_count]
 
     def gains(self, pose: Pose) -> Doubles:
-        """Return a view of the gains [lungs, 3] of a pose: for each lung the gains along x, y and z."""
+        """Return a view of the gains [lungs, 3] of a pose: factors of each lung's displacement along x, y and z."""
         return np.ctypeslib.as_array(pose.gains)[:len(self.lungs)]
 
     def volumes(self, pose: Pose) -> Doubles:
@@ -339,7 +341,7 @@ class Basis:
         return volumes
 
     def error(self, pose: Pose) -> float:
-        """Return a bound on the error of storage and rounding of any vertex in a pose, mm."""
+        """Return a bound, mm, on the position error that storage and rounding cause for any vertex in a pose."""
         return _c.basis_error(self._c, pose)
 
     def _range(self, begin: int, end: Optional[int]) -> tuple[int, int]:
@@ -364,7 +366,7 @@ class Basis:
 
     def deform_lit(self, pose: Pose, out: Optional[Floats] = None, normals: Optional[Floats] = None,
                    begin: int = 0, end: Optional[int] = None) -> tuple[Floats, Floats]:
-        """Compute positions and unit normals, without a pass over the triangles; requires `has_normals`."""
+        """Compute positions and unit normals from the file, not from the triangles. Requires `has_normals`."""
         end, size = self._range(begin, end)
         out = np.empty((end - begin, 3), _FLOAT) if out is None else out
         normals = np.empty((end - begin, 3), _FLOAT) if normals is None else normals
@@ -393,12 +395,12 @@ class Basis:
 class Location:
     """The result of `Basis.locate`: lungs found from observed points.
 
-    volume, volume_error   volume of all lungs and its standard deviation, mL (0 if the volume was given)
-    rotation, translation  observed = rotation @ (predicted position + correction) + translation
-    distances, sigmas      [n] distance of each point from its prediction by all other points, and the standard deviation of
-                           this distance, mm
-    outliers               [n] True for outliers, which the result ignores
-    log_evidence           log likelihood, to compare results that differ only in the posture
+    volume, volume_error: volume of all lungs and its standard deviation, mL (0 if the volume was given)
+    rotation, translation: observed = rotation @ (predicted position + correction) + translation
+    distances: [n] distance of each point from its prediction by all other points, mm
+    sigmas: [n] expected RMS of each distance, mm
+    outliers: [n] True for outliers, which the result ignores
+    log_evidence: log likelihood, to compare results that differ only in the posture
     """
 
     def __init__(self, inside: Basis, vertices: Sequence[int], positions: ArrayLike, state: Any, noise: float,
@@ -410,7 +412,7 @@ class Location:
         seen = (_c.Observation * max(count, 1))(*((int(v), tuple(p), noise)
                                                   for v, p in zip(vertices, places, strict=True)))
         residuals = (_c.Residual * max(count, 1))()
-        self._space = np.empty(_c.locate_space(count))  # memory of the fit in the C library
+        self._space = np.empty(_c.locate_space(count))  # memory that the C library uses in later calls
         self._c = _c.Location()
         task = _c.LocateTask(inside._c, count, seen, state, rigid)
         _c.locate(task, residuals, self._space.ctypes.data, self._c)
@@ -424,28 +426,28 @@ class Location:
         self.outliers: NDArray[np.bool_] = np.array([r.outlier for r in residuals])
 
     def positions(self, basis: Basis) -> tuple[Floats, Floats]:
-        """Compute the positions [N, 3] of a basis of the same lungs in the frame of the observations, and their
-        expected errors [N], mm."""
+        """Compute the positions [N, 3] of the vertices of `basis` in the frame of the observations, and their expected
+        errors [N], mm. `basis` must be of the same lungs."""
         xyz, sigma = np.empty((basis.vertex_count, 3), _FLOAT), np.empty(basis.vertex_count, _FLOAT)
         _c.locate_positions(self._c, basis._c, xyz.ctypes.data, sigma.ctypes.data)
         return xyz, sigma
 
 
 def open(source: Source, *, storage: str = "auto", simd: str = "auto", normals: bool = True) -> Basis:
-    """Open a basis file, or one in memory (bytes), and check all of it.
+    """Open a basis file, given by its path or its bytes, and check all of it.
 
-    storage  kind of numbers in memory: "exact", "int16", "mixed"; or "auto", the smallest with an error of at most
-             0.005 mm
-    simd     instruction set: "portable", "avx2", "avx512"; or "auto", the widest set of this processor
-    normals  False ignores the file's normals, to save memory
+    storage: kind of numbers in memory: "exact", "int16", "mixed"; or "auto", the smallest with an error of at most
+        0.005 mm
+    simd: instruction set: "portable", "avx2", "avx512"; or "auto", the widest set of this processor
+    normals: False ignores the file's normals, to save memory
     """
     return Basis(source, storage=storage, simd=simd, normals=normals)
 
 
 def precompute(*surfaces: Any, progress: Optional[_program.Progress] = None, **options: Any) -> Basis:
-    """Make a basis from lung surfaces with the program `supine`, beside this package or on PATH:
+    """Make a basis from lung surfaces with the program `supine`, beside this package or on PATH. Examples:
 
-        precompute(vertices, faces, scanned="supine:rest")      # one lung or both: [N, 3], [M, 3]
+        precompute(vertices, faces, scanned="supine:rest")      # vertices [N, 3], faces [M, 3] of one lung or both
         precompute((vertices, faces), (vertices, faces))        # one surface for each lung
         precompute("lungs.nii.gz", resting={"supine": "2600mL"}, output="lungs.safetensors")
 
@@ -454,7 +456,7 @@ def precompute(*surfaces: Any, progress: Optional[_program.Progress] = None, **o
     becomes a,b,c and a dict becomes a=b,c=d; a list repeats the option. Without `output`, the basis is only in
     memory. Warnings of the program become Python warnings.
 
-    progress  called with the fraction done, 0 to 1; an exception from it stops the program
+    progress: function that is called with the fraction done, 0 to 1. If it raises an exception, the program stops.
     """
     if len(surfaces) == 2 and not isinstance(surfaces[0], (str, tuple, os.PathLike)):
         surfaces = (surfaces,)
@@ -462,13 +464,13 @@ def precompute(*surfaces: Any, progress: Optional[_program.Progress] = None, **o
 
 
 def embed(lungs: Basis, *content: Any, progress: Optional[_program.Progress] = None, **options: Any) -> Basis:
-    """Make a basis of content that is inside the lungs of a basis and moves with them:
+    """Make a basis of structures that are inside the lungs of a basis and move with them. Examples:
 
-        embed(lungs, {"nodule": (-80, -120, -90)})              # points by name; or an array [n, 3]
-        embed(lungs, (vertices, faces), "airways.ply")          # meshes
-        embed(lungs, "labels.nii.gz", labels="7=nodule")        # and all options of `supine embed --help`
+        embed(lungs, {"nodule": (-80, -120, -90)})              # named points; or an array [n, 3] of points
+        embed(lungs, (vertices, faces), "airways.ply")          # a mesh from arrays, and one from a file
+        embed(lungs, "labels.nii.gz", labels="7=nodule")        # an image of labels
 
-    Options, `output` and `progress`: as in `precompute`."""
+    Options are those of `supine embed --help`, given as in `precompute`, with the same `output` and `progress`."""
     return _made("embed", lungs._owner.source, content, options, progress)
 
 

@@ -48,7 +48,7 @@ def _words(options: dict[str, Any]) -> list[str]:
 
 
 def _write_mesh(path: str, vertices: ArrayLike, faces: ArrayLike) -> None:
-    """Write a surface as PLY: vertices [N, 3]; faces [M, 3], or 3, a, b, c, 3, ... as `Basis.faces` has them."""
+    """Write a surface as PLY: vertices [N, 3]; faces [M, 3], or an array 3, a, b, c, 3, ... like `Basis.faces`."""
     points, corners = np.asarray(vertices, "<f8"), np.asarray(faces)
     if corners.ndim == 1 and corners.size % 4 == 0 and (corners[::4] == 3).all():
         corners = corners.reshape(-1, 4)[:, 1:]
@@ -58,7 +58,7 @@ def _write_mesh(path: str, vertices: ArrayLike, faces: ArrayLike) -> None:
         raise ValueError(f"faces must be integers [M, 3], not {corners.dtype} {list(corners.shape)}")
     records = np.empty(len(corners), [("count", "u1"), ("corner", "<i4", 3)])
     records["count"] = 3
-    records["corner"] = np.clip(corners, -1, 2**31 - 1)  # the program reports indices out of range
+    records["corner"] = np.clip(corners, -1, 2**31 - 1)  # too large ones stay too large: the program reports them
     with open(path, "wb") as file:
         file.write(b"ply\nformat binary_little_endian 1.0\n"
                    b"element vertex %d\nproperty double x\nproperty double y\nproperty double z\n"
@@ -105,7 +105,7 @@ def run(command: str, operands: Sequence[str], options: dict[str, Any], names: d
     """Run a command and return its standard output. Its warnings become Python warnings. Its errors become exceptions
     with the same message.
 
-    names  the names that messages show instead of the paths of temporary files: path -> name"""
+    names: dict from the path of each temporary file to the name that messages show instead"""
     import pty  # not at the top, as Windows does not have this module
 
     arguments = [_find(), command, *_words(options), "--", *operands]
@@ -146,8 +146,8 @@ def make(command: str, lungs: Any, content: Sequence[Any], options: dict[str, An
          progress: Optional[Progress]) -> tuple[Any, str]:
     """Run a command that makes a basis; return the basis, as bytes or as the path `output`, and the standard output.
 
-    lungs    None, or the path or the bytes of a basis
-    content  paths, (vertices, faces) or points; arrays are written to a temporary folder"""
+    lungs: path or bytes of a basis, or None
+    content: each item is a path, a tuple (vertices, faces), or points; arrays are written to a temporary folder"""
     with tempfile.TemporaryDirectory(prefix="supine-") as folder:
         operands: list[str] = []
         names: dict[str, str] = {}
