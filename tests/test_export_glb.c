@@ -197,6 +197,31 @@ TEST(test_glb_weights_any_direction_between_0_and_1) {
   supine_export_source_close(&source);
 }
 
+/* A breath of 2500 mL passes the volume at which the curvature of the vertices' paths adds most to
+ * the displacement. */
+TEST(test_glb_weights_within_large_breath_between_0_and_1) {
+  enum { TRIED = 64, PHASES = 20 };
+  export_source source = {0};
+  export_targets *targets = fixture_allocate(1, sizeof *targets);
+  assert_int_equal(supine_export_source_open(basis, &source, NULL), SUPINE_OK);
+  assert_int_equal(supine_export_targets_choose(&source, 2500, targets, NULL), SUPINE_OK);
+  for (size_t i = 0; i <= PHASES * (size_t)TRIED; ++i) {
+    double g[3];
+    double weights[EXPORT_TARGETS_MAX];
+    supine_pose pose;
+    supine_spiral((double)(i / PHASES), TRIED + 1, 0, g);
+    assert_int_equal(
+        supine_export_breath_pose(&source, 2500, g, (double)(i % PHASES) / PHASES, &pose, NULL),
+        SUPINE_OK);
+    supine_export_targets_weights(&source, targets, &pose, 0, weights);
+    for (size_t j = 0; j < targets->count; ++j) {
+      assert_true(weights[j] >= 0.0 && weights[j] <= 1.0);
+    }
+  }
+  free(targets);
+  supine_export_source_close(&source);
+}
+
 TEST(test_glb_compressed_views_fill_file_without_gaps) {
   assert_int_equal(EXPORT_RUN(text, basis, "-o", out), 0);
   unsigned char *bytes = NULL;
