@@ -46,7 +46,7 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT,
      .endings = ".vtp or .safetensors"},
     {"turn", 0, "FROM:TO:SECONDS",
-     "turn from one posture to another at constant speed: supine:left:10 takes 10 s. Between "
+     "turn from one posture to another at constant speed: supine:left:10s takes 10 s. Between "
      "opposite postures, the body turns through left (supine to prone) or through supine (upright "
      "to inverted, left to right). The volume at rest changes with the posture",
      SUPINE_FILLS(request, turn), .read = supine_breath_turn_read, .wants = "FROM:TO:SECONDS",
@@ -65,8 +65,9 @@ static const supine_option table[] = {
     {"pv", 0, "FILE", "pressure-volume relation made by 'supine pv fit'; default a normal adult's",
      SUPINE_FILLS(request, pv), .file = SUPINE_FILE_IN},
     {"rest-pressure", 0, "P",
-     "pressure at the end of an exhalation, in cmH2O: the same kind of pressure as in --pv, "
-     "transpulmonary without --pv; default 5",
+     "pressure at the end of an exhalation, in cmH2O; with --pv, of the kind in that file (airway "
+     "or "
+     "transpulmonary), otherwise transpulmonary; default 5",
      SUPINE_FILLS(request, breath.rest_pressure), .wants = "a number of cmH2O", .more = true},
     {"course", 0, "NAME",
      "cosine: pressure follows a cosine; ramp: pressure is linear in time; flow: inflow and "

@@ -82,9 +82,9 @@ static const supine_option table[] = {
      FILLS(first), .read = read_state, .standard = "supine:rest"},
     {"other", 0, "STATE",
      "state of the second scan, in the same form; either scan may be the fuller one. A missing "
-     "volume is taken from the surfaces. With landmarks alone, give both volumes; without them, "
-     "the "
-     "fuller scan counts as full inflation and the emptier one as rest",
+     "volume is taken from the surfaces. With landmarks alone, give both volumes. If two "
+     "surfaces have no given volumes, the fuller one is at full inflation and the emptier one at "
+     "rest",
      FILLS(second), .read = read_state, .standard = "supine"},
     {"law", 0, "LAW",
      "constants that are fitted\ndeep: the size of the displacement; the other constants stay "
@@ -96,19 +96,21 @@ static const supine_option table[] = {
      FILLS(name), .more = true},
     {"state", 0, "STATE:FILE",
      "further state: its surface, or landmarks (.csv) from the first scan to this state. May be "
-     "repeated, up to 8 times. A state in another posture determines the part of the force that "
-     "depends on gravity (the gain); for a state in the same posture, only the size of the "
-     "displacement is fitted. All other constants come from the two scans",
+     "repeated, up to 8 times. A state in another posture determines how strongly the "
+     "displacement depends on gravity (--gain of 'supine precompute'); for a state in the same "
+     "posture, only the size of the displacement is fitted. All other constants come from the two "
+     "scans",
      .read = read_further, .wants = "STATE:FILE (at most 8 times), such as prone:rest:prone.ply"},
-    {"midline", 0, "X", "x of the plane between the lungs, in mm; default the middle of the points",
+    {"midline", 0, "X",
+     "x of the plane between the lungs, in mm and LPS; default the middle of the points",
      FILLS(source.midline), SUPINE_SAYS_GIVEN(request, source.has_midline),
      .wants = "a number of mm", .more = true},
     {.table = supine_options_surface_frame, FILLS(source.load)},
     {"expandability", 0, NULL,
      "for surfaces: instead of kriging, fit the expandability (the inverse of the stiffness) of "
-     "regions about 45 mm wide. The directions of displacement are fitted as with --law paper; the "
-     "force is that of the deep law. The result is used only if it lowers the held-out residual by "
-     "5 % or more",
+     "regions about 45 mm wide. The directions of displacement are fitted as with --law paper, and "
+     "the constants of the force stay those of the deep law. The result is used only if it lowers "
+     "the held-out residual by 5 % or more",
      FILLS(expandability), .more = true},
     {"json", 0, NULL, "print JSON instead of text", FILLS(json)},
     {.name = NULL}};

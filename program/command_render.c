@@ -315,14 +315,16 @@ static const supine_option table[] = {
     {"posture", 0, "LIST", "comma-separated postures, up to 8", SUPINE_FILLS(request, postures)},
     {"turn", 0, "FROM:TO:SECONDS",
      "draw an animation instead: gravity turns from one posture to another at constant speed, "
-     "pauses for a second, and starts again. For example, supine:left:5 turns for 5 s",
+     "pauses for a second, and starts again. For example, supine:left:5s turns for 5 s",
      SUPINE_FILLS(request, turn), .read = supine_breath_turn_read, .wants = "FROM:TO:SECONDS",
      SUPINE_SAYS_GIVEN(request, turns)},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {"output", 'o', "FILE", ".png for --posture; .webp for --turn, an animation that browsers play",
      SUPINE_FILLS(request, output), .required = true, .file = SUPINE_FILE_OUT,
      .endings = ".png or .webp"},
-    {"size", 0, "WxH", "size in pixels; default 440 x 480 for each posture and view, plus margins",
+    {"size", 0, "WxH",
+     "size of the whole picture, in pixels; default 440 x 480 for each posture and view, plus "
+     "margins",
      .read = read_size, .wants = "WIDTHxHEIGHT, up to 16384 each"},
     {"view", 0, "LIST",
      "views to draw, one below another, separated by commas: anterior, posterior, left (or "

@@ -30,14 +30,15 @@ static const supine_option table[] = {
      "without scaling to a volume",
      SUPINE_FILLS(request, state), .read = supine_options_read_volume},
     {"unit-force", 0, "VERTEX",
-     "instead of a posture: write a CSV file of the response of every vertex to a unit force on "
+     "instead of a posture: write to -o FILE.csv the response of every vertex to a unit force on "
      "this vertex (numbered from 0)",
      SUPINE_FILLS(request, vertex), SUPINE_SAYS_GIVEN(request, has_vertex),
      .wants = "the number of a vertex", .more = true},
     {"pitcher-catcher", 0, NULL,
      "solve by the iteration of Santhanam 2008, which always distributes the force of the node "
-     "with the largest remaining force. Print the share of the force that remains, and the largest "
-     "difference from the direct solve. Use it for small meshes, as it is slow. Needs --law paper",
+     "with the largest remaining force. Also prints the share of the force not yet balanced, and "
+     "the "
+     "largest difference from the direct solution. Slow, so for small meshes. Needs --law paper",
      SUPINE_FILLS(request, pitcher_catcher), .more = true},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.table = supine_command_model_options, SUPINE_FILLS(request, model)},

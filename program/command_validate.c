@@ -56,16 +56,20 @@ static supine_status append_state(const char *text, void *field, supine_error *e
 static const supine_option table[] = {
     {"state", 0, "[POSTURE[:VOLUME]:]SURFACE",
      "surface of the same lungs in another state; its mesh may differ from that of the basis. May "
-     "be repeated, up to 8 times. The landmarks belong to the first --state",
+     "be repeated, up to 8 times. The second points of landmarks are in the first --state",
      .read = append_state,
      .wants = "SURFACE, POSTURE:SURFACE or POSTURE:VOLUME:SURFACE (at most 8 times)"},
     {.table = supine_options_landmarks, FILLS(landmarks)},
     {"from", 0, "POSTURE[:VOLUME]",
-     "state in which the motion starts, with the first points of landmarks; default the scan",
+     "state in which the motion starts, and in which the first points of landmarks are; default "
+     "the "
+     "scan",
      FILLS(from), .read = read_state, .wants = "a state, such as supine:rest"},
     {"to", 0, "POSTURE[:VOLUME]",
-     "without --state, the state of the second landmarks; with --state, the posture and volume of "
-     "every --state that gives only a file; default supine, with the volume of the surface",
+     "without --state, the state of the second points of landmarks; give its volume too. With "
+     "--state, the state of every surface that --state gives without a posture; default supine, "
+     "with "
+     "the volume of the surface",
      FILLS(to), .read = read_state, .wants = "a state, such as prone:rest+500"},
     {.table = supine_options_surface_frame, FILLS(source.load)},
     {"output", 'o', "FILE",
@@ -243,12 +247,13 @@ const supine_command supine_command_validate = {
         "Hausdorff distance. The translation and the affine map are fitted to the other state. "
         "'explained' is 1 minus the ratio of the mean squared distances with and without the "
         "motion. A small distance between surfaces does not prove that the motion inside is right; "
-        "landmarks measure that. Santhanam 2008 reported surfaces 2 mm apart in smaller "
-        "breaths, and constants recovered within 1 %.\nWith several states, each predicted "
+        "landmarks measure that. Santhanam 2008 reported surfaces 2 mm apart, in smaller "
+        "breaths.\nWith several states, each predicted "
         "displacement is also multiplied by the factor that brings it nearest to its surface. For "
-        "states in the posture of the first --state, a straight line of factor against volume is "
-        "fitted, which is 0 at the start of the motion. The largest deviation from the line is "
-        "given in percent of the largest factor.\n"
+        "states in the posture of the first --state, a straight line through 0 at the start of the "
+        "motion is fitted to factor against volume. The largest deviation from the line is given "
+        "in "
+        "percent of the largest factor.\n"
         "\n"
         "Examples:\n"
         "  supine validate lungs.safetensors --state prone:prone.ply -o errors.png\n"

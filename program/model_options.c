@@ -115,8 +115,8 @@ const supine_option supine_command_model_options[] = {
     {.help = "Surfaces:"},
     {.table = supine_options_surface_frame, FILLS(source.load)},
     {"midline", 0, "X",
-     "x of the sagittal plane between the lungs, in mm; default the middle of the bounding box of "
-     "two lungs, or the medial side of a single lung",
+     "x of the sagittal plane between the lungs, in mm and LPS; default the middle of the bounding "
+     "box of two lungs, or the medial side of a single lung",
      FILLS(source.midline), SUPINE_SAYS_GIVEN(supine_model_options, source.has_midline),
      .wants = "a number of mm", .more = true},
     {.help = "Label maps (.nrrd, .nii, .nii.gz, .mha) instead of surfaces: one map, one mask per "
@@ -179,15 +179,16 @@ const supine_option supine_command_model_options[] = {
      "expands more. With --law paper, --reach must be given too. Default 0",
      FILLS(choice.model.force.soften), .more = true},
     {"constants", 0, "C1,...,C6",
-     "constants of the direction of displacement, (15)-(17) of Santhanam 2008: C1 X^C2 outwards, "
-     "C3 Y^C4 to the front and C5 Z^C6 to the feet, in mm. Those of deep are fitted to landmarks "
+     "constants of the displacement for a unit force, equations (15)-(17) of Santhanam 2008: "
+     "C1 X^C2 outwards, C3 Y^C4 to the front and C5 Z^C6 to the feet, in mm. Those of deep are "
+     "fitted to landmarks "
      "in ten full breaths (DIR-Lab COPDgene). Those of paper are fitted to "
      "landmarks in ten 4-D CTs (DIR-Lab), as the original ones are lost" SUPINE_LAWS(LAW_CONSTANTS),
      FILLS(choice.model.direction.c), .wants = "six numbers, C1,C2,C3,C4,C5,C6", .more = true},
     {"reach", 0, "MM",
      "distance over which a force spreads along the surface: the force falls with the distance r "
-     "about as exp(-r/MM). Without --reach, the paper law spreads it over a few links of the mesh; "
-     "a finer mesh has shorter links, and its surface may tear. Default 10 for deep",
+     "about as exp(-r/MM). Without --reach, the paper law spreads it over a few edges of the mesh; "
+     "in a finer mesh edges are shorter, and its surface may fold. Default 10 for deep",
      FILLS(choice.model.reach), SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0", .more = true},
     {.help = "Tissue. Expandability is the inverse of stiffness. Only its ratios between parts of "
              "the lungs count: doubling it everywhere changes nothing."},
@@ -210,7 +211,7 @@ const supine_option supine_command_model_options[] = {
      .wants = "X,Y,Z,RADIUS,FACTOR, the last two above 0 (at most 64 times)"},
     {"lung", 0, "SIDE:SHARE",
      "collapsed lung (pneumothorax), left or right: SHARE, above 0 and at most 1, multiplies its "
-     "volume in every state. The other lung takes the remainder of a breath",
+     "volume in every state. The other lung takes the rest of each breath",
      FILLS(choice), .read = read_lung, .wants = "left:SHARE or right:SHARE, above 0 and at most 1"},
     {.name = NULL}};
 
