@@ -186,7 +186,7 @@ TEST(test_gate_specks_dropped_and_reported) {
   outcome out = pass(&mesh, NULL);
   assert_int_equal(out.status, SUPINE_OK);
   assert_says(out.findings.text,
-              "dropped 10 specks, each below 1 % of the volume; 2 pieces are left");
+              "dropped 10 small components, each below 1 % of the volume; 2 components remain");
   assert_int_equal(out.lungs.mesh.vertex_count, vertices);
   assert_memory_equal(out.lungs.mesh.vertices, clean.lungs.mesh.vertices,
                       3 * vertices * sizeof(double));
@@ -234,7 +234,7 @@ TEST(test_gate_many_pieces_reported) {
     append(&mesh, 4, at[0], 4, tetrahedron[0], true);
   }
   outcome out = pass(&mesh, NULL);
-  assert_says(out.findings.text, "warning: 8 pieces; remove those that are not lung");
+  assert_says(out.findings.text, "warning: 8 components; remove those that are not lung");
   supine_lungs_free(&out.lungs);
   supine_mesh_free(&mesh);
 }

@@ -374,7 +374,7 @@ TEST(test_fit_surface_wrong_frame_unit_or_side_refused) {
     moved.vertices[i] = 1.05 * rest.mesh.vertices[i];
   }
   moved.triangles = inwards;
-  refused(&rest, &moved, "faces the same way");
+  refused(&rest, &moved, "have a normal like that of the nearest point");
   free(inwards);
   free(moved.vertices);
   supine_mesh_free(&lump);

@@ -125,8 +125,8 @@ TEST(test_load_malformed_parameters_message_names_fault) {
     const char *expected;
   } bad[] = {
       {"", ":1: "},
-      {"{}", "neither inhale nor exhale"},
-      {"[1]", "neither inhale nor exhale"},
+      {"{}", "neither the limb inhale nor exhale"},
+      {"[1]", "neither the limb inhale nor exhale"},
       {"{\"inhale\": 1}", "inhale: Expected object"},
       {"{\"inhale\": {}}", "inhale: Object item not found: pressure_cmH2O"},
       {"{" CURVE("inhale", "0", "0, 6000", "1, 2, 3, 4, 5") "}", "inhale: "},
