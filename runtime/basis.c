@@ -184,8 +184,8 @@ static void bound_lungs(supine_basis *basis) {
   basis->info.bounds = basis->bounds[0][0];
 }
 
-/* Read the names of the lungs from the metadata "lungs", such as "left,right". Name every other
- * lung by its index. Return the number of names in the metadata. */
+/* Read the names of the lungs from the metadata "lungs", such as "left,right". Name the remaining
+ * lungs by their indices. Return the number of names in the metadata. */
 static size_t name_lungs(const check *c, supine_basis *basis) {
   const char *at = supine_safetensors_metadata(c->file, "lungs");
   size_t named = 0;
@@ -326,8 +326,8 @@ static supine_status check_reference(const check *c, supine_basis *basis) {
   return read_numbers(c, "reference_volume_ml", basis->info.lung_count, basis->reference_volume);
 }
 
-/* Read the metadata about the state in the scan and at full inflation. A file without them counts
- * as scanned in the posture supine, at the volume of the reference surface. */
+/* Read the metadata about the scan and about full inflation. If the posture and volume in the scan
+ * are missing, assume supine and the volume of the reference surface. */
 static supine_status check_scan(const check *c, supine_basis *basis) {
   const char *volume = supine_safetensors_metadata(c->file, "scan_volume_ml");
   const char *scanned = supine_safetensors_metadata(c->file, "scanned");

@@ -170,12 +170,13 @@ supine_status supine_breath_curve_evaluate(const supine_pv_curve *curve, size_t 
 
 const supine_pv *supine_breath_normal(void) {
   static const supine_pv normal = {
-      /* Inhale limb: range of pressures, cmH2O, range of volumes, mL, and control parameters, which
-       * are fitted to the sigmoid a + b / (1 + exp(-(P - 10) / 6)) of the pressure P. */
+      /* Curve of inhalation: pressures at its ends, cmH2O, volumes at its ends, mL, and control
+       * parameters of an approximate sigmoid 1 / (1 + exp(-(P - 10) / 6)) of the pressure P. */
       {{{0.0, 30.0},
         {0.0, 6000.0},
         {-0.697448914, -2.22791741, 0.470886417, 0.269525392, -0.132010658}},
-       /* Exhale limb: the first parameter is -15 cmH2O ln 2 / (7.58 cmH2O) [Salazar1964]. */
+       /* Curve of exhalation: an exponential (supine_breath_normal). The first control parameter is
+        * minus half of the pressure range, 15 cmH2O, times ln 2 / (7.58 cmH2O). */
        {{0.0, 30.0}, {0.0, 6000.0}, {-1.3716632861, 0.0, 0.0, 0.0, 0.0}}}};
   return &normal;
 }

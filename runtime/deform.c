@@ -5,8 +5,8 @@
 #include "runtime/rigid.h"
 
 /* Compute the numbers by which a kernel multiplies packed numbers of a lung: for each mode, the
- * weight times the quantisation steps (supine_basis.mode_scale), and then the three gains of the
- * lung.
+ * weight times the quantisation steps (supine_basis.mode_scale), and then the factors of the lung's
+ * displacement along x, y and z.
  * @param scales  [modes + 3], written */
 static void weigh(const supine_basis *basis, const supine_pose *pose, size_t lung, float *scales) {
   const size_t modes = basis->info.mode_count;
@@ -53,8 +53,8 @@ void supine_deform_lung(supine_deform_tiles *kernel, const supine_tiles *tiles, 
 
 enum { RIGID_BLOCK = 256 };
 
-/* Overwrite those of vertices begin <= i < end that belong to rigid parts: apply the rigid motion
- * of each part (rigid.h). */
+/* Overwrite the positions or displacements of the vertices begin <= i < end that belong to rigid
+ * parts. Each part moves by its rigid motion (rigid.h). */
 static void deform_rigid(const supine_basis *basis, const supine_pose *pose, size_t begin,
                          size_t end, const supine_target *target) {
   for (size_t part = 0; part < basis->rigid_count; ++part) {

@@ -17,8 +17,8 @@ double supine_basis_error(const supine_basis *basis, const supine_pose *pose) {
   for (size_t i = 0; i < 3 * basis->info.lung_count; ++i) {
     scale = fmax(scale, fabs(pose->gains[i / 3][i % 3]));
   }
-  /* A displacement is rounded modes + 8 times: by packing, by the scaling of the weights and in the
-   * sum over the modes. The addition of the reference position rounds once more. */
+  /* A displacement undergoes at most modes + 8 roundings: in packing, in the scaling of the weights
+   * and in the sum over the modes. Adding the reference position rounds once more. */
   const double rounding =
       ((double)modes + 8) * unit * scale * moved + unit * (basis->reference_size + scale * moved);
   return 1.001 * (scale * stored + basis->reference_error + rounding);
@@ -42,8 +42,8 @@ static double largest_displacement(const supine_basis *basis, const supine_pose 
 }
 
 double supine_basis_storage_error(const supine_basis *basis) {
-  static const double volume = 500;  /* volume minus that of the reference surface, mL */
-  static const double distance = 20; /* largest displacement if the surface is open, mm */
+  static const double volume = 500;  /* volume added to the reference surface, mL */
+  static const double distance = 20; /* open surfaces are displaced by at most this, mm */
   double worst = 0;
   for (int number = 0; number < 27; ++number) {
     supine_pose pose;

@@ -79,12 +79,12 @@ supine_status supine_expected_shifted(const supine_basis *basis, const supine_st
 
 /* Poses from which the expected errors of a state are computed. */
 typedef struct poses {
-  supine_pose at;   /* state whose errors are computed */
-  supine_pose from; /* state whose positions count as exact */
-  /* Both states with 1 % of the reference volume added if their volume is relative to an assumed
-   * volume at rest; otherwise unchanged. */
+  supine_pose at;   /* pose whose errors are computed */
+  supine_pose from; /* pose whose positions are taken to be exact */
+  /* Copies of `at` and `from`. If the volume of a state is relative to an assumed volume at rest,
+   * its copy holds 1 % of the reference volume more. */
   supine_pose fuller_at, fuller_from;
-  bool assumed; /* whether `fuller_at` or `fuller_from` differs from `at` or `from` */
+  bool assumed; /* whether `fuller_at` or `fuller_from` holds more than its original */
 } poses;
 
 static supine_status find_poses(const supine_basis *basis, const supine_state *state,

@@ -26,7 +26,7 @@ double supine_expected_constant(const supine_basis *basis);
 /** Return the sum of the volumes of all lungs of the reference surface, mL. */
 double supine_expected_reference(const supine_basis *basis);
 
-/** Volume that supine_expected_shifted adds, as a fraction of the reference volume: 0.01. */
+/** Fraction of the reference volume that supine_expected_shifted adds to the lungs: 0.01. */
 extern const double supine_expected_shift;
 
 /** Return the RMS over all vertices of the displacement between two poses, mm. */

@@ -1,5 +1,4 @@
 /* SPDX-License-Identifier: MIT */
-/* Fill the vertex attributes and uniforms of supine.glsl. */
 #include <string.h>
 
 #include "runtime/internal.h"

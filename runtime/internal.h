@@ -11,12 +11,12 @@
 /** Number of harmonics that describe the volume at rest: bands 0 to 2. */
 enum { RESTING_TERMS = 9 };
 
-/** Limits for storing positions with stores that bypass the caches. */
+/** Sizes above which positions are written with stores that bypass the caches. One pose must exceed
+ * both STREAM_BYTES and STREAM_RANGE. */
 enum {
-  STREAM_BYTES = 1 << 22, /**< bytes of basis and positions above which to bypass the caches */
-  /** Bytes of a batch's positions above which to bypass the caches. */
-  STREAM_BATCH_BYTES = 1 << 24,
-  STREAM_RANGE = 1 << 13 /**< vertices of one pose up to which to use the caches */
+  STREAM_BYTES = 1 << 22,       /**< for one pose: bytes of the basis and of all positions */
+  STREAM_RANGE = 1 << 13,       /**< for one pose: number of vertices to evaluate */
+  STREAM_BATCH_BYTES = 1 << 24, /**< for supine_deform_batch: bytes of all positions */
 };
 
 enum { LUNG_NAME_SIZE = 32 }; /**< largest size of a lung's name in bytes, with its NUL */
@@ -29,7 +29,7 @@ struct supine_basis {
   const char *name_of[SUPINE_LUNGS_MAX]; /**< pointers to `names`, for info.lung_names */
   float bounds[SUPINE_LUNGS_MAX][2][3];
 
-  supine_tiles lit;   /**< packed vectors of normals; lit.bytes is NULL without normals */
+  supine_tiles lit;   /**< info.normals, packed; lit.bytes is NULL if the basis has none */
   supine_tiles tiles; /**< packed coefficients, directions and reference positions */
   const supine_kernels *kernels;
   bool stream; /**< whether to write positions with stores that bypass the caches */
@@ -37,7 +37,7 @@ struct supine_basis {
   /** Quantisation step of the coefficients of each mode, times that of the directions, mm. */
   double mode_scale[SUPINE_MODES_MAX];
   /** For each mode, upper bounds on the quantisation error (mode_error) and on the displacement
-   * (mode_size) of any vertex at weight 1 and gain 1, mm. */
+   * (mode_size) of any vertex if the weight and the displacement factors are 1, mm. */
   double mode_error[SUPINE_MODES_MAX], mode_size[SUPINE_MODES_MAX];
   double reference_volume[SUPINE_LUNGS_MAX]; /**< array that info.reference_volume points to, mL */
   /** Volume at rest minus the volume of the reference surface, mL, as spherical-harmonic
@@ -45,7 +45,7 @@ struct supine_basis {
    * all lungs together. NULL if the file has no volume at rest. */
   const double *resting;
   bool rest_by_lung;   /**< `resting` has coefficients for each lung */
-  double upright_gain; /**< full inflation: (volume upright - volume supine) / reference volume */
+  double upright_gain; /**< (full volume upright - full volume supine) / reference volume */
   double scan_volume;  /**< volume in the scan minus that of the reference surface, mL */
   double scan_gravity[3];
   const uint32_t *rigid; /**< [rigid_count, 2] begin and end of the vertices of each rigid part */
@@ -55,7 +55,7 @@ struct supine_basis {
 };
 
 /** Pack the coefficients, directions and reference positions of the vertices into tiles of 16
- * vertices, as numbers of a storage other than AUTO. Free the previous tiles.
+ * vertices, in the number format `storage`, which is not AUTO. Free the previous tiles.
  * @retval SUPINE_ERROR_MEMORY  an allocation failed */
 supine_status supine_basis_pack(supine_basis *basis, supine_storage storage);
 
@@ -63,20 +63,20 @@ supine_status supine_basis_pack(supine_basis *basis, supine_storage storage);
  * @retval SUPINE_ERROR_MEMORY  an allocation failed */
 supine_status supine_basis_pack_normals(supine_basis *basis);
 
-/** Return the number of terms of the polynomials that supine_basis_normal_weights evaluates on one
- * axis: 1 + 2 K + K (K + 1) / 2 for K modes. In files of versions 1 and 2, it is K less, as only
- * one gain multiplies the weights. */
+/** Return the number of terms that supine_basis_normal_weights adds for each vector and axis: 1
+ * constant, 2 K products of a gain and a weight, and K (K + 1) / 2 products with two weights, for K
+ * modes. Files of versions 1 and 2 have one gain (factor of displacement) and only K of the 2 K. */
 static inline size_t supine_basis_normal_terms(const supine_basis *basis) {
   const size_t k = basis->info.mode_count;
   return 1 + (basis->info.volume_axes == 3 ? 2 : 1) * k + k * (k + 1) / 2;
 }
 
-/** Evaluate vertices begin <= i < end of one lung. The first is written to target->xyz.
+/** Evaluate vertices begin <= i < end of one lung. Write the first of them to target->xyz.
  * @param scales  numbers by which `kernel` multiplies packed numbers (supine_deform_tiles) */
 void supine_deform_lung(supine_deform_tiles *kernel, const supine_tiles *tiles, const float *scales,
                         size_t begin, size_t end, const supine_target *target);
 
-/** Return a copy of a target that writes to a place `count` vertices later. */
+/** Return a copy of an output target, with its array advanced by `count` vertices. */
 supine_target supine_target_after(const supine_target *target, size_t count);
 
 /** Compute supine_basis_info.storage_error, the bound on position errors from storage and rounding,

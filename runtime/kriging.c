@@ -56,9 +56,9 @@ size_t supine_kriging_space(size_t count) {
   return count * (count + SUPINE_KRIGING_COLUMNS + 3);
 }
 
-/* Return the column of supine_kriging.whitened by which a term (0 to 2: translation, 3: volume, 4
- * to 6: rotation) is multiplied in the residual on an axis. Write the sign of this product, or 0 if
- * the term does not change this coordinate. */
+/* Return the column of supine_kriging.whitened that `term` (0 to 2: translation, 3: volume, 4 to 6:
+ * rotation) multiplies in the residual along `axis`. Write the sign of the product, or 0 if the
+ * term does not change this coordinate. */
 static int column_of(size_t term, size_t axis, double *sign) {
   *sign = 1;
   if (term < 3) {
@@ -73,8 +73,8 @@ static int column_of(size_t term, size_t axis, double *sign) {
   return PLACE + (int)((6 - about - axis) % 3);
 }
 
-/* Compute the mean position of the points. Fill in the regressors and residuals of
- * supine_kriging.whitened, and multiply them by the inverse of the Cholesky factor. */
+/* Compute the mean position of the points. Fill in supine_kriging.whitened: regressors and
+ * residuals, multiplied by the inverse Cholesky factor of the covariance matrix of the points. */
 static void whiten(supine_kriging *fit) {
   const size_t n = fit->count;
   memset(fit->centre, 0, sizeof fit->centre);
@@ -109,15 +109,15 @@ static bool is_known(const supine_kriging_options *options, size_t term) {
   return term == 3 ? !options->volume : term > 3 && !options->rotation;
 }
 
-/* Compute A and the right side of the normal equations of the terms translation, volume and
- * rotation:
+/* Compute A and the right side of the normal equations for the fitted terms: translation, volume
+ * and rotation.
  *
  *     A = X' K^-1 X + P        right = X' K^-1 y + P m
  *
- *     X  regressors of the terms, for each coordinate of each point
+ *     X  what each term, if it is 1, adds to each coordinate of each point
  *     K  covariance matrix of the coordinates of the points
- *     y  residuals
- *     P  inverse covariance of the prior; only the volume has one
+ *     y  residuals: observed minus predicted coordinates of the points
+ *     P  inverse covariance of the prior of the terms; 0 but for the volume
  *     m  mean of the prior
  *
  * If a term is not fitted, its row of A is a row of the identity. */
@@ -154,7 +154,8 @@ static bool determined(const double a[TERMS * TERMS], const double factor[TERMS 
   return true;
 }
 
-/* Solve the normal equations for the fitted terms, their covariance and supine_kriging.spread. */
+/* Solve the normal equations for supine_kriging.terms. Compute their covariance, and
+ * supine_kriging.spread, the same covariance for the columns of supine_kriging.whitened. */
 static void solve_terms(supine_kriging *fit, const supine_kriging_options *options,
                         const double factor[TERMS * TERMS], const double right[TERMS]) {
   double inverse[TERMS][TERMS];

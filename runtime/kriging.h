@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * Kriging of the residuals that a displacement law leaves at observed points.
- *
- * The residual y_j of point j, mm, is the observed position minus the predicted position:
+ * Kriging of residuals. The residual y_j of point j, mm, is its observed position minus its
+ * predicted position:
  *
  *     y_j = t + b v_j + r x (p_j - c) + g(p_j) + noise
  *
@@ -12,14 +11,16 @@
  *     r    rotation vector about the mean c of all p_j, rad, small, fitted on request
  *     p_j  position of point j in the scan, mm
  *     g    random field, whose coordinates on x, y and z are independent
+ *     noise  error of the observed position, independent for each point and axis
  *
  * Each coordinate of g has the covariance, mm^2,
  *
  *     cov(g(p_i), g(p_j)) = (sill / 3) sqrt(|u_i| |u_j|) q (1 + a) exp(-a)
  *     a = sqrt(3) |p_i - p_j| / correlation length;  q = 1 within a lung, less between two lungs
  *
- * where u_i is the displacement of point i from the scan. All three axes share one n x n covariance
- * matrix of the n points. No function allocates; any number of threads may predict from one fit.
+ * where u_i is the displacement of point i from the scan, and sill is the variance of g per mm of
+ * displacement. All axes share one n x n covariance matrix of the n points. No function allocates;
+ * any number of threads may predict from one fit.
  *
  * The covariance is the Matern covariance of order 3/2 (Rasmussen & Williams, Gaussian Processes
  * for Machine Learning, 2006, equation 4.17), and the fit is universal kriging (section 2.7). */
@@ -38,7 +39,7 @@ enum {
 };
 
 typedef struct supine_kriging_model {
-  double sill; /**< variance of the random field, sum of x, y and z, mm^2 per mm of displacement */
+  double sill;   /**< variance of the random field (sum over x, y, z) / displacement, mm */
   double length; /**< correlation length of the random field, mm */
   double across; /**< factor of the covariance if two points are in different lungs, 0 to 1 */
   double least;  /**< shorter displacements count as displacements of this length, mm */
@@ -49,15 +50,15 @@ extern const supine_kriging_model supine_kriging_default;
 
 typedef struct supine_kriging_point {
   double position[3]; /**< position in the scan, mm */
-  double volume[3];   /**< displacement if the volume grows by one prior standard deviation, mm */
+  double volume[3];   /**< shift if the volume grows by one prior standard deviation, mm */
   double residual[3]; /**< observed position minus predicted position, mm */
   double size;        /**< length of the displacement from the scan, mm */
   double noise;       /**< standard deviation of the observed position on each axis, mm, above 0 */
   size_t lung;
 } supine_kriging_point;
 
-/** Options of a fit. `volume` and `rotation` tell whether to fit a change of the volume and a
- * rotation in addition to the translation. */
+/** Options of a fit. A translation is always fitted. `volume` and `rotation` tell whether to fit a
+ * change of the volume of the lungs, and a rotation, too. */
 typedef struct supine_kriging_options {
   supine_kriging_model model;
   bool volume, rotation;
@@ -70,17 +71,19 @@ typedef struct supine_kriging {
   size_t count;
   double centre[3]; /**< mean position of the points, mm */
   double *factor;   /**< [count, count] lower triangle L of the covariance matrix L L' */
-  /** [SUPINE_KRIGING_COLUMNS, count] the matrix L^-1 X, transposed, for L = `factor`. Row j of X
-   * has ten numbers of point j: 1, supine_kriging_point.volume [3], position - `centre` [3],
-   * residual [3]. */
+  /** [SUPINE_KRIGING_COLUMNS, count] the matrix L^-1 X, transposed, with L in `factor`. Row j of X
+   * has ten numbers of point j: 1; its displacement per prior standard deviation of the volume [3];
+   * its position minus `centre` [3]; its residual [3]. */
   double *whitened;
-  double *weights; /**< [3, count] L^-1 (residuals - fitted terms) for L = `factor` */
-  double terms[SUPINE_KRIGING_TERMS]; /**< fitted translation [3], volume, rotation [3]; else 0 */
+  double *weights; /**< [3, count] L^-1 (residuals - their fit by `terms`), with L in `factor` */
+  /** Fitted translation [3], mm, volume change, prior standard deviations, and rotation [3], rad; 0
+   * where not fitted. */
+  double terms[SUPINE_KRIGING_TERMS];
   /** Covariance matrix of `terms`. Rows and columns of terms that are not fitted are 0. */
   double covariance[SUPINE_KRIGING_TERMS][SUPINE_KRIGING_TERMS];
-  /** Covariance of the errors of `terms`, arranged as a matrix S. These errors add m' S m, mm^2, to
-   * the variance (sum of x, y and z) of a predicted position. For this position, m holds 1,
-   * supine_kriging_point.volume [3], and position - `centre` [3]. */
+  /** Covariance of `terms` for the first seven columns of X, a matrix S. Errors of `terms` add m' S
+   * m, mm^2, to the variance (sum over x, y and z) of a prediction. m is the row of X for the
+   * predicted point, minus its prediction from the rows of the observed points. */
   double spread[SUPINE_KRIGING_TERMS][SUPINE_KRIGING_TERMS];
   double log_likelihood; /**< restricted log likelihood of the residuals, up to a constant */
 } supine_kriging;
@@ -119,7 +122,7 @@ typedef struct supine_kriging_target {
   size_t count, lung;
   const float *position; /**< [count, 3] positions in the scan, mm */
   const float *size;     /**< [count] lengths of the displacements from the scan, mm */
-  const float *volume;   /**< [count, 3] as supine_kriging_point.volume; NULL if not fitted */
+  const float *volume; /**< [count, 3] shift per prior standard deviation of volume, mm; or NULL */
 } supine_kriging_target;
 
 /** Predict the residual (true minus predicted position) at every point of a target. Cost: n^2 / 2 +

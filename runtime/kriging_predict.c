@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Predict residuals and their variance at many points, in blocks of RUN points. */
+/* Predict residuals and their variance at many points, RUN points at a time. */
 #include <math.h>
 #include <string.h>
 
@@ -7,12 +7,11 @@
 
 enum { RUN = 32, COLUMNS = SUPINE_KRIGING_TERMS };
 
-/* RUN consecutive points at which to predict, with an array for each axis. If points are missing in
- * the last block, the last point is repeated. */
+/* RUN consecutive points at which to predict. If fewer are left, the last one is repeated. */
 typedef struct run {
-  float place[3][RUN];  /* position minus supine_kriging.centre, mm */
-  float volume[3][RUN]; /* displacement if the volume grows by one prior standard deviation, mm */
-  float root[RUN];      /* standard deviation of one coordinate of the random field, mm */
+  float place[3][RUN];  /* [axis][point] position minus supine_kriging.centre, mm */
+  float volume[3][RUN]; /* [axis][point] shift per prior standard deviation of the volume, mm */
+  float root[RUN];      /* [point] standard deviation of each coordinate of the random field, mm */
 } run;
 
 static void fill(const supine_kriging *fit, const supine_kriging_target *target, size_t begin,
@@ -91,13 +90,13 @@ static void solve(const supine_kriging *fit, size_t lung, const run *in, float (
 
 /* Compute the variance of the prediction, summed over x, y and z, at each of RUN points, mm^2:
  *
- *     3 (k - w'w) + m' S m
+ *     3 (k - w'w) + m' S m        m = h - sum over j of w_j h_j
  *
- *     k  variance of one coordinate of the random field
- *     w  L^-1 times the covariances with the observed points (solve)
- *     S  covariance of the errors of the fitted terms (supine_kriging.spread)
- *     m  (1, volume [3], position - centre [3]) of this point, minus the weighted sum of the same
- *        vectors of the observed points: w times the rows of supine_kriging.whitened */
+ *     k    variance of one coordinate of the random field
+ *     w_j  L^-1 times the covariances with the observed points j (solve)
+ *     S    covariance of the fitted terms (supine_kriging.spread)
+ *     h    seven numbers of this point: 1, shift by the volume [3], position - centre [3]
+ *     h_j  the same numbers of observed point j, times L^-1 (supine_kriging.whitened) */
 static void vary(const supine_kriging *fit, const run *in, float (*w)[RUN], float *variance) {
   float column[COLUMNS][RUN];
   for (size_t v = 0; v < RUN; ++v) {

@@ -7,7 +7,7 @@
 #include "runtime/safetensors/platform.h"
 #include "sh/base/clones.h"
 
-/* Pack the vectors of the normals of 16 vertices. rows[v] points to those of vertex v, by axis. */
+/* Pack supine_basis_info.normals of 16 vertices. rows[v] points to the numbers of vertex v. */
 SUPINE_CLONES static void pack_tile(const supine_tiles *tiles, const int16_t *const rows[TILE],
                                     unsigned char *to) {
   const size_t words = supine_tiles_normal_words(tiles->modes);
@@ -93,8 +93,8 @@ void supine_basis_normal_weights(const supine_basis *basis, const supine_pose *p
   }
 }
 
-/* Compute the numbers by which the kernel supine_kernels.light multiplies the packed vectors of the
- * normals of a lung: the weights of the vectors times normal_unit(). */
+/* Compute the factors by which the kernel supine_kernels.light multiplies the packed vectors of a
+ * lung (supine_basis_info.normals): the weight of each vector times normal_unit(). */
 static void weigh(const supine_basis *basis, size_t lung, const supine_pose *pose, float *scales) {
   double v[SUPINE_NORMAL_MODES_MAX];
   lung_weights(basis, lung, pose, v);
@@ -109,7 +109,7 @@ static void light(const supine_basis *basis, const supine_pose *pose, size_t beg
   const supine_target target = {.xyz = normals,
                                 .stream = stream,
                                 .prefetch = stream ? basis->prefetch : SUPINE_PREFETCH_NONE};
-  float scales[SUPINE_NORMAL_MODES_MAX + 2] = {0}; /* padded with 0 for absent vectors */
+  float scales[SUPINE_NORMAL_MODES_MAX + 2] = {0}; /* factor of each vector, then 0 */
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     const size_t first = basis->lung_begin[lung] > begin ? basis->lung_begin[lung] : begin;
     const size_t last = basis->lung_begin[lung + 1] < end ? basis->lung_begin[lung + 1] : end;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Find the volume of the lungs, a rigid motion and a correction of predicted positions from
- * observed points. */
+/* From observed points, find the volume of the lungs, the rigid motion to the frame of the points,
+ * and a correction of the predicted positions. */
 #include <math.h>
 #include <string.h>
 
@@ -14,15 +14,15 @@ _Static_assert((int)SUPINE_LOCATE_POINTS_MAX == (int)SUPINE_KRIGING_POINTS_MAX,
  * the difference between the volumes at full inflation (1) and at rest (0.43). */
 static const double prior_spread = 0.17;
 static const double outlier_limit = 3.0; /* outliers exceed this number of standard deviations */
-static const double outlier_noise = 300; /* noise assigned to an outlier, mm */
+static const double outlier_noise = 300; /* standard deviation assigned to an outlier, mm */
 static const double volume_step = 1;     /* the search ends when steps are smaller than this, mL */
 static const double angle_step = 1e-4;   /* the search ends when steps are smaller than this, rad */
-/* Ratio of two variances per mm of displacement: of the random field (supine_kriging_model.sill, 6
- * mm), and of the expected error (c in supine/locate.h, 4.5 mm). The second is smaller because the
- * translation that fits best was subtracted before it was measured. */
+/* Ratio of supine_kriging_model.sill, 6 mm, to the factor c of the expected error in
+ * supine/locate.h, 4.5 mm. Both are variances (mm^2) per mm of displacement. c is smaller because
+ * the translation that fits best had been subtracted before c was measured. */
 static const double sill_of_error = 4.0 / 3;
 
-/* Largest number of Gauss-Newton steps, and of halvings of one change of the volume. */
+/* Largest number of Gauss-Newton steps, and of times that a step of the volume is halved. */
 enum { STEPS_MAX = 20, HALVINGS_MAX = 8 };
 
 typedef struct workspace {
@@ -154,8 +154,8 @@ static supine_status evaluate(workspace *s, supine_error *error) {
   return status;
 }
 
-/* Compute, for the current rotation, the translation between the mean positions
- * (supine_locate_fit.origin), and the residual of each observed point in body axes. */
+/* For the current rotation, compute the translation from the mean predicted to the mean observed
+ * position (supine_locate_fit.origin), and the residual of each point in the frame of the basis. */
 static void find_residuals(workspace *s) {
   const size_t n = s->task->count;
   supine_location *found = s->found;

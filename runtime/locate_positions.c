@@ -9,8 +9,8 @@
  * volume added (`fuller`). */
 typedef struct poses {
   supine_pose at, scan, fuller;
-  double constant; /* squared expected error without observations / displacement, mm */
-  double per_step; /* prior standard deviation of the volume / (volume of `fuller` - of `at`) */
+  double constant; /* (expected error without observations)^2 / displacement, mm */
+  double per_step; /* prior standard deviation of the volume / volume added in `fuller` */
 } poses;
 
 static supine_status find_poses(const supine_location *found, const supine_basis *basis, poses *p,
@@ -65,10 +65,10 @@ static void predict(const supine_location *found, const supine_basis *basis, con
   supine_kriging_predict(&fit->kriging, &target, b->shift, b->variance);
 }
 
-/* Convert the corrected positions to the frame of the observations, and write the expected errors.
- * Kriging gives the expected errors. With at least three observed points and no fitted rotation,
- * none exceeds the expected error without observations. With two points, this limit would be too
- * small (0.85 of the true error); with a rotation, it would ignore the error of the rotation. */
+/* Convert the corrected positions to the frame of the observations, and write the expected errors
+ * of kriging. If at least three points were observed and no rotation was fitted, limit each to the
+ * expected error without observations. For two points, this limit would be too small (0.85 of the
+ * true error). For a fitted rotation, it would ignore the error of the rotation. */
 static void finish(const supine_location *found, const poses *p, const block *b, size_t count,
                    float *xyz, float *sigma) {
   const supine_locate_fit *fit = found->fit;

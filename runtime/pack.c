@@ -13,20 +13,20 @@ enum {
   FLOAT_FRACTION_BITS = 23
 };
 
-/* The numbers of 16 vertices before packing; coefficients are [axes, modes, 16]. */
+/* Data of 16 vertices before packing. Coefficients are [axes, modes, 16], the others [16, 3]. */
 typedef struct source {
   float coefficients[3 * SUPINE_MODES_MAX * TILE];
   float direction[TILE_NUMBERS];
   float reference[TILE_NUMBERS];
 } source;
 
-/* Work space of packing. */
+/* Quantisation steps and errors, and the vertices being packed. */
 typedef struct work {
   double mode[SUPINE_MODES_MAX]; /* quantisation step of the coefficients of each mode, mm */
-  double direction;              /* quantisation step of directions */
+  double direction;              /* quantisation step of the unit vectors of displacement */
   double reference;              /* quantisation step of reference positions, mm, a power of two */
-  float direction_square;        /* largest squared quantisation error of a direction */
-  float reference_square;        /* largest squared quantisation error of a position, mm^2 */
+  float direction_square; /* largest squared quantisation error of a unit vector of displacement */
+  float reference_square; /* largest squared quantisation error of a reference position, mm^2 */
   source source;
 } work;
 
@@ -103,8 +103,8 @@ static int word_bits(const supine_tiles *tiles, size_t k) {
   return k < paired ? 16 : (k - paired) % 3 == 2 ? 10 : 11;
 }
 
-/* Choose the quantisation steps. Bound the displacement and the quantisation error of each mode. A
- * packed coefficient errs by half of its lowest bit and by the rounding of its word to a float. */
+/* Choose the quantisation steps. Bound the displacement and the error of each mode. The error is
+ * half of the lowest bit, plus the rounding when a packed word is converted to a float. */
 static void choose_steps(supine_basis *basis, work *w) {
   const bool compact = supine_tiles_compact(basis->tiles.storage);
   const double axes = sqrt((double)basis->tiles.axes); /* length of the vector (1, 1, 1) or (1) */
@@ -122,7 +122,7 @@ static void choose_steps(supine_basis *basis, work *w) {
   for (size_t k = 0; k < basis->info.mode_count; ++k) {
     const int bits = word_bits(&basis->tiles, k);
     w->mode[k] = 1;
-    if (flush(top[k]) > 0 && compact) { /* let the largest coefficient fill all bits */
+    if (flush(top[k]) > 0 && compact) { /* the largest coefficient becomes the largest integer */
       w->mode[k] = (double)top[k] / (0x1p31 - ldexp(1, 32 - bits));
     }
     basis->mode_scale[k] = w->mode[k] * w->direction;
@@ -159,8 +159,8 @@ static void pack_coefficients(const supine_tiles *tiles, const double *unit, con
   }
 }
 
-/* Pack the coordinates of 16 directions or positions. Replace *square by the largest squared
- * quantisation error of a vertex if this error is larger. */
+/* Pack the coordinates of 16 directions or positions, in quantisation steps of `unit`. Raise
+ * *square to the largest squared quantisation error of these vectors, if that is larger. */
 static void pack_numbers(const supine_tiles *tiles, double unit, const float *numbers,
                          unsigned char *at, float *square) {
   float error[TILE_NUMBERS];

@@ -182,9 +182,9 @@ static supine_status total_gains(const supine_basis *basis, const volumes *v, do
   return status;
 }
 
-/* Find the gains (factors of the displacement) of a state that gives a volume for each lung by its
- * name. If this volume is relative to rest, full inflation or the scan, add it to the volume that
- * this lung has when all lungs together are in that condition. */
+/* Find the gains (factors of the displacement) for a state that names each lung with a volume. A
+ * volume relative to rest, full inflation or the scan is added to the volume that the named lung
+ * has when all lungs are at rest, at full inflation or as in the scan. */
 static supine_status named_gains(const supine_basis *basis, const volumes *v,
                                  const supine_state *state, supine_pose *pose,
                                  supine_error *error) {

@@ -22,9 +22,9 @@ typedef struct supine_rigid_motion {
   double rotation[9];    /**< rotation R by rows, set by supine_rigid_finish */
 } supine_rigid_motion;
 
-/** Add the positions p and x [count, 3] of `count` vertices to the sums of a motion. */
+/** Add vertices with reference positions p and deformed positions x, [count, 3], to a motion. */
 void supine_rigid_add(supine_rigid_motion *motion, const float *p, const float *x, size_t count);
-/** Compute the means and the rotation R after all vertices were added. */
+/** After all vertices were added, compute their mean positions and the rotation R. */
 void supine_rigid_finish(supine_rigid_motion *motion);
 /** Move one point p rigidly, and return coordinate `axis` of the result, mm. */
 double supine_rigid_move(const supine_rigid_motion *motion, const float *p, size_t axis);

@@ -173,7 +173,7 @@ supine_status supine_state_parse(const char *text, supine_state *state, supine_e
     return SUPINE_OK;
   }
   const char *equals = strchr(text, '=');
-  if (equals != NULL && colon != NULL && colon > equals) { /* no posture is before the colon */
+  if (equals != NULL && colon != NULL && colon > equals) { /* LUNG=VOLUME is no posture */
     colon = NULL;
   }
   if (colon == NULL) {

@@ -3,10 +3,10 @@
 // Put this text after the #version line (and, for ES, after "precision highp float;").
 //
 //     x = reference + gain (w . c) direction    w, c: weight of each of K modes, and its coefficient at the vertex
-//     n = sum over j of v_j n_j                 v, n: weights and vectors, Q of each, whose sum is the normal
+//     normal = sum over j of v_j m_j            v_j, m_j: weight of each of Q vectors, and the vector at the vertex
 //
 // `direction` is the vector along which the vertex moves. `gain` multiplies the displacement of a lung along x, y and z.
-// Attributes (reference, direction, c, n) come from supine_gl_pack and supine_gl_pack_normals, the uniforms from
+// Attributes (reference, direction, c, m) come from supine_gl_pack and supine_gl_pack_normals, the uniforms from
 // supine_gl_weights and supine_gl_normal_weights (supine/runtime.h). reference.w is the index of the lung and selects
 // its gains, so that one draw call draws all lungs. A vertex costs K + 6 multiplications and K + 2 additions; its normal
 // costs 3 Q multiplications and 3 Q additions.
@@ -18,7 +18,7 @@
 #define SUPINE_VECTORS 4 // vec4s that hold the coefficients of K modes: (K + 3) / 4
 #endif
 #ifndef SUPINE_WORDS
-#define SUPINE_WORDS 2 // uvec3s that hold Q vectors for the normal: (Q + 2) / 3
+#define SUPINE_WORDS 2 // uvec3s that hold the Q vectors of a vertex whose weighted sum is its normal: (Q + 2) / 3
 #endif
 
 uniform vec4 supine_weights[SUPINE_VECTORS];
@@ -53,8 +53,8 @@ vec3 supine_displace(vec4 reference, vec3 direction, vec4 c0, vec4 c1, vec4 c2, 
 }
 #endif
 
-// Compute the weighted sum of the three vectors in attribute number `part` of the normal. The total over all such
-// attributes points along the normal, but its length is not 1. The vectors have 13, 10 and 9 bits of each word.
+// Compute the weighted sum of three vectors of a vertex in lung reference.w. `words` is attribute number `part` of
+// supine_gl_pack_normals, with 13, 10 and 9 bits per vector. The sum over all parts is the normal before normalisation.
 vec3 supine_normal(vec4 reference, int part, uvec3 words) {
   vec3 v = supine_normal_weights[int(reference.w) * SUPINE_WORDS + part];
   return v.x * vec3(ivec3(words)) + v.y * vec3(ivec3(words << 13)) + v.z * vec3(ivec3(words << 23));

@@ -1,5 +1,4 @@
 /* SPDX-License-Identifier: MIT */
-/* Compare words that users type. */
 #include <string.h>
 
 #include "runtime/words.h"

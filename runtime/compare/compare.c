@@ -160,8 +160,8 @@ static double product(const double *gram, const double *q, const double *p, size
   return sum;
 }
 
-/* For each lung, axis and mode, write the gain times the weight of `pose` to `q`. Unless `from` is
- * NULL, subtract the gain times the weight of `from`. */
+/* For each lung, axis and mode, write the displacement factor times the weight of `pose` to `q`.
+ * Unless `from` is NULL, subtract the same product of `from`. */
 static void products_of(const supine_compare *compare, const supine_pose *pose,
                         const supine_pose *from, double *q) {
   for (size_t i = 0; i < 3 * compare->basis->info.lung_count; ++i) {

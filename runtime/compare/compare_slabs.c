@@ -11,9 +11,9 @@
 
 enum { BEFORE, AFTER, TIMES };
 
-/* A point of the surface. */
+/* A vertex of the surface, or a point where a plane cuts an edge of a triangle. */
 typedef struct corner {
-  double at[TIMES][3]; /* positions before and after the breath, mm */
+  double at[TIMES][3]; /* [BEFORE, AFTER] positions, mm */
   double level;        /* coordinate along gravity before the breath, mm; larger is lower */
 } corner;
 
@@ -23,12 +23,12 @@ typedef struct polygon {
   corner corner[6];
 } polygon;
 
-/* Sums over the edges of the outline along which a horizontal plane cuts the surface. Each edge has
- * the direction that it has in the part of its triangle above the plane. */
+/* Sums over the edges of the outline along which a horizontal plane cuts the surface. Each edge is
+ * oriented as in the boundary of the part of its triangle above the plane. */
 typedef struct outline {
   double length;           /* total length of the edges before the breath, mm */
-  double middle[TIMES][3]; /* sum of edge midpoint times edge length before the breath, mm^2 */
-  double area[TIMES][3];   /* sum over edges: cross product of start and end, mm^2 */
+  double middle[TIMES][3]; /* [BEFORE, AFTER] sum of edge midpoint times initial length, mm^2 */
+  double area[TIMES][3];   /* [BEFORE, AFTER] sum of cross product of start and end, mm^2 */
 } outline;
 
 /* Horizontal planes that cut the lungs into slabs, and the outlines of one lung in these planes. */
@@ -137,7 +137,7 @@ static void add_triangle(cutter *c, const polygon *triangle, supine_slab *slabs)
 /* Close the slabs above and below an outline by triangles. Each triangle joins one edge of the
  * outline to the mean point of the outline. */
 static void close_cut(const outline *cut, supine_slab *above, supine_slab *below) {
-  double volume[TIMES]; /* volume between the origin and the closing triangles, mL */
+  double volume[TIMES]; /* [BEFORE, AFTER] between the origin and the triangles, signed, mL */
   for (int time = 0; time < TIMES && cut->length > 0; ++time) {
     volume[time] = 1e-3 / 6 * supine_dot(cut->middle[time], cut->area[time]) / cut->length;
   }

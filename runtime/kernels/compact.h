@@ -49,17 +49,17 @@ static inline uint32_t triple_narrow(double first, double second, double third) 
   return word_nearest(first, lower, 21);
 }
 
-/** Pack three numbers between -2^31 and 2^31, from three vectors of a normal, into a word. They
- * are rounded to 13, 10 and 9 bits; the first, which tends to be the largest, gets the
- * uppermost bits. */
+/** Pack three numbers between -2^31 and 2^31 into a word, rounded to 13, 10 and 9 bits. The first
+ * gets the uppermost bits. The numbers are coordinates of vectors whose weighted sum is a normal
+ * (supine_basis_info.normals); the first tends to be the largest. */
 static inline uint32_t normal_narrow(double first, double second, double third) {
   const uint32_t low = word_nearest(third, 0, 23) >> 23;
   const uint32_t lower = word_nearest(second, low << 13, 22) >> 13;
   return word_nearest(first, lower, 19);
 }
 
-/** Return the factor that converts a number that normal_narrow packed to the 16-bit number of the
- * file. It converts 255 x 2^23, the largest number whose lowest 23 bits are 0, to 32767. */
+/** Return the scale from the numbers packed by normal_narrow to the 16-bit numbers of the file. 255
+ * x 2^23, the largest integer whose lowest 23 bits are 0, becomes 32767. */
 static inline double normal_unit(void) {
   return INT16_MAX / (255 * 0x1p23);
 }

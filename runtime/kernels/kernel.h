@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * The loops that evaluate tiles (16 vertices each), for vectors of LANES floats. Each kernel_*.c
- * includes this file once, after definitions of
+ * The loops that evaluate tiles (16 vertices each), for SIMD vectors of LANES floats. Each
+ * kernel_*.c includes this file once, and before that defines
  *
- *     KERNELS          the name of the supine_kernels that this file defines
+ *     KERNELS          name of its table of kernels (supine_kernels)
  *     LANES            4, 8 or 16
  *     FMA(a, b, c)     a * b + c
  *     RSQRT(x)         an estimate of 1 / sqrt(x), accurate to 12 bits at least
  *     STREAM(to, v)    store a vector and bypass the caches
- *     OWN_WRITER       instead of STREAM, if the including file defines the struct `writer` */
+ *     OWN_WRITER       instead of STREAM, if kernel_*.c has its own struct `writer` */
 #include "runtime/kernels/tiles.h"
 #include <string.h>
 
@@ -19,8 +19,8 @@ typedef int32_t vi __attribute__((vector_size(4 * LANES)));
 typedef uint32_t vu __attribute__((vector_size(4 * LANES)));
 
 enum {
-  GROUPS = TILE / LANES, /* number of SIMD vectors for one number of each vertex in a tile */
-  PIECES = TILE_NUMBERS / LANES, /* number of SIMD vectors for the 48 coordinates of a tile */
+  GROUPS = TILE / LANES,         /* SIMD vectors that hold one number per vertex of a tile */
+  PIECES = TILE_NUMBERS / LANES, /* SIMD vectors that hold the 48 coordinates of a tile */
   CHAINS = GROUPS == 1 ? 2 : 1,  /* partial sums in a dot product; two hide the latency of FMA */
   KNOWN_MODES = 16               /* largest number of modes whose weights stay in registers */
 };
@@ -74,11 +74,11 @@ INLINE vf weight(const weights *w, size_t k, bool known) {
   return known ? w->v[k] : splat(w->at[k]);
 }
 
-/* Constants for which the compiler specialises a loop over tiles. If it knows the number of modes,
- * the loop writes positions, never displacements. */
+/* Properties of tiles for which the compiler makes a separate loop. Loops for a constant number of
+ * modes always write positions, never displacements. */
 typedef struct form {
   supine_storage storage;
-  size_t modes; /* number of modes if the compiler knows it, else 0 */
+  size_t modes; /* number of modes if it is a compile-time constant, else 0 */
   bool vector;
 } form;
 
@@ -262,9 +262,9 @@ INLINE void deform_kind(const supine_tiles *tiles, const float *scales, size_t f
   }
 }
 
-/* Call the loop for the storage (number format) of the tiles. `modes` is the number of modes if the
- * compiler knows it, otherwise 0. In the second case, the INT16 loop also serves MIXED, because
- * that loop reads the layout from `tiles`. */
+/* Evaluate tiles by the loop for their number format. `modes` is the number of modes if it is a
+ * compile-time constant, otherwise 0. If it is 0, the loop for INT16 also evaluates MIXED, as it
+ * reads the layout from `tiles`. */
 INLINE void deform_storage(const supine_tiles *tiles, const float *scales, size_t first,
                            size_t count, const supine_target *target, size_t modes) {
   if (tiles->storage == SUPINE_STORAGE_EXACT) {

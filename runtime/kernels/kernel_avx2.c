@@ -5,8 +5,8 @@
 #if defined(__AVX2__) && defined(__FMA__)
 #include <immintrin.h>
 
-/* Store a vector. Bypass the caches by one store if the array is aligned to 32 bytes, or by two
- * stores if it is aligned to 16 bytes, as memory from malloc is. */
+/* Store a vector. If the address is aligned to 16 bytes, as memory from malloc is, bypass the
+ * caches: with one store if it is aligned to 32 bytes, otherwise with two. */
 static inline __attribute__((always_inline)) void stream8(float *to, __m256 v) {
   if ((uintptr_t)to % 16 != 0) {
     _mm256_storeu_ps(to, v);

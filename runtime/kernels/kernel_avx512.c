@@ -14,7 +14,7 @@ typedef struct writer {
   float *to;
   size_t offset; /* number of floats from the start of a cache line to `to` */
   bool stream;
-  bool shared; /* the next store fills only a part of the first cache line */
+  bool partial; /* the next store is the first one, and fills only a part of a cache line */
 } writer;
 
 static inline __attribute__((always_inline)) writer writer_open(const supine_target *target) {
@@ -32,9 +32,9 @@ static inline __attribute__((always_inline)) writer writer_open(const supine_tar
 static inline __attribute__((always_inline)) void writer_put(writer *w, __m512 next) {
   if (!w->stream) {
     _mm512_storeu_ps(w->to, next);
-  } else if (w->shared) {
+  } else if (w->partial) {
     _mm512_mask_storeu_ps(w->to, (__mmask16)(0xFFFFU >> w->offset), next);
-    w->shared = false;
+    w->partial = false;
   } else {
     _mm512_stream_ps(w->to - w->offset, _mm512_permutex2var_ps(w->last, w->join, next));
   }

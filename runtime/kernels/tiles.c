@@ -12,10 +12,10 @@ static bool has_avx512(void) {
   return has_avx2() && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw");
 }
 
-/* Choose the distance of prefetching by the family of the processor. AMD Zen 4 (family 25) fetches
- * cache lines in pairs, so that every other line (NEAR) is best: it reads 16 million vertices of 16
- * int16 modes at 39 GB/s, against 37 GB/s without prefetching and 36 GB/s with every line (FAR). On
- * AMD Zen 5 (family 26), FAR is the fastest. */
+/* Choose how to prefetch, by the family of the processor. AMD Zen 4 (family 25) fetches cache lines
+ * in pairs. To prefetch every other line (NEAR) is therefore best: 16 million vertices with 16
+ * int16 modes are read at 39 GB/s, against 37 GB/s without prefetching and 36 GB/s with every line
+ * (FAR). On AMD Zen 5 (family 26), FAR is the fastest. */
 supine_prefetch supine_kernels_prefetch_choose(void) {
   unsigned a = 0;
   unsigned b = 0;
@@ -24,7 +24,7 @@ supine_prefetch supine_kernels_prefetch_choose(void) {
   const bool amd = __get_cpuid(0, &a, &b, &c, &d) != 0 && b == signature_AMD_ebx &&
                    d == signature_AMD_edx && c == signature_AMD_ecx;
   const bool known = __get_cpuid(1, &a, &b, &c, &d) != 0;
-  const unsigned family = (a >> 8 & 15U) + (a >> 20 & 255U); /* base family plus extended family */
+  const unsigned family = (a >> 8 & 15U) + (a >> 20 & 255U); /* base plus extended CPU family */
   return amd && known && family == 26 ? SUPINE_PREFETCH_FAR : SUPINE_PREFETCH_NEAR;
 }
 #else

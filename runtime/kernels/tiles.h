@@ -1,21 +1,21 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * Layout of a basis in memory for the kernels: tiles of 16 vertices, each of whole cache lines.
+ * Layout of a basis in memory for the kernels. A tile holds 16 vertices in whole cache lines:
  *
- *     coefficients   of each mode at the 16 vertices; in vector fields, those on x, then y, then z
- *     direction      48 numbers x y z x y z ..., directions of displacement; not in vector fields
- *     reference      48 numbers x y z x y z ..., reference positions
+ *     coefficients   [axes, modes, 16]; 3 axes if supine_basis_info.vector is true, otherwise 1
+ *     direction      [16, 3] vectors along which the vertices move; absent with 3 axes
+ *     reference      [16, 3] reference positions
  *
  * Tile t holds vertices 16 t to 16 t + 15; the last tile repeats the last vertex. The storage
  * determines the types of numbers:
  *
  *     EXACT  floats
  *     INT16  32-bit words (compact.h): one for two coefficients, two for three coordinates
- *     MIXED  like INT16, but one word for three coefficients of the last modes
+ *     MIXED  like INT16, but one word for three coefficients of the last 3 floor(K / 8) of K modes
  *
- * Integers count quantisation steps, which are so large that the largest number just fits. Within
- * half a metre of the origin, a reference position errs by at most 0.0005 mm in each coordinate.
- * Once a frame, the weights are multiplied by the steps of coefficients and directions. */
+ * Integers count quantisation steps. A step is as small as the largest number allows. Within half a
+ * metre of the origin, a reference position errs by at most 0.0005 mm in each coordinate. Once a
+ * frame, the weights of modes are multiplied by the steps of coefficients and directions. */
 #ifndef SUPINE_TILES_H
 #define SUPINE_TILES_H
 
@@ -29,7 +29,7 @@ enum {
 typedef struct supine_tiles {
   supine_storage storage;
   size_t modes;
-  size_t axes;       /**< number of coefficients per vertex and mode: 3 in vector fields, else 1 */
+  size_t axes;       /**< coefficients per vertex and mode: 3 (x, y, z), or 1 along the direction */
   size_t axis_bytes; /**< bytes of the coefficients of one axis in one tile */
   size_t direction_begin; /**< byte offset of the directions in a tile */
   size_t reference_begin; /**< byte offset of the reference positions in a tile */
@@ -47,19 +47,19 @@ static inline bool supine_tiles_compact(supine_storage storage) {
   return storage != SUPINE_STORAGE_EXACT;
 }
 
-/** Return the number of 32-bit words per vertex that hold the coefficients of three modes each. */
+/** Return how many 32-bit words of a vertex hold three coefficients each. */
 static inline size_t supine_tiles_thirds(supine_storage storage, size_t modes) {
   return storage == SUPINE_STORAGE_MIXED ? modes / 8 : 0;
 }
 
-/** Return the number of modes whose coefficients do not share a word by threes. In compact
- * storages, the coefficients of two of these modes share a word. */
+/** Return the number of modes whose coefficients are not packed three to a word. Compact storages
+ * pack these two to a word. */
 static inline size_t supine_tiles_paired(supine_storage storage, size_t modes) {
   return modes - 3 * supine_tiles_thirds(storage, modes);
 }
 
-/** Fill in all members but `bytes` and `reference_unit` for a storage other than AUTO. The function
- * is inline, so that the layout is a constant for a constant number of modes. */
+/** Fill in all members but `bytes` and `reference_unit`; `storage` is not AUTO. This function is
+ * inline so that the compiler can compute the layout if `modes` is a constant. */
 static inline void supine_tiles_layout(supine_tiles *tiles, supine_storage storage, size_t modes,
                                        bool vector, size_t count) {
   const bool compact = supine_tiles_compact(storage);
@@ -77,18 +77,18 @@ static inline void supine_tiles_layout(supine_tiles *tiles, supine_storage stora
   tiles->count = count;
 }
 
-/** Return the number W of 32-bit words for one coordinate of the vectors whose weighted sum is a
- * normal. Word j holds vectors j, j + W and j + 2 W (compact.h), with 0 for absent vectors. */
-static inline size_t supine_tiles_normal_words(size_t modes) {
-  return (modes + 2) / 3;
+/** Return the number W of 32-bit words that hold one coordinate of all vectors of a vertex
+ * (supine_basis_info.normals). Word j holds vectors j, j + W and j + 2 W, or 0 past the last. */
+static inline size_t supine_tiles_normal_words(size_t vectors) {
+  return (vectors + 2) / 3;
 }
 
-/** Fill in the layout of tiles that hold the vectors of normals. For each axis, a tile has
+/** Fill in the layout of tiles of supine_basis_info.normals. For each axis, a tile has
  * supine_tiles_normal_words words for each of its 16 vertices.
- * @param modes  number of vectors of a normal */
-static inline void supine_tiles_layout_lit(supine_tiles *tiles, size_t modes, size_t count) {
-  *tiles = (supine_tiles){.modes = modes, .axes = 3, .count = count};
-  tiles->axis_bytes = TILE * sizeof(uint32_t) * supine_tiles_normal_words(modes);
+ * @param vectors  number of vectors per vertex, whose weighted sum is the normal */
+static inline void supine_tiles_layout_lit(supine_tiles *tiles, size_t vectors, size_t count) {
+  *tiles = (supine_tiles){.modes = vectors, .axes = 3, .count = count};
+  tiles->axis_bytes = TILE * sizeof(uint32_t) * supine_tiles_normal_words(vectors);
   tiles->stride = 3 * tiles->axis_bytes;
 }
 
@@ -98,7 +98,7 @@ typedef enum supine_prefetch {
   SUPINE_PREFETCH_FAR,  /**< every cache line, 8192 bytes ahead, without filling the outer caches */
 } supine_prefetch;
 
-/** Prefetch `stride` bytes at a distance after `tile`. `how` selects the distance. */
+/** Prefetch `stride` bytes of a later tile, at the distance given by `how`. */
 static inline __attribute__((always_inline)) void
 supine_prefetch_tile(const unsigned char *tile, size_t stride, supine_prefetch how) {
   enum { PAST_CACHES = 0, SECOND_LEVEL = 2 }; /* locality arguments of __builtin_prefetch */
@@ -120,9 +120,9 @@ typedef struct supine_target {
   supine_prefetch prefetch;
 } supine_target;
 
-/** Evaluate tiles first <= t < first + count of one lung, and write their vertices to the target.
- * @param scales  [modes + 3] weight of each mode, times the quantisation steps of coefficients
- *                 and directions; then the three gains of the lung (factors of its displacement)
+/** Evaluate tiles first <= t < first + count of one lung, 16 vertices each, into the target.
+ * @param scales  [modes + 3] weight of each mode times supine_basis.mode_scale; then the factors of
+ *                 the lung's displacement along x, y and z
  * @param count    at least 1 */
 typedef void supine_deform_tiles(const supine_tiles *tiles, const float *scales, size_t first,
                                  size_t count, const supine_target *target);

@@ -24,7 +24,7 @@ class Basis {
     this.#c = instance.exports;
     this.#c._initialize();
     const size = 2 * (STATE + POSE) + VOLUMES + TEXT + ERROR;
-    this.#state = this.#allocate(size); // pieces with doubles come first; their sizes are multiples of 8, for alignment
+    this.#state = this.#allocate(size); // first the structs with doubles, in sizes that are multiples of 8, for alignment
     this.#pose = this.#state + STATE;
     this.#nextState = this.#pose + POSE;
     this.#nextPose = this.#nextState + STATE;
@@ -166,7 +166,7 @@ export async function open(source, { wasm } = {}) {
   const bytes = ArrayBuffer.isView(source) ? new Uint8Array(source.buffer, source.byteOffset, source.byteLength) : new Uint8Array(source);
   const module = wasm === undefined ? await (beside ??= load()) : wasm instanceof WebAssembly.Module ? wasm : await WebAssembly.compile(wasm);
   // The C library imports functions that write to files, for printf. Refuse every call.
-  const none = () => 52; // ENOSYS
+  const none = () => 52; // the error ENOSYS of WASI
   const instance = await WebAssembly.instantiate(module, { wasi_snapshot_preview1: { fd_close: none, fd_seek: none, fd_write: none } });
   return new Basis(instance, bytes);
 }

@@ -31,7 +31,6 @@ struct supine_safetensors {
 /** Return the name of an element type in the header, such as "F32". `dtype` must be in range. */
 const char *supine_safetensors_dtype_name(supine_dtype dtype);
 
-/** Return the size of one element in bytes. */
 size_t supine_safetensors_dtype_size(supine_dtype dtype);
 
 /** Compute the size of a tensor in bytes; return false if the size overflows. */

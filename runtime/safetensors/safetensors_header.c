@@ -41,8 +41,8 @@ bool supine_safetensors_tensor_size(const supine_tensor *tensor, size_t *size) {
   return true;
 }
 
-/* The header being parsed, which a NUL follows. After a failure, take() accepts no character, and
- * further failures do not change the error. */
+/* State of the parser of a header, whose text ends with a NUL. After a failure, take() accepts no
+ * character, and further failures do not change the error. */
 typedef struct parser {
   supine_safetensors *file;
   char *at, *end;

@@ -1,5 +1,4 @@
 /* SPDX-License-Identifier: MIT */
-/* Write safetensors files. */
 #include <stdarg.h>
 #include <stdbool.h>
 #include <stdio.h>

@@ -89,8 +89,8 @@ SUPINE_API const char *supine_breath_limb_name(supine_pv_limb limb);
  * 201-210) found 10^4 to 10^5 in published curves. */
 SUPINE_API const supine_pv *supine_breath_normal(void);
 
-/** Check that the numbers of a limb are finite, that its pressures and its volumes rise from the
- * lower to the upper end, and that no control parameter exceeds SUPINE_PV_CONTROL_MAX in magnitude.
+/** Check one limb of a P-V loop: its numbers are finite, its pressures and its volumes rise from
+ * the lower to the upper end, and no control parameter exceeds SUPINE_PV_CONTROL_MAX in magnitude.
  * @retval SUPINE_ERROR_ARGUMENT  a check failed */
 SUPINE_API supine_status supine_breath_curve_check(const supine_pv_curve *curve,
                                                    supine_error *error);
@@ -132,7 +132,7 @@ typedef struct supine_pv_breath {
 } supine_pv_breath;
 
 /** Return the default breath: 500 mL, 12 breaths per minute, inhalation in a third of the time, 5
- * cmH2O at rest, and the course SUPINE_PV_COSINE. */
+ * cmH2O at rest, and a pressure that follows half a cosine (SUPINE_PV_COSINE). */
 SUPINE_API supine_pv_breath supine_breath_default(void);
 
 /** Compute the volume above rest, and the pressure, at given times. A breath begins at time 0, at

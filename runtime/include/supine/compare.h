@@ -24,8 +24,8 @@ typedef struct supine_compare supine_compare;
  *
  *     G_j[k, l] = sum over the vertices i of the lung of a_i d_ij^2 c_ik c_il
  *
- * c_ik is the coefficient of mode k at vertex i, and d_ij is coordinate j of the direction of this
- * vertex. A vector field has the coefficients c_ijk in place of d_ij c_ik. Cost: 3 N K^2 / 2
+ * Mode k moves vertex i along the vector d_i, in proportion to c_ik; d_ij is coordinate j of d_i.
+ * If supine_basis_info.vector is true, coefficients c_ijk replace d_ij c_ik. Cost: 3 N K^2 / 2
  * multiplications for N vertices and K modes, in one pass over the vertices.
  * @param basis    must outlive the comparison
  * @param compare  written; free it with supine_compare_destroy
@@ -58,12 +58,12 @@ SUPINE_API double supine_compare_rms(const supine_compare *compare, const supine
 SUPINE_API void supine_compare_distances(const supine_compare *compare, const supine_pose *pose,
                                          const supine_pose *from, float *distance);
 
-/** Statistics of distances over the surface, mm. */
+/** Statistics of the distances between the positions of every vertex in two poses, mm. */
 typedef struct supine_distance_statistics {
   double mean; /**< area-weighted mean */
   double rms;  /**< area-weighted root mean square */
   double p95;  /**< 95th percentile by area */
-  double max;  /**< largest distance of any vertex */
+  double max;
 } supine_distance_statistics;
 
 /** Compute the statistics of distances exactly, in four passes over the vertices, without
@@ -72,8 +72,8 @@ typedef struct supine_distance_statistics {
 SUPINE_API void supine_compare_statistics(const supine_compare *compare, const float *distance,
                                           supine_distance_statistics *statistics);
 
-/** Compute the energy of each band l of spherical harmonics: the part of band l in the squared
- * displacement, averaged over the area and over all directions of gravity, at gains of 1:
+/** Compute the energy of each band l of spherical harmonics: its squared displacement, averaged
+ * over the area and all directions of gravity, at gains (factors of the displacement) of 1:
  *
  *     energy[l] = 1 / (4 pi) * sum over m of  M_lm^T G M_lm
  *

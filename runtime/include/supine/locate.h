@@ -19,10 +19,11 @@
  *
  * Observed points correct the predicted positions by kriging. This reduces the expected errors near
  * the points. If at least three points were observed and no rotation is fitted, no expected error
- * exceeds sigma, which is then computed with two changes:
- * - |u_i| and the RMS count as at least 2 mm.
- * - The second term is (|dx_i/dV| 0.17 V_full)^2 for an unknown volume, and 0 for a given
- *   volume. */
+ * exceeds the square root of
+ *
+ *     max(|u_i|, 2 mm) min(c, max(RMS of |u|, 2 mm)) + (|dx_i/dV| D)^2
+ *
+ * D is 0.17 V_full for an unknown volume, and 0 for a given volume. */
 #ifndef SUPINE_LOCATE_H
 #define SUPINE_LOCATE_H
 
@@ -36,17 +37,16 @@
 extern "C" {
 #endif
 
-/** Default of c, mm: the square of an expected error is c times the displacement (top of this
- * file). */
+/** Default of the factor c in the formula of the expected error (top of this file), mm. */
 #define SUPINE_EXPECTED_ERROR_MM 4.5
 
 /** Compute the expected error of every vertex in a state, if the positions in state `from` are
  * exact.
  *
- * The constant c (top of this file) is the metadata "expected_error_mm" of the file or, if the
- * file lacks it, SUPINE_EXPECTED_ERROR_MM. The volume at rest counts as measured if the file has
- * metadata "resting_known" or was scanned at rest. Cost: four evaluations of every vertex, or six
- * if the volume at rest was assumed.
+ * The factor c in the formula of the expected error (top of this file) is the metadata
+ * "expected_error_mm" or, if the file lacks it, SUPINE_EXPECTED_ERROR_MM. The volume at rest was
+ * measured if the file has metadata "resting_known" or was scanned at rest; otherwise it was
+ * assumed. Cost: four evaluations of every vertex, or six if the volume at rest was assumed.
  * @param from   NULL for the state of the scan
  * @param sigma  [N] expected 3-D RMS errors, mm, written
  * @return a status of supine_basis_pose, or one of these:
@@ -60,7 +60,7 @@ enum { SUPINE_LOCATE_POINTS_MAX = 300 };
 /** One observed point, a vertex of a basis. The frame of all observed positions may be translated
  * from the frame of the basis and, if supine_locate_task.rigid is true, rotated. */
 typedef struct supine_observation {
-  size_t vertex;      /**< index of the observed vertex in the basis `inside` of the task */
+  size_t vertex;      /**< index of the vertex in the basis supine_locate_task.inside */
   double position[3]; /**< observed position, mm */
   double noise; /**< standard deviation of `position` per axis, mm, above 0; give 2 if unknown */
 } supine_observation;
@@ -90,9 +90,9 @@ typedef struct supine_location {
 
 /** Comparison of an observed point with its prediction by all other points. */
 typedef struct supine_locate_residual {
-  double distance; /**< distance from the prediction, mm; 0 if there is no prediction */
+  double distance; /**< from the observed to the predicted position, mm; 0 if not predicted */
   double sigma;    /**< expected RMS of `distance`, mm */
-  bool outlier;    /**< the point was left out because it is too far from the prediction */
+  bool outlier;    /**< the point was left out because `distance` is too large */
 } supine_locate_residual;
 
 /** Return the number of doubles that supine_locate needs for `count` points. */

@@ -97,8 +97,8 @@ typedef struct supine_basis_info {
   const float *vertices; /**< [vertex_count, 3] reference positions, mm, LPS */
   const uint32_t *triangles; /**< [triangle_count, 3] vertices of each triangle */
   const float *direction; /**< [vertex_count, 3] vectors along which vertices move, mm; or NULL */
-  /** Coefficients of the modes at each vertex: [vertex_count, mode_count], which multiply
-   * `direction`, or [vertex_count, 3, mode_count] along x, y and z, mm, if `vector` is true. */
+  /** Coefficients of the modes at each vertex. If `vector` is false: [vertex_count, mode_count],
+   * factors of `direction`. If it is true: [vertex_count, 3, mode_count] along x, y and z, mm. */
   const float *coefficients;
   /** [mode_count, (band + 1)^2] spherical-harmonic coefficients of the weight of each mode. */
   const double *modes;
@@ -112,17 +112,16 @@ typedef struct supine_basis_info {
   size_t normal_count; /**< vectors per vertex whose weighted sum is the normal; 0 if none */
   /** [vertex_count, 3, normal_count] vectors whose weighted and normalised sum is the normal. */
   const int16_t *normals;
-  /** Coefficients of the polynomials that give the weights of the vectors in `normals` (V of
-   * supine_basis_normal_weights). With K = mode_count, the shape is [lung_count, normal_count, 3,
-   * 1 + 2 K + K (K + 1) / 2], or [lung_count, normal_count, (K + 1) (K + 2) / 2] in files of
-   * versions 1 and 2. */
+  /** Coefficients of the polynomials that supine_basis_normal_weights evaluates. With K =
+   * mode_count, the shape is [lung_count, normal_count, 3, 1 + 2 K + K (K + 1) / 2], or
+   * [lung_count, normal_count, (K + 1) (K + 2) / 2] in files of versions 1 and 2. */
   const double *normal_weights;
   const double *reference_volume; /**< [lung_count] volume of reference surface, mL; 0 if open */
   bool has_rest;                  /**< the file has the volume at rest for every posture */
   bool has_full;                  /**< the reference surface is at full inflation */
-  bool is_fields;     /**< made from another simulator's displacements, which gain 1 reproduces */
-  size_t volume_axes; /**< number of gains of a lung: 3, or 1 in files of versions 1 and 2 */
-  double bend[3];     /**< curvature of the gains' path on x, y and z (supine_volume_bend) */
+  bool is_fields;     /**< made from another simulator's displacements; factor 1 reproduces them */
+  size_t volume_axes; /**< factors of displacement per lung: 3, or 1 in files of versions 1 and 2 */
+  double bend[3];     /**< `bend` of supine_volume_bend: how unevenly x, y and z move in a breath */
 } supine_basis_info;
 
 typedef struct supine_pose {
@@ -214,8 +213,8 @@ SUPINE_API supine_status supine_basis_pose(const supine_basis *basis, const supi
 SUPINE_API supine_status supine_basis_gains(const supine_basis *basis, const supine_state *state,
                                             supine_pose *pose, supine_error *error);
 
-/** Return the volume that SUPINE_VOLUME_DEFAULT means for this basis (supine_basis_pose). If it
- * means gains of 1 instead of a volume, return a volume of the kind SUPINE_VOLUME_DEFAULT. */
+/** Return the default volume of a basis (supine_basis_pose). If the default is to multiply
+ * displacements by 1, whatever the volume, the kind of the result is SUPINE_VOLUME_DEFAULT. */
 SUPINE_API supine_volume supine_basis_default_volume(const supine_basis *basis);
 
 /** Multiply the displacements of a pose by `gain`: set its gains for all lungs and axes to this
@@ -263,9 +262,10 @@ SUPINE_API void supine_deform_range(const supine_basis *basis, const supine_pose
 SUPINE_API void supine_deform_batch(const supine_basis *basis, size_t count,
                                     const supine_pose *poses, size_t begin, size_t end, float *xyz);
 
-/** Compute the displacements of vertices begin <= i < end from the reference surface. For fixed
- * weights, displacements are linear in the gains, except in rigid parts. For one step of a breath
- * (supine_step), therefore pass a pose with the gains after the step minus the gains before it.
+/** Compute the displacements of vertices begin <= i < end from the reference surface. To find the
+ * change of the displacements in one step of a breath (supine_step), pass the weights of the
+ * posture and the change of the gains (factors of displacement). Rigid parts do not follow this
+ * rule.
  * @param xyz  [end - begin, 3] mm, written */
 SUPINE_API void supine_displace_range(const supine_basis *basis, const supine_pose *pose,
                                       size_t begin, size_t end, float *xyz);
@@ -283,15 +283,15 @@ SUPINE_API void supine_displace_range(const supine_basis *basis, const supine_po
 SUPINE_API void supine_step(size_t count, const float *step, float *xyz);
 
 /** Compute, for each lung, the weights of the vectors whose weighted sum is the normal of a vertex
- * (supine_deform_lit). The weight of vector j is a sum over the axes c = x, y, z:
+ * (supine_deform_lit). The weight v of a vector is a polynomial, summed over the axes x, y, z:
  *
- *     v_j = sum over c of V_jc . (1, a w_k, b w_k, a b w_k w_l)    for all k and all l >= k
+ *     v = sum over axes of V_0 + a sum_k A_k w_k + b sum_k B_k w_k + a b sum_(k <= l) C_kl w_k w_l
  *
- *     V_jc  coefficients for this lung (supine_basis_info.normal_weights)
- *     w_k   weight of mode k of the pose
- *     a, b  gains on the next two axes: y, z for c = x; z, x for c = y; x, y for c = z
+ *     V_0, A, B, C  coefficients for a lung, vector and axis (supine_basis_info.normal_weights)
+ *     w_k           weight of mode k of the pose
+ *     a, b          gains (factors of displacement) on the next two axes, in cyclic order
  *
- * In files of versions 1 and 2, a lung has one gain a, and v_j = V_j . (1, a w_k, a^2 w_k w_l).
+ * In files of versions 1 and 2, v = V_0 + a sum_k A_k w_k + a^2 sum_(k <= l) C_kl w_k w_l.
  * Cost: 1.5 Q K^2 multiplications for each lung, once a frame, for K modes and Q vectors.
  * @param normal_weights  [lung_count, normal_count] v, written */
 SUPINE_API void supine_basis_normal_weights(const supine_basis *basis, const supine_pose *pose,
@@ -305,11 +305,10 @@ SUPINE_API void supine_basis_normal_weights(const supine_basis *basis, const sup
  * those of supine_basis_normal_weights. Cost of a normal: 3 Q + 8 multiplications for Q vectors,
  * and as many additions.
  *
- * The file states how far these normals turn away from those of supine_normals in states that did
- * not serve to make the vectors: metadata "normals_mean_degrees" is the mean angle,
- * "normals_p999_degrees" the 99.9th percentile. Both hold for volumes in the range
- * "normals_range_ml" or, if the file has no volume at rest, for largest displacements in the range
- * "normals_range_mm". Outside these ranges, angles are larger.
+ * The metadata of the file state how far these normals turn away from those of supine_normals:
+ * "normals_mean_degrees" is the mean angle, "normals_p999_degrees" the 99.9th percentile. Both were
+ * measured in held-out states. Angles are larger for volumes outside the range "normals_range_ml".
+ * A file without a volume at rest has "normals_range_mm" instead, for the largest displacement.
  * @param xyz      [N, 3] mm, written; NULL to compute only normals
  * @param normals  [N, 3], written; 0 for a vertex without triangles
  * @retval SUPINE_ERROR_UNSUPPORTED  the file has no normals, or it was opened without_normals */

@@ -46,8 +46,8 @@ typedef enum supine_dtype {
 
 enum { SUPINE_TENSOR_RANK_MAX = 4 };
 
-/** A tensor in row-major order. If the tensor is to be written, the caller owns the data. The data
- * of a tensor of an open file are in the memory of the file, aligned to the element size. */
+/** A tensor in row-major order. If the tensor is to be written, the caller owns the data. In an
+ * open file, `data` points to the bytes of the file in memory, aligned to the element size. */
 typedef struct supine_tensor {
   const char *name;
   supine_dtype dtype;

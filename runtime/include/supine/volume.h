@@ -23,9 +23,9 @@ typedef struct supine_volume_form {
   double of[7];
 } supine_volume_form;
 
-/** Add the polynomial of a lung in a pose with the weights w_k of K modes to `form`. The volume of
- * a lung is a sum of determinants, and each product in a determinant has one x, one y and one z
- * coordinate of vertices. Therefore
+/** Add to `form` the volume of a lung as a polynomial of its gains, at given weights w_k of K
+ * modes. L, Q and T are coefficients of first, second and third order. The volume is a sum of
+ * determinants, each product of which has one x, one y and one z coordinate of vertices. Therefore
  *
  *     of[j]     += sum_k L_jk w_k             for the gain of axis j = 0, 1, 2
  *     of[3 + j] += sum_kl Q_jkl w_k w_l       for the product of the gains of the other two axes
@@ -45,8 +45,8 @@ SUPINE_API void supine_volume_contract(size_t count, size_t axes, const double *
  * the displacement along x, y and z). */
 SUPINE_API double supine_volume_form_at(const supine_volume_form *form, const double gains[3]);
 
-/** Compute how the volume of a lung depends on a scale s if its gains on x, y and z are s ratio[0],
- * s ratio[1] and s ratio[2]. The volume minus that of the reference surface is
+/** Compute how the volume of a lung depends on a scale s if its displacement along axis j = 0, 1, 2
+ * (x, y, z) is multiplied by s ratio[j]. The volume minus that of the reference surface is
  *
  *     cubic[0] s + cubic[1] s^2 + cubic[2] s^3
  * @param cubic  [3] coefficients, mL, written */
@@ -60,9 +60,9 @@ SUPINE_API void supine_volume_form_along(const supine_volume_form *form, const d
 SUPINE_API supine_status supine_volume_scale(const double cubic[3], double volume, double *scale,
                                              supine_error *error);
 
-/** Compute the three gains of a lung (factors of its displacement along x, y and z), as multiples
- * of the gain at rest, at a point of the path that the lung follows as its volume changes. The
- * path leads from full inflation (sigma = 0) to rest (sigma = 1), and continues beyond both:
+/** Compute the gains of a lung (factors of its displacement along x, y and z), divided by the gain
+ * at rest. `sigma` is the position on the path that the lung follows as its volume changes: 0 at
+ * full inflation, 1 at rest, and beyond both:
  *
  *     ratio_j = sigma + 2 bend_j e(sigma)
  *     e = (sigma^3 - sigma) / 2  for sigma <= 1,   (sigma - 1) / sigma^6  for sigma > 1

@@ -4,7 +4,7 @@
     import supine
 
     lungs = supine.open("lungs.safetensors")
-    pose = lungs.pose("prone:rest+500")        # a posture and a volume: once for each state
+    pose = lungs.pose("prone:rest+500")        # compute once for each posture and volume
     points = lungs.deform(pose)                # float32 [N, 3], mm, LPS
 
 Lengths are millimetres, volumes millilitres, axes the DICOM patient axes (LPS: +x left, +y posterior,
@@ -156,7 +156,7 @@ class _Owner:
         self.pointer = ctypes.c_void_p()
         self.source = source
         if isinstance(source, (bytes, bytearray, memoryview)):
-            self.bytes = np.frombuffer(source, np.uint8)  # keep the bytes as long as the basis
+            self.bytes = np.frombuffer(source, np.uint8)  # keep the bytes alive while the basis exists
             _c.basis_open_memory(self.bytes.ctypes.data, self.bytes.size, options, self.pointer)
         else:
             _c.basis_open(os.fsencode(source), options, self.pointer)
@@ -272,7 +272,7 @@ class Basis:
 
     def locate(self, vertices: Sequence[int], positions: ArrayLike, state: Gravity = _SUPINE, volume: str = "", *,
                noise: float = 2.0, rigid: bool = False) -> Location:
-        """Find the lungs from observed positions of vertices of this basis, which `embed` usually made.
+        """Find the lungs from observed positions of vertices. This basis has these vertices; `embed` usually makes it.
 
         vertices: index of the vertex of each of the n observed points
         positions: [n, 3] observed positions, mm, in a frame that may be translated from the frame of the basis and,
@@ -333,7 +333,7 @@ class Basis:
         return np.ctypeslib.as_array(pose.gains)[:len(self.lungs)]
 
     def volumes(self, pose: Pose) -> Doubles:
-        """Compute the volume of each lung in a pose, gas and tissue, mL."""
+        """Compute the volume (gas and tissue) of each lung in a pose, mL."""
         if not self.has_volume:
             raise OpenSurfaceError("the surface is open and encloses no volume")
         volumes = np.empty(len(self.lungs))
@@ -366,7 +366,7 @@ class Basis:
 
     def deform_lit(self, pose: Pose, out: Optional[Floats] = None, normals: Optional[Floats] = None,
                    begin: int = 0, end: Optional[int] = None) -> tuple[Floats, Floats]:
-        """Compute positions and unit normals from the file, not from the triangles. Requires `has_normals`."""
+        """Compute positions, and unit normals from vectors in the file instead of triangles. Requires `has_normals`."""
         end, size = self._range(begin, end)
         out = np.empty((end - begin, 3), _FLOAT) if out is None else out
         normals = np.empty((end - begin, 3), _FLOAT) if normals is None else normals

@@ -58,7 +58,7 @@ def _write_mesh(path: str, vertices: ArrayLike, faces: ArrayLike) -> None:
         raise ValueError(f"faces must be integers [M, 3], not {corners.dtype} {list(corners.shape)}")
     records = np.empty(len(corners), [("count", "u1"), ("corner", "<i4", 3)])
     records["count"] = 3
-    records["corner"] = np.clip(corners, -1, 2**31 - 1)  # too large ones stay too large: the program reports them
+    records["corner"] = np.clip(corners, -1, 2**31 - 1)  # out-of-range indices stay so: the program reports them
     with open(path, "wb") as file:
         file.write(b"ply\nformat binary_little_endian 1.0\n"
                    b"element vertex %d\nproperty double x\nproperty double y\nproperty double z\n"
@@ -146,8 +146,8 @@ def make(command: str, lungs: Any, content: Sequence[Any], options: dict[str, An
          progress: Optional[Progress]) -> tuple[Any, str]:
     """Run a command that makes a basis; return the basis, as bytes or as the path `output`, and the standard output.
 
-    lungs: path or bytes of a basis, or None
-    content: each item is a path, a tuple (vertices, faces), or points; arrays are written to a temporary folder"""
+    lungs: basis that the command reads first (path or bytes), or None
+    content: further inputs: paths, tuples (vertices, faces) or points; arrays are written to a temporary folder"""
     with tempfile.TemporaryDirectory(prefix="supine-") as folder:
         operands: list[str] = []
         names: dict[str, str] = {}
