@@ -13,16 +13,16 @@
 
 #include <supine/status.h>
 
-/** An interpolating function. Zero-initialise; release with supine_inside_biharmonic_free. */
+/** An interpolant of given values. Zero-initialise; release with supine_inside_biharmonic_free. */
 typedef struct supine_inside_biharmonic {
-  size_t count;     /**< number of centres */
-  size_t columns;   /**< number of components of the interpolated function */
-  size_t *chosen;   /**< [count] indices of the given points that are centres, in order of choice */
-  double *centres;  /**< [count, 3] positions relative to `middle`, divided by `unit` */
-  double *weights;  /**< [columns, count + 4] factors of the centres' distances and of 1, x, y, z */
-  double middle[3]; /**< centre of the bounding box of the given points, mm */
-  double unit;      /**< half the diagonal of the bounding box of the given points, mm */
-  double spacing;   /**< largest distance of a given point from its nearest centre, mm */
+  size_t count;    /**< number of centres: input points at which the function is exact */
+  size_t columns;  /**< number of components of the function: 3 for a vector */
+  size_t *chosen;  /**< [count] indices of the input points chosen as centres, in that order */
+  double *centres; /**< [count, 3] positions of the centres minus `middle`, divided by `unit` */
+  double *weights; /**< [columns, count + 4] factor of each centre's distance, then of 1, x, y, z */
+  double middle[3]; /**< centre of the bounding box of the input points, mm */
+  double unit;      /**< half the diagonal of the bounding box of the input points, mm */
+  double spacing;   /**< largest distance from an input point to its nearest centre, mm */
 } supine_inside_biharmonic;
 
 /** Choose at most `centre_max` of the points as centres, each as far as possible from the earlier

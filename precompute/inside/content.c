@@ -62,7 +62,7 @@ supine_status supine_inside_content_points(const char *path,
   return status;
 }
 
-/* Return the name of a mesh and its length: "airways" for the path "/scans/airways.ply". */
+/* Return where the mesh name ("airways") starts in "/scans/airways.ply", and set its length. */
 static const char *part_name(const char *path, size_t *length) {
   const char *slash = strrchr(path, '/');
   const char *name = slash != NULL ? slash + 1 : path;

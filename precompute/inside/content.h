@@ -11,7 +11,7 @@
 typedef struct supine_inside_content {
   size_t count;
   double *points; /**< [count, 3] mm, LPS */
-  uint32_t *part; /**< [count] index of the part of each point; in a grid, index of the node */
+  uint32_t *part; /**< [count] index of the named point, mesh or grid node of each point */
   size_t triangle_count;
   uint32_t *triangles; /**< [triangle_count, 3] indices of points */
   size_t part_count;   /**< number of named points and meshes; 0 for a grid */

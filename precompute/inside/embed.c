@@ -20,14 +20,14 @@ typedef struct embedding {
   const supine_inside_content *content;
   const supine_inside_options *options;
   size_t columns;             /* number of coefficients of a point: 3 for each mode */
-  supine_inside_place *place; /* [points] position relative to its lung; order of content->points */
-  unsigned char *lung;        /* [points] index of the lung; order of content->points */
-  size_t *order;              /* [points] indices of content->points, sorted by lung */
+  supine_inside_place *place; /* [points] position in the lung, ordered like content->points */
+  unsigned char *lung; /* [points] index of the lung of each point, ordered like content->points */
+  size_t *order;       /* [points] indices of content->points, sorted by lung */
   float *vertices;     /* [points, 3] at full inflation, mm; this and later arrays follow `order` */
   float *coefficients; /* [points, 3, modes] displacement by each mode, mm */
   float *depth;        /* [points] mm below the surface; negative outside */
-  uint32_t *part;      /* [points] copy of content->part */
-  unsigned char *group; /* [points] index of the lung */
+  uint32_t *part;      /* [points] index of the named point, mesh or grid node of each point */
+  unsigned char *group; /* [points] index of the lung of each point */
   uint32_t *triangles;  /* [triangles, 3] indices of vertices */
   uint32_t *rigid;      /* [rigid_count, 2] begin and end of the vertices of each rigid part */
   size_t rigid_count;
@@ -186,7 +186,7 @@ static void move_block(embedding *e, const double *displacement,
 
 static supine_status embed_lung(embedding *e, size_t lung, size_t begin, size_t end,
                                 supine_error *error) {
-  /* Corrections reach this many times the spacing of the centres plus the mean edge length. */
+  /* (width of the correction zone) / (spacing of interpolation centres + mean edge length) */
   static const double reach_spacings = 2.0;
   const supine_inside_shell *shell = &e->shells->shell[lung];
   const size_t centres =
@@ -215,9 +215,9 @@ cleanup:
   return status;
 }
 
-/* Find the position of a rigid part at full inflation from which the pose of the scan moves the
- * part to its position in the scan. Iterate, because the rotation of the part by that pose depends
- * on the position that is sought. */
+/* Find where a rigid part lies at full inflation, so that the mode weights and gains of the scan
+ * move it to its scanned position. Iterate, because the rotation of the part by this movement
+ * depends on the unknown position. */
 static void rigid_to_full(embedding *e, size_t begin, size_t end) {
   enum { TURNS = 60 };
   const double count = (double)(end - begin);
@@ -262,7 +262,7 @@ static bool is_of_surface(const char *key) {
   return false;
 }
 
-/* Write the basis file. Its metadata are those of the surface, then those of the points. */
+/* Write the basis file. Add the metadata of the points to those copied from the lungs' basis. */
 static supine_status write_file(const embedding *e, const char *path, supine_tensor *tensors,
                                 size_t tensor_count, supine_error *error) {
   enum { OWN = 5 };

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file Embed points and meshes (content.h) in the lungs, so that they move with the lungs. For
  * each mode, the displacement of a point interpolates the displacement of the surface of its lung
- * (biharmonic.h). The result is a basis of the kind "vector". It has the modes, volume tensors and
- * metadata of the surface's basis, so the weights and gains of a pose apply to both.
+ * (biharmonic.h). The result is a basis of the kind "vector": each mode has a displacement
+ * vector for each point. It has the modes, volume tensors and metadata of the surface's basis, so
+ * the mode weights and gains (factors of displacement) of a pose apply to both.
  *
  * The interpolation b is exact only at some of the vertices of the surface (the centres). Near the
  * surface, the displacement u of a point x is b(x), corrected by the error of b at the surface
@@ -18,7 +19,7 @@
  * A rigid part belongs to the lung with most of its vertices (runtime/rigid.h).
  *
  * Positions x are given in the scan. The new basis stores positions at full inflation, like the
- * basis of the surface: x minus u(x) at the scan's weights and gains. */
+ * basis of the surface: x minus the displacement u(x) in the scan. */
 #ifndef SUPINE_INSIDE_EMBED_H
 #define SUPINE_INSIDE_EMBED_H
 
@@ -32,7 +33,7 @@ enum { SUPINE_INSIDE_CENTRES = 4000 };
 
 typedef struct supine_inside_options {
   bool clamp;     /**< whether points outside a lung move like the surface point nearest to them */
-  size_t centres; /**< largest number of centres of one lung; 0 for SUPINE_INSIDE_CENTRES */
+  size_t centres; /**< most interpolation centres per lung; 0 for SUPINE_INSIDE_CENTRES */
   const char *made_by; /**< program that writes the basis file, for the metadata; optional */
 } supine_inside_options;
 
@@ -45,8 +46,8 @@ typedef struct supine_inside_report {
   size_t rigid;       /**< number of rigid parts of more than one vertex */
 } supine_inside_report;
 
-/** Embed the points of `content` in the lungs of an open basis, and write them as a new basis file.
- * It has these additional tensors, for N points and R rigid meshes:
+/** Embed the points of `content` in the lungs, and write them as a new basis file. The file has
+ * these additional tensors, for N points and R rigid meshes:
  *
  *     part       U32 [N]     index of the named point or mesh; in a grid, index of the grid node
  *     depth      F32 [N]     mm below the surface in the scan, negative outside
@@ -55,10 +56,9 @@ typedef struct supine_inside_report {
  *     grid       F64 [4, 3]  position of the first node, then the three steps, mm (for a grid)
  *     grid_size  U32 [3]     number of nodes along the three steps (for a grid)
  *
- * The metadata "content" is "points", "mesh" or "grid".
+ * The metadata "content" is "points", "mesh" or "grid". Uses all cores; cost: see biharmonic.h.
  * @retval SUPINE_ERROR_MESH  `content` has no points
- * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY, SUPINE_ERROR_WRITE
- * Cost: see biharmonic.h; in parallel. */
+ * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY, SUPINE_ERROR_WRITE */
 supine_status supine_inside_embed(const supine_inside_shells *shells,
                                   const supine_inside_content *content,
                                   const supine_inside_options *options, const char *path,

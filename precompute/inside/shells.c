@@ -123,10 +123,10 @@ void supine_inside_shell_displacement(const supine_inside_shells *shells, size_t
   }
 }
 
-/* Update walk->place[lung], the position of a point relative to the surface, for a new point. The
- * distance of the old point from the surface minus the distance between the two points is a lower
- * bound of the new distance. If it exceeds `far`, keep the position of the old point: the new point
- * is then on the same side of the surface. */
+/* Replace walk->place[lung], an old point's position relative to the surface, by that of a new
+ * point. Subtract the distance between the two points from the old point's distance to the surface:
+ * this is a lower bound of the new distance. If the bound exceeds `far`, keep the position of the
+ * old point, because both points are then on the same side of the surface. */
 static void step_to(const supine_inside_shells *shells, const double point[3], size_t lung,
                     double far, supine_inside_walk *walk) {
   supine_inside_place *place = &walk->place[lung];

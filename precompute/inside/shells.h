@@ -10,7 +10,7 @@
 #include "precompute/inside/surface.h"
 
 typedef struct supine_inside_shell {
-  size_t begin; /**< index in the basis of the lung's first vertex */
+  size_t begin; /**< index of the lung's first vertex in the basis */
   size_t vertex_count;
   double *vertices; /**< [vertex_count, 3] positions in the scan, mm */
   size_t triangle_count;
@@ -36,7 +36,7 @@ supine_status supine_inside_shells_create(const supine_basis *basis, supine_insi
                                           supine_error *error);
 void supine_inside_shells_free(supine_inside_shells *shells);
 
-/** Find the displacement of each vertex of a lung by each mode, at weight 1 and gain 1.
+/** Find the displacement of each vertex of a lung by each mode at weight 1, not scaled further.
  * @param displacement  [vertex_count, 3, modes] output, mm */
 void supine_inside_shell_displacement(const supine_inside_shells *shells, size_t lung,
                                       double *displacement);
@@ -44,7 +44,7 @@ void supine_inside_shell_displacement(const supine_inside_shells *shells, size_t
 /** Results of earlier searches, which speed up the search for a nearby point. */
 typedef struct supine_inside_walk {
   bool known[SUPINE_LUNGS_MAX];                /**< [lung] whether `place` is set */
-  supine_inside_place place[SUPINE_LUNGS_MAX]; /**< [lung] position of an earlier point */
+  supine_inside_place place[SUPINE_LUNGS_MAX]; /**< [lung] last result for this lung's surface */
   size_t lung;                                 /**< index of the lung found for the last point */
 } supine_inside_walk;
 
@@ -52,8 +52,7 @@ typedef struct supine_inside_walk {
  * point's position relative to the surface of that lung to walk->place[lung].
  * @param walk  results for earlier points; zeroed for the first point
  * @param far   mm; if the point is farther from the surface than this, walk->place[lung] may keep
- *              the result of an earlier point on the same side of the surface. With INFINITY, it
- *              is always the result of this point. */
+ *              the result of an earlier point on the same side of the surface (INFINITY: never) */
 size_t supine_inside_shells_find(const supine_inside_shells *shells, const double point[3],
                                  double far, supine_inside_walk *walk);
 

@@ -250,7 +250,7 @@ static double along(const double offset[3], const double edge[3]) {
  * undefined, if the triangle's squared distance from x certainly exceeds `best`. */
 static bool nearest_in_triangle(const double *const p[3], const double x[3], double best,
                                 double b[3]) {
-  /* The coordinates b are inexact if the squared sine of the angle at p[0] is below this. */
+  /* The barycentric coordinates b are inexact if sin^2 of the angle at p[0] is below this. */
   static const double slender = 1e-4;
   double u[3];
   double v[3];
@@ -328,8 +328,8 @@ SUPINE_CLONES static void boxes_squares(const boxes *leaf, const double x[3], do
   }
 }
 
-/* Search tree node `at` and its descendants for the point nearest to x. Only points whose squared
- * distance is below *best count. If one is found, update *best and `place`. */
+/* Search tree node `at` and its descendants for the point nearest to x. Ignore points at a
+ * squared distance of *best or more. If a point is nearer, update *best and `place`. */
 static void search(const supine_inside_surface *s, size_t at, const double x[3], double *best,
                    supine_inside_place *place) {
   const node *n = &s->nodes[at];

@@ -13,7 +13,7 @@ typedef struct supine_inside_surface supine_inside_surface;
 
 /** The position of a point relative to a surface. */
 typedef struct supine_inside_place {
-  double point[3];       /**< mm */
+  double point[3];       /**< the point whose position is described, mm */
   double depth;          /**< distance to the surface, mm; positive inside, negative outside */
   double nearest[3];     /**< point of the surface nearest to `point`, mm */
   size_t triangle;       /**< index of the triangle that contains `nearest` */
@@ -28,7 +28,7 @@ typedef struct supine_inside_place {
 supine_status supine_inside_surface_create(const double *vertices, size_t count,
                                            const uint32_t *triangles, bool sides,
                                            supine_inside_surface **surface, supine_error *error);
-/** Free the tree; NULL is legal. */
+/** Free a surface; NULL is allowed. */
 void supine_inside_surface_destroy(supine_inside_surface *surface);
 
 /** Find the surface point nearest to a point. The result's `depth` is the distance, without a sign

@@ -27,7 +27,7 @@ static const double agreement = 0.05;
 void supine_reference_capacity(const supine_person *person, double range[2]) {
   static const struct {
     double slope, offset; /* capacity in L is slope x height in m - offset */
-    double usual[2];      /* range of usual heights, cm */
+    double usual[2];      /* range of an adult's height if it is unknown, cm */
   } of[2] = {{6.60, 5.79, {150.0, 180.0}}, {7.99, 7.08, {160.0, 195.0}}}; /* [0] women, [1] men */
   range[0] = INFINITY;
   range[1] = 0.0;
@@ -45,7 +45,7 @@ void supine_reference_capacity(const supine_person *person, double range[2]) {
   }
 }
 
-/* Return the usual volume of the scanned lungs divided by that of two lungs: 1 for two lungs. */
+/* Return the scanned lungs' usual share of the volume of both lungs: 1 if both were scanned. */
 static double part_of_pair(const supine_reference *reference) {
   return reference->lung_count == 2 ? 1.0
          : reference->side[0] > 0   ? SUPINE_LEFT_SHARE

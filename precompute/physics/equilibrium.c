@@ -31,12 +31,12 @@ enum { BATCH = 8, LARGE = 100000 };
 static const double residual_limit = 1e-8;
 
 /* A part of the mesh without edges to the rest, such as one lung. The parts are solved in parallel,
- * but in one thread if the first part has more than LARGE vertices. */
+ * or one after the other, to save memory, if the first has more than LARGE vertices. */
 typedef struct part {
   size_t vertex, vertex_count; /* index of the first vertex, and number of vertices */
   size_t edge, edge_count;     /* index of the first edge, and number of edges */
   bool factorised;             /* whether `factor` matches the values of `matrix` */
-  cholmod_sparse *matrix;      /* lower triangle, see create_matrix */
+  cholmod_sparse *matrix;      /* lower triangle of the part's system matrix (create_matrix) */
   cholmod_factor *factor;
   cholmod_common common;
 } part;
@@ -44,13 +44,13 @@ typedef struct part {
 struct supine_equilibrium {
   size_t vertex_count;
   const supine_topology *topology;
-  double reach;        /* smoothing length of force, mm; 0 for the method of [Santhanam2008] */
-  double *area;        /* [N] area of each vertex divided by the mean area; NULL if reach is 0 */
-  double *edge_term;   /* [edges] if reach is 0, half the edge length, mm, at least 1; otherwise the
-                          off-diagonal matrix element of the edge, times -1 */
-  double *lesions;     /* [N] factors by which lesions multiply the normalised stiffness, or NULL */
-  double *mass_weight; /* [N] if reach is 0, 1 / stiffness of each vertex; otherwise 1 */
-  double *load_factor; /* [N] factor that turns an applied force into a right-hand side */
+  double reach;        /* smoothing length of force, mm; 0: none, as in [Santhanam2008] */
+  double *area;        /* [vertices] vertex area / mean vertex area; NULL without smoothing */
+  double *edge_term;   /* [edges] with smoothing, the edge's off-diagonal matrix element times -1;
+                          without smoothing, half the edge length, mm, at least 1 */
+  double *lesions;     /* [vertices] factors on the normalised stiffness in lesions, or NULL */
+  double *mass_weight; /* [vertices] weight in the matrix: 1 / stiffness, or 1 with smoothing */
+  double *load_factor; /* [vertices] right-hand side of the linear system / applied force */
   size_t part_count;
   part parts[2];
 };
@@ -192,7 +192,7 @@ static void set_reach(supine_equilibrium *eq, const supine_mesh *mesh) {
   for (size_t i = 0; i < n; ++i) {
     mean += eq->area[i] / (double)n;
   }
-  /* Smallest area of a vertex or edge, mm^2, so that degenerate triangles give no zero weights. */
+  /* Lower limit of areas and squared lengths, mm^2, against zero weights and divisions by zero. */
   const double least = 1e-6 * mean;
   for (size_t i = 0; i < n; ++i) {
     eq->area[i] = fmax(eq->area[i], least) / mean;
@@ -319,8 +319,8 @@ supine_status supine_physics_equilibrium_set_shape(supine_equilibrium *equilibri
 typedef struct solve {
   supine_equilibrium *eq;
   size_t count;
-  const double *force; /* [N, count] force applied to each vertex, in each of `count` solves */
-  double *catch_;      /* [N, count] force that each vertex keeps in equilibrium */
+  const double *force; /* [vertices, count] force applied to each vertex, one column per solve */
+  double *retained;    /* [vertices, count] force left at each vertex after exchange along edges */
   supine_status status[2];
   double residual[2]; /* [part_count] largest relative residual of each mesh part */
 } solve;
@@ -348,7 +348,7 @@ static supine_status solve_columns(solve *s, size_t k, size_t r, size_t count) {
   const double *load = s->eq->load_factor + p->vertex;
   const double *mass_s = s->eq->mass_weight + p->vertex;
   const double *force = s->force + p->vertex * s->count + r;
-  double *catch_ = s->catch_ + p->vertex * s->count + r;
+  double *retained = s->retained + p->vertex * s->count + r;
   double norm[BATCH] = {0.0};
   double square[BATCH] = {0.0};
   double one[2] = {1.0, 0.0};
@@ -367,7 +367,7 @@ static supine_status solve_columns(solve *s, size_t k, size_t r, size_t count) {
   for (size_t i = 0; i < n && solved; ++i) {
     for (size_t c = 0; c < count; ++c) {
       const double residual = ((const double *)right->x)[c * n + i];
-      catch_[i * s->count + c] = mass_s[i] * mass_s[i] * ((const double *)t->x)[c * n + i];
+      retained[i * s->count + c] = mass_s[i] * mass_s[i] * ((const double *)t->x)[c * n + i];
       square[c] += residual * residual;
     }
   }
@@ -398,9 +398,9 @@ static void solve_parts(void *context, size_t begin, size_t end, size_t thread) 
 }
 
 supine_status supine_physics_equilibrium_solve(supine_equilibrium *equilibrium, size_t count,
-                                               const double *force, double *catch_,
+                                               const double *force, double *retained,
                                                supine_error *error) {
-  solve s = {equilibrium, count, force, catch_, {SUPINE_OK, SUPINE_OK}, {0.0, 0.0}};
+  solve s = {equilibrium, count, force, retained, {SUPINE_OK, SUPINE_OK}, {0.0, 0.0}};
   const size_t threads = equilibrium->parts[0].vertex_count > LARGE ? 1 : 0;
   supine_parallel_for(equilibrium->part_count, 1, threads, solve_parts, &s);
   for (size_t k = 0; k < 2; ++k) {
@@ -420,7 +420,7 @@ supine_status supine_physics_equilibrium_solve(supine_equilibrium *equilibrium, 
 }
 
 supine_status supine_physics_equilibrium_force(supine_equilibrium *equilibrium,
-                                               const double *catch_, double *force,
+                                               const double *retained, double *force,
                                                supine_error *error) {
   supine_equilibrium *eq = equilibrium;
   const size_t n = eq->vertex_count;
@@ -431,7 +431,7 @@ supine_status supine_physics_equilibrium_force(supine_equilibrium *equilibrium,
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
   }
   for (size_t i = 0; i < n; ++i) {
-    t[i] = catch_[i] / (eq->mass_weight[i] * eq->mass_weight[i]);
+    t[i] = retained[i] / (eq->mass_weight[i] * eq->mass_weight[i]);
   }
   for (size_t k = 0; k < eq->part_count; ++k) {
     part *p = &eq->parts[k];

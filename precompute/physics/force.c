@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute the force (18) and the directions of displacement (15)-(17) of [Santhanam2008]. */
+/* Compute the applied force and the displacements at force 1, (15)-(18) of [Santhanam2008]. */
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
@@ -37,7 +37,6 @@ static void force_range(void *context, size_t begin, size_t end, size_t thread) 
     for (size_t d = 0; d < gravities->count; ++d) {
       const double *g = gravities->directions + 3 * d;
       const double height = gravities->maximum[d] - gravities->minimum[d];
-      /* [Santhanam2008] (18) */
       out[d] = fixed + law->gain * (supine_dot(g, p) - gravities->minimum[d]) / height;
       if (law->soften != 0.0) {
         out[d] *= exp(law->soften * supine_dot(g, from_middle) / height);
@@ -57,7 +56,7 @@ void supine_physics_force(const supine_lungs *lungs, const supine_force_law *law
   supine_parallel_for(vertex_count, GRAIN, 0, force_range, &work);
 }
 
-/* Compute a direction of displacement, [Santhanam2008] (15)-(17). */
+/* Compute a vertex's displacement at force 1, mm, by (15)-(17) of [Santhanam2008]. */
 static void box_direction(const supine_lungs *lungs, const double c[6], size_t vertex, double *d) {
   double box[3];
   supine_lungs_box_coordinates(lungs, vertex, box);

@@ -1,17 +1,17 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Compute the force of gravity and breath on the vertices, (18) of [Santhanam2008] (equilibrium.h)
- * for any direction of gravity, and the directions of displacement, (15)-(17).
+ * Compute the force of gravity and breath on each vertex, for any direction of gravity, by equation
+ * (18) of [Santhanam2008] (equilibrium.h). Compute the displacement at a force of 1 by (15)-(17).
  *
- * Gravity points along the unit vector g. The force f_i on vertex i at p_i depends on its relative
- * depth h_i, which grows from 0 at the uppermost to 1 at the lowest vertex of all lungs:
+ * Gravity points along the unit vector g. The force f_i (without a unit) on vertex i at p_i depends
+ * on its relative depth h_i, from 0 at the uppermost to 1 at the lowest vertex of all lungs:
  *
  *     h_i(g) = (g.p_i - min_j g.p_j) / (max_j g.p_j - min_j g.p_j)
  *     f_i(g) = (base + gain h_i(g) + cx X_i + cy Y_i + cz Z_i) exp(soften (h_i(g) - mean h(g)))
  *
  * X, Y and Z are coordinates from 0 to 1 in the lungs' bounding box (supine_lungs_box_coordinates).
- * If soften > 0, the exponential makes lower tissue more expandable. The geometric mean of the
- * exponential over all vertices is 1. */
+ * The constants base, gain, cx, cy, cz and soften are given (supine_force_law). If soften > 0, the
+ * exponential enlarges the force on lower tissue; its geometric mean over all vertices is 1. */
 #ifndef SUPINE_FORCE_H
 #define SUPINE_FORCE_H
 
@@ -19,9 +19,9 @@
 
 /** Dimensionless constants of the applied force. */
 typedef struct supine_force_law {
-  double base;   /**< force at the uppermost vertex, before the terms of `box` and `soften` */
-  double gain;   /**< increase of the force from the uppermost to the lowest vertex */
-  double box[3]; /**< factors of the coordinates X, Y and Z (0 to 1) in the lungs' bounding box */
+  double base;   /**< force at the uppermost vertex, without the terms of `box` and `soften` */
+  double gain;   /**< increase of the force from the uppermost to the lowest vertex, due to depth */
+  double box[3]; /**< coefficients of a vertex's coordinates (0 to 1) in the lungs' bounding box */
   double soften; /**< logarithm of the factor by which the lowest tissue is softer than the
                     uppermost; unless 0, supine_model.reach must be positive */
   bool pair;     /**< whether to add the mirror image of a single lung to find the lowest vertex */
@@ -50,18 +50,17 @@ void supine_physics_force(const supine_lungs *lungs, const supine_force_law *law
                           const supine_gravities *gravities, size_t vertex_count,
                           const size_t *vertices, double *force);
 
-/** Directions of displacement, mm: directions fitted to a patient, or (15)-(17) of [Santhanam2008],
- * d = (+-c1 X^c2, -c3 Y^c4, -c5 Z^c6), with + in the left lung and - in the right. X, Y and Z are
- * coordinates from 0 to 1 in the lungs' bounding box. */
+/** Displacement d of each vertex, mm, at a force of 1 (without a unit). Either d is fitted to a
+ * patient, or it is (+-c1 X^c2, -c3 Y^c4, -c5 Z^c6), with + in the left lung and - in the right. X,
+ * Y and Z are the vertex's coordinates from 0 to 1 in the lungs' bounding box. */
 typedef struct supine_direction_law {
-  double c[6];           /**< c1 to c6: c1, c3 and c5 in mm, and the exponents c2, c4 and c6 */
-  const double *vectors; /**< [N, 3] directions fitted to a patient, mm, not owned; NULL to use c */
+  double c[6]; /**< c1 to c6 of [Santhanam2008] (15)-(17): c1, c3, c5 in mm; c2, c4, c6 exponents */
+  const double *vectors; /**< [vertices, 3] fitted displacements, mm, not owned; NULL to use `c` */
 } supine_direction_law;
 
-/** Compute the direction of displacement of each vertex into directions [N, 3]. Its length is the
- * displacement, mm, for a force of 1.
+/** Compute the displacement of each vertex, mm, at a force of 1 into directions [vertices, 3].
  * @retval SUPINE_ERROR_ARGUMENT  a constant is not finite, or an exponent is not positive
- * @retval SUPINE_ERROR_MESH      every direction is zero */
+ * @retval SUPINE_ERROR_MESH      every displacement is zero */
 supine_status supine_physics_directions(const supine_lungs *lungs, const supine_direction_law *law,
                                         double *directions, supine_error *error);
 

@@ -24,17 +24,17 @@ typedef struct range_work {
   size_t vertex_count;
   const double *vertices;  /* [vertex_count, 3] sorted along a Morton curve, mm */
   const block_box *boxes;  /* [box_count] bounding box of each block of BLOCK vertices */
-  const block_box *groups; /* bounding box of each group of GROUP blocks */
+  const block_box *groups; /* bounding box of each GROUP consecutive elements of `boxes` */
   size_t box_count;
   size_t direction_count;
   const double *directions;
   double *minimum, *maximum;
 } range_work;
 
-/* LANES directions along which the greatest heights of vertices are searched for together. */
+/* A batch of LANES directions. One search finds the greatest height of a vertex along each. */
 typedef struct lanes {
   double g[3][LANES];    /* components of the directions, which are unit vectors */
-  double size[3][LANES]; /* absolute values of the components */
+  double size[3][LANES]; /* absolute values of the elements of `g` */
   double best[LANES];    /* greatest height found so far along each direction, mm */
 } lanes;
 

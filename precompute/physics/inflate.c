@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Move a scan to full inflation. From an estimate of the surface at full inflation, the physical
- * model predicts the displacements to the scan. The fixed-point map replaces the estimate by the
- * scan minus these displacements; the residual is the change that it makes. The fixed point is
- * found by Anderson acceleration (D. G. Anderson, J. ACM 12, 1965): the next estimate is the linear
- * combination of the last few values of the map with the smallest predicted residual. */
+ * model predicts the displacements to the scan. The fixed-point map of the estimate is the scan
+ * minus these displacements. The residual is the map minus the estimate. Anderson acceleration
+ * (D. G. Anderson, J. ACM 12, 1965) finds the fixed point: of all linear combinations of the last
+ * few map values, the next estimate is the one with the smallest predicted residual. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,7 +16,7 @@
 #include "precompute/physics/solve.h"
 #include "precompute/physics/volume_forms.h"
 
-/* SOLVES_MAX: largest number of iterations. DEPTH: number of iterations that are combined. */
+/* SOLVES_MAX: most iterations. DEPTH: most past iterations that Anderson acceleration uses. */
 enum { SOLVES_MAX = 30, DEPTH = 4 };
 
 /* RMS residuals, mm. The iteration ends if the residual is at most `converged`. It also ends if the
@@ -28,24 +28,24 @@ static const double folded_share = 0.01; /* largest accepted share of triangles 
 static const double ridge = 1e-12; /* relative increase of a matrix diagonal against singularity */
 
 typedef struct ascent {
-  supine_lungs lungs; /* current estimate of the lungs at full inflation; vertices not owned */
+  supine_lungs estimate; /* lungs at full inflation, estimated so far; vertices not owned */
   supine_lungs scan;
   supine_model model;
   supine_reference *found;
-  supine_solution field;     /* displacement field predicted from the current estimate */
+  supine_solution field;     /* displacements from `estimate` to the scan, predicted by the model */
   size_t size;               /* 3 x number of vertices */
-  double *map;               /* [size] value of the fixed-point map at the current estimate, mm */
-  double *previous_map;      /* [size] value of the fixed-point map at the previous estimate, mm */
-  double *previous_residual; /* [size] previous_map minus the previous estimate, mm */
-  double rms;                /* RMS residual of the current estimate, mm */
-  double *map_changes;       /* [DEPTH, size] changes of `map` in the last iterations, mm */
-  double *residual_changes;  /* [DEPTH, size] changes of the residual in these iterations, mm */
-  size_t stored;             /* number of iterations whose changes were stored since a restart */
-  size_t history;            /* number of iterations whose changes are in use, at most DEPTH */
+  double *map;               /* [size] vertices of the scan minus the predicted displacements, mm */
+  double *previous_map;      /* [size] `map` in the previous iteration, mm */
+  double *previous_residual; /* [size] `map` minus `estimate` in the previous iteration, mm */
+  double rms;                /* RMS length of `map` minus `estimate` over all vertices, mm */
+  double *map_changes;       /* [DEPTH, size] changes of `map` in recent iterations, mm */
+  double *residual_changes;  /* [DEPTH, size] changes of map - estimate in recent iterations, mm */
+  size_t stored;             /* number of changes stored since the acceleration last restarted */
+  size_t history; /* number of stored changes that the acceleration uses, at most DEPTH */
 } ascent;
 
 static supine_status check_folds(const ascent *a, supine_error *error) {
-  const double share = supine_mesh_turned_over(&a->scan.mesh, a->lungs.mesh.vertices);
+  const double share = supine_mesh_turned_over(&a->scan.mesh, a->estimate.mesh.vertices);
   return share <= folded_share
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
@@ -56,15 +56,16 @@ static supine_status check_folds(const ascent *a, supine_error *error) {
                                 100.0 * share);
 }
 
-/* Find the gains A of one lung in the scan: the factors along x, y and z on its displacement from
- * full inflation. They are A = s ratio(sigma), where ratio() is supine_volume_bend(), sigma is the
- * position of the scan on the path from full inflation (0) to rest (1), and s is the gain at rest.
- * Gains of -A lead from the scan to full inflation, and gains of s - A to rest:
+/* Find the gains A of one lung in the scan: factors of its displacement along x, y and z, which are
+ * 0 at full inflation. They are A = s ratio(sigma), where
  *
- *     form(-A) = to_full,    form(s - A) = to_rest
+ *     s      gain at rest, equal on all axes
+ *     sigma  position of the scan on the lung's path: 0 at full inflation, 1 at rest
+ *     ratio  gains on this path as multiples of s (supine_volume_bend)
  *
- * where `form` is the volume that gains add to the scan, mL. The first equation gives s for any
- * sigma. Secant steps find the sigma that satisfies the second. */
+ * Displacing the scan with gains -A leads to full inflation, and with gains s - A to rest. This
+ * changes the volume, mL, by form(-A) = to_full and form(s - A) = to_rest. For any sigma, the first
+ * equation gives s. Secant steps find the sigma that satisfies the second equation. */
 static supine_status find_lung_gains(const supine_volume_form *form, const double bend[3],
                                      bool at_rest, double to_full, double to_rest, double gains[3],
                                      supine_error *error) {
@@ -121,15 +122,15 @@ supine_status supine_reference_find_gains(const supine_lungs *scan, const double
   return status;
 }
 
-/* Set a->map to the vertices of the scan minus the displacements predicted from the current
- * estimate, scaled so that each lung gets its volume at full inflation. */
+/* Set a->map to the vertices of the scan minus the displacements that the model predicts from
+ * a->estimate. The displacements are scaled so that each lung gets its volume at full inflation. */
 static supine_status find_map(ascent *a, supine_error *error) {
   supine_solution *field = &a->field;
   a->rms = 0.0;
   ++a->found->solves;
-  supine_mesh_box(&a->lungs.mesh, a->lungs.minimum, a->lungs.maximum);
+  supine_mesh_box(&a->estimate.mesh, a->estimate.minimum, a->estimate.maximum);
   supine_status status =
-      supine_physics_solve(&a->lungs, &a->model, a->found->scan.state.gravity, field, error);
+      supine_physics_solve(&a->estimate, &a->model, a->found->scan.state.gravity, field, error);
   if (status == SUPINE_OK) {
     status = supine_reference_find_gains(&a->scan, a->model.bend, field->directions, field->catch_,
                                          a->found, error);
@@ -139,7 +140,7 @@ static supine_status find_map(ascent *a, supine_error *error) {
     for (size_t i = 3 * a->scan.lung_begin[lung]; i < 3 * a->scan.lung_begin[lung + 1]; ++i) {
       a->map[i] =
           a->scan.mesh.vertices[i] - gains[i % 3] * field->catch_[i / 3] * field->directions[i];
-      const double residual = a->map[i] - a->lungs.mesh.vertices[i];
+      const double residual = a->map[i] - a->estimate.mesh.vertices[i];
       a->rms += residual * residual;
     }
   }
@@ -155,13 +156,13 @@ static double product(const double *a, const double *b, size_t size) {
   return sum;
 }
 
-/* Store a->map and the residual of the current estimate, and their changes in this iteration. */
+/* Store a->map, the residual (a->map - a->estimate) and their changes since the last iteration. */
 static void store_differences(ascent *a) {
   double *changes = a->map_changes + a->stored % DEPTH * a->size;
   double *residuals = a->residual_changes + a->stored % DEPTH * a->size;
   const bool first = a->found->solves == 1;
   for (size_t i = 0; i < a->size; ++i) {
-    const double residual = a->map[i] - a->lungs.mesh.vertices[i];
+    const double residual = a->map[i] - a->estimate.mesh.vertices[i];
     changes[i] = a->map[i] - a->previous_map[i];
     residuals[i] = residual - a->previous_residual[i];
     a->previous_map[i] = a->map[i];
@@ -173,7 +174,7 @@ static void store_differences(ascent *a) {
   }
 }
 
-/* Replace the estimate by the combination of map values with the smallest predicted residual. */
+/* Set a->estimate by Anderson acceleration, from the latest values and changes of a->map. */
 static supine_status advance(ascent *a, supine_error *error) {
   double matrix[DEPTH * DEPTH];
   double weights[DEPTH] = {0.0};
@@ -198,7 +199,7 @@ static supine_status advance(ascent *a, supine_error *error) {
           "as it is");
     }
   }
-  double *to = a->lungs.mesh.vertices;
+  double *to = a->estimate.mesh.vertices;
   memcpy(to, a->map, a->size * sizeof *to);
   for (size_t j = 0; j < n; ++j) {
     const double *change = a->map_changes + j * a->size;
@@ -216,7 +217,7 @@ static supine_status iterate(ascent *a, supine_error *error) {
     status = find_map(a, error);
     if (status == SUPINE_OK &&
         (a->rms <= converged || (a->rms <= stalled && a->rms > 0.5 * before))) {
-      memcpy(a->lungs.mesh.vertices, a->map, a->size * sizeof(double));
+      memcpy(a->estimate.mesh.vertices, a->map, a->size * sizeof(double));
       return SUPINE_OK;
     }
     if (status == SUPINE_OK) {
@@ -226,7 +227,7 @@ static supine_status iterate(ascent *a, supine_error *error) {
       /* The step was too long: restart from the last value of the fixed-point map. */
       a->history = 0;
       a->stored = 0;
-      memcpy(a->lungs.mesh.vertices, a->previous_map, a->size * sizeof(double));
+      memcpy(a->estimate.mesh.vertices, a->previous_map, a->size * sizeof(double));
       status = SUPINE_OK;
     }
   }
@@ -242,7 +243,7 @@ static supine_status iterate(ascent *a, supine_error *error) {
 
 supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *model,
                                        supine_reference *found, supine_error *error) {
-  ascent a = {.lungs = *lungs,
+  ascent a = {.estimate = *lungs,
               .scan = *lungs,
               .model = *model,
               .found = found,

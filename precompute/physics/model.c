@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Make the model of a displacement law, and set up the equilibrium of lungs with a model. */
+/* Return the constants of a displacement law, and set up the equilibrium of forces with them. */
 #include <math.h>
 
 #include "precompute/physics/model.h"

@@ -8,27 +8,25 @@
 #include "precompute/physics/force.h"
 
 /* clang-format off */
-/** The displacement laws. The columns are: identifier, name; base, gain and box of supine_force_law;
- * c of supine_direction_law; bend and reach of supine_model; pair of supine_force_law; description
- * for the user.
+/** The displacement laws: LAW(identifier, name, base, gain, box, c, bend, reach, pair, help text).
+ * Of these, base, gain, box and pair are members of supine_force_law, c is a member of
+ * supine_direction_law, and bend and reach are members of supine_model.
  *
- * The constants of [Santhanam2008], Table I, are not available. The direction constants c of "paper"
- * are fits to 4-D CT landmarks of ten patients (DIR-Lab), those of "deep" to the full breaths of ten
- * others (DIR-Lab COPDgene). These scans are supine. There, gravity and the back-to-front axis
- * coincide, so base, gain and the y factor of `box` cannot be determined separately. The gain of
- * "deep" is an assumption: the force is 0.8 on the uppermost tissue and 1.2 on the lowest, a ratio
- * of 1.5, if the y coordinate in the box has its mean value. That lower tissue moves more agrees
- * with Milic-Emili (J Appl Physiol 1966), who found lower regions emptier.
+ * The constants of [Santhanam2008], Table I, are not available. The direction constants c are fits:
+ * "paper" to 4-D CT landmarks of ten patients (DIR-Lab), "deep" to the full breaths of ten others
+ * (DIR-Lab COPDgene). These patients lie supine, so gravity runs from front to back. Therefore
+ * base, gain and the y coefficient of `box` cannot be determined separately. The gain of "deep" is
+ * an assumption: the force is 0.8 on the uppermost and 1.2 on the lowest tissue (at the mean
+ * of y). This agrees with Milic-Emili (J Appl Physiol 1966), who found lower regions emptier.
  *
  * The bend (curvature of a vertex's path from full inflation to rest) has one free constant, 0.45,
- * chosen on ten quiet breaths (DIR-Lab 4-D CT). With this bend, scaling the displacements by one
- * factor for each patient explains 78 % of the squared displacement (median; 53 to 87 %), without
- * it 47 %.
+ * chosen on ten quiet breaths (DIR-Lab 4-D CT). Displacements with this bend, scaled by one factor
+ * for each patient, explain 78 % of the squared motion (median; 53 to 87 %), without bend 47 %.
  *
- * The weight of the heart on the lung below it is left out. A weight that raised the left lung's
- * share of a breath, lying on the left, from 48 to 49.5 % (published: 58 %) would also change
- * prone breaths: the ventilation of the lowest quarter divided by that of the uppermost would rise
- * from 1.4 to 1.6 (expected: 1). */
+ * The laws leave out the weight of the heart on the lung below it. A weight that raises the left
+ * lung's share of a breath from 48 to 49.5 % when lying on the left (published: 58 %) makes prone
+ * breaths worse: the ventilation of the lowest quarter of the lungs, divided by that of the
+ * uppermost, rises from 1.4 to 1.6 (expected: 1). */
 #define SUPINE_LAWS(LAW)                                                                           \
   LAW(DEEP, "deep", 0.9, 0.4, (0, -0.2, 0), (6, 2.6, 15, 1, 16, 1.3), (0, -0.45, 0.45), 10, true,  \
       "displacement from full inflation, for any posture and volume")                              \
@@ -48,11 +46,11 @@ typedef struct supine_model {
   supine_law law;
   supine_force_law force;
   supine_direction_law direction;
-  double bend[3]; /**< curvature of vertex paths to rest on x, y and z (supine_volume_bend) */
-  const double *stiffness; /**< [N] stiffness E, or NULL for 1 everywhere */
-  const double *lesions;   /**< [N] factors that multiply the normalised stiffness, or NULL */
-  double reach;    /**< smoothing length of force, mm; 0 for the method of [Santhanam2008] */
-  double share[2]; /**< volume of each lung as a share of the healthy lung's volume */
+  double bend[3]; /**< [axis] curvature of each vertex's path from full inflation to rest */
+  const double *stiffness; /**< [vertices] stiffness; NULL for 1 everywhere */
+  const double *lesions; /**< [vertices] factors that multiply the normalised stiffness, or NULL */
+  double reach;          /**< smoothing length of force, mm; 0 for the method of [Santhanam2008] */
+  double share[2];       /**< volume of each lung as a share of the healthy lung's volume */
 } supine_model;
 
 /** Return the model of healthy lungs of uniform stiffness under a displacement law. */

@@ -1,29 +1,29 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Run the Pitcher/Catcher iteration, (5)-(14) of [Santhanam2008], as the paper states it. */
+/* Run the Pitcher/Catcher iteration as published: equations (5)-(14) of [Santhanam2008]. */
 #include <math.h>
 #include <stdlib.h>
 
 #include "precompute/physics/equilibrium.h"
 
-/* State of the iteration. Nodes 0 to N - 1 are the masses; node N + e is the spring of edge e. */
+/* State of the iteration. Node i < N is vertex i of a mesh of N vertices; node N + e is edge e. */
 typedef struct iteration {
   size_t node_count;
-  size_t *clique_begin; /* [nodes + 2] index in `clique` of each node's first neighbour */
-  size_t *clique;       /* neighbours of every node, node by node */
-  double *te; /* for each entry of `clique`: share of a node's force that this neighbour gets */
-  double *te_self; /* [nodes] share of its force that each node keeps */
+  size_t *neighbours_begin; /* [nodes + 2] index in `neighbours` of each node's first neighbour */
+  size_t *neighbours;       /* neighbours of every node, node by node */
+  double *passed_share;     /* share of a node's force that each element of `neighbours` gets */
+  double *kept_share;       /* [nodes] share of the force on a node that the node keeps */
   double *pitcher; /* [nodes] force that each node has yet to distribute; may be negative */
   double *catcher; /* [nodes] total force that each node has kept in the steps so far */
-  /* [2 nodes] tournament tree to find the node with the largest |pitcher|. Leaf nodes + j holds j;
-   * the parent k of entries 2 k and 2 k + 1 holds the one with the larger |pitcher|. */
+  /* [2 nodes] tournament tree to find the node with the largest |pitcher|. Element nodes + j is the
+   * leaf of node j. Element k < nodes is the winner of the elements 2 k and 2 k + 1. */
   size_t *largest;
 } iteration;
 
 static void iteration_free(iteration *it) {
-  free(it->clique_begin);
-  free(it->clique);
-  free(it->te);
-  free(it->te_self);
+  free(it->neighbours_begin);
+  free(it->neighbours);
+  free(it->passed_share);
+  free(it->kept_share);
   free(it->pitcher);
   free(it->catcher);
   free(it->largest);
@@ -38,25 +38,25 @@ static void update(iteration *it, size_t node) {
   }
 }
 
-/* Find the neighbours of every node, and the shares of force that nodes pass to them, (8) of
- * [Santhanam2008]. Return false if out of memory. */
+/* Find the neighbours of every node, and the shares of force that nodes pass to them by equation
+ * (8) of [Santhanam2008]. Return false if out of memory. */
 static bool iteration_create(const supine_mesh *mesh, const supine_topology *topology,
                              const double *stiffness, iteration *it) {
   const size_t n = mesh->vertex_count;
   const size_t nodes = n + topology->edge_count;
   *it = (iteration){.node_count = nodes};
-  it->clique_begin = calloc(nodes + 2, sizeof *it->clique_begin);
-  it->clique = malloc((4 * topology->edge_count + 1) * sizeof *it->clique);
-  it->te = malloc((4 * topology->edge_count + 1) * sizeof *it->te);
-  it->te_self = malloc(nodes * sizeof *it->te_self);
+  it->neighbours_begin = calloc(nodes + 2, sizeof *it->neighbours_begin);
+  it->neighbours = malloc((4 * topology->edge_count + 1) * sizeof *it->neighbours);
+  it->passed_share = malloc((4 * topology->edge_count + 1) * sizeof *it->passed_share);
+  it->kept_share = malloc(nodes * sizeof *it->kept_share);
   it->pitcher = calloc(nodes, sizeof *it->pitcher);
   it->catcher = calloc(nodes, sizeof *it->catcher);
   it->largest = calloc(2 * nodes, sizeof *it->largest);
-  if (it->clique_begin == NULL || it->clique == NULL || it->te == NULL || it->te_self == NULL ||
-      it->pitcher == NULL || it->catcher == NULL || it->largest == NULL) {
+  if (it->neighbours_begin == NULL || it->neighbours == NULL || it->passed_share == NULL ||
+      it->kept_share == NULL || it->pitcher == NULL || it->catcher == NULL || it->largest == NULL) {
     return false;
   }
-  size_t *begin = it->clique_begin + 1;
+  size_t *begin = it->neighbours_begin + 1;
   for (size_t e = 0; e < topology->edge_count; ++e) {
     ++begin[topology->edges[2 * e] + 1];
     ++begin[topology->edges[2 * e + 1] + 1];
@@ -71,36 +71,36 @@ static bool iteration_create(const supine_mesh *mesh, const supine_topology *top
                                                   mesh->vertices + 3 * (size_t)edge[1]);
     const double spring = 0.5 * (stiffness[edge[0]] + stiffness[edge[1]]);
     for (size_t k = 0; k < 2; ++k) {
-      it->clique[begin[edge[k]]] = n + e;
-      it->te[begin[edge[k]]++] = spring / d;
-      it->clique[begin[n + e]] = edge[k];
-      it->te[begin[n + e]++] = 1.0 / stiffness[edge[k]] / d;
+      it->neighbours[begin[edge[k]]] = n + e;
+      it->passed_share[begin[edge[k]]++] = spring / d;
+      it->neighbours[begin[n + e]] = edge[k];
+      it->passed_share[begin[n + e]++] = 1.0 / stiffness[edge[k]] / d;
     }
   }
   for (size_t j = 0; j < nodes; ++j) {
     const uint32_t *edge = j < n ? NULL : topology->edges + 2 * (j - n);
     const double s = j < n ? 1.0 / stiffness[j] : 0.5 * (stiffness[edge[0]] + stiffness[edge[1]]);
     double z = s;
-    for (size_t c = it->clique_begin[j]; c < it->clique_begin[j + 1]; ++c) {
-      z += it->te[c];
+    for (size_t c = it->neighbours_begin[j]; c < it->neighbours_begin[j + 1]; ++c) {
+      z += it->passed_share[c];
     }
-    for (size_t c = it->clique_begin[j]; c < it->clique_begin[j + 1]; ++c) {
-      it->te[c] /= z;
+    for (size_t c = it->neighbours_begin[j]; c < it->neighbours_begin[j + 1]; ++c) {
+      it->passed_share[c] /= z;
     }
-    it->te_self[j] = s / z;
+    it->kept_share[j] = s / z;
   }
   return true;
 }
 
-/* Distribute it->pitcher[j] over node j and its neighbours, (5)-(7) of [Santhanam2008]. */
+/* Spread the force it->pitcher[j] over node j and its neighbours: [Santhanam2008] (5)-(7). */
 static void distribute(iteration *it, size_t j) {
   const double held = it->pitcher[j];
-  it->catcher[j] += it->te_self[j] * held;
+  it->catcher[j] += it->kept_share[j] * held;
   it->pitcher[j] = 0.0;
   update(it, j);
-  for (size_t c = it->clique_begin[j]; c < it->clique_begin[j + 1]; ++c) {
-    const size_t i = it->clique[c];
-    it->pitcher[i] += it->te[c] * held;
+  for (size_t c = it->neighbours_begin[j]; c < it->neighbours_begin[j + 1]; ++c) {
+    const size_t i = it->neighbours[c];
+    it->pitcher[i] += it->passed_share[c] * held;
     update(it, i);
   }
 }

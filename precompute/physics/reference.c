@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Find the volumes at full inflation from the state of a scan, and move the lungs there. */
+/* Find the volumes at full inflation from the state of a scan, and inflate the lungs to them. */
 #include <string.h>
 
 #include <supine/volume.h>
@@ -70,9 +70,9 @@ void supine_reference_share_out(const supine_reference *reference, const double 
 
 /* Find the volume of each lung's reference surface, found->full_volume.
  *
- * It follows from the lung's volume in the scan and the degree of filling t of the scan (0 at rest,
- * 1 at full inflation). The state of the scan is rest or full inflation plus a number of mL. Bisect
- * t until the volume in the scan minus that at rest or full inflation is this number of mL.
+ * If t is the degree of filling of the scan (0 at rest, 1 at full inflation), this volume is the
+ * lung's volume in the scan divided by volume_at(t). The user gives the state of the scan as rest
+ * plus some mL, or as full inflation plus some mL. Bisect t until these mL result.
  * @param volume  [lung_count] volume of each lung in the scan, mL */
 static supine_status find_full(supine_reference *found, const double *volume, supine_error *error) {
   const supine_state *state = &found->scan.state;
@@ -82,7 +82,7 @@ static supine_status find_full(supine_reference *found, const double *volume, su
   double high = 1.0;
   double t = from_rest ? 0.0 : 1.0;
   for (int halving = 0; halving < 60; ++halving) {
-    double beyond = 0.0; /* volume in the scan minus that at rest (or full inflation), mL */
+    double beyond = 0.0; /* mL by which the scan exceeds rest (if from_rest) or full inflation */
     for (size_t lung = 0; lung < found->lung_count; ++lung) {
       const double rest =
           supine_reference_resting_share(&found->resting, found->side[lung], state->gravity);

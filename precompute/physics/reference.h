@@ -4,15 +4,17 @@
  *
  * A lung at full inflation has nearly the same shape in every posture; at smaller volumes the
  * lowest regions are the emptiest (Milic-Emili 1966; Glazier 1967 found alveoli of one size at 30
- * cmH2O). Displacements are therefore measured from full inflation. With gravity along g,
- * coordinate j of vertex i is
+ * cmH2O). Displacements are therefore measured from full inflation:
  *
  *     x_ij(g) = p_ij + A_j F_i(g) d_ij
  *
- * where p is the surface at full inflation, F_i the force that the vertex keeps in equilibrium
- * (equilibrium.h), d_i its direction of displacement (force.h), and A_j the gain of the lung along
- * axis j, a factor that follows from its volume. A scan shows the lungs at such positions x. As F
- * and d depend on p, p is the fixed point of
+ *     x_ij  coordinate j of vertex i, with gravity along g
+ *     p     surface at full inflation
+ *     A_j   gain of the lung along axis j: a factor that follows from the volume of the lung
+ *     F_i   force that vertex i retains after exchange with its neighbours (equilibrium.h)
+ *     d_i   displacement of vertex i at a force of 1, mm (force.h)
+ *
+ * A scan shows the lungs at such positions x. As F and d depend on p, p is the fixed point of
  *
  *     p_ij = scan_ij - A_j F_i(g_scan; p) d_ij(p)
  *
@@ -41,32 +43,31 @@ typedef struct supine_scan_frame {
   double millimetres_per_unit;
 } supine_scan_frame;
 
-/** State of the scan, and volumes of the lungs without collapse: gas and tissue, mL. */
+/** State of a scan, and volumes (gas and tissue) that the lungs have if none is collapsed. */
 typedef struct supine_reference {
   bool known; /**< whether the state of the scan and the volumes are known */
   supine_scan scan;
   supine_resting resting; /**< volumes at rest as shares of full_volume */
   size_t lung_count;
-  int side[2];           /**< +1 left, -1 right */
+  int side[2];           /**< [lung] +1 left, -1 right */
   double full_volume[2]; /**< [lung] volume of the reference surface (full inflation), mL */
   double scan_volume[2]; /**< [lung] volume in the scan minus full_volume, mL */
   double scan_rest[2];   /**< [lung] volume at rest in the scan's posture, mL; 0 if unused */
-  /** [lung, axis] factors on the displacements that lead from full inflation to the scan */
+  /** [lung, axis] factors by which displacements from full inflation are scaled in the scan */
   double scan_gains[2][3];
   size_t solves; /**< number of iterations to find the surface at full inflation */
 } supine_reference;
 
 /** Find the volumes of scanned lungs at full inflation, and move the lungs to full inflation.
  * @param lungs  the vertices and the bounding box are changed, the midline is not
- * @retval SUPINE_ERROR_ARGUMENT   the scan holds less than the tissue, or is above full inflation
- * @retval SUPINE_ERROR_NUMERICAL  the surface folds on the way, or no fixed point is found
+ * @retval SUPINE_ERROR_ARGUMENT   the scan's volume is below its tissue's or above full inflation
+ * @retval SUPINE_ERROR_NUMERICAL  the surface folds, or the iteration does not converge
  * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_MESH */
 supine_status supine_reference_find(supine_lungs *lungs, const supine_model *model,
                                     const supine_scan *scan, const supine_resting *resting,
                                     supine_reference *reference, supine_error *error);
 
-/** Compute the volume of each lung at rest into ml [lung_count]. Return their sum.
- * @param g  direction of gravity */
+/** Compute the volume of each lung at rest, with gravity along g, into ml. Return their sum. */
 double supine_reference_rest(const supine_reference *reference, const double g[3], double *ml);
 
 /** Compute the volume of each lung at full inflation into ml [lung_count]. Return their sum. */
@@ -77,22 +78,19 @@ double supine_reference_full(const supine_reference *reference, const double g[3
 void supine_reference_share_out(const supine_reference *reference, const double g[3], double total,
                                 double *ml);
 
-/** Move the vertices of scanned lungs to full inflation, in place. Each lung then has the volume
- * reference->full_volume. lungs->scanned receives the vertices of the scan. Statuses as
- * supine_reference_find.
- * @param reference  in: scan and volumes; out: scan_gains and solves */
+/** Move the vertices of scanned lungs to full inflation, in place, where each lung has the volume
+ * reference->full_volume. Write the vertices of the scan to lungs->scanned, and set
+ * reference->scan_gains and reference->solves. Statuses as supine_reference_find. */
 supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *model,
                                        supine_reference *reference, supine_error *error);
 
-/** Find the gains A of each lung in the scan: the factors along x, y and z on its displacement from
- * full inflation to the scan. At full inflation the gains are 0; at rest they have one value s on
- * all axes. Displacing the scan with gains -A must give the volume at full inflation. Displacing it
- * with gains s - A must give the volume at rest.
+/** Find the gains A of each lung in the scan, reference->scan_gains: factors of its displacement
+ * from full inflation along x, y and z. At rest, the gains on all axes are equal, s. Displacing the
+ * scan with gains -A gives the volume at full inflation, and with gains s - A the volume at rest.
  * @param scan        closed lungs with the scan's vertices
- * @param bend        [3] curvature of the path from full inflation to rest (supine_volume_bend)
- * @param directions  [N, 3] directions of displacement, mm
- * @param amounts     [N] force that each vertex keeps in equilibrium, with gravity as in the scan
- * @param reference   in: scan and volumes; out: scan_gains
+ * @param bend        [3] curvature of a vertex's path to rest (supine_volume_bend); 0: straight
+ * @param directions  [vertices, 3] displacement of each vertex at a force of 1, mm
+ * @param amounts     [vertices] force that each vertex retains after exchange with its neighbours
  * @retval SUPINE_ERROR_NUMERICAL  no gains give these volumes */
 supine_status supine_reference_find_gains(const supine_lungs *scan, const double bend[3],
                                           const double *directions, const double *amounts,

@@ -10,7 +10,7 @@
 
 #include "precompute/physics/resting.h"
 
-/* Volumes at rest of healthy people divided by the volume at full inflation, both gas and tissue.
+/* Volumes at rest of healthy people divided by the volume at full inflation, all with tissue.
  * Rows: left lung, right lung. Columns: lying on the left, on the right, supine, prone, head down,
  * upright. Sources, for both lungs together:
  *
@@ -22,8 +22,8 @@
  *              0.86        tissue (Denison 1986, Thorax 41:620, 12 people)
  *   prone, on either side   0.47, 0.35 L above supine (Lumb & Nimmo; one figure for all three)
  *   upright    15 % above supine (Yamada 2020, Sci Rep 10, 100 people: 3.2 L seated, 2.7 L supine)
- *   head down  as supine, because no volume in litres was found; with the feet down, end-expiratory
- *              volume follows the sine of the tilt and is at or near its minimum when horizontal
+ *   head down  set to the value of supine, because no volume in litres was found. From upright to
+ *              horizontal, end-expiratory volume falls nearly to its minimum, as sine of the tilt
  *              ("Effects of body tilting on respiratory mechanics", J Appl Physiol 1956)
  *
  * The ratio of the left to the right lung's share is from a table after Svanberg 1957. The only
@@ -32,7 +32,7 @@
 static const supine_resting usual = {.share = {{0.413, 0.563, 0.418, 0.464, 0.418, 0.481},
                                                {0.546, 0.435, 0.440, 0.475, 0.440, 0.506}}};
 
-/* Limits of a volume at rest divided by the volume at full inflation; the tissue alone has 0.1. */
+/* Limits of (volume at rest) / (volume at full inflation). Without gas, this ratio is 0.1. */
 static const double least_share = 0.1;
 static const double most_share = 1.0;
 
@@ -174,13 +174,13 @@ double supine_reference_along_axes(const double values[6], const double g[3]) {
   return value;
 }
 
-/* The linear terms of supine_reference_along_axes give the harmonics that are proportional to x, y
- * and z. For its quadratic terms, let e_k be the mean of the values along +k and -k, and m the mean
- * of e_x, e_y and e_z. At the unit vector (x, y, z), the sum of these terms is
+/* At the unit vector (x, y, z), the interpolated value has linear and quadratic terms. Up to a
+ * constant factor each, x, y and z are harmonics. If e_k is the mean of the values along +k and -k,
+ * and m is the mean of e_x, e_y and e_z, the quadratic terms are
  *
  *     e_x x^2 + e_y y^2 + e_z z^2 = m + (e_z - m) (3 z^2 - 1) / 2 + (e_x - e_y) (x^2 - y^2) / 2
  *
- * The functions 1, 3 z^2 - 1 and x^2 - y^2 times a constant each are harmonics. */
+ * Up to a constant factor each, 1, 3 z^2 - 1 and x^2 - y^2 are harmonics, too. */
 void supine_reference_harmonics(const double values[6], double harmonics[9]) {
   static const size_t axis_term[3] = {3, 1, 2}; /* harmonics proportional to x, y and z */
   double even[3];

@@ -28,7 +28,7 @@
  * on the right, supine, prone, head down, upright. */
 typedef struct supine_resting {
   double share[2][6]; /**< [lung, posture] volume at rest / reference volume; left lung first */
-  double ml[6];       /**< [posture] volume of both lungs together, mL; 0 to use `share` */
+  double ml[6]; /**< [posture] volume of both lungs at rest, mL; 0 if `share` gives it instead */
 } supine_resting;
 
 /** Return the default volumes at rest, those of healthy people; resting.c names their sources. */
@@ -45,9 +45,8 @@ supine_status supine_reference_resting_set(supine_resting *resting, const char *
  * option --resting: "left=0.413/0.546,...,upright=0.481/0.506". 256 characters are enough. */
 void supine_reference_resting_print(const supine_resting *resting, char *text, size_t size);
 
-/** Convert volumes at rest in mL into shares of the reference volumes. If volumes were given in mL,
- * also scale the default shares of all other postures, by the mean over the given volumes of
- * (given volume) / (default volume).
+/** Convert volumes at rest that are given in mL into shares of the reference volumes. Scale the
+ * default shares of the other postures by the mean of (given volume) / (default volume).
  * @param side  [count] +1: left lung, -1: right lung
  * @param full  [count] reference volume of each lung, mL
  * @retval SUPINE_ERROR_ARGUMENT  a share is below that of the tissue alone, or above 1 */
@@ -66,14 +65,13 @@ double supine_reference_full_share(const double g[3]);
  * g. Assume that the left lung has the share SUPINE_LEFT_SHARE of the reference volume. */
 double supine_reference_resting_total(const supine_resting *resting, const double g[3]);
 
-/** Interpolate values v that are given along the axes +x, -x, +y, -y, +z, -z. At the unit vector g,
- * with k for x, y and z, return
+/** Interpolate values v, given along +x, -x, +y, -y, +z, -z, at the unit vector g. Return
  *
- *     sum over k of [(v(+k) - v(-k)) g_k + (v(+k) + v(-k)) g_k^2] / 2 */
+ *     sum over k = x, y, z of [(v(+k) - v(-k)) g_k + (v(+k) + v(-k)) g_k^2] / 2 */
 double supine_reference_along_axes(const double values[6], const double g[3]);
 
-/** Find the coefficients [9] of the real spherical harmonics of bands 0 to 2 for the function that
- * supine_reference_along_axes evaluates. */
+/** Interpolate values that are given along +x, -x, +y, -y, +z, -z (supine_reference_along_axes),
+ * and expand the result in real spherical harmonics of degrees 0 to 2, with 9 coefficients. */
 void supine_reference_harmonics(const double values[6], double harmonics[9]);
 
 #endif

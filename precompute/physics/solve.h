@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Compute the displacements for one direction of gravity with the model, without a basis. */
+ * Solve the physical model (model.h) for one direction of gravity, without a precomputed basis. */
 #ifndef SUPINE_SOLVE_H
 #define SUPINE_SOLVE_H
 
@@ -14,11 +14,13 @@
 typedef struct supine_solution {
   size_t vertex_count;
   supine_equilibrium *equilibrium; /**< equations of the lungs, kept for their next solve */
-  double *catch_;                  /**< [N] force that each vertex keeps in equilibrium */
-  double *directions;              /**< [N, 3] direction of displacement of each vertex, mm, smaller
-                                      in a collapsed lung (supine_tissue_collapse_directions) */
-  double cubic[3]; /**< volume, mL, added at scale s: cubic[0] s + cubic[1] s^2 + cubic[2] s^3 */
-  supine_volume_form form[2]; /**< [lung] added volume, mL, as a polynomial of the lung's gains */
+  double *catch_;     /**< [vertices] force that each vertex retains after exchanging force
+                         with its neighbours */
+  double *directions; /**< [vertices, 3] displacement of each vertex at a force of 1, mm;
+                         shorter in a collapsed lung */
+  double cubic[3];    /**< volume, mL, added at scale s: cubic[0] s + cubic[1] s^2 + cubic[2] s^3 */
+  supine_volume_form form[2]; /**< [lung] added volume, mL, as a polynomial of the factors that
+                                 scale displacements along x, y and z */
 } supine_solution;
 
 /** Compute the displacements for gravity along the unit vector `g`.
@@ -31,7 +33,7 @@ supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model
                                    supine_error *error);
 void supine_physics_solution_free(supine_solution *solution);
 
-/** Return the length, mm, of the largest displacement of a vertex at scale 1. */
+/** Return the length, mm, of the largest displacement of a vertex, without a scale factor. */
 double supine_physics_solution_largest(const supine_solution *solution);
 
 /** Compute the positions [N, 3] of displaced vertices, mm.

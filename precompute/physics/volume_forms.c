@@ -14,7 +14,7 @@
  * of threads. FORM: number of terms of a supine_volume_form. */
 enum { PARTS = 16, BLOCK = 128, FIELDS = SUPINE_VOLUME_FIELDS, FORM = 7 };
 
-static const double sixth_ml = 1e-3 / 6.0; /* mL of a tetrahedron per mm^3 of its determinant */
+static const double sixth_ml = 1e-3 / 6.0; /* volume of a tetrahedron, mL / its determinant, mm^3 */
 
 void supine_physics_volume_forms_free(supine_volume_forms *forms) {
   free(forms->linear);
@@ -25,16 +25,16 @@ void supine_physics_volume_forms_free(supine_volume_forms *forms) {
 
 typedef struct lung_work {
   const supine_lungs *lungs;
-  const double *directions; /* [N, 3] direction of displacement of each vertex, mm, or NULL */
-  const double *columns;    /* [N, count] displacements by the modes, as multiples of `directions`;
-                               [N, 3, count] displacements, mm, if `directions` is NULL */
-  size_t count;             /* number of modes, or of fields */
+  const double *directions; /* [vertices, 3] vector along which each vertex moves, mm; or NULL */
+  const double *columns;    /* [vertices, count] displacements as multiples of `directions`, or
+                               [vertices, 3, count] displacements, mm, if `directions` is NULL */
+  size_t count;             /* number of modes or other displacement fields in `columns` */
   size_t lung;
   double centre[3]; /* centre of the box of all lungs, mm, subtracted from each vertex */
-  double *sums;     /* [PARTS, size] coefficients of the volume polynomial, by triangle range */
+  double *sums;     /* [PARTS, size] partial sums of these coefficients, by range of triangles */
   size_t size;      /* number of coefficients of the volume polynomial */
-  double *space;    /* [threads, room] work space */
-  size_t room;      /* number of elements of the work space of one thread */
+  double *space;    /* [threads, room] scratch memory, `room` elements for each thread */
+  size_t room;
 } lung_work;
 
 static lung_work begin_lung(const supine_lungs *lungs, const double *directions,
@@ -83,10 +83,10 @@ static void add_pairs(size_t count, double factor, const double *a, const double
 /* Add the cubic terms of n triangles to sums [pairs of modes, modes]. For the pair of modes (k, l)
  * and the mode m, a triangle adds
  *
- *     (det(u0k, u1l, u2m) + det(u0l, u1k, u2m)) / 2
+ *     (det(u(0,k), u(1,l), u(2,m)) + det(u(0,l), u(1,k), u(2,m))) / 2
  *
- * where uvk is the displacement of corner v by mode k. If modes are multiples c of directions d,
- * det(u0k, u1l, u2m) = det(d0, d1, d2) c0k c1l c2m. x is work space. */
+ * where u(v,k) is the displacement of corner v by mode k. If it is c(v,k) d(v) for all modes, the
+ * first determinant is det(d(0), d(1), d(2)) c(0,k) c(1,l) c(2,m). x is work space. */
 SUPINE_CLONES static void add_cubic(const lung_work *work, size_t begin, size_t n, const double *u,
                                     double *x, double *sums) {
   const size_t count = work->count;
@@ -119,15 +119,15 @@ SUPINE_CLONES static void add_cubic(const lung_work *work, size_t begin, size_t 
   }
 }
 
-/* Expand the determinants det(p0 + u0, p1 + u1, p2 + u2) of n triangles, at most BLOCK, with
- * corners p and displacements u, and add these terms to `sums`:
+/* Expand the determinant det(p(0) + u(0), p(1) + u(1), p(2) + u(2)) for each of n triangles, at
+ * most BLOCK, with corners p and displacements u. Add its terms, except the constant, to `sums`:
  *
- *     linear     sum over corners v of u_v . (p_v+1 x p_v+2), a sum for each axis of u
- *     quadratic  sum over corners v of p_v . (u_v+1 x u_v+2), a sum for each axis of p
- *     cubic      det(u0, u1, u2)
+ *     linear     sum over corners v of u(v) . (p(v+1) x p(v+2)), a sum for each axis of u
+ *     quadratic  sum over corners v of p(v) . (u(v+1) x u(v+2)), a sum for each axis of p
+ *     cubic      det(u(0), u(1), u(2))
  *
- * The arrays u, area (cross products of corners) and at (corners) hold the first corners of all n
- * triangles, then the second corners, then the third. */
+ * Corner numbers are modulo 3. The arrays u, area (cross products of corners) and at (corners) hold
+ * the first corners of all n triangles, then the second corners, then the third. */
 SUPINE_CLONES static void add_block(const lung_work *work, size_t begin, size_t n, double *u,
                                     double *sums) {
   const size_t count = work->count;
@@ -189,8 +189,8 @@ static void forms_range(void *context, size_t begin, size_t end, size_t thread) 
   }
 }
 
-/* Add the sums of all triangle ranges, times `unit` (mL per mm^3 of the determinants), to the
- * coefficients of one lung's volume. Make these coefficients symmetric in the modes. */
+/* Add the sums over all ranges of triangles, in mm^3, to the coefficients of one lung's volume,
+ * with the factor `unit`. Average the coefficients over all orders of their mode indices. */
 static void forms_collect(const lung_work *work, double unit, supine_volume_forms *forms) {
   const size_t n = work->count;
   double *linear = forms->linear + 3 * work->lung * n;
