@@ -25,20 +25,20 @@
 #include "mesh/anatomy.h"
 
 /* Axes fit clearly better than other axes if their score is higher by more than this. In the lungs
- * of the table, the score of the true axes was higher by 0.35 to 0.7. */
+ * of the table at the top of this file, the true axes scored higher by 0.35 to 0.7. */
 static const double least_lead = 0.2;
-/* Largest contribution of ln(V_right / V_left) to the score, in magnitude, so that the axes do not
- * depend on the volumes alone if a lung is collapsed. */
+/* Limit of the magnitude of ln(V_right / V_left) in the score. If a lung is collapsed, this keeps
+ * the volumes from deciding alone. */
 static const double most_ratio = 0.25;
-/* Axes are refused for a single lung if its standard deviation along x (side to side) is more than
- * this times that along y or z. In real lungs it is 0.6 to 0.7 times that along y. */
+/* A lung is thin from side to side. Axes are rejected for a single lung if its standard deviation
+ * along x, divided by that along y or z, exceeds this. In real lungs, x / y is 0.6 to 0.7. */
 static const double thin = 0.85;
 /* A surface holds two lungs if, along one axis, its standard deviation exceeds `wide` times each of
  * the others and its kurtosis is less than `most_kurtosis`, that of a uniform distribution. */
 static const double wide = 1.15;
 static const double most_kurtosis = 1.8;
-/* The side of a lung (left or right) is unknown if the first term of its score, see the table
- * above, is below this in magnitude. */
+/* The side of a lung (left or right) is unknown if the first term in the table at the top of this
+ * file is below this in magnitude. */
 static const double least_side = 0.12;
 
 typedef struct shape {
@@ -76,10 +76,10 @@ static double mean_fourth(double a, double b, double c) {
   return abc / 35.0;
 }
 
-/* Integrate moments about `origin` over the enclosed volume, as a sum over the tetrahedra between
- * `origin` and each triangle: `sum` (first moments), `square` and `third` by Keast's five-point
- * rule, which is exact for cubic polynomials, and `fourth` exactly. Return the volume, which is
- * negative if the triangles face inwards. */
+/* Return the enclosed volume (negative if the triangles face inwards), and integrate powers of the
+ * coordinates x[a] relative to `origin` over it: x[a] into sum[a], x[a]^2 into square[a], x[a] x[b]
+ * x[c] into third[a][b][c] and x[a]^4 into fourth[a]. All are sums over tetrahedra between `origin`
+ * and a triangle. Up to degree 3, use Keast's five-point rule, which is exact. */
 static double integrate(const supine_mesh *mesh, const double origin[3], double sum[3],
                         double square[3], double third[3][3][3], double fourth[3]) {
   static const double rule[5][4] = {{-0.8, 0.25, 0.25, 0.25},
@@ -142,7 +142,7 @@ static bool measure_shape(const supine_mesh *mesh, shape *s) {
   for (int k = 0; k < 3; ++k) {
     s->centre[k] = 0.5 * (low[k] + high[k]);
   }
-  /* first about the centre of the bounding box, then about the centroid */
+  /* the first pass finds the centroid, the second pass takes the moments about it */
   for (int pass = 0; pass < 2; ++pass) {
     s->volume = integrate(mesh, s->centre, sum, square, s->moments, fourth);
     if (mesh->triangle_count == 0 ||

@@ -6,8 +6,8 @@
 #include "mesh/mesh.h"
 
 typedef struct supine_mesh_anatomy {
-  supine_axes axes; /**< best axes if they fit clearly better than LPS, otherwise LPS */
-  bool certain;     /**< whether `axes` fit clearly better than all other axes */
+  supine_axes axes; /**< axes that fit the shape best if clearly better than LPS, otherwise LPS */
+  bool certain;     /**< whether `axes` fit the shape clearly better than all other axes */
   int side;         /**< +1 left, -1 right; 0 if unknown, for two lungs, or if `axes` are not LPS */
   bool joined;      /**< whether a single surface seems to hold both lungs */
 } supine_mesh_anatomy;

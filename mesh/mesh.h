@@ -17,8 +17,7 @@
  * direction in which each coordinate grows (Left, Right, Posterior, Anterior, Superior, Inferior).
  * supine_mesh_axes_parse also returns values that have no name here. */
 typedef enum supine_axes {
-  /** the axes that a SPACE tag in the file names, or LPS without such a tag */
-  SUPINE_AXES_AUTO = 0,
+  SUPINE_AXES_AUTO = 0, /**< the axes given by the file's SPACE tag; LPS if there is no tag */
   SUPINE_AXES_LPS = 1,
   SUPINE_AXES_RAS = 4,
   SUPINE_AXES_COUNT = 49
@@ -45,7 +44,7 @@ typedef struct supine_mesh {
   uint32_t *triangles; /**< [triangle_count, 3] counter-clockwise seen from outside */
 } supine_mesh;
 
-/** How to read a file. If all fields are 0, the file names the axes, and the unit is 1 mm. */
+/** How to read a file. If all fields are 0, the axes are taken from it, and the unit is 1 mm. */
 typedef struct supine_mesh_load_options {
   supine_axes axes;
   double millimetres_per_unit; /**< length of the unit of coordinates, mm; 0 means 1 */
@@ -55,7 +54,7 @@ typedef struct supine_mesh_report {
   size_t degenerate_faces; /**< number of dropped faces with fewer than three different corners */
   size_t unreferenced_vertices; /**< number of dropped vertices that no triangle uses */
   supine_axes axes;             /**< axes assumed for the file */
-  bool axes_from_tag; /**< whether a SPACE tag in the file, as by 3D Slicer, gave the axes */
+  bool axes_from_tag; /**< whether the axes come from a SPACE tag, as 3D Slicer writes it */
 } supine_mesh_report;
 
 /** Read one surface: PLY and VTP by readers of this folder, OBJ, STL and other formats by the
@@ -99,7 +98,7 @@ typedef struct supine_topology {
   size_t non_manifold_edges; /**< edges shared by three or more triangles */
   size_t inconsistent_edges; /**< edges that two triangles run through in the same direction */
   size_t component_count;    /**< sets of vertices connected by edges */
-  uint32_t *component;       /**< [vertex_count] number of the component of each vertex */
+  uint32_t *component;       /**< [vertex_count] index of the component of each vertex */
   long euler_characteristic; /**< vertices - edges + triangles */
   long genus;  /**< (2 component_count - euler_characteristic) / 2 if the surface is closed and this
                   is a whole number >= 0; otherwise -1 */

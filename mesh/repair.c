@@ -9,8 +9,8 @@
 
 #include "mesh/repair.h"
 
-/* A triangle is loose if none of its edges belongs to exactly two triangles. Up to this fraction of
- * all triangles, loose ones are dropped. A mesh with more of them is refused. */
+/* A triangle is loose if none of its edges belongs to exactly two triangles. If at most this
+ * fraction of the triangles is loose, they are dropped; otherwise they are all kept. */
 static const double most_loose = 0.01;
 
 typedef struct triangle_forest {
@@ -39,7 +39,8 @@ static void mark_duplicates(const supine_mesh *mesh, const supine_mesh_side *sid
   }
 }
 
-/* Mark loose triangles. Mark none if their fraction exceeds most_loose. */
+/* Mark triangles none of whose edges belongs to exactly two triangles. If their fraction exceeds
+ * most_loose, mark none. */
 static void mark_loose(const supine_mesh *mesh, const supine_mesh_side *sides, uint8_t *drop) {
   const size_t count = 3 * mesh->triangle_count;
   size_t loose = mesh->triangle_count;
@@ -90,9 +91,8 @@ static uint32_t find_root(const triangle_forest *l, uint32_t t, uint8_t *turned)
   return root;
 }
 
-/* Join the trees of triangles that share an edge of exactly two triangles. Return false if they
- * form a one-sided surface. Set `closed` to whether every edge belongs to an even number of
- * triangles. */
+/* For each edge of exactly two triangles, unite their union-find trees. Return false if a surface
+ * is one-sided. Set `closed` to whether every edge belongs to an even number of triangles. */
 static bool link_triangles(const supine_mesh *mesh, const supine_mesh_side *sides,
                            const triangle_forest *l, bool *closed) {
   const size_t count = 3 * mesh->triangle_count;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/** @file Repair small, unambiguous defects of surfaces; list the sides of triangles by edge. */
+/** @file Repair small, unambiguous defects of surfaces; find the triangles at each edge. */
 #ifndef SUPINE_MESH_REPAIR_H
 #define SUPINE_MESH_REPAIR_H
 
@@ -7,7 +7,7 @@
 
 typedef struct supine_mesh_repair_report {
   size_t duplicates; /**< number of dropped triangles with the corners of an earlier one */
-  size_t loose;      /**< number of dropped triangles that share no edge with exactly one other */
+  size_t loose;      /**< number of dropped triangles with no edge that has exactly 2 triangles */
   size_t reversed;   /**< number of triangles reversed to face like most of their surface */
   size_t separated;  /**< number of vertices added where closed surfaces shared a vertex */
 } supine_mesh_repair_report;
@@ -28,18 +28,18 @@ size_t supine_mesh_drop_unreferenced(supine_mesh *mesh, uint32_t *space);
 supine_status supine_mesh_drop_specks(supine_mesh *mesh, double share, size_t *pieces,
                                       size_t *specks);
 
-/** One side of a triangle, between the vertices with the indices low < high. */
+/** A side of one triangle, between the vertices low < high. An edge of n triangles has n sides. */
 typedef struct supine_mesh_side {
   uint32_t low, high;
   uint32_t at; /**< position in mesh.triangles of the corner where the side starts */
 } supine_mesh_side;
 
-/** Return the sides of all triangles, sorted by lower vertex, then higher vertex, then position in
- * mesh->triangles. Return NULL if out of memory. The caller frees the array. */
+/** Return the sides of all triangles, sorted by `low`, then `high`, then `at`. Return NULL if out
+ * of memory. The caller frees the array. */
 supine_mesh_side *supine_mesh_sides_sort(const supine_mesh *mesh);
 
-/** Return how many of the `count` sorted sides lie on the same edge as sides[i], the first side on
- * this edge. */
+/** Return the number of triangles that share an edge: count how many of the sorted sides, from
+ * sides[i] on, have the same two vertices as sides[i]. */
 size_t supine_mesh_sides_of_edge(const supine_mesh_side *sides, size_t i, size_t count);
 
 #endif

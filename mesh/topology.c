@@ -14,8 +14,8 @@ static int compare_sides(const void *left, const void *right) {
                             : (a->at > b->at) - (a->at < b->at);
 }
 
-/* Sort triangle sides that have the same lower vertex by their higher vertex. Sides on the same
- * edge keep the order of their triangles. */
+/* Sort triangle sides with the same smaller vertex index by their larger vertex index. Sides on the
+ * same edge keep the order of their triangles. */
 static void sort_sides(supine_mesh_side *sides, size_t count) {
   if (count > FEW) {
     qsort(sides, count, sizeof *sides, compare_sides);
@@ -40,7 +40,7 @@ supine_mesh_side *supine_mesh_sides_sort(const supine_mesh *mesh) {
     free(sides);
     return NULL;
   }
-  /* pass 0 counts the sides of each lower vertex, pass 1 stores them */
+  /* bucket sort by the smaller vertex index of each side: pass 0 counts, pass 1 stores */
   for (int pass = 0; pass < 2; ++pass) {
     for (size_t i = 0; i < count; ++i) {
       const uint32_t a = mesh->triangles[i];

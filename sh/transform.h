@@ -3,8 +3,8 @@
  *
  *     coefficient(l, m) = integral over all directions g of value(g) Y(l, m)(g)
  *
- * by the quadrature rule of a grid. The transform is exact to rounding for fields without harmonics
- * of higher degree than the plan's band. Such harmonics of a field alias into its coefficients. */
+ * by the quadrature rule of a grid. Coefficients are computed up to a highest degree, the band.
+ * They are exact to rounding if a field has no harmonics of higher degree, which cause aliasing. */
 #ifndef SUPINE_TRANSFORM_H
 #define SUPINE_TRANSFORM_H
 
@@ -13,7 +13,7 @@
 #include "sh/grid.h"
 #include <supine/status.h>
 
-/** Plan for transforms of a fixed number of fields on one grid, up to a highest degree, the band.
+/** Plan for transforms of a fixed number of fields on one grid, up to one band (highest degree).
  * Only one thread at a time may use a plan. Only one thread of the process may create or destroy
  * plans, because FFTW's planner has global state. */
 typedef struct supine_sh_transform supine_sh_transform;

@@ -44,7 +44,7 @@ static inline int command_run(const supine_command *command, const char *const *
   return code;
 }
 
-/* Call command_run with the arguments that follow `text`, which must be an array, not a pointer. */
+/* Call command_run with the arguments after `text`. `text` must be an array, for its sizeof. */
 #define COMMAND_RUN(command, kept, text, ...)                                                      \
   command_run(command, (const char *const[]){__VA_ARGS__, NULL}, kept, text, sizeof(text))
 

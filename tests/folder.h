@@ -21,7 +21,7 @@ static inline int folder_remove(void **state) {
   return system(command); /* NOLINT(cert-env33-c) */
 }
 
-/* Return the path of a file in the folder. The text stays valid during the next seven calls. */
+/* Return the path of a file in the temporary folder. It stays valid during the next seven calls. */
 static inline const char *in_folder(const char *name) {
   static char path[8][128];
   static size_t next;

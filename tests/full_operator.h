@@ -14,14 +14,14 @@
 
 typedef struct full_operator {
   size_t node_count;  /* number of masses and springs; masses come first */
-  size_t entry_count; /* number of entries of A; its diagonal is 0 */
+  size_t entry_count; /* number of nonzero entries of A, none of which is on its diagonal */
   size_t *row, *column;
   double *value; /* [entries] fraction of the force on node `column` that passes to node `row` */
-  double *own;   /* [nodes] fraction of the force on each node that stays on this node */
+  double *own; /* [nodes] fraction of the force on each node that it keeps, and does not pass on */
 } full_operator;
 
-/* Compute the operator from the stiffness e [N] of each mass. Unlike the solver, do not scale e to
- * a geometric mean of 1. */
+/* Compute A and the fractions that nodes keep from the stiffness e [masses] of each mass. Unlike
+ * the solver, do not first scale e to a geometric mean of 1. */
 static inline full_operator full_operator_create(const supine_mesh *mesh,
                                                  const supine_topology *topology, const double *e) {
   const size_t n = mesh->vertex_count;
@@ -119,8 +119,8 @@ static inline direct_solver direct_solver_create(const full_operator *op) {
   return d;
 }
 
-/* Compute the force that stays on each mass at equilibrium, `catch_` [masses], when the force
- * `force` [masses] is applied. */
+/* Apply the force `force` [masses], which spreads between neighbouring nodes. Compute the part
+ * `catch_` [masses] that each mass keeps at equilibrium, when no more force is passed on. */
 static inline void direct_solver_solve(direct_solver *d, const full_operator *op, size_t masses,
                                        const double *force, double *catch_) {
   for (size_t j = 0; j < op->node_count; ++j) {

@@ -151,7 +151,7 @@ fixture *fixture_create_shrinking(size_t vertices, size_t modes, uint64_t seed) 
   memset(f->mode, 0, 4 * modes * sizeof *f->mode);
   memset(f->coefficient, 0, vertices * modes * sizeof *f->coefficient);
   f->mode[0] = 1 / 0.28209479177387814; /* mode 0 has the weight 1 for any direction of gravity */
-  f->mode[4 + 1] = 1 / 0.48860251190291992; /* mode 1 has the y coordinate of gravity as weight */
+  f->mode[4 + 1] = 1 / 0.48860251190291992; /* mode 1 has the weight y, as Y(1, -1) = 0.4886 y */
   for (size_t i = 0; i < vertices; ++i) {
     const float *p = f->vertex + 3 * i;
     const double middle = 150.3 * ((double)f->lung[i] - 0.5);

@@ -12,20 +12,20 @@ typedef struct fixture {
   size_t band; /* largest degree of the spherical harmonics */
   bool vector, volume;
   size_t lung_begin[17];
-  float *vertex;       /* [vertices, 3] mm */
-  uint32_t *triangle;  /* [triangles, 3] */
-  float *direction;    /* [vertices, 3] mm in which the vertex moves; not used if `vector` */
-  float *coefficient;  /* [vertices, modes] factor of `direction` for each mode; if `vector`,
-                          [vertices, 3, modes] mm */
+  float *vertex;      /* [vertices, 3] mm */
+  uint32_t *triangle; /* [triangles, 3] */
+  float *direction; /* [vertices, 3] displacement for a coefficient of 1, mm; unused if `vector` */
+  float *coefficient;  /* [vertices, modes] factor of `direction` for each mode. If `vector` is
+                          true: [vertices, 3, modes] displacement by each mode, mm */
   double *mode;        /* [modes, (band + 1)^2] harmonic coefficients of the weight of each mode */
   unsigned char *lung; /* [vertices] index of the lung */
   double *linear, *quadratic, *cubic;
-  /* [9] harmonic coefficients of the volume at rest, mL, over gravity; NULL if it is unknown */
+  /* [9] harmonic coefficients, mL, of the volume at rest as a function of gravity; may be NULL */
   const double *resting;
   bool fields;     /* whether the metadata says that another simulator computed the displacements */
   size_t normals;  /* number of modes from which normals are computed, set by fixture_add_normals */
-  int16_t *normal; /* [vertices, 3, normals] */
-  double *normal_weight; /* [lungs, normals, terms] terms of degree 0 to 2 in the modes' weights */
+  int16_t *normal; /* [vertices, 3, normals] coefficients of vertex normals, as integers */
+  double *normal_weight; /* [lungs, normals, terms] factors: quadratic polynomials in the weights */
 } fixture;
 
 /* Return zeroed memory. Abort if the allocation fails. */
@@ -35,9 +35,9 @@ __attribute__((returns_nonnull)) void *fixture_allocate(size_t count, size_t siz
 double fixture_random(uint64_t *state);
 
 /* Create `lungs` lungs of about 10 cm radius, each with an equal share of the `vertices`. A lung of
- * at least 5 vertices is closed. Its displacements are random, of about `amplitude` mm. If `volume`
- * is true, call fixture_add_forms. If `vector` is true, each mode moves each vertex in a direction
- * of its own. */
+ * at least 5 vertices is closed. Displacements are random, of about `amplitude` mm. If `vector` is
+ * true, the direction in which a vertex moves differs between modes. If `volume` is true, add the
+ * coefficients of the lungs' volumes. */
 fixture *fixture_create(size_t vertices, size_t modes, size_t band, size_t lungs, bool vector,
                         bool volume, double amplitude, uint64_t seed);
 void fixture_destroy(fixture *f);

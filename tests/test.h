@@ -56,7 +56,6 @@ void test_set_group(CMFixtureFunction setup, CMFixtureFunction teardown);
     }                                                                                              \
   } while (0)
 
-/* Write a text into a file. */
 static inline void test_write(const char *path, const char *text) {
   FILE *file = fopen(path, "wb");
   assert_non_null(file);

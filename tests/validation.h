@@ -18,7 +18,7 @@
 #include "precompute/precompute.h"
 #include <supine/volume.h>
 
-/* A network of masses (vertices) and links (edges). A ring of masses has no triangles. */
+/* A network of masses (vertices) and links (edges). Networks without triangles are allowed. */
 typedef struct frame {
   supine_mesh mesh;
   supine_topology topology;
@@ -73,8 +73,8 @@ static inline frame frame_ring(size_t count, double radius) {
   return f;
 }
 
-/* Compute the part of the force, `catch_` [masses], that each mass keeps at equilibrium when the
- * force `force` [masses] is applied. */
+/* Apply the force `force` [masses], which spreads over the links. Compute the part `catch_`
+ * [masses] that each mass keeps at equilibrium, when no more force is passed on. */
 static inline supine_status frame_solve(const frame *f, const double *stiffness,
                                         const double *force, double *catch_) {
   supine_equilibrium *equilibrium = NULL;
@@ -107,9 +107,9 @@ typedef struct mass_spring_damper {
   size_t evaluations; /* number of evaluations of the accelerations */
 } mass_spring_damper;
 
-/* Create a mass-spring-damper system. In its equilibrium, the position of each mass divided by the
- * stiffness of the mass is the force that the mass keeps in [Santhanam2008]. The geometric mean of
- * `stiffness` must be 1. */
+/* Create a mass-spring-damper system that has the equilibrium of frame_solve for the same
+ * `stiffness` [masses] and `force` [masses]: there, the position of a mass is its stiffness times
+ * the force that it keeps. The geometric mean of `stiffness` must be 1. */
 static inline mass_spring_damper damper_create(const frame *f, const double *stiffness,
                                                const double *force) {
   const size_t n = f->mesh.vertex_count;
@@ -166,8 +166,8 @@ static inline int damper_slope(double time, const double *state, double *slope, 
 }
 
 /* Integrate for `seconds`, from positions and velocities of 0. At each of `marks` evenly spaced
- * times, set `catch_` to the positions divided by the stiffness, and call `seen` if it is not NULL.
- * Return false if GSL fails. */
+ * times, set `catch_` to the force that each mass keeps, which is its position divided by its
+ * stiffness, and call `seen` if it is not NULL. Return false if GSL fails. */
 static inline bool damper_integrate(mass_spring_damper *system, const double *stiffness,
                                     double seconds, size_t marks, double *catch_,
                                     void (*seen)(void *context, size_t evaluations,
@@ -256,8 +256,8 @@ static inline double *ring_stiffness(size_t count, double factor) {
 enum { ZONES = 10 };
 
 typedef struct ventilation {
-  double index[ZONES]; /* mean force kept by a vertex at equilibrium, relative to all slabs */
-  double swept[ZONES]; /* fraction of the inhaled volume, divided by the fraction of the area */
+  double index[ZONES]; /* mean force that vertices in a slab keep, divided by that in all lungs */
+  double swept[ZONES]; /* a slab's share of the inhaled volume, divided by its share of the area */
   double slope;  /* slope of `index` against depth, which is 0 at the top and 1 at the bottom */
   double height; /* height of the lungs, mm */
 } ventilation;
@@ -455,8 +455,8 @@ static inline supine_status breathe_at(const supine_lungs *lungs, double reach, 
   return status;
 }
 
-/* Compute the RMS distance, mm, between `vertex` and the vertices to which a unit force on it
- * spreads, weighted by the force and the area of these vertices. `reach`: see breathe_at. */
+/* Apply a unit force to `vertex`, and compute how far it spreads: the RMS distance from `vertex` to
+ * all vertices, mm, weighted by the force times the area there. `reach` is that of breathe_at. */
 static inline supine_status spread_of(const supine_lungs *lungs, double reach, size_t vertex,
                                       double *spread) {
   const size_t n = lungs->mesh.vertex_count;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Choose an image's format by its name's ending, and check what all formats have in common. */
+/* Choose the reader of an image by the ending of the file's name, and check what it has read. */
 #include <errno.h>
 #include <math.h>
 #include <string.h>

@@ -35,7 +35,7 @@ typedef struct assimp {
 /* Limits of one import, far above what a lung needs; the time grows with the file's size. */
 enum { SECONDS_LEAST = 8, SECONDS_PER_MEGABYTE = 1, GIGABYTES_MOST = 4 };
 
-/* Result of the child process. In the stream, the vertices and triangles follow it. */
+/* What the child process that imports a file sends before the vertices and triangles. */
 typedef struct outcome {
   supine_error error;
   size_t dropped, vertex_count, triangle_count;

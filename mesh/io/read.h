@@ -29,8 +29,7 @@ bool supine_mesh_text_count(mesh_text word, uint64_t *value);
 /** Remove the next word from `text` and parse it with strtod; return false if it is missing or
  * not a number. A NUL must follow the text. */
 bool supine_mesh_text_number(mesh_text *text, double *value);
-/** Remove three numbers from `text`, and round them to single precision; return false on
- * failure. */
+/** Remove the next three numbers from `text`, and round them to float; return false on failure. */
 bool supine_mesh_text_position(mesh_text *text, double position[3]);
 
 /** A number type of a binary file. */
@@ -61,7 +60,7 @@ bool supine_mesh_guard_text(const mesh_file *file, supine_error *error);
 /* ---- faces.c: add faces to a mesh that already has its vertices. ---- */
 
 enum {
-  MESH_CORNERS_MAX = 1024, /**< largest number of corners of a face: cutting takes quadratic time */
+  MESH_CORNERS_MAX = 1024, /**< most corners of a face, because the time to cut it is quadratic */
   MESH_VERTICES_MAX = INT32_MAX,
   MESH_TRIANGLES_MAX = UINT32_MAX / 3
 };
@@ -91,9 +90,9 @@ mesh_reader supine_mesh_read_ply;
 mesh_reader supine_mesh_read_vtp;
 mesh_reader supine_mesh_read_stl;
 mesh_reader supine_mesh_read_obj;
-/** Import a format for which there is no reader above by the library assimp. */
+/** Read any other format with the library assimp. */
 mesh_reader supine_mesh_import;
-/** Return whether assimp is installed and imports this ending. */
+/** Return whether assimp is installed and imports files whose names have this ending. */
 bool supine_mesh_import_knows(const char *ending);
 
 /* ---- weld.c ---- */

@@ -13,7 +13,7 @@ typedef struct mesh_writer {
   const supine_mesh *mesh;
   supine_mesh_save_options options;
   unsigned char source[3]; /**< axis of `mesh`, 0 to 2, that gives each coordinate of the file */
-  double factor[3]; /**< sign of each coordinate of the file (1 or -1), divided by its unit in mm */
+  double factor[3]; /**< for each axis of the file: 1 or -1, divided by the file's unit in mm */
   bool mirrored;    /**< whether the file's axes are left-handed: triangles are then reversed */
   double step;   /**< lengths are rounded to multiples of this in the file's unit, unless it is 0 */
   char space[4]; /**< letters of the file's axes: "LPS", "RAS", ... */
@@ -35,8 +35,8 @@ void supine_mesh_writer_triangle(const mesh_writer *writer, size_t t, uint32_t c
 /** Fill a writer, except `out`, from the arguments of supine_mesh_save. */
 void supine_mesh_writer_begin(const supine_mesh *mesh, const supine_mesh_save_options *options,
                               mesh_writer *writer);
-/** Return SUPINE_ERROR_ARGUMENT for a surface too large for the formats, SUPINE_ERROR_MESH for one
- * with a coordinate that is not finite. */
+/** Check that a surface can be saved. Return SUPINE_ERROR_ARGUMENT if its counts exceed what files
+ * can hold, SUPINE_ERROR_MESH if a coordinate is not finite. */
 supine_status supine_mesh_writer_check(const char *path, const supine_mesh *mesh,
                                        supine_error *error);
 

@@ -218,8 +218,8 @@ static supine_status take_numbers(const vtp_file *v, const element *e, size_t co
   return SUPINE_OK;
 }
 
-/* Find an array in the element called `within` of a piece: the array called `name`, or the first
- * one if `name` is NULL. */
+/* Find an array in a piece's child element whose name is `within`. The array has the name `name`;
+ * if this is NULL, take the first array. */
 static bool find_array(const vtp_file *v, const element *piece, const char *within,
                        const char *name, element *found) {
   element e;

@@ -81,8 +81,8 @@ static const char *read_sum(const char *at, uint8_t value, uint8_t *side) {
   }
 }
 
-/* Parse a list such as "left=10+11,right=12" into `side`, which is 0 at first. Return false if the
- * list is invalid. */
+/* Parse a list such as "left=10+11,right=12": set side[label] for each label in it. The caller has
+ * set all elements to 0. Return false if the list is invalid. */
 static bool read_sides(const char *wanted, uint8_t *side) {
   const char *at = wanted;
   bool seen[2] = {false, false};

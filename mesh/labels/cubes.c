@@ -133,7 +133,7 @@ static bool mend(const size_t size[3], float *share) {
   return mended;
 }
 
-/* Keep only the largest connected piece of the cubes inside, and fill its cavities. */
+/* Keep only the largest connected piece of cubes inside the mask, and fill its cavities. */
 static supine_status one_piece(labels_cubes *cubes) {
   labels_mask inside = {.size = {cubes->size[0], cubes->size[1], cubes->size[2]}};
   const size_t count = supine_labels_mask_count(&inside);

@@ -12,7 +12,7 @@
 
 static const double least_edge = 0.2; /* mm; makes about ten million vertices */
 static const double most_edge = 20.0; /* mm; with larger cubes, little of a lung remains */
-static const double most_closing_radius = 20.0; /* mm; half the width of gaps to close */
+static const double most_closing_radius = 20.0; /* mm; half the width of the widest closed gaps */
 static const double least_volume = 1.0;         /* mL; smaller lungs are refused */
 static const double longest_lung = 1000.0; /* mm; if a lung seems longer, the voxel size is wrong */
 
@@ -185,7 +185,7 @@ static supine_status read_map(work *w, const char *const *paths, size_t count,
   return status;
 }
 
-/* Clear the voxels that closing gaps added to one lung although they belong to the other lung. */
+/* After gaps of a lung were closed, clear in its mask the voxels that belong to the other lung. */
 static void leave_other(const labels_mask *both, uint8_t value, labels_mask *mask) {
   const long *offset = mask->from;
   for (long k = 0; k < (long)mask->size[2]; ++k) {
@@ -207,8 +207,8 @@ static void leave_other(const labels_mask *both, uint8_t value, labels_mask *mas
   }
 }
 
-/* If the options say so, close gaps in a lung. Keep its largest connected piece, and fill the
- * cavities in it. */
+/* Close gaps in a lung if the options say so. Then always keep only its largest connected piece,
+ * and fill the cavities in it. */
 static supine_status clean(const work *w, uint8_t value, labels_mask *mask,
                            supine_labels_lung *lung) {
   const double ml = supine_labels_voxel_ml(mask);
@@ -281,8 +281,8 @@ static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung,
                                 w->path, name, w->edge);
 }
 
-/* Report that the left lung does not lie left of the right lung if the header is right. Judge by
- * the shape of the lungs whether the labels or the axes in the header are wrong. */
+/* Report that, in the axes given by the header, the left lung is not on the left. Judge by the
+ * shape of the lungs whether the labels or these axes are wrong. */
 static supine_status refuse_sides(const work *w, const supine_mesh *surfaces, supine_error *error) {
   const supine_labels_report *report = w->report;
   const supine_mesh_anatomy found = supine_mesh_anatomy_find(surfaces, report->lung_count);

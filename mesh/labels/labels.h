@@ -20,7 +20,7 @@ typedef struct supine_labels_options {
   const char *labels;
   supine_axes axes; /**< axes of the header's coordinates; AUTO: as the header states */
   double edge;      /**< approximate distance between vertices, mm; 0 means SUPINE_LABELS_EDGE */
-  double close;     /**< half the width of the widest gaps in a lung to close, mm; 0 closes none */
+  double close; /**< gaps in a lung are closed if not wider than twice this, mm; 0 closes none */
   /** Receive the fraction done, 0 to 1; return false to stop. Optional. */
   bool (*progress)(void *context, double fraction);
   void *progress_context;
@@ -40,7 +40,7 @@ typedef struct supine_labels_lung {
   bool cut;        /**< whether the lung reaches the image's border, where it is cut off */
 } supine_labels_lung;
 
-/** Geometry and labels of a map, and how touching lungs were split. */
+/** Geometry and labels of a label map, and how touching lungs were split. */
 typedef struct supine_labels_report {
   size_t size[3];
   double spacing[3]; /**< distances between voxels, mm */
@@ -57,22 +57,22 @@ typedef struct supine_labels_report {
 /** Make the surfaces of the lungs from a label map (.nrrd, .nii, .nii.gz, .mha), or from several
  * masks of one scan: nonzero voxels of the first get the label 1, of the second 2, and so on.
  *
- * The largest piece of each lung is kept and its cavities are filled. The map is averaged over a
- * grid of cubes with edges of `edge` mm along the map's axes. A cube is inside if at least half of
- * it is filled. More cubes are filled until no two cubes inside, and no two outside, meet only in
- * an edge or a corner: then the surface net [Gibson1998] is a closed manifold. The net is smoothed
- * without shrinking [Taubin1995]; each vertex stays between the centres of eight neighbouring
- * cubes.
+ * If the labels do not tell left from right, the lungs are split. Gaps up to 2 `close` wide are
+ * closed. The largest piece of each lung is kept, and its cavities are filled. The voxels are
+ * averaged over a grid of cubes with edges of `edge` mm along the image's axes. A cube is inside if
+ * at least half of it is filled. More cubes are filled until no two cubes inside, and no two
+ * outside, meet only in an edge or a corner: then the surface net [Gibson1998] is a closed
+ * manifold. It is smoothed without shrinking [Taubin1995]; no vertex moves by more than a cube.
  *
  * @param surfaces  [2] zero-initialised; surface i is that of report->lung[i] and faces outwards
- * @retval SUPINE_ERROR_ARGUMENT  the edge, the closing distance or the list of labels is invalid
+ * @retval SUPINE_ERROR_ARGUMENT  `edge`, `close` or `labels` is invalid
  * @retval SUPINE_ERROR_MESH      a lung has no voxels, or is too small or too large; it is unclear
  *             which labels are lungs; or the left lung does not lie left of the right lung
  * @retval SUPINE_ERROR_FORMAT    a voxel is not a whole number from 0 to 65535, or images differ in
  *             size or position
  * @retval SUPINE_ERROR_INTERRUPTED, SUPINE_ERROR_MEMORY, and the statuses of supine_image_read
- * Memory: the map and 1 byte per voxel. Splitting lungs takes 10 bytes more per voxel of the
- * bounding box of the lungs, and closing gaps takes 4 bytes more. */
+ * Memory: the image and 1 byte per voxel. For each voxel of the lungs' bounding box, splitting
+ * lungs takes 10 bytes more and closing gaps takes 4 bytes more. */
 supine_status supine_labels_surfaces(const char *const *paths, size_t count,
                                      const supine_labels_options *options, supine_mesh *surfaces,
                                      supine_labels_report *report, supine_error *error);

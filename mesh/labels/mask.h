@@ -8,11 +8,11 @@
 #include "mesh/io/image.h"
 #include "mesh/labels/labels.h"
 
-/** A box of voxels cut from an image or another mask, its source. Voxels inside an object are
- * nonzero. Around them is a margin of zeros. */
+/** A box of voxels cut from an image or from another mask. Voxels inside an object are nonzero.
+ * Around them is a margin of zeros. */
 typedef struct labels_mask {
   size_t size[3];
-  long from[3];      /**< index along each axis of the box's voxel 0 in the source of the box */
+  long from[3];      /**< indices, in that image or mask, of the first voxel of the box */
   double origin[3];  /**< centre of voxel 0, mm, LPS */
   double step[3][3]; /**< vector from a voxel to the next along each axis, mm, LPS */
   double spacing[3]; /**< distance between neighbouring voxels along each axis, mm */
@@ -89,7 +89,7 @@ typedef struct labels_pieces {
   size_t run_count;
   size_t *row;         /**< [rows + 1] index of the first run of each row of voxels */
   labels_run *run;     /**< [run_count] runs of all rows, row by row */
-  labels_piece *piece; /**< [run_count] by index of their first run; other elements are unused */
+  labels_piece *piece; /**< [run_count] element r is the piece whose first run is r, if any */
   size_t piece_count;
 } labels_pieces;
 
@@ -106,7 +106,7 @@ supine_status supine_labels_keep_one(labels_mask *mask, bool zero, size_t *other
 /* ---- distance.c ---- */
 
 /** Compute the squared distance, mm^2, from the centre of every voxel to the centre of the nearest
- * zero voxel or, if `zero` is false, nonzero voxel. The mask's axes must be orthogonal.
+ * voxel that is 0 (if `zero` is true) or not 0 (if false). The mask's axes must be orthogonal.
  * @param squares  [voxels] output */
 supine_status supine_labels_distance(const labels_mask *mask, bool zero, float *squares);
 /** Close gaps in the mask (morphological closing): fill all voxels that no ball of this radius, mm,
@@ -132,8 +132,8 @@ typedef struct labels_cubes {
   float *share;     /**< [size] fraction of each cube inside the mask; 0 in the outermost layers */
 } labels_cubes;
 
-/** Average a mask over a grid of cubes with edges of `edge` mm.
- * @param one  whether to keep only the largest piece and fill its cavities */
+/** Average a mask over a grid of cubes with edges of `edge` mm. If `one` is true, keep only the
+ * largest connected piece of cubes inside the mask, and fill its cavities. */
 supine_status supine_labels_cubes_create(const labels_mask *mask, double edge, bool one,
                                          labels_cubes *cubes);
 void supine_labels_cubes_free(labels_cubes *cubes);

@@ -12,15 +12,15 @@
 
 #define NONE UINT32_MAX
 
-/* A surface net. The eight corners of a cell are the centres of neighbouring cubes. The cell holds
- * a vertex if some of these cubes are inside the mask and some outside. */
+/* A surface net. A cell is the box whose eight corners are the centres of neighbouring cubes. It
+ * holds a vertex if some of these cubes are inside the mask and some outside. */
 typedef struct surface_net {
   size_t count;
-  uint32_t (*cell)[3]; /* [count] x, y, z indices of the cube at the lowest corner of the cell */
-  double (*at)[3];     /* [count] position of the vertex in its cell, 0 to 1 along each axis */
+  uint32_t (*cell)[3];      /* [count] lowest x, y, z indices of the cell's eight cubes */
+  double (*at)[3];          /* [count] position of the vertex in its cell, 0 to 1 along each axis */
   uint32_t (*neighbour)[6]; /* [count] vertices of the cells beyond faces -x, +x, ..., or NONE */
   size_t quad_count;
-  uint32_t (*quad)[4]; /* vertices; quads face outwards if the map's axes are right-handed */
+  uint32_t (*quad)[4]; /* vertices, counter-clockwise from outside if the axes are right-handed */
 } surface_net;
 
 static const float half = 0.5F;
@@ -28,7 +28,7 @@ static const float half = 0.5F;
 typedef struct build {
   const labels_cubes *cubes;
   size_t stride[3]; /* difference of the indices of neighbouring cubes along each axis */
-  uint32_t *vertex; /* [cubes] vertex of the cell with its lowest corner in this cube, if any */
+  uint32_t *vertex; /* [cubes] vertex, if any, between a cube and 7 neighbours at higher x, y, z */
   surface_net *net;
 } build;
 
@@ -97,8 +97,8 @@ static void find_vertices(build *b, bool write) {
   }
 }
 
-/* Add the quadrilateral around the edge from the centre of `cube` to that of the next cube along
- * axis `a`, and make its vertices neighbours. If `write` is false, only count it. */
+/* Add the quadrilateral that separates `cube` from the next cube along axis `a`, and record its
+ * four vertices as neighbours. If `write` is false, only count it. */
 static void add_quad(build *b, size_t cube, size_t a, bool write) {
   surface_net *net = b->net;
   const size_t u = (a + 1) % 3;
@@ -172,9 +172,9 @@ static supine_status create(const labels_cubes *cubes, surface_net *net) {
   return SUPINE_OK;
 }
 
-/* Factors of the smoothing steps [Taubin1995]: shrink by the first, then inflate by the second. The
- * pass-band frequency 1 / 0.5 - 1 / 0.51 = 0.04 keeps waves longer than about 16 cubes, and removes
- * the steps between slices of the image. */
+/* Factors lambda and mu of the two alternating smoothing steps [Taubin1995]. The pass-band
+ * frequency 1 / lambda + 1 / mu = 0.04 keeps features longer than 16 cubes, but no stairs between
+ * slices. */
 static const double shrink = 0.5;
 static const double swell = -0.51;
 enum { TURNS = 40 }; /* number of times that the net is shrunk and inflated */
@@ -200,8 +200,8 @@ static void step(const surface_net *net, double share, double (*next)[3]) {
   }
 }
 
-/* Smooth the net by alternate shrinking and inflation, which preserves long waves [Taubin1995].
- * Every vertex stays in its cell. */
+/* Smooth the net by alternate shrinking and inflation, a low-pass filter [Taubin1995]. Every vertex
+ * stays in its cell. */
 static supine_status relax(surface_net *net) {
   double(*next)[3] = malloc((net->count + 1) * sizeof *next);
   if (next == NULL) {

@@ -21,8 +21,8 @@ static void unite(labels_run *run, uint32_t a, uint32_t b) {
   run[a > b ? a : b].parent = a > b ? b : a;
 }
 
-/* Unite the pieces of runs [a, a_end) and [b, b_end) of two neighbouring rows where these runs
- * overlap. */
+/* Unite the connected pieces of two neighbouring rows, which have the runs [a, a_end) and
+ * [b, b_end), wherever two runs overlap. */
 static void unite_rows(labels_run *run, size_t a, size_t a_end, size_t b, size_t b_end) {
   while (a < a_end && b < b_end) {
     if (run[a].begin < run[b].end && run[b].begin < run[a].end) {
@@ -125,7 +125,7 @@ supine_status supine_labels_keep_one(labels_mask *mask, bool zero, size_t *other
   if (status != SUPINE_OK) {
     return status;
   }
-  /* first run of the piece to keep; for zero voxels this is run 0, in the margin */
+  /* first run of the piece to keep: run 0 for voxels of value 0, as it is in the outer margin */
   uint32_t kept = 0;
   for (size_t r = 1; !zero && r < pieces.run_count; ++r) {
     kept = pieces.piece[r].count > pieces.piece[kept].count ? (uint32_t)r : kept;

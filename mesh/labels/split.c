@@ -75,7 +75,7 @@ static void mark_pair(const labels_mask *mask, const labels_pieces *pieces, cons
   }
 }
 
-/* Assign every voxel of the mask to the nearer marked piece.
+/* Assign every voxel of the mask to the nearer of the two pieces marked in `marks`.
  * @param squares  [voxels] work space */
 static supine_status share_out(labels_mask *both, uint8_t *marks, float *squares) {
   const size_t count = supine_labels_mask_count(both);

@@ -99,8 +99,8 @@ static void descriptor_path(int descriptor, char path[32]) {
 }
 
 /* Choose a unique temporary name beside the target. If `link` is NULL, create a file of that name
- * and return its descriptor. Otherwise, give the name to the file to which `link` refers, and
- * return 0. Return -1 and set errno on failure. */
+ * and return its descriptor. Otherwise, hard-link an open, unnamed file to that name, and return 0;
+ * `link` is then the file's path in /proc. Return -1 and set errno on failure. */
 static int take_temporary(supine_output *output, const char *link) {
   enum { TRIES = 100 };
   const size_t size = strlen(output->target) + sizeof ".part-0123456789abcdef";

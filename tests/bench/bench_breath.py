@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measure the size of a file of a breath, of 334 frames, in each format. Print it relative to the size of
+"""Measure the file size of a breath of 334 frames in each format. Print it relative to the size of
 uncompressed frames, each with points, displacements, magnitudes of displacements, and triangles.
 
     bench_breath.py SUPINE [VERTICES]"""

@@ -2,15 +2,15 @@
 /* Measure how well kriging predicts the displacements of landmarks in the lungs of five people.
  * Observe ten landmarks of a person, and predict the displacements of all others, from exhaled to
  * inhaled and from inhaled to exhaled. Print the RMS error in mm and the percentage of landmarks
- * within the predicted 95 % band. Then print the time that the run-time library needs for a
+ * within the predicted 95 % interval. Then print the time that the run-time library needs for a
  * surface.
  *
  *     bench_locate [FOLDER OF LANDMARKS]
  *
- * Kriging corrects the displacements by a displacement law. Here, the law is the applied force
- * times a scale; the equilibrium of forces is not computed. The prior mean of a person's scale is
- * the mean of the other four people's scales. The prior standard deviation is 30 % of the prior
- * mean. */
+ * Kriging corrects displacements that a simple model predicts: the force that the program applies
+ * to a point of supine lungs, times a scale. (The spread of force between points is left out.) The
+ * prior mean of a person's scale is the mean of the other four people's scales. The prior standard
+ * deviation is 30 % of the prior mean. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -31,13 +31,13 @@
 
 enum { PEOPLE = 5, POINTS_MAX = 128, DRAWN = 10, DRAWS = 40, STEPS = 4 };
 
-static const double spread = 0.3; /* prior standard deviation of the scale, relative to its mean */
+static const double spread = 0.3; /* prior standard deviation of a person's scale / prior mean */
 
 typedef struct person {
   size_t count; /* number of landmarks */
-  /* [count, 3] mm: positions, displacements, and displacements by the law if its scale is 1 */
+  /* [count, 3] mm: positions, displacements, and displacements by the model with a scale of 1 */
   double from[3 * POINTS_MAX], moved[3 * POINTS_MAX], law[3 * POINTS_MAX];
-  double centre_distance[POINTS_MAX]; /* [count] squared, in half sides of the bounding box */
+  double centre_distance[POINTS_MAX]; /* [count] squared distance from the centre of a unit box */
   size_t lung[POINTS_MAX];
 } person;
 
@@ -48,8 +48,9 @@ static void need(supine_status status, const supine_error *error) {
   }
 }
 
-/* Compute the displacements of `points`, one for each landmark, by the displacement law for supine
- * lungs, and store them in `p->law`. The bounding box of the points replaces that of the lungs. */
+/* Compute the displacements of `points`, one for each landmark, by the model with a scale of 1, in
+ * `p->law`. The bounding box of the points replaces that of the lungs. Scale it to [-1, 1]^3 for
+ * `p->centre_distance`. */
 static void find_law(person *p, const double *points) {
   const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
   const double *c = model.direction.c;
@@ -124,7 +125,7 @@ static double fit_scale(const person *p) {
   return lu / ll;
 }
 
-/* Evaluate the displacement law at the inhaled position p of each landmark. p is not known, but the
+/* Evaluate the model law(p) at the inhaled position p of each landmark. p is not known, but the
  * exhaled position x is. Solve p = x + scale * law(p) by iteration from p = x. */
 static void find_law_at_inhaled(person *p, double scale) {
   double full[3 * POINTS_MAX];
@@ -157,8 +158,8 @@ typedef struct sums {
   double error;       /* sum of squared errors, mm^2 */
   double variance;    /* sum of the variances predicted by kriging, mm^2 */
   double points;      /* number of unobserved points */
-  double inside_band; /* number of unobserved points within the predicted 95 % band */
-  double left_out;    /* number of observed points that the others predict worse than 3 sigma */
+  double inside_band; /* number of unobserved points within the predicted 95 % interval */
+  double left_out;    /* number of observed points that the others predict with a 3 sigma error */
   double observed;    /* number of observed points */
 } sums;
 
@@ -239,8 +240,8 @@ static void study(const person *people, size_t number, double prior, bool centra
   gsl_rng_free(random);
 }
 
-/* Evaluate the displacement law for all people, and set the prior mean of each person's scale to
- * the mean of the other four people's scales. */
+/* Evaluate the model for all people. Set `prior` of each person to the mean of the scales that fit
+ * the displacements of the other four people best. */
 static void prepare(const char *folder, bool inhaling, person *people, double *prior) {
   static const char *const names[PEOPLE] = {"054", "055", "056", "094", "097"};
   for (int pass = 0; pass < (inhaling ? 2 : 1); ++pass) {

@@ -37,10 +37,10 @@ typedef struct bench {
   supine_pose pose;
   float weights[SUPINE_MODES_MAX]; /* [modes] weights of the modes, times the displacement factor */
   float *xyz, *normals;            /* [N, 3] positions, mm, and normals */
-  float *amount;                   /* [N] displacement along the direction of each vertex, mm */
-  float *columns;                  /* [modes, N] coefficients, mm */
-  int16_t *counts; /* [modes, N] coefficients, mm, as integer multiples of a unit for each mode */
-  float units[SUPINE_MODES_MAX]; /* [modes] unit of `counts`, mm, times the weight of the mode */
+  float *amount;   /* [N] displacement of each vertex along its unit vector in the basis, mm */
+  float *columns;  /* [modes, N] displacement of each vertex by each mode of weight 1, mm */
+  int16_t *counts; /* [modes, N] `columns` as multiples of a quantisation step for each mode */
+  float units[SUPINE_MODES_MAX]; /* [modes] quantisation step, mm, times the weight of the mode */
 } bench;
 
 typedef struct entry {

@@ -9,8 +9,7 @@
  * row for a server that sends messages of the same size without any computation. A row has
  * - the numbers of poses sent and of frames received
  * - "old": the number of frames that arrived when a newer pose than theirs had been sent
- * - "oldest": the largest number of poses that had been sent after a frame's pose when the frame
- *   arrived
+ * - "oldest": the largest number of poses by which an arriving frame was behind the newest pose
  * - median, 99th percentile and maximum of the time from the first byte of a pose sent to the last
  *   byte of its frame received, ms
  * - memory of the server after 1 s and at the end, KiB
@@ -155,9 +154,8 @@ typedef struct tally {
   double *sent;    /* [poses] times at which poses were sent, s; pose i has the time stamp i + 1 */
   double *latency; /* [frames] times from sending a pose to receiving its frame, s */
   size_t poses, frames;
-  size_t old; /* number of frames that arrived when a newer pose than theirs had been sent */
-  /* largest number of poses sent between a frame's pose and the arrival of the frame */
-  size_t oldest;
+  size_t old;    /* number of frames that arrived when a newer pose than theirs had been sent */
+  size_t oldest; /* largest number of poses by which an arriving frame was behind */
   /* bytes of the current message: number received, and number to receive before it is processed */
   size_t arrived, needed;
   unsigned char head[SUPINE_STREAM_HEADER];

@@ -56,19 +56,19 @@ static void end_figure(FILE *csv, const char *name, const char *commands) {
 }
 
 /* Convergence of one method: the error of the displacements against the work, which is the number
- * of times that a mass or spring reads the state of a neighbour over a link. */
+ * of times that a mass or spring reads the state of a neighbour. */
 typedef struct curve {
   FILE *csv;
   const char *method;
   size_t count;        /* number of displacements */
   const double *exact; /* [count] displacements without error */
-  double links;        /* number of links read in one step or evaluation of the accelerations */
+  double reads;        /* such reads in one solver step, or in one evaluation of accelerations */
 } curve;
 
 static void add_point(const curve *c, double work, const double *found) {
   const double error = relative_rms(c->count, found, c->exact);
   if (error > 1e-13) {
-    (void)fprintf(c->csv, "%s,%.6g,%.6g\n", c->method, work * c->links, error);
+    (void)fprintf(c->csv, "%s,%.6g,%.6g\n", c->method, work * c->reads, error);
   }
 }
 
@@ -81,8 +81,7 @@ static void count_steps(void *context, size_t steps, double held) {
   *(size_t *)context = steps;
 }
 
-/* Draw Fig. 7 of [Santhanam2008]: error against the number of links read. A link read from both its
- * ends counts twice. */
+/* Draw Fig. 7 of [Santhanam2008]: error against the number of reads of a neighbour's state. */
 static void convergence(void) {
   frame f = frame_plane(21, 10.0);
   const size_t n = f.mesh.vertex_count;
@@ -93,7 +92,7 @@ static void convergence(void) {
   double *found = calloc(n, sizeof *found);
   need(frame_solve(&f, NULL, force, exact) == SUPINE_OK, "no solution");
   FILE *csv = begin_csv("fig7_convergence", "method,link_visits,relative_rms_error");
-  /* A step updates one mass or one spring; this is the mean number of links that it reads. */
+  /* A step updates one mass or one spring; this is the mean number of neighbours that it reads. */
   const double visits = 2.0 * links / (double)(n + f.topology.edge_count);
   curve c = {csv, "Pitcher/Catcher", n, exact, visits};
   for (int k = 1; k <= 13; ++k) {
@@ -104,7 +103,7 @@ static void convergence(void) {
     add_point(&c, (double)steps, found);
   }
   c.method = "mass-spring-damper";
-  c.links = links;
+  c.reads = links;
   mass_spring_damper system = damper_create(&f, stiffness, force);
   need(damper_integrate(&system, stiffness, 40.0, 40, found, damper_seen, &c), "no integration");
   end_figure(csv, "fig7_convergence",

@@ -87,7 +87,7 @@ def compare(name, programs, arguments, rounds, output=None):
             wall, cpu, memory = run([program] + arguments)
             best[which] = [min(best[which][0], wall), min(best[which][1], cpu),
                            max(best[which][2], memory)]
-            if output is not None:  # the command names `output` for both programs, because outputs contain the command
+            if output is not None:  # outputs contain the command line, so both programs first write the same name
                 os.replace(output, f"{which}-{output}")
     differing = 0 if output is None else count_differences("0-" + output, "1-" + output)
     old, new = best
@@ -150,7 +150,7 @@ def main():
         write_image("labels.nii", True)
         with open("points.csv", "w", encoding="ascii") as file:
             file.write("x,y,z\n")
-            for i in range(20000):  # a point in the left lung
+            for i in range(20000):  # each point is in the left lung
                 file.write(f"{40 + i % 61},{-200 + i // 61 % 61},{-170 + i // 3721 * 10}\n")
 
         print(f"{'':28} {'wall, s':^24}   {'processors, s':^24}   {'memory, MB':^22}")

@@ -98,8 +98,8 @@ class Lungs:
         return int((np.einsum("ij,ij->i", self.area_vectors(xyz), self.reference) < 0).sum())
 
     def straight(self, posture, total):
-        """Return positions in a state of `total` mL if the vertices moved on straight lines: the factors of a lung's
-        displacement are equal along all axes, and each lung has the volume that it has in the state."""
+        """Return positions at `total` mL if the vertices moved on straight lines: multiply the displacements of a lung
+        by one factor for all axes, such that each lung has the volume that the model gives it at `total` mL."""
         pose = self.basis.pose(f"{posture}:{total:.3f}mL")
         wanted = np.array(self.basis.volumes(pose))
         gains = self.basis.gains(pose)

@@ -32,7 +32,7 @@ function oklab(bytes) {
 for (const name of ['displacement', 'difference']) {
   const bytes = Buffer.from(colours[name], 'hex');
   const lab = Array.from({ length: 256 }, (_, i) => oklab(bytes.subarray(3 * i, 3 * i + 3)));
-  const steps = []; // differences between entries i and i + 15, on which rounding to bytes has little effect
+  const steps = []; // OKLab distances of the colours i and i + 15: far apart, so that rounding to bytes matters little
   for (let i = 0; i + 15 < 256; i += 15) {
     steps.push(Math.hypot(...lab[i].map((x, j) => x - lab[i + 15][j])));
     assert.ok(lab[i + 15][0] > lab[i][0] + 0.01, `${name}: lightness does not rise at ${i}`);
@@ -42,8 +42,8 @@ for (const name of ['displacement', 'difference']) {
   assert.ok(ratio < 1.1, `${name}: steps differ by a factor of ${ratio}`);
 }
 
-// Each colour bar of the report shows one of the two colour maps. The map of all directions of gravity is coloured by the
-// colour map of differences.
+// Each colour bar of the report shows one of the two colour maps. The chart of all directions of gravity uses the colour
+// map of differences.
 supine('compare', join(folder, 'lungs.safetensors'), '--postures', 'supine,prone', '-o', join(folder, 'report.html'));
 const report = readFileSync(join(folder, 'report.html'), 'utf8');
 const bytesOf = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));

@@ -60,8 +60,8 @@ function root(f, from) {
   return b;
 }
 
-/** Find [s, t] so that a lung whose displacements are multiplied by s + bend[a] t along axis a holds `mL` more than the
- * reference surface. At rest it holds `rest` mL more. */
+/** Find [s, t] so that a lung whose displacements along axis a are multiplied by s + bend[a] t holds `mL` more than the
+ * reference surface. At rest it holds `rest` mL more, with s = r and t = 0. Elsewhere s = r q and t = bent(q). */
 function gainsFor(form, bend, rest, mL) {
   const even = (volume) => root((s) => formAt(form, [s, s, s]) - volume, volume / (form[0] + form[1] + form[2]));
   if (bend.every((c) => c === 0)) return [even(mL), 0];
@@ -165,8 +165,8 @@ async function check(basis, words, tolerance) {
   console.log(`${words.join(' ')}: ${lungs[0].morphTargetInfluences.length} targets, ${statSync(path).size} bytes, ${worst.toExponential(2)} mm, normals at ${BREATH} mL ${mean(angles).toFixed(2)} degrees mean, ${at95(angles).toFixed(2)} at the 95th percentile`);
   assert.ok(largestDistance(truth[0].xyz, truth[1].xyz) > 100 * tolerance, 'the lungs did not move, so nothing was tested');
   assert.ok(worst < tolerance, `${words.join(' ')}: ${worst} mm off`);
-  const least = words.includes('--plain') ? 1 : 1.25; // largest mean error, degrees
-  assert.ok(mean(angles) < least && at95(angles) < 3, 'normals are off');
+  const mostMean = words.includes('--plain') ? 1 : 1.25; // limit of the mean error of normals, degrees
+  assert.ok(mean(angles) < mostMean && at95(angles) < 3, 'normals are off');
 }
 
 /** Check that each clip turns gravity downwards, keeps the lungs above the table, and gives the
@@ -187,7 +187,7 @@ async function checkAnimations(basis) {
     const down = new three.Vector3(...gravity).transformDirection(lungs[0].matrixWorld);
     assert.ok(down.distanceTo(new three.Vector3(0, -1, 0)) < 1e-5, `${gltf.animations[clip].name}: gravity is not down`);
     const box = new three.Box3().setFromObject(gltf.scene.getObjectByName('patient'), true);
-    assert.ok(box.getCenter(new three.Vector3()).length() < 0.06, 'the lungs are not centred at the origin'); // a tolerance, because full lungs are centred, and these are smaller
+    assert.ok(box.getCenter(new three.Vector3()).length() < 0.06, 'the lungs are not centred at the origin'); // m; the centre of the full lungs is the origin, and these are less full
     assert.ok(box.min.y > new three.Box3().setFromObject(gltf.scene.getObjectByName('table')).max.y, 'the lungs are not above the table');
     const off = largestDistance(together(lungs, extras), inOrder(evaluate(basis, [[gravity, 500]])[0].xyz, order));
     assert.ok(off < COUNTS_MM, `${gltf.animations[clip].name} at ${seconds} s: ${off} mm off`);

@@ -52,7 +52,7 @@ async function checkControls(page) {
   await page.waitForFunction(() => document.getElementById('posture-name').value === 'upright');
   await changes('difference', () => page.locator('[name=kind][value=difference]').check({ force: true }));
   await changes('pinning', () => page.getByRole('button', { name: 'Use as the other posture' }).click());
-  await changes('another key', () => press(page, '3')); /* not upright, because then showing the room would change nothing */
+  await changes('another key', () => press(page, '3')); /* left side, because the room changes nothing in the picture of an upright patient */
   await changes('room', async () => {
     await page.locator('[name=frame][value=room]').check({ force: true });
     await page.waitForFunction(() => window.supine.state.roomBlend > 0.99);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The page as it opens, lying on the left at rest: cards and bars show the numbers of `supine compare`, outlines
-// enclose the lungs' volumes, and colours of the surface match the colour bar. The page also works in a small
-// window, with forced colours and without WebGL.
+// Test the page as it opens, with the patient on the left side at rest: cards and bars show the numbers of
+// `supine compare`, outlines enclose the lungs' volumes, and colours of the surface match the colour bar. The page also
+// works in a small window, with forced colours and without WebGL.
 import assert from 'node:assert/strict';
 import { close, openLungs, press, settled } from './browser.mjs';
 import { basis, html } from './lungs.mjs';

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Test the page with pointer, touch and keyboard: every key and button works, numbers can be typed, probes show what
-// the library computes, the arrow of gravity is visible from all sides, a breath has the right duration, and a
-// lost WebGL context is restored with camera, posture and probes.
+// Test the page with pointer, touch and keyboard: every key and button works, numbers can be typed, probes (marked points
+// with their displacement) show what the library computes, the arrow of gravity is visible from all sides, a breath has
+// the right duration, and a lost WebGL context is restored with camera, posture and probes.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -9,7 +9,7 @@ import { assertPicture, close, evaluateFor, openLungs, orderOf, picture, press, 
 import { basis, html } from './lungs.mjs';
 import { folder, inOrder, supine } from './support.mjs';
 
-const PROBE_MM = 0.06; // tolerance of lengths at probes, which are shown with one decimal
+const PROBE_MM = 0.06; // tolerance of displacements at marked points: the page shows one decimal
 const state = (page, name) => page.evaluate((key) => window.supine.state[key], name);
 
 /** Check that keys have their documented effect, and that a second press or the opposite key undoes
@@ -102,7 +102,7 @@ async function checkTyped(page) {
   await page.evaluate(() => document.activeElement.blur());
 }
 
-/** Check the displacements of probes and the distances between them against the library. */
+/** Check the displacements of marked points and the distances between them against the library. */
 async function checkProbes(page) {
   await press(page, '2');
   await settled(page);
@@ -133,7 +133,7 @@ async function checkProbes(page) {
 }
 
 /** Check that after the loss of the WebGL context the picture is the same in every pixel, with
- * probes, a turned camera and a reference posture. */
+ * marked points, a turned camera and a reference posture. */
 async function checkLoss(page) {
   await press(page, '3');
   await page.evaluate(() => { document.getElementById('pin').click(); document.getElementById('beside').click(); });
@@ -197,7 +197,7 @@ async function checkNotation(page) {
   }
 }
 
-/** Check touch: dragging with one finger rotates and leaves no probe in the picture; two fingers zoom and pan. */
+/** Check touch: dragging with one finger rotates and marks no point of the picture; two fingers zoom and pan. */
 async function checkTouch() {
   const { page, complaints } = await openLungs(html, { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });
   const cdp = await page.context().newCDPSession(page);
@@ -336,7 +336,7 @@ async function checkLegible(page) {
         if (!ground) return [element.id || element.className, 0];
         const [r, g, b, alpha = 1] = channels(getComputedStyle(ground).backgroundColor);
         const ink = luminance(channels(getComputedStyle(element).color));
-        const ratios = [0, 255].map((behind) => { // contrast if black or white lungs are behind it
+        const ratios = [0, 255].map((behind) => { // contrast of the text if black or white lungs are behind its background
           const paper = luminance([r, g, b].map((c) => alpha * c + (1 - alpha) * behind));
           return (Math.max(ink, paper) + 0.05) / (Math.min(ink, paper) + 0.05);
         });

@@ -130,8 +130,8 @@ async function checkPointer(page, rest) {
   await page.locator('#inside').check();
 }
 
-/** Check that keyboard and pointer can show and hide the names of structures, and keep them visible, and that a link
- * restores them. */
+/** Check that keyboard and pointer can show, hide and pin the names of structures, and that a link restores pinned
+ * names. */
 async function checkControls(page) {
   await page.mouse.move(5, 5);
   const before = await picture(page);
@@ -144,14 +144,14 @@ async function checkControls(page) {
     await assertPicture(page, before, `${kind} does not change the picture`, false);
   }
   await page.locator('[name=kind][value=displacement]').check();
-  /* From the check box `inside`, Tab reaches each name. Enter keeps the name visible. */
-  await page.mouse.move(5, 5); // off the rows: a row under the pointer shows its name
+  /* From the check box `inside`, Tab reaches each structure in the table. Enter pins its name in the picture. */
+  await page.mouse.move(5, 5); // off the table, because the row under the pointer also shows its name
   await page.locator('#inside').focus();
   const reached = [];
   for (let i = 0; i < PARTS.length; ++i) {
     await page.keyboard.press('Tab');
     reached.push(await page.evaluate(() => document.activeElement.getAttribute('aria-label')));
-    await page.waitForFunction((label) => { // the picture shows the name of the focused row only
+    await page.waitForFunction((label) => { // the picture names only the structure whose table row has the focus
       const shown = [...document.querySelectorAll('.name:not([hidden])')].map((e) => e.textContent);
       return shown.length === 1 && label.startsWith(shown[0].replace(/ moved [\d.]+ mm$/, ''));
     }, reached.at(-1));
@@ -195,7 +195,7 @@ async function checkSizes() {
     await page.locator('#inside-section').scrollIntoViewIfNeeded();
     await settled(page);
     writeFileSync(join('page_inside', `${width}x${height}-${colorScheme}.png`), await page.screenshot());
-    if (width === 1400 || touch) { // one size with the light theme and one with the dark theme
+    if (width === 1400 || touch) { // check accessibility at three sizes; these have the light and the dark theme
       await page.evaluate(axe);
       const { violations } = await page.evaluate(() => window.axe.run(document, { runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'] }));
       assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.html.slice(0, 120)).join(' | ')}`), []);

@@ -13,8 +13,8 @@ const [points, inside, html, moved, vtp] = ['nodule.csv', 'nodule.safetensors', 
 writeFileSync(points, 'name,x,y,z\nnodule,-80,-120,-90\n');
 supine('embed', basis, points, '-o', inside);
 
-/** Run `compare` and `deform` for a posture at rest. Return the displacement of the nodule from both, the mean and largest
- * displacement of the surface from `compare`, and the largest from `deform`. */
+/** Run `compare` and `deform` for a posture at the volume at rest. Return the displacement of the structure "nodule" by
+ * each command, the mean and largest displacement of the surface by `compare`, and the largest by `deform`. */
 function told(posture, from) {
   const pair = JSON.parse(supine('compare', inside, '--postures', `supine,${posture}`, '--json'))[0];
   const report = JSON.parse(supine('compare', basis, '--postures', posture, '--json', '--from', from).replace(/^[^{]*/, ''));
@@ -24,7 +24,7 @@ function told(posture, from) {
   return { pair: pair.mm, nodule: Number(row[columns.indexOf('moved_mm')]), mean: report.postures[0].displacement_mm.mean, max: report.postures[0].displacement_mm.max, largest: Number(largest[1]), name: largest[2], reported: report.displacement_from, held: report.postures[0].volume_ml, error: report.postures[0].expected_error_mm };
 }
 
-/** Return the numbers and texts of the page for a posture at rest. */
+/** Return the numbers and texts of the page for a posture at the volume at rest. */
 async function shown(page, posture) {
   await page.evaluate((text) => { location.hash = `posture=${text}&depth=0`; }, posture);
   await page.waitForFunction((text) => document.getElementById('posture-name').value === text, posture);

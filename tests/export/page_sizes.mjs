@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Test the page at four sizes in two themes: nothing is cut off, letters do not overlap, and a tap leaves a probe there.
-// Pictures are kept in the folder page_sizes of the working folder.
+// Test the page at four sizes in two themes: nothing is cut off, orientation letters (L, R, ...) do not overlap, and a tap
+// marks a point. Pictures are kept in the folder page_sizes of the working folder.
 import assert from 'node:assert/strict';
 import { mkdirSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -9,7 +9,7 @@ import { html } from './lungs.mjs';
 
 mkdirSync('page_sizes', { recursive: true });
 
-/** Check that letters do not overlap panels, the arrow of gravity or each other. */
+/** Check that orientation letters (L, R, ...) do not overlap panels, the arrow of gravity or each other. */
 async function checkLetters(page, what) {
   const { letters, plates, arrow } = await page.evaluate(() => {
     const middle = (box) => [box.x + box.width / 2, box.y + box.height / 2];
@@ -43,7 +43,7 @@ for (const [width, height] of [[1400, 900], [900, 600], [844, 390], [390, 844]])
   const touch = Math.min(width, height) < 400;
   const { page, complaints } = await openLungs(html, { viewport: { width, height }, ...(touch && { hasTouch: true }) }, '#posture=left');
   assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth && [...document.querySelectorAll('#panel button, #panel input')].every((e) => { const b = e.getBoundingClientRect(); return b.width === 0 || (b.left >= 0 && b.right <= innerWidth + 0.5); })), `${width} x ${height}: something is cut`);
-  if (touch) { // a tap leaves a probe in the picture, and does not turn the camera
+  if (touch) { // a tap marks a point of the picture, and does not turn the camera
     const box = await page.locator('#picture').boundingBox();
     const azimuth = await page.evaluate(() => window.supine.state.camera.azimuth);
     await page.touchscreen.tap(box.x + box.width * 0.48, box.y + box.height * 0.36);

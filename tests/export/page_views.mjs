@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Views, pan, zoom, postures, display options, probes, links and a lost WebGL context on the page.
+// Test views, pan, zoom, postures, display options, probes (marked points), links and a lost WebGL context on the page.
 import assert from 'node:assert/strict';
 import { assertPicture, close, openLungs, picture, press, settled } from './browser.mjs';
 import { basis, html } from './lungs.mjs';
@@ -57,7 +57,7 @@ async function checkCamera(page) {
   await press(page, '0');
 }
 
-/** Check that the page writes postures in the syntax of the program. */
+/** Check that the page writes postures as the command line accepts them, and reads them back. */
 async function checkPostures(page) {
   const texts = await page.evaluate(() => {
     const { postureText, postureFrom, gravityOf } = window.supine;
@@ -100,7 +100,7 @@ async function checkShown(page) {
   }
 }
 
-/** Check that probes move with the tissue and measure distances, and that a link restores them. */
+/** Check that marked points move with the tissue and measure distances, and that a link restores them. */
 async function checkProbes(page) {
   const box = await page.locator('#picture').boundingBox();
   for (const [x, y] of [[0.38, 0.5], [0.62, 0.55]]) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The printed report: on A4 and Letter every heading and number is inside the sheet, pages are numbered, the
-// provenance is complete, and the letters of pictures are on the right sides of the lungs.
+// Test the printed report: on A4 and Letter every heading and number is inside the sheet, pages are numbered, the
+// provenance is complete, and the orientation letters L, R, H and F in pictures are at the correct ends of the lungs.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { readFileSync } from 'node:fs';
@@ -89,7 +89,7 @@ assert.ok(directions.length >= 1, 'the report states no direction');
 for (const [words, degrees, name, ...numbers] of directions) {
   const far = (axis) => (Math.acos(axis.reduce((sum, x, i) => sum + x * numbers[i], 0) / Math.hypot(...numbers)) * 180) / Math.PI;
   assert.equal(name, Object.keys(named).reduce((best, other) => (far(named[other]) < far(named[best]) ? other : best)), words);
-  assert.ok(Math.abs(far(named[name]) - degrees) < 1.2, words); // degree and components are rounded
+  assert.ok(Math.abs(far(named[name]) - degrees) < 1.2, words); // the report rounds the angle and the components of gravity
 }
 
 /* The areas of outlines differ from that of the reference by the stated percentages. */
@@ -122,9 +122,10 @@ for (const [alt, { ends, gravity }] of Object.entries(shots)) {
   assert.ok(/<g|<circle/.test(gravity), alt);
 }
 const along = (name) => Number(/rotate\(([-\d.]+)\)/.exec(shots[`${name}, from the front`].gravity)?.[1]);
-assert.equal(Math.abs(along('left side')), 0); // degrees: if the patient lies on the left side, gravity points to the right
+// Angles of gravity in pictures from the front before they are rotated, clockwise, where 0 points to the right.
+assert.equal(Math.abs(along('left side')), 0); // to the patient's left, which the picture shows on the right
 assert.equal(Math.abs(along('right side')), 180);
-assert.equal(along('upright'), 90); // degrees: if the patient is upright, gravity points down
+assert.equal(along('upright'), 90);
 assert.deepEqual(['left side', 'right side'].map((name) => shots[`${name}, from the front`].turn), [90, 270]); // degrees by which a picture is rotated, so that gravity points down
 assert.deepEqual(complaints, []);
 assert.ok(!readFileSync(html, 'utf8').includes('0.000 %'));

@@ -41,8 +41,8 @@ static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 static uintptr_t blocks[BLOCKS];
 static long live;
 
-/* Functions of the C library, looked up once by dlsym. While dlsym allocates memory, it gets that
- * memory from `static_memory`, of which nothing is freed. */
+/* Functions of the C library, looked up once by dlsym. dlsym itself may allocate memory; it gets a
+ * part of `static_memory`, which is never freed. */
 static void *(*next_malloc)(size_t);
 static void *(*next_calloc)(size_t, size_t);
 static void *(*next_realloc)(void *, size_t);

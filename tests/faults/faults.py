@@ -25,7 +25,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-# Commands that make the input files, before any faults.
+# Commands that make the input files. They run first, without faults.
 BEFORE = """
 phantom --vertices 100 -o lungs.ply
 phantom --vertices 100 -o lungs.stl
@@ -89,7 +89,7 @@ REASONS = {
     "file": "memory|No space left|Too many open files|Input/output error|Resource temporarily|"
             "Cannot allocate|short|truncated|changed",
 }
-# Libraries in which allocations fail, too. They do not fail in drivers, fonts and the web server.
+# Libraries in which calls fail as in the program itself. In others (drivers, fonts, web server), none fails.
 ALSO = {"memory": "gsl,jansson", "file": ""}
 LIMIT = 60  # time limit of a command, s
 
@@ -161,8 +161,8 @@ def what_is_wrong(trial, kind, kept, whole, result):
 
 
 def faultless(trial, arguments):
-    """For each kind of fault, count calls in a run without faults, and return the result of that run. Its stdout is None
-    if it differs between runs."""
+    """Run the command without faults, once for each kind of fault. Return the result of each run, with the number of
+    calls that could fail in this way. Its stdout is None if the runs print different text."""
     runs = {kind: trial.run(arguments, kind) for kind in REASONS}
     same = len({run[1] for run in runs.values()}) == 1
     return {kind: (run[0], run[1] if same else None, *run[2:]) for kind, run in runs.items()}

@@ -94,8 +94,8 @@ static size_t put_word(uint8_t *bytes, size_t size, size_t place, const uint8_t 
   return size;
 }
 
-/* Apply one random mutation: change a bit or a byte; delete or repeat some bytes; insert a number,
- * bytes of a seed or a word, or overwrite with one of these; or truncate. Return the new size. */
+/* Apply one random mutation: change a bit or byte, delete or repeat bytes, truncate, or insert (or
+ * write over others) a number, bytes of a seed or a dictionary word. Return the new size. */
 static size_t change(uint8_t *bytes, size_t size) {
   static const char *const numbers[] = {"-1",    "0",   "4294967296",
                                         "1e999", "nan", "99999999999999999999"};

@@ -4,8 +4,8 @@
 #
 #     tests/fuzz/many.sh BUILD [RUNS [SEED]]      110000 runs by default
 #
-# Each reader gets RUNS inputs. Messages are quick and get five times as many. OBJ and STL, which a separate process
-# reads, get a 200th of RUNS. Exit with 1 if an input crashed a reader, took more than 0.5 s or used more than 2 GB.
+# Each reader gets RUNS inputs. Network messages are quick and get five times as many. OBJ and STL, which a separate
+# process reads, get a 200th of RUNS. Exit with 1 if an input crashed a reader, took more than 0.5 s or used over 2 GB.
 set -u
 build=$1
 runs=${2:-110000}

@@ -19,7 +19,7 @@ supine('precompute', mesh, '-o', demo);
 writeFileSync(content, 'name,x,y,z\nnodule,-80,-120,-90\nother,70,-150,-120\n');
 supine('embed', demo, content, mesh, '-o', inside);
 const states = ['supine', 'prone:rest+500', 'left:full-1500', 'supine+35:rest+120', '0.6:0.2:-0.7:2600mL', 'upright:full'];
-const ofScan = ['supine:scan+200', 'prone:scan+500', '0.6:0.2:-0.7:scan-100']; // a basis of version 1 has no volume at rest
+const ofScan = ['supine:scan+200', 'prone:scan+500', '0.6:0.2:-0.7:scan-100']; // for a basis of version 1, which does not store the volume at rest
 /** Paths of bases, each with the states to test. */
 export const bases = [[demo, states], [inside, states], [old, ofScan]];
 const real = ['left', 'right'].map((side) => join(process.env.LUNGS, `lungs/chaste_${side}.ply`));

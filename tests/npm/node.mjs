@@ -22,7 +22,7 @@ console.log(`supine.wasm: ${wasm.length} bytes, ${small} with brotli`);
 assert.ok(wasm.length <= 150000 && small <= 40000);
 
 /* Two open bases do not affect each other, and their arrays stay valid. A state can be given as text, or as gravity with
- * a volume or a gain. A refused state changes nothing. */
+ * a volume or a gain (factor of the displacements). A refused state changes nothing. */
 const [lungs, other] = [await open(bytes), await open(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length), { wasm })];
 const { positions, normals } = lungs;
 assert.ok(largestDistance(positions, lungs.vertices) < 0.002, 'positions before the first pose differ from those in the file');

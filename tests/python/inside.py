@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Test the Python package. test_python.py runs this program in the environment into which it installed the wheel.
 
-    inside.py REFERENCE BASIS"""
+    inside.py REFERENCE BASIS        REFERENCE is the program reference.c, which computes expected results"""
 import ctypes
 import gc
 import os

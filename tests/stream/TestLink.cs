@@ -61,7 +61,7 @@ static class TestLink
             new float[] { -1, 0, 0, 0, 0, 1, 0, 1, 0 },
             new float[] { 0, -1, 0, 0, 0, 1, -1, 0, 0 },
             new float[] { 0, 1, 0, 0, 0, 1, 1, 0, 0 } };
-        // Rotations of a standing Unity object to `postures`, by 90 degrees about x or z; h = sin(45 degrees) = cos(45 degrees).
+        // Rotations that bring a standing Unity object into each of `postures`: 90 degrees about x or z; h = sin 45 = cos 45 degrees.
         const float h = 0.70710678f;
         Quaternion[] turns = { new Quaternion(-h, 0, 0, h), new Quaternion(h, 0, 0, h),
                                new Quaternion(0, 0, h, h), new Quaternion(0, 0, -h, h) };

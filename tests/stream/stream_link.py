@@ -13,7 +13,7 @@ TOLERANCE_MM = 5e-3  # largest error of the library's packed storage, mm
 
 assert crc64(b"123456789") == 0x6C40DF5F0B497347  # published check value of CRC-64/ECMA-182
 
-SUPINE = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]  # rotation by rows, to a room whose z axis is up
+SUPINE = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]  # columns: the patient's left, back and head in a room with z up
 LEFT = [[0, -1, 0], [0, 0, 1], [-1, 0, 0]]
 
 
@@ -37,7 +37,7 @@ for version in (1, 2):
         kind, device, _, content = answer(link, stamp, send)
         assert (kind, device) == ("NDARRAY", "SUPINE")
         frames[stamp] = unpack(kind, content)
-        assert len(frames[stamp]) == basis.modes + 6  # modes; 3 gains for each of 2 lungs
+        assert len(frames[stamp]) == basis.modes + 6  # weights of modes; 3 displacement factors for each of 2 lungs
     # All message types give the same weights for a posture; weights of different postures differ.
     assert far(frames[101], frames[103]) < 1e-5 and far(frames[101], frames[105]) < 1e-5
     assert far(frames[102], frames[104]) < 1e-5 and far(frames[102], frames[106]) < 1e-5

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Test a server with the public OpenIGTLink library: stream_peer PORT BASIS
-// Use OpenIGTLink to pack each posture as a message, and to unpack the frames and verify their checksums. Compare the
-// frames with results of the run-time library.
+/* Test a server with the public OpenIGTLink library: stream_peer PORT BASIS
+ * Use OpenIGTLink to pack each posture as a message, and to unpack the frames and verify their checksums. Compare the
+ * frames with results of the run-time library. */
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -212,9 +212,8 @@ int main(int count, char **word) {
     send_transform(lies[1]);
     expect_weights(basis, pose_of(basis, prone, 500.0));
   }
-  // Ask for surfaces instead of weights.
   say("VOLUME", "rest+250");
-  say("SEND", "surface");
+  say("SEND", "surface"); // ask for surfaces instead of weights
   for (const Lie &lie : lies) {
     send_transform(lie);
     expect(supine_posture_gravity(lie.posture, gravity) == SUPINE_OK, lie.posture);

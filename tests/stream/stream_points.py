@@ -3,7 +3,7 @@
 
     stream_points.py PROGRAM FOLDER_OF_SAMPLE_CLIENTS
 
-The observed points come from deformed and shifted lungs. They are sent as one TRANSFORM per sensor, then as one POINT."""
+The observed points come from deformed and shifted lungs. Send a TRANSFORM message for each, then all in a POINT message."""
 import csv
 import os
 import re
@@ -18,8 +18,8 @@ from answers import answer  # noqa: E402
 from supine_link import Link, transform, unpack  # noqa: E402
 
 SHIFT = (12.0, -7.0, 20.0)
-LEFT = [[0, -1, 0], [0, 0, 1], [-1, 0, 0]]  # Rotation matrix, by rows, of a body on its left side.
-TURNED = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]  # rotation of a sensor, which the server ignores
+LEFT = [[0, -1, 0], [0, 0, 1], [-1, 0, 0]]  # rotation matrix, by rows, of a patient on the left side
+SENSOR = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]  # rotation matrix of a sensor; the server ignores rotations of sensors
 
 
 def run(*words):
@@ -82,12 +82,12 @@ with tempfile.TemporaryDirectory(prefix="supine-stream-") as folder:
             link = Link("127.0.0.1", port, version=version, check=True)
             names = list(seen)
             if version == 1:  # Recorded times count from the first pose, even if a point arrived earlier.
-                answer(link, 4, lambda: link.send("TRANSFORM", names[0], transform(TURNED, seen[names[0]]), 4))
+                answer(link, 4, lambda: link.send("TRANSFORM", names[0], transform(SENSOR, seen[names[0]]), 4))
             link.send_pose(LEFT, stamp=5)
             for name in names[:-1]:
-                link.send("TRANSFORM", name, transform(TURNED, seen[name]), 6)
+                link.send("TRANSFORM", name, transform(SENSOR, seen[name]), 6)
             last = names[-1]
-            check(answer(link, 7, lambda: link.send("TRANSFORM", last, transform(TURNED, seen[last]), 7)),
+            check(answer(link, 7, lambda: link.send("TRANSFORM", last, transform(SENSOR, seen[last]), 7)),
                   truth, len(truth))
             wrong = dict(seen, p3=[v + 30 for v in seen["p3"]])  # a wrong point, which the server must leave out
             body = b"".join(point(n, p) for n, p in wrong.items()) + point("stranger", (0, 0, 0))

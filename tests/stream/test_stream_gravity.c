@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Directions of gravity from trackers' matrices and quaternions, refused poses, and smoothing. */
+/* Test directions of gravity from trackers' matrices and quaternions, refused poses, smoothing. */
 #include "program/stream/gravity.h"
 #include "tests/test.h"
 #include <supine/posture.h>
@@ -30,20 +30,19 @@ static const placement placements[] = {
     /* Head at the head end of the bed, face down: seen from the feet, the patient's left is on the
      * left. */
     {"prone", {-1, 0, 0}, {0, 0, 1}, {0, 1, 0}},
-    /* On the left side: the patient's left points down, and the back to the left as seen from the
-     * feet. */
+    /* Lying on the left side: the patient's left points down, and the back points to -x. */
     {"left", {0, 0, -1}, {-1, 0, 0}, {0, 1, 0}},
-    /* On the right side: the patient's left points up, and the back to the right. */
+    /* Lying on the right side: the patient's left points up, and the back points to +x. */
     {"right", {0, 0, 1}, {1, 0, 0}, {0, 1, 0}},
     /* Head at the foot end of the bed: the four postures above, turned by 180 degrees about z. */
     {"supine", {-1, 0, 0}, {0, 0, -1}, {0, -1, 0}},
     {"prone", {1, 0, 0}, {0, 0, 1}, {0, -1, 0}},
     {"left", {0, 0, -1}, {1, 0, 0}, {0, -1, 0}},
     {"right", {0, 0, 1}, {-1, 0, 0}, {0, -1, 0}},
-    /* On the back across the bed, with the head towards -x. Then two standing postures. */
+    /* Lying on the back across the bed, with the head towards -x. */
     {"supine", {0, 1, 0}, {0, 0, -1}, {-1, 0, 0}},
     {"upright", {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
-    {"inverted", {1, 0, 0}, {0, -1, 0}, {0, 0, -1}},
+    {"inverted", {1, 0, 0}, {0, -1, 0}, {0, 0, -1}}, /* head down */
 };
 
 enum { PLACEMENTS = sizeof placements / sizeof *placements };
@@ -84,17 +83,17 @@ TEST(test_gravity_tracker_matrices_give_postures) {
 TEST(test_gravity_tracker_quaternions_give_postures) {
   static const struct {
     const char *posture;
-    double q[4]; /* w, x, y, z: cos(angle / 2), then sin(angle / 2) times the unit axis */
+    double q[4]; /* from upright: cos(angle / 2), then sin(angle / 2) times the unit axis */
   } turns[] = {
       {"upright", {1, 0, 0, 0}},
-      /* Upright, rotated backwards about x. */
+      /* about x by -90 degrees (backwards) or 90 degrees (forwards) */
       {"supine", {0.7071067811865476, -0.7071067811865476, 0, 0}},
-      {"prone", {0.7071067811865476, 0.7071067811865476, 0, 0}}, /* rotated forwards about x */
-      /* rotated about y by 90 degrees (head to x) or -90 degrees (head to -x), or about x by 180 */
+      {"prone", {0.7071067811865476, 0.7071067811865476, 0, 0}},
+      /* about y by 90 degrees (head to x) or -90 degrees (head to -x), or about x by 180 degrees */
       {"left", {0.7071067811865476, 0, 0.7071067811865476, 0}},
       {"right", {0.7071067811865476, 0, -0.7071067811865476, 0}},
       {"inverted", {0, 1, 0, 0}},
-      {"supine", {0.5, -0.5, -0.5, 0.5}}, /* rotated backwards, then about the vertical */
+      {"supine", {0.5, -0.5, -0.5, 0.5}}, /* about x by -90 degrees, then about z by 90 degrees */
   };
   const supine_stream_setup setup = supine_stream_setup_default();
   for (size_t i = 0; i < sizeof turns / sizeof *turns; ++i) {
@@ -124,8 +123,8 @@ TEST(test_gravity_setup_rotates_world_and_marker) {
   assert_true(fabs(determinant(r) - 1.0) < tolerance);
   assert_int_equal(supine_stream_gravity_rotation(&setup, r, gravity, &why), SUPINE_STREAM_EXACT);
   expect_gravity(gravity, "supine");
-  /* A tilt sensor, whose axes are the marker's, reports a vector of any length towards the ground,
-   * here towards the patient's right. */
+  /* A tilt sensor has the axes of the marker on the patient. It reports a vector of any length that
+   * points to the ground. If this vector points to the patient's right, the patient lies on it. */
   const double down[3] = {3, 0, 0};
   assert_int_equal(supine_stream_gravity_down(&setup, down, gravity, &why), SUPINE_STREAM_EXACT);
   expect_gravity(gravity, "right");
@@ -203,7 +202,7 @@ TEST(test_gravity_smooth_steady_turn_has_stated_lag) {
     const double angle = speed * step * i;
     const double gravity[3] = {sin(angle), cos(angle), 0};
     const double left = supine_stream_gravity_smooth(gravity, step, seconds, smooth);
-    if (i == 2000) { /* The last step: the lag may be wrong by up to one time step. */
+    if (i == 2000) { /* now the lag of the smoothed direction is `seconds`, within one time step */
       assert_true(fabs(left - speed * seconds) < speed * step);
       assert_true(fabs(atan2(smooth[0], smooth[1]) - (angle - left)) < 1e-12);
     }

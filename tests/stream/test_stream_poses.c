@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Recorded poses, volumes given as text, and the histogram of latencies. */
+/* Test recorded poses, volumes given as text, and the histogram of latencies. */
 #include "program/stream/tracked_patient.h"
 #include "tests/runtime_fixture.h"
 #include "tests/test.h"

@@ -266,8 +266,8 @@ static void expect_pose(const supine_pose *pose, const unsigned char *content) {
   }
 }
 
-/* Return the pose for a direction of gravity and a volume in mL above rest. All lungs have the same
- * gain. */
+/* Return the pose for a direction of gravity and a volume in mL above rest. One factor multiplies
+ * the displacements of all lungs. */
 static supine_pose pose_of(const stage *s, const double gravity[3], double above) {
   supine_pose pose = {.weights = {0}};
   double gain = 0.0;
@@ -278,8 +278,7 @@ static supine_pose pose_of(const stage *s, const double gravity[3], double above
   return pose;
 }
 
-/* Assert that `content` has the weights and gains for a direction of gravity and a volume in mL
- * above rest. */
+/* Assert that `content` has the weights and displacement factors of this pose: see pose_of. */
 static void expect_weights(const stage *s, const double gravity[3], double above,
                            const unsigned char *content) {
   const supine_pose pose = pose_of(s, gravity, above);
@@ -369,7 +368,7 @@ TEST(test_server_send_request_switches_content) {
   unsigned char body[4096];
   const size_t points = 40 + 12 * info->vertex_count;
   size_t whole = 0; /* size of a message body with points and triangles, bytes */
-  /* frames hold weights of modes until a peer requests something else */
+  /* until a peer requests another content, frames contain weights of modes */
   assert_true(send_pose(peer, poses[3], 1));
   (void)receive_stamp(peer, 1, &header, body);
   const char *const requests[] = {"points", "surface"};
@@ -433,7 +432,8 @@ TEST(test_server_many_poses_newest_answered) {
   stage_destroy(s);
 }
 
-/* Send `count` poses, one every 2 ms; return how many are answered before the first late answer. */
+/* Send up to `count` poses, one every 2 ms. Stop if more than 60 other frames arrive before the
+ * answer to a pose. Return the number of poses answered earlier. */
 static int keep_rate(int peer, int count, uint64_t stamp) {
   supine_stream_header header;
   unsigned char body[4096];
@@ -562,7 +562,7 @@ TEST(test_server_ten_thousand_mutated_messages_survives) {
     /* Use one connection per message, so that an error in one message does not hide the next
      * message. */
     const int peer = connect_peer(port);
-    /* This fails if the server closes the connection after the header. */
+    /* sending fails if the server has already refused the header and closed the connection */
     (void)send_bytes(peer, bytes, size);
     (void)shutdown(peer, SHUT_WR);
     assert_true(closed_by_server(peer)); /* the server closes the connection after the message */
@@ -692,8 +692,8 @@ TEST(test_server_replay_recorded_poses_same) {
   stage_destroy(s);
 }
 
-/* With smoothing, the server sends frames after the last pose until the lungs have reached it; with
- * breathing, it never stops. */
+/* With smoothing, the server sends frames after the last pose until the lungs have reached this
+ * pose. With breathing, the server never stops sending. */
 TEST(test_server_moving_lungs_send_frames) {
   stage *s = stage_create();
   s->options.smooth = 0.1;
@@ -733,8 +733,8 @@ TEST(test_server_moving_lungs_send_frames) {
   }
   const double supine[3] = {0, 1, 0};
   const double deep = pose_of(s, supine, 60.0).gains[0][0] - pose_of(s, supine, 0.0).gains[0][0];
-  /* Between rest and peak inspiration, the gain (factor of the displacements) changes by as much as
-   * between poses at these two volumes, within 5 %. */
+  /* During the breath, the factor of the displacements has the same range, within 5 %, as between
+   * still poses at rest and at peak inspiration. */
   assert_true(fabs((double)(high - low) - fabs(deep)) < 0.05 * fabs(deep));
   (void)close(other);
   stage_destroy(s);

@@ -135,7 +135,7 @@ TEST(test_read_transform_of_version_2_gives_rotation) {
   assert_true(read_ok(&header, body, NULL).number[8] == 9.0);
   supine_stream_message m;
   supine_error error;
-  /* In a truncated body, the metadata would overlap the content. */
+  /* Each truncated body is refused: the sizes in its headers add up to more than its size. */
   for (size_t size = 0; size < sizeof body; ++size) {
     header = header_of("TRANSFORM", "Patient", 2, body, size);
     assert_int_equal(supine_stream_message_read(&header, body, NULL, &m, &error),
@@ -197,7 +197,7 @@ TEST(test_read_position_of_library_gives_quaternion) {
   assert_int_equal(read_ok(&header, body, NULL).kind, SUPINE_STREAM_NOTHING);
 }
 
-/* Pack an NDARRAY of this element type by the library; return its size. */
+/* Pack an NDARRAY with elements of type `type` by the OpenIGTLink library; return its size. */
 static size_t make_array(int type, size_t count, const double *values, unsigned char *body) {
   igtl_ndarray_info info;
   const igtl_uint16 size[1] = {(igtl_uint16)count};
@@ -366,7 +366,7 @@ static sample sample_open(fixture *made) {
   s.moment = (supine_stream_snapshot){.gravity = {0.36, 0.48, -0.8}, .stamp = 0x11223344AABBCCDDu};
   assert_int_equal(supine_basis_weights(s.basis, s.moment.gravity, s.moment.pose.weights),
                    SUPINE_OK);
-  for (size_t i = 0; i < 3 * made->lungs; ++i) { /* a different gain for each axis of each lung */
+  for (size_t i = 0; i < 3 * made->lungs; ++i) { /* factors for each lung and axis */
     s.moment.pose.gains[i / 3][i % 3] = 0.7 - 0.17 * (double)i;
   }
   return s;
@@ -394,8 +394,8 @@ static void expect_message(const unsigned char *bytes, const char *type, uint64_
   assert_memory_equal(bytes + sizeof header, body, size);
 }
 
-/* Assert that the frame of a sample has the weights of all modes, then the gains along x, y and z
- * of each lung. Destroy the sample. */
+/* Assert that the frame of a sample has the weights of all modes, then the factors of each lung's
+ * displacements along x, y and z. Destroy the sample. */
 static void expect_weights_frame(sample s) {
   supine_stream_frames *frames = NULL;
   supine_error error;
@@ -450,7 +450,7 @@ static unsigned char *make_polydata(const sample *s, const struct iovec *strips,
     surface.points[3 * i] *= (float)sign;
     surface.points[3 * i + 1] *= (float)sign;
   }
-  /* The library expects native byte order. */
+  /* the OpenIGTLink library expects triangle strips in native byte order */
   for (size_t i = 0; strips != NULL && i < strips->iov_len / 4; ++i) {
     surface.triangle_strips[i] = word_at((const unsigned char *)strips->iov_base + 4 * i);
   }
