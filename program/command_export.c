@@ -82,14 +82,11 @@ static supine_status write_page(const export_source *source, const request *want
       status = supine_command_inside_check(source->basis, inside.basis, wanted->inside, error);
     }
   }
-  const char *slash = strrchr(basis_path, '/');
   const export_parts parts = {names.count, names.text, names.part};
   const export_page page = {.breath = wanted->glb.breath,
                             .from = &from.pose,
                             .from_name = from.name,
-                            .title = wanted->title != NULL ? wanted->title
-                                     : slash != NULL       ? slash + 1
-                                                           : basis_path,
+                            .title = wanted->title != NULL ? wanted->title : basename(basis_path),
                             .inside = wanted->inside != NULL ? &inside : NULL,
                             .parts = &parts};
   if (status == SUPINE_OK) {

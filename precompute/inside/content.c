@@ -64,8 +64,7 @@ supine_status supine_inside_content_points(const char *path,
 
 /* Return where the mesh name ("airways") starts in "/scans/airways.ply", and set its length. */
 static const char *part_name(const char *path, size_t *length) {
-  const char *slash = strrchr(path, '/');
-  const char *name = slash != NULL ? slash + 1 : path;
+  const char *name = basename(path);
   const char *dot = strrchr(name, '.');
   *length = dot != NULL && dot > name ? (size_t)(dot - name) : strlen(name);
   return name;

@@ -60,8 +60,7 @@ static json_t *provenance(const supine_comparison *c, json_t *file) {
 /* Return the values of these tags of report.html: {{provenance}}, those in the heading, and those
  * in the section on all directions of gravity. */
 static json_t *facts(const supine_comparison *c) {
-  const char *slash = strrchr(c->path, '/');
-  json_t *file = supine_options_json_text(slash != NULL ? slash + 1 : c->path);
+  json_t *file = supine_options_json_text(basename(c->path));
   char volume[160];
   supine_report_volume(c, volume, sizeof volume);
   json_t *list = provenance(c, file);
