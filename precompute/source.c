@@ -277,8 +277,3 @@ supine_status supine_precompute_source_load(const supine_source_options *options
   free(r.errors);
   return status;
 }
-
-void supine_precompute_source_free(supine_source *source) {
-  supine_lungs_free(&source->lungs);
-  *source = (supine_source){0};
-}

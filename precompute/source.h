@@ -28,14 +28,12 @@ typedef struct supine_source {
 } supine_source;
 
 /** Load surfaces (in parallel) or label maps, check them and join them into lungs.
- * @param source    zeroed; release with supine_precompute_source_free
+ * @param source    zeroed; release source->lungs with supine_lungs_free
  * @param findings  notes and warnings are added, also after a failure
  * @retval SUPINE_ERROR_ARGUMENT  both label maps and surfaces, or an option for the other kind
  * @retval the statuses of supine_mesh_load, supine_labels_surfaces and supine_lungs_gate */
 supine_status supine_precompute_source_load(const supine_source_options *options, char **paths,
                                             size_t count, supine_source *source,
                                             supine_findings *findings, supine_error *error);
-
-void supine_precompute_source_free(supine_source *source);
 
 #endif

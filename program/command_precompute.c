@@ -205,7 +205,7 @@ static supine_status take_patient(request *wanted, supine_patient_record *record
 }
 
 static void begin(void *chosen) {
-  supine_command_model_options_begin(&((request *)chosen)->model);
+  ((request *)chosen)->model.choice = supine_precompute_choice_default();
 }
 
 /* Refuse options that set constants of the displacement law, as the patient's model has its own.

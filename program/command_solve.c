@@ -266,7 +266,7 @@ cleanup:
 }
 
 static void begin(void *chosen) {
-  supine_command_model_options_begin(&((request *)chosen)->model);
+  ((request *)chosen)->model.choice = supine_precompute_choice_default();
 }
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {

@@ -80,10 +80,6 @@ static const supine_option table[] = {
     {"json", 0, NULL, "print JSON instead of text", FILLS(json)},
     {.name = NULL}};
 
-static bool draws(const char *path) {
-  return supine_text_ends_in(path, ".png");
-}
-
 static json_t *encode(const supine_command_distance of[SUPINE_PATIENT_MAP_COUNT]) {
   json_t *all = json_object();
   for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT; ++k) {
@@ -163,7 +159,7 @@ static void set_states(const request *wanted, supine_command_subject *s) {
 
 static supine_status write_errors(const request *wanted, const supine_command_subject *s,
                                   supine_error *error) {
-  if (draws(wanted->path)) {
+  if (supine_text_ends_in(wanted->path, ".png")) {
     return supine_command_draw_errors(s, wanted->path, error);
   }
   const supine_mesh shown = {s->start.vertex_count, s->outcome[0].predicted,

@@ -7,10 +7,6 @@
 #include "program/model_options.h"
 #include "program/options/surface_options.h"
 
-void supine_command_model_options_begin(supine_model_options *options) {
-  options->choice = supine_precompute_choice_default();
-}
-
 static supine_status read_scan(const char *text, void *field, supine_error *error) {
   supine_model_choice *choice = field;
   choice->has_scan = true;
@@ -341,6 +337,6 @@ supine_status supine_command_load_lungs(const char *command, const char *operand
 
 void supine_command_model_options_free(supine_model_options *options) {
   free(options->patient_arrays);
-  supine_precompute_source_free(&options->made_from);
+  supine_lungs_free(&options->made_from.lungs);
   supine_precompute_prepared_free(&options->prepared);
 }

@@ -25,9 +25,6 @@ typedef struct supine_model_options {
   supine_findings findings;
 } supine_model_options;
 
-/* Set the defaults. `options` must be initialised to zero. */
-void supine_command_model_options_begin(supine_model_options *options);
-
 /* Load the lungs from the files `paths`, print what the checks of the files found, and prepare the
  * model.
  * @param keep  whether to use the loaded surface as the reference surface, and ignore --scanned */

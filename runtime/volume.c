@@ -40,10 +40,6 @@ static double cubic_at(const double cubic[3], double scale) {
   return scale * (cubic[0] + scale * (cubic[1] + scale * cubic[2]));
 }
 
-static double cubic_slope(const double c[3], double s) {
-  return c[0] + s * (2 * c[1] + s * 3 * c[2]);
-}
-
 /* Find the s nearest to 0, with the sign of `side` (1 or -1), at which the slope of cubic_at() is
  * 0. Return an infinite s if there is none. */
 static double cubic_turn(const double c[3], double side) {
@@ -83,7 +79,8 @@ static double cubic_solve(const double c[3], double volume, double low, double h
     } else {
       low = s;
     }
-    const double next = s - residual / cubic_slope(c, s);
+    const double slope = c[0] + s * (2 * c[1] + s * 3 * c[2]);
+    const double next = s - residual / slope;
     if (fabs(next - s) <= 1e-16 * fabs(s)) {
       return s;
     }

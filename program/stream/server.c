@@ -180,7 +180,7 @@ static double frame_due(const supine_stream_server *s) {
   if (s->patient.pending || s->latest == NULL) {
     return soonest;
   }
-  if (!supine_stream_patient_moves(&s->patient)) {
+  if (!s->options->volume->breathes && !s->patient.turning) {
     return (double)INFINITY;
   }
   /* Each message triggers a frame. After a recent message, wait two frame intervals for the next

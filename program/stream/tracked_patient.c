@@ -211,10 +211,6 @@ void supine_stream_patient_pose(supine_stream_patient *patient, const double gra
   accept_pose(patient, verdict, why, unit, received, 0);
 }
 
-bool supine_stream_patient_moves(const supine_stream_patient *patient) {
-  return patient->options->volume->breathes || patient->turning;
-}
-
 static uint64_t stamp_now(void) {
   struct timespec now;
   (void)clock_gettime(CLOCK_REALTIME, &now);

@@ -67,9 +67,6 @@ void supine_stream_patient_receive(supine_stream_patient *patient,
 void supine_stream_patient_pose(supine_stream_patient *patient, const double gravity[3],
                                 double received);
 
-/* Return whether the lungs move even without new messages. */
-bool supine_stream_patient_moves(const supine_stream_patient *patient);
-
 /* Compute the state of the lungs at `now`, and mark the newest message as shown. */
 void supine_stream_patient_snapshot(supine_stream_patient *patient, double now,
                                     supine_stream_snapshot *snapshot);
