@@ -450,19 +450,9 @@ static supine_status draw_on(cairo_surface_t *surface, supine_renderer *renderer
   return status;
 }
 
-/* Check the size of a picture and load cairo. */
-static supine_status begin(const supine_picture *picture, supine_error *error) {
-  enum { SIZE_MAX_CAIRO = 32767 };
-  return picture->width <= SIZE_MAX_CAIRO && picture->height <= SIZE_MAX_CAIRO
-             ? SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error)
-             : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                "a picture has at most %d x %d pixels: give a smaller --size",
-                                SIZE_MAX_CAIRO, SIZE_MAX_CAIRO);
-}
-
 supine_status supine_render_picture_draw(supine_renderer *renderer, const supine_picture *picture,
                                          uint32_t *pixels, supine_error *error) {
-  supine_status status = begin(picture, error);
+  supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error);
   if (status != SUPINE_OK) {
     return status;
   }
@@ -477,7 +467,7 @@ supine_status supine_render_picture_draw(supine_renderer *renderer, const supine
 supine_status supine_render_picture_save(supine_renderer *renderer, const supine_picture *picture,
                                          const char *path, supine_error *error) {
   supine_output output = {0};
-  supine_status status = begin(picture, error);
+  supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error);
   if (status != SUPINE_OK) {
     return status;
   }
