@@ -192,14 +192,11 @@ supine_status supine_options_pose_check(const supine_basis *basis, const char *c
                                         bool allow_folds, const supine_pose *pose,
                                         supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
-  double held[SUPINE_LUNGS_MAX];
+  const double volume = supine_options_basis_volume(basis, pose);
   double full = 0.0;
-  double volume = 0.0;
   char wrong[192] = "";
-  supine_basis_volumes(basis, pose, held);
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     full += info->reference_volume[lung];
-    volume += held[lung];
   }
   const double share = volume / full;
   if (info->has_rest && !(share >= least_of_full && share <= most_of_full)) {

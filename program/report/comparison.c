@@ -150,8 +150,6 @@ cleanup:
 void supine_report_free(supine_comparison *c) {
   supine_compare_destroy(c->compare);
   free(c->posture);
-  c->compare = NULL;
-  c->posture = NULL;
 }
 
 void supine_report_volume(const supine_comparison *c, char *text, size_t size) {
