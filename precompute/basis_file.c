@@ -18,7 +18,7 @@
 
 enum { ENTRIES_MAX = 64 };
 
-/* Metadata entries of a basis file. Release their values with entries_free. */
+/* Metadata entries of a basis file. Release their values with free. */
 typedef struct entries {
   size_t count;
   supine_metadata metadata[ENTRIES_MAX];
@@ -36,12 +36,6 @@ static void add(entries *list, const char *key, const char *format, ...) {
     list->failed = true;
   } else {
     list->metadata[list->count++] = (supine_metadata){key, supine_text_make_utf8(text)};
-  }
-}
-
-static void entries_free(entries *list) {
-  for (size_t i = 0; i < list->count; ++i) {
-    free((char *)list->metadata[i].value);
   }
 }
 
@@ -330,7 +324,9 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   }
   status = supine_writer_safetensors_write(path, tensors, count, list.metadata, list.count, error);
 cleanup:
-  entries_free(&list);
+  for (size_t i = 0; i < list.count; ++i) {
+    free((char *)list.metadata[i].value);
+  }
   supine_normals_modes_free(&normals);
   free(collapsed);
   free(vertices);

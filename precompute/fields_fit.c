@@ -60,11 +60,6 @@ static void fit_free(fit *f) {
   *f = (fit){0};
 }
 
-static void fitting_free(fitting *w) {
-  free(w->gram);
-  fit_free(&w->chosen);
-}
-
 static supine_status fit_create(size_t band, size_t count, const double *directions, fit *f) {
   const size_t terms = supine_sh_count(band);
   const int m = (int)count;
@@ -339,7 +334,8 @@ supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_op
     supine_projection_compression_free(&made);
   }
   supine_projection_free(&projection);
-  fitting_free(&w);
+  free(w.gram);
+  fit_free(&w.chosen);
   return status;
 }
 

@@ -130,12 +130,6 @@ static supine_status print(const supine_patient_record *record, const char *made
   return SUPINE_OK;
 }
 
-static void scan_data_free(scan_data *data) {
-  supine_lungs_free(&data->lungs[0]);
-  supine_lungs_free(&data->lungs[1]);
-  supine_patient_pairs_free(&data->pairs);
-}
-
 /* Return the volume that the lungs' surface encloses, mL; 0 if there is no surface. */
 static double volume_of(const supine_lungs *lungs) {
   return lungs->mesh.vertex_count > 0 ? 1e-3 * supine_mesh_volume(&lungs->mesh) : 0.0;
@@ -365,11 +359,8 @@ static void warn_of_rest(const supine_patient_record *record) {
 static void set_name_and_force(const request *wanted, supine_patient_record *record) {
   const supine_model deep = supine_physics_model(SUPINE_LAW_DEEP);
   const char *path = wanted->landmarks.path != NULL ? wanted->landmarks.path : wanted->second_path;
-  const char *slash = strrchr(path, '/');
   (void)snprintf(record->name, sizeof record->name, "%s",
-                 wanted->name != NULL ? wanted->name
-                 : slash != NULL      ? slash + 1
-                                      : path);
+                 wanted->name != NULL ? wanted->name : basename(path));
   record->force =
       supine_patient_force(&record->patient.power, deep.force.gain, record->state[1].gravity);
 }
@@ -404,7 +395,9 @@ static supine_status fit(const request *wanted, supine_patient_record *record,
     set_name_and_force(wanted, record);
     status = fit_gravity_factor(wanted, &data, record, error);
   }
-  scan_data_free(&data);
+  supine_lungs_free(&data.lungs[0]);
+  supine_lungs_free(&data.lungs[1]);
+  supine_patient_pairs_free(&data.pairs);
   return status;
 }
 

@@ -241,13 +241,6 @@ static supine_status find(const supine_locate_task *task, bool posture_given,
   return status;
 }
 
-static void free_found(lungs_found *located) {
-  free(located->residuals);
-  free(located->xyz);
-  free(located->sigma);
-  free(located->space);
-}
-
 static supine_status write_surface(const char *path, const supine_basis *basis,
                                    const lungs_found *located, supine_error *error) {
   const supine_tensor *lung = supine_basis_tensor(basis, "lung");
@@ -374,7 +367,10 @@ static supine_status locate(const request *wanted, const supine_basis *lungs,
     status = csv ? write_points(wanted->output, inside, names, &located, error)
                  : write_surface(wanted->output, lungs, &located, error);
   }
-  free_found(&located);
+  free(located.residuals);
+  free(located.xyz);
+  free(located.sigma);
+  free(located.space);
   return status;
 }
 

@@ -2,6 +2,7 @@
 /* Run the Pitcher/Catcher iteration as published: equations (5)-(14) of [Santhanam2008]. */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "precompute/physics/equilibrium.h"
 
@@ -18,16 +19,6 @@ typedef struct iteration {
    * leaf of node j. Element k < nodes is the winner of the elements 2 k and 2 k + 1. */
   size_t *largest;
 } iteration;
-
-static void iteration_free(iteration *it) {
-  free(it->neighbours_begin);
-  free(it->neighbours);
-  free(it->passed_share);
-  free(it->kept_share);
-  free(it->pitcher);
-  free(it->catcher);
-  free(it->largest);
-}
 
 /* Update the tree it->largest after it->pitcher[node] has changed. */
 static void update(iteration *it, size_t node) {
@@ -151,11 +142,15 @@ supine_physics_pitcher_catcher(const supine_mesh *mesh, const supine_topology *t
     }
     distribute(&it, it.largest[1]);
   }
-  for (size_t i = 0; i < n; ++i) {
-    masses[i] = it.catcher[i];
-  }
+  memcpy(masses, it.catcher, n * sizeof *masses);
 cleanup:
-  iteration_free(&it);
+  free(it.neighbours_begin);
+  free(it.neighbours);
+  free(it.passed_share);
+  free(it.kept_share);
+  free(it.pitcher);
+  free(it.catcher);
+  free(it.largest);
   free(scaled);
   return status;
 }
