@@ -10,10 +10,9 @@
 #include "sh/base/clones.h"
 #include "sh/base/parallel.h"
 
-/* Vertices are sorted along a Morton curve (1966) through 32 x 32 x 32 cells. BLOCK consecutive
- * vertices form a block, and GROUP blocks form a group. The search skips blocks and groups whose
- * bounding boxes cannot contain a new greatest height. It handles LANES directions together. */
-enum { BLOCK = 64, GROUP = 32, CELL_BITS = 5, CELLS = 1 << (3 * CELL_BITS), LANES = 8 };
+/* BLOCK consecutive vertices form a block. The search skips blocks whose bounding boxes cannot
+ * contain a new greatest height. It handles LANES directions together. */
+enum { BLOCK = 64, LANES = 8 };
 
 typedef struct block_box {
   double centre[3];
@@ -22,9 +21,8 @@ typedef struct block_box {
 
 typedef struct range_work {
   size_t vertex_count;
-  const double *vertices;  /* [vertex_count, 3] sorted along a Morton curve, mm */
-  const block_box *boxes;  /* [box_count] bounding box of each block of BLOCK vertices */
-  const block_box *groups; /* bounding box of each GROUP consecutive elements of `boxes` */
+  const double *vertices; /* [vertex_count, 3] mm */
+  const block_box *boxes; /* [box_count] bounding box of each block of BLOCK vertices */
   size_t box_count;
   size_t direction_count;
   const double *directions;
@@ -88,14 +86,10 @@ static inline void raise_best(const range_work *work, size_t block, lanes *at) {
  * first. Return the block searched last, a good seed for similar directions. */
 static inline size_t search(const range_work *work, size_t seed, lanes *at) {
   raise_best(work, seed, at);
-  for (size_t first = 0; first < work->box_count; first += GROUP) {
-    for (size_t block = first; may_improve(&work->groups[first / GROUP], at) &&
-                               block < first + GROUP && block < work->box_count;
-         ++block) {
-      if (may_improve(&work->boxes[block], at)) {
-        raise_best(work, block, at);
-        seed = block;
-      }
+  for (size_t block = 0; block < work->box_count; ++block) {
+    if (may_improve(&work->boxes[block], at)) {
+      raise_best(work, block, at);
+      seed = block;
     }
   }
   return seed;
@@ -126,41 +120,6 @@ SUPINE_CLONES static void height_range(void *context, size_t begin, size_t end, 
   }
 }
 
-/* Return the index, along the Morton curve, of the cell that contains the vertex p. */
-static size_t cell_of(const block_box *box, const double *p) {
-  size_t cell = 0;
-  for (size_t k = 0; k < 3; ++k) {
-    const double share = 0.5 + 0.5 * (p[k] - box->centre[k]) / box->half[k]; /* 0 to 1 */
-    const size_t step = (size_t)(share * ((1 << CELL_BITS) - 1));
-    for (size_t bit = 0; bit < CELL_BITS; ++bit) {
-      cell |= (step >> bit & 1) << (3 * bit + k);
-    }
-  }
-  return cell;
-}
-
-/* Sort the vertices along the Morton curve by counting sort, into sorted [count, 3]. begin [CELLS +
- * 1] is work space and must be zero. */
-static void sort_vertices(const double *vertices, size_t count, size_t *begin, double *sorted) {
-  const block_box box = box_of(vertices, count);
-  for (size_t i = 0; i < count; ++i) {
-    ++begin[cell_of(&box, vertices + 3 * i) + 1];
-  }
-  for (size_t c = 0; c < CELLS; ++c) {
-    begin[c + 1] += begin[c];
-  }
-  for (size_t i = 0; i < count; ++i) {
-    memcpy(sorted + 3 * begin[cell_of(&box, vertices + 3 * i)]++, vertices + 3 * i,
-           3 * sizeof *sorted);
-  }
-}
-
-static void find_boxes(const double *vertices, size_t count, size_t size, block_box *boxes) {
-  for (size_t i = 0; i < count; i += size) {
-    boxes[i / size] = box_of(vertices + 3 * i, count - i < size ? count - i : size);
-  }
-}
-
 supine_status supine_physics_height_range(const supine_lungs *lungs, bool pair, size_t count,
                                           const double *directions, double *minimum,
                                           double *maximum) {
@@ -168,28 +127,22 @@ supine_status supine_physics_height_range(const supine_lungs *lungs, bool pair, 
   const size_t n = pair && lungs->lung_count == 1 ? 2 * single : single;
   const size_t box_count = (n + BLOCK - 1) / BLOCK;
   block_box *boxes = malloc((box_count + 1) * sizeof *boxes);
-  block_box *groups = malloc((box_count / GROUP + 1) * sizeof *groups);
   double *vertices = malloc((3 * n + 1) * sizeof *vertices);
-  double *sorted = malloc((3 * n + 1) * sizeof *sorted);
-  size_t *begin = calloc(CELLS + 1, sizeof *begin);
   supine_status status = SUPINE_ERROR_MEMORY;
-  if (boxes != NULL && groups != NULL && vertices != NULL && sorted != NULL && begin != NULL) {
-    range_work work = {n, sorted, boxes, groups, box_count, count, directions, minimum, maximum};
+  if (boxes != NULL && vertices != NULL) {
+    range_work work = {n, vertices, boxes, box_count, count, directions, minimum, maximum};
     memcpy(vertices, lungs->mesh.vertices, 3 * single * sizeof *vertices);
     for (size_t i = 3 * single; i < 3 * n; ++i) { /* append the mirror image of a single lung */
       const double at = vertices[i - 3 * single];
       vertices[i] = i % 3 == 0 ? 2.0 * lungs->midline - at : at;
     }
-    sort_vertices(vertices, n, begin, sorted);
-    find_boxes(sorted, n, BLOCK, boxes);
-    find_boxes(sorted, n, GROUP * BLOCK, groups);
+    for (size_t i = 0; i < n; i += BLOCK) {
+      boxes[i / BLOCK] = box_of(vertices + 3 * i, n - i < BLOCK ? n - i : BLOCK);
+    }
     supine_parallel_for((count + LANES - 1) / LANES, 4, 0, height_range, &work);
     status = SUPINE_OK;
   }
   free(boxes);
-  free(groups);
   free(vertices);
-  free(sorted);
-  free(begin);
   return status;
 }
