@@ -46,20 +46,20 @@ supine_status supine_export_breath_pose(const export_source *source, double brea
 
 /** Structures inside the lungs, such as airways, with the names that 'supine embed' has stored. */
 typedef struct export_parts {
-  size_t count;       /**< at least 1 */
+  size_t count;       /**< number of structures, at least 1 */
   char *const *name;  /**< [count] names of the structures */
-  const uint32_t *of; /**< [N] for each vertex, the index in `name` of its structure */
+  const uint32_t *of; /**< [N] structure of each vertex, as an index into `name` */
 } export_parts;
 
 typedef struct export_glb_options {
-  bool plain;   /**< If true, store floats, and keep the basis's order of vertices. If false, store
-                   compressed integers (KHR_mesh_quantization, EXT_meshopt_compression). This rounds
-                   positions to 0.045 mm (more coarsely in lungs longer than 1.47 m). Up to 500 mL
-                   above rest, positions then err by at most 0.1 mm */
-  bool animate; /**< true: add five animations of breathing: one while the patient turns, and four
-                   in the lying postures */
-  double
-      breath; /**< tidal volume, mL; weights of morph targets are between 0 and 1 in this breath */
+  bool plain;    /**< If true, store floats, and keep the basis's order of vertices. If false, store
+                    compressed integers (KHR_mesh_quantization, EXT_meshopt_compression). This rounds
+                    positions to 0.045 mm (more coarsely in lungs longer than 1.47 m). Up to 500 mL
+                    above rest, positions then err by at most 0.1 mm */
+  bool animate;  /**< true: add five animations of breathing: one while the patient turns, and four
+                    in the lying postures */
+  double breath; /**< tidal volume, mL; during the breath, weights of morph targets stay between
+                    0 and 1, to which viewers clamp them */
 } export_glb_options;
 
 /** Write a glTF 2.0 binary file. Each lung is a mesh whose morph targets j move vertex i to
@@ -90,9 +90,9 @@ typedef struct export_page {
   const supine_pose *from; /**< pose from which displacements are measured */
   const char *from_name;   /**< name of `from`, for example "supine at rest" */
   const char *title;       /**< title of the page, UTF-8 */
-  /** Basis that 'supine embed' has made for structures inside the lungs; NULL to show none. */
+  /** Basis of the structures inside the lungs, made by 'supine embed'; NULL to show none. */
   const export_source *inside;
-  const export_parts *parts; /**< names of the structures of `inside`; unused if `inside` is NULL */
+  const export_parts *parts; /**< names of the structures; unused if `inside` is NULL */
   bool live;                 /**< true to show also the states that 'supine stream' sends */
 } export_page;
 

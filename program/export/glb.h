@@ -31,7 +31,7 @@ typedef struct glb {
   export_order order;
   float *xyz;     /**< [N, 3] workspace */
   float *normals; /**< [N, 3] unit normals of the base mesh */
-  float *added;   /**< [targets.count, N, 3] vectors that each target at weight 1 adds to normals */
+  float *added; /**< [targets.count, N, 3] change of the normals by each morph target at weight 1 */
   uint8_t *colours; /**< [N, 4] linear RGBA of vertices */
   double step;      /**< unit of stored positions and displacements, mm; 1 if options->plain */
   json_t *views, *accessors, *meshes, *nodes, *materials, *animations;

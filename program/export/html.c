@@ -22,8 +22,8 @@ typedef struct page {
   const export_page *shown;
   double middle[3];        /* origin of stored positions, mm: centre of the bounding box */
   double position_step;    /* quantisation step of positions, mm */
-  double coefficient_step; /* quantisation step of the coefficients of the surface, mm */
-  double inside_step;      /* quantisation step of the coefficients of shown->inside, mm */
+  double coefficient_step; /* quantisation step of the surface's displacements by modes, mm */
+  double inside_step;      /* the same for structures inside the lungs, mm */
   export_order order;      /* order of stored vertices and triangles of the surface */
   supine_status *status;
 } page;
@@ -92,18 +92,18 @@ static int16_t coarse(int32_t number, int bits, int shift) {
   return (int16_t)((steps < most ? steps : most) + NORMAL_BIAS);
 }
 
-/* Fill a row with the normals of a vertex in all modes, as takeNormals in basis.js reads them. Each
- * of the `count` words from supine_gl_pack_normals has three signed numbers. The row has the first
- * numbers of all words, then the second, then the third. They are rounded to fewer bits. */
+/* Fill `row` [3, count] with the vectors whose weighted sum is the normal of a vertex. They come in
+ * `count` words of three signed numbers with 13, 10 and 9 bits. Round number j of word i to fewer
+ * bits, and store it at row[j * count + i], as takeNormals in basis.js expects it. */
 static void normal_row(const page *p, const export_source *s, size_t vertex, int16_t *row) {
   uint32_t words[3 * NORMAL_WORDS];
   const size_t count = (s->info->normal_count + 2) / 3 * 3;
   (void)p;
   (void)supine_gl_pack_normals(s->basis, vertex, vertex + 1, words);
   for (size_t i = 0; i < count; ++i) {
-    row[i] = coarse((int32_t)words[i] >> 19, 12, 2);                    /* 13 bits to 11 */
-    row[count + i] = coarse((int32_t)(words[i] << 13) >> 22, 9, 2);     /* 10 bits to 8 */
-    row[2 * count + i] = coarse((int32_t)(words[i] << 23) >> 23, 8, 1); /* 9 bits to 8 */
+    row[i] = coarse((int32_t)words[i] >> 19, 12, 2);                    /* round to 11 bits */
+    row[count + i] = coarse((int32_t)(words[i] << 13) >> 22, 9, 2);     /* round to 8 bits */
+    row[2 * count + i] = coarse((int32_t)(words[i] << 23) >> 23, 8, 1); /* round to 8 bits */
   }
 }
 

@@ -34,9 +34,8 @@ supine_status supine_export_pack_corners(const uint32_t *corners, size_t count, 
 
 /** Order in which vertices and triangles are written, lung by lung. */
 typedef struct export_order {
-  uint32_t *vertex; /**< [N] for each vertex in the file, its index in the basis */
-  uint32_t
-      *corners; /**< [triangles, 3] for each triangle, the indices in the file of its vertices */
+  uint32_t *vertex;  /**< [N] for each vertex in the file, its index in the basis */
+  uint32_t *corners; /**< [triangles, 3] vertices of each triangle, as indices into `vertex` */
   size_t corner_begin[SUPINE_LUNGS_MAX + 1]; /**< for each lung, the index in `corners` of its first
                                                 corner; then the total number of corners */
 } export_order;

@@ -10,9 +10,9 @@ enum { DIRECTIONS = 4096 }; /* number of sampled directions of gravity */
 /* The range of each weight in the sampled directions is extended by this fraction at both ends. */
 static const double margin = 0.02;
 
-/* Split a lung's gains, the factors of the displacement along each axis, into parts without and
- * with the constants `bend` of the basis: set `split` to {s, t}, where gains[axis] = s + t
- * bend[axis]. All gains have this form; use the axes with the smallest and the largest bend. */
+/* Set `split` to {s, t}, such that gains[axis] = s + t bend[axis] on all three axes. `gains` are
+ * the factors of a lung's displacement along the axes; `bend` has the three constants of the basis.
+ * Compute s and t from the axes with the smallest and the largest bend. */
 static void split_gains(const double bend[3], const double gains[3], double split[2]) {
   size_t low = 0;
   size_t high = 0;
@@ -24,7 +24,7 @@ static void split_gains(const double bend[3], const double gains[3], double spli
   split[0] = gains[low] - split[1] * bend[low];
 }
 
-/* Compute the factor of each displacement field of a lung in a pose (amount_j in targets.h). */
+/* Compute the factor that multiplies each displacement field of a lung in a pose. */
 static void find_amounts(const export_source *source, size_t count, const supine_pose *pose,
                          size_t lung, double *amounts) {
   const size_t k = source->info->mode_count;
@@ -44,10 +44,10 @@ void supine_export_targets_weights(const export_source *source, const export_tar
   }
 }
 
-/* Find the range of the factor of each displacement field: the smallest and the largest factor in
- * any sampled direction of gravity and phase of the breath. Within a large breath the factors of
- * the paths' curvature pass an extremum, which 10 steps miss by less than `margin`.
- * Set the offset of the morph target to the smallest factor, and its unit to the difference. */
+/* Find the smallest and the largest factor of each displacement field in any sampled direction of
+ * gravity and phase of the breath. Within a large breath, some factors pass an extremum; 10 steps
+ * miss it by less than `margin`. Set `offset` to the smallest factor, at which the morph target has
+ * weight 0, and `unit` to the difference from the largest, at which it has weight 1. */
 static supine_status find_ranges(const export_source *source, double breath,
                                  export_targets *targets, supine_error *error) {
   enum { STEPS = 10, PHASES = STEPS + 1 };
@@ -111,8 +111,7 @@ void supine_export_targets_field(const export_source *source, size_t vertex, siz
   }
 }
 
-/* Add amount[j] times displacement field j at a vertex to the position `xyz`, mm, for each j below
- * `count`. */
+/* Add the displacement fields at a vertex, times `amount` [count], to the position `xyz`, mm. */
 static void add_fields(const export_source *source, size_t count, const double *amount,
                        size_t vertex, double xyz[3]) {
   for (size_t j = 0; j < count; ++j) {
@@ -132,8 +131,8 @@ void supine_export_targets_base(const export_source *source, const export_target
   add_fields(source, targets->count, targets->lung[lung].offset, vertex, xyz);
 }
 
-/* Compute the normals [N, 3] of the surface at the weights of each lung, after adding `step` to the
- * weight of target `j` in every lung. `xyz` [N, 3] is workspace. */
+/* Compute the normals [N, 3] of the surface at the morph targets' `weights` in each lung. First add
+ * `step` to the weight of target `j` in every lung. `xyz` [N, 3] is workspace. */
 static void find_normals(const export_source *source, const export_targets *targets,
                          double (*weights)[EXPORT_TARGETS_MAX], size_t j, double step, float *xyz,
                          float *normals) {
@@ -155,11 +154,11 @@ static void find_normals(const export_source *source, const export_targets *targ
   supine_normals(source->basis, xyz, normals);
 }
 
-/* Divide each base normal by its length, because glTF requires unit normals. Divide the vectors
- * that targets add to a normal by the same length: engines normalise the sum. */
+/* Divide each base normal by its length, because glTF requires unit normals. Divide the changes of
+ * this normal by morph targets by the same length: viewers normalise the sum. */
 static void make_unit(const export_source *source, const export_targets *targets, float *base,
                       float *added) {
-  static const double least = 0.2; /* smallest length by which added vectors are divided */
+  static const double least = 0.2; /* smallest divisor of the changes */
   const size_t n = source->info->vertex_count;
   for (size_t i = 0; i < n; ++i) {
     float *b = base + 3 * i;
@@ -177,15 +176,15 @@ static void make_unit(const export_source *source, const export_targets *targets
   }
 }
 
-/* Round the vectors `added`, which morph targets add to normals, so that they compress well.
- * Components become multiples of 1 / INT8_MAX. A component that is nearly equal to that of the
- * previous vertex (in `order`) becomes equal to it. Then correct the normals `base` of the base
- * mesh such that the normals at the targets' weights `weights` stay the same. */
+/* Round the changes of normals by morph targets, `added`, so that they compress well. Components
+ * become multiples of 1 / INT8_MAX, or equal to that of the previous vertex (in `order`) if they
+ * nearly are. Then correct the normals `base` of the base mesh, to keep the normals that the
+ * targets' `weights` give: `base` plus the sum of weight times change. */
 static void round_changes(const export_source *source, const export_targets *targets,
                           double (*weights)[EXPORT_TARGETS_MAX], const uint32_t *order, float *base,
                           float *added) {
-  static const float near =
-      2.0F / INT8_MAX; /* components that differ by this or less are made equal */
+  /* A component that differs by at most this from that of the previous vertex becomes equal. */
+  static const float near = 2.0F / INT8_MAX;
   const supine_basis_info *info = source->info;
   for (size_t i = 0, lung = 0; i < info->vertex_count; ++i) {
     lung += i == info->lung_begin[lung + 1];
@@ -213,7 +212,7 @@ supine_status supine_export_targets_normals(const export_source *source, double 
                                             float *base, float *added, supine_error *error) {
   static const double supine[3] = {0, 1, 0};
   static const double step = 0.2; /* change of a weight for central differences */
-  /* RMS change of a lung's normals by a target, radians; smaller changes are set to 0. */
+  /* Changes of a lung's normals by a morph target are set to 0 if their RMS is less, radians. */
   static const double least = 0.044;
   const size_t n = source->info->vertex_count;
   supine_pose pose;

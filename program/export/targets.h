@@ -8,21 +8,20 @@
 
 enum { EXPORT_TARGETS_MAX = 2 * SUPINE_MODES_MAX };
 
-/** Offset and unit of each morph target of one lung. The displacement of a lung is a sum of fixed
- * fields times amounts that depend on gravity and volume. Each field gives a morph target:
+/** Offset and unit of each morph target of one lung. The basis gives the displacement of a lung as
+ * the sum over j of amount_j field_j. Only the amounts depend on gravity and volume:
  *
- *     vertex - middle + sum over j of amount_j field_j = base + sum over j of weight_j target_j
- *     base = vertex - middle + sum over j of offset_j field_j
- *     target_j = unit_j field_j
- *     weight_j = (amount_j - offset_j) / unit_j
+ *     mode j of K  field_j is the displacement by the mode, as stored in the basis;
+ *                  amount_j is s times the weight of the mode
+ *     K + j        field_(K+j), if bend is not 0, is field_j times bend[axis] along each axis;
+ *                  amount_(K+j) is t times the weight of mode j
  *
- *     vertex   position on the reference surface
- *     middle   centre of the bounding box
- *     field_j  for j < K, the number of modes: displacement by mode j, as stored in the basis;
- *              field_(K+j), if bend is not 0: field_j times bend[axis] along each axis
- *     amount   amount_j = s v_j and amount_(K+j) = t v_j, where v_j is the weight of mode j, and
- *              s + t bend[axis] is the gain: the factor of the displacement along an axis
- *     bend     constants of the basis, see supine_volume_bend
+ * s and t depend on the volume: s + t bend[axis] multiplies the displacement along an axis. `bend`
+ * has a constant of the basis for each axis (supine_volume_bend). In the file, a lung has a base
+ * mesh and a morph target for each field. The base plus all weight_j target_j is its shape:
+ *
+ *     base = reference position - export_targets.middle + sum over j of offset_j field_j
+ *     target_j = unit_j field_j            weight_j = (amount_j - offset_j) / unit_j
  *
  * Offset and unit keep the weights within [0, 1], to which viewers clamp them, for every direction
  * of gravity and every volume of the breath. */
@@ -47,17 +46,17 @@ supine_status supine_export_targets_choose(const export_source *source, double b
 void supine_export_targets_weights(const export_source *source, const export_targets *targets,
                                    const supine_pose *pose, size_t lung, double *weights);
 
-/** Compute the vector `u`, mm, at a vertex of the displacement field on which morph target `j` is
- * based (field_j of export_weights). */
+/** Compute the displacement `u`, mm, of a vertex by morph target `j`, before scaling by its unit:
+ * field_j of export_weights. */
 void supine_export_targets_field(const export_source *source, size_t vertex, size_t j, double u[3]);
 
 /** Compute the position of a vertex in a lung's base mesh, mm, relative to `targets->middle`. */
 void supine_export_targets_base(const export_source *source, const export_targets *targets,
                                 size_t lung, size_t vertex, double xyz[3]);
 
-/** Compute the normals `base` [N, 3] of the base mesh, and the vectors `added` [count, N, 3] that
- * each morph target at weight 1 adds to them. They linearise the normals of the deformed surface
- * about the supine posture.
+/** Compute the normals `base` [N, 3] of the base mesh, and the change of the normals by each morph
+ * target at weight 1, `added` [targets->count, N, 3]. Both linearise the normals of the deformed
+ * surface about the supine posture.
  * @param order  [N] order in which the file stores vertices. `added` is then rounded so that it
  *               compresses well in this order, and is 0 for a target that turns a lung's normals
  *               by less than 2.5 degrees (RMS). NULL to keep `added` exact

@@ -241,7 +241,7 @@ namespace Supine
             return frame;
         }
 
-        // Returns where number i of a frame is stored in `pose`.
+        // Returns the index in `pose` of the i-th number of a frame.
         int PoseIndex(int i)
         {
             return i < modes ? i : ModesMax + i - modes;

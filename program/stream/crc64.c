@@ -12,14 +12,14 @@
 
 static const uint64_t polynomial = 0x42F0E1EBA9EA3693u; /* CRC polynomial without its term x^64 */
 
-/* Distances, bytes, from 16 bytes of a message to the later 16 bytes to which fold() adds them. */
-enum { NEAR, FAR, FARTHEST, STEPS };
-static const size_t distance[STEPS] = {16, 64, 256};
+/* Indices of `distance`. fold() carries 16 bytes of a message forward by such a distance, bytes. */
+enum { NEAR, FAR, FARTHEST, DISTANCES };
+static const size_t distance[DISTANCES] = {16, 64, 256};
 
-/* Tables modulo the CRC polynomial, computed once:
- *     table[b] = b(x) x^64   where b(x) has the bits of the byte b as coefficients
- *     power[i] = {x^n, x^(n + 64)}   where n = 8 distance[i], the distance in bits; for fold() */
-static struct { uint64_t table[256], power[STEPS][2]; } known;
+/* Polynomials modulo the CRC polynomial, computed once:
+ *     table  [256] CRC of each byte: x^64 times the polynomial with the byte's bits as coefficients
+ *     power  {x^n, x^(n + 64)} for each distance, where n is the distance in bits; for fold() */
+static struct { uint64_t table[256], power[DISTANCES][2]; } known;
 static pthread_once_t once = PTHREAD_ONCE_INIT;
 
 static uint64_t times_x(uint64_t a) {
@@ -58,7 +58,7 @@ static void make_tables(void) {
     }
     known.table[b] = value;
   }
-  for (int i = 0; i < STEPS; ++i) {
+  for (int i = 0; i < DISTANCES; ++i) {
     known.power[i][0] = power_of(distance[i]);
     known.power[i][1] = power_of(distance[i] + 8);
   }

@@ -32,7 +32,7 @@ struct supine_stream_frames {
   bool ras;
   uint64_t newest_number;
   uint32_t *strips;   /* for each triangle strip: number of corners, then corners; big-endian */
-  size_t strips_size; /* bytes */
+  size_t strips_size; /* size of `strips`, bytes */
   size_t strips_count;
   uint64_t strips_crc;
   supine_stream_frame *unused; /* list of frames that can be reused */
@@ -157,7 +157,7 @@ static void encode_points(const supine_stream_frames *f, size_t count, float *xy
   supine_stream_encode_floats(3 * count, xyz);
 }
 
-/* Compute positions and expected errors from the fit snapshot.location; return false on failure. */
+/* Compute positions and their errors from the fit to observed points; return false on failure. */
 static bool compute_located_points(supine_stream_frames *f, supine_stream_frame *frame) {
   const size_t count = f->info->vertex_count;
   float *sigma = (void *)(frame->errors + supine_stream_attribute_head(count, frame->errors));
@@ -171,13 +171,12 @@ static bool compute_located_points(supine_stream_frames *f, supine_stream_frame 
   return true;
 }
 
-/* Data of the threads that compute points. Each thread computes a range of the vertices, and writes
- * the checksum and the size of their positions. */
+/* Data of the threads that compute points, each of them for a range of the vertices. */
 typedef struct points_work {
   const supine_stream_frames *frames;
   const supine_stream_frame *frame;
-  uint64_t crc[THREADS_MAX];
-  size_t size[THREADS_MAX]; /* size of each thread's positions, bytes; 0 for unused threads */
+  uint64_t crc[THREADS_MAX]; /* checksum of the positions that each thread has computed */
+  size_t size[THREADS_MAX];  /* size of these positions, bytes; 0 for unused threads */
 } points_work;
 
 static void compute_range(void *context, size_t begin, size_t end, size_t thread) {
@@ -192,8 +191,7 @@ static void compute_range(void *context, size_t begin, size_t end, size_t thread
   }
 }
 
-/* Compute a frame's points from the fit snapshot.location, or from snapshot.pose if there is no
- * usable fit. */
+/* Compute a frame's points from the fit in snapshot.location, or else from snapshot.pose. */
 static void compute_points(supine_stream_frames *f, supine_stream_frame *frame) {
   points_work p = {.frames = f, .frame = frame};
   if (frame->snapshot.location != NULL && compute_located_points(f, frame)) {
@@ -206,7 +204,7 @@ static void compute_points(supine_stream_frames *f, supine_stream_frame *frame) 
   }
 }
 
-/* Write the NDARRAY of weights and gains; return its size in bytes. */
+/* Write the NDARRAY of mode weights and displacement factors; return its size in bytes. */
 static size_t put_weights(const supine_stream_frames *f, const supine_stream_snapshot *snapshot,
                           unsigned char *bytes) {
   const size_t modes = f->info->mode_count;

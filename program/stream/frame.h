@@ -18,14 +18,14 @@
 
 /** Content sent to a peer. */
 typedef enum supine_stream_content {
-  SUPINE_STREAM_WEIGHTS = 0, /**< NDARRAY of weights and gains */
+  SUPINE_STREAM_WEIGHTS = 0, /**< NDARRAY of mode weights and displacement factors */
   SUPINE_STREAM_POINTS,      /**< POLYDATA, with triangles only in the first frame for a peer */
   SUPINE_STREAM_SURFACE,     /**< POLYDATA with triangles in every frame, as most viewers require */
   SUPINE_STREAM_SILENCE,
   SUPINE_STREAM_CONTENT_COUNT
 } supine_stream_content;
 
-/** Names of the contents: "weights", "points", "surface", "nothing"; then NULL. */
+/** Names of the contents by their number: "weights", "points", "surface", "nothing"; then NULL. */
 extern const char *const supine_stream_content_names[SUPINE_STREAM_CONTENT_COUNT + 1];
 
 /** State of the lungs at one time. */
@@ -51,8 +51,8 @@ typedef struct supine_stream_frame {
   bool has_points; /**< true if `points` and `points_crc` are computed */
   float *points;   /**< [N, 3] positions as sent, big-endian */
   uint64_t points_crc;
-  unsigned char *errors; /**< attribute with the expected error of each vertex, as sent; unused if
-                            snapshot.location is NULL */
+  unsigned char *errors; /**< bytes of the POLYDATA attribute with the expected error of each
+                            vertex; unused if snapshot.location is NULL */
   struct supine_stream_frame *next; /**< next frame in the list of unused frames */
 } supine_stream_frame;
 
@@ -76,11 +76,11 @@ void supine_stream_frame_release(supine_stream_frames *frames, supine_stream_fra
 
 enum {
   SUPINE_STREAM_PIECES = 4, /* largest number of pieces (ranges of bytes) of a message */
-  /* Size of the first piece, bytes, with room for a whole message of weights. */
+  /* Size of the buffer for the first piece, bytes, with room for a whole message of weights. */
   SUPINE_STREAM_FRONT = SUPINE_STREAM_HEADER + 40 + 4 * (SUPINE_MODES_MAX + 3 * SUPINE_LUNGS_MAX)
 };
 
-/** A message to send, as a list of ranges of bytes (pieces). The first piece is `front`. */
+/** A message to send, as a list of ranges of bytes (pieces). The first piece is in `front`. */
 typedef struct supine_stream_packet {
   unsigned char front[SUPINE_STREAM_FRONT];
   struct iovec piece[SUPINE_STREAM_PIECES];

@@ -11,7 +11,7 @@
 /* A matrix that deviates from a rotation by at most this counts as exact. Rounding to 32-bit floats
  * causes deviations of 1e-6, the arithmetic of trackers up to about 1e-4. */
 static const double exact_max = 1e-3;
-static const double repaired_max = 0.1; /* largest stretch or shear of a matrix that is accepted */
+static const double repaired_max = 0.1; /* a matrix with more stretch or shear is refused */
 
 supine_stream_setup supine_stream_setup_default(void) {
   return (supine_stream_setup){.down = {0, 0, -1}, .body = {1, 0, 0, 0, 1, 0, 0, 0, 1}};

@@ -42,8 +42,8 @@ supine_stream_verdict supine_stream_gravity_rotation(const supine_stream_setup *
                                                      const double rotation[9], double gravity[3],
                                                      const char **why);
 
-/** Compute the direction of gravity from a quaternion (w, x, y, z). The quaternion is refused if it
- * is zero or not finite, and repaired if its length differs from 1 by more than 0.001. */
+/** Compute the direction of gravity from a quaternion (w, x, y, z), normalised first. It is refused
+ * if it is zero or not finite, and counts as repaired if its length is not 1 within 0.001. */
 supine_stream_verdict supine_stream_gravity_quaternion(const supine_stream_setup *setup,
                                                        const double quaternion[4],
                                                        double gravity[3], const char **why);

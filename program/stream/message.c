@@ -207,7 +207,7 @@ static void array(cursor *c, supine_stream_message *m, supine_stream_kind kind, 
 }
 
 static void string(cursor *c, supine_stream_message *m, supine_stream_kind kind) {
-  (void)pass(c, 2); /* skip the encoding, because valid texts are ASCII in every encoding */
+  (void)pass(c, 2); /* skip the encoding: valid texts are ASCII, which all encodings share */
   const size_t length = (size_t)whole(c, 2);
   const unsigned char *text = pass(c, length);
   if (c->overrun == 0 && length < sizeof m->text) {

@@ -45,12 +45,11 @@ typedef enum supine_stream_kind {
   SUPINE_STREAM_NOTHING = 0, /**< message that is ignored because of its type or device */
   SUPINE_STREAM_ROTATION,    /**< number[0..8]: matrix from tracker to world axes, row by row;
                                   number[9..11]: position, mm; text: name of the device */
-  SUPINE_STREAM_POSITION,    /**< number and text as for SUPINE_STREAM_ROTATION, but the matrix is
-                                  not used */
-  SUPINE_STREAM_POINT_LIST,  /**< points: supine_stream_message_point reads one of them */
-  SUPINE_STREAM_QUATERNION,  /**< number[0..3]: w, x, y, z of the tracker-to-world rotation */
-  SUPINE_STREAM_DOWN,        /**< number[0..2]: direction of gravity in tracker axes */
-  SUPINE_STREAM_VOLUME,      /**< number[0]: volume above rest in the posture, mL */
+  SUPINE_STREAM_POSITION,   /**< number[9..11]: position of an observed point, mm; text: its name */
+  SUPINE_STREAM_POINT_LIST, /**< points: supine_stream_message_point reads one of them */
+  SUPINE_STREAM_QUATERNION, /**< number[0..3]: w, x, y, z of the tracker-to-world rotation */
+  SUPINE_STREAM_DOWN,       /**< number[0..2]: direction of gravity in tracker axes */
+  SUPINE_STREAM_VOLUME,     /**< number[0]: volume above rest in the posture, mL */
   SUPINE_STREAM_VOLUME_TEXT, /**< text: a volume such as rest+500 or 2600mL */
   SUPINE_STREAM_REQUEST      /**< text: name of the content that the peer asks for */
 } supine_stream_kind;
@@ -73,15 +72,15 @@ void supine_stream_message_point(const supine_stream_message *message, size_t po
 int supine_stream_message_is_known(const supine_stream_header *header);
 
 /** Decode the body of a message. Its numbers may be infinite or not-a-number. These messages are
- * used, depending on the device name in the header:
+ * used, depending on the device name in the header. A QTDATA has the poses of several instruments:
  *
  *     device name  type          meaning
  *     `device`     TRANSFORM     rotation and position of the tracker
  *     `device`     POSITION      rotation of the tracker, as a quaternion
  *     `device`     NDARRAY of 3  direction of gravity
- *     `device`     QTDATA        rotation of the last instrument
+ *     `device`     QTDATA        rotation of the last instrument in the message
  *     another      TRANSFORM     position of the observed point with this name
- *     another      QTDATA        rotation of the instrument named `device`
+ *     another      QTDATA        rotation of the instrument that is named `device` in the message
  *     any          POINT         positions of observed points
  *     "VOLUME"     NDARRAY of 1  volume above rest, mL
  *     "VOLUME"     STRING        volume such as rest+500

@@ -11,7 +11,7 @@
 
 #include "program/stream/peer.h"
 
-/* Largest body, such as an image, that is skipped, bytes. A larger body is an error. */
+/* Size, bytes, above which a message body is an error. Smaller unknown bodies are skipped. */
 static const uint64_t skipped_max = 256u << 20;
 
 supine_status supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connecting,

@@ -41,7 +41,7 @@ typedef struct supine_stream_peer {
   supine_stream_header header;
   uint64_t to_skip;    /**< bytes of a skipped body that are still to be received */
   unsigned char *body; /**< [SUPINE_STREAM_BODY_MAX] body of the message being received */
-  double emptied;      /**< time at which the socket last had no data, s by supine_clock_seconds */
+  double emptied; /**< time when no received data was left to read, s by supine_clock_seconds */
   supine_stream_content content; /**< kind of content that the peer is sent */
   bool knows_triangles; /**< true if the peer has received the triangles with a frame of points */
   uint64_t last_frame;  /**< serial number of the last frame given to the peer */

@@ -35,7 +35,7 @@ struct supine_stream_server {
   double accept_at;               /* time at which to accept peers again after a failure */
   supine_stream_peer *connected;  /* peer of --connect, connected or connecting; NULL if none */
   supine_stream_peer *peer;       /* [options->peers] connected peers and free slots */
-  struct pollfd *polled;          /* [options->peers + 2] peers, listener, live page */
+  struct pollfd *polled;          /* [options->peers + 2] peers, listener, pipe of web's poses */
   supine_stream_peer **owner;     /* [options->peers + 2] peer of each polled socket, or NULL */
   size_t replayed;                /* number of recorded poses replayed so far */
   double replay_begun;            /* time at which the replay began; negative before that */

@@ -13,7 +13,7 @@
 
 /** Points observed inside the lungs, to which the lungs are fitted (supine/locate.h). */
 typedef struct supine_stream_observed {
-  const supine_basis *inside; /**< basis made by 'supine embed' */
+  const supine_basis *inside; /**< basis with the points as vertices, made by 'supine embed' */
   size_t count;
   const char *name[SUPINE_LOCATE_POINTS_MAX];
   /** Newest observation of each point; its position is not-a-number if the point is not seen. */
@@ -115,18 +115,18 @@ void supine_stream_server_destroy(supine_stream_server *server);
 /** Return the port on which the server listens; 0 if it does not listen. */
 int supine_stream_server_port(const supine_stream_server *server);
 
-/** Run the server until `stop` returns true, `seconds` have passed or the replay ends.
+/** Run the server until options->stop returns true, the time options->seconds is over or the replay
+ * ends. The options are those of supine_stream_server_create.
  * @retval SUPINE_ERROR_WRITE  the system cannot wait for the sockets
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_stream_server_run(supine_stream_server *server, supine_error *error);
 
 const supine_stream_counts *supine_stream_server_counts(const supine_stream_server *server);
 
-/** Return the latencies of sent frames: those with the content SUPINE_STREAM_WEIGHTS, or, for any
- * other `content`, those with points. A latency is the time from receiving the newest message to
- * passing the frame to the kernel. Frames without a new message do not count. If a message may have
- * waited unread, its latency begins when the peer's socket was last found empty, so that no latency
- * is underestimated. */
+/** Return the latencies of sent frames: of frames of weights if `content` is SUPINE_STREAM_WEIGHTS,
+ * otherwise of frames of points. A latency is the time from receiving the newest message to passing
+ * the frame to the kernel. Frames without a new message do not count. If a message may have waited
+ * in the peer's socket, its latency is an upper bound: the time since the socket was last empty. */
 const supine_stream_latency *supine_stream_server_latency(const supine_stream_server *server,
                                                           supine_stream_content content);
 

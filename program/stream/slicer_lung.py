@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Show lungs in 3D Slicer that deform with the orientation of a transform node.
 
-Start the server with SERVER_OPTIONS:
+Start the server:
 
     supine stream lungs.safetensors --send points --space ras --world-down 0,-1,0 --body-from-tracker 0,0,0,1
 

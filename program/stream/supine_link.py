@@ -95,9 +95,9 @@ def corners(words):
 
 
 def unpack(kind, content):
-    """Decode the content of a message of type `kind`. Return a tuple of floats for NDARRAY, text for STRING, and for
-    POLYDATA (flat array of positions x, y, z, array of triangle strips as the function `corners` takes it). Return the
-    bytes of other types unchanged."""
+    """Decode the content of a message of type `kind`. For NDARRAY return a tuple of floats, for STRING the text, and
+    for POLYDATA a tuple of two flat arrays: positions x, y, z, and triangle strips in the form that corners() takes.
+    Return the bytes of other types unchanged."""
     if kind == "NDARRAY":
         scalar, dimension = content[0], content[1]
         count = 1
@@ -184,8 +184,8 @@ class Link:
 
 
 class Basis:
-    """A basis file, for peers that receive the weights w of the modes and the gains A of each lung. On each axis j, a
-    vertex p moves to p_j + A_j (w . c) d_j. The file must store a direction d and coefficients c for each vertex."""
+    """Reads a basis file, to deform lungs by the weights of the modes and the factors of each lung's displacement along
+    x, y and z (gains). The file must store, for each vertex, a direction and a coefficient for each mode."""
 
     def __init__(self, path):
         with open(path, "rb") as file:
@@ -208,8 +208,8 @@ class Basis:
         return memoryview(self._data[begin:end]).cast(kind)
 
     def deform(self, frame):
-        """Return the vertex positions x, y, z as a flat list. `frame` has the weights of the modes, then the
-        gains of each lung along x, y and z."""
+        """Return the positions x, y, z of all vertices as a flat list, for a frame with the content "weights": the
+        weights of the modes, then the factors of each lung's displacement along x, y and z."""
         weights, gains = frame[:self.modes], frame[self.modes:]
         positions = []
         for i, lung in enumerate(self.lung):

@@ -243,7 +243,7 @@ static void find_gains(supine_stream_patient *patient, double now,
   snapshot->above += snapshot->volume;
 }
 
-/* Fit the lungs to the observed points that are seen. Also fit their volume unless it is fixed. */
+/* Fit the lungs to the observed points that are visible, and their volume unless it is fixed. */
 static void find_location(supine_stream_patient *patient, double now,
                           supine_stream_snapshot *snapshot) {
   const supine_stream_volume *volume = patient->options->volume;

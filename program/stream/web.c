@@ -31,8 +31,8 @@
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } lws;
 
 enum {
-  TEXT = 256,     /* size of a state as JSON, bytes */
-  RECEIVED = 512, /* size of a received message, bytes */
+  TEXT = 256,     /* size of the buffer for a state as JSON, bytes */
+  RECEIVED = 512, /* size of the buffer for received bytes */
   CHUNK = 65536   /* size of the pieces in which the page is sent, bytes */
 };
 

@@ -14,7 +14,7 @@ function fromBase64(text) {
   return bytes;
 }
 
-/** Return the bytes of a tensor, and remove the element that holds them as text from the page. */
+/** Return the bytes of a tensor, and remove from the page the element that has them as text. */
 function takeBytes(name) {
   const element = document.getElementById(`tensor-${name}`);
   const text = element.textContent;
@@ -49,7 +49,7 @@ function takeTriangles(name, count) {
 }
 
 /** Return the normals as the 32-bit words that supine.glsl reads. A word has three signed numbers, of 13, 10 and 9
- * bits. The page stores these numbers rounded to 11, 8 and 8 bits, with 128 added. */
+ * bits. The page stores these numbers rounded to 11, 8 and 8 bits, and has added 128 to each of the three. */
 function takeNormals(vertices, words) {
   const columns = 3 * words;
   const counts = takeCounts('normals', vertices, 3 * columns);
@@ -100,13 +100,13 @@ function readBasis() {
   return basis;
 }
 
-const recurrences = new Map(); // results of recurrenceOf for each band
-/** Return the factors of the recurrence in harmonics() for all bands up to `band`. They are computed once. tops[m] is
- * the polynomial of order m in band m, a constant; `steps` has the factors of the steps to higher bands. */
+const recurrences = new Map(); // result of recurrenceOf for each largest degree
+/** Return the constants of the recurrence in harmonics() for all degrees up to `band`. They are computed once. tops[m]
+ * is the start, the constant polynomial of degree m and order m; `steps` has the factors from a degree to the next. */
 function recurrenceOf(band) {
   if (!recurrences.has(band)) {
     const tops = new Float64Array(band + 1);
-    const steps = new Float64Array((band + 1) ** 2); // index l * l + l + m: step from band l to band l + 1 at order m
+    const steps = new Float64Array((band + 1) ** 2); // index l * l + l + m: factor from degree l to l + 1 at order m
     for (let m = 0; m <= band; ++m) {
       tops[m] = m === 0 ? Math.sqrt(1 / (4 * Math.PI)) : tops[m - 1] * (m === 1 ? Math.sqrt(3) : Math.sqrt((2 * m + 1) / (2 * m)));
       for (let l = m; l <= band; ++l) steps[l * l + l + m] = Math.sqrt((4 * (l + 1) ** 2 - 1) / ((l + 1 - m) * (l + 1 + m)));
@@ -116,7 +116,7 @@ function recurrenceOf(band) {
   return recurrences.get(band);
 }
 
-/** Return the real spherical harmonics of a unit vector up to a band, Y_lm at index l*l + l + m: orthonormal,
+/** Return the real spherical harmonics of a unit vector up to degree `band`, Y_lm at index l*l + l + m: orthonormal,
  * without Condon-Shortley phase. Y_lm is a polynomial q in z, from a recurrence in l, times the real (m >= 0) or
  * imaginary (m < 0) part of (x + i y)^|m|. */
 function harmonics(band, [x, y, z]) {
@@ -189,7 +189,7 @@ function cubicTurn(c, side) {
   return side * Math.min(Infinity, ...ahead);
 }
 
-/** Return the gain s at which c[0] s + c[1] s^2 + c[2] s^3 is `volume`, mL, on the branch through s = 0; NaN if the
+/** Return the factor s at which c[0] s + c[1] s^2 + c[2] s^3 is `volume`, mL, on the branch through s = 0; NaN if the
  * surface folds before it reaches that volume. */
 function scaleForVolume(c, volume) {
   if (volume === 0) return 0;
@@ -219,18 +219,18 @@ function scaleForVolume(c, volume) {
   return s;
 }
 
-/** Return the gains along x, y and z, relative to the gain at rest, on the path from full inflation (sigma 0) through
- * rest (sigma 1) to lower volumes (sigma > 1), like supine_volume_bend. `bend` has a constant for each axis: the
- * relative gain is sigma + 2 bend e(sigma), where e is 0 at full inflation and at rest. */
+/** Return the gains (factors of a lung's displacement along x, y and z) as multiples of the gain at rest. `sigma` tells
+ * the volume: 0 at full inflation, 1 at rest, more below rest. The multiple is sigma + 2 bend[axis] e, where e is
+ * (sigma^3 - sigma) / 2 above rest and (sigma - 1) / sigma^6 below rest, like supine_volume_bend. */
 function pathAt(bend, sigma) {
   const cube = sigma * sigma * sigma;
   const e = sigma <= 1 ? (cube - sigma) / 2 : (sigma - 1) / (cube * cube);
   return bend.map((c) => sigma + 2 * c * e);
 }
 
-/** Return the gains along x, y and z at which a lung has the volume `volume`. The function pathAt gives their ratios
- * at each volume, such that the volume is `rest` at rest. Both volumes are mL above the reference volume. `form` has
- * the coefficients of the volume, from lungForm. Return NaN if the surface folds before it reaches `volume`. */
+/** Return the gains (factors of the displacement along x, y and z) at which a lung has the volume `volume`; NaN if its
+ * surface folds before. pathAt gives their ratios, with the constant bend[axis] of each axis. At rest, the lung has the
+ * volume `rest`. Both volumes are mL above the reference volume. `form` is the result of lungForm. */
 function gainsForVolume(form, bend, rest, volume) {
   const straight = bend.every((c) => c === 0) || volume === rest;
   const scale = scaleForVolume(cubicOf(form), straight ? volume : rest);
@@ -257,8 +257,8 @@ function gainsForVolume(form, bend, rest, volume) {
 const sumOf = (values) => values.reduce((sum, x) => sum + x, 0);
 
 /** Return {rest, full}: the volumes of the lungs at rest and at full inflation for a direction of gravity, mL above
- * the reference volumes. `full` has an element for each lung. `rest` too, or one element for the volume of all lungs
- * together if they have the same gains. If rest is unknown, `rest` is the volume of all lungs in the scan. */
+ * the reference volumes. Both have an element for each lung. But if all lungs have the same gains, the only element of
+ * `rest` is the total. If rest is unknown, this is the total in the scan. */
 function volumesFor(basis, gravity) {
   const y = harmonics(2, gravity);
   const rows = basis.resting ? basis.resting.length / y.length : 1;
@@ -289,9 +289,9 @@ function gainsFor(basis, forms, volumes, total) {
   return forms.map(() => gains);
 }
 
-/** Compute a moment: the state of the lungs for a direction of gravity and a volume `depth` mL above rest. `weights`
- * has the weight of each mode, `gains` the three gains of each lung, and `held` the volume of each lung with its
- * tissue, mL. `folds` is true if the surface folds before it reaches the volume. */
+/** Return a moment: {gravity, weights, gains, held, folds}, the state of the lungs for a direction of gravity and a
+ * volume `depth` mL above rest. `weights` are those of the modes, `gains` the factors of the displacement of each lung
+ * along x, y, z, and `held` the volume (gas and tissue) of each lung, mL. `folds`: whether the surface folds before. */
 function momentFor(basis, gravity, depth) {
   const weights = weightsFor(basis, gravity);
   const forms = basis.references.map((_, lung) => lungForm(basis, lung, weights));
@@ -305,12 +305,12 @@ function momentFor(basis, gravity, depth) {
  *
  *     weights  weight w_k of each mode k, in vectors of four
  *     gains    factors of the displacement along x, y and z, for each lung
- *     turns    weights of the modes of the normals, for each lung in `words` vectors of three: vector j has the weights
- *              of the modes j, j + words and j + 2 words
+ *     turns    for each lung, the weights of the vectors whose weighted sum is the normal, in groups of three: group
+ *              j of `words` groups has the weights of the vectors j, j + words and j + 2 words
  *
- * The weight of a mode of the normals is a sum over the axes of polynomials with the terms 1, a w_k, b w_k and
- * a b w_k w_l, where a and b are the gains along the other two axes, and k and l are modes. If a lung has only one gain
- * (volumeAxes 1), the weight is one polynomial, without the terms b w_k. */
+ * Each weight in `turns` is a sum over the axes. The summand of an axis has the terms 1, a w_k, b w_k and a b w_k w_l
+ * for all modes k and l, times coefficients of the basis; a and b are the factors of the displacement along the other
+ * two axes. If these factors are equal on all axes (volumeAxes 1), there is one summand, without the terms b w_k. */
 function uniformsOf(basis, moment) {
   const { modes: k, words, lungs, normalModes } = basis;
   const weights = new Float32Array(4 * Math.ceil(k / 4));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Write which structure inside the lungs is under the pointer, and the position, mm LPS. A NaN marks a structure; the
-// lowest bits of the NaN are the index of the structure plus 1.
+// Write the structure inside the lungs that is under the pointer. The first component is a NaN whose lowest bits are
+// the index of the structure plus 1. The other components are the position, mm LPS.
 in vec3 body;
 flat in uint part;
 out uvec4 picked;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Handle the events of mouse and touch, and write to the controls of the panel and to the colour bar.
+// Handle mouse and touch input, and update the panel's controls and the colour bar.
 
 const $ = (id) => document.getElementById(id);
 

@@ -59,8 +59,8 @@ function drawFigure(context, q, x, y, scale, tones) {
   context.save();
   const { a: ratio } = context.getTransform(); // device pixels per CSS pixel, from freshContext
   for (const part of parts) {
-    // Draw the ellipsoid as a circle, mapped to its outline by the symmetric square root of the ellipse's matrix: this
-    // map does not rotate the shading.
+    // Draw a shaded circle of radius 1, mapped to the outline of the ellipsoid, an ellipse. The map is the symmetric
+    // square root of the ellipse's matrix, because this does not rotate the shading.
     const det = Math.sqrt(Math.max(part.xx * part.yy - part.xy * part.xy, 0));
     const by = (ratio * scale) / Math.sqrt(part.xx + part.yy + 2 * det);
     context.setTransform(by * (part.xx + det), -by * part.xy, -by * part.xy, by * (part.yy + det), ratio * (x + scale * part.x), ratio * (y - scale * part.y));
@@ -180,8 +180,8 @@ function drawBall(canvas, toEye, gravity) {
     context.globalAlpha = front ? 1 : 0.4;
     context.beginPath(); // draw all three great circles by one stroke
     for (const n of [ends[0], ends[3], ends[4]]) { // L, P and H
-      // Draw the near or the far half of the great circle normal to n. The circle projects to an ellipse; if n points
-      // towards the viewer, the projection of the near half lies on the side away from n.
+      // Draw the near or the far half of the great circle normal to n. Its projection is an ellipse. If n points to the
+      // viewer, the near half of the circle projects to the half of the ellipse opposite to the projection of n.
       const begin = n[2] > 0 === front ? -radius : radius;
       const angle = Math.atan2(-n[0], -n[1]);
       context.moveTo(centre + begin * Math.cos(angle), centre + begin * Math.sin(angle));

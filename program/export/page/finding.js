@@ -81,8 +81,8 @@ function findingOf(basis, moment, gravity, volume, stride) {
 
 /** Return the expected error of the displacement u from the state `from` to the state `now`, mm RMS over the vertices,
  * as the library defines it. The squared error of a vertex is |u| min(expected_error_mm, RMS of u). If the volume at
- * rest is assumed, add the squared change of u by 5 % more volume, estimated as 5 times the change by 1 %. `fuller`
- * has both states with 1 % more volume (of the reference volume), or is null if the volume at rest is known. */
+ * rest is only assumed, add (5 d)^2. Here d is the change of u if the volumes of both states, `now` and `from`, grow by
+ * 1 % of the reference volume. `fuller` has both states with these volumes; null if the volume at rest is known. */
 function expectedError(basis, now, from, fuller) {
   const [a, b] = [placesOf(basis, now), placesOf(basis, from)];
   const more = fuller?.map((moment) => placesOf(basis, moment));
@@ -153,9 +153,9 @@ class Holds {
     });
   }
 
-  /** Show the volume of each lung, mL: `held` now, and `before`. Bars are scaled to `most`, the largest volume of a
-   * lung in any posture. `heights`, mm, tell which lung is uppermost. `measured` is the entry of PUBLISHED for this
-   * posture, if there is one. */
+  /** Show the volume of each lung, mL: `held` now, and `before` in the state from which displacements are measured.
+   * Bars are scaled to `most`, the largest volume of a lung in any posture. `heights`, mm, tell which lung is
+   * uppermost. `measured` has the published changes of volume in this posture; undefined if there are none. */
   show({ lungNames }, held, before, most, heights, measured) {
     const full = 1.06 * Math.max(most, ...held, ...before.map((ml, lung) => ml * (1 + (measured?.[lungNames[lung]] ?? [0, 0]).reduce((sum, x) => sum + x, 0) / 100)));
     const apart = heights.length === 2 && Math.abs(heights[0] - heights[1]) > 30; // one lung is > 30 mm higher

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Read and show the structures inside the lungs: named parts, which are points or meshes. A part moves with the weights
-// of the modes and the gains of its lung. The coefficients of its modes are `fields`, [vertex][axis][mode].
+// Read and show the structures inside the lungs: named parts, which are points or meshes. A vertex is displaced along
+// an axis by the sum over the modes of weight times fields[vertex][axis][mode], times a factor of its lung ("gain").
 
 const BALL_RADIUS = 4; // radius of the ball drawn at a point, mm
 
@@ -12,7 +12,7 @@ function takeInside({ inside, modes: k, placeUnit, middle }) {
     takeTensor('inside-parts', Uint32Array), takeTriangles('inside-triangles', inside.triangles)];
   const meshed = new Uint8Array(n);
   for (const corner of corners) meshed[corner] = 1;
-  of.forEach((part, i) => { meshed[i] ||= Number(inside.rigid.includes(part)); }); // so that the vertices of a rigid part stay contiguous
+  of.forEach((part, i) => { meshed[i] ||= Number(inside.rigid.includes(part)); }); // as in a mesh: sorting must not split a rigid part
   const order = Uint32Array.from({ length: n }, (_, i) => i).sort((a, b) => meshed[a] - meshed[b] || a - b);
   const rank = new Uint32Array(n);
   order.forEach((from, to) => { rank[from] = to; });
@@ -31,7 +31,7 @@ function takeInside({ inside, modes: k, placeUnit, middle }) {
   inside.normals = normalsOf(inside);
 }
 
-/** Return the unit normals of the vertices of meshes on the reference surface; 0 for points. */
+/** Return the unit normals of the meshes' vertices before deformation; 0 for points. */
 function normalsOf({ reference, vertices, corners }) {
   const normals = new Float32Array(3 * vertices);
   const at = (v) => [...reference.subarray(4 * v, 4 * v + 3)];
@@ -47,7 +47,7 @@ function normalsOf({ reference, vertices, corners }) {
   return normals;
 }
 
-/** Return the position, mm, of a vertex displaced by the modes, as if no part were rigid. */
+/** Return the position, mm, of a vertex displaced by the modes, even if its part is rigid. */
 function fieldPlace({ reference, fields, modes: k }, { weights, gains }, vertex) {
   return [0, 1, 2].map((axis) => {
     let sum = 0;
@@ -74,8 +74,8 @@ function rotationOf(h) {
     [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]];
 }
 
-/** Return the positions of the vertices of one part inside the lungs, mm. A rigid part moves by the rigid motion
- * closest to the displacements of its vertices by the modes. */
+/** Return the positions of a part's vertices in the state `moment` of the lungs, mm. The modes displace each vertex. A
+ * rigid part instead moves by the rotation and translation that fit these displacements best. */
 function insidePlaces(inside, moment, part) {
   const members = inside.members[part];
   const to = members.map((vertex) => fieldPlace(inside, moment, vertex));
@@ -132,7 +132,7 @@ class InsideTable {
     this.list();
   }
 
-  /** Show the rows of the parts whose names contain the search text. */
+  /** List the parts whose names contain the search text. */
   list() {
     const words = $('inside-find').value.trim().toLowerCase();
     const found = this.inside.names.flatMap((name, part) => (name.toLowerCase().includes(words) ? [part] : []));
@@ -199,7 +199,7 @@ class InsideNames {
   show(names) {
     const taken = [];
     for (const name of names.filter(({ at }) => at).sort((a, b) => a.at.y - b.at.y)) {
-      const half = 3.7 * name.text.length + 10; // estimated, because measuring it forces a layout
+      const half = 3.7 * name.text.length + 10; // half of the label's width, px; estimated, because measuring forces a layout
       for (const other of taken) {
         if (Math.abs(other.at.x - name.at.x) < half + other.half && name.at.y < other.at.y + 20) name.at.y = other.at.y + 20;
       }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Compute the position of each vertex of the structures inside the lungs, for transform feedback. picture.js appends
-// attributes with a coefficient for each axis and mode, and the function `amount(axis)`, the sum over the modes of
-// weight times coefficient.
+// Compute the position of each vertex of the structures inside the lungs, for transform feedback. picture.js appends to
+// this text: attributes with a coefficient for each axis and mode, and the function `amount(axis)`, which sums weight
+// times coefficient over the modes.
 layout(location = 0) in vec4 reference; // reference position, mm; w: lung
 out vec4 moved;
 

@@ -69,15 +69,15 @@ class Letters {
       const box = pane && { left: pane.box[0] / ratio, right: (pane.box[0] + pane.box[2]) / ratio, top: 0, bottom: pane.canvasHeight / ratio };
       const arrow = pane?.arrowEnds.map((end) => project(pane, end, ratio));
       Object.values(ENDS).forEach((end, j) => {
-        // distance of the letter from the lungs' box, in units of its longest half edge; larger beyond gravity's arrow
+        // gap between the letter and the lungs' box, in longest half edges of the box; larger where gravity's arrow is
         const beyond = pane && dot(end, pane.gravity) > 0.8 ? 0.95 : 0.26;
         let at = middle && project(pane, centre.map((c, k) => c + end[k] * (half[k] + beyond * Math.max(...half))), ratio);
         const far = at && Math.hypot(at.x - middle.x, at.y - middle.y) > 0.16 * Math.min(pane.box[2], pane.box[3]) / ratio;
-        if (at) { // keep the letter in the picture, and off plates and arrow
+        if (at) { // keep the letter in the picture, clear of the plates and of gravity's arrow
           at.x = Math.max(box.left + 15, Math.min(box.right - 15, at.x));
           at.y = Math.max(15, Math.min(box.bottom - 15, at.y));
           const off = () => { for (const plate of plates) at = offPlate(at, plate, box); };
-          off(); // again below, because offArrow may move the letter onto a plate
+          off(); // once more after offArrow, which may have moved the letter onto a plate
           if (arrow[0] && arrow[1]) at = offArrow(at, arrow, box);
           off();
         }

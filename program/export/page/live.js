@@ -31,7 +31,7 @@ window.supineLive = (() => {
     const now = window.supine.gravityOf(q);
     let [axis, w] = [cross(gravity, now), 1 + dot(gravity, now)];
     if (w < 1e-9) [axis, w] = [Math.abs(now[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0], 0]; // opposite directions: turn by 180 degrees about z or x
-    const u = cross(q, axis); // term of the quaternion product q * (axis, w)
+    const u = cross(q, axis); // cross-product term of the quaternion product q * (axis, w)
     const product = [0, 1, 2].map((i) => q[3] * axis[i] + w * q[i] + u[i]);
     const all = [...product, q[3] * w - dot(q, axis)];
     const length = Math.hypot(...all);

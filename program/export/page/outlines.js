@@ -70,7 +70,7 @@ class Outlines {
       parent.append(canvas);
       return canvas;
     });
-    this.across = [[0, 1], [0, 1]]; // for each plane, its second axis as a unit vector on the canvas (x right, y down)
+    this.across = [[0, 1], [0, 1]]; // direction of each section plane's second axis on its canvas, a unit vector (x right, y down)
   }
 
   /** Return the position of plane `i` of PLANES as text. */
@@ -107,7 +107,7 @@ class Outlines {
     const { scale } = this;
     const along = [gravity[others[0]], sign * gravity[others[1]]];
     const size = Math.hypot(...along);
-    // direction in the plane that is drawn downwards: gravity, unless it is nearly normal to the plane
+    // direction, within the section plane, that points down in the picture: gravity, unless nearly normal to the plane
     const [a, b] = size < 0.3 ? [0, 1] : along.map((x) => x / size);
     const turned = (u, v) => [u * b - sign * v * a, u * a + sign * v * b];
     const place = ([u, v]) => {

@@ -51,16 +51,16 @@ function start() {
   let stale = true;     // whether the vertices are out of date
   let unseen = true;    // whether the picture is out of date: the next frame draws it
   let pointer = null;   // position of the pointer on the canvas, CSS pixels
-  let asked = true;     // whether the point under the pointer was requested since the pointer or the picture changed
+  let asked = true;     // whether a lookup of the point under the pointer began since the pointer or the picture changed
   let wanted = null;    // {at, then}: position of a click, CSS pixels, and the callback for the point found there
-  let question = null;  // {pane, then}: pane and callback of the request for a point that the graphics card works on
+  let question = null;  // {pane, then}: name of the pane and callback of the lookup now on the graphics card; null before any
   let before = null;    // time of the last frame, ms; null if the last frame was not drawn
   let streak = 0;       // number of frames drawn without a pause
   let frameTime = NaN;  // smoothed time between frames, ms
   let idle = null;      // timer that writes the view to the URL
   let panes = [];
   const marks = [];
-  let tabled = -Infinity; // time when the texts and the table of structures inside the lungs were last written, ms
+  let tabled = -Infinity; // time when the descriptions and the table of inner structures were last written during motion, ms
 
   const ratio = () => canvas.width / Math.max(1, sizeOf(canvas).width);
   const blend = () => state.roomBlend * state.roomBlend * (3 - 2 * state.roomBlend);
@@ -135,8 +135,8 @@ function start() {
   }
   const pane_lowest = (name, moment) => pane_depth(name, moment).value;
 
-  /** Return the matrix that maps the box of makeTable, in camera coordinates, to the table under the patient; null if
-   * the posture has no table. The table tilts with the patient. */
+  /** Return the matrix from the box [-1, 1]^3 to the table under the patient in camera coordinates; null if the
+   * posture has no table. The table tilts with the patient. */
   function pane_table(name, moment, toRoom, offset) {
     const { down, table } = pane_depth(name, moment);
     if (!down) return null;
@@ -304,7 +304,7 @@ function start() {
   const holds = new Holds($('holds'), basis);
   const outlines = new Outlines($('outlines'), basis, state, () => { described = null; redraw(); });
 
-  let answered = { depth: null }; // volume above rest for which the posture cards were written; largest volume of a lung, mL
+  let answered = { depth: null }; // {depth, most}: volume above rest on the posture cards, mL; largest lung volume on them, mL
   /** Write the changes of the lungs' volumes and the displacement in each posture on its card. */
   function answerCards() {
     if (answered.depth === state.depth) return;
@@ -316,10 +316,10 @@ function start() {
     }
   }
 
-  /** Return the height of the middle of each lung, against gravity, mm. */
+  /** Return the height of the centre of each lung, mm, measured opposite to gravity. */
   const lungHeights = (gravity) => basis.lungMiddles.map((middle) => -dot(gravity, middle));
 
-  let described = null; // state of the lungs that the texts describe, and the stride of the vertices used
+  let described = null; // {moment, stride}: state and vertex stride of the last call of tellFinding; null to write again
   /** Write the texts, volume bars and outlines that describe the state of the lungs. Statistics of the displacement use
    * every `stride`th vertex. */
   function tellFinding(stride) {
@@ -487,8 +487,8 @@ function start() {
   }
 
   let inHeadset = false;
-  /** Advance the state to a time, ms, and return the pane that a headset shows; null before the first state is
-   * computed. */
+  /** Advance the state to the time `now`, ms, and return the view of the lungs (pane) for a headset; null before the
+   * first state is computed. */
   function headsetFrame(now) {
     if (state.advance(inHeadset && before !== null ? (now - before) / 1000 : 0) || stale || !inHeadset) {
       state.compute();
@@ -524,8 +524,8 @@ function start() {
     state.camera.pan = [state.camera.pan[0] + dx * mm, state.camera.pan[1] - dy * mm];
     redraw();
   };
-  /** Zoom by a ratio. What is seen at the position `at` on the canvas, CSS pixels, stays there if it is as far away as
-   * the pivot of the camera. */
+  /** Zoom by a ratio, towards the position `at` on the canvas, CSS pixels. A point that is seen there, as far away as
+   * the camera's pivot, does not move on the canvas. */
   const zoom = (ratioOfSizes, at) => {
     const { width, height } = boxSize();
     const aspect = width / height;
@@ -562,7 +562,7 @@ function start() {
   }, { passive: false });
   for (const type of ['pointermove', 'pointerdown']) {
     canvas.addEventListener(type, (event) => {
-      if (event.pointerType === 'touch' && type === 'pointermove') return; // on a touch screen a tap shows what is there
+      if (event.pointerType === 'touch' && type === 'pointermove') return; // on a touch screen, only a tap shows the value at a point
       pointer = dragging() ? null : { x: event.offsetX, y: event.offsetY };
       asked = false;
     });
@@ -601,7 +601,7 @@ function start() {
     spin(arrow[0] * step, arrow[1] * step);
   });
 
-  /** Update the ranges and the colour bar after a change of the volume. */
+  /** Update the colour bar and the range of its values after a change of the volume. */
   const remeasure = () => { state.measure(); showLegend(); };
   const slide = (id, act) => onSlider(id, (value) => { act(value); touch(); });
   slide('tilt', (value) => state.settle(state.standing.q, value, 0));
@@ -773,7 +773,7 @@ function start() {
      * are in the order of basis.inside: points first, then meshes. */
     insidePositions: (gravity, volume) => picture.readInside(momentFor(basis, unit(gravity), volume)),
     moment: (gravity, volume) => momentFor(basis, unit(gravity), volume),
-    /** Do the work of one frame that does not use the graphics card. */
+    /** Do the CPU part of the work of one frame. */
     frameScript: () => { state.compute(); panes = makePanes(); letters.show(panes, state.body, ratio(), plates()); showState(); },
     findingOf, linesAcross, placesOf, rangeEnd, tickStep, postureText, postureFrom, gravityOf, picturePng, basis, state, touch,
   };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Write which point of the surface is under the pointer: the value that its colour shows, with the index of the lung
-// in the lowest 4 bits, and the position, mm LPS.
+// Write the surface point under the pointer. The first component is the value that colours show there, a float whose
+// lowest 4 bits are replaced by the index of the lung. The other components are the position, mm LPS.
 in vec3 eye;
 in vec3 facing;
 in vec3 body;

@@ -129,8 +129,8 @@ class Picture {
     this.fewInputs = inputs(few(reference, 4), few(basis.direction, 3), few(basis.coefficients, k), few(basis.normals, 3 * words));
   }
 
-  /** Make the shader programs and buffers of the structures inside the lungs: their vertices, and a ball that is drawn
-   * at each point. */
+  /** Make the shader programs for structures inside the lungs, and buffers for the vertices of the structures and of
+   * the ball that marks a point. */
   makeInside() {
     const { gl, basis: { inside, modes: k } } = this;
     this.insideMoving = this.program('inside.vert.glsl', null, ['moved'], this.insideLibrary());
@@ -169,7 +169,7 @@ class Picture {
   makeOutputs() {
     const { gl, basis } = this;
     this.indices = this.buffer(basis.corners, gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER);
-    this.unread = this.buffer(16 * basis.vertices, gl.DYNAMIC_COPY); // receives the normals of vertices with arrows, which are not used
+    this.unread = this.buffer(16 * basis.vertices, gl.DYNAMIC_COPY); // receives normals where arrows start; nothing reads them
     this.edges = null;
     this.states = {};
     this.arrays = {};
@@ -445,8 +445,8 @@ class Picture {
     }
   }
 
-  /** Draw the structures inside the lungs in the colours of the lungs. If colours show expansion, draw them in grey,
-   * because points have no area. */
+  /** Draw the structures inside the lungs in the colours of the lungs. If colours show the growth of the surface area,
+   * draw the structures in grey, because points have no area. */
   drawContent(pane) {
     const { gl, content } = this;
     this.usePane(content, pane, [0, 0, 1, 1]);
@@ -502,7 +502,7 @@ class Picture {
     gl.drawArrays(gl.TRIANGLES, 0, 36);
   }
 
-  /** Draw panes (views of the lungs) to a framebuffer, or to the canvas if it is null. */
+  /** Draw panes (views of the lungs) to `framebuffer`, or to the canvas if `framebuffer` is null. */
   draw(panes, framebuffer = null) {
     const { gl } = this;
     this.beginTiming();
@@ -534,7 +534,7 @@ class Picture {
     const { gl } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.pickPlace);
     gl.viewport(0, 0, 1, 1);
-    gl.clearBufferuiv(gl.COLOR, 0, [0x7fc00000, 0, 0, 0]); // NaN with low bits 0: nothing is seen
+    gl.clearBufferuiv(gl.COLOR, 0, [0x7fc00000, 0, 0, 0]); // "nothing here": a NaN whose lowest bits are 0 instead of the index of a structure plus 1
     gl.clearBufferfv(gl.DEPTH, 0, [1]);
     gl.enable(gl.DEPTH_TEST);
     this.usePane(this.picker, pane, [x, y, pane.box[2], pane.box[3]]);

@@ -7,7 +7,7 @@ layout(location = 2) in vec3 tail;     // start of each arrow of a displacement,
 layout(location = 3) in vec3 head;     // end of each arrow of a displacement, mm
 uniform mat4 toEye;
 uniform mat4 projection;
-uniform float thick; // largest width of the arrow of a displacement, mm; 0 for gravity's arrow and the table
+uniform float thick; // largest width of a displacement's arrow, mm; 0 for gravity's arrow and the patient's table
 out vec3 facing;
 out vec3 body;
 

@@ -45,7 +45,7 @@ function postureFrom(text) {
   const word = text.trim().replaceAll('\u2212', '-');
   const numbers = word.split(/[:,]/).map((part) => (part.trim() === '' ? NaN : Number(part)));
   if (numbers.length === 3 && numbers.every(Number.isFinite) && Math.hypot(...numbers) > 0) {
-    const now = rotate(LYING, unit(numbers)); // gravity in the room if the patient were supine
+    const now = rotate(LYING, unit(numbers)); // gravity, rotated to the room's axes for a supine patient
     const axis = cross(now, [0, 0, -1]);
     const size = Math.hypot(...axis);
     const swing = size < 1e-9 ? (now[2] < 0 ? IDENTITY : turn([1, 0, 0], Math.PI)) : turn(unit(axis), Math.atan2(size, -now[2]));
@@ -67,7 +67,7 @@ class State {
   constructor(basis) {
     this.basis = basis;
     this.standing = { q: POSTURES[2].q, tilt: 0 }; // chosen posture; tilt in degrees
-    this.q = POSTURES[2].q;                        // rotation shown in this frame of the turn to the chosen posture
+    this.q = POSTURES[2].q;                        // rotation shown now; while `turning`, on the way to the chosen posture
     this.turning = null;
     this.tidal = basis.breathVolume;
     this.depth = 0;

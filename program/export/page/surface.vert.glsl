@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Project the deformed surface to the screen, or to the one pixel under the pointer.
+// Project the deformed surface to the screen, or, to find the point under the pointer, to an image of one pixel.
 layout(location = 0) in vec3 moved;
 layout(location = 1) in vec4 turned; // unit normal; w: area relative to the reference surface
 layout(location = 2) in vec3 origin; // position from which displacements are measured
-layout(location = 3) in vec4 before; // `turned` in the state from which displacements are measured
+layout(location = 3) in vec4 before; // normal and relative area in the state from which displacements are measured
 uniform mat4 toEye;
 uniform mat4 projection;
 uniform vec4 lens;    // part of the picture to draw: x and y of its centre, -1 to 1; magnifications in x and y

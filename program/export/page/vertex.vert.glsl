@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Compute the position and the normal of each vertex of the surface, for transform feedback. picture.js appends
-// attributes that hold packed vectors, and the function `turned_by_words()`, which computes the normal from them.
+// Compute the position and the normal of each vertex of the surface, for transform feedback. picture.js appends to this
+// text: attributes with packed vectors, and the function `turned_by_words()`, which sums them to the normal.
 layout(location = 0) in vec4 reference; // reference position, mm; w: lung
 layout(location = 1) in vec3 direction;
 layout(location = 2) in vec4 c0;
