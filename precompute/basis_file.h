@@ -13,7 +13,7 @@ typedef struct supine_basis_content {
   const supine_precompute_options *options; /**< options->model is unused if `fit` is not NULL */
   const supine_fit_report *fit;             /**< report on another simulator's fields, or NULL */
   const double *directions; /**< [N, 3] displacement of each vertex per unit force, mm; NULL if
-                               `compression` holds vectors */
+                               `compression` holds the displacement itself */
   const supine_compression *compression;
   const supine_volume_forms *forms;
   const supine_accuracy *accuracy;
@@ -21,9 +21,9 @@ typedef struct supine_basis_content {
   /** [lungs, 9] resting volume (FRC) minus the volume of the reference surface, mL: coefficients of
    * spherical harmonics of the direction of gravity, to degree 2; NULL if `reference` is NULL */
   const double *resting;
-  /** Share of triangles whose normals turn by more than 90 degrees; NULL if not measured. */
+  /** Share of triangles whose normals turn by more than 90 degrees as the lungs deform, or NULL. */
   const double *turned_over;
-  /** Errors by number of modes and by number of harmonics, or NULL. */
+  /** Relative RMS errors by number of modes and by number of harmonics, or NULL. */
   const supine_error_table *table;
 } supine_basis_content;
 

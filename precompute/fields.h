@@ -26,7 +26,6 @@ typedef struct supine_fields {
 /** Read displacement fields from a safetensors file with two tensors, F32 or F64. The tensor
  * gravity [M, 3] holds M directions of gravity. The tensor displacement [M, N, 3] holds the
  * displacements of the N vertices of `lungs` for each direction.
- *
  * @param lungs    the reference surface
  * @param options  axes and unit of the displacements
  * @param fields   release with supine_fields_free
@@ -46,7 +45,7 @@ typedef struct supine_fit_report {
   size_t band_highest; /**< highest degree that the directions of gravity determine */
   size_t band;         /**< highest degree of the harmonics in the chosen fit */
   double condition;    /**< condition number of the matrix of harmonics */
-  size_t mode_count;   /**< number of modes in the file; set only by supine_precompute_fields */
+  size_t mode_count; /**< number of modes in the basis file; set only by supine_precompute_fields */
   /** [l] relative RMS leave-one-out error with harmonics to degree l. */
   double error[SUPINE_FIT_BAND_MAX + 1];
   supine_accuracy accuracy; /**< leave-one-out errors of the chosen fit; its member `volume` is 0 */
@@ -60,7 +59,6 @@ typedef struct supine_fit_options {
 } supine_fit_options;
 
 /** Fit harmonics to the fields, compress the fit, and measure its leave-one-out error.
- *
  * @param compression  written; it has one row for each coordinate of each vertex. Release it
  *   with supine_projection_compression_free
  * @retval SUPINE_ERROR_ARGUMENT   fewer than two directions, or too few to determine options->band

@@ -24,8 +24,8 @@ static const double leverage_max = 0.999;
 static const double worthwhile = 0.99;
 static const double exact = 1e-6;
 
-/* A least-squares fit of harmonics to the fields of several directions of gravity. The coefficients
- * are `pinv` times the fields. */
+/* A least-squares fit of harmonics to displacement fields for several directions of gravity. The
+ * coefficient of each harmonic is a field; the coefficients are `pinv` times the given fields. */
 typedef struct fit {
   size_t count;      /* number of directions of gravity */
   size_t terms;      /* number of harmonics */
@@ -34,22 +34,22 @@ typedef struct fit {
   double condition;  /* condition number of `harmonics` */
 } fit;
 
-/* Work space of predict(). */
+/* Work space of predict(), which predicts the field of a held-out direction from all others. */
 typedef struct prediction {
-  double *pinv;      /* [harmonics, directions] pseudo-inverse without the held-out direction */
-  double *half_gram; /* [harmonics, directions] product of `pinv` and fitting.gram */
-  double *fit_gram;  /* [harmonics, harmonics] scalar products of the fields they multiply, mm^2 */
+  double *pinv;      /* [harmonics, directions] fit.pinv of a fit without the held-out direction */
+  double *pinv_gram; /* [harmonics, directions] product of `pinv` and fitting.gram */
+  double *coefficient_gram; /* [harmonics, harmonics] scalar products of coefficients, mm^2 */
   double *eigenvalues;
   double *eigenvectors;
-  double *target;        /* [harmonics] values at the held-out direction; with modes, projected */
-  double *residual;      /* [directions] weight of each given field in the residual field */
+  double *target;   /* [harmonics] values at the held-out direction, or their projection on modes */
+  double *residual; /* [directions] weight of each input field in the prediction error */
   double *gram_residual; /* [directions] product of fitting.gram and `residual` */
 } prediction;
 
 typedef struct fitting {
   const supine_fields *fields;
   size_t rows;  /* 3 x number of vertices */
-  double *gram; /* [directions, directions] scalar products of the given fields, mm^2 */
+  double *gram; /* [directions, directions] scalar products of any two input fields, mm^2 */
   fit chosen;
   prediction work;
 } fitting;
@@ -110,14 +110,14 @@ static bool fit_is_determined(const fit *f) {
 }
 
 /* Allocate all arrays in one block. Each matrix has room for M x M numbers, where M is the number
- * of fields: only bands with fewer than M harmonics are tried. */
+ * of fields, because only fits with fewer than M harmonics are tried. */
 static supine_status allocate(fitting *w, supine_error *error) {
   const size_t m = w->fields->direction_count;
   double *next = w->gram = malloc((5 * m * m + 4 * m) * sizeof *next);
   if (next == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu fields", m);
   }
-  double **const squares[] = {&w->work.pinv, &w->work.half_gram, &w->work.fit_gram,
+  double **const squares[] = {&w->work.pinv, &w->work.pinv_gram, &w->work.coefficient_gram,
                               &w->work.eigenvectors};
   double **const lists[] = {&w->work.eigenvalues, &w->work.target, &w->work.residual,
                             &w->work.gram_residual};
@@ -131,13 +131,13 @@ static supine_status allocate(fitting *w, supine_error *error) {
   return SUPINE_OK;
 }
 
-/* Predict the field of the held-out direction d from the fields of all other directions. If `modes`
- * is 0, predict with the harmonics; otherwise predict with that number of leading modes of their
- * coefficients. The residual field, true minus predicted, is a weighted sum of all given fields.
- * Write its weights to w->work.residual, and its squared norm, mm^2, to `square`.
+/* Predict the field for direction d of gravity from the fields for all other directions. Use the
+ * harmonics if `modes` is 0, otherwise that number of principal modes of the fitted field. The
+ * error, true minus predicted, is a weighted sum of all input fields. Write the weights to
+ * w->work.residual, and the squared norm of the error, mm^2, to `square`.
  *
- * With A = f->pinv, unit vector e_d, and h as row d of f->harmonics x A, the pseudo-inverse without
- * d is
+ * Let A be f->pinv, h row d of f->harmonics x A, and e_d a vector that is 1 at d and 0 elsewhere.
+ * The pseudo-inverse without direction d is
  *
  *     A_d = A - A e_d (e_d - h)^T / (1 - h_d) */
 static supine_status predict(const fitting *w, const fit *f, size_t d, size_t modes,
@@ -155,11 +155,11 @@ static supine_status predict(const fitting *w, const fit *f, size_t d, size_t mo
   memcpy(o->target, y, f->terms * sizeof *o->target);
   if (modes > 0) {
     cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, p, m, m, 1.0, o->pinv, m, w->gram, m,
-                0.0, o->half_gram, m);
-    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, p, p, m, 1.0, o->half_gram, m, o->pinv, m,
-                0.0, o->fit_gram, p);
-    status = supine_projection_leading_eigenpairs(f->terms, o->fit_gram, modes, o->eigenvalues,
-                                                  o->eigenvectors);
+                0.0, o->pinv_gram, m);
+    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, p, p, m, 1.0, o->pinv_gram, m, o->pinv, m,
+                0.0, o->coefficient_gram, p);
+    status = supine_projection_leading_eigenpairs(f->terms, o->coefficient_gram, modes,
+                                                  o->eigenvalues, o->eigenvectors);
     memset(o->target, 0, f->terms * sizeof *o->target);
     for (size_t k = 0; k < modes && status == SUPINE_OK; ++k) {
       const double *mode = o->eigenvectors + k * f->terms;
@@ -183,7 +183,7 @@ static double square_sum(const fitting *w) {
   return sum;
 }
 
-/* Compute the relative RMS leave-one-out error of a fit that uses all its harmonics, not modes. */
+/* Compute the relative RMS leave-one-out error of a fit before its compression to modes. */
 static double leave_one_out(const fitting *w, const fit *f) {
   double sum = 0.0;
   for (size_t d = 0; d < f->count; ++d) {
@@ -194,8 +194,8 @@ static double leave_one_out(const fitting *w, const fit *f) {
   return sqrt(sum / square_sum(w));
 }
 
-/* Fit harmonics to each degree (band) that the directions determine. Choose band `wanted` or, if
- * that is negative, a higher band only for a leave-one-out error at least 1 % lower. */
+/* Fit harmonics up to each degree (band) that the directions determine. Choose band `wanted`. If it
+ * is negative, prefer a higher band only if its leave-one-out error is over 1 % lower. */
 static supine_status choose_band(fitting *w, int wanted, supine_fit_report *report,
                                  supine_error *error) {
   const size_t m = w->fields->direction_count;
@@ -236,8 +236,8 @@ static supine_status choose_band(fitting *w, int wanted, supine_fit_report *repo
   return SUPINE_OK;
 }
 
-/* Make a projection, the product columns x functions (projection.h), from the chosen fit. The
- * columns are the given fields, the functions the transpose of the pseudo-inverse. */
+/* Make a projection (projection.h) from the chosen fit. Its columns are the input fields. Its
+ * functions are the transpose of the chosen fit's `pinv`. */
 static supine_status project(const fitting *w, size_t band, supine_projection *made,
                              supine_error *error) {
   const size_t m = w->chosen.count;

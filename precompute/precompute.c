@@ -29,7 +29,7 @@ typedef struct pipeline {
   const supine_lungs *given;
   const supine_lungs *lungs; /* lungs in use: `given`, or `anchored` after anchor() */
   const supine_precompute_options *options;
-  supine_lungs anchored; /* copy of `given` with the vertices that anchor() corrects, or empty */
+  supine_lungs anchored; /* copy of `given` whose vertices anchor() has corrected, or all zero */
   supine_reference reference;
   double *directions; /* [N, 3] displacement of each vertex per unit force, mm */
   /* [N] squared length of the vector in `directions`. With these weights, the modes minimise the
@@ -46,8 +46,8 @@ typedef struct pipeline {
   /* [lungs, 9] resting volume (FRC) minus the volume of the reference surface, mL: coefficients of
    * spherical harmonics of the direction of gravity, to degree 2 */
   double resting[2][9];
-  /* Volume at which errors are measured, minus that of the reference surface, mL: coefficients of
-   * the 9 spherical harmonics, to degree 2, of the direction of gravity. */
+  /* Coefficients of the 9 spherical harmonics to degree 2 of a function of the direction of
+   * gravity: the volume at which errors are measured, minus that of the reference surface, mL. */
   double volume[9];
   supine_error_table table;
 } pipeline;
@@ -91,13 +91,13 @@ static supine_status compress(pipeline *p, supine_error *error) {
                                                 error);
 }
 
-/* Correct the vertices of the reference surface so that the compressed field displaces them exactly
- * to the scan, in the posture of the scan. Along axis j, a vertex moves to
+/* Correct the vertices of the reference surface so that the displacement computed from the modes
+ * moves them exactly to the scan, in the posture of the scan. The corrected position of a vertex is
  *
- *     p_j = scan_j - A_j F d_j
+ *     p_j = scan_j - A_j F d_j        along axis j
  *
- * where A are the gains (factors on the displacement) that give its lung the volume of the scan, F
- * is the force on the vertex by the compressed field, and d its displacement per unit force. */
+ * A_j is the gain (factor on the displacement) at which its lung has the volume of the scan, F is
+ * the force on the vertex computed from the modes, and d is its displacement per unit force. */
 static supine_status anchor(pipeline *p, supine_error *error) {
   const supine_lungs *lungs = p->given;
   const supine_compression *field = &p->compression;

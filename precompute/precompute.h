@@ -21,9 +21,9 @@ typedef struct supine_precompute_options {
   supine_scan_frame frame;
   /** @{ Texts for the metadata of the basis file. Each may be NULL. */
   const char *made_by;         /**< command line that makes the basis */
-  const char *patient;         /**< displacement law fitted to the patient, as JSON */
+  const char *patient;         /**< JSON text of the displacement law fitted to the patient */
   const char *patient_summary; /**< name of the fitted displacement law, and its held-out error */
-  const char *assumed;         /**< axes, unit, displacement law, scan state and volumes assumed */
+  const char *assumed;         /**< what was assumed: axes, unit, displacement law, volumes, ... */
   const char *findings;        /**< notes and warnings, one per line */
   /** @} */
 } supine_precompute_options;

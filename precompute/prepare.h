@@ -12,10 +12,10 @@
 
 enum { SUPINE_LESIONS_MAX = 64 };
 
-/** The user's choices for the model and the scan. */
+/** The user's choices for the physical model and the scan. */
 typedef struct supine_model_choice {
   int law;            /**< displacement law: a supine_law, or SUPINE_LAW_COUNT for the default */
-  supine_model model; /**< constants that the user gave; NAN selects that of the displacement law */
+  supine_model model; /**< constants; each that is NAN is taken from the displacement law */
   const char *patient_law; /**< name of the displacement law fitted to the patient, or NULL */
   const double *stiffness; /**< [N] relative stiffness fitted to the patient, or NULL */
   bool has_scan; /**< whether `scan` was given; SUPINE_LAW_DEEP assumes full inflation if not */
@@ -40,8 +40,8 @@ typedef struct supine_prepared {
   double *lesions;   /**< [N] factors by which lesions multiply the stiffness, or NULL */
 } supine_prepared;
 
-/** Select the displacement law, set stiffness and lesions, and move the vertices from the scan to
- * the reference surface.
+/** Select the displacement law, set stiffness and lesions, and move the vertices of the scan to the
+ * reference surface.
  * @param lungs     in: the scan; out: the reference surface
  * @param prepared  zeroed; release with supine_precompute_prepared_free, also after an error
  * @param findings  warnings are added

@@ -14,7 +14,7 @@
 #include "precompute/lungs/gate.h"
 #include "precompute/source.h"
 
-/* Input files. The arrays have room for all files, and for at least two lungs of a label map. */
+/* Input files that are being read. Each array has an element for each file, and at least two. */
 typedef struct reading {
   const supine_source_options *options;
   char **paths;
@@ -127,8 +127,8 @@ static supine_status find_lobes(const char *folder, lobe_files *found, supine_er
                                 folder);
 }
 
-/* Load label maps. For a single lung without a given midline, take the side of its bounding box
- * that faces the other lung. */
+/* Load label maps. If they show a single lung and no midline was given, use the medial face of the
+ * lung's bounding box as midline. */
 static supine_status load_maps(reading *r, supine_source *source, supine_findings *findings,
                                supine_error *error) {
   supine_labels_options wanted = r->options->labels;

@@ -7,7 +7,7 @@
 
 #include "precompute/lungs/disease.h"
 
-/* Compute the exponent w of a lesion (disease.h) at a distance. */
+/* Compute the exponent w of a lesion's factor (disease.h) at a distance from its centre. */
 static double lesion_weight(double distance, double radius) {
   if (distance >= radius) {
     return 0.0;

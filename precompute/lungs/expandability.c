@@ -32,8 +32,8 @@ static bool parse_vertex(const char *text, size_t *vertex) {
   return end != text && *end == '\0' && errno == 0 && text[0] != '-';
 }
 
-/* Read one CSV row into a [count]: its expandability is that of the vertex that it names or,
- * without a column `vertex`, of vertex `row`. 0 marks vertices without a value so far. */
+/* Store the expandability in a CSV row for the vertex in its column `vertex` or, without that
+ * column, for vertex `row`. Elements of a [count] are 0 for vertices without a value so far. */
 static supine_status take_row(const supine_csv *csv, size_t row, size_t count, double *a,
                               supine_error *error) {
   const char *number = supine_csv_text(csv, 1);

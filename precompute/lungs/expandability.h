@@ -10,19 +10,18 @@
 
 #include "precompute/lungs/lungs.h"
 
-/** How expandability depends on t, a coordinate from 0 to 1 in the bounding box of the lungs. */
 typedef enum supine_expandability_shape {
   SUPINE_EXPANDABILITY_UNIFORM = 0, /**< 1 everywhere */
   SUPINE_EXPANDABILITY_LINEAR,      /**< `from` + (`to` - `from`) t, with t 0 to 1 along an axis */
   SUPINE_EXPANDABILITY_EXPONENTIAL  /**< `from` * (`to` / `from`)^t, with t 0 to 1 along an axis */
 } supine_expandability_shape;
 
-/** Expandability as a function of the coordinate t, 0 to 1, of a vertex in the bounding box of the
- * lungs (supine_lungs_box_coordinates). */
+/** Expandability of a vertex as a function of its coordinate t along one axis of the bounding box
+ * of the lungs, from 0 at one face to 1 at the opposite face (supine_lungs_box_coordinates). */
 typedef struct supine_expandability_law {
   supine_expandability_shape shape;
-  int axis;        /**< t grows along 0: midline to outside, 1: back to front, 2: apex to base */
-  double from, to; /**< expandability at t = 0 and at t = 1, the two ends of the axis; > 0 */
+  int axis;        /**< 0: from midline to outside, 1: from back to front, 2: from apex to base */
+  double from, to; /**< relative expandability at the start and at the end of the axis, > 0 */
 } supine_expandability_law;
 
 /** Compute the expandability a [N] of all vertices by a law whose shape is not

@@ -8,7 +8,7 @@
 #include "mesh/repair.h"
 #include "precompute/lungs/gate.h"
 
-/* Pieces with less than this share of the volume of their surface are dropped. */
+/* Connected components with less than this share of the volume of a surface are dropped. */
 static const double speck_share = 0.01;
 
 static const char *plural(size_t count) {
@@ -133,7 +133,7 @@ static size_t part_lungs(const supine_lungs *lungs, supine_mesh parts[2]) {
   return failed ? 0 : along < 0 ? 1 : 2;
 }
 
-/* Compare the axes with the shape of the lungs, and refuse both lungs in one piece. Write whether
+/* Compare the axes with the shape of the lungs. Refuse one component with both lungs. Write whether
  * the shape confirms the axes, and the side of a single lung: +1 left, -1 right, 0 unknown. */
 static supine_status check_shape(const supine_lungs *lungs, const supine_lungs_source *source,
                                  int *side, bool *axes_hold, supine_findings *findings,

@@ -19,17 +19,16 @@ typedef struct supine_lungs_source {
 
 /** Repair and check surfaces, and join them into lungs.
  *
- * - Surfaces are repaired by supine_mesh_repair. Pieces below 1 % of the volume of their surface
- * are dropped.
+ * - Surfaces are repaired by supine_mesh_repair. Connected components with less than 1 % of
+ *   the volume of their surface are dropped.
  * - The longest side of the bounding box must be plausible for lungs. If the user gave the axes or
  *   units, an implausible size is only a warning.
  * - Axes that the shape contradicts (supine_mesh_anatomy_find) are a warning.
  * - The side of a single lung follows from its shape or, if that is unclear, from its position.
- *
  * @param meshes     [count] changed in place
  * @param axes_hold  output: whether the shape fits the axes LPS clearly better than all other axes
  * @param findings   notes and warnings are added
- * @retval SUPINE_ERROR_MESH  a size impossible for lungs, or both lungs in one piece
+ * @retval SUPINE_ERROR_MESH  a size impossible for lungs, or one component with both lungs
  * @retval SUPINE_ERROR_OPEN_SURFACE  a surface that is not closed
  * @retval the statuses of supine_lungs_create */
 supine_status supine_lungs_gate(supine_mesh *meshes, size_t count,

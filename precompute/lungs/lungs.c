@@ -14,11 +14,11 @@ static const double same_box_share = 0.01;
 /* A surface is refused if its longest side is less than this share of another surface's longest
  * side. The lobes and lungs of one chest differ by less than a factor of ten. */
 static const double least_side_share = 0.05;
-/* A midline is refused if a lung reaches farther beyond it than this share of the lung's extent on
- * its own side. Lungs do reach across the midline behind the breastbone. */
+/* Largest extent of a lung beyond the midline, divided by its extent on its own side. The midline
+ * is refused if the ratio is larger. Lungs do reach across the midline behind the breastbone. */
 static const double most_beyond_share = 0.5;
 
-/* A surface and the mean x of its vertices. Surfaces are joined from left to right. */
+/* A surface, and the mean x of its vertices, mm. Surfaces are joined in order of falling mean x. */
 typedef struct placed_mesh {
   const supine_mesh *mesh;
   double mean_x;
@@ -209,7 +209,7 @@ static supine_status check_midline(const supine_lungs *lungs, bool two_sided, su
                             0.5 * (lungs->minimum[0] + lungs->maximum[0]));
   }
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-    double inner = INFINITY; /* smallest distance from the midline, mm; negative beyond it */
+    double inner = INFINITY; /* least x of a vertex, mm; 0 at midline, > 0 on the lung's side */
     double outer = -INFINITY;
     for (size_t i = lungs->lung_begin[lung]; i < lungs->lung_begin[lung + 1]; ++i) {
       const double x = lungs->side[lung] * (lungs->mesh.vertices[3 * i] - lungs->midline);

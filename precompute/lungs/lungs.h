@@ -29,7 +29,6 @@ typedef struct supine_lungs {
  * the left ones hardly overlap the right ones in x. Otherwise all components are one lung. Unless
  * given, the midline is the centre of the bounding box for two lungs, and the face of the bounding
  * box nearest x = 0 for one. If the triangles of a lung face inwards, they are reversed.
- *
  * @param meshes   [count] not changed
  * @param midline  x of the plane between left and right, mm; found if NULL
  * @param lungs    written on success; release with supine_lungs_free
@@ -49,10 +48,10 @@ void supine_lungs_free(supine_lungs *lungs);
 #define SUPINE_LUNGS_MOST_OVERLAP 0.5
 
 /** Divide connected components between the two sides of `middle` along an axis, by the mean of
- * their vertices. The range of a side spans its components with at least 5 % of all vertices.
+ * their vertices. Only components with at least 5 % of all vertices count for a side's range.
  * @param above  [components] written: whether the mean is above `middle`
- * @return overlap of the ranges of the two sides as a share of the narrower range; INFINITY if a
- *   side has no range, NAN if out of memory */
+ * @return overlap of the two ranges divided by the narrower range; INFINITY if no component counts
+ *   on a side, NAN if out of memory */
 double supine_lungs_sides(const supine_mesh *mesh, const supine_topology *topology, int axis,
                           double middle, uint8_t *above);
 

@@ -31,7 +31,8 @@ static void corner(size_t index, double p[3]) {
   p[(axis + 2) % 3] = 0.0;
 }
 
-/* Find the index of the edge between two corners. Edges are numbered in the order of `faces`. */
+/* Find the index of the edge between two corners of the icosahedron. Edges are numbered in the
+ * order in which `faces` names them with the lower corner first. */
 static size_t edge_index(unsigned a, unsigned b) {
   size_t count = 0;
   for (size_t f = 0; f < FACES; ++f) {

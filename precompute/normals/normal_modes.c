@@ -17,12 +17,12 @@
 enum {
   ROWS = 4096,    /* modes are found from at most this many vertices of a lung */
   STATES = 192,   /* modes are found from this many sampled states (posture and volume) */
-  HELD_OUT = 256, /* errors are measured in this many other states */
-  STEP = 3        /* number of modes that are added at a time */
+  HELD_OUT = 256, /* errors are measured in this many held-out states (posture and volume) */
+  STEP = 3        /* step between the numbers of modes that are tried */
 };
 
-/* Modes are weighted sums of snapshots, the normals in at most SNAPSHOTS states. LANES states are
- * evaluated together. Lane 0 of the first of 6 batches holds the reference surface instead. */
+/* A snapshot is all normals in one state. Up to MOST modes are weighted sums of up to SNAPSHOTS
+ * snapshots. LANES states are evaluated together; the first of all is the reference surface. */
 enum { LANES = 8, SNAPSHOTS = 6 * LANES - 1, MOST = SUPINE_NORMALS_MOST };
 
 /* Largest accepted mean and 99.9th percentile of the angle between an exact normal and its
@@ -32,17 +32,18 @@ static const double mean_wanted = 0.08;
 static const double p999_wanted = 0.8;
 static const double degrees_per_radian = 57.29577951308232;
 
-/* A state becomes a snapshot only if the earlier snapshots leave more than this share of the sum of
- * its squared normals unexplained. */
+/* Snapshots (normals in one state) are added until they reproduce the normals of every state with
+ * at most this squared error, relative to the sum of their squares. */
 static const double least_unexplained = 1e-7;
 
 /* Modes of the normals of one lung, before rounding. */
 typedef struct fit {
   size_t count; /* number of modes, at most MOST */
   size_t snapshot_count;
-  size_t state[SNAPSHOTS]; /* [snapshot_count] index of the state of each snapshot */
-  float snapshot_weights[1 + SNAPSHOTS][MOST]; /* [1 + snapshot][mode]; row 0 is zero */
-  double *weights; /* [mode, axis, monomial] coefficients of each mode's weight in a state */
+  size_t state[SNAPSHOTS]; /* [snapshot_count] index of the sampled state of each snapshot */
+  /* [1 + snapshot][mode] weight of a snapshot (normals in one state) in a mode; row 0 is zero */
+  float snapshot_weights[1 + SNAPSHOTS][MOST];
+  double *weights; /* [mode, 3, monomials] coefficients V (normal_modes.h) of each mode's weight */
   supine_normals_rows rows; /* polynomials that give the normals of held-out vertices */
   float *modes;             /* [rows.count, 3, MOST] modes at the held-out vertices */
 } fit;
@@ -67,9 +68,9 @@ static void apply_rows(const double *in, size_t count, size_t terms, const doubl
   }
 }
 
-/* Compute out[i, c, t] = sum over u of in[i, c, u] G_c[u, t] for `in` and `out` [count, 3, terms].
- * G_c = A_c^T A_c, where row r of A_c holds the polynomial coefficients along axis c of the normal
- * of vertex r of `rows`. gram [terms, terms] is work space. */
+/* Compute out_c = in_c A_c^T A_c for each axis c. Row r of A_c [rows->count, terms] holds the
+ * polynomial coefficients along axis c of the normal of vertex r of `rows`. in_c and out_c are the
+ * matrices [count, terms] of `in` and `out` for axis c. gram [terms, terms] is work space. */
 static void apply_gram(const supine_normals_rows *rows, size_t terms, const double *in,
                        size_t count, double *gram, double *out) {
   const int width = (int)terms;
@@ -82,10 +83,10 @@ static void apply_gram(const supine_normals_rows *rows, size_t terms, const doub
   }
 }
 
-/* Choose R snapshots among s states by pivoted Cholesky factorisation, and find the modes as
- * weighted sums of snapshots with the least squared error. product [s, s] holds the scalar products
- * of the normals of any two states, scaled to 1 on the diagonal, and is overwritten. Write the
- * weight of snapshot r in mode j to coefficients[j R + r]. */
+/* Choose snapshots (normals in one state) among s states by pivoted Cholesky factorisation. Find
+ * the weighted sums of snapshots (modes) that approximate all states with the least squared error.
+ * @param product       [s, s] scalar products of states' normals, 1 on the diagonal; overwritten
+ * @param coefficients  [modes, snapshots] written: weight of each snapshot in each mode */
 static supine_status choose_snapshots(size_t s, double *product, fit *made,
                                       double coefficients[MOST * SNAPSHOTS]) {
   lapack_int pivots[STATES];
@@ -115,8 +116,8 @@ static supine_status choose_snapshots(size_t s, double *product, fit *made,
 
 /* Find the modes that approximate the normals of the vertices of `rows` in all sampled states with
  * the least squared error. All states have equal weight. The modes are orthonormal over these
- * vertices. Write to mix [MOST, 3, terms] the matrix that turns the coefficients A of a vertex's
- * polynomial into its modes: mode j along axis c is sum over t of mix[j, c, t] A[c, t]. */
+ * vertices. Write mix [MOST, 3, terms]: if A are the coefficients of the polynomial of any normal,
+ * its mode j along axis c is sum over t of mix[j, c, t] A[c, t]. */
 static supine_status find_fit(const normals_work *work, size_t lung,
                               const supine_normals_rows *rows, double *mix, fit *made) {
   const size_t terms = work->terms;
@@ -212,10 +213,10 @@ static void pack(const int16_t *modes, size_t count, double *packed) {
   }
 }
 
-/* Divide the modes [n, 3, stride] of each vertex in place by the length of its normal on the
- * reference surface, unless `lengths` [n] is NULL. Modes of a vertex with length 0 become 0. Round
- * the first `count` modes to multiples, rounded [n, 3, count], of the quantisation step of each
- * mode, unit [count]. */
+/* Round the first `count` modes of n vertices to multiples of unit[mode], the quantisation step.
+ * @param values   [n, 3, stride] modes, first divided in place by `lengths`, unless NULL; x / 0 = 0
+ * @param lengths  [n] length of each normal on the reference surface, or NULL
+ * @param rounded  [n, 3, count] written: modes divided by `unit` */
 static void round_modes(float *values, const float *lengths, size_t n, size_t stride, size_t count,
                         int16_t *rounded, double *unit) {
   float top[MOST] = {0.0f};
@@ -239,7 +240,7 @@ static void round_modes(float *values, const float *lengths, size_t n, size_t st
   }
 }
 
-/* Multiply the weights [count, 3, terms] of each mode by its quantisation step. */
+/* Multiply the weights [count, 3, terms] of each mode by its quantisation step, unit[mode]. */
 static void scale_weights(const double *weights, const double *unit, size_t count, size_t terms,
                           double *scaled) {
   for (size_t i = 0; i < count * 3 * terms; ++i) {
@@ -265,8 +266,8 @@ SUPINE_CLONES static void find_angles(size_t count, const double *a, const doubl
 }
 
 /* Measure the angles between exact and approximate normals at the held-out vertices of a lung, in
- * all held-out states. Add them to the histogram `tally`, and their sum to `sum`. `modes`
- * [vertices, 3, count] and `weights` [count, 3, terms] are those of the basis file. */
+ * all held-out states. Add them to the histogram `tally`, and their sum to `sum`. The rounded
+ * modes [vertices, 3, count] and weights [count, 3, terms] are those of the basis file. */
 static void measure(const normals_work *work, size_t lung, size_t count, const int16_t *modes,
                     const double *weights, supine_tally *tally, double *sum) {
   enum { BLOCK = 16 }; /* vertices whose exact normals are computed at a time */
@@ -334,17 +335,16 @@ static supine_status measure_all(const normals_work *work, size_t count,
   return memory ? SUPINE_OK : SUPINE_ERROR_MEMORY;
 }
 
-/* Work space of make_modes(), which computes the modes of every vertex as sums over the
- * snapshots. */
+/* Work space of make_modes(), which computes each vertex's modes as sums over the snapshots. */
 typedef struct planes_work {
   const normals_work *work;
   size_t count; /* number of modes */
-  size_t first; /* index of the state in the first lane: 0 is the reference surface, 1 + r is
+  size_t first; /* index of the first evaluated state: 0 is the reference surface, 1 + r is
                    snapshot r */
-  /* [lung][axis][mode][lane] gain of the axis times weight of the displacement mode. */
+  /* [lung][axis][displacement mode][lane] gain (factor) along the axis times weight of the mode. */
   float (*mode_factors)[3][SUPINE_NORMALS_FIELD_MAX][LANES];
-  float *positions; /* [N, 3, LANES] positions, mm */
-  float *modes;     /* [N, 3, count] sums over the snapshots evaluated so far */
+  float *positions; /* [N, 3, LANES] positions in each of LANES states, mm */
+  float *modes;     /* [N, 3, count] modes summed over the snapshots evaluated so far */
   float *lengths;   /* [N] length of each normal on the reference surface */
 } planes_work;
 
@@ -418,9 +418,9 @@ SUPINE_CLONES static void sum_range(void *context, size_t begin, size_t end, siz
   }
 }
 
-/* Set planes->mode_factors, the products of gain and weight, from the monomials of the sampled
- * states. The products for the gain of axis a follow the constant 1 among the monomials along axis
- * (a + 2) mod 3. */
+/* Copy planes->mode_factors, the gain of an axis times the weight of a mode, from the monomials of
+ * the sampled states. The monomials along axis c are 1, the products for the gain of axis c + 1,
+ * and others. Those for `axis` are therefore found at c = (axis + 2) % 3. */
 static void find_mode_factors(const planes_work *planes) {
   const normals_work *work = planes->work;
   for (size_t lung = 0; lung < work->surface->lung_count; ++lung) {

@@ -2,16 +2,16 @@
 /** @file
  * Approximate the normals of the deformed surface by a few functions of posture and volume.
  *
- * The displacement of a vertex along an axis is the gain of this axis, one factor for each lung,
- * times the sum of the modes of the displacement field with the weights w_k. The normal N_i of
- * vertex i is the sum of the area vectors of its triangles. Its component along axis c is the
- * scalar product of coefficients A_ic, which depend on the vertex, and monomials phi_c, which
- * depend on the state. With the gains a and b of the two axes that follow axis c in cyclic order,
+ * The displacement of vertex i along axis c is s_c sum over k of w_k m_ikc, where m_k are the modes
+ * of the displacement field, w_k their weights, and s_c the gain of its lung for axis c. The normal
+ * N_i is the sum of the area vectors of the triangles at vertex i. Its component along axis c is a
+ * scalar product of coefficients A_ic of the vertex and monomials phi_c of the weights and gains.
+ * With the gains a and b of the two axes that follow axis c in cyclic order,
  *
  *     N_ic = A_ic . phi_c        phi_c = (1, a w_k, b w_k, a b w_k w_l for k <= l)
  *
- * The normals of each lung are approximated by a few modes n_j of their own, with weights v_j that
- * depend on the state. N_i(0) is the normal on the reference surface:
+ * The normals of each lung are approximated by a few modes n_j of their own. Their weights v_j have
+ * coefficients V_jc. N_i(0) is the normal on the reference surface:
  *
  *     N_i ~ |N_i(0)| sum over j of n_ij v_j        v_j = sum over c of V_jc . phi_c
  *
@@ -33,32 +33,33 @@ typedef struct supine_normals_surface {
   const float *vertices;     /**< [N, 3] positions on the reference surface, mm */
   const uint32_t *triangles; /**< [triangle_count, 3] indices of vertices */
   const float *directions;   /**< [N, 3] displacement of each vertex per unit force, mm; NULL if
-                                `field` holds vectors */
+                                `field` holds the displacement itself */
   const supine_compression *field;
   /** [lungs, 9] resting volume (FRC) minus the volume of the reference surface, mL: coefficients of
    * spherical harmonics of the direction of gravity, to degree 2; NULL if unknown */
   const double *resting;
-  const supine_volume_forms *forms; /**< lung volumes of `field`; unused if `resting` is NULL */
-  double bend[3]; /**< [axis] curvature of the path of the gains (supine_volume_bend) */
+  const supine_volume_forms *forms; /**< lung volumes as functions of mode weights and gains; unused
+                                       if `resting` is NULL */
+  double bend[3]; /**< [axis] curvature of the vertices' paths (supine_volume_bend) */
 } supine_normals_surface;
 
 /** Modes from which vertex normals are computed, and the error of these normals. */
 typedef struct supine_normals_modes {
   size_t count;   /**< number of modes; may be 0 */
   int16_t *modes; /**< [N, 3, count] scaled to integers; `weights` include the inverse scale */
-  /** [lungs, count, 3, terms] coefficients V_jc (top of this file) of the weight of each mode. */
+  /** [lungs, count, 3, monomials] coefficients V_jc of each mode's weight (top of this file). */
   double *weights;
-  /** Range of the states from which the modes are found: volume of all lungs minus that of the
-   * reference surface, mL. If the surface has no `resting`, displacement of the vertex that moves
-   * most, mm, negative where the gain is negative. */
+  /** Least and largest volume of all lungs, minus that of the reference surface, among the states
+   * from which the modes are found, mL. If the resting volume (FRC) is unknown: displacement of the
+   * vertex that moves most, mm, negative if all displacements are reversed. */
   double range[2];
   /** Mean angle between exact and approximate normals at held-out vertices and states, degrees. */
   double mean;
   double p999; /**< 99.9th percentile of the angle between exact and approximate normals, degrees */
 } supine_normals_modes;
 
-/** Fewest and most modes of normals, and most modes of a field whose normals get modes. */
-enum { SUPINE_NORMALS_FEW = 6, SUPINE_NORMALS_MOST = 24, SUPINE_NORMALS_FIELD_MAX = 24 };
+enum { SUPINE_NORMALS_FEW = 6, SUPINE_NORMALS_MOST = 24 }; /**< least and most modes of normals */
+enum { SUPINE_NORMALS_FIELD_MAX = 24 }; /**< displacement fields with more modes get no normals */
 
 /** Find modes of the normals: the smallest number with a mean angular error of at most 0.08 degrees
  * and a 99.9th percentile of at most 0.8 degrees. The error is measured at up to 4096 held-out

@@ -6,24 +6,24 @@
 
 #include "precompute/normals/normal_modes.h"
 
-/* Return the number of monomials in the component of a normal along one axis. With the weights w of
- * the displacement modes, and the gains a and b (factors on the displacement) of the next two axes
- * in cyclic order, they are
+/* Return the number of monomials in the component of a normal along one axis. Let w_k be the
+ * weights of the displacement modes, and let a and b be the gains (factors on the displacement) of
+ * the next two axes in cyclic order. The monomials are
  *
  *     1, a w_k, b w_k, a b w_k w_l for k <= l */
 static inline size_t supine_normals_terms(size_t modes) {
   return 1 + 2 * modes + modes * (modes + 1) / 2;
 }
 
-/* Compute the monomials of supine_normals_terms() for the axes x, y and z, phi [3, terms]. */
+/* Compute the monomials of weights and gains (supine_normals_terms) into phi [axis, monomial]. */
 void supine_normals_monomials(size_t modes, const double *weights, const double gains[3],
                               double *phi);
 
-/* The triangles around each vertex. The array `triangles` of the surface contains vertex i at the
- * indices corner[begin[i]] to corner[begin[i + 1] - 1]. */
+/* The triangles around each vertex. Vertex i stands at the indices corner[begin[i]], ...,
+ * corner[begin[i + 1] - 1] in the array `triangles` of the surface. */
 typedef struct supine_normals_fans {
-  uint32_t *begin;  /* [N + 2] first index into `corner` of each vertex; last: work space */
-  uint32_t *corner; /* [3 x triangle count] indices into `triangles`, grouped by vertex */
+  uint32_t *begin;  /* [N + 2] begin[i]: where vertex i starts in `corner`; last: work space */
+  uint32_t *corner; /* [3 x triangle count] indices into the array `triangles`, grouped by vertex */
 } supine_normals_fans;
 
 /* Find the triangles around each vertex. Release them with supine_normals_fans_free.
@@ -45,7 +45,8 @@ static inline void supine_normals_fan_others(const uint32_t *triangles, uint32_t
 typedef struct supine_normals_rows {
   size_t count;     /* number of vertices */
   uint32_t *vertex; /* [count] indices of the vertices */
-  double *terms;    /* [count, 3, terms] coefficients, for unit normals on the reference surface */
+  double *terms;    /* [count, 3, monomials] coefficients A_ic (normal_modes.h), divided by the
+                       length of the normal on the reference surface */
 } supine_normals_rows;
 
 /* Find the polynomials for the normals of every `stride`-th vertex of a lung. The first of these
@@ -61,14 +62,14 @@ void supine_normals_rows_free(supine_normals_rows *rows);
 typedef struct supine_normals_states {
   size_t count;    /* number of sampled states, at most `room` */
   size_t room;     /* requested number of states */
-  double *phi;     /* [lungs, room, 3, terms] monomials of supine_normals_terms() in each state */
-  double range[2]; /* least and largest volume, mL, or displacement, mm (supine_normals_modes) */
+  double *phi;     /* [lungs, requested states, 3, monomials] of supine_normals_monomials() */
+  double range[2]; /* extreme changes of volume, mL; if FRC is unknown, displacements, mm */
 } supine_normals_states;
 
 /* Sample up to `count` states with directions of gravity all over the sphere and volumes from rest
  * (FRC) to the reference surface. If the resting volume is unknown, the displacement of the vertex
- * that moves most ranges from -15 to 60 mm, negative where the gain is negative. States that the
- * lungs cannot reach are left out. A different `shift`, 0 to 1, gives different states. Release
+ * that moves most ranges from -15 to 60 mm; negative values reverse all displacements. States that
+ * the lungs cannot reach are left out. A different `shift`, 0 to 1, gives different states. Release
  * them with supine_normals_states_free.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_normals_states_create(const supine_normals_surface *surface, size_t count,

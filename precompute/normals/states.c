@@ -9,12 +9,12 @@
 
 #include "precompute/normals/polynomial.h"
 
-/* If the resting volume (FRC) is unknown, the displacement of the vertex that moves most spans this
- * range in the sampled states, mm; it is negative where the gain is negative. */
+/* Range of the displacement of the vertex that moves most, mm, in the sampled states if the resting
+ * volume (FRC) is unknown. Negative values reverse all displacements. */
 static const double lowest_mm = -15.0;
 static const double highest_mm = 60.0;
 
-/* Find the largest displacement, mm, of evenly chosen vertices at mode weights w and gain 1. */
+/* Find the largest displacement, mm, of evenly chosen vertices at mode weights w, unscaled. */
 static double largest(const supine_normals_surface *s, const double *w) {
   enum { SOME = 4096 };
   const size_t modes = s->field->mode_count;

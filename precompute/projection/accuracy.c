@@ -22,9 +22,9 @@
 enum { BLOCK = 128, PARTS = 16, VOLUME_HALVINGS = 10 };
 
 typedef struct tally {
-  double square_sum_mm2;    /* sum of the squared displacements at gain 1, mm^2 */
-  supine_tally same_gain;   /* errors where the exact and the compressed field have gain 1, mm */
-  supine_tally same_volume; /* errors where both fields have gains that give the same volume, mm */
+  double square_sum_mm2;    /* sum of the squared exact displacements before scaling, mm^2 */
+  supine_tally same_gain;   /* errors of the compressed displacement before scaling, mm */
+  supine_tally same_volume; /* errors after scaling both displacements to one lung volume, mm */
 } tally;
 
 typedef struct accuracy_work {
@@ -32,13 +32,13 @@ typedef struct accuracy_work {
   const supine_compression *compression;
   const double *directions; /* [N, 3] displacement of each vertex per unit force, mm */
   const double *weights;    /* [held-out directions, modes] weight of each mode */
-  const double *gains; /* [held-out directions, 2] gains of the exact and of the compressed field */
+  const double *gains; /* [held-out directions, 2] factors on exact and compressed displacement */
   tally *tallies;
   double *space; /* work space of all threads */
 } accuracy_work;
 
-/* Compute the errors of n displacements, mm. The displacement of vertex i is the gain times the
- * field, `approximate` or `exact`, times length[i], mm. */
+/* Compute the errors of n displacements, mm. The displacement of vertex i is its gain (a factor)
+ * times the force on it, approximate[i] or exact[i], times length[i], mm per unit force. */
 SUPINE_CLONES static void find_errors(size_t n, const double *approximate, const double *exact,
                                       const double *length, double approximate_gain,
                                       double exact_gain, double *out) {
@@ -54,7 +54,7 @@ static void compare_block(const accuracy_work *work, size_t begin, size_t n, dou
   const int count = (int)truth->direction_count;
   const size_t modes = work->compression->mode_count;
   double *coefficients = space;
-  double *approximate = coefficients + modes * BLOCK; /* [direction_count, n] field */
+  double *approximate = coefficients + modes * BLOCK; /* [direction_count, n] force by modes */
   double *exact = approximate + truth->direction_count * BLOCK;
   double length[BLOCK];
   double errors[BLOCK];
@@ -93,10 +93,9 @@ static void compare_range(void *context, size_t begin, size_t end, size_t thread
   }
 }
 
-/* For each held-out direction of gravity, find the gain of the exact field and the gain of the
- * compressed field (factors on the displacement) at which the volume of the lungs changes by
- * `fraction` times volumes [direction_count], mL. Write both to gains [direction_count, 2]. Return
- * false if a direction has no such gain. */
+/* For each held-out direction d of gravity, find the gains (factors on the displacement) of the
+ * exact and of the compressed field that change the lungs' volume by `fraction` volumes[d], mL.
+ * Write them to gains [direction_count, 2]. Return false if a direction has no such gain. */
 static bool find_gains(const supine_truth *truth, const supine_volume_forms *forms,
                        const double *weights, const double *volumes, double fraction,
                        double *gains) {
@@ -123,7 +122,7 @@ static double volume_along(const double harmonics[9], const double g[3]) {
   return volume;
 }
 
-/* Return the largest fraction 1, 1/2, 1/4, ... of `volumes` that find_gains() reaches, or 0. */
+/* Return the largest fraction 1, 1/2, 1/4, ... of `volumes` that the lungs can reach, or 0. */
 static double find_fraction(const accuracy_work *work, const supine_volume_forms *forms,
                             const double *volumes, double *gains) {
   double fraction = 1.0;

@@ -14,28 +14,29 @@
 /** Errors of the displacement over all vertices and held-out directions of gravity. */
 typedef struct supine_accuracy {
   size_t direction_count;
-  /** Errors if the exact and the compressed field have the same gain (factor on the displacement),
-   * as fractions of the RMS displacement. */
+  /** Errors of the compressed displacement before it is scaled to a lung volume, as fractions of
+   * the RMS displacement. */
   double relative_rms, relative_p95, relative_max;
-  /** Errors if the exact and the compressed field give the lungs the same volume, mm. For another
-   * simulator's fields, leave-one-out errors. */
+  /** Errors, mm, after the exact and the compressed displacement are scaled to the same volume of
+   * the lungs. For another simulator's fields, these are leave-one-out errors without scaling. */
   double rms_mm, p95_mm, max_mm;
-  /** Fraction of the volume requested from supine_accuracy_measure at which the errors in mm were
-   * measured. If the resting volume (FRC) is unknown, supine_precompute replaces the fraction by
-   * the volume in mL. 0 for another simulator's fields. */
+  /** Change of volume at which the errors in mm were measured, as a fraction of the change
+   * requested from supine_accuracy_measure. If the resting volume (FRC) is unknown,
+   * supine_precompute stores the change in mL instead. 0 for another simulator's fields. */
   double volume;
 } supine_accuracy;
 
-/** Solutions of the physical model for held-out directions of gravity. At vertex i, the field for
- * direction d is sum over k of columns[i, k] functions[d, k], up to the tolerance of span.c. */
+/** Solutions of the physical model for held-out directions of gravity. With direction d, the force
+ * on vertex i is sum over r of columns[i, r] functions[d, r], up to the tolerance of span.c. */
 typedef struct supine_truth {
   size_t direction_count;
   double *directions; /**< [direction_count, 3] unit vectors along gravity */
   size_t rank;
-  const double *columns; /**< [N, rank] fields that are summed; owned by the projection */
-  double *functions;     /**< [direction_count, rank] weights of the columns in each solution */
-  /** [direction_count, 3] coefficients of s, s^2 and s^3 in the change of volume, mL, at gain s
-   * (factor on the displacement). */
+  const double *columns; /**< [N, rank] solutions whose weighted sum is any other solution; owned by
+                            the projection */
+  double *functions;     /**< [direction_count, rank] weights of `columns` for each direction */
+  /** [direction_count, 3] coefficients of s, s^2 and s^3 in the change of the lungs' volume, mL,
+   * when the displacement is multiplied by s. */
   double *cubic;
 } supine_truth;
 
@@ -50,14 +51,14 @@ supine_status supine_accuracy_truth_create(const supine_lungs *lungs, const supi
                                            supine_truth *truth, supine_error *error);
 void supine_accuracy_truth_free(supine_truth *truth);
 
-/** Measure the error of a compressed field against the solutions `truth`. The 95th percentiles come
- * from a histogram whose bins are at most 0.4 % wide.
+/** Measure the error of the displacement computed from the modes of `compression`, against the
+ * exact solutions `truth`. Percentiles come from a histogram whose bins are at most 0.4 % wide.
  * @param directions  [N, 3] displacement of each vertex per unit force, mm
  * @param forms       volumes as polynomials of the weights of the modes (volume_forms.h)
- * @param volume      [9] volume at which errors in mm are measured minus that of the reference
- *   surface, mL: coefficients of spherical harmonics of the direction of gravity; halved until the
- *   lungs can reach it in every held-out direction
- * @retval SUPINE_ERROR_NUMERICAL  the lungs cannot reach a thousandth of the volume
+ * @param volume      [9] change of volume from the reference surface, mL, at which errors in mm are
+ *   measured: coefficients of spherical harmonics of the direction of gravity. It is halved until
+ *   the lungs can reach it in every held-out direction
+ * @retval SUPINE_ERROR_NUMERICAL  the lungs cannot reach a thousandth of the change of volume
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_accuracy_measure(const supine_truth *truth,
                                       const supine_compression *compression,
@@ -82,12 +83,12 @@ supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const doubl
  * vertices. */
 typedef struct supine_error_table {
   size_t band_count; /**< number of bands: highest degree of the harmonics + 1 */
-  double harmonics[SUPINE_SH_BAND_MAX + 1]; /**< [l] error with harmonics to degree l */
+  double harmonics[SUPINE_SH_BAND_MAX + 1]; /**< [l] relative error with harmonics to degree l */
   size_t mode_count;
-  double modes[SUPINE_MODES_MADE_MAX]; /**< [k] error with the first k + 1 modes */
+  double modes[SUPINE_MODES_MADE_MAX]; /**< [k] relative RMS error with the first k + 1 modes */
 } supine_error_table;
 
-/** Tabulate the error by the number of harmonics and by the number of modes.
+/** Tabulate the error of the displacement by number of harmonics and by number of modes.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_accuracy_error_table_create(const supine_truth *truth,
                                                  const supine_projection *projection,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Tabulate the error by the number of harmonics, and by the number of modes. */
+/* Tabulate the relative RMS error of the displacement by number of harmonics and of modes. */
 #include <cblas.h>
 #include <math.h>
 #include <stdlib.h>
@@ -13,9 +13,9 @@
 
 enum { VERTICES_MAX = 4096 };
 
-/* Compute the scalar products gram [rank, rank] of the columns of `truth` over evenly chosen
- * vertices. Each vertex has the weight |d|^2, where d is its displacement per unit force. w^T gram
- * w is then the sum of the squared displacements in the field columns x w. */
+/* Compute the scalar products gram [rank, rank] of the columns of truth->columns over evenly chosen
+ * vertices. Each vertex has the weight |d|^2, where d is its displacement per unit force. For any
+ * vector w, w^T gram w is then the sum of the squared displacements by the forces columns * w. */
 static void find_gram(const supine_truth *truth, size_t vertex_count, const double *directions,
                       double *gram) {
   const size_t rank = truth->rank;
@@ -36,7 +36,7 @@ static double square_of(const double *gram, size_t rank, const double *coefficie
   return cblas_ddot((int)rank, coefficients, 1, image, 1);
 }
 
-/* Compute residual -= part x weights. The rows of part [rank, count] are `stride` values apart. */
+/* Compute residual[r] -= sum over j of part[r stride + j] weights[j], with r < rank, j < count. */
 static void subtract(const double *part, size_t stride, size_t count, const double *weights,
                      size_t rank, double *residual) {
   cblas_dgemv(CblasRowMajor, CblasNoTrans, (int)rank, (int)count, -1.0, part, (int)stride, weights,

@@ -16,8 +16,8 @@ void supine_accuracy_truth_free(supine_truth *truth) {
 }
 
 /* Find the change of volume for each held-out direction of gravity as a cubic polynomial of the
- * gain (factor on the displacement). With at most FEW columns, use the volume as a polynomial of
- * their weights; otherwise compute AT_ONCE fields at a time. */
+ * gain (factor on the displacement). If truth->rank is at most FEW, use the volume as a polynomial
+ * of truth->functions. Otherwise compute the forces for AT_ONCE directions at a time. */
 static supine_status find_cubics(const supine_lungs *lungs, const double *share,
                                  const double *directions, const supine_truth *truth) {
   enum { FEW = 8, AT_ONCE = SUPINE_VOLUME_FIELDS };

@@ -71,16 +71,14 @@ supine_status supine_projection_leading_eigenpairs(size_t n, double *matrix, siz
   return status;
 }
 
-/* Find the leading right singular vectors of C = sqrt(W) x columns x functions. W is the diagonal
- * matrix of the weights of the vertices; columns [N, R] and functions [R, terms] are those of the
- * projection to `terms` harmonics. Write the vectors to modes [count, terms], the squares of all
- * singular values to values [R], and the sum of these squares to `total`. gram [R, R] = columns^T W
- * columns is overwritten. Steps:
+/* Find the leading right singular vectors of C = sqrt(W) P Q, where W is the diagonal matrix of the
+ * weights of the vertices, P = projection->columns [N, rank], and Q = projection->functions [rank,
+ * terms]. Write the vectors to modes [count, terms], all squared singular values to values [rank],
+ * and their sum to `total`. gram [rank, rank] holds P^T W P and is overwritten. Steps:
  *
- * - gram = H^T H, where the rows of H are its eigenvectors times the roots of their eigenvalues.
- * - A = H x functions has the singular values and right singular vectors of C: A^T A = C^T C.
- * - A A^T [R, R] has the eigenvalues sigma_k^2. With its eigenvectors U_k, mode k is
- *   A^T U_k / sigma_k. */
+ * - P^T W P = H^T H, where the rows of H are its eigenvectors times the roots of their eigenvalues.
+ * - A = H Q has the singular values sigma_k and right singular vectors of C, as A^T A = C^T C.
+ * - A A^T has the eigenvalues sigma_k^2. With its eigenvectors U_k, mode k is A^T U_k / sigma_k. */
 static supine_status find_modes(const supine_projection *projection, double *gram, size_t count,
                                 double *values, double *modes, double *total) {
   const size_t rank = projection->rank;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Expand the field of a physical model in spherical harmonics: solve for a few directions of
- * gravity, and expand the weights with which these solutions sum to that for any direction. */
+/* Expand the solutions of a physical model in spherical harmonics of the direction of gravity.
+ * Solve for a few directions. Any other solution is a weighted sum of these: expand the weights. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -8,8 +8,8 @@
 #include "sh/transform.h"
 #include <supine/sh.h>
 
-/* The expanded functions have kinks where another vertex becomes the lowest or the highest. With
- * eight latitudes for each degree of the harmonics, these kinks hardly alias. */
+/* As functions of the direction of gravity, the expanded weights have kinks where another vertex
+ * becomes the lowest or highest. With 8 latitudes for each degree, these kinks hardly alias. */
 enum { LATITUDES_PER_BAND = 8, LATITUDES_MIN = 32 };
 
 void supine_projection_free(supine_projection *projection) {
@@ -19,10 +19,9 @@ void supine_projection_free(supine_projection *projection) {
   *projection = (supine_projection){0};
 }
 
-/* Directions g of gravity on the grid of latitudes and longitudes, [count, 3], and the minimum and
- * maximum of g.p over all vertices p for each, [count], mm. */
 typedef struct grid_heights {
-  double *directions, *minimum, *maximum;
+  double *directions;        /* [count, 3] directions g of gravity at the nodes of the grid */
+  double *minimum, *maximum; /* [count] extremes of g.p over all vertices p for each g, mm */
 } grid_heights;
 
 /* Find the directions g of the grid, and the minimum and maximum of g.p over all vertices p. Those
@@ -45,8 +44,8 @@ static supine_status find_heights(const supine_lungs *lungs, bool pair, const su
   return status;
 }
 
-/* Expand the weights of the span (span.h), functions of the direction of gravity, in spherical
- * harmonics, functions [span->rank, (band + 1)^2]. */
+/* Expand the weights w_r(g) of span.h, which depend on the direction g of gravity, in spherical
+ * harmonics of g. Write the coefficients to functions [span->rank, (band + 1)^2]. */
 static supine_status transform(const supine_lungs *lungs, const supine_force_law *law, size_t band,
                                const supine_span *span, double *functions, supine_error *error) {
   const size_t least = LATITUDES_PER_BAND * (band + 1);

@@ -5,10 +5,10 @@
  *
  *     C_i,lm = integral of F_i(g) Y_lm(g) over the sphere
  *
- * The matrix C is stored as a product, C = columns x functions. The applied force for any direction
- * is a weighted sum of the applied forces for a few directions (span.h). The field is linear in the
- * applied force. It is therefore solved for these few directions alone (columns), and only their
- * weights are expanded (functions). */
+ * The applied force for any direction is a weighted sum of the applied forces for a few directions
+ * (span.h). F is linear in the applied force. It is therefore the sum, with the same weights, of
+ * the solutions for these directions. The matrix C is stored as a product, C = columns x functions.
+ * The columns are these solutions; the functions are the harmonic coefficients of the weights. */
 #ifndef SUPINE_PROJECTION_H
 #define SUPINE_PROJECTION_H
 
@@ -17,18 +17,19 @@
 #include "precompute/projection/span.h"
 
 typedef struct supine_projection {
-  size_t vertex_count;
+  size_t vertex_count; /**< N, or 3 N if `columns` holds another simulator's displacements, mm */
   size_t band;
   supine_span *span; /**< directions of gravity; NULL for another simulator's fields */
   size_t rank;       /**< number of directions of gravity in `columns` */
-  double *columns;   /**< [N, rank] field for each of `rank` directions of gravity */
-  double *functions; /**< [rank, (band + 1)^2] harmonic coefficients of each column's weight */
+  double *columns;   /**< [vertex_count, rank] force on each vertex for each direction of gravity */
+  double *functions; /**< [rank, (band + 1)^2] harmonic coefficients of the weights with which
+                        `columns` are summed to the force for any direction of gravity */
 } supine_projection;
 
 void supine_projection_free(supine_projection *projection);
 
-/** Expand the field of a physical model in spherical harmonics of the direction of gravity. Release
- * the projection with supine_projection_free.
+/** Expand the force on each vertex in equilibrium in spherical harmonics of the direction of
+ * gravity. Release the projection with supine_projection_free.
  * @retval SUPINE_ERROR_ARGUMENT  a band above SUPINE_SH_BAND_MAX; invalid stiffness;
  *   model->force.soften too large, or above 0 while model->reach is 0
  * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
@@ -45,7 +46,7 @@ typedef struct supine_compression {
   size_t mode_count;
   float *coefficients; /**< [vertex_count, mode_count] coefficient of each mode at each vertex */
   double *modes;       /**< [mode_count, (band + 1)^2] harmonic coefficients of each mode */
-  double *mix; /**< [rank, mode_count] matrix; coefficients = columns of the projection x mix */
+  double *mix; /**< [rank, mode_count] matrix: coefficients = (supine_projection.columns) mix */
 } supine_compression;
 
 void supine_projection_compression_free(supine_compression *compression);
@@ -57,9 +58,8 @@ supine_status supine_projection_compress_harmonics(const supine_projection *proj
                                                    supine_compression *compression,
                                                    supine_error *error);
 
-/** Compress the field to the modes with the least squared error: the leading right singular vectors
- * of the matrix of harmonic coefficients, found from the Gram matrix of the columns.
- *
+/** Compress a projection to the modes that give the least squared error. They are the leading right
+ * singular vectors of the product projection->columns x projection->functions.
  * @param weight     [N] weight of each vertex's squared error, such as the squared length of its
  *   displacement per unit force, or NULL for 1
  * @param mode_max   largest number of modes, 1 to SUPINE_MODES_MADE_MAX; there are fewer if the
@@ -67,25 +67,25 @@ supine_status supine_projection_compress_harmonics(const supine_projection *proj
  * @param singular   [mode_max] singular values of the modes in falling order, then zeros, or NULL
  * @param total      written: sum of the squares of all singular values; may be NULL
  * @retval SUPINE_ERROR_ARGUMENT   `mode_max` is out of range
- * @retval SUPINE_ERROR_NUMERICAL  the field is zero, or an eigenvalue problem failed
+ * @retval SUPINE_ERROR_NUMERICAL  all columns are zero, or an eigenvalue problem failed
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_projection_compress_modes(const supine_projection *projection,
                                                const double *weight, size_t mode_max,
                                                supine_compression *compression, double *singular,
                                                double *total, supine_error *error);
 
-/** Keep the first `count` modes of a compression whose projection had `rank` columns. */
+/** Keep the first `count` modes of a compression, whose array `mix` has `rank` rows. */
 void supine_projection_compression_truncate(supine_compression *compression, size_t rank,
                                             size_t count);
 
-/** Allocate a compression to `mode_count` modes, with the vertices and the band of the projection.
- * Modes and mix are zero; the coefficients are not set.
+/** Allocate a compression with the numbers of vertices and of harmonics of `projection`. Its arrays
+ * `modes` and `mix` are zero; its `coefficients` are not set.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_projection_compression_create(const supine_projection *projection,
                                                    size_t mode_count, supine_compression *made);
 
-/** Compute two matrices of `made` from its modes and the projection: mix = functions x modes^T, and
- * coefficients = columns x mix. */
+/** Compute made->mix = projection->functions x made->modes^T, and
+ * made->coefficients = projection->columns x made->mix. */
 void supine_projection_compression_mix(const supine_projection *projection,
                                        supine_compression *made);
 
@@ -100,14 +100,15 @@ supine_status supine_projection_leading_eigenpairs(size_t n, double *matrix, siz
 void supine_projection_compression_weights(const supine_compression *compression, const double g[3],
                                            double *weights);
 
-/** Compute the field [vertex_count] from the weights [mode_count] of the modes. */
+/** Compute the force on each vertex: field[i] = sum over k of weights[k] coefficients[i, k]. */
 void supine_projection_compression_field(const supine_compression *compression,
                                          const double *weights, double *field);
 
 /** Compute the volume of each lung as a polynomial of the weights of the modes and the gains
- * (volume_forms.h), from coefficients in the precision of the file.
+ * (volume_forms.h), from the coefficients in single precision that a basis file stores.
  * @param share       [lungs] volume of each lung divided by its healthy volume, or NULL for 1
- * @param directions  [N, 3] displacement of each vertex per unit force, mm, or NULL for vectors */
+ * @param directions  [N, 3] displacement of each vertex per unit force, mm; NULL if the compression
+ *   holds displacements, with 3 coordinates for each vertex, instead of forces */
 supine_status supine_projection_compression_volume_forms(
     const supine_compression *compression, const supine_lungs *lungs, const double *share,
     const double *directions, supine_volume_forms *forms, supine_error *error);

@@ -13,11 +13,11 @@
  * gravity. */
 enum { VERTICES = 1024, DIRECTIONS = 512 };
 
-/* Largest accepted residual of the cross approximation of the force, as a share of the largest
- * force: `rounding` if supine_force_law.soften is 0, otherwise `tolerance`. With `tolerance`, the
- * RMS residual is 6e-5 of the RMS force. That is a hundredth of the error that compression to 16
- * modes causes. */
+/* Largest accepted residual of the interpolated forces (span.h) on the examined vertices, divided
+ * by the largest force, if supine_force_law.soften is not 0. The RMS residual is then 6e-5 of the
+ * RMS force, a hundredth of the error that compression to 16 modes causes. */
 static const double tolerance = 3e-4;
+/* The same limit if supine_force_law.soften is 0, where the interpolation is exact. */
 static const double rounding = 1e-12;
 
 /* Make the row and the column of entry `at` of force [vertices, DIRECTIONS] zero: subtract the

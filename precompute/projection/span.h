@@ -12,26 +12,27 @@
 
 #include "precompute/physics/force.h"
 
-/* Largest number of fixed directions; supine_force_law.soften up to about 12 needs no more. */
+/* Largest number of directions of gravity in a span. Softening of the tissue
+ * (supine_force_law.soften) up to about 12 needs no more. */
 enum { SUPINE_SPAN_MAX = 128 };
 
 typedef struct supine_span {
-  size_t rank;                            /* number of fixed directions of gravity */
-  double directions[3 * SUPINE_SPAN_MAX]; /* [rank, 3] fixed directions of gravity */
-  size_t vertices[SUPINE_SPAN_MAX]; /* [rank] indices of vertices at which the weights are exact */
-  /* [rank, rank] inverse of the matrix of the forces on `vertices` for `directions` */
+  size_t rank;                            /* number of directions of gravity in `directions` */
+  double directions[3 * SUPINE_SPAN_MAX]; /* [rank, 3] directions whose forces are summed */
+  size_t vertices[SUPINE_SPAN_MAX];       /* [rank] vertices on which the summed force is exact */
+  /* [rank, rank] inverse of A, where A[i, j] is the force on vertices[i] for directions[j] */
   double inverse[SUPINE_SPAN_MAX * SUPINE_SPAN_MAX];
 } supine_span;
 
-/* Choose the fixed directions of gravity, and the vertices at which the weights are exact.
+/* Choose the R directions g_r of gravity whose forces are summed, and the R vertices (see above).
  * @retval SUPINE_ERROR_ARGUMENT   law->soften needs more than SUPINE_SPAN_MAX directions
  * @retval SUPINE_ERROR_NUMERICAL  the force is zero everywhere
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_projection_span_create(const supine_lungs *lungs, const supine_force_law *law,
                                             supine_span *span, supine_error *error);
 
-/* For each direction of `gravities`, compute the weights with which the forces for the fixed
- * directions sum to its force, into weights [gravities->count, rank].
+/* Express the force for each direction of `gravities` as a weighted sum of the forces for
+ * span->directions. Write the weights to weights [gravities->count, rank].
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_projection_span_weights(const supine_lungs *lungs, const supine_force_law *law,
                                              const supine_span *span,
