@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute the applied force that a measured displacement implies. */
+/* Compute the force on the lungs from a measured displacement. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,11 +13,11 @@
 
 enum { COLUMNS = SUPINE_PATIENT_COLUMNS, HEIGHT = COLUMNS, FORCE, ALL };
 
-static const double damping_ratio = 0.1; /* damping length / RMS displacement for a force of 1 */
+/* Square root of the Levenberg damping / RMS displacement for a force of 1. */
+static const double damping_ratio = 0.1;
 
-/* Compute smoothed_force [vertices], the applied force smoothed over the surface: the force of
- * the displacement law, plus the force that would move the displaced vertex onto the emptier
- * surface. */
+/* Compute smoothed_force [vertices], the applied force smoothed over the surface: the force of the
+ * displacement law, plus the force that would move the displaced vertex onto the other surface. */
 static void find_smoothed_force(supine_patient_matching *m, const supine_patient *patient,
                                 double *smoothed_force) {
   supine_patient law = *patient;
@@ -39,18 +39,19 @@ static void find_smoothed_force(supine_patient_matching *m, const supine_patient
   }
 }
 
-/* Average six quantities over the vertices in each cube of 40 mm (block), weighted by area: the
- * force terms 1, X - 1/2, Y - 1/2 and Z - 1/2, the depth along gravity, and the applied force.
- * For every two quantities, sum the products of their means over all blocks, weighted by area. */
-static void add_blocks(const supine_patient_matching *m, const double *force,
-                       const double gravity[3], const double *vertex_area, size_t blocks,
-                       double *means, double products[ALL * ALL]) {
+/* Average six quantities over the vertices in each cube of 40 mm, weighted by area: 1; X - 1/2,
+ * Y - 1/2 and Z - 1/2, where X, Y and Z are coordinates 0 to 1 in the bounding box; the depth along
+ * gravity; and the force. For each pair of quantities, multiply the two means of each cube by each
+ * other and by the cube's area, and sum the results into `products`. */
+static void sum_products(const supine_patient_matching *m, const double *force,
+                         const double gravity[3], const double *vertex_area, size_t blocks,
+                         double *means, double products[ALL * ALL]) {
   memset(means, 0, (ALL + 1) * blocks * sizeof *means);
   for (size_t v = 0; v < m->count; ++v) {
     double *mean = means + (ALL + 1) * m->rows[v].block;
-    const supine_patient_place place = supine_patient_find_vertex(m->rest, v);
+    const supine_patient_place place = supine_patient_find_vertex(m->fuller, v);
     cblas_daxpy(COLUMNS, vertex_area[v], place.force, 1, mean, 1);
-    mean[HEIGHT] += vertex_area[v] * supine_dot(gravity, m->rest->mesh.vertices + 3 * v);
+    mean[HEIGHT] += vertex_area[v] * supine_dot(gravity, m->fuller->mesh.vertices + 3 * v);
     mean[FORCE] += vertex_area[v] * force[v];
     mean[ALL] += vertex_area[v];
   }
@@ -67,8 +68,9 @@ static double covariance(const double products[ALL * ALL], size_t a, size_t b) {
   return (products[a * ALL + b] - products[a] * products[b] / products[0]) / products[0];
 }
 
-/* Fit the force by a linear function of the box coordinates X, Y and Z; return false on failure. */
-static bool fit_blocks(const double products[ALL * ALL], supine_patient_applied *applied) {
+/* Fit a linear function of X, Y and Z, coordinates in the lungs' bounding box, to the mean force in
+ * each cube (sum_products). Return false on failure. */
+static bool fit_force(const double products[ALL * ALL], supine_patient_applied *applied) {
   double matrix[ALL * ALL];
   double k[COLUMNS];
   memcpy(matrix, products, sizeof matrix);
@@ -97,7 +99,7 @@ static bool fit_blocks(const double products[ALL * ALL], supine_patient_applied 
 supine_status supine_patient_applied_find(supine_patient_matching *matching,
                                           const supine_patient *patient, const double gravity[3],
                                           supine_patient_applied *applied, supine_error *error) {
-  const size_t n = matching->rest->mesh.vertex_count;
+  const size_t n = matching->fuller->mesh.vertex_count;
   double products[ALL * ALL];
   double *spread = malloc(2 * n * sizeof *spread);
   double *means = malloc((ALL + 1) * n * sizeof *means);
@@ -113,9 +115,9 @@ supine_status supine_patient_applied_find(supine_patient_matching *matching,
   if (status == SUPINE_OK) {
     const size_t blocks = supine_patient_rows_block(&matching->frame, matching->rows, n, 1);
     applied->blocks = (double)blocks;
-    supine_mesh_vertex_area(&matching->rest->mesh, spread);
-    add_blocks(matching, spread + n, gravity, spread, blocks, means, products);
-    if (!fit_blocks(products, applied)) {
+    supine_mesh_vertex_area(&matching->fuller->mesh, spread);
+    sum_products(matching, spread + n, gravity, spread, blocks, means, products);
+    if (!fit_force(products, applied)) {
       status = supine_error_set(
           error, SUPINE_ERROR_NUMERICAL,
           "the displacement between the two surfaces does not determine the applied force: check "

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fit the expandability of each region of the lungs, and test it on held-out vertices. */
+/* Fit the expandability (1 / relative stiffness) of each region of the lungs, and test the result
+ * on held-out vertices. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,28 +9,36 @@
 
 #include "sh/base/vec3.h"
 
-static const double centre_distance_most = 35.0; /* from any vertex to the nearest centre, mm */
-static const double radius_over_distance = 1.5;
+/* Largest distance from a vertex to the nearest centre of a region, mm. */
+static const double centre_distance_most = 35.0;
+
+/* Radius of a region / largest distance from a vertex to the nearest centre of a region. */
+static const double radius_ratio = 1.5;
 
 enum {
   CANDIDATES = 8192, /* largest number of vertices tried as the centre of a region */
   LANES = 16,        /* largest number of regions in one call of the equilibrium solver */
-  ROUNDS = 5 /* number of times that a displacement law is fitted and the surfaces are matched */
+  ROUNDS = 5         /* number of fits, each followed by a matching of the surfaces */
 };
 
-/* Prior standard deviation of the difference of expandability between neighbouring regions. */
-static const double neighbour_deviation = 0.3;
-static const double region_deviation = 1.0; /* prior standard deviation of the expandability */
-static const double noise_least = 0.3; /* lower bound on the standard deviation of distances, mm */
-static const double vertices_per_error = 10.0; /* number of neighbours with correlated errors */
+/* Prior standard deviation of a region's expandability (1 / relative stiffness, near 1), and of its
+ * difference between neighbouring regions. */
+static const double region_deviation = 1.0, neighbour_deviation = 0.3;
 
-/* Largest distance between the centres of neighbouring regions / smallest distance of any two. */
-static const double neighbour_ratio = 1.7;
+/* Lower bound on the standard deviation of the distance between the matched surfaces, mm. */
+static const double noise_least = 0.3;
+/* The errors of about this many vertices are correlated, so that they count as one measurement. */
+static const double vertices_per_error = 10.0;
 
-/* Regions are kept if the held-out error with them, divided by that without, is less than this. */
+/* Regions are neighbours if the distance between their centres is less than this number times the
+ * smallest distance between any two centres. */
+static const double neighbour_distance_ratio = 1.7;
+
+/* Regions are kept if the held-out error with regions / that without is less than this. */
 static const double kept_ratio = 0.95;
 
-/* Find the vertex of one lung farthest from its nearest region centre, and this distance. */
+/* Find the vertex of one lung that is farthest from all centres of regions. Write its distance from
+ * the nearest centre into `distance`. */
 static size_t farthest(const supine_lungs *lungs, const supine_patient_stiffness *stiffness,
                        int side, double *distance) {
   size_t found = 0;
@@ -51,7 +60,7 @@ static size_t farthest(const supine_lungs *lungs, const supine_patient_stiffness
   return found;
 }
 
-/* Add regions of expandability 1 until all vertices are near a centre, or the array is full. */
+/* Add regions until every vertex is near the centre of a region, or the array is full. */
 static void place_regions(const supine_lungs *lungs, supine_patient_stiffness *stiffness) {
   *stiffness = (supine_patient_stiffness){0};
   for (int side = 1; side >= -1; side -= 2) {
@@ -66,7 +75,7 @@ static void place_regions(const supine_lungs *lungs, supine_patient_stiffness *s
       vertex = farthest(lungs, stiffness, side, &distance);
     }
     for (size_t k = first; k < stiffness->count; ++k) {
-      stiffness->region[k].radius = radius_over_distance * distance;
+      stiffness->region[k].radius = radius_ratio * distance;
     }
   }
 }
@@ -84,40 +93,41 @@ static void find_prior_precision(const supine_patient_stiffness *regions, double
     const size_t j = i / n;
     const size_t k = i % n;
     if (j != k && region[j].side == region[k].side &&
-        supine_distance(region[j].centre, region[k].centre) < neighbour_ratio * nearest) {
+        supine_distance(region[j].centre, region[k].centre) < neighbour_distance_ratio * nearest) {
       precision[j * n + j] += pow(neighbour_deviation, -2.0);
       precision[i] -= pow(neighbour_deviation, -2.0);
     }
   }
 }
 
-/* Compute response [m->count, regions->count]: the smoothed force at each chosen vertex if one
- * region has expandability 1 and all other regions have no force. */
+/* Compute response [vertex, region]: the force at each vertex listed in m->match if one region has
+ * expandability (1 / stiffness) 1 and the force on all other regions is 0. Each response is
+ * smoothed over the surface. */
 static supine_status find_responses(const supine_patient_matching *m,
                                     const supine_patient_stiffness *regions,
                                     const double gravity[3], double *response,
                                     supine_error *error) {
   const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
-  const size_t n = m->rest->mesh.vertex_count;
+  const size_t n = m->fuller->mesh.vertex_count;
   double range[2];
   double *force = malloc(n * sizeof *force);
   double *region_force = malloc(n * LANES * sizeof *region_force);
   double *spread_force = malloc(n * LANES * sizeof *spread_force);
   supine_status status = SUPINE_ERROR_MEMORY;
   if (force == NULL || region_force == NULL || spread_force == NULL ||
-      supine_physics_height_range(m->rest, model.force.pair, 1, gravity, range, range + 1) !=
+      supine_physics_height_range(m->fuller, model.force.pair, 1, gravity, range, range + 1) !=
           SUPINE_OK) {
     (void)supine_error_set(error, status, "no memory for %zu vertices", n);
     goto cleanup;
   }
   const supine_gravities gravities = {1, gravity, range, range + 1};
-  supine_physics_force(m->rest, &model.force, &gravities, n, NULL, force);
+  supine_physics_force(m->fuller, &model.force, &gravities, n, NULL, force);
   status = supine_physics_equilibrium_set_stiffness(m->equilibrium, NULL, error);
   for (size_t first = 0; first < regions->count && status == SUPINE_OK; first += LANES) {
     const size_t lanes = regions->count - first < LANES ? regions->count - first : LANES;
     for (size_t i = 0; i < n; ++i) {
       double shares[SUPINE_PATIENT_REGIONS_MAX];
-      supine_patient_stiffness_shares(regions, m->rest, i, shares);
+      supine_patient_stiffness_shares(regions, m->fuller, i, shares);
       for (size_t r = 0; r < lanes; ++r) {
         region_force[i * lanes + r] = force[i] * shares[first + r];
       }
@@ -136,8 +146,8 @@ cleanup:
   return status;
 }
 
-/* Set the force at each chosen vertex to the sum over all regions of response[vertex, region] *
- * a[region], where `a` holds the expandabilities (1 everywhere if `a` is NULL). */
+/* Set the force at each vertex listed in m->match to the sum over all regions of a[region] *
+ * response[vertex, region]. `a` holds the regions' values of 1 / stiffness, or is NULL for 1. */
 static void set_forces(supine_patient_matching *m, size_t count, const double *response,
                        const double *a) {
   for (size_t i = 0; i < m->count; ++i) {
@@ -150,7 +160,7 @@ static void set_forces(supine_patient_matching *m, size_t count, const double *r
   }
 }
 
-/* Fit the expandabilities of the regions and match the surfaces in turn, without robust weights. */
+/* Fit the stiffness of the regions and match the surfaces in turn, without robust weights. */
 static supine_status iterate(supine_patient_matching *m, const double *response,
                              supine_patient_fit_options *options, supine_patient *patient,
                              supine_patient_stiffness *regions, supine_error *error) {
@@ -188,7 +198,7 @@ supine_status supine_patient_expand(supine_patient_matching *matching,
   supine_patient_fit_options region_options = *options;
   supine_patient_fit_report fit_report;
   *report = (supine_patient_expand_report){.tried = true};
-  place_regions(m->rest, stiffness);
+  place_regions(m->fuller, stiffness);
   const size_t n = stiffness->count;
   double *response = malloc((m->count * n + 1) * sizeof *response);
   double *precision = malloc((n * n + 1) * sizeof *precision);

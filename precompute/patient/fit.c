@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fit a displacement law with a correction, and measure the error on held-out points. */
+/* Fit a displacement law with its kriging correction, and measure the error on held-out points. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -24,7 +24,7 @@ enum {
 
 /* Radius that contains 95 % of the errors of points in 3-D, and bound on 95 % of the errors along
  * one axis, both divided by the expected error. */
-static const double band_point = 1.8, band_component = 1.96;
+static const double bound_point = 1.8, bound_component = 1.96;
 /* Ratio of measured to expected error of points within 8 mm of the surface, in ten patients. */
 static const double near_surface = 1.3;
 
@@ -32,7 +32,7 @@ typedef struct squares {
   double residual[SCORES]; /* [predictor] weighted sum of squared residuals, mm^2 */
   double expected;         /* weighted sum of the expected variances of the residuals, mm^2 */
   double weight;
-  double points, within; /* number of points, and of those within the expected 95 % band */
+  double points, within; /* number of points, and of those with an error below the 95 % bound */
 } squares;
 
 typedef struct study {
@@ -40,7 +40,7 @@ typedef struct study {
   const supine_patient_row *rows;
   size_t row_count, components;
   size_t *fold;            /* [SEEDS, row_count] fold of each measurement */
-  squares held_out[ITEMS]; /* [SEEDS, FOLDS] sums over the held-out measurements */
+  squares held_out[ITEMS]; /* [SEEDS, FOLDS] squared errors of held-out measurements, summed */
   supine_status failed[ITEMS];
 } study;
 
@@ -84,9 +84,8 @@ static double affine_residual(const double map[AFFINE], const supine_patient_row
   return cblas_ddot(AFFINE, x, 1, map, 1) - row->value;
 }
 
-/* Group the measurements into cubes of 40 mm (blocks), and the blocks at random into folds.
- * Write the folds of all measurements into fold [count]. Return the number of blocks; 0: out of
- * memory. */
+/* Group the measurements into cubes of 40 mm, and the cubes at random into folds. Write the fold of
+ * each measurement into fold [count]. Return the number of cubes, or 0 if out of memory. */
 static size_t assign_folds(const supine_patient_frame *frame, supine_patient_row *rows,
                            size_t count, unsigned long seed, size_t *fold) {
   const size_t blocks = supine_patient_rows_block(frame, rows, count, seed + 1);
@@ -109,10 +108,12 @@ static size_t assign_folds(const supine_patient_frame *frame, supine_patient_row
   return able ? blocks : 0;
 }
 
-/* Predict measurements by predictors fitted to krige->rows; add the squared residuals to sums. */
+/* Fit each predictor of supine_patient_score (no displacement, translation, affine map,
+ * displacement law, corrected law) to krige->rows. Add the squared errors at `rows` to the sums of
+ * each. */
 static void add_residuals(const study *s, const supine_patient_row *rows, size_t count,
                           supine_patient_krige *krige, squares *sums) {
-  const double band = s->components == 3 ? band_point : band_component;
+  const double bound = s->components == 3 ? bound_point : bound_component;
   double map[2][AFFINE];
   affine_fit(krige->rows, krige->count, true, map[0]);
   affine_fit(krige->rows, krige->count, false, map[1]);
@@ -139,13 +140,14 @@ static void add_residuals(const study *s, const supine_patient_row *rows, size_t
     }
     sums->weight += weight;
     sums->points += weight > 0.0 ? 1.0 : 0.0;
-    sums->within += weight > 0.0 && square <= band * band * expected ? 1.0 : 0.0;
+    sums->within += weight > 0.0 && square <= bound * bound * expected ? 1.0 : 0.0;
   }
 }
 
 static supine_status hold_out(const study *s, const size_t *fold, size_t which, squares *sums) {
   const size_t n = s->row_count;
-  supine_patient_row *rows = malloc(n * sizeof *rows); /* fitted, then held-out measurements */
+  /* First the measurements to which the law is fitted, then the held-out ones. */
+  supine_patient_row *rows = malloc(n * sizeof *rows);
   supine_patient_krige krige = {0};
   supine_status status = rows == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
   size_t fitted_count = 0;
@@ -194,8 +196,8 @@ static supine_status hold_all_out(study *s, squares *held_out, supine_error *err
   return SUPINE_OK;
 }
 
-/* Write into `expected` the RMS error in 3-D, mm, that `krige` expects near the surface, or 0 if
- * the measurements are of landmarks. Return the mean length of the displacements by `law`, mm. */
+/* Return the mean length of the displacements by `law`, mm. Write into `expected` the RMS error of
+ * the corrected displacement, mm, that the kriging variance predicts. For landmarks, write 0. */
 static double find_expected_error(const study *s, const supine_patient_power *law,
                                   supine_patient_krige *krige, double *expected) {
   const size_t step = s->components * (1 + s->row_count / (s->components * EXPECTED_MAX));
@@ -225,8 +227,9 @@ static supine_patient_score baseline_of(const study *s) {
                                                         : SUPINE_PATIENT_SCORE_NONE;
 }
 
-/* Convert sums of squared residuals to the RMS error of each predictor, mm. Return by how many
- * percent the law with its correction reduces the squared error of the predictor baseline_of(s). */
+/* Compute the RMS error of each predictor, mm, from the sums of squared residuals. Return by how
+ * many percent the kriging-corrected law reduces the mean square error of the baseline predictor.
+ */
 static double find_rms(const study *s, const squares *sums, double score[SCORES]) {
   for (size_t k = 0; k < SCORES; ++k) {
     score[k] = sqrt(sums->residual[k] * (double)s->components / sums->weight);
@@ -234,7 +237,7 @@ static double find_rms(const study *s, const squares *sums, double score[SCORES]
   return 100.0 * (1.0 - pow(score[SUPINE_PATIENT_SCORE_CORRECTED] / score[baseline_of(s)], 2.0));
 }
 
-/* Fit all measurements. Then fit without each fold in turn, and measure the error on this fold. */
+/* Fit to all measurements. Then leave out each fold in turn, and measure the error on this fold. */
 static supine_status run(study *s, size_t triples, supine_patient *patient,
                          supine_patient_fit_report *report, supine_error *error) {
   squares fitted = {.points = 0};

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fit how much the force on the lungs depends on gravity, to scans in other postures. */
+/* Fit the gain, the increase of the force from the top to the bottom of the lungs, to scans in
+ * other postures. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,34 +11,41 @@
 #include "precompute/patient/matching.h"
 #include "sh/base/vec3.h"
 
-static const double gain_least = 0.01, gain_most = 2.0; /* gains outside this range are ignored */
-static const double same_posture = 0.05; /* unit vectors closer than this count as equal */
-/* The fit ends if the sum of changes of scales and gain in a round is below `converged`. It fails
- * if the last sum is above `not_converged`. */
+/* A fitted gain (increase of the force from top to bottom) outside this range is ignored. */
+static const double gain_least = 0.01, gain_most = 2.0;
+static const double same_posture = 0.05; /* directions of gravity closer than this are equal */
+/* The fit ends if the changes of its factors and gain in a round, summed, are below `converged`. It
+ * fails if the last sum is above `not_converged`. */
 static const double converged = 1e-4, not_converged = 1e-2;
 static const double force_least = 0.2; /* before a division, smaller forces are replaced by this */
 enum { ROUNDS = 100, VERTICES_MAX = 2000, BLOCKS = 8, GAIN = 5, UNKNOWNS = 6 };
 
 typedef struct point_motion {
-  double u[3];         /* displacement from full inflation to rest, mm */
-  double force_change; /* relative change of the force between the two postures, if the gain is 1 */
+  double u[3]; /* displacement from full inflation to rest, mm */
+  /* Relative change of the applied force, from the posture of the fitted displacement law to that
+   * of a third scan, if the force grows by 1 from the top to the bottom of the lungs. */
+  double force_change;
 } point_motion;
 
-/* Fit to a further scan of the same lungs. The displacement from full inflation along the axis of a
- * measurement is modelled as axis . (s (1 + gain force_change) u + t), with the u and force_change
- * of point_motion. The unknowns are a scale s for each lung, the gain, and the translation t. */
+/* Fit to a third scan of lungs whose displacement law was fitted to two scans. The displacement
+ * from full inflation to the third scan is modelled as s (1 + gain force_change) u + t:
+ * - s is an unknown factor for each lung, and t an unknown translation between the scans.
+ * - The unknown gain is the increase of the force from the top to the bottom of the lungs.
+ * - force_change and u are the relative change of force and the displacement in point_motion. */
 typedef struct work {
   const supine_patient_record *record;
   bool fits_translation;
-  /* [fuller or emptier state, axis] displacement from full inflation / displacement at rest */
+  /* [state, axis] displacement from full inflation to the fuller [0] or emptier [1] of the states
+   * to which the displacement law was fitted, divided by the displacement to rest */
   double state_share[2][3];
   supine_patient_matching matching;
   point_motion *motion; /* [matching.count] motion of each measured point */
-  double x[UNKNOWNS];   /* scales s of the left and right lung, translation t (x, y, z; mm), gain */
+  double x[UNKNOWNS];   /* factors s of the left and right lung, translation t [3], mm, and gain */
 } work;
 
-/* Fit the scales, translation and gain w->x by least squares. To keep the fit linear, use the
- * previous scale in the product of scale and gain. Return the RMS residual, mm.
+/* Fit the unknowns w->x of the model in struct work by least squares. The model contains the
+ * product of the factor s and the gain; to keep it linear, use the previous s there. Return the RMS
+ * residual, mm.
  * @param without  index of the block of measurements to leave out, or BLOCKS to use all */
 static double fit(work *w, bool fits_gain, size_t without) {
   double matrix[UNKNOWNS * UNKNOWNS] = {0.0};
@@ -92,8 +100,8 @@ static double depth_at(const supine_patient_frame *frame, const supine_patient_p
   return depth / range;
 }
 
-/* Make three measurements of each pair of points or, if `pairs` is NULL, one of each of at most
- * VERTICES_MAX vertices of the surface `rest`. */
+/* Make three measurements for each pair of points. If `pairs` is NULL, make one for each vertex of
+ * `fuller`, for at most VERTICES_MAX vertices. */
 static supine_status make_rows(work *w, const supine_lungs *rest, const supine_patient_pairs *pairs,
                                const supine_mesh *surface, supine_error *error) {
   supine_status status = SUPINE_OK;
@@ -114,7 +122,8 @@ static supine_status make_rows(work *w, const supine_lungs *rest, const supine_p
   return status;
 }
 
-/* Compute w->motion. Assign each measurement to a jackknife block: a quarter of its lung. */
+/* Compute w->motion, the displacement and change of force of each measured point. Assign the points
+ * of each lung to four jackknife blocks. */
 static void find_motion(work *w, const double gravity[3]) {
   supine_patient_matching *m = &w->matching;
   const supine_patient *patient = &w->record->patient;
@@ -129,8 +138,8 @@ static void find_motion(work *w, const double gravity[3]) {
     m->rows[i].block = (place.side > 0.0 ? 4U : 0U) + (place.box[1] > 0.5 ? 2U : 0U) +
                        (place.box[2] > 0.5 ? 1U : 0U);
     if (m->state != NULL && !w->record->from_surface) {
-      /* Find the box coordinates in the frame of the landmarks, to which the law was fitted. */
-      place = supine_patient_find(&patient->frame, m->rest->mesh.vertices + 3 * m->match[i].vertex,
+      /* Use the bounding box of the landmarks, because the displacement law was fitted in it. */
+      place = supine_patient_find(&patient->frame, m->fuller->mesh.vertices + 3 * m->match[i].vertex,
                                   place.side);
     }
     supine_patient_displacement(patient, &place, 1.0, w->motion[i].u);
@@ -140,14 +149,15 @@ static void find_motion(work *w, const double gravity[3]) {
   }
 }
 
-/* Displace vertices by the scales, gain and translation w->x; match them to the scanned surface. */
+/* Displace the vertices by the model in struct work, and match them to the surface in w->matching.
+ */
 static supine_status match_surface(work *w, supine_error *error) {
   supine_patient_matching *m = &w->matching;
   for (size_t i = 0; i < m->count; ++i) {
     const double scale = w->x[m->rows[i].place.side > 0.0 ? 0U : 1U] *
                          (1.0 + w->x[GAIN] * w->motion[i].force_change);
     for (size_t k = 0; k < 3; ++k) {
-      m->match[i].position[k] = m->rest->mesh.vertices[3 * m->match[i].vertex + k] +
+      m->match[i].position[k] = m->fuller->mesh.vertices[3 * m->match[i].vertex + k] +
                                 (scale - w->state_share[0][k]) * w->motion[i].u[k] + w->x[2 + k];
     }
   }
@@ -155,8 +165,8 @@ static supine_status match_surface(work *w, supine_error *error) {
   return supine_patient_matching_weigh(m, 0.0, error);
 }
 
-/* Match the surfaces and fit the unknowns in turn until the unknowns hardly change. Then estimate
- * the gain's standard error by the jackknife, which leaves out each of 8 blocks of measurements. */
+/* Match the surfaces and fit w->x (factors, translation and gain) in turn until w->x converges.
+ * Then estimate the gain's standard error by the jackknife over 8 blocks of measurements. */
 static supine_status iterate(work *w, supine_patient_further *further, supine_error *error) {
   supine_status status = SUPINE_OK;
   double change = INFINITY;

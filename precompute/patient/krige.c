@@ -14,13 +14,14 @@
 enum {
   TERMS = SUPINE_PATIENT_TERMS,
   MOTION = SUPINE_PATIENT_CONSTANTS, /* index of the first unknown of the body's motion */
-  SCALE = TERMS - 1,                 /* index of the unknown factor on the whole displacement law */
+  SCALE = TERMS - 1, /* index of the unknown that multiplies the whole displacement law */
   TERMS_MAX = TERMS + SUPINE_PATIENT_REGIONS_MAX,
   STEPS = 60
 };
 
-static const double scale_deviation = 0.3; /* prior standard deviation of the law's scale factor */
-static const double converged = 1e-10; /* a smaller relative decrease of k->objective ends a fit */
+/* Prior standard deviation of the factor by which the displacement law is multiplied. */
+static const double scale_deviation = 0.3;
+static const double converged = 1e-10;   /* relative decrease of k->objective that ends a fit */
 static const double damping_most = 1e10; /* a larger damping of the steps ends a fit */
 static const double expandability_least = 0.02;
 
@@ -81,8 +82,8 @@ static supine_patient_power take_step(const supine_patient_power *law, const dou
   return stepped;
 }
 
-/* Predict a measurement by supine_patient_power_design. If expandabilities of lung regions are
- * fitted, use the force that they cause, and append their derivatives to x. */
+/* Extend supine_patient_power_design to a fit of lung regions: take the force from k->region, the
+ * values of 1 / stiffness, and append the derivatives with respect to these values to x. */
 static double design_row(const supine_patient_krige *k, const supine_patient_row *row, double *x) {
   if (k->options.region_count == 0) {
     return supine_patient_power_design(&k->law, row, x);
@@ -100,9 +101,9 @@ static double noise_of(const supine_patient_krige *k, const supine_patient_row *
   return k->noise * row->noise / sqrt(fmin(1.0, fmax(1e-12, row->weight)));
 }
 
-/* Factorise the covariance matrix of the measurements, the sum of the covariances of their noise
- * and of the kriging correction. The latter grows with the displacement by the law; but if only a
- * factor on the law is fitted, it does not depend on the factor.
+/* Factorise the covariance matrix of the measurements: the covariance of their noise plus that of
+ * the kriging correction. The correction's covariance is proportional to the predicted
+ * displacement; if only the size of the displacement is fitted, its prior mean is used.
  * @return half the logarithm of the determinant; NAN if the matrix is not positive definite */
 static double factor_covariance(supine_patient_krige *k) {
   const size_t n = k->count;

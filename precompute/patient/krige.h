@@ -26,18 +26,19 @@ typedef struct supine_patient_row {
   double value;   /* measured displacement along `axis`, mm */
   double weight;  /* factor on the squared residual of this measurement */
   double noise;   /* standard deviation of `value`, mm */
-  size_t block;   /* index of the cube of space whose measurements are held out together */
+  size_t block;   /* index of the 40 mm cube whose measurements are held out together */
   /* [regions] contribution of each lung region to the force at this vertex if the region's
    * expandability (1 / stiffness) is 1; NULL if expandabilities are not fitted */
   const double *response;
 } supine_patient_row;
 
-/* Make three measurements of each pair of points, along x, y and z, into rows [3 pairs->count]. */
+/* Write three measurements for each pair of points, its displacement along x, y and z, into rows.
+ */
 void supine_patient_rows_of_pairs(const supine_patient_frame *frame,
                                   const supine_patient_pairs *pairs, supine_patient_row *rows);
 
 /* Set the `block` of each measurement: the index of the cube of 40 mm that contains its point,
- * in a grid with a random origin. Return the number of blocks, or 0 if out of memory. */
+ * in a grid with a random origin. Return the number of cubes, or 0 if out of memory. */
 size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patient_row *rows,
                                  size_t count, unsigned long seed);
 
@@ -46,12 +47,14 @@ size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patie
  * whole displacement law. The expandabilities of lung regions follow if they are fitted. */
 enum { SUPINE_PATIENT_TERMS = 16, SUPINE_PATIENT_REGIONS_MAX = 256 };
 
-/* Predict a measurement by the displacement law and the motion of the body. Write the derivatives
- * with respect to the unknowns into x. Return the prediction minus the measured value, mm. */
+/* Predict a measurement by the displacement law and the motion of the body. Return the prediction
+ * minus the measured value, mm. Write its derivatives with respect to the constants of the law, the
+ * motion, and a factor on the law into x. */
 double supine_patient_power_design(const supine_patient_power *law, const supine_patient_row *row,
                                    double x[SUPINE_PATIENT_TERMS]);
 
-/* If all options are 0, fit a law close to the default displacement law, and a correction. */
+/* Options of supine_patient_krige_fit. If all are 0, it fits a displacement law close to the
+ * default one, and a correction of the remaining errors by kriging. */
 typedef struct supine_patient_fit_options {
   supine_patient_law law;
   supine_patient_scan_motion scan_motion;
@@ -60,10 +63,10 @@ typedef struct supine_patient_fit_options {
   double gravity[3]; /* direction of gravity in the emptier state; 0,0,0 counts as supine */
   /* [axis] share of the displacement from full inflation to rest that lies between the scans */
   double path_span[3];
-  double sill;  /* factor on the covariance of the kriging correction; 0: the most likely one */
-  double noise; /* factor on the noise of every measurement; 0: the most likely factor */
+  double sill;  /* factor on the covariance of the kriging correction; 0: find it by likelihood */
+  double noise; /* factor on the noise of every measurement; 0: find it by likelihood */
   size_t region_count;           /* number of lung regions whose expandability is fitted */
-  const double *prior_precision; /* [region_count, region_count] of the expandabilities */
+  const double *prior_precision; /* [region_count, region_count] inverse of their covariance */
 } supine_patient_fit_options;
 
 typedef struct supine_patient_krige {
@@ -76,22 +79,22 @@ typedef struct supine_patient_krige {
   supine_patient_power mean; /* prior mean of the displacement law's constants */
   supine_patient_power uncorrected_law;
   supine_patient_power law;
-  double scaled_sill; /* sill, divided by the fitted factor if only a factor on the law is fitted */
-  supine_patient_centre *centre; /* [count] point of each measurement, with `weight` unset */
+  double scaled_sill; /* `sill`; if the fit only scales the law, divided by the fitted factor */
+  supine_patient_centre *centre; /* [count] points of the measurements; `weight` is not used */
   double *cholesky; /* [count, count] Cholesky factor of the measurements' covariance, or NULL */
   double *design;   /* [count, terms + 1] derivatives and residual of each measurement, whitened */
   double *kernel_weight; /* [count] weight of each measurement in a prediction */
   double *scratch;       /* [count] temporary values, one for each measurement */
-  double *normal_matrix; /* [2, terms, terms] normal matrix or its factor; work space */
+  double *normal_matrix; /* [terms, terms], after the fit its Cholesky factor; as much work space */
   double objective;      /* squared whitened residuals plus squared deviations from the prior */
   double right_side[SUPINE_PATIENT_TERMS + SUPINE_PATIENT_REGIONS_MAX];
 } supine_patient_krige;
 
-/* Fit a displacement law and its kriging correction in two steps:
- * - Fit one factor on the default displacement law. The scaled law is the prior mean of step two.
- * - Fit law and correction. With SUPINE_PATIENT_DEEP and a sill of at least 1, only another factor
- *   on the law is fitted. With SUPINE_PATIENT_DEEP and a smaller sill, all nine constants are
- *   fitted, with prior standard deviations of about 30 %. SUPINE_PATIENT_PAPER has a wider prior.
+/* Fit a displacement law (patient.h) and its kriging correction in two steps:
+ * - Multiply the default displacement law by a fitted factor, to get the prior mean of step two.
+ * - Fit law and correction. With SUPINE_PATIENT_PAPER, all nine constants of the law have a wide
+ *   prior. With SUPINE_PATIENT_DEEP, their prior standard deviations are about 30 %; but if the
+ *   factor `sill` on the correction's covariance is at least 1, the law is only scaled again.
  * @param rows   [count] measurements; those of weight 0 do not count; must outlive the fit
  * @param krige  release with supine_patient_krige_free, also after a failure
  * @retval SUPINE_ERROR_NUMERICAL  the measurements do not determine the displacement law
@@ -105,7 +108,7 @@ void supine_patient_krige_free(supine_patient_krige *krige);
  * not at all, 1 fully. `share` [region_count] is the diagonal of the resolution matrix. */
 void supine_patient_krige_resolution(const supine_patient_krige *krige, double *share);
 
-/* Compute the standard errors of the constants c1 to c9 of the law; 0 for those not fitted. */
+/* Compute standard errors of the displacement law's constants c1 to c9; 0 for those not fitted. */
 void supine_patient_krige_errors(const supine_patient_krige *krige,
                                  double error[SUPINE_PATIENT_CONSTANTS]);
 
@@ -117,7 +120,7 @@ double supine_patient_krige_predict(supine_patient_krige *krige, const supine_pa
 void supine_patient_krige_copy_law(const supine_patient_krige *krige, supine_patient *patient);
 
 /** Predictors of a displacement, whose errors are compared: no displacement, a translation, an
- * affine map, a displacement law, and this law with its kriging correction. */
+ * affine map, the fitted formula of patient.h (LAW), and this formula with a kriging correction. */
 typedef enum supine_patient_score {
   SUPINE_PATIENT_SCORE_NONE,
   SUPINE_PATIENT_SCORE_TRANSLATION,
@@ -130,24 +133,25 @@ typedef enum supine_patient_score {
 /** Result of a fit; errors are RMS distances, in mm. */
 typedef struct supine_patient_fit_report {
   double points;                          /**< number of landmarks, or of matched vertices */
-  double blocks;                          /**< number of cubes of 40 mm that contain points */
-  double fitted[SUPINE_PATIENT_SCORES];   /**< [predictor] error at fitted points */
-  double held_out[SUPINE_PATIENT_SCORES]; /**< [predictor] error at held-out points */
-  /** Held-out error of the best translation; without a fitted motion, of no displacement. */
+  double blocks;                          /**< number of cubes of 40 mm with points */
+  double fitted[SUPINE_PATIENT_SCORES];   /**< RMS error of each predictor at fitted points, mm */
+  double held_out[SUPINE_PATIENT_SCORES]; /**< as `fitted`, at held-out points */
+  /** RMS error at held-out points, mm, of a translation, or of no displacement if no motion of the
+   * body is fitted. */
   double baseline;
-  double band; /**< share of the held-out points whose error is within the expected 95 % band, % */
-  double explained; /**< 100 (1 - (held-out error with law and correction / `baseline`)^2), % */
-  double expected_point;    /**< expected error of the predicted position of a point, mm */
-  double expected_constant; /**< expected squared error for each mm of displacement, mm */
+  double band;           /**< share of the held-out points with an error below its 95 % bound, % */
+  double explained;      /**< reduction of the squared `baseline` by the corrected law, % */
+  double expected_point; /**< expected error of the predicted position of a point, mm */
+  double expected_constant; /**< expected squared error, mm^2, per mm of displacement */
   double error[SUPINE_PATIENT_CONSTANTS]; /**< standard errors of c1 to c9 (patient.h) */
 } supine_patient_fit_report;
 
 /** Fit a displacement law and its kriging correction to measurements. Measure the error of the
  * prediction by cross-validation, which holds out cubes of 40 mm.
- * @param rows     [single + 3 triples] measurements; their `block` is written
+ * @param rows     [single + 3 triples] measurements; the index of their cube, `block`, is written
  * @param single   number of vertices, each with one measurement; these measurements come first
  * @param triples  number of landmarks, each with three measurements
- * @param patient  in: the frame of the measured points; out: the law and its correction
+ * @param patient  in: `frame`, the bounding box of the lungs; out: the law and its correction
  * @retval SUPINE_ERROR_FORMAT     fewer points than the law has unknowns
  * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
 supine_status supine_patient_fit(const supine_patient_fit_options *options,

@@ -16,9 +16,10 @@
 enum { GRAIN = 64 };
 
 static const double compatible = 0.5; /* smallest cosine between the two normals of a match */
-static const double biweight = 4.685; /* cutoff of Tukey's biweight / robust scale of distances */
-static const double surface_noise = 0.5; /* standard deviation of a measured distance, mm */
-static const double scale_least = 0.02;  /* lower bound on the robust scale of the distances, mm */
+static const double biweight =
+    4.685; /* cutoff of Tukey's biweight, in robust standard deviations */
+static const double surface_noise = 0.5; /* standard deviation of a surface's position, mm */
+static const double scale_least = 0.02;  /* lower bound on the robust standard deviation, mm */
 static const double matched_least = 0.3; /* a smaller share of matched vertices is an error */
 
 static void match_range(void *context, size_t begin, size_t end, size_t thread) {
@@ -26,7 +27,7 @@ static void match_range(void *context, size_t begin, size_t end, size_t thread) 
   supine_patient_matching *m = context;
   for (size_t i = begin; i < end; ++i) {
     supine_patient_match *match = &m->match[i];
-    const double *from = m->rest->mesh.vertices + 3 * match->vertex;
+    const double *from = m->fuller->mesh.vertices + 3 * match->vertex;
     supine_patient_row *row = &m->rows[i];
     supine_inside_place *place = &match->nearest;
     *place = supine_inside_surface_nearest(m->tree, match->position, place);
@@ -124,16 +125,16 @@ supine_status supine_patient_matching_solve(supine_patient_matching *matching,
                                             const supine_patient_stiffness *stiffness,
                                             supine_error *error) {
   supine_patient_matching *m = matching;
-  const size_t n = m->rest->mesh.vertex_count;
+  const size_t n = m->fuller->mesh.vertex_count;
   double *e = malloc(n * sizeof *e);
   if (e == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
   }
   for (size_t i = 0; i < n; ++i) {
-    const supine_patient_place place = supine_patient_find_vertex(m->rest, i);
+    const supine_patient_place place = supine_patient_find_vertex(m->fuller, i);
     memcpy(m->smoothed_force + SUPINE_PATIENT_COLUMNS * i, place.force, sizeof place.force);
   }
-  supine_patient_stiffness_of(stiffness, m->rest, e);
+  supine_patient_stiffness_of(stiffness, m->fuller, e);
   supine_status status = supine_physics_equilibrium_set_stiffness(m->equilibrium, e, error);
   if (status == SUPINE_OK) {
     status = supine_physics_equilibrium_solve(m->equilibrium, SUPINE_PATIENT_COLUMNS,
@@ -149,17 +150,17 @@ supine_status supine_patient_matching_solve(supine_patient_matching *matching,
 
 void supine_patient_matching_choose(supine_patient_matching *matching, size_t limit) {
   supine_patient_matching *m = matching;
-  const size_t n = m->rest->mesh.vertex_count;
+  const size_t n = m->fuller->mesh.vertex_count;
   m->count = n < limit ? n : limit;
   m->landmark_row_count = 0;
   for (size_t i = 0; i < m->count; ++i) {
     const size_t v = i * n / m->count;
     m->match[i] = (supine_patient_match){.vertex = v, .nearest.depth = INFINITY};
-    m->rows[i] = (supine_patient_row){.place = supine_patient_find_vertex(m->rest, v),
+    m->rows[i] = (supine_patient_row){.place = supine_patient_find_vertex(m->fuller, v),
                                       .noise = surface_noise};
     memcpy(m->rows[i].place.force, m->smoothed_force + SUPINE_PATIENT_COLUMNS * v,
            sizeof m->rows[i].place.force);
-    memcpy(m->match[i].position, m->rest->mesh.vertices + 3 * v, sizeof m->match[i].position);
+    memcpy(m->match[i].position, m->fuller->mesh.vertices + 3 * v, sizeof m->match[i].position);
   }
 }
 
@@ -170,7 +171,7 @@ supine_status supine_patient_matching_create(const supine_lungs *rest, const sup
                                              supine_error *error) {
   const size_t n = rest->mesh.vertex_count;
   supine_patient_matching *m = matching;
-  *m = (supine_patient_matching){.rest = rest, .state = state};
+  *m = (supine_patient_matching){.fuller = rest, .state = state};
   m->frame = supine_patient_frame_of_lungs(rest);
   m->smoothed_force = malloc(SUPINE_PATIENT_COLUMNS * n * sizeof(double));
   m->rest_normals = malloc(3 * n * sizeof(double));
@@ -220,7 +221,7 @@ static void place_range(void *context, size_t begin, size_t end, size_t thread) 
     supine_patient_motion(&m->patient->power, place, motion);
     m->space[i] = 0.0;
     for (size_t a = 0; a < 3; ++a) {
-      const double at = m->rest->mesh.vertices[3 * match->vertex + a] + u[a] + motion[a];
+      const double at = m->fuller->mesh.vertices[3 * match->vertex + a] + u[a] + motion[a];
       m->space[i] += pow(at - match->position[a], 2.0);
       match->position[a] = at;
     }

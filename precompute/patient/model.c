@@ -12,8 +12,9 @@
 
 enum { GRAIN = 64 };
 
-/* Largest distance between the same faces of the bounding boxes of a surface and a scanned state /
- * width of the latter. The state's box is that of landmarks [0] or of a surface [1]. */
+/* Largest distance between corresponding faces of the bounding boxes of a surface and of a scanned
+ * state, as a share of the state's width. The state's box is that of landmarks [0] or surfaces [1].
+ */
 static const double apart_most[2] = {0.45, 0.2};
 /* Smaller forces are replaced by this before a division. The mean force is 1. */
 static const double force_least = 0.2;
@@ -65,8 +66,8 @@ static void find_parts(const supine_patient_record *record, double part[2]) {
   }
 }
 
-/* Compute gains [position, axis]: the displacement from full inflation, divided by that at rest,
- * along x, y and z, at two positions on the path from full inflation (0) to rest (1). */
+/* Compute the displacement from full inflation at two positions `part` on the path from full
+ * inflation (0) to rest (1). gains [position, axis] is its share of the displacement at rest. */
 static void find_gains(const double part[2], double gains[2][3]) {
   const supine_model deep = supine_physics_model(SUPINE_LAW_DEEP);
   supine_volume_bend(deep.bend, part[0], gains[0]);
@@ -83,7 +84,7 @@ typedef struct work {
   const supine_patient_record *record;
   supine_lungs lungs;      /* estimate of the lungs in the fuller state */
   const double *scan;      /* [N, 3] vertices of a scan in the emptier state, or NULL */
-  double *smoothing_ratio; /* [N] force after smoothing over the surface / force before */
+  double *smoothing_ratio; /* [N] force after smoothing over the surface / before it */
   double *displacement;    /* [N, 3] displacement from the fuller to the emptier state, mm */
 } work;
 
@@ -112,7 +113,7 @@ static void move(work *w) {
   supine_mesh_box(&w->lungs.mesh, w->lungs.minimum, w->lungs.maximum);
 }
 
-/* Compute w->smoothing_ratio and the stiffness [N], in the posture to which the law was fitted. */
+/* Compute w->smoothing_ratio and the stiffness [N], in the posture of the fitted scans. */
 static supine_status find_ratio(const work *w, double *stiffness, supine_error *error) {
   const supine_patient_record *record = w->record;
   supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
@@ -132,8 +133,8 @@ static supine_status find_ratio(const work *w, double *stiffness, supine_error *
   return status;
 }
 
-/* Compute the change of volume, mL, if the displacement between the two scanned states is scaled so
- * that it leads from the fuller state to full inflation (end 0) or to rest (end 1).
+/* Extrapolate the displacement between the two scanned states to full inflation (end 0) or to rest
+ * (end 1). Return the change of volume, mL, from the fuller scanned state to this end.
  * @param part  positions of the two states on the path from full inflation (0) to rest (1) */
 static double volume_to_end(const supine_volume_form *form, const double part[2], size_t end) {
   double gains[2][3];
@@ -145,9 +146,9 @@ static double volume_to_end(const supine_volume_form *form, const double part[2]
   return supine_volume_form_at(form, towards);
 }
 
-/* Compute path_span: along x, y and z, the share of the displacement from full inflation to rest
- * that lies between the two scanned states. Move the states along the path from full inflation to
- * rest until its ends have the known volumes.
+/* Compute, along x, y and z, the share of the displacement from full inflation to rest that lies
+ * between the two scanned states. To find it, adjust the positions of the states on this path until
+ * the extrapolated displacement gives the known volumes at full inflation and at rest.
  * @param ones  [vertices] 1 for each vertex */
 static void find_path_span(const work *w, const supine_resting *resting, const double *ones,
                            double path_span[3]) {
@@ -173,7 +174,7 @@ static void find_path_span(const work *w, const supine_resting *resting, const d
     const size_t k = (size_t)round % 2;
     const supine_volume *stated = &record->state[k].volume;
     if (stated->ml == 0.0 && stated->kind == (k == 0 ? SUPINE_VOLUME_FULL : SUPINE_VOLUME_REST)) {
-      continue; /* the state is exactly at an end of the path, and is not moved */
+      continue; /* the state is known to be full inflation or rest: keep its position */
     }
     const double off = volume_to_end(form, part, k) - (volume[k] - lung_volume);
     part[k] += step;
@@ -246,7 +247,8 @@ supine_status supine_patient_check_place(const supine_patient_record *record,
   const int only_side = lungs->lung_count == 1 ? lungs->side[0] : 0;
   const double *low[2] = {frame->minimum, record->emptier[0]};
   const double *high[2] = {frame->maximum, record->emptier[1]};
-  double off[2] = {0.0, 0.0}; /* [state] largest distance between same faces of boxes / width */
+  double off[2] = {0.0, 0.0}; /* [state] largest distance of its bounding box's faces from the
+                                 surface's, divided by the width of the state's box */
   size_t axis[2] = {0};
   if (frame->only_side != 0 && frame->only_side != only_side) {
     return supine_error_set(

@@ -21,7 +21,7 @@ enum {
 static const double flat_least = 1.0; /* points closer to a plane (RMS, mm) count as flat */
 static const double displacement_least = 0.05; /* a smaller RMS displacement is refused, mm */
 static const double rotation_most = 25.0;      /* a larger rotation is refused, degrees */
-static const double box_overlap_least = 0.5; /* least overlap of boxes / width of the larger box */
+static const double box_overlap_least = 0.5;   /* as a share of the larger box, along each axis */
 /* Largest translation, and largest residual of an affine map, between two states. Both are divided
  * by the RMS distance of the points from their mean. */
 static const double apart_most = 0.5, residual_most = 0.7;
@@ -108,8 +108,8 @@ void supine_patient_map_apply(const supine_patient_affinity *map, const double f
 bool supine_patient_map_fit(supine_patient_map kind, size_t count, const double *from,
                             const double *to, supine_patient_affinity *map) {
   double mean[2][3] = {{0.0}};
-  double cross[3][3] = {{0.0}};   /* [a][b] count times the covariance of from[a] and to[b] */
-  double scatter[3][3] = {{0.0}}; /* [a][b] count times the covariance of from[a] and from[b] */
+  double cross[3][3] = {{0.0}};   /* [a][b] sum of (from[a] - mean) (to[b] - mean) */
+  double scatter[3][3] = {{0.0}}; /* [a][b] sum of (from[a] - mean) (from[b] - mean) */
   double mapped[3];
   bool determined = true;
   *map = (supine_patient_affinity){.m = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0}};

@@ -75,7 +75,7 @@ supine_patient_power supine_patient_deep(const double gravity[3], const double p
   for (size_t k = 0; k < 3; ++k) {
     law.c[2 * k] = model.direction.c[2 * k] * (supine_length(path_span) > 0.0 ? path_span[k] : 1.0);
     law.c[2 * k + 1] = model.direction.c[2 * k + 1];
-    /* The minus sign is there because the box coordinates Y and Z decrease along +y and +z. */
+    /* Subtract the gain, because Y and Z in the bounding box grow in the directions -y and -z. */
     law.c[6 + k] = model.force.box[k] - (k > 0 ? model.force.gain * g[k] : 0.0);
   }
   return law;
@@ -175,8 +175,8 @@ supine_force_law supine_patient_force(const supine_patient_power *power, double 
                                       const double gravity[3]) {
   supine_force_law law = {.gain = gain, .pair = true};
   const double *slope = power->c + 6;
-  /* The part of the force that depends on gravity has no slope along X: X grows from the midline
-   * outwards, so that X grows downwards in one lung and upwards in the other. */
+  /* Gravity does not change the force's slope along X, which grows from the midline outwards: in a
+   * person lying on the side, X points downwards in one lung and upwards in the other. */
   law.box[0] = slope[0];
   law.box[1] = slope[1] + gain * gravity[1];
   law.box[2] = slope[2] + gain * gravity[2];

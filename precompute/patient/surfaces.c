@@ -21,14 +21,14 @@ static const double same_state = 0.02; /* surfaces closer than this (RMS, mm) ar
 /* Initialise the measurement of each vertex: the displacement along one axis by the affine map from
  * the bounding box of the reference surface to that of the surface in the emptier state. */
 static void start_rows(supine_patient_matching *m) {
-  const double *low = m->rest->minimum;
+  const double *low = m->fuller->minimum;
   double to[2][3];
   supine_mesh_box(m->state, to[0], to[1]);
   for (size_t i = 0; i < m->count; ++i) {
     supine_patient_row *row = &m->rows[i];
-    const double *from = m->rest->mesh.vertices + 3 * m->match[i].vertex;
+    const double *from = m->fuller->mesh.vertices + 3 * m->match[i].vertex;
     const size_t k = i % 3;
-    const double t = (from[k] - low[k]) / (m->rest->maximum[k] - low[k]);
+    const double t = (from[k] - low[k]) / (m->fuller->maximum[k] - low[k]);
     row->axis[0] = row->axis[1] = row->axis[2] = 0.0;
     row->axis[k] = 1.0;
     row->value = to[0][k] + t * (to[1][k] - to[0][k]) - from[k];
