@@ -30,7 +30,7 @@ typedef struct request {
   bool allow_folds, as_scanned;
   supine_from from;
   double fps;
-  double duration; /* s; 0 if not given */
+  double duration; /* length of the output, s; 0 for the length of the turn or of one breath */
 } request;
 
 /* Names of the shapes that a breath can have over time, indexed by supine_pv_course. */
@@ -143,7 +143,8 @@ static void end(playing *p) {
   supine_basis_close(p->basis);
 }
 
-/* Allocate memory for `count` frames. If `series` is true, keep positions of one frame only. */
+/* Allocate memory for `count` frames. If `series` is true, keep the positions of one frame only, as
+ * each is written before the next is computed. */
 static supine_status begin_frames(playing *p, size_t count, bool series, supine_error *error) {
   const size_t frame = 3 * supine_basis_get_info(p->basis)->vertex_count;
   p->frame_count = count;

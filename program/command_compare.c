@@ -87,7 +87,8 @@ static supine_status find_means(const structures *c, const supine_state *state, 
   return status;
 }
 
-/* Compute the mean squared expected error of each structure's displacement between two states. */
+/* For each structure, average the squared expected error of the displacement between two states
+ * over the vertices, mm^2. */
 static supine_status find_square_errors(const structures *c, const supine_state *to,
                                         const supine_state *from, supine_error *error) {
   const size_t n = supine_basis_get_info(c->basis)->vertex_count;

@@ -180,8 +180,8 @@ static supine_status read_row(const supine_csv *csv, request *row, supine_error 
                              : supine_command_deform_content_check(&row->content, error);
 }
 
-/* Check that the output of the last row can be written, and is neither an input nor the output of
- * another row. */
+/* Check that the output of the last request can be written, and is neither an input nor the output
+ * of another request. */
 static supine_status check_row(const char *basis, const request *rows, size_t count,
                                supine_error *error) {
   const request *row = &rows[count - 1];

@@ -273,9 +273,8 @@ static supine_status fit_further(const request *wanted, const scan_data *data, s
   return status;
 }
 
-/* Fit the further scans of --state, and set the factor of the part of the force that depends on
- * gravity. If the fuller scan has no surface, move the surface of the emptier scan to the fuller
- * scan. */
+/* Fit the scans given by --state, and set the factor of the gravity-dependent force. If the fuller
+ * scan has no surface, move the surface of the emptier scan to the fuller state. */
 static supine_status fit_gravity_factor(const request *wanted, scan_data *data,
                                         supine_patient_record *record, supine_error *error) {
   supine_lungs *from = &data->lungs[0];

@@ -358,7 +358,7 @@ static supine_status locate(const request *wanted, const supine_basis *lungs,
                                    .rigid = wanted->rigid};
   supine_status status = find(&task, wanted->orientation.given, shown, &located, error);
   if (status == SUPINE_ERROR_ARGUMENT && wanted->rigid) {
-    /* The error is one of the file: its points do not determine a rotation. */
+    /* Report a format error: the points in the file do not determine a rotation. */
     status = error->status = SUPINE_ERROR_FORMAT;
   }
   if (status == SUPINE_OK) {

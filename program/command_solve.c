@@ -159,8 +159,8 @@ static supine_status find_gains(const supine_lungs *lungs, const request *wanted
  * is at most this fraction of the largest applied force. */
 static const double pitcher_tolerance = 1e-6;
 
-/* Print the fraction of the force that is not yet distributed, each time the number of steps per
- * vertex has doubled. */
+/* Print the unbalanced fraction of the force each time the number of iteration steps per vertex has
+ * doubled. */
 static void report_remaining(void *context, size_t steps, double remaining) {
   const size_t per_vertex = steps / *(const size_t *)context;
   if ((per_vertex & (per_vertex - 1)) == 0) {

@@ -173,8 +173,8 @@ typedef struct observed_points {
   supine_stream_observed observed;
 } observed_points;
 
-/* Open the file of --points, and list as points the structures that have a single vertex. Mark all
- * points as not yet observed. */
+/* Open the file of --points. Each structure with a single vertex becomes a point, marked as not yet
+ * observed. */
 static supine_status open_points(const supine_basis *basis, const request *wanted,
                                  observed_points *points, supine_error *error) {
   const supine_command_names *names = &points->names;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Write displacement fields, images moved by a field, and moved points as CSV. */
+/* Write displacement fields, images moved by a field, and a CSV file of moved points. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -231,9 +231,9 @@ static supine_status invert(const supine_field *forward, supine_field *inverse,
   return status;
 }
 
-/* Replace `second`, the field from the scan to a state B, by the field u from a state A to B.
- * `first` is the field from the scan to A, and v is its inverse: u(x) = v(x) + second(x + v(x)).
- * The depth of each node below the lungs' surface becomes that in state A. */
+/* Replace `second`, the displacement from the scan to state B, by u, the displacement from state A
+ * to B: u(x) = v(x) + second(x + v(x)). v is the inverse of `first`, the displacement from the scan
+ * to A. Also replace each node's depth below the lungs' surface by its depth in state A. */
 static supine_status join_fields(const supine_field *first, supine_field *second,
                                  supine_error *error) {
   supine_field back = {0};

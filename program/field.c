@@ -52,7 +52,7 @@ void supine_field_interpolate(const supine_image *image, const supine_field_cell
   }
 }
 
-/* Read and check the tensors that describe the grid in a basis. */
+/* Read and check the grid in a basis: its shape, the node of each vertex, and the depth of each. */
 static supine_status read_grid(const supine_basis *basis, supine_image *nodes,
                                const uint32_t **part, const float **depth, supine_error *error) {
   const size_t n = supine_basis_get_info(basis)->vertex_count;
@@ -100,8 +100,9 @@ static supine_status read_grid(const supine_basis *basis, supine_image *nodes,
   return SUPINE_OK;
 }
 
-/* Average the displacements of the neighbours of node i that were set before the current layer:
- * their mark in `known` is neither 0 nor `now`. Return false if there are no such neighbours. */
+/* Average the displacements of those neighbours of node i whose displacement is known: their mark
+ * in `known` is neither 0 (unknown) nor `now` (set in the layer that is being added). Return false
+ * if there are none. */
 static bool mean_neighbour(const supine_image *nodes, const unsigned char *known, unsigned char now,
                            size_t i, float mean[3]) {
   const float *u = nodes->values;

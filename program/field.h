@@ -16,8 +16,8 @@ typedef struct supine_field {
                          inverse field has no depth, and depth.values is NULL */
 } supine_field;
 
-/** Compute the displacement field from the scan to a pose. Outside the nodes of the basis the field
- * has no physical meaning; it falls to 0 over `fade` mm.
+/** Compute the displacement field from the scan to a pose. It has a physical meaning only at the
+ * grid nodes that 'supine embed' stored in the basis. From these it falls to 0 over `fade` mm.
  * @param field  release with supine_field_free
  * @retval SUPINE_ERROR_FORMAT  the basis has no grid, or a malformed one
  * @retval SUPINE_ERROR_MEMORY */

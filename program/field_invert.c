@@ -96,7 +96,7 @@ static void invert_rows(void *context, size_t begin, size_t end, size_t thread) 
         x[k] = y[k] - u[k];
       }
       double off = solve(work->field, y, x);
-      if (off > lost_beyond) { /* solve again, starting from x = y */
+      if (off > lost_beyond) { /* the iteration failed: restart it without the estimate -u(y) */
         double other[3];
         memcpy(other, y, sizeof other);
         const double again = solve(work->field, y, other);

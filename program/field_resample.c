@@ -148,10 +148,9 @@ static double volume_ratio(const supine_image *nodes, const supine_image *image,
                        supine_triple(nodes->step[0], nodes->step[1], nodes->step[2]));
 }
 
-/* Interpolate densities, and multiply those inside the lungs by the volume of the tissue before the
- * motion, divided by its volume after the motion. Of the corners of its cell, each point uses only
- * those on the same side of the lungs' surface as the nearest corner, so that the chest wall adds
- * no mass to the lungs.
+/* Interpolate densities, and multiply those inside the lungs by volume_ratio(). A point is
+ * interpolated only from corners of its cell that lie on the same side of the lungs' surface as its
+ * nearest corner. The chest wall thus adds no mass to the lungs.
  * @param first  index of the first of the RUN voxels in the moved image */
 INLINE void interpolate_density(const resampling *work, const cells *in, size_t first,
                                 double *values) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Read the names of the structures in a file of 'supine embed', and make marks that show them. */
+/* Read the names of embedded structures ('supine embed'), and make their labels for pictures. */
 #ifndef SUPINE_COMMAND_INSIDE_H
 #define SUPINE_COMMAND_INSIDE_H
 

@@ -76,7 +76,7 @@ supine_status supine_command_subject_open(const char *path, supine_command_subje
 }
 
 /* Compute the gains (factors on the displacement of each lung) that give the volume of a state or,
- * if the state has no volume, the volume of its surface. */
+ * if the state has no volume, the volume of `mesh`, its scanned surface. */
 static supine_status find_gains(const supine_command_subject *s, const supine_command_state *state,
                                 const supine_mesh *mesh, supine_command_outcome *outcome,
                                 supine_error *error) {

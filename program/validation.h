@@ -23,9 +23,9 @@ extern const char *const supine_command_map_names[SUPINE_PATIENT_MAP_COUNT];
 typedef struct supine_command_distance {
   double mean, rms, p95;
   double largest; /* largest distance; between surfaces, the Hausdorff distance */
-  double
-      explained; /* 1 - (rms / r)^2, where r is the RMS distance of the prediction "none" (no
-                    motion) or, if body motion is removed, of "translation"; NAN if r is nearly 0 */
+  /* 1 - (rms / r)^2; NAN if r is nearly 0. r is the RMS distance without motion (of the prediction
+   * "none") or, if body motion is removed, with a fitted translation ("translation"). */
+  double explained;
 } supine_command_distance;
 
 /* A predicted state, and the distances of the prediction from the scan of that state. */
@@ -34,34 +34,35 @@ typedef struct supine_command_outcome {
   double scale;       /* pose.gains[0][0], the factor on the first lung's displacement along x */
   double millilitres; /* volume minus the volume before the predicted motion, mL */
   double *predicted;  /* [N, 3] predicted positions, mm */
-  double *nearest;    /* [N, 3] nearest points of the scanned surface, mm */
+  double *nearest;    /* [N, 3] for each predicted vertex, nearest point of the scan, mm */
   bool has_surface, has_points, has_best;
   supine_command_distance surface[SUPINE_PATIENT_MAP_COUNT];
   supine_command_distance points[SUPINE_PATIENT_MAP_COUNT];
   double best_scale; /* `scale` at which the prediction would be nearest to the scan */
-  double best_rms;   /* RMS distance from the scanned surface at best_scale, mm */
+  double best_rms;   /* RMS distance of the prediction with the scale best_scale, mm */
 } supine_command_outcome;
 
 typedef struct supine_command_subject {
   supine_basis *basis;
   supine_patient_scan_motion moved; /* kind of body motion to remove before comparing */
   supine_command_state from;        /* state in which the motion starts */
-  double from_scale;       /* factor on the first lung's displacement along x in the state `from` */
-  double from_millilitres; /* volume in the state `from`, mL */
-  supine_mesh start;       /* surface in the state `from` */
+  double from_scale;                /* `scale` of supine_command_outcome, for the state `from` */
+  double from_millilitres;          /* volume in the state `from`, mL */
+  supine_mesh start;                /* surface in the state in which the motion starts */
   size_t count;
   supine_command_state state[SUPINE_COMMAND_STATES_MAX];
   supine_command_outcome outcome[SUPINE_COMMAND_STATES_MAX];
-  size_t line_count; /* number of states to which best_scale = from_scale + line_slope * volume is
-                        fitted */
-  double line_slope; /* fitted change of best_scale per volume, 1/mL */
-  double line_off;   /* largest |best_scale - fitted line| / largest |best_scale - from_scale| */
+  size_t line_count; /* states to which supine_command_find_line fits a line */
+  double line_slope; /* slope of the line fitted to best_scale against volume, 1/mL */
+  /* Largest deviation of a state's best_scale from the line, relative to the largest |best_scale -
+   * from_scale|. */
+  double line_off;
 } supine_command_subject;
 
 void supine_command_subject_free(supine_command_subject *subject);
 
-/* Open a basis and compute the surface in the state `from`, in which the motion starts: the scan,
- * if `from` was not given.
+/* Open a basis. Compute the surface in the state in which the motion starts: subject->from, by
+ * default the scan.
  * @retval any status of the run-time library */
 supine_status supine_command_subject_open(const char *path, supine_command_subject *subject,
                                           supine_error *error);
@@ -75,9 +76,8 @@ supine_status supine_command_validate_state(supine_command_subject *subject, siz
                                             const char *landmarks, bool reverse,
                                             supine_error *error);
 
-/* Fit the line best_scale = from_scale + line_slope * volume to all states in the posture of the
- * first state. best_scale is the factor of the displacement at which the prediction is nearest to
- * the scan, from_scale is the factor in the state `from`, and the volume counts from that state. */
+/* Fit a line to the best scales of all states whose posture is that of state[0]: best_scale =
+ * from_scale + line_slope * (volume - from_millilitres). */
 void supine_command_find_line(supine_command_subject *subject);
 
 /* Draw the distance between prediction and scanned surface, in one panel for each state.
@@ -85,10 +85,9 @@ void supine_command_find_line(supine_command_subject *subject);
 supine_status supine_command_draw_errors(const supine_command_subject *subject, const char *path,
                                          supine_error *error);
 
-/* Compute the distances of the second points of pairs from each of the predictions in
- * supine_command_map_names.
- * @param moved      kind of body motion between the scans; fitted from the predicted to the
- *   second points, and applied to the predicted points before the comparison
+/* Compute the distances between predicted and true second points of pairs, for each prediction in
+ * supine_command_map_names: `predicted`, and maps fitted to the pairs.
+ * @param moved      body motion between the scans to fit to `predicted` and remove before comparing
  * @param predicted  [count, 3] positions predicted from the first points of the pairs, mm
  * @retval SUPINE_ERROR_NUMERICAL  the points lie in one plane
  * @retval SUPINE_ERROR_MEMORY */
@@ -96,15 +95,13 @@ supine_status supine_command_compare_points(
     const supine_patient_pairs *pairs, const double *predicted, supine_patient_scan_motion moved,
     supine_command_distance distance[SUPINE_PATIENT_MAP_COUNT], supine_error *error);
 
-/* Compute the distances between a scanned surface and each of the predictions in
- * supine_command_map_names, from the vertices of each surface to the other. Maps and body motion
- * are fitted by the iterative closest point (ICP) method.
+/* Compute the distances between `state`, a scanned surface, and a predicted surface, from the
+ * vertices of each to the other, for each prediction in supine_command_map_names: `predicted`, and
+ * maps fitted to `start`. Fit maps and body motion by the iterative closest point (ICP) method.
  * @param start      surface before the motion, N vertices
- * @param moved      kind of body motion between the scans; fitted from the predicted to the
- *   scanned surface, and applied to the predicted surface before the comparison
- * @param predicted  [N, 3] predicted positions, mm; on return, after the fitted body motion
- * @param state      scanned surface
- * @param nearest    [N, 3] nearest points of the scanned surface, mm; output, or NULL
+ * @param moved      body motion between the scans to fit to `predicted` and remove before comparing
+ * @param predicted  [N, 3] positions predicted by the basis, mm; on return, after the fitted motion
+ * @param nearest    [N, 3] point of `state` nearest to each predicted vertex, mm; output, or NULL
  * @retval SUPINE_ERROR_MESH  as supine_patient_check_boxes
  * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
 supine_status

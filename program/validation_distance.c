@@ -38,7 +38,7 @@ static void explain(supine_patient_scan_motion moved,
   }
 }
 
-/* Return the kind of map to fit: `kind` or, for the prediction, the motion between the scans. */
+/* Return the map to fit: `kind` or, for the basis's prediction, the body motion to remove. */
 static supine_patient_map map_of(int kind, supine_patient_scan_motion moved) {
   return kind != SUPINE_PATIENT_MAP_PREDICTED  ? (supine_patient_map)kind
          : moved == SUPINE_PATIENT_RIGID       ? SUPINE_PATIENT_MAP_RIGID

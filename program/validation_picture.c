@@ -9,12 +9,12 @@
 #include "program/render/render.h"
 #include "sh/base/vec3.h"
 
-/* Least value at the end of the colour bar, mm. */
+/* The upper end of the colour bar is at least this, mm. */
 static const double end_least = 1.0;
 
-/* Set value[i] to the distance of predicted vertex i from the scanned surface, mm. Raise *largest
- * to the largest of these distances, and *bar_end to the 95th percentile of the distances between
- * the two surfaces. */
+/* Set value[i] to the distance of predicted vertex i from the scanned surface, mm. Set *largest to
+ * the maximum of these distances and its previous value. Raise *bar_end to at least the 95th
+ * percentile of the distances between predicted and scanned surface. */
 static void find_values(const supine_command_subject *s, const supine_command_outcome *outcome,
                         float *value, double *largest, double *bar_end) {
   for (size_t i = 0; i < s->start.vertex_count; ++i) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Test supine breathe: volumes measured on the surfaces of frames, files, and refused input. */
+/* Test 'supine breathe': volumes of its frames, output files, and refusal of bad input. */
 #include <dirent.h>
 #include <signal.h>
 #include <sys/wait.h>

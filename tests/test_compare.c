@@ -226,8 +226,8 @@ TEST(test_compare_energy_all_bands_sum_to_mean_square) {
     total += energy[l];
   }
   /* Average the mean square displacement over a grid of directions of gravity. The average is exact
-   * for products of two harmonics of band BAND: LONGITUDES exceeds 2 BAND, and Fejer's first rule
-   * is exact to degree LATITUDES - 1 in z, which is at least 2 BAND. */
+   * for products of two harmonics of degree BAND, as LONGITUDES > 2 BAND, and as Fejer's first rule
+   * is exact to degree LATITUDES - 1 > 2 BAND in z. */
   double mean = 0;
   for (int j = 0; j < LATITUDES; ++j) {
     const double turn = 3.14159265358979323846 * (2 * j + 1) / (2.0 * LATITUDES);
@@ -313,8 +313,8 @@ TEST(test_slabs_reference_volumes_sum_to_lung_volume) {
   unmake(&m);
 }
 
-/* Cut a bipyramid of height 2 h into horizontal slabs. The part within a distance z of either tip,
- * up to h, has the share (z / h)^3 of half the volume. */
+/* Cut a bipyramid of height 2 h into horizontal slabs. For z <= h, the part within the height z of
+ * a tip has (z / h)^3 times half the volume. */
 TEST(test_slabs_bipyramid_volumes_grow_with_cube_of_height) {
   fixture *f = fixture_create(602, 3, 2, 1, false, true, 2, 8);
   for (size_t i = 0; i < 600; ++i) {
@@ -346,7 +346,7 @@ TEST(test_slabs_bipyramid_volumes_grow_with_cube_of_height) {
 /* Displacing every point x by M x + shift multiplies the volume of each slab by det(I + M). */
 TEST(test_slabs_affine_displacement_gains_equal_determinant) {
   static const double matrices[][3][3] = {
-      {{0}},                                        /* only the shift */
+      {{0}},                                        /* a shift without rotation or scale */
       {{0.1, 0, 0}, {0, 0.1, 0}, {0, 0, 0.1}},      /* expansion by 10 % */
       {{-0.2, -0.6, 0}, {0.6, -0.2, 0}, {0, 0, 0}}, /* rotation by 37 degrees */
       {{0.04, 0.08, -0.3}, {0.02, -0.06, 0.05}, {-0.09, 0.01, 0.07}}};

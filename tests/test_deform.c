@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compare positions with double precision, for every storage and every instruction set. */
+/* Compare positions with those in double precision, for every storage format and instruction
+ * set. */
 #include "test.h"
 
 #include <supine/runtime.h>
@@ -212,8 +213,8 @@ TEST(test_storage_auto_small_last_modes_chooses_mixed) {
   drop(&o);
 }
 
-/* Directions and coefficients of modes just below 2^30 give finite error bounds. A file with a
- * coefficient of 2^30 is refused. */
+/* If coefficients and displacement directions are numbers just below 2^30, error bounds are finite.
+ * A file with a coefficient of 2^30 is refused. */
 TEST(test_storage_error_largest_numbers_finite) {
   fixture *f = fixture_create(50, 16, 3, 1, false, false, 11, 5);
   for (size_t i = 0; i < 3; ++i) {
@@ -430,7 +431,7 @@ TEST(test_deform_batch_each_orientation_within_stated_error) {
   check_batch(700, 16, false, 64, 0, 700);
   check_batch(700, 16, false, 1, 3, 691);
   check_batch(24000, 16, false, 64, 0, 24000); /* the output exceeds the cache */
-  check_batch(23999, 16, false, 64, 1, 23998); /* orientations share cache lines of the output */
+  check_batch(23999, 16, false, 64, 1, 23998); /* from vertex 1: batch entries share cache lines */
   check_batch(90, 16, false, 300, 0, 90);
   check_batch(90, 3, false, 5, 17, 60);
   check_batch(90, 3, false, 5, 17, 18);

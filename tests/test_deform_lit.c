@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Normals computed from modes equal the defining formula, evaluated in double precision. */
+/* Test that normals equal the sum of modes that defines them, computed in double precision. */
 #include "test.h"
 
 #include <supine/runtime.h>
@@ -58,9 +58,8 @@ static void drop(opened *o) {
   fixture_destroy(o->f);
 }
 
-/* Compute the weights v of a lung's modes of normals, as polynomials of degree 2 in the products s
- * w[k]. Here w are the weights of the displacement modes, and the lung's displacement is multiplied
- * by s. */
+/* Compute the weights v of a lung's normal modes: polynomials of degree 2 in s w[k]. w are the
+ * weights of the displacement modes, and s is the factor on the lung's displacement. */
 static void expected_weights(const fixture *f, size_t lung, const double *w, double s, double *v) {
   const size_t terms = (MODES + 1) * (MODES + 2) / 2;
   for (size_t j = 0; j < f->normals; ++j) {

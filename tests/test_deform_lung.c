@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Test that positions of a real lung with 16 harmonics err by at most the stated bound. */
+/* Test that positions of a real lung with 16 harmonics err by at most the error bound of the
+ * basis. */
 #include "test.h"
 
 #include <supine/runtime.h>

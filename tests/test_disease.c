@@ -56,10 +56,10 @@ static const double *side_of(const supine_lungs *lungs) {
   return lungs->mesh.vertices + 3 * found;
 }
 
-/* Ratio of the displacement with a lesion to the displacement without it. */
+/* Smallest and largest ratio of the displacement with a lesion to that without it. */
 typedef struct change {
-  double inside[2]; /* smallest and largest ratio within half a radius of the lesion's centre */
-  double far[2];    /* smallest and largest ratio more than 50 mm outside the lesion */
+  double inside[2]; /* range of displacement with / without lesion, within half its radius */
+  double far[2];    /* range of displacement with / without lesion, over 50 mm outside it */
 } change;
 
 static void widen(double range[2], double value) {
@@ -67,8 +67,8 @@ static void widen(double range[2], double value) {
   range[1] = fmax(range[1], value);
 }
 
-/* Compare the displacements in a breath with and without the lesion. If `volume` is above 0, both
- * breaths inhale that volume, mL. If it is 0, the displacements are not scaled. */
+/* Compare the displacements with and without the lesion. Scale both to the volume change `volume`,
+ * mL; if it is 0, compare the displacements as solved. */
 static change change_by(const supine_lungs *lungs, const supine_lesion *lesion, double volume) {
   supine_solution healthy = solve(lungs, supine);
   double *factors = no_lesions(lungs);

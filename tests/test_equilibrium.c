@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compare the equilibrium with its equations and with the iteration of [Santhanam2008]. */
+/* Test that the equilibrium solves its equations, and equals the iteration of [Santhanam2008]. */
 
 #include "precompute/physics/equilibrium.h"
 #include "test.h"
@@ -12,7 +12,7 @@
 typedef struct fixture {
   supine_mesh mesh;
   supine_topology topology;
-  double *stiffness; /* [N] with a geometric mean far from 1 */
+  double *stiffness; /* [N] of the vertices; not normalised: the geometric mean is far from 1 */
   double *force;     /* [N, 3] three sets of forces on the N vertices, one in each column */
 } fixture;
 
@@ -73,8 +73,8 @@ static double *normalised(size_t count, const double *stiffness) {
   return out;
 }
 
-/* Compute the force that ends up on each spring from the force that ends up on each mass [N], by
- * (8) and (12)-(14) of [Santhanam2008]. The caller frees the result. */
+/* Compute the final force on each spring from the final force on each mass, by (8) and (12)-(14) of
+ * [Santhanam2008]. The caller frees the result. */
 static double *spring_catch(const fixture *f, const double *masses) {
   const size_t edges = f->topology.edge_count;
   double *e = normalised(f->mesh.vertex_count, f->stiffness);
@@ -201,7 +201,7 @@ TEST(test_transfer_column_all_vertices_superpose_to_solution) {
   double *column = malloc(n * sizeof *column);
   double *sum = calloc(n, sizeof *sum);
   double *whole = solve_of(f, f->stiffness, 3);
-  /* The sum of all columns, each times the force on its vertex, is the solution. */
+  /* The columns of the transfer matrix, each times the force on its vertex, sum to the solution. */
   for (size_t j = 0; j < n; ++j) {
     assert_int_equal(supine_physics_transfer_column(eq, j, column, NULL), SUPINE_OK);
     for (size_t i = 0; i < n; ++i) {

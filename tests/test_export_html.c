@@ -114,9 +114,9 @@ static double number_of(const char *page, const char *name) {
   return strtod(at + (*at == '['), NULL);
 }
 
-/* Assert that positions and coefficients in the page are those of the basis, rounded to 16 bits. In
- * the page, directions have unit length, and coefficients are multiplied by the length that the
- * direction has in the basis. */
+/* Assert that positions and coefficients in the page are those of the basis, rounded to 16 bits.
+ * The page normalises each vertex's direction of displacement to unit length, and multiplies its
+ * coefficients by the original length. */
 static void check_motion(const char *page, const export_source *s, const uint32_t *order) {
   const size_t n = s->info->vertex_count;
   const size_t modes = s->info->mode_count;

@@ -92,7 +92,7 @@ TEST(test_field_at_nodes_and_cells_interpolates_basis) {
     }
     supine_field_at(&field, p, u);
     for (size_t k = 0; k < 3; ++k) {
-      /* The tolerance, mm, allows for the rounding of positions by up to 1e-5 mm. */
+      /* The tolerance is twice the rounding of a float32 position, mm. */
       assert_close(u[k], (double)moved[3 * i + k], 2e-5);
     }
   }
@@ -141,7 +141,7 @@ TEST(test_field_scan_below_full_measured_from_scan) {
     assert_true(fabs((double)((const float *)field.nodes.values)[i]) < 1e-4);
   }
   supine_field_free(&field);
-  /* Find a grid node inside the lungs, and embed it as a point. */
+  /* Compare the field at a grid node in the lungs with the motion of a point embedded there. */
   assert_int_equal(supine_field_create(grid, POSED(grid, weights, scales), 60.0, &field, &error),
                    SUPINE_OK);
   size_t node = count / 2;
@@ -219,8 +219,8 @@ TEST(test_field_invert_residual_within_a_tenth_of_a_mm) {
   supine_field_free(&inverse);
 }
 
-/* Positions of landmarks in the left lung, mm. */
 enum { LANDMARKS = 5 };
+/* Positions in the left lung, mm. */
 static const double landmarks[LANDMARKS][3] = {{71.0, 3.0, -40.0},
                                                {90.0, 20.0, 10.0},
                                                {60.0, -30.0, -90.0},
@@ -313,8 +313,8 @@ static void moved_landmarks(double out[LANDMARKS][3]) {
   supine_inside_shells_free(&shells);
 }
 
-/* Assert that each landmark in a warped image is within 2 mm (a voxel) of where an embedded point
- * at the landmark moves. */
+/* Assert that each landmark in a warped image is within 2 mm (a voxel) of the same landmark
+ * embedded in the basis as a point and moved with it. */
 static void check_landmarks(const supine_image *image, bool labels) {
   double moved[LANDMARKS][3];
   double largest = 0.0;

@@ -184,7 +184,7 @@ static void check_stated_error(const supine_lungs *of, const char *what) {
     supine_pose pose;
     assert_int_equal(supine_basis_pose(basis, &posture, &pose, NULL), SUPINE_OK);
     supine_deform(basis, &pose, xyz);
-    posture.volume.kind = SUPINE_VOLUME_REST; /* the other simulator gave no volume at rest */
+    posture.volume.kind = SUPINE_VOLUME_REST; /* must be refused: the volume at rest is unknown */
     assert_int_equal(supine_basis_pose(basis, &posture, &pose, NULL), SUPINE_ERROR_ARGUMENT);
     posture.volume.kind = SUPINE_VOLUME_FULL;
     assert_int_equal(supine_basis_pose(basis, &posture, &pose, NULL), SUPINE_ERROR_ARGUMENT);

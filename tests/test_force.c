@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Test the applied force (18) of [Santhanam2008], heights, and directions (15)-(17). */
+/* Test forces (18), vertex heights and displacement directions (15)-(17) of [Santhanam2008]. */
 #include <float.h>
 
 #include "precompute/physics/model.h"
@@ -164,7 +164,7 @@ TEST(test_directions_box_model_literal_values) {
   assert_close(lungs.midline, 10.0, 0.0);
   assert_int_equal(lungs.side[0], 1);
   assert_int_equal(supine_physics_directions(&lungs, &law, d, NULL), SUPINE_OK);
-  /* vertex 1 has X = Y = Z = 1 (outer side, front, base), so it moves by (c1, -c3, -c5) */
+  /* vertex 1 is outermost, frontmost and at the base, where (15)-(17) are largest */
   assert_close(d[3], 2.0, 1e-14);
   assert_close(d[4], -1.5, 1e-14);
   assert_close(d[5], -16.0, 1e-14);

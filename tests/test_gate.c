@@ -118,7 +118,7 @@ TEST(test_gate_clean_lungs_no_message) {
   supine_mesh_free((supine_mesh *)&before);
 }
 
-/* A mesh whose axes are any of the 47 other than LPS is read as if they were LPS. The warning
+/* A mesh in any of the 47 axis conventions other than LPS is read as if it were in LPS. The warning
  * proposes the true axes. */
 TEST(test_gate_any_wrong_axes_proposes_correct_ones) {
   for (int code = 2; code < SUPINE_AXES_COUNT; ++code) {

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Run supine.glsl without a window, in GLSL ES 3.00 and GLSL 3.30 core. Assert that positions and
- * normals, read back by transform feedback, equal those of the C library except for rounding. The
- * displacements of the lungs have different factors in one draw. The tests are skipped if EGL has
- * no context without a surface. */
+ * normals, read back by transform feedback, equal those of the C library except for rounding. One
+ * draw call contains both lungs, each with its own factors on the displacement. The tests are
+ * skipped if EGL has no context without a surface. */
 #include <EGL/egl.h>
 #include <EGL/eglext.h>
 #include <GLES3/gl3.h>

@@ -138,7 +138,7 @@ TEST(test_surface_find_with_hint_same_answer) {
   supine_inside_place near = {0};
   for (int i = 0; i < 500; ++i) {
     double p[3];
-    if (i % 50 == 0) { /* a random point, far from the last one, which is the hint */
+    if (i % 50 == 0) { /* a random point; the search starts from the last point, far away */
       point_at_share(0, &seed, 1.4 * helper_random(&seed), p);
     } else {
       for (int k = 0; k < 3; ++k) {
@@ -294,8 +294,8 @@ TEST(test_embed_affine_motion_exact_quadratic_approximate) {
   supine_inside_content_free(&content);
 }
 
-/* Embedded points on the surface follow it to 0.01 mm when all modes act together, even if few
- * vertices are the centres of the interpolation. */
+/* Embedded points on the surface follow it to 0.01 mm when all modes act together, even if their
+ * motion is interpolated from few vertices. */
 TEST(test_embed_surface_points_move_with_surface) {
   enum { COUNT = 600 };
   supine_inside_content content = made_points(COUNT, 1.0, 1.0, 33);
@@ -335,9 +335,9 @@ TEST(test_embed_surface_points_move_with_surface) {
   supine_inside_content_free(&content);
 }
 
-/* If the scan is below full inflation, points are given at their positions in the scan. In the
- * state of the scan, embedded points have these positions. Points on the surface of the scan move
- * with the surface. */
+/* If the scan is below full inflation, points are given at their positions in the scan. Embedded
+ * points deformed to the state of the scan return to these positions. Points on the surface of the
+ * scan move with the surface. */
 TEST(test_embed_scan_below_full_measured_from_scan) {
   enum { COUNT = 400 };
   char path[80];
@@ -381,7 +381,7 @@ TEST(test_embed_scan_below_full_measured_from_scan) {
       assert_close(content.points[3 * i + k], there, 1e-4);
     }
   }
-  assert_true(farthest > 10.0); /* mm between the surfaces in the file and in the scan */
+  assert_true(farthest > 10.0); /* mm: the surface in the file differs from the scanned one */
   (void)embed(&content, false, 0);
   supine_basis *inside = helper_open(inside_path);
   const uint32_t *part = supine_basis_tensor(inside, "part")->data;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Test that the force applied to each vertex can be computed from the force that ends up on it. */
+/* Test that the applied force on each vertex can be computed from its force in equilibrium. */
 #include "precompute/physics/model.h"
 #include "test.h"
 

@@ -16,8 +16,8 @@ static double normal(uint64_t *state) {
   return sum;
 }
 
-/* Choose random points in two lungs. The displacement law, which kriging corrects, displaces them
- * by up to 40 mm. */
+/* Choose random points in two lungs, displaced by up to 40 mm. Kriging corrects these
+ * displacements. */
 static void place(uint64_t *seed, size_t count, supine_kriging_point *points) {
   for (size_t j = 0; j < count; ++j) {
     supine_kriging_point *p = &points[j];
@@ -171,7 +171,7 @@ TEST(test_kriging_one_or_repeated_points_positive_definite) {
   double *space = fixture_allocate(supine_kriging_space(12), sizeof *space);
   place(&seed, 12, points);
   for (size_t j = 0; j < 12; ++j) {
-    points[j] = points[0]; /* the same position for all points */
+    points[j] = points[0];
     points[j].residual[0] = 5 * fixture_random(&seed);
   }
   for (size_t count = 1; count <= 12; ++count) {
@@ -186,7 +186,7 @@ TEST(test_kriging_one_or_repeated_points_positive_definite) {
     double scratch[12];
     predict(&fit, &points[0], shift, &variance);
     assert_true(isfinite((double)shift[0]) && variance > 0);
-    assert_true(variance <= 3.01F); /* an observation's variance, 1 mm^2 per axis */
+    assert_true(variance <= 3.01F); /* sum over 3 axes of an observation's variance, 1 mm^2 */
     assert_int_equal(supine_kriging_leave_out(&fit, 0, left, scratch) > 0, count > 1);
   }
   points[1].noise = points[0].noise = 0;

@@ -142,8 +142,8 @@ TEST(test_labels_phantom_volume_and_surface_recovered) {
   supine_mesh_free(&phantom);
 }
 
-/* Return a copy of the map `from` with other labels. From the feet up, the left lung, 2 in `from`,
- * gets left[0] and left[1]. The right lung, 1 in `from`, gets right[0], right[1] and right[2]. */
+/* Return a copy of a label map. Relabel the left lung, 2, as left[0] in the lower half and left[1]
+ * in the upper, and the right lung, 1, as right[0] to right[2] in thirds from bottom to top. */
 static supine_image relabelled(const supine_image *from, const uint8_t left[2],
                                const uint8_t right[3]) {
   supine_image image = *from;
@@ -162,7 +162,7 @@ static supine_image relabelled(const supine_image *from, const uint8_t left[2],
 TEST(test_labels_any_convention_same_lungs) {
   static const struct {
     uint8_t left[2], right[3];
-    const char *options[3]; /* values of --labels to try; a NULL in front omits it */
+    const char *options[3]; /* values of --labels to try; a first NULL stands for no --labels */
     const char *said;
   } maps[] = {
       {{2, 2}, {1, 1, 1}, {NULL, "lungmask", "left=2,right=1"}, "2 left; 1 right"},
@@ -478,7 +478,7 @@ TEST(test_labels_noise_closed_manifold) {
       if (status == SUPINE_OK) {
         check_closed(&out.surface[0]);
         check_closed(&out.surface[1]);
-      } else { /* refused, because averaging has removed sparse noise */
+      } else { /* no surface: averaging has removed the sparse voxels */
         assert_int_equal(status, SUPINE_ERROR_MESH);
         assert_true(density < 0.5);
       }

@@ -23,8 +23,8 @@ static const double p999_most = 1.0;
 static const double printed = 0.05;
 /* Tolerance of the mean angle over all random states, in standard errors. */
 static const double sigmas = 4.0;
-/* Largest ratio of the measured to the stated 99.9th percentile of the angle, and of the stated to
- * the measured. It is large because few states determine the percentile. */
+/* Largest allowed ratio, either way, of the measured to the stated 99.9th percentile of the angle.
+ * It is large because few of the measured angles determine the percentile. */
 static const double p999_ratio_most = 1.4;
 
 /* Make a basis of lungs scanned at full inflation. If `soften` > 0, lower tissue is softer. */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Test expected errors, and the location of lungs from observed points. */
+/* Test the expected errors of positions, and the location of lungs from observed points. */
 #include "test.h"
 
 #include <supine/locate.h>

@@ -124,7 +124,7 @@ static void turn_inwards(supine_mesh *mesh, size_t first) {
 }
 
 TEST(test_lungs_inward_triangles_reversed_and_reported) {
-  /* Bit 0 of `which` reverses the left lung, bit 1 the right. */
+  /* Bit 0 of `which` reverses the triangles of the left lung, bit 1 those of the right. */
   for (int which = 0; which < 4; ++which) {
     supine_mesh lumps[2] = {helper_lump(5, 90.0, 3), helper_lump(6, -80.0, 4)};
     const double volume = supine_mesh_volume(&lumps[0]) + supine_mesh_volume(&lumps[1]);
@@ -258,7 +258,8 @@ TEST(test_phantom_create_same_shape_as_first_version) {
         sum += sin((double)(v + 1) * (double)(a + 1)) * mesh.vertices[3 * v + a];
       }
     }
-    /* Each coefficient of the shape changes `sum` by at least 0.01 mm, more than this tolerance. */
+    /* Every coefficient of the shape affects `sum` by at least 0.01 mm, 100 times this
+     * tolerance. */
     assert_true(fabs(sum - made[lung]) < 1e-4);
   }
   supine_mesh_free(&mesh);
@@ -303,7 +304,7 @@ TEST(test_volume_forms_any_scale_equal_measured_volume) {
   for (size_t i = 0; i < n * COLUMNS; ++i) {
     columns[i] = helper_random(&seed);
   }
-  /* `vectors` are the same displacements, `columns` along the direction d, as xyz vectors. */
+  /* `columns` holds lengths along d; `vectors` holds the same displacements as xyz vectors. */
   for (size_t i = 0; i < 3 * n * COLUMNS; ++i) {
     vectors[i] = columns[i / (3 * COLUMNS) * COLUMNS + i % COLUMNS] * d[i / COLUMNS];
   }

@@ -5,7 +5,7 @@
 
 #include <gsl/gsl_errno.h>
 
-/* The address of this function is NULL if the program is linked without GSL. */
+/* In a program that is linked without GSL, the address of gsl_set_error_handler_off is NULL. */
 #pragma weak gsl_set_error_handler_off
 
 enum { SKIPPED = 77 }; /* exit code of a skipped program, as SKIP_RETURN_CODE in CMakeLists.txt */

@@ -104,7 +104,7 @@ TEST(test_save_real_lung_as_stl_loads_same_surface) {
   assert_int_equal(unlink(path), 0);
   assert_int_equal(again.vertex_count, mesh.vertex_count);
   assert_int_equal(again.triangle_count, mesh.triangle_count);
-  /* The coordinates were float32 before, so they are exact. */
+  /* The coordinates in the first file were float32, so a float32 file holds them exactly. */
   for (size_t c = 0; c < 3 * mesh.triangle_count; ++c) {
     assert_memory_equal(again.vertices + 3 * (size_t)again.triangles[c],
                         mesh.vertices + 3 * (size_t)mesh.triangles[c], 3 * sizeof(double));

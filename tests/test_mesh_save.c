@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Test that saved files are equal when read again, that they hold displacements and expected
+/* Test that a saved file gives the same mesh when loaded, that it holds displacements and expected
  * errors, and that no incomplete file is left. */
 #include <fcntl.h>
 #include <float.h>
@@ -27,8 +27,8 @@ static void save(const char *path, const supine_mesh *mesh,
   }
 }
 
-/* Return the vertex nearest to a position, and set `distance` to their largest difference in x, y
- * or z. Loaded vertices have another order, so tests compare positions. */
+/* Return the vertex nearest to `position`, and set `distance` to the largest difference in x, y or
+ * z between both. Loaded vertices have another order, so tests compare positions. */
 static size_t nearest(const supine_mesh *mesh, const double position[3], double *distance) {
   size_t found = 0;
   *distance = INFINITY;
@@ -71,7 +71,7 @@ TEST(test_save_load_round_trip_each_format_and_axes) {
       if (supine_mesh_load(path, NULL, &again, &report, &error) != SUPINE_OK) {
         fail_msg("%s", error.message);
       }
-      /* Positions are float32. assimp may round text again. VTP has multiples of 1/256 mm. */
+      /* PLY: float32; OBJ: rounded text; STL: float32; VTP: multiples of 1/256 mm */
       static const double tolerance[] = {64.0 * FLT_EPSILON, 512.0 * FLT_EPSILON,
                                          64.0 * FLT_EPSILON, 0.5 / 256.0};
       expect_same(&again, &mesh, tolerance[k]);

@@ -166,7 +166,7 @@ TEST(test_topology_flipped_triangle_inconsistent) {
 }
 
 TEST(test_topology_hub_of_many_edges_sorted) {
-  /* A fan of triangles around vertex 0. Successive vertices of its rim are 331 apart in number. */
+  /* A fan of triangles around vertex 0. Indices of its rim vertices advance by 331, modulo RIM. */
   enum { RIM = 997 };
   static double vertices[3 * (RIM + 1)];
   static uint32_t triangles[3 * RIM];

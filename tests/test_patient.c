@@ -113,7 +113,7 @@ TEST(test_covariances_any_distance_equal_those_of_kriging) {
 TEST(test_fit_public_landmarks_err_less_than_quadratic_law) {
   static const struct {
     const char *name;
-    double quadratic_rms[2]; /* mm: inhaled to exhaled image, and the reverse */
+    double quadratic_rms[2]; /* RMS error, mm, from inhaled to exhaled image, and the reverse */
   } cases[] = {{"054", {3.01, 3.30}},
                {"055", {8.07, 9.83}},
                {"056", {3.83, 4.44}},
@@ -200,7 +200,7 @@ TEST(test_find_side_given_overrides_midline) {
   assert_true(place.side == 1.0 && place.box[0] < 0.0);
   double u[3];
   supine_patient_displacement(&patient, &place, 1.0, u);
-  /* Where the box coordinate X is at most 0, the displacement law has no x component. */
+  /* At or beyond the midline (box[0] <= 0), the displacement formula gives no x component. */
   assert_true(u[0] == 0.0);
   supine_patient_pairs_free(&pairs);
 }
@@ -335,7 +335,7 @@ TEST(test_pairs_load_image_columns_start_at_second_image) {
   supine_patient_pairs pairs = {0};
   supine_error error;
   for (int reverse = 0; reverse < 2; ++reverse) {
-    /* Columns im1 are the inhaled image, columns im2 the image at rest, from which pairs start. */
+    /* im1: landmarks in the inhaled image; im2: the same at rest. Pairs go from im2 to im1. */
     for (int file = 0; file < 2; ++file) {
       assert_int_equal(load_text(file == 0 ? plain : images, reverse == 1, &pairs, &error),
                        SUPINE_OK);
@@ -472,8 +472,8 @@ TEST(test_force_in_fitted_posture_linear_in_box) {
       assert_true(fabs(force - expected) < 1e-14);
     }
   }
-  /* Under the law `deep`, the force in the supine posture is 0.9 + 0.4 times the height - 0.2 Y,
-   * where Y is the y coordinate in the lungs' bounding box. */
+  /* The force of the default law (`deep`) in the supine posture is 0.9 + 0.4 h - 0.2 Y. h is the
+   * height, and Y the y coordinate, both 0 to 1 in the lungs' bounding box. */
   const supine_patient_power shape = supine_patient_deep(postures[0], (const double[3]){0});
   const supine_force_law deep = supine_patient_force(&shape, 0.4, postures[0]);
   assert_true(fabs(deep.base - 0.9) < 1e-14 && fabs(deep.box[1] + 0.2) < 1e-14);

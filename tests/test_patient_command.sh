@@ -35,7 +35,8 @@ pairs() {
     vertices "$2.obj" | paste -d, from.csv - | awk 'NR % 25 == 1'
   } >"$3.csv"
 }
-# surfaces FILE: print the RMS distance, mm, of the predicted from the scanned surface in the first state of `validate`.
+# surfaces FILE: print the RMS distance, mm, between the predicted and the scanned surface of the first state in FILE,
+# which `supine validate --json` wrote.
 surfaces() {
   number rms_mm "$1"
 }
@@ -59,9 +60,8 @@ pairs s_supine_rest s_prone_rest prone
 pairs s_supine_full s_prone_rest down
 mv prone.csv prone.CSV
 
-# The fit finds a gain (the coefficient of height in the force) of 0.70 for either order of the two states. The basis of
-# the scan at rest predicts the true prone surface.
-# turns NAME ARGUMENTS...: fit with these arguments, and check the gain and the predicted prone surface.
+# turns NAME ARGUMENTS...: fit with these arguments. Check that the fitted gain (the coefficient of height in the force)
+# is 0.70 and that the basis of the scan at rest predicts the true prone surface.
 turns() {
   name=$1
   shift
@@ -88,10 +88,8 @@ grep -q 'state *supine:full' fit.txt || fail "the states are not stated: $(cat f
 "$supine" info points.safetensors | grep -q 'patient.* expected error [0-9.]* mm RMS' ||
   fail "info does not state the fit's error"
 
-# With default options and two meshes, the basis of either scan predicts the other scan within 0.2 mm RMS. Within
-# 0.6 mm, it predicts a state four times as far above rest as the fuller scan.
-# chain SCAN MESH [VOLUME ALLOWED]...: make a basis of the scan. Check that it predicts the surfaces of MESH at two
-# volumes within the ALLOWED distances, mm RMS.
+# chain SCAN MESH [VOLUME ALLOWED]...: make a basis of SCAN and the patient model in surface.json. Check that it predicts
+# the surface of MESH at each VOLUME (two of them) within the ALLOWED distance, mm RMS.
 chain() {
   scan=$1
   mesh=$2
@@ -100,7 +98,7 @@ chain() {
     fail "precompute $scan: $(cat out)"
   states=$(printf -- "--state supine:%s:${mesh}_supine_%s.ply " "$1" "$1" "$3" "$3")
   "$supine" validate surface.safetensors $states --json >valid.json || fail "validate $scan"
-  for state in 1 5; do # which rms_mm: each state has four, the first is the prediction's
+  for state in 1 5; do # index of rms_mm: valid.json lists four for each state, that of the prediction first
     echo "$scan at $1: $(number rms_mm valid.json $state) mm"
     near "$(number rms_mm valid.json $state)" 0 "$2" ||
       fail "$scan at $1: $(number rms_mm valid.json $state) mm"
@@ -169,8 +167,8 @@ near "$(number left_rms stiff.json)" 0 0.035 || fail "the force: $(cat fit.txt)"
 near "$(number explained_percent valid.json)" 100 2 || # not exactly 100, as regions do not have the lesion's shape
   fail "stiff: $(number explained_percent valid.json) % explained"
 
-# Validate with several states, relative to a state other than the scan. The states were computed with the same basis,
-# so it predicts them, and the factor on the displacement is nearly linear in volume. Write a picture of the errors.
+# Validate a basis with states computed from it, relative to a state other than the scan. The prediction is exact, and
+# the displacement is scaled by a factor that is nearly linear in volume. Write a picture of the errors.
 "$supine" precompute rest.ply --band 3 -o full.safetensors >/dev/null || fail "precompute"
 "$supine" deform full.safetensors --posture supine --volume rest -o scan.ply >/dev/null ||
   fail "deform to rest"
@@ -196,7 +194,7 @@ fi
 "$supine" validate scanned.safetensors --state supine:rest+400.ply --state supine:rest+900.ply \
   --state supine:rest+1500:rest+1500.ply --state prone:rest:prone.ply --from supine:rest --json >valid.json ||
   fail "validate several"
-for state in 1 5 9 13; do # which rms_mm: each state has four, for the prediction, without motion, ...
+for state in 1 5 9 13; do # index of rms_mm: four for each state; first the prediction's, then that without motion
   near "$(number rms_mm valid.json $state)" 0 0.01 || fail "state $state is not predicted"
   near "$(number rms_mm valid.json $((state + 1)))" 0 0.5 && fail "state $state did not move"
 done
@@ -233,7 +231,7 @@ near "$(surfaces valid.json)" 0 1 || fail "shift: $(surfaces valid.json) mm"
 "$supine" validate points.safetensors --from supine:rest --state supine:full:shifted.obj --json \
   >valid.json || fail "validate without a shift"
 near "$(surfaces valid.json)" 0 3 && fail "a shift was removed without --translation"
-# A third scan in the same posture, taken halfway through a breath, has about half the factor on the displacement.
+# A third scan, about halfway between the two fitted ones, is fitted by about half of their displacement.
 "$supine" deform s.safetensors --posture supine --volume rest+1500 -o half.ply >/dev/null ||
   fail deform
 "$supine" fit s_supine_rest.ply s_supine_full.ply --state supine:half.ply --other supine:full \

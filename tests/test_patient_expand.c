@@ -116,7 +116,7 @@ static void expect_lesion(const supine_lungs *rest, const supine_lungs *other,
   assert_true(fabs(times / lesion->factor - 1.0) < 0.2);
   assert_true(found.expand.kept);
   assert_true(found.expand.held_out[1] < 0.5 * found.expand.held_out[0]);
-  /* The report gives the held-out error of the final fit, which has the stiffness of regions. */
+  /* The reported held-out error is that of the final fit, in which regions differ in stiffness. */
   assert_true(found.report.held_out[SUPINE_PATIENT_SCORE_CORRECTED] == found.expand.held_out[1]);
 }
 
@@ -132,7 +132,7 @@ TEST(test_fit_real_lung_with_lesion_recovers_stiffness) {
   supine_lungs_free(&other);
 }
 
-/* Make synthetic lungs. The number of vertices changes their shape by at most 0.2 mm. */
+/* Make synthetic lungs. Lungs with different numbers of vertices differ by at most 0.2 mm. */
 static void make_lungs(size_t vertices, supine_lungs *lungs) {
   supine_mesh mesh = {0};
   supine_error error;

@@ -81,7 +81,7 @@ refused 2 'No such file' --landmarks absent.csv
 refused 1 'nothing to fit to' --name nobody
 refused 1 'give --translation or --rigid, not both' --landmarks good.csv --translation --rigid
 
-# Surfaces: synthetic lungs, one in each file, and the same lungs after a breath.
+# Surfaces instead of points: pair.obj holds two synthetic lungs, and `half` writes each into a file of its own.
 "$supine" phantom -o pair.obj --vertices 700 >/dev/null || fail "phantom"
 # half NAME 0|1: write NAME.obj with the first or the second lung of the pair.
 half() {

@@ -88,8 +88,8 @@ TEST(test_fit_surface_known_law_recovered_on_another_mesh) {
   }
   printf("\n");
   assert_true(sqrt(square) <= 0.15);
-  /* The force has the terms 0.4 (1 - Y) and -0.2 Y, so its slope along Y is -0.6. Y is the y
-   * coordinate in the lungs' bounding box, and 1 - Y is the height if supine. */
+  /* Y is the y coordinate in the lungs' bounding box, 0 to 1. The supine height is 1 - Y, and the
+   * force has the terms 0.4 (1 - Y) - 0.2 Y, so its slope along Y is -0.6. */
   const supine_patient_applied *applied = &fit.applied;
   printf(
       "force: correlation with height %.3f, c7 to c9 %.3f %.3f %.3f, spread %.3f, residual %.3f, "
@@ -112,9 +112,9 @@ TEST(test_fit_surface_known_law_recovered_on_another_mesh) {
   supine_lungs_free(&other);
 }
 
-/* Displace a surface by a law other than the default, `deep`. Fit `deep` with kriging to it, on a
- * coarser mesh. The fit reproduces the displaced surface and its volume, because the displacement
- * along the normal determines the volume change. */
+/* Displace a surface by a law other than `deep`, the default. Fit `deep` with kriging to the
+ * displaced surface, on a coarser mesh. The fit reproduces the surface and its volume, because the
+ * displacement along the normal determines the volume change. */
 TEST(test_fit_surface_other_law_reaches_state_and_volume) {
   supine_mesh coarse = helper_lump(9, 70.3, 5);
   supine_mesh fine = helper_lump(15, 70.3, 5);

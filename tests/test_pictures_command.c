@@ -7,7 +7,7 @@
 #include <cairo.h>
 #include <webp/demux.h>
 
-/* Basis file of an open surface, made by an earlier version of the program. */
+/* The quoted name of a basis file of an open surface, which an earlier version made. */
 #define OPEN "\"" SUPINE_GOLDEN "/open_surface.safetensors\""
 
 static size_t count_words(const char *text, const char *word) {
@@ -287,7 +287,7 @@ static void find_arrow(const char *path, double place[2]) {
   double count = 0;
   int low[2] = {width, width};
   int high[2] = {0, 0};
-  /* Rows and columns of the ball, which is left of the title. */
+  /* Search for the arrow only in the ball, left of the title of the picture. */
   for (int y = width / 24; y < width / 5; ++y) {
     const unsigned char *row = cairo_image_surface_get_data(image) + (ptrdiff_t)y * stride;
     for (int x = width / 24; x < width / 5; ++x) {

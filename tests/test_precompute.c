@@ -184,11 +184,11 @@ static sample_mean mean_of(size_t count, const double *values) {
 
 enum { CHECKED = 300 };
 
-/* Compare a basis with supine_physics_solve in `count` directions of gravity. For each direction,
- * set three means over the vertices. The scale is a factor on the displacement.
- * - error2: squared distance of both results at scale 1
- * - field2: squared displacement at scale 1
- * - error_mm2: squared distance at the scales that change the volume by `volume` mL, mm^2 */
+/* Compare the displacements of a basis with those of supine_physics_solve, in `count` directions of
+ * gravity. For each direction, set three means over the vertices, mm^2:
+ * - error2: squared difference of the displacements
+ * - field2: squared displacement
+ * - error_mm2: squared difference after scaling both displacements to `volume`, mL */
 static void true_errors(const supine_lungs *lungs, const supine_model *model,
                         const supine_basis *basis, size_t count, const double *directions,
                         double volume, double *error2, double *field2, double *error_mm2) {
@@ -275,8 +275,9 @@ static void check_error_table(const supine_lungs *lungs, const supine_model *mod
   }
 }
 
-/* Check that the error stated in the file equals the error measured in the held-out directions of
- * gravity. With `soften`, superposing a few solves adds an error, so the tolerance is larger. */
+/* Check that the basis file states the error measured in held-out directions of gravity. If
+ * `soften` > 0 (lower tissue is softer), superposed solves add an error, so the tolerance is
+ * larger. */
 static void check_stated_error(const supine_lungs *lungs, size_t band, size_t modes,
                                double soften) {
   enum { HELD_OUT = 40 };
@@ -309,8 +310,8 @@ static void check_stated_error(const supine_lungs *lungs, size_t band, size_t mo
   supine_basis_close(basis);
 }
 
-/* Check that the error stated in the file equals the error measured in random directions of
- * gravity, within four standard errors of this sample. */
+/* Check that the displacement error stated in the basis file equals that measured in random
+ * directions of gravity, within four standard errors of the measurement. */
 static void check_error_elsewhere(const supine_lungs *lungs, size_t band, size_t modes,
                                   double soften, const char *what) {
   const supine_precompute_report report = make_basis(lungs, band, modes, soften, 0);
@@ -355,8 +356,8 @@ TEST(test_precompute_random_directions_error_as_stated) {
   supine_lungs_free(&lungs);
 }
 
-/* Check that the relative error of a basis of best modes is at most `most`. Check that the error of
- * the 16 harmonics of [Santhanam2008] is at least `least_ratio` times as large. */
+/* Check that the relative error with the leading modes is at most `most`. With 16 spherical
+ * harmonics, as in [Santhanam2008], it must be at least `least_ratio` times as large. */
 static void check_best_modes(const char *name, supine_axes axes, double soften, double most,
                              double least_ratio) {
   supine_lungs lungs = {0};
@@ -444,7 +445,7 @@ static void check_volumes(const supine_lungs *lungs, size_t band, size_t modes, 
 TEST(test_precompute_volumes_exact_in_every_direction) {
   supine_lungs lungs = phantom(3000);
   check_volumes(&lungs, 3, 0, 0.0, -300.0);
-  /* Head down, the surface of the softened phantom folds at -299 mL, so test down to -200 mL. */
+  /* Head down, the phantom with softer lower tissue folds at -299 mL: test to -200 mL only. */
   check_volumes(&lungs, 7, 10, 1.0, -200.0);
   supine_lungs_free(&lungs);
 }
@@ -533,8 +534,8 @@ TEST(test_turned_over_one_posture_emptied_finds_more_reversed) {
     static const size_t term[3] = {3, 1, 2}; /* index of the band-1 harmonic along x, y, z */
     const double part = -0.76 * full;
     const double sign = g < 3 ? 1.0 : -1.0;
-    /* Expand the volume at rest in harmonics: 0 mL at one end of the axis, `part` mL at the other.
-     * The divisors are the values of the harmonics of bands 0 and 1 on the axis. */
+    /* Expand the volume at rest in harmonics: `part` mL in one posture, 0 mL in the opposite one.
+     * The divisors are the values of the harmonics of degrees 0 and 1 along that axis. */
     double resting[9] = {0.5 * part / 0.28209479177387814};
     resting[term[g % 3]] = sign * 0.5 * part / 0.48860251190291992;
     const double even[9] = {resting[0]};
@@ -545,7 +546,7 @@ TEST(test_turned_over_one_posture_emptied_finds_more_reversed) {
         SUPINE_OK);
     assert_int_equal(supine_accuracy_turned_over(&lungs, directions, &field, &forms, even, &least),
                      SUPINE_OK);
-    assert_true(share > least + 0.02); /* the shares of reversed triangles are 0.08 to 0.16 */
+    assert_true(share > least + 0.02); /* 0.12 to 0.16 against 0.08 of the triangles */
   }
   supine_physics_volume_forms_free(&forms);
   supine_projection_compression_free(&field);
@@ -600,7 +601,7 @@ TEST(test_precompute_bad_options_refused) {
   options.modes = 65;
   assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error), SUPINE_ERROR_ARGUMENT);
   options.modes = 16;
-  /* `soften` is refused if the reach of the model is 0. */
+  /* Softening of lower tissue (`soften`) requires a smoothing distance of forces (`reach`) > 0. */
   options.model.force.soften = 1.0;
   assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error), SUPINE_ERROR_ARGUMENT);
   supine_lungs_free(&lungs);

@@ -192,7 +192,7 @@ TEST(test_precompute_scan_state_and_frame_reproduced) {
   assert_true(take_file("breath.vtp", text, sizeof text) > 0);
   assert_says(text, "RAS");
   EXPECT(0, "frames", "breathe ras.safetensors --posture left --fps 0.2 -o breath.vtp");
-  /* Without --as-scanned, the file has the same arrays. */
+  /* Without --as-scanned, breath.vtp has displacement arrays, too. */
   assert_true(take_file("breath.vtp", text, sizeof text) > 0);
   assert_says(text, "Name=\"displacement_magnitude\"");
   EXPECT(1, "is for VTP files",

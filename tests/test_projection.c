@@ -44,8 +44,8 @@ static double *coefficients_of(const supine_projection *projection) {
   return c;
 }
 
-/* A projection is a sum of `rank` fields, whose weights depend on gravity. Return these weights
- * [count, rank] for `count` directions of gravity (malloc). */
+/* A projection writes the displacement as a sum of `rank` fixed fields, with weights that depend on
+ * gravity. Return these weights [count, rank] for `count` directions of gravity (malloc). */
 static double *weights_at(const supine_lungs *lungs, const supine_model *model,
                           const supine_span *span, size_t count, const double *g) {
   double *range = malloc(2 * count * sizeof *range);
@@ -60,9 +60,9 @@ static double *weights_at(const supine_lungs *lungs, const supine_model *model,
   return weights;
 }
 
-/* Expand the weights of a projection's fields in harmonics on a much finer grid of directions. The
- * coefficients change little, although the weights have kinks where the lowest or the highest
- * vertex changes. */
+/* A projection expands the weights of its fields in harmonics of the direction of gravity. On a
+ * much finer grid of directions, the coefficients are nearly equal, although the weights have kinks
+ * where another vertex becomes the lowest or the highest. */
 TEST(test_projection_finer_grid_same_functions) {
   enum { LATITUDES = 512, LONGITUDES = 513 };
   static const size_t bands[] = {1, 15};
@@ -189,8 +189,8 @@ TEST(test_projection_impossible_softening_refused) {
   supine_mesh_free(&mesh);
 }
 
-/* Compare the singular values, error and functions of the modes with a dense decomposition of the
- * projection's coefficients, whose row i is multiplied by the square root of weight[i]. */
+/* Compare the modes' singular values, error and functions of gravity with a dense SVD. Decompose
+ * the matrix of the projection's coefficients, with row i multiplied by sqrt(weight[i]). */
 static void check_modes(const supine_projection *projection, const double *weight, size_t most) {
   const size_t n = projection->vertex_count;
   const size_t terms = supine_sh_count(projection->band);
@@ -223,7 +223,7 @@ static void check_modes(const supine_projection *projection, const double *weigh
       tail += expected * expected;
     }
   }
-  double error = 0.0; /* squared error of the modes, the best approximation of this rank */
+  double error = 0.0; /* squared error, the least possible with so many modes */
   for (size_t i = 0; i < n; ++i) {
     for (size_t t = 0; t < terms; ++t) {
       double approximation = 0.0;

@@ -15,15 +15,15 @@ enum { SAMPLES = 33, HELD_OUT = 211 };
  * - d = 0: Salazar and Knowles' exponential b (1 - exp(-c P)) */
 typedef struct truth {
   const char *name;
-  double low, high;  /* range of pressures, cmH2O */
-  double a, b, c, d; /* a, b: mL; c, d: cmH2O, but c: 1/cmH2O if d = 0 */
+  double low, high; /* range of pressures, cmH2O */
+  double a, b;      /* mL */
+  double c, d;      /* cmH2O; if d = 0, c is in 1/cmH2O */
 } truth;
 
-/* Salazar and Knowles: c = ln 2 / h. The pressure h at half inflation was 7.58 (SD 2.53) cmH2O in
- * 20 normal subjects [Salazar1964]. The first rows have the mean of h, and h one or two deviations
- * away. Then follow two and three times the normal c (lost recoil), and half of it (fibrosis).
- * Venegas: b d is between 10^3.3 and 10^5 mL cmH2O, about the range of published curves (Narusawa,
- * J. Appl. Physiol. 91, 2001). ARDS has a small b and d and a large c. */
+/* Salazar-Knowles: c = ln 2 / h, with the pressure h at half inflation. The normal h is that of 20
+ * subjects, 7.58 (SD 2.53) cmH2O [Salazar1964]. Emphysema (lost recoil) doubles or triples the
+ * normal c, and fibrosis halves it. Venegas: b d is between 10^3.3 and 10^5 mL cmH2O, about the
+ * range of published curves (Narusawa, J. Appl. Physiol. 91, 2001). */
 static const truth truths[] = {
     {"Salazar-Knowles, normal mean", 0.0, 30.0, 0.0, 6413.0, 0.0914, 0.0},
     {"Salazar-Knowles, normal +1 SD", 0.0, 30.0, 0.0, 6413.0, 0.0686, 0.0},
@@ -107,8 +107,8 @@ TEST(test_fit_published_curves_error_below_one_percent) {
     assert_close(report.rms, 0.01 * report.rms_percent * truth_range(&truths[i]),
                  1e-9 * report.rms + 1e-12);
     assert_true(curve.pressure[0] == truths[i].low && curve.pressure[1] == truths[i].high);
-    /* A d of 0 marks an exponential 1 - exp(-c P). The slope of its log compliance is constant:
-     * only the first control parameter, -c (high - low) / 2, is not 0. */
+    /* If d = 0, the log compliance of the curve b (1 - exp(-c P)) has the constant slope -c. Only
+     * the first control parameter, the mean of this slope, is then not 0. */
     if (truths[i].d == 0.0) {
       assert_close(curve.control[0], -0.5 * truths[i].c * truths[i].high, 1e-6);
       for (size_t c = 1; c < SUPINE_PV_CONTROLS; ++c) {

@@ -10,11 +10,11 @@
 
 #include "lungs_helpers.h"
 
-/* Model of [Santhanam2008] with the reach, the distance over which forces spread, of a test. */
+/* Model of [Santhanam2008]. Each test sets its reach, the distance over which forces spread. */
 static supine_model model;
 
-/* Return, for each vertex, the part of the force that stays there, from the force and the stiffness
- * of each vertex (malloc). */
+/* Return the force that remains at each vertex in equilibrium, given the applied forces and the
+ * stiffness of each vertex (malloc). */
 static double *solve(const supine_lungs *lungs, const double *stiffness, const double *force) {
   const size_t n = lungs->mesh.vertex_count;
   supine_equilibrium *equilibrium = NULL;
@@ -55,8 +55,8 @@ static double triangle_area(const supine_mesh *mesh, size_t t) {
   return 3.0 * area[one.triangles[0]];
 }
 
-/* The solution equals that of a dense matrix for all masses (vertices) and springs (edges), with
- * the link weights of equilibrium.h. */
+/* The solution equals that of a dense matrix of the flow of force between nodes: masses (vertices)
+ * and springs (edges). The weights of the links between nodes are those of equilibrium.h. */
 TEST(test_reach_solution_equals_dense_solution) {
   const double reach = 30.0;
   supine_lungs lungs = lungs_of(helper_lump(4, 60.0, 77), reach);
@@ -79,7 +79,7 @@ TEST(test_reach_solution_equals_dense_solution) {
   double *s = calloc(nodes, sizeof *s);
   double *a = calloc(n, sizeof *a);
   for (size_t i = 0; i < n; ++i) {
-    a[i] = 1.0 / (e[i] / exp(mean_log)); /* expandability, which multiplies the force */
+    a[i] = 1.0 / (e[i] / exp(mean_log)); /* compliance / its geometric mean; multiplies the force */
     s[i] = 1.0;
     gsl_matrix_set(link_weight, i, i, area[i] / mean);
   }
@@ -107,9 +107,9 @@ TEST(test_reach_solution_equals_dense_solution) {
       gsl_matrix_set(link_weight, n + k, edge[c], w);
     }
   }
-  /* The matrix I - A. A[i, j] = s_i w_ij / z_j is the share of the force at node j that goes to
-   * node i. w_ij is the weight of the link of both nodes, s_i that of node i. z_j is the sum of
-   * s_l w_lj over all nodes l. */
+  /* Fill in I - A. A[i, j] = s_i w_ij / z_j is the share of the force at node j that goes to node
+   * i. w_ij is the weight of the link between i and j, s_i is the weight of node i, and z_j is the
+   * sum of s_l w_lj over all nodes l. */
   gsl_matrix *matrix = gsl_matrix_alloc(nodes, nodes);
   gsl_vector *b = gsl_vector_calloc(nodes);
   gsl_vector *x = gsl_vector_alloc(nodes);
@@ -135,7 +135,7 @@ TEST(test_reach_solution_equals_dense_solution) {
   double given = 0.0;
   for (size_t i = 0; i < n; ++i) {
     const double own = area[i] / mean;
-    /* the part of the total force x_i that stays at mass i */
+    /* Of x_i, all force that reaches mass i, this remains there; the rest goes on to springs. */
     const double expected = s[i] * own / z[i] * gsl_vector_get(x, i);
     assert_true(fabs(own * found[i] - expected) < 1e-10 * largest);
     balance += own * found[i];
@@ -265,8 +265,8 @@ static double spread(size_t frequency, double reach) {
   return sqrt(square / sum);
 }
 
-/* In any mesh, a point force spreads over an RMS distance of 2 R, where R is the reach. This is the
- * RMS radius of the response in the plane, the Bessel function K_0(r / R) at distance r. */
+/* In any mesh, a point force spreads over an RMS distance of twice the reach. The response to it in
+ * a plane is the Bessel function K_0(distance / reach), which has this RMS radius. */
 TEST(test_reach_finer_mesh_spreads_same_distance) {
   double with[3];
   double without[3];

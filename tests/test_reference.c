@@ -14,7 +14,7 @@
 
 #include "lungs_helpers.h"
 
-static const double promised = 0.005; /* documented error of a reproduced scan, mm */
+static const double promised = 0.005; /* documented limit of the error in the scan's state, mm */
 
 static char path[] = "/tmp/supine-reference-XXXXXX";
 
@@ -120,8 +120,8 @@ TEST(test_resting_options_override_defaults) {
   supine_error error = {0};
   assert_memory_equal(resting.share[0], left, sizeof left);
   assert_memory_equal(resting.share[1], right, sizeof right);
-  /* Set the volume at rest of both lungs together to 0.5 of the full volume. The shares of the
-   * single lungs keep their default ratio, and have the mean 0.5 for lungs of the usual sizes. */
+  /* Set the volume at rest to 0.5 of full inflation, both lungs together. The shares of the lungs
+   * keep their default ratio; weighted by the usual lung sizes, their mean is 0.5. */
   assert_int_equal(supine_reference_resting_set(&resting, "HFP", "0.5", &error), SUPINE_OK);
   assert_true(fabs(0.45 * resting.share[0][3] + 0.55 * resting.share[1][3] - 0.5) < 1e-15);
   assert_true(fabs(resting.share[0][3] / resting.share[1][3] - 0.464 / 0.475) < 1e-15);
@@ -141,8 +141,8 @@ TEST(test_resting_options_override_defaults) {
   }
 }
 
-/* A volume at rest in mL becomes a share of the full volume of each lung. In postures without a
- * given value, the default share is multiplied by the ratio of given to default volume. */
+/* A resting volume in mL is converted to a fraction of full inflation. In postures without one, the
+ * default fraction is multiplied by given / default volume of the posture that has one. */
 TEST(test_resting_volumes_become_shares) {
   static const int side[2] = {1, -1};
   static const double full[2] = {2500.0, 3100.0};
@@ -299,8 +299,8 @@ TEST(test_reference_scan_of_any_state_recovers_full_lungs) {
   supine_lungs_free(&full);
 }
 
-/* By the equations of ECSC 1993, a man of 1.78 m has a total lung capacity of 7.1422 L, and
- * of 6.4402 L supine; tissue adds 0.86 L. */
+/* By the equations of ECSC 1993, a man of 1.78 m has a total lung capacity of 7.1422 L upright and
+ * 6.4402 L supine. The expected volume is the latter plus 0.86 L of tissue. */
 TEST(test_capacity_height_and_sex_literal) {
   static const struct {
     supine_person person;
@@ -327,9 +327,9 @@ TEST(test_capacity_height_and_sex_literal) {
 TEST(test_doubt_implausible_volume_names_option) {
   static const struct {
     const char *scanned;
-    double full;        /* full volume of each lung, mL */
+    double full;        /* volume of each lung at full inflation, mL */
     double rest;        /* volume at rest supine given by --resting, mL; 0 if not given */
-    const char *doubts; /* expected text; NULL if nothing is doubted */
+    const char *doubts; /* part of the expected warning; NULL if none is expected */
   } known[] = {{"full", 3000.0, 0.0, NULL},
                {"full", 1700.0, 0.0, "--scanned, such as supine:rest"},
                {"supine:rest", 5100.0, 0.0, "--scanned full"},
@@ -459,7 +459,7 @@ TEST(test_basis_of_any_scan_reproduces_scan_and_rest) {
     printf("%s: scan reproduced within %.4f and %.4f mm; error of the basis %.4f mm RMS\n",
            scans[s], farthest(placed, scanned, n), farthest(posed, scanned, n), rms);
     assert_true(farthest(placed, scanned, n) < promised);
-    /* Except at rest, an error of a few mL in the full volume moves vertices slightly. */
+    /* States other than rest depend on the volume at full inflation, which errs by a few mL. */
     assert_true(farthest(posed, scanned, n) <
                 (rests && scan.state.volume.ml == 0.0 ? promised : 0.15));
     free(placed);

@@ -222,7 +222,7 @@ TEST(test_project_outer_vertices_match_drawing) {
         drawn[2 * side + 1] = fmax(drawn[2 * side + 1], place[side] + 1);
       }
     }
-    /* At the left, right, top or bottom end, a triangle may be too thin to cover a pixel. */
+    /* The leftmost, rightmost, highest or lowest triangle may be too thin to cover a pixel. */
     for (int end = 0; end < 4; ++end) {
       assert_true(fabs(projected[end] - drawn[end]) < 3);
     }

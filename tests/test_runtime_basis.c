@@ -123,7 +123,7 @@ TEST(test_open_every_flipped_bit_refused_or_same) {
     damaged[bit / 8] ^= (unsigned char)(1U << bit % 8);
     const supine_status status = open_copy(damaged, size, NULL);
     if (status == SUPINE_OK) {
-      /* Only changes of the header or its length may go undetected, never of the data. */
+      /* Changes of the header or its length may go undetected; changes of the data must not. */
       assert_true(bit / 8 < 8 + header);
       assert_same_basis(bytes, damaged, size);
       ++accepted;
@@ -324,7 +324,7 @@ TEST(test_open_wrong_structure_refused) {
   assert_int_equal(open_parts(&p), SUPINE_OK);
   p.tensors[9] = (supine_tensor){"resting_volume", SUPINE_F64, 2, {2, 9}, zeros64};
   assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
-  /* Kind `vector` needs three components: coefficients [N, 3, number of modes]. */
+  /* If the modes are of the kind `vector`, coefficients are [N, 3, modes], not [N, modes]. */
   p = sound();
   p.metadata[2].value = "vector";
   assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);

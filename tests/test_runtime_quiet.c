@@ -189,7 +189,7 @@ TEST(test_evaluate_open_basis_no_system_calls) {
   supine_basis_close(basis);
   counting = false;
   assert_int_equal(status, SUPINE_OK);
-  assert_true(opening > 5); /* shows that calls are counted */
+  assert_true(opening > 5); /* opening allocates and reads, so calls are counted */
   assert_int_equal(using, 0);
   assert_int_equal(live, 0);
   setting_close(&s);

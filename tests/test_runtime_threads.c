@@ -16,10 +16,10 @@ enum { THREADS = 4, VERTICES = 1003 };
 typedef struct job {
   const supine_basis *basis;
   size_t number;
-  /* [N, 3] positions in the shared orientation; each thread writes a range of them */
+  /* [N, 3] positions for one direction of gravity; each thread writes a range of the vertices */
   float *shared;
-  float own[3 * VERTICES];       /* positions in the thread's own orientation */
-  float batch[3 * 2 * VERTICES]; /* positions in the shared orientation, then in the thread's own */
+  float own[3 * VERTICES];       /* positions for a direction of gravity of its own */
+  float batch[3 * 2 * VERTICES]; /* positions as in `shared`, then as in `own` */
 } job;
 
 static void frame(const supine_basis *basis, size_t number, double *weights, double *scales) {

@@ -190,8 +190,8 @@ TEST(test_open_bad_headers_refused) {
       {" {}", 0},
       {"{", 0},
       {"{}x", 0},
-      {"{" A8 "}", 1},        /* 1 byte of data, not 2 */
-      {"{" A8 "}", 3},        /* 3 bytes of data, not 2 */
+      {"{" A8 "}", 1},        /* 1 byte of data; the header says 2 */
+      {"{" A8 "}", 3},        /* 3 bytes of data; the header says 2 */
       {"{" A8 ",}", 2},       /* trailing comma */
       {"{" A8 " " A8 "}", 2}, /* missing comma */
       {"{" A8 "," A8 "}", 4}, /* two tensors named `a` */

@@ -48,7 +48,7 @@ def check_surface(surface, points, triangles, rest, lung):
     assert np.abs(found - points).max() <= HALF_STEP * 1.01
     assert (vtk_to_numpy(surface.GetPolys().GetConnectivityArray()).reshape(-1, 3) == triangles).all()
     moved = vtk_to_numpy(data.GetArray("displacement"))
-    # The evaluator rounds reference positions by at most 0.0005 mm.
+    # The program rounds reference positions by at most 0.0005 mm when it opens a basis.
     assert np.abs(moved - (points - rest)).max() <= HALF_STEP * 1.01 + 0.0006
     normals = vtk_to_numpy(data.GetNormals()).astype(float)
     assert np.abs(np.linalg.norm(normals, axis=1) - 1).max() < 0.01
@@ -112,7 +112,7 @@ with tempfile.TemporaryDirectory() as folder:
     n, m = len(rest), len(triangles)
     share = os.path.getsize("breath.vtp") / (frames * (28 * n + 16 * m))
     print(f"{frames} frames of {n} vertices: {share:.3f} of the bytes without compression")
-    assert share <= 0.42  # file size at the fastest level of compression; the slowest level gives 0.39
+    assert share <= 0.42  # at the fastest level of compression; 0.39 at the slowest
 
     # A file with a single surface has the same arrays as a file with a breath.
     run("deform", "lungs.safetensors", "--posture", "prone", "-o", "prone.vtp")

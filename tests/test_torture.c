@@ -13,8 +13,8 @@ static supine_mesh phantom(void) {
 }
 
 /* Return the largest difference between the applied force and the force computed back from a
- * solution, relative to the largest force. If the model spreads forces over a distance, its reach,
- * first divide both by the stiffness. */
+ * solution, relative to the largest force. If the model spreads forces (reach > 0), first divide
+ * both forces at each vertex by its stiffness. */
 static double residual(const supine_lungs *lungs, const supine_model *model, const double g[3],
                        const supine_solution *solution) {
   const size_t n = solution->vertex_count;

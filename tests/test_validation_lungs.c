@@ -112,8 +112,8 @@ TEST(test_solve_all_postures_dependent_zones_ventilate_more) {
   supine_lungs_free(&lungs);
 }
 
-/* A reach, a distance in mm over which forces spread, more than halves the difference between the
- * same lungs with 5,000 and with 20,000 vertices. */
+/* The same lungs with 5,000 and with 20,000 vertices move differently. If forces are spread over a
+ * fixed distance (`reach`, mm), the difference is less than half as large. */
 TEST(test_solve_reach_reduces_change_with_resolution) {
   supine_lungs coarse = {0};
   supine_lungs fine = {0};

@@ -80,7 +80,7 @@ TEST(test_solve_uniform_ring_stays_circle) {
     least_radius = fmin(least_radius, hypot(x, y));
     largest_radius = fmax(largest_radius, hypot(x, y));
   }
-  assert_true(least_radius > 51.0); /* before: 50 mm */
+  assert_true(least_radius > 51.0); /* initial radius: 50 mm */
   assert_true(largest_radius - least_radius <= 1e-10);
   free(force);
   frame_free(&f);
@@ -101,7 +101,7 @@ TEST(test_solve_mixed_ring_stiff_part_moves_less) {
     printf("ring with a third %g times as stiff: the third moves %.4f, the opposite side %.4f\n",
            factors[k], middle, opposite);
     for (size_t i = 0; i < COUNT; ++i) {
-      /* As on an inflated balloon, every point moves outwards. */
+      /* catch_ is the outward displacement: every point moves outwards, as on a balloon. */
       assert_true(catch_[i] > 0.0);
     }
     assert_true(middle / opposite < last);

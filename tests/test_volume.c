@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Test volume forms, polynomials that give a volume from the weights of modes or from factors on
- * the displacement (gains). They equal the volume of the surface, and the gains for a given volume
- * are found. */
+/* Test that volume forms equal the volume of the surface, and that gains (factors on the
+ * displacement) are found for a given volume. Volume forms are polynomials in gains or mode
+ * weights. */
 #include <float.h>
 
 #include "test.h"
@@ -114,7 +114,7 @@ TEST(test_scale_cubic_volume_gives_root_connected_to_zero) {
       {2, 0, 0, -10, -5},
       {-2, 0, 0, 10, -5}, /* the displacement shrinks the lung */
       {0, 0, 0, 1, NAN},  /* the volume never changes */
-      {0, 0, 1, 8, NAN},  /* refused: s^3 has the slope 0 at s = 0 */
+      {0, 0, 1, 8, NAN},  /* refused: the polynomial s^3 has zero slope at s = 0 */
       {0, 0, 0, 0, 0},
       {2, 1, 0, 8, 2},        /* 2 s + s^2 = 8 at s = 2; s = -4 is beyond the minimum */
       {2, 1, 0, -0.75, -0.5}, /* 2 s + s^2 has the minimum -1 at s = -1 */
@@ -219,12 +219,12 @@ TEST(test_volume_form_gains_at_rest_equal_on_all_axes) {
   }
 }
 
-/* The gains along x, y and z change in the ratio 1 : 0.1 : 1.9 at rest, and 1 : 1.45 : 0.55 at full
- * inflation. */
+/* As the volume changes, the factors on the displacement along x, y and z change in the ratio 1 :
+ * 0.1 : 1.9 at rest, and 1 : 1.45 : 0.55 at full inflation. */
 TEST(test_volume_bend_path_has_stated_slopes) {
   static const double stated[2][3] = {{1, 1.45, 0.55}, {1, 0.1, 1.9}};
   for (size_t end = 0; end < 2; ++end) {
-    /* At full inflation and at rest, the slope is the same from both sides. */
+    /* At full inflation and at rest, the derivative is the same from both sides. */
     for (int side = -1; side <= 1; side += 2) {
       double at[3];
       double near[3];
@@ -238,8 +238,8 @@ TEST(test_volume_bend_path_has_stated_slopes) {
   }
 }
 
-/* The gains have the stated values beyond full inflation, between full inflation and rest, and
- * below rest. */
+/* The factors along y and z have literal values for three factors along x: beyond full inflation,
+ * between full inflation and rest, and below rest. */
 TEST(test_volume_bend_path_has_stated_values) {
   static const double at[][3] = {
       {-0.2, -0.2864, -0.1136}, {0.4, 0.5512, 0.2488}, {1.3, 1.244062423021089, 1.355937576978911}};

@@ -20,8 +20,8 @@ void supine_breath_turn_gravity(const breath_turn *turn, double time, double gra
 /* Read a text such as "supine:left:10s" into the breath_turn `turn`. */
 supine_status supine_breath_turn_read(const char *text, void *turn, supine_error *error);
 
-/* Return the state whose volume is `ml` mL above that at rest or, if that is unknown, above that in
- * the scan. */
+/* Return the state whose volume is `ml` mL above the resting volume or, if the resting volume is
+ * unknown, above the scan's volume. */
 supine_state supine_breath_state(const supine_basis *basis, const double gravity[3], double ml);
 
 #endif

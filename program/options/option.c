@@ -15,7 +15,7 @@ enum { ROWS_MAX = 64, HELP_ALL = 256, FIRST_LONG };
 
 typedef struct row {
   const supine_option *option;
-  char *filled; /* struct that the option's table fills */
+  char *filled; /* struct that receives the value of the option */
   bool given;
   const char *value;
 } row;

@@ -50,10 +50,10 @@ typedef enum supine_option_file {
   SUPINE_FILE_OUT
 } supine_option_file;
 
-/* Read `text` into `field`: the member that the option sets (SUPINE_FILLS) or, if it names no
- * member, the struct that the option's table fills.
+/* Read `text` into `field`. This is the member named by SUPINE_FILLS or, if the option names no
+ * member, the whole struct that receives the option values of its table.
  * @retval SUPINE_ERROR_ARGUMENT  the text is invalid. The user sees "--NAME: MESSAGE" or, if the
- *   message is empty, "--NAME takes WANTS, not 'TEXT'" */
+ *   message is empty, "--NAME takes WANTS, not 'TEXT'", where WANTS describes valid values */
 typedef supine_status supine_option_reader(const char *text, void *field, supine_error *error);
 static inline supine_status supine_options_fits(bool fits) {
   return fits ? SUPINE_OK : SUPINE_ERROR_ARGUMENT;
@@ -75,7 +75,7 @@ typedef struct supine_option {
   bool open;            /* true if values equal to a limit are invalid */
   const char *wants;    /* description of valid values; NULL to derive it from kind and range */
   const char *const *choices; /* valid words, then NULL; if `read` is set, for completion only */
-  const char *rivals; /* name of a group of options; at most one of them may be given, once */
+  const char *rivals;         /* name of a group of which the user may give one option, once */
   bool required;
   bool more; /* shown by --help-all only */
   supine_option_file file;
@@ -115,7 +115,7 @@ typedef struct supine_command {
   size_t operands_least, operands_most;
   const char *operands_missing; /* message if the number of operands is wrong */
   size_t request_size;
-  void (*begin)(void *request); /* sets defaults that table rows cannot express; may be NULL */
+  void (*begin)(void *request); /* sets defaults other than supine_option.standard; may be NULL */
   supine_status (*run)(void *request, const supine_arguments *given, supine_error *error);
 } supine_command;
 
@@ -135,14 +135,14 @@ int supine_options_run(const supine_command *command, int argc, char **argv);
 supine_status supine_options_check_output(const char *output, const char *input,
                                           supine_error *error);
 
-/* Call `each` for every option and heading of a table and of the tables that it includes, in order.
- * `base` is the position of the struct that the option's table fills: bytes from the start of the
- * struct of all options of the command. */
+/* Receive one option or heading of a table. `base` is the offset, bytes, of the struct that the
+ * table fills within the command's struct of all options. */
 typedef void supine_option_visit(void *context, const supine_option *option, size_t base);
+/* Call `each` for the options and headings of a table and of the tables that it includes. */
 void supine_options_visit(const supine_option *options, size_t base, supine_option_visit *each,
                           void *context);
 
-/* Print the help of a command. Unless `all` is true, omit the options that set `more`. */
+/* Print the help of a command. Unless `all` is true, omit options whose field `more` is true. */
 void supine_options_print_help(const supine_command *command, bool all, FILE *file);
 
 #endif

@@ -158,8 +158,8 @@ static const struct {
               {NULL, "volume_interval_mL", "  confidence interval, +- mL"},
               {NULL, "volume_mL", "volume, from and to, mL"}};
 
-/* Write the label of a member. If `labels` has none, write the key with spaces for underscores and
- * with a comma before the unit. */
+/* Write the label of the member `key` of the object `parent`. If `labels` has none, derive it from
+ * the key: "height_above_mm" becomes "height above, mm". */
 static void write_label(const char *parent, const char *key, char text[TEXT_MAX]) {
   static const char *const units[][2] = {{"_mm", ", mm"},   {"_mm2", ", mm2"},
                                          {"_ml", ", mL"},   {"_percent", ", %"},

@@ -13,8 +13,8 @@
 #include "program/options/pv.h"
 
 enum {
-  LOW = SUPINE_PV_CONTROLS, /* indices of the end volumes V_low and V_high among the unknowns */
-  HIGH
+  LOW = SUPINE_PV_CONTROLS, /* index, among the unknowns, of the volume at the lower end */
+  HIGH                      /* index of the volume at the upper end */
 };
 
 typedef struct problem {
@@ -69,7 +69,7 @@ static supine_status sort(problem *limb, const supine_pv_sample *samples, supine
              : refuse_fall(limb, &sorted[count - 1], sorted[0].volume, error);
 }
 
-/* Refuse samples if a volume is less than one at a lower pressure by more than noise explains. */
+/* Refuse samples if the volume falls with rising pressure by more than noise explains. */
 static supine_status check_falls(const problem *limb, double span, supine_error *error) {
   static const double allowed = 0.1; /* largest fall, as a fraction of the range of volumes */
   double peak = limb->sample[0].volume;
@@ -147,7 +147,8 @@ static void describe(const problem *limb, double span, double confidence,
   const double misfit = cblas_dnrm2((int)count, residual->data, (int)residual->stride);
   const double share = misfit / sqrt((double)count);
   *report = (supine_pv_report){.samples = count, .rms = span * share, .rms_percent = 100.0 * share};
-  /* The covariance of the unknowns is (J^T J)^-1 misfit^2 / freedom, where J is the Jacobian. */
+  /* Compute (J^T J)^-1 for the Jacobian J. Times misfit^2 / freedom, it is the covariance of the
+   * unknowns. */
   (void)gsl_multifit_nlinear_covar(jacobian, 0.0, limb->covariance);
   const double t = gsl_cdf_tdist_Pinv(0.5 + 0.5 * confidence, freedom);
   for (size_t i = 0; i < SUPINE_PV_UNKNOWNS; ++i) {

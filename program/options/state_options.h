@@ -93,9 +93,10 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
                                        bool compares, supine_reference_pose *reference,
                                        supine_error *error);
 
-/* Check that a pose is plausible: its surface must not fold, and if rest is known, its volume must
- * be 10 % to 120 % of full inflation. An implausible pose is an error (SUPINE_ERROR_NUMERICAL) if
- * rest is known and `allow_folds` is false. In all other cases, only a warning is printed. */
+/* Check that a pose is plausible: its surface must not fold, and if the volume at rest is known,
+ * its volume must be 10 % to 120 % of full inflation. An implausible pose is an error
+ * (SUPINE_ERROR_NUMERICAL) if the volume at rest is known and `allow_folds` is false. Otherwise, it
+ * causes only a warning. */
 supine_status supine_options_pose_check(const supine_basis *basis, const char *command,
                                         bool allow_folds, const supine_pose *pose,
                                         supine_error *error);

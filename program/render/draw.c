@@ -33,13 +33,12 @@ void supine_render_view_axes(supine_view view, double axes[3][3]) {
   memcpy(axes, views[view].axes, sizeof views[view].axes);
 }
 
-/* Each pixel is the mean of OVERSAMPLE x OVERSAMPLE samples. */
-enum { OVERSAMPLE = 2, SIDE_MAX = 16384, SHADES = 4096, NOTHING = UINT32_MAX, GRAIN = 16 };
+enum { SIDE_MAX = 16384, SHADES = 4096, NO_TRIANGLE = UINT32_MAX, ROWS_PER_JOB = 16 };
+enum { OVERSAMPLE = 2 }; /* each pixel is the mean of OVERSAMPLE x OVERSAMPLE samples */
 
-/* Distance from the viewer to the lungs' centre, and the largest distance in front of this centre
- * that is drawn, in half diagonals of the lungs' bounding box. */
-static const double distance_in_radii = 5.0;
-static const double depth_in_radii = 3.0;
+/* Distances, in half diagonals of the lungs' bounding box. */
+static const double viewer_distance = 5.0; /* from the viewer to the centre of the lungs */
+static const double drawn_depth = 3.0;     /* from the centre to the nearest drawn point, at most */
 static const double margin = 1.03; /* size of the picture divided by the size of the lungs in it */
 static const float gamma_exponent = 2.2F;
 
@@ -104,7 +103,7 @@ static camera find_camera(const supine_renderer *r, const supine_scene *scene) {
     c.centre[axis] = (low[axis] + high[axis]) / 2;
     c.radius = hypot(c.radius, (high[axis] - low[axis]) / 2);
   }
-  c.away = distance_in_radii * c.radius;
+  c.away = viewer_distance * c.radius;
   return c;
 }
 
@@ -124,7 +123,7 @@ static void place(const camera *c, const float xyz[3], double seen[3]) {
 
 void supine_render_extent(supine_renderer *r, const supine_scene *scene, double extent[4]) {
   const camera c = find_camera(r, scene);
-  const double closest = c.away - 0.98 * depth_in_radii * c.radius;
+  const double closest = c.away - 0.98 * drawn_depth * c.radius;
   supine_deform(r->basis, scene->pose, r->scratch);
   for (size_t i = 0; i < r->info->vertex_count; ++i) {
     double p[3];
@@ -137,7 +136,7 @@ void supine_render_extent(supine_renderer *r, const supine_scene *scene, double 
   }
 }
 
-/* Fit the extent into the picture. Set frame[0] and frame[1] to the centre of the extent, mm, and
+/* Fit the lungs into the picture. Set frame[0] and frame[1] to the centre of their extent, mm, and
  * frame[2] and frame[3] to the scales, in half widths and half heights of the picture per mm. */
 static void find_frame(supine_renderer *r, const supine_scene *scene, double frame[4]) {
   double extent[4] = SUPINE_EXTENT_NONE;
@@ -182,9 +181,9 @@ void supine_render_project(supine_renderer *r, const supine_scene *scene, const 
 typedef struct canvas {
   supine_renderer *renderer;
   const supine_scene *scene;
-  size_t width, height; /* size of the picture, samples */
-  uint32_t *nearest; /* [height, width] index of the triangle nearest to the viewer, or NOTHING */
-  float *nearness;   /* [height, width] 1 / (depth of the nearest triangle), 1/mm */
+  size_t width, height;             /* size of the picture, samples */
+  uint32_t *nearest;                /* [height, width] nearest triangle, or NO_TRIANGLE */
+  float *nearness;                  /* [height, width] 1 / (depth of the nearest triangle), 1/mm */
   float colours[SHADES + 1][3];     /* colour map, linear RGB, 0 to 1 */
   unsigned char encode[SHADES + 1]; /* [i] byte that encodes the linear light i / SHADES */
   uint32_t *pixels;
@@ -194,7 +193,7 @@ static void find_corners(const canvas *c) {
   supine_renderer *r = c->renderer;
   const camera cam = find_camera(r, c->scene);
   const double size[2] = {(double)c->width, (double)c->height};
-  const double near = cam.away - depth_in_radii * cam.radius;
+  const double near = cam.away - drawn_depth * cam.radius;
   double frame[4];
   find_frame(r, c->scene, frame);
   supine_deform(r->basis, c->scene->pose, r->scratch);
@@ -376,7 +375,7 @@ static uint32_t mean_of(const canvas *c, size_t x, size_t y) {
     const size_t column = OVERSAMPLE * x + sub % OVERSAMPLE;
     const uint32_t triangle = c->nearest[row * c->width + column];
     unsigned char rgba[4];
-    if (triangle != NOTHING) {
+    if (triangle != NO_TRIANGLE) {
       shade(c, triangle, (float)column + 0.5F, (float)row + 0.5F, rgba);
       for (int k = 0; k < 4; ++k) {
         sum[k] += rgba[k];
@@ -440,7 +439,7 @@ supine_status supine_render_draw(supine_renderer *r, const supine_scene *scene, 
     memset(c.nearest, 0xFF, count * sizeof *c.nearest);
     find_colours(&c);
     find_corners(&c);
-    supine_parallel_for(scene->height, GRAIN, 0, draw_rows, &c);
+    supine_parallel_for(scene->height, ROWS_PER_JOB, 0, draw_rows, &c);
   }
   free(c.nearest);
   free(c.nearness);

@@ -137,7 +137,8 @@ typedef struct supine_picture {
   size_t width, height; /**< size of the picture, pixels */
 } supine_picture;
 
-/** Return the interval between ticks of a colour bar: a round number, 1/10 to 1/4 of `value`. */
+/** Return the interval between ticks of a colour bar that shows 0 to `value`: a round number, 1/10
+ * to 1/4 of `value`. */
 double supine_render_bar_step(double value);
 /** Return the end of a colour bar: `value` rounded up to a tick. */
 double supine_render_bar_end(double value);

@@ -39,14 +39,13 @@ typedef struct supine_comparison {
   supine_compared_posture *posture; /* [postures.count] */
   size_t directions;                /* number of sampled directions of gravity with a valid pose */
   double farthest[3];  /* direction of gravity that moves the lungs farthest from supine */
-  double farthest_rms; /* RMS distance from supine to the surface for `farthest`, mm */
+  double farthest_rms; /* RMS distance from supine with gravity along `farthest`, mm */
 } supine_comparison;
 
-/* Compute `reference` and the members after it. Free them with supine_report_free, also after a
- * failure. */
+/* Compute the results: `reference` and all members below it. Free them with supine_report_free,
+ * also after a failure. */
 supine_status supine_report_find(supine_comparison *comparison, supine_error *error);
 
-/* Free the members that supine_report_find allocated. */
 void supine_report_free(supine_comparison *comparison);
 
 /* Write the volume of `comparison->state` to `text`, for example "at rest + 300 mL". */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Build the first sentences and the first table of the report, and the titles of its charts by
- * height. */
+/* Build the first sentences and the first table of the report, and the titles of its charts, whose
+ * vertical axis is height. */
 #include <ctype.h>
 #include <math.h>
 #include <stdlib.h>
@@ -8,7 +8,7 @@
 
 #include "program/report/comparison_parts.h"
 
-/* Values from publications for the row of a posture; report.html names their sources. */
+/* Published values for the postures' table rows; report.html names the sources. */
 static const struct {
   const char *posture, *words;
 } published[] = {
@@ -107,10 +107,10 @@ json_t *supine_report_findings(const supine_comparison *c) {
   return list;
 }
 
-/* Print the title of a chart by height: a heading, then the name and value of each posture up to
- * index `last`. If `share` is true, the value is the share of the lower half of the lungs in the
- * breath. Otherwise it is the expansion of the three lowest slabs divided by that of the three
- * uppermost. */
+/* Print the title of a chart: a heading, then the name and value of each posture up to index
+ * `last`. If `share` is true, the value is the fraction of the inhaled volume that enters the lower
+ * half of the lungs. Otherwise it is the ratio of the expansions of the lowest and uppermost three
+ * slabs. */
 static void print_profile(const supine_comparison *c, size_t last, bool share, FILE *to) {
   (void)fputs(share ? "Share of a breath that goes to the lower half:"
                     : "Expansion, lowest 30 % of the height divided by uppermost 30 %:",

@@ -30,13 +30,13 @@ json_t *supine_report_findings(const supine_comparison *comparison);
  * changes, displacements, and values from publications. */
 json_t *supine_report_postures(const supine_comparison *comparison);
 
-/* Return the title of a chart by height, with a value for each of the first four postures. If
- * `share` is true, the value is the share of the breath in the lower half of the lungs. Otherwise
- * it is the expansion of the three lowest slabs divided by that of the three uppermost slabs. */
+/* Return the title of a chart, with a value for each of the first four postures. If `share` is
+ * true, it is the fraction of the inhaled volume that enters the lower half of the lungs. Otherwise
+ * it is the ratio of the expansions of the lowest and uppermost three slabs. */
 json_t *supine_report_profile_finding(const supine_comparison *comparison, bool share);
 
-/* Return the value of the tag {{profiles}}: two charts by height, one of regional expansion and one
- * of the share of the breath. */
+/* Return the value of the tag {{profiles}}: charts, by height along gravity, of the regional
+ * expansion and of the fraction of the inhaled volume. */
 json_t *supine_report_profiles(const supine_comparison *comparison);
 
 /* Return the value of the tag {{map}}: the RMS distance from supine by direction of gravity. */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Print a comparison as JSON, or as text. */
+/* Print the comparison of postures as JSON, or as text. */
 #include "program/report/comparison.h"
 
 static json_t *statistics(const supine_distance_statistics *d) {
