@@ -14,9 +14,9 @@ enum { RESTING_TERMS = 9 };
 /** Sizes above which positions are written with stores that bypass the caches. One pose must exceed
  * both STREAM_BYTES and STREAM_RANGE. */
 enum {
-  STREAM_BYTES = 1 << 22,       /**< for one pose: bytes of the basis and of all positions */
-  STREAM_RANGE = 1 << 13,       /**< for one pose: number of vertices to evaluate */
-  STREAM_BATCH_BYTES = 1 << 24, /**< for supine_deform_batch: bytes of all positions */
+  STREAM_BYTES = 1 << 22,       /**< limit for the basis and the positions of one pose, bytes */
+  STREAM_RANGE = 1 << 13,       /**< limit for the vertices evaluated for one pose */
+  STREAM_BATCH_BYTES = 1 << 24, /**< limit for all positions of supine_deform_batch, bytes */
 };
 
 enum { LUNG_NAME_SIZE = 32 }; /**< largest size of a lung's name in bytes, with its NUL */

@@ -58,8 +58,9 @@ static void drop(opened *o) {
   fixture_destroy(o->f);
 }
 
-/* Compute the weights v of a lung's normal modes: polynomials of degree 2 in s w[k]. w are the
- * weights of the displacement modes, and s is the factor on the lung's displacement. */
+/* Compute the weights v of the modes of a lung's surface normals: polynomials of degree 2 in s
+ * w[k], with the weights w of the displacement modes and the factor s on the lung's displacement.
+ */
 static void expected_weights(const fixture *f, size_t lung, const double *w, double s, double *v) {
   const size_t terms = (MODES + 1) * (MODES + 2) / 2;
   for (size_t j = 0; j < f->normals; ++j) {

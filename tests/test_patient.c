@@ -108,8 +108,8 @@ TEST(test_covariances_any_distance_equal_those_of_kriging) {
   }
 }
 
-/* For five public pairs of images, each fitted in both directions, the cross-validated errors are
- * below `quadratic_rms`, those of a quadratic law (commit 220ee0d) on the same folds of points. */
+/* Five public pairs of images are each fitted in both directions. The cross-validated errors are
+ * below those of a quadratic law on the same folds of points (`quadratic_rms`, commit 220ee0d). */
 TEST(test_fit_public_landmarks_err_less_than_quadratic_law) {
   static const struct {
     const char *name;

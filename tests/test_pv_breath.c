@@ -108,8 +108,8 @@ TEST(test_breath_volume_follows_scaled_limbs) {
   }
 }
 
-/* At each time of a breath with constant flow, the pressure-volume curve gives the breath's volume
- * at the breath's pressure, even if the curve has two steep parts. */
+/* Each pressure and volume of a breath with constant flow lie on the pressure-volume curve, even if
+ * the curve has two steep parts. */
 TEST(test_breath_constant_flow_stiff_limb_pressures_give_volumes) {
   enum { COUNT = 61 };
   const supine_pv_curve stiff = {{0.0, 45.0}, {0.0, 800.0}, {0.5, -4.5, -2.3, 12.0, 2.7}};

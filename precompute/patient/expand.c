@@ -100,8 +100,8 @@ static void find_prior_precision(const supine_patient_stiffness *regions, double
   }
 }
 
-/* Compute response [vertex, region]: the force at each vertex listed in m->match if one region has
- * expandability (1 / stiffness) 1 and the force on all other regions is 0. Each response is
+/* Compute response [vertex, region]: the force at each vertex listed in m->match if only one region
+ * can expand, with the expandability (1 / stiffness) 1. Each response is
  * smoothed over the surface. */
 static supine_status find_responses(const supine_patient_matching *m,
                                     const supine_patient_stiffness *regions,

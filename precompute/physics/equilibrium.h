@@ -71,7 +71,7 @@ void supine_physics_equilibrium_destroy(supine_equilibrium *equilibrium);
 /** Replace the vertex positions, the smoothing length and the stiffness of an equilibrium. This is
  * faster than creating a new equilibrium.
  * @param reach  smoothing length, mm; may be above 0 only if it was above 0 at creation
- * Statuses as supine_physics_equilibrium_set_stiffness. */
+ * @return status as of supine_physics_equilibrium_set_stiffness */
 supine_status supine_physics_equilibrium_set_shape(supine_equilibrium *equilibrium,
                                                    const supine_mesh *mesh, double reach,
                                                    const double *stiffness, supine_error *error);
