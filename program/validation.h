@@ -23,8 +23,9 @@ extern const char *const supine_command_map_names[SUPINE_PATIENT_MAP_COUNT];
 typedef struct supine_command_distance {
   double mean, rms, p95;
   double largest; /* largest distance; between surfaces, the Hausdorff distance */
-  /* 1 - (rms / r)^2; NAN if r is nearly 0. r is the RMS distance without motion (of the prediction
-   * "none") or, if body motion is removed, with a fitted translation ("translation"). */
+  /* share of the squared distance that the prediction explains: 1 - (rms / r)^2, where r is the RMS
+   * distance of the prediction "none", or of "translation" if body motion is removed; NAN if r is
+   * nearly 0 */
   double explained;
 } supine_command_distance;
 

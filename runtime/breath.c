@@ -107,8 +107,8 @@ static double limb_volume(const integrated *of, double pressure, double *complia
   return curve->volume[0] + gain * (of->sum[part] + within);
 }
 
-/* Find the pressure, cmH2O, at which a P-V limb has a volume, mL, in its range. At the pressure
- * found, the volume is accurate to 1e-11 of this range.
+/* Find the pressure, cmH2O, at which a limb of a P-V loop has the given volume, mL. The volume at
+ * this pressure is accurate to 1e-11 of the limb's range of volumes.
  * @retval SUPINE_ERROR_NUMERICAL  no pressure was found */
 static supine_status limb_pressure(const integrated *of, double volume, double *pressure) {
   enum { STEPS_MAX = 200 };

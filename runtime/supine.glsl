@@ -53,8 +53,9 @@ vec3 supine_displace(vec4 reference, vec3 direction, vec4 c0, vec4 c1, vec4 c2, 
 }
 #endif
 
-// Compute the weighted sum of three vectors of a vertex in lung reference.w. `words` is attribute number `part` of
-// supine_gl_pack_normals, with 13, 10 and 9 bits per vector. The sum over all parts is the normal before normalisation.
+// Compute the part of a vertex normal that one vertex attribute holds; the normal is the sum over all `part`s, before
+// normalisation. `words` is the attribute packed by supine_gl_pack_normals: each word has one coordinate of three
+// vectors, in 13, 10 and 9 bits. reference.w is the index of the lung, which has its own weights of the vectors.
 vec3 supine_normal(vec4 reference, int part, uvec3 words) {
   vec3 v = supine_normal_weights[int(reference.w) * SUPINE_WORDS + part];
   return v.x * vec3(ivec3(words)) + v.y * vec3(ivec3(words << 13)) + v.z * vec3(ivec3(words << 23));

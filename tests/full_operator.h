@@ -14,7 +14,7 @@
 
 typedef struct full_operator {
   size_t node_count;  /* number of masses and springs; masses come first */
-  size_t entry_count; /* number of nonzero entries of A, none of which is on its diagonal */
+  size_t entry_count; /* number of nonzero entries of the matrix; its diagonal is zero */
   size_t *row, *column;
   double *value; /* [entries] fraction of the force on node `column` that passes to node `row` */
   double *own; /* [nodes] fraction of the force on each node that it keeps, and does not pass on */

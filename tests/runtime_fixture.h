@@ -25,7 +25,8 @@ typedef struct fixture {
   bool fields;     /* whether the metadata says that another simulator computed the displacements */
   size_t normals;  /* number of modes from which normals are computed, set by fixture_add_normals */
   int16_t *normal; /* [vertices, 3, normals] coefficients of vertex normals, as integers */
-  double *normal_weight; /* [lungs, normals, terms] factors: quadratic polynomials in the weights */
+  double *normal_weight; /* [lungs, normals, terms] coefficients of the weight of each normal mode:
+                            a quadratic polynomial in the weights of the displacement modes */
 } fixture;
 
 /* Return zeroed memory. Abort if the allocation fails. */
@@ -48,7 +49,7 @@ fixture *fixture_create_shrinking(size_t vertices, size_t modes, uint64_t seed);
 /* Compute the coefficients from which the library computes the volumes of lungs. */
 void fixture_add_forms(fixture *f);
 
-/* Add `modes` modes for normals, with random values that are not normal to the surface. */
+/* Add `modes` modes of vertex normals, with random vectors. */
 void fixture_add_normals(fixture *f, size_t modes, uint64_t seed);
 
 /* Write the basis file, and assert that this succeeds. */

@@ -58,8 +58,9 @@ static const double *side_of(const supine_lungs *lungs) {
 
 /* Smallest and largest ratio of the displacement with a lesion to that without it. */
 typedef struct change {
-  double inside[2]; /* range of displacement with / without lesion, within half its radius */
-  double far[2];    /* range of displacement with / without lesion, over 50 mm outside it */
+  double inside[2]; /* least and greatest ratio of displacements with and without the lesion, within
+                       half its radius */
+  double far[2];    /* the same ratios more than 50 mm from the lesion */
 } change;
 
 static void widen(double range[2], double value) {

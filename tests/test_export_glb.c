@@ -197,8 +197,8 @@ TEST(test_glb_weights_any_direction_between_0_and_1) {
   supine_export_source_close(&source);
 }
 
-/* A breath of 2500 mL passes the volume at which the curvature of the vertices' paths adds most to
- * the displacement. */
+/* The curved part of the vertices' paths is largest at a volume within a breath of 2500 mL. Its
+ * weight is at most 1 there, too. */
 TEST(test_glb_weights_within_large_breath_between_0_and_1) {
   enum { TRIED = 64, PHASES = 20 };
   export_source source = {0};

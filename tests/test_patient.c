@@ -113,7 +113,8 @@ TEST(test_covariances_any_distance_equal_those_of_kriging) {
 TEST(test_fit_public_landmarks_err_less_than_quadratic_law) {
   static const struct {
     const char *name;
-    double quadratic_rms[2]; /* RMS error, mm, from inhaled to exhaled image, and the reverse */
+    double quadratic_rms[2]; /* RMS error of the quadratic law, mm: inhaled to exhaled image, and
+                                the reverse */
   } cases[] = {{"054", {3.01, 3.30}},
                {"055", {8.07, 9.83}},
                {"056", {3.83, 4.44}},

@@ -194,7 +194,7 @@ fi
 "$supine" validate scanned.safetensors --state supine:rest+400.ply --state supine:rest+900.ply \
   --state supine:rest+1500:rest+1500.ply --state prone:rest:prone.ply --from supine:rest --json >valid.json ||
   fail "validate several"
-for state in 1 5 9 13; do # index of rms_mm: four for each state; first the prediction's, then that without motion
+for state in 1 5 9 13; do # index of the prediction's rms_mm, the first of four of a state; the second is that without motion
   near "$(number rms_mm valid.json $state)" 0 0.01 || fail "state $state is not predicted"
   near "$(number rms_mm valid.json $((state + 1)))" 0 0.5 && fail "state $state did not move"
 done

@@ -7,7 +7,7 @@
 #include <cairo.h>
 #include <webp/demux.h>
 
-/* The quoted name of a basis file of an open surface, which an earlier version made. */
+/* Quoted name of a basis file that an earlier version of the program made from an open surface. */
 #define OPEN "\"" SUPINE_GOLDEN "/open_surface.safetensors\""
 
 static size_t count_words(const char *text, const char *word) {

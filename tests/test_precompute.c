@@ -546,7 +546,7 @@ TEST(test_turned_over_one_posture_emptied_finds_more_reversed) {
         SUPINE_OK);
     assert_int_equal(supine_accuracy_turned_over(&lungs, directions, &field, &forms, even, &least),
                      SUPINE_OK);
-    assert_true(share > least + 0.02); /* 0.12 to 0.16 against 0.08 of the triangles */
+    assert_true(share > least + 0.02); /* 0.12 to 0.16 of the triangles turn, against 0.08 */
   }
   supine_physics_volume_forms_free(&forms);
   supine_projection_compression_free(&field);

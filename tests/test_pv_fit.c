@@ -107,8 +107,8 @@ TEST(test_fit_published_curves_error_below_one_percent) {
     assert_close(report.rms, 0.01 * report.rms_percent * truth_range(&truths[i]),
                  1e-9 * report.rms + 1e-12);
     assert_true(curve.pressure[0] == truths[i].low && curve.pressure[1] == truths[i].high);
-    /* If d = 0, the log compliance of the curve b (1 - exp(-c P)) has the constant slope -c. Only
-     * the first control parameter, the mean of this slope, is then not 0. */
+    /* If d = 0, the logarithm of the compliance has the constant slope -c. Of the control
+     * parameters, only the first, the mean of this slope, is not 0. */
     if (truths[i].d == 0.0) {
       assert_close(curve.control[0], -0.5 * truths[i].c * truths[i].high, 1e-6);
       for (size_t c = 1; c < SUPINE_PV_CONTROLS; ++c) {

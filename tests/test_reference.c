@@ -120,8 +120,8 @@ TEST(test_resting_options_override_defaults) {
   supine_error error = {0};
   assert_memory_equal(resting.share[0], left, sizeof left);
   assert_memory_equal(resting.share[1], right, sizeof right);
-  /* Set the volume at rest to 0.5 of full inflation, both lungs together. The shares of the lungs
-   * keep their default ratio; weighted by the usual lung sizes, their mean is 0.5. */
+  /* Set the volume at rest of both lungs together to 0.5 of full inflation. One factor scales the
+   * default shares of the two lungs. */
   assert_int_equal(supine_reference_resting_set(&resting, "HFP", "0.5", &error), SUPINE_OK);
   assert_true(fabs(0.45 * resting.share[0][3] + 0.55 * resting.share[1][3] - 0.5) < 1e-15);
   assert_true(fabs(resting.share[0][3] / resting.share[1][3] - 0.464 / 0.475) < 1e-15);
@@ -141,8 +141,8 @@ TEST(test_resting_options_override_defaults) {
   }
 }
 
-/* A resting volume in mL is converted to a fraction of full inflation. In postures without one, the
- * default fraction is multiplied by given / default volume of the posture that has one. */
+/* A resting volume in mL is converted to a share of full inflation. The default shares of the other
+ * postures are multiplied by the same ratio, given / default volume. */
 TEST(test_resting_volumes_become_shares) {
   static const int side[2] = {1, -1};
   static const double full[2] = {2500.0, 3100.0};

@@ -9,9 +9,9 @@
 
 enum { COLUMNS = SUPINE_NORMALS_FIELD_MAX + 1 };
 
-/* Return the index of the monomial (supine_normals_terms) that multiplies column k of one side of a
- * triangle along an axis and column l of another side along the next axis. Column 0 is the side on
- * the reference surface, column k > 0 its change by displacement mode k - 1. */
+/* Each side of a triangle is a sum of columns: column 0 is the side on the reference surface,
+ * column k > 0 its change by displacement mode k - 1. Return the index of the monomial
+ * (supine_normals_terms) of the product of column k of one side and column l of another. */
 static size_t term_of(size_t modes, size_t k, size_t l) {
   const size_t low = (k < l ? k : l) - 1;
   const size_t high = (k < l ? l : k) - 1;

@@ -29,9 +29,8 @@ static const double expandability_least = 0.02;
  * absolute values of the slopes c7, c8 and c9. */
 static const double exponent_least = 0.5, exponent_most = 4.0, slope_most = 2.5;
 
-/* [law] prior standard deviations of the constants of the displacement law (patient.h): of the
- * factors c1, c3 and c5, divided by their prior means; of the logarithms of the exponents c2, c4
- * and c6; of the slopes c7, c8 and c9. */
+/* [law][3] prior standard deviations: of c1, c3 and c5, divided by their prior means; of the
+ * logarithms of the exponents c2, c4 and c6; of the slopes c7, c8 and c9 (patient.h). */
 static const double law_deviation[SUPINE_PATIENT_LAW_COUNT][3] = {{0.3, 0.3, 0.3}, {3.0, 1.0, 1.0}};
 
 static supine_patient_centre centre_of(const supine_patient_power *law,

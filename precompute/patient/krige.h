@@ -85,7 +85,8 @@ typedef struct supine_patient_krige {
   double *design;   /* [count, terms + 1] derivatives and residual of each measurement, whitened */
   double *kernel_weight; /* [count] weight of each measurement in a prediction */
   double *scratch;       /* [count] temporary values, one for each measurement */
-  double *normal_matrix; /* [terms, terms], after the fit its Cholesky factor; as much work space */
+  double *normal_matrix; /* [2, terms, terms] normal matrix, after the fit its Cholesky factor; then
+                            work space */
   double objective;      /* squared whitened residuals plus squared deviations from the prior */
   double right_side[SUPINE_PATIENT_TERMS + SUPINE_PATIENT_REGIONS_MAX];
 } supine_patient_krige;
@@ -135,13 +136,14 @@ typedef struct supine_patient_fit_report {
   double points;                          /**< number of landmarks, or of matched vertices */
   double blocks;                          /**< number of cubes of 40 mm with points */
   double fitted[SUPINE_PATIENT_SCORES];   /**< RMS error of each predictor at fitted points, mm */
-  double held_out[SUPINE_PATIENT_SCORES]; /**< as `fitted`, at held-out points */
+  double held_out[SUPINE_PATIENT_SCORES]; /**< the same residuals at held-out points, mm */
   /** RMS error at held-out points, mm, of a translation, or of no displacement if no motion of the
    * body is fitted. */
   double baseline;
-  double band;           /**< share of the held-out points with an error below its 95 % bound, % */
-  double explained;      /**< reduction of the squared `baseline` by the corrected law, % */
-  double expected_point; /**< expected error of the predicted position of a point, mm */
+  double band;      /**< share of the held-out points with an error below its 95 % bound, % */
+  double explained; /**< percentage by which the law with its kriging correction reduces the squared
+                       `baseline` */
+  double expected_point;    /**< expected error of the predicted position of a point, mm */
   double expected_constant; /**< expected squared error, mm^2, per mm of displacement */
   double error[SUPINE_PATIENT_CONSTANTS]; /**< standard errors of c1 to c9 (patient.h) */
 } supine_patient_fit_report;

@@ -24,7 +24,7 @@ typedef struct supine_patient_matching {
   /* [vertices, 4] 1, X - 1/2, Y - 1/2 and Z - 1/2, smoothed over the surface; X, Y and Z are
    * coordinates 0 to 1 in the lungs' bounding box */
   double *smoothed_force;
-  double *rest_normals;        /* [fuller->mesh.vertex_count, 3] unit normals */
+  double *rest_normals;        /* [fuller->mesh.vertex_count, 3] unit normals of `fuller` */
   double *state_normals;       /* [state->vertex_count, 3] unit normals */
   size_t count;                /* number of vertices to match, spread over `fuller` */
   supine_patient_match *match; /* [count] these vertices and their matches */

@@ -13,8 +13,7 @@
 enum { GRAIN = 64 };
 
 /* Largest distance between corresponding faces of the bounding boxes of a surface and of a scanned
- * state, as a share of the state's width. The state's box is that of landmarks [0] or surfaces [1].
- */
+ * state, as a share of the state's width: [0] if landmarks give the state, [1] if surfaces do. */
 static const double apart_most[2] = {0.45, 0.2};
 /* Smaller forces are replaced by this before a division. The mean force is 1. */
 static const double force_least = 0.2;
@@ -113,7 +112,7 @@ static void move(work *w) {
   supine_mesh_box(&w->lungs.mesh, w->lungs.minimum, w->lungs.maximum);
 }
 
-/* Compute w->smoothing_ratio and the stiffness [N], in the posture of the fitted scans. */
+/* Compute w->smoothing_ratio and the stiffness of each vertex, for the posture of the two scans. */
 static supine_status find_ratio(const work *w, double *stiffness, supine_error *error) {
   const supine_patient_record *record = w->record;
   supine_model model = supine_physics_model(SUPINE_LAW_DEEP);

@@ -17,8 +17,9 @@ typedef struct supine_patient_further {
   /** [left, right lung] displacement from full inflation to this scan / displacement to rest. */
   double scale[2];
   double residual;              /**< RMS residual, mm; of a surface, along its normals */
-  double residual_without_gain; /**< RMS residual if the force is the same in all postures, mm */
-  double gain, gain_error; /**< increase of the force from top to bottom, and its standard error */
+  double residual_without_gain; /**< RMS residual with a gain of 0, mm */
+  double gain, gain_error; /**< increase of the dimensionless force from the uppermost to the lowest
+                              vertex, and its standard error */
 } supine_patient_further;
 
 /** A region of a lung. The expandability a = 1 / stiffness at a point p ([Santhanam2008] VI) is a
@@ -63,7 +64,8 @@ typedef struct supine_patient_expand_report {
 typedef struct supine_patient_applied {
   double blocks;      /**< number of cubes of 40 mm that contain vertices; 0: not computed */
   double correlation; /**< correlation of the force with the depth along gravity */
-  double slopes[3];   /**< slopes of the force along X, Y and Z / force at the lungs' centre */
+  double slopes[3];   /**< gradient of the force along X, Y and Z (0 to 1 in the bounding box),
+                         divided by the force at the lungs' centre */
   double residual;    /**< RMS residual of the linear fit / force at the lungs' centre */
   double spread;      /**< standard deviation of the cubes' forces / force at the lungs' centre */
 } supine_patient_applied;

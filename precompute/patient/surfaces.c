@@ -18,8 +18,8 @@ static const double size_converged = 0.5;
 static const double scale_least = 1.0; /* lower bound on the robust scale of the distances, mm */
 static const double same_state = 0.02; /* surfaces closer than this (RMS, mm) are equal */
 
-/* Initialise the measurement of each vertex: the displacement along one axis by the affine map from
- * the bounding box of the reference surface to that of the surface in the emptier state. */
+/* Set the measurement of each vertex to a first guess: its displacement along one axis by the
+ * affine map from the bounding box of the fuller surface to that of the emptier one. */
 static void start_rows(supine_patient_matching *m) {
   const double *low = m->fuller->minimum;
   double to[2][3];

@@ -19,7 +19,8 @@
 
 /** Dimensionless constants of the applied force. */
 typedef struct supine_force_law {
-  double base;   /**< force at the uppermost vertex, without the terms of `box` and `soften` */
+  double base;   /**< force on the uppermost vertex (dimensionless), before the terms of `box` and
+                    `soften` */
   double gain;   /**< increase of the force from the uppermost to the lowest vertex, due to depth */
   double box[3]; /**< coefficients of a vertex's coordinates (0 to 1) in the lungs' bounding box */
   double soften; /**< logarithm of the factor by which the lowest tissue is softer than the
@@ -55,7 +56,8 @@ void supine_physics_force(const supine_lungs *lungs, const supine_force_law *law
  * Y and Z are the vertex's coordinates from 0 to 1 in the lungs' bounding box. */
 typedef struct supine_direction_law {
   double c[6]; /**< c1 to c6 of [Santhanam2008] (15)-(17): c1, c3, c5 in mm; c2, c4, c6 exponents */
-  const double *vectors; /**< [vertices, 3] fitted displacements, mm, not owned; NULL to use `c` */
+  const double *vectors; /**< [vertices, 3] displacement per unit force, mm, not owned; NULL to
+                            compute it from the constants `c` */
 } supine_direction_law;
 
 /** Compute the displacement of each vertex, mm, at a force of 1 into directions [vertices, 3].

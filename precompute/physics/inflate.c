@@ -38,8 +38,9 @@ typedef struct ascent {
   double *previous_map;      /* [size] `map` in the previous iteration, mm */
   double *previous_residual; /* [size] `map` minus `estimate` in the previous iteration, mm */
   double rms;                /* RMS length of `map` minus `estimate` over all vertices, mm */
-  double *map_changes;       /* [DEPTH, size] changes of `map` in recent iterations, mm */
-  double *residual_changes;  /* [DEPTH, size] changes of map - estimate in recent iterations, mm */
+  double *map_changes;       /* [DEPTH, size] changes of `map` in the last DEPTH iterations, mm */
+  double *residual_changes;  /* [DEPTH, size] changes of the residual map - estimate in the last
+                                DEPTH iterations, mm */
   size_t stored;             /* number of changes stored since the acceleration last restarted */
   size_t history; /* number of stored changes that the acceleration uses, at most DEPTH */
 } ascent;
@@ -122,8 +123,8 @@ supine_status supine_reference_find_gains(const supine_lungs *scan, const double
   return status;
 }
 
-/* Set a->map to the vertices of the scan minus the displacements that the model predicts from
- * a->estimate. The displacements are scaled so that each lung gets its volume at full inflation. */
+/* Set a->map to the vertices of the scan minus the displacements predicted for lungs that have the
+ * shape a->estimate at full inflation, scaled so that each lung gets its volume there. */
 static supine_status find_map(ascent *a, supine_error *error) {
   supine_solution *field = &a->field;
   a->rms = 0.0;

@@ -50,7 +50,7 @@ typedef struct supine_model {
   const double *stiffness; /**< [vertices] stiffness; NULL for 1 everywhere */
   const double *lesions; /**< [vertices] factors that multiply the normalised stiffness, or NULL */
   double reach;          /**< smoothing length of force, mm; 0 for the method of [Santhanam2008] */
-  double share[2];       /**< volume of each lung as a share of the healthy lung's volume */
+  double share[2];       /**< volume of each lung divided by its volume without disease */
 } supine_model;
 
 /** Return the model of healthy lungs of uniform stiffness under a displacement law. */

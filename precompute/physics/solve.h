@@ -33,7 +33,7 @@ supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model
                                    supine_error *error);
 void supine_physics_solution_free(supine_solution *solution);
 
-/** Return the length, mm, of the largest displacement of a vertex, without a scale factor. */
+/** Return the length, mm, of the largest displacement of a vertex, before scaling to a volume. */
 double supine_physics_solution_largest(const supine_solution *solution);
 
 /** Compute the positions [N, 3] of displaced vertices, mm.

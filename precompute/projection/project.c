@@ -8,8 +8,9 @@
 #include "sh/transform.h"
 #include <supine/sh.h>
 
-/* As functions of the direction of gravity, the expanded weights have kinks where another vertex
- * becomes the lowest or highest. With 8 latitudes for each degree, these kinks hardly alias. */
+/* The weights, as functions of the direction of gravity, have kinks where another vertex becomes
+ * the lowest or highest. With 8 latitudes for each degree of the harmonics, these kinks hardly
+ * alias. */
 enum { LATITUDES_PER_BAND = 8, LATITUDES_MIN = 32 };
 
 void supine_projection_free(supine_projection *projection) {

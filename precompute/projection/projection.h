@@ -22,8 +22,8 @@ typedef struct supine_projection {
   supine_span *span; /**< directions of gravity; NULL for another simulator's fields */
   size_t rank;       /**< number of directions of gravity in `columns` */
   double *columns;   /**< [vertex_count, rank] force on each vertex for each direction of gravity */
-  double *functions; /**< [rank, (band + 1)^2] harmonic coefficients of the weights with which
-                        `columns` are summed to the force for any direction of gravity */
+  double *functions; /**< [rank, (band + 1)^2] row r: harmonic coefficients of the weight of column
+                        r in the force, as a function of the direction of gravity */
 } supine_projection;
 
 void supine_projection_free(supine_projection *projection);

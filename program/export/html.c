@@ -92,9 +92,10 @@ static int16_t coarse(int32_t number, int bits, int shift) {
   return (int16_t)((steps < most ? steps : most) + NORMAL_BIAS);
 }
 
-/* Fill `row` [3, count] with the vectors whose weighted sum is the normal of a vertex. They come in
- * `count` words of three signed numbers with 13, 10 and 9 bits. Round number j of word i to fewer
- * bits, and store it at row[j * count + i], as takeNormals in basis.js expects it. */
+/* Fill `row` [3, count] with the vectors of which the normal of a vertex is a weighted sum. They
+ * are stored in `count` words, each with three signed numbers of 13, 10 and 9 bits. Round each
+ * number to the bits of its place in the word; store number j of word i at row[j * count + i], as
+ * takeNormals in basis.js expects it. */
 static void normal_row(const page *p, const export_source *s, size_t vertex, int16_t *row) {
   uint32_t words[3 * NORMAL_WORDS];
   const size_t count = (s->info->normal_count + 2) / 3 * 3;

@@ -8,17 +8,17 @@
 
 enum { EXPORT_TARGETS_MAX = 2 * SUPINE_MODES_MAX };
 
-/** Offset and unit of each morph target of one lung. The basis gives the displacement of a lung as
- * the sum over j of amount_j field_j. Only the amounts depend on gravity and volume:
+/** Offset and unit of each morph target of one lung.
  *
- *     mode j of K  field_j is the displacement by the mode, as stored in the basis;
- *                  amount_j is s times the weight of the mode
- *     K + j        field_(K+j), if bend is not 0, is field_j times bend[axis] along each axis;
- *                  amount_(K+j) is t times the weight of mode j
+ * The basis has K modes and a constant bend[axis] for each axis (supine_volume_bend). It gives the
+ * displacement of a lung as the sum over j of amount_j field_j; only amounts depend on gravity and
+ * volume. s and t follow from the volume: s + t bend[axis] multiplies displacements along an axis.
  *
- * s and t depend on the volume: s + t bend[axis] multiplies the displacement along an axis. `bend`
- * has a constant of the basis for each axis (supine_volume_bend). In the file, a lung has a base
- * mesh and a morph target for each field. The base plus all weight_j target_j is its shape:
+ *     field_j     displacement by mode j          amount_j      s times the weight of mode j
+ *     field_(K+j) bend[axis] times field_j        amount_(K+j)  t times the weight of mode j
+ *
+ * If bend is 0, there are only the first K. In the file, a lung has a base mesh and a morph target
+ * for each field. The base plus all weight_j target_j is its shape:
  *
  *     base = reference position - export_targets.middle + sum over j of offset_j field_j
  *     target_j = unit_j field_j            weight_j = (amount_j - offset_j) / unit_j
@@ -46,8 +46,7 @@ supine_status supine_export_targets_choose(const export_source *source, double b
 void supine_export_targets_weights(const export_source *source, const export_targets *targets,
                                    const supine_pose *pose, size_t lung, double *weights);
 
-/** Compute the displacement `u`, mm, of a vertex by morph target `j`, before scaling by its unit:
- * field_j of export_weights. */
+/** Compute the displacement `u`, mm, of a vertex by field j of export_weights. */
 void supine_export_targets_field(const export_source *source, size_t vertex, size_t j, double u[3]);
 
 /** Compute the position of a vertex in a lung's base mesh, mm, relative to `targets->middle`. */

@@ -38,7 +38,8 @@ enum { OVERSAMPLE = 2 }; /* each pixel is the mean of OVERSAMPLE x OVERSAMPLE sa
 
 /* Distances, in half diagonals of the lungs' bounding box. */
 static const double viewer_distance = 5.0; /* from the viewer to the centre of the lungs */
-static const double drawn_depth = 3.0;     /* from the centre to the nearest drawn point, at most */
+static const double drawn_depth = 3.0;     /* largest distance from the centre towards the viewer at
+                                              which points are drawn, in radii */
 static const double margin = 1.03; /* size of the picture divided by the size of the lungs in it */
 static const float gamma_exponent = 2.2F;
 

@@ -88,9 +88,9 @@ WIDE static lanes take_wide(const void *at) {
   return _mm512_shuffle_epi8(_mm512_loadu_si512(at), _mm512_broadcast_i32x4(REVERSED));
 }
 
-/* Return 128 bits that equal a x^n + next modulo the CRC polynomial, where `next` follows `a` in
- * the message after n bits. `powers` has the factors of the low and the high half of `a`: x^n and
- * x^(n + 64). */
+/* Return 128 bits that equal `a` times x^n plus `next` modulo the CRC polynomial. `next` is the
+ * part of the message n bits after `a`. `powers` has the factors of the low and the high half of
+ * `a`: x^n and x^(n + 64). */
 CARRY_LESS static lane fold(lane a, lane powers, lane next) {
   return _mm_xor_si128(next, _mm_xor_si128(_mm_clmulepi64_si128(a, powers, 0x11),
                                            _mm_clmulepi64_si128(a, powers, 0x00)));

@@ -74,8 +74,8 @@ INLINE vf weight(const weights *w, size_t k, bool known) {
   return known ? w->v[k] : splat(w->at[k]);
 }
 
-/* Properties of tiles for which the compiler makes a separate loop. Loops for a constant number of
- * modes always write positions, never displacements. */
+/* Properties of the stored modes for which the compiler makes a separate loop over vertices. A loop
+ * made for a constant number of modes writes positions, never displacements. */
 typedef struct form {
   supine_storage storage;
   size_t modes; /* number of modes if it is a compile-time constant, else 0 */
@@ -263,8 +263,8 @@ INLINE void deform_kind(const supine_tiles *tiles, const float *scales, size_t f
 }
 
 /* Evaluate tiles by the loop for their number format. `modes` is the number of modes if it is a
- * compile-time constant, otherwise 0. If it is 0, the loop for INT16 also evaluates MIXED, as it
- * reads the layout from `tiles`. */
+ * compile-time constant, otherwise 0. With 0, the loop for INT16 takes the layout from `tiles`, and
+ * therefore also evaluates MIXED. */
 INLINE void deform_storage(const supine_tiles *tiles, const float *scales, size_t first,
                            size_t count, const supine_target *target, size_t modes) {
   if (tiles->storage == SUPINE_STORAGE_EXACT) {

@@ -5,9 +5,9 @@
 #if defined(__AVX512F__) && defined(__AVX512BW__)
 #include <immintrin.h>
 
-/* An array that is written from beginning to end. If `stream` is true, stores bypass the caches;
- * each must then fill an aligned cache line. If the array is not aligned, a line consists of the
- * end of one vector and the beginning of the next vector. */
+/* An output array, written in order. If `stream` is true, stores bypass the caches and must fill
+ * whole cache lines. In an unaligned array, each line is then joined from the end of one vector and
+ * the beginning of the next. */
 typedef struct writer {
   __m512 last;  /* vector of the last writer_put() */
   __m512i join; /* permutation that selects a cache line from `last` and the next vector */

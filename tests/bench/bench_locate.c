@@ -31,11 +31,13 @@
 
 enum { PEOPLE = 5, POINTS_MAX = 128, DRAWN = 10, DRAWS = 40, STEPS = 4 };
 
-static const double spread = 0.3; /* prior standard deviation of a person's scale / prior mean */
+static const double spread =
+    0.3; /* prior standard deviation / mean of the factor on a person's displacements */
 
 typedef struct person {
   size_t count; /* number of landmarks */
-  /* [count, 3] mm: positions, displacements, and displacements by the model with a scale of 1 */
+  /* [count, 3] mm: positions, true displacements, and displacements by the law with a factor of 1
+   */
   double from[3 * POINTS_MAX], moved[3 * POINTS_MAX], law[3 * POINTS_MAX];
   double centre_distance[POINTS_MAX]; /* [count] squared distance from the centre of a unit box */
   size_t lung[POINTS_MAX];

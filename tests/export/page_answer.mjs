@@ -112,7 +112,7 @@ await close(page);
 /* In a window of 320 x 256 (1280 x 1024 at a zoom of 400 %) nothing is cut off, and the picture is at least 240 px
  * wide. */
 const { page: small } = await openLungs(html, { viewport: { width: 320, height: 256 } }, '#posture=left&depth=900');
-assert.equal(await small.evaluate(() => window.supine.state.measured), 900); // the colour range holds for the 900 mL that depth= in the link gives
+assert.equal(await small.evaluate(() => window.supine.state.measured), 900); // colours are for the volume that depth= in the link gives, 900 mL above rest
 const { width, height, wide } = await small.evaluate(() => ({ ...document.getElementById('picture').getBoundingClientRect().toJSON(), wide: document.documentElement.scrollWidth }));
 assert.ok(width >= 240 && height >= 120 && wide <= 320, `${width} x ${height} in ${wide}`);
 const targets = await small.evaluate(() => [...document.querySelectorAll('button, select, summary, input')].filter((e) => e.checkVisibility()).map((e) => { const target = (e.type === 'checkbox' && e.labels.length ? e.labels[0] : e).getBoundingClientRect(); return [e.id || e.textContent, target.width, target.height]; }).filter(([, w, h]) => w < 24 || h < 24));

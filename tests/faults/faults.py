@@ -161,8 +161,8 @@ def what_is_wrong(trial, kind, kept, whole, result):
 
 
 def faultless(trial, arguments):
-    """Run the command without faults, once for each kind of fault. Return the result of each run, with the number of
-    calls that could fail in this way. Its stdout is None if the runs print different text."""
+    """For each kind of fault, run the command once and only count the calls that could fail. Return the results of the
+    runs with these counts. The text in stdout is None if the runs print different text."""
     runs = {kind: trial.run(arguments, kind) for kind in REASONS}
     same = len({run[1] for run in runs.values()}) == 1
     return {kind: (run[0], run[1] if same else None, *run[2:]) for kind, run in runs.items()}

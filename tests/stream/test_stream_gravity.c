@@ -86,7 +86,7 @@ TEST(test_gravity_tracker_quaternions_give_postures) {
     double q[4]; /* from upright: cos(angle / 2), then sin(angle / 2) times the unit axis */
   } turns[] = {
       {"upright", {1, 0, 0, 0}},
-      /* about x by -90 degrees (backwards) or 90 degrees (forwards) */
+      /* rotated about x by -90 degrees (backwards) or 90 degrees (forwards) */
       {"supine", {0.7071067811865476, -0.7071067811865476, 0, 0}},
       {"prone", {0.7071067811865476, 0.7071067811865476, 0, 0}},
       /* about y by 90 degrees (head to x) or -90 degrees (head to -x), or about x by 180 degrees */

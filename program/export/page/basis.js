@@ -173,7 +173,8 @@ function lungForm(basis, lung, w) {
 
 const formAt = (f, [x, y, z]) => x * f[0] + y * f[1] + z * f[2] + y * z * f[3] + x * z * f[4] + x * y * f[5] + x * y * z * f[6];
 
-/** Return the coefficients c of the volume at equal gains: formAt(f, [s, s, s]) = c[0] s + c[1] s^2 + c[2] s^3. */
+/** Return the coefficients c of a lung's change of volume, c[0] s + c[1] s^2 + c[2] s^3, if all displacements are
+ * multiplied by s. `f` are those of formAt. */
 const cubicOf = (f) => [f[0] + f[1] + f[2], f[3] + f[4] + f[5], f[6]];
 
 const cubicAt = (c, s) => s * (c[0] + s * (c[1] + s * c[2]));

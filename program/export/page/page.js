@@ -122,7 +122,7 @@ function start() {
 
   const depths = {}; // results of pane_depth for the state 'now' and for the other posture, 'pinned'
   /** Return the coordinate along gravity of the lowest point (`value`), and the normal and coordinate of the table
-   * under the patient, mm. Keep the result until the state changes. */
+   * under the patient, mm. The result is cached until the state changes. */
   function pane_depth(name, moment) {
     const { kind } = state;
     if (depths[name]?.moment !== moment || depths[name].kind !== kind) {
@@ -319,7 +319,7 @@ function start() {
   /** Return the height of the centre of each lung, mm, measured opposite to gravity. */
   const lungHeights = (gravity) => basis.lungMiddles.map((middle) => -dot(gravity, middle));
 
-  let described = null; // {moment, stride}: state and vertex stride of the last call of tellFinding; null to write again
+  let described = null; // {moment, stride}: state and vertex stride for which tellFinding last wrote its text; null makes it write again
   /** Write the texts, volume bars and outlines that describe the state of the lungs. Statistics of the displacement use
    * every `stride`th vertex. */
   function tellFinding(stride) {

@@ -306,8 +306,8 @@ class Picture {
     if (inside) this.captureInside(moment, inside);
   }
 
-  /** Deform the structures inside the lungs by the modes. Then overwrite the rigid ones, which the shader cannot move,
-   * because the motion of a vertex depends on all vertices of its structure. */
+  /** Deform the structures inside the lungs by the modes in the shader. In a rigid structure, the motion of a vertex
+   * depends on all the others: compute the vertices of these structures here, and overwrite those of the shader. */
   captureInside(moment, target) {
     const { gl, basis: { inside } } = this;
     this.capture(moment, this.insideInputs, [target], inside.vertices, this.insideMoving);

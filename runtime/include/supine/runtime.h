@@ -121,7 +121,8 @@ typedef struct supine_basis_info {
   bool has_full;                  /**< the reference surface is at full inflation */
   bool is_fields;     /**< made from another simulator's displacements; factor 1 reproduces them */
   size_t volume_axes; /**< factors of displacement per lung: 3, or 1 in files of versions 1 and 2 */
-  double bend[3];     /**< `bend` of supine_volume_bend: how unevenly x, y and z move in a breath */
+  double bend[3];     /**< constant of the path along x, y and z (supine_volume_bend); 0 if the
+                         displacement is proportional along the axis */
 } supine_basis_info;
 
 typedef struct supine_pose {

@@ -24,15 +24,15 @@ typedef struct supine_volume_form {
 } supine_volume_form;
 
 /** Add to `form` the volume of a lung as a polynomial of its gains, at given weights w_k of K
- * modes. L, Q and T are coefficients of first, second and third order. The volume is a sum of
- * determinants, each product of which has one x, one y and one z coordinate of vertices. Therefore
+ * modes. Gains are factors of the displacement along x, y and z. L, Q and T are coefficients of
+ * first, second and third order, as the volume is a sum of products of an x, a y and a z
+ * coordinate:
  *
  *     of[j]     += sum_k L_jk w_k             for the gain of axis j = 0, 1, 2
  *     of[3 + j] += sum_kl Q_jkl w_k w_l       for the product of the gains of the other two axes
  *     of[6]     += sum_klm T_klm w_k w_l w_m
  * @param count      number K of modes
- * @param axes       3, or 1 if one gain serves all axes. With 1, only the coefficients of x, yz
- *                   and xyz change.
+ * @param axes       3, or 1 if one gain serves all axes: then only of[0], of[3] and of[6] change
  * @param linear     [axes, K] L, mL
  * @param quadratic  [axes, K, K] Q, mL
  * @param third      [K, K, K] T, mL
