@@ -38,9 +38,9 @@ static const supine_option table[] = {
      .rivals = "output"},
     {"states", 0, "LIST",
      "CSV file with a state in each row, in the columns posture, volume and output; the basis and "
-     "the image are read once for all states. An output is a surface, points, a displacement "
-     "field, or the image of --image or --labels, moved; its path is relative to the folder of "
-     "LIST",
+     "the image are read once for all states. An output is a surface, points, or "
+     "an image: the image of --image or --labels, moved, or without these the displacement field. "
+     "Its path is relative to the folder of LIST",
      SUPINE_FILLS(request, states), .file = SUPINE_FILE_IN, .wants = "a CSV file",
      .rivals = "output"},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},

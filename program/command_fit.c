@@ -82,9 +82,9 @@ static const supine_option table[] = {
      FILLS(first), .read = read_state, .standard = "supine:rest"},
     {"other", 0, "STATE",
      "state of the second scan, in the same form; either scan may be the fuller one. A missing "
-     "volume is taken from the surfaces. With landmarks alone, give both volumes. If two "
-     "surfaces have no given volumes, the fuller one is at full inflation and the emptier one at "
-     "rest",
+     "volume is taken from the surfaces. With landmarks alone, give both volumes. If neither "
+     "--rest nor --other gives a volume, the fuller of two surfaces is at full inflation and the "
+     "other one at rest",
      FILLS(second), .read = read_state, .standard = "supine"},
     {"law", 0, "LAW",
      "constants that are fitted\ndeep: the size of the displacement; the other constants stay "
@@ -108,9 +108,9 @@ static const supine_option table[] = {
     {.table = supine_options_surface_frame, FILLS(source.load)},
     {"expandability", 0, NULL,
      "for surfaces: instead of kriging, fit the expandability (the inverse of the stiffness) of "
-     "regions about 45 mm wide. The directions of displacement are fitted as with --law paper, and "
-     "the constants of the force stay those of the deep law. The result is used only if it lowers "
-     "the held-out residual by 5 % or more",
+     "regions about 45 mm wide. The constants of (15)-(17) of Santhanam 2008 are fitted as with "
+     "--law paper, and those of (18), the force, stay those of the deep law. The result is used "
+     "only if it lowers the held-out residual by 5 % or more",
      FILLS(expandability), .more = true},
     {"json", 0, NULL, "print JSON instead of text", FILLS(json)},
     {.name = NULL}};

@@ -410,7 +410,7 @@ const supine_command supine_command_locate = {
     .about = "Fits the lungs to a few points observed inside them, for example by a navigation "
              "system. Finds the volume and the translation between the frames of the scan and of "
              "the observations, and corrects the predicted positions near the points. OBSERVED.csv "
-             "has the columns name,x,y,z, in mm, with the names given to 'supine embed'.",
+             "has the columns name,x,y,z, in mm and LPS, with the names given to 'supine embed'.",
     .options = table,
     .notes =
         "Expected errors are " SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT

@@ -62,14 +62,13 @@ static const supine_option table[] = {
     {.table = supine_options_landmarks, FILLS(landmarks)},
     {"from", 0, "POSTURE[:VOLUME]",
      "state in which the motion starts, and in which the first points of landmarks are; default "
-     "the "
-     "scan",
+     "the scan",
      FILLS(from), .read = read_state, .wants = "a state, such as supine:rest"},
     {"to", 0, "POSTURE[:VOLUME]",
      "without --state, the state of the second points of landmarks; give its volume too. With "
-     "--state, the state of every surface that --state gives without a posture; default supine, "
-     "with "
-     "the volume of the surface",
+     "--state, the state of the surfaces for which --state names no posture; default supine, at "
+     "the "
+     "volume of the surface",
      FILLS(to), .read = read_state, .wants = "a state, such as prone:rest+500"},
     {.table = supine_options_surface_frame, FILLS(source.load)},
     {"output", 'o', "FILE",
@@ -244,11 +243,12 @@ const supine_command supine_command_validate = {
         "'explained' is 1 minus the ratio of the mean squared distances with and without the "
         "motion. A small distance between surfaces does not prove that the motion inside is right; "
         "landmarks measure that. Santhanam 2008 reported surfaces 2 mm apart, in smaller "
-        "breaths.\nWith several states, each predicted "
-        "displacement is also multiplied by the factor that brings it nearest to its surface. For "
-        "states in the posture of the first --state, a straight line through 0 at the start of the "
-        "motion is fitted to factor against volume. The largest deviation from the line is given "
-        "in "
+        "breaths.\nWith several states, the factor on the "
+        "displacement that brings the predicted surface nearest to the scanned one is also sought "
+        "for "
+        "each state. For states in the posture of the first --state, a straight line is fitted to "
+        "factor "
+        "against volume, with factor 0 at the volume of --from. Its largest deviation is given in "
         "percent of the largest factor.\n"
         "\n"
         "Examples:\n"

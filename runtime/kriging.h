@@ -39,7 +39,8 @@ enum {
 };
 
 typedef struct supine_kriging_model {
-  double sill;   /**< variance of the random field (sum over x, y, z) / displacement, mm */
+  double sill;   /**< variance of the random field, summed over x, y and z, divided by the
+                    displacement, mm */
   double length; /**< correlation length of the random field, mm */
   double across; /**< factor of the covariance if two points are in different lungs, 0 to 1 */
   double least;  /**< shorter displacements count as displacements of this length, mm */

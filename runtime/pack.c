@@ -131,8 +131,8 @@ static void choose_steps(supine_basis *basis, work *w) {
   }
 }
 
-/* Pack the coefficients of 16 vertices on one axis, `rows` [modes, 16]. The first of three modes in
- * a word gets the uppermost bits, as its coefficients tend to be the largest. */
+/* Pack the coefficients of 16 vertices on one axis, `rows` [modes, 16]. A word holds three modes,
+ * the first of them in the uppermost bits. */
 static void pack_coefficients(const supine_tiles *tiles, const double *unit, const float *rows,
                               unsigned char *at) {
   const size_t paired = supine_tiles_paired(tiles->storage, tiles->modes);

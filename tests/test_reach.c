@@ -55,8 +55,9 @@ static double triangle_area(const supine_mesh *mesh, size_t t) {
   return 3.0 * area[one.triangles[0]];
 }
 
-/* The solution equals that of a dense matrix of the flow of force between nodes: masses (vertices)
- * and springs (edges). The weights of the links between nodes are those of equilibrium.h. */
+/* The solution equals the one found with a dense matrix, which describes how force flows between
+ * nodes. A node is a mass (vertex) or a spring (edge). The weights of the links between nodes are
+ * those of equilibrium.h. */
 TEST(test_reach_solution_equals_dense_solution) {
   const double reach = 30.0;
   supine_lungs lungs = lungs_of(helper_lump(4, 60.0, 77), reach);

@@ -256,7 +256,7 @@ static inline double *ring_stiffness(size_t count, double factor) {
 enum { ZONES = 10 };
 
 typedef struct ventilation {
-  double index[ZONES]; /* mean force that vertices in a slab keep, divided by that in all lungs */
+  double index[ZONES]; /* mean force on the vertices of a slab, divided by that in all lungs */
   double swept[ZONES]; /* a slab's share of the inhaled volume, divided by its share of the area */
   double slope;  /* slope of `index` against depth, which is 0 at the top and 1 at the bottom */
   double height; /* height of the lungs, mm */

@@ -41,7 +41,8 @@ void supine_inside_biharmonic_free(supine_inside_biharmonic *fit);
 
 /** Evaluate the interpolating function.
  * @param points  [count, 3] mm
- * @param values  [count, columns] value of each component at each point, written
+ * @param values  [count, columns] output: value of each component at each point
+ *
  * Cost: a square root and `columns` multiplications for each pair of a point and a centre. */
 void supine_inside_biharmonic_evaluate(const supine_inside_biharmonic *fit, size_t count,
                                        const double *points, double *values);

@@ -30,7 +30,7 @@ typedef struct point_motion {
 /* Fit to a third scan of lungs whose displacement law was fitted to two scans. The displacement
  * from full inflation to the third scan is modelled as s (1 + gain force_change) u + t:
  * - s is an unknown factor for each lung, and t an unknown translation between the scans.
- * - The unknown gain is the increase of the force from the top to the bottom of the lungs.
+ * - gain, unknown, is the increase of the force from the top to the bottom of the lungs.
  * - force_change and u are the relative change of force and the displacement in point_motion. */
 typedef struct work {
   const supine_patient_record *record;
@@ -139,8 +139,8 @@ static void find_motion(work *w, const double gravity[3]) {
                        (place.box[2] > 0.5 ? 1U : 0U);
     if (m->state != NULL && !w->record->from_surface) {
       /* Use the bounding box of the landmarks, because the displacement law was fitted in it. */
-      place = supine_patient_find(&patient->frame, m->fuller->mesh.vertices + 3 * m->match[i].vertex,
-                                  place.side);
+      place = supine_patient_find(&patient->frame,
+                                  m->fuller->mesh.vertices + 3 * m->match[i].vertex, place.side);
     }
     supine_patient_displacement(patient, &place, 1.0, w->motion[i].u);
     for (size_t k = 0; k < 3; ++k) {

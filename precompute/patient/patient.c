@@ -75,7 +75,8 @@ supine_patient_power supine_patient_deep(const double gravity[3], const double p
   for (size_t k = 0; k < 3; ++k) {
     law.c[2 * k] = model.direction.c[2 * k] * (supine_length(path_span) > 0.0 ? path_span[k] : 1.0);
     law.c[2 * k + 1] = model.direction.c[2 * k + 1];
-    /* Subtract the gain, because Y and Z in the bounding box grow in the directions -y and -z. */
+    /* X in the bounding box grows along x, but Y and Z along -y and -z, so their gain is
+     * subtracted. */
     law.c[6 + k] = model.force.box[k] - (k > 0 ? model.force.gain * g[k] : 0.0);
   }
   return law;

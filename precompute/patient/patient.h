@@ -75,7 +75,9 @@ typedef struct supine_patient_place {
   double box[3];                        /**< X, Y, Z in the lungs' bounding box, each 0 to 1 */
   double side;                          /**< +1 left lung, -1 right lung */
   double offset[3];                     /**< position relative to the lungs' centre, mm */
-  double force[SUPINE_PATIENT_COLUMNS]; /**< terms 1, X - 1/2, Y - 1/2, Z - 1/2 of the force */
+  double force[SUPINE_PATIENT_COLUMNS]; /**< values of the terms of the force here: 1, X - 1/2, Y -
+                                           1/2, Z - 1/2, with X, Y and Z from 0 to 1 in the lungs'
+                                           bounding box */
 } supine_patient_place;
 
 /** Compute the box coordinates and the force terms of a point. The force terms are not smoothed

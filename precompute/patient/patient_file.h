@@ -66,8 +66,8 @@ typedef struct supine_patient_applied {
   double correlation; /**< correlation of the force with the depth along gravity */
   double slopes[3];   /**< gradient of the force along X, Y and Z (0 to 1 in the bounding box),
                          divided by the force at the lungs' centre */
-  double residual;    /**< RMS residual of the linear fit / force at the lungs' centre */
-  double spread;      /**< standard deviation of the cubes' forces / force at the lungs' centre */
+  double residual; /**< RMS residual of the linear fit, divided by the force at the lungs' centre */
+  double spread;   /**< standard deviation of the cubes' forces / force at the lungs' centre */
 } supine_patient_applied;
 
 typedef struct supine_patient_surface_report {

@@ -56,8 +56,9 @@ static supine_status refit(const supine_patient_matching *m, bool shaped,
   return status;
 }
 
-/* Fit the displacement law and match the surfaces in turn. Until the vertices move little, fit only
- * a factor on the default law, because matches do not show displacement along the surface. */
+/* Fit the displacement law and match the surfaces in turn. In the first rounds, fit only a factor
+ * on the default law, because matches do not show displacement along the surface. When the vertices
+ * move little from round to round, fit the whole law. */
 static supine_status iterate(supine_patient_matching *m, const supine_patient_fit_options *wanted,
                              supine_patient *patient, supine_patient_surface_report *report,
                              supine_error *error) {

@@ -103,7 +103,7 @@ supine_status supine_physics_equilibrium_force(supine_equilibrium *equilibrium,
                                                const double *retained, double *force,
                                                supine_error *error);
 
-/** Apply a unit force to `vertex`, and compute the force that each vertex then retains: a column
+/** Apply a unit force to `vertex`, and compute the part of it that remains on each vertex: a column
  * [vertices] of the transfer matrix of [Santhanam2008], equation (2).
  * @retval SUPINE_ERROR_ARGUMENT  no such vertex */
 supine_status supine_physics_transfer_column(supine_equilibrium *equilibrium, size_t vertex,

@@ -10,9 +10,9 @@ enum { DIRECTIONS = 4096 }; /* number of sampled directions of gravity */
 /* The range of each weight in the sampled directions is extended by this fraction at both ends. */
 static const double margin = 0.02;
 
-/* Set `split` to {s, t}, such that gains[axis] = s + t bend[axis] on all three axes. `gains` are
- * the factors of a lung's displacement along the axes; `bend` has the three constants of the basis.
- * Compute s and t from the axes with the smallest and the largest bend. */
+/* Set `split` to {s, t}, such that gains[axis] = s + t bend[axis]. `gains` are the factors of a
+ * lung's displacement along x, y and z, and `bend` has the basis's constant for each axis. As gains
+ * always have this form, two axes suffice: those with the smallest and the largest bend. */
 static void split_gains(const double bend[3], const double gains[3], double split[2]) {
   size_t low = 0;
   size_t high = 0;
@@ -176,10 +176,10 @@ static void make_unit(const export_source *source, const export_targets *targets
   }
 }
 
-/* Round the changes of normals by morph targets, `added`, so that they compress well. Components
- * become multiples of 1 / INT8_MAX, or equal to that of the previous vertex (in `order`) if they
- * nearly are. Then correct the normals `base` of the base mesh, to keep the normals that the
- * targets' `weights` give: `base` plus the sum of weight times change. */
+/* Round the changes of normals by morph targets, `added`, so that they compress well: to multiples
+ * of 1 / INT8_MAX, or to the value of the previous vertex in `order` if that is close. The normal
+ * at the targets' `weights` is `base` plus the sum of weight times change. Correct `base`, so that
+ * this normal stays as it was. */
 static void round_changes(const export_source *source, const export_targets *targets,
                           double (*weights)[EXPORT_TARGETS_MAX], const uint32_t *order, float *base,
                           float *added) {

@@ -135,8 +135,8 @@ int supine_options_run(const supine_command *command, int argc, char **argv);
 supine_status supine_options_check_output(const char *output, const char *input,
                                           supine_error *error);
 
-/* Receive one option or heading of a table. `base` is the offset, bytes, of the struct that the
- * table fills within the command's struct of all options. */
+/* Receive one option or heading of a table. The table fills a struct inside the command's struct of
+ * all options; `base` is its offset there, bytes. */
 typedef void supine_option_visit(void *context, const supine_option *option, size_t base);
 /* Call `each` for the options and headings of a table and of the tables that it includes. */
 void supine_options_visit(const supine_option *options, size_t base, supine_option_visit *each,

@@ -7,8 +7,8 @@
  *
  *     bench_locate [FOLDER OF LANDMARKS]
  *
- * Kriging corrects displacements that a simple model predicts: the force that the program applies
- * to a point of supine lungs, times a scale. (The spread of force between points is left out.) The
+ * Kriging corrects the displacements of a simple model: the displacement that the force on a point
+ * of supine lungs causes, times a scale. (The spread of force between points is left out.) The
  * prior mean of a person's scale is the mean of the other four people's scales. The prior standard
  * deviation is 30 % of the prior mean. */
 #include <math.h>
