@@ -59,8 +59,7 @@ static supine_status set_expandability(const supine_lungs *lungs, const supine_m
                      choice->expandability_law.shape != SUPINE_EXPANDABILITY_UNIFORM;
   if (choice->stiffness != NULL && given) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "the patient's law has its own stiffness: leave --expandability "
-                            "out");
+                            "the file of --patient sets the stiffness: leave --expandability out");
   }
   if (choice->stiffness == NULL && !given) {
     return SUPINE_OK;

@@ -93,7 +93,7 @@ static supine_status write_page(const export_source *source, const request *want
     status = supine_export_html_write(wanted->path, source, &page, error);
   }
   if (status == SUPINE_OK) {
-    (void)printf("%s: a page of %zu vertices", wanted->path, source->info->vertex_count);
+    (void)printf("%s: HTML page of %zu vertices", wanted->path, source->info->vertex_count);
     if (page.inside != NULL) {
       (void)printf(" and %zu structure%s inside the lungs", parts.count,
                    parts.count == 1 ? "" : "s");

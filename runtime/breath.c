@@ -308,11 +308,11 @@ static supine_status follow(const supine_pv_breath *breath, const loop *cycle, d
     *volume = breath->tidal * share;
     const supine_status status =
         limb_pressure(here, between(low + share * cycle->gain[of], low, high), pressure);
-    return status == SUPINE_OK
-               ? status
-               : supine_error_set(
-                     error, status,
-                     "at %g s, no pressure gives the volume of the breath: check the limbs", time);
+    return status == SUPINE_OK ? status
+                               : supine_error_set(error, status,
+                                                  "at %g s, no pressure gives the volume of the "
+                                                  "breath: check the pressure-volume curve",
+                                                  time);
   }
   if (breath->course == SUPINE_PV_COSINE) {
     share = 0.5 - 0.5 * cos(pi * share);

@@ -88,5 +88,5 @@ supine_status supine_physics_directions(const supine_lungs *lungs, const supine_
     }
   }
   return supine_error_set(error, SUPINE_ERROR_MESH,
-                          "all directions of displacement are zero: change --constants");
+                          "no vertex is displaced: C1, C3 and C5 of --constants must not all be 0");
 }
