@@ -101,15 +101,16 @@ static double depth_at(const supine_patient_frame *frame, const supine_patient_p
 }
 
 /* Make three measurements for each pair of points. If `pairs` is NULL, make one for each vertex of
- * `fuller`, for at most VERTICES_MAX vertices. */
-static supine_status make_rows(work *w, const supine_lungs *rest, const supine_patient_pairs *pairs,
-                               const supine_mesh *surface, supine_error *error) {
+ * `lungs`, for at most VERTICES_MAX vertices. */
+static supine_status make_rows(work *w, const supine_lungs *lungs,
+                               const supine_patient_pairs *pairs, const supine_mesh *surface,
+                               supine_error *error) {
   supine_status status = SUPINE_OK;
   if (pairs != NULL) {
     w->matching.count = 3 * pairs->count;
     w->matching.rows = malloc(w->matching.count * sizeof *w->matching.rows);
   } else {
-    status = supine_patient_matching_create(rest, surface, &w->record->stiffness, VERTICES_MAX, 0,
+    status = supine_patient_matching_create(lungs, surface, &w->record->stiffness, VERTICES_MAX, 0,
                                             &w->matching, error);
   }
   w->motion = malloc(w->matching.count * sizeof *w->motion);
@@ -203,15 +204,15 @@ static supine_status iterate(work *w, supine_patient_further *further, supine_er
   return SUPINE_OK;
 }
 
-supine_status supine_patient_gain_fit(const supine_patient_record *record, const supine_lungs *rest,
-                                      const supine_patient_pairs *pairs, const supine_mesh *surface,
-                                      bool scans_moved, supine_patient_further *further,
-                                      supine_error *error) {
+supine_status supine_patient_gain_fit(const supine_patient_record *record,
+                                      const supine_lungs *fuller, const supine_patient_pairs *pairs,
+                                      const supine_mesh *surface, bool scans_moved,
+                                      supine_patient_further *further, supine_error *error) {
   work w = {.record = record, .fits_translation = scans_moved, .x = {1.0, 1.0}};
   further->fits_gain =
       supine_distance(further->state.gravity, record->state[1].gravity) >= same_posture;
   supine_patient_path(record, w.state_share);
-  supine_status status = make_rows(&w, rest, pairs, surface, error);
+  supine_status status = make_rows(&w, fuller, pairs, surface, error);
   if (status == SUPINE_OK) {
     find_motion(&w, further->state.gravity);
     status = iterate(&w, further, error);

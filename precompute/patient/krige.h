@@ -28,7 +28,7 @@ typedef struct supine_patient_row {
   double noise;   /* standard deviation of `value`, mm */
   size_t block;   /* index of the 40 mm cube whose measurements are held out together */
   /* [regions] contribution of each lung region to the force at this vertex if the region's
-   * expandability (1 / stiffness) is 1; NULL if expandabilities are not fitted */
+   * expandability (1 / stiffness) is 1; NULL if stiffness is not fitted */
   const double *response;
 } supine_patient_row;
 
@@ -44,7 +44,7 @@ size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patie
 
 /* The unknowns of a fit are, in order: c1, c3, c5; log c2, log c4, log c6; c7, c8, c9 (constants
  * of the displacement law, patient.h); translation [3]; small rotation [3]; and a factor on the
- * whole displacement law. The expandabilities of lung regions follow if they are fitted. */
+ * whole displacement law. The values of 1 / stiffness of lung regions follow if they are fitted. */
 enum { SUPINE_PATIENT_TERMS = 16, SUPINE_PATIENT_REGIONS_MAX = 256 };
 
 /* Predict a measurement by the displacement law and the motion of the body. Return the prediction
@@ -105,7 +105,7 @@ supine_status supine_patient_krige_fit(const supine_patient_fit_options *options
                                        supine_patient_krige *krige, supine_error *error);
 void supine_patient_krige_free(supine_patient_krige *krige);
 
-/* Compute how far the measurements, not the prior, determine the expandability of each region: 0
+/* Compute how far the measurements, not the prior, determine the stiffness of each region: 0
  * not at all, 1 fully. `share` [region_count] is the diagonal of the resolution matrix. */
 void supine_patient_krige_resolution(const supine_patient_krige *krige, double *share);
 

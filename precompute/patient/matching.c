@@ -45,7 +45,7 @@ static void match_range(void *context, size_t begin, size_t end, size_t thread) 
       row->axis[k] = length > 0.0 ? normal[k] / length : 0.0;
       row->value += row->axis[k] * (place->nearest[k] - from[k]);
       match->distance += row->axis[k] * (place->nearest[k] - match->position[k]);
-      cosine += row->axis[k] * m->rest_normals[3 * match->vertex + k];
+      cosine += row->axis[k] * m->fuller_normals[3 * match->vertex + k];
     }
     row->weight = cosine > compatible ? 1.0 : 0.0;
   }
@@ -164,29 +164,29 @@ void supine_patient_matching_choose(supine_patient_matching *matching, size_t li
   }
 }
 
-supine_status supine_patient_matching_create(const supine_lungs *rest, const supine_mesh *state,
+supine_status supine_patient_matching_create(const supine_lungs *fuller, const supine_mesh *state,
                                              const supine_patient_stiffness *stiffness,
                                              size_t limit, size_t landmarks,
                                              supine_patient_matching *matching,
                                              supine_error *error) {
-  const size_t n = rest->mesh.vertex_count;
+  const size_t n = fuller->mesh.vertex_count;
   supine_patient_matching *m = matching;
-  *m = (supine_patient_matching){.fuller = rest, .state = state};
-  m->frame = supine_patient_frame_of_lungs(rest);
+  *m = (supine_patient_matching){.fuller = fuller, .state = state};
+  m->frame = supine_patient_frame_of_lungs(fuller);
   m->smoothed_force = malloc(SUPINE_PATIENT_COLUMNS * n * sizeof(double));
-  m->rest_normals = malloc(3 * n * sizeof(double));
+  m->fuller_normals = malloc(3 * n * sizeof(double));
   m->state_normals = malloc(3 * state->vertex_count * sizeof(double));
   m->match = malloc(n * sizeof *m->match);
   m->rows = malloc((n + 3 * landmarks) * sizeof *m->rows);
   m->space = malloc(n * sizeof(double));
-  if (m->smoothed_force == NULL || m->rest_normals == NULL || m->state_normals == NULL ||
+  if (m->smoothed_force == NULL || m->fuller_normals == NULL || m->state_normals == NULL ||
       m->match == NULL || m->rows == NULL || m->space == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
   }
-  supine_mesh_vertex_normals(&rest->mesh, m->rest_normals);
+  supine_mesh_vertex_normals(&fuller->mesh, m->fuller_normals);
   supine_mesh_vertex_normals(state, m->state_normals);
   const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
-  supine_status status = supine_physics_model_equilibrium(rest, &model, &m->equilibrium, error);
+  supine_status status = supine_physics_model_equilibrium(fuller, &model, &m->equilibrium, error);
   if (status == SUPINE_OK) {
     status = supine_patient_matching_solve(m, stiffness, error);
   }
@@ -202,7 +202,7 @@ void supine_patient_matching_free(supine_patient_matching *matching) {
   supine_inside_surface_destroy(matching->tree);
   supine_physics_equilibrium_destroy(matching->equilibrium);
   free(matching->smoothed_force);
-  free(matching->rest_normals);
+  free(matching->fuller_normals);
   free(matching->state_normals);
   free(matching->match);
   free(matching->rows);

@@ -24,7 +24,7 @@ typedef struct supine_patient_matching {
   /* [vertices, 4] 1, X - 1/2, Y - 1/2 and Z - 1/2, smoothed over the surface; X, Y and Z are
    * coordinates 0 to 1 in the lungs' bounding box */
   double *smoothed_force;
-  double *rest_normals;        /* [fuller->mesh.vertex_count, 3] unit normals of `fuller` */
+  double *fuller_normals;      /* [fuller->mesh.vertex_count, 3] unit normals of `fuller` */
   double *state_normals;       /* [state->vertex_count, 3] unit normals */
   size_t count;                /* number of vertices to match, spread over `fuller` */
   supine_patient_match *match; /* [count] these vertices and their matches */
@@ -40,7 +40,7 @@ typedef struct supine_patient_matching {
  * at most `limit` vertices to match. Allocate one measurement per vertex and three per landmark.
  * Call supine_patient_matching_free also after a failure.
  * @retval SUPINE_ERROR_MEMORY, those of supine_physics_equilibrium_solve */
-supine_status supine_patient_matching_create(const supine_lungs *rest, const supine_mesh *state,
+supine_status supine_patient_matching_create(const supine_lungs *fuller, const supine_mesh *state,
                                              const supine_patient_stiffness *stiffness,
                                              size_t limit, size_t landmarks,
                                              supine_patient_matching *matching,

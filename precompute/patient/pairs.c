@@ -253,12 +253,12 @@ supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool
   return SUPINE_OK;
 }
 
-supine_status supine_patient_check_boxes(const supine_mesh *rest, const supine_mesh *state,
+supine_status supine_patient_check_boxes(const supine_mesh *first, const supine_mesh *second,
                                          supine_error *error) {
   double low[2][3];
   double high[2][3];
-  supine_mesh_box(rest, low[0], high[0]);
-  supine_mesh_box(state, low[1], high[1]);
+  supine_mesh_box(first, low[0], high[0]);
+  supine_mesh_box(second, low[1], high[1]);
   for (int k = 0; k < 3; ++k) {
     const double larger = fmax(high[0][k] - low[0][k], high[1][k] - low[1][k]);
     const double overlap = fmin(high[0][k], high[1][k]) - fmax(low[0][k], low[1][k]);

@@ -66,7 +66,7 @@ void supine_patient_map_apply(const supine_patient_affinity *map, const double f
 
 /** Check by the overlap of bounding boxes that two surfaces can be two states of the same lungs.
  * @retval SUPINE_ERROR_MESH  along an axis, they overlap by less than half of the larger box */
-supine_status supine_patient_check_boxes(const supine_mesh *rest, const supine_mesh *state,
+supine_status supine_patient_check_boxes(const supine_mesh *first, const supine_mesh *second,
                                          supine_error *error);
 
 #endif

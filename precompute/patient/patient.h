@@ -3,13 +3,13 @@
  * ([Santhanam2008] IV-B): a formula with nine constants, and a correction that interpolates the
  * residual of the formula.
  *
- * The law gives the displacement u from the fuller of two scanned states to the emptier one. X, Y
- * and Z, each 0 to 1, are coordinates in the bounding box of the lungs in the fuller state (box
- * coordinates of lungs.h). `side` is +1 in the left lung and -1 in the right. c1 to c9 are the
- * constants, and r is the correction, a weighted sum of covariance functions (krige.h):
+ * The law gives the displacement u from the fuller of two scanned states to the emptier one:
  *
  *     u = (1 + c7 (X-1/2) + c8 (Y-1/2) + c9 (Z-1/2)) (side c1 X^c2, -c3 Y^c4, -c5 Z^c6) + r
  *
+ * X, Y and Z are coordinates, 0 to 1, in the bounding box of the lungs in the fuller state. `side`
+ * is +1 in the left lung and -1 in the right. c1 to c9 are the constants. r is the correction, a
+ * weighted sum of covariance functions (krige.h).
  * The first factor is the force (18) of [Santhanam2008], scaled to 1 at the box's centre; the
  * second is the direction (15)-(17). */
 #ifndef SUPINE_PATIENT_H
@@ -21,14 +21,14 @@
 #include "precompute/physics/force.h"
 
 typedef enum supine_patient_law {
-  SUPINE_PATIENT_DEEP = 0, /**< the default displacement law, or one close to it (model.h) */
-  SUPINE_PATIENT_PAPER,    /**< the formula of [Santhanam2008] with nine fitted constants */
+  SUPINE_PATIENT_DEEP = 0, /**< constants at or near those of the default law (model.h) */
+  SUPINE_PATIENT_PAPER,    /**< nine constants fitted to the patient, with a wide prior */
   SUPINE_PATIENT_LAW_COUNT
 } supine_patient_law;
 
 extern const char *const supine_patient_law_names[SUPINE_PATIENT_LAW_COUNT + 1];
 
-/** Motion of the body that is fitted between two scans; the value is its number of unknowns. */
+/** Motion of the body between two scans, to be fitted. The value is its number of unknowns. */
 typedef enum supine_patient_scan_motion {
   SUPINE_PATIENT_STILL = 0,
   SUPINE_PATIENT_TRANSLATION = 3,
@@ -44,7 +44,7 @@ typedef struct supine_patient_frame {
 
 enum {
   SUPINE_PATIENT_CONSTANTS = 9,
-  SUPINE_PATIENT_COLUMNS = 4, /**< number of terms of the force: 1, and one for each coordinate */
+  SUPINE_PATIENT_COLUMNS = 4, /**< the force is a linear function with 4 terms: 1, X, Y, Z */
   SUPINE_PATIENT_CENTRES_MAX = 900
 };
 
@@ -54,19 +54,19 @@ typedef struct supine_patient_power {
   double motion[6]; /**< translation, mm; small rotation about the lungs' centre, rad */
 } supine_patient_power;
 
-/** A term of the kriging correction of a displacement law: a weighted covariance with a point. */
+/** A point that adds weight * its covariance with p to the kriging correction at every point p. */
 typedef struct supine_patient_centre {
   double offset[3]; /**< position relative to the centre of the lungs' bounding box, mm */
   double side;      /**< +1 left lung, -1 right lung */
   double size;      /**< length of the uncorrected displacement at the point, mm */
-  double weight[3]; /**< [axis] weight of the covariance in the correction, 1/mm */
+  double weight[3]; /**< [axis] factor of the covariance, 1/mm */
 } supine_patient_centre;
 
 typedef struct supine_patient {
   supine_patient_law law;
   supine_patient_frame frame;
   supine_patient_power power;
-  size_t centre_count; /**< number of elements of `centre`; 0 if the law has no correction */
+  size_t centre_count; /**< number of points `centre`; 0 if there is no kriging correction */
   supine_patient_centre centre[SUPINE_PATIENT_CENTRES_MAX];
 } supine_patient;
 
@@ -80,9 +80,9 @@ typedef struct supine_patient_place {
                                            bounding box */
 } supine_patient_place;
 
-/** Compute the box coordinates and the force terms of a point. The force terms are not smoothed
- * over the surface; outside the bounding box, they are those of the nearest point of the box.
- * @param point  position in the fuller state, mm
+/** Find the coordinates of a point in the lungs' bounding box, and the variables of the force
+ * there. These are not smoothed; outside the box, they are those of the nearest point of the box.
+ * @param point  position in the fuller of the two scanned states, mm
  * @param side   +1 left lung, -1 right lung, 0 to choose by the side of the midline */
 supine_patient_place supine_patient_find(const supine_patient_frame *frame, const double point[3],
                                          double side);
@@ -106,31 +106,31 @@ supine_patient_place supine_patient_find_vertex(const supine_lungs *lungs, size_
  *   lies between the two scanned states; 0,0,0 counts as 1,1,1 */
 supine_patient_power supine_patient_deep(const double gravity[3], const double path_span[3]);
 
-/** Compute the dimensionless force at a place, [Santhanam2008] (18). */
+/** Compute the dimensionless force on a point of the lungs by equation (18) of [Santhanam2008]. */
 double supine_patient_force_at(const supine_patient_power *power,
                                const supine_patient_place *place);
 
-/** Compute the displacement d, mm, that a dimensionless force causes: the force times the direction
- * of [Santhanam2008] (15)-(17), which is the displacement for a force of 1. */
+/** Compute the displacement d = force * direction, mm. The direction, [Santhanam2008] (15)-(17), is
+ * the displacement for a dimensionless force of 1. */
 void supine_patient_direction(const supine_patient_power *power, const supine_patient_place *place,
                               double force, double d[3]);
 
-/** Compute the displacement u of a place, mm, by the body's rigid motion between the two scans. */
+/** Compute the displacement u of a point, mm, by the body's rigid motion between the two scans. */
 void supine_patient_motion(const supine_patient_power *power, const supine_patient_place *place,
                            double u[3]);
 
-/** Compute the covariances [count], mm^2, of the correction at the point `here` and the
- * corrections at the `count` points `centre`, along one axis. */
+/** Compute the covariances [count], mm^2, of the kriging correction of the displacement, along one
+ * axis, at point `here` with the correction at each of the points `centre`. */
 void supine_patient_covariances(const supine_patient_centre *here, size_t count,
                                 const supine_patient_centre *centre, double *covariance);
 
-/** Compute the displacement u of a place, mm, by the displacement law and its correction, without
- * the rigid motion between the scans.
+/** Compute the displacement u of a point, mm, by the displacement law and its kriging correction,
+ * without the rigid motion between the scans.
  * @param force_factor  multiplies the force of the law */
 void supine_patient_displacement(const supine_patient *patient, const supine_patient_place *place,
                                  double force_factor, double u[3]);
 
-/** Find where a point of the emptier state lies in the fuller state, by fixed-point iteration.
+/** Find where a point of the emptier scanned state lies in the fuller one. Uses fixed-point steps.
  * @param side    +1 left lung, -1 right lung, 0 to choose by the side of the midline
  * @param force_factor  multiplies the force of the displacement law
  * @param at      in: initial guess; out: position in the fuller state, mm
@@ -138,12 +138,12 @@ void supine_patient_displacement(const supine_patient *patient, const supine_pat
 void supine_patient_find_in_fuller(const supine_patient *patient, const double point[3],
                                    double side, double force_factor, double at[3], double u[3]);
 
-/** Move points [count, 3] of the emptier state to their positions in the fuller state, mm. */
+/** Move points [count, 3] of the emptier scanned state to their positions in the fuller one, mm. */
 void supine_patient_points_to_fuller(const supine_patient *patient, size_t count, double *points);
 
 /** Split the force of a displacement law into a part that depends on gravity and a part that is
  * fixed to the body. In the posture of the fitted scans, the sum does not depend on `gain`.
- * @param gain     increase of the force from the uppermost to the lowest point of the lungs
+ * @param gain     increase of the force from the highest to the lowest point; 1 is the mean force
  * @param gravity  unit vector in the posture of the fitted scans */
 supine_force_law supine_patient_force(const supine_patient_power *power, double gain,
                                       const double gravity[3]);

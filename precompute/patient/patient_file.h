@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/** @file Write and read patient.json, which holds a patient's displacement law, the two scanned
- * states and the errors of the fit. Make a physical model from such a law. */
+/** @file Write and read patient.json. It holds a formula for the displacement of a patient's lungs
+ * (displacement law), the two scanned states and the errors of the fit. Make a physical model. */
 #ifndef SUPINE_PATIENT_FILE_H
 #define SUPINE_PATIENT_FILE_H
 
@@ -9,12 +9,12 @@
 
 enum { SUPINE_PATIENT_TEXT = 48, SUPINE_PATIENT_OTHERS_MAX = 8, SUPINE_PATIENT_STATE_TEXT = 160 };
 
-/** Fit to a scan of the same lungs that is not one of the two to which the law was fitted. The gain
- * is the increase of the force from the uppermost to the lowest point. */
+/** Result of a fit to a third scan, besides the two to which the displacement law was fitted. The
+ * gain is the increase of the force from the uppermost to the lowest point of the lungs. */
 typedef struct supine_patient_further {
   supine_state state;
-  bool fits_gain; /**< whether the gain is fitted: only in a posture other than the law's */
-  /** [left, right lung] displacement from full inflation to this scan / displacement to rest. */
+  bool fits_gain; /**< whether the gain is fitted; false in the posture of the two scans */
+  /** [left, right lung] displacement from full inflation to the third scan / that to rest */
   double scale[2];
   double residual;              /**< RMS residual, mm; of a surface, along its normals */
   double residual_without_gain; /**< RMS residual with a gain of 0, mm */
@@ -32,27 +32,28 @@ typedef struct supine_patient_region {
   double expandability; /**< 1 / relative stiffness, > 0 */
   double centre[3];     /**< centre in the reference surface, mm */
   double radius; /**< distance from the centre at which the weight of the region becomes 0, mm */
-  double determined; /**< how far the surfaces determine the expandability: 0 not at all, 1 fully */
+  double determined; /**< how far the surfaces determine the stiffness: 0 not at all, 1 fully */
 } supine_patient_region;
 
-/** Regions of the left lung, then of the right; without regions, the stiffness is uniform. */
+/** Stiffness of regions of the left lung, then of the right. Without regions, it is uniform. */
 typedef struct supine_patient_stiffness {
   size_t count;
   supine_patient_region region[SUPINE_PATIENT_REGIONS_MAX];
 } supine_patient_stiffness;
 
-#define SUPINE_PATIENT_DETERMINED 0.5 /**< regions with a smaller `determined` are undetermined */
+/** Regions with a smaller supine_patient_region.determined count as undetermined. */
+#define SUPINE_PATIENT_DETERMINED 0.5
 
-/** Errors of two fits: [0] with uniform tissue, [1] with a fitted expandability of each region. */
+/** Errors of two fits: [0] with uniform stiffness, [1] with a fitted stiffness of each region. */
 typedef struct supine_patient_expand_report {
   bool tried, kept;
-  double fitted[2];    /**< [fit] RMS distance of the two surfaces along normals, mm */
-  double held_out[2];  /**< [fit] RMS distance along normals at held-out vertices, mm */
-  double undetermined; /**< number of regions whose expandability the surfaces hardly determine */
+  double fitted[2];    /**< [uniform, regional] RMS distance from fitted to scanned surface, mm */
+  double held_out[2];  /**< [uniform, regional] the same at held-out vertices, mm */
+  double undetermined; /**< number of regions whose stiffness the surfaces hardly determine */
 } supine_patient_expand_report;
 
-/** The applied force that a measured displacement implies ([Santhanam2008] IV-B.3), without an
- * assumption about its form. At vertex i,
+/** The force on the lungs, computed from the displacement of each vertex ([Santhanam2008] IV-B.3)
+ * without a formula for the force. At vertex i,
  *
  *     F_i = u_i . d_i / |d_i|^2,    f = A F
  *
@@ -60,7 +61,7 @@ typedef struct supine_patient_expand_report {
  * - d_i is the displacement that a force of 1 causes, [Santhanam2008] (15)-(17).
  * - F_i is the applied force after smoothing over the surface (equilibrium.h).
  * - f is the applied force before smoothing; the matrix A inverts the smoothing.
- * A amplifies roughness of u, so f is averaged over the vertices in each cube of 40 mm (block). */
+ * A amplifies roughness of u, so f is averaged over the vertices in each cube of 40 mm. */
 typedef struct supine_patient_applied {
   double blocks;      /**< number of cubes of 40 mm that contain vertices; 0: not computed */
   double correlation; /**< correlation of the force with the depth along gravity */
@@ -72,7 +73,7 @@ typedef struct supine_patient_applied {
 
 typedef struct supine_patient_surface_report {
   double vertices;      /**< number of matched vertices, or 0 without surfaces */
-  double matched;       /**< share of vertices with a similar normal at the nearest point */
+  double matched;       /**< share of vertices whose nearest point has a similar normal */
   double before, after; /**< RMS distance between the surfaces before and after the fit, mm */
 } supine_patient_surface_report;
 
@@ -136,11 +137,10 @@ supine_status supine_patient_check_place(const supine_patient_record *record,
                                          const supine_lungs *lungs, size_t *state,
                                          supine_error *error);
 
-/** Compute, for the fuller and the emptier state, the share of the displacement from full
- * inflation to rest along x, y and z: gains [state][axis]. The shares are those of the default
- * displacement law (supine_volume_bend), at a point of the path from full inflation to rest that
- * the cube root of the state's volume determines. If this volume is unknown, the fuller state
- * counts as full inflation, and the emptier one as rest. */
+/** Compute gains [state][axis]: the displacement from full inflation to the fuller [0] and to the
+ * emptier [1] scanned state, divided by the displacement to rest. The default displacement law
+ * gives the path of the vertices to rest; the cube root of a state's volume gives the position on
+ * the path. If the volume is unknown, the states count as full inflation and rest. */
 void supine_patient_path(const supine_patient_record *record, double gains[2][3]);
 
 /** Scale the volumes at rest to those of the patient. They stay unchanged unless one scanned
@@ -159,50 +159,49 @@ supine_scan supine_patient_scan(const supine_patient_record *record, size_t stat
  * record.
  *
  * The fit repeats three steps until the vertices move by less than 0.002 mm (RMS):
- * - Displace vertices of the reference surface by the present law, and find the nearest points of
- *   the other surface.
+ * - Displace vertices of `fuller` by the present law, and find the nearest points of `emptier`.
  * - Keep matches whose normals agree to within 60 degrees. Use only the distance along the normal,
  *   so that surfaces may slide. Weight it by Tukey's biweight.
  * - Fit the law to these distances.
  * A small distance between the surfaces does not prove the displacement of points, because sliding
  * along the surface is not observed.
- * @param rest           the reference surface, in the fuller state
- * @param state          the same lungs in the emptier state, mm, in the same frame
+ * @param fuller         the lungs in the state with more air
+ * @param emptier        surface of the same lungs with less air, mm, in the same coordinate frame
  * @param landmarks      pairs to fit as well; ignored if `expandability` is true
- * @param expandability  also fit the expandability of regions (supine_patient_expand), with
+ * @param expandability  also fit the stiffness of lung regions (supine_patient_expand), with
  *   SUPINE_PATIENT_PAPER and without a kriging correction
  * @retval SUPINE_ERROR_MESH  no overlap (frames, units or sides differ), equal surfaces, or too few
  *   matches
  * @retval those of supine_patient_fit */
-supine_status supine_patient_fit_surface(const supine_lungs *rest, const supine_mesh *state,
+supine_status supine_patient_fit_surface(const supine_lungs *fuller, const supine_mesh *emptier,
                                          const supine_patient_pairs *landmarks,
                                          const supine_patient_fit_options *options,
                                          bool expandability, supine_patient_record *record,
                                          supine_error *error);
 
-/** Fit the gain g, the increase of the force from the uppermost to the lowest point, to a further
- * scan of the same lungs. Point p moves from full inflation to this scan by
+/** Fit the increase of the force from the uppermost to the lowest point of the lungs (gain) to a
+ * third scan, besides the two to which the displacement law was fitted. The displacement of a point
+ * from full inflation to the third scan is modelled as
  *
- *     s (1 + g (h'(p) - h(p)) / f(p)) u(p) + t
+ *     s (1 + g (h' - h) / f) u + t
  *
- * - u is the displacement from full inflation to rest by the patient's displacement law.
- * - f is the force of this law.
- * - h and h' are the depths along gravity, 0 to 1, in the posture of the law and of this scan.
- * - s is a factor for each lung, and t is the translation between the scans.
- * On a surface, f, h and h' are smoothed (equilibrium.h), and matches are found anew before each
- * fit. The unknowns s, g and t are fitted by least squares.
- * @param rest     the surface of the fuller state; NULL if `surface` is NULL
- * @param pairs    points in the fuller state and in the further scan; NULL if `surface` is given
+ * - u is the displacement of the point from full inflation to rest by the displacement law.
+ * - f is the force on the point by this law.
+ * - h and h' are its depths along gravity, 0 to 1, in the posture of the two and the third scan.
+ * - g is the gain, s a factor for each lung, and t a translation; all three are fitted.
+ * On a surface, f, h and h' are smoothed (equilibrium.h), and every fit starts from new matches.
+ * @param fuller   surface in the fuller of the two scans; NULL if `surface` is NULL
+ * @param pairs    points in the fuller and in the third scan; NULL if `surface` is given
  * @param scans_moved  whether to fit t; otherwise it is 0
- * @param further  in: the state of the further scan; out: the fit
+ * @param further  in: the state of the third scan; out: the fit
  * @retval SUPINE_ERROR_MESH    too few matches
  * @retval SUPINE_ERROR_MEMORY, those of supine_physics_equilibrium_solve */
-supine_status supine_patient_gain_fit(const supine_patient_record *record, const supine_lungs *rest,
-                                      const supine_patient_pairs *pairs, const supine_mesh *surface,
-                                      bool scans_moved, supine_patient_further *further,
-                                      supine_error *error);
+supine_status supine_patient_gain_fit(const supine_patient_record *record,
+                                      const supine_lungs *fuller, const supine_patient_pairs *pairs,
+                                      const supine_mesh *surface, bool scans_moved,
+                                      supine_patient_further *further, supine_error *error);
 
-/** Set record->force.gain to the mean of the gains fitted to further scans, weighted by 1 /
+/** Set record->force.gain to the mean of the gains in record->further, weighted by 1 /
  * gain_error^2. If the mean is not between 0.01 and 2, keep the previous gain. */
 void supine_patient_gain_set(supine_patient_record *record);
 

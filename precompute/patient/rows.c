@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Make measurements from landmarks, group them by position, and predict them. */
+/* Make measurements from landmarks, group measurements by position, and predict their values. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -9,13 +9,12 @@
 
 #include "sh/base/vec3.h"
 
-/* Side of the cubes of space whose measurements are held out together, mm. Landmarks a third of
- * this distance apart have displacements that differ by only a few mm, so that holding out single
+/* Side of the cubes whose measurements are held out together, mm. Landmarks a third of this
+ * distance apart have displacements that differ by only a few mm, so that holding out single
  * landmarks would make the error seem too small. */
 static const double block_side = 40.0;
 
-/* Standard deviation of a landmark's measured displacement along each axis, mm. */
-static const double landmark_noise = 2.0;
+static const double landmark_noise = 2.0; /* standard deviation of a displacement, mm */
 
 void supine_patient_rows_of_pairs(const supine_patient_frame *frame,
                                   const supine_patient_pairs *pairs, supine_patient_row *rows) {
@@ -32,10 +31,10 @@ void supine_patient_rows_of_pairs(const supine_patient_frame *frame,
 
 size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patient_row *rows,
                                  size_t count, unsigned long seed) {
-  enum { CELLS = 64 }; /* number of cubes of space along each axis */
+  enum { CELLS = 64 }; /* number of cubes along each axis */
   size_t blocks = 0;
   double origin[3] = {0.0};
-  /* [cube of space] 1 plus the index of its block, or 0 if it holds no measurement so far. */
+  /* [cube] index of the cube in the list of cubes with measurements, plus 1; else 0 */
   size_t *number = calloc((size_t)CELLS * CELLS * CELLS, sizeof *number);
   gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
   const bool able = number != NULL && random != NULL;
@@ -63,7 +62,7 @@ size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patie
 double supine_patient_power_design(const supine_patient_power *law, const supine_patient_row *row,
                                    double x[SUPINE_PATIENT_TERMS]) {
   const double force = supine_patient_force_at(law, &row->place);
-  double along[3]; /* [axis] displacement along row->axis for force 1 and c1, c3 or c5 of 1 mm */
+  double along[3]; /* [x, y, z] share in the measurement for force 1 and c1, c3 or c5 of 1 mm */
   double motion[3];
   double turned[3];
   double unit_force = 0.0; /* displacement along row->axis for a force of 1, mm */

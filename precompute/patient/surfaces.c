@@ -8,15 +8,14 @@
 
 enum {
   VERTICES_MAX = 600,  /* largest number of matched vertices */
-  EXPANDED_MAX = 2000, /* largest number of matched vertices if expandability is fitted */
+  REGIONAL_MAX = 2000, /* the same, if the stiffness of lung regions is fitted */
   ROUNDS_MAX = 60
 };
 
-static const double converged = 2e-3; /* RMS movement of the vertices, mm, that ends the fit */
-/* RMS movement, mm, that ends the fit of a scale factor */
-static const double size_converged = 0.5;
-static const double scale_least = 1.0; /* lower bound on the robust scale of the distances, mm */
-static const double same_state = 0.02; /* surfaces closer than this (RMS, mm) are equal */
+static const double converged = 2e-3;     /* RMS movement of the vertices, mm, that ends the fit */
+static const double size_converged = 0.5; /* movement, mm, that ends the fit of the size only */
+static const double scale_least = 1.0;    /* lower bound on the distances' robust deviation, mm */
+static const double same_state = 0.02;    /* surfaces closer than this (RMS, mm) are equal */
 
 /* Set the measurement of each vertex to a first guess: its displacement along one axis by the
  * affine map from the bounding box of the fuller surface to that of the emptier one. */
@@ -36,7 +35,7 @@ static void start_rows(supine_patient_matching *m) {
   }
 }
 
-/* Fit the displacement law or, if `shaped` is false, only a scale factor of the default law. */
+/* Fit the displacement law or, if `shaped` is false, only one factor on the default law. */
 static supine_status refit(const supine_patient_matching *m, bool shaped,
                            supine_patient_fit_options *options, supine_patient *patient,
                            supine_error *error) {
@@ -128,7 +127,7 @@ static supine_status run(supine_patient_matching *m, const supine_patient_fit_op
   return status == SUPINE_OK ? measure(m, wanted, record, error) : status;
 }
 
-supine_status supine_patient_fit_surface(const supine_lungs *rest, const supine_mesh *state,
+supine_status supine_patient_fit_surface(const supine_lungs *fuller, const supine_mesh *emptier,
                                          const supine_patient_pairs *landmarks,
                                          const supine_patient_fit_options *options,
                                          bool expandability, supine_patient_record *record,
@@ -136,15 +135,15 @@ supine_status supine_patient_fit_surface(const supine_lungs *rest, const supine_
   const size_t landmark_count = expandability ? 0 : landmarks->count;
   supine_patient_matching m = {0};
   supine_patient_fit_options wanted = *options;
-  if (expandability) { /* fit expandabilities instead of a correction */
+  if (expandability) { /* fit the stiffness of regions instead of a kriging correction */
     wanted.law = SUPINE_PATIENT_PAPER;
     wanted.uncorrected = true;
   }
   record->stiffness.count = 0;
-  supine_status status = supine_patient_check_boxes(&rest->mesh, state, error);
+  supine_status status = supine_patient_check_boxes(&fuller->mesh, emptier, error);
   if (status == SUPINE_OK) {
-    status = supine_patient_matching_create(rest, state, &record->stiffness,
-                                            expandability ? EXPANDED_MAX : VERTICES_MAX,
+    status = supine_patient_matching_create(fuller, emptier, &record->stiffness,
+                                            expandability ? REGIONAL_MAX : VERTICES_MAX,
                                             landmark_count, &m, error);
   }
   if (status == SUPINE_OK && landmark_count > 0) {
