@@ -375,7 +375,8 @@ const supine_command supine_command_stream = {
     .about = "Receives the pose of a tracked patient by OpenIGTLink (headers of version 1 and 2) "
              "and sends the lungs in that pose to every connected peer. A pose is a TRANSFORM, "
              "QTDATA or POSITION message, or an NDARRAY of three numbers, the direction of gravity "
-             "that a tilt sensor measures. Only the newest pose counts: a slow peer misses frames "
+             "in the marker's axes, as a tilt sensor measures it. Only the newest pose counts: a "
+             "slow peer misses frames "
              "without delaying the others. At the end the command prints the time from receiving a "
              "pose to sending its frame.",
     .options = table,
