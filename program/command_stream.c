@@ -304,7 +304,7 @@ static supine_status stream(const supine_basis *basis, const char *path, const r
     status = supine_output_open(wanted->record, &record, error);
     options.record = record.file;
     if (status == SUPINE_OK) {
-      (void)fputs("seconds,gravity_x,gravity_y,gravity_z\n", record.file);
+      supine_stream_poses_begin(record.file);
     }
   }
   if (status == SUPINE_OK) {

@@ -4,7 +4,6 @@
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
 #include "precompute/projection/projection.h"
-#include "sh/base/vec3.h"
 #include "sh/grid.h"
 #include "test.h"
 #include <supine/runtime.h>
@@ -290,9 +289,7 @@ static void check_stated_error(const supine_lungs *lungs, size_t band, size_t mo
   double error_mm2[HELD_OUT];
   model.force.soften = soften;
   model.reach = soften != 0.0 ? 10.0 : 0.0;
-  for (size_t d = 0; d < HELD_OUT; ++d) {
-    supine_spiral((double)d, HELD_OUT, 0.3, g + 3 * d);
-  }
+  supine_accuracy_held_out_directions(HELD_OUT, g);
   true_errors(lungs, &model, basis, HELD_OUT, g, report.accuracy.volume, error2, field2, error_mm2);
   const double relative = sqrt(mean_of(HELD_OUT, error2).mean / mean_of(HELD_OUT, field2).mean);
   const double rounding = soften == 0.0 ? 1e-4 : 1e-3;

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Test the projection onto harmonics against full solves and plain quadrature. Test the modes
  * against a dense singular value decomposition. */
-#include "sh/base/vec3.h"
 #include "test.h"
 
 #include <gsl/gsl_linalg.h>
@@ -118,9 +117,7 @@ static void check_superposition(const supine_lungs *lungs, const supine_model *m
   double missed = 0.0;
   double all = 0.0;
   assert_int_equal(supine_projection_create(lungs, model, 3, &made, NULL), SUPINE_OK);
-  for (size_t d = 0; d < COUNT; ++d) {
-    supine_spiral((double)d, COUNT, 0.3, g + 3 * d);
-  }
+  supine_accuracy_held_out_directions(COUNT, g);
   double *weights = weights_at(lungs, model, made.span, COUNT, g);
   for (size_t d = 0; d < COUNT; ++d) {
     supine_solution solution = {0};

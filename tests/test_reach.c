@@ -173,8 +173,8 @@ TEST(test_reach_constant_force_gives_constant_catch) {
 /* Make a sphere of radius 100 mm about the origin, whose vertices are shifted within the surface by
  * up to about `irregularity` times the length of an edge. */
 static supine_mesh sphere(size_t frequency, double irregularity) {
-  supine_mesh mesh = {.vertex_count = 10 * frequency * frequency + 2,
-                      .triangle_count = 20 * frequency * frequency};
+  supine_mesh mesh = {.vertex_count = supine_phantom_geodesic_vertex_count(frequency),
+                      .triangle_count = supine_phantom_geodesic_triangle_count(frequency)};
   uint64_t seed = 99;
   mesh.vertices = calloc(3 * mesh.vertex_count, sizeof *mesh.vertices);
   mesh.triangles = calloc(3 * mesh.triangle_count, sizeof *mesh.triangles);
@@ -276,7 +276,7 @@ TEST(test_reach_finer_mesh_spreads_same_distance) {
     with[f] = spread(frequencies[f], 12.0);
     without[f] = spread(frequencies[f], 0.0);
     printf("%zu vertices: a unit force spreads %.2f mm with a reach of 12 mm, %.2f mm without\n",
-           10 * frequencies[f] * frequencies[f] + 2, with[f], without[f]);
+           supine_phantom_geodesic_vertex_count(frequencies[f]), with[f], without[f]);
     assert_true(fabs(with[f] - 24.0) < 0.1 * 24.0);
   }
   assert_true(fabs(with[2] / with[0] - 1.0) < 0.05);

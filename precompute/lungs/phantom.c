@@ -20,6 +20,14 @@ static const unsigned char faces[FACES][3] = {
     {3, 8, 9},   {4, 9, 5},  {2, 4, 11}, {6, 2, 10}, {8, 6, 7},   {9, 8, 1},
 };
 
+size_t supine_phantom_geodesic_vertex_count(size_t frequency) {
+  return 10 * frequency * frequency + 2;
+}
+
+size_t supine_phantom_geodesic_triangle_count(size_t frequency) {
+  return 20 * frequency * frequency;
+}
+
 /* Compute a corner of the icosahedron: corners are cyclic permutations of (+-1, +-golden, 0). */
 static void corner(size_t index, double p[3]) {
   const double golden = 0.5 * (1.0 + sqrt(5.0));
@@ -196,8 +204,8 @@ supine_status supine_phantom_create(size_t vertices, double millilitres, supine_
   }
   const double exact = sqrt(((double)vertices / 2.0 - 2.0) / 10.0);
   const size_t frequency = (size_t)fmax(2.0, floor(exact + 0.5));
-  const size_t count = 10 * frequency * frequency + 2;
-  const size_t triangles = 20 * frequency * frequency;
+  const size_t count = supine_phantom_geodesic_vertex_count(frequency);
+  const size_t triangles = supine_phantom_geodesic_triangle_count(frequency);
   supine_mesh made = {.vertex_count = 2 * count, .triangle_count = 2 * triangles};
   made.vertices = malloc(3 * made.vertex_count * sizeof *made.vertices);
   made.triangles = malloc(3 * made.triangle_count * sizeof *made.triangles);

@@ -21,9 +21,13 @@ enum { SUPINE_PHANTOM_VERTICES_MIN = 84, SUPINE_PHANTOM_VERTICES_MAX = 20000000 
 supine_status supine_phantom_create(size_t vertices, double millilitres, supine_mesh *mesh,
                                     supine_error *error);
 
-/** Make a geodesic sphere of frequency f >= 1, an icosahedron with each face cut into f^2
- * triangles: unit vertices [10 f^2 + 2, 3], and outward triangles [20 f^2, 3] whose vertices are
- * numbered from `base`. */
+/** Return the number of vertices, 10 f^2 + 2, or of triangles, 20 f^2, of a geodesic sphere. It is
+ * an icosahedron with each face cut into f^2 triangles; f is the frequency. */
+size_t supine_phantom_geodesic_vertex_count(size_t frequency);
+size_t supine_phantom_geodesic_triangle_count(size_t frequency);
+
+/** Make a geodesic sphere of frequency f >= 1: unit vertices [10 f^2 + 2, 3], and outward triangles
+ * [20 f^2, 3] whose vertices are numbered from `base`. */
 void supine_phantom_geodesic(size_t frequency, uint32_t base, double *vertices,
                              uint32_t *triangles);
 

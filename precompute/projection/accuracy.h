@@ -51,6 +51,10 @@ supine_status supine_accuracy_truth_create(const supine_lungs *lungs, const supi
                                            supine_truth *truth, supine_error *error);
 void supine_accuracy_truth_free(supine_truth *truth);
 
+/** Compute `count` unit vectors along a golden-angle spiral that avoids the nodes of the grid from
+ * which harmonics are computed, into directions [count, 3]. */
+void supine_accuracy_held_out_directions(size_t count, double *directions);
+
 /** Measure the error of the displacement computed from the modes of `compression`, against the
  * exact solutions `truth`. Percentiles come from a histogram whose bins are at most 0.4 % wide.
  * @param directions  [N, 3] displacement of each vertex per unit force, mm

@@ -8,6 +8,13 @@
 
 #include "precompute/projection/accuracy.h"
 
+void supine_accuracy_held_out_directions(size_t count, double *directions) {
+  static const double first_longitude = 0.3; /* rad; off the nodes of the harmonics' grid */
+  for (size_t i = 0; i < count; ++i) {
+    supine_spiral((double)i, (double)count, first_longitude, directions + 3 * i);
+  }
+}
+
 void supine_accuracy_truth_free(supine_truth *truth) {
   free(truth->directions);
   free(truth->functions);
@@ -68,10 +75,7 @@ supine_status supine_accuracy_truth_create(const supine_lungs *lungs, const supi
   supine_status status = SUPINE_ERROR_MEMORY;
   if (range != NULL && truth->directions != NULL && truth->functions != NULL &&
       truth->cubic != NULL) {
-    static const double first_longitude = 0.3; /* rad; off the nodes of the harmonics' grid */
-    for (size_t i = 0; i < count; ++i) {
-      supine_spiral((double)i, (double)count, first_longitude, truth->directions + 3 * i);
-    }
+    supine_accuracy_held_out_directions(count, truth->directions);
     status = supine_physics_height_range(lungs, model->force.pair, count, truth->directions, range,
                                          range + count);
   }

@@ -73,6 +73,10 @@ void supine_stream_poses_free(supine_stream_poses *poses) {
   *poses = (supine_stream_poses){0};
 }
 
+void supine_stream_poses_begin(FILE *file) {
+  (void)fputs("seconds,gravity_x,gravity_y,gravity_z\n", file);
+}
+
 void supine_stream_poses_add(FILE *file, const supine_stream_pose *pose) {
   (void)fprintf(file, "%.17g,%.17g,%.17g,%.17g\n", pose->seconds, pose->gravity[0],
                 pose->gravity[1], pose->gravity[2]);

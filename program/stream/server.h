@@ -42,6 +42,8 @@ supine_status supine_stream_poses_load(const char *path, supine_stream_poses *po
                                        supine_error *error);
 void supine_stream_poses_free(supine_stream_poses *poses);
 
+/** Write the first line of a file of recorded poses, the names of its columns. */
+void supine_stream_poses_begin(FILE *file);
 /** Write a pose as one line, with enough digits to read the same numbers back. */
 void supine_stream_poses_add(FILE *file, const supine_stream_pose *pose);
 

@@ -662,7 +662,7 @@ TEST(test_server_replay_recorded_poses_same) {
   stage *s = stage_create();
   s->options.replay = &kept;
   s->options.record = record;
-  (void)fputs("seconds,gravity_x,gravity_y,gravity_z\n", record);
+  supine_stream_poses_begin(record);
   const int peer = connect_peer(stage_run(s)); /* the server replays from the first connection on */
   supine_stream_header header;
   unsigned char body[4096];
