@@ -66,8 +66,7 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, pv), .file = SUPINE_FILE_IN},
     {"rest-pressure", 0, "P",
      "pressure at the end of an exhalation, in cmH2O; with --pv, of the kind in that file (airway "
-     "or "
-     "transpulmonary), otherwise transpulmonary; default 5",
+     "or transpulmonary), otherwise transpulmonary; default 5",
      SUPINE_FILLS(request, breath.rest_pressure), .wants = "a number of cmH2O", .more = true},
     {"course", 0, "NAME",
      "cosine: pressure follows a cosine; ramp: pressure is linear in time; flow: inflow and "

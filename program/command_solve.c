@@ -37,8 +37,8 @@ static const supine_option table[] = {
     {"pitcher-catcher", 0, NULL,
      "solve by the iteration of Santhanam 2008, which always distributes the force of the node "
      "with the largest remaining force. Also prints the share of the force not yet balanced, and "
-     "the "
-     "largest difference from the direct solution. Slow, so for small meshes. Needs --law paper",
+     "the largest difference from the direct solution. Slow, so for small meshes. Needs --law "
+     "paper",
      SUPINE_FILLS(request, pitcher_catcher), .more = true},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.table = supine_command_model_options, SUPINE_FILLS(request, model)},

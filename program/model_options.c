@@ -177,8 +177,7 @@ const supine_option supine_command_model_options[] = {
     {"constants", 0, "C1,...,C6",
      "constants of the displacement for a unit force, equations (15)-(17) of Santhanam 2008: "
      "C1 X^C2 outwards, C3 Y^C4 to the front and C5 Z^C6 to the feet, in mm. Those of deep are "
-     "fitted to landmarks "
-     "in ten full breaths (DIR-Lab COPDgene). Those of paper are fitted to "
+     "fitted to landmarks in ten full breaths (DIR-Lab COPDgene). Those of paper are fitted to "
      "landmarks in ten 4-D CTs (DIR-Lab), as the original ones are lost" SUPINE_LAWS(LAW_CONSTANTS),
      FILLS(choice.model.direction.c), .wants = "six numbers, C1,C2,C3,C4,C5,C6", .more = true},
     {"reach", 0, "MM",

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Test that normals equal the sum of modes that defines them, computed in double precision. */
+/* Test that normals equal the weighted sum of their modes, computed in double precision. */
 #include "test.h"
 
 #include <supine/runtime.h>

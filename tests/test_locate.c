@@ -78,7 +78,7 @@ static void observe(world *w, const supine_state *state, bool turned) {
   float xyz[3 * VERTICES];
   deform(w->basis, state, xyz);
   for (size_t j = 0; j < SEEN; ++j) {
-    /* The offset 19 makes the sample include a tip of each lung. */
+    /* With the offset 19, the sample includes a tip of each lung. */
     const size_t at = j * VERTICES / SEEN + (j % 2) * 19;
     const double x[3] = {(double)xyz[3 * at], (double)xyz[3 * at + 1], (double)xyz[3 * at + 2]};
     w->seen[j] = (supine_observation){.vertex = at, .noise = 1};

@@ -228,8 +228,7 @@ static supine_patient_score baseline_of(const study *s) {
 }
 
 /* Compute the RMS error of each predictor, mm, from the sums of squared residuals. Return by how
- * many percent the kriging-corrected law reduces the mean square error of the baseline predictor.
- */
+ * many percent the kriging-corrected law reduces the mean square error of the baseline. */
 static double find_rms(const study *s, const squares *sums, double score[SCORES]) {
   for (size_t k = 0; k < SCORES; ++k) {
     score[k] = sqrt(sums->residual[k] * (double)s->components / sums->weight);

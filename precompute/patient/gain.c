@@ -150,8 +150,7 @@ static void find_motion(work *w, const double gravity[3]) {
   }
 }
 
-/* Displace the vertices by the model in struct work, and match them to the surface in w->matching.
- */
+/* Displace the vertices by the model in struct work. Match them to the surface of w->matching. */
 static supine_status match_surface(work *w, supine_error *error) {
   supine_patient_matching *m = &w->matching;
   for (size_t i = 0; i < m->count; ++i) {

@@ -32,8 +32,7 @@ typedef struct supine_patient_row {
   const double *response;
 } supine_patient_row;
 
-/* Write three measurements for each pair of points, its displacement along x, y and z, into rows.
- */
+/* Write into rows, for each pair of points, its displacement along x, y and z. */
 void supine_patient_rows_of_pairs(const supine_patient_frame *frame,
                                   const supine_patient_pairs *pairs, supine_patient_row *rows);
 

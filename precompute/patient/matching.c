@@ -16,8 +16,8 @@
 enum { GRAIN = 64 };
 
 static const double compatible = 0.5; /* smallest cosine between the two normals of a match */
-static const double biweight =
-    4.685; /* cutoff of Tukey's biweight, in robust standard deviations */
+/* Cutoff of Tukey's biweight, in robust standard deviations. */
+static const double biweight = 4.685;
 static const double surface_noise = 0.5; /* standard deviation of a surface's position, mm */
 static const double scale_least = 0.02;  /* lower bound on the robust standard deviation, mm */
 static const double matched_least = 0.3; /* a smaller share of matched vertices is an error */

@@ -39,8 +39,8 @@ typedef struct ascent {
   double *previous_residual; /* [size] `map` minus `estimate` in the previous iteration, mm */
   double rms;                /* RMS length of `map` minus `estimate` over all vertices, mm */
   double *map_changes;       /* [DEPTH, size] changes of `map` in the last DEPTH iterations, mm */
-  double *residual_changes;  /* [DEPTH, size] changes of the residual map - estimate in the last
-                                DEPTH iterations, mm */
+  double *residual_changes;  /* [DEPTH, size] changes of the residual (`map` minus the vertices of
+                                `estimate`) in the last DEPTH iterations, mm */
   size_t stored;             /* number of changes stored since the acceleration last restarted */
   size_t history; /* number of stored changes that the acceleration uses, at most DEPTH */
 } ascent;

@@ -48,11 +48,10 @@ static const char *const postures[] = {"supine",  "prone",    "left", "right",
 
 const supine_option supine_options_orientation[] = {
     {"posture", 0, "POSTURE",
-     "supine, prone, left or right (lying on that side), upright, inverted (head down), or a DICOM "
-     "patient position: HFS, FFS, HFP, FFP, HFDL, FFDL, HFDR, FFDR. +DEGREES turns gravity about "
-     "the left-right axis, from the back towards the head, and -DEGREES the other way: supine+15 "
-     "and "
-     "prone-15 lower the head (Trendelenburg)",
+     "supine, prone, left or right (lying on that side), upright, inverted (head down), or a "
+     "DICOM patient position: HFS, FFS, HFP, FFP, HFDL, FFDL, HFDR, FFDR. +DEGREES turns gravity "
+     "about the left-right axis, from the back towards the head, and -DEGREES the other way: "
+     "supine+15 and prone-15 lower the head (Trendelenburg)",
      GRAVITY, .read = read_posture, .choices = postures},
     {"gravity", 0, "X,Y,Z",
      "direction of gravity in body axes, instead of a posture: x to the left, y to the back, z to "
@@ -132,11 +131,9 @@ const supine_option supine_options_volume[] = {
 #define FROM(standard)                                                                             \
   {                                                                                                \
     "from", 0, "STATE",                                                                            \
-        "state that displacements are measured from: POSTURE, VOLUME or POSTURE:VOLUME. POSTURE "  \
-        "is "                                                                                      \
-        "a name such as prone; VOLUME is rest (FRC), full (TLC) or scan, each alone or with +ML "  \
-        "or "                                                                                      \
-        "-ML, or an absolute volume such as 2600mL; default " standard,                            \
+        "state that displacements are measured from: POSTURE, VOLUME or POSTURE:VOLUME. "          \
+        "POSTURE is a name such as prone; VOLUME is rest (FRC), full (TLC) or scan, each alone "   \
+        "or with +ML or -ML, or an absolute volume such as 2600mL; default " standard,             \
         SUPINE_FILLS(supine_from, state), SUPINE_SAYS_GIVEN(supine_from, given), .read = read_from \
   }
 const supine_option supine_options_from[] = {FROM("supine:rest, or the scan if rest is unknown"),

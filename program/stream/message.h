@@ -58,8 +58,7 @@ typedef struct supine_stream_message {
   supine_stream_kind kind;
   double number[12];
   char text[64];
-  const unsigned char
-      *points; /**< [point_count] points as received, in the buffer of the message's body */
+  const unsigned char *points; /**< [point_count] points in the body of the message */
   size_t point_count;
 } supine_stream_message;
 

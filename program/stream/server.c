@@ -15,8 +15,7 @@
 #include "sh/base/clock.h"
 
 static const double frame_interval = 15e-3; /* time between frames while no messages arrive, s */
-static const double send_interval =
-    20e-3; /* time between checks whether a peer can take a frame, s */
+static const double send_interval = 20e-3;  /* time between checks of the peers that wait, s */
 static const double connect_interval = 1.0; /* time between attempts to connect to a peer, s */
 static const double stop_interval = 0.1;    /* time between calls of options->stop, s */
 

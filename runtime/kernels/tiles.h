@@ -47,8 +47,7 @@ static inline bool supine_tiles_compact(supine_storage storage) {
   return storage != SUPINE_STORAGE_EXACT;
 }
 
-/** Return how many of the 32-bit words that hold the coefficients of a vertex hold three of them.
- */
+/** Return how many of the 32-bit words with the coefficients of a vertex hold three of them. */
 static inline size_t supine_tiles_thirds(supine_storage storage, size_t modes) {
   return storage == SUPINE_STORAGE_MIXED ? modes / 8 : 0;
 }

@@ -31,13 +31,12 @@
 
 enum { PEOPLE = 5, POINTS_MAX = 128, DRAWN = 10, DRAWS = 40, STEPS = 4 };
 
-static const double spread =
-    0.3; /* prior standard deviation / mean of the factor on a person's displacements */
+/* Relative prior standard deviation of the factor on a person's displacements. */
+static const double spread = 0.3;
 
 typedef struct person {
   size_t count; /* number of landmarks */
-  /* [count, 3] mm: positions, true displacements, and displacements by the law with a factor of 1
-   */
+  /* [count, 3] positions, true displacements, and those by the law with a factor of 1, mm */
   double from[3 * POINTS_MAX], moved[3 * POINTS_MAX], law[3 * POINTS_MAX];
   double centre_distance[POINTS_MAX]; /* [count] squared distance from the centre of a unit box */
   size_t lung[POINTS_MAX];
@@ -161,7 +160,7 @@ typedef struct sums {
   double variance;    /* sum of the variances predicted by kriging, mm^2 */
   double points;      /* number of unobserved points */
   double inside_band; /* number of unobserved points within the predicted 95 % interval */
-  double left_out;    /* number of observed points that the others predict with a 3 sigma error */
+  double left_out;    /* observed points over 3 expected errors from their prediction */
   double observed;    /* number of observed points */
 } sums;
 

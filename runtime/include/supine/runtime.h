@@ -87,10 +87,10 @@ typedef struct supine_basis_info {
   supine_storage storage;  /**< the storage in use, never AUTO */
   supine_simd simd;        /**< the instruction set in use, never AUTO */
   double bytes_per_vertex; /**< bytes that an evaluation reads for each vertex */
-  /** Bound on the position error of any vertex from storage and rounding, mm: the largest
+  /** Largest position error of any vertex from storage and rounding, mm: the largest
    * supine_basis_error for 26 directions of gravity, towards the faces, edges and corners of a
-   * cube. The lungs hold 500 mL more than the reference surface or, if the surface is open, move
-   * by at most 20 mm. */
+   * cube. The lungs hold 500 mL more than the reference surface or, if the surface is open, move by
+   * at most 20 mm. */
   double storage_error;
   const char *const *lung_names; /**< [lung_count] such as "left", or an index such as "0" */
   const float *bounds;   /**< [lung_count, 2, 3] lowest and highest corner of each lung's box, mm */
@@ -121,8 +121,7 @@ typedef struct supine_basis_info {
   bool has_full;                  /**< the reference surface is at full inflation */
   bool is_fields;     /**< made from another simulator's displacements; factor 1 reproduces them */
   size_t volume_axes; /**< factors of displacement per lung: 3, or 1 in files of versions 1 and 2 */
-  double bend[3];     /**< constant of the path along x, y and z (supine_volume_bend); 0 if the
-                         displacement is proportional along the axis */
+  double bend[3];     /**< constant of the path along each axis (supine_volume_bend) */
 } supine_basis_info;
 
 typedef struct supine_pose {
