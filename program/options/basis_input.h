@@ -46,8 +46,8 @@ supine_status supine_options_basis_mesh(const supine_basis *basis, supine_mesh *
   "3-D RMS; half of all points lie within 0.9 times this distance of their true position, 95 % "   \
   "within 1.8 times"
 #define SUPINE_EXPECTED_SUPPORT                                                                    \
-  "The expected error was measured on full breaths in one posture; for a change of posture it is " \
-  "an extrapolation."
+  "The expected error was measured on breaths in one posture; for a change of posture it is an "   \
+  "extrapolation. 'supine info' lists its terms."
 
 /* Expected errors of the displacements from one state to another. Initialise with zeros, and
  * release with supine_options_expected_free. */
