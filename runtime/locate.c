@@ -263,13 +263,15 @@ static supine_status change_volume(workspace *s, double ml, supine_error *error)
   supine_status status = SUPINE_OK;
   for (int halving = 0; halving < HALVINGS_MAX; ++halving) {
     s->found->state.volume.ml = before + ml;
-    status = evaluate(s, error);
+    status = evaluate(s, NULL);
     if (status == SUPINE_OK) {
       return status;
     }
     ml /= 2;
   }
-  return status;
+  return supine_error_set(error, status,
+                          "the points need a volume that the lungs cannot hold: check their names, "
+                          "unit and axes, or give --volume");
 }
 
 /* Find the unknown volume and rotation by Gauss-Newton steps. */
