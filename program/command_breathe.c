@@ -6,8 +6,9 @@
 
 #include <gsl/gsl_statistics.h>
 
+#include <supine/safetensors.h>
+
 #include "mesh/mesh.h"
-#include "precompute/writer.h"
 #include "sh/base/clock.h"
 #include "sh/base/text.h"
 
@@ -301,9 +302,8 @@ static supine_status write_tensors(playing *p, const char *made_by, supine_error
                                       {"made_by", made_by}};
   const supine_status status = play_frames(p, NULL, error);
   return status == SUPINE_OK
-             ? supine_writer_safetensors_write(p->wanted->path, tensors,
-                                               sizeof tensors / sizeof *tensors, metadata,
-                                               sizeof metadata / sizeof *metadata, error)
+             ? supine_safetensors_write(p->wanted->path, tensors, sizeof tensors / sizeof *tensors,
+                                        metadata, sizeof metadata / sizeof *metadata, error)
              : status;
 }
 
