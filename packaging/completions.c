@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sh/base/output.h"
+#include "base/output.h"
 
 #include "program/options/command.h"
 

@@ -10,10 +10,10 @@
 #include <supine/safetensors.h>
 #include <supine/sh.h>
 
+#include "base/text.h"
 #include "precompute/basis_file.h"
 #include "precompute/lungs/disease.h"
 #include "precompute/normals/normal_modes.h"
-#include "sh/base/text.h"
 
 enum { ENTRIES_MAX = 64 };
 

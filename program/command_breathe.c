@@ -8,9 +8,9 @@
 
 #include <supine/safetensors.h>
 
+#include "base/clock.h"
+#include "base/text.h"
 #include "mesh/mesh.h"
-#include "sh/base/clock.h"
-#include "sh/base/text.h"
 
 #include "program/options/basis_input.h"
 #include "program/options/breath_turn.h"

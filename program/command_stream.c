@@ -4,17 +4,17 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "program/export/export.h"
-#include "program/inside.h"
+#include "base/output.h"
+#include "base/vec3.h"
 #include "program/options/basis_input.h"
 #include "program/options/command.h"
+#include "program/options/inside.h"
 #include "program/options/pv.h"
 #include "program/options/state_options.h"
 #include "program/stream/peer.h"
 #include "program/stream/server.h"
 #include "program/stream/tracked_patient.h"
-#include "sh/base/output.h"
-#include "sh/base/vec3.h"
+#include "program/view/export/export.h"
 
 static const char name[] = "stream";
 

@@ -7,8 +7,8 @@
 
 #include <supine/safetensors.h>
 
+#include "base/parallel.h"
 #include "runtime/rigid.h"
-#include "sh/base/parallel.h"
 
 #include "precompute/inside/biharmonic.h"
 #include "precompute/inside/embed.h"

@@ -4,9 +4,9 @@
 #include <stdbool.h>
 #include <stdlib.h>
 
+#include "base/csv.h"
+#include "base/vec3.h"
 #include "program/stream/server.h"
-#include "sh/base/csv.h"
-#include "sh/base/vec3.h"
 
 static const char *const columns[] = {"seconds", "gravity_x", "gravity_y", "gravity_z"};
 

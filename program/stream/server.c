@@ -9,10 +9,10 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "base/clock.h"
 #include "program/stream/peer.h"
 #include "program/stream/server.h"
 #include "program/stream/tracked_patient.h"
-#include "sh/base/clock.h"
 
 static const double frame_interval = 15e-3; /* time between frames while no messages arrive, s */
 static const double send_interval = 20e-3;  /* time between checks of the peers that wait, s */

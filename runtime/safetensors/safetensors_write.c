@@ -4,9 +4,9 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/output.h"
+#include "base/utf8.h"
 #include "runtime/safetensors/safetensors_file.h"
-#include "sh/base/output.h"
-#include "sh/base/utf8.h"
 
 typedef struct content {
   const supine_tensor *tensors;

@@ -10,8 +10,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/output.h"
 #include "runtime/safetensors/platform.h"
-#include "sh/base/output.h"
 
 /* Convert a path from UTF-8 to UTF-16; the caller frees the result. Return NULL if the path is not
  * UTF-8 or if out of memory. */

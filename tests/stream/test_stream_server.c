@@ -11,9 +11,9 @@
 #include <sys/socket.h>
 #include <time.h>
 
+#include "base/clock.h"
 #include "program/stream/peer.h"
 #include "program/stream/tracked_patient.h"
-#include "sh/base/clock.h"
 #include "tests/runtime_fixture.h"
 
 #include "tests/poses.h"
