@@ -192,7 +192,7 @@ static supine_status find_volumes(playing *p, const supine_pv *pv, supine_error 
     if (status != SUPINE_OK) {
       return supine_error_set(error, status, "frame at %.3f s: %s", p->time[t], cause.message);
     }
-    supine_basis_volumes(p->basis, &pose, p->volumes + t * p->lung_count);
+    (void)supine_basis_volumes(p->basis, &pose, p->volumes + t * p->lung_count);
   }
   return status;
 }
@@ -236,7 +236,7 @@ static supine_status play_frames(playing *p, supine_mesh_series *series, supine_
     supine_pose pose;
     const double start = supine_clock_seconds();
     (void)find_pose(p, t, &pose, NULL);
-    supine_deform(p->basis, &pose, p->positions);
+    (void)supine_deform(p->basis, &pose, p->positions);
     p->compute_time[t] = supine_clock_seconds() - start;
     if (series != NULL) {
       for (size_t i = 0; i < frame; ++i) {

@@ -31,7 +31,7 @@ with tempfile.TemporaryDirectory() as folder:
         return done.stdout
 
     # Build in a copy of the sources, as the build leaves files beside them.
-    for name in ("CMakeLists.txt", "sh", "runtime"):
+    for name in ("CMakeLists.txt", "base", "runtime"):
         path = os.path.join(source, name)
         target = os.path.join(folder, "source", name)
         if os.path.isdir(path):
@@ -60,6 +60,7 @@ with tempfile.TemporaryDirectory() as folder:
         f"{source}/tests/python/reference.c", library, "-lm", "-o", "reference")
     run(supine, "phantom", "-o", "lungs.ply", "--vertices", "5000")
     run(supine, "precompute", "lungs.ply", "-o", "lungs.safetensors", "--band", "3")
+    run(supine, "precompute", "lungs.ply", "-o", "other.safetensors", "--band", "2")
     run(supine, "embed", "lungs.safetensors", "--grid", "12", "-o", "grid.safetensors")
     print(wheel, run(python, f"{source}/tests/python/inside.py", "./reference", "lungs.safetensors"))
 
