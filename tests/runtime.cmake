@@ -4,7 +4,7 @@
 add_library(runtime_fixture STATIC runtime_fixture.c)
 target_link_libraries(runtime_fixture
   PRIVATE supine_build PkgConfig::CMOCKA
-  PUBLIC supine_runtime supine_writer)
+  PUBLIC supine_runtime)
 
 supine_test(safetensors runtime_fixture)
 supine_test(golden supine_runtime)

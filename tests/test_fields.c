@@ -9,7 +9,6 @@
 #include <supine/runtime.h>
 #include <supine/safetensors.h>
 
-#include "precompute/writer.h"
 #include <supine/sh.h>
 
 #include "lungs_helpers.h"
@@ -346,7 +345,7 @@ TEST(test_fields_load_bad_tensors_refused) {
                               {"displacement", SUPINE_F32, 3, {2, n, 3}, displacement}};
   const char *path = in_folder("fields.safetensors");
   supine_fields fields = {0};
-  assert_int_equal(supine_writer_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
+  assert_int_equal(supine_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
   assert_int_equal(supine_fields_load(path, &lungs, NULL, &fields, NULL), SUPINE_OK);
   assert_close(fields.directions[5], -1.0, 0.0);
   assert_close(fields.displacement[3 * n + 4], 0.5, 0.0);
@@ -354,19 +353,19 @@ TEST(test_fields_load_bad_tensors_refused) {
   displacement[3 * n + 3] = 0.25F;
   displacement[3 * n + 5] = 0.75F;
   const supine_mesh_load_options ras = {.axes = SUPINE_AXES_RAS, .millimetres_per_unit = 10.0};
-  assert_int_equal(supine_writer_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
+  assert_int_equal(supine_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
   assert_int_equal(supine_fields_load(path, &lungs, &ras, &fields, NULL), SUPINE_OK);
   assert_close(fields.displacement[3 * n + 3], -2.5, 0.0);
   assert_close(fields.displacement[3 * n + 4], -5.0, 0.0);
   assert_close(fields.displacement[3 * n + 5], 7.5, 0.0);
   supine_fields_free(&fields);
   displacement[3 * n + 4] = NAN;
-  assert_int_equal(supine_writer_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
+  assert_int_equal(supine_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
   expect_failure("fields.safetensors", SUPINE_ERROR_FORMAT, "row 1: the displacement of vertex 1");
   tensors[1].shape[1] = n / 2;
-  assert_int_equal(supine_writer_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
+  assert_int_equal(supine_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
   expect_failure("fields.safetensors", SUPINE_ERROR_MESH, "but the reference surface has");
-  assert_int_equal(supine_writer_safetensors_write(path, tensors, 1, NULL, 0, NULL), SUPINE_OK);
+  assert_int_equal(supine_safetensors_write(path, tensors, 1, NULL, 0, NULL), SUPINE_OK);
   expect_failure("fields.safetensors", SUPINE_ERROR_FORMAT, "displacement [M,N,3]");
   expect_failure("nothing.safetensors", SUPINE_ERROR_READ, "nothing.safetensors");
   displacement[3 * n + 4] = 0.0F;
@@ -380,7 +379,7 @@ TEST(test_fields_load_bad_tensors_refused) {
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     memcpy(gravity + 3, bad[i].gravity, sizeof bad[i].gravity);
     assert_int_equal(
-        supine_writer_safetensors_write(in_folder("fields.safetensors"), tensors, 2, NULL, 0, NULL),
+        supine_safetensors_write(in_folder("fields.safetensors"), tensors, 2, NULL, 0, NULL),
         SUPINE_OK);
     expect_failure("fields.safetensors", SUPINE_ERROR_FORMAT, bad[i].words);
   }
