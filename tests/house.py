@@ -20,7 +20,7 @@ PREFIX = {"sh/base": ("supine_",), "runtime": ("supine_",), "runtime/safetensors
           "mesh/io": ("supine_mesh_", "supine_image_"), "precompute/lungs": ("supine_lungs_", "supine_phantom_", "supine_tissue_"),
           "precompute/physics": ("supine_physics_", "supine_reference_"),
           "precompute/projection": ("supine_projection_", "supine_accuracy_"),
-          "precompute": ("supine_precompute_", "supine_writer_", "supine_fields_"), "program/export": ("supine_export_", "supine_template_"), "program/options": ("supine_options_", "supine_breath_"),
+          "precompute": ("supine_precompute_", "supine_writer_"), "program/export": ("supine_export_", "supine_template_"), "program/options": ("supine_options_", "supine_breath_"),
           "program": ("supine_command_", "supine_field_")}
 PUBLIC = ("runtime/include/supine",)
 

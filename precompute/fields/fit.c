@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "precompute/basis_file.h"
+#include "precompute/fields/fields.h"
 #include "precompute/projection/projection.h"
 #include "precompute/projection/tally.h"
 #include "sh/base/lapack.h"
@@ -23,6 +24,9 @@ static const double leverage_max = 0.999;
  * is rounding error. */
 static const double worthwhile = 0.99;
 static const double exact = 1e-6;
+
+/* Relative error that is small beside that of any simulator. Modes are not kept to lower it. */
+static const double negligible = 1e-4;
 
 /* A least-squares fit of harmonics to displacement fields for several directions of gravity. The
  * coefficient of each harmonic is a field; the coefficients are `pinv` times the given fields. */
@@ -293,6 +297,37 @@ static supine_status cross_validate(const fitting *w, size_t modes, supine_accur
   return status;
 }
 
+/* Compress the chosen fit to modes, or use its harmonics. */
+static supine_status compress(const supine_projection *projection,
+                              const supine_fit_options *options, double fit_error,
+                              supine_compression *made, supine_error *error) {
+  double singular[SUPINE_MODES_MADE_MAX];
+  double total = 0.0;
+  if (options->modes == 0) {
+    return supine_projection_compress_harmonics(projection, made, error);
+  }
+  const supine_status status = supine_projection_compress_modes(projection, NULL, options->modes,
+                                                                made, singular, &total, error);
+  if (status == SUPINE_OK && options->fewest_modes) {
+    supine_projection_compression_truncate(
+        made, projection->rank,
+        supine_projection_modes_needed(made->mode_count, singular, total,
+                                       fmax(fit_error, negligible)));
+  }
+  return status;
+}
+
+/* Subtract from each mode its weight w in the posture of the scan. The constant harmonic is
+ * 1 / sqrt(4 pi), so that its coefficient falls by sqrt(4 pi) w. */
+static void subtract_scan(const double scan_gravity[3], supine_compression *made) {
+  static const double sqrt_4pi = 3.5449077018110321;
+  double weights[SUPINE_MODES_MADE_MAX];
+  supine_projection_compression_weights(made, scan_gravity, weights);
+  for (size_t k = 0; k < made->mode_count; ++k) {
+    made->modes[k * supine_sh_count(made->band)] -= sqrt_4pi * weights[k];
+  }
+}
+
 supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_options *options,
                                 supine_compression *compression, supine_fit_report *report,
                                 supine_error *error) {
@@ -320,14 +355,16 @@ supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_op
     status = project(&w, found.band, &projection, error);
   }
   if (status == SUPINE_OK) {
-    status = options->modes == 0 ? supine_projection_compress_harmonics(&projection, &made, error)
-                                 : supine_projection_compress_modes(
-                                       &projection, NULL, options->modes, &made, NULL, NULL, error);
+    status = compress(&projection, options, found.error[found.band], &made, error);
   }
   if (status == SUPINE_OK) {
     status = cross_validate(&w, options->modes == 0 ? 0 : made.mode_count, &found.accuracy, error);
   }
   if (status == SUPINE_OK) {
+    if (options->scan_gravity != NULL) {
+      subtract_scan(options->scan_gravity, &made);
+    }
+    found.mode_count = made.mode_count;
     *compression = made;
     *report = found;
   } else {
@@ -339,9 +376,9 @@ supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_op
   return status;
 }
 
-supine_status supine_precompute_fields(const supine_lungs *lungs, const supine_fields *fields,
-                                       const supine_fit_options *options, const char *path,
-                                       supine_fit_report *report, supine_error *error) {
+supine_status supine_fields_write(const supine_lungs *lungs, const supine_fields *fields,
+                                  const supine_fit_options *options, const char *path,
+                                  supine_fit_report *report, supine_error *error) {
   supine_compression field = {0};
   supine_volume_forms forms = {0};
   supine_status status = supine_fields_fit(fields, options, &field, report, error);
@@ -349,15 +386,19 @@ supine_status supine_precompute_fields(const supine_lungs *lungs, const supine_f
     status = supine_projection_compression_volume_forms(&field, lungs, NULL, NULL, &forms, error);
   }
   if (status == SUPINE_OK) {
-    const supine_precompute_options basis = {
-        .modes = options->modes, .findings = options->findings, .made_by = options->made_by};
+    const supine_precompute_options basis = {.modes = options->modes,
+                                             .assumed = options->assumed,
+                                             .findings = options->findings,
+                                             .frame = options->frame,
+                                             .made_by = options->made_by};
+    const supine_basis_fit summary = {report->band_highest, report->condition,
+                                      options->scan_gravity};
     const supine_basis_content content = {.lungs = lungs,
                                           .options = &basis,
-                                          .fit = report,
+                                          .fit = &summary,
                                           .compression = &field,
                                           .forms = &forms,
                                           .accuracy = &report->accuracy};
-    report->mode_count = field.mode_count;
     status = supine_writer_basis_write(path, &content, error);
   }
   supine_projection_compression_free(&field);
