@@ -8,7 +8,7 @@
 
 #include "precompute/fields/fields.h"
 #include "precompute/patient/patient_file.h"
-#include "program/model_options.h"
+#include "program/options/model_options.h"
 #include "program/options/surface_options.h"
 
 static const char name[] = "precompute";

@@ -71,7 +71,7 @@ typedef struct supine_fit_options {
 
 /** Fit harmonics to the fields, compress the fit, and measure its leave-one-out error.
  * @param compression  written; it has one row for each coordinate of each vertex. Release it
- *   with supine_projection_compression_free
+ *   with supine_sh_compression_free
  * @retval SUPINE_ERROR_ARGUMENT   fewer than two directions, or too few to determine options->band
  * @retval SUPINE_ERROR_NUMERICAL  all displacements are zero, or a decomposition failed
  * @retval SUPINE_ERROR_MEMORY */

@@ -5,12 +5,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/lapack.h"
+#include "base/vec3.h"
 #include "precompute/basis_file.h"
 #include "precompute/fields/fields.h"
-#include "precompute/projection/projection.h"
 #include "precompute/projection/tally.h"
-#include "sh/base/lapack.h"
-#include "sh/base/vec3.h"
 #include <supine/sh.h>
 
 /* The directions of gravity determine a fit if the condition number of the matrix of harmonics and
@@ -162,8 +161,8 @@ static supine_status predict(const fitting *w, const fit *f, size_t d, size_t mo
                 0.0, o->pinv_gram, m);
     cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, p, p, m, 1.0, o->pinv_gram, m, o->pinv, m,
                 0.0, o->coefficient_gram, p);
-    status = supine_projection_leading_eigenpairs(f->terms, o->coefficient_gram, modes,
-                                                  o->eigenvalues, o->eigenvectors);
+    status = supine_sh_leading_eigenpairs(f->terms, o->coefficient_gram, modes, o->eigenvalues,
+                                          o->eigenvectors);
     memset(o->target, 0, f->terms * sizeof *o->target);
     for (size_t k = 0; k < modes && status == SUPINE_OK; ++k) {
       const double *mode = o->eigenvectors + k * f->terms;
@@ -240,13 +239,13 @@ static supine_status choose_band(fitting *w, int wanted, supine_fit_report *repo
   return SUPINE_OK;
 }
 
-/* Make a projection (projection.h) from the chosen fit. Its columns are the input fields. Its
+/* Make an expansion (sh/expansion.h) from the chosen fit. Its columns are the input fields. Its
  * functions are the transpose of the chosen fit's `pinv`. */
-static supine_status project(const fitting *w, size_t band, supine_projection *made,
+static supine_status project(const fitting *w, size_t band, supine_expansion *made,
                              supine_error *error) {
   const size_t m = w->chosen.count;
   const size_t terms = w->chosen.terms;
-  *made = (supine_projection){.vertex_count = w->rows, .band = band, .rank = m};
+  *made = (supine_expansion){.row_count = w->rows, .band = band, .rank = m};
   made->columns = malloc(w->rows * m * sizeof *made->columns);
   made->functions = malloc(m * terms * sizeof *made->functions);
   if (made->columns == NULL || made->functions == NULL) {
@@ -298,21 +297,19 @@ static supine_status cross_validate(const fitting *w, size_t modes, supine_accur
 }
 
 /* Compress the chosen fit to modes, or use its harmonics. */
-static supine_status compress(const supine_projection *projection,
-                              const supine_fit_options *options, double fit_error,
-                              supine_compression *made, supine_error *error) {
+static supine_status compress(const supine_expansion *expansion, const supine_fit_options *options,
+                              double fit_error, supine_compression *made, supine_error *error) {
   double singular[SUPINE_MODES_MADE_MAX];
   double total = 0.0;
   if (options->modes == 0) {
-    return supine_projection_compress_harmonics(projection, made, error);
+    return supine_sh_compress_harmonics(expansion, made, error);
   }
-  const supine_status status = supine_projection_compress_modes(projection, NULL, options->modes,
-                                                                made, singular, &total, error);
+  const supine_status status =
+      supine_sh_compress_modes(expansion, NULL, options->modes, made, singular, &total, error);
   if (status == SUPINE_OK && options->fewest_modes) {
-    supine_projection_compression_truncate(
-        made, projection->rank,
-        supine_projection_modes_needed(made->mode_count, singular, total,
-                                       fmax(fit_error, negligible)));
+    supine_sh_compression_truncate(
+        made, expansion->rank,
+        supine_sh_modes_needed(made->mode_count, singular, total, fmax(fit_error, negligible)));
   }
   return status;
 }
@@ -322,7 +319,7 @@ static supine_status compress(const supine_projection *projection,
 static void subtract_scan(const double scan_gravity[3], supine_compression *made) {
   static const double sqrt_4pi = 3.5449077018110321;
   double weights[SUPINE_MODES_MADE_MAX];
-  supine_projection_compression_weights(made, scan_gravity, weights);
+  supine_sh_compression_weights(made, scan_gravity, weights);
   for (size_t k = 0; k < made->mode_count; ++k) {
     made->modes[k * supine_sh_count(made->band)] -= sqrt_4pi * weights[k];
   }
@@ -334,7 +331,7 @@ supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_op
   const int m = (int)fields->direction_count;
   fitting w = {.fields = fields, .rows = 3 * fields->vertex_count};
   const int rows = (int)w.rows;
-  supine_projection projection = {0};
+  supine_expansion expansion = {0};
   supine_compression made = {0};
   supine_fit_report found = {0};
   if (m < 2) {
@@ -352,10 +349,10 @@ supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_op
                                "all displacements are zero: give fields that move the surface");
   }
   if (status == SUPINE_OK) {
-    status = project(&w, found.band, &projection, error);
+    status = project(&w, found.band, &expansion, error);
   }
   if (status == SUPINE_OK) {
-    status = compress(&projection, options, found.error[found.band], &made, error);
+    status = compress(&expansion, options, found.error[found.band], &made, error);
   }
   if (status == SUPINE_OK) {
     status = cross_validate(&w, options->modes == 0 ? 0 : made.mode_count, &found.accuracy, error);
@@ -368,9 +365,9 @@ supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_op
     *compression = made;
     *report = found;
   } else {
-    supine_projection_compression_free(&made);
+    supine_sh_compression_free(&made);
   }
-  supine_projection_free(&projection);
+  supine_sh_expansion_free(&expansion);
   free(w.gram);
   fit_free(&w.chosen);
   return status;
@@ -383,7 +380,7 @@ supine_status supine_fields_write(const supine_lungs *lungs, const supine_fields
   supine_volume_forms forms = {0};
   supine_status status = supine_fields_fit(fields, options, &field, report, error);
   if (status == SUPINE_OK) {
-    status = supine_projection_compression_volume_forms(&field, lungs, NULL, NULL, &forms, error);
+    status = supine_projection_volume_forms(&field, lungs, NULL, NULL, &forms, error);
   }
   if (status == SUPINE_OK) {
     const supine_precompute_options basis = {.modes = options->modes,
@@ -401,7 +398,7 @@ supine_status supine_fields_write(const supine_lungs *lungs, const supine_fields
                                           .accuracy = &report->accuracy};
     status = supine_writer_basis_write(path, &content, error);
   }
-  supine_projection_compression_free(&field);
+  supine_sh_compression_free(&field);
   supine_physics_volume_forms_free(&forms);
   return status;
 }

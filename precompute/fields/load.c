@@ -5,10 +5,10 @@
 
 #include <supine/safetensors.h>
 
+#include "base/text.h"
+#include "base/vec3.h"
 #include "precompute/fields/fields.h"
 #include "precompute/inside/surface.h"
-#include "sh/base/text.h"
-#include "sh/base/vec3.h"
 
 /* Largest distance between unit vectors that count as the same direction. */
 static const double same_direction = 1e-6;
