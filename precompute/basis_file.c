@@ -136,11 +136,15 @@ static void add_expected_error(entries *list, const supine_basis_content *conten
   }
 }
 
-static void add_fit(entries *list, const supine_fit_report *fit) {
+static void add_fit(entries *list, const supine_basis_fit *fit) {
+  const double *g = fit->scan_gravity;
   add(list, "route", "fields");
   add(list, "condition", "%.4g", fit->condition);
   add(list, "band_determined", "%zu", fit->band_highest);
   add(list, "error_method", "leave-one-out");
+  if (g != NULL) {
+    add(list, "scan_gravity", "%.9g,%.9g,%.9g", g[0], g[1], g[2]);
+  }
 }
 
 static void add_lungs(entries *list, const supine_lungs *lungs, const double share[2]) {

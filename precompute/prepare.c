@@ -183,6 +183,11 @@ supine_status supine_precompute_prepare(supine_lungs *lungs, const supine_model_
                             "--law paper takes the scan as the reference: leave --scanned out, or "
                             "use --law deep");
   }
+  if (scan.known && scan.state.volume.kind == SUPINE_VOLUME_DEFAULT) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "--scanned: a posture alone is only for --fields: add the volume, as "
+                            "in supine:rest, or give full or none");
+  }
   supine_status status = set_expandability(lungs, choice, p, error);
   status = status == SUPINE_OK ? set_lesions(lungs, choice, p, findings, error) : status;
   status = status == SUPINE_OK ? set_shares(lungs, choice, p, error) : status;

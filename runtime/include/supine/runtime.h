@@ -89,8 +89,8 @@ typedef struct supine_basis_info {
   double bytes_per_vertex; /**< bytes that an evaluation reads for each vertex */
   /** Largest position error of any vertex from storage and rounding, mm: the largest
    * supine_basis_error for 26 directions of gravity, towards the faces, edges and corners of a
-   * cube. The lungs hold 500 mL more than the reference surface or, if the surface is open, move by
-   * at most 20 mm. */
+   * cube. The lungs hold 500 mL more than the reference surface; an open surface moves by at most
+   * 20 mm; another simulator's fields are not scaled. */
   double storage_error;
   const char *const *lung_names; /**< [lung_count] such as "left", or an index such as "0" */
   const float *bounds;   /**< [lung_count, 2, 3] lowest and highest corner of each lung's box, mm */
