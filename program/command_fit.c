@@ -336,17 +336,13 @@ static void set_states(const request *wanted, const scan_data *data,
 
 /* Warn if the volume at rest in the scans differs from the volume at rest of healthy people. */
 static void warn_of_rest(const supine_patient_record *record) {
-  /* Warn if the ratio of the volumes at rest and at full inflation differs by more than this
-   * between the scans and healthy people. Among healthy people, the standard deviation of the ratio
-   * is 0.04. */
-  static const double reported_from = 0.07;
   const supine_resting usual = supine_reference_resting_default();
   const double *g = record->state[1].gravity;
   supine_resting shown = usual;
   supine_patient_resting(record, &shown);
   const double share[2] = {supine_reference_resting_total(&usual, g),
                            supine_reference_resting_total(&shown, g)};
-  if (fabs(share[1] - share[0]) > reported_from) {
+  if (fabs(share[1] - share[0]) > SUPINE_REST_SPREAD) {
     supine_options_say(name,
                        "warning: the volume at rest is %.0f %% of full inflation in the two "
                        "scans, but %.0f %% in healthy people: check --rest. 'supine precompute "

@@ -290,9 +290,10 @@ void supine_patient_resting(const supine_patient_record *record, supine_resting 
     const double share = (record->volume[k] - shown->volume.ml) / full;
     if (share > share_least && share < share_most) {
       const double assumed = supine_reference_resting_total(resting, shown->gravity);
+      resting->assumed *= share / assumed;
+      (void)supine_reference_resting_settle(resting, 0, NULL, NULL, NULL);
       for (size_t a = 0; a < 6; ++a) {
-        resting->share[0][a] *= share / assumed;
-        resting->share[1][a] *= share / assumed;
+        resting->given[a] = true;
       }
     }
   }
