@@ -10,11 +10,11 @@
 #include <supine/safetensors.h>
 #include <supine/sh.h>
 
+#include "base/text.h"
 #include "precompute/basis_file.h"
 #include "precompute/lungs/disease.h"
 #include "precompute/normals/normal_modes.h"
 #include "precompute/writer.h"
-#include "sh/base/text.h"
 
 enum { ENTRIES_MAX = 64 };
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Write safetensors files atomically. */
 #include "precompute/writer.h"
-#include "sh/base/output.h"
+#include "base/output.h"
 
 supine_status supine_writer_safetensors_write(const char *path, const supine_tensor *tensors,
                                               size_t tensor_count, const supine_metadata *metadata,

@@ -5,7 +5,7 @@
 
 #include <supine/safetensors.h>
 
-/* Write a safetensors file atomically (sh/base/output.h): a failure leaves no partial file.
+/* Write a safetensors file atomically (base/output.h): a failure leaves no partial file.
  * @retval SUPINE_ERROR_WRITE, and those of supine_safetensors_write */
 supine_status supine_writer_safetensors_write(const char *path, const supine_tensor *tensors,
                                               size_t tensor_count, const supine_metadata *metadata,

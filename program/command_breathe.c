@@ -6,10 +6,10 @@
 
 #include <gsl/gsl_statistics.h>
 
+#include "base/clock.h"
+#include "base/text.h"
 #include "mesh/mesh.h"
 #include "precompute/writer.h"
-#include "sh/base/clock.h"
-#include "sh/base/text.h"
 
 #include "program/options/basis_input.h"
 #include "program/options/breath_turn.h"

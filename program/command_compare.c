@@ -4,11 +4,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sh/base/output.h"
-#include "sh/base/vec3.h"
+#include "base/output.h"
+#include "base/vec3.h"
 
-#include "program/inside.h"
 #include "program/options/basis_input.h"
+#include "program/options/inside.h"
 #include "program/options/state_options.h"
 #include "program/report/comparison.h"
 

@@ -4,11 +4,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/csv.h"
+#include "base/output.h"
+#include "base/text.h"
+#include "base/vec3.h"
 #include "mesh/mesh.h"
-#include "sh/base/csv.h"
-#include "sh/base/output.h"
-#include "sh/base/text.h"
-#include "sh/base/vec3.h"
 #include <supine/runtime.h>
 
 #include "program/deform_content.h"

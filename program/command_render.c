@@ -6,13 +6,13 @@
 
 #include <supine/compare.h>
 
-#include "sh/base/output.h"
-#include "sh/base/text.h"
-#include "sh/base/vec3.h"
+#include "base/output.h"
+#include "base/text.h"
+#include "base/vec3.h"
 
-#include "program/inside.h"
 #include "program/options/basis_input.h"
 #include "program/options/breath_turn.h"
+#include "program/options/inside.h"
 #include "program/options/state_options.h"
 
 static const char name[] = "render";

@@ -3,14 +3,14 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "sh/base/output.h"
-#include "sh/base/text.h"
-#include "sh/base/vec3.h"
+#include "base/output.h"
+#include "base/text.h"
+#include "base/vec3.h"
 
 #include "mesh/mesh.h"
+#include "precompute/warp/field.h"
 #include "program/deform_content.h"
-#include "program/field.h"
-#include "program/inside.h"
+#include "program/options/inside.h"
 
 /* Distance from the lungs at which a displacement field reaches 0, mm. Grids made by 'supine embed'
  * extend this far around the lungs. */

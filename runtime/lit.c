@@ -2,10 +2,10 @@
 /* Compute the normals of a deformed surface as weighted sums of vectors of the file. */
 #include <string.h>
 
+#include "base/clones.h"
 #include "runtime/internal.h"
 #include "runtime/kernels/compact.h"
 #include "runtime/safetensors/platform.h"
-#include "sh/base/clones.h"
 
 /* Pack supine_basis_info.normals of 16 vertices. rows[v] points to the numbers of vertex v. */
 SUPINE_CLONES static void pack_tile(const supine_tiles *tiles, const int16_t *const rows[TILE],

@@ -13,7 +13,7 @@ endif()
 supine_test(reference supine_precompute supine_lungs supine_mesh_io supine_gsl)
 supine_test(lungs supine_precompute supine_lungs supine_mesh_io)
 supine_test(precompute supine_precompute supine_lungs supine_mesh_io umfpack)
-supine_test(program supine_sh_basis)
+supine_test(program supine_status)
 target_compile_definitions(test_program PRIVATE SUPINE_PROGRAM="$<TARGET_FILE:supine>")
 # Compare the complete output of the commands with golden files.
 add_test(NAME command_output COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_command_output.sh

@@ -2,7 +2,7 @@
 /* Test displacements of another simulator: loading, fit, cross-validation, refused input. */
 
 #include "folder.h"
-#include "precompute/fields.h"
+#include "precompute/fields/fields.h"
 #include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
@@ -95,8 +95,8 @@ static void check_band_limited(const supine_fields *fields, size_t band) {
   }
   assert_int_equal(report.band, band);
   assert_true(report.accuracy.relative_rms < 1e-6);
-  assert_int_equal(field.vertex_count, 3 * fields->vertex_count);
-  supine_projection_compression_free(&field);
+  assert_int_equal(field.row_count, 3 * fields->vertex_count);
+  supine_sh_compression_free(&field);
 }
 
 TEST(test_fit_band_limited_fields_recovered) {
@@ -120,7 +120,7 @@ TEST(test_fit_leave_one_out_error_equals_refits) {
   supine_compression field;
   supine_fit_report report;
   assert_int_equal(supine_fields_fit(&fields, &options, &field, &report, NULL), SUPINE_OK);
-  supine_projection_compression_free(&field);
+  supine_sh_compression_free(&field);
   double error2 = 0.0;
   double field2 = 0.0;
   for (size_t out = 0; out < COUNT; ++out) {
@@ -148,7 +148,7 @@ TEST(test_fit_leave_one_out_error_equals_refits) {
       error2 += (is - should) * (is - should);
       field2 += should * should;
     }
-    supine_projection_compression_free(&field);
+    supine_sh_compression_free(&field);
     supine_fields_free(&rest);
   }
   const double direct = sqrt(error2 / field2);
@@ -241,7 +241,7 @@ static double gain_of_band_2(double amount, size_t *band) {
     fields.displacement[i] += amount * more.displacement[i] + random_signed(&seed);
   }
   assert_int_equal(supine_fields_fit(&fields, &options, &field, &report, NULL), SUPINE_OK);
-  supine_projection_compression_free(&field);
+  supine_sh_compression_free(&field);
   supine_fields_free(&fields);
   supine_fields_free(&more);
   *band = report.band;
@@ -312,7 +312,7 @@ TEST(test_fit_few_directions_limit_the_band) {
   assert_int_equal(supine_fields_fit(&fields, &options, &field, &report, NULL), SUPINE_OK);
   assert_in_range(report.band_highest, 1, 2);
   assert_true(report.band <= report.band_highest);
-  supine_projection_compression_free(&field);
+  supine_sh_compression_free(&field);
   options.band = 4;
   assert_int_equal(supine_fields_fit(&fields, &options, &field, &report, &error),
                    SUPINE_ERROR_ARGUMENT);

@@ -3,10 +3,10 @@
 #include "folder.h"
 #include "inside_helpers.h"
 
+#include "base/vec3.h"
 #include "precompute/inside/biharmonic.h"
 #include "precompute/inside/content.h"
 #include "precompute/inside/embed.h"
-#include "sh/base/vec3.h"
 
 #include "tests/poses.h"
 

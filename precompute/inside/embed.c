@@ -5,9 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/parallel.h"
 #include "precompute/writer.h"
 #include "runtime/rigid.h"
-#include "sh/base/parallel.h"
 
 #include "precompute/inside/biharmonic.h"
 #include "precompute/inside/embed.h"

@@ -10,8 +10,8 @@
  * Respir J 57: 2000289, 2021). */
 #include <math.h>
 
+#include "base/text.h"
 #include "precompute/physics/reference.h"
-#include "sh/base/text.h"
 
 /* The state given for a scan is doubtful if it implies a volume of both lungs at full inflation
  * below `least_share` of the expected volume, below `least_ml`, or above `most_ml`. */

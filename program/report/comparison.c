@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/vec3.h"
 #include "program/report/comparison.h"
-#include "sh/base/vec3.h"
 
 /* Compute the volume that each lung and each of ten horizontal slabs gains in a breath. The breath
  * begins at the lung volumes in the posture. `xyz` [2][N, 3] is workspace. */

@@ -3,9 +3,9 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "program/export/base64.h"
-#include "program/render/render.h"
 #include "program/report/comparison_parts.h"
+#include "program/view/export/base64.h"
+#include "program/view/render/render.h"
 
 enum { WIDTH = 360, HEIGHT = 330 };
 static const supine_view view = SUPINE_VIEW_ANTERIOR;

@@ -8,9 +8,9 @@
 
 #include <meshoptimizer.h>
 
+#include "base/library.h"
+#include "base/parallel.h"
 #include "program/stream/frame.h"
-#include "sh/base/library.h"
-#include "sh/base/parallel.h"
 
 /* clang-format off */
 #define FUNCTIONS(EACH)                                                                            \

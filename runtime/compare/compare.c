@@ -9,8 +9,8 @@
 #include <supine/compare.h>
 #include <supine/sh.h>
 
+#include "base/vec3.h"
 #include "runtime/internal.h"
-#include "sh/base/vec3.h"
 
 struct supine_compare {
   const supine_basis *basis;

@@ -4,8 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/utf8.h"
 #include "runtime/safetensors/safetensors_file.h"
-#include "sh/base/utf8.h"
 
 typedef struct content {
   const supine_tensor *tensors;
