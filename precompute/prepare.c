@@ -155,18 +155,25 @@ static void summarize(const supine_model_choice *choice, bool predicted, supine_
   (void)supine_state_describe(&reference->scan.state, state, sizeof state);
   const double full = reference->full_volume[0] + reference->full_volume[1];
   const double held = full + reference->scan_volume[0] + reference->scan_volume[1];
+  const bool given = supine_reference_resting_given(&choice->resting);
   const bool at_rest = reference->scan.state.volume.kind == SUPINE_VOLUME_REST;
   if (held != full) {
     supine_text_add(p->summary, size, "%s, %.0f mL; ", state, held);
   }
   supine_text_add(p->summary, size, "%sfull inflation %.0f mL (%s", held != full ? "" : "at ", full,
-                  choice->full > 0.0 ? "given, " : at_rest ? "assumed from rest, " : "");
+                  choice->full > 0.0 ? "given, "
+                  : at_rest && given ? "from rest, "
+                  : at_rest          ? "assumed from rest, "
+                                     : "");
   supine_reference_compare(reference, &choice->person, p->summary, size);
   const double rest = supine_reference_rest(reference, supine, ml);
   const double ratio = exp(choice->resting.spread / choice->resting.assumed);
   supine_text_add(p->summary, size, "); rest supine %.0f mL (", rest);
-  if (at_rest || supine_reference_resting_given(&choice->resting)) {
-    supine_text_add(p->summary, size, "by %s)", at_rest ? "the scan" : "--resting");
+  if (at_rest || given) {
+    supine_text_add(p->summary, size, "by %s)",
+                    at_rest                       ? "the scan"
+                    : choice->patient_law != NULL ? "the fit"
+                                                  : "--resting");
   } else {
     supine_text_add(p->summary, size, "%.0f to %.0f by %s, which --resting changes)", rest / ratio,
                     rest * ratio,

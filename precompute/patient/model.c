@@ -266,7 +266,10 @@ supine_status supine_patient_check_place(const supine_patient_record *record,
       off[s] = fmax(off[s], apart);
     }
   }
-  *state = off[1] < off[0] ? 1 : 0;
+  *state =
+      record->volume[0] > 0.0 && record->volume[1] > 0.0 && only_side == frame->only_side
+          ? 1e-3 * supine_mesh_volume(&lungs->mesh) < sqrt(record->volume[0] * record->volume[1])
+          : off[1] < off[0];
   const size_t k = axis[*state];
   return off[*state] <= apart_most[record->from_surface]
              ? SUPINE_OK
