@@ -12,7 +12,7 @@ static supine_status read_scan(const char *text, void *field, supine_error *erro
   supine_state posture = {.volume = {SUPINE_VOLUME_DEFAULT, 0.0}};
   choice->has_scan = true;
   if (supine_state_parse_posture(text, &posture, NULL) == SUPINE_OK) {
-    choice->scan = (supine_scan){true, posture};
+    choice->scan = (supine_scan){.known = true, .state = posture};
     return SUPINE_OK;
   }
   return supine_reference_scan_parse(text, &choice->scan, error);
