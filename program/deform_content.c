@@ -69,7 +69,6 @@ supine_status supine_command_deform_content_check(const supine_deform_content *w
 
 supine_status supine_command_deform_content_read(supine_deform_content *wanted, const char *command,
                                                  supine_error *error) {
-  static const double aerated = -300.0; /* every lung has voxels below this density, HU */
   const char *path = wanted->image != NULL ? wanted->image : wanted->labels;
   supine_image *image = &wanted->source;
   const supine_status status = path != NULL ? supine_image_read(path, image, error) : SUPINE_OK;
@@ -85,11 +84,11 @@ supine_status supine_command_deform_content_read(supine_deform_content *wanted, 
   for (size_t i = 0; i < image->size[0] * image->size[1] * image->size[2]; ++i) {
     least = fmin(least, supine_image_get(image, i));
   }
-  return least < aerated ? SUPINE_OK
+  return least < supine_field_aerated ? SUPINE_OK
                          : supine_error_set(error, SUPINE_ERROR_FORMAT,
                                             "%s: no voxel is below %g, so the image is not in "
                                             "Hounsfield units: convert it, or leave --density out",
-                                            path, aerated);
+                                            path, supine_field_aerated);
 }
 
 bool supine_command_deform_content_wanted(const supine_deform_content *wanted) {

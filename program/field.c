@@ -8,6 +8,8 @@
 
 #include "program/field.h"
 
+const double supine_field_aerated = -300.0;
+
 void supine_field_find_cell(const supine_image *image, const double point[3],
                             supine_field_cell *cell) {
   double voxel[3];

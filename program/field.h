@@ -42,6 +42,10 @@ typedef struct supine_field_residual {
 supine_status supine_field_invert(const supine_field *field, supine_field *inverse,
                                   supine_field_residual *residual, supine_error *error);
 
+/** Density below which a voxel near the surface of the lungs belongs to them, HU. All lungs have
+ * such voxels. */
+extern const double supine_field_aerated;
+
 /** Move an image: moved(y) = image(y + v(y)) at the voxels y of the image; places outside the image
  * have the value of the nearest voxel. If `depth` is given, densities (Hounsfield units + 1000)
  * inside the lungs are multiplied by det(I + dv/dy). This is the tissue's volume before the motion,
