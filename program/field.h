@@ -28,6 +28,10 @@ void supine_field_free(supine_field *field);
 /** Interpolate the field at a point. */
 void supine_field_at(const supine_field *field, const double point[3], double u[3]);
 
+/** Count the cells that the field u turns over (det(I + du/dx) is not positive at their centre), as
+ * a share of the number of cells inside the lungs. Near each of them, lung or body is lost. */
+double supine_field_folded(const supine_field *field);
+
 /** Residual u(x) + v(x + u(x)) of a field u and its inverse v. */
 typedef struct supine_field_residual {
   double rms, largest; /**< RMS and largest length of the residual inside the lungs, mm */
@@ -68,6 +72,9 @@ typedef struct supine_field_cell {
 /* Find the cell that contains a point, mm; a point outside the image is clamped to its border. */
 void supine_field_find_cell(const supine_image *image, const double point[3],
                             supine_field_cell *cell);
+
+/* Return det(I + du/dx) at a point in a cell of the field u. */
+double supine_field_stretch(const supine_image *nodes, const supine_field_cell *cell);
 
 /* Interpolate all channels of an F32 image at a point in a cell. Unless `slope` is NULL, also
  * compute the derivatives [channels, 3] with respect to cell->share, the position of the point in

@@ -138,18 +138,10 @@ INLINE void take_nearest(const supine_image *image, cells in, double *values) {
  * This is det(I + dv/dy) for the inverse field v; return 0 if the field folds at y. */
 static double volume_ratio(const supine_image *nodes, const supine_image *image, size_t index) {
   double point[3];
-  double v[3];
-  double slope[3][3];
-  double edge[3][3];
   supine_field_cell cell;
   supine_image_place(image, index, point);
   supine_field_find_cell(nodes, point, &cell);
-  supine_field_interpolate(nodes, &cell, v, slope);
-  for (size_t k = 0; k < 9; ++k) {
-    edge[k / 3][k % 3] = nodes->step[k / 3][k % 3] + slope[k % 3][k / 3];
-  }
-  return fmax(0.0, supine_triple(edge[0], edge[1], edge[2]) /
-                       supine_triple(nodes->step[0], nodes->step[1], nodes->step[2]));
+  return fmax(0.0, supine_field_stretch(nodes, &cell));
 }
 
 /* Interpolate densities, and multiply those inside the lungs by volume_ratio(). A point is
