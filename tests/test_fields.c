@@ -506,6 +506,7 @@ TEST(test_precompute_fields_every_option_used_or_refused) {
                {"patient", "m.obj", 1, "give --fields or --patient, not both"},
                {"held-out", "200", 1, no_effect},
                {"resting", "supine=0.4", 1, no_effect},
+               {"full", "5000mL", 1, no_effect},
                {"height", "170", 1, no_effect},
                {"sex", "male", 1, no_effect},
                {"law", "paper", 1, no_effect},

@@ -93,13 +93,28 @@ TEST(test_deform_volume_reached) {
          "deform lungs.safetensors --posture left --volume left=rest -o b.ply");
   EXPECT(1, "give rest, full or scan",
          "deform lungs.safetensors --posture left --volume resting -o b.ply");
-  EXPECT(5, "prone: 9000 mL are 150 % of full inflation (6000 mL), outside the 10 to 120 %",
+  EXPECT(5,
+         "lungs.safetensors: prone at full inflation + 3000 mL: 9000 mL are 150 % of full "
+         "inflation (6000 mL), outside the 10 to 120 %",
          "compare lungs.safetensors --postures prone --volume full+3000 -o b.html");
-  EXPECT(5, "left: 8258 mL are 138 % of", /* only the end of the breath is above the limit */
+  EXPECT(5, "left side at 8258 mL: 8258 mL are 138 % of", /* only the end of the breath is above the
+                                                             limit */
          "compare lungs.safetensors --postures left --volume rest --breath 5000 -o b.html");
   EXPECT(5, "8025 mL are 134 % of",
          "breathe lungs.safetensors --posture prone --tidal 4900 --fps 2 -o b.vtp");
+  EXPECT(5, "outside the 10 to 120 %",
+         "solve lungs.ply --posture left --volume scan-5700 -o b.ply");
+  EXPECT(5, "choose a volume nearer to rest, or accept this with --allow-folds",
+         "solve lungs.ply --posture left --volume full+1300 -o b.ply");
+  EXPECT(0, "nodes", "embed lungs.safetensors --grid 12 -o grid.safetensors");
+  EXPECT(5, "supine at rest - 1800 mL: the field folds",
+         "deform grid.safetensors --posture supine --volume rest-1800 --field-out b.nrrd");
   assert_int_equal(count_files("b."), 0);
+  EXPECT(0, "the field folds",
+         "deform grid.safetensors --posture supine --volume rest-1800 --allow-folds "
+         "--field-out a.nrrd");
+  EXPECT(0, "outside the 10 to 120 %",
+         "solve lungs.ply --posture left --volume full+1300 --allow-folds -o a.ply");
   EXPECT(0, "8025 mL are 134 % of",
          "breathe lungs.safetensors --posture prone --tidal 4900 --fps 2 --allow-folds "
          "-o a.safetensors");
