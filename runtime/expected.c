@@ -52,8 +52,8 @@ static double mean_square(const supine_basis *basis, const supine_pose *pose,
   double sum = 0;
   for (size_t begin = 0; begin < n; begin += LOCATE_BLOCK) {
     const size_t end = n - begin < LOCATE_BLOCK ? n : begin + LOCATE_BLOCK;
-    supine_displace_range(basis, pose, begin, end, x);
-    supine_displace_range(basis, from, begin, end, origin);
+    (void)supine_displace_range(basis, pose, begin, end, x);
+    (void)supine_displace_range(basis, from, begin, end, origin);
     for (size_t i = 0; i < 3 * (end - begin); ++i) {
       const double d = (double)x[i] - (double)origin[i];
       sum += d * d;
@@ -189,7 +189,7 @@ void supine_expected_evaluate(const supine_expected_model *m, size_t begin, size
   const bool used[EXPECTED_POSES / 2] = {true, m->per_step > 0, m->turn > 0};
   for (size_t k = 0; k < EXPECTED_POSES; ++k) {
     if (used[k / 2]) {
-      supine_displace_range(m->basis, &m->pose[k], begin, end, b->x[k]);
+      (void)supine_displace_range(m->basis, &m->pose[k], begin, end, b->x[k]);
     } else {
       memset(b->x[k], 0, sizeof b->x[k]);
     }

@@ -6,9 +6,9 @@
 
 #include "precompute/patient/matching.h"
 
+#include "base/parallel.h"
 #include "precompute/physics/solve.h"
 #include "precompute/physics/volume_forms.h"
-#include "sh/base/parallel.h"
 
 enum { GRAIN = 64 };
 
@@ -208,7 +208,10 @@ static supine_status find_state(supine_patient_record *record, const supine_lung
       off[s] = fmax(off[s], apart);
     }
   }
-  const size_t state = sum[1] < sum[0] ? 1 : 0;
+  const size_t state =
+      record->volume[0] > 0.0 && record->volume[1] > 0.0 && only_side == frame->only_side
+          ? 1e-3 * supine_mesh_volume(&lungs->mesh) < sqrt(record->volume[0] * record->volume[1])
+          : sum[1] < sum[0];
   const size_t k = axis[state];
   record->shown = state;
   return off[state] <= apart_most[record->from_surface]
@@ -222,7 +225,6 @@ static supine_status find_state(supine_patient_record *record, const supine_lung
 }
 
 void supine_patient_resting(const supine_patient_record *record, supine_resting *resting) {
-  const supine_resting before = *resting;
   for (size_t k = 0; k < 2; ++k) {
     const supine_state *shown = &record->state[k];
     const double full = record->state[1 - k].volume.kind == SUPINE_VOLUME_FULL
@@ -232,15 +234,22 @@ void supine_patient_resting(const supine_patient_record *record, supine_resting 
       continue;
     }
     const double share = (record->volume[k] - shown->volume.ml) / full;
-    const double assumed = supine_reference_resting_total(resting, shown->gravity);
-    for (size_t i = 0; i < 12 && share > share_least && share < share_most; ++i) {
-      const double *of = record->lung_volume[k];
-      const double *other = record->lung_volume[1 - k];
-      const double own = supine_reference_along_axes(before.share[i / 6], shown->gravity);
-      const double factor = of[i / 6] > 0.0 ? share * (of[i / 6] / record->volume[k]) /
-                                                  (other[i / 6] / record->volume[1 - k]) / own
-                                            : share / assumed;
-      resting->share[i / 6][i % 6] = fmin(share_most, factor * before.share[i / 6][i % 6]);
+    if (share <= share_least || share >= share_most) {
+      continue;
+    }
+    resting->assumed *= share / supine_reference_resting_total(resting, shown->gravity);
+    (void)supine_reference_resting_settle(resting, 0, NULL, NULL, NULL);
+    const double *of = record->lung_volume[k];
+    const double *full_of = record->lung_volume[1 - k];
+    const double own[2] = {supine_reference_along_axes(resting->share[0], shown->gravity),
+                           supine_reference_along_axes(resting->share[1], shown->gravity)};
+    for (size_t i = 0; i < 12; ++i) {
+      const size_t side = i / 6;
+      const double found =
+          share * of[side] / record->volume[k] * record->volume[1 - k] / full_of[side];
+      resting->share[side][i % 6] =
+          fmin(1.0, resting->share[side][i % 6] * (of[side] > 0.0 ? found / own[side] : 1.0));
+      resting->given[i % 6] = true;
     }
   }
 }
