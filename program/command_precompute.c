@@ -195,6 +195,11 @@ static supine_status compress_fields(request *wanted, const supine_arguments *gi
 static supine_status compute(const supine_lungs *lungs, request *wanted, const char *made_by,
                              supine_error *error) {
   supine_precompute_report report;
+  char *text = wanted->patient != NULL ? supine_patient_text(wanted->model.patient, NULL) : NULL;
+  if (wanted->patient != NULL && text == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %s", wanted->patient);
+  }
+  wanted->basis.patient = text;
   wanted->basis.model = wanted->model.prepared.model;
   wanted->basis.reference = &wanted->model.prepared.reference;
   wanted->basis.made_by = made_by;
@@ -206,24 +211,19 @@ static supine_status compute(const supine_lungs *lungs, request *wanted, const c
   if (status == SUPINE_OK) {
     report_result(wanted->path, lungs, &wanted->basis, &report);
   }
+  free(text);
   return status;
 }
 
-/* Read a patient model and encode it as text for the basis. The caller frees the text. */
-static supine_status take_patient(request *wanted, supine_patient_record *record, char **text,
+static supine_status take_patient(request *wanted, supine_patient_record *record,
                                   supine_error *error) {
   supine_status status = supine_patient_read(wanted->patient, record, error);
   if (status != SUPINE_OK) {
     return status;
   }
-  *text = supine_patient_text(record, NULL);
-  if (*text == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %s", wanted->patient);
-  }
   wanted->model.patient = record;
   /* Later, the constants of this law are replaced by those of the patient. */
   wanted->model.choice.law = SUPINE_LAW_DEEP;
-  wanted->basis.patient = *text;
   const supine_patient_fit_report *report = &record->report;
   (void)snprintf(wanted->summary, sizeof wanted->summary,
                  "%s: %s law%s from %.0f points; held-out residual %.1f of %.1f mm RMS, %.0f %% "
@@ -259,7 +259,6 @@ static supine_status check_patient(const supine_model_choice *choice, supine_err
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
   const supine_lungs *lungs = &wanted->model.made_from.lungs;
-  char *text = NULL;
   static supine_patient_record record; /* static, as it is too large for the stack */
   if (supine_mesh_save_supports(wanted->path)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
@@ -270,7 +269,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   if (wanted->patient != NULL) {
     status = check_patient(&wanted->model.choice, error);
     if (status == SUPINE_OK) {
-      status = take_patient(wanted, &record, &text, error);
+      status = take_patient(wanted, &record, error);
     }
   }
   if (status == SUPINE_OK && wanted->fields != NULL) {
@@ -280,7 +279,6 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
         supine_command_model_load(&wanted->model, name, given->operand, given->count, false, error);
     status = status == SUPINE_OK ? compute(lungs, wanted, given->made_by, error) : status;
   }
-  free(text);
   supine_command_model_options_free(&wanted->model);
   return status;
 }

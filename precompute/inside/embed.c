@@ -8,6 +8,7 @@
 #include <supine/safetensors.h>
 
 #include "base/parallel.h"
+#include "base/vec3.h"
 #include "runtime/rigid.h"
 
 #include "precompute/inside/biharmonic.h"
@@ -141,6 +142,34 @@ static void points_to_full(embedding *e, size_t lung, size_t begin, size_t end,
   }
 }
 
+/* Scale the interpolated displacements b_k by each mode k at `count` positions, so that with the
+ * weights w of the scan's posture they add up to the displacement u of options->field:
+ *
+ *     b_k := u (b_k . B) / (B . B),    B = sum over k of w_k b_k */
+static void take_field(const embedding *e, size_t lung, size_t count, const double *positions,
+                       double *values) {
+  const size_t modes = e->columns / 3;
+  const double *weights = e->shells->scan.weights;
+  const char *name = supine_basis_get_info(e->shells->basis)->lung_names[lung];
+  for (size_t i = 0; i < count && e->options->field != NULL; ++i) {
+    double *of[3] = {values + 3 * i * modes, values + (3 * i + 1) * modes,
+                     values + (3 * i + 2) * modes};
+    double sum[3] = {0.0, 0.0, 0.0};
+    double u[3];
+    for (size_t k = 0; k < 3 * modes; ++k) {
+      sum[k / modes] += weights[k % modes] * of[k / modes][k % modes];
+    }
+    const double square = supine_dot(sum, sum);
+    e->options->field(e->options->context, positions + 3 * i, name[0] == 'l' ? 1.0 : -1.0, u);
+    for (size_t k = 0; k < modes && square > 0.0; ++k) {
+      const double factor = (of[0][k] * sum[0] + of[1][k] * sum[1] + of[2][k] * sum[2]) / square;
+      for (size_t axis = 0; axis < 3; ++axis) {
+        of[axis][k] = factor * u[axis];
+      }
+    }
+  }
+}
+
 /* Find the displacements of the points order[begin] to order[end - 1], at most BLOCK, of one lung.
  * @param displacement  [vertices of the lung, columns] displacement of the surface by each mode, mm
  * @param reach  distance from the surface, mm, below which the interpolation `fit` is corrected
@@ -167,6 +196,7 @@ static void move_block(embedding *e, const double *displacement,
     }
   }
   supine_inside_biharmonic_evaluate(fit, count + near_count, positions, values);
+  take_field(e, lung, count + near_count, positions, values);
   double *motion = values + (size_t)2 * BLOCK * e->columns;
   for (size_t j = 0; j < near_count; ++j) {
     const supine_inside_place *place = &e->place[e->order[begin + near[j]]];
@@ -223,7 +253,8 @@ static supine_status embed_lung(embedding *e, size_t lung, size_t begin, size_t 
                ? SUPINE_OK
                : supine_inside_biharmonic_fit(shell->vertex_count, shell->vertices, e->columns,
                                               displacement, centres, &fit, error);
-  const double reach = reach_spacings * (fit.spacing + shell->edge);
+  const double reach =
+      e->options->field != NULL ? shell->edge : reach_spacings * (fit.spacing + shell->edge);
   for (size_t at = begin; at < end && status == SUPINE_OK; at += BLOCK) {
     move_block(e, displacement, &fit, reach, at, at + BLOCK < end ? at + BLOCK : end, space);
   }

@@ -213,7 +213,7 @@ static supine_status find_state(supine_patient_record *record, const supine_lung
           ? 1e-3 * supine_mesh_volume(&lungs->mesh) < sqrt(record->volume[0] * record->volume[1])
           : sum[1] < sum[0];
   const size_t k = axis[state];
-  record->shown = state;
+  record->shown = (double)state;
   return off[state] <= apart_most[record->from_surface]
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_MESH,
@@ -300,7 +300,7 @@ supine_status supine_patient_model(supine_patient_record *record, const supine_l
             .lungs = *lungs,
             .smoothing_ratio = malloc(2 * n * sizeof(double)),
             .displacement = directions};
-  double path_span[3];
+  double *path_span = record->path_span;
   supine_volume_form forms[2] = {{{0.0}}};
   supine_status status = find_state(record, lungs, error);
   w.lungs.mesh.vertices = malloc(3 * n * sizeof(double));
@@ -310,7 +310,7 @@ supine_status supine_patient_model(supine_patient_record *record, const supine_l
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  w.scan = record->shown == 1 ? lungs->mesh.vertices : NULL;
+  w.scan = record->shown == 1.0 ? lungs->mesh.vertices : NULL;
   memcpy(w.lungs.mesh.vertices, lungs->mesh.vertices, 3 * n * sizeof(double));
   for (size_t i = 0; i < 2 * n; ++i) {
     w.smoothing_ratio[i] = 1.0;
@@ -325,8 +325,8 @@ supine_status supine_patient_model(supine_patient_record *record, const supine_l
   supine_physics_volume_of_fields(&w.lungs, NULL, w.displacement, w.smoothing_ratio + n, 1, forms);
   set_volumes(record, &w.lungs, forms);
   supine_patient_resting(record, resting);
-  *scan =
-      supine_patient_scan(record, record->shown, 1e-3 * supine_mesh_volume(&lungs->mesh), resting);
+  *scan = supine_patient_scan(record, (size_t)record->shown,
+                              1e-3 * supine_mesh_volume(&lungs->mesh), resting);
   for (size_t i = 0; i < sizeof forms[0].of / sizeof *forms[0].of; ++i) {
     forms[0].of[i] += forms[1].of[i];
   }
@@ -351,4 +351,18 @@ cleanup:
   free(w.smoothing_ratio);
   free(w.lungs.mesh.vertices);
   return status;
+}
+
+void supine_patient_field(const void *record, const double point[3], double side, double u[3]) {
+  const supine_patient_record *of = record;
+  double at[3] = {point[0], point[1], point[2]};
+  if (of->shown == 1.0) {
+    supine_patient_find_in_fuller(&of->patient, point, side, 1.0, at, u);
+  } else {
+    const supine_patient_place place = supine_patient_find(&of->patient.frame, point, side);
+    supine_patient_displacement(&of->patient, &place, 1.0, u);
+  }
+  for (size_t k = 0; k < 3; ++k) {
+    u[k] /= -of->path_span[k];
+  }
 }

@@ -94,7 +94,11 @@ typedef struct supine_patient_record {
   size_t further_count; /**< number of elements of `further`; 0 after supine_patient_read */
   supine_patient_further further[SUPINE_PATIENT_OTHERS_MAX];
   bool gain_undetermined; /**< whether the fitted gain is outside 0.01 to 2 and ignored */
-  size_t shown; /**< state that a further scan shows (supine_patient_model): 0 fuller, 1 emptier */
+  /** @{ Set by supine_patient_model, for a basis: the state that its scan shows (0 fuller, 1
+   * emptier), and the displacement between the two states as a share of that from full inflation
+   * to rest, along x, y and z. */
+  double shown, path_span[3];
+  /** @} */
   /** [state][left, right lung] volumes of that scan and of its surface, displaced by the law to the
    * other state, mL; 0 if unknown */
   double lung_volume[2][2];
@@ -112,6 +116,15 @@ struct json_t *supine_patient_encode(const supine_patient_record *record, const 
 /** Return the record as JSON text that the caller frees, or NULL if out of memory. */
 char *supine_patient_text(const supine_patient_record *record, const char *made_by);
 
+/** Compute the displacement of a point by a patient's law, for a basis that was made with this law.
+ * A supine_inside_field; its context is a supine_patient_record. */
+void supine_patient_field(const void *record, const double point[3], double side, double u[3]);
+
+/** Read the record of a patient's displacement law from JSON text, of a file named `name`. Other
+ * statuses: as supine_patient_read. */
+supine_status supine_patient_decode(const char *name, const char *text,
+                                    supine_patient_record *record, supine_error *error);
+
 /** Read the record of a patient's displacement law from a JSON file.
  * @retval SUPINE_ERROR_READ    the file cannot be opened
  * @retval SUPINE_ERROR_FORMAT  a key is missing or invalid */
@@ -127,7 +140,7 @@ supine_status supine_patient_read(const char *path, supine_patient_record *recor
  *   the displacement from full inflation to rest.
  * - F is the patient's force on the vertex, smoothed over the surface (equilibrium.h). The
  *   unsmoothed force, and the ratio of F to it, are at least 0.2.
- * @param record   `shown`, `volume` and `lung_volume` are written
+ * @param record   `shown`, `path_span`, `volume` and `lung_volume` are written
  * @param lungs    scan of one of the two states
  * @param resting  default volumes at rest; on return those of the patient
  * @param scan     written: the state of the scan; `known` is false if its volume relative to full

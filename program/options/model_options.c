@@ -269,7 +269,7 @@ static void print_map(const char *path, const supine_source *source) {
 static void tell_volume(const supine_patient_record *record, double measured,
                         supine_findings *findings) {
   static const double different = 1.0 / 3.0; /* ratio of volumes minus 1 from which to warn */
-  const size_t other = 1 - record->shown;
+  const size_t other = record->shown == 1.0 ? 0 : 1;
   const double *lung = record->lung_volume[other];
   const bool both = (lung[0] > 0.0 && lung[1] > 0.0) || record->patient.frame.only_side != 0;
   char state[160];
@@ -306,7 +306,7 @@ static supine_status take_patient(supine_model_options *options, supine_error *e
   if (status != SUPINE_OK) {
     return status;
   }
-  tell_volume(record, measured[1 - record->shown], &options->findings);
+  tell_volume(record, measured[record->shown == 1.0 ? 0 : 1], &options->findings);
   choice->stiffness = choice->model.stiffness;
   if (choice->has_scan) {
     return SUPINE_OK;
@@ -316,8 +316,8 @@ static supine_status take_patient(supine_model_options *options, supine_error *e
   supine_findings_add(&options->findings,
                       "note: the scan is assumed to be the %s of the two that were fitted; "
                       "--scanned changes this",
-                      record->shown == 0 ? "fuller" : "emptier");
-  return record->shown == 0 || scan.known
+                      record->shown == 0.0 ? "fuller" : "emptier");
+  return record->shown == 0.0 || scan.known
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                                 "this scan is the emptier of the two that were fitted, and how far "

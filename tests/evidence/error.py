@@ -72,10 +72,10 @@ def judge(found, sigma, truth, points=slice(None), free=True):
 def full_breath(p, exp, insp):
     """Yield the path, the constant that was used, and what 'judge' returns, for each path of a full breath."""
     held, fitted = p.order[:HELD], np.sort(p.order[HELD:])
-    made = p.run("precompute", exp, "--edge", 6, "--held-out", 20, "-o", "b.safetensors")
-    volume = sum(float(ml) for ml in re.findall(r"vertices: ([0-9.]+) mL", made))
+    made = [p.run("precompute", scan, "--edge", 6, "--held-out", 20, "-o", "b.safetensors") for scan in (exp, insp)]
+    volume = [sum(float(ml) for ml in re.findall(r"vertices: ([0-9.]+) mL", text)) for text in made]
     p.basis(insp, p.inhaled)
-    yield "law", 4.5, *judge(*p.deform(f"{volume:.0f}mL"), p.exhaled)
+    yield "law", 4.5, *judge(*p.deform(f"{volume[0]:.0f}mL"), p.exhaled)
     seen, others = p.order[:SEEN], p.order[SEEN:]
     p.write("seen.csv", p.exhaled)
     lines = (p.folder / "seen.csv").read_text(encoding="utf-8").splitlines()
@@ -83,10 +83,12 @@ def full_breath(p, exp, insp):
     p.run("locate", "b.safetensors", "seen.csv", "--points", "i.safetensors", "--posture", "supine", "-o", "o.csv")
     yield "locate", 4.5, *judge(*p.read(), p.exhaled, others, False)
     p.write("fitted.csv", p.exhaled[fitted], p.inhaled[fitted])
-    for path, options, points in (("surfaces", [exp, insp], slice(None)),
-                                  ("surfaces and landmarks", [exp, insp, "--landmarks", "fitted.csv"], held),
-                                  ("landmarks", [exp, "--landmarks", "fitted.csv", "--translation"], held)):
-        record = p.run("fit", *options, "--rest", "supine:rest", "--other", "supine:full", "--json", "-o", "p.json")
+    states = ["--rest", "supine:rest", "--other", "supine:full"]
+    alone = ["--translation", "--rest", f"{volume[0]:.0f}mL", "--other", f"{volume[1]:.0f}mL"]
+    for path, options, points in (("surfaces", [exp, insp, *states], slice(None)),
+                                  ("surfaces and landmarks", [exp, insp, "--landmarks", "fitted.csv", *states], held),
+                                  ("landmarks", ["--landmarks", "fitted.csv", *alone], held)):
+        record = p.run("fit", *options, "--json", "-o", "p.json")
         p.basis(exp, p.exhaled, "--patient", "p.json")
         constant = float(record.split('"expected_constant_mm":')[1].split(",")[0])
         yield path, constant, *judge(*p.deform("full"), p.inhaled, points)
