@@ -121,16 +121,28 @@ static void add_reference(entries *list, const supine_reference *reference, cons
   add(list, "resting_shares", "%s", shares);
 }
 
-/* Add the constant c of the expected position error (supine/locate.h), and whether the resting
+/* Add the constants of the expected position error (supine/locate.h), and whether the resting
  * volume (FRC) of a posture is the patient's own. */
 static void add_expected_error(entries *list, const supine_basis_content *content) {
+  const supine_precompute_options *options = content->options;
   if (content->fit == NULL) {
-    const double own = content->options->expected_error;
     add(list, "expected_error_mm", "%g",
-        own > 0.0 ? fmin(own, SUPINE_EXPECTED_ERROR_MM) : SUPINE_EXPECTED_ERROR_MM);
+        options->expected_error > 0.0 ? options->expected_error : SUPINE_EXPECTED_ERROR_MM);
   }
-  if (content->reference != NULL && supine_reference_resting_given(&content->reference->resting)) {
-    add(list, "resting_known", "yes");
+  if (content->fit == NULL && options->expected_error > 0.0) {
+    add(list, "expected_error_from_mm", "%g", options->expected_from);
+    add(list, "expected_error_source", "%s", options->patient_summary);
+  }
+  if (content->fit == NULL && options->turn_fitted) {
+    add(list, "turn_fitted", "yes");
+  }
+  if (content->reference != NULL) {
+    const supine_resting *resting = &content->reference->resting;
+    if (supine_reference_resting_given(resting)) {
+      add(list, "resting_known", "yes");
+    } else {
+      add(list, "resting_spread", "%g", resting->spread);
+    }
   }
 }
 

@@ -234,6 +234,8 @@ static supine_status take_patient(request *wanted, supine_patient_record *record
                  report->explained, report->expected_point);
   wanted->basis.patient_summary = wanted->summary;
   wanted->basis.expected_error = report->expected_constant;
+  wanted->basis.expected_from = report->expected_from;
+  wanted->basis.turn_fitted = record->gain_error > 0.0;
   (void)printf("%s\n", wanted->summary);
   return SUPINE_OK;
 }

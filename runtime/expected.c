@@ -8,11 +8,11 @@
 #include "runtime/internal.h"
 
 /* Standard deviation of an assumed volume, as a fraction of the volume at full inflation: of the
- * volume at rest if full inflation was scanned, and of full inflation if rest was scanned. The
- * second follows from the first: 0.08 / 0.48. */
+ * volume at rest if full inflation was scanned (unless metadata "resting_spread" gives it), and of
+ * full inflation if rest was scanned. The second follows from the first: 0.08 / 0.48. */
 static const double rest_spread = 0.08, full_spread = 0.17;
-/* RMS displacement of a full breath, mm: for shorter displacements, c is reduced in proportion. It
- * is 4.5 mm / 0.25, where 0.25 was measured on quiet breaths. */
+/* RMS displacement of a full breath, mm, below which c falls in proportion: 4.5 mm / 0.25, where
+ * 0.25 was measured on quiet breaths. */
 static const double full_breath = 18;
 /* Error beside the heart for a change of gravity of 1 across the body, and the error along gravity
  * for a change of 1 sideways, mm. */
@@ -28,10 +28,15 @@ static const struct {
     {"heart", "motion of the heart, supine to prone (Chino & Marks 2008, n 16)"},
     {"sliding", "sliding of the lungs along gravity, which the model lacks"}};
 
-double supine_expected_constant(const supine_basis *basis) {
-  const char *text = supine_basis_metadata(basis, "expected_error_mm");
+/* Return the positive number that the metadata `key` holds, or `usual`. */
+static double number_of(const supine_basis *basis, const char *key, double usual) {
+  const char *text = supine_basis_metadata(basis, key);
   const double stated = text == NULL ? 0 : strtod(text, NULL);
-  return stated > 0 && isfinite(stated) ? stated : SUPINE_EXPECTED_ERROR_MM;
+  return stated > 0 && isfinite(stated) ? stated : usual;
+}
+
+double supine_expected_constant(const supine_basis *basis) {
+  return number_of(basis, "expected_error_mm", SUPINE_EXPECTED_ERROR_MM);
 }
 
 double supine_expected_reference(const supine_basis *basis) {
@@ -138,7 +143,8 @@ supine_status supine_expected_prepare(const supine_basis *basis, const supine_st
                                       supine_expected_model *m, supine_error *error) {
   const supine_state *const states[2] = {state, from};
   const supine_volume_kind assumed = assumed_kind(basis);
-  const double spread = assumed == SUPINE_VOLUME_FULL ? full_spread : rest_spread;
+  const double spread =
+      assumed == SUPINE_VOLUME_FULL ? full_spread : number_of(basis, "resting_spread", rest_spread);
   const double own = supine_expected_constant(basis);
   supine_status status = SUPINE_OK;
   *m = (supine_expected_model){.basis = basis, .least = least};
@@ -158,10 +164,10 @@ supine_status supine_expected_prepare(const supine_basis *basis, const supine_st
   const double square = basis->squares != NULL
                             ? mean_square_of_lungs(basis, &m->pose[0], &m->pose[1])
                             : mean_square(basis, &m->pose[0], &m->pose[1]);
-  const double share = fmin(1, fmax(least, sqrt(square)) / full_breath);
-  m->law = own * share;
-  if (own < SUPINE_EXPECTED_ERROR_MM && supine_basis_metadata(basis, "turn_fitted") == NULL) {
-    m->turn = (SUPINE_EXPECTED_ERROR_MM - own) * share;
+  const double rms = fmax(least, sqrt(square));
+  m->law = own * fmin(1, rms / number_of(basis, "expected_error_from_mm", full_breath));
+  if (supine_basis_metadata(basis, "turn_fitted") == NULL) {
+    m->turn = fmax(0, SUPINE_EXPECTED_ERROR_MM * fmin(1, rms / full_breath) - m->law);
   }
   for (size_t k = 0; k < 2 && m->turn > 0 && status == SUPINE_OK; ++k) {
     supine_state level = *states[k];

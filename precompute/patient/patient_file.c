@@ -13,7 +13,7 @@
 
 static const char format[] = "supine-patient";
 enum {
-  VERSION = 3,
+  VERSION = 4,
   CENTRE = sizeof(supine_patient_centre) / sizeof(double),
   REGION = sizeof(supine_patient_region) / sizeof(double)
 };
@@ -45,7 +45,8 @@ static const numbers table[] = {
     {NULL, "explained_percent", 1, AT(report.explained), false},
     {NULL, "expected_rms_mm", 1, AT(report.expected_point), false},
     {NULL, "expected_constant_mm", 1, AT(report.expected_constant), false},
-    {NULL, "band_95_percent_holds", 1, AT(report.band), false},
+    {NULL, "expected_from_mm", 1, AT(report.expected_from), false},
+    {NULL, "band_95_percent_holds", 1, AT(report.band), true},
     {"frame", "minimum_mm", 3, AT(patient.frame.minimum), false},
     {"frame", "maximum_mm", 3, AT(patient.frame.maximum), false},
     {"frame", "midline_mm", 1, AT(patient.frame.midline), false},

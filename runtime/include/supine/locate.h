@@ -6,7 +6,7 @@
  * position, after the translation that fits best. It is the root of a sum of terms:
  *
  *     sigma_i^2 = |u_i| c s                              displacement
- *               + |w_i| (4.5 mm - c) s                   turn, after a fit in one posture
+ *               + |w_i| max(0, 4.5 mm s_0 - c s)         turn, after a fit in one posture
  *               + (|dx_i/dV| s_V)^2                      assumed volume
  *               + (12 mm |Dg_xy| b_i)^2                  heart
  *               + (3 mm |Dg_x|)^2                        sliding
@@ -14,18 +14,21 @@
  *     u_i     displacement of the vertex from a state whose positions are exact, mm
  *     c       4.5 mm (95 % interval 3.7 to 5.7), measured on full breaths of 15 people in one
  *             posture; or the constant of a patient's fit, metadata "expected_error_mm"
- *     s       min(1, RMS of |u| over the lungs / 18 mm); measured on quiet breaths of 10 people
- *     w_i     part of u_i that a change of posture adds, mm. The term applies if c < 4.5 mm, and if
- *             no scan in another posture was fitted (metadata "turn_fitted")
+ *     s       min(1, RMS of |u| over the lungs / R). R is 18 mm, measured on quiet breaths of 10
+ *             people; or the RMS displacement of a fit, metadata "expected_error_from_mm"
+ *     s_0     s with R = 18 mm
+ *     w_i     part of u_i that a change of posture adds, mm. The term is 0 after a fit to a scan
+ *             in another posture too, metadata "turn_fitted"
  *     x_i     position of the vertex, mm
  *     V       volume of all lungs, mL
- *     s_V     0.08 of full inflation where the volume at rest was assumed, 0.17 where full
- * inflation was. The error is common to all postures: two states at rest differ by |d(u_i)/dV| s_V
+ *     s_V     0.08 of full inflation, or metadata "resting_spread", where the volume at rest was
+ *             assumed; 0.17 where full inflation was. The error is common to all postures: two
+ *             states at rest differ by |d(u_i)/dV| s_V
  *     Dg      change of the unit vector of gravity
  *     b_i     max(0, 1 - X / 0.7) 4 Y (1 - Y) max(0, 1 - |Z - 0.65| / 0.35), with X from the
  *             midline outwards, Y from the back and Z from the apex, 0 to 1 in the box around the
  *             lungs. The heart moves by up to 19 mm (Chino & Marks 2008, n 16), but not in the
- * model
+ *             model
  *
  * For a change of posture, all terms are extrapolations: nobody was scanned in two postures. Half
  * of all points lie within 0.9 sigma of the truth, 95 % within 1.8 sigma.
