@@ -9,7 +9,7 @@
 
 #include "program/validation.h"
 
-#include "precompute/inside/surface.h"
+#include "precompute/lungs/surface.h"
 #include "sh/base/vec3.h"
 
 const char *const supine_command_map_names[SUPINE_PATIENT_MAP_COUNT] = {"predicted", "none",

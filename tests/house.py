@@ -17,7 +17,7 @@ faults = []
 
 # Prefixes of external names, for folders whose prefix is not supine_<folder>_.
 PREFIX = {"sh/base": ("supine_",), "runtime": ("supine_",), "runtime/safetensors": ("supine_",),
-          "mesh/io": ("supine_mesh_", "supine_image_"), "precompute/lungs": ("supine_lungs_", "supine_phantom_", "supine_tissue_"),
+          "mesh/io": ("supine_mesh_", "supine_image_"), "precompute/lungs": ("supine_lungs_", "supine_phantom_", "supine_tissue_", "supine_inside_surface_"),
           "precompute/physics": ("supine_physics_", "supine_reference_"),
           "precompute/projection": ("supine_projection_", "supine_accuracy_"),
           "precompute": ("supine_precompute_", "supine_writer_", "supine_fields_"), "program/export": ("supine_export_", "supine_template_"), "program/options": ("supine_options_", "supine_breath_"),

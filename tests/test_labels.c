@@ -5,8 +5,8 @@
 #include "mesh/labels/labels.h"
 #include "mesh/labels/mask.h"
 #include "mesh/labels/shapes.h"
-#include "precompute/inside/surface.h"
 #include "precompute/lungs/phantom.h"
+#include "precompute/lungs/surface.h"
 
 #include "labels_helpers.h"
 #include "sh_helpers.h"
