@@ -104,22 +104,24 @@ static void check(checks *c, bool holds, supine_status refuse, const char *forma
   }
 }
 
-#define ACCEPT ". To use this size all the same, add --units mm"
+static const char to_accept[] = ". To use this size all the same, add --units mm";
 
 /* Check the length, proportions and volume of the lungs. */
-static void check_size(checks *c, const supine_lungs *lungs, bool likely, supine_status refuse) {
+static void check_size(checks *c, const supine_lungs *lungs, bool likely) {
+  const supine_status refuse = c->source->units_given ? SUPINE_OK : SUPINE_ERROR_MESH;
+  const char *accept = refuse == SUPINE_OK ? "" : to_accept;
   const double ml = 1e-3 * supine_mesh_volume(&lungs->mesh);
   const double most = lungs->lung_count == 2 ? 1.0 : 0.6; /* largest share of a pair's volume */
   const double height = lungs->maximum[2] - lungs->minimum[2];
   const double ratio = height / (lungs->maximum[0] - lungs->minimum[0]);
   check(c, lungs->lung_count < 2 || (ratio >= 0.55 && ratio <= 1.8), refuse,
         "the lungs are %.2f times as high as wide, which is impossible: correct the distance of "
-        "the slices (the voxel spacing) in the header" ACCEPT,
-        ratio);
+        "the slices (the voxel spacing) in the header%s",
+        ratio, accept);
   check(c, likely && ml >= 100.0 * most && ml <= 12000.0 * most, refuse,
         "the lungs are %.0f mm high and hold %.0f mL, which is impossible: correct the voxel "
-        "spacing in the header, or the unit" ACCEPT,
-        height, ml);
+        "spacing in the header, or the unit%s",
+        height, ml, accept);
   check(c, ml >= 1500.0 * most, SUPINE_OK,
         "the lungs hold %.0f mL, as a child's may: for an adult, check the voxel spacing", ml);
 }
@@ -263,10 +265,11 @@ static void check_shape(checks *c, const supine_lungs *lungs, int *side, bool *a
   const char *unit = NULL;
   const double length = supine_mesh_box(&lungs->mesh, (double[3]){0}, (double[3]){0});
   const bool likely = supine_mesh_unit_is_likely(length, &unit);
-  const supine_status refuse = c->source->units_given ? SUPINE_OK : SUPINE_ERROR_MESH;
+  const bool given = c->source->units_given;
   char letters[4];
-  check(c, likely || unit == NULL, refuse,
-        "the lungs are %.3g mm long, which is impossible: add --units %s" ACCEPT, length, unit);
+  check(c, likely || unit == NULL, given ? SUPINE_OK : SUPINE_ERROR_MESH,
+        "the lungs are %.3g mm long, which is impossible: add --units %s%s", length, unit,
+        given ? "" : to_accept);
   check(
       c, t->closed, SUPINE_ERROR_OPEN_SURFACE,
       "the surface is open (edges: %zu boundary, %zu non-manifold, %zu inconsistent) and encloses "
@@ -292,7 +295,7 @@ static void check_shape(checks *c, const supine_lungs *lungs, int *side, bool *a
   check(c, !found.joined || c->source->midline != NULL, SUPINE_ERROR_MESH,
         "this surface looks like both lungs in one piece: separate them (for a label map by "
         "--labels one). If it is a single lung, give --midline");
-  check_size(c, lungs, likely, refuse);
+  check_size(c, lungs, likely);
 }
 
 /* Choose the side of a single lung by its shape or, if that is unclear, by its position. */
