@@ -167,8 +167,7 @@ static supine_status read_map(work *w, const char *const *paths, size_t count,
   status = status == SUPINE_OK ? supine_labels_count(w->path, &w->image, tally, error) : status;
   if (status == SUPINE_OK) {
     labels_choice choice = {.taken = report->taken};
-    status =
-        supine_labels_choose(w->path, &w->image, tally, w->options->labels, side, &choice, error);
+    status = supine_labels_choose(w->path, &w->image, tally, w->options, side, &choice, error);
     w->doubted = choice.doubted;
   }
   status = status == SUPINE_OK ? advance(w, 0.3, error) : status;
