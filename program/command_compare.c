@@ -35,6 +35,7 @@ typedef struct request {
   supine_volume_options volume;
   supine_from from;
   double breath; /* tidal volume, mL */
+  bool has_breath;
 } request;
 
 static const supine_option table[] = {
@@ -43,7 +44,8 @@ static const supine_option table[] = {
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {"breath", 0, "ML", "tidal volume of the breath whose ventilation by height is computed",
-     SUPINE_FILLS(request, breath), .standard = "500", SUPINE_ABOVE_ZERO},
+     SUPINE_FILLS(request, breath), SUPINE_SAYS_GIVEN(request, has_breath), .standard = "500",
+     SUPINE_ABOVE_ZERO},
     {"json", 0, NULL, "print JSON to standard output instead of text", SUPINE_FILLS(request, json)},
     {"output", 'o', "FILE", ".html file to write: a report with charts and pictures",
      SUPINE_FILLS(request, html), .file = SUPINE_FILE_OUT, .endings = ".html"},
@@ -183,6 +185,9 @@ static supine_status compare(const char *path, const char *made_by, const supine
                                   .from = wanted->from,
                                   .breath = wanted->breath};
   comparison.state.gravity[1] = 1.0;
+  if (supine_basis_get_info(basis)->is_fields && !wanted->has_breath) {
+    comparison.breath = 0.0; /* fields of gravity have no volumes and no breaths */
+  }
   if (comparison.state.lung_count == 0 && comparison.state.volume.kind == SUPINE_VOLUME_DEFAULT) {
     comparison.state.volume = supine_basis_default_volume(basis);
   }

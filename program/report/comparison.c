@@ -63,7 +63,8 @@ static supine_status find_posture(const supine_comparison *c, const supine_postu
   supine_compare_statistics(c->compare, distance, &posture->displacement);
   (void)supine_basis_volumes(c->basis, &posture->pose, posture->volume);
   status = supine_options_pose_check(c->basis, c->command, c->allow_folds, &posture->pose, error);
-  return status == SUPINE_OK ? find_breath(c, item, xyz, posture, error) : status;
+  return status == SUPINE_OK && c->breath > 0.0 ? find_breath(c, item, xyz, posture, error)
+                                                : status;
 }
 
 /* Compute the expected error of each posture's displacement, mm RMS; 0 if it is unknown. */

@@ -147,6 +147,7 @@ json_t *supine_report_postures(const supine_comparison *c) {
     double percent[SUPINE_LUNGS_MAX] = {0};
     double ml[SUPINE_LUNGS_MAX] = {0};
     const char *words = "";
+    const double ratio = lowest_over_uppermost(c, i); /* NaN if no breath is computed */
     find_changes(c, i, percent, ml);
     for (size_t lung = 0; lung < info->lung_count; ++lung) {
       (void)json_array_append_new(
@@ -165,7 +166,7 @@ json_t *supine_report_postures(const supine_comparison *c) {
                         supine_report_line(i), "held", lungs, "mean",
                         json_sprintf("%.1f", c->posture[i].displacement.mean), "max",
                         json_sprintf("%.1f", c->posture[i].displacement.max), "published", words,
-                        "ratio", json_sprintf("%.2f", lowest_over_uppermost(c, i))));
+                        "ratio", json_sprintf(isnan(ratio) ? "" : "%.2f", ratio)));
   }
   return list;
 }

@@ -89,8 +89,8 @@ typedef struct supine_basis_info {
   double bytes_per_vertex; /**< bytes that an evaluation reads for each vertex */
   /** Largest position error of any vertex from storage and rounding, mm: the largest
    * supine_basis_error for 26 directions of gravity, towards the faces, edges and corners of a
-   * cube. The lungs hold 500 mL more than the reference surface or, if the surface is open, move by
-   * at most 20 mm. */
+   * cube. The lungs hold 500 mL more than the reference surface; an open surface moves by at most
+   * 20 mm; another simulator's fields are not scaled. */
   double storage_error;
   const char *const *lung_names; /**< [lung_count] such as "left", or an index such as "0" */
   const float *bounds;   /**< [lung_count, 2, 3] lowest and highest corner of each lung's box, mm */
@@ -289,7 +289,9 @@ SUPINE_API supine_status supine_displace_range(const supine_basis *basis, const 
  *     xyz += step
  *
  * Each step rounds a coordinate by at most 2^-24 of its value. These errors add up, so begin each
- * breath with supine_deform.
+ * breath with supine_deform. One step for a whole breath is right only for a law with straight
+ * paths (`paper`): with the default law, the middle of a path of 500 mL lies 3 to 5 % of the chord
+ * away from it. Use supine_deform there, or a step for each volume.
  * @param count  number of vertices
  * @param step   [count, 3] displacement of each vertex in this step, mm (supine_displace_range)
  * @param xyz    [count, 3] mm, changed; must not overlap `step` */

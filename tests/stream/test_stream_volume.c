@@ -1,45 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Test recorded poses, volumes given as text, and the histogram of latencies. */
+/* Test volumes given as text, and the histogram of latencies. */
 #include "program/stream/tracked_patient.h"
 #include "tests/runtime_fixture.h"
 #include "tests/test.h"
-
-static char *folder;
-
-static const char *file_of(const char *text) {
-  static char path[256];
-  (void)snprintf(path, sizeof path, "%s/poses.csv", folder);
-  FILE *file = fopen(path, "w");
-  assert_non_null(file);
-  assert_true(fputs(text, file) >= 0);
-  assert_int_equal(fclose(file), 0);
-  return path;
-}
-
-TEST(test_poses_bad_files_refused) {
-  static const struct {
-    const char *text, *says;
-  } bad[] = {
-      {"seconds,gravity_x,gravity_y,gravity_z\n", "no poses"},
-      {"seconds,gravity_x,gravity_y\n0,0,1\n", "gravity_z"},
-      {"seconds,gravity_x,gravity_y,gravity_z\n0,0,1,0\n1,0,0,0\n", ":3:"},
-      {"seconds,gravity_x,gravity_y,gravity_z\n1,0,1,0\n0.5,0,1,0\n", ":3:"},
-      {"seconds,gravity_x,gravity_y,gravity_z\n-1,0,1,0\n", ":2:"},
-      {"seconds,gravity_x,gravity_y,gravity_z\n0,0,nan,0\n", ":2:"},
-      {"seconds,gravity_x,gravity_y,gravity_z\n0,0,1e300,0\n", ":2:"},
-      {"seconds,gravity_x,gravity_y,gravity_z\n0,0,1\n", ":2:"},
-  };
-  supine_stream_poses poses;
-  supine_error error;
-  for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
-    assert_int_equal(supine_stream_poses_load(file_of(bad[i].text), &poses, &error),
-                     SUPINE_ERROR_FORMAT);
-    assert_says(error.message, bad[i].says);
-    assert_null(poses.pose);
-  }
-  assert_int_equal(supine_stream_poses_load("/no/such/poses.csv", &poses, &error),
-                   SUPINE_ERROR_READ);
-}
 
 TEST(test_latency_known_values_give_percentiles) {
   supine_stream_latency *latency = fixture_allocate(1, sizeof *latency);
@@ -120,16 +83,4 @@ TEST(test_volume_parse_each_form_literal) {
   fixture_destroy(made);
 }
 
-static int make_folder(void **state) {
-  (void)state;
-  folder = fixture_folder();
-  return 0;
-}
-
-static int remove_folder(void **state) {
-  (void)state;
-  fixture_folder_remove(folder);
-  return 0;
-}
-
-TEST_GROUP(make_folder, remove_folder)
+TEST_GROUP(NULL, NULL)
