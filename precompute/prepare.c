@@ -144,6 +144,10 @@ static void summarize(const supine_model_choice *choice, supine_prepared *p) {
   const supine_resting usual = supine_reference_resting_default();
   const supine_reference *reference = &p->reference;
   const size_t size = sizeof p->summary;
+  const char *source = memcmp(&usual, &choice->resting, sizeof usual) == 0
+                           ? "healthy people's share, which --resting changes"
+                           : "by --resting";
+  const bool at_rest = reference->scan.state.volume.kind == SUPINE_VOLUME_REST;
   char state[160];
   double ml[2];
   supine_text_add(p->summary, size, "%s law; scan ",
@@ -161,11 +165,24 @@ static void summarize(const supine_model_choice *choice, supine_prepared *p) {
   }
   supine_text_add(p->summary, size, "%sfull inflation %.0f mL (", held != full ? "" : "at ", full);
   supine_reference_compare(reference, &choice->person, p->summary, size);
-  supine_text_add(p->summary, size, "); rest supine %.0f mL (%s)",
-                  supine_reference_rest(reference, supine, ml),
-                  memcmp(&usual, &choice->resting, sizeof usual) == 0
-                      ? "healthy people's share, which --resting changes"
-                      : "by --resting");
+  const double rest = supine_reference_rest(reference, supine, ml);
+  /* The share gives full inflation if the scan is at rest, else rest. */
+  if (at_rest) {
+    supine_text_add(p->summary, size, ", from rest by %s); rest supine %.0f mL", source, rest);
+  } else {
+    supine_text_add(p->summary, size, "); rest supine %.0f mL (%s)", rest, source);
+  }
+  double collapsed = 0.0; /* volume in the scan as the basis holds it, mL */
+  for (size_t lung = 0; lung < reference->lung_count; ++lung) {
+    collapsed +=
+        p->model.share[lung] * (reference->full_volume[lung] + reference->scan_volume[lung]);
+  }
+  if (p->model.share[0] != 1.0 || p->model.share[1] != 1.0) {
+    supine_text_add(p->summary, size,
+                    "; collapsed in every state by --lung, also in the scan, which then holds %.0f "
+                    "mL: no displacement contains the collapse",
+                    collapsed);
+  }
 }
 
 supine_status supine_precompute_prepare(supine_lungs *lungs, const supine_model_choice *choice,

@@ -82,14 +82,14 @@ supine_status supine_reference_resting_set(supine_resting *resting, const char *
   supine_resting set = *resting;
   if (supine_posture_gravity(posture, g) != SUPINE_OK) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--resting: '%s' is not a posture; did you mean '%s'?", posture,
+                            "'%s' is not a posture; did you mean '%s'?", posture,
                             supine_posture_nearest(posture));
   }
   for (size_t k = 0; k < 3; ++k) {
     if (g[k] != 0.0 && !read_value(&set, 2 * k + (g[k] < 0.0), value)) {
       return supine_error_set(
           error, SUPINE_ERROR_ARGUMENT,
-          "--resting %s=%s: give a share of the full volume above %g and at most %g (0.43, or "
+          "%s=%s: give a share of the full volume above %g and at most %g (0.43, or "
           "0.42/0.44 for the left and the right lung) or a volume of gas and tissue (2600mL)",
           posture, value, least_share, most_share);
     }
