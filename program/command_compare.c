@@ -4,11 +4,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sh/base/output.h"
-#include "sh/base/vec3.h"
+#include "base/output.h"
+#include "base/vec3.h"
 
-#include "program/inside.h"
 #include "program/options/basis_input.h"
+#include "program/options/inside.h"
 #include "program/options/state_options.h"
 #include "program/report/comparison.h"
 
@@ -35,6 +35,7 @@ typedef struct request {
   supine_volume_options volume;
   supine_from from;
   double breath; /* tidal volume, mL */
+  bool has_breath;
 } request;
 
 static const supine_option table[] = {
@@ -43,7 +44,8 @@ static const supine_option table[] = {
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {"breath", 0, "ML", "tidal volume of the breath whose ventilation by height is computed",
-     SUPINE_FILLS(request, breath), .standard = "500", SUPINE_ABOVE_ZERO},
+     SUPINE_FILLS(request, breath), SUPINE_SAYS_GIVEN(request, has_breath), .standard = "500",
+     SUPINE_ABOVE_ZERO},
     {"json", 0, NULL, "print JSON to standard output instead of text", SUPINE_FILLS(request, json)},
     {"output", 'o', "FILE", ".html file to write: a report with charts and pictures",
      SUPINE_FILLS(request, html), .file = SUPINE_FILE_OUT, .endings = ".html"},
@@ -80,8 +82,8 @@ static supine_status find_means(const structures *c, const supine_state *state, 
   supine_pose pose;
   const supine_status status = supine_basis_pose(c->basis, state, &pose, error);
   if (status == SUPINE_OK) {
-    supine_displace_range(c->basis, &pose, 0, supine_basis_get_info(c->basis)->vertex_count,
-                          c->displacement);
+    (void)supine_displace_range(c->basis, &pose, 0, supine_basis_get_info(c->basis)->vertex_count,
+                                c->displacement);
     average(c, 3, c->displacement, c->mean + 3 * i * c->names.count);
   }
   return status;
@@ -183,6 +185,9 @@ static supine_status compare(const char *path, const char *made_by, const supine
                                   .from = wanted->from,
                                   .breath = wanted->breath};
   comparison.state.gravity[1] = 1.0;
+  if (supine_basis_get_info(basis)->is_fields && !wanted->has_breath) {
+    comparison.breath = 0.0; /* fields of gravity have no volumes and no breaths */
+  }
   if (comparison.state.lung_count == 0 && comparison.state.volume.kind == SUPINE_VOLUME_DEFAULT) {
     comparison.state.volume = supine_basis_default_volume(basis);
   }

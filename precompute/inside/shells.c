@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Extract the surface of each lung from a basis, and find the lung that contains a point. */
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "sh/base/vec3.h"
+#include "base/vec3.h"
 
 #include "precompute/inside/shells.h"
 
@@ -77,7 +78,7 @@ supine_status supine_inside_shells_create(const supine_basis *basis, supine_insi
                              : supine_error_set(error, SUPINE_ERROR_MEMORY,
                                                 "no memory for %zu vertices", info->vertex_count);
   if (status == SUPINE_OK) {
-    supine_deform(basis, &shells->scan, scanned);
+    (void)supine_deform(basis, &shells->scan, scanned);
   }
   for (size_t i = 0; i < 3 * info->vertex_count && status == SUPINE_OK; ++i) {
     if (!isfinite(scanned[i])) {
