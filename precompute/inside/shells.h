@@ -8,7 +8,7 @@
 #include <supine/runtime.h>
 
 #include "mesh/mesh.h"
-#include "precompute/inside/surface.h"
+#include "precompute/lungs/surface.h"
 
 typedef struct supine_inside_shell {
   size_t begin; /**< index of the lung's first vertex in the basis */
