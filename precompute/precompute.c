@@ -69,8 +69,8 @@ static supine_status find_directions(pipeline *p, supine_error *error) {
   if (p->directions == NULL || p->weight == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
   }
-  const supine_status status =
-      supine_physics_directions(p->lungs, &p->options->model.direction, p->directions, error);
+  const supine_status status = supine_physics_directions(
+      p->lungs, &p->options->model.force, &p->options->model.direction, p->directions, error);
   for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
     const double *d = p->directions + 3 * i;
     p->weight[i] = supine_dot(d, d);

@@ -15,6 +15,7 @@ supine_model_choice supine_precompute_choice_default(void) {
                                 .resting = supine_reference_resting_default()};
   choice.model.reach = choice.model.force.base = choice.model.force.gain = NAN;
   choice.model.force.box[0] = choice.model.direction.c[0] = NAN;
+  choice.model.direction.shear = NAN;
   return choice;
 }
 
@@ -34,6 +35,8 @@ static supine_model choose_law(const supine_model_choice *choice) {
   model.reach = isnan(model.reach) ? law.reach : model.reach;
   model.force.base = isnan(model.force.base) ? law.force.base : model.force.base;
   model.force.gain = isnan(model.force.gain) ? law.force.gain : model.force.gain;
+  model.direction.shear =
+      isnan(model.direction.shear) ? law.direction.shear : model.direction.shear;
   if (isnan(model.force.box[0])) {
     memcpy(model.force.box, law.force.box, sizeof law.force.box);
   }

@@ -41,7 +41,8 @@ supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model
     (void)supine_error_set(error, status, "no memory to solve %zu vertices", n);
     goto cleanup;
   }
-  status = supine_physics_directions(lungs, &model->direction, made.directions, error);
+  status =
+      supine_physics_directions(lungs, &model->force, &model->direction, made.directions, error);
   if (status != SUPINE_OK) {
     goto cleanup;
   }
