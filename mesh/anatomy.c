@@ -20,7 +20,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "sh/base/vec3.h"
+#include "base/vec3.h"
 
 #include "mesh/anatomy.h"
 

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sh/base/vec3.h"
+#include "base/vec3.h"
 #include <supine/volume.h>
 
 #include "precompute/precompute.h"
@@ -57,7 +57,7 @@ static void pipeline_free(pipeline *p) {
   free(p->directions);
   free(p->weight);
   supine_projection_free(&p->projection);
-  supine_projection_compression_free(&p->compression);
+  supine_sh_compression_free(&p->compression);
   supine_physics_volume_forms_free(&p->forms);
   supine_accuracy_truth_free(&p->truth);
 }
@@ -85,10 +85,9 @@ static supine_status project(pipeline *p, supine_error *error) {
 
 static supine_status compress(pipeline *p, supine_error *error) {
   return p->options->modes == 0
-             ? supine_projection_compress_harmonics(&p->projection, &p->compression, error)
-             : supine_projection_compress_modes(&p->projection, p->weight, p->options->modes,
-                                                &p->compression, p->singular, &p->square_sum,
-                                                error);
+             ? supine_sh_compress_harmonics(&p->projection.expansion, &p->compression, error)
+             : supine_sh_compress_modes(&p->projection.expansion, p->weight, p->options->modes,
+                                        &p->compression, p->singular, &p->square_sum, error);
 }
 
 /* Correct the vertices of the reference surface so that the displacement computed from the modes
@@ -115,8 +114,8 @@ static supine_status anchor(pipeline *p, supine_error *error) {
     free(amounts);
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
   }
-  supine_projection_compression_weights(field, p->reference.scan.state.gravity, weights);
-  supine_projection_compression_field(field, weights, amounts);
+  supine_sh_compression_weights(field, p->reference.scan.state.gravity, weights);
+  supine_sh_compression_field(field, weights, amounts);
   memcpy(p->anchored.mesh.vertices, lungs->scanned, 3 * n * sizeof(double));
   const supine_status status = supine_reference_find_gains(
       &p->anchored, p->options->model.bend, p->directions, amounts, &p->reference, error);
@@ -131,8 +130,8 @@ static supine_status anchor(pipeline *p, supine_error *error) {
 }
 
 static supine_status find_forms(pipeline *p, supine_error *error) {
-  return supine_projection_compression_volume_forms(
-      &p->compression, p->lungs, p->options->model.share, p->directions, &p->forms, error);
+  return supine_projection_volume_forms(&p->compression, p->lungs, p->options->model.share,
+                                        p->directions, &p->forms, error);
 }
 
 /* Check that each lung can reach its resting volume (FRC) with gravity along the unit vector g.
@@ -142,7 +141,7 @@ static supine_status check_rest(const supine_compression *compression,
                                 const double *volume, supine_error *error) {
   double weights[SUPINE_MODES_MADE_MAX];
   supine_error inner = {0};
-  supine_projection_compression_weights(compression, g, weights);
+  supine_sh_compression_weights(compression, g, weights);
   for (size_t lung = 0; lung < forms->lung_count; ++lung) {
     static const double straight[3] = {0.0, 0.0, 0.0};
     supine_volume_form form;
@@ -249,7 +248,7 @@ static supine_status drop_modes(pipeline *p, supine_error *error) {
   if (p->options->modes == 0 || needed == p->compression.mode_count) {
     return SUPINE_OK;
   }
-  supine_projection_compression_truncate(&p->compression, p->projection.rank, needed);
+  supine_sh_compression_truncate(&p->compression, p->projection.expansion.rank, needed);
   supine_physics_volume_forms_free(&p->forms);
   supine_status status = anchor(p, error);
   status = status == SUPINE_OK ? find_forms(p, error) : status;
@@ -300,5 +299,31 @@ supine_status supine_precompute(const supine_lungs *lungs, const supine_precompu
                                          .turned_over = p.turned_over};
   }
   pipeline_free(&p);
+  return status;
+}
+
+supine_status supine_precompute_fields(const supine_lungs *lungs, const supine_fields *fields,
+                                       const supine_fit_options *options, const char *path,
+                                       supine_fit_report *report, supine_error *error) {
+  supine_compression field = {0};
+  supine_volume_forms forms = {0};
+  supine_status status = supine_fields_fit(fields, options, &field, report, error);
+  if (status == SUPINE_OK) {
+    status = supine_projection_volume_forms(&field, lungs, NULL, NULL, &forms, error);
+  }
+  if (status == SUPINE_OK) {
+    const supine_precompute_options basis = {
+        .modes = options->modes, .findings = options->findings, .made_by = options->made_by};
+    const supine_basis_content content = {.lungs = lungs,
+                                          .options = &basis,
+                                          .fit = report,
+                                          .compression = &field,
+                                          .forms = &forms,
+                                          .accuracy = &report->accuracy};
+    report->mode_count = field.mode_count;
+    status = supine_writer_basis_write(path, &content, error);
+  }
+  supine_sh_compression_free(&field);
+  supine_physics_volume_forms_free(&forms);
   return status;
 }

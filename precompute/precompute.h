@@ -4,7 +4,7 @@
 #ifndef SUPINE_PRECOMPUTE_H
 #define SUPINE_PRECOMPUTE_H
 
-#include "precompute/fields.h"
+#include "precompute/fields/fields.h"
 #include "precompute/physics/model.h"
 #include "precompute/physics/reference.h"
 #include "precompute/projection/accuracy.h"

@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sh/base/text.h"
-#include "sh/base/vec3.h"
+#include "base/text.h"
+#include "base/vec3.h"
 
 #include "precompute/prepare.h"
 

@@ -4,7 +4,7 @@
 #ifndef SUPINE_PREPARE_H
 #define SUPINE_PREPARE_H
 
-#include "sh/base/findings.h"
+#include "base/findings.h"
 
 #include "precompute/lungs/disease.h"
 #include "precompute/lungs/expandability.h"

@@ -7,10 +7,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "sh/base/parallel.h"
-#include "sh/base/text.h"
+#include "base/parallel.h"
+#include "base/text.h"
 
-#include "mesh/io/image.h"
+#include "mesh/image/image.h"
 #include "precompute/lungs/gate.h"
 #include "precompute/source.h"
 

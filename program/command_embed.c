@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "mesh/io/image.h"
+#include "mesh/image/image.h"
 #include "mesh/io/points.h"
 #include "mesh/labels/shapes.h"
 #include "precompute/inside/content.h"

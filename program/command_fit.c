@@ -6,11 +6,11 @@
 
 #include <jansson.h>
 
-#include "sh/base/text.h"
+#include "base/text.h"
 
 #include "precompute/inside/surface.h"
 #include "precompute/patient/patient_file.h"
-#include "program/model_options.h"
+#include "program/options/model_options.h"
 #include "program/options/surface_options.h"
 
 static const char name[] = "fit";

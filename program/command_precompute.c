@@ -7,7 +7,7 @@
 #include <supine/sh.h>
 
 #include "precompute/patient/patient_file.h"
-#include "program/model_options.h"
+#include "program/options/model_options.h"
 
 static const char name[] = "precompute";
 

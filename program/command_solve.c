@@ -3,11 +3,11 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "base/output.h"
 #include "precompute/lungs/disease.h"
-#include "sh/base/output.h"
 #include <supine/volume.h>
 
-#include "program/model_options.h"
+#include "program/options/model_options.h"
 #include "program/options/state_options.h"
 
 static const char name[] = "solve";

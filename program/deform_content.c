@@ -3,14 +3,14 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "sh/base/output.h"
-#include "sh/base/text.h"
-#include "sh/base/vec3.h"
+#include "base/output.h"
+#include "base/text.h"
+#include "base/vec3.h"
 
 #include "mesh/mesh.h"
+#include "precompute/warp/field.h"
 #include "program/deform_content.h"
-#include "program/field.h"
-#include "program/inside.h"
+#include "program/options/inside.h"
 
 /* Distance from the lungs at which a displacement field reaches 0, mm. Grids made by 'supine embed'
  * extend this far around the lungs. */
@@ -131,8 +131,8 @@ static supine_status write_points(const char *path, const supine_basis *basis,
     status = supine_output_open(path, &output, error);
   }
   if (status == SUPINE_OK) {
-    supine_deform(basis, &moved->pose, xyz);
-    supine_deform(basis, &moved->from.pose, before);
+    (void)supine_deform(basis, &moved->pose, xyz);
+    (void)supine_deform(basis, &moved->from.pose, before);
     supine_mesh_unit_name(unit, unit_name);
     supine_mesh_axes_letters(frame->axes, axes);
     (void)fprintf(

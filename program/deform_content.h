@@ -5,7 +5,7 @@
 
 #include <supine/runtime.h>
 
-#include "mesh/io/image.h"
+#include "mesh/image/image.h"
 
 #include "program/options/basis_input.h"
 #include "program/options/state_options.h"

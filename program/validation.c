@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "program/model_options.h"
+#include "program/options/model_options.h"
 #include "program/validation.h"
 
 #include "precompute/inside/biharmonic.h"

@@ -7,9 +7,9 @@
 #include <sys/resource.h>
 #include <sys/stat.h>
 
-#include "sh/base/output.h"
-#include "sh/base/parallel.h"
-#include "sh/base/text.h"
+#include "base/output.h"
+#include "base/parallel.h"
+#include "base/text.h"
 #include "test.h"
 #include <supine/status.h>
 

@@ -2,14 +2,13 @@
 /* Test displacements of another simulator: loading, fit, cross-validation, refused input. */
 
 #include "folder.h"
-#include "precompute/fields.h"
+#include "precompute/fields/fields.h"
 #include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
 #include <supine/runtime.h>
 #include <supine/safetensors.h>
 
-#include "precompute/writer.h"
 #include <supine/sh.h>
 
 #include "lungs_helpers.h"
@@ -95,8 +94,8 @@ static void check_band_limited(const supine_fields *fields, size_t band) {
   }
   assert_int_equal(report.band, band);
   assert_true(report.accuracy.relative_rms < 1e-6);
-  assert_int_equal(field.vertex_count, 3 * fields->vertex_count);
-  supine_projection_compression_free(&field);
+  assert_int_equal(field.row_count, 3 * fields->vertex_count);
+  supine_sh_compression_free(&field);
 }
 
 TEST(test_fit_band_limited_fields_recovered) {
@@ -120,7 +119,7 @@ TEST(test_fit_leave_one_out_error_equals_refits) {
   supine_compression field;
   supine_fit_report report;
   assert_int_equal(supine_fields_fit(&fields, &options, &field, &report, NULL), SUPINE_OK);
-  supine_projection_compression_free(&field);
+  supine_sh_compression_free(&field);
   double error2 = 0.0;
   double field2 = 0.0;
   for (size_t out = 0; out < COUNT; ++out) {
@@ -148,7 +147,7 @@ TEST(test_fit_leave_one_out_error_equals_refits) {
       error2 += (is - should) * (is - should);
       field2 += should * should;
     }
-    supine_projection_compression_free(&field);
+    supine_sh_compression_free(&field);
     supine_fields_free(&rest);
   }
   const double direct = sqrt(error2 / field2);
@@ -241,7 +240,7 @@ static double gain_of_band_2(double amount, size_t *band) {
     fields.displacement[i] += amount * more.displacement[i] + random_signed(&seed);
   }
   assert_int_equal(supine_fields_fit(&fields, &options, &field, &report, NULL), SUPINE_OK);
-  supine_projection_compression_free(&field);
+  supine_sh_compression_free(&field);
   supine_fields_free(&fields);
   supine_fields_free(&more);
   *band = report.band;
@@ -312,7 +311,7 @@ TEST(test_fit_few_directions_limit_the_band) {
   assert_int_equal(supine_fields_fit(&fields, &options, &field, &report, NULL), SUPINE_OK);
   assert_in_range(report.band_highest, 1, 2);
   assert_true(report.band <= report.band_highest);
-  supine_projection_compression_free(&field);
+  supine_sh_compression_free(&field);
   options.band = 4;
   assert_int_equal(supine_fields_fit(&fields, &options, &field, &report, &error),
                    SUPINE_ERROR_ARGUMENT);
@@ -346,7 +345,7 @@ TEST(test_fields_load_bad_tensors_refused) {
                               {"displacement", SUPINE_F32, 3, {2, n, 3}, displacement}};
   const char *path = in_folder("fields.safetensors");
   supine_fields fields = {0};
-  assert_int_equal(supine_writer_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
+  assert_int_equal(supine_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
   assert_int_equal(supine_fields_load(path, &lungs, NULL, &fields, NULL), SUPINE_OK);
   assert_close(fields.directions[5], -1.0, 0.0);
   assert_close(fields.displacement[3 * n + 4], 0.5, 0.0);
@@ -354,19 +353,19 @@ TEST(test_fields_load_bad_tensors_refused) {
   displacement[3 * n + 3] = 0.25F;
   displacement[3 * n + 5] = 0.75F;
   const supine_mesh_load_options ras = {.axes = SUPINE_AXES_RAS, .millimetres_per_unit = 10.0};
-  assert_int_equal(supine_writer_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
+  assert_int_equal(supine_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
   assert_int_equal(supine_fields_load(path, &lungs, &ras, &fields, NULL), SUPINE_OK);
   assert_close(fields.displacement[3 * n + 3], -2.5, 0.0);
   assert_close(fields.displacement[3 * n + 4], -5.0, 0.0);
   assert_close(fields.displacement[3 * n + 5], 7.5, 0.0);
   supine_fields_free(&fields);
   displacement[3 * n + 4] = NAN;
-  assert_int_equal(supine_writer_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
+  assert_int_equal(supine_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
   expect_failure("fields.safetensors", SUPINE_ERROR_FORMAT, "row 1: the displacement of vertex 1");
   tensors[1].shape[1] = n / 2;
-  assert_int_equal(supine_writer_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
+  assert_int_equal(supine_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
   expect_failure("fields.safetensors", SUPINE_ERROR_MESH, "but the reference surface has");
-  assert_int_equal(supine_writer_safetensors_write(path, tensors, 1, NULL, 0, NULL), SUPINE_OK);
+  assert_int_equal(supine_safetensors_write(path, tensors, 1, NULL, 0, NULL), SUPINE_OK);
   expect_failure("fields.safetensors", SUPINE_ERROR_FORMAT, "displacement [M,N,3]");
   expect_failure("nothing.safetensors", SUPINE_ERROR_READ, "nothing.safetensors");
   displacement[3 * n + 4] = 0.0F;
@@ -380,7 +379,7 @@ TEST(test_fields_load_bad_tensors_refused) {
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     memcpy(gravity + 3, bad[i].gravity, sizeof bad[i].gravity);
     assert_int_equal(
-        supine_writer_safetensors_write(in_folder("fields.safetensors"), tensors, 2, NULL, 0, NULL),
+        supine_safetensors_write(in_folder("fields.safetensors"), tensors, 2, NULL, 0, NULL),
         SUPINE_OK);
     expect_failure("fields.safetensors", SUPINE_ERROR_FORMAT, bad[i].words);
   }

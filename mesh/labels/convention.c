@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sh/base/text.h"
+#include "base/text.h"
 
 #include "mesh/labels/mask.h"
 

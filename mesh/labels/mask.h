@@ -5,7 +5,7 @@
 
 #include <stdint.h>
 
-#include "mesh/io/image.h"
+#include "mesh/image/image.h"
 #include "mesh/labels/labels.h"
 
 /** A box of voxels cut from an image or from another mask. Voxels inside an object are nonzero.

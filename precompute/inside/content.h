@@ -3,7 +3,7 @@
 #ifndef SUPINE_INSIDE_CONTENT_H
 #define SUPINE_INSIDE_CONTENT_H
 
-#include "mesh/io/image.h"
+#include "mesh/image/image.h"
 #include "precompute/inside/shells.h"
 
 /** Points inside the lungs, some of which may be corners of triangles. Each named point and each

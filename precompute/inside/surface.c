@@ -4,9 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sh/base/clones.h"
-#include "sh/base/parallel.h"
-#include "sh/base/vec3.h"
+#include "base/clones.h"
+#include "base/parallel.h"
+#include "base/vec3.h"
 
 #include "precompute/inside/surface.h"
 

@@ -10,8 +10,8 @@
 
 #include "precompute/patient/krige.h"
 
-#include "sh/base/parallel.h"
-#include "sh/base/vec3.h"
+#include "base/parallel.h"
+#include "base/vec3.h"
 
 enum {
   EXPECTED_MAX = 200, /* largest number of points used to compute the expected error */

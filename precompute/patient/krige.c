@@ -9,7 +9,7 @@
 
 #include "precompute/patient/krige.h"
 
-#include "sh/base/vec3.h"
+#include "base/vec3.h"
 
 enum {
   TERMS = SUPINE_PATIENT_TERMS,

@@ -6,9 +6,9 @@
 
 #include "precompute/patient/matching.h"
 
+#include "base/parallel.h"
 #include "precompute/physics/solve.h"
 #include "precompute/physics/volume_forms.h"
-#include "sh/base/parallel.h"
 
 enum { GRAIN = 64 };
 

@@ -7,7 +7,7 @@
 
 #include "precompute/patient/krige.h"
 
-#include "sh/base/vec3.h"
+#include "base/vec3.h"
 
 /* Side of the cubes whose measurements are held out together, mm. Landmarks a third of this
  * distance apart have displacements that differ by only a few mm, so that holding out single

@@ -10,8 +10,8 @@
  * within 5 % of the medians of Hall et al. at age 40 (Eur Respir J 57: 2000289, 2021). */
 #include <math.h>
 
+#include "base/text.h"
 #include "precompute/physics/reference.h"
-#include "sh/base/text.h"
 
 static const double tissue = 860.0; /* volume of the tissue of both lungs, mL */
 

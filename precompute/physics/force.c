@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sh/base/parallel.h"
-#include "sh/base/vec3.h"
+#include "base/parallel.h"
+#include "base/vec3.h"
 
 #include "precompute/physics/force.h"
 

@@ -6,7 +6,7 @@
 #include <strings.h>
 #include <sys/stat.h>
 
-#include "sh/base/output.h"
+#include "base/output.h"
 
 #include "program/options/command.h"
 

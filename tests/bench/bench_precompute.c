@@ -14,9 +14,9 @@
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
+#include "base/clock.h"
+#include "base/parallel.h"
 #include "precompute/precompute.h"
-#include "sh/base/clock.h"
-#include "sh/base/parallel.h"
 
 static const char *const sizes[][2] = {
     {"chaste_left_5k.obj", "chaste_right_5k.obj"},

@@ -1,0 +1,71 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file
+ * Fit spherical harmonics of the direction of gravity to the displacement fields of another
+ * simulator, and compress the fit. The field u(g_j) holds the displacements of all vertices for the
+ * direction of gravity g_j, and Y(g_j) holds the values of the harmonics at g_j. The coefficients C
+ * minimise
+ *
+ *     sum over j of |u(g_j) - C Y(g_j)|^2
+ *
+ * The band of a fit is the highest degree of its harmonics. By default, bands are tried in rising
+ * order, and a higher band is chosen if it reduces the leave-one-out error by more than 1 %. */
+#ifndef SUPINE_FIELDS_H
+#define SUPINE_FIELDS_H
+
+#include "precompute/lungs/lungs.h"
+#include "precompute/projection/accuracy.h"
+
+/** Displacements of all vertices for several directions of gravity, made by another simulator. */
+typedef struct supine_fields {
+  size_t direction_count; /**< number of directions of gravity */
+  size_t vertex_count;
+  double *directions;   /**< [direction_count, 3] unit vectors along gravity */
+  double *displacement; /**< [direction_count, vertex_count, 3] displacement of each vertex, mm */
+} supine_fields;
+
+/** Read displacement fields from a safetensors file with two tensors, F32 or F64. The tensor
+ * gravity [M, 3] holds M directions of gravity. The tensor displacement [M, N, 3] holds the
+ * displacements of the N vertices of `lungs` for each direction.
+ * @param lungs    the reference surface
+ * @param options  axes and unit of the displacements
+ * @param fields   release with supine_fields_free
+ * @retval SUPINE_ERROR_READ    the file is missing
+ * @retval SUPINE_ERROR_FORMAT  malformed; a direction that is zero, repeated or not finite, or a
+ *   displacement that is not finite
+ * @retval SUPINE_ERROR_MESH    the number of vertices differs from that of the lungs
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_fields_load(const char *path, const supine_lungs *lungs,
+                                 const supine_mesh_load_options *options, supine_fields *fields,
+                                 supine_error *error);
+void supine_fields_free(supine_fields *fields);
+
+enum { SUPINE_FIT_BAND_MAX = 11 };
+
+typedef struct supine_fit_report {
+  size_t band_highest; /**< highest degree that the directions of gravity determine */
+  size_t band;         /**< highest degree of the harmonics in the chosen fit */
+  double condition;    /**< condition number of the matrix of harmonics */
+  size_t mode_count; /**< number of modes in the basis file; set only by supine_precompute_fields */
+  /** [l] relative RMS leave-one-out error with harmonics to degree l. */
+  double error[SUPINE_FIT_BAND_MAX + 1];
+  supine_accuracy accuracy; /**< leave-one-out errors of the chosen fit; its member `volume` is 0 */
+} supine_fit_report;
+
+typedef struct supine_fit_options {
+  int band; /**< highest degree of the harmonics; if negative, chosen by the leave-one-out error */
+  size_t modes;         /**< largest number of modes; 0 uses the harmonics instead of modes */
+  const char *findings; /**< notes on the surface for the metadata, one per line, or NULL */
+  const char *made_by;  /**< command line that makes the basis, for the metadata, or NULL */
+} supine_fit_options;
+
+/** Fit harmonics to the fields, compress the fit, and measure its leave-one-out error.
+ * @param compression  written; it has one row for each coordinate of each vertex. Release it
+ *   with supine_sh_compression_free
+ * @retval SUPINE_ERROR_ARGUMENT   fewer than two directions, or too few to determine options->band
+ * @retval SUPINE_ERROR_NUMERICAL  all displacements are zero, or a decomposition failed
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_options *options,
+                                supine_compression *compression, supine_fit_report *report,
+                                supine_error *error);
+
+#endif
