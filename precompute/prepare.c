@@ -189,6 +189,10 @@ supine_status supine_precompute_prepare(supine_lungs *lungs, const supine_model_
   supine_status status = set_expandability(lungs, choice, p, error);
   status = status == SUPINE_OK ? set_lesions(lungs, choice, p, findings, error) : status;
   status = status == SUPINE_OK ? set_shares(lungs, choice, p, error) : status;
+  if (status == SUPINE_OK && p->model.reach > 0.0 && (p->stiffness != NULL || p->lesions != NULL)) {
+    status = supine_physics_strain_create(lungs, p->stiffness, p->lesions, &p->strain, error);
+    p->model.strain = p->strain;
+  }
   status = status == SUPINE_OK ? supine_reference_find(lungs, &p->model, &scan, &choice->resting,
                                                        &p->reference, error)
                                : status;
@@ -207,5 +211,6 @@ supine_status supine_precompute_prepare(supine_lungs *lungs, const supine_model_
 void supine_precompute_prepared_free(supine_prepared *prepared) {
   free(prepared->stiffness);
   free(prepared->lesions);
+  supine_physics_strain_destroy(prepared->strain);
   *prepared = (supine_prepared){0};
 }

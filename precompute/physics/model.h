@@ -6,6 +6,7 @@
 
 #include "precompute/physics/equilibrium.h"
 #include "precompute/physics/force.h"
+#include "precompute/physics/strain.h"
 
 /* clang-format off */
 /** The displacement laws: LAW(identifier, name, base, gain, box, c, shear, bend, reach, pair, help
@@ -57,6 +58,7 @@ typedef struct supine_model {
   double bend[3]; /**< [axis] curvature of each vertex's path from full inflation to rest */
   const double *stiffness; /**< [vertices] stiffness; NULL for 1 everywhere */
   const double *lesions; /**< [vertices] factors that multiply the normalised stiffness, or NULL */
+  supine_strain *strain; /**< effect of stiffness and lesions if reach > 0, or NULL; not owned */
   double reach;          /**< smoothing length of force, mm; 0 for the method of [Santhanam2008] */
   double share[2];       /**< volume of each lung divided by its volume without disease */
 } supine_model;
@@ -67,7 +69,8 @@ supine_model supine_physics_model(supine_law law);
 /** Names of the displacement laws, indexed by supine_law and ended by NULL. */
 extern const char *const supine_physics_law_names[SUPINE_LAW_COUNT + 1];
 
-/** Set up the equilibrium of lungs with the stiffness, lesions and smoothing length of a model.
+/** Set up the equilibrium of lungs with the smoothing length of a model or, without one,
+ * with its stiffness and lesions.
  * @param lungs        must outlive the equilibrium
  * @param equilibrium  in: points to NULL, or to an equilibrium of the same lungs, which is updated
  *                     for moved vertices; out: the equilibrium, which the caller destroys

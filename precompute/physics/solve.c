@@ -52,6 +52,18 @@ supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model
   if (status != SUPINE_OK) {
     goto cleanup;
   }
+  if (model->strain != NULL) {
+    for (size_t i = 0; i < 3 * n; ++i) {
+      made.directions[i] *= made.catch_[i / 3];
+    }
+    status = supine_physics_strain_apply(model->strain, NULL, 3, made.directions, error);
+    for (size_t i = 0; i < n; ++i) {
+      made.catch_[i] = 1.0;
+    }
+  }
+  if (status != SUPINE_OK) {
+    goto cleanup;
+  }
   supine_physics_volume_of_fields(lungs, model->share, made.directions, made.catch_, 1, made.form);
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     supine_physics_volume_form_add(&made.form[lung], made.cubic);
