@@ -38,7 +38,8 @@ typedef struct request {
 } request;
 
 static const supine_option table[] = {
-    {"postures", 0, "LIST", "postures to compare, separated by commas",
+    {"postures", 0, "LIST",
+     "states to compare, separated by commas, such as supine:rest,prone:rest+500",
      SUPINE_FILLS(request, postures), .standard = "supine,prone,left,right"},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
@@ -125,18 +126,15 @@ static void add_pair(const structures *c, size_t from, size_t to, json_t *list) 
 }
 
 /* Append to a list the displacement of each named structure between every two postures. */
-static supine_status find_pairs(const structures *c, const supine_state *volume, json_t *list,
-                                supine_error *error) {
-  supine_state state[SUPINE_POSTURE_LIST_MAX];
+static supine_status find_pairs(const structures *c, json_t *list, supine_error *error) {
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < c->postures->count && status == SUPINE_OK; ++i) {
-    state[i] = *volume;
-    memcpy(state[i].gravity, c->postures->item[i].gravity, sizeof state[i].gravity);
-    status = find_means(c, &state[i], i, error);
+    status = find_means(c, &c->postures->item[i].state, i, error);
   }
   for (size_t i = 0; i < c->postures->count; ++i) {
     for (size_t j = i + 1; j < c->postures->count && status == SUPINE_OK; ++j) {
-      status = find_square_errors(c, &state[j], &state[i], error);
+      status =
+          find_square_errors(c, &c->postures->item[j].state, &c->postures->item[i].state, error);
       add_pair(c, i, j, list);
     }
   }
@@ -145,7 +143,7 @@ static supine_status find_pairs(const structures *c, const supine_state *volume,
 
 /* Print the mean displacement of each named structure between every two postures. */
 static supine_status compare_content(const supine_basis *basis, const supine_posture_list *postures,
-                                     const supine_state *volume, bool json, supine_error *error) {
+                                     bool json, supine_error *error) {
   const size_t n = supine_basis_get_info(basis)->vertex_count;
   structures c = {.basis = basis, .postures = postures};
   json_t *list = json_array();
@@ -159,7 +157,7 @@ static supine_status compare_content(const supine_basis *basis, const supine_pos
     }
   }
   if (status == SUPINE_OK) {
-    status = find_pairs(&c, volume, list, error);
+    status = find_pairs(&c, list, error);
   }
   if (status == SUPINE_OK) {
     supine_options_print(json_incref(list), json);
@@ -186,8 +184,8 @@ static supine_status compare(const char *path, const char *made_by, const supine
   if (comparison.state.lung_count == 0 && comparison.state.volume.kind == SUPINE_VOLUME_DEFAULT) {
     comparison.state.volume = supine_basis_default_volume(basis);
   }
-  supine_status status =
-      supine_options_posture_list_parse(wanted->postures, &comparison.postures, error);
+  supine_status status = supine_options_posture_list_parse(wanted->postures, &comparison.state,
+                                                           &comparison.postures, error);
   if (status != SUPINE_OK) {
     return status;
   }
@@ -197,8 +195,7 @@ static supine_status compare(const char *path, const char *made_by, const supine
                                   "%s holds structures inside the lungs, but -o needs the lungs: "
                                   "give the basis of the lungs, or leave -o out",
                                   path)
-               : compare_content(basis, &comparison.postures, &comparison.state, wanted->json,
-                                 error);
+               : compare_content(basis, &comparison.postures, wanted->json, error);
   }
   status = supine_report_find(&comparison, error);
   if (status == SUPINE_OK) {
@@ -242,7 +239,7 @@ const supine_command supine_command_compare = {
     "over a part, in mm to the left, to the back and to the head.\n"
     "\n"
     "Examples:\n"
-    "  supine compare lungs.safetensors --postures supine,prone,supine+15,0.6:0:-0.8\n"
+    "  supine compare lungs.safetensors --postures supine,prone:rest+500,supine+15,0.6:0:-0.8\n"
     "  supine compare lungs.safetensors --volume rest --breath 800 -o report.html",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),

@@ -15,8 +15,10 @@ enum { SUPINE_COMPARISON_SLABS = 10 };
 /* Results for one posture. */
 typedef struct supine_compared_posture {
   supine_pose pose;
-  supine_distance_statistics displacement;   /* displacement from the reference pose, mm */
-  double expected_error;                     /* expected RMS error, mm; 0 if unknown */
+  supine_distance_statistics displacement; /* displacement from the reference pose, mm */
+  double expected_error;                   /* expected RMS error, mm; 0 if unknown */
+  bool has_breath; /* whether the lungs can hold the breath; if not, the members from `gain` on are
+                      0 */
   double volume[SUPINE_LUNGS_MAX];           /* volume of each lung, gas and tissue, mL */
   double gain[SUPINE_LUNGS_MAX];             /* volume that each lung gains in the breath, mL */
   supine_slab slab[SUPINE_COMPARISON_SLABS]; /* horizontal slabs, uppermost first */
@@ -30,7 +32,7 @@ typedef struct supine_comparison {
   const char *made_by; /* command line, which the report prints */
   bool allow_folds;
   const supine_basis *basis;
-  supine_state state; /* supine, at the volume used for all postures */
+  supine_state state; /* supine, at the volume of all postures that name none */
   supine_from from;
   double breath; /* volume that a breath adds, mL */
   supine_posture_list postures;

@@ -116,6 +116,9 @@ static void print_profile(const supine_comparison *c, size_t last, bool share, F
                     : "Expansion, lowest 30 % of the height divided by uppermost 30 %:",
               to);
   for (size_t i = 0; i <= last; ++i) {
+    if (!c->posture[i].has_breath) {
+      continue;
+    }
     double gain = 0;
     for (size_t s = SUPINE_COMPARISON_SLABS / 2; s < SUPINE_COMPARISON_SLABS; ++s) {
       gain += c->posture[i].slab[s].gain;
@@ -160,12 +163,14 @@ json_t *supine_report_postures(const supine_comparison *c) {
       }
     }
     (void)json_array_append_new(
-        list, json_pack("{s:s, s:s, s:o, s:o, s:o, s:s, s:o}", "name",
-                        supine_options_posture_label(c->postures.item[i].name), "line",
-                        supine_report_line(i), "held", lungs, "mean",
-                        json_sprintf("%.1f", c->posture[i].displacement.mean), "max",
-                        json_sprintf("%.1f", c->posture[i].displacement.max), "published", words,
-                        "ratio", json_sprintf("%.2f", lowest_over_uppermost(c, i))));
+        list,
+        json_pack("{s:s, s:s, s:o, s:o, s:o, s:s, s:o}", "name",
+                  supine_options_posture_label(c->postures.item[i].name), "line",
+                  supine_report_line(i), "held", lungs, "mean",
+                  json_sprintf("%.1f", c->posture[i].displacement.mean), "max",
+                  json_sprintf("%.1f", c->posture[i].displacement.max), "published", words, "ratio",
+                  c->posture[i].has_breath ? json_sprintf("%.2f", lowest_over_uppermost(c, i))
+                                           : json_string("-")));
   }
   return list;
 }

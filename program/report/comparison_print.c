@@ -33,18 +33,20 @@ static json_t *encode_postures(const supine_comparison *c) {
   for (size_t i = 0; i < c->postures.count; ++i) {
     const supine_posture_item *item = &c->postures.item[i];
     json_t *posture =
-        json_pack("{s:s, s:o, s:o}", "name", item->name, "gravity", direction(item->gravity),
+        json_pack("{s:s, s:o, s:o}", "name", item->name, "gravity", direction(item->state.gravity),
                   "displacement_mm", statistics(&c->posture[i].displacement));
     if (supine_report_has_errors(c)) {
       (void)json_object_set_new(posture, "expected_error_mm",
                                 json_real(c->posture[i].expected_error));
     }
     json_t *slabs = json_array();
-    for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
+    for (size_t s = 0; s < SUPINE_COMPARISON_SLABS && c->posture[i].has_breath; ++s) {
       (void)json_array_append_new(slabs, encode_slab(&c->posture[i], s));
     }
     (void)json_object_set_new(posture, "volume_ml", by_lung(c, c->posture[i].volume));
-    (void)json_object_set_new(posture, "gain_ml", by_lung(c, c->posture[i].gain));
+    (void)json_object_set_new(posture, "gain_ml",
+                              c->posture[i].has_breath ? by_lung(c, c->posture[i].gain)
+                                                       : json_null());
     (void)json_object_set_new(posture, "slabs", slabs);
     (void)json_array_append_new(list, posture);
   }
@@ -67,7 +69,7 @@ static void add_row(json_t *tables, const char *heading, const char *name, const
 static void add_tables(const supine_comparison *c, json_t *text) {
   char gained[64];
   (void)snprintf(gained, sizeof gained, "volume (mL) that each lung gains in a breath of %.4g mL",
-                 supine_report_gain(c, 0));
+                 c->breath);
   for (size_t i = 0; i < c->postures.count; ++i) {
     const char *name = supine_options_posture_label(c->postures.item[i].name);
     json_t *moved = statistics(&c->posture[i].displacement);
@@ -76,7 +78,9 @@ static void add_tables(const supine_comparison *c, json_t *text) {
     }
     add_row(text, "displacement, mm", "posture", name, moved);
     add_row(text, "volume of each lung, mL", "posture", name, by_lung(c, c->posture[i].volume));
-    add_row(text, gained, "posture", name, by_lung(c, c->posture[i].gain));
+    if (c->posture[i].has_breath) {
+      add_row(text, gained, "posture", name, by_lung(c, c->posture[i].gain));
+    }
   }
   for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
     json_t *values[2] = {json_object(), json_object()};
@@ -84,6 +88,9 @@ static void add_tables(const supine_comparison *c, json_t *text) {
     (void)snprintf(height, sizeof height, "%zu-%zu", 100 - 10 * (s + 1), 100 - 10 * s);
     for (size_t i = 0; i < c->postures.count; ++i) {
       const char *name = supine_options_posture_label(c->postures.item[i].name);
+      if (!c->posture[i].has_breath) {
+        continue;
+      }
       (void)json_object_set_new(values[0], name, json_real(100.0 * c->posture[i].expansion[s]));
       (void)json_object_set_new(values[1], name, json_real(100.0 * c->posture[i].share[s]));
     }
