@@ -16,8 +16,9 @@ static supine_status find_breath(const supine_comparison *c, const supine_postur
   const supine_basis_info *info = supine_basis_get_info(c->basis);
   supine_slab slabs[SUPINE_LUNGS_MAX * SUPINE_COMPARISON_SLABS];
   supine_pose after = posture->pose;
-  supine_state state = {.volume = {SUPINE_VOLUME_ABSOLUTE, c->breath}};
-  memcpy(state.gravity, item->state.gravity, sizeof state.gravity);
+  supine_state state = item->state;
+  state.volume = (supine_volume){SUPINE_VOLUME_ABSOLUTE, c->breath};
+  state.lung_count = 0;
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     state.volume.ml += posture->volume[lung];
   }
@@ -28,11 +29,9 @@ static supine_status find_breath(const supine_comparison *c, const supine_postur
   if (status != SUPINE_OK) {
     return status;
   }
-  double total = 0.0;
   supine_basis_volumes(c->basis, &after, posture->gain);
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     posture->gain[lung] -= posture->volume[lung];
-    total += posture->gain[lung];
   }
   supine_deform(c->basis, &posture->pose, xyz[0]);
   supine_deform(c->basis, &after, xyz[1]);
@@ -45,7 +44,7 @@ static supine_status find_breath(const supine_comparison *c, const supine_postur
   for (size_t i = 0; i < SUPINE_COMPARISON_SLABS; ++i) {
     const supine_slab *slab = &posture->slab[i];
     posture->expansion[i] = slab->volume > 0.0 ? slab->gain / slab->volume : 0.0;
-    posture->share[i] = total != 0.0 ? slab->gain / total : 0.0;
+    posture->share[i] = slab->gain / c->breath;
   }
   return status;
 }
@@ -176,12 +175,4 @@ bool supine_report_has_errors(const supine_comparison *c) {
     sum += c->posture[i].expected_error;
   }
   return sum > 0.0;
-}
-
-double supine_report_gain(const supine_comparison *c, size_t posture) {
-  double gain = 0.0;
-  for (size_t lung = 0; lung < supine_basis_get_info(c->basis)->lung_count; ++lung) {
-    gain += c->posture[posture].gain[lung];
-  }
-  return gain;
 }

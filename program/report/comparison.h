@@ -60,8 +60,11 @@ double supine_report_from_supine(const supine_comparison *comparison, const doub
 /* Return whether the expected error of any posture is known. */
 bool supine_report_has_errors(const supine_comparison *comparison);
 
-/* Return the volume of the breath in one of the compared postures, summed over all lungs, mL. */
-double supine_report_gain(const supine_comparison *comparison, size_t posture);
+/* Return the volume of a lung in a posture as {value, low, high, source}, or as text. The source is
+ * "measured" in the scan, "given" in mL or by --resting, "assumed" from other people, or "computed"
+ * from the scan or from a given volume. */
+struct json_t *supine_report_held(const supine_comparison *comparison, size_t posture, size_t lung,
+                                  bool as_text);
 
 /* Print the comparison to standard output, as JSON or as text with tables of the postures. */
 void supine_report_print(const supine_comparison *comparison, bool json);
