@@ -54,8 +54,9 @@ typedef struct structures {
   const supine_basis *basis;
   const supine_posture_list *postures;
   supine_command_names names;
-  float *displacement; /* [N, 3] displacement of each vertex in one posture, mm */
-  double *mean; /* [postures, structures, 3] mean displacement from the reference surface, mm */
+  float *xyz;            /* [N, 3] position of each vertex in one posture, mm */
+  double *mean;          /* [postures, structures, 3] mean position, mm */
+  double *volumes;       /* [postures, structures] mL; NAN if the triangles enclose no volume */
   double *square_errors; /* [structures] mean squared expected error, mm^2; NAN if unknown */
 } structures;
 
@@ -75,15 +76,44 @@ static void average(const structures *c, size_t width, const float *values, doub
   }
 }
 
-/* Compute the mean displacement of each named structure in posture i. */
+/* Compute the volume of each named structure. Where its triangles enclose one, their normals sum to
+ * 0, and the volume is a sixth of the sum of a . (b x c) over the corners a, b, c. */
+static void find_volumes(const structures *c, double *volumes) {
+  const supine_basis_info *info = supine_basis_get_info(c->basis);
+  for (size_t part = 0; part < c->names.count; ++part) {
+    double normal[3] = {0.0, 0.0, 0.0};
+    double area = 0.0;
+    volumes[part] = 0.0;
+    for (size_t t = 0; t < 3 * info->triangle_count; t += 3) {
+      const uint32_t *corner = info->triangles + t;
+      double x[3][3];
+      double one[3];
+      if (c->names.part[corner[0]] != part) {
+        continue;
+      }
+      for (size_t k = 0; k < 9; ++k) {
+        x[k / 3][k % 3] = (double)c->xyz[3 * corner[k / 3] + k % 3];
+      }
+      supine_normal(x[0], x[1], x[2], one);
+      area += supine_length(one);
+      for (size_t k = 0; k < 3; ++k) {
+        normal[k] += one[k];
+      }
+      volumes[part] += supine_triple(x[0], x[1], x[2]) / 6000.0;
+    }
+    volumes[part] = supine_length(normal) < 1e-3 * area ? volumes[part] : (double)NAN;
+  }
+}
+
+/* Compute the mean position and the volume of each named structure in posture i. */
 static supine_status find_means(const structures *c, const supine_state *state, size_t i,
                                 supine_error *error) {
   supine_pose pose;
   const supine_status status = supine_basis_pose(c->basis, state, &pose, error);
   if (status == SUPINE_OK) {
-    supine_displace_range(c->basis, &pose, 0, supine_basis_get_info(c->basis)->vertex_count,
-                          c->displacement);
-    average(c, 3, c->displacement, c->mean + 3 * i * c->names.count);
+    supine_deform(c->basis, &pose, c->xyz);
+    average(c, 3, c->xyz, c->mean + 3 * i * c->names.count);
+    find_volumes(c, c->volumes + i * c->names.count);
   }
   return status;
 }
@@ -108,7 +138,7 @@ static supine_status find_square_errors(const structures *c, const supine_state 
   return status;
 }
 
-/* Append to a list the displacement of each named structure from one posture to another. */
+/* Append to a list the displacement and volumes of each structure from one posture to another. */
 static void add_pair(const structures *c, size_t from, size_t to, json_t *list) {
   for (size_t part = 0; part < c->names.count; ++part) {
     const char *const text[] = {c->postures->item[from].name, c->postures->item[to].name,
@@ -118,10 +148,15 @@ static void add_pair(const structures *c, size_t from, size_t to, json_t *list) 
     const double move[3] = {after[0] - before[0], after[1] - before[1], after[2] - before[2]};
     const double length = supine_length(move);
     const double sigma = sqrt(c->square_errors[part]);
-    (void)json_array_append_new(
-        list, json_pack("{s:s, s:s, s:s, s:[f,f,f], s:f, s:o}", "from", text[0], "to", text[1],
-                        "name", text[2], "move", move[0], move[1], move[2], "mm", length,
-                        "expected_error_mm", isnan(sigma) ? json_null() : json_real(sigma)));
+    const double ml[2] = {c->volumes[from * c->names.count + part],
+                          c->volumes[to * c->names.count + part]};
+    json_t *row = json_pack("{s:s, s:s, s:s, s:[f,f,f], s:f, s:o}", "from", text[0], "to", text[1],
+                            "name", text[2], "move", move[0], move[1], move[2], "mm", length,
+                            "expected_error_mm", isnan(sigma) ? json_null() : json_real(sigma));
+    if (supine_basis_get_info(c->basis)->triangle_count > 0) {
+      (void)json_object_set_new(row, "volumes_ml", supine_options_json_numbers(2, ml));
+    }
+    (void)json_array_append_new(list, row);
   }
 }
 
@@ -149,10 +184,11 @@ static supine_status compare_content(const supine_basis *basis, const supine_pos
   json_t *list = json_array();
   supine_status status = supine_command_names_open(basis, &c.names, error);
   if (status == SUPINE_OK) {
-    c.displacement = malloc(3 * n * sizeof *c.displacement);
+    c.xyz = malloc(3 * n * sizeof *c.xyz);
+    c.volumes = calloc(postures->count * c.names.count, sizeof *c.volumes);
     c.mean = calloc(3 * postures->count * c.names.count, sizeof *c.mean);
     c.square_errors = calloc(c.names.count, sizeof *c.square_errors);
-    if (c.displacement == NULL || c.mean == NULL || c.square_errors == NULL) {
+    if (c.xyz == NULL || c.mean == NULL || c.volumes == NULL || c.square_errors == NULL) {
       status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
     }
   }
@@ -163,7 +199,8 @@ static supine_status compare_content(const supine_basis *basis, const supine_pos
     supine_options_print(json_incref(list), json);
   }
   json_decref(list);
-  free(c.displacement);
+  free(c.xyz);
+  free(c.volumes);
   free(c.mean);
   free(c.square_errors);
   supine_command_names_close(&c.names);
@@ -227,7 +264,7 @@ const supine_command supine_command_compare = {
              "--from, the volume of each lung, and the ventilation by height in a breath. Then "
              "finds the direction of gravity with the largest displacement from supine. If BASIS "
              "was made by 'supine embed', reports only the displacement of each named part between "
-             "every two postures.",
+             "every two postures, and the volumes of closed parts in both.",
     .options = table,
     .notes = SUPINE_POSTURE_LIST_HELP
     "\n\nStatistics are weighted by the area of the surface; '95 %' is the 95th percentile. "
