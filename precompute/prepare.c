@@ -179,6 +179,17 @@ static void summarize(const supine_model_choice *choice, bool predicted, supine_
                   : predicted                                    ? "height and sex"
                   : choice->resting.assumed == SUPINE_REST_SHARE ? "healthy people's share"
                                                                  : "the share in COPD");
+  double collapsed = 0.0; /* volume in the scan as the basis holds it, mL */
+  for (size_t lung = 0; lung < reference->lung_count; ++lung) {
+    collapsed +=
+        p->model.share[lung] * (reference->full_volume[lung] + reference->scan_volume[lung]);
+  }
+  if (p->model.share[0] != 1.0 || p->model.share[1] != 1.0) {
+    supine_text_add(p->summary, size,
+                    "; collapsed in every state by --lung, also in the scan, which then holds %.0f "
+                    "mL: no displacement contains the collapse",
+                    collapsed);
+  }
 }
 
 supine_status supine_precompute_prepare(supine_lungs *lungs, const supine_model_choice *choice,
@@ -195,6 +206,11 @@ supine_status supine_precompute_prepare(supine_lungs *lungs, const supine_model_
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "--law paper takes the scan as the reference: leave --scanned out, or "
                             "use --law deep");
+  }
+  if (scan.known && scan.state.volume.kind == SUPINE_VOLUME_DEFAULT) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "--scanned: a posture alone is only for --fields: add the volume, as "
+                            "in supine:rest, or give full or none");
   }
   const supine_volume *full = &choice->full.volume;
   scan.full = full->ml;

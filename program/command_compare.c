@@ -35,6 +35,7 @@ typedef struct request {
   supine_volume_options volume;
   supine_from from;
   double breath; /* tidal volume, mL */
+  bool has_breath;
 } request;
 
 static const supine_option table[] = {
@@ -44,7 +45,8 @@ static const supine_option table[] = {
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {"breath", 0, "ML", "tidal volume of the breath whose ventilation by height is computed",
-     SUPINE_FILLS(request, breath), .standard = "500", SUPINE_ABOVE_ZERO},
+     SUPINE_FILLS(request, breath), SUPINE_SAYS_GIVEN(request, has_breath), .standard = "500",
+     SUPINE_ABOVE_ZERO},
     {"json", 0, NULL, "print JSON to standard output instead of text", SUPINE_FILLS(request, json)},
     {"output", 'o', "FILE", ".html file to write: a report with charts and pictures",
      SUPINE_FILLS(request, html), .file = SUPINE_FILE_OUT, .endings = ".html"},
@@ -111,7 +113,7 @@ static supine_status find_means(const structures *c, const supine_state *state, 
   supine_pose pose;
   const supine_status status = supine_basis_pose(c->basis, state, &pose, error);
   if (status == SUPINE_OK) {
-    supine_deform(c->basis, &pose, c->xyz);
+    (void)supine_deform(c->basis, &pose, c->xyz);
     average(c, 3, c->xyz, c->mean + 3 * i * c->names.count);
     find_volumes(c, c->volumes + i * c->names.count);
   }
@@ -218,6 +220,9 @@ static supine_status compare(const char *path, const char *made_by, const supine
                                   .from = wanted->from,
                                   .breath = wanted->breath};
   comparison.state.gravity[1] = 1.0;
+  if (supine_basis_get_info(basis)->is_fields && !wanted->has_breath) {
+    comparison.breath = 0.0; /* fields of gravity have no volumes and no breaths */
+  }
   if (comparison.state.lung_count == 0 && comparison.state.volume.kind == SUPINE_VOLUME_DEFAULT) {
     comparison.state.volume = supine_basis_default_volume(basis);
   }
@@ -226,7 +231,15 @@ static supine_status compare(const char *path, const char *made_by, const supine
   if (status != SUPINE_OK) {
     return status;
   }
-  if (supine_basis_metadata(basis, "content") != NULL) { /* only 'supine embed' writes this key */
+  const bool content = supine_basis_metadata(basis, "content") != NULL;
+  if (content && wanted->from.given) {
+    return supine_error_set(
+        error, SUPINE_ERROR_ARGUMENT,
+        "%s holds structures inside the lungs, which are compared between every "
+        "two postures: leave --from out, or use 'supine deform --from'",
+        path);
+  }
+  if (content) { /* only 'supine embed' writes this key */
     return wanted->html != NULL
                ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                                   "%s holds structures inside the lungs, but -o needs the lungs: "

@@ -8,7 +8,7 @@
 
 #include "base/text.h"
 
-#include "precompute/inside/surface.h"
+#include "precompute/lungs/surface.h"
 #include "precompute/patient/patient_file.h"
 #include "program/options/model_options.h"
 #include "program/options/surface_options.h"

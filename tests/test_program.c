@@ -104,13 +104,27 @@ TEST(test_deform_volume_reached) {
          "deform lungs.safetensors --posture left --volume left=rest -o b.ply");
   EXPECT(1, "give rest, full or scan",
          "deform lungs.safetensors --posture left --volume resting -o b.ply");
-  EXPECT(5, "prone: 9000 mL are 150 % of full inflation (6000 mL), outside the 10 to 120 %",
+  EXPECT(5,
+         "lungs.safetensors: prone at full inflation + 3000 mL: 9000 mL are 150 % of full "
+         "inflation (6000 mL), outside the 10 to 120 %",
          "compare lungs.safetensors --postures prone --volume full+3000 -o b.html");
-  EXPECT(0, "note: left: without a breath of 5000 mL: 8258 mL are 138 % of",
+  EXPECT(0, "note: without a breath: left side at 8258 mL: 8258 mL are 138 % of",
          "compare lungs.safetensors --postures left --volume rest --breath 5000 -o a.html");
   EXPECT(5, "8025 mL are 134 % of",
          "breathe lungs.safetensors --posture prone --tidal 4900 --fps 2 -o b.vtp");
+  EXPECT(5, "outside the 10 to 120 %",
+         "solve lungs.ply --posture left --volume scan-5700 -o b.ply");
+  EXPECT(5, "choose a volume nearer to rest, or accept this with --allow-folds",
+         "solve lungs.ply --posture left --volume full+1300 -o b.ply");
+  EXPECT(0, "nodes", "embed lungs.safetensors --grid 12 -o grid.safetensors");
+  EXPECT(5, "supine at rest - 1800 mL: the field folds",
+         "deform grid.safetensors --posture supine --volume rest-1800 --field-out b.nrrd");
   assert_int_equal(count_files("b."), 0);
+  EXPECT(0, "the field folds",
+         "deform grid.safetensors --posture supine --volume rest-1800 --allow-folds "
+         "--field-out a.nrrd");
+  EXPECT(0, "outside the 10 to 120 %",
+         "solve lungs.ply --posture left --volume full+1300 --allow-folds -o a.ply");
   EXPECT(0, "8025 mL are 134 % of",
          "breathe lungs.safetensors --posture prone --tidal 4900 --fps 2 --allow-folds "
          "-o a.safetensors");
@@ -177,6 +191,11 @@ TEST(test_precompute_scan_state_and_frame_reproduced) {
          "deform lungs.safetensors --posture supine --volume scan-2000 -o low.ply");
   EXPECT(0, "scan supine at full inflation - 2000 mL, 4000 mL\n  full inflation 6000 mL",
          "precompute low.ply --scanned full-2000 --band 7 -o low.safetensors");
+  EXPECT(0, "also in the scan, which then holds 4643 mL", /* 0.5 of 2714.1 mL is missing */
+         "precompute lungs.ply --lung left:0.5 --modes 1 --held-out 20 -o r.safetensors");
+  EXPECT(0, "from prone at rest", "deform lungs.safetensors --posture left --from prone -o a.ply");
+  EXPECT(1, "--resting: 'foo' is not a posture",
+         "precompute lungs.ply --resting foo=0.4 -o r.safetensors");
   EXPECT(0, "rest supine 2884 mL (2441 to 3407 by healthy people's share)", "info low.safetensors");
   EXPECT(0, "low.obj", "deform low.safetensors --posture supine --volume scan -o low.obj");
   EXPECT(0, "displacement 0.000 mm from the scan",

@@ -81,6 +81,7 @@ void supine_reference_compare(const supine_reference *reference, const supine_pe
 void supine_reference_doubt(const supine_reference *reference, const supine_person *person,
                             const supine_resting *given, char *text, size_t size) {
   const supine_state *state = &reference->scan.state;
+  const bool at_rest = state->volume.kind == SUPINE_VOLUME_REST;
   const double part = part_of_pair(reference);
   double range[2];
   double full = 0.0;
@@ -95,7 +96,7 @@ void supine_reference_doubt(const supine_reference *reference, const supine_pers
     full += reference->full_volume[lung];
     held += reference->full_volume[lung] + reference->scan_volume[lung];
   }
-  for (size_t axis = 0; axis < 6 && state->volume.kind == SUPINE_VOLUME_REST; ++axis) {
+  for (size_t axis = 0; axis < 6 && at_rest; ++axis) {
     const double along = (axis % 2 == 0 ? 1.0 : -1.0) * state->gravity[axis / 2];
     const double ml = given->ml[axis] + state->volume.ml;
     if (along > 1.0 - 1e-9 && given->ml[axis] > 0.0 && fabs(held - ml) > agreement * ml) {
@@ -110,15 +111,18 @@ void supine_reference_doubt(const supine_reference *reference, const supine_pers
   if (full < part * fmax(least_share * range[0], least_ml) || gas < part * least_gas) {
     supine_text_add(text, size,
                     "%sat full inflation the lungs hold %.0f mL (%s mL), at rest %.0f mL of gas, "
-                    "where %.0f mL (SD 600 mL) remain after a full expiration: the scan was "
-                    "probably not at full inflation: give its state with --scanned, such as "
-                    "supine:rest or full-1000",
-                    separator, full, expected, gas, part * SUPINE_RESIDUAL_ML);
+                    "where %.0f mL (SD 600 mL) remain after a full expiration: %s",
+                    separator, full, expected, gas, part * SUPINE_RESIDUAL_ML,
+                    at_rest ? "check the voxel spacing and --resting; if the scan was emptier than "
+                              "rest, say so, as in --scanned supine:rest-300"
+                            : "the scan was probably not at full inflation: give its state with "
+                              "--scanned, such as supine:rest or full-1000");
   } else if (full > part * most_ml) {
     supine_text_add(
-        text, size,
-        "%sat full inflation the lungs hold %.0f mL (%s mL): if the scan was fuller than "
-        "rest, give --scanned full or supine:rest+1000, or change --resting",
-        separator, full, expected);
+        text, size, "%sat full inflation the lungs hold %.0f mL (%s mL): %s", separator, full,
+        expected,
+        at_rest ? "if the scan was fuller than rest, give --scanned full or supine:rest+1000, or "
+                  "change --resting"
+                : "check the voxel spacing or the unit, and that all of the mask is lung");
   }
 }

@@ -10,7 +10,12 @@
 
 static supine_status read_scan(const char *text, void *field, supine_error *error) {
   supine_model_choice *choice = field;
+  supine_state posture = {.volume = {SUPINE_VOLUME_DEFAULT, 0.0}};
   choice->has_scan = true;
+  if (supine_state_parse_posture(text, &posture, NULL) == SUPINE_OK) {
+    choice->scan = (supine_scan){.known = true, .state = posture};
+    return SUPINE_OK;
+  }
   return supine_reference_scan_parse(text, &choice->scan, error);
 }
 
@@ -138,7 +143,8 @@ const supine_option supine_command_model_options[] = {
      "state of the lungs in the scan\nfull: a breath-hold at full inflation (TLC)\nPOSTURE:rest: "
      "the end of a quiet expiration (FRC). POSTURE is supine, prone, left or right (lying on that "
      "side), upright or inverted\nnone: unknown. Breaths are added to the shape in the scan, and a "
-     "change of posture alone does not deform it\nfull and rest may have +ML or -ML, for both "
+     "change of posture alone does not deform it\nPOSTURE alone: with --fields, which then do not "
+     "displace the surface in this posture\nfull and rest may have +ML or -ML, for both "
      "lungs together: supine:rest+300, full-2000. Default full",
      FILLS(choice), .read = read_scan,
      .wants = "full or POSTURE:rest, optionally with +ML or -ML, or none"},
@@ -287,19 +293,26 @@ static supine_status take_patient(supine_model_options *options, supine_error *e
   return status;
 }
 
-supine_status supine_command_model_load(supine_model_options *options, const char *command,
-                                        char **paths, size_t count, bool keep,
-                                        supine_error *error) {
+supine_status supine_command_source_load(supine_model_options *options, char **paths, size_t count,
+                                         supine_error *error) {
   supine_progress progress = supine_options_progress_begin("label map");
   supine_source *source = &options->made_from;
   options->source.labels.progress = supine_options_progress_step;
   options->source.labels.progress_context = &progress;
-  supine_status status = supine_precompute_source_load(&options->source, paths, count, source,
-                                                       &options->findings, error);
+  const supine_status status = supine_precompute_source_load(&options->source, paths, count, source,
+                                                             &options->findings, error);
   supine_options_progress_end(&progress);
   if (status == SUPINE_OK && source->is_map) {
     print_map(paths[0], source);
   }
+  return status;
+}
+
+supine_status supine_command_model_load(supine_model_options *options, const char *command,
+                                        char **paths, size_t count, bool keep,
+                                        supine_error *error) {
+  supine_source *source = &options->made_from;
+  supine_status status = supine_command_source_load(options, paths, count, error);
   if (keep) {
     options->choice.scan.known = false;
     options->choice.has_scan = true;

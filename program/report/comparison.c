@@ -22,19 +22,22 @@ static supine_status find_breath(const supine_comparison *c, const supine_postur
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     state.volume.ml += posture->volume[lung];
   }
-  supine_status status = supine_basis_gains(c->basis, &state, &after, error);
-  if (status == SUPINE_OK) {
-    status = supine_options_pose_check(c->basis, c->command, c->allow_folds, &after, error);
+  supine_error wrong;
+  supine_status status = supine_basis_gains(c->basis, &state, &after, &wrong);
+  if (status != SUPINE_OK) {
+    (void)supine_error_set(error, status, "%s: %s", item->name, wrong.message);
+  } else {
+    status = supine_options_pose_check(c->basis, c->command, c->allow_folds, &state, &after, error);
   }
   if (status != SUPINE_OK) {
     return status;
   }
-  supine_basis_volumes(c->basis, &after, posture->gain);
+  (void)supine_basis_volumes(c->basis, &after, posture->gain);
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     posture->gain[lung] -= posture->volume[lung];
   }
-  supine_deform(c->basis, &posture->pose, xyz[0]);
-  supine_deform(c->basis, &after, xyz[1]);
+  (void)supine_deform(c->basis, &posture->pose, xyz[0]);
+  (void)supine_deform(c->basis, &after, xyz[1]);
   status = supine_compare_slabs(c->basis, item->state.gravity, xyz[0], xyz[1],
                                 SUPINE_COMPARISON_SLABS, slabs, error);
   for (size_t i = 0; status == SUPINE_OK && i < info->lung_count * SUPINE_COMPARISON_SLABS; ++i) {
@@ -52,20 +55,23 @@ static supine_status find_breath(const supine_comparison *c, const supine_postur
 static supine_status find_posture(const supine_comparison *c, const supine_posture_item *item,
                                   float *distance, float *xyz[2], supine_compared_posture *posture,
                                   supine_error *error) {
-  supine_status status = supine_options_pose(c->basis, c->command, c->allow_folds, &item->state,
-                                             &posture->pose, error);
+  supine_error wrong;
+  supine_status status = supine_basis_pose(c->basis, &item->state, &posture->pose, &wrong);
   if (status != SUPINE_OK) {
-    return status;
+    return supine_error_set(error, status, "%s: %s", item->name, wrong.message);
   }
-  supine_compare_distances(c->compare, &posture->pose, &c->reference.pose, distance);
+  (void)supine_compare_distances(c->compare, &posture->pose, &c->reference.pose, distance);
   supine_compare_statistics(c->compare, distance, &posture->displacement);
-  supine_basis_volumes(c->basis, &posture->pose, posture->volume);
-  status = find_breath(c, item, xyz, posture, error);
-  posture->has_breath = status == SUPINE_OK;
-  if (status == SUPINE_ERROR_NUMERICAL) { /* the lungs cannot hold that much more */
-    supine_options_say(c->command, "note: %s: without a breath of %g mL: %s", item->name, c->breath,
-                       error->message);
-    return SUPINE_OK;
+  (void)supine_basis_volumes(c->basis, &posture->pose, posture->volume);
+  status = supine_options_pose_check(c->basis, c->command, c->allow_folds, &item->state,
+                                     &posture->pose, error);
+  if (status == SUPINE_OK && c->breath > 0.0) {
+    status = find_breath(c, item, xyz, posture, error);
+    posture->has_breath = status == SUPINE_OK;
+    if (status == SUPINE_ERROR_NUMERICAL) { /* the lungs cannot hold that much more */
+      supine_options_say(c->command, "note: without a breath: %s", error->message);
+      return SUPINE_OK;
+    }
   }
   return status;
 }
@@ -132,7 +138,7 @@ supine_status supine_report_find(supine_comparison *c, supine_error *error) {
     supine_error wrong = {SUPINE_OK, ""};
     status = find_posture(c, &c->postures.item[i], distance, xyz, &c->posture[i], &wrong);
     if (status != SUPINE_OK) {
-      (void)supine_error_set(error, status, "%s: %s", c->postures.item[i].name,
+      (void)supine_error_set(error, status, "%s: %s", c->path,
                              wrong.message[0] != '\0' ? wrong.message
                                                       : supine_status_string(status));
     }
