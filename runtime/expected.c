@@ -7,10 +7,9 @@
 #include "runtime/expected.h"
 #include "runtime/internal.h"
 
-/* Standard deviation of an assumed volume, as a fraction of the volume at full inflation: of the
- * volume at rest if full inflation was scanned (unless metadata "resting_spread" gives it), and of
- * full inflation if rest was scanned. The second follows from the first: 0.08 / 0.48. */
-static const double rest_spread = 0.08, full_spread = 0.17;
+/* Relative standard deviation of an assumed volume, that at rest if full inflation was scanned and
+ * full inflation if rest was scanned, unless metadata "resting_spread" gives it: 0.08 / 0.48. */
+static const double usual_spread = 0.17;
 /* RMS displacement of a full breath, mm, below which c falls in proportion: 4.5 mm / 0.25, where
  * 0.25 was measured on quiet breaths. */
 static const double full_breath = 18;
@@ -24,7 +23,8 @@ static const struct {
 } terms[SUPINE_EXPECTED_TERMS] = {
     {"displacement", "landmarks of full breaths (15 people) and of quiet breaths (10 people)"},
     {"turn", "a fit in one posture does not show the effect of a turn"},
-    {"assumed volume", "standard deviation 0.08 of full inflation at rest, 0.17 at full inflation"},
+    {"assumed volume",
+     "standard deviation of the share at rest in other people (supine info: resting shares)"},
     {"heart", "motion of the heart, supine to prone (Chino & Marks 2008, n 16)"},
     {"sliding", "sliding of the lungs along gravity, which the model lacks"}};
 
@@ -98,6 +98,19 @@ static supine_volume_kind assumed_kind(const supine_basis *basis) {
                    : SUPINE_VOLUME_REST;
 }
 
+/* Return the volume of all lungs at rest, in the posture of the scan, divided by that at full
+ * inflation. */
+static double resting_share(const supine_basis *basis) {
+  supine_state rest = supine_basis_scan(basis);
+  supine_pose pose;
+  double volumes[SUPINE_LUNGS_MAX] = {0};
+  rest.volume.kind = SUPINE_VOLUME_REST;
+  if (supine_basis_pose(basis, &rest, &pose, NULL) == SUPINE_OK) {
+    (void)supine_basis_volumes(basis, &pose, volumes);
+  }
+  return (volumes[0] + volumes[1]) / supine_expected_reference(basis);
+}
+
 /* Return whether the volume of a state, of all lungs or of one lung, is relative to `kind`. */
 static bool counts_from(const supine_state *state, supine_volume_kind kind) {
   const supine_volume_kind own = state->volume.kind;
@@ -143,8 +156,8 @@ supine_status supine_expected_prepare(const supine_basis *basis, const supine_st
                                       supine_expected_model *m, supine_error *error) {
   const supine_state *const states[2] = {state, from};
   const supine_volume_kind assumed = assumed_kind(basis);
-  const double spread =
-      assumed == SUPINE_VOLUME_FULL ? full_spread : number_of(basis, "resting_spread", rest_spread);
+  const double spread = number_of(basis, "resting_spread", usual_spread) *
+                        (assumed == SUPINE_VOLUME_REST ? resting_share(basis) : 1);
   const double own = supine_expected_constant(basis);
   supine_status status = SUPINE_OK;
   *m = (supine_expected_model){.basis = basis, .least = least};

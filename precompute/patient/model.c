@@ -112,14 +112,12 @@ static void move(work *w) {
   supine_mesh_box(&w->lungs.mesh, w->lungs.minimum, w->lungs.maximum);
 }
 
-/* Compute w->smoothing_ratio and the stiffness of each vertex, for the posture of the two scans. */
-static supine_status find_ratio(const work *w, double *stiffness, supine_error *error) {
+/* Compute w->smoothing_ratio of each vertex, for the posture of the two scans. */
+static supine_status find_ratio(const work *w, supine_error *error) {
   const supine_patient_record *record = w->record;
   supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
   supine_solution solution = {0};
   model.force = record->force;
-  supine_patient_stiffness_of(&record->stiffness, &w->lungs, stiffness);
-  model.stiffness = stiffness;
   const supine_status status =
       supine_physics_solve(&w->lungs, &model, record->state[1].gravity, &solution, error);
   for (size_t i = 0; i < w->lungs.mesh.vertex_count && status == SUPINE_OK; ++i) {
@@ -129,6 +127,24 @@ static supine_status find_ratio(const work *w, double *stiffness, supine_error *
         fmax(force_least, supine_patient_force_at(&record->patient.power, &place));
   }
   supine_physics_solution_free(&solution);
+  return status;
+}
+
+/* Compute w->displacement and, if `scan` [vertices, 3] shows the emptier state, the vertices of
+ * w->lungs in the fuller state. Set the last [vertices] of w->smoothing_ratio to 1. */
+static supine_status displace(work *w, const double *scan, supine_error *error) {
+  supine_status status = SUPINE_OK;
+  w->scan = scan;
+  for (size_t i = 0; i < 2 * w->lungs.mesh.vertex_count; ++i) {
+    w->smoothing_ratio[i] = 1.0;
+  }
+  if (scan != NULL) {
+    move(w);
+  }
+  for (int pass = 0; pass < (scan != NULL ? 2 : 1) && status == SUPINE_OK; ++pass) {
+    status = find_ratio(w, error);
+    move(w);
+  }
   return status;
 }
 
@@ -310,18 +326,8 @@ supine_status supine_patient_model(supine_patient_record *record, const supine_l
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  w.scan = record->shown == 1.0 ? lungs->mesh.vertices : NULL;
   memcpy(w.lungs.mesh.vertices, lungs->mesh.vertices, 3 * n * sizeof(double));
-  for (size_t i = 0; i < 2 * n; ++i) {
-    w.smoothing_ratio[i] = 1.0;
-  }
-  if (w.scan != NULL) {
-    move(&w);
-  }
-  for (int pass = 0; pass < (w.scan != NULL ? 2 : 1) && status == SUPINE_OK; ++pass) {
-    status = find_ratio(&w, stiffness, error);
-    move(&w);
-  }
+  status = displace(&w, record->shown == 1.0 ? lungs->mesh.vertices : NULL, error);
   supine_physics_volume_of_fields(&w.lungs, NULL, w.displacement, w.smoothing_ratio + n, 1, forms);
   set_volumes(record, &w.lungs, forms);
   supine_patient_resting(record, resting);
@@ -340,9 +346,11 @@ supine_status supine_patient_model(supine_patient_record *record, const supine_l
       directions[3 * i + k] /= -force * path_span[k];
     }
   }
+  supine_patient_stiffness_of(&record->stiffness, &w.lungs, stiffness);
   model->force = record->force;
   model->stiffness = record->stiffness.count > 0 ? stiffness : NULL;
   model->direction.vectors = directions;
+  model->direction.shear = 0.0; /* the fitted law has none */
   for (size_t k = 0; k < 3; ++k) {
     model->direction.c[2 * k] = -record->patient.power.c[2 * k] / path_span[k];
     model->direction.c[2 * k + 1] = record->patient.power.c[2 * k + 1];
