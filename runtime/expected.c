@@ -103,12 +103,16 @@ static supine_volume_kind assumed_kind(const supine_basis *basis) {
 static double resting_share(const supine_basis *basis) {
   supine_state rest = supine_basis_scan(basis);
   supine_pose pose;
-  double volumes[SUPINE_LUNGS_MAX] = {0};
+  double volumes[SUPINE_LUNGS_MAX];
+  double sum = 0;
   rest.volume.kind = SUPINE_VOLUME_REST;
   if (supine_basis_pose(basis, &rest, &pose, NULL) == SUPINE_OK) {
     (void)supine_basis_volumes(basis, &pose, volumes);
+    for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+      sum += volumes[lung];
+    }
   }
-  return (volumes[0] + volumes[1]) / supine_expected_reference(basis);
+  return sum / supine_expected_reference(basis);
 }
 
 /* Return whether the volume of a state, of all lungs or of one lung, is relative to `kind`. */

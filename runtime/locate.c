@@ -341,31 +341,20 @@ static size_t find_worst(workspace *s, supine_locate_residual *residuals) {
   return worst;
 }
 
-/* Return the RMS distance of points [count] from their mean, mm. */
-static double spread_of(size_t count, size_t stride, const double *points) {
-  double sum[3] = {0};
-  double square = 0;
-  for (size_t j = 0; j < count; ++j) {
-    for (size_t i = 0; i < 3; ++i) {
-      const double x = points[j * stride + i] - points[i];
-      sum[i] += x / (double)count;
-      square += x * x / (double)count;
-    }
-  }
-  return sqrt(fmax(0, square - sum[0] * sum[0] - sum[1] * sum[1] - sum[2] * sum[2]));
-}
-
+/* Refuse observed points that are at one place, although the points in the scan are not. */
 static supine_status refuse_place(const workspace *s, supine_error *error) {
-  const size_t n = s->task->count;
-  const double seen =
-      spread_of(n, sizeof *s->task->observed / sizeof(double), s->task->observed->position);
-  const double scanned = spread_of(n, sizeof *s->points / sizeof(double), s->points->position);
-  return seen >= spread_least * scanned
+  double seen = 0;
+  double scanned = 0;
+  for (size_t j = 0; j < 3 * s->task->count; ++j) {
+    const supine_observation *o = s->task->observed;
+    seen += pow(o[j / 3].position[j % 3] - o->position[j % 3], 2);
+    scanned += pow(s->points[j / 3].position[j % 3] - s->points->position[j % 3], 2);
+  }
+  return seen >= spread_least * spread_least * scanned
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                                "the observed points are at one place (%.1f mm RMS from their "
-                                "mean, but %.1f mm in the scan): check their positions and unit",
-                                seen, scanned);
+                                "the observed points are at one place, unlike those in the scan: "
+                                "check their positions and unit");
 }
 
 /* Refuse what no patient has: large residuals, or lungs that are nearly empty. */
