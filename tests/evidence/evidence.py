@@ -153,7 +153,7 @@ class Lungs:
         out["lower half / upper third, to prone"] = move[height < 1 / 2].mean() / move[height > 2 / 3].mean()
         over, more = 0, 0
         for p in POSTURES:
-            for share in (0.35, 0.5, 0.7, 0.9, 1.1):
+            for share in (0.3, 0.5, 0.7, 0.9, 1.1):
                 total = share * full_ml.sum()
                 bent = self.turned_over(self.at(f"{p}:{total:.3f}mL")[0])
                 over = max(over, bent)
@@ -217,7 +217,7 @@ def main(arguments):
         bad = [(low is not None and v < low) or (high is not None and v > high) for v in values]
         misses += sum(bad)
         held = "shown" if high is None else f"{'' if low is None else low}..{high}"
-        text = "".join("%16s" % ("-" if v != v else f"{v:.3g}" + "!" * b) for v, b in zip(values, bad))
+        text = "".join("%16s" % ("-" if v != v else f"{v:.3g}" + "!" * int(b)) for v, b in zip(values, bad))
         print("%-36s%s  %-14s %s" % (what + (f", {unit}" if unit else ""), text, held, published))
     print(f"values outside their range (marked !): {misses}")
     return 1 if check and misses else 0
