@@ -6,6 +6,7 @@
 #include <supine/sh.h>
 #include <supine/volume.h>
 
+#include "base/vec3.h"
 #include "runtime/internal.h"
 
 static const double default_above_scan = 500; /* default volume minus the volume in the scan, mL */
@@ -239,9 +240,7 @@ static supine_status reference_gains(const supine_basis *basis, const supine_sta
                     (volume->kind == SUPINE_VOLUME_FULL && basis->info.has_full)) &&
                    volume->ml == 0 && state->lung_count == 0;
   if (basis->info.is_fields) {
-    for (int k = 0; k < 3; ++k) {
-      reference = reference && fabs(state->gravity[k] - basis->scan_gravity[k]) < 1e-6;
-    }
+    reference = reference && supine_distance(state->gravity, basis->scan_gravity) < 1e-6;
     if (!reference) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                               "this basis holds another simulator's fields of gravity, which have "

@@ -374,7 +374,8 @@ supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_op
 }
 
 supine_status supine_fields_write(const supine_lungs *lungs, const supine_fields *fields,
-                                  const supine_fit_options *options, const char *path,
+                                  const supine_fit_options *options,
+                                  const supine_precompute_options *basis, const char *path,
                                   supine_fit_report *report, supine_error *error) {
   supine_compression field = {0};
   supine_volume_forms forms = {0};
@@ -383,16 +384,10 @@ supine_status supine_fields_write(const supine_lungs *lungs, const supine_fields
     status = supine_projection_volume_forms(&field, lungs, NULL, NULL, &forms, error);
   }
   if (status == SUPINE_OK) {
-    const supine_precompute_options basis = {.modes = options->modes,
-                                             .assumed = options->assumed,
-                                             .findings = options->findings,
-                                             .frame = options->frame,
-                                             .made_by = options->made_by};
-    const supine_basis_fit summary = {report->band_highest, report->condition,
-                                      options->scan_gravity};
     const supine_basis_content content = {.lungs = lungs,
-                                          .options = &basis,
-                                          .fit = &summary,
+                                          .options = basis,
+                                          .is_fields = true,
+                                          .scan_gravity = options->scan_gravity,
                                           .compression = &field,
                                           .forms = &forms,
                                           .accuracy = &report->accuracy};
