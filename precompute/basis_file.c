@@ -14,7 +14,6 @@
 #include "precompute/basis_file.h"
 #include "precompute/lungs/disease.h"
 #include "precompute/normals/normal_modes.h"
-#include "precompute/writer.h"
 
 enum { ENTRIES_MAX = 64 };
 
@@ -323,7 +322,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
     tensors[count++] = (supine_tensor){
         "normal_weights", SUPINE_F64, 4, {g, q, 3, 1 + 2 * k + k * (k + 1) / 2}, normals.weights};
   }
-  status = supine_writer_safetensors_write(path, tensors, count, list.metadata, list.count, error);
+  status = supine_safetensors_write(path, tensors, count, list.metadata, list.count, error);
 cleanup:
   for (size_t i = 0; i < list.count; ++i) {
     free((char *)list.metadata[i].value);

@@ -82,8 +82,8 @@ static supine_status find_means(const structures *c, const supine_state *state, 
   supine_pose pose;
   const supine_status status = supine_basis_pose(c->basis, state, &pose, error);
   if (status == SUPINE_OK) {
-    supine_displace_range(c->basis, &pose, 0, supine_basis_get_info(c->basis)->vertex_count,
-                          c->displacement);
+    (void)supine_displace_range(c->basis, &pose, 0, supine_basis_get_info(c->basis)->vertex_count,
+                                c->displacement);
     average(c, 3, c->displacement, c->mean + 3 * i * c->names.count);
   }
   return status;

@@ -57,7 +57,7 @@ static supine_status deformed_mesh(const supine_basis *basis, const supine_pose 
   float *xyz = malloc(count * sizeof *xyz);
   supine_status status = xyz == NULL ? SUPINE_ERROR_MEMORY : supine_options_basis_mesh(basis, mesh);
   if (status == SUPINE_OK) {
-    supine_deform(basis, pose, xyz);
+    (void)supine_deform(basis, pose, xyz);
     for (size_t i = 0; i < count; ++i) {
       mesh->vertices[i] = (double)xyz[i];
     }
@@ -107,7 +107,7 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
   if (status == SUPINE_OK) {
     status = deformed_mesh(basis, &moved->pose, &mesh, normals);
   }
-  supine_basis_volumes(basis, &moved->pose, volumes);
+  (void)supine_basis_volumes(basis, &moved->pose, volumes);
   save->from = from.vertices;
   save->normals = mesh.triangle_count > 0 ? normals : NULL;
   save->expected_error = moved->expected.sigma;

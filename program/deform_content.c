@@ -131,8 +131,8 @@ static supine_status write_points(const char *path, const supine_basis *basis,
     status = supine_output_open(path, &output, error);
   }
   if (status == SUPINE_OK) {
-    supine_deform(basis, &moved->pose, xyz);
-    supine_deform(basis, &moved->from.pose, before);
+    (void)supine_deform(basis, &moved->pose, xyz);
+    (void)supine_deform(basis, &moved->from.pose, before);
     supine_mesh_unit_name(unit, unit_name);
     supine_mesh_axes_letters(frame->axes, axes);
     (void)fprintf(

@@ -265,6 +265,11 @@ supine_volume supine_basis_default_volume(const supine_basis *basis) {
 supine_status supine_basis_gains(const supine_basis *basis, const supine_state *state,
                                  supine_pose *pose, supine_error *error) {
   supine_state asked = *state;
+  if (!supine_basis_has_pose(basis, pose)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "the pose was made for another basis: make it with supine_basis_pose");
+  }
+  pose->basis = basis->info.identity;
   if (asked.lung_count == 0 && asked.volume.kind == SUPINE_VOLUME_DEFAULT) {
     asked.volume = supine_basis_default_volume(basis);
     if (asked.volume.kind == SUPINE_VOLUME_DEFAULT) {
@@ -292,6 +297,7 @@ supine_status supine_basis_pose(const supine_basis *basis, const supine_state *s
   if (supine_basis_weights(basis, state->gravity, pose->weights) != SUPINE_OK) {
     return refuse_gravity(error);
   }
+  pose->basis = basis->info.identity;
   return supine_basis_gains(basis, state, pose, error);
 }
 
@@ -309,13 +315,18 @@ supine_state supine_basis_scan(const supine_basis *basis) {
       .volume = {SUPINE_VOLUME_SCAN, 0}};
 }
 
-void supine_basis_volumes(const supine_basis *basis, const supine_pose *pose, double *volumes_ml) {
+supine_status supine_basis_volumes(const supine_basis *basis, const supine_pose *pose,
+                                   double *volumes_ml) {
+  if (!basis->info.has_volume || !supine_basis_has_pose(basis, pose)) {
+    return basis->info.has_volume ? SUPINE_ERROR_ARGUMENT : SUPINE_ERROR_OPEN_SURFACE;
+  }
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     supine_volume_form form;
     contract(basis, lung, pose->weights, &form);
     volumes_ml[lung] =
         basis->info.reference_volume[lung] + supine_volume_form_at(&form, pose->gains[lung]);
   }
+  return SUPINE_OK;
 }
 
 supine_status supine_basis_add_volume(const supine_basis *basis, double volume, supine_pose *pose) {

@@ -530,9 +530,8 @@ TEST(test_field_malformed_grids_refused) {
         {"grid_size", SUPINE_U32, 1, {3}, size}};
     const supine_metadata metadata[] = {
         {"format", "supine-basis"}, {"version", "2"}, {"kind", "vector"}};
-    assert_int_equal(
-        supine_writer_safetensors_write(in_folder("lie"), tensors, 9, metadata, 3, NULL),
-        SUPINE_OK);
+    assert_int_equal(supine_safetensors_write(in_folder("lie"), tensors, 9, metadata, 3, NULL),
+                     SUPINE_OK);
     supine_basis *bad = helper_open(in_folder("lie"));
     supine_field field;
     supine_error error;

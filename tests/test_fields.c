@@ -11,7 +11,6 @@
 #include <supine/runtime.h>
 #include <supine/safetensors.h>
 
-#include "precompute/writer.h"
 #include <supine/sh.h>
 
 #include "lungs_helpers.h"
@@ -367,7 +366,7 @@ static void write_fields(const char *path, size_t count, const double *direction
   tensors[0] = (supine_tensor){"points", SUPINE_F64, 2, {n + 1, 3}, points};
   tensors[1] = (supine_tensor){"gravity", SUPINE_F64, 2, {count, 3}, gravity};
   tensors[2] = (supine_tensor){"displacement", SUPINE_F32, 3, {count, n + 1, 3}, u};
-  assert_int_equal(supine_writer_safetensors_write(path, tensors, 3, NULL, 0, NULL), SUPINE_OK);
+  assert_int_equal(supine_safetensors_write(path, tensors, 3, NULL, 0, NULL), SUPINE_OK);
 }
 
 static void free_tensors(supine_tensor tensors[3]) {
@@ -404,7 +403,7 @@ static void expect_failure(const supine_tensor *tensors, size_t count,
   const char *path = in_folder("bad.safetensors");
   supine_fields fields = {0};
   supine_error error = {0};
-  assert_int_equal(supine_writer_safetensors_write(path, tensors, count, NULL, 0, NULL), SUPINE_OK);
+  assert_int_equal(supine_safetensors_write(path, tensors, count, NULL, 0, NULL), SUPINE_OK);
   assert_int_equal(supine_fields_load(path, &lungs, frame, &fields, &error), status);
   assert_says(error.message, words);
   assert_null(fields.directions);
@@ -425,7 +424,7 @@ TEST(test_fields_load_points_elsewhere_or_missing_refused) {
   points[30] -= 0.03e-5 * diagonal;
   supine_fields fields = {0};
   const char *path = in_folder("fields.safetensors");
-  assert_int_equal(supine_writer_safetensors_write(path, tensors, 3, NULL, 0, NULL), SUPINE_OK);
+  assert_int_equal(supine_safetensors_write(path, tensors, 3, NULL, 0, NULL), SUPINE_OK);
   assert_int_equal(supine_fields_load(path, &lungs, &ras_cm, &fields, NULL), SUPINE_OK);
   supine_fields_free(&fields);
   memcpy(points, points + 60, 3 * sizeof *points); /* the inner point is also that of a vertex */

@@ -76,7 +76,7 @@ supine_status supine_inside_shells_create(const supine_basis *basis, supine_insi
                              : supine_error_set(error, SUPINE_ERROR_MEMORY,
                                                 "no memory for %zu vertices", info->vertex_count);
   if (status == SUPINE_OK) {
-    supine_deform(basis, &shells->scan, scanned);
+    (void)supine_deform(basis, &shells->scan, scanned);
   }
   for (size_t i = 0; i < 3 * info->vertex_count && status == SUPINE_OK; ++i) {
     if (!isfinite(scanned[i])) {

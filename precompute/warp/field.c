@@ -189,7 +189,7 @@ supine_status supine_field_create(const supine_basis *basis, const supine_pose *
         supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a field of %zu nodes", count);
     supine_field_free(&made);
   } else {
-    supine_displace_range(basis, pose, 0, n, moved);
+    (void)supine_displace_range(basis, pose, 0, n, moved);
     for (size_t i = 0; i < count; ++i) {
       below[i] = (float)-fade; /* nodes not in the basis count as `fade` mm outside the lungs */
     }

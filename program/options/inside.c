@@ -96,16 +96,13 @@ supine_status supine_command_inside_check(const supine_basis *lungs, const supin
                                           const char *path, supine_error *error) {
   const supine_basis_info *a = supine_basis_get_info(lungs);
   const supine_basis_info *b = supine_basis_get_info(inside);
-  const size_t terms = (a->band + 1) * (a->band + 1);
-  const bool same = b->vector && a->mode_count == b->mode_count && a->band == b->band &&
-                    a->lung_count == b->lung_count &&
-                    memcmp(a->modes, b->modes, a->mode_count * terms * sizeof *a->modes) == 0;
-  return same ? SUPINE_OK
-              : supine_error_set(
-                    error, SUPINE_ERROR_FORMAT,
-                    "%s belongs to another basis: make it again with 'supine embed' from "
-                    "the given basis",
-                    path);
+  return b->vector && a->identity == b->identity
+             ? SUPINE_OK
+             : supine_error_set(
+                   error, SUPINE_ERROR_FORMAT,
+                   "%s belongs to another basis: make it again with 'supine embed' from "
+                   "the given basis",
+                   path);
 }
 
 supine_status supine_command_inside_open(const supine_basis *lungs, const char *path,
@@ -153,8 +150,8 @@ supine_status supine_command_marks_make(const supine_basis *inside,
                                .label = calloc(names->count, sizeof *made.label)};
   supine_status status = SUPINE_ERROR_MEMORY;
   if (xyz != NULL && before != NULL && made.mark != NULL && made.label != NULL) {
-    supine_deform(inside, pose, xyz);
-    supine_deform(inside, from, before);
+    (void)supine_deform(inside, pose, xyz);
+    (void)supine_deform(inside, from, before);
     for (size_t part = 0; part < names->count; ++part) {
       add_part(names, part, xyz, before, &made);
     }

@@ -29,13 +29,13 @@ static supine_status find_breath(const supine_comparison *c, const supine_postur
     return status;
   }
   double total = 0.0;
-  supine_basis_volumes(c->basis, &after, posture->gain);
+  (void)supine_basis_volumes(c->basis, &after, posture->gain);
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     posture->gain[lung] -= posture->volume[lung];
     total += posture->gain[lung];
   }
-  supine_deform(c->basis, &posture->pose, xyz[0]);
-  supine_deform(c->basis, &after, xyz[1]);
+  (void)supine_deform(c->basis, &posture->pose, xyz[0]);
+  (void)supine_deform(c->basis, &after, xyz[1]);
   status = supine_compare_slabs(c->basis, item->gravity, xyz[0], xyz[1], SUPINE_COMPARISON_SLABS,
                                 slabs, error);
   for (size_t i = 0; status == SUPINE_OK && i < info->lung_count * SUPINE_COMPARISON_SLABS; ++i) {
@@ -59,9 +59,9 @@ static supine_status find_posture(const supine_comparison *c, const supine_postu
   if (status != SUPINE_OK) {
     return status;
   }
-  supine_compare_distances(c->compare, &posture->pose, &c->reference.pose, distance);
+  (void)supine_compare_distances(c->compare, &posture->pose, &c->reference.pose, distance);
   supine_compare_statistics(c->compare, distance, &posture->displacement);
-  supine_basis_volumes(c->basis, &posture->pose, posture->volume);
+  (void)supine_basis_volumes(c->basis, &posture->pose, posture->volume);
   status = supine_options_pose_check(c->basis, c->command, c->allow_folds, &posture->pose, error);
   return status == SUPINE_OK && c->breath > 0.0 ? find_breath(c, item, xyz, posture, error)
                                                 : status;

@@ -19,7 +19,7 @@ static const struct {
 /* Compute the change of each lung's volume between the reference pose and a posture, % and mL. */
 static void find_changes(const supine_comparison *c, size_t posture, double *percent, double *ml) {
   double held[SUPINE_LUNGS_MAX];
-  supine_basis_volumes(c->basis, &c->reference.pose, held);
+  (void)supine_basis_volumes(c->basis, &c->reference.pose, held);
   for (size_t lung = 0; lung < supine_basis_get_info(c->basis)->lung_count; ++lung) {
     ml[lung] = c->posture[posture].volume[lung] - held[lung];
     percent[lung] = 100 * ml[lung] / held[lung];

@@ -8,6 +8,8 @@
 #ifndef SUPINE_STREAM_SERVER_H
 #define SUPINE_STREAM_SERVER_H
 
+#include <stdio.h>
+
 #include "program/stream/gravity.h"
 #include "program/stream/web.h"
 

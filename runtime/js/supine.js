@@ -3,7 +3,7 @@
 // memory never grows and the arrays never move.
 
 // Bytes reserved for C structs and buffers.
-const STATE = 128, POSE = 8 * (256 + 3 * 16), VOLUMES = 8 * 16, TEXT = 512, ERROR = 4 + 512;
+const STATE = 128, POSE = 8 * (256 + 3 * 16 + 1), VOLUMES = 8 * 16, TEXT = 512, ERROR = 4 + 512;
 // Byte offsets of members of the C struct supine_basis_info. Later versions of the library keep these offsets.
 const INFO = { vertices: 0, lungs: 16, begin: 20, hasVolume: 25, names: 56, normals: 100 };
 const TYPES = [Uint8Array, Uint32Array, Float32Array, Float64Array, Int16Array]; // in the order of supine_dtype

@@ -25,7 +25,7 @@ static double find_displacements(const glb *g, float *displacement) {
         SUPINE_OK) {
       continue;
     }
-    supine_deform(g->source->basis, &pose, p == 0 ? from : g->xyz);
+    (void)supine_deform(g->source->basis, &pose, p == 0 ? from : g->xyz);
     for (size_t i = 0; p > 0 && i < g->source->info->vertex_count; ++i) {
       const float *to = g->xyz + 3 * i;
       const float away[3] = {to[0] - from[3 * i], to[1] - from[3 * i + 1], to[2] - from[3 * i + 2]};

@@ -246,7 +246,7 @@ static double scan_volume(const export_source *s) {
   if (supine_basis_pose(s->basis, &scan, &pose, &error) != SUPINE_OK) {
     return 0;
   }
-  supine_basis_volumes(s->basis, &pose, held);
+  (void)supine_basis_volumes(s->basis, &pose, held);
   for (size_t lung = 0; lung < s->info->lung_count; ++lung) {
     beyond += held[lung] - s->info->reference_volume[lung];
   }

@@ -125,7 +125,7 @@ static void place(const camera *c, const float xyz[3], double seen[3]) {
 void supine_render_extent(supine_renderer *r, const supine_scene *scene, double extent[4]) {
   const camera c = find_camera(r, scene);
   const double closest = c.away - 0.98 * drawn_depth * c.radius;
-  supine_deform(r->basis, scene->pose, r->scratch);
+  (void)supine_deform(r->basis, scene->pose, r->scratch);
   for (size_t i = 0; i < r->info->vertex_count; ++i) {
     double p[3];
     place(&c, r->scratch + 3 * i, p);
@@ -197,7 +197,7 @@ static void find_corners(const canvas *c) {
   const double near = cam.away - drawn_depth * cam.radius;
   double frame[4];
   find_frame(r, c->scene, frame);
-  supine_deform(r->basis, c->scene->pose, r->scratch);
+  (void)supine_deform(r->basis, c->scene->pose, r->scratch);
   const float *normals = r->scratch + 3 * r->info->vertex_count;
   supine_normals(r->basis, r->scratch, r->scratch + 3 * r->info->vertex_count);
   for (size_t i = 0; i < r->info->vertex_count; ++i) {
