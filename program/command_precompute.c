@@ -6,6 +6,7 @@
 
 #include <supine/sh.h>
 
+#include "base/vec3.h"
 #include "precompute/fields/fields.h"
 #include "precompute/patient/patient_file.h"
 #include "program/options/model_options.h"
@@ -20,6 +21,7 @@ typedef struct request {
   const char *fields, *patient;
   char summary[256];
   bool has_band, has_modes;
+  size_t directions; /* number of directions of gravity to print; 0 to make a basis */
 } request;
 
 static supine_status read_modes(const char *text, void *field, supine_error *error) {
@@ -65,6 +67,9 @@ static const supine_option table[] = {
      "Without --band and --modes, cross-validation chooses both",
      SUPINE_FILLS(request, fields), .file = SUPINE_FILE_IN, .rivals = "directions",
      .partners = "output band modes axes units midline labels edge close surfaces-out scanned"},
+    {"directions", 0, "N",
+     "only print N directions of gravity that cover the sphere evenly, as CSV, to simulate",
+     SUPINE_FILLS(request, directions), .range = {2.0, 1000.0}, .partners = ""},
     {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
     {.name = NULL}};
 
@@ -233,6 +238,15 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   const supine_scan scan = wanted->model.choice.scan;
   char *text = NULL;
   static supine_patient_record record; /* static, as it is too large for the stack */
+  if (wanted->directions > 0) {
+    (void)puts("x,y,z");
+    for (size_t i = 0; i < wanted->directions; ++i) {
+      double g[3];
+      supine_spiral((double)i, (double)wanted->directions, 0.0, g);
+      (void)printf("%.9g,%.9g,%.9g\n", g[0], g[1], g[2]);
+    }
+    return SUPINE_OK;
+  }
   if (supine_mesh_save_supports(wanted->path)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "%s: this is the name of a mesh: give a name that ends in .safetensors",
@@ -265,7 +279,8 @@ const supine_command supine_command_precompute = {
     name,
     "solve the physics once, and write a basis file for any posture",
     .usage = "MESH... -o FILE [OPTIONS]\n"
-             "LABELS... -o FILE [OPTIONS]",
+             "LABELS... -o FILE [OPTIONS]\n"
+             "--directions N",
     .about = "Solves the physics of one or two lungs for all directions of gravity, and writes a "
              "basis file. From this file, 'supine deform' and the run-time library compute "
              "deformed lungs in real time. MESH is any surface that assimp reads (PLY, OBJ, STL, "

@@ -507,6 +507,7 @@ TEST(test_precompute_fields_every_option_used_or_refused) {
                {"close", "3", 1, "are for label maps"},
                {"surfaces-out", "s.ply", 1, "are for label maps"},
                {"patient", "m.obj", 1, "give --fields or --patient, not both"},
+               {"directions", "32", 1, no_effect},
                {"held-out", "200", 1, no_effect},
                {"resting", "supine=0.4", 1, no_effect},
                {"height", "170", 1, no_effect},
@@ -557,6 +558,35 @@ TEST(test_precompute_fields_scanned_posture_not_displaced) {
   EXPECT(1, "give the posture alone", FIELDS "--scanned supine:rest");
   EXPECT(1, "only for --fields",
          "precompute m.obj --axes RAS --units cm --scanned supine -o c.safetensors");
+}
+
+TEST(test_fields_file_of_another_program_named) {
+  write_input();
+  assert_int_equal(rename(in_folder("m.obj"), in_folder("m.frd")), 0);
+  write_input();
+  EXPECT(2, "m.frd: a file of CalculiX: convert its results in Python with supine.save_fields(",
+         "precompute m.obj --axes RAS --units cm --fields m.frd -o c.safetensors");
+}
+
+TEST(test_directions_printed_evenly_spread) {
+  double g[3] = {0.0};
+  int used = 0;
+  int length = 0;
+  EXPECT(0, "x,y,z\n", "precompute --directions 32");
+  for (int count = 0; count < 32; ++count) {
+    double next[3];
+    assert_int_equal(
+        sscanf(printed + 6 + used, "%lf,%lf,%lf\n%n", &next[0], &next[1], &next[2], &length), 3);
+    assert_close(supine_length(next), 1.0, 1e-8);
+    used += length;
+    for (int k = 0; k < 3; ++k) {
+      g[k] += next[k] / 32.0;
+    }
+  }
+  assert_int_equal(printed[6 + used], '\0');
+  assert_true(supine_length(g) < 0.02);
+  EXPECT(1, "--modes has no effect with --directions", "precompute --directions 32 --modes 3");
+  EXPECT(1, "unexpected argument 'm.obj'", "precompute m.obj --directions 32");
 }
 
 TEST(test_fields_basis_volumes_and_breaths_refused) {

@@ -190,13 +190,30 @@ static supine_status take_tensors(reading *r) {
   return status;
 }
 
+/* Open the file. Name the program that has written a file of another kind. */
+static supine_status open_file(const char *path, supine_safetensors **file, supine_error *error) {
+  static const char *const kinds[][2] = {{".frd", "CalculiX"}, {".dat", "CalculiX"},
+                                         {".xplt", "FEBio"},   {".odb", "Abaqus"},
+                                         {".vtu", "VTK"},      {".vtk", "VTK"}};
+  const supine_status status = supine_safetensors_open(path, file, error);
+  for (size_t i = 0; status == SUPINE_ERROR_FORMAT && i < sizeof kinds / sizeof *kinds; ++i) {
+    if (supine_text_ends_in(path, kinds[i][0])) {
+      return supine_error_set(error, status,
+                              "%s: a file of %s: convert its results in Python with supine."
+                              "save_fields(\"fields.safetensors\", points, gravity, displacement)",
+                              path, kinds[i][1]);
+    }
+  }
+  return status;
+}
+
 supine_status supine_fields_load(const char *path, const supine_lungs *lungs,
                                  const supine_scan_frame *frame, supine_fields *fields,
                                  supine_error *error) {
   reading r = {.path = path, .lungs = lungs, .frame = *frame, .error = error};
   r.frame.millimetres_per_unit += r.frame.millimetres_per_unit == 0.0;
   supine_safetensors *file = NULL;
-  supine_status status = supine_safetensors_open(path, &file, error);
+  supine_status status = open_file(path, &file, error);
   if (status == SUPINE_OK) {
     r.points = supine_safetensors_find(file, "points");
     r.gravity = supine_safetensors_find(file, "gravity");

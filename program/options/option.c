@@ -231,12 +231,25 @@ static supine_status check_partners(const reading *r, const supine_option *optio
   return SUPINE_OK;
 }
 
+static supine_status refuse_operand(const char *operand, supine_error *error) {
+  return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "unexpected argument '%s': remove it",
+                          operand);
+}
+
 static supine_status check_given(const reading *r, size_t operands, char **argv,
                                  supine_error *error) {
   const supine_command *command = r->command;
+  for (size_t i = 0; i < r->count; ++i) {
+    const supine_option *option = r->rows[i].option;
+    if (option->partners != NULL && r->rows[i].given) {
+      const supine_status status = check_partners(r, option, error);
+      if (status != SUPINE_OK || option->partners[0] == '\0') {
+        return status == SUPINE_OK && operands > 0 ? refuse_operand(argv[optind], error) : status;
+      }
+    }
+  }
   if (operands > command->operands_most && command->operands_most == 0) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "unexpected argument '%s': remove it",
-                            argv[optind]);
+    return refuse_operand(argv[optind], error);
   }
   if (operands < command->operands_least || operands > command->operands_most) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%s", command->operands_missing);
@@ -255,10 +268,6 @@ static supine_status check_given(const reading *r, size_t operands, char **argv,
         !has_ending(r->rows[i].value, option->endings)) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%s: the name must end in %s",
                               r->rows[i].value, option->endings);
-    }
-    if (option->partners != NULL && r->rows[i].given &&
-        check_partners(r, option, error) != SUPINE_OK) {
-      return SUPINE_ERROR_ARGUMENT;
     }
   }
   return SUPINE_OK;
