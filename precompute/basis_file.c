@@ -122,16 +122,14 @@ static void add_reference(entries *list, const supine_reference *reference, cons
 }
 
 /* Add the constant c of the expected position error (supine/locate.h), and whether the resting
- * volumes (FRC) differ from the defaults for healthy people. */
+ * volume (FRC) of a posture is the patient's own. */
 static void add_expected_error(entries *list, const supine_basis_content *content) {
-  const supine_resting usual = supine_reference_resting_default();
   if (!content->is_fields) {
     const double own = content->options->expected_error;
     add(list, "expected_error_mm", "%g",
         own > 0.0 ? fmin(own, SUPINE_EXPECTED_ERROR_MM) : SUPINE_EXPECTED_ERROR_MM);
   }
-  if (content->reference != NULL &&
-      memcmp(&content->reference->resting, &usual, sizeof usual) != 0) {
+  if (content->reference != NULL && supine_reference_resting_given(&content->reference->resting)) {
     add(list, "resting_known", "yes");
   }
 }

@@ -139,10 +139,11 @@ static supine_status load_maps(reading *r, supine_source *source, supine_finding
   }
   wanted.labels = folder && wanted.labels == NULL ? lobes.labels : wanted.labels;
   wanted.axes = r->options->load.axes;
-  if (r->options->load.millimetres_per_unit != 0.0) {
+  if (r->options->load.millimetres_per_unit != 0.0 &&
+      r->options->load.millimetres_per_unit != 1.0) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--units is for surfaces: leave it out, as a label map's header states "
-                            "its unit");
+                            "a label map's header states its unit: leave --units out, or give "
+                            "--units mm to accept any size of the lungs");
   }
   const supine_status status = supine_labels_surfaces(
       (const char *const *)(folder ? lobes.list : r->paths), folder ? lobes.count : r->count,
@@ -231,7 +232,6 @@ static supine_status join(reading *r, supine_source *source, supine_findings *fi
                           supine_error *error) {
   const supine_lungs_source given = {.name = r->paths[0],
                                      .axes = r->axes,
-                                     .axes_given = r->options->load.axes != SUPINE_AXES_AUTO,
                                      .units_given = r->options->load.millimetres_per_unit != 0.0,
                                      .midline = r->has_midline ? &r->midline : NULL};
   supine_status status = supine_lungs_gate(r->meshes, r->count, &given, &source->lungs,

@@ -314,9 +314,12 @@ static supine_status check_ends(const playing *p, supine_error *error) {
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < 2 && status == SUPINE_OK; ++i) {
     supine_pose pose;
-    status = find_pose(p, ends[i], &pose, error);
+    const supine_state state =
+        supine_breath_state(p->basis, p->gravity + 3 * ends[i], p->above[ends[i]]);
+    status = supine_basis_pose(p->basis, &state, &pose, error);
     if (status == SUPINE_OK) {
-      status = supine_options_pose_check(p->basis, name, p->wanted->allow_folds, &pose, error);
+      status =
+          supine_options_pose_check(p->basis, name, p->wanted->allow_folds, &state, &pose, error);
     }
   }
   return status;

@@ -196,7 +196,15 @@ static supine_status compare(const char *path, const char *made_by, const supine
   if (status != SUPINE_OK) {
     return status;
   }
-  if (supine_basis_metadata(basis, "content") != NULL) { /* only 'supine embed' writes this key */
+  const bool content = supine_basis_metadata(basis, "content") != NULL;
+  if (content && wanted->from.given) {
+    return supine_error_set(
+        error, SUPINE_ERROR_ARGUMENT,
+        "%s holds structures inside the lungs, which are compared between every "
+        "two postures: leave --from out, or use 'supine deform --from'",
+        path);
+  }
+  if (content) { /* only 'supine embed' writes this key */
     return wanted->html != NULL
                ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                                   "%s holds structures inside the lungs, but -o needs the lungs: "

@@ -129,7 +129,9 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
 }
 
 static supine_status deform(const supine_basis *basis, const request *wanted, supine_error *error) {
-  supine_deformation moved = {.state = wanted->volume.state, .from_given = wanted->from.given};
+  supine_deformation moved = {.state = wanted->volume.state,
+                              .from_given = wanted->from.given,
+                              .allow_folds = wanted->volume.allow_folds};
   char comment[128];
   supine_status status = supine_options_reference(basis, &wanted->from, false, &moved.from, error);
   if (status == SUPINE_OK) {

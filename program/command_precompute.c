@@ -56,7 +56,7 @@ static const supine_option table[] = {
      "model of the patient's motion, made by 'supine fit', to use instead of the built-in law",
      SUPINE_FILLS(request, patient), .file = SUPINE_FILE_IN, .rivals = "directions",
      .partners = "output band modes held-out axes units midline labels edge close surfaces-out "
-                 "scanned resting height sex expandability lesion lung"},
+                 "scanned resting full height sex expandability lesion lung"},
     {.help = "Displacements from another simulator, instead of the built-in physics:"},
     {"fields", 0, "FILE",
      "safetensors file with three tensors: points [P,3], the positions of P points; gravity [M,3], "

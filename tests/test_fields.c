@@ -510,6 +510,8 @@ TEST(test_precompute_fields_every_option_used_or_refused) {
                {"directions", "32", 1, no_effect},
                {"held-out", "200", 1, no_effect},
                {"resting", "supine=0.4", 1, no_effect},
+               {"full", "5000mL", 1, no_effect},
+               {"full", "6000mL", 1, no_effect},
                {"height", "170", 1, no_effect},
                {"sex", "male", 1, no_effect},
                {"law", "paper", 1, no_effect},

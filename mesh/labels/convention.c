@@ -224,6 +224,7 @@ supine_status supine_labels_choose(const char *path, const supine_image *image,
   for (int value = LABELS_LEFT; value <= LABELS_EITHER; ++value) {
     list_labels(tally, side, (uint8_t)value, list[value - 1], sizeof list[0]);
   }
+  choice->named = list[2][0] == '\0' && (name == NULL || strcmp(name, "their sides") != 0);
   taken[0] = '\0';
   if (list[2][0] != '\0') {
     supine_text_add(taken, 256, "%s both lungs", list[2]);

@@ -67,7 +67,8 @@ typedef struct supine_labels_report {
  * @param surfaces  [2] zero-initialised; surface i is that of report->lung[i] and faces outwards
  * @retval SUPINE_ERROR_ARGUMENT  `edge`, `close` or `labels` is invalid
  * @retval SUPINE_ERROR_MESH      a lung has no voxels, or is too small or too large; it is unclear
- *             which labels are lungs; or the left lung does not lie left of the right lung
+ *             which labels are lungs; the left lung does not lie left of the right lung; or labels
+ *             name the sides, the header's axes were not given, and the lungs' shape is mirrored
  * @retval SUPINE_ERROR_FORMAT    a voxel is not a whole number from 0 to 65535, or images differ in
  *             size or position
  * @retval SUPINE_ERROR_INTERRUPTED, SUPINE_ERROR_MEMORY, and the statuses of supine_image_read

@@ -55,7 +55,8 @@ supine_status supine_labels_count(const char *path, const supine_image *image, l
                                   supine_error *error);
 
 typedef struct labels_choice {
-  char *taken;  /**< [256] output: labels of each side, such as "2 left; 1 right" */
+  char *taken; /**< [256] output: labels of each side, such as "2 left; 1 right" */
+  bool named;  /**< output: whether the labels, not the position, tell which lung is the left one */
   bool doubted; /**< whether the left lung does not lie mainly to the left of the right lung */
 } labels_choice;
 

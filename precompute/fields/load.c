@@ -8,7 +8,7 @@
 #include "base/text.h"
 #include "base/vec3.h"
 #include "precompute/fields/fields.h"
-#include "precompute/inside/surface.h"
+#include "precompute/lungs/surface.h"
 
 /* Largest distance between unit vectors that count as the same direction. */
 static const double same_direction = 1e-6;

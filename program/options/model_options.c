@@ -12,13 +12,13 @@ static supine_status read_scan(const char *text, void *field, supine_error *erro
   supine_state posture = {.volume = {SUPINE_VOLUME_DEFAULT, 0.0}};
   choice->has_scan = true;
   if (supine_state_parse_posture(text, &posture, NULL) == SUPINE_OK) {
-    choice->scan = (supine_scan){true, posture};
+    choice->scan = (supine_scan){.known = true, .state = posture};
     return SUPINE_OK;
   }
   return supine_reference_scan_parse(text, &choice->scan, error);
 }
 
-/* Read volumes at rest, such as "supine=0.43,prone=2600mL". */
+/* Read volumes at rest, such as "supine=0.48,prone=2600mL" or "copd". */
 static supine_status read_resting(const char *text, void *field, supine_error *error) {
   supine_model_choice *choice = field;
   char copy[256];
@@ -26,13 +26,24 @@ static supine_status read_resting(const char *text, void *field, supine_error *e
   supine_status status = SUPINE_OK;
   for (char *rest = copy, *piece; status == SUPINE_OK && (piece = strsep(&rest, ",")) != NULL;) {
     char *value = strchr(piece, '=');
-    if (value == NULL) {
+    if (value != NULL) {
+      *value++ = '\0';
+    } else if (strcmp(piece, "copd") != 0) {
       return SUPINE_ERROR_ARGUMENT;
     }
-    *value = '\0';
-    status = supine_reference_resting_set(&choice->resting, piece, value + 1, error);
+    status = supine_reference_resting_set(&choice->resting, piece, value, error);
   }
   return status;
+}
+
+/* Read an absolute volume, such as "4.2L". */
+static supine_status read_full(const char *text, void *field, supine_error *error) {
+  supine_state state = {.lung_count = 0};
+  const supine_status status = supine_state_parse_volume(text, &state, error);
+  *(double *)field = state.volume.ml;
+  return status == SUPINE_OK ? supine_options_fits(state.volume.kind == SUPINE_VOLUME_ABSOLUTE &&
+                                                   state.lung_count == 0)
+                             : status;
 }
 
 /* Read "uniform", or "linear:AXIS:FROM:TO" or "exp:AXIS:FROM:TO" with the expandability at both
@@ -149,12 +160,20 @@ const supine_option supine_command_model_options[] = {
     {"resting", 0, "LIST",
      "volume of the patient's lungs at rest (FRC), for one posture or several, separated by "
      "commas\nPOSTURE=2600mL: gas and tissue of both lungs, as measured in a CT at rest\n"
-     "POSTURE=0.43: a share of the volume at full inflation\nPOSTURE=0.42/0.44: shares for the "
-     "left and the right lung\nThe volumes of other postures keep the default proportions to "
-     "these. A lung-function test gives the gas alone, seated: add about 0.9 L of tissue, and give "
-     "the sum as upright. Default, from healthy people: supine 0.418/0.440, prone 0.464/0.475, "
-     "left 0.413/0.546, right 0.563/0.435, upright 0.481/0.506, inverted as supine",
-     FILLS(choice), .read = read_resting, .wants = "POSTURE=2600mL or POSTURE=SHARE,..."},
+     "POSTURE=0.48: a share of the volume at full inflation\nPOSTURE=0.47/0.49: shares for the "
+     "left and the right lung\ncopd: the usual share in COPD, 0.64 supine (SD 0.11; ten patients)\n"
+     "The volumes of other postures keep the default proportions to these. A lung-function test "
+     "gives the gas alone, seated: add about 0.9 L of tissue, and give the sum as upright. "
+     "Default, "
+     "from healthy people (SD 0.08): supine 0.467/0.492, prone 0.519/0.531, left 0.462/0.610, "
+     "right "
+     "0.629/0.486, upright 0.538/0.566, inverted as supine; with --height and --sex, mL that these "
+     "predict (GLI 2021, less 0.806 L for lying, plus 0.86 L of tissue)",
+     FILLS(choice), .read = read_resting, .wants = "copd, POSTURE=2600mL or POSTURE=SHARE,..."},
+    {"full", 0, "VOLUME",
+     "for a scan at rest: volume of gas and tissue of the scanned lungs at full inflation, such as "
+     "4200mL or 4.2L. Without it, full inflation is assumed from the usual share at rest",
+     FILLS(choice.full), .read = read_full, .wants = "a volume such as 4200mL"},
     {"height", 0, "CM",
      "height of the patient. Height and --sex give the volume expected at TLC (ECSC 1993, less 10 "
      "% for lying, plus 0.86 L of tissue), which is printed beside the volume of the scan. Without "

@@ -21,9 +21,12 @@ static supine_status find_breath(const supine_comparison *c, const supine_postur
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     state.volume.ml += posture->volume[lung];
   }
-  supine_status status = supine_basis_gains(c->basis, &state, &after, error);
-  if (status == SUPINE_OK) {
-    status = supine_options_pose_check(c->basis, c->command, c->allow_folds, &after, error);
+  supine_error wrong;
+  supine_status status = supine_basis_gains(c->basis, &state, &after, &wrong);
+  if (status != SUPINE_OK) {
+    (void)supine_error_set(error, status, "%s: %s", item->name, wrong.message);
+  } else {
+    status = supine_options_pose_check(c->basis, c->command, c->allow_folds, &state, &after, error);
   }
   if (status != SUPINE_OK) {
     return status;
@@ -55,14 +58,16 @@ static supine_status find_posture(const supine_comparison *c, const supine_postu
                                   supine_error *error) {
   supine_state state = c->state;
   memcpy(state.gravity, item->gravity, sizeof state.gravity);
-  supine_status status = supine_basis_pose(c->basis, &state, &posture->pose, error);
+  supine_error wrong;
+  supine_status status = supine_basis_pose(c->basis, &state, &posture->pose, &wrong);
   if (status != SUPINE_OK) {
-    return status;
+    return supine_error_set(error, status, "%s: %s", item->name, wrong.message);
   }
   (void)supine_compare_distances(c->compare, &posture->pose, &c->reference.pose, distance);
   supine_compare_statistics(c->compare, distance, &posture->displacement);
   (void)supine_basis_volumes(c->basis, &posture->pose, posture->volume);
-  status = supine_options_pose_check(c->basis, c->command, c->allow_folds, &posture->pose, error);
+  status = supine_options_pose_check(c->basis, c->command, c->allow_folds, &state, &posture->pose,
+                                     error);
   return status == SUPINE_OK && c->breath > 0.0 ? find_breath(c, item, xyz, posture, error)
                                                 : status;
 }
@@ -130,7 +135,7 @@ supine_status supine_report_find(supine_comparison *c, supine_error *error) {
     supine_error wrong = {SUPINE_OK, ""};
     status = find_posture(c, &c->postures.item[i], distance, xyz, &c->posture[i], &wrong);
     if (status != SUPINE_OK) {
-      (void)supine_error_set(error, status, "%s: %s", c->postures.item[i].name,
+      (void)supine_error_set(error, status, "%s: %s", c->path,
                              wrong.message[0] != '\0' ? wrong.message
                                                       : supine_status_string(status));
     }

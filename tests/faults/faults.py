@@ -34,7 +34,7 @@ precompute lungs.ply --band 2 -o lungs.safetensors
 solve lungs.ply --posture supine --reach 10 -o state.ply
 embed lungs.safetensors points.csv -o points.safetensors
 embed lungs.safetensors --grid 60 -o grid.safetensors
-fit --landmarks pairs.csv --law deep -o patient.json
+fit --landmarks pairs.csv --rest 2600mL --other 5400mL --law deep -o patient.json
 pv fit samples.csv -o patient.pv.json
 """
 
@@ -51,7 +51,7 @@ precompute lungs.ply --fields fields.safetensors -o out/a.safetensors
 precompute lungs.ply --band 2 --patient patient.json -o out/a.safetensors
 solve lungs.ply --posture prone -o out/a.vtp
 solve lungs.ply --unit-force 3 -o out/a.csv
-fit --landmarks pairs.csv -o out/a.json
+fit --landmarks pairs.csv --rest 2600mL --other 5400mL -o out/a.json
 fit lungs.ply state.ply -o out/a.json
 validate lungs.safetensors --state supine:state.ply
 embed lungs.safetensors points.csv lungs.ply -o out/a.safetensors
