@@ -7,12 +7,14 @@
 The simulator is CalculiX (ccx) on a tetrahedral mesh by tetgen, of the left synthetic lung with about VERTICES (default
 1200) vertices. The tissue is linear, or neo-Hookean with large deformation; the pleura slides on springs along its
 normals; the hilum is held. A basis is made of the fields for 32 directions of gravity, and compared with the simulator
-in 10 further directions. It prints the rows of FIGURES.md. The exit code is 1 if an error is outside the limits below,
+in 10 further directions; the commands of docs/guide/simulator.md are run on its results. It prints the rows of
+FIGURES.md. The exit code is 1 if an error is outside the limits below,
 and 77 if a program is missing.
 """
 import concurrent.futures
 import os
 import pathlib
+import re
 import resource
 import shutil
 import subprocess
@@ -134,6 +136,20 @@ def measure(supine, law, points, faces, directions, others):
     return errors, seconds, (time.process_time() - begun) / count
 
 
+def follow_guide(supine, points, faces):
+    """Run the commands and programs of docs/guide/simulator.md on the last simulations."""
+    page = (pathlib.Path(__file__).resolve().parents[2] / "docs/guide/simulator.md").read_text("utf-8")
+    supine._program._write_mesh("lung.ply", points, faces)  # pylint: disable=protected-access
+    np.savetxt("points.csv", points, delimiter=",")
+    for language, text in re.findall(r"```(sh|python)\n(.*?)```", page, re.S):
+        subprocess.run(["sh", "-euc", text] if language == "sh" else [sys.executable, "-c", text], check=True,
+                       stdout=subprocess.DEVNULL)
+    assert pathlib.Path("same.safetensors").read_bytes() == pathlib.Path("fields.safetensors").read_bytes()
+    for name, moves in (("lung", True), ("scanned", False)):
+        basis = supine.open(name + ".safetensors")
+        assert (np.abs(basis.deform(basis.pose("supine")) - points).max() > 1) == moves, name
+
+
 def main():
     for wanted in ("ccx", "tetgen"):
         if shutil.which(wanted) is None:
@@ -141,6 +157,7 @@ def main():
     build, vertices = pathlib.Path(sys.argv[1]).resolve(), int(sys.argv[2]) if len(sys.argv) > 2 else 1200
     os.environ["PATH"] = f"{build}:{os.environ['PATH']}"
     with tempfile.TemporaryDirectory() as folder:
+        os.environ["PYTHONPATH"] = folder
         os.chdir(folder)
         supine = take_package(build, pathlib.Path(folder))
         points, faces = surface(str(build / "supine"), vertices)
@@ -151,6 +168,7 @@ def main():
         print("| tissue | modes | error found | error stated | RMS | largest |\n|---|--:|--:|--:|--:|--:|")
         measure(supine, "linear", points, faces, directions, others)
         errors, seconds, fast = measure(supine, "neo-Hookean", points, faces, directions, others)
+        follow_guide(supine, points, faces)
         os.chdir("/")
     print(f"\nneo-Hookean: {seconds:.2g} s of processor time in CalculiX, {1e6 * fast:.2g} us in supine_deform: "
           f"{seconds / fast:,.0f} times")
