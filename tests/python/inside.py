@@ -225,7 +225,7 @@ assert "--held-out 60" in apart.metadata["made_by"]
 assert supine.precompute(lungs.vertices, lungs.faces, band=3, modes=2).mode_count == 2  # `faces` has VTK's layout
 with warnings.catch_warnings(record=True) as warned:
     warnings.simplefilter("always")
-    supine.precompute(1.4 * lungs.vertices, lungs.triangles, band=3)
+    supine.precompute(1.2 * lungs.vertices, lungs.triangles, band=3)
 assert warned and "an adult's" in str(warned[0].message) and warned[0].filename == __file__, warned
 refused(supine.MeshError, f"surface 1: face 0 names vertex {n + 3}", supine.precompute, lungs.vertices,
         lungs.triangles[:1].astype(np.int64) * 0 + n + 3)
