@@ -10,7 +10,6 @@
 #include "precompute/fields/fields.h"
 #include "precompute/patient/patient_file.h"
 #include "program/options/model_options.h"
-#include "program/options/surface_options.h"
 
 static const char name[] = "precompute";
 
@@ -143,7 +142,6 @@ static void report_fit(const char *path, const char *assumed, const supine_field
     (void)printf("  band %-2zu  %8.3g %%%s\n", band, 100.0 * fit->error[band],
                  band == fit->band ? "  <- chosen" : "");
   }
-  (void)printf("condition number of the harmonics at these directions: %.3g\n", fit->condition);
   if (fit->band == highest && highest < SUPINE_FIT_BAND_MAX) {
     (void)printf("the error is still falling at the highest band, so detail beyond band %zu is "
                  "missing: about\n%zu evenly spread directions would determine band %zu\n",

@@ -47,7 +47,6 @@ enum { SUPINE_FIT_BAND_MAX = 11 };
 typedef struct supine_fit_report {
   size_t band_highest; /**< highest degree that the directions of gravity determine */
   size_t band;         /**< highest degree of the harmonics in the chosen fit */
-  double condition;    /**< condition number of the matrix of harmonics */
   size_t mode_count;   /**< number of modes, or of harmonics instead of modes */
   /** [l] relative RMS leave-one-out error with harmonics to degree l. */
   double error[SUPINE_FIT_BAND_MAX + 1];

@@ -116,21 +116,14 @@ static bool fit_is_determined(const fit *f) {
  * of fields, because only fits with fewer than M harmonics are tried. */
 static supine_status allocate(fitting *w, supine_error *error) {
   const size_t m = w->fields->direction_count;
-  double *next = w->gram = malloc((5 * m * m + 4 * m) * sizeof *next);
+  const size_t square = m * m;
+  double *next = w->gram = malloc((5 * square + 4 * m) * sizeof *next);
   if (next == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu fields", m);
   }
-  double **const squares[] = {&w->work.pinv, &w->work.pinv_gram, &w->work.coefficient_gram,
-                              &w->work.eigenvectors};
-  double **const lists[] = {&w->work.eigenvalues, &w->work.target, &w->work.residual,
-                            &w->work.gram_residual};
-  for (size_t i = 0; i < 4; ++i) {
-    *squares[i] = next += m * m;
-  }
-  next += m * m;
-  for (size_t i = 0; i < 4; ++i, next += m) {
-    *lists[i] = next;
-  }
+  double *lists = next + 5 * square;
+  w->work = (prediction){next + square,     next + 2 * square, next + 3 * square, lists,
+                         next + 4 * square, lists + m,         lists + 2 * m,     lists + 3 * m};
   return SUPINE_OK;
 }
 
@@ -179,11 +172,8 @@ static supine_status predict(const fitting *w, const fit *f, size_t d, size_t mo
 
 /* Sum the squared displacements of all fields, mm^2. */
 static double square_sum(const fitting *w) {
-  double sum = 0.0;
-  for (size_t i = 0; i < w->fields->direction_count; ++i) {
-    sum += w->gram[i * w->fields->direction_count + i];
-  }
-  return sum;
+  const int m = (int)w->fields->direction_count;
+  return cblas_dasum(m, w->gram, m + 1);
 }
 
 /* Compute the relative RMS leave-one-out error of a fit before its compression to modes. */
@@ -235,7 +225,6 @@ static supine_status choose_band(fitting *w, int wanted, supine_fit_report *repo
         m, wanted, (wanted + 1) * (wanted + 1), (int)determined_count - 1);
   }
   report->band_highest = determined_count - 1;
-  report->condition = w->chosen.condition;
   return SUPINE_OK;
 }
 

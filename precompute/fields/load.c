@@ -15,6 +15,8 @@ static const double same_direction = 1e-6;
 /* Largest distance of a vertex from its point, as a fraction of the diagonal of the lungs' box. */
 static const double farthest_point = 1e-4;
 
+#define WRITE "supine.save_fields(\"fields.safetensors\", points, gravity, displacement)"
+
 /* A file being read. */
 typedef struct reading {
   const char *path;
@@ -159,22 +161,15 @@ static bool is_real(const supine_tensor *tensor, size_t rank) {
 
 static supine_status check_tensors(const reading *r) {
   const supine_tensor *u = r->displacement;
-  if (!is_real(r->gravity, 2) || !is_real(u, 3) || r->gravity->shape[0] != u->shape[0] ||
-      r->gravity->shape[0] == 0) {
-    return supine_error_set(r->error, SUPINE_ERROR_FORMAT,
-                            "%s: expected tensors points [P,3], gravity [M,3] and displacement "
-                            "[M,P,3], F32 or F64: write all three",
-                            r->path);
-  }
-  return is_real(r->points, 2) && r->points->shape[0] == u->shape[1]
-             ? SUPINE_OK
-             : supine_error_set(
-                   r->error, SUPINE_ERROR_FORMAT,
-                   "%s: the tensor points [%zu,3] is missing or has another shape: it gives the "
-                   "position of each point that the displacements belong to. In Python: t = "
-                   "safetensors.numpy.load_file(\"%s\"); supine.save_fields(\"%s\", points, "
-                   "t[\"gravity\"], t[\"displacement\"])",
-                   r->path, u->shape[1], r->path, r->path);
+  const bool valid = is_real(r->points, 2) && is_real(r->gravity, 2) && is_real(u, 3) &&
+                     r->gravity->shape[0] == u->shape[0] && r->points->shape[0] == u->shape[1] &&
+                     u->shape[0] > 0;
+  return valid ? SUPINE_OK
+               : supine_error_set(r->error, SUPINE_ERROR_FORMAT,
+                                  "%s: expected tensors points [P,3], gravity [M,3] and "
+                                  "displacement [M,P,3], F32 or F64. Write all three, with the "
+                                  "position of each point that is displaced, in Python: " WRITE,
+                                  r->path);
 }
 
 static supine_status take_tensors(reading *r) {
@@ -190,30 +185,19 @@ static supine_status take_tensors(reading *r) {
   return status;
 }
 
-/* Open the file. Name the program that has written a file of another kind. */
-static supine_status open_file(const char *path, supine_safetensors **file, supine_error *error) {
-  static const char *const kinds[][2] = {{".frd", "CalculiX"}, {".dat", "CalculiX"},
-                                         {".xplt", "FEBio"},   {".odb", "Abaqus"},
-                                         {".vtu", "VTK"},      {".vtk", "VTK"}};
-  const supine_status status = supine_safetensors_open(path, file, error);
-  for (size_t i = 0; status == SUPINE_ERROR_FORMAT && i < sizeof kinds / sizeof *kinds; ++i) {
-    if (supine_text_ends_in(path, kinds[i][0])) {
-      return supine_error_set(error, status,
-                              "%s: a file of %s: convert its results in Python with supine."
-                              "save_fields(\"fields.safetensors\", points, gravity, displacement)",
-                              path, kinds[i][1]);
-    }
-  }
-  return status;
-}
-
 supine_status supine_fields_load(const char *path, const supine_lungs *lungs,
                                  const supine_scan_frame *frame, supine_fields *fields,
                                  supine_error *error) {
   reading r = {.path = path, .lungs = lungs, .frame = *frame, .error = error};
   r.frame.millimetres_per_unit += r.frame.millimetres_per_unit == 0.0;
   supine_safetensors *file = NULL;
-  supine_status status = open_file(path, &file, error);
+  supine_status status = supine_safetensors_open(path, &file, error);
+  if (status == SUPINE_ERROR_FORMAT && !supine_text_ends_in(path, ".safetensors")) {
+    (void)supine_error_set(error, status,
+                           "%s: no safetensors file: convert the results of another program, such "
+                           "as .frd or .dat of CalculiX or .xplt of FEBio, in Python with " WRITE,
+                           path);
+  }
   if (status == SUPINE_OK) {
     r.points = supine_safetensors_find(file, "points");
     r.gravity = supine_safetensors_find(file, "gravity");

@@ -231,25 +231,27 @@ static supine_status check_partners(const reading *r, const supine_option *optio
   return SUPINE_OK;
 }
 
-static supine_status refuse_operand(const char *operand, supine_error *error) {
-  return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "unexpected argument '%s': remove it",
-                          operand);
-}
-
 static supine_status check_given(const reading *r, size_t operands, char **argv,
                                  supine_error *error) {
   const supine_command *command = r->command;
+  size_t most = command->operands_most;
+  bool alone = false;
   for (size_t i = 0; i < r->count; ++i) {
     const supine_option *option = r->rows[i].option;
     if (option->partners != NULL && r->rows[i].given) {
-      const supine_status status = check_partners(r, option, error);
-      if (status != SUPINE_OK || option->partners[0] == '\0') {
-        return status == SUPINE_OK && operands > 0 ? refuse_operand(argv[optind], error) : status;
+      if (check_partners(r, option, error) != SUPINE_OK) {
+        return SUPINE_ERROR_ARGUMENT;
       }
+      alone = option->partners[0] == '\0';
+      most = alone ? 0 : most;
     }
   }
-  if (operands > command->operands_most && command->operands_most == 0) {
-    return refuse_operand(argv[optind], error);
+  if (operands > most && most == 0) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "unexpected argument '%s': remove it",
+                            argv[optind]);
+  }
+  if (alone) {
+    return SUPINE_OK;
   }
   if (operands < command->operands_least || operands > command->operands_most) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%s", command->operands_missing);
