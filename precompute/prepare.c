@@ -181,6 +181,17 @@ static void summarize(const supine_model_choice *choice, bool predicted, supine_
                     : choice->resting.assumed == SUPINE_REST_SHARE ? "healthy people's share"
                                                                    : "the share in COPD");
   }
+  double collapsed = 0.0; /* volume in the scan as the basis holds it, mL */
+  for (size_t lung = 0; lung < reference->lung_count; ++lung) {
+    collapsed +=
+        p->model.share[lung] * (reference->full_volume[lung] + reference->scan_volume[lung]);
+  }
+  if (p->model.share[0] != 1.0 || p->model.share[1] != 1.0) {
+    supine_text_add(p->summary, size,
+                    "; collapsed in every state by --lung, also in the scan, which then holds %.0f "
+                    "mL: no displacement contains the collapse",
+                    collapsed);
+  }
 }
 
 supine_status supine_precompute_prepare(supine_lungs *lungs, const supine_model_choice *choice,

@@ -181,6 +181,11 @@ TEST(test_precompute_scan_state_and_frame_reproduced) {
          "deform lungs.safetensors --posture supine --volume scan-2000 -o low.ply");
   EXPECT(0, "scan supine at full inflation - 2000 mL, 4000 mL\n  full inflation 6000 mL",
          "precompute low.ply --scanned full-2000 --band 7 -o low.safetensors");
+  EXPECT(0, "also in the scan, which then holds 4643 mL", /* 0.5 of 2714.1 mL is missing */
+         "precompute lungs.ply --lung left:0.5 --modes 1 --held-out 20 -o r.safetensors");
+  EXPECT(0, "from prone at rest", "deform lungs.safetensors --posture left --from prone -o a.ply");
+  EXPECT(1, "--resting: 'foo' is not a posture",
+         "precompute lungs.ply --resting foo=0.4 -o r.safetensors");
   EXPECT(0, "rest supine 2884 mL (2441 to 3407 by healthy people's share, which --resting changes)",
          "info low.safetensors");
   EXPECT(0, "low.obj", "deform low.safetensors --posture supine --volume scan -o low.obj");

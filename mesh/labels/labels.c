@@ -167,8 +167,7 @@ static supine_status read_map(work *w, const char *const *paths, size_t count,
   status = status == SUPINE_OK ? supine_labels_count(w->path, &w->image, tally, error) : status;
   if (status == SUPINE_OK) {
     w->choice.taken = report->taken;
-    status = supine_labels_choose(w->path, &w->image, tally, w->options->labels, side, &w->choice,
-                                  error);
+    status = supine_labels_choose(w->path, &w->image, tally, w->options, side, &w->choice, error);
   }
   status = status == SUPINE_OK ? advance(w, 0.3, error) : status;
   status = status == SUPINE_OK ? make_mask(w, tally, side, error) : status;

@@ -18,6 +18,9 @@ typedef struct supine_labels_options {
    * - "lungmask", "lobes", "totalsegmentator" or "totalsegmentator-v1": labels of that segmenter
    * - a list such as "left=10+11,right=12+13+14", for one or both sides */
   const char *labels;
+  /** If `labels` is NULL, and one is not 0: the first `left_masks` files are masks of parts of the
+   * left lung, and the next `right_masks` files of the right lung. */
+  size_t left_masks, right_masks;
   supine_axes axes; /**< axes of the header's coordinates; AUTO: as the header states */
   double edge;      /**< approximate distance between vertices, mm; 0 means SUPINE_LABELS_EDGE */
   double close; /**< gaps in a lung are closed if not wider than twice this, mm; 0 closes none */

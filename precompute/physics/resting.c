@@ -104,14 +104,14 @@ supine_status supine_reference_resting_set(supine_resting *resting, const char *
     set.spread = SUPINE_COPD_SPREAD;
   } else if (supine_posture_gravity(posture, g) != SUPINE_OK) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--resting: '%s' is not a posture; did you mean '%s'?", posture,
+                            "'%s' is not a posture; did you mean '%s'?", posture,
                             supine_posture_nearest(posture));
   }
   for (size_t k = 0; k < 3 && value != NULL; ++k) {
     if (g[k] != 0.0 && !read_value(&set, 2 * k + (g[k] < 0.0), value)) {
       return supine_error_set(
           error, SUPINE_ERROR_ARGUMENT,
-          "--resting %s=%s: give a share of the full volume above %g and at most %g (0.48, or "
+          "%s=%s: give a share of the full volume above %g and at most %g (0.48, or "
           "0.47/0.49 for the left and the right lung) or a volume of gas and tissue (2600mL)",
           posture, value, least_share, most_share);
     }

@@ -167,6 +167,9 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
   if (status != SUPINE_OK) {
     return supine_error_set(error, status, "%s%s", from->given ? "--from: " : "", inner.message);
   }
+  if (state.lung_count == 0 && state.volume.kind == SUPINE_VOLUME_DEFAULT) {
+    state.volume = supine_basis_default_volume(basis); /* the name states the volume */
+  }
   if (scan) {
     (void)snprintf(reference->name, sizeof reference->name, "the scan");
   } else {

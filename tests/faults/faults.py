@@ -6,7 +6,7 @@
     faults.py PROGRAM            run each command once without faults, for a program built with a sanitizer
 
 By default, a command runs once for each call that it makes, and in the n-th run the n-th call fails. If EACH is above
-0, only about EACH of these runs are made, spread over all calls (CTest uses 1). If WORD is given, only commands that
+0, only about EACH of these runs are made, spread over all calls (CTest uses 3). If WORD is given, only commands that
 contain WORD run.
 
 Each run must end within a minute and without a signal. It must either write its complete outputs, or exit with a code
