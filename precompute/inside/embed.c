@@ -34,6 +34,7 @@ typedef struct embedding {
   uint32_t *rigid;      /* [rigid_count, 2] begin and end of the vertices of each rigid part */
   size_t rigid_count;
   double *squares; /* [lungs, 3, modes, modes] the tensor lungs_squares */
+  double *hilum;   /* [lungs, 3, modes] the tensor lungs_hilum */
 } embedding;
 
 static void find_places(void *context, size_t begin, size_t end, size_t thread) {
@@ -392,6 +393,10 @@ static supine_status write_content(const embedding *e, const char *path, supine_
     tensors[count++] =
         (supine_tensor){"names", SUPINE_U8, 1, {strlen(content->names)}, content->names};
   }
+  if (supine_inside_hilum(e->shells->basis, e->hilum)) {
+    tensors[count++] = (supine_tensor){
+        "lungs_hilum", SUPINE_F64, 3, {e->shells->count, 3, e->columns / 3}, e->hilum};
+  }
   if (e->rigid_count > 0) {
     tensors[count++] = (supine_tensor){"rigid", SUPINE_U32, 2, {e->rigid_count, 2}, e->rigid};
   }
@@ -410,10 +415,11 @@ static bool allocate(embedding *e) {
   e->group = malloc(n);
   e->triangles = malloc((3 * e->content->triangle_count + 1) * sizeof *e->triangles);
   e->rigid = malloc((2 * e->content->part_count + 1) * sizeof *e->rigid);
+  e->hilum = malloc(e->shells->count * e->columns * sizeof *e->hilum);
   e->squares = calloc(e->shells->count * e->columns * e->columns, sizeof *e->squares);
-  return e->squares != NULL && e->rigid != NULL && e->place != NULL && e->lung != NULL &&
-         e->order != NULL && e->vertices != NULL && e->coefficients != NULL && e->depth != NULL &&
-         e->part != NULL && e->group != NULL && e->triangles != NULL;
+  return e->hilum != NULL && e->squares != NULL && e->rigid != NULL && e->place != NULL &&
+         e->lung != NULL && e->order != NULL && e->vertices != NULL && e->coefficients != NULL &&
+         e->depth != NULL && e->part != NULL && e->group != NULL && e->triangles != NULL;
 }
 
 supine_status supine_inside_embed(const supine_inside_shells *shells,
@@ -467,5 +473,6 @@ cleanup:
   free(e.triangles);
   free(e.rigid);
   free(e.squares);
+  free(e.hilum);
   return status;
 }
