@@ -1,11 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine compare: compute the displacement and the ventilation by height in several postures. */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "sh/base/output.h"
-#include "sh/base/vec3.h"
 
 #include "program/inside.h"
 #include "program/options/basis_input.h"
@@ -49,126 +47,54 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, html), .file = SUPINE_FILE_OUT, .endings = ".html"},
     {.name = NULL}};
 
-typedef struct structures {
-  const supine_basis *basis;
-  const supine_posture_list *postures;
-  supine_command_names names;
-  float *displacement; /* [N, 3] displacement of each vertex in one posture, mm */
-  double *mean; /* [postures, structures, 3] mean displacement from the reference surface, mm */
-  double *square_errors; /* [structures] mean squared expected error, mm^2; NAN if unknown */
-} structures;
-
-/* Average values [N, width] over each structure's vertices; the mean over no vertices is 0. */
-static void average(const structures *c, size_t width, const float *values, double *mean) {
-  const supine_command_names *names = &c->names;
-  for (size_t part = 0; part < names->count; ++part) {
-    const size_t begin = names->begin[part];
-    const size_t end = names->begin[part + 1];
-    for (size_t k = 0; k < width; ++k) {
-      double sum = 0.0;
-      for (size_t i = begin; i < end; ++i) {
-        sum += (double)values[width * names->order[i] + k];
-      }
-      mean[width * part + k] = end > begin ? sum / (double)(end - begin) : 0.0;
-    }
-  }
-}
-
-/* Compute the mean displacement of each named structure in posture i. */
-static supine_status find_means(const structures *c, const supine_state *state, size_t i,
-                                supine_error *error) {
-  supine_pose pose;
-  const supine_status status = supine_basis_pose(c->basis, state, &pose, error);
-  if (status == SUPINE_OK) {
-    supine_displace_range(c->basis, &pose, 0, supine_basis_get_info(c->basis)->vertex_count,
-                          c->displacement);
-    average(c, 3, c->displacement, c->mean + 3 * i * c->names.count);
-  }
-  return status;
-}
-
-/* For each structure, average the squared expected error of the displacement between two states
- * over the vertices, mm^2. */
-static supine_status find_square_errors(const structures *c, const supine_state *to,
-                                        const supine_state *from, supine_error *error) {
-  const size_t n = supine_basis_get_info(c->basis)->vertex_count;
+/* Append to a list the displacement of each named structure between two postures. */
+static supine_status add_pair(const supine_basis *basis, const supine_command_names *names,
+                              const supine_posture_list *postures, const supine_state *volume,
+                              const size_t pair[2], json_t *list, supine_error *error) {
+  const supine_posture_item *item[2] = {&postures->item[pair[0]], &postures->item[pair[1]]};
+  supine_state state[2] = {*volume, *volume};
+  supine_pose pose[2];
   supine_expected expected = {0};
-  const supine_status status = supine_options_expected_find(c->basis, to, from, &expected, error);
-  for (size_t i = 0; i < n && expected.sigma != NULL; ++i) {
-    expected.sigma[i] *= expected.sigma[i];
+  supine_target *targets = NULL;
+  supine_status status = SUPINE_OK;
+  for (size_t i = 0; i < 2 && status == SUPINE_OK; ++i) {
+    memcpy(state[i].gravity, item[i]->gravity, sizeof state[i].gravity);
+    status = supine_basis_pose(basis, &state[i], &pose[i], error);
   }
-  for (size_t part = 0; part < c->names.count; ++part) {
-    c->square_errors[part] = (double)NAN;
+  if (status == SUPINE_OK) {
+    status = supine_options_expected_find(basis, &state[1], &state[0], &expected, error);
   }
-  if (expected.sigma != NULL) {
-    average(c, 1, expected.sigma, c->square_errors);
+  if (status == SUPINE_OK) {
+    status =
+        supine_command_targets_find(basis, names, (const supine_pose *const[2]){&pose[0], &pose[1]},
+                                    expected.sigma, false, &targets, error);
   }
+  for (size_t i = 0; status == SUPINE_OK && i < names->count; ++i) {
+    json_t *entry = json_pack("{s:s, s:s}", "from", item[0]->name, "to", item[1]->name);
+    (void)json_object_update_new(entry, supine_command_target_json(&targets[i]));
+    (void)json_array_append_new(list, entry);
+  }
+  free(targets);
   supine_options_expected_free(&expected);
   return status;
 }
 
-/* Append to a list the displacement of each named structure from one posture to another. */
-static void add_pair(const structures *c, size_t from, size_t to, json_t *list) {
-  for (size_t part = 0; part < c->names.count; ++part) {
-    const char *const text[] = {c->postures->item[from].name, c->postures->item[to].name,
-                                c->names.text[part]};
-    const double *before = c->mean + 3 * (from * c->names.count + part);
-    const double *after = c->mean + 3 * (to * c->names.count + part);
-    const double move[3] = {after[0] - before[0], after[1] - before[1], after[2] - before[2]};
-    const double length = supine_length(move);
-    const double sigma = sqrt(c->square_errors[part]);
-    (void)json_array_append_new(
-        list, json_pack("{s:s, s:s, s:s, s:[f,f,f], s:f, s:o}", "from", text[0], "to", text[1],
-                        "name", text[2], "move", move[0], move[1], move[2], "mm", length,
-                        "expected_error_mm", isnan(sigma) ? json_null() : json_real(sigma)));
-  }
-}
-
-/* Append to a list the displacement of each named structure between every two postures. */
-static supine_status find_pairs(const structures *c, const supine_state *volume, json_t *list,
-                                supine_error *error) {
-  supine_state state[SUPINE_POSTURE_LIST_MAX];
-  supine_status status = SUPINE_OK;
-  for (size_t i = 0; i < c->postures->count && status == SUPINE_OK; ++i) {
-    state[i] = *volume;
-    memcpy(state[i].gravity, c->postures->item[i].gravity, sizeof state[i].gravity);
-    status = find_means(c, &state[i], i, error);
-  }
-  for (size_t i = 0; i < c->postures->count; ++i) {
-    for (size_t j = i + 1; j < c->postures->count && status == SUPINE_OK; ++j) {
-      status = find_square_errors(c, &state[j], &state[i], error);
-      add_pair(c, i, j, list);
-    }
-  }
-  return status;
-}
-
-/* Print the mean displacement of each named structure between every two postures. */
+/* Print the displacement of each named structure between every two postures. */
 static supine_status compare_content(const supine_basis *basis, const supine_posture_list *postures,
                                      const supine_state *volume, bool json, supine_error *error) {
-  const size_t n = supine_basis_get_info(basis)->vertex_count;
-  structures c = {.basis = basis, .postures = postures};
+  supine_command_names names;
   json_t *list = json_array();
-  supine_status status = supine_command_names_open(basis, &c.names, error);
-  if (status == SUPINE_OK) {
-    c.displacement = malloc(3 * n * sizeof *c.displacement);
-    c.mean = calloc(3 * postures->count * c.names.count, sizeof *c.mean);
-    c.square_errors = calloc(c.names.count, sizeof *c.square_errors);
-    if (c.displacement == NULL || c.mean == NULL || c.square_errors == NULL) {
-      status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  supine_status status = supine_command_names_open(basis, &names, error);
+  for (size_t i = 0; i < postures->count; ++i) {
+    for (size_t j = i + 1; j < postures->count && status == SUPINE_OK; ++j) {
+      status = add_pair(basis, &names, postures, volume, (size_t[2]){i, j}, list, error);
     }
-  }
-  if (status == SUPINE_OK) {
-    status = find_pairs(&c, volume, list, error);
   }
   if (status == SUPINE_OK) {
     supine_options_print(json_incref(list), json);
   }
   json_decref(list);
-  free(c.displacement);
-  free(c.mean);
-  free(c.square_errors);
-  supine_command_names_close(&c.names);
+  supine_command_names_close(&names);
   return status;
 }
 

@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sh/base/vec3.h"
+
 #include "program/inside.h"
 #include "program/options/basis_input.h"
 
@@ -114,6 +116,64 @@ supine_status supine_command_inside_open(const supine_basis *lungs, const char *
   supine_status status = supine_options_basis_open(path, SUPINE_STORAGE_AUTO, inside, error);
   status = status == SUPINE_OK ? supine_command_names_open(*inside, names, error) : status;
   return status == SUPINE_OK ? supine_command_inside_check(lungs, *inside, path, error) : status;
+}
+
+/* Average the vertices order[begin] to order[end - 1] to a target; [N, 3] positions before and
+ * after.
+ */
+static supine_target average(const supine_command_names *names, size_t begin, size_t end,
+                             const float *after, const float *before, const float *sigma) {
+  const double count = (double)(end - begin);
+  supine_target target = {.name = names->text[names->part[names->order[begin]]]};
+  double square = 0;
+  for (size_t i = begin; i < end; ++i) {
+    const size_t vertex = names->order[i];
+    for (size_t k = 0; k < 3; ++k) {
+      const double x = (double)after[3 * vertex + k];
+      target.at[k] += x / count;
+      target.move[k] += (x - (double)before[3 * vertex + k]) / count;
+    }
+    square += sigma == NULL ? (double)NAN : (double)sigma[vertex] * (double)sigma[vertex] / count;
+  }
+  target.moved = supine_length(target.move);
+  target.expected = sqrt(square);
+  return target;
+}
+
+supine_status supine_command_targets_find(const supine_basis *inside,
+                                          const supine_command_names *names,
+                                          const supine_pose *const pose[2], const float *sigma,
+                                          bool each, supine_target **targets, supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(inside);
+  const size_t n = info->vertex_count;
+  const size_t count = each ? n : names->count;
+  float *after = malloc(3 * n * sizeof *after);
+  float *before = malloc(3 * n * sizeof *before);
+  *targets = calloc(count, sizeof **targets);
+  const bool enough = after != NULL && before != NULL && *targets != NULL;
+  if (enough) {
+    supine_deform(inside, pose[0], before);
+    supine_deform(inside, pose[1], after);
+  }
+  for (size_t i = 0; enough && i < count; ++i) {
+    const size_t begin = each ? i : names->begin[i];
+    const size_t end = each ? i + 1 : names->begin[i + 1];
+    (*targets)[i].name = names->text[i];
+    if (end > begin) { /* a name may have no vertices */
+      (*targets)[i] = average(names, begin, end, after, before, sigma);
+      (*targets)[i].lung = supine_command_lung_of(info, names->order[begin]);
+    }
+  }
+  free(after);
+  free(before);
+  return enough ? SUPINE_OK
+                : supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu points", n);
+}
+
+json_t *supine_command_target_json(const supine_target *t) {
+  return json_pack("{s:s, s:[f, f, f], s:f, s:o}", "name", t->name, "move", t->move[0], t->move[1],
+                   t->move[2], "mm", t->moved, "expected_error_mm",
+                   isnan(t->expected) ? json_null() : json_real(t->expected));
 }
 
 /* Add the marks of one structure: its vertices, and its name at their mean position. */

@@ -3,6 +3,8 @@
 #ifndef SUPINE_COMMAND_INSIDE_H
 #define SUPINE_COMMAND_INSIDE_H
 
+#include <jansson.h>
+
 #include "program/render/render.h"
 
 typedef struct supine_command_names {
@@ -33,6 +35,29 @@ supine_status supine_command_inside_check(const supine_basis *lungs, const supin
 supine_status supine_command_inside_open(const supine_basis *lungs, const char *path,
                                          supine_basis **inside, supine_command_names *names,
                                          supine_error *error);
+
+/* Where a group of vertices is, and how it has moved. */
+typedef struct supine_target {
+  const char *name;
+  size_t lung;     /* index of the lung of the first vertex */
+  double at[3];    /* mean position of the vertices, mm */
+  double move[3];  /* displacement of the mean position, mm */
+  double moved;    /* length of `move`, mm */
+  double expected; /* RMS of the vertices' expected errors, mm; NAN if unknown */
+} supine_target;
+
+/* Compute where the structures are in pose[1], and how they have moved from pose[0].
+ * @param sigma    [N] expected error of each vertex, mm; NULL if unknown
+ * @param each     true for a target for each vertex, false for one for each structure
+ * @param targets  output: array of targets in the order of `names`, which the caller frees
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_command_targets_find(const supine_basis *inside,
+                                          const supine_command_names *names,
+                                          const supine_pose *const pose[2], const float *sigma,
+                                          bool each, supine_target **targets, supine_error *error);
+
+/* Return a target as JSON: its name, displacement, and the expected error. */
+json_t *supine_command_target_json(const supine_target *target);
 
 /* Marks of a picture: the vertices of each structure, and a label with name and displacement. */
 typedef struct supine_command_marks {
