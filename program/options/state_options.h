@@ -93,6 +93,9 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
                                        bool compares, supine_reference_pose *reference,
                                        supine_error *error);
 
+/* Return the volume of a state, mL above rest; NAN if the state does not count from rest. */
+double supine_options_above_rest(const supine_state *state);
+
 /* Check that a pose is plausible: its surface must not fold, and if the volume at rest is known,
  * its volume must be 10 % to 120 % of full inflation. An implausible pose is an error
  * (SUPINE_ERROR_NUMERICAL) if the volume at rest is known and `allow_folds` is false. Otherwise, it
