@@ -368,21 +368,7 @@ function start() {
     drawLegend(state.kind, state.range, legendTitle(), basis.colours[KINDS[state.kind].map]);
     write('kind-text', KIND_TEXT[state.kind].replace('FROM', fromWhere()));
     write('pinned', `other posture: ${postureWords(gravityOf(state.pinnedQ))}`);
-    $('coloured').addEventListener('change', () => colourBy($('coloured').checked ? 'displacement' : 'plain'));
-  if (basis.froms.length > 1) {
-    const group = document.createElement('div');
-    Object.assign(group, { id: 'since', role: 'radiogroup', ariaLabel: 'Displacements are measured' });
-    basis.froms.forEach((from, i) => {
-      const [label, input, words] = ['label', 'input', 'span'].map((tag) => document.createElement(tag));
-      Object.assign(input, { type: 'radio', name: 'since', value: i });
-      words.textContent = `since ${from.name.replace('scan', 'CT')}`;
-      input.addEventListener('change', () => measureFrom(from));
-      label.append(input, words);
-      group.prepend(label);
-    });
-    document.querySelector(inside ? '#targets .head' : '#surface-section .head').append(group);
-  }
-  for (const input of document.getElementsByName('kind')) input.checked = input.value === state.kind;
+    for (const input of document.getElementsByName('kind')) input.checked = input.value === state.kind;
     for (const input of document.getElementsByName('frame')) input.checked = (input.value === 'room') === state.room;
     for (const id of CHECKBOXES) $(id).checked = state[id];
     $('coloured').checked = state.kind !== 'plain';
@@ -614,6 +600,20 @@ function start() {
   $('pin').addEventListener('click', pin);
   $('reset').addEventListener('click', reset);
   for (const id of CHECKBOXES) $(id).addEventListener('change', () => flip(id));
+  $('coloured').addEventListener('change', () => colourBy($('coloured').checked ? 'displacement' : 'plain'));
+  if (basis.froms.length > 1) {
+    const group = document.createElement('div');
+    Object.assign(group, { id: 'since', role: 'radiogroup', ariaLabel: 'Displacements are measured' });
+    basis.froms.forEach((from, i) => {
+      const [label, input, words] = ['label', 'input', 'span'].map((tag) => document.createElement(tag));
+      Object.assign(input, { type: 'radio', name: 'since', value: i });
+      words.textContent = `since ${from.name.replace('scan', 'CT')}`;
+      input.addEventListener('change', () => measureFrom(from));
+      label.append(input, words);
+      group.prepend(label);
+    });
+    document.querySelector(inside ? '#targets .head' : '#surface-section .head').append(group);
+  }
   for (const input of document.getElementsByName('kind')) input.addEventListener('change', () => colourBy(input.value));
   for (const input of document.getElementsByName('frame')) input.addEventListener('change', () => holdStill(input.value === 'room'));
   $('cut-axis').addEventListener('change', change(() => { state.cut.axis = Number($('cut-axis').value); }));
@@ -754,7 +754,7 @@ function start() {
     moment: (gravity, volume) => momentFor(basis, unit(gravity), volume),
     /** Do the CPU part of the work of one frame. */
     frameScript: () => { state.compute(); panes = makePanes(); drawNotes(); showState(); },
-    sentenceOf, movedBetween, targetOf, linesAcross, placesOf, rangeEnd, tickStep, postureText, postureFrom, gravityOf, picturePng, basis, state, touch,
+    sentenceOf, movedBetween, targetOf, planesFor, linesAcross, placesOf, rangeEnd, tickStep, postureText, postureFrom, gravityOf, picturePng, basis, state, touch,
   };
 }
 
