@@ -4,6 +4,7 @@
 #   sh cmake/debian.sh demo    build; make, precompute, deform and draw synthetic lungs
 #   sh cmake/debian.sh build   build the program and the tests
 #   sh cmake/debian.sh test    build, and run the tests
+#   sh cmake/debian.sh platforms   build the library also for musl, aarch64 and Windows, and run it
 #   sh cmake/debian.sh count   print the lines that the quick tests do not reach
 set -eu
 cd "$(dirname "$0")/.."
@@ -17,6 +18,7 @@ tests="g++ libegl-dev libgles-dev libgl1-mesa-dri poppler-utils libcmocka-dev li
   python3-vtk9 python3-numpy python3-nibabel python3-pip python3-setuptools python3-wheel gnuplot-nox
   plastimatch elastix clang lld wasi-libc libclang-rt-dev-wasm32
   binaryen"
+platforms="clang musl-tools gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user gcc-mingw-w64-x86-64-win32 wine64 wine"
 
 install_missing() {
   missing=""
@@ -44,7 +46,8 @@ demo)
   cmake --build --preset release
   exec sh cmake/demo.sh build/release/supine demo
   ;;
-build | test)
+build | test | platforms)
+  [ "$1" != platforms ] || build="$build $platforms"
   # Tests open exported files in node and Chromium. Install each only if it is not on PATH.
   command -v npm >/dev/null || tests="$tests nodejs npm"
   command -v chromium >/dev/null || tests="$tests chromium"
@@ -55,11 +58,12 @@ build | test)
     echo "npm could not install vtk.js and other packages: tests that need them are skipped" >&2
   cmake --preset release -DBUILD_TESTING=ON
   cmake --build --preset release
+  [ "$1" != platforms ] || exec ctest --preset release -R '^platform_'
   # One test more than processors at a time, as some tests wait for servers and pages.
   [ "$1" = build ] || exec ctest --preset release -j "$(($(nproc) + 1))"
   ;;
 *)
-  echo "usage: sh cmake/debian.sh demo|build|test|count" >&2
+  echo "usage: sh cmake/debian.sh demo|build|test|platforms|count" >&2
   exit 1
   ;;
 esac

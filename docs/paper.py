@@ -8,6 +8,7 @@ import csv
 import json
 import math
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -52,8 +53,58 @@ def off_line():
                for p in ("supine", "prone", "left", "right"))
 
 
+POSTURES = ("supine", "prone", "left", "right")
+
+
+def surface(posture, volume):
+    """Return the vertices of the basis in a state, and the state's volume in mL."""
+    run("deform", "basis.safetensors", "--posture", posture, "--volume", volume, "-o", "state.obj")
+    with open("state.obj", encoding="ascii") as file:
+        lines = [line.split() for line in file]
+    at = [tuple(map(float, words[1:4])) for words in lines if words[:1] == ["v"]]
+    faces = [[at[int(w.split("/")[0]) - 1] for w in words[1:4]] for words in lines if words[:1] == ["f"]]
+    volume = sum(a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+                 for a, b, c in faces) / 6000
+    return at, abs(volume)
+
+
+def lengths():
+    """Return the smallest and the largest length (feet to head) per volume, cm / dL, in a breath of 500 mL in four postures."""
+    ratios = []
+    for posture in POSTURES:
+        for volume in ("scan", "scan+250", "scan+500"):
+            at, ml = surface(posture, volume)
+            z = [p[2] for p in at]
+            ratios.append((max(z) - min(z)) / 10 / (ml / 100))
+    return min(ratios), max(ratios)
+
+
+def bends():
+    """Return the least and the greatest distance of a path's middle from the chord, in percent of the chord's length.
+
+    The path is that of the vertex that moves most, from rest to 500 mL above it; one number for each of four postures."""
+    percents = []
+    for posture in POSTURES:
+        a, b, c = (surface(posture, volume)[0] for volume in ("rest", "rest+250", "rest+500"))
+        chord = [math.dist(p, q) for p, q in zip(a, c, strict=True)]
+        i = max(range(len(a)), key=chord.__getitem__)
+        percents.append(100 * math.dist(b[i], [(p + q) / 2 for p, q in zip(a[i], c[i], strict=True)]) / chord[i])
+    return min(percents), max(percents)
+
+
 os.chdir(tempfile.mkdtemp())
 run("phantom", "-o", "lungs.ply", "--vertices", "5000")
+run("precompute", "lungs.ply", "--law", "paper", "-o", "basis.safetensors")
+shortest, longest = lengths()
+run("precompute", "lungs.ply", "-o", "basis.safetensors")
+straightest, most_bent = bends()
+fewest = json.loads(run("info", "basis.safetensors", "--json"))
+run("precompute", "lungs.ply", "--band", "3", "--modes", "harmonics", "-o", "basis.safetensors")
+default_first = json.loads(run("info", "basis.safetensors", "--json"))
+subprocess.run([supine, "phantom", "-o", "small.ply", "--vertices", "160"], check=True, capture_output=True)
+iterated = subprocess.run([supine, "solve", "small.ply", "--law", "paper", "--posture", "prone", "--pitcher-catcher", "-o",
+                           "x.ply"], check=True, capture_output=True, text=True)
+iterated = " ".join((iterated.stdout + iterated.stderr).split())
 best, first = info(), info("--band", "3", "--modes", "harmonics")
 soft_best = info("--reach", "10", "--soften", "1")
 soft_first = info("--reach", "10", "--soften", "1", "--band", "3", "--modes", "harmonics")
@@ -80,6 +131,10 @@ def percent(basis):
     return f"{float(basis['error']['rms_percent']):.2g} %"
 
 
+steps, left = re.findall(r"(\d+) steps, (\S+) of the force not yet balanced", iterated)[-1]
+pitcher = f"{steps} steps leave {left} of the force; {re.search(r'largest difference.*?[0-9.e-]+', iterated)[0]} (184 vertices)"
+
+
 def operations(basis):
     return f"{basis['modes'] + 6} multiplications and {basis['modes'] + 2} additions"
 
@@ -94,23 +149,28 @@ makes this file from synthetic lungs of {best['vertices']:,} vertices.
 | in the paper | reproduced by | result | difference |
 |---|---|---|---|
 | III-B, pressure and volume: a second-order equation with five control parameters | `supine pv fit`, `supine pv show`, `supine breathe` | the built-in adult relation; other curves are fitted with errors below 1 % (`test_pv_fit`) | the paper does not define the control functions; here they are Legendre polynomials (`<supine/breath.h>`) |
-| III-C, displacement as a function of volume at one orientation | `tests/bench/bench_validation`, linearity.csv; `supine validate` with several `--state` | at most {off_line():.1f} % of the displacement at 500 mL away from a straight line, from 0 to 500 mL in four postures | with `deep` the path of a vertex bends, like that of real lungs; with `paper` it is a straight line |
+| III-C, displacement as a function of volume at one orientation | `tests/bench/bench_validation`, linearity.csv; `supine validate` with several `--state` | `paper`: at most {off_line():.1f} % of the displacement at 500 mL away from a straight line, from 0 to 500 mL in four postures | with `deep`, the default law, the path bends: its middle is {straightest:.1f} to {most_bent:.1f} % of the chord away from it, so that steps of equal displacement (`supine_step`) are wrong |
 | III-E, mass and spring nodes, expandability, local transfer; (3), (8) | `supine precompute --law paper`, `--expandability`, `--lesion` | every column of the transfer sums to 1 (`test_equilibrium`) | the spring nodes are eliminated exactly; `deep` spreads the force over 10 mm and has no spring nodes |
 | (2), a column of the transfer matrix | `supine solve --unit-force VERTEX` | CSV, one row per vertex | |
 | (5), (6), Pitcher/Catcher | `tests/bench/bench_validation`, fig7_convergence.csv | link visits until the error is 1e-6: {reached} | the program factorises the matrix (CHOLMOD); tests compare the solution with the paper's iteration |
+| (5), (6), the iteration itself | `supine solve --law paper --pitcher-catcher` | {pitcher} | |
 | (9)-(14), all paths | `supine solve --law paper` | the fixed point of (5), (6) (`test_equilibrium`) | the paths are not enumerated; the linear system is solved |
 | (15)-(17), directions | `--law`, `--constants`, `supine fit` | {best['direction_constants']} | **Table I is not available**: these constants were fitted to the 4-D CT of ten patients (DIR-Lab); `supine fit` fits those of a person |
 | (18), applied force | `--base`, `--gain`, `--box-force`, `supine fit` | {best['force']} | in `deep` only a part of the gradient of the force follows gravity |
-| Fig. 4, lungs in postures | `supine render BASIS --posture supine,prone,left,right -o postures.png` | | drawn by the processor |
+| (18), its result: the force grows with the height along gravity | `supine fit REST STATE` estimates the force from a measured displacement | a force of known gain is recovered (`test_patient_surface`) | not compared with the paper's gradients, whose 4-D CT is not available |
+| Fig. 4, length of the bounding box divided by volume; the paper: 0.32 to 0.40 | `supine deform --law paper`, breath of 500 mL in four postures | {shortest:.3f} to {longest:.3f} cm per 100 mL | the unit is inferred from the size of the number |
+| Figs. 1 to 3 and 10 to 13 | | | not reproduced |
 | IV, Fig. 7, convergence | `tests/bench/bench_validation`, fig7_convergence.png | as for (5), (6) | |
 | IV, Fig. 8, a plane | `tests/bench/bench_validation`, fig8_plane.png | {plane[0]} and {plane[1]} differ by {apart('fig8_plane', plane[0], plane[1]):.1g} of the displacement, in the nine digits written | |
 | IV, Fig. 9, a ring with a stiffer third | `tests/bench/bench_validation`, fig9_ring.png | mean radius {radius('x0'):.1f} mm before, {radius('x1'):.1f} with uniform stiffness, {radius('x2'):.1f} with a third twice as stiff, {radius('x4'):.1f} with a third four times as stiff | |
 | IV-B, expandability from displacement | `supine fit --expandability` | a known law is recovered (`test_inverse`, `test_patient_expand`) | found for regions, because surfaces do not determine it for single vertices |
-| IV-B, distance between surfaces; the paper: 2 mm, constants within 1 % | `supine validate`, error pictures by `-o errors.png` | see `tests/FIGURES.md`, measured in larger breaths of other people | |
-| V, spherical harmonics of the orientation, l <= 3 | `supine precompute --law paper --band 3 --modes harmonics` | error {percent(first)} RMS on held-out directions; {operations(first)} per vertex | |
-| V, with at most the same number of operations | `supine precompute --law paper` | error {percent(best)} with {best['modes']} modes of band {best['band']}; {operations(best)} per vertex | uses the best functions of orientation instead of the first harmonics |
+| IV-B, distance between surfaces, landmarks under 2 mm apart, deformation RMS below 1 % | `supine validate`, error pictures by `-o errors.png` | see `tests/FIGURES.md`, measured in larger breaths of other people | |
+| V, spherical harmonics of the orientation, l <= 3 | `supine precompute --law paper --band 3 --modes harmonics` | error {percent(first)} RMS on held-out directions ({percent(default_first)} with the default law); {operations(first)} per vertex | |
+| V, with at most the same number of operations | `supine precompute --law paper` | error {percent(best)} with {best['modes']} modes of band {best['band']} ({percent(fewest)} with {fewest['modes']} and the default law); {operations(best)} per vertex | uses the best functions of orientation instead of the first harmonics |
 | V, with stiffness that follows gravity | `--reach 10 --soften 1` | {percent(soft_first)} with the first 16 harmonics, {percent(soft_best)} with {soft_best['modes']} modes | |
-| V, FFTW | `supine precompute` | the force on a grid of directions, by FFTW along longitude and Legendre functions along latitude | the force is transformed, not the displacement; the transfer matrix is applied once, to the best modes |
-| V, a breath of 500 mL over 5 s in steps of 1.5 mL, 15 ms per frame | `supine breathe --course flow`, `supine_step` | three additions per vertex and step (`test_deform`) | |
+| V, FFTW | `supine precompute` | the force on a grid of directions, by FFTW along longitude and Legendre functions along latitude | the force is transformed, not the displacement; the transfer is applied once, to the few functions whose sums are all forces, before modes are chosen |
+| V, a breath of 500 mL over 5 s in steps of 4.5 and 2.25 mL, 15 ms per frame | `supine breathe --course flow`, `supine_step` | three additions per vertex and step (`test_deform`) | only for a straight path (`paper`) |
+| V, evaluation in a vertex shader | `runtime/supine.glsl`, `supine export` | positions equal those of the library within 0.001 mm (`test_glsl`) | |
+| VI, a loop of augmented reality: tracked pose in, deformed lungs out | `supine stream` (OpenIGTLink, live page), the page's headset mode | `stream_*` tests | tried with simulated trackers and an emulated headset only |
 | VI, a patient's own lungs, disease | `supine fit`, `--lesion`, `--lung` | | |
 """.rstrip())

@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Write completions for bash and zsh from the commands' tables of options, as FOLDER/supine.bash
- * and FOLDER/_supine:
+/* Write the completion for bash from the commands' tables of options, as FOLDER/supine.bash:
  *
  *     write_completions FOLDER */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "sh/base/output.h"
+#include "base/output.h"
 
 #include "program/options/command.h"
 
@@ -101,74 +100,11 @@ static void write_bash(FILE *file) {
               file);
 }
 
-/* Write a text for use within '...[...]...' of zsh: up to the first ; : . or line end, with a space
- * in place of each character that zsh would interpret. */
-static void zsh_text(const char *text, FILE *file) {
-  const size_t length = strcspn(text, ";:\n.");
-  for (size_t i = 0; i < length; ++i) {
-    (void)fputc(strchr("'[]\\", text[i]) == NULL ? text[i] : ' ', file);
-  }
-}
-
-static void zsh_option(void *given, const supine_option *option, size_t base) {
-  const context *c = given;
-  (void)base;
-  if (option->name == NULL) {
-    return;
-  }
-  (void)fprintf(c->file, "      ");
-  if (option->letter != 0) {
-    (void)fprintf(c->file, "'(-%c --%s)'{-%c,--%s}'[", option->letter, option->name, option->letter,
-                  option->name);
-  } else {
-    (void)fprintf(c->file, "'--%s[", option->name);
-  }
-  zsh_text(option->help, c->file);
-  (void)fputc(']', c->file);
-  if (option->argument != NULL) {
-    (void)fputc(':', c->file);
-    zsh_text(option->argument, c->file);
-    (void)fputc(':', c->file);
-    if (option->choices != NULL) {
-      (void)fputc('(', c->file);
-      bash_words(option, c->file);
-      (void)fputc(')', c->file);
-    } else if (option->file != SUPINE_FILE_NONE) {
-      (void)fputs("_files", c->file);
-    }
-  }
-  (void)fputs("' \\\n", c->file);
-}
-
-static void write_zsh(FILE *file) {
-  (void)fputs("#compdef supine\n# zsh completion for supine, generated from its tables of options\n"
-              "if (( CURRENT == 2 )); then\n  local -a commands=(\n",
-              file);
-  for (size_t i = 0; supine_command_list[i] != NULL; ++i) {
-    (void)fprintf(file, "    '%s:", supine_command_list[i]->name);
-    zsh_text(supine_command_list[i]->summary, file);
-    (void)fputs("'\n", file);
-  }
-  (void)fputs("  )\n  _describe command commands\nelse\n  local command=$words[2]\n  shift words\n"
-              "  (( CURRENT-- ))\n  case $command in\n",
-              file);
-  for (size_t i = 0; supine_command_list[i] != NULL; ++i) {
-    context c = {supine_command_list[i]->name, file};
-    (void)fprintf(file, "  %s)\n    _arguments \\\n", supine_command_list[i]->name);
-    supine_options_visit(supine_command_list[i]->options, 0, zsh_option, &c);
-    (void)fputs("      '(-h --help)'{-h,--help}'[prints help]' '--help-all[prints help of every "
-                "option]' '*:file:_files' ;;\n",
-                file);
-  }
-  (void)fputs("  esac\nfi\n", file);
-}
-
 int main(int argc, char **argv) {
   if (argc != 2) {
     (void)fputs("usage: write_completions FOLDER\n", stderr);
     return SUPINE_EXIT_USAGE;
   }
   write_file(write_bash, argv[1], "supine.bash");
-  write_file(write_zsh, argv[1], "_supine");
   return SUPINE_EXIT_OK;
 }

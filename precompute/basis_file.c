@@ -10,11 +10,10 @@
 #include <supine/safetensors.h>
 #include <supine/sh.h>
 
+#include "base/text.h"
 #include "precompute/basis_file.h"
 #include "precompute/lungs/disease.h"
 #include "precompute/normals/normal_modes.h"
-#include "precompute/writer.h"
-#include "sh/base/text.h"
 
 enum { ENTRIES_MAX = 64 };
 
@@ -123,25 +122,27 @@ static void add_reference(entries *list, const supine_reference *reference, cons
 }
 
 /* Add the constant c of the expected position error (supine/locate.h), and whether the resting
- * volumes (FRC) differ from the defaults for healthy people. */
+ * volume (FRC) of a posture is the patient's own. */
 static void add_expected_error(entries *list, const supine_basis_content *content) {
-  const supine_resting usual = supine_reference_resting_default();
   if (content->fit == NULL) {
     const double own = content->options->expected_error;
     add(list, "expected_error_mm", "%g",
         own > 0.0 ? fmin(own, SUPINE_EXPECTED_ERROR_MM) : SUPINE_EXPECTED_ERROR_MM);
   }
-  if (content->reference != NULL &&
-      memcmp(&content->reference->resting, &usual, sizeof usual) != 0) {
+  if (content->reference != NULL && supine_reference_resting_given(&content->reference->resting)) {
     add(list, "resting_known", "yes");
   }
 }
 
-static void add_fit(entries *list, const supine_fit_report *fit) {
+static void add_fit(entries *list, const supine_basis_fit *fit) {
+  const double *g = fit->scan_gravity;
   add(list, "route", "fields");
   add(list, "condition", "%.4g", fit->condition);
   add(list, "band_determined", "%zu", fit->band_highest);
   add(list, "error_method", "leave-one-out");
+  if (g != NULL) {
+    add(list, "scan_gravity", "%.9g,%.9g,%.9g", g[0], g[1], g[2]);
+  }
 }
 
 static void add_lungs(entries *list, const supine_lungs *lungs, const double share[2]) {
@@ -322,7 +323,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
     tensors[count++] = (supine_tensor){
         "normal_weights", SUPINE_F64, 4, {g, q, 3, 1 + 2 * k + k * (k + 1) / 2}, normals.weights};
   }
-  status = supine_writer_safetensors_write(path, tensors, count, list.metadata, list.count, error);
+  status = supine_safetensors_write(path, tensors, count, list.metadata, list.count, error);
 cleanup:
   for (size_t i = 0; i < list.count; ++i) {
     free((char *)list.metadata[i].value);

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sh/base/vec3.h"
+#include "base/vec3.h"
 #include <supine/volume.h>
 
 #include "precompute/precompute.h"
@@ -21,9 +21,6 @@ enum { HELD_OUT_MIN = 100, HELD_OUT_MAX = 1000, HELD_OUT_WORK = 20000000 };
  * volume of the reference surface plus `breath_volume`, mL. */
 static const double breath_volume = 500.0;
 static const double sqrt_4pi = 3.5449077018110321;
-
-/* Modes are dropped as long as the error stays below this multiple of the error with all modes. */
-static const double same_error = 1.01;
 
 typedef struct pipeline {
   const supine_lungs *given;
@@ -57,7 +54,7 @@ static void pipeline_free(pipeline *p) {
   free(p->directions);
   free(p->weight);
   supine_projection_free(&p->projection);
-  supine_projection_compression_free(&p->compression);
+  supine_sh_compression_free(&p->compression);
   supine_physics_volume_forms_free(&p->forms);
   supine_accuracy_truth_free(&p->truth);
 }
@@ -85,10 +82,9 @@ static supine_status project(pipeline *p, supine_error *error) {
 
 static supine_status compress(pipeline *p, supine_error *error) {
   return p->options->modes == 0
-             ? supine_projection_compress_harmonics(&p->projection, &p->compression, error)
-             : supine_projection_compress_modes(&p->projection, p->weight, p->options->modes,
-                                                &p->compression, p->singular, &p->square_sum,
-                                                error);
+             ? supine_sh_compress_harmonics(&p->projection.expansion, &p->compression, error)
+             : supine_sh_compress_modes(&p->projection.expansion, p->weight, p->options->modes,
+                                        &p->compression, p->singular, &p->square_sum, error);
 }
 
 /* Correct the vertices of the reference surface so that the displacement computed from the modes
@@ -115,8 +111,8 @@ static supine_status anchor(pipeline *p, supine_error *error) {
     free(amounts);
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
   }
-  supine_projection_compression_weights(field, p->reference.scan.state.gravity, weights);
-  supine_projection_compression_field(field, weights, amounts);
+  supine_sh_compression_weights(field, p->reference.scan.state.gravity, weights);
+  supine_sh_compression_field(field, weights, amounts);
   memcpy(p->anchored.mesh.vertices, lungs->scanned, 3 * n * sizeof(double));
   const supine_status status = supine_reference_find_gains(
       &p->anchored, p->options->model.bend, p->directions, amounts, &p->reference, error);
@@ -131,8 +127,8 @@ static supine_status anchor(pipeline *p, supine_error *error) {
 }
 
 static supine_status find_forms(pipeline *p, supine_error *error) {
-  return supine_projection_compression_volume_forms(
-      &p->compression, p->lungs, p->options->model.share, p->directions, &p->forms, error);
+  return supine_projection_volume_forms(&p->compression, p->lungs, p->options->model.share,
+                                        p->directions, &p->forms, error);
 }
 
 /* Check that each lung can reach its resting volume (FRC) with gravity along the unit vector g.
@@ -142,7 +138,7 @@ static supine_status check_rest(const supine_compression *compression,
                                 const double *volume, supine_error *error) {
   double weights[SUPINE_MODES_MADE_MAX];
   supine_error inner = {0};
-  supine_projection_compression_weights(compression, g, weights);
+  supine_sh_compression_weights(compression, g, weights);
   for (size_t lung = 0; lung < forms->lung_count; ++lung) {
     static const double straight[3] = {0.0, 0.0, 0.0};
     supine_volume_form form;
@@ -220,23 +216,6 @@ static supine_status measure(pipeline *p, supine_error *error) {
   return status;
 }
 
-/* Find the smallest number of modes with an error below `same_error` times that with all modes. */
-static size_t modes_needed(const pipeline *p) {
-  const size_t most = p->compression.mode_count;
-  const double limit = pow(same_error, 2.0) - 1.0;
-  const double error2 = p->accuracy.relative_rms * p->accuracy.relative_rms;
-  double dropped = 0.0;
-  size_t count = most;
-  while (count > 1) {
-    dropped += p->singular[count - 1] * p->singular[count - 1] / p->square_sum;
-    if (dropped > limit * error2) {
-      break;
-    }
-    --count;
-  }
-  return count;
-}
-
 static supine_status tabulate(pipeline *p, supine_error *error) {
   const supine_status status = supine_accuracy_error_table_create(
       &p->truth, &p->projection, &p->compression, p->directions, &p->table);
@@ -245,11 +224,12 @@ static supine_status tabulate(pipeline *p, supine_error *error) {
 }
 
 static supine_status drop_modes(pipeline *p, supine_error *error) {
-  const size_t needed = modes_needed(p);
+  const size_t needed = supine_sh_modes_needed(p->compression.mode_count, p->singular,
+                                               p->square_sum, p->accuracy.relative_rms);
   if (p->options->modes == 0 || needed == p->compression.mode_count) {
     return SUPINE_OK;
   }
-  supine_projection_compression_truncate(&p->compression, p->projection.rank, needed);
+  supine_sh_compression_truncate(&p->compression, p->projection.expansion.rank, needed);
   supine_physics_volume_forms_free(&p->forms);
   supine_status status = anchor(p, error);
   status = status == SUPINE_OK ? find_forms(p, error) : status;

@@ -4,7 +4,7 @@
 #ifndef SUPINE_SOURCE_H
 #define SUPINE_SOURCE_H
 
-#include "sh/base/findings.h"
+#include "base/findings.h"
 
 #include "mesh/labels/labels.h"
 #include "precompute/lungs/lungs.h"

@@ -6,10 +6,11 @@
 
 #include <gsl/gsl_statistics.h>
 
+#include <supine/safetensors.h>
+
+#include "base/clock.h"
+#include "base/text.h"
 #include "mesh/mesh.h"
-#include "precompute/writer.h"
-#include "sh/base/clock.h"
-#include "sh/base/text.h"
 
 #include "program/options/basis_input.h"
 #include "program/options/breath_turn.h"
@@ -191,7 +192,7 @@ static supine_status find_volumes(playing *p, const supine_pv *pv, supine_error 
     if (status != SUPINE_OK) {
       return supine_error_set(error, status, "frame at %.3f s: %s", p->time[t], cause.message);
     }
-    supine_basis_volumes(p->basis, &pose, p->volumes + t * p->lung_count);
+    (void)supine_basis_volumes(p->basis, &pose, p->volumes + t * p->lung_count);
   }
   return status;
 }
@@ -235,7 +236,7 @@ static supine_status play_frames(playing *p, supine_mesh_series *series, supine_
     supine_pose pose;
     const double start = supine_clock_seconds();
     (void)find_pose(p, t, &pose, NULL);
-    supine_deform(p->basis, &pose, p->positions);
+    (void)supine_deform(p->basis, &pose, p->positions);
     p->compute_time[t] = supine_clock_seconds() - start;
     if (series != NULL) {
       for (size_t i = 0; i < frame; ++i) {
@@ -301,9 +302,8 @@ static supine_status write_tensors(playing *p, const char *made_by, supine_error
                                       {"made_by", made_by}};
   const supine_status status = play_frames(p, NULL, error);
   return status == SUPINE_OK
-             ? supine_writer_safetensors_write(p->wanted->path, tensors,
-                                               sizeof tensors / sizeof *tensors, metadata,
-                                               sizeof metadata / sizeof *metadata, error)
+             ? supine_safetensors_write(p->wanted->path, tensors, sizeof tensors / sizeof *tensors,
+                                        metadata, sizeof metadata / sizeof *metadata, error)
              : status;
 }
 
@@ -314,9 +314,12 @@ static supine_status check_ends(const playing *p, supine_error *error) {
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < 2 && status == SUPINE_OK; ++i) {
     supine_pose pose;
-    status = find_pose(p, ends[i], &pose, error);
+    const supine_state state =
+        supine_breath_state(p->basis, p->gravity + 3 * ends[i], p->above[ends[i]]);
+    status = supine_basis_pose(p->basis, &state, &pose, error);
     if (status == SUPINE_OK) {
-      status = supine_options_pose_check(p->basis, name, p->wanted->allow_folds, &pose, error);
+      status =
+          supine_options_pose_check(p->basis, name, p->wanted->allow_folds, &state, &pose, error);
     }
   }
   return status;

@@ -3,10 +3,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sh/base/output.h"
+#include "base/output.h"
 
-#include "program/inside.h"
 #include "program/options/basis_input.h"
+#include "program/options/inside.h"
 #include "program/options/state_options.h"
 #include "program/report/comparison.h"
 
@@ -33,6 +33,7 @@ typedef struct request {
   supine_volume_options volume;
   supine_from from;
   double breath; /* tidal volume, mL */
+  bool has_breath;
 } request;
 
 static const supine_option table[] = {
@@ -41,7 +42,8 @@ static const supine_option table[] = {
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {"breath", 0, "ML", "tidal volume of the breath whose ventilation by height is computed",
-     SUPINE_FILLS(request, breath), .standard = "500", SUPINE_ABOVE_ZERO},
+     SUPINE_FILLS(request, breath), SUPINE_SAYS_GIVEN(request, has_breath), .standard = "500",
+     SUPINE_ABOVE_ZERO},
     {"json", 0, NULL, "print JSON to standard output instead of text", SUPINE_FILLS(request, json)},
     {"output", 'o', "FILE", ".html file to write: a report with charts and pictures",
      SUPINE_FILLS(request, html), .file = SUPINE_FILE_OUT, .endings = ".html"},
@@ -109,6 +111,9 @@ static supine_status compare(const char *path, const char *made_by, const supine
                                   .from = wanted->from,
                                   .breath = wanted->breath};
   comparison.state.gravity[1] = 1.0;
+  if (supine_basis_get_info(basis)->is_fields && !wanted->has_breath) {
+    comparison.breath = 0.0; /* fields of gravity have no volumes and no breaths */
+  }
   if (comparison.state.lung_count == 0 && comparison.state.volume.kind == SUPINE_VOLUME_DEFAULT) {
     comparison.state.volume = supine_basis_default_volume(basis);
   }
@@ -117,7 +122,15 @@ static supine_status compare(const char *path, const char *made_by, const supine
   if (status != SUPINE_OK) {
     return status;
   }
-  if (supine_basis_metadata(basis, "content") != NULL) { /* only 'supine embed' writes this key */
+  const bool content = supine_basis_metadata(basis, "content") != NULL;
+  if (content && wanted->from.given) {
+    return supine_error_set(
+        error, SUPINE_ERROR_ARGUMENT,
+        "%s holds structures inside the lungs, which are compared between every "
+        "two postures: leave --from out, or use 'supine deform --from'",
+        path);
+  }
+  if (content) { /* only 'supine embed' writes this key */
     return wanted->html != NULL
                ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                                   "%s holds structures inside the lungs, but -o needs the lungs: "

@@ -4,11 +4,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/csv.h"
+#include "base/output.h"
+#include "base/text.h"
+#include "base/vec3.h"
 #include "mesh/mesh.h"
-#include "sh/base/csv.h"
-#include "sh/base/output.h"
-#include "sh/base/text.h"
-#include "sh/base/vec3.h"
 #include <supine/runtime.h>
 
 #include "program/deform_content.h"
@@ -57,7 +57,7 @@ static supine_status deformed_mesh(const supine_basis *basis, const supine_pose 
   float *xyz = malloc(count * sizeof *xyz);
   supine_status status = xyz == NULL ? SUPINE_ERROR_MEMORY : supine_options_basis_mesh(basis, mesh);
   if (status == SUPINE_OK) {
-    supine_deform(basis, pose, xyz);
+    (void)supine_deform(basis, pose, xyz);
     for (size_t i = 0; i < count; ++i) {
       mesh->vertices[i] = (double)xyz[i];
     }
@@ -107,7 +107,7 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
   if (status == SUPINE_OK) {
     status = deformed_mesh(basis, &moved->pose, &mesh, normals);
   }
-  supine_basis_volumes(basis, &moved->pose, volumes);
+  (void)supine_basis_volumes(basis, &moved->pose, volumes);
   save->from = from.vertices;
   save->normals = mesh.triangle_count > 0 ? normals : NULL;
   save->expected_error = moved->expected.sigma;
@@ -129,7 +129,9 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
 }
 
 static supine_status deform(const supine_basis *basis, const request *wanted, supine_error *error) {
-  supine_deformation moved = {.state = wanted->volume.state, .from_given = wanted->from.given};
+  supine_deformation moved = {.state = wanted->volume.state,
+                              .from_given = wanted->from.given,
+                              .allow_folds = wanted->volume.allow_folds};
   char comment[128];
   supine_status status = supine_options_reference(basis, &wanted->from, false, &moved.from, error);
   if (status == SUPINE_OK) {

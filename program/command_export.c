@@ -4,10 +4,10 @@
 
 #include <export.h>
 
-#include "sh/base/text.h"
+#include "base/text.h"
 
-#include "program/inside.h"
 #include "program/options/basis_input.h"
+#include "program/options/inside.h"
 #include "program/options/state_options.h"
 
 static const char name[] = "export";

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sh/base/findings.h"
+#include "base/findings.h"
 
 #include <supine/compare.h>
 #include <supine/runtime.h>

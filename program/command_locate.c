@@ -7,12 +7,12 @@
 #include <supine/locate.h>
 #include <supine/posture.h>
 
-#include "sh/base/csv.h"
-#include "sh/base/output.h"
-#include "sh/base/text.h"
+#include "base/csv.h"
+#include "base/output.h"
+#include "base/text.h"
 
-#include "program/inside.h"
 #include "program/options/basis_input.h"
+#include "program/options/inside.h"
 #include "program/options/state_options.h"
 
 static const char name[] = "locate";

@@ -6,7 +6,7 @@
 
 #include <jansson.h>
 
-#include "sh/base/output.h"
+#include "base/output.h"
 
 #include "program/options/command.h"
 #include "program/options/pv.h"

@@ -6,13 +6,13 @@
 
 #include <supine/compare.h>
 
-#include "sh/base/output.h"
-#include "sh/base/text.h"
-#include "sh/base/vec3.h"
+#include "base/output.h"
+#include "base/text.h"
+#include "base/vec3.h"
 
-#include "program/inside.h"
 #include "program/options/basis_input.h"
 #include "program/options/breath_turn.h"
+#include "program/options/inside.h"
 #include "program/options/state_options.h"
 
 static const char name[] = "render";
@@ -106,7 +106,7 @@ static supine_status fill_panel(studio *s, size_t i, supine_error *error) {
     return status;
   }
   supine_distance_statistics statistics;
-  supine_compare_distances(s->compare, &shown->pose, &s->from.pose, shown->value);
+  (void)supine_compare_distances(s->compare, &shown->pose, &s->from.pose, shown->value);
   supine_compare_statistics(s->compare, shown->value, &statistics);
   s->p95 = fmax(s->p95, statistics.p95);
   s->max = fmax(s->max, statistics.max);

@@ -4,17 +4,17 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "program/export/export.h"
-#include "program/inside.h"
+#include "base/output.h"
+#include "base/vec3.h"
 #include "program/options/basis_input.h"
 #include "program/options/command.h"
+#include "program/options/inside.h"
 #include "program/options/pv.h"
 #include "program/options/state_options.h"
 #include "program/stream/peer.h"
 #include "program/stream/server.h"
 #include "program/stream/tracked_patient.h"
-#include "sh/base/output.h"
-#include "sh/base/vec3.h"
+#include "program/view/export/export.h"
 
 static const char name[] = "stream";
 
@@ -29,7 +29,6 @@ typedef struct request {
   const char *pv;
   supine_pv_breath breath;
   double smooth; /* time constant with which poses are smoothed, ms; 0 for no smoothing */
-  const char *record, *replay;
   const char *web, *certificate, *key;
   supine_from from;
   const char *points;
@@ -112,13 +111,6 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, certificate), .file = SUPINE_FILE_IN, .more = true},
     {"key", 0, "PEM", "the certificate's private key", SUPINE_FILLS(request, key),
      .file = SUPINE_FILE_IN, .more = true},
-    {.help = "Recording:"},
-    {"record", 0, "POSES.csv", "file to write the received poses to, at the end of the run",
-     SUPINE_FILLS(request, record), .file = SUPINE_FILE_OUT},
-    {"replay", 0, "POSES.csv",
-     "follow recorded poses instead of a tracker, starting when the first peer or viewer connects, "
-     "and stop at their end",
-     SUPINE_FILLS(request, replay), .file = SUPINE_FILE_IN},
     {"seconds", 0, "S", "duration of the run in s; default until interrupted",
      SUPINE_FILLS(request, options.seconds), SUPINE_ABOVE_ZERO, .more = true},
     {.name = NULL}};
@@ -270,9 +262,16 @@ static supine_status open_page(const request *wanted, const supine_basis *basis,
   return status;
 }
 
-static supine_status set_volume(const request *wanted, supine_stream_volume *volume,
-                                supine_error *error) {
+/* Choose a breath, or a fixed volume. Fields of gravity have no breaths. */
+static supine_status set_volume(const supine_basis *basis, const request *wanted,
+                                supine_stream_volume *volume, supine_error *error) {
   supine_pv pv = *supine_breath_normal();
+  if (supine_basis_get_info(basis)->is_fields) {
+    supine_pose pose;
+    volume->fixed = wanted->volume;
+    volume->fixed.gravity[1] = 1.0;
+    return supine_basis_pose(basis, &volume->fixed, &pose, error);
+  }
   if (wanted->has_volume) {
     volume->fixed = wanted->volume;
     return SUPINE_OK;
@@ -287,27 +286,14 @@ static supine_status stream(const supine_basis *basis, const char *path, const r
                             supine_error *error) {
   supine_stream_options options = wanted->options;
   supine_stream_volume volume = {0};
-  supine_stream_poses poses = {0};
-  supine_output record = {0};
   supine_stream_server *server = NULL;
   char *page = NULL;
   observed_points points = {0};
-  supine_status status = set_volume(wanted, &volume, error);
+  supine_status status = set_volume(basis, wanted, &volume, error);
   options.volume = &volume;
   if (status == SUPINE_OK && wanted->points != NULL) {
     status = open_points(basis, wanted, &points, error);
     options.observed = &points.observed;
-  }
-  if (status == SUPINE_OK && wanted->replay != NULL) {
-    status = supine_stream_poses_load(wanted->replay, &poses, error);
-    options.replay = &poses;
-  }
-  if (status == SUPINE_OK && wanted->record != NULL) {
-    status = supine_output_open(wanted->record, &record, error);
-    options.record = record.file;
-    if (status == SUPINE_OK) {
-      supine_stream_poses_begin(record.file);
-    }
   }
   if (status == SUPINE_OK) {
     status = open_page(wanted, basis, path, &page, &options.web, error);
@@ -324,13 +310,8 @@ static supine_status stream(const supine_basis *basis, const char *path, const r
     status = supine_stream_server_run(server, error);
     report(server, wanted);
   }
-  if (status == SUPINE_OK && wanted->record != NULL) {
-    status = supine_output_commit(&record, error);
-  }
-  supine_output_abandon(&record);
   supine_stream_server_destroy(server);
   supine_stream_web_destroy(options.web);
-  supine_stream_poses_free(&poses);
   close_points(&points);
   free(page);
   return status;
@@ -386,8 +367,7 @@ const supine_command supine_command_stream = {
         "Examples:\n"
         "  supine stream lungs.safetensors --device Patient\n"
         "  supine stream lungs.safetensors --send surface --space ras --connect localhost:18944\n"
-        "  supine stream lungs.safetensors --web 8080 --record night.csv\n"
-        "  supine stream lungs.safetensors --web 8080 --replay night.csv",
+        "  supine stream lungs.safetensors --web 8080",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),
     .begin = begin,

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "sh/base/text.h"
+#include "base/text.h"
 
 #include "program/options/surface_options.h"
 #include "program/validation.h"

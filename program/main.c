@@ -11,9 +11,9 @@
 
 #include <supine/version.h>
 
+#include "base/output.h"
+#include "base/parallel.h"
 #include "program/options/command.h"
-#include "sh/base/output.h"
-#include "sh/base/parallel.h"
 
 static void print_help(void) {
   (void)puts("supine - lungs that deform with gravity, in real time\n"

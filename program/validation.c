@@ -4,11 +4,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "program/model_options.h"
+#include "program/options/model_options.h"
 #include "program/validation.h"
 
 #include "precompute/inside/biharmonic.h"
-#include "precompute/inside/surface.h"
+#include "precompute/lungs/surface.h"
 #include "program/options/basis_input.h"
 
 enum { MEASURED_VERTICES_MAX = 1500, GOLDEN_SECTION_STEPS = 24 };

@@ -9,8 +9,8 @@
 
 #include "program/validation.h"
 
-#include "precompute/inside/surface.h"
-#include "sh/base/vec3.h"
+#include "base/vec3.h"
+#include "precompute/lungs/surface.h"
 
 const char *const supine_command_map_names[SUPINE_PATIENT_MAP_COUNT] = {"predicted", "none",
                                                                         "translation", "affine"};

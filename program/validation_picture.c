@@ -6,8 +6,8 @@
 
 #include "program/validation.h"
 
-#include "program/render/render.h"
-#include "sh/base/vec3.h"
+#include "base/vec3.h"
+#include "program/view/render/render.h"
 
 /* The upper end of the colour bar is at least this, mm. */
 static const double end_least = 1.0;

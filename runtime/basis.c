@@ -9,7 +9,7 @@
 #include <supine/sh.h>
 
 #include "runtime/internal.h"
-#include "runtime/safetensors/platform.h"
+#include "runtime/safetensors/safetensors_file.h"
 
 /* A file to check, and the name of the file in messages. */
 typedef struct check {
@@ -394,6 +394,16 @@ static supine_status check_normals(const check *c, supine_basis *basis) {
   return info->normal_weights != NULL ? SUPINE_OK : SUPINE_ERROR_FORMAT;
 }
 
+/* Identify what determines the meaning of a pose: the modes and the coefficients of the volumes. */
+static supine_status identify(const check *c, supine_basis *basis) {
+  static const char *const names[] = {"modes", "volume_linear", "volume_quadratic", "volume_cubic"};
+  for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
+    const supine_tensor *tensor = supine_safetensors_find(c->file, names[i]);
+    basis->info.identity += supine_safetensors_checksum(tensor, tensor == NULL ? 0 : 1, NULL, 0);
+  }
+  return SUPINE_OK;
+}
+
 /* Choose the instruction set, and pack the tensors for evaluation. For SUPINE_STORAGE_AUTO, choose
  * the smallest storage whose position error is at most error_limit_mm. */
 static supine_status prepare(const check *c, supine_basis *basis,
@@ -505,8 +515,8 @@ static supine_status open_file(supine_safetensors *file, const char *name,
   basis->file = file;
   status = check_metadata(&c, &basis->info);
   static supine_status (*const steps[])(const check *, supine_basis *) = {
-      check_surface,   check_field, check_modes, check_lungs,   check_volume,
-      check_reference, check_rest,  check_scan,  check_normals, check_rigid};
+      check_surface, check_field, check_modes,   check_lungs, check_volume, check_reference,
+      check_rest,    check_scan,  check_normals, check_rigid, identify};
   for (size_t i = 0; status == SUPINE_OK && i < sizeof steps / sizeof *steps; ++i) {
     status = steps[i](&c, basis);
   }

@@ -104,32 +104,41 @@ static void deform_lungs(const supine_basis *basis, const supine_pose *pose, siz
   }
 }
 
-static void deform_range(const supine_basis *basis, const supine_pose *pose, size_t begin,
-                         size_t end, supine_target target) {
+static supine_status deform_range(const supine_basis *basis, const supine_pose *pose, size_t begin,
+                                  size_t end, supine_target target) {
+  if (!supine_basis_has_range(basis, pose, begin, end)) {
+    return SUPINE_ERROR_ARGUMENT;
+  }
   target.stream = basis->stream && end - begin > STREAM_RANGE;
   target.prefetch = basis->prefetch;
   deform_lungs(basis, pose, begin, end, &target);
   supine_stream_fence(target.stream);
   deform_rigid(basis, pose, begin, end, &target);
+  return SUPINE_OK;
 }
 
-void supine_deform_range(const supine_basis *basis, const supine_pose *pose, size_t begin,
-                         size_t end, float *xyz) {
-  deform_range(basis, pose, begin, end, (supine_target){.xyz = xyz, .add_reference = true});
+supine_status supine_deform_range(const supine_basis *basis, const supine_pose *pose, size_t begin,
+                                  size_t end, float *xyz) {
+  return deform_range(basis, pose, begin, end, (supine_target){.xyz = xyz, .add_reference = true});
 }
 
-void supine_deform(const supine_basis *basis, const supine_pose *pose, float *xyz) {
-  supine_deform_range(basis, pose, 0, basis->info.vertex_count, xyz);
+supine_status supine_deform(const supine_basis *basis, const supine_pose *pose, float *xyz) {
+  return supine_deform_range(basis, pose, 0, basis->info.vertex_count, xyz);
 }
 
-void supine_deform_batch(const supine_basis *basis, size_t count, const supine_pose *poses,
-                         size_t begin, size_t end, float *xyz) {
+supine_status supine_deform_batch(const supine_basis *basis, size_t count, const supine_pose *poses,
+                                  size_t begin, size_t end, float *xyz) {
   enum { BLOCK_BYTES = 1 << 18 }; /* bytes of packed vertices, few enough for the cache */
   const size_t block = BLOCK_BYTES / basis->tiles.stride * TILE;
   const size_t apart = 3 * (end - begin);
   supine_target target = {.add_reference = true,
                           .stream =
                               (double)count * (double)apart * sizeof *xyz > STREAM_BATCH_BYTES};
+  for (size_t j = 0; j < count; ++j) {
+    if (!supine_basis_has_range(basis, &poses[j], begin, end)) {
+      return SUPINE_ERROR_ARGUMENT;
+    }
+  }
   for (size_t at = begin, next; at < end; at = next) {
     next = (at / block + 1) * block < end ? (at / block + 1) * block : end;
     for (size_t j = 0; j < count; ++j) {
@@ -142,11 +151,12 @@ void supine_deform_batch(const supine_basis *basis, size_t count, const supine_p
     target.xyz = xyz + j * apart;
     deform_rigid(basis, &poses[j], begin, end, &target);
   }
+  return SUPINE_OK;
 }
 
-void supine_displace_range(const supine_basis *basis, const supine_pose *pose, size_t begin,
-                           size_t end, float *xyz) {
-  deform_range(basis, pose, begin, end, (supine_target){.xyz = xyz});
+supine_status supine_displace_range(const supine_basis *basis, const supine_pose *pose,
+                                    size_t begin, size_t end, float *xyz) {
+  return deform_range(basis, pose, begin, end, (supine_target){.xyz = xyz});
 }
 
 void supine_step(size_t count, const float *restrict step, float *restrict xyz) {

@@ -21,7 +21,9 @@ double supine_basis_error(const supine_basis *basis, const supine_pose *pose) {
    * and in the sum over the modes. Adding the reference position rounds once more. */
   const double rounding =
       ((double)modes + 8) * unit * scale * moved + unit * (basis->reference_size + scale * moved);
-  return 1.001 * (scale * stored + basis->reference_error + rounding);
+  return supine_basis_has_pose(basis, pose)
+             ? 1.001 * (scale * stored + basis->reference_error + rounding)
+             : INFINITY;
 }
 
 static double largest_displacement(const supine_basis *basis, const supine_pose *pose) {
@@ -31,7 +33,7 @@ static double largest_displacement(const supine_basis *basis, const supine_pose 
   float top = 0;
   for (size_t begin = 0; begin < n; begin += BLOCK) {
     const size_t end = n - begin < BLOCK ? n : begin + BLOCK;
-    supine_displace_range(basis, pose, begin, end, xyz);
+    (void)supine_displace_range(basis, pose, begin, end, xyz);
     for (size_t i = 0; i < end - begin; ++i) {
       const float *u = xyz + 3 * i;
       const float square = u[0] * u[0] + u[1] * u[1] + u[2] * u[2];
@@ -46,13 +48,15 @@ double supine_basis_storage_error(const supine_basis *basis) {
   static const double distance = 20; /* open surfaces are displaced by at most this, mm */
   double worst = 0;
   for (int number = 0; number < 27; ++number) {
-    supine_pose pose;
+    supine_pose pose = {.basis = 0};
     const int cell[3] = {number % 3 - 1, number / 3 % 3 - 1, number / 9 - 1};
     const supine_state state = {.gravity = {cell[0], cell[1], cell[2]}};
     if (supine_basis_weights(basis, state.gravity, pose.weights) != SUPINE_OK) {
       continue; /* the zero vector has no direction */
     }
-    if (basis->info.has_volume) {
+    if (basis->info.is_fields) {
+      supine_pose_fill(&pose, 1);
+    } else if (basis->info.has_volume) {
       if (supine_basis_add_volume(basis, volume, &pose) != SUPINE_OK) {
         continue; /* the lungs cannot hold this volume in this posture */
       }

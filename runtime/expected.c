@@ -33,8 +33,8 @@ double supine_expected_rms(const supine_basis *basis, const supine_pose *pose,
   double sum = 0;
   for (size_t begin = 0; begin < n; begin += LOCATE_BLOCK) {
     const size_t end = n - begin < LOCATE_BLOCK ? n : begin + LOCATE_BLOCK;
-    supine_displace_range(basis, pose, begin, end, x);
-    supine_displace_range(basis, from, begin, end, origin);
+    (void)supine_displace_range(basis, pose, begin, end, x);
+    (void)supine_displace_range(basis, from, begin, end, origin);
     for (size_t i = 0; i < 3 * (end - begin); ++i) {
       const double d = (double)x[i] - (double)origin[i];
       sum += d * d;
@@ -112,7 +112,7 @@ static void fill_block(const supine_basis *basis, const poses *p, double constan
   const supine_pose *const of[4] = {&p->at, &p->from, &p->fuller_at, &p->fuller_from};
   float x[4][3 * LOCATE_BLOCK];
   for (size_t k = 0; k < (p->assumed ? 4U : 2U); ++k) {
-    supine_displace_range(basis, of[k], begin, end, x[k]);
+    (void)supine_displace_range(basis, of[k], begin, end, x[k]);
   }
   for (size_t i = 0; i < end - begin; ++i) {
     double moved = 0;

@@ -31,8 +31,8 @@ supine_status supine_gl_pack(const supine_basis *basis, size_t begin, size_t end
 supine_status supine_gl_weights(const supine_basis *basis, const supine_pose *pose, float *weights,
                                 float *gains) {
   const size_t modes = basis->info.mode_count;
-  if (!fits(basis)) {
-    return SUPINE_ERROR_UNSUPPORTED;
+  if (!fits(basis) || !supine_basis_has_pose(basis, pose)) {
+    return fits(basis) ? SUPINE_ERROR_ARGUMENT : SUPINE_ERROR_UNSUPPORTED;
   }
   for (size_t k = 0; k < (modes + 3) / 4 * 4; ++k) {
     weights[k] = k < modes ? (float)pose->weights[k] : 0;
@@ -67,7 +67,10 @@ supine_status supine_gl_normal_weights(const supine_basis *basis, const supine_p
   if (words == 0) {
     return SUPINE_ERROR_UNSUPPORTED;
   }
-  supine_basis_normal_weights(basis, pose, v);
+  const supine_status status = supine_basis_normal_weights(basis, pose, v);
+  if (status != SUPINE_OK) {
+    return status;
+  }
   memset(uniforms, 0, 3 * words * basis->info.lung_count * sizeof *uniforms);
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     for (size_t j = 0; j < modes; ++j) {

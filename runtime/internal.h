@@ -54,6 +54,17 @@ struct supine_basis {
   double reference_size;  /**< bound on the distance of a reference position from the origin, mm */
 };
 
+/** Return whether a pose was made for this basis or by hand, or is NULL. */
+static inline bool supine_basis_has_pose(const supine_basis *basis, const supine_pose *pose) {
+  return pose == NULL || pose->basis == 0 || pose->basis == basis->info.identity;
+}
+
+/** Return whether a pose can be evaluated at vertices begin <= i < end of a basis. */
+static inline bool supine_basis_has_range(const supine_basis *basis, const supine_pose *pose,
+                                          size_t begin, size_t end) {
+  return supine_basis_has_pose(basis, pose) && begin <= end && end <= basis->info.vertex_count;
+}
+
 /** Pack the coefficients, directions and reference positions of the vertices into tiles of 16
  * vertices, in the number format `storage`, which is not AUTO. Free the previous tiles.
  * @retval SUPINE_ERROR_MEMORY  an allocation failed */

@@ -2,10 +2,10 @@
 /* Compute the normals of a deformed surface as weighted sums of vectors of the file. */
 #include <string.h>
 
+#include "base/clones.h"
 #include "runtime/internal.h"
 #include "runtime/kernels/compact.h"
 #include "runtime/safetensors/platform.h"
-#include "sh/base/clones.h"
 
 /* Pack supine_basis_info.normals of 16 vertices. rows[v] points to the numbers of vertex v. */
 SUPINE_CLONES static void pack_tile(const supine_tiles *tiles, const int16_t *const rows[TILE],
@@ -86,11 +86,15 @@ static void lung_weights(const supine_basis *basis, size_t lung, const supine_po
   }
 }
 
-void supine_basis_normal_weights(const supine_basis *basis, const supine_pose *pose,
-                                 double *normal_weights) {
+supine_status supine_basis_normal_weights(const supine_basis *basis, const supine_pose *pose,
+                                          double *normal_weights) {
+  if (!supine_basis_has_pose(basis, pose)) {
+    return SUPINE_ERROR_ARGUMENT;
+  }
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     lung_weights(basis, lung, pose, normal_weights + lung * basis->info.normal_count);
   }
+  return SUPINE_OK;
 }
 
 /* Compute the factors by which the kernel supine_kernels.light multiplies the packed vectors of a
@@ -127,8 +131,11 @@ supine_status supine_deform_lit_range(const supine_basis *basis, const supine_po
   if (basis->info.normal_count == 0) {
     return SUPINE_ERROR_UNSUPPORTED;
   }
+  if (!supine_basis_has_range(basis, pose, begin, end)) {
+    return SUPINE_ERROR_ARGUMENT;
+  }
   if (xyz != NULL) {
-    supine_deform_range(basis, pose, begin, end, xyz);
+    (void)supine_deform_range(basis, pose, begin, end, xyz);
   }
   light(basis, pose, begin, end, basis->stream && end - begin > STREAM_RANGE, normals);
   return SUPINE_OK;

@@ -81,7 +81,7 @@ static supine_status check(const supine_locate_task *task, supine_error *error) 
 static void position(const supine_basis *basis, const supine_pose *pose, size_t vertex,
                      double at[3]) {
   float x[3];
-  supine_deform_range(basis, pose, vertex, vertex + 1, x);
+  (void)supine_deform_range(basis, pose, vertex, vertex + 1, x);
   for (size_t i = 0; i < 3; ++i) {
     at[i] = (double)x[i];
   }
@@ -349,7 +349,7 @@ supine_status supine_locate(const supine_locate_task *task, supine_locate_residu
     supine_pose pose;
     double volumes[SUPINE_LUNGS_MAX];
     (void)supine_basis_pose(task->inside, &found->state, &pose, NULL);
-    supine_basis_volumes(task->inside, &pose, volumes);
+    (void)supine_basis_volumes(task->inside, &pose, volumes);
     for (size_t lung = 0; lung < info->lung_count; ++lung) {
       found->volume += volumes[lung];
     }

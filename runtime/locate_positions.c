@@ -43,10 +43,10 @@ typedef struct block {
 static void predict(const supine_location *found, const supine_basis *basis, const poses *p,
                     size_t lung, size_t begin, size_t end, block *b) {
   const supine_locate_fit *fit = found->fit;
-  supine_deform_range(basis, &p->at, begin, end, b->law);
-  supine_deform_range(basis, &p->scan, begin, end, b->scan);
+  (void)supine_deform_range(basis, &p->at, begin, end, b->law);
+  (void)supine_deform_range(basis, &p->scan, begin, end, b->scan);
   if (fit->options.volume) {
-    supine_deform_range(basis, &p->fuller, begin, end, b->volume);
+    (void)supine_deform_range(basis, &p->fuller, begin, end, b->volume);
   }
   for (size_t i = 0; i < end - begin; ++i) {
     float square = 0;

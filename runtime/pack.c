@@ -3,10 +3,10 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "base/clones.h"
 #include "runtime/internal.h"
 #include "runtime/kernels/compact.h"
 #include "runtime/safetensors/platform.h"
-#include "sh/base/clones.h"
 
 enum {
   FIXED_TOP = INT32_MAX / 4096 * 4096, /* integer that means 1; fixed_narrow() does not clip it */

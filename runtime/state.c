@@ -9,8 +9,8 @@
 
 #include <supine/state.h>
 
+#include "base/vec3.h"
 #include "runtime/words.h"
-#include "sh/base/vec3.h"
 
 static const char *const kinds[] = {[SUPINE_VOLUME_DEFAULT] = "",
                                     [SUPINE_VOLUME_REST] = "rest",

@@ -25,10 +25,10 @@ if [ "$what" = all ] || [ "$what" = clang-tidy ]; then
   # Include analyse.h first in all sources of the build, except status.c, which defines supine_error_set.
   {
     sed -n 's|^ *"file": "\(.*\)",*$|\1|p' build/clang/compile_commands.json | sort -u |
-      grep -E "^$PWD/(sh|mesh|precompute|runtime|program|packaging)/" | grep -v '/sh/base/status\.c$' |
+      grep -E "^$PWD/(base|sh|mesh|precompute|runtime|program|packaging)/" | grep -v '/base/status\.c$' |
       xargs -P "$(nproc)" -n 4 clang-tidy --quiet -p build/clang --extra-arg=-include \
         --extra-arg="$PWD/tests/analyse.h"
-    clang-tidy --quiet -p build/clang sh/base/status.c
+    clang-tidy --quiet -p build/clang base/status.c
   } 2>/dev/null | grep -E ': (warning|error): ' | sort -u |
     awk -v root="$PWD/" 'NR == FNR { known[$1]; next }
       {

@@ -16,19 +16,19 @@ source, build = sys.argv[1:3]
 faults = []
 
 # Prefixes of external names, for folders whose prefix is not supine_<folder>_.
-PREFIX = {"sh/base": ("supine_",), "runtime": ("supine_",), "runtime/safetensors": ("supine_",),
-          "mesh/io": ("supine_mesh_", "supine_image_"), "precompute/lungs": ("supine_lungs_", "supine_phantom_", "supine_tissue_"),
+PREFIX = {"base": ("supine_",), "runtime": ("supine_",), "runtime/safetensors": ("supine_",),
+          "mesh/io": ("supine_mesh_",), "precompute/lungs": ("supine_lungs_", "supine_phantom_", "supine_tissue_", "supine_inside_surface_"),
           "precompute/physics": ("supine_physics_", "supine_reference_"),
           "precompute/projection": ("supine_projection_", "supine_accuracy_"),
-          "precompute": ("supine_precompute_", "supine_writer_", "supine_fields_"), "program/export": ("supine_export_", "supine_template_"), "program/options": ("supine_options_", "supine_breath_"),
-          "program": ("supine_command_", "supine_field_")}
+          "precompute": ("supine_precompute_", "supine_writer_"), "precompute/warp": ("supine_field_",), "mesh/image": ("supine_image_",), "program/view/render": ("supine_render_",), "program/view/export": ("supine_export_", "supine_template_"), "program/options": ("supine_options_", "supine_breath_", "supine_command_"),
+          "program": ("supine_command_",)}
 PUBLIC = ("runtime/include/supine",)
 
 
 def read_table():
     folders = {}
     with open(os.path.join(source, "ARCHITECTURE.md"), encoding="utf-8") as readme:
-        table = re.findall(r"^\| `(?:sh|mesh|precompute|runtime|program)[a-z/]*`.*$", readme.read(), re.M)
+        table = re.findall(r"^\| `(?:base|sh|mesh|precompute|runtime|program)[a-z/]*`.*$", readme.read(), re.M)
     rows = []
     for line in table:
         row = re.fullmatch(r"\| `([a-z/]+)` \|([^|]*)\|([^|]*)\|", line)
@@ -52,10 +52,10 @@ def tracked():
     listed = subprocess.run(["git", "-C", source, "ls-files", "*.c", "*.h"], capture_output=True,
                             text=True, check=False).stdout.split()
     found = [os.path.relpath(os.path.join(folder, name), source)
-             for top in ("sh", "mesh", "precompute", "runtime", "program")
+             for top in ("base", "sh", "mesh", "precompute", "runtime", "program")
              for folder, _, names in os.walk(os.path.join(source, top))
              for name in names if name.endswith((".c", ".h"))]
-    files = [f for f in (listed or found) if f.split("/")[0] in ("sh", "mesh", "precompute", "runtime", "program")]
+    files = [f for f in (listed or found) if f.split("/")[0] in ("base", "sh", "mesh", "precompute", "runtime", "program")]
     return [f for f in files if os.path.exists(os.path.join(source, f))]
 
 

@@ -2,7 +2,7 @@
 supine_test(inside supine_inside supine_lungs)
 supine_test(image supine_image)
 supine_test(labels supine_labels supine_image supine_inside supine_lungs m)
-supine_test(field supine_inside supine_field supine_lungs)
+supine_test(field supine_inside supine_warp supine_lungs)
 set_tests_properties(image labels PROPERTIES
   ENVIRONMENT "LSAN_OPTIONS=suppressions=${CMAKE_CURRENT_SOURCE_DIR}/lsan.supp:print_suppressions=0")
 

@@ -8,8 +8,6 @@
 #include <supine/runtime.h>
 #include <supine/safetensors.h>
 
-#include "precompute/writer.h"
-
 #include "lungs_helpers.h"
 
 enum { HELPER_MODES = 3 };
@@ -98,8 +96,8 @@ static inline void helper_write_scanned_basis(const char *path, size_t frequency
                                       {"scan_volume_ml", scan_volume}};
   const size_t metadata_count = sizeof metadata / sizeof *metadata - (scan_volume == NULL ? 2 : 0);
   supine_error error;
-  if (supine_writer_safetensors_write(path, tensors, sizeof tensors / sizeof *tensors, metadata,
-                                      metadata_count, &error) != SUPINE_OK) {
+  if (supine_safetensors_write(path, tensors, sizeof tensors / sizeof *tensors, metadata,
+                               metadata_count, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
   free(vertices);

@@ -7,7 +7,7 @@
 #include <stdint.h>
 #include <stdlib.h>
 
-#include "mesh/io/image.h"
+#include "mesh/image/image.h"
 #include "mesh/mesh.h"
 
 /* largest number of times that a straight line crosses one surface */

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Compare the JavaScript package with the C library, in node and in Chromium, if the tools to make it are installed.
 if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
-  set(tarball ${PROJECT_BINARY_DIR}/runtime/npm/supine-${PROJECT_VERSION}.tgz)
+  set(tarball ${PROJECT_BINARY_DIR}/runtime/js/supine-${PROJECT_VERSION}.tgz)
   add_executable(npm_native npm/native.c)
   target_link_libraries(npm_native PRIVATE supine_build supine_runtime)
   add_test(NAME npm_package COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/npm/package.sh ${CMAKE_COMMAND} ${PROJECT_BINARY_DIR}

@@ -4,7 +4,7 @@
 add_library(runtime_fixture STATIC runtime_fixture.c)
 target_link_libraries(runtime_fixture
   PRIVATE supine_build PkgConfig::CMOCKA
-  PUBLIC supine_runtime supine_writer)
+  PUBLIC supine_runtime)
 
 supine_test(safetensors runtime_fixture)
 supine_test(golden supine_runtime)
@@ -43,11 +43,13 @@ if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
   set_tests_properties(python PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
 endif()
 
-# Build the library for Windows, if a compiler for it is installed.
+# Build and run the library for other platforms, where their compilers and emulators are installed.
 if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
-  add_test(NAME windows COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_windows.sh ${CMAKE_COMMAND}
-    ${PROJECT_SOURCE_DIR} $<TARGET_FILE:supine_runtime> ${CMAKE_C_COMPILER})
-  set_tests_properties(windows PROPERTIES TIMEOUT 1800 SKIP_RETURN_CODE 77)
+  foreach(platform gcc clang musl aarch64 windows)
+    add_test(NAME platform_${platform} COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_platform.sh ${platform} ${CMAKE_COMMAND}
+      ${PROJECT_SOURCE_DIR} $<TARGET_FILE:supine_runtime> ${CMAKE_C_COMPILER} $<TARGET_FILE:supine>)
+    set_tests_properties(platform_${platform} PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
+  endforeach()
 endif()
 
 supine_test(runtime_quiet runtime_fixture)

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include <dirent.h>
 
-#include "precompute/writer.h"
 #include "runtime_fixture.h"
 #include "test.h"
+#include <supine/safetensors.h>
 
 void *fixture_allocate(size_t count, size_t size) {
   void *memory = calloc(count + 1, size);
@@ -233,8 +233,8 @@ void fixture_write(const fixture *f, const char *path) {
       {"route", f->fields ? "fields" : "linear"},
   };
   supine_error error = {0};
-  const supine_status status = supine_writer_safetensors_write(
-      path, tensors, count, metadata, sizeof metadata / sizeof *metadata, &error);
+  const supine_status status = supine_safetensors_write(path, tensors, count, metadata,
+                                                        sizeof metadata / sizeof *metadata, &error);
   if (status != SUPINE_OK) {
     fail_msg("%s", error.message);
   }

@@ -5,7 +5,7 @@ function(supine_stream_test name)
 endfunction()
 
 supine_stream_test(gravity)
-supine_stream_test(poses)
+supine_stream_test(volume)
 supine_stream_test(server supine_base Threads::Threads)
 
 # Run clients with a real server.

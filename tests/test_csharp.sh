@@ -22,13 +22,13 @@ vertices=$(($(wc -c <"$work/expected") / 60))
     SupineError error = new SupineError();
     IntPtr basis;
     byte[] state = new byte[112];
-    double[] pose = new double[256 + 16 * 3];
+    double[] pose = new double[256 + 16 * 3 + 1];
     float[] xyz = new float[3 * int.Parse(arguments[2])];
     if (supine_basis_open("absent", out basis, ref error) == 0 || error.message[0] == 0) Environment.Exit(2);
     if (supine_basis_open(arguments[0], out basis, ref error) != 0) Environment.Exit(3);
     if (supine_state_parse(arguments[1], state, ref error) != 0) Environment.Exit(4);
     if (supine_basis_pose(basis, state, pose, ref error) != 0) Environment.Exit(5);
-    supine_deform(basis, pose, xyz);
+    if (supine_deform(basis, pose, xyz) != 0) Environment.Exit(6);
     byte[] bytes = new byte[4 * xyz.Length];
     Buffer.BlockCopy(xyz, 0, bytes, 0, bytes.Length);
     File.WriteAllBytes(arguments[3], bytes);

@@ -3,6 +3,7 @@
  * set. */
 #include "test.h"
 
+#include <supine/compare.h>
 #include <supine/runtime.h>
 
 #include "runtime_fixture.h"
@@ -512,4 +513,56 @@ TEST(test_normals_bipyramid_area_weighted) {
   }
   supine_basis_close(basis);
   drop(&o);
+}
+
+/* Every function that evaluates a pose refuses one that another basis made, and writes nothing. */
+TEST(test_evaluate_pose_of_another_basis_refused) {
+  enum { N = 200 };
+  fixture *lit = fixture_create_shrinking(N, 3, 5);
+  fixture_add_normals(lit, 2, 6);
+  opened o[2] = {made(lit), made(fixture_create_shrinking(N, 3, 7))};
+  supine_basis *basis = open_as(&o[0], SUPINE_STORAGE_AUTO, SUPINE_SIMD_AUTO);
+  supine_basis *other = open_as(&o[1], SUPINE_STORAGE_AUTO, SUPINE_SIMD_AUTO);
+  const supine_state asked = {.gravity = {0.3, 0.8, -0.2}, .volume = {SUPINE_VOLUME_SCAN, -20}};
+  const supine_status bad = SUPINE_ERROR_ARGUMENT;
+  supine_compare *compare = NULL;
+  supine_pose poses[2];
+  float xyz[6 * N];
+  float clean[6 * N];
+  double numbers[64] = {0};
+  memset(xyz, 77, sizeof xyz);
+  memcpy(clean, xyz, sizeof xyz);
+  assert_int_equal(supine_basis_pose(basis, &asked, &poses[0], NULL), SUPINE_OK);
+  assert_int_equal(supine_basis_pose(other, &asked, &poses[1], NULL), SUPINE_OK);
+  assert_int_equal(supine_compare_create(basis, &compare, NULL), SUPINE_OK);
+  const supine_pose *foreign = &poses[1];
+  assert_int_equal(supine_deform(basis, foreign, xyz), bad);
+  assert_int_equal(supine_deform_range(basis, foreign, 0, 10, xyz), bad);
+  assert_int_equal(supine_deform_batch(basis, 2, poses, 0, N, xyz), bad);
+  assert_int_equal(supine_displace_range(basis, foreign, 0, 10, xyz), bad);
+  assert_int_equal(supine_deform_lit(basis, foreign, xyz, xyz + 3 * N), bad);
+  assert_int_equal(supine_deform_lit(basis, foreign, NULL, xyz), bad);
+  assert_int_equal(supine_compare_distances(compare, foreign, NULL, xyz), bad);
+  assert_int_equal(supine_compare_distances(compare, poses, foreign, xyz), bad);
+  assert_int_equal(supine_gl_weights(basis, foreign, xyz, xyz + 3 * N), bad);
+  assert_int_equal(supine_gl_normal_weights(basis, foreign, xyz), bad);
+  assert_int_equal(supine_basis_volumes(basis, foreign, numbers), bad);
+  assert_int_equal(supine_basis_normal_weights(basis, foreign, numbers), bad);
+  assert_true(isinf(supine_basis_error(basis, foreign)));
+  assert_true(isinf(supine_compare_rms(compare, poses, foreign)));
+  assert_int_equal(supine_basis_gains(basis, &asked, &poses[1], NULL), bad);
+  assert_int_equal(supine_deform_range(basis, poses, 5, 4, xyz), bad);
+  assert_int_equal(supine_deform_range(basis, poses, 0, N + 1, xyz), bad);
+  assert_memory_equal(xyz, clean, sizeof xyz);
+  /* supine_basis_pose overwrites any pose; a pose whose weights were set by hand fits any basis. */
+  assert_int_equal(supine_basis_pose(basis, &asked, &poses[1], NULL), SUPINE_OK);
+  assert_int_equal(supine_deform_batch(basis, 2, poses, 0, N, xyz), SUPINE_OK);
+  assert_memory_equal(xyz, xyz + 3 * N, sizeof xyz / 2);
+  poses[1].basis = 0;
+  assert_int_equal(supine_deform(other, &poses[1], xyz), SUPINE_OK);
+  supine_compare_destroy(compare);
+  supine_basis_close(basis);
+  supine_basis_close(other);
+  drop(&o[0]);
+  drop(&o[1]);
 }

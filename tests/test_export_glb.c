@@ -8,9 +8,9 @@
 
 #include <export.h>
 
+#include "base/vec3.h"
 #include "export_helpers.h"
-#include "program/export/targets.h"
-#include "sh/base/vec3.h"
+#include "program/view/export/targets.h"
 
 enum { TARGETS = 8 };
 

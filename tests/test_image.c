@@ -3,7 +3,7 @@
 #include <sys/stat.h>
 
 #include "folder.h"
-#include "mesh/io/image.h"
+#include "mesh/image/image.h"
 
 #include "sh_helpers.h"
 

@@ -3,10 +3,10 @@
 #include "folder.h"
 #include "inside_helpers.h"
 
+#include "base/vec3.h"
 #include "precompute/inside/biharmonic.h"
 #include "precompute/inside/content.h"
 #include "precompute/inside/embed.h"
-#include "sh/base/vec3.h"
 
 #include "tests/poses.h"
 
@@ -433,6 +433,7 @@ TEST(test_embed_file_repeats_weights_volumes_and_metadata) {
   assert_int_equal(supine_basis_weights(inside, gravity, mine), SUPINE_OK);
   assert_int_equal(supine_basis_weights(surface, gravity, theirs), SUPINE_OK);
   assert_memory_equal(mine, theirs, sizeof mine);
+  assert_true(info->identity != 0 && info->identity == supine_basis_get_info(surface)->identity);
   assert_int_equal(posed_scale(inside, mine, 700.0, &scale[0], NULL), SUPINE_OK);
   assert_int_equal(posed_scale(surface, mine, 700.0, &scale[1], NULL), SUPINE_OK);
   assert_true(scale[0] == scale[1]);

@@ -68,6 +68,7 @@ cat "$prefix"/include/supine/*.h | grep -o '[A-Za-z0-9_./]*\.h\b' | sort -u | wh
   *) [ -f "$prefix/include/$named" ] || { echo "a header cites $named, which is not installed"; exit 1; } ;;
   esac
 done
+if grep -wn 'FILE' "$prefix"/include/supine/*.h; then echo "a header needs stdio"; exit 1; fi
 # The static library defines only names that begin with supine_.
 nm --defined-only --extern-only "$lib/libsupine_runtime.a" | awk 'NF == 3 {print $3}' >"$work/names"
 if grep -v '^supine_' "$work/names"; then exit 1; fi

@@ -13,11 +13,11 @@ fail() {
 commands=$("$supine" --help | sed -n '/^Commands:/,/^$/s/^  \([a-z]*\) .*/\1/p')
 [ "$(echo "$commands" | wc -w)" -ge 11 ] || fail "commands: $commands"
 
-# Every option of --help-all is in the manual page of its command and in the completion for zsh.
+# Every option of --help-all is in the manual page of its command and in the completion.
 for command in $commands; do
   for option in $("$supine" "$command" --help-all | grep -oE '^  (-[a-z], )?--[a-z-]+' | grep -oE -- '--.*'); do
     sed 's/\\-/-/g' "supine-$command.1" | grep -q -- "$option" || fail "supine-$command.1 lacks $option"
-    grep -A60 "^  $command)$" _supine | sed '/;;/q' | grep -q -- "$option" || fail "_supine: $command $option"
+    grep "^  $command) words=" supine.bash | grep -q -- "$option " || fail "supine.bash: $command lacks $option"
   done
   if command -v groff >/dev/null; then
     warnings=$(groff -man -Tutf8 -ww -z "supine-$command.1" 2>&1)
@@ -51,7 +51,4 @@ expect "lungs.ply" precompute -o lu
 expect "lungs.ply" precompute --fields lu
 rm -r "$PWD"
 cd "$2" || exit 1
-if command -v zsh >/dev/null; then
-  zsh -n _supine || fail "_supine is not valid in zsh"
-fi
 [ $failures -eq 0 ] || exit 1

@@ -9,10 +9,10 @@
 #include <gsl/gsl_sort.h>
 #include <lapacke.h>
 
+#include "base/vec3.h"
 #include "precompute/patient/matching.h"
 #include "precompute/patient/patient_file.h"
 #include "precompute/physics/solve.h"
-#include "sh/base/vec3.h"
 
 #include "patient_helpers.h"
 

@@ -29,14 +29,14 @@ static int teardown(void **state) {
 }
 
 /* Return the product of a projection's factors (malloc): coefficients [N, number of harmonics]. */
-static double *coefficients_of(const supine_projection *projection) {
-  const size_t terms = supine_sh_count(projection->band);
-  double *c = calloc(projection->vertex_count * terms + 1, sizeof *c);
-  for (size_t i = 0; i < projection->vertex_count; ++i) {
-    for (size_t r = 0; r < projection->rank; ++r) {
+static double *coefficients_of(const supine_expansion *expansion) {
+  const size_t terms = supine_sh_count(expansion->band);
+  double *c = calloc(expansion->row_count * terms + 1, sizeof *c);
+  for (size_t i = 0; i < expansion->row_count; ++i) {
+    for (size_t r = 0; r < expansion->rank; ++r) {
       for (size_t t = 0; t < terms; ++t) {
         c[i * terms + t] +=
-            projection->columns[i * projection->rank + r] * projection->functions[r * terms + t];
+            expansion->columns[i * expansion->rank + r] * expansion->functions[r * terms + t];
       }
     }
   }
@@ -73,7 +73,7 @@ TEST(test_projection_finer_grid_same_functions) {
     supine_sh_grid *grid = NULL;
     assert_int_equal(supine_projection_create(*state, &model, bands[b], &made, NULL), SUPINE_OK);
     assert_int_equal(supine_sh_grid_create(LATITUDES, LONGITUDES, &grid), SUPINE_OK);
-    double *fine = calloc(made.rank * terms, sizeof *fine);
+    double *fine = calloc(made.expansion.rank * terms, sizeof *fine);
     double *g = malloc(3 * LATITUDES * LONGITUDES * sizeof *g);
     double y[256];
     for (size_t d = 0; d < LATITUDES * LONGITUDES; ++d) {
@@ -83,16 +83,16 @@ TEST(test_projection_finer_grid_same_functions) {
     for (size_t d = 0; d < LATITUDES * LONGITUDES; ++d) {
       const double share = grid->weight[d / LONGITUDES] * 2.0 * M_PI / LONGITUDES;
       assert_int_equal(supine_sh_evaluate(bands[b], g + 3 * d, y), SUPINE_OK);
-      for (size_t r = 0; r < made.rank; ++r) {
+      for (size_t r = 0; r < made.expansion.rank; ++r) {
         for (size_t t = 0; t < terms; ++t) {
-          fine[r * terms + t] += share * weights[d * made.rank + r] * y[t];
+          fine[r * terms + t] += share * weights[d * made.expansion.rank + r] * y[t];
         }
       }
     }
     double missed = 0.0;
     double all = 0.0;
-    for (size_t i = 0; i < made.rank * terms; ++i) {
-      missed += pow(made.functions[i] - fine[i], 2.0);
+    for (size_t i = 0; i < made.expansion.rank * terms; ++i) {
+      missed += pow(made.expansion.functions[i] - fine[i], 2.0);
       all += pow(fine[i], 2.0);
     }
     printf("band %zu: functions differ by %.1e from those of the fine grid\n", bands[b],
@@ -124,8 +124,9 @@ static void check_superposition(const supine_lungs *lungs, const supine_model *m
     assert_int_equal(supine_physics_solve(lungs, model, g + 3 * d, &solution, NULL), SUPINE_OK);
     for (size_t i = 0; i < n; ++i) {
       double sum = 0.0;
-      for (size_t r = 0; r < made.rank; ++r) {
-        sum += made.columns[i * made.rank + r] * weights[d * made.rank + r];
+      for (size_t r = 0; r < made.expansion.rank; ++r) {
+        sum += made.expansion.columns[i * made.expansion.rank + r] *
+               weights[d * made.expansion.rank + r];
       }
       missed += pow(sum - solution.catch_[i], 2.0);
       all += pow(solution.catch_[i], 2.0);
@@ -133,8 +134,8 @@ static void check_superposition(const supine_lungs *lungs, const supine_model *m
     supine_physics_solution_free(&solution);
   }
   printf("soften %g, reach %g: %zu solves, difference from the full solve %.1e RMS\n",
-         model->force.soften, model->reach, made.rank, sqrt(missed / all));
-  assert_true(made.rank <= rank_most);
+         model->force.soften, model->reach, made.expansion.rank, sqrt(missed / all));
+  assert_true(made.expansion.rank <= rank_most);
   assert_true(sqrt(missed / all) < most);
   supine_projection_free(&made);
   free(weights);
@@ -188,10 +189,10 @@ TEST(test_projection_impossible_softening_refused) {
 
 /* Compare the modes' singular values, error and functions of gravity with a dense SVD. Decompose
  * the matrix of the projection's coefficients, with row i multiplied by sqrt(weight[i]). */
-static void check_modes(const supine_projection *projection, const double *weight, size_t most) {
-  const size_t n = projection->vertex_count;
-  const size_t terms = supine_sh_count(projection->band);
-  double *c = coefficients_of(projection);
+static void check_modes(const supine_expansion *expansion, const double *weight, size_t most) {
+  const size_t n = expansion->row_count;
+  const size_t terms = supine_sh_count(expansion->band);
+  double *c = coefficients_of(expansion);
   gsl_matrix *u = gsl_matrix_alloc(n, terms);
   gsl_matrix *v = gsl_matrix_alloc(terms, terms);
   gsl_vector *s = gsl_vector_alloc(terms);
@@ -207,8 +208,7 @@ static void check_modes(const supine_projection *projection, const double *weigh
   double singular[SUPINE_MODES_MADE_MAX] = {0.0};
   double total;
   assert_int_equal(
-      supine_projection_compress_modes(projection, weight, most, &modes, singular, &total, NULL),
-      SUPINE_OK);
+      supine_sh_compress_modes(expansion, weight, most, &modes, singular, &total, NULL), SUPINE_OK);
   assert_close(total, energy, 1e-12 * energy);
   double tail = 0.0;
   for (size_t k = 0; k < terms; ++k) {
@@ -241,7 +241,7 @@ static void check_modes(const supine_projection *projection, const double *weigh
       assert_close(dot, a == b ? 1.0 : 0.0, 1e-6);
     }
   }
-  supine_projection_compression_free(&modes);
+  supine_sh_compression_free(&modes);
   gsl_matrix_free(u);
   gsl_matrix_free(v);
   gsl_vector_free(s);
@@ -258,14 +258,14 @@ TEST(test_modes_equal_dense_decomposition) {
   supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_projection projection;
   assert_int_equal(supine_projection_create(lungs, &model, 5, &projection, NULL), SUPINE_OK);
-  check_modes(&projection, weight, 3);
-  check_modes(&projection, weight, 16);
+  check_modes(&projection.expansion, weight, 3);
+  check_modes(&projection.expansion, weight, 16);
   supine_projection_free(&projection);
   model.force.soften = 1.0;
   model.reach = 10.0;
   assert_int_equal(supine_projection_create(lungs, &model, 5, &projection, NULL), SUPINE_OK);
-  check_modes(&projection, weight, 7);
-  check_modes(&projection, weight, 16);
+  check_modes(&projection.expansion, weight, 7);
+  check_modes(&projection.expansion, weight, 16);
   supine_projection_free(&projection);
   free(weight);
 }
@@ -281,18 +281,17 @@ TEST(test_modes_below_rounding_dropped) {
     columns[(t + 2) * TERMS + t] = sizes[t];
     functions[t * TERMS + t] = 1.0;
   }
-  const supine_projection projection = {
-      .vertex_count = ROWS, .band = 1, .rank = TERMS, .columns = columns, .functions = functions};
+  const supine_expansion expansion = {
+      .row_count = ROWS, .band = 1, .rank = TERMS, .columns = columns, .functions = functions};
   supine_compression modes;
   double singular[TERMS];
-  assert_int_equal(
-      supine_projection_compress_modes(&projection, NULL, TERMS, &modes, singular, NULL, NULL),
-      SUPINE_OK);
+  assert_int_equal(supine_sh_compress_modes(&expansion, NULL, TERMS, &modes, singular, NULL, NULL),
+                   SUPINE_OK);
   assert_int_equal(modes.mode_count, 3);
   assert_close(singular[2], 6e-7, 1e-9);
   assert_close(singular[3], 0.0, 0.0);
   assert_close(fabs(modes.modes[2 * TERMS + 2]), 1.0, 1e-3);
-  supine_projection_compression_free(&modes);
+  supine_sh_compression_free(&modes);
 }
 
 /* A percentile is the upper edge of its bin. From 2^k to 2^(k + 1), bins are 2^k / 256 wide. */

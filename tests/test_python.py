@@ -19,8 +19,8 @@ for wanted in ("pip", "setuptools", "wheel", "numpy"):
 
 with tempfile.TemporaryDirectory() as folder:
     # The user's own Python modules must not replace Debian's.
-    clean = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "PIP_"))}
-    clean.update(SUPINE_LIBRARY=library, HOME=folder, PIP_CONFIG_FILE=os.devnull, PIP_NO_CACHE_DIR="1",
+    clean = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "PIP_", "SUPINE_"))}
+    clean.update(HOME=folder, PIP_CONFIG_FILE=os.devnull, PIP_NO_CACHE_DIR="1",
                  PIP_DISABLE_PIP_VERSION_CHECK="1", PIP_NO_INDEX="1", LD_LIBRARY_PATH=os.path.dirname(library),
                  PATH=os.path.dirname(supine) + os.pathsep + os.environ["PATH"])
 
@@ -31,7 +31,7 @@ with tempfile.TemporaryDirectory() as folder:
         return done.stdout
 
     # Build in a copy of the sources, as the build leaves files beside them.
-    for name in ("CMakeLists.txt", "sh", "runtime"):
+    for name in ("CMakeLists.txt", "base", "runtime"):
         path = os.path.join(source, name)
         target = os.path.join(folder, "source", name)
         if os.path.isdir(path):
@@ -39,8 +39,10 @@ with tempfile.TemporaryDirectory() as folder:
         else:
             os.makedirs(os.path.dirname(target))
             shutil.copy(path, target)
-    run(sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-build-isolation", "--wheel-dir", "wheels",
-        "source/runtime/python")
+    # Build as runtime/python/README.md says.
+    with open(f"{source}/runtime/python/README.md", encoding="utf-8") as readme:
+        command = re.search(r"^    python3 (-m pip wheel .*? runtime/python) ", readme.read(), re.M)[1]
+    run(sys.executable, *command.replace("runtime/python", "source/runtime/python").split(), "--wheel-dir", "wheels")
     wheel, = os.listdir(os.path.join(folder, "wheels"))
     # The platform tag states the newest version of glibc that the symbols of the library need.
     wanted = re.findall(r"GLIBC_2\.(\d+)", run("objdump", "-T", library))
@@ -52,11 +54,13 @@ with tempfile.TemporaryDirectory() as folder:
     run(sys.executable, "-m", "venv", "--without-pip", "--system-site-packages", "clean")
     python = os.path.join(folder, "clean/bin/python")
     run(sys.executable, "-m", "pip", "--python", python, "install", os.path.join("wheels", wheel))
+    run(f"{source}/tests/test_search_path.sh", "clean/lib")
 
     run(cc, "-std=c17", "-O2", "-Wall", "-Wextra", "-Werror", f"-I{source}/runtime/include",
         f"{source}/tests/python/reference.c", library, "-lm", "-o", "reference")
     run(supine, "phantom", "-o", "lungs.ply", "--vertices", "5000")
     run(supine, "precompute", "lungs.ply", "-o", "lungs.safetensors", "--band", "3")
+    run(supine, "precompute", "lungs.ply", "-o", "other.safetensors", "--band", "2")
     run(supine, "embed", "lungs.safetensors", "--grid", "12", "-o", "grid.safetensors")
     print(wheel, run(python, f"{source}/tests/python/inside.py", "./reference", "lungs.safetensors"))
 

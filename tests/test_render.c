@@ -2,7 +2,7 @@
 /* Test pictures: views, colours, colour bars and drawings. */
 #include "test.h"
 
-#include "program/render/render.h"
+#include "program/view/render/render.h"
 #include "runtime_fixture.h"
 
 #include "tests/poses.h"

@@ -5,8 +5,6 @@
 #include <supine/runtime.h>
 #include <supine/safetensors.h>
 
-#include "precompute/writer.h"
-
 #include "runtime_fixture.h"
 
 #include "tests/poses.h"
@@ -270,8 +268,8 @@ static supine_status open_parts(const parts *p) {
   char *folder = fixture_folder();
   char path[128];
   (void)snprintf(path, sizeof path, "%s/a", folder);
-  assert_int_equal(supine_writer_safetensors_write(path, p->tensors, p->tensor_count, p->metadata,
-                                                   p->metadata_count, NULL),
+  assert_int_equal(supine_safetensors_write(path, p->tensors, p->tensor_count, p->metadata,
+                                            p->metadata_count, NULL),
                    SUPINE_OK);
   supine_basis *basis = NULL;
   supine_error error = {0};

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Test templates: names, sections, included files, escapes. */
-#include "program/export/template.h"
+#include "program/view/export/template.h"
 #include "test.h"
 
 static void write_large(const void *context, const char *name, FILE *file) {

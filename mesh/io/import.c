@@ -16,8 +16,8 @@
 #include <assimp/config.h>
 #include <assimp/scene.h>
 
+#include "base/library.h"
 #include "mesh/io/read.h"
-#include "sh/base/library.h"
 
 /* clang-format off */
 #define FUNCTIONS(EACH)                                                                            \

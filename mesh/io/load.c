@@ -8,7 +8,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-#include "sh/base/text.h"
+#include "base/text.h"
 
 #include "mesh/io/read.h"
 

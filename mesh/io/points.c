@@ -7,8 +7,8 @@
 
 #include <jansson.h>
 
-#include "sh/base/csv.h"
-#include "sh/base/text.h"
+#include "base/csv.h"
+#include "base/text.h"
 
 #include "mesh/io/points.h"
 

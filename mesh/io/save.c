@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Save a surface in the format of the name's ending. */
-#include "sh/base/output.h"
-#include "sh/base/text.h"
+#include "base/output.h"
+#include "base/text.h"
 
 #include "mesh/io/save.h"
 

@@ -6,8 +6,8 @@
 
 #include <libdeflate.h>
 
-#include "sh/base/output.h"
-#include "sh/base/parallel.h"
+#include "base/output.h"
+#include "base/parallel.h"
 
 #include "mesh/io/save.h"
 

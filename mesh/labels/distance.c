@@ -5,8 +5,8 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "base/parallel.h"
 #include "mesh/labels/mask.h"
-#include "sh/base/parallel.h"
 
 static const float far_away = 1e30F; /* stands for an infinite squared distance, mm^2 */
 

@@ -6,9 +6,9 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "sh/base/clones.h"
-#include "sh/base/parallel.h"
-#include "sh/base/vec3.h"
+#include "base/clones.h"
+#include "base/parallel.h"
+#include "base/vec3.h"
 
 #include "precompute/inside/biharmonic.h"
 

@@ -3,7 +3,7 @@
 #ifndef SUPINE_INSIDE_CONTENT_H
 #define SUPINE_INSIDE_CONTENT_H
 
-#include "mesh/io/image.h"
+#include "mesh/image/image.h"
 #include "precompute/inside/shells.h"
 
 /** Points inside the lungs, some of which may be corners of triangles. Each named point and each
@@ -56,6 +56,12 @@ supine_status supine_inside_content_make_rigid(supine_inside_content *content, c
 supine_status supine_inside_content_grid(const supine_inside_shells *shells,
                                          const supine_image *like, double spacing, double margin,
                                          supine_inside_content *content, supine_error *error);
+
+/** Check that every part has a name of its own.
+ * @retval SUPINE_ERROR_FORMAT  two parts have the same name
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_inside_content_check_names(const supine_inside_content *content,
+                                                supine_error *error);
 
 void supine_inside_content_free(supine_inside_content *content);
 

@@ -3,8 +3,8 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "sh/base/parallel.h"
-#include "sh/base/vec3.h"
+#include "base/parallel.h"
+#include "base/vec3.h"
 
 #include "precompute/inside/content.h"
 

@@ -5,9 +5,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "precompute/writer.h"
+#include <supine/safetensors.h>
+
+#include "base/parallel.h"
 #include "runtime/rigid.h"
-#include "sh/base/parallel.h"
 
 #include "precompute/inside/biharmonic.h"
 #include "precompute/inside/embed.h"
@@ -290,7 +291,7 @@ static supine_status write_file(const embedding *e, const char *path, supine_ten
   metadata[count++] = (supine_metadata){
       "made_by", e->options->made_by != NULL ? e->options->made_by : "supine_inside_embed"};
   const supine_status status =
-      supine_writer_safetensors_write(path, tensors, tensor_count, metadata, count, error);
+      supine_safetensors_write(path, tensors, tensor_count, metadata, count, error);
   free(metadata);
   return status;
 }

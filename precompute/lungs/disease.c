@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "sh/base/vec3.h"
+#include "base/vec3.h"
 
 #include "precompute/lungs/disease.h"
 

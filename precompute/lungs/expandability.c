@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sh/base/csv.h"
+#include "base/csv.h"
 
 #include "precompute/lungs/expandability.h"
 

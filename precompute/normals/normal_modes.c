@@ -5,14 +5,14 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/clones.h"
+#include "base/lapack.h"
+#include "base/parallel.h"
 #include "precompute/normals/polynomial.h"
 #include "precompute/projection/projection.h"
 #include "precompute/projection/tally.h"
 #include "runtime/kernels/compact.h"
 #include "runtime/kernels/tiles.h"
-#include "sh/base/clones.h"
-#include "sh/base/lapack.h"
-#include "sh/base/parallel.h"
 
 enum {
   ROWS = 4096,    /* modes are found from at most this many vertices of a lung */
@@ -108,7 +108,7 @@ static supine_status choose_snapshots(size_t s, double *product, fit *made,
   cblas_dsyrk(CblasColMajor, CblasLower, CblasTrans, (int)r, (int)s, 1.0, product, (int)s, 0.0,
               gram, (int)r);
   const supine_status status =
-      supine_projection_leading_eigenpairs(r, gram, made->count, values, coefficients);
+      supine_sh_leading_eigenpairs(r, gram, made->count, values, coefficients);
   cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasTrans, CblasNonUnit, (int)r,
               (int)made->count, 1.0, product, (int)s, coefficients, (int)r);
   return status;

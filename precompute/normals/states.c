@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "sh/base/vec3.h"
+#include "base/vec3.h"
 #include <supine/sh.h>
 #include <supine/volume.h>
 
@@ -95,7 +95,7 @@ supine_status supine_normals_states_create(const supine_normals_surface *surface
     double gains[SUPINE_LUNGS_MAX][3];
     double amount = 0.0;
     (void)supine_sh_evaluate(2, g, low);
-    supine_projection_compression_weights(surface->field, g, w);
+    supine_sh_compression_weights(surface->field, g, w);
     if (surface->resting != NULL ? gains_from_rest(surface, low, w, share, gains, &amount)
                                  : common_gain(surface, w, share, gains, &amount)) {
       for (size_t lung = 0; lung < surface->lung_count; ++lung) {

@@ -9,7 +9,7 @@
 
 #include "precompute/patient/matching.h"
 
-#include "sh/base/vec3.h"
+#include "base/vec3.h"
 
 enum { COLUMNS = SUPINE_PATIENT_COLUMNS, HEIGHT = COLUMNS, FORCE, ALL };
 

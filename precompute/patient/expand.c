@@ -7,7 +7,7 @@
 
 #include "precompute/patient/matching.h"
 
-#include "sh/base/vec3.h"
+#include "base/vec3.h"
 
 /* Largest distance from a vertex to the nearest centre of a region, mm. */
 static const double centre_distance_most = 35.0;

@@ -8,8 +8,8 @@
 #include <cblas.h>
 #include <lapacke.h>
 
+#include "base/vec3.h"
 #include "precompute/patient/matching.h"
-#include "sh/base/vec3.h"
 
 /* A fitted gain (increase of the force from top to bottom) outside this range is ignored. */
 static const double gain_least = 0.01, gain_most = 2.0;

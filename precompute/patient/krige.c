@@ -9,12 +9,13 @@
 
 #include "precompute/patient/krige.h"
 
-#include "sh/base/vec3.h"
+#include "base/vec3.h"
 
 enum {
   TERMS = SUPINE_PATIENT_TERMS,
-  MOTION = SUPINE_PATIENT_CONSTANTS, /* index of the first unknown of the body's motion */
-  SCALE = TERMS - 1, /* index of the unknown that multiplies the whole displacement law */
+  MOTION =
+      SUPINE_PATIENT_BY_TRANSLATION, /* first unknown of the body's motion; its rotation follows */
+  SCALE = SUPINE_PATIENT_BY_SCALE,
   TERMS_MAX = TERMS + SUPINE_PATIENT_REGIONS_MAX,
   STEPS = 60
 };

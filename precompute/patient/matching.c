@@ -9,9 +9,9 @@
 
 #include "precompute/patient/matching.h"
 
+#include "base/parallel.h"
+#include "base/vec3.h"
 #include "precompute/physics/solve.h"
-#include "sh/base/parallel.h"
-#include "sh/base/vec3.h"
 
 enum { GRAIN = 64 };
 

@@ -8,9 +8,9 @@
 
 #include "precompute/patient/pairs.h"
 
+#include "base/csv.h"
+#include "base/vec3.h"
 #include "runtime/rigid.h"
-#include "sh/base/csv.h"
-#include "sh/base/vec3.h"
 
 enum {
   COLUMNS = 12,

@@ -5,10 +5,10 @@
 
 #include "precompute/patient/patient.h"
 
+#include "base/clones.h"
+#include "base/vec3.h"
 #include "precompute/physics/model.h"
 #include "runtime/kriging.h"
-#include "sh/base/clones.h"
-#include "sh/base/vec3.h"
 
 const char *const supine_patient_law_names[SUPINE_PATIENT_LAW_COUNT + 1] = {"deep", "paper", NULL};
 

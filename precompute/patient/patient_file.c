@@ -9,7 +9,7 @@
 
 #include "precompute/patient/patient_file.h"
 
-#include "sh/base/output.h"
+#include "base/output.h"
 
 static const char format[] = "supine-patient";
 enum {

@@ -7,10 +7,10 @@
 
 #include <suitesparse/cholmod.h>
 
+#include "base/library.h"
+#include "base/parallel.h"
+#include "base/vec3.h"
 #include "precompute/physics/equilibrium.h"
-#include "sh/base/library.h"
-#include "sh/base/parallel.h"
-#include "sh/base/vec3.h"
 
 /* clang-format off */
 #define FUNCTIONS(EACH)                                                                            \

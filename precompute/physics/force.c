@@ -4,8 +4,8 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "sh/base/parallel.h"
-#include "sh/base/vec3.h"
+#include "base/parallel.h"
+#include "base/vec3.h"
 
 #include "precompute/physics/force.h"
 

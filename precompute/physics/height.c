@@ -6,9 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/clones.h"
+#include "base/parallel.h"
 #include "precompute/physics/force.h"
-#include "sh/base/clones.h"
-#include "sh/base/parallel.h"
 
 /* BLOCK consecutive vertices form a block. The search skips blocks whose bounding boxes cannot
  * contain a new greatest height. It handles LANES directions together. */

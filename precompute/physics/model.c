@@ -2,8 +2,8 @@
 /* Return the constants of a displacement law, and set up the equilibrium of forces with them. */
 #include <math.h>
 
+#include "base/vec3.h"
 #include "precompute/physics/model.h"
-#include "sh/base/vec3.h"
 
 #define LIST(...)                                                                                  \
   { __VA_ARGS__ }

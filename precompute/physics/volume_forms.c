@@ -4,10 +4,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/clones.h"
+#include "base/parallel.h"
+#include "base/vec3.h"
 #include "precompute/physics/volume_forms.h"
-#include "sh/base/clones.h"
-#include "sh/base/parallel.h"
-#include "sh/base/vec3.h"
 
 /* The triangles of each lung are split into PARTS ranges, which are summed separately, BLOCK
  * triangles at a time. The number of ranges is fixed, so that the sums do not depend on the number

@@ -20,9 +20,6 @@
 
 #include "precompute/lungs/lungs.h"
 
-/** Largest number of modes that 'supine precompute' writes to a basis. */
-enum { SUPINE_MODES_MADE_MAX = 64 };
-
 /** Coefficients of each lung's change of volume, a polynomial of the weights of modes and of the
  * lung's gains (factors of its displacement along x, y and z). They are symmetric in the modes. */
 typedef struct supine_volume_forms {

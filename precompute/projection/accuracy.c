@@ -6,10 +6,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/clones.h"
+#include "base/parallel.h"
+#include "base/vec3.h"
 #include "precompute/projection/accuracy.h"
-#include "sh/base/clones.h"
-#include "sh/base/parallel.h"
-#include "sh/base/vec3.h"
 #include <supine/sh.h>
 #include <supine/volume.h>
 
@@ -82,7 +82,7 @@ static void compare_block(const accuracy_work *work, size_t begin, size_t n, dou
 
 static void compare_range(void *context, size_t begin, size_t end, size_t thread) {
   const accuracy_work *work = context;
-  const size_t n = work->compression->vertex_count;
+  const size_t n = work->compression->row_count;
   const size_t room = BLOCK * (work->compression->mode_count + 2 * work->truth->direction_count);
   for (size_t part = begin; part < end; ++part) {
     const size_t last = n * (part + 1) / PARTS;
@@ -136,7 +136,7 @@ static double find_fraction(const accuracy_work *work, const supine_volume_forms
 
 static void conclude(const accuracy_work *work, supine_accuracy *made) {
   const double samples =
-      (double)work->compression->vertex_count * (double)work->truth->direction_count;
+      (double)work->compression->row_count * (double)work->truth->direction_count;
   tally *all = &work->tallies[0];
   for (size_t t = 1; t < PARTS; ++t) {
     all->square_sum_mm2 += work->tallies[t].square_sum_mm2;
@@ -175,7 +175,7 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
   for (size_t d = 0; d < count; ++d) {
     const double *g = truth->directions + 3 * d;
     volumes[d] = volume_along(volume, g);
-    supine_projection_compression_weights(compression, g, weights + d * modes);
+    supine_sh_compression_weights(compression, g, weights + d * modes);
   }
   accuracy->volume = find_fraction(&work, forms, volumes, gains);
   if (accuracy->volume == 0.0) {
@@ -219,12 +219,12 @@ supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const doubl
     double cubic[3];
     double scale = 0.0;
     g[posture / 2] = posture % 2 == 0 ? 1.0 : -1.0;
-    supine_projection_compression_weights(compression, g, weights);
+    supine_sh_compression_weights(compression, g, weights);
     supine_physics_volume_forms_contract(forms, weights, cubic);
     if (supine_volume_scale(cubic, volume_along(volume, g), &scale, NULL) != SUPINE_OK) {
       continue;
     }
-    supine_projection_compression_field(compression, weights, amounts);
+    supine_sh_compression_field(compression, weights, amounts);
     for (size_t i = 0; i < 3 * n; ++i) {
       moved[i] = mesh->vertices[i] + scale * amounts[i / 3] * directions[i];
     }

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sh/base/vec3.h"
+#include "base/vec3.h"
 #include <supine/sh.h>
 
 #include "precompute/projection/accuracy.h"
@@ -48,8 +48,8 @@ supine_status supine_accuracy_error_table_create(const supine_truth *truth,
                                                  const supine_compression *compression,
                                                  const double *directions,
                                                  supine_error_table *table) {
-  const size_t rank = projection->rank;
-  const size_t bands = projection->band + 1;
+  const size_t rank = projection->expansion.rank;
+  const size_t bands = projection->expansion.band + 1;
   const size_t terms = bands * bands;
   const size_t modes = compression->mode_count;
   double weights[SUPINE_MODES_MADE_MAX];
@@ -61,15 +61,16 @@ supine_status supine_accuracy_error_table_create(const supine_truth *truth,
   if (gram == NULL) {
     return SUPINE_ERROR_MEMORY;
   }
-  find_gram(truth, compression->vertex_count, directions, gram);
+  find_gram(truth, compression->row_count, directions, gram);
   for (size_t d = 0; d < truth->direction_count; ++d) {
     const double *functions = truth->functions + d * rank;
-    (void)supine_sh_evaluate(projection->band, truth->directions + 3 * d, y);
-    supine_projection_compression_weights(compression, truth->directions + 3 * d, weights);
+    (void)supine_sh_evaluate(projection->expansion.band, truth->directions + 3 * d, y);
+    supine_sh_compression_weights(compression, truth->directions + 3 * d, weights);
     all += square_of(gram, rank, functions);
     memcpy(residual, functions, rank * sizeof *residual);
     for (size_t l = 0; l < bands; ++l) {
-      subtract(projection->functions + l * l, terms, 2 * l + 1, y + l * l, rank, residual);
+      subtract(projection->expansion.functions + l * l, terms, 2 * l + 1, y + l * l, rank,
+               residual);
       table->harmonics[l] += square_of(gram, rank, residual);
     }
     memcpy(residual, functions, rank * sizeof *residual);

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sh/base/vec3.h"
+#include "base/vec3.h"
 
 #include "precompute/projection/accuracy.h"
 
@@ -64,12 +64,12 @@ supine_status supine_accuracy_truth_create(const supine_lungs *lungs, const supi
                                            const double *directions,
                                            const supine_projection *projection, size_t count,
                                            supine_truth *truth, supine_error *error) {
-  const size_t rank = projection->rank;
+  const size_t rank = projection->expansion.rank;
   double *range = malloc(2 * count * sizeof *range);
   *truth = (supine_truth){.direction_count = count,
                           .directions = malloc(3 * count * sizeof(double)),
                           .rank = rank,
-                          .columns = projection->columns,
+                          .columns = projection->expansion.columns,
                           .functions = malloc(count * rank * sizeof(double)),
                           .cubic = malloc(3 * count * sizeof(double))};
   supine_status status = SUPINE_ERROR_MEMORY;

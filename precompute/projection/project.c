@@ -5,18 +5,11 @@
 #include <string.h>
 
 #include "precompute/projection/projection.h"
-#include "sh/transform.h"
 #include <supine/sh.h>
-
-/* The weights, as functions of the direction of gravity, have kinks where another vertex becomes
- * the lowest or highest. With 8 latitudes for each degree of the harmonics, these kinks hardly
- * alias. */
-enum { LATITUDES_PER_BAND = 8, LATITUDES_MIN = 32 };
 
 void supine_projection_free(supine_projection *projection) {
   free(projection->span);
-  free(projection->columns);
-  free(projection->functions);
+  supine_sh_expansion_free(&projection->expansion);
   *projection = (supine_projection){0};
 }
 
@@ -45,39 +38,36 @@ static supine_status find_heights(const supine_lungs *lungs, bool pair, const su
   return status;
 }
 
-/* Expand the weights w_r(g) of span.h, which depend on the direction g of gravity, in spherical
- * harmonics of g. Write the coefficients to functions [span->rank, (band + 1)^2]. */
-static supine_status transform(const supine_lungs *lungs, const supine_force_law *law, size_t band,
-                               const supine_span *span, double *functions, supine_error *error) {
-  const size_t least = LATITUDES_PER_BAND * (band + 1);
-  const size_t latitudes = least < LATITUDES_MIN ? LATITUDES_MIN : least;
-  const size_t count = 2 * latitudes * latitudes;
+/* Expand the weights w_r(g) of span.h, which depend on the direction g of gravity and have kinks
+ * where another vertex becomes the lowest or highest, in spherical harmonics of g. Write the
+ * coefficients to functions [span->rank, (band + 1)^2]. */
+static supine_status expand(const supine_lungs *lungs, const supine_force_law *law, size_t band,
+                            const supine_span *span, double *functions, supine_error *error) {
   supine_sh_grid *grid = NULL;
-  supine_sh_transform *plan = NULL;
-  grid_heights heights = {malloc(3 * count * sizeof(double)), malloc(count * sizeof(double)),
-                          malloc(count * sizeof(double))};
-  double *weights = malloc(count * span->rank * sizeof *weights);
-  supine_status status = supine_sh_grid_create(latitudes, 2 * latitudes, &grid);
+  grid_heights heights = {0};
+  double *weights = NULL;
+  supine_status status = supine_sh_expansion_grid(band, &grid);
   if (status == SUPINE_OK) {
-    status = supine_sh_transform_create(band, grid, span->rank, &plan, error);
-  }
-  if (status == SUPINE_OK && (heights.directions == NULL || heights.minimum == NULL ||
-                              heights.maximum == NULL || weights == NULL)) {
-    status = SUPINE_ERROR_MEMORY;
+    const size_t count = grid->latitudes * grid->longitudes;
+    heights = (grid_heights){malloc(3 * count * sizeof(double)), malloc(count * sizeof(double)),
+                             malloc(count * sizeof(double))};
+    weights = malloc(count * span->rank * sizeof *weights);
+    if (heights.directions == NULL || heights.minimum == NULL || heights.maximum == NULL ||
+        weights == NULL) {
+      status = SUPINE_ERROR_MEMORY;
+    }
   }
   if (status == SUPINE_OK) {
     status = find_heights(lungs, law->pair, grid, &heights);
   }
   if (status == SUPINE_OK) {
-    const supine_gravities gravities = {count, heights.directions, heights.minimum,
-                                        heights.maximum};
+    const supine_gravities gravities = {grid->latitudes * grid->longitudes, heights.directions,
+                                        heights.minimum, heights.maximum};
     status = supine_projection_span_weights(lungs, law, span, &gravities, weights);
   }
-  memset(functions, 0, span->rank * supine_sh_count(band) * sizeof *functions);
-  for (size_t j = 0; j < latitudes && status == SUPINE_OK; ++j) {
-    supine_sh_transform_ring(plan, j, weights + j * 2 * latitudes * span->rank, functions);
+  if (status == SUPINE_OK) {
+    status = supine_sh_expand(band, grid, span->rank, weights, functions, NULL);
   }
-  supine_sh_transform_destroy(plan);
   supine_sh_grid_destroy(grid);
   free(heights.directions);
   free(heights.minimum);
@@ -88,11 +78,11 @@ static supine_status transform(const supine_lungs *lungs, const supine_force_law
                                                 supine_status_string(status));
 }
 
-/* Solve the physical model for each direction of gravity of made->span, into made->columns. */
+/* Solve the physical model for each direction of gravity of made->span, into the columns. */
 static supine_status solve(const supine_lungs *lungs, const supine_model *model,
                            supine_projection *made, supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
-  const size_t rank = made->rank;
+  const size_t rank = made->expansion.rank;
   double range[2 * SUPINE_SPAN_MAX];
   const supine_gravities gravities = {rank, made->span->directions, range, range + rank};
   supine_equilibrium *equilibrium = NULL;
@@ -102,9 +92,9 @@ static supine_status solve(const supine_lungs *lungs, const supine_model *model,
   }
   supine_status status = supine_physics_model_equilibrium(lungs, model, &equilibrium, error);
   if (status == SUPINE_OK) {
-    supine_physics_force(lungs, &model->force, &gravities, n, NULL, made->columns);
-    status =
-        supine_physics_equilibrium_solve(equilibrium, rank, made->columns, made->columns, error);
+    supine_physics_force(lungs, &model->force, &gravities, n, NULL, made->expansion.columns);
+    status = supine_physics_equilibrium_solve(equilibrium, rank, made->expansion.columns,
+                                              made->expansion.columns, error);
   }
   supine_physics_equilibrium_destroy(equilibrium);
   return status;
@@ -114,7 +104,8 @@ supine_status supine_projection_create(const supine_lungs *lungs, const supine_m
                                        size_t band, supine_projection *projection,
                                        supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
-  supine_projection made = {.vertex_count = n, .band = band};
+  supine_projection made = {.expansion = {.row_count = n, .band = band}};
+  supine_expansion *expansion = &made.expansion;
   if (band > SUPINE_SH_BAND_MAX) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "band %zu: give at most %d", band,
                             SUPINE_SH_BAND_MAX);
@@ -124,13 +115,14 @@ supine_status supine_projection_create(const supine_lungs *lungs, const supine_m
       made.span == NULL ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the forces")
                         : supine_projection_span_create(lungs, &model->force, made.span, error);
   if (status == SUPINE_OK) {
-    made.rank = made.span->rank;
-    made.columns = malloc(n * made.rank * sizeof *made.columns);
-    made.functions = malloc(made.rank * supine_sh_count(band) * sizeof *made.functions);
+    expansion->rank = made.span->rank;
+    expansion->columns = malloc(n * expansion->rank * sizeof *expansion->columns);
+    expansion->functions =
+        malloc(expansion->rank * supine_sh_count(band) * sizeof *expansion->functions);
     status =
-        made.columns == NULL || made.functions == NULL
+        expansion->columns == NULL || expansion->functions == NULL
             ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to solve %zu vertices", n)
-            : transform(lungs, &model->force, band, made.span, made.functions, error);
+            : expand(lungs, &model->force, band, made.span, expansion->functions, error);
   }
   if (status == SUPINE_OK) {
     status = solve(lungs, model, &made, error);
@@ -140,5 +132,25 @@ supine_status supine_projection_create(const supine_lungs *lungs, const supine_m
     made = (supine_projection){0};
   }
   supine_projection_free(&made);
+  return status;
+}
+
+supine_status supine_projection_volume_forms(const supine_compression *compression,
+                                             const supine_lungs *lungs, const double *share,
+                                             const double *directions, supine_volume_forms *forms,
+                                             supine_error *error) {
+  const size_t count = compression->mode_count;
+  const size_t values = compression->row_count * count;
+  double *columns = malloc(values * sizeof *columns);
+  if (columns == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY,
+                            "no memory for volume coefficients of %zu modes", count);
+  }
+  for (size_t i = 0; i < values; ++i) {
+    columns[i] = (double)compression->coefficients[i];
+  }
+  const supine_status status =
+      supine_physics_volume_forms_create(lungs, share, directions, columns, count, forms, error);
+  free(columns);
   return status;
 }

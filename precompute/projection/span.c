@@ -5,9 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/lapack.h"
+#include "base/vec3.h"
 #include "precompute/projection/span.h"
-#include "sh/base/lapack.h"
-#include "sh/base/vec3.h"
 
 /* The cross approximation (span.h) examines at most VERTICES vertices in DIRECTIONS directions of
  * gravity. */

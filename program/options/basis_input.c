@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sh/base/text.h"
+#include "base/text.h"
 
 #include "program/options/basis_input.h"
 
@@ -55,9 +55,9 @@ void supine_options_basis_title(const char *path, char *title, size_t size) {
 }
 
 double supine_options_basis_volume(const supine_basis *basis, const supine_pose *pose) {
-  double volumes[SUPINE_LUNGS_MAX];
+  double volumes[SUPINE_LUNGS_MAX] = {0.0};
   double sum = 0.0;
-  supine_basis_volumes(basis, pose, volumes);
+  (void)supine_basis_volumes(basis, pose, volumes);
   for (size_t lung = 0; lung < supine_basis_get_info(basis)->lung_count; ++lung) {
     sum += volumes[lung];
   }
@@ -77,7 +77,7 @@ double *supine_options_basis_positions(const supine_basis *basis, const supine_p
   float *xyz = malloc(3 * supine_basis_get_info(basis)->vertex_count * sizeof *xyz);
   double *positions = NULL;
   if (xyz != NULL) {
-    supine_deform(basis, pose, xyz);
+    (void)supine_deform(basis, pose, xyz);
     positions = to_doubles(basis, xyz);
   }
   free(xyz);

@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "sh/base/vec3.h"
+#include "base/vec3.h"
 
 #include "program/options/breath_turn.h"
 #include "program/options/state_options.h"

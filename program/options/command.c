@@ -12,9 +12,9 @@
 
 #include <supine/version.h>
 
-#include "sh/base/clock.h"
-#include "sh/base/output.h"
-#include "sh/base/text.h"
+#include "base/clock.h"
+#include "base/output.h"
+#include "base/text.h"
 
 #include "program/options/command.h"
 #include "runtime/words.h"

@@ -5,7 +5,7 @@
 
 #include <jansson.h>
 
-#include "sh/base/text.h"
+#include "base/text.h"
 
 #include "program/options/command.h"
 

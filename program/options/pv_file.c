@@ -6,7 +6,7 @@
 
 #include <jansson.h>
 
-#include "sh/base/csv.h"
+#include "base/csv.h"
 
 #include "program/options/pv.h"
 

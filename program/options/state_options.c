@@ -112,8 +112,9 @@ static supine_status read_from(const char *text, void *field, supine_error *erro
 
 const supine_option supine_options_folds[] = {
     {"allow-folds", 0, NULL,
-     "allow volumes below 10 % or above 120 % of full inflation, and surfaces with more than 1 % "
-     "of their triangles turned over",
+     "allow volumes below 10 % or above 120 % of full inflation, surfaces with more than 1 % of "
+     "their triangles turned over, and fields that fold in more than 1 % as many cells as are "
+     "inside the lungs",
      .kind = SUPINE_OPTION_FLAG, .size = sizeof(bool)},
     {.name = NULL}};
 
@@ -121,8 +122,8 @@ const supine_option supine_options_volume[] = {
     {"volume", 0, "VOLUME",
      SUPINE_VOLUME_HELP
      "\nleft=VOLUME,right=VOLUME: a volume for each lung; name every lung\nDefault rest; for a "
-     "basis made by 'supine precompute' with --scanned none or --law paper, scan+500; for one made "
-     "with its option --fields, the given displacements, unscaled",
+     "basis made by 'supine precompute' with --scanned none or --law paper, scan+500. A basis "
+     "made with --fields has no volumes",
      SUPINE_FILLS(supine_volume_options, state), .read = supine_options_read_volume,
      .rivals = "breath"},
     {.table = supine_options_folds, SUPINE_FILLS(supine_volume_options, allow_folds)},
@@ -166,6 +167,9 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
   if (status != SUPINE_OK) {
     return supine_error_set(error, status, "%s%s", from->given ? "--from: " : "", inner.message);
   }
+  if (state.lung_count == 0 && state.volume.kind == SUPINE_VOLUME_DEFAULT) {
+    state.volume = supine_basis_default_volume(basis); /* the name states the volume */
+  }
   if (scan) {
     (void)snprintf(reference->name, sizeof reference->name, "the scan");
   } else {
@@ -191,40 +195,49 @@ static double turned_over(const supine_basis *basis, const supine_pose *pose) {
   return turned;
 }
 
-supine_status supine_options_pose_check(const supine_basis *basis, const char *command,
-                                        bool allow_folds, const supine_pose *pose,
-                                        supine_error *error) {
-  const supine_basis_info *info = supine_basis_get_info(basis);
-  const double volume = supine_options_basis_volume(basis, pose);
-  double full = 0.0;
-  char wrong[192] = "";
-  for (size_t lung = 0; lung < info->lung_count; ++lung) {
-    full += info->reference_volume[lung];
-  }
-  const double share = volume / full;
-  if (info->has_rest && !(share >= least_of_full && share <= most_of_full)) {
+supine_status supine_options_plausible(const supine_plausible *lungs, supine_error *error) {
+  char state[160];
+  char wrong[192];
+  const double share = lungs->full > 0.0 ? lungs->volume / lungs->full : 1.0;
+  (void)supine_state_describe(lungs->state, state, sizeof state);
+  if (!(share >= least_of_full && share <= most_of_full)) {
     (void)snprintf(wrong, sizeof wrong,
                    "%.0f mL are %.0f %% of full inflation (%.0f mL), outside the %.0f to %.0f %% "
                    "that lungs hold",
-                   volume, 100.0 * share, full, 100.0 * least_of_full, 100.0 * most_of_full);
+                   lungs->volume, 100.0 * share, lungs->full, 100.0 * least_of_full,
+                   100.0 * most_of_full);
+  } else if (lungs->folded > folded_limit) {
+    (void)snprintf(wrong, sizeof wrong, "%s: %.3g %% (at most %g %%)", lungs->parts,
+                   100.0 * lungs->folded, 100.0 * folded_limit);
   } else {
-    const double turned = turned_over(basis, pose);
-    if (turned < 0.0) {
-      return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
-                              info->vertex_count);
-    }
-    if (turned > folded_limit) {
-      (void)snprintf(wrong, sizeof wrong, "the surface folds: %.3g %% of its triangles turn over",
-                     100.0 * turned);
-    }
+    return SUPINE_OK;
   }
-  if (wrong[0] != '\0' && info->has_rest && !allow_folds) {
-    return supine_error_set(error, SUPINE_ERROR_NUMERICAL, "%s; --allow-folds accepts this", wrong);
+  if (!lungs->allowed) {
+    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                            "%s: %s: choose a volume nearer to rest, or accept this with "
+                            "--allow-folds",
+                            state, wrong);
   }
-  if (wrong[0] != '\0') {
-    supine_options_say(command, "%s", wrong);
-  }
+  supine_options_say(lungs->command, "warning: %s: %s", state, wrong);
   return SUPINE_OK;
+}
+
+supine_status supine_options_pose_check(const supine_basis *basis, const char *command,
+                                        bool allow_folds, const supine_state *state,
+                                        const supine_pose *pose, supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  supine_plausible lungs = {.command = command,
+                            .state = state,
+                            .volume = supine_options_basis_volume(basis, pose),
+                            .folded = turned_over(basis, pose),
+                            .parts = "the surface folds; triangles that turn over",
+                            .allowed = allow_folds || !info->has_rest};
+  for (size_t lung = 0; lung < info->lung_count && info->has_rest; ++lung) {
+    lungs.full += info->reference_volume[lung];
+  }
+  return lungs.folded < 0.0 ? supine_error_set(error, SUPINE_ERROR_MEMORY,
+                                               "no memory for %zu vertices", info->vertex_count)
+                            : supine_options_plausible(&lungs, error);
 }
 
 supine_status supine_options_pose(const supine_basis *basis, const char *command,
@@ -234,6 +247,6 @@ supine_status supine_options_pose(const supine_basis *basis, const char *command
   memcpy(state.gravity, gravity, sizeof state.gravity);
   const supine_status status = supine_basis_pose(basis, &state, pose, error);
   return status == SUPINE_OK
-             ? supine_options_pose_check(basis, command, wanted->allow_folds, pose, error)
+             ? supine_options_pose_check(basis, command, wanted->allow_folds, &state, pose, error)
              : status;
 }

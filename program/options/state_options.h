@@ -96,13 +96,26 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
 /* Return the volume of a state, mL above rest; NAN if the state does not count from rest. */
 double supine_options_above_rest(const supine_state *state);
 
-/* Check that a pose is plausible: its surface must not fold, and if the volume at rest is known,
- * its volume must be 10 % to 120 % of full inflation. An implausible pose is an error
- * (SUPINE_ERROR_NUMERICAL) if the volume at rest is known and `allow_folds` is false. Otherwise, it
- * causes only a warning. */
+/* What decides whether the lungs in a state are plausible. */
+typedef struct supine_plausible {
+  const char *command;
+  const supine_state *state;
+  double volume, full; /* volume in the state and at full inflation, mL; full is 0 if unknown */
+  double folded;       /* share of the surface or of the field that turns over, 0 to 1 */
+  const char *parts;   /* what `folded` counts, such as "triangles that turn over" */
+  bool allowed;        /* whether implausible lungs cause only a warning */
+} supine_plausible;
+
+/* Check that the volume is 10 % to 120 % of full inflation, and that at most 1 % of the parts turn
+ * over.
+ * @retval SUPINE_ERROR_NUMERICAL */
+supine_status supine_options_plausible(const supine_plausible *lungs, supine_error *error);
+
+/* Check the surface of a pose with supine_options_plausible. If the volume at rest is unknown, the
+ * volume is not checked, and folds cause only a warning. */
 supine_status supine_options_pose_check(const supine_basis *basis, const char *command,
-                                        bool allow_folds, const supine_pose *pose,
-                                        supine_error *error);
+                                        bool allow_folds, const supine_state *state,
+                                        const supine_pose *pose, supine_error *error);
 
 /* Compute the pose for a direction of gravity and the requested volume, and check it. Statuses as
  * supine_basis_pose and supine_options_pose_check. */

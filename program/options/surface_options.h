@@ -3,7 +3,7 @@
 #ifndef SUPINE_SURFACE_OPTIONS_H
 #define SUPINE_SURFACE_OPTIONS_H
 
-#include "sh/base/findings.h"
+#include "base/findings.h"
 
 #include "mesh/mesh.h"
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Choose the colours of the HTML report, and build its colour bar. */
-#include "program/render/render.h"
 #include "program/report/comparison_parts.h"
+#include "program/view/render/render.h"
 
 json_t *supine_report_hex(supine_colours map, double t) {
   double rgb[3];

@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/vec3.h"
 #include "program/report/comparison.h"
-#include "sh/base/vec3.h"
 
 /* Compute the volume that each lung and each of ten horizontal slabs gains in a breath. The breath
  * begins at the lung volumes in the posture. `xyz` [2][N, 3] is workspace. */
@@ -21,21 +21,24 @@ static supine_status find_breath(const supine_comparison *c, const supine_postur
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     state.volume.ml += posture->volume[lung];
   }
-  supine_status status = supine_basis_gains(c->basis, &state, &after, error);
-  if (status == SUPINE_OK) {
-    status = supine_options_pose_check(c->basis, c->command, c->allow_folds, &after, error);
+  supine_error wrong;
+  supine_status status = supine_basis_gains(c->basis, &state, &after, &wrong);
+  if (status != SUPINE_OK) {
+    (void)supine_error_set(error, status, "%s: %s", item->name, wrong.message);
+  } else {
+    status = supine_options_pose_check(c->basis, c->command, c->allow_folds, &state, &after, error);
   }
   if (status != SUPINE_OK) {
     return status;
   }
   double total = 0.0;
-  supine_basis_volumes(c->basis, &after, posture->gain);
+  (void)supine_basis_volumes(c->basis, &after, posture->gain);
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     posture->gain[lung] -= posture->volume[lung];
     total += posture->gain[lung];
   }
-  supine_deform(c->basis, &posture->pose, xyz[0]);
-  supine_deform(c->basis, &after, xyz[1]);
+  (void)supine_deform(c->basis, &posture->pose, xyz[0]);
+  (void)supine_deform(c->basis, &after, xyz[1]);
   status = supine_compare_slabs(c->basis, item->gravity, xyz[0], xyz[1], SUPINE_COMPARISON_SLABS,
                                 slabs, error);
   for (size_t i = 0; status == SUPINE_OK && i < info->lung_count * SUPINE_COMPARISON_SLABS; ++i) {
@@ -55,15 +58,18 @@ static supine_status find_posture(const supine_comparison *c, const supine_postu
                                   supine_error *error) {
   supine_state state = c->state;
   memcpy(state.gravity, item->gravity, sizeof state.gravity);
-  supine_status status = supine_basis_pose(c->basis, &state, &posture->pose, error);
+  supine_error wrong;
+  supine_status status = supine_basis_pose(c->basis, &state, &posture->pose, &wrong);
   if (status != SUPINE_OK) {
-    return status;
+    return supine_error_set(error, status, "%s: %s", item->name, wrong.message);
   }
-  supine_compare_distances(c->compare, &posture->pose, &c->reference.pose, distance);
+  (void)supine_compare_distances(c->compare, &posture->pose, &c->reference.pose, distance);
   supine_compare_statistics(c->compare, distance, &posture->displacement);
-  supine_basis_volumes(c->basis, &posture->pose, posture->volume);
-  status = supine_options_pose_check(c->basis, c->command, c->allow_folds, &posture->pose, error);
-  return status == SUPINE_OK ? find_breath(c, item, xyz, posture, error) : status;
+  (void)supine_basis_volumes(c->basis, &posture->pose, posture->volume);
+  status = supine_options_pose_check(c->basis, c->command, c->allow_folds, &state, &posture->pose,
+                                     error);
+  return status == SUPINE_OK && c->breath > 0.0 ? find_breath(c, item, xyz, posture, error)
+                                                : status;
 }
 
 /* Compute the expected error of each posture's displacement, mm RMS; 0 if it is unknown. */
@@ -129,7 +135,7 @@ supine_status supine_report_find(supine_comparison *c, supine_error *error) {
     supine_error wrong = {SUPINE_OK, ""};
     status = find_posture(c, &c->postures.item[i], distance, xyz, &c->posture[i], &wrong);
     if (status != SUPINE_OK) {
-      (void)supine_error_set(error, status, "%s: %s", c->postures.item[i].name,
+      (void)supine_error_set(error, status, "%s: %s", c->path,
                              wrong.message[0] != '\0' ? wrong.message
                                                       : supine_status_string(status));
     }

@@ -32,7 +32,7 @@ typedef struct supine_comparison {
   const supine_basis *basis;
   supine_state state; /* supine, at the volume used for all postures */
   supine_from from;
-  double breath; /* volume that a breath adds, mL */
+  double breath; /* volume that a breath adds, mL; 0 if no breath is computed */
   supine_posture_list postures;
   supine_reference_pose reference; /* pose from which displacements are measured */
   supine_compare *compare;

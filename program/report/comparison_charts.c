@@ -5,10 +5,10 @@
 
 #include <supine/posture.h>
 
-#include "sh/base/vec3.h"
+#include "base/vec3.h"
 
-#include "program/render/render.h"
 #include "program/report/comparison_parts.h"
+#include "program/view/render/render.h"
 
 static const double pi = 3.14159265358979323846;
 

@@ -19,7 +19,7 @@ static const struct {
 /* Compute the change of each lung's volume between the reference pose and a posture, % and mL. */
 static void find_changes(const supine_comparison *c, size_t posture, double *percent, double *ml) {
   double held[SUPINE_LUNGS_MAX];
-  supine_basis_volumes(c->basis, &c->reference.pose, held);
+  (void)supine_basis_volumes(c->basis, &c->reference.pose, held);
   for (size_t lung = 0; lung < supine_basis_get_info(c->basis)->lung_count; ++lung) {
     ml[lung] = c->posture[posture].volume[lung] - held[lung];
     percent[lung] = 100 * ml[lung] / held[lung];
@@ -147,6 +147,7 @@ json_t *supine_report_postures(const supine_comparison *c) {
     double percent[SUPINE_LUNGS_MAX] = {0};
     double ml[SUPINE_LUNGS_MAX] = {0};
     const char *words = "";
+    const double ratio = lowest_over_uppermost(c, i); /* NaN if no breath is computed */
     find_changes(c, i, percent, ml);
     for (size_t lung = 0; lung < info->lung_count; ++lung) {
       (void)json_array_append_new(
@@ -165,7 +166,7 @@ json_t *supine_report_postures(const supine_comparison *c) {
                         supine_report_line(i), "held", lungs, "mean",
                         json_sprintf("%.1f", c->posture[i].displacement.mean), "max",
                         json_sprintf("%.1f", c->posture[i].displacement.max), "published", words,
-                        "ratio", json_sprintf("%.2f", lowest_over_uppermost(c, i))));
+                        "ratio", json_sprintf(isnan(ratio) ? "" : "%.2f", ratio)));
   }
   return list;
 }

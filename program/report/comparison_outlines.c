@@ -60,7 +60,7 @@ static json_t *outline(const supine_comparison *c, const slice *s, double at,
   if (path == NULL) {
     return json_string("");
   }
-  supine_deform(c->basis, pose, xyz);
+  (void)supine_deform(c->basis, pose, xyz);
   *area = trace(supine_basis_get_info(c->basis), s, at, xyz, path);
   json_t *made = fclose(path) == 0 ? json_string(text) : json_string("");
   free(text);
@@ -121,7 +121,7 @@ json_t *supine_report_outlines(const supine_comparison *c) {
     return list;
   }
   for (size_t i = 0; i < c->postures.count; ++i) {
-    supine_deform(c->basis, &c->posture[i].pose, xyz);
+    (void)supine_deform(c->basis, &c->posture[i].pose, xyz);
     for (size_t j = 0; j < 3 * info->vertex_count; ++j) {
       low[j % 3] = fmin(low[j % 3], (double)xyz[j]);
       high[j % 3] = fmax(high[j % 3], (double)xyz[j]);

@@ -5,8 +5,8 @@
 
 #include <jansson.h>
 
-#include "program/render/render.h"
 #include "program/report/comparison.h"
+#include "program/view/render/render.h"
 
 /* Return the colour of a map at 0 <= t <= 1 as a string "#rrggbb". */
 json_t *supine_report_hex(supine_colours map, double t);

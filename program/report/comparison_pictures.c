@@ -3,9 +3,9 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "program/export/base64.h"
-#include "program/render/render.h"
 #include "program/report/comparison_parts.h"
+#include "program/view/export/base64.h"
+#include "program/view/render/render.h"
 
 enum { WIDTH = 360, HEIGHT = 330 };
 static const supine_view view = SUPINE_VIEW_ANTERIOR;
@@ -65,7 +65,7 @@ static json_t *picture(const supine_comparison *c, supine_renderer *renderer, si
                        double largest, const double extent[4], float *value, supine_error *error) {
   const supine_compared_posture *shown = &c->posture[posture];
   supine_scene scene = make_scene(c, posture, extent);
-  supine_compare_distances(c->compare, &shown->pose, &c->reference.pose, value);
+  (void)supine_compare_distances(c->compare, &shown->pose, &c->reference.pose, value);
   scene.value = value;
   scene.largest = largest;
   scene.line_step = supine_render_bar_step(largest);

@@ -39,13 +39,15 @@ static json_t *encode_postures(const supine_comparison *c) {
       (void)json_object_set_new(posture, "expected_error_mm",
                                 json_real(c->posture[i].expected_error));
     }
-    json_t *slabs = json_array();
-    for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
-      (void)json_array_append_new(slabs, encode_slab(&c->posture[i], s));
-    }
     (void)json_object_set_new(posture, "volume_ml", by_lung(c, c->posture[i].volume));
-    (void)json_object_set_new(posture, "gain_ml", by_lung(c, c->posture[i].gain));
-    (void)json_object_set_new(posture, "slabs", slabs);
+    if (c->breath > 0.0) {
+      json_t *slabs = json_array();
+      for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
+        (void)json_array_append_new(slabs, encode_slab(&c->posture[i], s));
+      }
+      (void)json_object_set_new(posture, "gain_ml", by_lung(c, c->posture[i].gain));
+      (void)json_object_set_new(posture, "slabs", slabs);
+    }
     (void)json_array_append_new(list, posture);
   }
   return list;
@@ -76,9 +78,11 @@ static void add_tables(const supine_comparison *c, json_t *text) {
     }
     add_row(text, "displacement, mm", "posture", name, moved);
     add_row(text, "volume of each lung, mL", "posture", name, by_lung(c, c->posture[i].volume));
-    add_row(text, gained, "posture", name, by_lung(c, c->posture[i].gain));
+    if (c->breath > 0.0) {
+      add_row(text, gained, "posture", name, by_lung(c, c->posture[i].gain));
+    }
   }
-  for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
+  for (size_t s = 0; c->breath > 0.0 && s < SUPINE_COMPARISON_SLABS; ++s) {
     json_t *values[2] = {json_object(), json_object()};
     char height[16];
     (void)snprintf(height, sizeof height, "%zu-%zu", 100 - 10 * (s + 1), 100 - 10 * s);

@@ -192,7 +192,7 @@ namespace Supine
         [DllImport(Library)] static extern IntPtr supine_basis_triangles(IntPtr basis);
         [DllImport(Library)] static extern int supine_state_parse(string text, byte[] state, IntPtr error);
         [DllImport(Library)] static extern int supine_basis_pose(IntPtr basis, byte[] state, double[] pose, IntPtr error);
-        [DllImport(Library)] static extern void supine_deform(IntPtr basis, double[] pose, float[] xyz);
+        [DllImport(Library)] static extern int supine_deform(IntPtr basis, double[] pose, float[] xyz);
 
         [StructLayout(LayoutKind.Sequential)]
         struct Info // the beginning of supine_basis_info
@@ -204,7 +204,7 @@ namespace Supine
         const int ModesMax = 256, LungsMax = 16;
         IntPtr handle;
         readonly int modes, lungs;
-        readonly double[] pose = new double[ModesMax + 3 * LungsMax]; // supine_pose: weights, gains
+        readonly double[] pose = new double[ModesMax + 3 * LungsMax + 1]; // supine_pose: weights, gains, basis
 
         public Basis(string path)
         {
@@ -226,7 +226,7 @@ namespace Supine
             if (frame.Length != modes + 3 * lungs || xyz.Length != 3 * VertexCount)
                 throw new ArgumentException("the frame belongs to another basis: open the basis file of the server");
             for (int i = 0; i < frame.Length; ++i) pose[PoseIndex(i)] = frame[i];
-            supine_deform(handle, pose, xyz);
+            if (supine_deform(handle, pose, xyz) != 0) throw new ArgumentException("the pose is of another basis");
         }
 
         /// <summary>Computes a frame, as the server would send it, from a state such as "left:rest+500".</summary>

@@ -8,9 +8,9 @@
 
 #include <meshoptimizer.h>
 
+#include "base/library.h"
+#include "base/parallel.h"
 #include "program/stream/frame.h"
-#include "sh/base/library.h"
-#include "sh/base/parallel.h"
 
 /* clang-format off */
 #define FUNCTIONS(EACH)                                                                            \
@@ -185,7 +185,7 @@ static void compute_range(void *context, size_t begin, size_t end, size_t thread
   for (; begin < end; begin += BATCH) {
     const size_t next = begin + BATCH < end ? begin + BATCH : end;
     float *xyz = p->frame->points + 3 * begin;
-    supine_deform_range(p->frames->basis, &p->frame->snapshot.pose, begin, next, xyz);
+    (void)supine_deform_range(p->frames->basis, &p->frame->snapshot.pose, begin, next, xyz);
     encode_points(p->frames, next - begin, xyz);
     p->crc[thread] = supine_stream_crc64(p->crc[thread], xyz, 12 * (next - begin));
   }

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "sh/base/vec3.h"
+#include "base/vec3.h"
 
 #include "program/options/breath_turn.h"
 #include "program/stream/gravity.h"

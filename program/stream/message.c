@@ -4,8 +4,8 @@
 #include <endian.h>
 #include <string.h>
 
+#include "base/clones.h"
 #include "program/stream/message.h"
-#include "sh/base/clones.h"
 
 static uint64_t number(const unsigned char *bytes, int size) {
   uint64_t value = 0;

@@ -9,10 +9,10 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "base/clock.h"
 #include "program/stream/peer.h"
 #include "program/stream/server.h"
 #include "program/stream/tracked_patient.h"
-#include "sh/base/clock.h"
 
 static const double frame_interval = 15e-3; /* time between frames while no messages arrive, s */
 static const double send_interval = 20e-3;  /* time between checks of the peers that wait, s */
@@ -36,8 +36,6 @@ struct supine_stream_server {
   supine_stream_peer *peer;       /* [options->peers] connected peers and free slots */
   struct pollfd *polled;          /* [options->peers + 2] peers, listener, pipe of web's poses */
   supine_stream_peer **owner;     /* [options->peers + 2] peer of each polled socket, or NULL */
-  size_t replayed;                /* number of recorded poses replayed so far */
-  double replay_begun;            /* time at which the replay began; negative before that */
   double wait_begun;              /* time at which ppoll() was last called */
   double woke;                    /* time at which ppoll() last returned */
   supine_stream_latency *latency; /* [2] latencies of frames of weights, and of frames of points */
@@ -155,24 +153,6 @@ static void read_peer(supine_stream_server *s, supine_stream_peer *peer) {
   }
 }
 
-static void replay_poses(supine_stream_server *s) {
-  const supine_stream_poses *poses = s->options->replay;
-  const bool watched = s->counts.peers > 0 ||
-                       (s->options->web != NULL && supine_stream_web_viewers(s->options->web) > 0);
-  if (poses == NULL || (s->replay_begun < 0.0 && !watched)) {
-    return;
-  }
-  s->replay_begun = s->replay_begun < 0.0 ? s->woke : s->replay_begun;
-  for (; s->replayed < poses->count; ++s->replayed) {
-    const supine_stream_pose *pose = &poses->pose[s->replayed];
-    const double due = s->replay_begun + pose->seconds;
-    if (due > s->woke) {
-      return;
-    }
-    supine_stream_patient_pose(&s->patient, pose->gravity, due);
-  }
-}
-
 /* Return the time at which to make the next frame; INFINITY if no frame is needed. */
 static double frame_due(const supine_stream_server *s) {
   const double soonest = s->latest == NULL ? 0.0 : s->frame_time + 1.0 / s->options->rate;
@@ -260,11 +240,7 @@ static void send_peers(supine_stream_server *s) {
 
 /* Compute how long ppoll() may wait in a run that ends at the time `end`. */
 static struct timespec find_timeout(const supine_stream_server *s, double end) {
-  const supine_stream_poses *poses = s->options->replay;
   double next = fmin(fmin(s->woke + stop_interval, end), fmin(s->connect_at, frame_due(s)));
-  if (poses != NULL && s->replay_begun >= 0.0 && s->replayed < poses->count) {
-    next = fmin(next, s->replay_begun + poses->pose[s->replayed].seconds);
-  }
   for (size_t i = 0; i < s->options->peers; ++i) {
     if (needs_frame(s, &s->peer[i])) {
       next = fmin(next, s->woke + send_interval);
@@ -295,7 +271,7 @@ static nfds_t gather(supine_stream_server *s) {
   return count;
 }
 
-/* Read from all sockets that ppoll() reported, and store the recorded poses that are due. */
+/* Read from all sockets that ppoll() reported. */
 static void receive_all(supine_stream_server *s, nfds_t count) {
   for (nfds_t i = 0; i + 2 < count; ++i) {
     if (s->polled[i].revents != 0) {
@@ -316,14 +292,6 @@ static void receive_all(supine_stream_server *s, nfds_t count) {
       supine_stream_patient_pose(&s->patient, gravity, received);
     }
   }
-  replay_poses(s);
-}
-
-/* Return whether a replay ended long enough ago for its last frame to be sent. */
-static bool replay_over(const supine_stream_server *s) {
-  const supine_stream_poses *poses = s->options->replay;
-  return poses != NULL && s->replayed == poses->count &&
-         s->woke > s->replay_begun + poses->pose[poses->count - 1].seconds + 2.0 * stop_interval;
 }
 
 supine_status supine_stream_server_run(supine_stream_server *server, supine_error *error) {
@@ -332,7 +300,7 @@ supine_status supine_stream_server_run(supine_stream_server *server, supine_erro
   s->woke = supine_clock_seconds();
   const double end = options->seconds > 0.0 ? s->woke + options->seconds : (double)INFINITY;
   double asked = s->woke;
-  while (s->woke < end && !replay_over(s)) {
+  while (s->woke < end) {
     const nfds_t count = gather(s);
     const struct timespec timeout = find_timeout(s, end);
     s->wait_begun = supine_clock_seconds();
@@ -365,7 +333,7 @@ supine_status supine_stream_server_create(const supine_basis *basis,
   const double now = supine_clock_seconds();
   supine_stream_server *s = calloc(1, sizeof *s);
   if (s != NULL) {
-    *s = (supine_stream_server){.options = options, .listener = -1, .replay_begun = -1.0};
+    *s = (supine_stream_server){.options = options, .listener = -1};
     s->peer = calloc(options->peers, sizeof *s->peer);
     s->polled = calloc(options->peers + 2, sizeof *s->polled);
     s->owner = calloc(options->peers + 2, sizeof(supine_stream_peer *));

@@ -8,6 +8,8 @@
 #ifndef SUPINE_STREAM_SERVER_H
 #define SUPINE_STREAM_SERVER_H
 
+#include <stdio.h>
+
 #include "program/stream/gravity.h"
 #include "program/stream/web.h"
 
@@ -22,30 +24,6 @@ typedef struct supine_stream_observed {
   double *space; /**< [supine_locate_space(count)] workspace */
   supine_location location;
 } supine_stream_observed;
-
-/** A recorded pose: a time and the direction of gravity in body axes. Files of poses are CSV with
- * the columns seconds, gravity_x, gravity_y, gravity_z; times are at least 0 and never decrease. */
-typedef struct supine_stream_pose {
-  double seconds;
-  double gravity[3]; /**< unit vector */
-} supine_stream_pose;
-
-typedef struct supine_stream_poses {
-  size_t count;
-  supine_stream_pose *pose;
-} supine_stream_poses;
-
-/** Read recorded poses from a file; release them with supine_stream_poses_free.
- * @retval SUPINE_ERROR_FORMAT  the message names the line
- * @retval SUPINE_ERROR_READ, SUPINE_ERROR_MEMORY */
-supine_status supine_stream_poses_load(const char *path, supine_stream_poses *poses,
-                                       supine_error *error);
-void supine_stream_poses_free(supine_stream_poses *poses);
-
-/** Write the first line of a file of recorded poses, the names of its columns. */
-void supine_stream_poses_begin(FILE *file);
-/** Write a pose as one line, with enough digits to read the same numbers back. */
-void supine_stream_poses_add(FILE *file, const supine_stream_pose *pose);
 
 /** Numbers of events since the server was created. */
 typedef struct supine_stream_counts {
@@ -95,9 +73,6 @@ typedef struct supine_stream_options {
   size_t peers;                      /**< maximum number of peers, 1 to 1000 */
   double smooth;                     /**< time constant for smoothing gravity, s; 0 to turn off */
   double seconds;                    /**< duration, s; 0 to run until `stop` returns true */
-  const supine_stream_poses *replay; /**< recorded poses, replayed once a peer or viewer has
-                                        connected; NULL if none */
-  FILE *record;                      /**< file to which each pose is written; NULL if none */
   supine_stream_web *web;            /**< live page; NULL if none */
   void (*warn)(void *context, const char *text);
   bool (*stop)(void *context); /**< called every 100 ms or so; true ends the run */
@@ -117,8 +92,7 @@ void supine_stream_server_destroy(supine_stream_server *server);
 /** Return the port on which the server listens; 0 if it does not listen. */
 int supine_stream_server_port(const supine_stream_server *server);
 
-/** Run the server until options->stop returns true, the time options->seconds is over or the replay
- * ends. The options are those of supine_stream_server_create.
+/** Run the server until options->stop returns true or the time options->seconds is over. The options are those of supine_stream_server_create.
  * @retval SUPINE_ERROR_WRITE  the system cannot wait for the sockets
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_stream_server_run(supine_stream_server *server, supine_error *error);

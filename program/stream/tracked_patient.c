@@ -85,17 +85,11 @@ static void store_pose(supine_stream_patient *p, const double gravity[3], double
   if (p->counts->poses == 0) { /* the first pose is not smoothed */
     memcpy(p->smoothed_gravity, gravity, sizeof p->smoothed_gravity);
     p->smoothed_at = received;
-    p->first_pose = received;
   }
   note_message(p, received);
   p->pose_received = received;
   p->stamp = stamp;
   ++p->counts->poses;
-  if (p->options->record != NULL) {
-    const supine_stream_pose pose = {fmax(0.0, received - p->first_pose),
-                                     {gravity[0], gravity[1], gravity[2]}};
-    supine_stream_poses_add(p->options->record, &pose);
-  }
 }
 
 /* Store a pose unless `verdict` refuses it. Warn if the pose is refused or repaired. */

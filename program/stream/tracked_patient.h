@@ -34,7 +34,6 @@ typedef struct supine_stream_patient {
   const supine_stream_options *options;
   supine_stream_counts *counts;
   double breath_begun;
-  double first_pose;    /* time of the first pose, s, at which a recording begins */
   double pose_received; /* time of receipt of the newest pose or observed point, s; -1 if none */
   double received;      /* time of receipt of the newest message, s; -1 if none */
   bool pending;         /* true until a frame shows the newest message */

@@ -10,9 +10,9 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "base/clock.h"
+#include "base/library.h"
 #include "program/stream/web.h"
-#include "sh/base/clock.h"
-#include "sh/base/library.h"
 
 /* clang-format off */
 #define FUNCTIONS(EACH)                                                                            \

@@ -6,8 +6,8 @@
 
 #include <supine/compare.h>
 
+#include "base/vec3.h"
 #include "runtime/internal.h"
-#include "sh/base/vec3.h"
 
 enum { BEFORE, AFTER, TIMES };
 

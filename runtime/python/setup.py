@@ -31,7 +31,8 @@ class Build(build_py):
             folder = os.path.abspath("build/runtime")
             subprocess.run(["cmake", "-S", top, "-B", folder, "-DSUPINE_RUNTIME_ONLY=ON"], check=True)
             subprocess.run(["cmake", "--build", folder, "--parallel", "--target", "supine_runtime_shared"], check=True)
-            library, = glob.glob(os.path.join(folder, "runtime", "*supine_runtime.[sd]*"))
+            # The shortest name is that of the library; others end in a version or are import libraries.
+            library = min(glob.glob(os.path.join(folder, "runtime", "*supine_runtime.[sd]*")), key=len)
         shutil.copy(library, os.path.join(self.build_lib, "supine", "libsupine_runtime.so"))
 
 

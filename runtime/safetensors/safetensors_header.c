@@ -8,8 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/utf8.h"
 #include "runtime/safetensors/safetensors_file.h"
-#include "sh/base/utf8.h"
 
 enum { PREFIX = 8, HEADER_MAX = 1 << 24, TENSORS_MAX = 1024, METADATA_MAX = 4096 };
 

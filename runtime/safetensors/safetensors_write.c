@@ -4,8 +4,9 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/output.h"
+#include "base/utf8.h"
 #include "runtime/safetensors/safetensors_file.h"
-#include "sh/base/utf8.h"
 
 typedef struct content {
   const supine_tensor *tensors;
@@ -97,6 +98,18 @@ static size_t put_string(FILE *file, const char *text) {
   return size + put(file, "\"");
 }
 
+/* Return tensor n in the order of the file: by descending element size, and those of the same size
+ * in the order given. */
+static const supine_tensor *tensor_at(const content *c, size_t n) {
+  for (size_t element = 8;; element /= 2) {
+    for (size_t i = 0; i < c->tensor_count; ++i) {
+      if (supine_safetensors_dtype_size(c->tensors[i].dtype) == element && n-- == 0) {
+        return &c->tensors[i];
+      }
+    }
+  }
+}
+
 /* Write the header to a file, or only count if `file` is NULL; return its size without padding. */
 static size_t put_header(const content *c, FILE *file) {
   size_t size = put(file, "{\"__metadata__\":{");
@@ -106,52 +119,57 @@ static size_t put_header(const content *c, FILE *file) {
     size += put_string(file, c->metadata[i].value) + put(file, ",");
   }
   size += put(file, "\"checksum\":\"%s\"}", c->checksum);
-  for (size_t element = 8; element >= 1; element /= 2) {
-    for (size_t i = 0; i < c->tensor_count; ++i) {
-      const supine_tensor *tensor = &c->tensors[i];
-      size_t bytes = 0;
-      if (supine_safetensors_dtype_size(tensor->dtype) != element) {
-        continue;
-      }
-      (void)supine_safetensors_tensor_size(tensor, &bytes);
-      size += put(file, ",") + put_string(file, tensor->name);
-      size +=
-          put(file, ":{\"dtype\":\"%s\",\"shape\":[", supine_safetensors_dtype_name(tensor->dtype));
-      for (size_t r = 0; r < tensor->rank; ++r) {
-        size += put(file, "%s%zu", r == 0 ? "" : ",", tensor->shape[r]);
-      }
-      size += put(file, "],\"data_offsets\":[%zu,%zu]}", offset, offset + bytes);
-      offset += bytes;
+  for (size_t i = 0; i < c->tensor_count; ++i) {
+    const supine_tensor *tensor = tensor_at(c, i);
+    size_t bytes = 0;
+    (void)supine_safetensors_tensor_size(tensor, &bytes);
+    size += put(file, ",") + put_string(file, tensor->name);
+    size +=
+        put(file, ":{\"dtype\":\"%s\",\"shape\":[", supine_safetensors_dtype_name(tensor->dtype));
+    for (size_t r = 0; r < tensor->rank; ++r) {
+      size += put(file, "%s%zu", r == 0 ? "" : ",", tensor->shape[r]);
     }
+    size += put(file, "],\"data_offsets\":[%zu,%zu]}", offset, offset + bytes);
+    offset += bytes;
   }
   return size + put(file, "}");
 }
 
-supine_status supine_safetensors_write(FILE *file, const char *name, const supine_tensor *tensors,
+/* Write a whole file. Errors are left in the stream. */
+static void put_file(const content *c, FILE *file) {
+  const size_t header = put_header(c, NULL);
+  const size_t padded = (header + 7) / 8 * 8;
+  const uint64_t length = padded;
+  (void)fwrite(&length, sizeof length, 1, file);
+  (void)put_header(c, file);
+  (void)put(file, "%*s", (int)(padded - header), "");
+  for (size_t i = 0; i < c->tensor_count; ++i) {
+    const supine_tensor *tensor = tensor_at(c, i);
+    size_t size = 0;
+    (void)supine_safetensors_tensor_size(tensor, &size);
+    if (size > 0) {
+      (void)fwrite(tensor->data, 1, size, file);
+    }
+  }
+}
+
+supine_status supine_safetensors_write(const char *path, const supine_tensor *tensors,
                                        size_t tensor_count, const supine_metadata *metadata,
                                        size_t metadata_count, supine_error *error) {
   content c = {tensors, tensor_count, metadata, metadata_count, ""};
-  supine_status status = check_tensors(&c, name, error);
+  supine_output output;
+  supine_status status = check_tensors(&c, path, error);
   if (status == SUPINE_OK) {
-    status = check_metadata(&c, name, error);
+    status = check_metadata(&c, path, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_output_open(path, &output, error);
   }
   if (status != SUPINE_OK) {
     return status;
   }
   (void)snprintf(c.checksum, sizeof c.checksum, CHECKSUM_FORMAT,
                  supine_safetensors_checksum(tensors, tensor_count, metadata, metadata_count));
-  const uint64_t length = (put_header(&c, NULL) + 7) / 8 * 8;
-  (void)fwrite(&length, sizeof length, 1, file);
-  const size_t written = put_header(&c, file);
-  (void)fwrite("       ", 1, length - written, file);
-  for (size_t element = 8; element >= 1; element /= 2) {
-    for (size_t i = 0; i < tensor_count; ++i) {
-      size_t size = 0;
-      (void)supine_safetensors_tensor_size(&tensors[i], &size);
-      if (supine_safetensors_dtype_size(tensors[i].dtype) == element && size > 0) {
-        (void)fwrite(tensors[i].data, 1, size, file);
-      }
-    }
-  }
-  return SUPINE_OK;
+  put_file(&c, output.file);
+  return supine_output_commit(&output, error);
 }

@@ -1,12 +1,16 @@
 /* SPDX-License-Identifier: MIT */
-/* Map files and allocate memory on Windows. */
+/* Map files, allocate memory and write output files on Windows. */
 #define WIN32_LEAN_AND_MEAN
 #include <windows.h>
 
+#include <io.h>
 #include <malloc.h>
+#include <share.h>
 #include <stdint.h>
 #include <stdlib.h>
+#include <string.h>
 
+#include "base/output.h"
 #include "runtime/safetensors/platform.h"
 
 /* Convert a path from UTF-8 to UTF-16; the caller frees the result. Return NULL if the path is not
@@ -73,4 +77,43 @@ void *supine_platform_allocate(size_t bytes) {
 
 void supine_platform_free(void *memory) {
   _aligned_free(memory);
+}
+
+/* Write to a file beside the target, which no other process can open for writing. */
+supine_status supine_output_open(const char *path, supine_output *output, supine_error *error) {
+  const size_t size = strlen(path) + sizeof ".part";
+  *output = (supine_output){.path = _strdup(path), .temporary = malloc(size)};
+  if (output->path != NULL && output->temporary != NULL) {
+    (void)snprintf(output->temporary, size, "%s.part", path);
+    wchar_t *wide = widen(output->temporary);
+    output->file = wide != NULL ? _wfsopen(wide, L"wb", _SH_DENYWR) : NULL;
+    free(wide);
+  }
+  if (output->file == NULL) {
+    free(output->path);
+    free(output->temporary);
+    return supine_error_set(error, SUPINE_ERROR_WRITE, "%s: cannot write: Windows error %lu", path,
+                            (unsigned long)GetLastError());
+  }
+  return SUPINE_OK;
+}
+
+supine_status supine_output_commit(supine_output *output, supine_error *error) {
+  wchar_t *from = widen(output->temporary);
+  wchar_t *to = widen(output->path);
+  bool done =
+      fflush(output->file) == 0 && ferror(output->file) == 0 && _commit(_fileno(output->file)) == 0;
+  (void)fclose(output->file);
+  done = done && from != NULL && to != NULL &&
+         MoveFileExW(from, to, MOVEFILE_REPLACE_EXISTING | MOVEFILE_WRITE_THROUGH);
+  if (!done) {
+    (void)supine_error_set(error, SUPINE_ERROR_WRITE, "%s: cannot write: Windows error %lu",
+                           output->path, (unsigned long)GetLastError());
+    (void)(from != NULL && DeleteFileW(from));
+  }
+  free(from);
+  free(to);
+  free(output->path);
+  free(output->temporary);
+  return done ? SUPINE_OK : SUPINE_ERROR_WRITE;
 }

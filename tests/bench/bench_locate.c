@@ -23,10 +23,10 @@
 
 #include <supine/locate.h>
 
+#include "base/clock.h"
+#include "base/csv.h"
 #include "precompute/physics/model.h"
 #include "runtime/kriging.h"
-#include "sh/base/clock.h"
-#include "sh/base/csv.h"
 #include "tests/runtime_fixture.h"
 
 enum { PEOPLE = 5, POINTS_MAX = 128, DRAWN = 10, DRAWS = 40, STEPS = 4 };

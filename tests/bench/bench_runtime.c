@@ -21,8 +21,8 @@
 
 #include <supine/runtime.h>
 
-#include "sh/base/clock.h"
-#include "sh/base/parallel.h"
+#include "base/clock.h"
+#include "base/parallel.h"
 #include "tests/runtime_fixture.h"
 #include "tests/test.h"
 

@@ -29,8 +29,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "base/clock.h"
 #include "program/stream/message.h"
-#include "sh/base/clock.h"
 
 static const double interval = 1.0 / 66.66; /* time between poses, s */
 

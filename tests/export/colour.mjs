@@ -12,7 +12,7 @@ supine('export', join(folder, 'lungs.safetensors'), '-o', join(folder, 'lungs.ht
 const page = readFileSync(join(folder, 'lungs.html'), 'utf8');
 const { colours } = JSON.parse(page.match(/<data id="basis" hidden>(.*?)<\/data>/)[1].replaceAll('&quot;', '"'));
 
-const code = readFileSync(new URL('../../program/export/page/colour.js', import.meta.url), 'utf8');
+const code = readFileSync(new URL('../../program/view/page/colour.js', import.meta.url), 'utf8');
 const { tickStep, rangeEnd } = new Function(`${code}
   return { tickStep, rangeEnd };`)();
 

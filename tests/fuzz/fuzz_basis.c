@@ -2,6 +2,7 @@
 /* Fuzz basis files. Each file is opened twice: unchanged, and with the correct checksum, without
  * which it would be refused before most of the code runs. A basis that opens is evaluated. */
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 

@@ -6,7 +6,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "mesh/io/image.h"
+#include "mesh/image/image.h"
 #include "mesh/labels/labels.h"
 
 #include "fuzz.h"

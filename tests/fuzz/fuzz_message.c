@@ -47,20 +47,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
     read_message(copy, size, true);
     free(copy);
   }
-  const char *path = supine_fuzz_file(bytes, size, ".csv");
-  supine_stream_poses poses = {0};
-  supine_error error = {0};
-  if (supine_stream_poses_load(path, &poses, &error) == SUPINE_OK) {
-    for (size_t i = 0; i < poses.count; ++i) {
-      const double *g = poses.pose[i].gravity;
-      supine_fuzz_expect(fabs(g[0] * g[0] + g[1] * g[1] + g[2] * g[2] - 1.0) < 1e-6,
-                         "directions of gravity of unit length");
-    }
-    supine_stream_poses_free(&poses);
-  } else {
-    supine_fuzz_expect(error.message[0] != '\0', "an error message");
-  }
-  (void)unlink(path);
   return 0;
 }
 

@@ -32,7 +32,7 @@ COPY = FOLDER / "source"
 BUILD = FOLDER / "build"
 COMMIT = subprocess.run(["git", "-C", str(SOURCE), "rev-parse", "HEAD"], check=True, text=True,
                         stdout=subprocess.PIPE).stdout.strip()
-FOLDERS = ("sh", "mesh", "precompute", "runtime", "program")
+FOLDERS = ("base", "sh", "mesh", "precompute", "runtime", "program")
 QUICK, SLOW = 2.0, 320.0  # time in the instrumented build, s, up to which a test runs first, and is used at all
 ENOUGH = 240.0  # longest total time of the tests of one mutant, s
 JOBS = str(len(os.sched_getaffinity(0)))  # number of processors

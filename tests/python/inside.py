@@ -76,6 +76,13 @@ assert np.abs(lungs.vertices + moved - raw[0]).max() <= 2 * lungs.error(pose)
 assert bytes(lungs.pose((0, -2, 0), "rest+321.5")) == bytes(pose) == bytes(lungs.pose(STATE, out=supine.Pose()))
 assert (lungs.deform(supine.Pose().fill(0.0)) == lungs.deform(lungs.pose("full"))).all()
 
+# A pose of another basis is refused, but a basis and the structures embedded in it share their poses.
+other = supine.open("other.safetensors").pose("prone")
+refused(supine.ArgumentError, "made by another basis", lungs.deform, other)
+refused(supine.ArgumentError, "made by another basis", lungs.volumes, other)
+grid = supine.open("grid.safetensors")
+assert (grid.deform(pose) == grid.deform(grid.pose(STATE))).all()
+
 # The direction of gravity can be given as a name, a tilt or a quaternion.
 assert tuple(supine.gravity("HFP")) == (0.0, -1.0, 0.0) and "prone" in supine.postures()
 assert np.allclose(supine.tilt("supine", 90), (0, 0, 1))

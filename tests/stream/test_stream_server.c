@@ -11,9 +11,9 @@
 #include <sys/socket.h>
 #include <time.h>
 
+#include "base/clock.h"
 #include "program/stream/peer.h"
 #include "program/stream/tracked_patient.h"
-#include "sh/base/clock.h"
 #include "tests/runtime_fixture.h"
 
 #include "tests/poses.h"
@@ -645,50 +645,6 @@ TEST(test_server_tracker_gone_reconnects) {
   }
   (void)close(listener);
   assert_int_equal(stage_end(s).peers, 2);
-  stage_destroy(s);
-}
-
-TEST(test_server_replay_recorded_poses_same) {
-  enum { COUNT = 30 };
-  supine_stream_pose pose[COUNT];
-  for (int i = 0; i < COUNT; ++i) {
-    pose[i] = (supine_stream_pose){0.01 * i, {sin(0.1 * i), cos(0.1 * i), 0}};
-  }
-  const supine_stream_poses kept = {COUNT, pose};
-  char path[] = "/tmp/supine-record-XXXXXX";
-  const int descriptor = mkstemp(path);
-  FILE *record = fdopen(descriptor, "w");
-  assert_non_null(record);
-  stage *s = stage_create();
-  s->options.replay = &kept;
-  s->options.record = record;
-  supine_stream_poses_begin(record);
-  const int peer = connect_peer(stage_run(s)); /* the server replays from the first connection on */
-  supine_stream_header header;
-  unsigned char body[4096];
-  unsigned char last[4096];
-  int frames = 0;
-  struct pollfd waiting = {peer, POLLIN, 0};
-  while (poll(&waiting, 1, 500) == 1 && receive(peer, &header, body)) {
-    memcpy(last, body, sizeof last);
-    ++frames;
-  }
-  const supine_stream_counts counts = stage_end(s);
-  assert_int_equal(counts.poses, COUNT);
-  assert_in_range(frames, 2, COUNT + 1); /* one frame precedes the first pose */
-  expect_weights(s, pose[COUNT - 1].gravity, 30.0, last);
-  (void)close(peer);
-  assert_int_equal(fclose(record), 0);
-  supine_stream_poses back;
-  supine_error error;
-  assert_int_equal(supine_stream_poses_load(path, &back, &error), SUPINE_OK);
-  assert_int_equal(back.count, COUNT);
-  for (int i = 0; i < COUNT; ++i) {
-    assert_true(fabs(back.pose[i].seconds - pose[i].seconds) < 1e-6);
-    assert_true(fabs(back.pose[i].gravity[0] - pose[i].gravity[0]) < 1e-12);
-  }
-  supine_stream_poses_free(&back);
-  (void)unlink(path);
   stage_destroy(s);
 }
 

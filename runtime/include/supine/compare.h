@@ -47,7 +47,8 @@ SUPINE_API double supine_compare_area(const supine_compare *compare);
  * G is the Gram matrix of a lung and an axis (supine_compare_create). A is the gain of `pose` for
  * this lung and axis, and w are the weights of `pose`. A' and w' are the gain and the weights of
  * `from`. Cost: 3 K^2 multiplications for each lung and K modes.
- * @param from  NULL for the reference surface */
+ * @param from  NULL for the reference surface
+ * @return D, or infinity if a pose is of another basis */
 SUPINE_API double supine_compare_rms(const supine_compare *compare, const supine_pose *pose,
                                      const supine_pose *from);
 
@@ -55,8 +56,9 @@ SUPINE_API double supine_compare_rms(const supine_compare *compare, const supine
  * vertices, with 3 K + 6 multiplications per vertex for K modes.
  * @param from      NULL for the reference surface
  * @param distance  [N] mm, written */
-SUPINE_API void supine_compare_distances(const supine_compare *compare, const supine_pose *pose,
-                                         const supine_pose *from, float *distance);
+SUPINE_API supine_status supine_compare_distances(const supine_compare *compare,
+                                                  const supine_pose *pose, const supine_pose *from,
+                                                  float *distance);
 
 /** Statistics of the distances between the positions of every vertex in two poses, mm. */
 typedef struct supine_distance_statistics {

@@ -89,8 +89,8 @@ typedef struct supine_basis_info {
   double bytes_per_vertex; /**< bytes that an evaluation reads for each vertex */
   /** Largest position error of any vertex from storage and rounding, mm: the largest
    * supine_basis_error for 26 directions of gravity, towards the faces, edges and corners of a
-   * cube. The lungs hold 500 mL more than the reference surface or, if the surface is open, move by
-   * at most 20 mm. */
+   * cube. The lungs hold 500 mL more than the reference surface; an open surface moves by at most
+   * 20 mm; another simulator's fields are not scaled. */
   double storage_error;
   const char *const *lung_names; /**< [lung_count] such as "left", or an index such as "0" */
   const float *bounds;   /**< [lung_count, 2, 3] lowest and highest corner of each lung's box, mm */
@@ -122,11 +122,20 @@ typedef struct supine_basis_info {
   bool is_fields;     /**< made from another simulator's displacements; factor 1 reproduces them */
   size_t volume_axes; /**< factors of displacement per lung: 3, or 1 in files of versions 1 and 2 */
   double bend[3];     /**< constant of the path along each axis (supine_volume_bend) */
+  /** Hash of the modes, the coefficients of the volumes, and the names of the lungs. Bases that
+   * share it have the same poses: a basis, and those that `supine embed` makes from it. */
+  uint64_t identity;
 } supine_basis_info;
 
+/** The weights of modes and the gains of a state (supine_basis_pose). All zeros mean the reference
+ * surface of any basis. */
 typedef struct supine_pose {
   double weights[SUPINE_MODES_MAX];
   double gains[SUPINE_LUNGS_MAX][3]; /**< factor of each lung's displacement along x, y and z */
+  /** supine_basis_info.identity of the basis that made the pose. For a basis with another identity,
+   * functions that return a status return SUPINE_ERROR_ARGUMENT, and write nothing. The identity 0
+   * is not checked: a program may set the weights of a pose itself. */
+  uint64_t basis;
 } supine_pose;
 
 /** Open a basis from a file. Check all of it, and pack it for evaluation. Cost: a few passes over
@@ -174,7 +183,7 @@ SUPINE_API const uint32_t *supine_basis_triangles(const supine_basis *basis);
 /** Compute the weights of the modes for a direction of gravity, once a frame. Cost:
  * mode_count (band + 1)^2 multiplications.
  * @param gravity  [3], any length but 0
- * @param weights  [mode_count] written
+ * @param weights  [mode_count] written, such as the weights of a pose that is zero otherwise
  * @retval SUPINE_ERROR_ARGUMENT  gravity is zero or not finite */
 SUPINE_API supine_status supine_basis_weights(const supine_basis *basis, const double gravity[3],
                                               double *weights);
@@ -209,7 +218,7 @@ SUPINE_API supine_status supine_basis_pose(const supine_basis *basis, const supi
 
 /** Compute only the gains of a state. `pose` must already have the weights for the gravity of the
  * state. This is enough during a breath, as gravity stays the same. Statuses: as
- * supine_basis_pose. */
+ * supine_basis_pose, and SUPINE_ERROR_ARGUMENT for a pose of another basis. */
 SUPINE_API supine_status supine_basis_gains(const supine_basis *basis, const supine_state *state,
                                             supine_pose *pose, supine_error *error);
 
@@ -225,15 +234,15 @@ SUPINE_API void supine_pose_fill(supine_pose *pose, double gain);
 /** Return the gravity and the volume in the scan. The volume is of the kind SUPINE_VOLUME_SCAN. */
 SUPINE_API supine_state supine_basis_scan(const supine_basis *basis);
 
-/** Compute the volume of each lung in a pose. The basis must have volumes
- * (supine_basis_info.has_volume).
- * @param volumes  [lung_count] volumes of gas and tissue, mL, written */
-SUPINE_API void supine_basis_volumes(const supine_basis *basis, const supine_pose *pose,
-                                     double *volumes);
+/** Compute the volume of each lung in a pose.
+ * @param volumes  [lung_count] volumes of gas and tissue, mL, written
+ * @retval SUPINE_ERROR_OPEN_SURFACE  the basis has no volumes (supine_basis_info.has_volume) */
+SUPINE_API supine_status supine_basis_volumes(const supine_basis *basis, const supine_pose *pose,
+                                              double *volumes);
 
 /** Return a bound, mm, on the position error that storage and rounding cause in a pose: the
  * distance of any deformed vertex from the position that exact arithmetic computes from the
- * numbers of the file. */
+ * numbers of the file. Return infinity for a pose of another basis. */
 SUPINE_API double supine_basis_error(const supine_basis *basis, const supine_pose *pose);
 
 /** Compute the deformed position of every vertex, in the caller's thread.
@@ -248,27 +257,31 @@ SUPINE_API double supine_basis_error(const supine_basis *basis, const supine_pos
  * basis exceed 4 MiB, positions are written with stores that bypass the caches. These are fastest
  * if `xyz` is aligned to 64 bytes.
  * @param xyz  [N, 3] mm, LPS, written; aligned like a float */
-SUPINE_API void supine_deform(const supine_basis *basis, const supine_pose *pose, float *xyz);
+SUPINE_API supine_status supine_deform(const supine_basis *basis, const supine_pose *pose,
+                                       float *xyz);
 
 /** Compute supine_deform for vertices begin <= i < end, so that several threads can share the work.
  * Ranges that begin at multiples of 16 are fastest.
- * @param xyz  [end - begin, 3] mm, written */
-SUPINE_API void supine_deform_range(const supine_basis *basis, const supine_pose *pose,
-                                    size_t begin, size_t end, float *xyz);
+ * @param xyz  [end - begin, 3] mm, written
+ * @retval SUPINE_ERROR_ARGUMENT  the range does not lie within 0 to N */
+SUPINE_API supine_status supine_deform_range(const supine_basis *basis, const supine_pose *pose,
+                                             size_t begin, size_t end, float *xyz);
 
-/** Compute supine_deform_range for many poses. Each vertex is read from memory only once.
+/** Compute supine_deform_range for many poses. Each vertex is read from memory only once. Statuses:
+ * as supine_deform_range, for any of the poses.
  * @param poses  [count]
  * @param xyz    [count, end - begin, 3] mm, written */
-SUPINE_API void supine_deform_batch(const supine_basis *basis, size_t count,
-                                    const supine_pose *poses, size_t begin, size_t end, float *xyz);
+SUPINE_API supine_status supine_deform_batch(const supine_basis *basis, size_t count,
+                                             const supine_pose *poses, size_t begin, size_t end,
+                                             float *xyz);
 
 /** Compute the displacements of vertices begin <= i < end from the reference surface. To find the
  * change of the displacements in one step of a breath (supine_step), pass the weights of the
  * posture and the change of the gains (factors of displacement). Rigid parts do not follow this
- * rule.
+ * rule. Statuses: as supine_deform_range.
  * @param xyz  [end - begin, 3] mm, written */
-SUPINE_API void supine_displace_range(const supine_basis *basis, const supine_pose *pose,
-                                      size_t begin, size_t end, float *xyz);
+SUPINE_API supine_status supine_displace_range(const supine_basis *basis, const supine_pose *pose,
+                                               size_t begin, size_t end, float *xyz);
 
 /** Add one step of a breath in a fixed posture, with three additions per vertex ([Santhanam2008]
  * III-B, see supine/breath.h):
@@ -276,7 +289,9 @@ SUPINE_API void supine_displace_range(const supine_basis *basis, const supine_po
  *     xyz += step
  *
  * Each step rounds a coordinate by at most 2^-24 of its value. These errors add up, so begin each
- * breath with supine_deform.
+ * breath with supine_deform. One step for a whole breath is right only for a law with straight
+ * paths (`paper`): with the default law, the middle of a path of 500 mL lies 3 to 5 % of the chord
+ * away from it. Use supine_deform there, or a step for each volume.
  * @param count  number of vertices
  * @param step   [count, 3] displacement of each vertex in this step, mm (supine_displace_range)
  * @param xyz    [count, 3] mm, changed; must not overlap `step` */
@@ -294,8 +309,9 @@ SUPINE_API void supine_step(size_t count, const float *step, float *xyz);
  * In files of versions 1 and 2, v = V_0 + a sum_k A_k w_k + a^2 sum_(k <= l) C_kl w_k w_l.
  * Cost: 1.5 Q K^2 multiplications for each lung, once a frame, for K modes and Q vectors.
  * @param normal_weights  [lung_count, normal_count] v, written */
-SUPINE_API void supine_basis_normal_weights(const supine_basis *basis, const supine_pose *pose,
-                                            double *normal_weights);
+SUPINE_API supine_status supine_basis_normal_weights(const supine_basis *basis,
+                                                     const supine_pose *pose,
+                                                     double *normal_weights);
 
 /** Compute the positions of supine_deform and unit normals, without a pass over the triangles:
  *

@@ -26,7 +26,6 @@
 
 #include <stddef.h>
 #include <stdint.h>
-#include <stdio.h>
 
 #include <supine/status.h>
 
@@ -100,16 +99,19 @@ SUPINE_API const supine_metadata *supine_safetensors_all_metadata(const supine_s
 SUPINE_API supine_status supine_safetensors_verify(const supine_safetensors *file,
                                                    supine_error *error);
 
-/** Write a safetensors file to a stream, and add the metadata "checksum". Tensors are sorted by
+/** Write a safetensors file, and add the metadata "checksum". The file gets its name when it is
+ * complete: a failure leaves no partial file, and an existing file unchanged. Tensors are sorted by
  * descending element size, so that each begins at a multiple of its element size; tensors of the
  * same element size keep their order. The header is padded with spaces to a multiple of 8 bytes.
- * Errors of the stream are not reported: check ferror and fclose.
- * @param name  name of the file in messages
+ * @param path  in UTF-8; "-" is standard output, except on Windows
  * @retval SUPINE_ERROR_ARGUMENT  two tensors or two keys have the same name, a dtype, rank or size
  *                                is out of range, text is not UTF-8, or metadata has the key
- *                                "checksum" already */
-SUPINE_API supine_status supine_safetensors_write(FILE *file, const char *name,
-                                                  const supine_tensor *tensors, size_t tensor_count,
+ *                                "checksum" already
+ * @retval SUPINE_ERROR_WRITE     the file cannot be written; the message says why, such as a full
+ *                                disk
+ * @retval SUPINE_ERROR_MEMORY    an allocation failed */
+SUPINE_API supine_status supine_safetensors_write(const char *path, const supine_tensor *tensors,
+                                                  size_t tensor_count,
                                                   const supine_metadata *metadata,
                                                   size_t metadata_count, supine_error *error);
 

@@ -369,8 +369,6 @@ class Basis:
 
     def volumes(self, pose: Pose) -> Doubles:
         """Compute the volume (gas and tissue) of each lung in a pose, mL."""
-        if not self.has_volume:
-            raise OpenSurfaceError("the surface is open and encloses no volume")
         volumes = np.empty(len(self.lungs))
         _c.basis_volumes(self._c, pose, volumes.ctypes.data)
         return volumes
@@ -405,10 +403,7 @@ class Basis:
         end, size = self._range(begin, end)
         out = np.empty((end - begin, 3), _FLOAT) if out is None else out
         normals = np.empty((end - begin, 3), _FLOAT) if normals is None else normals
-        status = _c.deform_lit_range(self._c, pose, begin, end, _address(out, size, "out"),
-                                     _address(normals, size, "normals"))
-        if status != 0:
-            _c.fail(status, b"the basis was made or opened without normals: normals() computes them from the triangles")
+        _c.deform_lit_range(self._c, pose, begin, end, _address(out, size, "out"), _address(normals, size, "normals"))
         return out, normals
 
     def deform_batch(self, poses: Sequence[Pose], out: Optional[Floats] = None, begin: int = 0,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import ctypes.util
 import os
-from ctypes import POINTER, c_bool, c_char, c_char_p, c_double, c_float, c_int, c_int16, c_size_t, c_uint32, c_void_p
+from ctypes import POINTER, c_bool, c_char, c_char_p, c_double, c_float, c_int, c_int16, c_size_t, c_uint32, c_uint64, c_void_p
 from typing import Any, Optional
 
 MODES_MAX, LUNGS_MAX = 256, 16
@@ -84,7 +84,7 @@ class State(ctypes.Structure):
 
 class CPose(ctypes.Structure):
     """The C struct supine_pose."""
-    _fields_ = [("weights", c_double * MODES_MAX), ("gains", c_double * 3 * LUNGS_MAX)]
+    _fields_ = [("weights", c_double * MODES_MAX), ("gains", c_double * 3 * LUNGS_MAX), ("basis", c_uint64)]
 
 
 class GivenPose:
@@ -112,7 +112,8 @@ class Info(ctypes.Structure):
                 ("volume_linear", c_void_p), ("volume_quadratic", c_void_p), ("volume_cubic", c_void_p),
                 ("packed", c_void_p), ("normal_count", c_size_t), ("normals", c_void_p),
                 ("normal_weights", c_void_p), ("reference_volume", c_void_p), ("has_rest", c_bool),
-                ("has_full", c_bool), ("is_fields", c_bool), ("volume_axes", c_size_t), ("bend", c_double * 3)]
+                ("has_full", c_bool), ("is_fields", c_bool), ("volume_axes", c_size_t), ("bend", c_double * 3),
+                ("identity", c_uint64)]
 
 
 class Tensor(ctypes.Structure):
@@ -176,6 +177,22 @@ def _checked(name: str, *arguments: Any) -> Any:
     return call
 
 
+_POSED = {1: b"the pose was made by another basis: make it by Basis.pose of this basis",
+          6: b"the surface is open and encloses no volume",
+          7: b"the basis was made or opened without normals: normals() computes them from the triangles"}
+
+
+def _posed(name: str, *arguments: Any) -> Any:
+    """Declare a function that evaluates a pose; it raises an exception on failure."""
+    function = _declare(name, c_int, *arguments)
+
+    def call(*given: Any) -> None:
+        status = function(*given)
+        if status != 0:
+            fail(status, _POSED.get(status, b""))
+    return call
+
+
 def fail(status: int, message: bytes = b"") -> None:
     """Raise the exception for a status."""
     text = message or status_string(status)
@@ -200,12 +217,12 @@ basis_all_metadata = _declare("basis_all_metadata", POINTER(Metadata), c_void_p,
 basis_tensor = _declare("basis_tensor", POINTER(Tensor), c_void_p, c_char_p)
 basis_pose = _checked("basis_pose", c_void_p, POINTER(State), GivenPose)
 basis_scan = _declare("basis_scan", State, c_void_p)
-basis_volumes = _declare("basis_volumes", None, c_void_p, GivenPose, c_void_p)
+basis_volumes = _posed("basis_volumes", c_void_p, GivenPose, c_void_p)
 basis_error = _declare("basis_error", c_double, c_void_p, GivenPose)
-deform_range = _declare("deform_range", None, c_void_p, GivenPose, c_size_t, c_size_t, c_void_p)
-displace_range = _declare("displace_range", None, c_void_p, GivenPose, c_size_t, c_size_t, c_void_p)
-deform_lit_range = _declare("deform_lit_range", c_int, c_void_p, GivenPose, c_size_t, c_size_t, c_void_p, c_void_p)
-deform_batch = _declare("deform_batch", None, c_void_p, c_size_t, POINTER(CPose), c_size_t, c_size_t, c_void_p)
+deform_range = _posed("deform_range", c_void_p, GivenPose, c_size_t, c_size_t, c_void_p)
+displace_range = _posed("displace_range", c_void_p, GivenPose, c_size_t, c_size_t, c_void_p)
+deform_lit_range = _posed("deform_lit_range", c_void_p, GivenPose, c_size_t, c_size_t, c_void_p, c_void_p)
+deform_batch = _posed("deform_batch", c_void_p, c_size_t, POINTER(CPose), c_size_t, c_size_t, c_void_p)
 expected_error = _checked("expected_error", c_void_p, POINTER(State), POINTER(State), c_void_p)
 locate_space = _declare("locate_space", c_size_t, c_size_t)
 locate = _checked("locate", POINTER(LocateTask), POINTER(Residual), c_void_p, POINTER(Location))

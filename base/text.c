@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: MIT */
+/* Build sentences from parts, and compare endings of names. */
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+#include <strings.h>
+
+#include "base/text.h"
+#include "base/utf8.h"
+
+void supine_text_add(char *text, size_t size, const char *format, ...) {
+  const size_t used = strlen(text);
+  va_list arguments;
+  va_start(arguments, format);
+  (void)vsnprintf(text + used, size - used, format, arguments);
+  va_end(arguments);
+}
+
+bool supine_text_ends_in(const char *name, const char *ending) {
+  const size_t length = strlen(name);
+  const size_t tail = strlen(ending);
+  return length > tail && strcasecmp(name + length - tail, ending) == 0;
+}
+
+char *supine_text_make_utf8(char *text) {
+  const char *const end = text + strlen(text);
+  for (char *at = text; at < end;) {
+    const size_t size = supine_utf8_length(at, (size_t)(end - at));
+    if (size == 0) {
+      *at = '?';
+    }
+    at += size == 0 ? 1 : size;
+  }
+  return text;
+}

@@ -1,0 +1,136 @@
+/* SPDX-License-Identifier: MIT */
+/* Access an image in memory: get and set voxels, and convert positions between voxels and mm. */
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/clones.h"
+#include "base/vec3.h"
+
+#include "mesh/image/image_formats.h"
+
+void supine_image_free(supine_image *image) {
+  free(image->values);
+  *image = (supine_image){0};
+}
+
+size_t supine_image_voxel_size(supine_image_voxel voxel) {
+  static const size_t sizes[SUPINE_VOXEL_COUNT] = {1, 1, 2, 2, 4, 4, 4, 8};
+  return sizes[voxel];
+}
+
+size_t supine_image_bytes(const supine_image *image) {
+  return image->size[0] * image->size[1] * image->size[2] * image->channels *
+         supine_image_voxel_size(image->voxel);
+}
+
+double supine_image_get(const supine_image *image, size_t index) {
+  double value = 0.0;
+  supine_image_gather(image, index, &(size_t){0}, 1, &value);
+  return value;
+}
+
+#define GATHER(type)                                                                               \
+  for (size_t i = 0; i < count; ++i) {                                                             \
+    values[i] = (double)((const type *)image->values)[from + index[i]];                            \
+  }                                                                                                \
+  break
+
+SUPINE_CLONES void supine_image_gather(const supine_image *image, size_t from, const size_t *index,
+                                       size_t count, double *restrict values) {
+  switch (image->voxel) {
+  case SUPINE_VOXEL_I8:
+    GATHER(int8_t);
+  case SUPINE_VOXEL_U8:
+    GATHER(uint8_t);
+  case SUPINE_VOXEL_I16:
+    GATHER(int16_t);
+  case SUPINE_VOXEL_U16:
+    GATHER(uint16_t);
+  case SUPINE_VOXEL_I32:
+    GATHER(int32_t);
+  case SUPINE_VOXEL_U32:
+    GATHER(uint32_t);
+  case SUPINE_VOXEL_F32:
+    GATHER(float);
+  case SUPINE_VOXEL_F64:
+  case SUPINE_VOXEL_COUNT:
+    GATHER(double);
+  }
+}
+
+static double clip(double value, double low, double high) {
+  const double whole = rint(value);
+  return whole > low ? (whole < high ? whole : high) : low; /* NaN becomes `low` */
+}
+
+#define PUT(type, number)                                                                          \
+  for (size_t i = 0; i < count; ++i) {                                                             \
+    ((type *)image->values)[begin + i] = (type)(number);                                           \
+  }                                                                                                \
+  break
+
+SUPINE_CLONES void supine_image_put(supine_image *image, size_t begin, size_t count,
+                                    const double *restrict values) {
+  switch (image->voxel) {
+  case SUPINE_VOXEL_I8:
+    PUT(int8_t, clip(values[i], INT8_MIN, INT8_MAX));
+  case SUPINE_VOXEL_U8:
+    PUT(uint8_t, clip(values[i], 0, UINT8_MAX));
+  case SUPINE_VOXEL_I16:
+    PUT(int16_t, clip(values[i], INT16_MIN, INT16_MAX));
+  case SUPINE_VOXEL_U16:
+    PUT(uint16_t, clip(values[i], 0, UINT16_MAX));
+  case SUPINE_VOXEL_I32:
+    PUT(int32_t, clip(values[i], INT32_MIN, INT32_MAX));
+  case SUPINE_VOXEL_U32:
+    PUT(uint32_t, clip(values[i], 0, UINT32_MAX));
+  case SUPINE_VOXEL_F32:
+    PUT(float, values[i]);
+  case SUPINE_VOXEL_F64:
+  case SUPINE_VOXEL_COUNT:
+    PUT(double, values[i]);
+  }
+}
+
+void supine_image_set_axes(supine_image *image, supine_axes axes) {
+  if (axes == SUPINE_AXES_AUTO) {
+    return;
+  }
+  double from[3][3];
+  double *vectors[4] = {image->step[0], image->step[1], image->step[2], image->origin};
+  supine_mesh_axes_matrix(image->axes, from);
+  for (int v = 0; v < 4; ++v) {
+    const double p[3] = {vectors[v][0], vectors[v][1], vectors[v][2]};
+    for (int k = 0; k < 3; ++k) {
+      vectors[v][k] = from[0][k] * p[0] + from[1][k] * p[1] + from[2][k] * p[2];
+    }
+    supine_mesh_axes_apply(axes, 1.0, vectors[v]);
+  }
+  image->axes = axes;
+}
+
+void supine_image_place(const supine_image *image, size_t index, double point[3]) {
+  const double at[3] = {(double)(index % image->size[0]),
+                        (double)(index / image->size[0] % image->size[1]),
+                        (double)(index / image->size[0] / image->size[1])};
+  for (int k = 0; k < 3; ++k) {
+    point[k] = image->origin[k] + at[0] * image->step[0][k] + at[1] * image->step[1][k] +
+               at[2] * image->step[2][k];
+  }
+}
+
+void supine_image_locate(const supine_image *image, const double point[3], double voxel[3]) {
+  const double whole = supine_triple(image->step[0], image->step[1], image->step[2]);
+  double from[3];
+  for (int k = 0; k < 3; ++k) {
+    from[k] = point[k] - image->origin[k];
+  }
+  for (int a = 0; a < 3; ++a) { /* solve for voxel[a] by Cramer's rule */
+    double replaced[3][3];
+    memcpy(replaced, image->step, sizeof replaced);
+    memcpy(replaced[a], from, sizeof from);
+    voxel[a] = supine_triple(replaced[0], replaced[1], replaced[2]) / whole;
+  }
+}

@@ -1,0 +1,181 @@
+/* SPDX-License-Identifier: MIT */
+/* Read NIfTI through libnifti2, and write NIfTI-1. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <nifti2_io.h>
+
+#include "base/text.h"
+#include "base/vec3.h"
+
+#include "mesh/image/image_formats.h"
+
+static const int types[SUPINE_VOXEL_COUNT] = {DT_INT8,  DT_UINT8,  DT_INT16,   DT_UINT16,
+                                              DT_INT32, DT_UINT32, DT_FLOAT32, DT_FLOAT64};
+
+/* Return whether qform and sform place a corner of the image half a voxel or more apart. */
+static bool forms_differ(const nifti_image *nifti) {
+  const double size[3] = {(double)nifti->nx, (double)nifti->ny, (double)nifti->nz};
+  const double voxel = fmin(fabs(nifti->dx), fmin(fabs(nifti->dy), fabs(nifti->dz)));
+  double farthest = 0.0;
+  for (int corner = 0; corner < 8; ++corner) {
+    double apart = 0.0;
+    for (int k = 0; k < 3; ++k) {
+      double difference = nifti->sto_xyz.m[k][3] - nifti->qto_xyz.m[k][3];
+      for (int a = 0; a < 3; ++a) {
+        difference +=
+            (corner >> a & 1) * (size[a] - 1.0) * (nifti->sto_xyz.m[k][a] - nifti->qto_xyz.m[k][a]);
+      }
+      apart += difference * difference;
+    }
+    farthest = fmax(farthest, sqrt(apart));
+  }
+  return nifti->sform_code > 0 && nifti->qform_code > 0 && farthest >= 0.5 * voxel;
+}
+
+/* Check the image's size and type. Convert origin and steps from RAS, NIfTI's axes, to LPS. */
+static supine_status check(const char *path, const nifti_image *nifti, supine_image *image,
+                           image_storage *storage, supine_error *error) {
+  const double unit = nifti->xyz_units == NIFTI_UNITS_METER    ? 1000.0
+                      : nifti->xyz_units == NIFTI_UNITS_MICRON ? 1e-3
+                                                               : 1.0;
+  const nifti_dmat44 *m = nifti->sform_code > 0 ? &nifti->sto_xyz : &nifti->qto_xyz;
+  const int64_t size[3] = {nifti->nx, nifti->ny, nifti->nz};
+  size_t type = 0;
+  if (nifti->ndim < 3 || nifti->nx * nifti->ny * nifti->nz != nifti->nvox) {
+    return supine_error_set(
+        error, SUPINE_ERROR_FORMAT,
+        "%s: ndim is %d; give an image with one number per voxel, three axes and one volume", path,
+        (int)nifti->ndim);
+  }
+  if (nifti->sform_code <= 0 && nifti->qform_code <= 0) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s: the header has no orientation (qform and sform are 0); give the "
+                            "file that the segmenter wrote",
+                            path);
+  }
+  const bool wide = nifti->datatype == DT_INT64 || nifti->datatype == DT_UINT64;
+  while (type < SUPINE_VOXEL_COUNT && types[type] != (wide ? DT_FLOAT64 : nifti->datatype)) {
+    ++type;
+  }
+  if (type == SUPINE_VOXEL_COUNT) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s: voxels of type %s are not supported; convert them to int16", path,
+                            nifti_datatype_string(nifti->datatype));
+  }
+  image->voxel = (supine_image_voxel)type;
+  image->axes = SUPINE_AXES_RAS;
+  image->frame_source = nifti->sform_code > 0 ? "sform" : "qform";
+  image->frames_differ = forms_differ(nifti);
+  for (int k = 0; k < 3; ++k) {
+    const double turn = k < 2 ? -unit : unit;
+    image->size[k] = size[k] > 0 ? (size_t)size[k] : 0;
+    image->origin[k] = turn * m->m[k][3];
+    for (int a = 0; a < 3; ++a) {
+      image->step[a][k] = turn * m->m[k][a];
+    }
+  }
+  const bool packed = nifti_is_gzfile(path) != 0;
+  *storage = (image_storage){.offset = packed ? 0 : nifti->iname_offset,
+                             .skip = packed ? nifti->iname_offset : 0,
+                             .packed = packed,
+                             .big_endian = nifti->byteorder != nifti_short_order(),
+                             .integer = nifti->datatype == DT_INT64    ? 1
+                                        : nifti->datatype == DT_UINT64 ? -1
+                                                                       : 0,
+                             .slope = nifti->scl_slope,
+                             .intercept = nifti->scl_inter};
+  return SUPINE_OK;
+}
+
+supine_status supine_image_describe_nifti(const char *path, supine_image *image,
+                                          image_storage *storage, supine_error *error) {
+  nifti_set_debug_level(0);
+  nifti_image *nifti = nifti_image_read(path, 0);
+  if (nifti == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: not a NIfTI header; give a NIfTI file",
+                            path);
+  }
+  const supine_status status = check(path, nifti, image, storage, error);
+  nifti_image_free(nifti);
+  return status;
+}
+
+/* Make the header: 348 bytes, then four zero bytes, which say that no extension follows. */
+static void make_header(const supine_image *image, const char *note, unsigned char header[352]) {
+  nifti_1_header h = {0};
+  static const short bits[SUPINE_VOXEL_COUNT] = {8, 8, 16, 16, 32, 32, 32, 64};
+  float *rows[3] = {h.srow_x, h.srow_y, h.srow_z};
+  h.sizeof_hdr = 348;
+  h.dim[0] = 3;
+  h.datatype = (short)types[image->voxel];
+  h.bitpix = bits[image->voxel];
+  h.vox_offset = 352.0F;
+  h.scl_slope = 1.0F;
+  h.xyzt_units = NIFTI_UNITS_MM;
+  h.sform_code = NIFTI_XFORM_SCANNER_ANAT;
+  h.pixdim[0] = 1.0F;
+  for (int a = 0; a < 7; ++a) {
+    h.dim[1 + a] = 1;
+  }
+  for (int a = 0; a < 3; ++a) {
+    const double *s = image->step[a];
+    h.dim[1 + a] = (short)image->size[a];
+    h.pixdim[1 + a] = (float)supine_length(s);
+    for (int k = 0; k < 3; ++k) {
+      rows[k][a] = (float)(k < 2 ? -s[k] : s[k]);
+    }
+    rows[a][3] = (float)(a < 2 ? -image->origin[a] : image->origin[a]);
+  }
+  if (image->channels == 3) { /* NIfTI stores the components of vectors along the fifth axis */
+    h.dim[0] = 5;
+    h.dim[5] = 3;
+    h.pixdim[4] = h.pixdim[5] = 1.0F;
+    h.intent_code = NIFTI_INTENT_VECTOR;
+  }
+  (void)snprintf(h.descrip, sizeof h.descrip, "%.79s", note != NULL ? note : "");
+  memcpy(h.magic, "n+1", 4);
+  memset(header, 0, 352);
+  memcpy(header, &h, sizeof h);
+}
+
+/* Copy the vectors: first all x, then all y, then all z. Return NULL if out of memory. The vectors
+ * stay in LPS: ITK and ANTs do not convert NIFTI_INTENT_VECTOR, and ITK before 5.3 reads only the
+ * first component of NIFTI_INTENT_DISPVECT. */
+static float *planes(const supine_image *image) {
+  const size_t count = image->size[0] * image->size[1] * image->size[2];
+  float *made = malloc(3 * count * sizeof *made);
+  for (size_t i = 0; made != NULL && i < 3 * count; ++i) {
+    made[i % 3 * count + i / 3] = (float)supine_image_get(image, i);
+  }
+  return made;
+}
+
+supine_status supine_image_write_nifti(const char *path, const supine_image *image,
+                                       const char *note, FILE *file, supine_error *error) {
+  unsigned char header[352];
+  const bool vectors = image->channels == 3 && image->voxel == SUPINE_VOXEL_F32;
+  if ((image->channels != 1 && !vectors) || image->size[0] > INT16_MAX ||
+      image->size[1] > INT16_MAX || image->size[2] > INT16_MAX) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "%s: NIfTI-1 holds one number or a 3-vector per voxel, and at most "
+                            "%d voxels along an axis: save it as .nrrd",
+                            path, INT16_MAX);
+  }
+  float *planar = vectors ? planes(image) : NULL;
+  if (vectors && planar == NULL) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  supine_status status = SUPINE_OK;
+  const void *values = vectors ? planar : image->values;
+  make_header(image, note, header);
+  if (supine_text_ends_in(path, ".gz")) {
+    status = supine_image_pack(IMAGE_GZIP, header, sizeof header, image, values, file);
+  } else {
+    (void)fwrite(header, 1, sizeof header, file);
+    (void)fwrite(values, 1, supine_image_bytes(image), file);
+  }
+  free(planar);
+  return status;
+}

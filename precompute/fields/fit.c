@@ -1,0 +1,404 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Fit harmonics to another simulator's fields, cross-validate the fit, and write a basis file. */
+#include <cblas.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/lapack.h"
+#include "base/vec3.h"
+#include "precompute/basis_file.h"
+#include "precompute/fields/fields.h"
+#include "precompute/projection/tally.h"
+#include <supine/sh.h>
+
+/* The directions of gravity determine a fit if the condition number of the matrix of harmonics and
+ * the leverage of each direction are at most these limits. At leverage 1, a direction always has
+ * residual 0, whatever its field. */
+static const double condition_max = 100.0;
+static const double leverage_max = 0.999;
+
+/* A higher band replaces the chosen one if its leave-one-out error is below `worthwhile` times that
+ * of the chosen band. A chosen band with an error of at most `exact` is kept, because such an error
+ * is rounding error. */
+static const double worthwhile = 0.99;
+static const double exact = 1e-6;
+
+/* Relative error that is small beside that of any simulator. Modes are not kept to lower it. */
+static const double negligible = 1e-4;
+
+/* A least-squares fit of harmonics to displacement fields for several directions of gravity. The
+ * coefficient of each harmonic is a field; the coefficients are `pinv` times the given fields. */
+typedef struct fit {
+  size_t count;      /* number of directions of gravity */
+  size_t terms;      /* number of harmonics */
+  double *harmonics; /* [count, terms] value of each harmonic at each direction */
+  double *pinv;      /* [terms, count] pseudo-inverse of `harmonics` */
+  double condition;  /* condition number of `harmonics` */
+} fit;
+
+/* Work space of predict(), which predicts the field of a held-out direction from all others. */
+typedef struct prediction {
+  double *pinv;      /* [harmonics, directions] fit.pinv of a fit without the held-out direction */
+  double *pinv_gram; /* [harmonics, directions] product of `pinv` and fitting.gram */
+  double *coefficient_gram; /* [harmonics, harmonics] scalar products of coefficients, mm^2 */
+  double *eigenvalues;
+  double *eigenvectors;
+  double *target;   /* [harmonics] values at the held-out direction, or their projection on modes */
+  double *residual; /* [directions] weight of each input field in the prediction error */
+  double *gram_residual; /* [directions] product of fitting.gram and `residual` */
+} prediction;
+
+typedef struct fitting {
+  const supine_fields *fields;
+  size_t rows;  /* 3 x number of vertices */
+  double *gram; /* [directions, directions] scalar products of any two input fields, mm^2 */
+  fit chosen;
+  prediction work;
+} fitting;
+
+static void fit_free(fit *f) {
+  free(f->harmonics);
+  free(f->pinv);
+  *f = (fit){0};
+}
+
+static supine_status fit_create(size_t band, size_t count, const double *directions, fit *f) {
+  const size_t terms = supine_sh_count(band);
+  const int m = (int)count;
+  const int p = (int)terms;
+  *f = (fit){.count = count, .terms = terms};
+  f->harmonics = calloc(count * terms, sizeof *f->harmonics);
+  f->pinv = malloc(terms * count * sizeof *f->pinv);
+  double *a = malloc(count * terms * sizeof *a);
+  double *u = malloc(count * terms * sizeof *u);
+  double *vt = malloc(terms * terms * sizeof *vt);
+  double *s = calloc(terms, sizeof *s);
+  supine_status status = SUPINE_ERROR_MEMORY;
+  if (f->harmonics != NULL && f->pinv != NULL && a != NULL && u != NULL && vt != NULL &&
+      s != NULL) {
+    status = supine_sh_evaluate_many(band, count, directions, f->harmonics);
+  }
+  if (status == SUPINE_OK) {
+    memcpy(a, f->harmonics, count * terms * sizeof *a);
+    status =
+        supine_lapack_status(LAPACKE_dgesdd(LAPACK_ROW_MAJOR, 'S', m, p, a, p, s, u, p, vt, p));
+  }
+  if (status == SUPINE_OK) {
+    f->condition = s[terms - 1] > 0.0 ? s[0] / s[terms - 1] : INFINITY;
+    for (size_t t = 0; t < terms; ++t) {
+      cblas_dscal(p, 1.0 / s[t], vt + t * terms, 1);
+    }
+    cblas_dgemm(CblasRowMajor, CblasTrans, CblasTrans, p, m, p, 1.0, vt, p, u, p, 0.0, f->pinv, m);
+  } else {
+    fit_free(f);
+  }
+  free(a);
+  free(u);
+  free(vt);
+  free(s);
+  return status;
+}
+
+static double leverage(const fit *f, size_t d) {
+  return cblas_ddot((int)f->terms, f->harmonics + d * f->terms, 1, f->pinv + d, (int)f->count);
+}
+
+static bool fit_is_determined(const fit *f) {
+  bool determined = f->condition <= condition_max;
+  for (size_t i = 0; determined && i < f->count; ++i) {
+    determined = leverage(f, i) <= leverage_max;
+  }
+  return determined;
+}
+
+/* Allocate all arrays in one block. Each matrix has room for M x M numbers, where M is the number
+ * of fields, because only fits with fewer than M harmonics are tried. */
+static supine_status allocate(fitting *w, supine_error *error) {
+  const size_t m = w->fields->direction_count;
+  double *next = w->gram = malloc((5 * m * m + 4 * m) * sizeof *next);
+  if (next == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu fields", m);
+  }
+  double **const squares[] = {&w->work.pinv, &w->work.pinv_gram, &w->work.coefficient_gram,
+                              &w->work.eigenvectors};
+  double **const lists[] = {&w->work.eigenvalues, &w->work.target, &w->work.residual,
+                            &w->work.gram_residual};
+  for (size_t i = 0; i < 4; ++i) {
+    *squares[i] = next += m * m;
+  }
+  next += m * m;
+  for (size_t i = 0; i < 4; ++i, next += m) {
+    *lists[i] = next;
+  }
+  return SUPINE_OK;
+}
+
+/* Predict the field for direction d of gravity from the fields for all other directions. Use the
+ * harmonics if `modes` is 0, otherwise that number of principal modes of the fitted field. The
+ * error, true minus predicted, is a weighted sum of all input fields. Write the weights to
+ * w->work.residual, and the squared norm of the error, mm^2, to `square`.
+ *
+ * Let A be f->pinv, h row d of f->harmonics x A, and e_d a vector that is 1 at d and 0 elsewhere.
+ * The pseudo-inverse without direction d is
+ *
+ *     A_d = A - A e_d (e_d - h)^T / (1 - h_d) */
+static supine_status predict(const fitting *w, const fit *f, size_t d, size_t modes,
+                             double *square) {
+  const prediction *o = &w->work;
+  const int m = (int)f->count;
+  const int p = (int)f->terms;
+  const double *y = f->harmonics + d * f->terms;
+  supine_status status = SUPINE_OK;
+  cblas_dgemv(CblasRowMajor, CblasTrans, p, m, -1.0, f->pinv, m, y, 1, 0.0, o->residual, 1);
+  o->residual[d] += 1.0;
+  memcpy(o->pinv, f->pinv, f->terms * f->count * sizeof *o->pinv);
+  cblas_dger(CblasRowMajor, p, m, -1.0 / o->residual[d], f->pinv + d, m, o->residual, 1, o->pinv,
+             m);
+  memcpy(o->target, y, f->terms * sizeof *o->target);
+  if (modes > 0) {
+    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, p, m, m, 1.0, o->pinv, m, w->gram, m,
+                0.0, o->pinv_gram, m);
+    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, p, p, m, 1.0, o->pinv_gram, m, o->pinv, m,
+                0.0, o->coefficient_gram, p);
+    status = supine_sh_leading_eigenpairs(f->terms, o->coefficient_gram, modes, o->eigenvalues,
+                                          o->eigenvectors);
+    memset(o->target, 0, f->terms * sizeof *o->target);
+    for (size_t k = 0; k < modes && status == SUPINE_OK; ++k) {
+      const double *mode = o->eigenvectors + k * f->terms;
+      cblas_daxpy(p, cblas_ddot(p, mode, 1, y, 1), mode, 1, o->target, 1);
+    }
+  }
+  cblas_dgemv(CblasRowMajor, CblasTrans, p, m, -1.0, o->pinv, m, o->target, 1, 0.0, o->residual, 1);
+  o->residual[d] += 1.0;
+  cblas_dsymv(CblasRowMajor, CblasUpper, m, 1.0, w->gram, m, o->residual, 1, 0.0, o->gram_residual,
+              1);
+  *square = fmax(cblas_ddot(m, o->gram_residual, 1, o->residual, 1), 0.0);
+  return status;
+}
+
+/* Sum the squared displacements of all fields, mm^2. */
+static double square_sum(const fitting *w) {
+  double sum = 0.0;
+  for (size_t i = 0; i < w->fields->direction_count; ++i) {
+    sum += w->gram[i * w->fields->direction_count + i];
+  }
+  return sum;
+}
+
+/* Compute the relative RMS leave-one-out error of a fit before its compression to modes. */
+static double leave_one_out(const fitting *w, const fit *f) {
+  double sum = 0.0;
+  for (size_t d = 0; d < f->count; ++d) {
+    double square;
+    (void)predict(w, f, d, 0, &square);
+    sum += square;
+  }
+  return sqrt(sum / square_sum(w));
+}
+
+/* Fit harmonics up to each degree (band) that the directions determine. Choose band `wanted`. If it
+ * is negative, prefer a higher band only if its leave-one-out error is over 1 % lower. */
+static supine_status choose_band(fitting *w, int wanted, supine_fit_report *report,
+                                 supine_error *error) {
+  const size_t m = w->fields->direction_count;
+  double least = INFINITY;
+  size_t determined_count = 0;
+  for (size_t band = 0; band <= SUPINE_FIT_BAND_MAX && supine_sh_count(band) < m; ++band) {
+    fit trial;
+    const supine_status status = fit_create(band, m, w->fields->directions, &trial);
+    if (status != SUPINE_OK) {
+      return supine_error_set(error, status, "fit of band %zu: %s", band,
+                              supine_status_string(status));
+    }
+    if (!fit_is_determined(&trial)) {
+      fit_free(&trial);
+      break;
+    }
+    report->error[band] = leave_one_out(w, &trial);
+    determined_count = band + 1;
+    if (wanted < 0 ? report->error[band] < worthwhile * least && least > exact
+                   : (size_t)wanted == band) {
+      least = report->error[band];
+      fit_free(&w->chosen);
+      w->chosen = trial;
+      report->band = band;
+    } else {
+      fit_free(&trial);
+    }
+  }
+  if (w->chosen.harmonics == NULL) {
+    return supine_error_set(
+        error, SUPINE_ERROR_ARGUMENT,
+        "%zu directions do not determine band %d (%d harmonics); the highest "
+        "band that they determine is %d: give more directions, or leave --band out",
+        m, wanted, (wanted + 1) * (wanted + 1), (int)determined_count - 1);
+  }
+  report->band_highest = determined_count - 1;
+  report->condition = w->chosen.condition;
+  return SUPINE_OK;
+}
+
+/* Make an expansion (sh/expansion.h) from the chosen fit. Its columns are the input fields. Its
+ * functions are the transpose of the chosen fit's `pinv`. */
+static supine_status project(const fitting *w, size_t band, supine_expansion *made,
+                             supine_error *error) {
+  const size_t m = w->chosen.count;
+  const size_t terms = w->chosen.terms;
+  *made = (supine_expansion){.row_count = w->rows, .band = band, .rank = m};
+  made->columns = malloc(w->rows * m * sizeof *made->columns);
+  made->functions = malloc(m * terms * sizeof *made->functions);
+  if (made->columns == NULL || made->functions == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu fields", m);
+  }
+  for (size_t d = 0; d < m; ++d) {
+    for (size_t i = 0; i < w->rows; ++i) {
+      made->columns[i * m + d] = w->fields->displacement[d * w->rows + i];
+    }
+    for (size_t t = 0; t < terms; ++t) {
+      made->functions[d * terms + t] = w->chosen.pinv[t * m + d];
+    }
+  }
+  return SUPINE_OK;
+}
+
+static supine_status cross_validate(const fitting *w, size_t modes, supine_accuracy *accuracy,
+                                    supine_error *error) {
+  const size_t m = w->fields->direction_count;
+  const double samples = (double)m * (double)w->fields->vertex_count;
+  supine_tally *tally = calloc(1, sizeof *tally);
+  double *residual = malloc(w->rows * sizeof *residual);
+  supine_status status = tally == NULL || residual == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
+  for (size_t d = 0; d < m && status == SUPINE_OK; ++d) {
+    double square;
+    status = predict(w, &w->chosen, d, modes, &square);
+    cblas_dgemv(CblasRowMajor, CblasTrans, (int)m, (int)w->rows, 1.0, w->fields->displacement,
+                (int)w->rows, w->work.residual, 1, 0.0, residual, 1);
+    for (size_t i = 0; i < w->rows; i += 3) {
+      const double length = supine_length(residual + i);
+      supine_accuracy_tally_add(tally, 1, &length);
+    }
+  }
+  if (status == SUPINE_OK) {
+    const double size = sqrt(square_sum(w) / samples);
+    *accuracy = (supine_accuracy){.direction_count = m,
+                                  .rms_mm = sqrt(tally->square_sum / samples),
+                                  .p95_mm = supine_accuracy_tally_percentile(tally, 0.95),
+                                  .max_mm = tally->largest};
+    accuracy->relative_rms = accuracy->rms_mm / size;
+    accuracy->relative_p95 = accuracy->p95_mm / size;
+    accuracy->relative_max = accuracy->max_mm / size;
+  } else {
+    (void)supine_error_set(error, status, "cross-validation: %s", supine_status_string(status));
+  }
+  free(tally);
+  free(residual);
+  return status;
+}
+
+/* Compress the chosen fit to modes, or use its harmonics. */
+static supine_status compress(const supine_expansion *expansion, const supine_fit_options *options,
+                              double fit_error, supine_compression *made, supine_error *error) {
+  double singular[SUPINE_MODES_MADE_MAX];
+  double total = 0.0;
+  if (options->modes == 0) {
+    return supine_sh_compress_harmonics(expansion, made, error);
+  }
+  const supine_status status =
+      supine_sh_compress_modes(expansion, NULL, options->modes, made, singular, &total, error);
+  if (status == SUPINE_OK && options->fewest_modes) {
+    supine_sh_compression_truncate(
+        made, expansion->rank,
+        supine_sh_modes_needed(made->mode_count, singular, total, fmax(fit_error, negligible)));
+  }
+  return status;
+}
+
+/* Subtract from each mode its weight w in the posture of the scan. The constant harmonic is
+ * 1 / sqrt(4 pi), so that its coefficient falls by sqrt(4 pi) w. */
+static void subtract_scan(const double scan_gravity[3], supine_compression *made) {
+  static const double sqrt_4pi = 3.5449077018110321;
+  double weights[SUPINE_MODES_MADE_MAX];
+  supine_sh_compression_weights(made, scan_gravity, weights);
+  for (size_t k = 0; k < made->mode_count; ++k) {
+    made->modes[k * supine_sh_count(made->band)] -= sqrt_4pi * weights[k];
+  }
+}
+
+supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_options *options,
+                                supine_compression *compression, supine_fit_report *report,
+                                supine_error *error) {
+  const int m = (int)fields->direction_count;
+  fitting w = {.fields = fields, .rows = 3 * fields->vertex_count};
+  const int rows = (int)w.rows;
+  supine_expansion expansion = {0};
+  supine_compression made = {0};
+  supine_fit_report found = {0};
+  if (m < 2) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "too few directions of gravity (%d): give fields for at least two", m);
+  }
+  supine_status status = allocate(&w, error);
+  if (status == SUPINE_OK) {
+    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, m, m, rows, 1.0, fields->displacement,
+                rows, fields->displacement, rows, 0.0, w.gram, m);
+    status =
+        square_sum(&w) > 0.0
+            ? choose_band(&w, options->band, &found, error)
+            : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                               "all displacements are zero: give fields that move the surface");
+  }
+  if (status == SUPINE_OK) {
+    status = project(&w, found.band, &expansion, error);
+  }
+  if (status == SUPINE_OK) {
+    status = compress(&expansion, options, found.error[found.band], &made, error);
+  }
+  if (status == SUPINE_OK) {
+    status = cross_validate(&w, options->modes == 0 ? 0 : made.mode_count, &found.accuracy, error);
+  }
+  if (status == SUPINE_OK) {
+    if (options->scan_gravity != NULL) {
+      subtract_scan(options->scan_gravity, &made);
+    }
+    found.mode_count = made.mode_count;
+    *compression = made;
+    *report = found;
+  } else {
+    supine_sh_compression_free(&made);
+  }
+  supine_sh_expansion_free(&expansion);
+  free(w.gram);
+  fit_free(&w.chosen);
+  return status;
+}
+
+supine_status supine_fields_write(const supine_lungs *lungs, const supine_fields *fields,
+                                  const supine_fit_options *options, const char *path,
+                                  supine_fit_report *report, supine_error *error) {
+  supine_compression field = {0};
+  supine_volume_forms forms = {0};
+  supine_status status = supine_fields_fit(fields, options, &field, report, error);
+  if (status == SUPINE_OK) {
+    status = supine_projection_volume_forms(&field, lungs, NULL, NULL, &forms, error);
+  }
+  if (status == SUPINE_OK) {
+    const supine_precompute_options basis = {.modes = options->modes,
+                                             .assumed = options->assumed,
+                                             .findings = options->findings,
+                                             .frame = options->frame,
+                                             .made_by = options->made_by};
+    const supine_basis_fit summary = {report->band_highest, report->condition,
+                                      options->scan_gravity};
+    const supine_basis_content content = {.lungs = lungs,
+                                          .options = &basis,
+                                          .fit = &summary,
+                                          .compression = &field,
+                                          .forms = &forms,
+                                          .accuracy = &report->accuracy};
+    status = supine_writer_basis_write(path, &content, error);
+  }
+  supine_sh_compression_free(&field);
+  supine_physics_volume_forms_free(&forms);
+  return status;
+}

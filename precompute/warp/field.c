@@ -1,0 +1,255 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Compute the displacement field on the grid of a basis, and let it fall to 0 outside the lungs. */
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+
+#include "base/vec3.h"
+
+#include "precompute/warp/field.h"
+
+const double supine_field_aerated = -300.0;
+
+void supine_field_find_cell(const supine_image *image, const double point[3],
+                            supine_field_cell *cell) {
+  double voxel[3];
+  supine_image_locate(image, point, voxel);
+  for (size_t a = 0; a < 3; ++a) {
+    const double last = (double)image->size[a] - 1.0;
+    const double at = fmin(fmax(voxel[a], 0.0), last);
+    const double corner = fmin(floor(at), fmax(last - 1.0, 0.0));
+    cell->corner[a] = (size_t)corner;
+    cell->share[a] = at - corner;
+  }
+}
+
+void supine_field_interpolate(const supine_image *image, const supine_field_cell *cell,
+                              double *values, double (*slope)[3]) {
+  const float *numbers = image->values;
+  for (size_t c = 0; c < image->channels; ++c) {
+    values[c] = 0.0;
+    for (size_t k = 0; k < 3 && slope != NULL; ++k) {
+      slope[c][k] = 0.0;
+    }
+  }
+  for (size_t corner = 0; corner < 8; ++corner) {
+    double weight[3];
+    size_t at[3];
+    for (size_t a = 0; a < 3; ++a) {
+      const size_t up = corner >> a & 1U;
+      weight[a] = up ? cell->share[a] : 1.0 - cell->share[a];
+      at[a] = cell->corner[a] + up;
+      /* On an axis of one voxel, the upper corner is outside the image, and its weight is 0. */
+      at[a] -= at[a] == image->size[a];
+    }
+    const size_t voxel = at[0] + image->size[0] * (at[1] + image->size[1] * at[2]);
+    for (size_t c = 0; c < image->channels; ++c) {
+      const double value = (double)numbers[image->channels * voxel + c];
+      values[c] += weight[0] * weight[1] * weight[2] * value;
+      for (size_t k = 0; k < 3 && slope != NULL; ++k) {
+        const double sign = corner >> k & 1U ? 1.0 : -1.0;
+        slope[c][k] += sign * weight[(k + 1) % 3] * weight[(k + 2) % 3] * value;
+      }
+    }
+  }
+}
+
+/* Read and check the grid in a basis: its shape, the node of each vertex, and the depth of each. */
+static supine_status read_grid(const supine_basis *basis, supine_image *nodes,
+                               const uint32_t **part, const float **depth, supine_error *error) {
+  const size_t n = supine_basis_get_info(basis)->vertex_count;
+  const supine_tensor *grid = supine_basis_tensor(basis, "grid");
+  const supine_tensor *size = supine_basis_tensor(basis, "grid_size");
+  const supine_tensor *of = supine_basis_tensor(basis, "part");
+  const supine_tensor *deep = supine_basis_tensor(basis, "depth");
+  if (grid == NULL || size == NULL || of == NULL || deep == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "the basis holds no grid: make one with 'supine embed BASIS --grid MM' "
+                            "or 'supine embed BASIS IMAGE'");
+  }
+  bool valid = grid->dtype == SUPINE_F64 && grid->rank == 2 && grid->shape[0] == 4 &&
+               grid->shape[1] == 3 && size->dtype == SUPINE_U32 && size->rank == 1 &&
+               size->shape[0] == 3 && of->dtype == SUPINE_U32 && of->rank == 1 &&
+               of->shape[0] == n && deep->dtype == SUPINE_F32 && deep->rank == 1 &&
+               deep->shape[0] == n;
+  double count = 1.0;
+  for (size_t k = 0; k < 3 && valid; ++k) {
+    nodes->size[k] = ((const uint32_t *)size->data)[k];
+    count *= (double)nodes->size[k];
+    valid = nodes->size[k] >= 2;
+  }
+  valid = valid && count < 2147483648.0;
+  for (size_t i = 0; i < 12 && valid; ++i) {
+    const double value = ((const double *)grid->data)[i];
+    *(i < 3 ? &nodes->origin[i] : &nodes->step[i / 3 - 1][i % 3]) = value;
+    valid = isfinite(value);
+  }
+  for (size_t i = 0; i < n && valid; ++i) {
+    valid = ((const uint32_t *)of->data)[i] < count;
+  }
+  double axes[3] = {0.0, 0.0, 0.0};
+  if (valid) {
+    /* The result is finite only if the axes of the grid are linearly independent. */
+    supine_image_locate(nodes, axes, axes);
+  }
+  if (!valid || !isfinite(axes[0] + axes[1] + axes[2])) {
+    return supine_error_set(
+        error, SUPINE_ERROR_FORMAT,
+        "the grid in the basis is malformed: make it again with 'supine embed'");
+  }
+  *part = of->data;
+  *depth = deep->data;
+  return SUPINE_OK;
+}
+
+/* Average the displacements of those neighbours of node i whose displacement is known: their mark
+ * in `known` is neither 0 (unknown) nor `now` (set in the layer that is being added). Return false
+ * if there are none. */
+static bool mean_neighbour(const supine_image *nodes, const unsigned char *known, unsigned char now,
+                           size_t i, float mean[3]) {
+  const float *u = nodes->values;
+  const size_t stride[3] = {1, nodes->size[0], nodes->size[0] * nodes->size[1]};
+  size_t count = 0;
+  mean[0] = mean[1] = mean[2] = 0.0F;
+  for (size_t a = 0; a < 3; ++a) {
+    const size_t at = i / stride[a] % nodes->size[a];
+    for (int side = 0; side < 2; ++side) {
+      if (side == 0 ? at == 0 : at + 1 == nodes->size[a]) {
+        continue;
+      }
+      const size_t j = side == 0 ? i - stride[a] : i + stride[a];
+      if (known[j] != 0 && known[j] != now) {
+        ++count;
+        for (size_t k = 0; k < 3; ++k) {
+          mean[k] += u[3 * j + k];
+        }
+      }
+    }
+  }
+  for (size_t k = 0; k < 3 && count > 0; ++k) {
+    mean[k] /= (float)count;
+  }
+  return count > 0;
+}
+
+/* Extend the field outwards in layers of nodes, so that it falls linearly to 0 over `fade` mm.
+ * `known` holds a mark for each node: 0 if its displacement is not set, 1 if it was set before the
+ * newest layer, and 2 or 3 (in odd or even layers) if it was set in the newest layer. */
+static void fade_out(supine_image *nodes, unsigned char *known, double fade) {
+  float *u = nodes->values;
+  const size_t count = nodes->size[0] * nodes->size[1] * nodes->size[2];
+  double step = INFINITY;
+  for (int a = 0; a < 3; ++a) {
+    step = fmin(step, supine_length(nodes->step[a]));
+  }
+  const size_t layers = (size_t)fmin(ceil(fade / step), 1000.0);
+  for (size_t layer = 1; layer < layers; ++layer) {
+    const float share = (float)(layers - layer) / (float)(layers - layer + 1);
+    const unsigned char now = layer % 2 == 1 ? 2 : 3;
+    bool any = false;
+    for (size_t i = 0; i < count; ++i) {
+      float mean[3];
+      if (known[i] == 0 && mean_neighbour(nodes, known, now, i, mean)) {
+        known[i] = now;
+        any = true;
+        for (size_t k = 0; k < 3; ++k) {
+          u[3 * i + k] = share * mean[k];
+        }
+      }
+    }
+    if (!any) {
+      break;
+    }
+    for (size_t i = 0; i < count; ++i) {
+      known[i] = known[i] != 0 && known[i] != now ? 1 : known[i];
+    }
+  }
+}
+
+supine_status supine_field_create(const supine_basis *basis, const supine_pose *pose, double fade,
+                                  supine_field *field, supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const size_t n = info->vertex_count;
+  supine_field made = {.nodes = {.voxel = SUPINE_VOXEL_F32, .channels = 3}};
+  const uint32_t *part = NULL;
+  const float *depth = NULL;
+  supine_status status = read_grid(basis, &made.nodes, &part, &depth, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  const size_t count = made.nodes.size[0] * made.nodes.size[1] * made.nodes.size[2];
+  float *moved = malloc(3 * n * sizeof *moved);
+  unsigned char *known = calloc(count, 1);
+  float *u = calloc(3 * count, sizeof *u);
+  float *below = malloc(count * sizeof *below);
+  made.nodes.values = u;
+  made.depth = made.nodes;
+  made.depth.channels = 1;
+  made.depth.values = below;
+  if (moved == NULL || known == NULL || u == NULL || below == NULL) {
+    status =
+        supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a field of %zu nodes", count);
+    supine_field_free(&made);
+  } else {
+    (void)supine_displace_range(basis, pose, 0, n, moved);
+    for (size_t i = 0; i < count; ++i) {
+      below[i] = (float)-fade; /* nodes not in the basis count as `fade` mm outside the lungs */
+    }
+    /* The field gives displacements from the scan, but info->vertices are at full inflation. */
+    for (size_t i = 0; i < n; ++i) {
+      double node[3];
+      supine_image_place(&made.nodes, part[i], node);
+      for (size_t k = 0; k < 3; ++k) {
+        u[3 * (size_t)part[i] + k] =
+            (float)((double)info->vertices[3 * i + k] - node[k] + (double)moved[3 * i + k]);
+      }
+      known[part[i]] = 1;
+      below[part[i]] = depth[i];
+    }
+    fade_out(&made.nodes, known, fade);
+    *field = made;
+  }
+  free(moved);
+  free(known);
+  return status;
+}
+
+void supine_field_free(supine_field *field) {
+  supine_image_free(&field->nodes);
+  supine_image_free(&field->depth);
+  *field = (supine_field){0};
+}
+
+void supine_field_at(const supine_field *field, const double point[3], double u[3]) {
+  supine_field_cell cell;
+  supine_field_find_cell(&field->nodes, point, &cell);
+  supine_field_interpolate(&field->nodes, &cell, u, NULL);
+}
+
+double supine_field_stretch(const supine_image *nodes, const supine_field_cell *cell) {
+  double u[3];
+  double slope[3][3];
+  double edge[3][3];
+  supine_field_interpolate(nodes, cell, u, slope);
+  for (size_t k = 0; k < 9; ++k) {
+    edge[k / 3][k % 3] = nodes->step[k / 3][k % 3] + slope[k % 3][k / 3];
+  }
+  return supine_triple(edge[0], edge[1], edge[2]) /
+         supine_triple(nodes->step[0], nodes->step[1], nodes->step[2]);
+}
+
+double supine_field_folded(const supine_field *field) {
+  const size_t *size = field->nodes.size;
+  size_t inside = 0;
+  size_t folded = 0;
+  for (size_t i = 0; i < size[0] * size[1] * size[2]; ++i) {
+    const supine_field_cell cell = {{i % size[0], i / size[0] % size[1], i / size[0] / size[1]},
+                                    {0.5, 0.5, 0.5}};
+    if (cell.corner[0] + 1 < size[0] && cell.corner[1] + 1 < size[1] &&
+        cell.corner[2] + 1 < size[2]) {
+      inside += ((const float *)field->depth.values)[i] > 0.0F ? 1 : 0;
+      folded += supine_field_stretch(&field->nodes, &cell) > 0.0 ? 0 : 1;
+    }
+  }
+  return (double)folded / fmax((double)inside, 1.0);
+}

@@ -1,0 +1,85 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file
+ * The displacement field on the grid of a basis ('supine embed'), its inverse, and images moved by
+ * it. Fields are trilinear between nodes, and constant beyond the outermost nodes. */
+#ifndef SUPINE_FIELD_H
+#define SUPINE_FIELD_H
+
+#include <supine/runtime.h>
+
+#include "mesh/image/image.h"
+
+/** Displacement u(x) at the nodes x of a grid, mm. */
+typedef struct supine_field {
+  supine_image nodes; /**< the displacement u: three F32 channels, mm */
+  supine_image depth; /**< depth below the lungs' surface, negative outside: one F32 channel, mm; an
+                         inverse field has no depth, and depth.values is NULL */
+} supine_field;
+
+/** Compute the displacement field from the scan to a pose. It has a physical meaning only at the
+ * grid nodes that 'supine embed' stored in the basis. From these it falls to 0 over `fade` mm.
+ * @param field  release with supine_field_free
+ * @retval SUPINE_ERROR_FORMAT  the basis has no grid, or a malformed one
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_field_create(const supine_basis *basis, const supine_pose *pose, double fade,
+                                  supine_field *field, supine_error *error);
+void supine_field_free(supine_field *field);
+
+/** Interpolate the field at a point. */
+void supine_field_at(const supine_field *field, const double point[3], double u[3]);
+
+/** Count the cells that the field u turns over (det(I + du/dx) is not positive at their centre), as
+ * a share of the number of cells inside the lungs. Near each of them, lung or body is lost. */
+double supine_field_folded(const supine_field *field);
+
+/** Residual u(x) + v(x + u(x)) of a field u and its inverse v. */
+typedef struct supine_field_residual {
+  double rms, largest; /**< RMS and largest length of the residual inside the lungs, mm */
+  size_t lost; /**< number of nodes at which the inverse errs by more than 0.01 mm, because the
+                  field folds there */
+} supine_field_residual;
+
+/** Invert a field u by Newton's method, on the same nodes: v(y) = x - y, where x + u(x) = y. A
+ * resampled image takes the value of its voxel y from the place y + v(y). Cost: about ten
+ * evaluations of u per node, in parallel.
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_field_invert(const supine_field *field, supine_field *inverse,
+                                  supine_field_residual *residual, supine_error *error);
+
+/** Density below which a voxel near the surface of the lungs belongs to them, HU. All lungs have
+ * such voxels. */
+extern const double supine_field_aerated;
+
+/** Move an image: moved(y) = image(y + v(y)) at the voxels y of the image; places outside the image
+ * have the value of the nearest voxel. If `depth` is given, densities (Hounsfield units + 1000)
+ * inside the lungs are multiplied by det(I + dv/dy). This is the tissue's volume before the motion,
+ * divided by its volume after the motion; it keeps the mass.
+ * @param inverse  field v, made by supine_field_invert
+ * @param depth    depth of the nodes below the lungs' surface; NULL to keep densities unscaled
+ * @param labels   whether to take the value of the nearest voxel instead of interpolating
+ * @param moved    release with supine_image_free
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_field_resample(const supine_field *inverse, const supine_image *depth,
+                                    bool labels, const supine_image *image, supine_image *moved,
+                                    supine_error *error);
+
+/* The cell between eight voxels that contains a point. */
+typedef struct supine_field_cell {
+  size_t corner[3]; /* voxel at the lowest corner */
+  double share[3];  /* position of the point in the cell, 0 to 1 along each axis */
+} supine_field_cell;
+
+/* Find the cell that contains a point, mm; a point outside the image is clamped to its border. */
+void supine_field_find_cell(const supine_image *image, const double point[3],
+                            supine_field_cell *cell);
+
+/* Return det(I + du/dx) at a point in a cell of the field u. */
+double supine_field_stretch(const supine_image *nodes, const supine_field_cell *cell);
+
+/* Interpolate all channels of an F32 image at a point in a cell. Unless `slope` is NULL, also
+ * compute the derivatives [channels, 3] with respect to cell->share, the position of the point in
+ * the cell. */
+void supine_field_interpolate(const supine_image *image, const supine_field_cell *cell,
+                              double *values, double (*slope)[3]);
+
+#endif

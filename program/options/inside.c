@@ -1,0 +1,234 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Read the names of embedded structures ('supine embed'), and make their labels for pictures. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/vec3.h"
+
+#include "program/options/basis_input.h"
+#include "program/options/inside.h"
+
+/* Sort the vertices by structure, then in input order; return false if out of memory. */
+static bool sort_by_name(supine_command_names *names, size_t n) {
+  size_t *begin = calloc(names->count + 2, sizeof *begin);
+  names->begin = begin;
+  names->order = malloc(n * sizeof *names->order);
+  if (begin == NULL || names->order == NULL) {
+    return false;
+  }
+  for (size_t i = 0; i < n; ++i) {
+    ++begin[names->part[i] + 2];
+  }
+  for (size_t name = 0; name < names->count; ++name) {
+    begin[name + 2] += begin[name + 1];
+  }
+  for (size_t i = 0; i < n; ++i) {
+    names->order[begin[names->part[i] + 1]++] = i;
+  }
+  return true;
+}
+
+supine_status supine_command_names_open(const supine_basis *basis, supine_command_names *names,
+                                        supine_error *error) {
+  const size_t n = supine_basis_get_info(basis)->vertex_count;
+  const supine_tensor *text = supine_basis_tensor(basis, "names");
+  const supine_tensor *part = supine_basis_tensor(basis, "part");
+  *names = (supine_command_names){0};
+  if (text == NULL || part == NULL || text->dtype != SUPINE_U8 || text->rank != 1 ||
+      part->dtype != SUPINE_U32 || part->rank != 1 || part->shape[0] != n) {
+    return supine_error_set(
+        error, SUPINE_ERROR_FORMAT,
+        "the basis names no points: make one with 'supine embed BASIS POINTS.csv'");
+  }
+  const size_t length = text->shape[0];
+  names->part = part->data;
+  names->space = malloc(length + 1);
+  names->text = malloc((length + 1) * sizeof *names->text);
+  if (names->space == NULL || names->text == NULL) {
+    supine_command_names_close(names);
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the names of %zu vertices",
+                            n);
+  }
+  memcpy(names->space, text->data, length);
+  names->space[length] = '\0';
+  names->text[names->count++] = names->space;
+  for (size_t i = 0; i < length; ++i) {
+    if (names->space[i] == '\n') {
+      names->space[i] = '\0';
+      names->text[names->count++] = names->space + i + 1;
+    }
+  }
+  supine_status status = SUPINE_OK;
+  for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
+    if (names->part[i] >= names->count) {
+      status = supine_error_set(error, SUPINE_ERROR_FORMAT,
+                                "point %zu of the basis has no name: make the file again with "
+                                "'supine embed BASIS POINTS.csv'",
+                                i);
+    }
+  }
+  if (status == SUPINE_OK && !sort_by_name(names, n)) {
+    status =
+        supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the names of %zu vertices", n);
+  }
+  if (status != SUPINE_OK) {
+    supine_command_names_close(names);
+  }
+  return status;
+}
+
+void supine_command_names_close(supine_command_names *names) {
+  free(names->space);
+  free(names->text);
+  free(names->order);
+  free(names->begin);
+  *names = (supine_command_names){0};
+}
+
+size_t supine_command_lung_of(const supine_basis_info *info, size_t vertex) {
+  size_t lung = 0;
+  while (vertex >= info->lung_begin[lung + 1]) {
+    ++lung;
+  }
+  return lung;
+}
+
+supine_status supine_command_inside_check(const supine_basis *lungs, const supine_basis *inside,
+                                          const char *path, supine_error *error) {
+  const supine_basis_info *a = supine_basis_get_info(lungs);
+  const supine_basis_info *b = supine_basis_get_info(inside);
+  return b->vector && a->identity == b->identity
+             ? SUPINE_OK
+             : supine_error_set(
+                   error, SUPINE_ERROR_FORMAT,
+                   "%s belongs to another basis: make it again with 'supine embed' from "
+                   "the given basis",
+                   path);
+}
+
+supine_status supine_command_inside_open(const supine_basis *lungs, const char *path,
+                                         supine_basis **inside, supine_command_names *names,
+                                         supine_error *error) {
+  supine_status status = supine_options_basis_open(path, SUPINE_STORAGE_AUTO, inside, error);
+  status = status == SUPINE_OK ? supine_command_names_open(*inside, names, error) : status;
+  return status == SUPINE_OK ? supine_command_inside_check(lungs, *inside, path, error) : status;
+}
+
+/* Average the vertices order[begin] to order[end - 1] to a target; [N, 3] positions before and
+ * after.
+ */
+static supine_target average(const supine_command_names *names, size_t begin, size_t end,
+                             const float *after, const float *before, const float *sigma) {
+  const double count = (double)(end - begin);
+  supine_target target = {.name = names->text[names->part[names->order[begin]]]};
+  double square = 0;
+  for (size_t i = begin; i < end; ++i) {
+    const size_t vertex = names->order[i];
+    for (size_t k = 0; k < 3; ++k) {
+      const double x = (double)after[3 * vertex + k];
+      target.at[k] += x / count;
+      target.move[k] += (x - (double)before[3 * vertex + k]) / count;
+    }
+    square += sigma == NULL ? (double)NAN : (double)sigma[vertex] * (double)sigma[vertex] / count;
+  }
+  target.moved = supine_length(target.move);
+  target.expected = sqrt(square);
+  return target;
+}
+
+supine_status supine_command_targets_find(const supine_basis *inside,
+                                          const supine_command_names *names,
+                                          const supine_pose *const pose[2], const float *sigma,
+                                          bool each, supine_target **targets, supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(inside);
+  const size_t n = info->vertex_count;
+  const size_t count = each ? n : names->count;
+  float *after = malloc(3 * n * sizeof *after);
+  float *before = malloc(3 * n * sizeof *before);
+  *targets = calloc(count, sizeof **targets);
+  const bool enough = after != NULL && before != NULL && *targets != NULL;
+  if (enough) {
+    (void)supine_deform(inside, pose[0], before);
+    (void)supine_deform(inside, pose[1], after);
+  }
+  for (size_t i = 0; enough && i < count; ++i) {
+    const size_t begin = each ? i : names->begin[i];
+    const size_t end = each ? i + 1 : names->begin[i + 1];
+    (*targets)[i].name = names->text[i];
+    if (end > begin) { /* a name may have no vertices */
+      (*targets)[i] = average(names, begin, end, after, before, sigma);
+      (*targets)[i].lung = supine_command_lung_of(info, names->order[begin]);
+    }
+  }
+  free(after);
+  free(before);
+  return enough ? SUPINE_OK
+                : supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu points", n);
+}
+
+json_t *supine_command_target_json(const supine_target *t) {
+  return json_pack("{s:s, s:[f, f, f], s:f, s:o}", "name", t->name, "move", t->move[0], t->move[1],
+                   t->move[2], "mm", t->moved, "expected_error_mm",
+                   isnan(t->expected) ? json_null() : json_real(t->expected));
+}
+
+/* Add the marks of one structure: its vertices, and its name at their mean position. */
+static void add_part(const supine_command_names *names, size_t part, const float *xyz,
+                     const float *from, supine_command_marks *out) {
+  const size_t *order = names->order + names->begin[part];
+  const size_t count = names->begin[part + 1] - names->begin[part];
+  supine_mark middle = {.xyz = {0.0F, 0.0F, 0.0F}, .point = count == 1, .label = out->label[part]};
+  for (size_t i = 0; i < count; ++i) {
+    const float *p = xyz + 3 * order[i];
+    const float *q = from + 3 * order[i];
+    const float moved = hypotf(hypotf(p[0] - q[0], p[1] - q[1]), p[2] - q[2]);
+    for (size_t k = 0; k < 3; ++k) {
+      middle.xyz[k] += p[k] / (float)count;
+    }
+    middle.value += moved / (float)count;
+    if (count > 1) {
+      out->mark[out->marks.count++] = (supine_mark){{p[0], p[1], p[2]}, moved, false, NULL};
+    }
+  }
+  (void)snprintf(out->label[part], sizeof out->label[part], "%.30s moved %.1f mm",
+                 names->text[part], (double)middle.value);
+  if (count > 0) {
+    out->mark[out->marks.count++] = middle;
+  }
+}
+
+supine_status supine_command_marks_make(const supine_basis *inside,
+                                        const supine_command_names *names, const supine_pose *pose,
+                                        const supine_pose *from, supine_command_marks *marks,
+                                        supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(inside);
+  const size_t n = info->vertex_count;
+  float *xyz = malloc(3 * n * sizeof *xyz);
+  float *before = malloc(3 * n * sizeof *before);
+  supine_command_marks made = {.mark = malloc((n + names->count) * sizeof(supine_mark)),
+                               .label = calloc(names->count, sizeof *made.label)};
+  supine_status status = SUPINE_ERROR_MEMORY;
+  if (xyz != NULL && before != NULL && made.mark != NULL && made.label != NULL) {
+    (void)supine_deform(inside, pose, xyz);
+    (void)supine_deform(inside, from, before);
+    for (size_t part = 0; part < names->count; ++part) {
+      add_part(names, part, xyz, before, &made);
+    }
+    made.marks.mark = made.mark;
+    *marks = made;
+    made = (supine_command_marks){.mark = NULL};
+    status = SUPINE_OK;
+  }
+  free(xyz);
+  free(before);
+  supine_command_marks_free(&made);
+  return status == SUPINE_OK ? status
+                             : supine_error_set(error, status, "no memory for %zu points", n);
+}
+
+void supine_command_marks_free(supine_command_marks *marks) {
+  free(marks->mark);
+  free(marks->label);
+  *marks = (supine_command_marks){.mark = NULL};
+}

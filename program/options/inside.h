@@ -1,0 +1,78 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Read the names of embedded structures ('supine embed'), and make their labels for pictures. */
+#ifndef SUPINE_COMMAND_INSIDE_H
+#define SUPINE_COMMAND_INSIDE_H
+
+#include <jansson.h>
+
+#include "program/view/render/render.h"
+
+typedef struct supine_command_names {
+  size_t count;
+  char **text;          /* [count] name of each structure */
+  const uint32_t *part; /* [N] index of each vertex's name in `text` */
+  size_t *order;        /* [N] indices of the vertices, sorted by structure, then in input order */
+  size_t *begin;        /* [count + 1] index of each structure's first vertex in `order` */
+  char *space;          /* memory that `text` points into */
+} supine_command_names;
+
+/* Read the names of embedded structures.
+ * @retval SUPINE_ERROR_FORMAT  the basis has no names, or malformed ones */
+supine_status supine_command_names_open(const supine_basis *basis, supine_command_names *names,
+                                        supine_error *error);
+void supine_command_names_close(supine_command_names *names);
+
+/* Return the index of the lung that a vertex belongs to. */
+size_t supine_command_lung_of(const supine_basis_info *info, size_t vertex);
+
+/* Check that the structures `inside` were embedded in `lungs`; else return SUPINE_ERROR_FORMAT. */
+supine_status supine_command_inside_check(const supine_basis *lungs, const supine_basis *inside,
+                                          const char *path, supine_error *error);
+
+/* Open the basis file of embedded structures, read their names, and check that they were embedded
+ * in `lungs`. Initialise *inside and *names to zero before the call; close both after it, even if
+ * it fails. */
+supine_status supine_command_inside_open(const supine_basis *lungs, const char *path,
+                                         supine_basis **inside, supine_command_names *names,
+                                         supine_error *error);
+
+/* Where a group of vertices is, and how it has moved. */
+typedef struct supine_target {
+  const char *name;
+  size_t lung;     /* index of the lung of the first vertex */
+  double at[3];    /* mean position of the vertices, mm */
+  double move[3];  /* displacement of the mean position, mm */
+  double moved;    /* length of `move`, mm */
+  double expected; /* RMS of the vertices' expected errors, mm; NAN if unknown */
+} supine_target;
+
+/* Compute where the structures are in pose[1], and how they have moved from pose[0].
+ * @param sigma    [N] expected error of each vertex, mm; NULL if unknown
+ * @param each     true for a target for each vertex, false for one for each structure
+ * @param targets  output: array of targets in the order of `names`, which the caller frees
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_command_targets_find(const supine_basis *inside,
+                                          const supine_command_names *names,
+                                          const supine_pose *const pose[2], const float *sigma,
+                                          bool each, supine_target **targets, supine_error *error);
+
+/* Return a target as JSON: its name, displacement, and the expected error. */
+json_t *supine_command_target_json(const supine_target *target);
+
+/* Marks of a picture: the vertices of each structure, and a label with name and displacement. */
+typedef struct supine_command_marks {
+  supine_marks marks;
+  supine_mark *mark;
+  char (*label)[48];
+} supine_command_marks;
+
+/* Make the marks that show the structures in a pose.
+ * @param from  pose from which displacements are measured
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_command_marks_make(const supine_basis *inside,
+                                        const supine_command_names *names, const supine_pose *pose,
+                                        const supine_pose *from, supine_command_marks *marks,
+                                        supine_error *error);
+void supine_command_marks_free(supine_command_marks *marks);
+
+#endif

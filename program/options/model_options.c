@@ -1,0 +1,373 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Options that choose the lungs and the model of their mechanics. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "program/options/model_options.h"
+#include "program/options/surface_options.h"
+
+static supine_status read_scan(const char *text, void *field, supine_error *error) {
+  supine_model_choice *choice = field;
+  supine_state posture = {.volume = {SUPINE_VOLUME_DEFAULT, 0.0}};
+  choice->has_scan = true;
+  if (supine_state_parse_posture(text, &posture, NULL) == SUPINE_OK) {
+    choice->scan = (supine_scan){.known = true, .state = posture};
+    return SUPINE_OK;
+  }
+  return supine_reference_scan_parse(text, &choice->scan, error);
+}
+
+/* Read volumes at rest, such as "supine=0.48,prone=2600mL" or "copd". */
+static supine_status read_resting(const char *text, void *field, supine_error *error) {
+  supine_model_choice *choice = field;
+  char copy[256];
+  (void)snprintf(copy, sizeof copy, "%s", text);
+  supine_status status = SUPINE_OK;
+  for (char *rest = copy, *piece; status == SUPINE_OK && (piece = strsep(&rest, ",")) != NULL;) {
+    char *value = strchr(piece, '=');
+    if (value != NULL) {
+      *value++ = '\0';
+    } else if (strcmp(piece, "copd") != 0) {
+      return SUPINE_ERROR_ARGUMENT;
+    }
+    status = supine_reference_resting_set(&choice->resting, piece, value, error);
+  }
+  return status;
+}
+
+/* Read an absolute volume, such as "4.2L". */
+static supine_status read_full(const char *text, void *field, supine_error *error) {
+  supine_state state = {.lung_count = 0};
+  const supine_status status = supine_state_parse_volume(text, &state, error);
+  *(double *)field = state.volume.ml;
+  return status == SUPINE_OK ? supine_options_fits(state.volume.kind == SUPINE_VOLUME_ABSOLUTE &&
+                                                   state.lung_count == 0)
+                             : status;
+}
+
+/* Read "uniform", or "linear:AXIS:FROM:TO" or "exp:AXIS:FROM:TO" with the expandability at both
+ * ends of an axis x, y or z; any other text names a file. */
+static supine_status read_expandability(const char *text, void *field, supine_error *error) {
+  supine_model_choice *choice = field;
+  (void)error;
+  choice->expandability = NULL;
+  choice->expandability_law = (supine_expandability_law){0};
+  if (strcmp(text, "uniform") == 0) {
+    return SUPINE_OK;
+  }
+  if (strncmp(text, "linear:", strlen("linear:")) == 0) {
+    choice->expandability_law.shape = SUPINE_EXPANDABILITY_LINEAR;
+  } else if (strncmp(text, "exp:", strlen("exp:")) == 0) {
+    choice->expandability_law.shape = SUPINE_EXPANDABILITY_EXPONENTIAL;
+  } else {
+    choice->expandability = text;
+    return SUPINE_OK;
+  }
+  const char *at = strchr(text, ':') + 1;
+  if (at[0] < 'x' || at[0] > 'z' || at[1] != ':') {
+    return SUPINE_ERROR_ARGUMENT;
+  }
+  choice->expandability_law.axis = at[0] - 'x';
+  char numbers[128];
+  (void)snprintf(numbers, sizeof numbers, "%s", at + 2);
+  char *colon = strchr(numbers, ':');
+  if (colon == NULL) {
+    return SUPINE_ERROR_ARGUMENT;
+  }
+  *colon = '\0';
+  return supine_options_fits(
+      supine_options_parse_number(numbers, &choice->expandability_law.from) &&
+      supine_options_parse_number(colon + 1, &choice->expandability_law.to) &&
+      choice->expandability_law.from > 0.0 && choice->expandability_law.to > 0.0);
+}
+
+static supine_status read_lesion(const char *text, void *field, supine_error *error) {
+  supine_model_choice *choice = field;
+  (void)error;
+  double v[5];
+  if (choice->lesion_count == SUPINE_LESIONS_MAX || !supine_options_parse_numbers(text, 5, v) ||
+      !(v[3] > 0.0) || !(v[4] > 0.0)) {
+    return SUPINE_ERROR_ARGUMENT;
+  }
+  choice->lesions[choice->lesion_count++] = (supine_lesion){{v[0], v[1], v[2]}, v[3], v[4]};
+  return SUPINE_OK;
+}
+
+/* Read a collapsed lung and the share of its volume that remains, such as "left:0.3". */
+static supine_status read_lung(const char *text, void *field, supine_error *error) {
+  supine_model_choice *choice = field;
+  (void)error;
+  const char *colon = strchr(text, ':');
+  const bool left = colon == text + 4 && strncmp(text, "left", 4) == 0;
+  const bool right = colon == text + 5 && strncmp(text, "right", 5) == 0;
+  double share;
+  if (!(left || right) || !supine_options_parse_number(colon + 1, &share) ||
+      !(share > 0.0 && share <= 1.0)) {
+    return SUPINE_ERROR_ARGUMENT;
+  }
+  *(left ? &choice->share[0] : &choice->share[1]) = share;
+  return SUPINE_OK;
+}
+
+static const char *const sexes[] = {"unknown", "female", "male", NULL};
+
+/* Parts of help texts: a line that describes each displacement law, and the defaults of its
+ * constants. */
+#define LAW_HELP(id, name, base, gain, box, constants, bend, reach, pair, what) name ": " what "\n"
+#define LAW_BASE(id, name, base, ...) "; default " #base " for " name
+#define LAW_GAIN(id, name, base, gain, ...) "; default " #gain " for " name
+#define LAW_BOX(id, name, base, gain, box, ...) "; default " #box " for " name
+#define LAW_CONSTANTS(id, name, base, gain, box, constants, ...)                                   \
+  "; default " #constants " for " name
+
+#define FILLS(member) SUPINE_FILLS(supine_model_options, member)
+
+const supine_option supine_command_model_options[] = {
+    {.help = "Surfaces:"},
+    {.table = supine_options_surface_frame, FILLS(source.load)},
+    {"midline", 0, "X",
+     "x of the sagittal plane between the lungs, in mm and LPS; default the middle of the bounding "
+     "box of two lungs, or the medial side of a single lung",
+     FILLS(source.midline), SUPINE_SAYS_GIVEN(supine_model_options, source.has_midline),
+     .wants = "a number of mm", .more = true},
+    {.help = "Label maps (.nrrd, .nii, .nii.gz, .mha) instead of surfaces: one map, one mask per "
+             "file, or the folder of masks that TotalSegmentator writes:"},
+    {"labels", 0, "WHICH",
+     "labels of the lungs: lungmask (1 right, 2 left), lobes (1, 2 left, 3 to 5 right), "
+     "totalsegmentator (10 to 14), totalsegmentator-v1 (13 to 17), one (every label but 0 is lung; "
+     "left and right are separated), or a list such as left=10+11,right=12+13+14, or left=2 for "
+     "one lung. By default, the labels in the map decide, if they are unambiguous",
+     FILLS(source.labels.labels)},
+    {"edge", 0, "MM", "edge length of the surface's triangles; default 2",
+     FILLS(source.labels.edge), .range = {0.2, 20.0}, .wants = "0.2 to 20 mm", .more = true},
+    {"close", 0, "MM",
+     "close gaps and channels narrower than twice MM, which vessels leave in masks; default 0",
+     FILLS(source.labels.close), .range = {0.0, 20.0}, .wants = "0 to 20 mm"},
+    {"surfaces-out", 0, "FILE", "also write the surfaces: " SUPINE_MESH_ENDINGS,
+     FILLS(source.surfaces_out), .file = SUPINE_FILE_OUT, .endings = SUPINE_MESH_ENDINGS,
+     .more = true},
+    {.help = "The scan:"},
+    {"scanned", 0, "STATE",
+     "state of the lungs in the scan\nfull: a breath-hold at full inflation (TLC)\nPOSTURE:rest: "
+     "the end of a quiet expiration (FRC). POSTURE is supine, prone, left or right (lying on that "
+     "side), upright or inverted\nnone: unknown. Breaths are added to the shape in the scan, and a "
+     "change of posture alone does not deform it\nPOSTURE alone: with --fields, which then do not "
+     "displace the surface in this posture\nfull and rest may have +ML or -ML, for both "
+     "lungs together: supine:rest+300, full-2000. Default full",
+     FILLS(choice), .read = read_scan,
+     .wants = "full or POSTURE:rest, optionally with +ML or -ML, or none"},
+    {"resting", 0, "LIST",
+     "volume of the patient's lungs at rest (FRC), for one posture or several, separated by "
+     "commas\nPOSTURE=2600mL: gas and tissue of both lungs, as measured in a CT at rest\n"
+     "POSTURE=0.48: a share of the volume at full inflation\nPOSTURE=0.47/0.49: shares for the "
+     "left and the right lung\ncopd: the usual share in COPD, 0.64 supine (SD 0.11; ten patients)\n"
+     "The volumes of other postures keep the default proportions to these. A lung-function test "
+     "gives the gas alone, seated: add about 0.9 L of tissue, and give the sum as upright. "
+     "Default, "
+     "from healthy people (SD 0.08): supine 0.467/0.492, prone 0.519/0.531, left 0.462/0.610, "
+     "right "
+     "0.629/0.486, upright 0.538/0.566, inverted as supine; with --height and --sex, mL that these "
+     "predict (GLI 2021, less 0.806 L for lying, plus 0.86 L of tissue)",
+     FILLS(choice), .read = read_resting, .wants = "copd, POSTURE=2600mL or POSTURE=SHARE,..."},
+    {"full", 0, "VOLUME",
+     "for a scan at rest: volume of gas and tissue of the scanned lungs at full inflation, such as "
+     "4200mL or 4.2L. Without it, full inflation is assumed from the usual share at rest",
+     FILLS(choice.full), .read = read_full, .wants = "a volume such as 4200mL"},
+    {"height", 0, "CM",
+     "height of the patient. Height and --sex give the volume expected at TLC (ECSC 1993, less 10 "
+     "% for lying, plus 0.86 L of tissue), which is printed beside the volume of the scan. Without "
+     "them, the range of adults is printed",
+     FILLS(choice.person.height), .range = {50.0, 250.0}, .wants = "50 to 250 cm", .more = true},
+    {"sex", 0, "SEX", "female or male", FILLS(choice.person.sex), .choices = sexes, .more = true},
+    {.help = "Law of motion. The force on a vertex is base + gain h + cx X + cy Y + cz Z. The "
+             "depth h along gravity is 0 at the uppermost vertex and 1 at the lowermost. X, Y and "
+             "Z are coordinates in the bounding box, from 0 to 1: X from the midline outwards, Y "
+             "from back to front, Z from apex to base."},
+    {"law", 0, "LAW",
+     "how gravity and volume move the surface\n" SUPINE_LAWS(
+         LAW_HELP) "The options from --base to --reach change constants of the law. Default deep",
+     FILLS(choice.law), .choices = supine_physics_law_names, .more = true},
+    {"base", 0, "B", "part of the force that is equal everywhere" SUPINE_LAWS(LAW_BASE),
+     FILLS(choice.model.force.base), .more = true},
+    {"gain", 0, "G", "factor of the depth h" SUPINE_LAWS(LAW_GAIN), FILLS(choice.model.force.gain),
+     .more = true},
+    {"box-force", 0, "X,Y,Z",
+     "cx, cy and cz, the parts of the force that are fixed to the body" SUPINE_LAWS(LAW_BOX),
+     FILLS(choice.model.force.box), .wants = "three numbers, CX,CY,CZ", .more = true},
+    {"soften", 0, "S",
+     "multiply the expandability of the tissue by exp(S (h - mean h)), so that lower tissue "
+     "expands more. With --law paper, --reach must be given too. Default 0",
+     FILLS(choice.model.force.soften), .more = true},
+    {"constants", 0, "C1,...,C6",
+     "constants of the displacement for a unit force, equations (15)-(17) of Santhanam 2008: "
+     "C1 X^C2 outwards, C3 Y^C4 to the front and C5 Z^C6 to the feet, in mm. Those of deep are "
+     "fitted to landmarks in ten full breaths (DIR-Lab COPDgene). Those of paper are fitted to "
+     "landmarks in ten 4-D CTs (DIR-Lab), as the original ones are lost" SUPINE_LAWS(LAW_CONSTANTS),
+     FILLS(choice.model.direction.c), .wants = "six numbers, C1,C2,C3,C4,C5,C6", .more = true},
+    {"reach", 0, "MM",
+     "distance over which a force spreads along the surface: the force falls with the distance r "
+     "about as exp(-r/MM). Without --reach, the paper law spreads it over a few edges of the mesh; "
+     "in a finer mesh edges are shorter, and its surface may fold. Default 10 for deep",
+     FILLS(choice.model.reach), SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0", .more = true},
+    {.help = "Tissue. Expandability is the inverse of stiffness. Only its ratios between parts of "
+             "the lungs count: doubling it everywhere changes nothing."},
+    {"expandability", 0, "WHAT",
+     "uniform: the same everywhere\nlinear:AXIS:FROM:TO, exp:AXIS:FROM:TO: it changes from FROM to "
+     "TO, linearly or exponentially, along AXIS: x from the midline outwards, y from back to "
+     "front, z from apex to base. With linear:z:0.5:1.5 the base expands most\nFILE: CSV with the "
+     "expandability of every vertex: a column expandability, in the vertex order of 'supine solve' "
+     "(left lung first); or the columns vertex,expandability, with vertices numbered from 0\n"
+     "Default uniform",
+     FILLS(choice), .read = read_expandability, .file = SUPINE_FILE_IN,
+     .wants = "uniform, linear:AXIS:FROM:TO or exp:AXIS:FROM:TO with AXIS x, y or z and both ends "
+              "above 0, or a file",
+     .more = true},
+    {"lesion", 0, "X,Y,Z,RADIUS,FACTOR",
+     "lesion with its centre at X,Y,Z (mm, LPS). Within half of RADIUS (mm), the stiffness is "
+     "multiplied by FACTOR; from there to RADIUS the multiplier changes smoothly to 1. A FACTOR "
+     "above 1 stiffens the tissue, which then moves less. May be repeated, up to 64 times",
+     FILLS(choice), .read = read_lesion,
+     .wants = "X,Y,Z,RADIUS,FACTOR, the last two above 0 (at most 64 times)"},
+    {"lung", 0, "SIDE:SHARE",
+     "collapsed lung (pneumothorax), left or right: SHARE, above 0 and at most 1, multiplies its "
+     "volume in every state. The other lung takes the rest of each breath",
+     FILLS(choice), .read = read_lung, .wants = "left:SHARE or right:SHARE, above 0 and at most 1"},
+    {.name = NULL}};
+
+static void print_map(const char *path, const supine_source *source) {
+  const supine_labels_report *report = &source->report;
+  const supine_lungs *lungs = &source->lungs;
+  (void)printf("%s: %zu x %zu x %zu voxels of %.3g x %.3g x %.3g mm, %s (%s)\n  labels %s\n", path,
+               report->size[0], report->size[1], report->size[2], report->spacing[0],
+               report->spacing[1], report->spacing[2], report->axes, report->source, report->taken);
+  if (report->neck > 0.0) {
+    (void)printf("  the lungs touch: separated at necks up to %.3g mm wide\n", report->neck);
+  }
+  for (size_t i = 0; i < report->lung_count; ++i) {
+    const supine_labels_lung *lung = &report->lung[i];
+    (void)printf("%s lung: %.1f mL", lung->side > 0 ? "left" : "right", lung->mask);
+    if (lung->closed > 0.0) {
+      (void)printf("; closed gaps of %.2g mL", lung->closed);
+    }
+    (void)printf("; dropped %zu %s (%.2g mL), filled %zu %s (%.2g mL)\n", lung->islands,
+                 lung->islands == 1 ? "island" : "islands", lung->dropped, lung->cavities,
+                 lung->cavities == 1 ? "cavity" : "cavities", lung->filled);
+    (void)printf("  surface of %zu vertices: %.1f mL (%+.2g mL)\n",
+                 lungs->lung_begin[i + 1] - lungs->lung_begin[i], lung->surface,
+                 lung->surface - lung->mask);
+  }
+  if (source->axes_hold) {
+    (void)printf("the shape of the lungs confirms the axes in the header: narrow at the head, "
+                 "deepest at the back, the heart on the left\n");
+  }
+}
+
+/* Set options->choice to the displacement law and the force that were fitted to a patient. If the
+ * state of the scan is not given, use the state in the fit. */
+static supine_status take_patient(supine_model_options *options, supine_error *error) {
+  const supine_patient_record *record = options->patient;
+  const supine_lungs *lungs = &options->made_from.lungs;
+  supine_model_choice *choice = &options->choice;
+  size_t state = 0;
+  supine_status status = supine_patient_check_place(record, lungs, &state, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  choice->patient_law = "the patient's own";
+  choice->model = supine_physics_model(SUPINE_LAW_DEEP);
+  supine_patient_resting(record, &choice->resting);
+  if (!choice->has_scan) {
+    const double volume = 1e-3 * supine_mesh_volume(&lungs->mesh);
+    choice->has_scan = true;
+    choice->scan = supine_patient_scan(record, state, volume, &choice->resting);
+    if (state == 1 && !choice->scan.known) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "this scan is the emptier of the two that were fitted, and how far "
+                              "it is below full inflation is unknown: give its state, such as "
+                              "--scanned supine:rest, or use the fuller scan");
+    }
+    supine_findings_add(&options->findings,
+                        "note: the scan is assumed to be the %s of the two that were fitted; "
+                        "--scanned changes this",
+                        state == 0 ? "fuller" : "emptier");
+  }
+  options->patient_arrays = malloc(4 * lungs->mesh.vertex_count * sizeof(double));
+  status = options->patient_arrays == NULL
+               ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
+                                  lungs->mesh.vertex_count)
+               : supine_patient_model(record, &choice->resting, lungs, state,
+                                      options->patient_arrays, &choice->model, error);
+  choice->stiffness = choice->model.stiffness;
+  return status;
+}
+
+supine_status supine_command_source_load(supine_model_options *options, char **paths, size_t count,
+                                         supine_error *error) {
+  supine_progress progress = supine_options_progress_begin("label map");
+  supine_source *source = &options->made_from;
+  options->source.labels.progress = supine_options_progress_step;
+  options->source.labels.progress_context = &progress;
+  const supine_status status = supine_precompute_source_load(&options->source, paths, count, source,
+                                                             &options->findings, error);
+  supine_options_progress_end(&progress);
+  if (status == SUPINE_OK && source->is_map) {
+    print_map(paths[0], source);
+  }
+  return status;
+}
+
+supine_status supine_command_model_load(supine_model_options *options, const char *command,
+                                        char **paths, size_t count, bool keep,
+                                        supine_error *error) {
+  supine_source *source = &options->made_from;
+  supine_status status = supine_command_source_load(options, paths, count, error);
+  if (keep) {
+    options->choice.scan.known = false;
+    options->choice.has_scan = true;
+  }
+  if (status == SUPINE_OK && options->patient != NULL) {
+    status = take_patient(options, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_precompute_prepare(&source->lungs, &options->choice, &options->prepared,
+                                       &options->findings, error);
+  }
+  supine_options_say_findings(command, &options->findings);
+  (void)snprintf(options->assumed, sizeof options->assumed, "%s; %s", source->summary,
+                 options->prepared.summary);
+  return status;
+}
+
+supine_status supine_command_load_lungs(const char *command, const char *operand,
+                                        const supine_source_options *options, supine_lungs *lungs,
+                                        supine_error *error) {
+  enum { FILES_MAX = 2 };
+  char *paths[FILES_MAX + 1];
+  size_t count = 0;
+  supine_source source = {.is_map = false};
+  supine_findings findings = {""};
+  char *names = strdup(operand);
+  char *remaining = names;
+  if (names == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  }
+  while (remaining != NULL && count <= FILES_MAX) {
+    paths[count++] = strsep(&remaining, ",");
+  }
+  const supine_status status =
+      count > FILES_MAX
+          ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                             "'%s' names more than two surfaces: give one or two", operand)
+          : supine_precompute_source_load(options, paths, count, &source, &findings, error);
+  supine_options_say_findings(command, &findings);
+  *lungs = source.lungs;
+  free(names);
+  return status;
+}
+
+void supine_command_model_options_free(supine_model_options *options) {
+  free(options->patient_arrays);
+  supine_lungs_free(&options->made_from.lungs);
+  supine_precompute_prepared_free(&options->prepared);
+}

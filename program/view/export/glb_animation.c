@@ -1,0 +1,95 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Append animations of breathing: one while the patient turns about the long axis, and one in each
+ * lying posture. Gravity always points down. */
+#include <math.h>
+#include <stdlib.h>
+
+#include "program/view/export/glb.h"
+
+static const double pi = 3.14159265358979323846;
+enum { RATE = 6 /* frames per second */, POSTURES = 4, SECONDS = 6, BREATH_SECONDS = 3 };
+
+/* At a roll of t radians, gravity in the patient's axes (LPS) is (sin t, cos t, 0). In glTF's axes
+ * the patient turns by t about y, the body's long axis, then by -90 degrees about x to lie down. */
+void supine_export_glb_rotation(double roll, float q[4]) {
+  const double c = cos(roll / 2) * sqrt(0.5);
+  const double s = sin(roll / 2) * sqrt(0.5);
+  q[0] = (float)-c;
+  q[1] = (float)s;
+  q[2] = (float)-s;
+  q[3] = (float)c;
+}
+
+/* Return the patient's roll, radians, in the animation "turning". Each posture takes SECONDS: the
+ * patient lies still for the first half of this time, then turns to the next posture. */
+static double roll_at(double seconds) {
+  const double stage = floor(seconds / SECONDS);
+  const double x = fmax(0, 2 * (seconds / SECONDS - stage) - 1);
+  return pi / 2 * (stage + x * x * (3 - 2 * x));
+}
+
+/* Compute one frame: the weights of all morph targets, `seconds` after the start of a breath.
+ * `rows` points to this frame of lung 0 in an array [lungs, frames, targets]. */
+static void make_frame(glb *g, double roll, double seconds, float *rows, size_t frames) {
+  const double gravity[3] = {sin(roll), cos(roll), 0};
+  const double fraction = 0.5 - 0.5 * cos(2 * pi * seconds / BREATH_SECONDS);
+  double weights[EXPORT_TARGETS_MAX];
+  supine_pose pose;
+  /* No failure is expected, because supine_export_targets_choose has checked this breath. */
+  (void)supine_export_breath_pose(g->source, g->options->breath, gravity, fraction, &pose, NULL);
+  for (size_t i = 0; i < g->source->info->lung_count; ++i) {
+    supine_export_targets_weights(g->source, &g->targets, &pose, i, weights);
+    for (size_t j = 0; j < g->targets.count; ++j) {
+      rows[i * frames * g->targets.count + j] = (float)weights[j];
+    }
+  }
+}
+
+/* Append an animation of breathing at `roll` radians, or during one full turn if `roll` is NAN. */
+static void add(glb *g, const char *name, double roll, size_t seconds) {
+  const size_t count = g->source->info->lung_count;
+  const size_t frames = RATE * seconds + 1;
+  const size_t targets = g->targets.count;
+  float *times = malloc(frames * sizeof *times);
+  float *rotations = malloc(4 * frames * sizeof *rotations);
+  float *weights = malloc(count * frames * targets * sizeof *weights);
+  if (times == NULL || rotations == NULL || weights == NULL) {
+    g->status = SUPINE_ERROR_MEMORY;
+    goto cleanup;
+  }
+  for (size_t i = 0; i < frames; ++i) {
+    const double at = (double)i / RATE;
+    const double turned = isnan(roll) ? roll_at(at) : roll;
+    times[i] = (float)at;
+    supine_export_glb_rotation(turned, rotations + 4 * i);
+    make_frame(g, turned, at, weights + i * targets, frames);
+  }
+  const json_int_t input = supine_export_glb_put(g, GLB_TIMES, times, NULL, frames);
+  json_t *samplers = json_pack("[{s:I, s:I}]", "input", input, "output",
+                               supine_export_glb_put(g, GLB_ROTATIONS, rotations, NULL, frames));
+  json_t *channels =
+      json_pack("[{s:i, s:{s:i, s:s}}]", "sampler", 0, "target", "node", 0, "path", "rotation");
+  for (size_t i = 0; i < count; ++i) {
+    (void)json_array_append_new(
+        samplers, json_pack("{s:I, s:I}", "input", input, "output",
+                            supine_export_glb_put(g, GLB_WEIGHTS, weights + i * frames * targets,
+                                                  NULL, frames * targets)));
+    (void)json_array_append_new(channels,
+                                json_pack("{s:I, s:{s:I, s:s}}", "sampler", (json_int_t)i + 1,
+                                          "target", "node", (json_int_t)i + 1, "path", "weights"));
+  }
+  (void)json_array_append_new(g->animations, json_pack("{s:s, s:o, s:o}", "name", name, "samplers",
+                                                       samplers, "channels", channels));
+cleanup:
+  free(times);
+  free(rotations);
+  free(weights);
+}
+
+void supine_export_glb_animate(glb *g) {
+  static const char *const names[POSTURES] = {"supine", "left side", "prone", "right side"};
+  add(g, "turning", NAN, SECONDS * POSTURES);
+  for (size_t p = 0; p < POSTURES; ++p) {
+    add(g, names[p], (double)p * pi / 2, BREATH_SECONDS);
+  }
+}

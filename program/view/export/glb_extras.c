@@ -1,0 +1,117 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Write the extras of a glTF file: formulas and constants for the weights of morph targets. */
+#include <math.h>
+#include <stdlib.h>
+
+#include "program/view/export/glb.h"
+#include "program/view/export/template.h"
+
+/* With more morph targets, the extras omit the volume formula: it has too many constants then. */
+enum { VOLUME_TARGETS_MAX = 32 };
+
+static const char frame_text[] =
+    "Vertices of a lung's mesh are in the patient's axes, LPS (x left, y back, z head), from "
+    "'middle', mm: position = middle + millimetresPerUnit * vertex. The mesh's node converts "
+    "them to glTF's metres (y head, z front); the node 'patient' lays the patient down.";
+static const char weights_text[] =
+    "weight[j] = (amount[j] - offset[j]) / unit[j], with the lung's offset and unit. With K "
+    "modes, amount[j] = s v[j] for j < K and amount[K + k] = t v[k]. v[k] = modeUnit * sum over "
+    "i of modes[k][i] * Y[i](g), where g is the unit vector of gravity in the patient's axes "
+    "(supine 0,1,0). Y: real orthonormal spherical harmonics, index l*l+l+m, sine terms at m < "
+    "0, no Condon-Shortley phase: Y[0] = 0.28209479, Y[1..3] = 0.48860251 * (y, z, x). The gain "
+    "along axis a is A[a] = s + t * bend[a]; s = t = 0 is the reference surface.";
+static const char volume_text[] =
+    "volume of a lung minus its referenceVolume, mL: sum over axes a of L[a] A[a], plus Q[0] "
+    "A[1] A[2] + Q[1] A[0] A[2] + Q[2] A[0] A[1] + C A[0] A[1] A[2], where L[a] = sum "
+    "linear[a][k] v[k], Q[a] = sum quadratic[a][k][l] v[k] v[l], C = sum cubic[k][l][m] v[k] "
+    "v[l] v[m]. Arrays are flat, last index fastest. If linear has only K numbers, all gains are "
+    "s and the volume is L s + Q s^2 + C s^3. To reach a volume if bend is 0, solve for s on the "
+    "branch through s = 0. With bend, first find r, the s of the volume at rest with t = 0; then "
+    "find the q at which s = r q, t = 2 r e(q) give the volume, where e = (q^3 - q) / 2 for q <= "
+    "1, else (q - 1) / q^6.";
+static const char resting_text[] =
+    "volume of a lung at rest minus referenceVolume, mL: sum over l <= 2 and m of "
+    "resting[l*l+l+m] * Y[l*l+l+m](g); of all lungs together if byLung is false. Full inflation "
+    "minus referenceVolume is max(0, -g_z)^2 * fullUprightGain * referenceVolume. Above rest, "
+    "all lungs have covered the same fraction of the way from rest to full inflation.";
+
+/* Return the names of the morph targets, such as "mode_3" and "bend_3". */
+static json_t *target_names(const glb *g) {
+  const size_t k = g->source->info->mode_count;
+  json_t *names = json_array();
+  for (size_t j = 0; j < g->targets.count; ++j) {
+    (void)json_array_append_new(names, json_sprintf("%s_%zu", j < k ? "mode" : "bend", j % k));
+  }
+  return names;
+}
+
+/* Return the metadata that describe how the basis was made, as JSON. */
+static json_t *origin(const export_source *source) {
+  static const char *const keys[] = {
+      "lungs",       "made_by",          "force", "direction", "direction_constants", "stiffness",
+      "attribution", "error_rms_percent"};
+  json_t *object = json_object();
+  for (size_t i = 0; i < sizeof keys / sizeof *keys; ++i) {
+    const char *value = supine_basis_metadata(source->basis, keys[i]);
+    if (value != NULL) {
+      (void)json_object_set_new(object, keys[i], json_string(value));
+    }
+  }
+  return object;
+}
+
+json_t *supine_export_glb_extras(const glb *g, double end) {
+  const export_source *s = g->source;
+  const char *full = supine_basis_metadata(s->basis, "full_upright_gain");
+  const double unit = 1e-7; /* value of one integer step in `modes` */
+  json_t *modes = json_array();
+  for (size_t k = 0; k < s->info->mode_count; ++k) {
+    json_t *row = json_array();
+    for (size_t i = 0; i < s->terms; ++i) {
+      (void)json_array_append_new(row,
+                                  json_integer(llround(s->info->modes[k * s->terms + i] / unit)));
+    }
+    (void)json_array_append_new(modes, row);
+  }
+  json_t *supine = json_pack(
+      "{s:s, s:s, s:i, s:o, s:f, s:o, s:o, s:f, s:f, s:f, s:o}", "frame", frame_text, "weights",
+      weights_text, "band", (int)s->info->band, "modes", modes, "modeUnit", unit, "bend",
+      supine_template_numbers(s->info->bend, 3), "middle",
+      supine_template_numbers(g->targets.middle, 3), "millimetresPerUnit", g->step, "breathVolume",
+      g->options->breath, "largestDisplacementColoured", end, "basis", origin(s));
+  if (g->targets.count <= VOLUME_TARGETS_MAX) {
+    (void)json_object_set_new(supine, "volume", json_string(volume_text));
+  }
+  if (s->info->has_rest) {
+    (void)json_object_update_new(supine, json_pack("{s:s, s:b, s:f}", "rest", resting_text,
+                                                   "byLung", s->resting_rows > 1, "fullUprightGain",
+                                                   full != NULL ? strtod(full, NULL) : 0));
+  }
+  return json_pack("{s:o}", "supine", supine);
+}
+
+json_t *supine_export_glb_lung_extras(const glb *g, size_t lung) {
+  const supine_basis_info *info = g->source->info;
+  const size_t k = info->mode_count;
+  const size_t axes = info->volume_axes;
+  json_t *supine =
+      json_pack("{s:I, s:o, s:o}", "lung", (json_int_t)lung, "offset",
+                supine_template_numbers(g->targets.lung[lung].offset, g->targets.count), "unit",
+                supine_template_numbers(g->targets.lung[lung].unit, g->targets.count));
+  if (info->has_rest) {
+    const double *resting =
+        g->source->resting + (g->source->resting_rows > 1 ? lung * EXPORT_RESTING_TERMS : 0);
+    (void)json_object_set_new(supine, "resting",
+                              supine_template_numbers(resting, EXPORT_RESTING_TERMS));
+  }
+  if (g->targets.count <= VOLUME_TARGETS_MAX) {
+    (void)json_object_update_new(
+        supine,
+        json_pack(
+            "{s:f, s:o, s:o, s:o}", "referenceVolume", info->reference_volume[lung], "linear",
+            supine_template_numbers(info->volume_linear + lung * axes * k, axes * k), "quadratic",
+            supine_template_numbers(info->volume_quadratic + lung * axes * k * k, axes * k * k),
+            "cubic", supine_template_numbers(info->volume_cubic + lung * k * k * k, k * k * k)));
+  }
+  return json_pack("{s:o, s:o}", "targetNames", target_names(g), "supine", supine);
+}

@@ -1,0 +1,128 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Append meshes with morph targets, nodes and materials to a glTF file. */
+#include <math.h>
+#include <stdio.h>
+
+#include "program/view/export/glb.h"
+
+json_int_t supine_export_glb_show(glb *g, const char *name, json_t *mesh) {
+  const double half = sqrt(0.5);
+  const double metres = 1e-3 * g->step;
+  (void)json_object_set_new(mesh, "name", json_string(name));
+  (void)json_array_append_new(g->nodes,
+                              json_pack("{s:s, s:I, s:[f,f,f,f], s:[f,f,f]}", "name", name, "mesh",
+                                        (json_int_t)json_array_size(g->meshes), "rotation", -half,
+                                        0.0, 0.0, half, "scale", metres, metres, metres));
+  (void)json_array_append_new(g->meshes, mesh);
+  return (json_int_t)json_array_size(g->nodes) - 1;
+}
+
+json_int_t supine_export_glb_material(glb *g, const char *name, const double rgb[3]) {
+  (void)json_array_append_new(g->materials,
+                              json_pack("{s:s, s:{s:[f,f,f,f], s:f, s:f}, s:b}", "name", name,
+                                        "pbrMetallicRoughness", "baseColorFactor", rgb[0], rgb[1],
+                                        rgb[2], 1.0, "metallicFactor", 0.0, "roughnessFactor", 0.55,
+                                        "doubleSided", 1));
+  return (json_int_t)json_array_size(g->materials) - 1;
+}
+
+/* Compute the displacement of a vertex by morph target `j` at weight 1, in units of glb.step. */
+static void place_target(const glb *g, size_t lung, size_t j, size_t vertex, double xyz[3]) {
+  supine_export_targets_field(g->source, vertex, j, xyz);
+  for (size_t axis = 0; axis < 3; ++axis) {
+    xyz[axis] *= g->targets.lung[lung].unit[j] / g->step;
+  }
+}
+
+/* Compute the position of a vertex of the base mesh, in units of glb.step. If the file rounds morph
+ * targets, correct the position so that the deformed vertex is exact at the weights `rest`. */
+static void place_base(const glb *g, size_t lung, const double *rest, size_t vertex,
+                       double xyz[3]) {
+  supine_export_targets_base(g->source, &g->targets, lung, vertex, xyz);
+  for (size_t axis = 0; axis < 3; ++axis) {
+    xyz[axis] /= g->step;
+  }
+  for (size_t j = 0; !g->options->plain && j < g->targets.count; ++j) {
+    double target[3];
+    place_target(g, lung, j, vertex, target);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      xyz[axis] += rest[j] * (target[axis] - rint(target[axis]));
+    }
+  }
+}
+
+/* Append one lung's part of an array over all vertices; return the index of the accessor. */
+static json_int_t put(glb *g, size_t lung, glb_kind kind, const void *rows) {
+  const size_t *begin = g->source->info->lung_begin + lung;
+  return supine_export_glb_put(g, kind, rows, g->order.vertex + begin[0], begin[1] - begin[0]);
+}
+
+/* Append a lung's displacements by morph target `j`, or the positions of its base mesh if `j` is
+ * the number of targets. */
+static json_int_t put_places(glb *g, size_t lung, size_t j, const double *rest) {
+  const size_t *begin = g->source->info->lung_begin + lung;
+  for (size_t i = begin[0]; i < begin[1]; ++i) {
+    double at[3];
+    if (j < g->targets.count) {
+      place_target(g, lung, j, i, at);
+    } else {
+      place_base(g, lung, rest, i, at);
+    }
+    for (size_t axis = 0; axis < 3; ++axis) {
+      g->xyz[3 * i + axis] = (float)at[axis];
+    }
+  }
+  return put(g, lung, GLB_POSITIONS, g->xyz);
+}
+
+/* Append the vectors that morph target `j` adds to the normals of a lung. */
+static json_int_t put_changes(glb *g, size_t lung, size_t j) {
+  const supine_basis_info *info = g->source->info;
+  const size_t *begin = info->lung_begin + lung;
+  const float *added = g->added + 3 * j * info->vertex_count;
+  for (size_t i = 3 * begin[0]; i < 3 * begin[1]; ++i) {
+    if (added[i] != 0) {
+      return put(g, lung, GLB_NORMAL_CHANGES, added);
+    }
+  }
+  return supine_export_glb_put_zeros(g, GLB_NORMAL_CHANGES, begin[1] - begin[0]);
+}
+
+/* Append a lung's triangles. Their vertex indices count from the lung's first vertex. */
+static json_int_t put_corners(glb *g, size_t lung) {
+  const size_t *begin = g->order.corner_begin + lung;
+  uint32_t *corners = g->order.corners + begin[0];
+  for (size_t i = 0; i < begin[1] - begin[0]; ++i) {
+    corners[i] -= (uint32_t)g->source->info->lung_begin[lung];
+  }
+  return supine_export_glb_put(g, GLB_CORNERS, corners, NULL, begin[1] - begin[0]);
+}
+
+json_int_t supine_export_glb_add(glb *g, size_t lung) {
+  static const double supine[3] = {0, 1, 0};
+  static const double white[3] = {1, 1, 1};
+  json_t *targets = json_array();
+  json_t *weights = json_array();
+  double rest[EXPORT_TARGETS_MAX];
+  char name[64];
+  supine_pose pose;
+  (void)snprintf(name, sizeof name, "%s lung", g->source->info->lung_names[lung]);
+  (void)supine_export_breath_pose(g->source, g->options->breath, supine, 0, &pose, NULL);
+  supine_export_targets_weights(g->source, &g->targets, &pose, lung, rest);
+  for (size_t j = 0; j < g->targets.count; ++j) {
+    (void)json_array_append_new(targets,
+                                json_pack("{s:I, s:I}", "POSITION", put_places(g, lung, j, rest),
+                                          "NORMAL", put_changes(g, lung, j)));
+    (void)json_array_append_new(weights, json_real(rest[j]));
+  }
+  const json_int_t places = put_places(g, lung, g->targets.count, rest);
+  const json_int_t normals = put(g, lung, GLB_NORMALS, g->normals);
+  const json_int_t colours = put(g, lung, GLB_COLOURS, g->colours);
+  const json_int_t corners = put_corners(g, lung);
+  return supine_export_glb_show(
+      g, name,
+      json_pack("{s:[{s:{s:I, s:I, s:I}, s:I, s:I, s:o}], s:o, s:o}", "primitives", "attributes",
+                "POSITION", places, "NORMAL", normals, "COLOR_0", colours, "indices", corners,
+                "material", supine_export_glb_material(g, name, white), "targets", targets,
+                "weights", weights, "extras", supine_export_glb_lung_extras(g, lung)));
+}

@@ -1,0 +1,52 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file
+ * Compress arrays with meshoptimizer, in the format of EXT_meshopt_compression. */
+#ifndef SUPINE_EXPORT_PACKED_H
+#define SUPINE_EXPORT_PACKED_H
+
+#include "program/view/export/export.h"
+
+/** Compressed bytes; free `bytes` with free(). */
+typedef struct export_packed {
+  unsigned char *bytes;
+  size_t size;
+} export_packed;
+
+/** Load meshoptimizer; call this before the functions below.
+ * @retval SUPINE_ERROR_UNSUPPORTED  meshoptimizer is not installed */
+supine_status supine_export_pack_begin(supine_error *error);
+
+/** Encode a unit vector for the filter OCTAHEDRAL of EXT_meshopt_compression, as 4 signed integers,
+ * of which the last is 0.
+ * @param size     size of all 4 integers together, bytes: 4 or 8
+ * @param numbers  output: the integers */
+void supine_export_pack_direction(const float direction[3], size_t size, void *numbers);
+
+/** Compress `count` rows of `stride` bytes; the stride is a multiple of 4 and at most 256.
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_export_pack_rows(const void *rows, size_t count, size_t stride,
+                                      export_packed *packed);
+
+/** Compress triangles, given as `count` vertex indices below `vertices`.
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_export_pack_corners(const uint32_t *corners, size_t count, size_t vertices,
+                                         export_packed *packed);
+
+/** Order in which vertices and triangles are written, lung by lung. */
+typedef struct export_order {
+  uint32_t *vertex;  /**< [N] for each vertex in the file, its index in the basis */
+  uint32_t *corners; /**< [triangles, 3] vertices of each triangle, as indices into `vertex` */
+  size_t corner_begin[SUPINE_LUNGS_MAX + 1]; /**< for each lung, the index in `corners` of its first
+                                                corner; then the total number of corners */
+} export_order;
+
+/** Choose an order; free it with supine_export_order_free, also after a failure.
+ * @param packed  false to keep the order of the basis. True for an order that compresses well:
+ *                triangles are sorted, and vertices are in the order in which the triangles first
+ *                use them; call supine_export_pack_begin first
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_export_order_make(const export_source *source, bool packed,
+                                       export_order *order, supine_error *error);
+void supine_export_order_free(export_order *order);
+
+#endif

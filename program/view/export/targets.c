@@ -1,0 +1,263 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "program/view/export/targets.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "base/vec3.h"
+
+enum { DIRECTIONS = 4096 }; /* number of sampled directions of gravity */
+/* The range of each weight in the sampled directions is extended by this fraction at both ends. */
+static const double margin = 0.02;
+
+/* Set `split` to {s, t}, such that gains[axis] = s + t bend[axis]. `gains` are the factors of a
+ * lung's displacement along x, y and z, and `bend` has the basis's constant for each axis. As gains
+ * always have this form, two axes suffice: those with the smallest and the largest bend. */
+static void split_gains(const double bend[3], const double gains[3], double split[2]) {
+  size_t low = 0;
+  size_t high = 0;
+  for (size_t axis = 1; axis < 3; ++axis) {
+    low = bend[axis] < bend[low] ? axis : low;
+    high = bend[axis] > bend[high] ? axis : high;
+  }
+  split[1] = low == high ? 0 : (gains[high] - gains[low]) / (bend[high] - bend[low]);
+  split[0] = gains[low] - split[1] * bend[low];
+}
+
+/* Compute the factor that multiplies each displacement field of a lung in a pose. */
+static void find_amounts(const export_source *source, size_t count, const supine_pose *pose,
+                         size_t lung, double *amounts) {
+  const size_t k = source->info->mode_count;
+  double gain[2];
+  split_gains(source->info->bend, pose->gains[lung], gain);
+  for (size_t j = 0; j < count; ++j) {
+    amounts[j] = gain[j / k] * pose->weights[j % k];
+  }
+}
+
+void supine_export_targets_weights(const export_source *source, const export_targets *targets,
+                                   const supine_pose *pose, size_t lung, double *weights) {
+  const export_weights *w = &targets->lung[lung];
+  find_amounts(source, targets->count, pose, lung, weights);
+  for (size_t j = 0; j < targets->count; ++j) {
+    weights[j] = (weights[j] - w->offset[j]) / w->unit[j];
+  }
+}
+
+/* Find the smallest and the largest factor of each displacement field in any sampled direction of
+ * gravity and phase of the breath. Within a large breath, some factors pass an extremum; 10 steps
+ * miss it by less than `margin`. Set `offset` to the smallest factor, at which the morph target has
+ * weight 0, and `unit` to the difference from the largest, at which it has weight 1. */
+static supine_status find_ranges(const export_source *source, double breath,
+                                 export_targets *targets, supine_error *error) {
+  enum { STEPS = 10, PHASES = STEPS + 1 };
+  double amounts[EXPORT_TARGETS_MAX];
+  supine_pose pose;
+  for (size_t i = 0; i < PHASES * (size_t)DIRECTIONS; ++i) {
+    double g[3];
+    supine_spiral((double)(i / PHASES), DIRECTIONS, 0, g);
+    const supine_status status =
+        supine_export_breath_pose(source, breath, g, (double)(i % PHASES) / STEPS, &pose, error);
+    if (status != SUPINE_OK) {
+      return status;
+    }
+    for (size_t lung = 0; lung < source->info->lung_count; ++lung) {
+      export_weights *w = &targets->lung[lung];
+      find_amounts(source, targets->count, &pose, lung, amounts);
+      for (size_t j = 0; j < targets->count; ++j) {
+        const double high = i == 0 ? amounts[j] : fmax(amounts[j], w->offset[j] + w->unit[j]);
+        w->offset[j] = i == 0 ? amounts[j] : fmin(amounts[j], w->offset[j]);
+        w->unit[j] = high - w->offset[j];
+      }
+    }
+  }
+  return SUPINE_OK;
+}
+
+static void find_middle(const export_source *source, export_targets *targets) {
+  double low[3] = {INFINITY, INFINITY, INFINITY};
+  double high[3] = {-INFINITY, -INFINITY, -INFINITY};
+  supine_export_box(source, low, high);
+  targets->half_extent = 0;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    targets->middle[axis] = (low[axis] + high[axis]) / 2;
+    targets->half_extent = fmax(targets->half_extent, (high[axis] - low[axis]) / 2);
+  }
+}
+
+supine_status supine_export_targets_choose(const export_source *source, double breath,
+                                           export_targets *targets, supine_error *error) {
+  const supine_basis_info *info = source->info;
+  const bool bent = info->bend[0] != 0 || info->bend[1] != 0 || info->bend[2] != 0;
+  targets->count = (bent ? 2 : 1) * info->mode_count;
+  find_middle(source, targets);
+  const supine_status status = find_ranges(source, breath, targets, error);
+  for (size_t lung = 0; status == SUPINE_OK && lung < info->lung_count; ++lung) {
+    export_weights *w = &targets->lung[lung];
+    for (size_t j = 0; j < targets->count; ++j) {
+      w->offset[j] -= margin * w->unit[j];
+      w->unit[j] = w->unit[j] > 0 ? (1 + 2 * margin) * w->unit[j] : 1;
+    }
+  }
+  return status;
+}
+
+void supine_export_targets_field(const export_source *source, size_t vertex, size_t j,
+                                 double u[3]) {
+  const size_t k = source->info->mode_count;
+  supine_export_field(source, vertex, j % k, u);
+  for (size_t axis = 0; axis < 3 && j >= k; ++axis) {
+    u[axis] *= source->info->bend[axis];
+  }
+}
+
+/* Add the displacement fields at a vertex, times `amount` [count], to the position `xyz`, mm. */
+static void add_fields(const export_source *source, size_t count, const double *amount,
+                       size_t vertex, double xyz[3]) {
+  for (size_t j = 0; j < count; ++j) {
+    double u[3];
+    supine_export_targets_field(source, vertex, j, u);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      xyz[axis] += amount[j] * u[axis];
+    }
+  }
+}
+
+void supine_export_targets_base(const export_source *source, const export_targets *targets,
+                                size_t lung, size_t vertex, double xyz[3]) {
+  for (size_t axis = 0; axis < 3; ++axis) {
+    xyz[axis] = (double)source->info->vertices[3 * vertex + axis] - targets->middle[axis];
+  }
+  add_fields(source, targets->count, targets->lung[lung].offset, vertex, xyz);
+}
+
+/* Compute the normals [N, 3] of the surface at the morph targets' `weights` in each lung. First add
+ * `step` to the weight of target `j` in every lung. `xyz` [N, 3] is workspace. */
+static void find_normals(const export_source *source, const export_targets *targets,
+                         double (*weights)[EXPORT_TARGETS_MAX], size_t j, double step, float *xyz,
+                         float *normals) {
+  const supine_basis_info *info = source->info;
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    double amount[EXPORT_TARGETS_MAX];
+    for (size_t i = 0; i < targets->count; ++i) {
+      amount[i] = targets->lung[lung].unit[i] * (weights[lung][i] + (i == j ? step : 0));
+    }
+    for (size_t i = info->lung_begin[lung]; i < info->lung_begin[lung + 1]; ++i) {
+      double at[3];
+      supine_export_targets_base(source, targets, lung, i, at);
+      add_fields(source, targets->count, amount, i, at);
+      for (size_t axis = 0; axis < 3; ++axis) {
+        xyz[3 * i + axis] = (float)at[axis];
+      }
+    }
+  }
+  supine_normals(source->basis, xyz, normals);
+}
+
+/* Divide each base normal by its length, because glTF requires unit normals. Divide the changes of
+ * this normal by morph targets by the same length: viewers normalise the sum. */
+static void make_unit(const export_source *source, const export_targets *targets, float *base,
+                      float *added) {
+  static const double least = 0.2; /* smallest divisor of the changes */
+  const size_t n = source->info->vertex_count;
+  for (size_t i = 0; i < n; ++i) {
+    float *b = base + 3 * i;
+    const double length = hypot(hypot((double)b[0], (double)b[1]), (double)b[2]);
+    if (length < 1e-6) { /* the vertex is in no triangle */
+      b[2] = 1;
+      continue;
+    }
+    for (size_t axis = 0; axis < 3; ++axis) {
+      b[axis] = (float)((double)b[axis] / length);
+      for (size_t j = 0; j < targets->count; ++j) {
+        added[3 * (j * n + i) + axis] /= (float)fmax(length, least);
+      }
+    }
+  }
+}
+
+/* Round the changes of normals by morph targets, `added`, so that they compress well: to multiples
+ * of 1 / INT8_MAX, or to the value of the previous vertex in `order` if that is close. The normal
+ * at the targets' `weights` is `base` plus the sum of weight times change. Correct `base`, so that
+ * this normal stays as it was. */
+static void round_changes(const export_source *source, const export_targets *targets,
+                          double (*weights)[EXPORT_TARGETS_MAX], const uint32_t *order, float *base,
+                          float *added) {
+  /* A component that differs by at most this from that of the previous vertex becomes equal. */
+  static const float near = 2.0F / INT8_MAX;
+  const supine_basis_info *info = source->info;
+  for (size_t i = 0, lung = 0; i < info->vertex_count; ++i) {
+    lung += i == info->lung_begin[lung + 1];
+    float *b = base + 3 * (size_t)order[i];
+    for (size_t axis = 0; axis < 3; ++axis) {
+      for (size_t j = 0; j < targets->count; ++j) {
+        float *rows = added + 3 * j * info->vertex_count + axis;
+        const float given = rows[3 * (size_t)order[i]];
+        const float before = i > info->lung_begin[lung] ? rows[3 * (size_t)order[i - 1]] : 2;
+        const float own = rintf(INT8_MAX * fmaxf(-1, fminf(1, given))) / INT8_MAX;
+        const float kept = fabsf(given - before) <= near ? before : own;
+        b[axis] += (float)weights[lung][j] * (given - kept);
+        rows[3 * (size_t)order[i]] = kept;
+      }
+    }
+    const float length = hypotf(hypotf(b[0], b[1]), b[2]);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      b[axis] /= length;
+    }
+  }
+}
+
+supine_status supine_export_targets_normals(const export_source *source, double breath,
+                                            const export_targets *targets, const uint32_t *order,
+                                            float *base, float *added, supine_error *error) {
+  static const double supine[3] = {0, 1, 0};
+  static const double step = 0.2; /* change of a weight for central differences */
+  /* Changes of a lung's normals by a morph target are set to 0 if their RMS is less, radians. */
+  static const double least = 0.044;
+  const size_t n = source->info->vertex_count;
+  supine_pose pose;
+  double(*weights)[EXPORT_TARGETS_MAX] = malloc(source->info->lung_count * sizeof *weights);
+  float *xyz = malloc(3 * n * sizeof *xyz);
+  float *below = malloc(3 * n * sizeof *below);
+  supine_status status = SUPINE_ERROR_MEMORY;
+  if (weights == NULL || xyz == NULL || below == NULL) {
+    (void)supine_error_set(error, status, "out of memory");
+    goto cleanup;
+  }
+  status = supine_export_breath_pose(source, breath, supine, 0, &pose, error);
+  if (status != SUPINE_OK) {
+    goto cleanup;
+  }
+  for (size_t lung = 0; lung < source->info->lung_count; ++lung) {
+    supine_export_targets_weights(source, targets, &pose, lung, weights[lung]);
+  }
+  find_normals(source, targets, weights, 0, 0, xyz, base);
+  for (size_t j = 0; j < targets->count; ++j) {
+    float *d = added + 3 * j * n;
+    find_normals(source, targets, weights, j, step, xyz, d);
+    find_normals(source, targets, weights, j, -step, xyz, below);
+    for (size_t lung = 0; lung < source->info->lung_count; ++lung) {
+      const size_t begin = 3 * source->info->lung_begin[lung];
+      const size_t end = 3 * source->info->lung_begin[lung + 1];
+      double sum = 0;
+      for (size_t i = begin; i < end; ++i) {
+        d[i] = (d[i] - below[i]) / (float)(2 * step);
+        sum += (double)d[i] * (double)d[i];
+      }
+      const bool seen = order == NULL || sum > least * least * (double)(end - begin) / 3;
+      for (size_t i = begin; i < end; ++i) {
+        d[i] = seen ? d[i] : 0;
+        base[i] -= (float)weights[lung][j] * d[i];
+      }
+    }
+  }
+  make_unit(source, targets, base, added);
+  if (order != NULL) {
+    round_changes(source, targets, weights, order, base, added);
+  }
+cleanup:
+  free(weights);
+  free(xyz);
+  free(below);
+  return status;
+}

@@ -1,0 +1,504 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Compose pictures of postures side by side with cairo. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cairo.h>
+
+#include "base/library.h"
+#include "base/output.h"
+#include "program/view/render/render.h"
+
+/* clang-format off */
+#define FUNCTIONS(EACH)                                                                            \
+  EACH(cairo_, arc) EACH(cairo_, close_path) EACH(cairo_, create) EACH(cairo_, destroy)            \
+  EACH(cairo_, fill) EACH(cairo_, fill_preserve) EACH(cairo_, image_surface_create)                \
+  EACH(cairo_, image_surface_create_for_data) EACH(cairo_, image_surface_get_data)                 \
+  EACH(cairo_, image_surface_get_stride) EACH(cairo_, line_to) EACH(cairo_, move_to)               \
+  EACH(cairo_, new_path) EACH(cairo_, new_sub_path) EACH(cairo_, paint)                            \
+  EACH(cairo_, paint_with_alpha) EACH(cairo_, pattern_add_color_stop_rgb)                          \
+  EACH(cairo_, pattern_create_linear) EACH(cairo_, pattern_destroy) EACH(cairo_, rectangle)        \
+  EACH(cairo_, select_font_face) EACH(cairo_, set_font_size) EACH(cairo_, set_line_width)          \
+  EACH(cairo_, set_source) EACH(cairo_, set_source_rgb) EACH(cairo_, set_source_rgba)              \
+  EACH(cairo_, set_source_surface) EACH(cairo_, show_text) EACH(cairo_, status)                    \
+  EACH(cairo_, status_to_string) EACH(cairo_, stroke) EACH(cairo_, stroke_preserve)                \
+  EACH(cairo_, surface_destroy) EACH(cairo_, surface_flush) EACH(cairo_, surface_mark_dirty)       \
+  EACH(cairo_, surface_status) EACH(cairo_, surface_write_to_png_stream)                           \
+  EACH(cairo_, text_extents) EACH(cairo_, text_path)
+/* clang-format on */
+
+/* Functions of cairo. They are loaded at the first use, so that all commands that draw nothing run
+ * without cairo and the X11 libraries that it needs. */
+static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cairo;
+
+static const double pi = 3.14159265358979323846;
+
+static const double ground_top[3] = {0.985, 0.988, 0.992};
+static const double ground_bottom[3] = {0.925, 0.941, 0.957};
+static const double card[3] = {1, 1, 1};
+static const double edge[3] = {0.86, 0.885, 0.91};
+static const double ink[3] = {0.09, 0.13, 0.18};
+static const double faint[3] = {0.37, 0.43, 0.49};
+static const double gravity_colour[3] = {0.91, 0.33, 0.17};
+
+/* Layout of the picture, pixels. */
+typedef struct layout {
+  double font;
+  double margin;
+  double cell_width, cell_height;
+  double heading_height;
+  double footer_height; /* height of the area below the cells, which holds the colour bar */
+} layout;
+
+typedef struct bar_scale {
+  double largest;
+  double step;
+} bar_scale;
+
+static void colour(cairo_t *cr, const double rgb[3]) {
+  cairo.set_source_rgb(cr, rgb[0], rgb[1], rgb[2]);
+}
+
+static void font(cairo_t *cr, double size, bool bold) {
+  cairo.select_font_face(cr, "sans-serif", CAIRO_FONT_SLANT_NORMAL,
+                         bold ? CAIRO_FONT_WEIGHT_BOLD : CAIRO_FONT_WEIGHT_NORMAL);
+  cairo.set_font_size(cr, size);
+}
+
+static double text_width(cairo_t *cr, const char *text) {
+  cairo_text_extents_t extents;
+  cairo.text_extents(cr, text, &extents);
+  return extents.x_advance;
+}
+
+/* Draw text with its left end (align 0), middle (0.5) or right end (1) at x, baseline at y. */
+static void text(cairo_t *cr, double x, double y, double align, const char *words) {
+  cairo.move_to(cr, x - align * text_width(cr, words), y);
+  cairo.show_text(cr, words);
+}
+
+/* Draw text with its left end at x, reduced in size if it is wider than `room`, pixels. */
+static void fitted_text(cairo_t *cr, double x, double y, double size, bool bold, double room,
+                        const char *words) {
+  font(cr, size, bold);
+  const double width = text_width(cr, words);
+  if (width > room) {
+    font(cr, size * room / width, bold);
+  }
+  text(cr, x, y, 0, words);
+}
+
+static void rounded(cairo_t *cr, double x, double y, double width, double height, double radius) {
+  cairo.new_sub_path(cr);
+  cairo.arc(cr, x + width - radius, y + radius, radius, -pi / 2, 0);
+  cairo.arc(cr, x + width - radius, y + height - radius, radius, 0, pi / 2);
+  cairo.arc(cr, x + radius, y + height - radius, radius, pi / 2, pi);
+  cairo.arc(cr, x + radius, y + radius, radius, pi, 3 * pi / 2);
+  cairo.close_path(cr);
+}
+
+static void ground(cairo_t *cr, const supine_picture *picture) {
+  cairo_pattern_t *fade = cairo.pattern_create_linear(0, 0, 0, (double)picture->height);
+  cairo.pattern_add_color_stop_rgb(fade, 0, ground_top[0], ground_top[1], ground_top[2]);
+  cairo.pattern_add_color_stop_rgb(fade, 1, ground_bottom[0], ground_bottom[1], ground_bottom[2]);
+  cairo.set_source(cr, fade);
+  cairo.paint(cr);
+  cairo.pattern_destroy(fade);
+}
+
+/* Draw gravity on the ball that shows the body's axes: as a circle with a dot if it points nearly
+ * towards the viewer, as a circle with a cross if it points nearly away, else as an arrow. `seen`
+ * is gravity's unit vector in the viewer's axes. */
+static void gravity_arrow(cairo_t *cr, double x, double y, double radius, const double seen[3]) {
+  const double flat = hypot(seen[0], seen[1]);
+  cairo.new_path(cr);
+  colour(cr, gravity_colour);
+  cairo.set_line_width(cr, radius * 0.13);
+  if (flat < 0.35) {
+    const double r = radius * 0.3;
+    cairo.arc(cr, x, y, r, 0, 2 * pi);
+    cairo.stroke(cr);
+    if (seen[2] > 0) {
+      cairo.arc(cr, x, y, r * 0.42, 0, 2 * pi);
+      cairo.fill(cr);
+      return;
+    }
+    const double d = r * 0.6;
+    cairo.move_to(cr, x - d, y - d);
+    cairo.line_to(cr, x + d, y + d);
+    cairo.move_to(cr, x - d, y + d);
+    cairo.line_to(cr, x + d, y - d);
+    cairo.stroke(cr);
+    return;
+  }
+  const double dx = seen[0] / flat;
+  const double dy = -seen[1] / flat;
+  const double length = radius * fmax(flat, 0.55);
+  const double head = radius * 0.42;
+  const double neck = length - head;
+  cairo.move_to(cr, x - 0.25 * length * dx, y - 0.25 * length * dy);
+  cairo.line_to(cr, x + (neck + head * 0.2) * dx, y + (neck + head * 0.2) * dy);
+  cairo.stroke(cr);
+  cairo.move_to(cr, x + length * dx, y + length * dy);
+  cairo.line_to(cr, x + neck * dx - 0.5 * head * dy, y + neck * dy + 0.5 * head * dx);
+  cairo.line_to(cr, x + neck * dx + 0.5 * head * dy, y + neck * dy - 0.5 * head * dx);
+  cairo.close_path(cr);
+  cairo.fill(cr);
+}
+
+/* Draw the ball that shows the body's axes and gravity. */
+static void ball(cairo_t *cr, double x, double y, double radius, supine_view view,
+                 const double gravity[3]) {
+  static const char *const ends[3][2] = {{"L", "R"}, {"P", "A"}, {"H", "F"}};
+  double axes[3][3];
+  double seen[3] = {0, 0, 0};
+  supine_render_view_axes(view, axes);
+  cairo.arc(cr, x, y, radius, 0, 2 * pi);
+  cairo.set_source_rgba(cr, faint[0], faint[1], faint[2], 0.13);
+  cairo.fill_preserve(cr);
+  cairo.set_source_rgba(cr, faint[0], faint[1], faint[2], 0.5);
+  cairo.set_line_width(cr, fmax(0.6, radius * 0.035));
+  cairo.stroke(cr);
+  font(cr, radius * 0.4, false);
+  for (int axis = 0; axis < 3; ++axis) {
+    const double dx = axes[0][axis];
+    const double dy = -axes[1][axis];
+    for (int row = 0; row < 3; ++row) {
+      seen[row] += axes[row][axis] * gravity[axis];
+    }
+    if (hypot(dx, dy) < 0.3) {
+      continue;
+    }
+    cairo.set_source_rgba(cr, faint[0], faint[1], faint[2], 0.45);
+    cairo.move_to(cr, x - 0.62 * radius * dx, y - 0.62 * radius * dy);
+    cairo.line_to(cr, x + 0.62 * radius * dx, y + 0.62 * radius * dy);
+    cairo.stroke(cr);
+    for (int end = 0; end < 2; ++end) {
+      const double reach = (end == 0 ? 0.8 : -0.8) * radius;
+      cairo.set_source_rgba(cr, ink[0], ink[1], ink[2], 0.8);
+      text(cr, x + reach * dx, y + reach * dy + 0.145 * radius, 0.5, ends[axis][end]);
+    }
+  }
+  gravity_arrow(cr, x, y, radius * 0.66, seen);
+}
+
+/* Move the name at index `count` down until it overlaps no earlier name. `box` holds the left end,
+ * the baseline and the width of each name, and `line` is the height of a line, pixels. */
+static void place_name(double (*box)[3], size_t count, double line) {
+  double *own = box[count];
+  for (size_t i = 0; i < count; ++i) {
+    const bool beside = own[0] > box[i][0] + box[i][2] || box[i][0] > own[0] + own[2];
+    if (!beside && fabs(own[1] - box[i][1]) < line * 0.999) {
+      own[1] = box[i][1] + line;
+      i = SIZE_MAX; /* the loop starts again with the first name */
+    }
+  }
+}
+
+/* Draw discs and dots at the marks, then the labels over them. (x, y) is the upper left corner of
+ * the scene; `size` is the size of the font, pixels. */
+static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const supine_scene *scene,
+                                const supine_marks *marks, double size, double x, double y) {
+  double(*pixel)[2] = malloc((marks->count + 1) * sizeof *pixel);
+  double(*box)[3] = malloc((marks->count + 1) * sizeof *box);
+  size_t placed = 0;
+  if (pixel == NULL || box == NULL) {
+    free(pixel);
+    free(box);
+    return SUPINE_ERROR_MEMORY;
+  }
+  supine_render_project(renderer, scene, marks, pixel);
+  for (int names = 0; names < 2; ++names) {
+    for (size_t i = 0; i < marks->count; ++i) {
+      const supine_mark *mark = &marks->mark[i];
+      const double *at = pixel[i];
+      double rgb[3];
+      if (names == 1 ? mark->label == NULL : mark->label != NULL && !mark->point) {
+        continue;
+      }
+      supine_render_colour(scene->colours, fmin(1, (double)mark->value / scene->largest), rgb);
+      if (names == 0) {
+        cairo.new_path(cr);
+        cairo.arc(cr, x + at[0], y + at[1], size * (mark->point ? 0.32 : 0.07), 0, 2 * pi);
+        colour(cr, rgb);
+        cairo.fill_preserve(cr);
+        cairo.set_line_width(cr, size * 0.1);
+        colour(cr, mark->point ? ink : rgb);
+        cairo.stroke(cr);
+        continue;
+      }
+      font(cr, size * 0.75, false);
+      double *own = box[placed];
+      own[2] = text_width(cr, mark->label);
+      own[0] = fmax(0, fmin(at[0] + size * 0.5, (double)scene->width - own[2]));
+      own[1] = at[1] - size * 0.3;
+      place_name(box, placed++, size);
+      cairo.move_to(cr, x + own[0], y + own[1]);
+      cairo.text_path(cr, mark->label);
+      cairo.set_source_rgba(cr, card[0], card[1], card[2], 0.85);
+      cairo.set_line_width(cr, size * 0.25);
+      cairo.stroke_preserve(cr);
+      colour(cr, ink);
+      cairo.fill(cr);
+    }
+  }
+  free(pixel);
+  free(box);
+  return SUPINE_OK;
+}
+
+/* Draw a scene on a new cairo surface, which the caller must destroy, even after a failure. */
+static supine_status draw_scene(supine_renderer *renderer, const supine_scene *scene,
+                                cairo_surface_t **image, supine_error *error) {
+  *image = cairo.image_surface_create(CAIRO_FORMAT_ARGB32, (int)scene->width, (int)scene->height);
+  if (cairo.surface_status(*image) != CAIRO_STATUS_SUCCESS ||
+      (size_t)cairo.image_surface_get_stride(*image) != 4 * scene->width) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  }
+  cairo.surface_flush(*image);
+  const supine_status status = supine_render_draw(
+      renderer, scene, (uint32_t *)(void *)cairo.image_surface_get_data(*image), error);
+  cairo.surface_mark_dirty(*image);
+  return status;
+}
+
+/* Draw the lungs and the marks of a panel in a box whose upper left corner is (x, y); `size` is the
+ * size of the font; all in pixels. A struct for the 13 parameters would have no other use. */
+static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
+                           const supine_panel *panel, supine_view view, const bar_scale *bar,
+                           double x, double y, double width, double height, double size,
+                           const double *extent, supine_error *error) {
+  const supine_scene scene = {.pose = panel->pose,
+                              .value = panel->value,
+                              .largest = bar->largest,
+                              .line_step = bar->step,
+                              .colours = picture->colours,
+                              .view = view,
+                              .shell = picture->transparency > 0,
+                              .width = (size_t)width,
+                              .height = (size_t)height,
+                              .extent = extent};
+  cairo_surface_t *image = NULL;
+  supine_status status = draw_scene(renderer, &scene, &image, error);
+  if (status == SUPINE_OK) {
+    cairo.set_source_surface(cr, image, floor(x), floor(y));
+    cairo.paint_with_alpha(cr, picture->transparency > 0 ? fmin(1, 2 * (1 - picture->transparency))
+                                                         : 1);
+    if (panel->marks != NULL) {
+      status = draw_marks(cr, renderer, &scene, panel->marks, size, floor(x), floor(y));
+    }
+  }
+  cairo.surface_destroy(image);
+  return status;
+}
+
+/* Draw the cell of the picture that shows the posture `column` from the view `row`. A struct for
+ * the nine parameters would have no other use. */
+static supine_status cell(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
+                          const layout *at, const bar_scale *bar, size_t column, size_t row,
+                          const double extent[4], supine_error *error) {
+  const supine_panel *panel = &picture->panel[column];
+  const supine_view view = picture->view[row];
+  const double gap = at->margin / 2;
+  const double x = at->margin + (double)column * (at->cell_width + gap);
+  const double y = at->margin + (double)row * (at->cell_height + gap);
+  const double radius = at->heading_height * 0.4;
+  const double words = x + 2 * radius + at->font * 1.5;
+  const double room = x + at->cell_width - words - at->font;
+  rounded(cr, x, y, at->cell_width, at->cell_height, at->font * 0.7);
+  colour(cr, card);
+  cairo.fill_preserve(cr);
+  colour(cr, edge);
+  cairo.set_line_width(cr, 1);
+  cairo.stroke(cr);
+  ball(cr, x + radius + at->font * 0.7, y + at->heading_height / 2 + at->font * 0.2, radius, view,
+       panel->gravity);
+  colour(cr, ink);
+  fitted_text(cr, words, y + at->heading_height / 2 - at->font * 0.25, at->font * 1.3, true, room,
+              panel->title);
+  colour(cr, faint);
+  fitted_text(cr, words, y + at->heading_height / 2 + at->font * 0.95, at->font * 0.82, false, room,
+              panel->subtitle);
+  fitted_text(cr, words, y + at->heading_height / 2 + at->font * 2.0, at->font * 0.82, false, room,
+              supine_render_view_name(view));
+  return lungs(cr, renderer, picture, panel, view, bar, x + at->font * 0.5, y + at->heading_height,
+               at->cell_width - at->font, at->cell_height - at->heading_height - at->font * 0.5,
+               at->font, extent, error);
+}
+
+static void colour_bar(cairo_t *cr, const supine_picture *picture, const layout *at,
+                       const bar_scale *bar) {
+  enum { STOPS = 64 };
+  const double width = fmin((double)picture->width - 2 * at->margin, 34 * at->font);
+  const double x = ((double)picture->width - width) / 2;
+  const double y = (double)picture->height - at->footer_height + at->font * 1.65;
+  const double height = at->font * 0.8;
+  cairo_pattern_t *fade = cairo.pattern_create_linear(x, 0, x + width, 0);
+  for (int i = 0; i <= STOPS; ++i) {
+    double rgb[3];
+    supine_render_colour(picture->colours, i / (double)STOPS, rgb);
+    cairo.pattern_add_color_stop_rgb(fade, i / (double)STOPS, rgb[0], rgb[1], rgb[2]);
+  }
+  cairo.rectangle(cr, x, y, width, height);
+  if (picture->beyond) {
+    cairo.move_to(cr, x + width, y);
+    cairo.line_to(cr, x + width + 0.9 * height, y + height / 2);
+    cairo.line_to(cr, x + width, y + height);
+  }
+  cairo.set_source(cr, fade);
+  cairo.fill(cr);
+  cairo.pattern_destroy(fade);
+  font(cr, at->font * 0.85, false);
+  colour(cr, ink);
+  text(cr, x + width / 2, y - at->font * 0.5, 0.5, picture->bar_label);
+  colour(cr, faint);
+  cairo.set_line_width(cr, 1);
+  for (int i = 0; i * bar->step <= bar->largest * (1 + 1e-9); ++i) {
+    char number[32];
+    const double tick = x + width * i * bar->step / bar->largest;
+    (void)snprintf(number, sizeof number, "%g", i * bar->step);
+    cairo.move_to(cr, tick, y + height + at->font * 0.15);
+    cairo.line_to(cr, tick, y + height + at->font * 0.4);
+    cairo.stroke(cr);
+    text(cr, tick, y + height + at->font * 1.3, 0.5, number);
+  }
+}
+
+static layout make_layout(const supine_picture *picture) {
+  layout at;
+  const double width = (double)picture->width;
+  const double height = (double)picture->height;
+  at.font =
+      fmin(width / (double)picture->panel_count / 19, height / (double)picture->view_count / 24);
+  at.font = fmin(28, at.font);
+  at.margin = at.font * 0.9;
+  at.heading_height = at.font * 5.2;
+  at.footer_height = at.font * 4.6;
+  const double gap = at.margin / 2;
+  at.cell_width = (width - 2 * at.margin - gap * (double)(picture->panel_count - 1)) /
+                  (double)picture->panel_count;
+  at.cell_height =
+      (height - at.margin - at.footer_height - gap * (double)(picture->view_count - 1)) /
+      (double)picture->view_count;
+  return at;
+}
+
+void supine_render_picture_extent(supine_renderer *renderer, const supine_picture *picture,
+                                  double (*extent)[4]) {
+  for (size_t row = 0; row < picture->view_count; ++row) {
+    for (size_t column = 0; column < picture->panel_count; ++column) {
+      const supine_scene scene = {.pose = picture->panel[column].pose, .view = picture->view[row]};
+      supine_render_extent(renderer, &scene, extent[row]);
+    }
+  }
+}
+
+static supine_status compose(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
+                             supine_error *error) {
+  const layout at = make_layout(picture);
+  const bar_scale bar = {picture->largest, supine_render_bar_step(picture->largest)};
+  double own[SUPINE_VIEWS_MAX][4];
+  supine_status status = SUPINE_OK;
+  if (at.font < 4) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "%zu x %zu pixels are too few for %zu posture%s and %zu view%s: give "
+                            "a larger --size",
+                            picture->width, picture->height, picture->panel_count,
+                            picture->panel_count == 1 ? "" : "s", picture->view_count,
+                            picture->view_count == 1 ? "" : "s");
+  }
+  ground(cr, picture);
+  if (picture->extent == NULL) {
+    for (size_t row = 0; row < picture->view_count; ++row) {
+      memcpy(own[row], (const double[])SUPINE_EXTENT_NONE, sizeof own[row]);
+    }
+    supine_render_picture_extent(renderer, picture, own);
+  }
+  for (size_t row = 0; row < picture->view_count && status == SUPINE_OK; ++row) {
+    for (size_t column = 0; column < picture->panel_count && status == SUPINE_OK; ++column) {
+      status = cell(cr, renderer, picture, &at, &bar, column, row,
+                    picture->extent != NULL ? picture->extent[row] : own[row], error);
+    }
+  }
+  colour_bar(cr, picture, &at, &bar);
+  return status;
+}
+
+static cairo_status_t to_file(void *file, const unsigned char *bytes, unsigned length) {
+  return fwrite(bytes, 1, length, file) == length ? CAIRO_STATUS_SUCCESS : CAIRO_STATUS_WRITE_ERROR;
+}
+
+static supine_status write_png(cairo_surface_t *surface, FILE *file, supine_error *error) {
+  const cairo_status_t written = cairo.surface_write_to_png_stream(surface, to_file, file);
+  return written == CAIRO_STATUS_SUCCESS ? SUPINE_OK
+                                         : supine_error_set(error, SUPINE_ERROR_WRITE, "PNG: %s",
+                                                            cairo.status_to_string(written));
+}
+
+static supine_status draw_on(cairo_surface_t *surface, supine_renderer *renderer,
+                             const supine_picture *picture, supine_error *error) {
+  supine_status status = SUPINE_ERROR_MEMORY;
+  cairo_t *cr = cairo.create(surface);
+  if (cairo.status(cr) == CAIRO_STATUS_SUCCESS) {
+    status = compose(cr, renderer, picture, error);
+    cairo.surface_flush(surface);
+  } else {
+    (void)supine_error_set(error, status, "out of memory");
+  }
+  cairo.destroy(cr);
+  return status;
+}
+
+supine_status supine_render_picture_draw(supine_renderer *renderer, const supine_picture *picture,
+                                         uint32_t *pixels, supine_error *error) {
+  supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  cairo_surface_t *surface = cairo.image_surface_create_for_data(
+      (unsigned char *)pixels, CAIRO_FORMAT_RGB24, (int)picture->width, (int)picture->height,
+      (int)(4 * picture->width));
+  status = draw_on(surface, renderer, picture, error);
+  cairo.surface_destroy(surface);
+  return status;
+}
+
+supine_status supine_render_picture_save(supine_renderer *renderer, const supine_picture *picture,
+                                         const char *path, supine_error *error) {
+  supine_output output = {0};
+  supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  cairo_surface_t *surface =
+      cairo.image_surface_create(CAIRO_FORMAT_RGB24, (int)picture->width, (int)picture->height);
+  status = draw_on(surface, renderer, picture, error);
+  if (status == SUPINE_OK) {
+    status = supine_output_open(path, &output, error);
+  }
+  if (status == SUPINE_OK) {
+    status = write_png(surface, output.file, error);
+    if (status == SUPINE_OK || ferror(output.file) != 0) {
+      status = supine_output_commit(&output, error);
+    }
+  }
+  supine_output_abandon(&output);
+  cairo.surface_destroy(surface);
+  return status;
+}
+
+supine_status supine_render_png(supine_renderer *renderer, const supine_scene *scene, FILE *file,
+                                supine_error *error) {
+  supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  cairo_surface_t *image = NULL;
+  status = draw_scene(renderer, scene, &image, error);
+  if (status == SUPINE_OK) {
+    status = write_png(image, file, error);
+  }
+  cairo.surface_destroy(image);
+  return status;
+}

@@ -1,0 +1,139 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Compress rows to a few functions of the direction, and evaluate the result. */
+#include <cblas.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <supine/sh.h>
+
+#include "base/parallel.h"
+#include "sh/compression.h"
+
+void supine_sh_compression_free(supine_compression *compression) {
+  free(compression->coefficients);
+  free(compression->modes);
+  free(compression->mix);
+  *compression = (supine_compression){0};
+}
+
+supine_status supine_sh_compression_create(const supine_expansion *expansion, size_t mode_count,
+                                           supine_compression *made) {
+  *made = (supine_compression){
+      .row_count = expansion->row_count, .band = expansion->band, .mode_count = mode_count};
+  made->coefficients = malloc(expansion->row_count * mode_count * sizeof(float));
+  made->modes = calloc(mode_count * supine_sh_count(expansion->band), sizeof(double));
+  made->mix = calloc(expansion->rank * mode_count, sizeof(double));
+  if (made->coefficients == NULL || made->modes == NULL || made->mix == NULL) {
+    supine_sh_compression_free(made);
+    return SUPINE_ERROR_MEMORY;
+  }
+  return SUPINE_OK;
+}
+
+typedef struct mix_work {
+  const supine_expansion *expansion;
+  supine_compression *made;
+} mix_work;
+
+static void mix_range(void *context, size_t begin, size_t end, size_t thread) {
+  enum { BLOCK = 128 };
+  const mix_work *work = context;
+  const int rank = (int)work->expansion->rank;
+  const size_t count = work->made->mode_count;
+  double block[BLOCK * SUPINE_MODES_MADE_MAX];
+  (void)thread;
+  for (size_t i = begin; i < end; i += BLOCK) {
+    const size_t n = end - i < BLOCK ? end - i : BLOCK;
+    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, (int)n, (int)count, rank, 1.0,
+                work->expansion->columns + i * work->expansion->rank, rank, work->made->mix,
+                (int)count, 0.0, block, (int)count);
+    for (size_t k = 0; k < n * count; ++k) {
+      work->made->coefficients[i * count + k] = (float)block[k];
+    }
+  }
+}
+
+void supine_sh_compression_mix(const supine_expansion *expansion, supine_compression *made) {
+  const int terms = (int)supine_sh_count(expansion->band);
+  const int count = (int)made->mode_count;
+  mix_work work = {expansion, made};
+  cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)expansion->rank, count, terms, 1.0,
+              expansion->functions, terms, made->modes, terms, 0.0, made->mix, count);
+  supine_parallel_for(expansion->row_count, 1024, 0, mix_range, &work);
+}
+
+supine_status supine_sh_compress_harmonics(const supine_expansion *expansion,
+                                           supine_compression *compression, supine_error *error) {
+  const size_t terms = supine_sh_count(expansion->band);
+  if (terms > SUPINE_MODES_MADE_MAX) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "band %zu has %zu harmonics, but a basis file holds at most %d: "
+                            "give --modes 16, or --band 7 or less",
+                            expansion->band, terms, SUPINE_MODES_MADE_MAX);
+  }
+  supine_compression made;
+  if (supine_sh_compression_create(expansion, terms, &made) != SUPINE_OK) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu harmonics", terms);
+  }
+  for (size_t t = 0; t < terms; ++t) {
+    made.modes[t * terms + t] = 1.0;
+  }
+  supine_sh_compression_mix(expansion, &made);
+  *compression = made;
+  return SUPINE_OK;
+}
+
+/* Keep the first `count` of `width` values of `size` bytes in each row, and close the gaps. */
+static void keep_columns(void *data, size_t rows, size_t width, size_t count, size_t size) {
+  unsigned char *bytes = data;
+  for (size_t r = 1; r < rows; ++r) {
+    memmove(bytes + r * count * size, bytes + r * width * size, count * size);
+  }
+}
+
+size_t supine_sh_modes_needed(size_t count, const double *singular, double total, double error) {
+  static const double same_error = 1.01;
+  const double limit = (same_error * same_error - 1.0) * error * error;
+  double dropped = 0.0;
+  while (count > 1) {
+    dropped += singular[count - 1] * singular[count - 1] / total;
+    if (dropped > limit) {
+      break;
+    }
+    --count;
+  }
+  return count;
+}
+
+void supine_sh_compression_truncate(supine_compression *compression, size_t rank, size_t count) {
+  const size_t width = compression->mode_count;
+  if (count < width) {
+    keep_columns(compression->coefficients, compression->row_count, width, count, sizeof(float));
+    keep_columns(compression->mix, rank, width, count, sizeof(double));
+    compression->mode_count = count;
+  }
+}
+
+void supine_sh_compression_weights(const supine_compression *compression, const double g[3],
+                                   double *weights) {
+  double y[(SUPINE_SH_BAND_MAX + 1) * (SUPINE_SH_BAND_MAX + 1)] = {0.0};
+  const size_t terms = supine_sh_count(compression->band);
+  (void)supine_sh_evaluate(compression->band, g, y); /* cannot fail: g is a unit vector */
+  for (size_t k = 0; k < compression->mode_count; ++k) {
+    weights[k] = 0.0;
+    for (size_t t = 0; t < terms; ++t) {
+      weights[k] += compression->modes[k * terms + t] * y[t];
+    }
+  }
+}
+
+void supine_sh_compression_field(const supine_compression *compression, const double *weights,
+                                 double *field) {
+  for (size_t i = 0; i < compression->row_count; ++i) {
+    const float *c = compression->coefficients + i * compression->mode_count;
+    field[i] = 0.0;
+    for (size_t k = 0; k < compression->mode_count; ++k) {
+      field[i] += weights[k] * (double)c[k];
+    }
+  }
+}

@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file
+ * Expand real functions F_i(g) of a direction g in spherical harmonics Y_lm:
+ *
+ *     C_i,lm = integral of F_i(g) Y_lm(g) over the sphere
+ *
+ * Usually, many functions are sums of a few. If F_i(g) is the sum over r of P_i,r w_r(g), only the
+ * weights w_r(g) need expansion: C = P Q, where row r of Q holds the coefficients of w_r. The
+ * matrix C is therefore stored as a product, C = columns x functions. Here, a row i is a vertex or
+ * one coordinate of a vertex, a column is its value for one direction, and g is a direction of
+ * gravity; nothing in this folder depends on that. */
+#ifndef SUPINE_EXPANSION_H
+#define SUPINE_EXPANSION_H
+
+#include "sh/grid.h"
+
+typedef struct supine_expansion {
+  size_t row_count;  /**< N */
+  size_t band;       /**< highest degree of the harmonics */
+  size_t rank;       /**< number of functions whose sums are all rows */
+  double *columns;   /**< [row_count, rank] P: weight of each function in each row */
+  double *functions; /**< [rank, (band + 1)^2] Q: harmonic coefficients of each function */
+} supine_expansion;
+
+void supine_sh_expansion_free(supine_expansion *expansion);
+
+/** Create a grid that is fine enough for functions with kinks: 8 latitudes for each degree up to
+ * `band`, at least 32, and twice as many longitudes. Statuses: as supine_sh_grid_create. */
+supine_status supine_sh_expansion_grid(size_t band, supine_sh_grid **grid);
+
+/** Compute the harmonic coefficients of functions from their values on a grid.
+ * @param values     [latitudes, longitudes, rank] value of each function at each direction
+ * @param functions  [rank, (band + 1)^2] output
+ * Statuses: as supine_sh_transform_create. */
+supine_status supine_sh_expand(size_t band, const supine_sh_grid *grid, size_t rank,
+                               const double *values, double *functions, supine_error *error);
+
+#endif
