@@ -29,6 +29,7 @@ static supine_status write_html(const char *path, const supine_comparison *compa
 typedef struct request {
   const char *postures;
   const char *html;
+  const char *inside;
   bool json;
   supine_volume_options volume;
   supine_from from;
@@ -44,6 +45,10 @@ static const supine_option table[] = {
     {"breath", 0, "ML", "tidal volume of the breath whose ventilation by height is computed",
      SUPINE_FILLS(request, breath), SUPINE_SAYS_GIVEN(request, has_breath), .standard = "500",
      SUPINE_ABOVE_ZERO},
+    {"inside", 0, "FILE",
+     "structures made by 'supine embed' from the same basis: the report has the displacement of "
+     "each, with its expected error",
+     SUPINE_FILLS(request, inside), .file = SUPINE_FILE_IN},
     {"json", 0, NULL, "print JSON to standard output instead of text", SUPINE_FILLS(request, json)},
     {"output", 'o', "FILE", ".html file to write: a report with charts and pictures",
      SUPINE_FILLS(request, html), .file = SUPINE_FILE_OUT, .endings = ".html"},
@@ -134,12 +139,18 @@ static supine_status compare(const char *path, const char *made_by, const supine
     return wanted->html != NULL
                ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                                   "%s holds structures inside the lungs, but -o needs the lungs: "
-                                  "give the basis of the lungs, or leave -o out",
+                                  "give the basis of the lungs, and the structures by --inside",
                                   path)
                : compare_content(basis, &comparison.postures, &comparison.state, wanted->json,
                                  error);
   }
-  status = supine_report_find(&comparison, error);
+  if (wanted->inside != NULL) {
+    status = supine_command_inside_open(basis, wanted->inside, &comparison.inside,
+                                        &comparison.names, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_report_find(&comparison, error);
+  }
   if (status == SUPINE_OK) {
     supine_report_print(&comparison, wanted->json);
   }
@@ -147,6 +158,8 @@ static supine_status compare(const char *path, const char *made_by, const supine
     status = write_html(wanted->html, &comparison, error);
   }
   supine_report_free(&comparison);
+  supine_command_names_close(&comparison.names);
+  supine_basis_close(comparison.inside);
   return status;
 }
 
@@ -166,8 +179,7 @@ const supine_command supine_command_compare = {
     "compare postures: displacement, and ventilation by height",
     .usage = "BASIS [--postures LIST] [--volume VOLUME] [-o report.html] [OPTIONS]",
     .about = "For each posture, reports the displacement from supine at rest or from the state of "
-             "--from, the volume of each lung, and the ventilation by height in a breath. Then "
-             "finds the direction of gravity with the largest displacement from supine. If BASIS "
+             "--from, the volume of each lung, and the ventilation by height in a breath. If BASIS "
              "was made by 'supine embed', reports only the displacement of each named part between "
              "every two postures.",
     .options = table,
@@ -182,7 +194,7 @@ const supine_command supine_command_compare = {
     "\n"
     "Examples:\n"
     "  supine compare lungs.safetensors --postures supine,prone,supine+15,0.6:0:-0.8\n"
-    "  supine compare lungs.safetensors --volume rest --breath 800 -o report.html",
+    "  supine compare lungs.safetensors --inside nodules.safetensors -o report.html",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),
     .run = run};

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/text.h"
 #include "base/vec3.h"
 
 #include "program/options/basis_input.h"
@@ -165,6 +166,22 @@ supine_status supine_command_targets_find(const supine_basis *inside,
   free(before);
   return enough ? SUPINE_OK
                 : supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu points", n);
+}
+
+const char *supine_command_target_way(const supine_target *target, size_t most, char way[96]) {
+  static const char *const names[3][2] = {{"right", "left"}, {"front", "back"}, {"feet", "head"}};
+  double left[3] = {fabs(target->move[0]), fabs(target->move[1]), fabs(target->move[2])};
+  (void)snprintf(way, 96, "%s", target->moved <= target->expected ? SUPINE_TARGET_UNTOLD : "");
+  for (size_t i = 0; target->moved > target->expected && i < most; ++i) {
+    size_t axis = left[0] > left[1] ? 0U : 1U;
+    axis = left[2] > left[axis] ? 2 : axis;
+    if (left[axis] >= 0.5) {
+      supine_text_add(way, 96, "%s%.0f to the %s", i > 0 ? ", " : "", left[axis],
+                      names[axis][target->move[axis] > 0]);
+    }
+    left[axis] = 0;
+  }
+  return way;
 }
 
 json_t *supine_command_target_json(const supine_target *t) {
