@@ -75,8 +75,8 @@ static void add_model(entries *list, const supine_lungs *lungs, const supine_mod
   add(list, "force", "base=%.9g gain=%.9g cx=%.9g cy=%.9g cz=%.9g soften=%.9g", force->base,
       force->gain, force->box[0], force->box[1], force->box[2], force->soften);
   add(list, "direction", "box");
-  add(list, "direction_constants", "c1=%.9g c2=%.9g c3=%.9g c4=%.9g c5=%.9g c6=%.9g", c[0], c[1],
-      c[2], c[3], c[4], c[5]);
+  add(list, "direction_constants", "c1=%.9g c2=%.9g c3=%.9g c4=%.9g c5=%.9g c6=%.9g shear=%.9g",
+      c[0], c[1], c[2], c[3], c[4], c[5], model->direction.shear);
   add(list, "stiffness", "%s", model->stiffness == NULL ? "uniform" : "per vertex");
   if (model->lesions != NULL) {
     add_lesions(list, lungs->mesh.vertex_count, model->lesions);
@@ -119,18 +119,21 @@ static void add_reference(entries *list, const supine_reference *reference, cons
   add(list, "full_upright_gain", "%g", SUPINE_FULL_UPRIGHT_GAIN);
   supine_reference_resting_print(&reference->resting, shares, sizeof shares);
   add(list, "resting_shares", "%s", shares);
+  /* State whether the ratio of the volumes at rest (FRC) and at full inflation is the patient's own
+   * or, if not, the standard deviation of its logarithm. */
+  if (supine_reference_resting_given(&reference->resting) || reference->scan.full > 0.0) {
+    add(list, "resting_known", "yes");
+  } else {
+    add(list, "resting_spread", "%.4g", reference->resting.spread / reference->resting.assumed);
+  }
 }
 
-/* Add the constant c of the expected position error (supine/locate.h), and whether the resting
- * volume (FRC) of a posture is the patient's own. */
+/* Add the constant c of the expected position error (supine/locate.h). */
 static void add_expected_error(entries *list, const supine_basis_content *content) {
   if (content->fit == NULL) {
     const double own = content->options->expected_error;
     add(list, "expected_error_mm", "%g",
         own > 0.0 ? fmin(own, SUPINE_EXPECTED_ERROR_MM) : SUPINE_EXPECTED_ERROR_MM);
-  }
-  if (content->reference != NULL && supine_reference_resting_given(&content->reference->resting)) {
-    add(list, "resting_known", "yes");
   }
 }
 

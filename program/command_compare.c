@@ -38,7 +38,8 @@ typedef struct request {
 } request;
 
 static const supine_option table[] = {
-    {"postures", 0, "LIST", "postures to compare, separated by commas",
+    {"postures", 0, "LIST",
+     "states to compare, separated by commas, such as supine:rest,prone:rest+500",
      SUPINE_FILLS(request, postures), .standard = "supine,prone,left,right"},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
@@ -56,20 +57,18 @@ static const supine_option table[] = {
 
 /* Append to a list the displacement of each named structure between two postures. */
 static supine_status add_pair(const supine_basis *basis, const supine_command_names *names,
-                              const supine_posture_list *postures, const supine_state *volume,
-                              const size_t pair[2], json_t *list, supine_error *error) {
-  const supine_posture_item *item[2] = {&postures->item[pair[0]], &postures->item[pair[1]]};
-  supine_state state[2] = {*volume, *volume};
+                              const supine_posture_item *const item[2], json_t *list,
+                              supine_error *error) {
   supine_pose pose[2];
   supine_expected expected = {0};
   supine_target *targets = NULL;
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < 2 && status == SUPINE_OK; ++i) {
-    memcpy(state[i].gravity, item[i]->gravity, sizeof state[i].gravity);
-    status = supine_basis_pose(basis, &state[i], &pose[i], error);
+    status = supine_basis_pose(basis, &item[i]->state, &pose[i], error);
   }
   if (status == SUPINE_OK) {
-    status = supine_options_expected_find(basis, &state[1], &state[0], &expected, error);
+    status =
+        supine_options_expected_find(basis, &item[1]->state, &item[0]->state, &expected, error);
   }
   if (status == SUPINE_OK) {
     status =
@@ -88,13 +87,14 @@ static supine_status add_pair(const supine_basis *basis, const supine_command_na
 
 /* Print the displacement of each named structure between every two postures. */
 static supine_status compare_content(const supine_basis *basis, const supine_posture_list *postures,
-                                     const supine_state *volume, bool json, supine_error *error) {
+                                     bool json, supine_error *error) {
   supine_command_names names;
   json_t *list = json_array();
   supine_status status = supine_command_names_open(basis, &names, error);
   for (size_t i = 0; i < postures->count; ++i) {
     for (size_t j = i + 1; j < postures->count && status == SUPINE_OK; ++j) {
-      status = add_pair(basis, &names, postures, volume, (size_t[2]){i, j}, list, error);
+      const supine_posture_item *const item[2] = {&postures->item[i], &postures->item[j]};
+      status = add_pair(basis, &names, item, list, error);
     }
   }
   if (status == SUPINE_OK) {
@@ -122,8 +122,8 @@ static supine_status compare(const char *path, const char *made_by, const supine
   if (comparison.state.lung_count == 0 && comparison.state.volume.kind == SUPINE_VOLUME_DEFAULT) {
     comparison.state.volume = supine_basis_default_volume(basis);
   }
-  supine_status status =
-      supine_options_posture_list_parse(wanted->postures, &comparison.postures, error);
+  supine_status status = supine_options_posture_list_parse(wanted->postures, &comparison.state,
+                                                           &comparison.postures, error);
   if (status != SUPINE_OK) {
     return status;
   }
@@ -141,8 +141,7 @@ static supine_status compare(const char *path, const char *made_by, const supine
                                   "%s holds structures inside the lungs, but -o needs the lungs: "
                                   "give the basis of the lungs, and the structures by --inside",
                                   path)
-               : compare_content(basis, &comparison.postures, &comparison.state, wanted->json,
-                                 error);
+               : compare_content(basis, &comparison.postures, wanted->json, error);
   }
   if (wanted->inside != NULL) {
     status = supine_command_inside_open(basis, wanted->inside, &comparison.inside,
@@ -181,7 +180,7 @@ const supine_command supine_command_compare = {
     .about = "For each posture, reports the displacement from supine at rest or from the state of "
              "--from, the volume of each lung, and the ventilation by height in a breath. If BASIS "
              "was made by 'supine embed', reports only the displacement of each named part between "
-             "every two postures.",
+             "every two postures, and the volumes of closed parts in both.",
     .options = table,
     .notes = SUPINE_POSTURE_LIST_HELP
     "\n\nStatistics are weighted by the area of the surface; '95 %' is the 95th percentile. "
@@ -193,7 +192,7 @@ const supine_command supine_command_compare = {
     "over a part, in mm to the left, to the back and to the head.\n"
     "\n"
     "Examples:\n"
-    "  supine compare lungs.safetensors --postures supine,prone,supine+15,0.6:0:-0.8\n"
+    "  supine compare lungs.safetensors --postures supine,prone:rest+500,supine+15,0.6:0:-0.8\n"
     "  supine compare lungs.safetensors --inside nodules.safetensors -o report.html",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),

@@ -516,6 +516,7 @@ TEST(test_precompute_fields_every_option_used_or_refused) {
                {"soften", "1", 1, no_effect},
                {"constants", "1,2,3,4,5,6", 1, no_effect},
                {"reach", "20", 1, no_effect},
+               {"shear", "0.1", 1, no_effect},
                {"expandability", "uniform", 1, no_effect},
                {"lesion", "0,0,0,9,2", 1, no_effect},
                {"lung", "left:0.3", 1, no_effect}};

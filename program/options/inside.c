@@ -138,6 +138,34 @@ static supine_target average(const supine_command_names *names, size_t begin, si
   return target;
 }
 
+/* Compute the volume of each structure whose positions are `xyz` [N, 3]. The normals of a closed
+ * surface sum to 0, and its volume is a sixth of the sum of (corner) . (normal) over its triangles.
+ */
+static void find_volumes(const supine_basis_info *info, const supine_command_names *names,
+                         const float *xyz, int side, supine_target *targets) {
+  for (size_t part = 0; part < names->count; ++part) {
+    double sum[5] = {0.0}; /* of the normals x, y, z, of their lengths, and of corner . normal */
+    for (size_t t = 0; t < 3 * info->triangle_count; t += 3) {
+      const uint32_t *corner = info->triangles + t;
+      double x[3][3];
+      double normal[3];
+      if (names->part[corner[0]] != part) {
+        continue;
+      }
+      for (size_t k = 0; k < 9; ++k) {
+        x[k / 3][k % 3] = (double)xyz[3 * corner[k / 3] + k % 3];
+      }
+      supine_normal(x[0], x[1], x[2], normal);
+      for (size_t k = 0; k < 3; ++k) {
+        sum[k] += normal[k];
+      }
+      sum[3] += supine_length(normal);
+      sum[4] += supine_dot(x[0], normal);
+    }
+    targets[part].volume[side] = supine_length(sum) < 1e-3 * sum[3] ? sum[4] / 6000.0 : (double)NAN;
+  }
+}
+
 supine_status supine_command_targets_find(const supine_basis *inside,
                                           const supine_command_names *names,
                                           const supine_pose *const pose[2], const float *sigma,
@@ -162,6 +190,10 @@ supine_status supine_command_targets_find(const supine_basis *inside,
       (*targets)[i].lung = supine_command_lung_of(info, names->order[begin]);
     }
   }
+  if (enough && !each) {
+    find_volumes(info, names, before, 0, *targets);
+    find_volumes(info, names, after, 1, *targets);
+  }
   free(after);
   free(before);
   return enough ? SUPINE_OK
@@ -185,9 +217,13 @@ const char *supine_command_target_way(const supine_target *target, size_t most, 
 }
 
 json_t *supine_command_target_json(const supine_target *t) {
-  return json_pack("{s:s, s:[f, f, f], s:f, s:o}", "name", t->name, "move", t->move[0], t->move[1],
-                   t->move[2], "mm", t->moved, "expected_error_mm",
-                   isnan(t->expected) ? json_null() : json_real(t->expected));
+  json_t *made = json_pack("{s:s, s:[f, f, f], s:f, s:o}", "name", t->name, "move", t->move[0],
+                           t->move[1], t->move[2], "mm", t->moved, "expected_error_mm",
+                           isnan(t->expected) ? json_null() : json_real(t->expected));
+  if (!isnan(t->volume[0])) {
+    (void)json_object_set_new(made, "volumes_ml", supine_options_json_numbers(2, t->volume));
+  }
+  return made;
 }
 
 /* Add the marks of one structure: its vertices, and its name at their mean position. */

@@ -39,11 +39,12 @@ supine_status supine_command_inside_open(const supine_basis *lungs, const char *
 /* Where a group of vertices is, and how it has moved. */
 typedef struct supine_target {
   const char *name;
-  size_t lung;     /* index of the lung of the first vertex */
-  double at[3];    /* mean position of the vertices, mm */
-  double move[3];  /* displacement of the mean position, mm */
-  double moved;    /* length of `move`, mm */
-  double expected; /* RMS of the vertices' expected errors, mm; NAN if unknown */
+  size_t lung;      /* index of the lung of the first vertex */
+  double at[3];     /* mean position of the vertices, mm */
+  double move[3];   /* displacement of the mean position, mm */
+  double moved;     /* length of `move`, mm */
+  double volume[2]; /* volume before and after, mL; NAN unless the structure is a closed mesh */
+  double expected;  /* RMS of the vertices' expected errors, mm; NAN if unknown */
 } supine_target;
 
 /* Compute where the structures are in pose[1], and how they have moved from pose[0].

@@ -41,6 +41,9 @@ json_t *supine_report_profile(const supine_comparison *c) {
                          "value", json_sprintf("%g", low + i * step)));
   }
   for (size_t i = 0; i < c->postures.count; ++i) {
+    if (!c->posture[i].has_breath) {
+      continue;
+    }
     json_t *dots = json_array();
     for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
       const double value = percent(c, i, s);

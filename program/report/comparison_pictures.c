@@ -76,7 +76,7 @@ static json_t *picture(const supine_comparison *c, supine_renderer *renderer, si
   json_t *made =
       json_pack("{s:s, s:o}", "name", supine_options_posture_label(c->postures.item[posture].name),
                 "png", png);
-  set_gravity(c->postures.item[posture].gravity, made);
+  set_gravity(c->postures.item[posture].state.gravity, made);
   return made;
 }
 

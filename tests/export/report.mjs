@@ -47,8 +47,8 @@ const summary = await page.evaluate(() => [...document.querySelectorAll('.summar
 assert.deepEqual(summary.map(([name]) => name), postures.map((name) => ({ left: 'left side', right: 'right side' })[name] ?? name));
 json.postures.forEach(({ volume_ml: ml, displacement_mm: mm, expected_error_mm: error, slabs }, i) => {
   ['left', 'right'].forEach((lung, j) => {
-    assert.ok(Math.abs(Number(summary[i][1 + j]) - ml[lung]) <= 0.5, `${summary[i]}`);
-    assert.ok(Math.abs(Number(summary[i][3 + j]) - (100 * ml[lung]) / supineRest[lung] + 100) <= 0.51, `${summary[i]}`);
+    assert.ok(Math.abs(Number(summary[i][1 + j]) - ml[lung].value) <= 0.5, `${summary[i]}`);
+    assert.ok(Math.abs(Number(summary[i][3 + j]) - (100 * ml[lung].value) / supineRest[lung].value + 100) <= 0.51, `${summary[i]}`);
   });
   [mm.mean, mm.max, error].forEach((x, k) => assert.ok(Math.abs(Number(summary[i][6 + k]) - x) <= 0.051, `${summary[i]}`));
   const third = (list) => list.slice(0, 4).reduce(([gain, volume], slab, k) => { const part = k < 3 ? 1 : 1 / 3; return [gain + part * slab.gain_ml, volume + part * slab.volume_ml]; }, [0, 0]);
