@@ -190,7 +190,7 @@ supine_status supine_command_targets_find(const supine_basis *inside,
       (*targets)[i].lung = supine_command_lung_of(info, names->order[begin]);
     }
   }
-  if (enough && !each) {
+  if (enough && !each && info->triangle_count > 0) {
     find_volumes(info, names, before, 0, *targets);
     find_volumes(info, names, after, 1, *targets);
   }
@@ -220,7 +220,7 @@ json_t *supine_command_target_json(const supine_target *t) {
   json_t *made = json_pack("{s:s, s:[f, f, f], s:f, s:o}", "name", t->name, "move", t->move[0],
                            t->move[1], t->move[2], "mm", t->moved, "expected_error_mm",
                            isnan(t->expected) ? json_null() : json_real(t->expected));
-  if (!isnan(t->volume[0])) {
+  if (t->volume[0] != 0) {
     (void)json_object_set_new(made, "volumes_ml", supine_options_json_numbers(2, t->volume));
   }
   return made;

@@ -43,7 +43,7 @@ typedef struct supine_target {
   double at[3];     /* mean position of the vertices, mm */
   double move[3];   /* displacement of the mean position, mm */
   double moved;     /* length of `move`, mm */
-  double volume[2]; /* volume before and after, mL; NAN unless the structure is a closed mesh */
+  double volume[2]; /* volume before and after, mL; NAN if it is no closed mesh; 0 without meshes */
   double expected;  /* RMS of the vertices' expected errors, mm; NAN if unknown */
 } supine_target;
 
