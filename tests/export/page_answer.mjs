@@ -31,7 +31,8 @@ const bars = await page.evaluate(() => [...document.querySelectorAll('.hold')].m
 for (const [who, text, hidden] of bars) {
   const lung = who.split(' ')[0];
   assert.equal(who, `${lung} lung (${lung === 'left' ? 'down' : 'up'})`);
-  const [, ...ml] = /^(\d+) \u2192 (\d+) mL; published mean (\d+)/.exec(text).map(Number);
+  const [, ...ml] = /^(\d+) \u2192 (\d+) mL, range (\d+) to (\d+)$/.exec(text).map(Number);
+  ['low', 'high'].forEach((end, i) => assert.ok(Math.abs(ml[2 + i] - json.postures[2].volume_ml[lung][end]) <= 0.51, `${who}: ${text}`));
   ml.slice(0, 2).forEach((x, i) => assert.ok(Math.abs(x - [rest, json.postures[2]][i].volume_ml[lung].value) <= 0.51, `${who}: ${text}`));
   assert.equal(hidden, false);
 }

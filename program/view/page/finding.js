@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Compute how far targets and the surface move, with the expected error, and write it in words.
 
-/** Published changes, %, of the volume that each lung has at rest, relative to the supine posture: mean and standard
- * deviation, by posture. */
-const PUBLISHED = { left: { source: 'Little 2021, n 10', 'left lung': [0, 44], 'right lung': [25, 11] } };
+/** Published changes, %, of the volume that each lung has at rest, relative to the supine posture: mean (standard
+ * deviation), by posture. */
+const PUBLISHED = { left: 'left lung 0 (44), right lung +25 (11) (Little 2021, n 10)' };
 
 /** Return the volume (gas plus tissue) of each lung, mL. */
 const heldBy = (basis, { weights, gains }) => basis.references.map((ml, lung) => ml + formAt(lungForm(basis, lung, weights), gains.slice(3 * lung, 3 * lung + 3)));
@@ -155,7 +155,7 @@ function answerOf(moved, target) {
   return `${told.mm.toFixed(1)} mm${target ? `, ${wayWords(target.move, 1)}` : ' on average'}`;
 }
 
-/** Bars with the lungs' volumes: a tick for the earlier volume, a dot for that now, and a band for published changes. */
+/** Bars with the lungs' volumes: a tick for the earlier volume, a dot for that now, and a band for its range. */
 class Holds {
   constructor(parent, { lungNames }) {
     this.rows = lungNames.map(() => {
@@ -173,21 +173,22 @@ class Holds {
     });
   }
 
-  /** Show the volume of each lung, mL: `held` now, and `before` in the state from which displacements are measured.
-   * `heights`, mm, tell which lung is uppermost. `measured` has the published changes of volume in this posture;
-   * undefined if there are none. */
-  show({ lungNames, references }, held, before, heights, measured) {
+  /** Show the volume of each lung, mL: `held` now, `depth` above rest in all lungs, and `before` in the state from which
+   * displacements are measured. `heights`, mm, tell which lung is uppermost. The logarithm of an assumed volume at rest
+   * has a normal distribution; the range is one standard deviation to either side. */
+  show({ lungNames, references, metadata }, held, depth, before, heights) {
     const apart = heights.length === 2 && Math.abs(heights[0] - heights[1]) > 30; // one lung is > 30 mm higher
     this.rows.forEach(({ who, band, was, now, ml }, lung) => {
       const [from, to] = [before[lung], held[lung]];
+      const above = (depth * to) / sumOf(held);
+      const ends = [-1, 1].map((sign) => above + (to - above) * Math.exp(sign * Number(metadata.resting_spread)));
+      const known = !metadata.resting_spread;
       const at = (volume) => `${Math.max(0, Math.min(100, (100 * volume) / references[lung]))}%`;
-      const [mean, deviation] = measured?.[lungNames[lung]] ?? [0, 0];
-      const ends = [mean - deviation, mean + deviation].map((percent) => from * (1 + percent / 100));
       who.textContent = `${lungNames[lung]}${apart ? ` (${heights[lung] > heights[1 - lung] ? 'up' : 'down'})` : ''}`;
-      ml.textContent = `${Math.abs(to - from) < 0.5 ? '' : `${from.toFixed(0)} \u2192 `}${to.toFixed(0)} mL${measured ? `; published mean ${(from * (1 + mean / 100)).toFixed(0)}` : ''}`;
+      ml.textContent = `${Math.abs(to - from) < 0.5 ? '' : `${from.toFixed(0)} \u2192 `}${to.toFixed(0)} mL${known ? '' : `, range ${ends[0].toFixed(0)} to ${ends[1].toFixed(0)}`}`;
       was.style.left = at(from);
       now.style.left = at(to);
-      band.hidden = !measured;
+      band.hidden = known;
       [band.style.left, band.style.right] = [at(ends[0]), `calc(100% - ${at(ends[1])})`];
     });
   }

@@ -315,9 +315,9 @@ function start() {
     $('holds-section').hidden = !moment.held;
     if (!moment.held) return;
     const measured = told.depth === 0 && from.name === 'supine at rest' ? PUBLISHED[postureText(state.gravity)] : undefined;
-    holds.show(basis, moment.held, heldBy(basis, from), lungHeights(state.gravity), measured);
-    write('holds-source', basis.hasResting && !basis.metadata.resting_known ? 'assumed from healthy people' : '');
-    write('holds-text', `Dashed tick: ${from.name}. Dot: now. Full bar: reference volume.${measured ? ` Band: published mean and SD (${measured.source}).` : ''}`);
+    holds.show(basis, moment.held, told.depth, heldBy(basis, from), lungHeights(state.gravity));
+    write('holds-source', basis.metadata.resting_spread ? 'assumed from healthy people' : '');
+    write('holds-text', `Dashed tick: ${from.name}. Dot: now.${basis.metadata.resting_spread ? ' Band: one SD.' : ''} Full bar: the reference.${measured ? ` Published change, %, mean (SD): ${measured}.` : ''}`);
   }
 
   const volumeWords = () => `${amount(state.tidal)}, ${state.rate} a minute${Math.round(state.depth) ? `; now ${restOrScan} + ${amount(state.depth)}` : ''}`;
