@@ -68,8 +68,7 @@ typedef struct export_glb_options {
  *
  * base_i is the stored position, target_ij the displacement stored in target j. The `extras` of the
  * file and of each lung's mesh say how to compute the weights from gravity and volume. Targets also
- * change normals. The colour of a vertex shows its largest displacement between
- * supine and another lying posture, at the start of a breath. The node "patient" lies on a table
+ * change normals. The node "patient" lies on a table
  * and rotates about the centre of the lungs; an arrow shows gravity. Units are metres, y points up.
  * @param bytes  output: size of the file
  * @retval SUPINE_ERROR_MESH         the basis has no triangles
