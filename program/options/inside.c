@@ -226,58 +226,51 @@ json_t *supine_command_target_json(const supine_target *t) {
   return made;
 }
 
-/* Add the marks of one structure: its vertices, and its name at their mean position. */
-static void add_part(const supine_command_names *names, size_t part, const float *xyz,
-                     const float *from, supine_command_marks *out) {
-  const size_t *order = names->order + names->begin[part];
-  const size_t count = names->begin[part + 1] - names->begin[part];
-  supine_mark middle = {.xyz = {0.0F, 0.0F, 0.0F}, .point = count == 1, .label = out->label[part]};
-  for (size_t i = 0; i < count; ++i) {
-    const float *p = xyz + 3 * order[i];
-    const float *q = from + 3 * order[i];
-    const float moved = hypotf(hypotf(p[0] - q[0], p[1] - q[1]), p[2] - q[2]);
-    for (size_t k = 0; k < 3; ++k) {
-      middle.xyz[k] += p[k] / (float)count;
-    }
-    middle.value += moved / (float)count;
-    if (count > 1) {
-      out->mark[out->marks.count++] = (supine_mark){{p[0], p[1], p[2]}, moved, false, NULL};
-    }
-  }
-  (void)snprintf(out->label[part], sizeof out->label[part], "%.30s moved %.1f mm",
-                 names->text[part], (double)middle.value);
-  if (count > 0) {
-    out->mark[out->marks.count++] = middle;
-  }
-}
-
 supine_status supine_command_marks_make(const supine_basis *inside,
-                                        const supine_command_names *names, const supine_pose *pose,
-                                        const supine_pose *from, supine_command_marks *marks,
-                                        supine_error *error) {
-  const supine_basis_info *info = supine_basis_get_info(inside);
-  const size_t n = info->vertex_count;
+                                        const supine_command_names *names,
+                                        const supine_pose *const pose[2], const float *sigma,
+                                        supine_command_marks *marks, supine_error *error) {
+  const size_t n = supine_basis_get_info(inside)->vertex_count;
   float *xyz = malloc(3 * n * sizeof *xyz);
-  float *before = malloc(3 * n * sizeof *before);
-  supine_command_marks made = {.mark = malloc((n + names->count) * sizeof(supine_mark)),
+  supine_target *targets = NULL;
+  supine_command_marks made = {.mark = calloc(n + names->count, sizeof *made.mark),
                                .label = calloc(names->count, sizeof *made.label)};
   supine_status status = SUPINE_ERROR_MEMORY;
-  if (xyz != NULL && before != NULL && made.mark != NULL && made.label != NULL) {
-    (void)supine_deform(inside, pose, xyz);
-    (void)supine_deform(inside, from, before);
-    for (size_t part = 0; part < names->count; ++part) {
-      add_part(names, part, xyz, before, &made);
-    }
-    made.marks.mark = made.mark;
-    *marks = made;
-    made = (supine_command_marks){.mark = NULL};
-    status = SUPINE_OK;
+  if (xyz != NULL && made.mark != NULL && made.label != NULL) {
+    status = supine_command_targets_find(inside, names, pose, sigma, false, &targets, error);
+  } else {
+    (void)supine_error_set(error, status, "no memory for %zu points", n);
   }
+  if (status == SUPINE_OK) {
+    (void)supine_deform(inside, pose[1], xyz);
+  }
+  for (size_t part = 0; status == SUPINE_OK && part < names->count; ++part) {
+    const supine_target *t = &targets[part];
+    const size_t count = names->begin[part + 1] - names->begin[part];
+    for (size_t i = 0; count > 1 && i < count; ++i) {
+      supine_mark *mark = &made.mark[made.marks.count++];
+      memcpy(mark->xyz, xyz + 3 * names->order[names->begin[part] + i], sizeof mark->xyz);
+    }
+    supine_mark *middle = &made.mark[made.marks.count];
+    for (size_t k = 0; k < 3; ++k) {
+      middle->xyz[k] = (float)t->at[k];
+      middle->from[k] = (float)(t->at[k] - t->move[k]);
+    }
+    (void)snprintf(made.label[part], sizeof made.label[part],
+                   t->moved <= t->expected ? "%.30s" : "%.30s %.1f mm", t->name, t->moved);
+    middle->label = made.label[part];
+    middle->point = count == 1;
+    made.marks.count += count > 0;
+  }
+  made.marks.mark = made.mark;
+  made.first = status == SUPINE_OK ? targets[0] : made.first;
+  free(targets);
   free(xyz);
-  free(before);
-  supine_command_marks_free(&made);
-  return status == SUPINE_OK ? status
-                             : supine_error_set(error, status, "no memory for %zu points", n);
+  if (status != SUPINE_OK) {
+    supine_command_marks_free(&made);
+  }
+  *marks = made;
+  return status;
 }
 
 void supine_command_marks_free(supine_command_marks *marks) {

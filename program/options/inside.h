@@ -71,16 +71,17 @@ json_t *supine_command_target_json(const supine_target *target);
 typedef struct supine_command_marks {
   supine_marks marks;
   supine_mark *mark;
-  char (*label)[48];
+  char (*label)[64];
+  supine_target first; /* the first structure */
 } supine_command_marks;
 
-/* Make the marks that show the structures in a pose.
- * @param from  pose from which displacements are measured
+/* Make the marks that show the structures in pose[1], with arrows from where they were in pose[0].
+ * @param sigma  [N] expected error of each vertex, mm; NULL if unknown
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_command_marks_make(const supine_basis *inside,
-                                        const supine_command_names *names, const supine_pose *pose,
-                                        const supine_pose *from, supine_command_marks *marks,
-                                        supine_error *error);
+                                        const supine_command_names *names,
+                                        const supine_pose *const pose[2], const float *sigma,
+                                        supine_command_marks *marks, supine_error *error);
 void supine_command_marks_free(supine_command_marks *marks);
 
 #endif

@@ -45,7 +45,7 @@ static json_t *draw(supine_renderer *renderer, const supine_scene *scene, supine
 static void set_gravity(const double g[3], json_t *shot) {
   double axes[3][3];
   double seen[3] = {0.0, 0.0, 0.0};
-  supine_render_view_axes(view, axes);
+  supine_render_view_axes(view, g, axes);
   for (int row = 0; row < 3; ++row) {
     for (int axis = 0; axis < 3; ++axis) {
       seen[row] += axes[row][axis] * g[axis];
