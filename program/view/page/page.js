@@ -449,17 +449,23 @@ function start() {
   /** Advance the state to the time `now`, ms, and return the view of the lungs (pane) for a headset; null before the
    * first state is computed. */
   function headsetFrame(now) {
-    if (state.advance(inHeadset && before !== null ? (now - before) / 1000 : 0) || stale || !inHeadset) {
+    if (state.advance(inHeadset && before !== null ? (now - before) / 1000 : 0) || stale || !inHeadset || dot(state.gravity, state.moment.gravity) < 1 - 1e-9) {
       state.compute();
       deform();
       showState();
     }
+    if (state.moment) tellSettled(now);
     inHeadset = true;
     before = now;
     stale = false;
     return state.moment && picture ? makePane('now', state.moment, state.q, [0, 0, 1, 1]) : null;
   }
-  offerXr($('vr'), () => picture, headsetFrame, () => { inHeadset = false; before = null; touch(); });
+  const headset = {
+    getPicture: () => picture, frame: headsetFrame, sentence: () => $('finding').textContent,
+    over: () => { inHeadset = false; before = null; touch(); },
+  };
+  offerXr('immersive-vr', $('vr'), state, headset);
+  offerXr('immersive-ar', $('ar'), state, headset);
 
   function keepLink() {
     try {

@@ -568,6 +568,39 @@ class Picture {
     gl.drawArrays(gl.TRIANGLES, 0, 36);
   }
 
+  /** Draw a text, wrapped, on a panel before a headset's viewer; `at` is its place in the room, m. */
+  drawNote(pane, { text, toEye, at }) {
+    const { gl } = this;
+    this.note ??= { program: this.program('note.vert.glsl', 'note.frag.glsl'), array: this.array([[this.buffer(new Float32Array([-1, -1, 1, -1, -1, 1, 1, 1])), 2, 8, 0]]), map: this.texture(gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, 1024, 256, null), text: null };
+    const { note } = this;
+    gl.bindTexture(gl.TEXTURE_2D, note.map);
+    if (note.text !== text) {
+      const paper = Object.assign(document.createElement('canvas'), { width: 1024, height: 256 });
+      const context = paper.getContext('2d');
+      Object.assign(context, { fillStyle: '#121d2bcc', font: '600 36px system-ui, sans-serif' });
+      context.fillRect(0, 0, 1024, 256);
+      context.fillStyle = '#fff';
+      let [line, y] = ['', 52];
+      for (const word of [...text.split(' '), null]) {
+        if (word !== null && context.measureText(`${line} ${word}`).width < 960) line += ` ${word}`;
+        else {
+          context.fillText(line.trim(), 32, y);
+          [line, y] = [word ?? '', y + 46];
+        }
+      }
+      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, gl.RGBA, gl.UNSIGNED_BYTE, paper);
+      for (const side of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, side, gl.LINEAR);
+      note.text = text;
+    }
+    gl.useProgram(note.program.program);
+    gl.uniformMatrix4fv(note.program.at.toEye, false, toEye);
+    gl.uniformMatrix4fv(note.program.at.projection, false, pane.projection);
+    gl.uniform3fv(note.program.at.place, at);
+    gl.uniform2f(note.program.at.size, 0.32, 0.08);
+    gl.bindVertexArray(note.array);
+    gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
+  }
+
   /** Draw panes (views of the lungs) to `framebuffer`, or to the canvas if `framebuffer` is null. */
   draw(panes, framebuffer = null) {
     const { gl } = this;
@@ -587,6 +620,7 @@ class Picture {
       gl.bindTexture(gl.TEXTURE_2D, this.maps[pane.map]);
       this.drawLungs(pane);
       if (pane.arrows) this.drawArrows(pane);
+      if (pane.note?.text) this.drawNote(pane, pane.note);
     }
     gl.depthFunc(gl.LEQUAL);
     gl.disable(gl.BLEND);
