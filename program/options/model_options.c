@@ -299,26 +299,19 @@ static supine_status take_patient(supine_model_options *options, supine_error *e
   return status;
 }
 
-supine_status supine_command_source_load(supine_model_options *options, char **paths, size_t count,
-                                         supine_error *error) {
+supine_status supine_command_model_load(supine_model_options *options, const char *command,
+                                        char **paths, size_t count, bool keep,
+                                        supine_error *error) {
   supine_progress progress = supine_options_progress_begin("label map");
   supine_source *source = &options->made_from;
   options->source.labels.progress = supine_options_progress_step;
   options->source.labels.progress_context = &progress;
-  const supine_status status = supine_precompute_source_load(&options->source, paths, count, source,
-                                                             &options->findings, error);
+  supine_status status = supine_precompute_source_load(&options->source, paths, count, source,
+                                                       &options->findings, error);
   supine_options_progress_end(&progress);
   if (status == SUPINE_OK && source->is_map) {
     print_map(paths[0], source);
   }
-  return status;
-}
-
-supine_status supine_command_model_load(supine_model_options *options, const char *command,
-                                        char **paths, size_t count, bool keep,
-                                        supine_error *error) {
-  supine_source *source = &options->made_from;
-  supine_status status = supine_command_source_load(options, paths, count, error);
   if (keep) {
     options->choice.scan.known = false;
     options->choice.has_scan = true;
