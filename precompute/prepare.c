@@ -142,6 +142,16 @@ static supine_status set_shares(const supine_lungs *lungs, const supine_model_ch
   return status;
 }
 
+/* Whether the expandability differs between vertices. */
+static bool varies(const supine_prepared *p, size_t count) {
+  bool same = true;
+  for (size_t i = 0; i < count && same; ++i) {
+    same = (p->stiffness == NULL || p->stiffness[i] == p->stiffness[0]) &&
+           (p->lesions == NULL || p->lesions[i] == 1.0);
+  }
+  return !same;
+}
+
 static void summarize(const supine_model_choice *choice, supine_prepared *p) {
   static const double supine[3] = {0.0, 1.0, 0.0};
   const supine_resting usual = supine_reference_resting_default();
@@ -189,7 +199,7 @@ supine_status supine_precompute_prepare(supine_lungs *lungs, const supine_model_
   supine_status status = set_expandability(lungs, choice, p, error);
   status = status == SUPINE_OK ? set_lesions(lungs, choice, p, findings, error) : status;
   status = status == SUPINE_OK ? set_shares(lungs, choice, p, error) : status;
-  if (status == SUPINE_OK && p->model.reach > 0.0 && (p->stiffness != NULL || p->lesions != NULL)) {
+  if (status == SUPINE_OK && p->model.reach > 0.0 && varies(p, lungs->mesh.vertex_count)) {
     status = supine_physics_strain_create(lungs, p->stiffness, p->lesions, &p->strain, error);
     p->model.strain = p->strain;
   }
