@@ -108,9 +108,8 @@ static const supine_option table[] = {
     {.table = supine_options_surface_frame, FILLS(source.load)},
     {"expandability", 0, NULL,
      "for surfaces: instead of kriging, fit the expandability (the inverse of the stiffness) of "
-     "regions about 45 mm wide. The constants of (15)-(17) of Santhanam 2008 are fitted as with "
-     "--law paper, and those of (18), the force, stay those of the deep law. The result is used "
-     "only if it lowers the held-out residual by 5 % or more",
+     "regions about 45 mm wide, relative to the deep law with one factor for each axis. The result "
+     "is used only if it lowers the held-out residual by 5 % or more",
      FILLS(expandability), .more = true},
     {"json", 0, NULL, "print JSON instead of text", FILLS(json)},
     {.name = NULL}};
@@ -415,8 +414,8 @@ static supine_status check(request *wanted, const supine_arguments *given, supin
           ? "--state with a surface needs a first scan: name the surface of the first scan too"
       : wanted->expandability && wanted->second_path == NULL
           ? "--expandability needs surfaces: give those of both scans"
-      : wanted->expandability && wanted->has_law && wanted->law == SUPINE_PATIENT_DEEP
-          ? "--expandability uses the paper law: leave --law out"
+      : wanted->expandability && wanted->has_law && wanted->law == SUPINE_PATIENT_PAPER
+          ? "--expandability uses the deep law: leave --law out"
           : NULL;
   return wrong != NULL ? supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%s", wrong) : SUPINE_OK;
 }

@@ -266,7 +266,7 @@ done
 refused 1 'leave --expandability out' precompute rest.ply --patient stiff.json \
   --expandability linear:z:0.5:1.5 -o x.safetensors
 refused 1 'needs surfaces' fit --landmarks full.csv --expandability
-refused 1 "uses the paper law" fit rest.ply stiff.ply --law deep --expandability
+refused 1 "uses the deep law" fit rest.ply stiff.ply --law paper --expandability
 echo '{}' >fit.csv
 refused 2 'not a patient' precompute rest.ply --patient fit.csv -o x.safetensors
 awk -F, 'NR == 1 { print; next } { printf "%s,%s,%s,%s,%s,%s\n", $1+900, $2, $3, $4+900, $5, $6 }' \

@@ -41,6 +41,8 @@ ROWS = (
     ("density, back third, prone", None, None, "g/mL", "-0.11 (Prisk 2007)"),
     ("mean displacement to prone, rest", 6, 20, "mm", ""),
     ("lower half / upper third, to prone", 2, 10, "", "lesions move below the carina (Yankelevitz 1995)"),
+    ("expansion of upper / lower lobes, supine", 0.61, 0.94, "", "0.61 to 0.94 (Shin 2020, n 56)"),
+    ("expansion of upper / lower lobes, prone", 0.93, 1.06, "", "0.98 to 1.06 (Shin 2020, n 34)"),
     ("reversed triangles, at most", 0, 0.03, "%", ""),
     ("reversed triangles added by the bend", None, 2, "", ""),
 )
@@ -155,6 +157,26 @@ class Lungs:
         return out
 
 
+def lobes(run, supine, folder, title, source):
+    """Yield the expansion from rest to full of the upper lobes divided by that of the lower ones, by name. The lobe map
+    lobes_NNN.nii.gz is in `source`, in the frame of the pair covidNNN: labels 1, 2 left upper, lower; 3, 5 right."""
+    path = os.path.join(source, "lobes_" + title[-3:] + ".nii.gz")
+    if not os.path.exists(path):
+        return
+    volume = {}
+    for part, labels in (("upper", "1=left,3=right"), ("lower", "2=left,5=right")):
+        basis = str(folder / (part + ".safetensors"))
+        run("embed", str(folder / (title + ".safetensors")), path, "--labels", labels, "-o", basis)
+        made = supine.open(basis)
+        faces = np.asarray(made.faces).reshape(-1, 4)[:, 1:]
+        for state in ("supine:full", "supine:rest", "prone:full", "prone:rest"):
+            a, b, c = (made.deform(made.pose(state))[faces[:, i]].astype(float) for i in range(3))
+            volume[part, state] = abs(np.einsum("ij,ij->i", a, np.cross(b, c)).sum())
+    for p in ("supine", "prone"):
+        upper, lower = (volume[part, p + ":full"] / volume[part, p + ":rest"] for part in ("upper", "lower"))
+        yield f"expansion of upper / lower lobes, {p}", upper / lower
+
+
 def pairs(argument):
     """Yield name, left file, right file and axes of each pair in `argument`, which is FOLDER or FOLDER:AXES."""
     folder, _, axes = argument.partition(":")
@@ -181,13 +203,15 @@ def main(arguments):
         columns = {}
         for title, left, right, axes in found:
             basis = str(folder / (title + ".safetensors"))
-            subprocess.run([str(build / "supine"), "precompute", left, right, "-o", basis, *(["--axes", axes] if axes else [])],
-                           check=True, stdout=subprocess.DEVNULL)
+            def run(*words):
+                subprocess.run([str(build / "supine"), *words], check=True, stdout=subprocess.DEVNULL)
+            run("precompute", left, right, "-o", basis, *(["--axes", axes] if axes else []))
             columns[title] = Lungs(supine, basis).measure()
+            columns[title].update(lobes(run, supine, folder, title, os.path.dirname(left)))
     print("%-36s" % "" + "".join("%16s" % title for title in columns) + "  range          published")
     misses = 0
     for what, low, high, unit, published in ROWS:
-        values = [column[what] for column in columns.values()]
+        values = [column.get(what, np.nan) for column in columns.values()]
         bad = [(low is not None and v < low) or (high is not None and v > high) for v in values]
         misses += sum(bad)
         held = "shown" if high is None else f"{'' if low is None else low}..{high}"
