@@ -116,39 +116,19 @@ static double integrate(const supine_mesh *mesh, const double origin[3], double 
   return volume;
 }
 
-static void find_box(const supine_mesh *mesh, double low[3], double high[3]) {
-  for (int k = 0; k < 3; ++k) {
-    low[k] = INFINITY;
-    high[k] = -INFINITY;
-  }
-  for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {
-    const double *p = mesh->vertices + 3 * (size_t)mesh->triangles[i];
-    for (int k = 0; k < 3; ++k) {
-      low[k] = fmin(low[k], p[k]);
-      high[k] = fmax(high[k], p[k]);
-    }
-  }
-}
-
 /* Compute the volume, centroid and normalised moments of a surface. Return false if the surface
- * encloses less than 0.1 % of the volume of its bounding box. */
+ * encloses no volume. */
 static bool measure_shape(const supine_mesh *mesh, shape *s) {
   double sum[3];
   double square[3];
   double fourth[3];
-  double low[3];
-  double high[3];
-  find_box(mesh, low, high);
-  for (int k = 0; k < 3; ++k) {
-    s->centre[k] = 0.5 * (low[k] + high[k]);
+  if (mesh->triangle_count == 0) {
+    return false;
   }
+  memcpy(s->centre, mesh->vertices + 3 * (size_t)mesh->triangles[0], sizeof s->centre);
   /* the first pass finds the centroid, the second pass takes the moments about it */
   for (int pass = 0; pass < 2; ++pass) {
     s->volume = integrate(mesh, s->centre, sum, square, s->moments, fourth);
-    if (mesh->triangle_count == 0 ||
-        fabs(s->volume) <= 1e-3 * (high[0] - low[0]) * (high[1] - low[1]) * (high[2] - low[2])) {
-      return false;
-    }
     for (int k = 0; k < 3; ++k) {
       s->centre[k] += pass == 0 ? sum[k] / s->volume : 0.0;
       s->deviation[k] = sqrt(square[k] / s->volume);

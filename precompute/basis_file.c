@@ -119,28 +119,33 @@ static void add_reference(entries *list, const supine_reference *reference, cons
   add(list, "full_upright_gain", "%g", SUPINE_FULL_UPRIGHT_GAIN);
   supine_reference_resting_print(&reference->resting, shares, sizeof shares);
   add(list, "resting_shares", "%s", shares);
+  /* State whether the ratio of the volumes at rest (FRC) and at full inflation is the patient's own
+   * or, if not, the standard deviation of its logarithm. */
+  if (supine_reference_resting_given(&reference->resting) || reference->scan.full > 0.0) {
+    add(list, "resting_known", "yes");
+  } else {
+    add(list, "resting_spread", "%.4g", reference->resting.spread / reference->resting.assumed);
+  }
 }
 
-/* Add the constant c of the expected position error (supine/locate.h), and whether the resting
- * volumes (FRC) differ from the defaults for healthy people. */
+/* Add the constant c of the expected position error (supine/locate.h). */
 static void add_expected_error(entries *list, const supine_basis_content *content) {
-  const supine_resting usual = supine_reference_resting_default();
   if (content->fit == NULL) {
     const double own = content->options->expected_error;
     add(list, "expected_error_mm", "%g",
         own > 0.0 ? fmin(own, SUPINE_EXPECTED_ERROR_MM) : SUPINE_EXPECTED_ERROR_MM);
   }
-  if (content->reference != NULL &&
-      memcmp(&content->reference->resting, &usual, sizeof usual) != 0) {
-    add(list, "resting_known", "yes");
-  }
 }
 
-static void add_fit(entries *list, const supine_fit_report *fit) {
+static void add_fit(entries *list, const supine_basis_fit *fit) {
+  const double *g = fit->scan_gravity;
   add(list, "route", "fields");
   add(list, "condition", "%.4g", fit->condition);
   add(list, "band_determined", "%zu", fit->band_highest);
   add(list, "error_method", "leave-one-out");
+  if (g != NULL) {
+    add(list, "scan_gravity", "%.9g,%.9g,%.9g", g[0], g[1], g[2]);
+  }
 }
 
 static void add_lungs(entries *list, const supine_lungs *lungs, const double share[2]) {

@@ -23,9 +23,6 @@ enum { HELD_OUT_MIN = 100, HELD_OUT_MAX = 1000, HELD_OUT_WORK = 20000000 };
 static const double breath_volume = 500.0;
 static const double sqrt_4pi = 3.5449077018110321;
 
-/* Modes are dropped as long as the error stays below this multiple of the error with all modes. */
-static const double same_error = 1.01;
-
 typedef struct pipeline {
   const supine_lungs *given;
   const supine_lungs *lungs; /* lungs in use: `given`, or `anchored` after anchor() */
@@ -246,23 +243,6 @@ static supine_status measure(pipeline *p, supine_error *error) {
   return status;
 }
 
-/* Find the smallest number of modes with an error below `same_error` times that with all modes. */
-static size_t modes_needed(const pipeline *p) {
-  const size_t most = p->compression.mode_count;
-  const double limit = pow(same_error, 2.0) - 1.0;
-  const double error2 = p->accuracy.relative_rms * p->accuracy.relative_rms;
-  double dropped = 0.0;
-  size_t count = most;
-  while (count > 1) {
-    dropped += p->singular[count - 1] * p->singular[count - 1] / p->square_sum;
-    if (dropped > limit * error2) {
-      break;
-    }
-    --count;
-  }
-  return count;
-}
-
 static supine_status tabulate(pipeline *p, supine_error *error) {
   const supine_status status = supine_accuracy_error_table_create(
       &p->truth, &p->projection, &p->compression, p->directions, &p->table);
@@ -271,7 +251,8 @@ static supine_status tabulate(pipeline *p, supine_error *error) {
 }
 
 static supine_status drop_modes(pipeline *p, supine_error *error) {
-  const size_t needed = modes_needed(p);
+  const size_t needed = supine_sh_modes_needed(p->compression.mode_count, p->singular,
+                                               p->square_sum, p->accuracy.relative_rms);
   if (p->options->modes == 0 || needed == p->compression.mode_count) {
     return SUPINE_OK;
   }
@@ -331,31 +312,5 @@ supine_status supine_precompute(const supine_lungs *lungs, const supine_precompu
                                          .turned_over = p.turned_over};
   }
   pipeline_free(&p);
-  return status;
-}
-
-supine_status supine_precompute_fields(const supine_lungs *lungs, const supine_fields *fields,
-                                       const supine_fit_options *options, const char *path,
-                                       supine_fit_report *report, supine_error *error) {
-  supine_compression field = {0};
-  supine_volume_forms forms = {0};
-  supine_status status = supine_fields_fit(fields, options, &field, report, error);
-  if (status == SUPINE_OK) {
-    status = supine_projection_volume_forms(&field, lungs, NULL, NULL, &forms, error);
-  }
-  if (status == SUPINE_OK) {
-    const supine_precompute_options basis = {
-        .modes = options->modes, .findings = options->findings, .made_by = options->made_by};
-    const supine_basis_content content = {.lungs = lungs,
-                                          .options = &basis,
-                                          .fit = report,
-                                          .compression = &field,
-                                          .forms = &forms,
-                                          .accuracy = &report->accuracy};
-    report->mode_count = field.mode_count;
-    status = supine_writer_basis_write(path, &content, error);
-  }
-  supine_sh_compression_free(&field);
-  supine_physics_volume_forms_free(&forms);
   return status;
 }

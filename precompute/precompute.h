@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Make a basis file from lungs, or from another simulator's displacement fields. */
+ * Make a basis file from lungs. */
 #ifndef SUPINE_PRECOMPUTE_H
 #define SUPINE_PRECOMPUTE_H
 
-#include "precompute/fields/fields.h"
+#include "precompute/lungs/lungs.h"
 #include "precompute/physics/model.h"
 #include "precompute/physics/reference.h"
 #include "precompute/projection/accuracy.h"
@@ -40,13 +40,5 @@ typedef struct supine_precompute_report {
 supine_status supine_precompute(const supine_lungs *lungs, const supine_precompute_options *options,
                                 const char *path, supine_precompute_report *report,
                                 supine_error *error);
-
-/** Fit harmonics to another simulator's displacement fields, compress and cross-validate the fit,
- * and write a basis file. Gain 1 (the factor on the displacement) reproduces the given
- * displacements.
- * @retval SUPINE_ERROR_WRITE, and those of supine_fields_fit */
-supine_status supine_precompute_fields(const supine_lungs *lungs, const supine_fields *fields,
-                                       const supine_fit_options *options, const char *path,
-                                       supine_fit_report *report, supine_error *error);
 
 #endif

@@ -152,9 +152,8 @@ static bool varies(const supine_prepared *p, size_t count) {
   return !same;
 }
 
-static void summarize(const supine_model_choice *choice, supine_prepared *p) {
+static void summarize(const supine_model_choice *choice, bool predicted, supine_prepared *p) {
   static const double supine[3] = {0.0, 1.0, 0.0};
-  const supine_resting usual = supine_reference_resting_default();
   const supine_reference *reference = &p->reference;
   const size_t size = sizeof p->summary;
   char state[160];
@@ -169,16 +168,41 @@ static void summarize(const supine_model_choice *choice, supine_prepared *p) {
   (void)supine_state_describe(&reference->scan.state, state, sizeof state);
   const double full = reference->full_volume[0] + reference->full_volume[1];
   const double held = full + reference->scan_volume[0] + reference->scan_volume[1];
+  const bool known = supine_reference_resting_given(&choice->resting);
+  const bool at_rest = reference->scan.state.volume.kind == SUPINE_VOLUME_REST;
   if (held != full) {
     supine_text_add(p->summary, size, "%s, %.0f mL; ", state, held);
   }
-  supine_text_add(p->summary, size, "%sfull inflation %.0f mL (", held != full ? "" : "at ", full);
+  supine_text_add(p->summary, size, "%sfull inflation %.0f mL (%s", held != full ? "" : "at ", full,
+                  reference->scan.full > 0.0 ? "given, "
+                  : !at_rest                 ? ""
+                  : known                    ? "from rest, "
+                                             : "assumed from rest, ");
   supine_reference_compare(reference, &choice->person, p->summary, size);
-  supine_text_add(p->summary, size, "); rest supine %.0f mL (%s)",
-                  supine_reference_rest(reference, supine, ml),
-                  memcmp(&usual, &choice->resting, sizeof usual) == 0
-                      ? "healthy people's share, which --resting changes"
-                      : "by --resting");
+  const double rest = supine_reference_rest(reference, supine, ml);
+  const double ratio = exp(choice->resting.spread / choice->resting.assumed);
+  supine_text_add(p->summary, size, "); rest supine %.0f mL (", rest);
+  if (!at_rest && !known) {
+    supine_text_add(p->summary, size, "%.0f to %.0f ", rest / ratio, rest * ratio);
+  }
+  supine_text_add(p->summary, size, "by %s)",
+                  at_rest                                        ? "the scan"
+                  : choice->patient_law != NULL                  ? "the fit"
+                  : known                                        ? "--resting"
+                  : predicted                                    ? "height and sex"
+                  : choice->resting.assumed == SUPINE_REST_SHARE ? "healthy people's share"
+                                                                 : "the share in COPD");
+  double collapsed = 0.0; /* volume in the scan as the basis holds it, mL */
+  for (size_t lung = 0; lung < reference->lung_count; ++lung) {
+    collapsed +=
+        p->model.share[lung] * (reference->full_volume[lung] + reference->scan_volume[lung]);
+  }
+  if (p->model.share[0] != 1.0 || p->model.share[1] != 1.0) {
+    supine_text_add(p->summary, size,
+                    "; collapsed in every state by --lung, also in the scan, which then holds %.0f "
+                    "mL: no displacement contains the collapse",
+                    collapsed);
+  }
 }
 
 supine_status supine_precompute_prepare(supine_lungs *lungs, const supine_model_choice *choice,
@@ -196,18 +220,35 @@ supine_status supine_precompute_prepare(supine_lungs *lungs, const supine_model_
                             "--law paper takes the scan as the reference: leave --scanned out, or "
                             "use --law deep");
   }
+  if (scan.known && scan.state.volume.kind == SUPINE_VOLUME_DEFAULT) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "--scanned: a posture alone is only for --fields: add the volume, as "
+                            "in supine:rest, or give full or none");
+  }
+  const supine_volume *full = &choice->full.volume;
+  scan.full = full->ml;
+  if (full->kind != SUPINE_VOLUME_DEFAULT &&
+      (full->kind != SUPINE_VOLUME_ABSOLUTE || scan.state.volume.kind != SUPINE_VOLUME_REST)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "--full is for a scan at rest: give a volume such as 4200mL, and "
+                            "--scanned supine:rest too");
+  }
   supine_status status = set_expandability(lungs, choice, p, error);
   status = status == SUPINE_OK ? set_lesions(lungs, choice, p, findings, error) : status;
   status = status == SUPINE_OK ? set_shares(lungs, choice, p, error) : status;
+  const supine_reference scanned = {
+      .scan = scan, .lung_count = lungs->lung_count, .side = {lungs->side[0], lungs->side[1]}};
+  supine_resting resting = choice->resting;
+  supine_reference_predict_rest(&scanned, &choice->person, &resting);
   if (status == SUPINE_OK && p->model.reach > 0.0 && varies(p, lungs->mesh.vertex_count)) {
     status = supine_physics_strain_create(lungs, p->stiffness, p->lesions, &p->strain, error);
     p->model.strain = p->strain;
   }
-  status = status == SUPINE_OK ? supine_reference_find(lungs, &p->model, &scan, &choice->resting,
-                                                       &p->reference, error)
-                               : status;
+  status = status == SUPINE_OK
+               ? supine_reference_find(lungs, &p->model, &scan, &resting, &p->reference, error)
+               : status;
   if (status == SUPINE_OK) {
-    summarize(choice, p);
+    summarize(choice, resting.ml[2] != choice->resting.ml[2], p);
   }
   if (status == SUPINE_OK && p->reference.known) {
     supine_reference_doubt(&p->reference, &choice->person, &choice->resting, doubt, sizeof doubt);

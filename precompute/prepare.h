@@ -20,6 +20,7 @@ typedef struct supine_model_choice {
   const double *stiffness; /**< [N] relative stiffness fitted to the patient, or NULL */
   bool has_scan; /**< whether `scan` was given; SUPINE_LAW_DEEP assumes full inflation if not */
   supine_scan scan;
+  supine_state full; /**< its volume: absolute, at full inflation, for a scan at rest; or DEFAULT */
   supine_resting resting;
   supine_person person;
   const char *expandability; /**< path of a CSV file, or NULL to use `expandability_law` */
@@ -46,7 +47,8 @@ typedef struct supine_prepared {
  * @param lungs     in: the scan; out: the reference surface
  * @param prepared  zeroed; release with supine_precompute_prepared_free, also after an error
  * @param findings  warnings are added
- * @retval SUPINE_ERROR_ARGUMENT  SUPINE_LAW_PAPER with a known state of the scan; expandability in
+ * @retval SUPINE_ERROR_ARGUMENT  a scan's posture without its volume; SUPINE_LAW_PAPER with a known
+ *   state of the scan; expandability in
  *   addition to a stiffness fitted to the patient; a volume share for a lung that the model lacks
  * @retval the statuses of supine_tissue_add_lesion and supine_reference_find */
 supine_status supine_precompute_prepare(supine_lungs *lungs, const supine_model_choice *choice,

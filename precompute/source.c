@@ -94,32 +94,27 @@ enum { LOBES = 5, LEFT_LOBES = 2 };
 /* Masks of the lobes of the lungs, in a folder made by TotalSegmentator. */
 typedef struct lobe_files {
   char path[LOBES][PATH_MAX];
-  char *list[LOBES];
-  size_t count;
-  char labels[64]; /* value of --labels that assigns the files to the lungs */
+  char *list[LOBES];  /* paths of the masks that exist, those of the left lung first */
+  size_t left, right; /* number of masks of each lung */
 } lobe_files;
 
 static supine_status find_lobes(const char *folder, lobe_files *found, supine_error *error) {
   static const char *const names[LOBES] = {"upper_lobe_left", "lower_lobe_left", "upper_lobe_right",
                                            "middle_lobe_right", "lower_lobe_right"};
   static const char *const endings[] = {".nii.gz", ".nii", ".nrrd", ".mha"};
-  const char *before = "left=";
-  found->count = 0;
-  found->labels[0] = '\0';
+  found->left = found->right = 0;
   for (size_t lobe = 0; lobe < LOBES; ++lobe) {
-    before = lobe == LEFT_LOBES ? found->count > 0 ? ",right=" : "right=" : before;
     for (size_t e = 0; e < sizeof endings / sizeof *endings; ++e) {
-      char *path = found->path[found->count];
+      char *path = found->path[lobe];
       const int length = snprintf(path, PATH_MAX, "%s/lung_%s%s", folder, names[lobe], endings[e]);
       if (length < PATH_MAX && access(path, F_OK) == 0) {
-        found->list[found->count++] = path;
-        supine_text_add(found->labels, sizeof found->labels, "%s%zu", before, found->count);
-        before = "+";
+        found->list[found->left + found->right] = path;
+        ++*(lobe < LEFT_LOBES ? &found->left : &found->right);
         break;
       }
     }
   }
-  return found->count > 0
+  return found->left + found->right > 0
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_READ,
                                 "%s: no lung_upper_lobe_left.nii.gz or other lobe of "
@@ -133,20 +128,22 @@ static supine_status load_maps(reading *r, supine_source *source, supine_finding
                                supine_error *error) {
   supine_labels_options wanted = r->options->labels;
   const bool folder = r->count == 1 && is_folder(r->paths[0]);
-  lobe_files lobes;
+  lobe_files lobes = {.left = 0};
   if (folder && find_lobes(r->paths[0], &lobes, error) != SUPINE_OK) {
     return SUPINE_ERROR_READ;
   }
-  wanted.labels = folder && wanted.labels == NULL ? lobes.labels : wanted.labels;
+  wanted.left_masks = lobes.left;
+  wanted.right_masks = lobes.right;
   wanted.axes = r->options->load.axes;
-  if (r->options->load.millimetres_per_unit != 0.0) {
+  if (r->options->load.millimetres_per_unit != 0.0 &&
+      r->options->load.millimetres_per_unit != 1.0) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--units is for surfaces: leave it out, as a label map's header states "
-                            "its unit");
+                            "a label map's header states its unit: leave --units out, or give "
+                            "--units mm to accept any size of the lungs");
   }
   const supine_status status = supine_labels_surfaces(
-      (const char *const *)(folder ? lobes.list : r->paths), folder ? lobes.count : r->count,
-      &wanted, r->meshes, &source->report, error);
+      (const char *const *)(folder ? lobes.list : r->paths),
+      folder ? lobes.left + lobes.right : r->count, &wanted, r->meshes, &source->report, error);
   if (status != SUPINE_OK) {
     return status;
   }
@@ -231,7 +228,6 @@ static supine_status join(reading *r, supine_source *source, supine_findings *fi
                           supine_error *error) {
   const supine_lungs_source given = {.name = r->paths[0],
                                      .axes = r->axes,
-                                     .axes_given = r->options->load.axes != SUPINE_AXES_AUTO,
                                      .units_given = r->options->load.millimetres_per_unit != 0.0,
                                      .midline = r->has_midline ? &r->midline : NULL};
   supine_status status = supine_lungs_gate(r->meshes, r->count, &given, &source->lungs,

@@ -97,11 +97,16 @@ static supine_status complete(request *wanted, size_t *count, supine_error *erro
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give --turn or one posture, not both");
   }
   if (!wanted->turns) {
-    const supine_status status =
-        supine_options_gravity(&wanted->orientation, wanted->turn.to, error);
+    supine_state state = {.lung_count = 0};
+    const supine_status status = supine_options_state(&wanted->orientation, &state, error);
     if (status != SUPINE_OK) {
       return status;
     }
+    if (state.volume.kind != SUPINE_VOLUME_DEFAULT || state.lung_count > 0) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "a breath starts at rest: give --posture without a volume");
+    }
+    memcpy(wanted->turn.to, state.gravity, sizeof wanted->turn.to);
     memcpy(wanted->turn.from, wanted->turn.to, sizeof wanted->turn.from);
   }
   double seconds = wanted->turns ? wanted->turn.seconds : 60.0 / breath->rate;
@@ -314,9 +319,12 @@ static supine_status check_ends(const playing *p, supine_error *error) {
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < 2 && status == SUPINE_OK; ++i) {
     supine_pose pose;
-    status = find_pose(p, ends[i], &pose, error);
+    const supine_state state =
+        supine_breath_state(p->basis, p->gravity + 3 * ends[i], p->above[ends[i]]);
+    status = supine_basis_pose(p->basis, &state, &pose, error);
     if (status == SUPINE_OK) {
-      status = supine_options_pose_check(p->basis, name, p->wanted->allow_folds, &pose, error);
+      status =
+          supine_options_pose_check(p->basis, name, p->wanted->allow_folds, &state, &pose, error);
     }
   }
   return status;

@@ -185,11 +185,32 @@ static void print_summary(const supine_inside_shells *shells, const supine_insid
                  report->outside, report->count, report->farthest_mm, text,
                  wanted->clamp ? "taken from the nearest point of the surface"
                                : "extrapolated from inside (--clamp changes this)");
-    if (2 * report->outside > report->count && report->farthest_mm > 50.0) {
-      (void)printf("most are outside: if the content is in RAS, as 3D Slicer and ITK-SNAP write, "
-                   "add --axes RAS\n");
-    }
   }
+}
+
+/* Tell if the points lie inside the lungs only in other units or axes. Refuse points of which none
+ * is inside as read if no unit was given. */
+static supine_status check_content(const supine_inside_shells *shells, const request *wanted,
+                                   const supine_inside_content *content, supine_error *error) {
+  supine_inside_reading reading;
+  char text[160];
+  supine_status status = supine_inside_content_check_names(content, error);
+  if (status != SUPINE_OK || content->part_count == 0) {
+    return status;
+  }
+  supine_inside_shells_reading(shells, &wanted->load, content->points, content->count, &reading);
+  if (reading.options[0] == '\0') {
+    return SUPINE_OK;
+  }
+  (void)snprintf(text, sizeof text, "%zu of %zu points are inside the lungs, but %zu with %s",
+                 reading.as_read, reading.tested, reading.inside, reading.options);
+  if (reading.as_read == 0 && reading.tested > 2 && reading.other_units &&
+      !(wanted->load.millimetres_per_unit > 0.0)) {
+    return supine_error_set(error, SUPINE_ERROR_MESH,
+                            "%s: give that, or --units mm to embed the points as they are", text);
+  }
+  supine_options_say(name, "warning: %s: check the axes and units of the points", text);
+  return SUPINE_OK;
 }
 
 static supine_status embed(const supine_basis *basis, const request *wanted,
@@ -201,6 +222,9 @@ static supine_status embed(const supine_basis *basis, const request *wanted,
   supine_status status = supine_inside_shells_create(basis, &shells, error);
   if (status == SUPINE_OK) {
     status = read_content(&shells, wanted, given->operand + 1, given->count - 1, &content, error);
+  }
+  if (status == SUPINE_OK) {
+    status = check_content(&shells, wanted, &content, error);
   }
   if (status == SUPINE_OK && wanted->rigid != NULL) {
     status = supine_inside_content_make_rigid(&content, wanted->rigid, error);

@@ -8,7 +8,7 @@
 
 #include "base/text.h"
 
-#include "precompute/inside/surface.h"
+#include "precompute/lungs/surface.h"
 #include "precompute/patient/patient_file.h"
 #include "program/options/model_options.h"
 #include "program/options/surface_options.h"
@@ -82,9 +82,9 @@ static const supine_option table[] = {
      FILLS(first), .read = read_state, .standard = "supine:rest"},
     {"other", 0, "STATE",
      "state of the second scan, in the same form; either scan may be the fuller one. A missing "
-     "volume is taken from the surfaces. With landmarks alone, give both volumes. If neither "
-     "--rest nor --other gives a volume, the fuller of two surfaces is at full inflation and the "
-     "other one at rest",
+     "volume is taken from the surfaces. With landmarks alone, give both volumes in mL. If the "
+     "states are only known by two volumes, the fuller scan is at full inflation and the other one "
+     "at rest, or a breath above rest if it holds less than 1.23 times as much",
      FILLS(second), .read = read_state, .standard = "supine"},
     {"law", 0, "LAW",
      "constants that are fitted\ndeep: the size of the displacement; the other constants stay "
@@ -290,6 +290,22 @@ static supine_status fit_gravity_factor(const request *wanted, scan_data *data,
   return status;
 }
 
+/* If only the volumes of the scans are known, count the emptier scan as rest. Count the fuller scan
+ * as full inflation, unless the other holds more of it than lungs at rest do. */
+static void name_volumes(supine_patient_record *record) {
+  static const double rest_most = 0.81; /* largest share at rest of ten patients with COPD */
+  const double *v = record->volume;
+  if (record->state[0].volume.kind == SUPINE_VOLUME_ABSOLUTE &&
+      record->state[1].volume.kind == SUPINE_VOLUME_ABSOLUTE) {
+    const bool breath = v[1] > rest_most * v[0];
+    record->state[1].volume = (supine_volume){SUPINE_VOLUME_REST, 0.0};
+    record->state[0].volume = breath ? (supine_volume){SUPINE_VOLUME_REST, v[0] - v[1]}
+                                     : (supine_volume){SUPINE_VOLUME_FULL, 0.0};
+    supine_options_say(name, "note: the scan of %.0f mL counts as rest, that of %.0f mL as %s",
+                       v[1], v[0], breath ? "a breath above it" : "full inflation");
+  }
+}
+
 /* Set the volume of scan k (0 or 1), if it was not given, to that of its surface. If the volume of
  * the other scan is relative to full inflation, or to rest in the same posture, make this one
  * relative too; otherwise absolute. */
@@ -322,6 +338,7 @@ static void set_states(const request *wanted, const scan_data *data,
   }
   complete_state(record, 0);
   complete_state(record, 1);
+  name_volumes(record);
   if (record->from_surface) {
     memcpy(record->emptier[0], data->lungs[1].minimum, sizeof record->emptier[0]);
     memcpy(record->emptier[1], data->lungs[1].maximum, sizeof record->emptier[1]);
@@ -335,17 +352,13 @@ static void set_states(const request *wanted, const scan_data *data,
 
 /* Warn if the volume at rest in the scans differs from the volume at rest of healthy people. */
 static void warn_of_rest(const supine_patient_record *record) {
-  /* Warn if the ratio of the volumes at rest and at full inflation differs by more than this
-   * between the scans and healthy people. Among healthy people, the standard deviation of the ratio
-   * is 0.04. */
-  static const double reported_from = 0.07;
   const supine_resting usual = supine_reference_resting_default();
   const double *g = record->state[1].gravity;
   supine_resting shown = usual;
   supine_patient_resting(record, &shown);
   const double share[2] = {supine_reference_resting_total(&usual, g),
                            supine_reference_resting_total(&shown, g)};
-  if (fabs(share[1] - share[0]) > reported_from) {
+  if (fabs(share[1] - share[0]) > SUPINE_REST_SPREAD) {
     supine_options_say(name,
                        "warning: the volume at rest is %.0f %% of full inflation in the two "
                        "scans, but %.0f %% in healthy people: check --rest. 'supine precompute "
@@ -378,6 +391,14 @@ static supine_status fit(const request *wanted, supine_patient_record *record,
   }
   if (status == SUPINE_OK) {
     set_states(wanted, &data, record);
+    if (wanted->second_path == NULL && !(record->volume[0] > 0.0 && record->volume[1] > 0.0)) {
+      status = supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                "landmarks do not show the volume of the lungs, which decides what "
+                                "rest and full inflation are: give both volumes of gas and tissue, "
+                                "such as --rest 2600mL --other 5400mL, or both surfaces");
+    }
+  }
+  if (status == SUPINE_OK) {
     memcpy(options.gravity, record->state[1].gravity, sizeof options.gravity);
     warn_of_rest(record);
     supine_patient_path(record, gains);
@@ -459,7 +480,7 @@ const supine_command supine_command_fit = {
         "the part of it that equation (18) of Santhanam 2008 does not explain.\n"
         "\n"
         "Examples:\n"
-        "  supine fit --landmarks pairs.csv --translation --rest supine:rest --other supine:full "
+        "  supine fit --landmarks pairs.csv --translation --rest 2600mL --other 5400mL "
         "-o patient.json\n"
         "  supine fit rest.ply full.ply --other supine:full --landmarks pairs.csv -o patient.json\n"
         "  supine fit rest.ply later.ply --other supine:rest+500 -o patient.json\n"

@@ -6,8 +6,10 @@
 
 #include <supine/sh.h>
 
+#include "precompute/fields/fields.h"
 #include "precompute/patient/patient_file.h"
 #include "program/options/model_options.h"
+#include "program/options/surface_options.h"
 
 static const char name[] = "precompute";
 
@@ -17,7 +19,7 @@ typedef struct request {
   const char *path;
   const char *fields, *patient;
   char summary[256];
-  bool has_band;
+  bool has_band, has_modes;
 } request;
 
 static supine_status read_modes(const char *text, void *field, supine_error *error) {
@@ -42,8 +44,8 @@ static const supine_option table[] = {
      "Santhanam 2008 with --band 3\nK: the K functions (modes) that describe the displacement "
      "best, or fewer if fewer suffice. More modes are more accurate, but each costs a "
      "multiplication per vertex at run time",
-     SUPINE_FILLS(request, basis.modes), .read = read_modes, .standard = "16",
-     .wants = "1 to 64 or 'harmonics'", .more = true},
+     SUPINE_FILLS(request, basis.modes), SUPINE_SAYS_GIVEN(request, has_modes), .read = read_modes,
+     .standard = "16", .wants = "1 to 64 or 'harmonics'", .more = true},
     {"held-out", 0, "N",
      "number of held-out directions in which the error is measured; default 1000; fewer, but at "
      "least 100, for more than 20000 vertices",
@@ -53,10 +55,14 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, patient), .file = SUPINE_FILE_IN, .rivals = "directions"},
     {.help = "Displacements from another simulator, instead of the built-in physics:"},
     {"fields", 0, "FILE",
-     "safetensors file with two tensors: gravity [M,3], M directions; and displacement [M,N,3], "
-     "the displacement of each of the N vertices of MESH for each direction, in mm. Without "
-     "--band, cross-validation chooses the band, among those for which M directions are enough",
-     SUPINE_FILLS(request, fields), .file = SUPINE_FILE_IN, .rivals = "directions", .more = true},
+     "safetensors file with three tensors: points [P,3], the positions of P points; gravity [M,3], "
+     "M directions; and displacement [M,P,3], the displacement of each point for each direction. "
+     "All three are in the axes and unit of MESH. Each vertex of MESH takes the displacement of "
+     "the point at its position, so that the points may have any order and may include inner nodes "
+     "of a volume mesh. The fields give gravity alone: the basis has no volumes and no breaths. "
+     "Without --band and --modes, cross-validation chooses both",
+     SUPINE_FILLS(request, fields), .file = SUPINE_FILE_IN, .rivals = "directions",
+     .partners = "output band modes axes units midline labels edge close surfaces-out scanned"},
     {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
     {.name = NULL}};
 
@@ -65,6 +71,16 @@ static const double turned_over_limit = 0.01;
 
 static const char *plural(size_t count) {
   return count == 1 ? "" : "s";
+}
+
+/* Print the assumptions, one per line, and the options that change them. */
+static void print_assumed(const char *options, const char *assumed) {
+  (void)printf("assumed (%s change it):\n", options);
+  for (const char *item = assumed, *end; item != NULL; item = end) {
+    end = strstr(item, "; ");
+    (void)printf("  %.*s\n", (int)(end != NULL ? end - item : 1000), item);
+    end = end != NULL ? end + 2 : NULL;
+  }
 }
 
 static void report_result(const char *path, const supine_lungs *lungs,
@@ -84,12 +100,7 @@ static void report_result(const char *path, const supine_lungs *lungs,
                lungs->lung_count == 2 ? "two lungs" : "one lung", lungs->mesh.vertex_count,
                options->band, report->mode_count, options->modes == 0 ? "harmonic" : "mode",
                plural(report->mode_count));
-  (void)puts("assumed (--axes, --units, --scanned, --law and --resting change it):");
-  for (const char *item = options->assumed, *end; item != NULL; item = end) {
-    end = strstr(item, "; ");
-    (void)printf("  %.*s\n", (int)(end != NULL ? end - item : 1000), item);
-    end = end != NULL ? end + 2 : NULL;
-  }
+  print_assumed("--axes, --units, --scanned, --law and --resting", options->assumed);
   (void)printf("error against the full solve, on %zu held-out direction%s:\n  %.3g %% RMS, %.3g %% "
                "95th percentile, %.3g %% largest, of the RMS displacement\n",
                accuracy->direction_count, plural(accuracy->direction_count),
@@ -112,12 +123,13 @@ static void report_result(const char *path, const supine_lungs *lungs,
 
 /* Print the highest band (degree) of spherical harmonics that the given directions of gravity
  * determine, and the leave-one-out error of each band. */
-static void report_fit(const char *path, const supine_fields *fields,
+static void report_fit(const char *path, const char *assumed, const supine_fields *fields,
                        const supine_fit_report *fit) {
   const size_t highest = fit->band_highest;
-  (void)printf("%s: field of %zu vertices from %zu directions, band %zu, %zu mode%s\n", path,
+  (void)printf("%s: fields of gravity: %zu vertices, %zu directions, band %zu, %zu mode%s\n", path,
                fields->vertex_count, fields->direction_count, fit->band, fit->mode_count,
                plural(fit->mode_count));
+  print_assumed("--axes, --units and --scanned", assumed);
   (void)printf("the directions determine bands up to %zu (%zu harmonic%s); leave-one-out error:\n",
                highest, (highest + 1) * (highest + 1), highest > 0 ? "s" : "");
   for (size_t band = 0; band <= highest; ++band) {
@@ -138,21 +150,43 @@ static void report_fit(const char *path, const supine_fields *fields,
                fit->accuracy.max_mm);
 }
 
-static supine_status compress_fields(const supine_lungs *lungs, const request *wanted,
-                                     const char *made_by, supine_error *error) {
-  const supine_fit_options options = {.band = wanted->has_band ? (int)wanted->basis.band : -1,
-                                      .modes = wanted->basis.modes,
-                                      .findings = wanted->model.findings.text,
-                                      .made_by = made_by};
+static supine_status compress_fields(request *wanted, const supine_arguments *given,
+                                     supine_error *error) {
+  const supine_source *source = &wanted->model.made_from;
+  const supine_scan *scan = &wanted->model.choice.scan;
   supine_fields fields = {0};
   supine_fit_report report;
+  if (scan->known && scan->state.volume.kind != SUPINE_VOLUME_DEFAULT) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "--scanned: with --fields, give the posture alone, such as supine, as "
+                            "fields of gravity have no volume");
+  }
   supine_status status =
-      supine_fields_load(wanted->fields, lungs, &wanted->model.source.load, &fields, error);
+      supine_command_source_load(&wanted->model, given->operand, given->count, error);
+  supine_options_say_findings(name, &wanted->model.findings);
   if (status == SUPINE_OK) {
-    status = supine_precompute_fields(lungs, &fields, &options, wanted->path, &report, error);
+    status = supine_fields_load(wanted->fields, &source->lungs, &source->frame, &fields, error);
   }
   if (status == SUPINE_OK) {
-    report_fit(wanted->path, &fields, &report);
+    char posture[160] = "not displaced by gravity";
+    if (scan->known) {
+      (void)supine_state_describe(&scan->state, posture, sizeof posture);
+    }
+    (void)snprintf(wanted->model.assumed, sizeof wanted->model.assumed, "%s; scan %s",
+                   source->summary, posture);
+    const supine_fit_options options = {.band = wanted->has_band ? (int)wanted->basis.band : -1,
+                                        .modes = wanted->has_modes ? wanted->basis.modes
+                                                                   : SUPINE_MODES_MADE_MAX,
+                                        .fewest_modes = !wanted->has_modes,
+                                        .scan_gravity = scan->known ? scan->state.gravity : NULL,
+                                        .frame = source->frame,
+                                        .assumed = wanted->model.assumed,
+                                        .findings = wanted->model.findings.text,
+                                        .made_by = given->made_by};
+    status = supine_fields_write(&source->lungs, &fields, &options, wanted->path, &report, error);
+  }
+  if (status == SUPINE_OK) {
+    report_fit(wanted->path, wanted->model.assumed, &fields, &report);
   }
   supine_fields_free(&fields);
   return status;
@@ -226,7 +260,6 @@ static supine_status check_patient(const supine_model_choice *choice, supine_err
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
   const supine_lungs *lungs = &wanted->model.made_from.lungs;
-  const bool fields = wanted->fields != NULL;
   char *text = NULL;
   static supine_patient_record record; /* static, as it is too large for the stack */
   if (supine_mesh_save_supports(wanted->path)) {
@@ -241,13 +274,12 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
       status = take_patient(wanted, &record, &text, error);
     }
   }
-  if (status == SUPINE_OK) {
-    status = supine_command_model_load(&wanted->model, name, given->operand, given->count, fields,
-                                       error);
-  }
-  if (status == SUPINE_OK) {
-    status = fields ? compress_fields(lungs, wanted, given->made_by, error)
-                    : compute(lungs, wanted, given->made_by, error);
+  if (status == SUPINE_OK && wanted->fields != NULL) {
+    status = compress_fields(wanted, given, error);
+  } else if (status == SUPINE_OK) {
+    status =
+        supine_command_model_load(&wanted->model, name, given->operand, given->count, false, error);
+    status = status == SUPINE_OK ? compute(lungs, wanted, given->made_by, error) : status;
   }
   free(text);
   supine_command_model_options_free(&wanted->model);

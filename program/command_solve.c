@@ -17,7 +17,7 @@ typedef struct request {
   supine_orientation orientation;
   const char *path;
   supine_state state; /* the kind of its volume is SUPINE_VOLUME_DEFAULT if none is given */
-  bool has_vertex, pitcher_catcher;
+  bool has_vertex, pitcher_catcher, allow_folds;
   size_t vertex;
 } request;
 
@@ -29,6 +29,7 @@ static const supine_option table[] = {
      ". Default rest; if rest is unknown (--scanned none, --law paper), the solved displacement, "
      "without scaling to a volume",
      SUPINE_FILLS(request, state), .read = supine_options_read_volume},
+    {.table = supine_options_folds, SUPINE_FILLS(request, allow_folds)},
     {"unit-force", 0, "VERTEX",
      "instead of a posture: write to -o FILE.csv the response of every vertex to a unit force on "
      "this vertex (numbered from 0)",
@@ -249,14 +250,26 @@ static supine_status write_solution(const supine_lungs *lungs, const request *wa
     solution.directions[i] *= gains[lungs->lung_count == 2 && i >= 3 * lungs->lung_begin[1]][i % 3];
   }
   supine_physics_solution_apply(&solution, &reference, 1.0, deformed.vertices);
+  const bool known = wanted->model.prepared.reference.known;
+  const double full = 1e-3 * supine_mesh_volume(&reference);
+  const double volume = 1e-3 * supine_mesh_volume(&deformed);
+  const supine_plausible result = {.command = name,
+                                   .state = &wanted->state,
+                                   .volume = volume,
+                                   .full = known ? full : 0.0,
+                                   .folded = supine_mesh_turned_over(&reference, deformed.vertices),
+                                   .parts = "the surface folds; triangles that turn over",
+                                   .allowed = wanted->allow_folds || !known};
   const supine_mesh_save_options save = {.from = reference.vertices};
-  status = supine_mesh_save(wanted->path, &deformed, &save, error);
+  status = supine_options_plausible(&result, error);
+  if (status == SUPINE_OK) {
+    status = supine_mesh_save(wanted->path, &deformed, &save, error);
+  }
   if (status == SUPINE_OK) {
     (void)printf("%s: gravity %.4g,%.4g,%.4g", wanted->path, g[0], g[1], g[2]);
     print_gains(lungs, gains);
     (void)printf(", largest displacement %.3f mm, %+.2f mL\n",
-                 supine_physics_solution_largest(&solution),
-                 1e-3 * (supine_mesh_volume(&deformed) - supine_mesh_volume(&reference)));
+                 supine_physics_solution_largest(&solution), volume - full);
   }
 cleanup:
   free(deformed.vertices);
@@ -278,7 +291,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
                             "%s: the name must end in " SUPINE_MESH_ENDINGS, wanted->path);
   }
   if (!wanted->has_vertex) {
-    status = supine_options_gravity(&wanted->orientation, wanted->state.gravity, error);
+    status = supine_options_state(&wanted->orientation, &wanted->state, error);
   }
   if (status == SUPINE_OK) {
     status = supine_command_model_load(&wanted->model, name, given->operand, given->count,

@@ -260,9 +260,16 @@ static supine_status open_page(const request *wanted, const supine_basis *basis,
   return status;
 }
 
-static supine_status set_volume(const request *wanted, supine_stream_volume *volume,
-                                supine_error *error) {
+/* Choose a breath, or a fixed volume. Fields of gravity have no breaths. */
+static supine_status set_volume(const supine_basis *basis, const request *wanted,
+                                supine_stream_volume *volume, supine_error *error) {
   supine_pv pv = *supine_breath_normal();
+  if (supine_basis_get_info(basis)->is_fields) {
+    supine_pose pose;
+    volume->fixed = wanted->volume;
+    volume->fixed.gravity[1] = 1.0;
+    return supine_basis_pose(basis, &volume->fixed, &pose, error);
+  }
   if (wanted->has_volume) {
     volume->fixed = wanted->volume;
     return SUPINE_OK;
@@ -280,7 +287,7 @@ static supine_status stream(const supine_basis *basis, const char *path, const r
   supine_stream_server *server = NULL;
   char *page = NULL;
   observed_points points = {0};
-  supine_status status = set_volume(wanted, &volume, error);
+  supine_status status = set_volume(basis, wanted, &volume, error);
   options.volume = &volume;
   if (status == SUPINE_OK && wanted->points != NULL) {
     status = open_points(basis, wanted, &points, error);

@@ -69,7 +69,6 @@ supine_status supine_command_deform_content_check(const supine_deform_content *w
 
 supine_status supine_command_deform_content_read(supine_deform_content *wanted, const char *command,
                                                  supine_error *error) {
-  static const double aerated = -300.0; /* every lung has voxels below this density, HU */
   const char *path = wanted->image != NULL ? wanted->image : wanted->labels;
   supine_image *image = &wanted->source;
   const supine_status status = path != NULL ? supine_image_read(path, image, error) : SUPINE_OK;
@@ -85,11 +84,12 @@ supine_status supine_command_deform_content_read(supine_deform_content *wanted, 
   for (size_t i = 0; i < image->size[0] * image->size[1] * image->size[2]; ++i) {
     least = fmin(least, supine_image_get(image, i));
   }
-  return least < aerated ? SUPINE_OK
-                         : supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                            "%s: no voxel is below %g, so the image is not in "
-                                            "Hounsfield units: convert it, or leave --density out",
-                                            path, aerated);
+  return least < supine_field_aerated
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_FORMAT,
+                                "%s: no voxel is below %g, so the image is not in "
+                                "Hounsfield units: convert it, or leave --density out",
+                                path, supine_field_aerated);
 }
 
 bool supine_command_deform_content_wanted(const supine_deform_content *wanted) {
@@ -272,7 +272,8 @@ static supine_status join_fields(const supine_field *first, supine_field *second
   return status;
 }
 
-/* Compute the displacement field to the pose `moved`, from the scan or the state of --from. */
+/* Compute the displacement field to the pose `moved`, from the scan or the state of --from, and
+ * check that it does not fold. */
 static supine_status find_field(const supine_basis *basis, const supine_deformation *moved,
                                 supine_field *field, supine_error *error) {
   supine_field first = {0};
@@ -284,6 +285,15 @@ static supine_status find_field(const supine_basis *basis, const supine_deformat
     status = join_fields(&first, field, error);
   }
   supine_field_free(&first);
+  if (status == SUPINE_OK) {
+    const supine_plausible lungs = {
+        .command = "deform",
+        .state = &moved->state,
+        .folded = supine_field_folded(field),
+        .parts = "the field folds; cells that turn over, relative to those in the lungs",
+        .allowed = moved->allow_folds || !supine_basis_get_info(basis)->has_rest};
+    status = supine_options_plausible(&lungs, error);
+  }
   return status;
 }
 

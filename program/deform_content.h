@@ -24,6 +24,7 @@ typedef struct supine_deformation {
   supine_state state;
   supine_pose pose;
   supine_reference_pose from; /* state in the input image, where displacements are 0 */
+  bool allow_folds;           /* whether folded fields cause only a warning */
   bool from_given;            /* whether --from was given; otherwise `from` is the scan */
   supine_expected expected;
   supine_mesh_save_options save; /* axes, unit and comment of the output */

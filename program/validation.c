@@ -8,7 +8,7 @@
 #include "program/validation.h"
 
 #include "precompute/inside/biharmonic.h"
-#include "precompute/inside/surface.h"
+#include "precompute/lungs/surface.h"
 #include "program/options/basis_input.h"
 
 enum { MEASURED_VERTICES_MAX = 1500, GOLDEN_SECTION_STEPS = 24 };

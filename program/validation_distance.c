@@ -10,7 +10,7 @@
 #include "program/validation.h"
 
 #include "base/vec3.h"
-#include "precompute/inside/surface.h"
+#include "precompute/lungs/surface.h"
 
 const char *const supine_command_map_names[SUPINE_PATIENT_MAP_COUNT] = {"predicted", "none",
                                                                         "translation", "affine"};

@@ -394,17 +394,13 @@ static supine_status check_normals(const check *c, supine_basis *basis) {
   return info->normal_weights != NULL ? SUPINE_OK : SUPINE_ERROR_FORMAT;
 }
 
-/* Identify the content of the file that determines what a pose means. */
+/* Identify what determines the meaning of a pose: the modes and the coefficients of the volumes. */
 static supine_status identify(const check *c, supine_basis *basis) {
   static const char *const names[] = {"modes", "volume_linear", "volume_quadratic", "volume_cubic"};
-  const char *lungs = supine_safetensors_metadata(c->file, "lungs");
-  supine_tensor tensors[sizeof names / sizeof *names];
-  size_t count = 0;
-  for (size_t i = 0; i < (basis->info.has_volume ? sizeof names / sizeof *names : 1); ++i) {
-    tensors[count++] = *supine_safetensors_find(c->file, names[i]);
+  for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
+    const supine_tensor *tensor = supine_safetensors_find(c->file, names[i]);
+    basis->info.identity += supine_safetensors_checksum(tensor, tensor == NULL ? 0 : 1, NULL, 0);
   }
-  basis->info.identity = supine_safetensors_checksum(
-      tensors, count, &(supine_metadata){"lungs", lungs}, lungs != NULL ? 1 : 0);
   return SUPINE_OK;
 }
 

@@ -54,7 +54,9 @@ double supine_basis_storage_error(const supine_basis *basis) {
     if (supine_basis_weights(basis, state.gravity, pose.weights) != SUPINE_OK) {
       continue; /* the zero vector has no direction */
     }
-    if (basis->info.has_volume) {
+    if (basis->info.is_fields) {
+      supine_pose_fill(&pose, 1);
+    } else if (basis->info.has_volume) {
       if (supine_basis_add_volume(basis, volume, &pose) != SUPINE_OK) {
         continue; /* the lungs cannot hold this volume in this posture */
       }

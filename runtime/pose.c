@@ -97,7 +97,7 @@ static supine_status find_volumes(const supine_basis *basis, const double gravit
 static supine_status refuse(const char *what, supine_error *error) {
   return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                           "this basis has no volume at %s, as its scan was used unchanged "
-                          "(--scanned none, --law paper or --fields): give scan+ML or an absolute "
+                          "(--scanned none or --law paper): give scan+ML or an absolute "
                           "volume such as 2600mL",
                           what);
 }
@@ -229,14 +229,25 @@ static supine_status named_gains(const supine_basis *basis, const volumes *v,
   return SUPINE_OK;
 }
 
-/* Set all gains (factors of the displacement) of an open surface to 0 if the state is that of the
- * reference surface. Refuse all other states, because they need volumes. */
-static supine_status open_gains(const supine_basis *basis, const supine_state *state,
-                                supine_pose *pose, supine_error *error) {
+/* Set all gains (factors of the displacement) to 0 if the state is that of the reference surface.
+ * Refuse all other states of an open surface or of another simulator's fields, because they need
+ * volumes. For such fields, the state `scan` is refused in other postures than that of the scan. */
+static supine_status reference_gains(const supine_basis *basis, const supine_state *state,
+                                     supine_pose *pose, supine_error *error) {
   const supine_volume *volume = &state->volume;
-  const bool reference = (volume->kind == SUPINE_VOLUME_SCAN ||
-                          (volume->kind == SUPINE_VOLUME_FULL && basis->info.has_full)) &&
-                         volume->ml == 0 && state->lung_count == 0;
+  bool reference = (volume->kind == SUPINE_VOLUME_SCAN ||
+                    (volume->kind == SUPINE_VOLUME_FULL && basis->info.has_full)) &&
+                   volume->ml == 0 && state->lung_count == 0;
+  if (basis->info.is_fields) {
+    for (int k = 0; k < 3; ++k) {
+      reference = reference && fabs(state->gravity[k] - basis->scan_gravity[k]) < 1e-6;
+    }
+    if (!reference) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "this basis holds another simulator's fields of gravity, which have "
+                              "no volumes and no breaths: give the posture alone");
+    }
+  }
   if (!reference) {
     return supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
                             "the surface is open and encloses no volume: close "
@@ -267,8 +278,8 @@ supine_status supine_basis_gains(const supine_basis *basis, const supine_state *
       return SUPINE_OK;
     }
   }
-  if (!basis->info.has_volume) {
-    return open_gains(basis, &asked, pose, error);
+  if (!basis->info.has_volume || basis->info.is_fields) {
+    return reference_gains(basis, &asked, pose, error);
   }
   volumes v;
   double total = 0;

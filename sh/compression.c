@@ -91,6 +91,20 @@ static void keep_columns(void *data, size_t rows, size_t width, size_t count, si
   }
 }
 
+size_t supine_sh_modes_needed(size_t count, const double *singular, double total, double error) {
+  static const double same_error = 1.01;
+  const double limit = (same_error * same_error - 1.0) * error * error;
+  double dropped = 0.0;
+  while (count > 1) {
+    dropped += singular[count - 1] * singular[count - 1] / total;
+    if (dropped > limit) {
+      break;
+    }
+    --count;
+  }
+  return count;
+}
+
 void supine_sh_compression_truncate(supine_compression *compression, size_t rank, size_t count) {
   const size_t width = compression->mode_count;
   if (count < width) {

@@ -43,6 +43,12 @@ supine_status supine_sh_compress_modes(const supine_expansion *expansion, const 
                                        size_t mode_max, supine_compression *compression,
                                        double *singular, double *total, supine_error *error);
 
+/** Find the smallest number of modes with an error below 1.01 times that with `count` modes.
+ * @param singular  [count] singular values of the modes
+ * @param total     sum of the squares of all singular values
+ * @param error     relative RMS error with `count` modes */
+size_t supine_sh_modes_needed(size_t count, const double *singular, double total, double error);
+
 /** Keep the first `count` modes of a compression, whose array `mix` has `rank` rows. */
 void supine_sh_compression_truncate(supine_compression *compression, size_t rank, size_t count);
 

@@ -42,7 +42,7 @@ static void expect(int code, const char *words, int got) {
 #define EXPECT(code, words, ...) expect(code, words, run(__VA_ARGS__))
 
 /* Count the files in the temporary folder whose names begin with `prefix`. */
-static size_t count_files(const char *prefix) {
+static inline size_t count_files(const char *prefix) {
   size_t count = 0;
   DIR *entries = opendir(folder);
   assert_non_null(entries);

@@ -7,6 +7,7 @@
 #include <sys/resource.h>
 #include <sys/stat.h>
 
+#include "base/arena.h"
 #include "base/output.h"
 #include "base/parallel.h"
 #include "base/text.h"
@@ -280,4 +281,30 @@ TEST(test_parallel_for_any_split_covers_each_item_once) {
     }
   }
   assert_true(supine_thread_count() >= 1);
+}
+
+static supine_status fill(size_t count, size_t size, supine_error *error) {
+  SUPINE_ARENA arena = {0};
+  unsigned char *zeros = supine_arena_zeros(&arena, 1000, 1);
+  unsigned char *many = supine_arena_take(&arena, count, size);
+  if (arena.failed) {
+    return supine_error_memory(error, "%zu items", count);
+  }
+  for (size_t i = 0; i < 1000; ++i) {
+    assert_int_equal(zeros[i], 0);
+  }
+  memset(many, 1, count * size);
+  assert_int_equal((uintptr_t)many % _Alignof(max_align_t), 0);
+  SUPINE_TRY(count == 0 ? SUPINE_ERROR_MESH : SUPINE_OK);
+  return SUPINE_OK;
+}
+
+/* A sanitizer or valgrind would report arrays that an early return leaves behind. */
+TEST(test_arena_overflow_and_early_return_free_everything) {
+  supine_error error;
+  assert_int_equal(fill(100, 7, &error), SUPINE_OK);
+  assert_int_equal(fill(0, 7, &error), SUPINE_ERROR_MESH);
+  assert_int_equal(fill(SIZE_MAX / 4, 8, &error), SUPINE_ERROR_MEMORY);
+  assert_int_equal(error.status, SUPINE_ERROR_MEMORY);
+  assert_non_null(strstr(error.message, "out of memory: "));
 }

@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Test displacements of another simulator: loading, fit, cross-validation, refused input. */
 
-#include "folder.h"
+#include "program_helpers.h"
+
+#include "base/vec3.h"
 #include "precompute/fields/fields.h"
 #include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
@@ -165,7 +167,7 @@ static void check_stated_error(const supine_lungs *of, const char *what) {
   const char *path = in_folder("basis.safetensors");
   supine_fit_report report;
   supine_error error;
-  if (supine_precompute_fields(of, &fields, &options, path, &report, &error) != SUPINE_OK) {
+  if (supine_fields_write(of, &fields, &options, path, &report, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
   const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
@@ -267,8 +269,7 @@ TEST(test_fit_vector_volumes_exact) {
   const supine_fit_options options = {.band = -1, .modes = 8};
   const char *path = in_folder("volume.safetensors");
   supine_fit_report report;
-  assert_int_equal(supine_precompute_fields(&lungs, &fields, &options, path, &report, NULL),
-                   SUPINE_OK);
+  assert_int_equal(supine_fields_write(&lungs, &fields, &options, path, &report, NULL), SUPINE_OK);
   const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
   supine_basis *basis = NULL;
   assert_int_equal(supine_basis_open_with(path, &exact, &basis, NULL), SUPINE_OK);
@@ -327,63 +328,253 @@ TEST(test_fit_few_directions_limit_the_band) {
   supine_fields_free(&fields);
 }
 
-/* Assert that loading a file fails with this status and message. */
-static void expect_failure(const char *name, supine_status status, const char *words) {
+/* Rows of points in the files of the tests below: an inner point and then the vertices, the last
+ * one first. */
+static size_t point_row(size_t vertex) {
+  return lungs.mesh.vertex_count - vertex;
+}
+
+/* Write a file of fields of all vertices and an inner point, as another simulator might, in axes
+ * RAS and cm. The displacement of vertex i with gravity along the unit vector g is g[0], g[1] and
+ * i g[2] / 100, mm, in LPS.
+ * @param tensors  [3] written; the caller may change them and write again; freed by the test */
+static void write_fields(const char *path, size_t count, const double *directions,
+                         supine_tensor tensors[3]) {
+  const size_t n = lungs.mesh.vertex_count;
+  double *points = calloc(3 * (n + 1), sizeof *points);
+  double *gravity = calloc(3 * count, sizeof *gravity);
+  float *u = calloc(3 * count * (n + 1), sizeof *u);
+  for (size_t i = 0; i < 3 * n; ++i) {
+    points[3 * point_row(i / 3) + i % 3] = (i % 3 < 2 ? -0.1 : 0.1) * lungs.mesh.vertices[i];
+    points[i % 3] = points[3 * point_row(0) + i % 3] * 0.9;
+  }
+  for (size_t d = 0; d < count; ++d) {
+    const double *g = directions + 3 * d;
+    gravity[3 * d] = -2.0 * g[0];
+    gravity[3 * d + 1] = -2.0 * g[1];
+    gravity[3 * d + 2] = 2.0 * g[2];
+    for (size_t i = 0; i < n; ++i) {
+      float *to = u + 3 * ((n + 1) * d + point_row(i));
+      to[0] = (float)(-0.1 * g[0]);
+      to[1] = (float)(-0.1 * g[1]);
+      to[2] = (float)(1e-3 * (double)i * g[2]);
+    }
+  }
+  tensors[0] = (supine_tensor){"points", SUPINE_F64, 2, {n + 1, 3}, points};
+  tensors[1] = (supine_tensor){"gravity", SUPINE_F64, 2, {count, 3}, gravity};
+  tensors[2] = (supine_tensor){"displacement", SUPINE_F32, 3, {count, n + 1, 3}, u};
+  assert_int_equal(supine_safetensors_write(path, tensors, 3, NULL, 0, NULL), SUPINE_OK);
+}
+
+static void free_tensors(supine_tensor tensors[3]) {
+  for (size_t t = 0; t < 3; ++t) {
+    free((void *)tensors[t].data);
+  }
+}
+
+static const supine_scan_frame ras_cm = {SUPINE_AXES_RAS, 10.0};
+static const double two_directions[] = {0.6, 0.0, -0.8, 0.0, 1.0, 0.0};
+
+TEST(test_fields_load_any_order_axes_and_inner_points_each_vertex_its_own) {
+  supine_tensor tensors[3];
+  supine_fields fields = {0};
+  const char *path = in_folder("fields.safetensors");
+  write_fields(path, 2, two_directions, tensors);
+  assert_int_equal(supine_fields_load(path, &lungs, &ras_cm, &fields, NULL), SUPINE_OK);
+  assert_int_equal(fields.vertex_count, lungs.mesh.vertex_count);
+  for (size_t i = 0; i < fields.vertex_count; ++i) {
+    assert_close(fields.displacement[3 * i], 0.6, 1e-6);
+    assert_close(fields.displacement[3 * i + 2], -0.008 * (double)i, 1e-5);
+    assert_close(fields.displacement[3 * (fields.vertex_count + i) + 1], 1.0, 1e-6);
+  }
+  assert_close(fields.directions[2], -0.8, 1e-15);
+  assert_close(fields.directions[4], 1.0, 1e-15);
+  supine_fields_free(&fields);
+  free_tensors(tensors);
+}
+
+/* Write the tensors, and assert that loading them fails with this status and message. */
+static void expect_failure(const supine_tensor *tensors, size_t count,
+                           const supine_scan_frame *frame, supine_status status,
+                           const char *words) {
+  const char *path = in_folder("bad.safetensors");
   supine_fields fields = {0};
   supine_error error = {0};
-  assert_int_equal(supine_fields_load(in_folder(name), &lungs, NULL, &fields, &error), status);
+  assert_int_equal(supine_safetensors_write(path, tensors, count, NULL, 0, NULL), SUPINE_OK);
+  assert_int_equal(supine_fields_load(path, &lungs, frame, &fields, &error), status);
   assert_says(error.message, words);
   assert_null(fields.directions);
 }
 
-TEST(test_fields_load_bad_tensors_refused) {
-  const size_t n = lungs.mesh.vertex_count;
-  double gravity[6] = {0, 1, 0, 0, 0, -2};
-  float *displacement = calloc(6 * n, sizeof *displacement);
-  displacement[3 * n + 4] = 0.5F;
-  supine_tensor tensors[2] = {{"gravity", SUPINE_F64, 2, {2, 3}, gravity},
-                              {"displacement", SUPINE_F32, 3, {2, n, 3}, displacement}};
-  const char *path = in_folder("fields.safetensors");
+TEST(test_fields_load_points_elsewhere_or_missing_refused) {
+  static const supine_scan_frame wrong[] = {
+      {SUPINE_AXES_LPS, 10.0}, {SUPINE_AXES_RAS, 1.0}, {SUPINE_AXES_AUTO, 0.0}};
+  supine_tensor tensors[3];
+  write_fields(in_folder("fields.safetensors"), 2, two_directions, tensors);
+  double *points = (double *)tensors[0].data;
+  for (size_t i = 0; i < sizeof wrong / sizeof *wrong; ++i) {
+    expect_failure(tensors, 3, &wrong[i], SUPINE_ERROR_MESH, "has no point of its own");
+  }
+  const double diagonal = supine_distance(lungs.minimum, lungs.maximum);
+  points[30] += 1.01e-5 * diagonal; /* 1.01e-4 of the diagonal, as the unit is 10 mm */
+  expect_failure(tensors, 3, &ras_cm, SUPINE_ERROR_MESH, "has no point of its own");
+  points[30] -= 0.03e-5 * diagonal;
   supine_fields fields = {0};
-  assert_int_equal(supine_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
-  assert_int_equal(supine_fields_load(path, &lungs, NULL, &fields, NULL), SUPINE_OK);
-  assert_close(fields.directions[5], -1.0, 0.0);
-  assert_close(fields.displacement[3 * n + 4], 0.5, 0.0);
+  const char *path = in_folder("fields.safetensors");
+  assert_int_equal(supine_safetensors_write(path, tensors, 3, NULL, 0, NULL), SUPINE_OK);
+  assert_int_equal(supine_fields_load(path, &lungs, &ras_cm, &fields, NULL), SUPINE_OK);
   supine_fields_free(&fields);
-  displacement[3 * n + 3] = 0.25F;
-  displacement[3 * n + 5] = 0.75F;
-  const supine_mesh_load_options ras = {.axes = SUPINE_AXES_RAS, .millimetres_per_unit = 10.0};
-  assert_int_equal(supine_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
-  assert_int_equal(supine_fields_load(path, &lungs, &ras, &fields, NULL), SUPINE_OK);
-  assert_close(fields.displacement[3 * n + 3], -2.5, 0.0);
-  assert_close(fields.displacement[3 * n + 4], -5.0, 0.0);
-  assert_close(fields.displacement[3 * n + 5], 7.5, 0.0);
-  supine_fields_free(&fields);
-  displacement[3 * n + 4] = NAN;
-  assert_int_equal(supine_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
-  expect_failure("fields.safetensors", SUPINE_ERROR_FORMAT, "row 1: the displacement of vertex 1");
-  tensors[1].shape[1] = n / 2;
-  assert_int_equal(supine_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
-  expect_failure("fields.safetensors", SUPINE_ERROR_MESH, "but the reference surface has");
-  assert_int_equal(supine_safetensors_write(path, tensors, 1, NULL, 0, NULL), SUPINE_OK);
-  expect_failure("fields.safetensors", SUPINE_ERROR_FORMAT, "displacement [M,N,3]");
-  expect_failure("nothing.safetensors", SUPINE_ERROR_READ, "nothing.safetensors");
-  displacement[3 * n + 4] = 0.0F;
+  memcpy(points, points + 60, 3 * sizeof *points); /* the inner point is also that of a vertex */
+  expect_failure(tensors, 3, &ras_cm, SUPINE_ERROR_MESH, "points 0 and 20 are at the same place");
+  points[0] = NAN;
+  expect_failure(tensors, 3, &ras_cm, SUPINE_ERROR_FORMAT, "point 0 is not finite");
+  expect_failure(tensors + 1, 2, &ras_cm, SUPINE_ERROR_FORMAT, "supine.save_fields(");
+  --tensors[0].shape[0];
+  expect_failure(tensors, 3, &ras_cm, SUPINE_ERROR_FORMAT, "has another shape");
+  free_tensors(tensors);
+}
+
+TEST(test_fields_load_bad_tensors_refused) {
   static const struct {
     double gravity[3];
     const char *words;
-  } bad[] = {{{0, 3, 0}, "rows 0 and 1 have the same direction of gravity: keep one"},
+  } bad[] = {{{-0.3, 0, -0.4}, "rows 0 and 1 have the same direction of gravity: keep one"},
              {{0, 0, 0}, "row 1: gravity 0,0,0 has no direction"},
              {{0, NAN, 0}, "has no direction"}};
-  tensors[1].shape[1] = n;
+  supine_tensor tensors[3];
+  write_fields(in_folder("fields.safetensors"), 2, two_directions, tensors);
+  float *u = (float *)tensors[2].data;
+  u[0] = NAN; /* the displacement of the inner point is not used */
+  u[3 * (lungs.mesh.vertex_count + 1) + 4] = NAN;
+  expect_failure(tensors, 3, &ras_cm, SUPINE_ERROR_FORMAT,
+                 "row 1: the displacement of point 1 is not finite");
+  expect_failure(tensors, 2, &ras_cm, SUPINE_ERROR_FORMAT, "displacement [M,P,3]");
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
-    memcpy(gravity + 3, bad[i].gravity, sizeof bad[i].gravity);
-    assert_int_equal(
-        supine_safetensors_write(in_folder("fields.safetensors"), tensors, 2, NULL, 0, NULL),
-        SUPINE_OK);
-    expect_failure("fields.safetensors", SUPINE_ERROR_FORMAT, bad[i].words);
+    memcpy((double *)tensors[1].data + 3, bad[i].gravity, sizeof bad[i].gravity);
+    expect_failure(tensors, 3, &ras_cm, SUPINE_ERROR_FORMAT, bad[i].words);
   }
-  free(displacement);
+  supine_fields fields = {0};
+  assert_int_equal(
+      supine_fields_load(in_folder("nothing.safetensors"), &lungs, &ras_cm, &fields, NULL),
+      SUPINE_ERROR_READ);
+  free_tensors(tensors);
+}
+
+/* Write the surface of the lungs and 20 fields (write_fields), in LPS and mm. */
+static void write_input(void) {
+  enum { COUNT = 20 };
+  double directions[3 * COUNT];
+  supine_tensor tensors[3];
+  uint64_t seed = 3;
+  for (size_t d = 0; d < COUNT; ++d) {
+    random_direction(&seed, directions + 3 * d);
+  }
+  write_fields(in_folder("f.safetensors"), COUNT, directions, tensors);
+  free_tensors(tensors);
+  supine_mesh turned = lungs.mesh;
+  turned.vertices = malloc(3 * turned.vertex_count * sizeof *turned.vertices);
+  for (size_t i = 0; i < 3 * turned.vertex_count; ++i) {
+    turned.vertices[i] = (i % 3 < 2 ? -0.1 : 0.1) * lungs.mesh.vertices[i];
+  }
+  assert_int_equal(supine_mesh_save(in_folder("m.obj"), &turned, NULL, NULL), SUPINE_OK);
+  free(turned.vertices);
+}
+
+#define FIELDS "precompute m.obj --fields f.safetensors --axes RAS --units cm -o b.safetensors "
+
+/* Every option that the help lists changes the result with --fields, or is refused. */
+TEST(test_precompute_fields_every_option_used_or_refused) {
+  static const char no_effect[] = "has no effect with --fields";
+  static const struct {
+    const char *name, *value;
+    int code;
+    const char *words;
+  } known[] = {{"help", "", 0, "Usage"},
+               {"help-all", "", 0, "Usage"},
+               {"fields", "f.safetensors", 1, "give --fields once"},
+               {"output", "c.safetensors", 0, "c.safetensors: fields"},
+               {"band", "0", 0, "band 0, 1 mode"},
+               {"modes", "2", 0, "2 modes"},
+               {"axes", "LPS", 0, "LPS axes (by --axes)"},
+               {"units", "in", 0, "25.4 mm a unit"},
+               {"midline", "60", 2, "midline"},
+               {"scanned", "supine", 0, "  scan supine\n"},
+               {"labels", "lungmask", 1, "are for label maps"},
+               {"edge", "3", 1, "are for label maps"},
+               {"close", "3", 1, "are for label maps"},
+               {"surfaces-out", "s.ply", 1, "are for label maps"},
+               {"patient", "m.obj", 1, "give --fields or --patient, not both"},
+               {"held-out", "200", 1, no_effect},
+               {"resting", "supine=0.4", 1, no_effect},
+               {"full", "5000mL", 1, no_effect},
+               {"height", "170", 1, no_effect},
+               {"sex", "male", 1, no_effect},
+               {"law", "paper", 1, no_effect},
+               {"base", "1", 1, no_effect},
+               {"gain", "0.7", 1, no_effect},
+               {"box-force", "1,2,3", 1, no_effect},
+               {"soften", "1", 1, no_effect},
+               {"constants", "1,2,3,4,5,6", 1, no_effect},
+               {"reach", "20", 1, no_effect},
+               {"shear", "0.1", 1, no_effect},
+               {"expandability", "uniform", 1, no_effect},
+               {"lesion", "0,0,0,9,2", 1, no_effect},
+               {"lung", "left:0.3", 1, no_effect}};
+  write_input();
+  EXPECT(0, "  scan not displaced by gravity\n", FIELDS);
+  EXPECT(0, "Usage", "precompute --help-all");
+  char *help = strdup(printed);
+  size_t listed = 0;
+  for (char *at = help; (at = strstr(at, "  --")) != NULL || listed == 0;) {
+    const char *option = at + 4;
+    const size_t length = strcspn(option, " \n");
+    size_t i = 0;
+    while (i < sizeof known / sizeof *known &&
+           (strlen(known[i].name) != length || strncmp(known[i].name, option, length) != 0)) {
+      ++i;
+    }
+    if (i == sizeof known / sizeof *known) {
+      fail_msg("add --%.*s to the table: is it used or refused with --fields?", (int)length,
+               option);
+    }
+    EXPECT(known[i].code, known[i].words, FIELDS "--%s %s", known[i].name, known[i].value);
+    ++listed;
+    at += 4;
+  }
+  assert_true(listed >= 25);
+  free(help);
+}
+
+/* Print the displacement of the first vertex in a posture of b.safetensors, which is g in mm. */
+TEST(test_precompute_fields_scanned_posture_not_displaced) {
+  write_input();
+  EXPECT(0, "  scan supine\n", FIELDS "--scanned supine");
+  EXPECT(0, "largest displacement 0.000 mm", "deform b.safetensors --posture supine -o a.ply");
+  EXPECT(0, "largest displacement 2.000 mm", "deform b.safetensors --posture prone -o a.ply");
+  EXPECT(0, "sampled directions", "compare b.safetensors --postures supine,prone");
+  assert_null(strstr(printed, "breath"));
+  EXPECT(1, "give the posture alone", FIELDS "--scanned supine:rest");
+  EXPECT(1, "only for --fields",
+         "precompute m.obj --axes RAS --units cm --scanned supine -o c.safetensors");
+}
+
+TEST(test_fields_basis_volumes_and_breaths_refused) {
+  static const char *const commands[] = {
+      "deform b.safetensors --posture prone --volume scan+500 -o a.ply",
+      "deform b.safetensors --posture prone --volume 3000mL -o a.ply",
+      "deform b.safetensors --posture prone --volume scan -o a.ply",
+      "deform b.safetensors --posture prone --volume left=scan,right=scan+100 -o a.ply",
+      "compare b.safetensors --breath 500",
+      "compare b.safetensors --volume rest",
+      "breathe b.safetensors --posture supine -o a.vtp",
+      "stream b.safetensors --listen 0 --volume full"};
+  write_input();
+  EXPECT(0, "3 modes", FIELDS);
+  EXPECT(0, "largest displacement 0.000 mm",
+         "deform b.safetensors --posture supine --volume scan -o a.ply");
+  for (size_t i = 0; i < sizeof commands / sizeof *commands; ++i) {
+    EXPECT(1, "have no volumes and no breaths", "%s", commands[i]);
+  }
 }
 
 TEST_GROUP(setup, teardown)

@@ -118,6 +118,22 @@ TEST(test_gate_clean_lungs_no_message) {
   supine_mesh_free((supine_mesh *)&before);
 }
 
+/* Turned by 40 degrees about the left-right axis, lungs look mirrored. */
+TEST(test_lungs_gate_pitched_scan_warned_of) {
+  supine_mesh mesh = phantom();
+  for (size_t i = 0; i < mesh.vertex_count; ++i) {
+    double *p = mesh.vertices + 3 * i;
+    const double y = p[1];
+    p[1] = 0.766 * y - 0.643 * p[2];
+    p[2] = 0.643 * y + 0.766 * p[2];
+  }
+  outcome out = pass(&mesh, NULL);
+  assert_int_equal(out.status, SUPINE_OK);
+  assert_says(out.findings.text, "pitched by more than 25 degrees");
+  supine_lungs_free(&out.lungs);
+  supine_mesh_free(&mesh);
+}
+
 /* A mesh in any of the 47 axis conventions other than LPS is read as if it were in LPS. The warning
  * proposes the true axes. */
 TEST(test_gate_any_wrong_axes_proposes_correct_ones) {
@@ -139,7 +155,7 @@ TEST(test_gate_any_wrong_axes_proposes_correct_ones) {
 /* --axes RAS is given for a file whose axes are LPS. The warning proposes LPS. */
 TEST(test_gate_wrong_axes_option_proposes_correct_one) {
   supine_mesh mesh = phantom();
-  const supine_lungs_source ras = {.name = "x", .axes = SUPINE_AXES_RAS, .axes_given = true};
+  const supine_lungs_source ras = {.name = "x", .axes = SUPINE_AXES_RAS};
   misread(&mesh, SUPINE_AXES_RAS); /* as if --axes RAS were given for an LPS file */
   outcome out = pass(&mesh, &ras);
   assert_says(out.findings.text, "add --axes LPS");
@@ -318,4 +334,111 @@ TEST(test_repair_open_surface_unchanged) {
   assert_int_equal(report.duplicates + report.loose + report.reversed + report.separated, 0);
   assert_int_equal(mesh.triangle_count, count);
   supine_mesh_free(&mesh);
+}
+
+static void scale(supine_mesh *mesh, double x, double y, double z) {
+  const double factor[3] = {x, y, z};
+  for (size_t i = 0; i < 3 * mesh->vertex_count; ++i) {
+    mesh->vertices[i] *= factor[i % 3];
+  }
+}
+
+TEST(test_gate_impossible_volume_or_height_refused_unless_units_given) {
+  static const struct {
+    double ml, ratio; /* volume; height divided by width */
+    const char *said;
+    bool refused;
+  } cases[] = {{6000.0, 1.81, "as high as wide", true},   {6000.0, 1.79, "", false},
+               {6000.0, 0.54, "as high as wide", true},   {6000.0, 0.56, "", false},
+               {12001.0, 1.0, "and hold 12001 mL", true}, {11999.0, 1.0, "", false},
+               {99.8, 1.0, "and hold 100 mL", true},      {101.0, 1.0, "a child's", false},
+               {1499.0, 1.0, "a child's", false},         {1501.0, 1.0, "", false}};
+  for (size_t k = 0; k < 2 * sizeof cases / sizeof *cases; ++k) {
+    const supine_lungs_source given = {
+        .name = "x.ply", .axes = SUPINE_AXES_LPS, .units_given = k % 2 == 1};
+    supine_mesh mesh = phantom();
+    double low[3];
+    double high[3];
+    (void)supine_mesh_box(&mesh, low, high);
+    const double x = 250.0 / (high[0] - low[0]);
+    const double z = 250.0 * cases[k / 2].ratio / (high[2] - low[2]);
+    scale(&mesh, x, cases[k / 2].ml / (1e-3 * supine_mesh_volume(&mesh) * x * z), z);
+    outcome out = pass(&mesh, &given);
+    const bool refused = cases[k / 2].refused && k % 2 == 0;
+    assert_int_equal(out.status, refused ? SUPINE_ERROR_MESH : SUPINE_OK);
+    assert_says(refused ? out.error.message : out.findings.text, cases[k / 2].said);
+    if (cases[k / 2].said[0] == '\0') {
+      assert_null(strstr(out.findings.text, "as high as wide"));
+      assert_null(strstr(out.findings.text, "the lungs hold"));
+    }
+    supine_lungs_free(&out.lungs);
+    supine_mesh_free(&mesh);
+  }
+}
+
+TEST(test_gate_lifted_vertex_refused_at_its_place) {
+  static const char *const ends[6] = {"right", "left", "front", "back", "feet", "head"};
+  for (size_t end = 0; end < 6; ++end) {
+    char place[64];
+    supine_mesh mesh = phantom();
+    double *p = mesh.vertices + 3 * (mesh.vertex_count / 3);
+    p[end / 2] += end % 2 == 0 ? -500.0 : 500.0;
+    (void)snprintf(place, sizeof place, "up to %.0f,%.0f,%.0f mm", p[0], p[1], p[2]);
+    outcome out = pass(&mesh, NULL);
+    assert_int_equal(out.status, SUPINE_ERROR_MESH);
+    assert_says(out.error.message, ends[end]);
+    assert_says(out.error.message, place);
+    supine_mesh_free(&mesh);
+  }
+}
+
+TEST(test_gate_lungs_that_overlap_and_inner_surface_refused) {
+  supine_mesh mesh = phantom();
+  const size_t half = mesh.vertex_count / 2;
+  double gap[2] = {INFINITY, -INFINITY};
+  for (size_t i = 0; i < mesh.vertex_count; ++i) {
+    gap[0] = i < half ? fmin(gap[0], mesh.vertices[3 * i]) : gap[0];
+    gap[1] = i < half ? gap[1] : fmax(gap[1], mesh.vertices[3 * i]);
+  }
+  for (size_t i = half; i < mesh.vertex_count; ++i) {
+    mesh.vertices[3 * i] += gap[0] - gap[1] + 30.0;
+  }
+  outcome out = pass(&mesh, NULL);
+  assert_int_equal(out.status, SUPINE_ERROR_MESH);
+  assert_says(out.error.message, "mm into another one, at ");
+  supine_mesh_free(&mesh);
+  mesh = phantom();
+  double at[4][3]; /* a tetrahedron of 85 mL around the left lung's centre */
+  double centre[3] = {0.0, 0.0, 0.0};
+  for (size_t i = 0; i < 3 * half; ++i) {
+    centre[i % 3] += mesh.vertices[i] / (double)half;
+  }
+  for (int k = 0; k < 12; ++k) {
+    at[k / 3][k % 3] = centre[k % 3] - 20.0 + (k / 3 == k % 3 + 1 ? 80.0 : 0.0);
+  }
+  append(&mesh, 4, at[0], 4, tetrahedron[0], true);
+  out = pass(&mesh, NULL);
+  assert_int_equal(out.status, SUPINE_ERROR_MESH);
+  assert_says(out.error.message, "mm into another one, at ");
+  supine_mesh_free(&mesh);
+}
+
+/* Vertices below the cut are moved up to it, and the vertices around the apex far up. */
+TEST(test_gate_flat_end_and_thin_tip_warned_of) {
+  for (int tube = 0; tube < 2; ++tube) {
+    supine_mesh mesh = phantom();
+    double low[3];
+    double high[3];
+    (void)supine_mesh_box(&mesh, low, high);
+    for (size_t i = 0; i < mesh.vertex_count; ++i) {
+      double *z = &mesh.vertices[3 * i + 2];
+      *z = tube == 0 ? fmax(*z, low[2] + 70.0) : *z > high[2] - 1.5 ? *z + 30.0 : *z;
+    }
+    outcome out = pass(&mesh, NULL);
+    assert_int_equal(out.status, SUPINE_OK);
+    assert_says(out.findings.text, tube == 0 ? "towards the feet are" : "towards the head are");
+    assert_says(out.findings.text, tube == 0 ? "cut off flat there" : "trachea");
+    supine_lungs_free(&out.lungs);
+    supine_mesh_free(&mesh);
+  }
 }

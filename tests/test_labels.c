@@ -5,8 +5,8 @@
 #include "mesh/labels/labels.h"
 #include "mesh/labels/mask.h"
 #include "mesh/labels/shapes.h"
-#include "precompute/inside/surface.h"
 #include "precompute/lungs/phantom.h"
+#include "precompute/lungs/surface.h"
 
 #include "labels_helpers.h"
 #include "sh_helpers.h"
@@ -390,6 +390,22 @@ TEST(test_labels_flipped_header_axes_found_by_anatomy) {
   assert_int_equal(supine_labels_surfaces(&path, 1, &named, out.surface, &out.report, &error),
                    SUPINE_ERROR_MESH);
   assert_says(error.message, "--axes RPS");
+  /* So is one that mirrors front and back, or head and feet, unless the user states its axes. */
+  for (int a = 1; a < 3; ++a) {
+    supine_labels_options stated = {.labels = "lungmask", .axes = SUPINE_AXES_LPS};
+    map = image;
+    map.step[a][a] = -4.0;
+    assert_int_equal(supine_image_write(path, &map, NULL, NULL), SUPINE_OK);
+    assert_int_equal(supine_labels_surfaces(&path, 1, &named, out.surface, &out.report, &error),
+                     SUPINE_ERROR_MESH);
+    assert_says(error.message, "mirrored (labels 2 left; 1 right");
+    assert_says(error.message, a == 1 ? "--axes LAS" : "--axes LPI");
+    made accepted = surfaces_of(&path, 1, &stated);
+    release(&accepted);
+    stated = (supine_labels_options){.labels = NULL}; /* sides by position: nothing is named */
+    accepted = surfaces_of(&path, 1, &stated);
+    release(&accepted);
+  }
   supine_image_free(&image);
 }
 
@@ -403,6 +419,17 @@ TEST(test_labels_lungs_cut_at_the_border_reported) {
   made out = surfaces_of_image(&part, "cut.nrrd", &options);
   assert_true(out.report.lung[0].cut && out.report.lung[1].cut);
   check_closed(&out.surface[0]);
+  release(&out);
+  /* Islands that are dropped do not count, and do not change the surface. */
+  made clean = surfaces_of_image(&image, "whole.nrrd", &options);
+  memset(image.values, 1, layer);
+  out = surfaces_of_image(&image, "bed.nrrd", &options);
+  assert_int_equal(out.report.lung[1].islands, 1);
+  assert_false(out.report.lung[0].cut || out.report.lung[1].cut);
+  assert_int_equal(out.surface[1].vertex_count, clean.surface[1].vertex_count);
+  assert_memory_equal(out.surface[1].vertices, clean.surface[1].vertices,
+                      3 * clean.surface[1].vertex_count * sizeof(double));
+  release(&clean);
   release(&out);
   supine_image_free(&image);
 }
@@ -674,6 +701,27 @@ TEST(test_labels_bad_maps_refused) {
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
   refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "impossible for a lung");
   supine_image_free(&image);
+}
+
+/* A lung of exactly 1 mL and one exactly 1000 mm long are accepted. */
+TEST(test_labels_lungs_of_limit_size_accepted) {
+  static const size_t sizes[2][3] = {{10, 10, 10}, {100, 2, 2}};
+  for (int k = 0; k < 2; ++k) {
+    const double spacing = k == 0 ? 1.0 : 10.0;
+    const supine_labels_options options = {.labels = "left=1", .edge = spacing};
+    supine_image image = {.voxel = SUPINE_VOXEL_U8, .channels = 1};
+    for (int a = 0; a < 3; ++a) {
+      image.size[a] = sizes[k][a] + 2;
+      image.step[a][a] = spacing;
+    }
+    image.values = calloc(voxels(&image), 1);
+    box_set(&image, (const size_t[3]){1, 1, 1},
+            (const size_t[3]){sizes[k][0] + 1, sizes[k][1] + 1, sizes[k][2] + 1}, 1);
+    made out = surfaces_of_image(&image, "limit.nrrd", &options);
+    assert_int_equal(out.report.lung_count, 1);
+    release(&out);
+    supine_image_free(&image);
+  }
 }
 
 TEST(test_labels_impossible_voxels_refused) {

@@ -29,7 +29,8 @@ static const double p999_ratio_most = 1.4;
 
 /* Make a basis of lungs scanned at full inflation. If `soften` > 0, lower tissue is softer. */
 static supine_basis *make_basis(supine_lungs *lungs, double soften, size_t modes) {
-  static const supine_scan full = {true, {.gravity = {0, 1, 0}, .volume = {SUPINE_VOLUME_FULL, 0}}};
+  static const supine_scan full = {.known = true,
+                                   .state = {.gravity = {0, 1, 0}, .volume = {SUPINE_VOLUME_FULL}}};
   const supine_resting resting = supine_reference_resting_default();
   supine_precompute_options options = {
       .model = supine_physics_model(SUPINE_LAW_DEEP), .band = 15, .modes = modes, .held_out = 20};

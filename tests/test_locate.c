@@ -151,6 +151,20 @@ TEST(test_locate_given_volume_kept) {
   assert_true(miss(w, &found, &truth, false) < 0.05);
 }
 
+/* Three points, the fewest that determine a rotation, give the exact one. */
+TEST(test_locate_rotation_from_three_points_exact) {
+  world *w = *state;
+  const supine_state truth = state_of("prone:rest+300");
+  observe(w, &truth, true);
+  w->seen[1] = w->seen[9];
+  w->seen[2] = w->seen[18];
+  const supine_locate_task task = {
+      .inside = w->basis, .count = 3, .observed = w->seen, .state = truth, .rigid = true};
+  supine_location found;
+  assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, NULL), SUPINE_OK);
+  assert_true(miss(w, &found, &truth, true) < 0.05);
+}
+
 TEST(test_locate_wrong_point_reported_and_ignored) {
   world *w = *state;
   const supine_state truth =

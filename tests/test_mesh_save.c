@@ -260,6 +260,38 @@ TEST(test_save_vtp_arrays_and_header_as_documented) {
   assert_int_equal(unlink(path), 0);
 }
 
+/* A strip of triangles with more points than a 16-bit index or a block of 65,536 points holds. */
+TEST(test_save_vtp_more_than_65536_points_loads_same) {
+  enum { POINTS = 70001 };
+  supine_mesh mesh = {.vertex_count = POINTS,
+                      .vertices = malloc(3 * POINTS * sizeof(double)),
+                      .triangle_count = POINTS - 2,
+                      .triangles = malloc(3 * (POINTS - 2) * sizeof(uint32_t))};
+  for (size_t i = 0; i < POINTS; ++i) {
+    const double p[3] = {1e-3 * (double)i, i % 2 == 0 ? 0.0 : 1.0, sin(1e-4 * (double)i)};
+    memcpy(mesh.vertices + 3 * i, p, sizeof p);
+  }
+  for (uint32_t t = 0; t < POINTS - 2; ++t) {
+    const uint32_t corner[3] = {t, t + 1 + t % 2, t + 2 - t % 2};
+    memcpy(mesh.triangles + 3 * (size_t)t, corner, sizeof corner);
+  }
+  char path[256];
+  supine_mesh found = {0};
+  save(sample_path(state, "a.vtp", path), &mesh, NULL);
+  assert_int_equal(supine_mesh_load(path, NULL, &found, NULL, NULL), SUPINE_OK);
+  assert_int_equal(found.vertex_count, POINTS);
+  assert_int_equal(found.triangle_count, POINTS - 2);
+  for (size_t c = 0; c < 3 * mesh.triangle_count; ++c) {
+    for (size_t k = 0; k < 3; ++k) {
+      const double expected = mesh.vertices[3 * (size_t)mesh.triangles[c] + k];
+      assert_true(fabs(found.vertices[3 * (size_t)found.triangles[c] + k] - expected) < 1e-5);
+    }
+  }
+  supine_mesh_free(&found);
+  supine_mesh_free(&mesh);
+  assert_int_equal(unlink(path), 0);
+}
+
 TEST(test_save_vtp_opens_in_vtk) {
   static const char check[] =
       "import sys, vtk\n"

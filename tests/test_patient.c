@@ -315,6 +315,22 @@ static supine_status load_text(const char *text, bool reverse, supine_patient_pa
   return status;
 }
 
+/* An affine map needs points whose RMS distance from a plane is 1 mm at least. */
+TEST(test_map_fit_nearly_flat_points_limit_is_one_millimetre) {
+  enum { N = 16 };
+  for (int below = 0; below < 2; ++below) {
+    double from[3 * N];
+    supine_patient_affinity map;
+    for (int i = 0; i < N; ++i) { /* uncorrelated coordinates, so that the RMS in z is exact */
+      from[3 * i] = i & 1 ? 64.0 : -64.0;
+      from[3 * i + 1] = i & 2 ? 32.0 : -32.0;
+      from[3 * i + 2] = (i & 4 ? 1.0 : -1.0) * (below == 0 ? 1.0 : 1.0 - 1e-9);
+    }
+    assert_int_equal(supine_patient_map_fit(SUPINE_PATIENT_MAP_AFFINE, N, from, from, &map),
+                     below == 0);
+  }
+}
+
 TEST(test_pairs_load_bad_files_message_names_fault) {
   static const struct {
     const char *text, *words;

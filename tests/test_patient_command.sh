@@ -79,8 +79,8 @@ turns forwards s_supine_rest.ply s_supine_full.ply --other supine:full \
   --state prone:rest:s_prone_rest.ply
 turns backwards s_supine_full.ply s_supine_rest.ply --rest supine:full --other supine:rest \
   --state prone:rest:s_prone_rest.ply
-turns points --landmarks full.csv --other supine:full --state prone:rest:prone.CSV
-turns reversed --landmarks empty.csv --rest supine:full --other supine:rest \
+turns points --landmarks full.csv --rest 2884mL --other 6000mL --state prone:rest:prone.CSV
+turns reversed --landmarks empty.csv --rest 6000mL --other 2884mL \
   --state prone:rest:down.csv
 grep -q 'state *supine:full' fit.txt || fail "the states are not stated: $(cat fit.txt)"
 "$supine" info points.safetensors | grep -q 'patient *somebody: deep law.* held-out residual' ||
@@ -124,27 +124,28 @@ grep -q '"explained_percent": null' valid.json || fail "a share is explained whe
 # If a scan that is declared to be at rest holds too much gas, fit gives a warning.
 "$supine" fit s_supine_rest+500.ply q_supine_full.ply --other supine:full -o x.json >out 2>note ||
   fail "fit a fuller rest"
-grep -q 'the volume at rest is 51 % of full inflation' note || fail "no warning: $(cat note)"
+grep -q 'the volume at rest is 56 % of full inflation' note || fail "no warning: $(cat note)"
 
-# If fit knows only absolute volumes, states relative to rest or full inflation are refused.
-"$supine" fit s_supine_rest.ply q_supine_full.ply --rest 2600mL --other 6000mL -o known.json \
-  >fit.txt || fail "fit volumes alone"
-"$supine" precompute s_supine_rest.ply --patient known.json -o known.safetensors >out 2>&1 &&
-  fail "an emptier scan of unknown state"
-grep -q 'or use the fuller scan' out || fail "emptier scan: $(cat out)"
-"$supine" precompute q_supine_full.ply --patient known.json -o known.safetensors >out 2>&1 ||
+# Two absolute volumes are rest and full inflation; a scan is recognised by its volume. The patient's full inflation is
+# kept if the state of the scan is given.
+"$supine" fit s_supine_rest.ply q_supine_full.ply --rest 2884mL --other 6000mL -o known.json >fit.txt 2>note ||
+  fail "fit volumes alone"
+grep -q '2884 mL counts as rest, that of 6000 mL as full inflation' note || fail "volumes alone: $(cat note)"
+"$supine" precompute s_supine_rest.ply --scanned supine:rest --patient known.json -o known.safetensors >out 2>&1 ||
   fail "precompute volumes alone: $(cat out)"
-for volume in rest full; do
-  "$supine" deform known.safetensors --posture prone --volume $volume -o x.ply >out 2>&1 &&
-    fail "$volume is known"
-done
+grep -q 'full inflation 6[0-9]* mL (from rest' out || fail "full inflation is lost: $(cat out)"
+"$supine" fit --landmarks full.csv --rest 2884mL --other 3300mL -o x.json >out 2>&1 &&
+  grep -q 'as a breath above it' out || fail "a breath: $(cat out)"
+"$supine" fit --landmarks full.csv --rest supine:rest --other supine:full -o x.json >out 2>&1 &&
+  fail "landmarks without volumes"
+grep -q 'give both volumes' out || fail "landmarks without volumes: $(cat out)"
 "$supine" validate known.safetensors --state s_supine_rest.ply --json >valid.json ||
   fail "validate volumes alone"
 near "$(surfaces valid.json)" 0 2 || fail "volumes alone: $(surfaces valid.json) mm"
 
 # A third state that is called prone, but has the positions of a supine scan, does not determine the gain
 # (the coefficient of height in the force).
-"$supine" fit --landmarks full.csv --other supine:full --state prone:rest:full.csv -o x.json \
+"$supine" fit --landmarks full.csv --rest 2884mL --other 6000mL --state prone:rest:full.csv -o x.json \
   --json >fit.json 2>&1 || fail "fit a state that did not turn"
 "$supine" fit s_supine_rest.ply s_supine_full.ply --other supine:full \
   --state prone:rest:s_supine_rest.ply --law paper >fit.txt || fail "fit a scan that did not turn"
@@ -204,6 +205,13 @@ near "$(number volume_ml valid.json 3)" 1500 1 || fail "volume $(number volume_m
 near "$(number off_percent valid.json)" 2.5 2.5 || fail "line off by $(number off_percent valid.json)"
 near "$(number nearest_scale valid.json 2)" "$(number scale valid.json 2)" 0.001 ||
   fail "not the nearest scale"
+# At full inflation the predicted scale is 0, but the nearest scale of a surface 300 mL below it is not.
+"$supine" phantom --vertices 1000 -o full.ply >/dev/null && "$supine" precompute full.ply --held-out 20 -o full.safetensors \
+  >/dev/null 2>&1 && "$supine" deform full.safetensors --posture supine --volume full-300 -o below.ply >/dev/null &&
+  "$supine" validate full.safetensors --from supine:rest --state supine:full:below.ply --state supine:rest:full.ply \
+    --json >valid.json || fail "validate at full inflation"
+near "$(number scale valid.json)" 0 0.001 || fail "scale at full inflation: $(number scale valid.json)"
+near "$(number nearest_scale valid.json)" -0.36 0.1 || fail "nearest scale: $(number nearest_scale valid.json)"
 "$supine" validate scanned.safetensors --state supine:rest+400.ply --from supine:rest+900 --json \
   >valid.json || fail "validate from another state"
 near "$(number volume_ml valid.json)" -500 1 || fail "from: $(number volume_ml valid.json)"
@@ -271,7 +279,7 @@ echo '{}' >fit.csv
 refused 2 'not a patient' precompute rest.ply --patient fit.csv -o x.safetensors
 awk -F, 'NR == 1 { print; next } { printf "%s,%s,%s,%s,%s,%s\n", $1+900, $2, $3, $4+900, $5, $6 }' \
   full.csv >far.csv
-"$supine" fit --landmarks far.csv --other supine:full -o far.json >/dev/null || fail "fit far away"
+"$supine" fit --landmarks far.csv --rest 2884mL --other 6000mL -o far.json >/dev/null || fail "fit far away"
 refused 2 'check that it has the same coordinate frame and unit' precompute s.ply --patient far.json -o x.safetensors
 refused 2 'check their frame, unit and patient' validate points.safetensors --to supine:full --landmarks far.csv
 [ ! -e x.safetensors ] || fail "a refused command left a file"

@@ -36,14 +36,14 @@ awk 'BEGIN {
     printf "%.3f,%.3f,%.3f,%.3f,%.3f,%.3f\n", x, y, z, x + side * 6 * X * X, y - 9 * Y, z - 20 * Z
   }
 }' >good.csv
-"$supine" fit --landmarks good.csv -o good.json >/dev/null || fail "fit refuses good landmarks"
+"$supine" fit --landmarks good.csv --rest 2600mL --other 5400mL -o good.json >/dev/null || fail "fit refuses good landmarks"
 # changed NAME AWK: write NAME.csv from good.csv with each row changed by an awk statement.
 changed() {
   awk -F, -v OFS=, "NR == 1 { print; next } { $2; print }" good.csv >"$1.csv"
 }
 changed apart '$4 += 150; $5 += 150; $6 += 150'
 refused 2 'mm apart: give all points in one coordinate frame, or fit the motion between the scans with --translation' --landmarks apart.csv
-"$supine" fit --landmarks apart.csv --translation >/dev/null || fail "fit --translation refuses shifted landmarks"
+"$supine" fit --landmarks apart.csv --translation --rest 2600mL --other 5400mL >/dev/null || fail "fit --translation refuses shifted landmarks"
 changed beyond '$6 += 5000'
 refused 2 'mm apart: give all points in one coordinate frame' --landmarks beyond.csv
 changed centimetres '$4 /= 10; $5 /= 10; $6 /= 10'
@@ -69,9 +69,9 @@ sed '30s/.*/1,2,3,4,5/' good.csv >short.csv
 refused 2 'short.csv:30' --landmarks short.csv
 head -12 good.csv >eleven.csv
 refused 2 'pairs of points: 11, but at least 12 are needed' --landmarks eleven.csv
-refused 2 'pairs of points: 11' --landmarks good.csv --state prone:rest:eleven.csv
+refused 2 'pairs of points: 11' --landmarks good.csv --rest 2600mL --other 5400mL --state prone:rest:eleven.csv
 head -15 good.csv >few.csv
-refused 2 'points: 14, fewer than the 15 unknowns of the paper law' --landmarks few.csv --law paper --rigid
+refused 2 'points: 14, fewer than the 15 unknowns of the paper law' --landmarks few.csv --rest 2600mL --other 5400mL --law paper --rigid
 refused 1 'takes deep or paper' --landmarks good.csv --law quadratic
 head -1 good.csv >none.csv
 refused 2 'no pairs of points' --landmarks none.csv

@@ -507,6 +507,21 @@ static double turned_over_at_run_time(double volume) {
   return worst;
 }
 
+/* Return a copy of the triangles of lungs, repeated until there are more than 50,000, of which
+ * every second one has no area. Only the others are measured in a mesh of this size. */
+static supine_lungs with_more_triangles(const supine_lungs *lungs) {
+  supine_lungs dense = *lungs;
+  const size_t count = lungs->mesh.triangle_count;
+  const size_t times = 26000 / count + 1;
+  dense.mesh.triangle_count = 2 * times * count;
+  dense.mesh.triangles = calloc(3 * dense.mesh.triangle_count, sizeof(uint32_t));
+  for (size_t t = 0; t < times * count; ++t) {
+    memcpy(dense.mesh.triangles + 6 * t, lungs->mesh.triangles + 3 * (t % count),
+           3 * sizeof(uint32_t));
+  }
+  return dense;
+}
+
 /* If lungs empty in one posture only, more triangles are reversed than if the lungs lose the same
  * mean volume in all postures. */
 TEST(test_turned_over_one_posture_emptied_finds_more_reversed) {
@@ -544,6 +559,13 @@ TEST(test_turned_over_one_posture_emptied_finds_more_reversed) {
         SUPINE_OK);
     assert_int_equal(supine_accuracy_turned_over(&lungs, directions, &field, &forms, even, &least),
                      SUPINE_OK);
+    supine_lungs dense = with_more_triangles(&lungs);
+    double sampled = 0.0;
+    assert_int_equal(
+        supine_accuracy_turned_over(&dense, directions, &field, &forms, resting, &sampled),
+        SUPINE_OK);
+    free(dense.mesh.triangles);
+    assert_close(sampled, share, 1e-12);
     assert_true(share > least + 0.02); /* 0.12 to 0.16 of the triangles turn, against 0.08 */
   }
   supine_physics_volume_forms_free(&forms);

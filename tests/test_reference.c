@@ -114,18 +114,19 @@ TEST(test_resting_axes_values_interpolated_by_harmonics) {
 }
 
 TEST(test_resting_options_override_defaults) {
-  static const double left[6] = {0.413, 0.563, 0.418, 0.464, 0.418, 0.481};
-  static const double right[6] = {0.546, 0.435, 0.440, 0.475, 0.440, 0.506};
+  static const double left[6] = {0.462, 0.629, 0.467, 0.519, 0.467, 0.538};
+  static const double right[6] = {0.610, 0.486, 0.492, 0.531, 0.492, 0.566};
   supine_resting resting = supine_reference_resting_default();
   supine_error error = {0};
   assert_memory_equal(resting.share[0], left, sizeof left);
   assert_memory_equal(resting.share[1], right, sizeof right);
   /* Set the volume at rest of both lungs together to 0.5 of full inflation. One factor scales the
-   * default shares of the two lungs. */
+   * default shares of the two lungs, and those of all postures that are not given. */
   assert_int_equal(supine_reference_resting_set(&resting, "HFP", "0.5", &error), SUPINE_OK);
   assert_true(fabs(0.45 * resting.share[0][3] + 0.55 * resting.share[1][3] - 0.5) < 1e-15);
-  assert_true(fabs(resting.share[0][3] / resting.share[1][3] - 0.464 / 0.475) < 1e-15);
-  assert_true(resting.share[0][2] == 0.418 && resting.share[1][2] == 0.440);
+  assert_true(fabs(resting.share[0][3] / resting.share[1][3] - 0.519 / 0.531) < 1e-15);
+  const double factor = 0.5 / (0.45 * 0.519 + 0.55 * 0.531);
+  assert_true(fabs(resting.share[0][5] - 0.538 * factor) < 1e-15);
   assert_int_equal(supine_reference_resting_set(&resting, "left", "0.4/0.52", &error), SUPINE_OK);
   assert_true(resting.share[0][0] == 0.4 && resting.share[1][0] == 0.52);
   assert_int_equal(supine_reference_resting_set(&resting, "pron", "0.5", &error),
@@ -139,10 +140,15 @@ TEST(test_resting_options_override_defaults) {
                      SUPINE_ERROR_ARGUMENT);
     assert_memory_equal(&before, &resting, sizeof before);
   }
+  /* The share in COPD scales all postures, up to 1, and counts as assumed. */
+  resting = supine_reference_resting_default();
+  assert_int_equal(supine_reference_resting_set(&resting, "copd", NULL, &error), SUPINE_OK);
+  assert_true(fabs(resting.share[0][5] - 0.538 * 0.64 / 0.48) < 1e-15);
+  assert_true(resting.spread == 0.11 && !supine_reference_resting_given(&resting));
 }
 
 /* A resting volume in mL is converted to a share of full inflation. The default shares of the other
- * postures are multiplied by the same ratio, given / default volume. */
+ * postures are multiplied by the mean of the ratios, given / default volume. */
 TEST(test_resting_volumes_become_shares) {
   static const int side[2] = {1, -1};
   static const double full[2] = {2500.0, 3100.0};
@@ -153,17 +159,19 @@ TEST(test_resting_volumes_become_shares) {
   assert_int_equal(supine_reference_resting_set(&resting, "supine", "3000mL", &error), SUPINE_OK);
   assert_int_equal(supine_reference_resting_set(&resting, "prone", "0.6/0.6", &error), SUPINE_OK);
   assert_int_equal(supine_reference_resting_settle(&resting, 2, side, full, &error), SUPINE_OK);
-  const double factor = 3000.0 / (2500.0 * 0.418 + 3100.0 * 0.440);
+  const double supine = 3000.0 / (2500.0 * 0.467 + 3100.0 * 0.492);
+  const double prone = 0.6 * 5600.0 / (2500.0 * 0.519 + 3100.0 * 0.531);
   assert_true(fabs(2500.0 * resting.share[0][2] + 3100.0 * resting.share[1][2] - 3000.0) < 1e-9);
   for (size_t axis = 0; axis < 6; ++axis) {
     for (size_t k = 0; k < 2; ++k) {
+      const double factor = axis == 2 ? supine : 0.5 * (supine + prone);
       const double wanted = axis == 3 ? 0.6 : factor * usual.share[k][axis];
       assert_true(fabs(resting.share[k][axis] - wanted) < 1e-12);
     }
   }
   supine_reference_resting_print(&usual, text, sizeof text);
-  assert_string_equal(text, "left=0.413/0.546,right=0.563/0.435,supine=0.418/0.44,"
-                            "prone=0.464/0.475,inverted=0.418/0.44,upright=0.481/0.506");
+  assert_string_equal(text, "left=0.462/0.61,right=0.629/0.486,supine=0.467/0.492,"
+                            "prone=0.519/0.531,inverted=0.467/0.492,upright=0.538/0.566");
   resting = usual;
   assert_int_equal(supine_reference_resting_set(&resting, "supine", "5700mL", &error), SUPINE_OK);
   assert_int_equal(supine_reference_resting_settle(&resting, 2, side, full, &error),
@@ -219,13 +227,13 @@ TEST(test_share_out_any_volume_divided_along_straight_lines) {
                               .side = {1, -1},
                               .full_volume = {2000.0, 3000.0}};
   double ml[2];
-  assert_true(fabs(supine_reference_rest(&r, left_side, ml) - (826.0 + 1638.0)) < 1e-9);
-  supine_reference_share_out(&r, left_side, 826.0 + 1638.0 + 500.0, ml);
-  const double t = 500.0 / (5000.0 - 2464.0);
-  assert_true(fabs(ml[0] - (826.0 + t * (2000.0 - 826.0))) < 1e-9);
-  assert_true(fabs(ml[1] - (1638.0 + t * (3000.0 - 1638.0))) < 1e-9);
-  supine_reference_share_out(&r, left_side, 0.9 * 2464.0, ml);
-  assert_true(fabs(ml[0] - 0.9 * 826.0) < 1e-9 && fabs(ml[1] - 0.9 * 1638.0) < 1e-9);
+  assert_true(fabs(supine_reference_rest(&r, left_side, ml) - (924.0 + 1830.0)) < 1e-9);
+  supine_reference_share_out(&r, left_side, 924.0 + 1830.0 + 500.0, ml);
+  const double t = 500.0 / (5000.0 - 2754.0);
+  assert_true(fabs(ml[0] - (924.0 + t * (2000.0 - 924.0))) < 1e-9);
+  assert_true(fabs(ml[1] - (1830.0 + t * (3000.0 - 1830.0))) < 1e-9);
+  supine_reference_share_out(&r, left_side, 0.9 * 2754.0, ml);
+  assert_true(fabs(ml[0] - 0.9 * 924.0) < 1e-9 && fabs(ml[1] - 0.9 * 1830.0) < 1e-9);
   assert_true(fabs(supine_reference_full(&r, upright, ml) - 1.109 * 5000.0) < 1e-9);
   supine_reference_share_out(&r, upright, 1.109 * 5000.0, ml);
   assert_true(fabs(ml[0] - 1.109 * 2000.0) < 1e-9 && fabs(ml[1] - 1.109 * 3000.0) < 1e-9);
@@ -323,6 +331,24 @@ TEST(test_capacity_height_and_sex_literal) {
   }
 }
 
+/* By the equation of Hall et al. 2021 without the spline of age, the FRC of a man of 1.78 m and 45
+ * years is 3.4989 L; 0.806 L less supine, and 0.86 L of tissue. A scan at rest is not predicted. */
+TEST(test_predict_rest_height_and_sex_literal) {
+  static const supine_person man = {178.0, SUPINE_SEX_MALE};
+  static const supine_person woman = {165.0, SUPINE_SEX_FEMALE};
+  static const supine_person unknown = {178.0, SUPINE_SEX_UNKNOWN};
+  const supine_reference full = {.scan = scan_named("full"), .lung_count = 2, .side = {1, -1}};
+  const supine_reference rest = {.scan = scan_named("supine:rest"), .lung_count = 2};
+  supine_resting resting = supine_reference_resting_default();
+  supine_reference_predict_rest(&full, &unknown, &resting);
+  supine_reference_predict_rest(&rest, &man, &resting);
+  assert_true(resting.ml[2] == 0.0);
+  supine_reference_predict_rest(&full, &man, &resting);
+  assert_true(fabs(resting.ml[2] - 3552.9) < 1.0);
+  supine_reference_predict_rest(&full, &woman, &resting);
+  assert_true(fabs(resting.ml[2] - 2797.6) < 1.0);
+}
+
 /* The given state of a scan is reported as doubtful if full inflation is not of an adult's size, or
  * if the given volume at rest disagrees with the scan. */
 TEST(test_doubt_implausible_volume_names_option) {
@@ -333,6 +359,7 @@ TEST(test_doubt_implausible_volume_names_option) {
     const char *doubts; /* part of the expected warning; NULL if none is expected */
   } known[] = {{"full", 3000.0, 0.0, NULL},
                {"full", 1700.0, 0.0, "--scanned, such as supine:rest"},
+               {"full", 1900.0, 0.0, "962 mL of gas, where 1400 mL"},
                {"supine:rest", 5100.0, 0.0, "--scanned full"},
                {"supine:rest", 3000.0, 2400.0, "but --resting and --scanned say 2400 mL"},
                {"supine:rest", 3000.0, 2600.0, NULL},
@@ -345,6 +372,7 @@ TEST(test_doubt_implausible_volume_names_option) {
     supine_reference reference = {.scan = scan_named(known[i].scanned),
                                   .lung_count = 2,
                                   .side = {1, -1},
+                                  .resting = resting,
                                   .full_volume = {full, full}};
     char text[512];
     if (reference.scan.state.volume.kind == SUPINE_VOLUME_REST) {

@@ -148,9 +148,15 @@ static bool choose_by_presence(const supine_image *image, const labels_tally *ta
 /* Set the left or right side of each label. Set `name` to the labelling convention, such as
  * "lungmask", if one was used. */
 static supine_status choose(const char *path, const supine_image *image, const labels_tally *tally,
-                            const char *wanted, uint8_t *side, const char **name,
+                            const supine_labels_options *options, uint8_t *side, const char **name,
                             supine_error *error) {
+  const char *wanted = options->labels;
   char present[128];
+  if (wanted == NULL && options->left_masks + options->right_masks > 0) {
+    memset(side + 1, LABELS_LEFT, options->left_masks);
+    memset(side + 1 + options->left_masks, LABELS_RIGHT, options->right_masks);
+    return SUPINE_OK;
+  }
   if (wanted == NULL && choose_by_presence(image, tally, side, name)) {
     return SUPINE_OK;
   }
@@ -210,13 +216,13 @@ static supine_status check(const char *path, const supine_image *image, const la
 }
 
 supine_status supine_labels_choose(const char *path, const supine_image *image,
-                                   const labels_tally *tally, const char *wanted, uint8_t *side,
-                                   labels_choice *choice, supine_error *error) {
+                                   const labels_tally *tally, const supine_labels_options *options,
+                                   uint8_t *side, labels_choice *choice, supine_error *error) {
   char *taken = choice->taken;
   const char *name = NULL;
   char list[3][96];
   memset(side, 0, LABELS_MAX);
-  supine_status status = choose(path, image, tally, wanted, side, &name, error);
+  supine_status status = choose(path, image, tally, options, side, &name, error);
   status = status == SUPINE_OK ? check(path, image, tally, side, &choice->doubted, error) : status;
   if (status != SUPINE_OK) {
     return status;
@@ -224,6 +230,7 @@ supine_status supine_labels_choose(const char *path, const supine_image *image,
   for (int value = LABELS_LEFT; value <= LABELS_EITHER; ++value) {
     list_labels(tally, side, (uint8_t)value, list[value - 1], sizeof list[0]);
   }
+  choice->named = list[2][0] == '\0' && (name == NULL || strcmp(name, "their sides") != 0);
   taken[0] = '\0';
   if (list[2][0] != '\0') {
     supine_text_add(taken, 256, "%s both lungs", list[2]);

@@ -23,7 +23,7 @@ typedef struct work {
   double edge;
   supine_image image; /* the label map; freed when the lungs have been copied to `both` */
   labels_mask both;
-  bool doubted; /* whether the left lung does not lie mainly to the left of the right lung */
+  labels_choice choice;
 } work;
 
 static supine_status advance(work *w, double fraction, supine_error *error) {
@@ -166,10 +166,8 @@ static supine_status read_map(work *w, const char *const *paths, size_t count,
   status = status == SUPINE_OK ? advance(w, 0.2, error) : status;
   status = status == SUPINE_OK ? supine_labels_count(w->path, &w->image, tally, error) : status;
   if (status == SUPINE_OK) {
-    labels_choice choice = {.taken = report->taken};
-    status =
-        supine_labels_choose(w->path, &w->image, tally, w->options->labels, side, &choice, error);
-    w->doubted = choice.doubted;
+    w->choice.taken = report->taken;
+    status = supine_labels_choose(w->path, &w->image, tally, w->options, side, &w->choice, error);
   }
   status = status == SUPINE_OK ? advance(w, 0.3, error) : status;
   status = status == SUPINE_OK ? make_mask(w, tally, side, error) : status;
@@ -208,8 +206,9 @@ static void leave_other(const labels_mask *both, uint8_t value, labels_mask *mas
 }
 
 /* Close gaps in a lung if the options say so. Then always keep only its largest connected piece,
- * and fill the cavities in it. */
-static supine_status clean(const work *w, uint8_t value, labels_mask *mask,
+ * and fill the cavities in it. If pieces were dropped, cut the mask to the bounding box of the lung
+ * without them. */
+static supine_status clean(const work *w, uint8_t value, size_t margin, labels_mask *mask,
                            supine_labels_lung *lung) {
   const double ml = supine_labels_voxel_ml(mask);
   size_t voxels = 0;
@@ -227,8 +226,17 @@ static supine_status clean(const work *w, uint8_t value, labels_mask *mask,
     status = supine_labels_keep_one(mask, true, &lung->cavities, &voxels);
     lung->filled = ml * (double)voxels;
   }
+  if (status == SUPINE_OK && lung->islands > 0) {
+    labels_mask kept;
+    status = supine_labels_mask_extract(mask, 1, margin, &kept);
+    for (int a = 0; a < 3; ++a) {
+      kept.from[a] += mask->from[a];
+    }
+    supine_labels_mask_free(mask);
+    *mask = kept;
+  }
   voxels = 0;
-  for (size_t i = 0; i < supine_labels_mask_count(mask); ++i) {
+  for (size_t i = 0; status == SUPINE_OK && i < supine_labels_mask_count(mask); ++i) {
     voxels += mask->at[i];
   }
   lung->mask = ml * (double)voxels;
@@ -247,8 +255,8 @@ static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung,
     return SUPINE_OK;
   }
   lung->side = value == LABELS_LEFT ? 1 : -1;
+  status = status == SUPINE_OK ? clean(w, value, margin, &mask, lung) : status;
   lung->cut = is_cut(w, &mask, margin);
-  status = status == SUPINE_OK ? clean(w, value, &mask, lung) : status;
   double longest = 0.0;
   for (int a = 0; a < 3; ++a) {
     longest = fmax(longest, (double)(mask.size[a] - 2 * margin) * mask.spacing[a]);
@@ -281,21 +289,29 @@ static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung,
                                 w->path, name, w->edge);
 }
 
-/* Report that, in the axes given by the header, the left lung is not on the left. Judge by the
- * shape of the lungs whether the labels or these axes are wrong. */
-static supine_status refuse_sides(const work *w, const supine_mesh *surfaces, supine_error *error) {
-  const supine_labels_report *report = w->report;
-  const supine_mesh_anatomy found = supine_mesh_anatomy_find(surfaces, report->lung_count);
+/* Refuse a header whose axes contradict labels that name the sides of the lungs: the left lung is
+ * not on the left, or the lungs' shape is mirrored otherwise and the user did not give the axes.
+ * Find by the shape whether the labels or the axes are wrong. */
+static supine_status check_sides(const work *w, const supine_mesh *surfaces, supine_error *error) {
+  const bool doubted = w->choice.doubted;
+  const supine_mesh_anatomy found = supine_mesh_anatomy_find(surfaces, w->report->lung_count);
   char letters[4];
-  supine_mesh_axes_letters(supine_mesh_axes_after(report->coordinates, found.axes), letters);
+  supine_mesh_axes_letters(found.axes, letters);
+  const bool mirrored = letters[0] == 'L' && supine_mesh_axes_mirrored(found.axes) &&
+                        w->choice.named && w->options->axes == SUPINE_AXES_AUTO;
+  if (!doubted && !mirrored) {
+    return SUPINE_OK;
+  }
+  supine_mesh_axes_letters(supine_mesh_axes_after(w->report->coordinates, found.axes), letters);
   return supine_error_set(
-      error, SUPINE_ERROR_MESH,
-      "%s: by its header, the left lung does not lie left of the right lung (labels %s). %s%s",
-      w->path, report->taken,
+      error, SUPINE_ERROR_MESH, "%s: by its header, %s (labels %s). %s%s%s", w->path,
+      doubted ? "the left lung does not lie left of the right lung" : "the lungs are mirrored",
+      w->report->taken,
       found.axes == SUPINE_AXES_LPS
           ? "Exchange the labels, --labels left=...,right=..., or correct the axes with --axes"
           : "The lungs' shape fits other axes: if the labels are correct, add --axes ",
-      found.axes == SUPINE_AXES_LPS ? "" : letters);
+      found.axes == SUPINE_AXES_LPS ? "" : letters,
+      doubted ? "" : "; if the header is correct, add --axes with its axes");
 }
 
 supine_status supine_labels_surfaces(const char *const *paths, size_t count,
@@ -322,9 +338,8 @@ supine_status supine_labels_surfaces(const char *const *paths, size_t count,
   }
   supine_image_free(&w.image);
   supine_labels_mask_free(&w.both);
-  if (status == SUPINE_OK && w.doubted) {
-    status = refuse_sides(&w, surfaces, error);
-  }
+  status =
+      status == SUPINE_OK && report->lung_count == 2 ? check_sides(&w, surfaces, error) : status;
   status = status == SUPINE_OK ? advance(&w, 1.0, error) : status;
   if (status == SUPINE_OK) {
     return status;

@@ -18,6 +18,9 @@ typedef struct supine_labels_options {
    * - "lungmask", "lobes", "totalsegmentator" or "totalsegmentator-v1": labels of that segmenter
    * - a list such as "left=10+11,right=12+13+14", for one or both sides */
   const char *labels;
+  /** If `labels` is NULL, and one is not 0: the first `left_masks` files are masks of parts of the
+   * left lung, and the next `right_masks` files of the right lung. */
+  size_t left_masks, right_masks;
   supine_axes axes; /**< axes of the header's coordinates; AUTO: as the header states */
   double edge;      /**< approximate distance between vertices, mm; 0 means SUPINE_LABELS_EDGE */
   double close; /**< gaps in a lung are closed if not wider than twice this, mm; 0 closes none */
@@ -67,7 +70,8 @@ typedef struct supine_labels_report {
  * @param surfaces  [2] zero-initialised; surface i is that of report->lung[i] and faces outwards
  * @retval SUPINE_ERROR_ARGUMENT  `edge`, `close` or `labels` is invalid
  * @retval SUPINE_ERROR_MESH      a lung has no voxels, or is too small or too large; it is unclear
- *             which labels are lungs; or the left lung does not lie left of the right lung
+ *             which labels are lungs; the left lung does not lie left of the right lung; or labels
+ *             name the sides, the header's axes were not given, and the lungs' shape is mirrored
  * @retval SUPINE_ERROR_FORMAT    a voxel is not a whole number from 0 to 65535, or images differ in
  *             size or position
  * @retval SUPINE_ERROR_INTERRUPTED, SUPINE_ERROR_MEMORY, and the statuses of supine_image_read

@@ -55,15 +55,16 @@ supine_status supine_labels_count(const char *path, const supine_image *image, l
                                   supine_error *error);
 
 typedef struct labels_choice {
-  char *taken;  /**< [256] output: labels of each side, such as "2 left; 1 right" */
+  char *taken; /**< [256] output: labels of each side, such as "2 left; 1 right" */
+  bool named;  /**< output: whether the labels, not the position, tell which lung is the left one */
   bool doubted; /**< whether the left lung does not lie mainly to the left of the right lung */
 } labels_choice;
 
-/** Choose the side of each label. `wanted` is the field `labels` of supine_labels_options.
+/** Choose the side of each label.
  * @param side     [LABELS_MAX] output: 0 (no lung), LABELS_LEFT, LABELS_RIGHT or LABELS_EITHER */
 supine_status supine_labels_choose(const char *path, const supine_image *image,
-                                   const labels_tally *tally, const char *wanted, uint8_t *side,
-                                   labels_choice *choice, supine_error *error);
+                                   const labels_tally *tally, const supine_labels_options *options,
+                                   uint8_t *side, labels_choice *choice, supine_error *error);
 
 /** Copy the box of voxels from voxel `low` to voxel `high` of an image that supine_labels_count has
  * checked, with a margin of `margin` zeros around it. On SUPINE_ERROR_MEMORY, mask->at is NULL.

@@ -13,6 +13,7 @@
 #define SUPINE_FIELDS_H
 
 #include "precompute/lungs/lungs.h"
+#include "precompute/physics/reference.h"
 #include "precompute/projection/accuracy.h"
 
 /** Displacements of all vertices for several directions of gravity, made by another simulator. */
@@ -23,19 +24,22 @@ typedef struct supine_fields {
   double *displacement; /**< [direction_count, vertex_count, 3] displacement of each vertex, mm */
 } supine_fields;
 
-/** Read displacement fields from a safetensors file with two tensors, F32 or F64. The tensor
- * gravity [M, 3] holds M directions of gravity. The tensor displacement [M, N, 3] holds the
- * displacements of the N vertices of `lungs` for each direction.
- * @param lungs    the reference surface
- * @param options  axes and unit of the displacements
- * @param fields   release with supine_fields_free
+/** Read displacement fields from a safetensors file with three tensors, F32 or F64: points [P, 3],
+ * the positions of P points; gravity [M, 3], M directions of gravity; and displacement [M, P, 3],
+ * the displacement of each point for each direction. All are in the same axes and unit. Each vertex
+ * of `lungs` takes the displacement of the point at its position, within 1e-4 of the diagonal of
+ * the bounding box. Other points, such as inner nodes of a volume mesh, are left out.
+ * @param lungs   the reference surface
+ * @param frame   axes and unit of the file, which are those of the files of the lungs; a frame of
+ *   zeros stands for LPS and mm
+ * @param fields  release with supine_fields_free
  * @retval SUPINE_ERROR_READ    the file is missing
- * @retval SUPINE_ERROR_FORMAT  malformed; a direction that is zero, repeated or not finite, or a
- *   displacement that is not finite
- * @retval SUPINE_ERROR_MESH    the number of vertices differs from that of the lungs
+ * @retval SUPINE_ERROR_FORMAT  malformed, or without points; a direction that is zero, repeated or
+ *   not finite; a point or a displacement that is not finite
+ * @retval SUPINE_ERROR_MESH    a vertex without a point of its own; two points at one vertex
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_fields_load(const char *path, const supine_lungs *lungs,
-                                 const supine_mesh_load_options *options, supine_fields *fields,
+                                 const supine_scan_frame *frame, supine_fields *fields,
                                  supine_error *error);
 void supine_fields_free(supine_fields *fields);
 
@@ -45,7 +49,7 @@ typedef struct supine_fit_report {
   size_t band_highest; /**< highest degree that the directions of gravity determine */
   size_t band;         /**< highest degree of the harmonics in the chosen fit */
   double condition;    /**< condition number of the matrix of harmonics */
-  size_t mode_count; /**< number of modes in the basis file; set only by supine_precompute_fields */
+  size_t mode_count;   /**< number of modes, or of harmonics instead of modes */
   /** [l] relative RMS leave-one-out error with harmonics to degree l. */
   double error[SUPINE_FIT_BAND_MAX + 1];
   supine_accuracy accuracy; /**< leave-one-out errors of the chosen fit; its member `volume` is 0 */
@@ -53,9 +57,16 @@ typedef struct supine_fit_report {
 
 typedef struct supine_fit_options {
   int band; /**< highest degree of the harmonics; if negative, chosen by the leave-one-out error */
-  size_t modes;         /**< largest number of modes; 0 uses the harmonics instead of modes */
-  const char *findings; /**< notes on the surface for the metadata, one per line, or NULL */
-  const char *made_by;  /**< command line that makes the basis, for the metadata, or NULL */
+  size_t modes; /**< largest number of modes; 0 uses the harmonics instead of modes */
+  /** Whether to leave out modes that raise the leave-one-out error by less than 1 % together. */
+  bool fewest_modes;
+  /** [3] gravity in the scan, which is then not displaced in its own posture; NULL if the reference
+   * surface is not displaced by gravity */
+  const double *scan_gravity;
+  supine_scan_frame frame; /**< axes and unit of the files, for the metadata */
+  const char *assumed;     /**< assumptions about the surface, for the metadata, or NULL */
+  const char *findings;    /**< notes on the surface for the metadata, one per line, or NULL */
+  const char *made_by;     /**< command line that makes the basis, for the metadata, or NULL */
 } supine_fit_options;
 
 /** Fit harmonics to the fields, compress the fit, and measure its leave-one-out error.
@@ -67,5 +78,12 @@ typedef struct supine_fit_options {
 supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_options *options,
                                 supine_compression *compression, supine_fit_report *report,
                                 supine_error *error);
+
+/** Fit the fields (supine_fields_fit), and write a basis file. Gain 1 (the factor on the
+ * displacement) reproduces the given displacements.
+ * @retval SUPINE_ERROR_WRITE, and those of supine_fields_fit */
+supine_status supine_fields_write(const supine_lungs *lungs, const supine_fields *fields,
+                                  const supine_fit_options *options, const char *path,
+                                  supine_fit_report *report, supine_error *error);
 
 #endif

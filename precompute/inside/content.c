@@ -139,6 +139,39 @@ supine_status supine_inside_content_make_rigid(supine_inside_content *content, c
   }
 }
 
+/* Compare two names, each of which ends at a newline or at the end of the text. */
+static int compare_names(const void *first, const void *second) {
+  const char *a = *(const char *const *)first;
+  const char *b = *(const char *const *)second;
+  const size_t length[2] = {strcspn(a, "\n"), strcspn(b, "\n")};
+  const int order = memcmp(a, b, length[0] < length[1] ? length[0] : length[1]);
+  return order != 0 ? order : (length[0] > length[1]) - (length[0] < length[1]);
+}
+
+supine_status supine_inside_content_check_names(const supine_inside_content *content,
+                                                supine_error *error) {
+  const char **names = malloc((content->part_count + 1) * sizeof *names);
+  supine_status status = SUPINE_OK;
+  if (names == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu names",
+                            content->part_count);
+  }
+  const char *name = content->names;
+  for (size_t i = 0; i < content->part_count; ++i, name += strcspn(name, "\n") + 1) {
+    names[i] = name;
+  }
+  qsort(names, content->part_count, sizeof *names, compare_names);
+  for (size_t i = 1; i < content->part_count && status == SUPINE_OK; ++i) {
+    if (compare_names(&names[i - 1], &names[i]) == 0) {
+      status = supine_error_set(error, SUPINE_ERROR_FORMAT,
+                                "two parts are named '%.*s': give each a name of its own",
+                                (int)strcspn(names[i], "\n"), names[i]);
+    }
+  }
+  free(names);
+  return status;
+}
+
 void supine_inside_content_free(supine_inside_content *content) {
   free(content->rigid);
   free(content->points);

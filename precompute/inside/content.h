@@ -57,6 +57,12 @@ supine_status supine_inside_content_grid(const supine_inside_shells *shells,
                                          const supine_image *like, double spacing, double margin,
                                          supine_inside_content *content, supine_error *error);
 
+/** Check that every part has a name of its own.
+ * @retval SUPINE_ERROR_FORMAT  two parts have the same name
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_inside_content_check_names(const supine_inside_content *content,
+                                                supine_error *error);
+
 void supine_inside_content_free(supine_inside_content *content);
 
 #endif

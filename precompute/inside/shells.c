@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Extract the surface of each lung from a basis, and find the lung that contains a point. */
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/vec3.h"
 
@@ -154,4 +156,51 @@ size_t supine_inside_shells_find(const supine_inside_shells *shells, const doubl
   }
   walk->lung = best;
   return best;
+}
+
+/* Count the points inside the lungs, every `step` of them, once converted. */
+static size_t count_inside(const supine_inside_shells *shells, const double *points, size_t count,
+                           size_t step, supine_axes axes, double scale) {
+  size_t inside = 0;
+  for (size_t i = 0; i < count; i += step) {
+    supine_inside_walk walk = {0};
+    double point[3];
+    memcpy(point, points + 3 * i, sizeof point);
+    supine_mesh_axes_apply(axes, scale, point);
+    const size_t lung = supine_inside_shells_find(shells, point, INFINITY, &walk);
+    inside += walk.place[lung].depth >= 0.0 ? 1 : 0;
+  }
+  return inside;
+}
+
+void supine_inside_shells_reading(const supine_inside_shells *shells,
+                                  const supine_mesh_load_options *load, const double *points,
+                                  size_t count, supine_inside_reading *reading) {
+  enum { MOST = 999 };
+  static const char *const units[] = {"mm", "cm", "m"};
+  static const char *const frames[] = {"LPS", "RAS", "RPS", "LAS", "LPI"};
+  const double unit = load->millimetres_per_unit > 0.0 ? load->millimetres_per_unit : 1.0;
+  const size_t step = (count + MOST - 1) / MOST;
+  *reading = (supine_inside_reading){.tested = (count + step - 1) / step};
+  reading->as_read = count_inside(shells, points, count, step, SUPINE_AXES_LPS, 1.0);
+  reading->inside = reading->as_read;
+  for (size_t i = 0; i < 15 && 10 * reading->as_read < 9 * reading->tested; ++i) {
+    double millimetres = 1.0;
+    supine_axes axes;
+    char letters[4];
+    (void)supine_mesh_unit_find(units[i / 5], &millimetres);
+    (void)supine_mesh_axes_parse(frames[i % 5], &axes);
+    const size_t inside = count_inside(shells, points, count, step, axes, millimetres / unit);
+    if (inside > reading->inside &&
+        3 * (reading->tested - inside) < reading->tested - reading->as_read) {
+      reading->inside = inside;
+      reading->other_units = millimetres != unit;
+      supine_mesh_axes_letters(supine_mesh_axes_after(load->axes, axes), letters);
+      (void)snprintf(reading->options, sizeof reading->options, "%s%s%s%s%s",
+                     reading->other_units ? "--units " : "",
+                     reading->other_units ? units[i / 5] : "",
+                     reading->other_units && i % 5 > 0 ? " " : "", i % 5 > 0 ? "--axes " : "",
+                     i % 5 > 0 ? letters : "");
+    }
+  }
 }

@@ -7,7 +7,8 @@
 
 #include <supine/runtime.h>
 
-#include "precompute/inside/surface.h"
+#include "mesh/mesh.h"
+#include "precompute/lungs/surface.h"
 
 typedef struct supine_inside_shell {
   size_t begin; /**< index of the lung's first vertex in the basis */
@@ -55,5 +56,21 @@ typedef struct supine_inside_walk {
  *              the result of an earlier point on the same side of the surface (INFINITY: never) */
 size_t supine_inside_shells_find(const supine_inside_shells *shells, const double point[3],
                                  double far, supine_inside_walk *walk);
+
+/** Numbers of points inside the lungs, as read and in other units and axes. */
+typedef struct supine_inside_reading {
+  size_t tested, as_read; /**< points tested (at most 999, evenly chosen), and those inside */
+  size_t inside;          /**< largest number inside among all readings */
+  bool other_units;       /**< whether that reading is in other units */
+  char options[40];       /**< options for it, such as "--units cm"; "" if reading the points as
+                             they were leaves at most three times as many outside */
+} supine_inside_reading;
+
+/** Compare the axes and units in which points were read with others: mm, cm and m; RAS, and the
+ * frames that mirror one axis. A patient's points lie inside the lungs in the right one.
+ * @param load  axes and units in which the points were read */
+void supine_inside_shells_reading(const supine_inside_shells *shells,
+                                  const supine_mesh_load_options *load, const double *points,
+                                  size_t count, supine_inside_reading *reading);
 
 #endif

@@ -1,15 +1,35 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Check and repair surfaces, and join them into lungs. */
 #include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "base/vec3.h"
 
 #include "mesh/anatomy.h"
 #include "mesh/repair.h"
 #include "precompute/lungs/gate.h"
+#include "precompute/lungs/surface.h"
 
 /* Connected components with less than this share of the volume of a surface are dropped. */
 static const double speck_share = 0.01;
+/* Depth to which a surface may reach into another one, mm. */
+static const double most_overlap = 5.0;
+/* Number of vertices, about, whose depth in another surface is computed. */
+enum { SAMPLES = 2000 };
+/* Share of a lung's volume that forms its tip in a direction. */
+static const double tip_share = 0.003;
+/* Least and largest length of a tip, in cube roots of the lung's volume. In 32 surfaces of lungs of
+ * nine people and in two synthetic lungs, tips were 0.05 to 0.10 long at the head, 0.06 to 0.17 at
+ * the feet, and 0.02 to 0.15 elsewhere. A tip longer than `longest_tip` is refused. */
+static const struct {
+  const char *name;
+  double least, most;
+} tips[6] = {{"right", 0.0, 0.25}, {"left", 0.0, 0.25},  {"front", 0.0, 0.25},
+             {"back", 0.0, 0.25},  {"feet", 0.03, 0.25}, {"head", 0.03, 0.135}};
+static const double longest_tip = 0.5;
 
 static const char *plural(size_t count) {
   return count == 1 ? "" : "s";
@@ -58,41 +78,143 @@ static supine_status mend(supine_mesh *mesh, const char *name, supine_findings *
   return SUPINE_OK;
 }
 
-static supine_status check_closed(const supine_lungs *lungs, const char *name,
-                                  supine_error *error) {
-  const supine_topology *t = &lungs->topology;
-  return t->closed
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
-                                "%s: the surface is open (edges: %zu boundary, %zu non-manifold, "
-                                "%zu inconsistent) and encloses no volume: close its holes in a "
-                                "mesh editor, or give the label map that it was made from",
-                                name, t->boundary_edges, t->non_manifold_edges,
-                                t->inconsistent_edges);
+/* The checks of one input. After one has failed, the others are left out. */
+typedef struct checks {
+  const supine_lungs_source *source;
+  supine_findings *findings;
+  supine_error *error;
+  supine_status status;
+} checks;
+
+/* Unless a condition holds, refuse the input with a status, or only warn if it is SUPINE_OK. */
+SUPINE_PRINTF(4, 5)
+static void check(checks *c, bool holds, supine_status refuse, const char *format, ...) {
+  char text[512];
+  va_list arguments;
+  if (holds || c->status != SUPINE_OK) {
+    return;
+  }
+  va_start(arguments, format);
+  (void)vsnprintf(text, sizeof text, format, arguments);
+  va_end(arguments);
+  if (refuse != SUPINE_OK) {
+    c->status = supine_error_set(c->error, refuse, "%s: %s", c->source->name, text);
+  } else {
+    supine_findings_add(c->findings, "%s: warning: %s", c->source->name, text);
+  }
 }
 
-/* Refuse lungs of an impossible size; only warn if the user gave the axes or units. */
-static supine_status check_size(const supine_lungs *lungs, const supine_lungs_source *source,
-                                supine_findings *findings, supine_error *error) {
-  const char *unit = NULL;
-  double side = 0.0;
-  for (int k = 0; k < 3; ++k) {
-    side = fmax(side, lungs->maximum[k] - lungs->minimum[k]);
+static const char to_accept[] = ". To use this size all the same, add --units mm";
+
+/* Check the length, proportions and volume of the lungs. */
+static void check_size(checks *c, const supine_lungs *lungs, bool likely) {
+  const supine_status refuse = c->source->units_given ? SUPINE_OK : SUPINE_ERROR_MESH;
+  const char *accept = refuse == SUPINE_OK ? "" : to_accept;
+  const double ml = 1e-3 * supine_mesh_volume(&lungs->mesh);
+  const double most = lungs->lung_count == 2 ? 1.0 : 0.6; /* largest share of a pair's volume */
+  const double height = lungs->maximum[2] - lungs->minimum[2];
+  const double ratio = height / (lungs->maximum[0] - lungs->minimum[0]);
+  check(c, lungs->lung_count < 2 || (ratio >= 0.55 && ratio <= 1.8), refuse,
+        "the lungs are %.2f times as high as wide, which is impossible: correct the distance of "
+        "the slices (the voxel spacing) in the header%s",
+        ratio, accept);
+  check(c, likely && ml >= 100.0 * most && ml <= 12000.0 * most, refuse,
+        "the lungs are %.0f mm high and hold %.0f mL, which is impossible: correct the voxel "
+        "spacing in the header, or the unit%s",
+        height, ml, accept);
+  check(c, ml >= 1500.0 * most, SUPINE_OK,
+        "the lungs hold %.0f mL, as a child's may: for an adult, check the voxel spacing", ml);
+}
+
+/* Return the volume of a surface beyond `from` on an axis, on the side of `sign`, mm^3: the
+ * integral of max(0, h) n over the surface, with the height h beyond `from` and the normal n. */
+static double volume_beyond(const supine_mesh *mesh, int axis, double sign, double from) {
+  double sum = 0.0;
+  for (size_t t = 0; t < mesh->triangle_count; ++t) {
+    const double *p[3];
+    double h[3];
+    double normal[3];
+    for (size_t k = 0; k < 3; ++k) {
+      p[k] = mesh->vertices + 3 * (size_t)mesh->triangles[3 * t + k];
+      h[k] = sign * (p[k][axis] - from);
+    }
+    double mean = fmax(0.0, (h[0] + h[1] + h[2]) / 3.0); /* of max(0, h) over the triangle */
+    for (int k = 0; k < 3; ++k) { /* if corner k lies on the other side than the other two */
+      const double a = h[(k + 1) % 3];
+      const double b = h[(k + 2) % 3];
+      if ((h[k] > 0.0 && a <= 0.0 && b <= 0.0) || (h[k] < 0.0 && a >= 0.0 && b >= 0.0)) {
+        const double cut = h[k] * h[k] * h[k] / (3.0 * (h[k] - a) * (h[k] - b));
+        mean = h[k] > 0.0 ? cut : (h[k] + a + b) / 3.0 - cut;
+      }
+    }
+    supine_normal(p[0], p[1], p[2], normal);
+    sum += 0.5 * mean * sign * normal[axis];
   }
-  if (supine_mesh_unit_is_likely(side, &unit)) {
-    return SUPINE_OK;
+  return sum;
+}
+
+/* Check that a lung has no long, thin tip, as of a stray vertex or a trachea, and no flat end. */
+static void check_tips(checks *c, const supine_lungs *lungs, size_t lung) {
+  const supine_mesh part = supine_lungs_part(lungs, lung);
+  const double volume = supine_mesh_volume(&part);
+  for (int tip = 0; tip < 6; ++tip) {
+    const int axis = tip / 2;
+    const double sign = tip % 2 == 0 ? -1.0 : 1.0;
+    const double *end = part.vertices + 3 * (size_t)part.triangles[0];
+    double length = 0.0; /* cube roots of the volume */
+    for (size_t i = 0; i < 3 * part.triangle_count; ++i) {
+      const double *p = part.vertices + 3 * (size_t)part.triangles[i];
+      end = sign * (p[axis] - end[axis]) > 0.0 ? p : end;
+    }
+    while (length < longest_tip &&
+           volume_beyond(&part, axis, sign, end[axis] - sign * length * cbrt(volume)) <
+               tip_share * volume) {
+      length += 0.01;
+    }
+    const bool stray = length >= longest_tip;
+    const bool thin = length > tips[tip].most;
+    check(c, !thin && length >= tips[tip].least, stray ? SUPINE_ERROR_MESH : SUPINE_OK,
+          "the outermost %g %% of the %s lung towards the %s are %s%.0f mm long, up to "
+          "%.0f,%.0f,%.0f mm (LPS): %s",
+          100.0 * tip_share, supine_lungs_name(lungs, lung), tips[tip].name,
+          stray ? "more than " : "", length * cbrt(volume), end[0], end[1], end[2],
+          thin ? "too thin for a lung: remove the stray vertex, trachea or other part there"
+               : "if the lung is cut off flat there, give a scan that shows all of it");
   }
-  if (source->axes_given || source->units_given) {
-    supine_findings_add(
-        findings, "%s: warning: the lungs are %.3g mm long, which is impossible: check --units",
-        source->name, side);
-    return SUPINE_OK;
+}
+
+/* Check that no component of the surface reaches deep into another one. */
+static void check_overlap(checks *c, const supine_lungs *lungs) {
+  const supine_mesh *mesh = &lungs->mesh;
+  const uint32_t *part = lungs->topology.component;
+  const size_t parts = lungs->topology.component_count;
+  uint32_t *corners = malloc(3 * mesh->triangle_count * sizeof *corners);
+  check(c, corners != NULL, SUPINE_ERROR_MEMORY, "no memory for %zu components", parts);
+  for (size_t of = 0; of < parts && parts > 1 && c->status == SUPINE_OK; ++of) {
+    supine_inside_surface *surface = NULL;
+    supine_inside_place deepest = {.depth = 0.0};
+    size_t count = 0;
+    for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {
+      if (part[mesh->triangles[i]] == of) {
+        corners[count++] = mesh->triangles[i];
+      }
+    }
+    c->status =
+        supine_inside_surface_create(mesh->vertices, count / 3, corners, true, &surface, c->error);
+    for (size_t i = 0; i < mesh->vertex_count && c->status == SUPINE_OK;
+         i += mesh->vertex_count / SAMPLES + 1) {
+      const double *p = mesh->vertices + 3 * i;
+      const supine_inside_place place =
+          part[i] == of ? deepest : supine_inside_surface_find(surface, p, NULL);
+      deepest = place.depth > deepest.depth ? place : deepest;
+    }
+    supine_inside_surface_destroy(surface);
+    check(c, deepest.depth <= most_overlap, SUPINE_ERROR_MESH,
+          "one of its surfaces reaches %.0f mm into another one, at %.0f,%.0f,%.0f mm (LPS): give "
+          "both lungs in the axes of one scan, and remove surfaces inside a lung",
+          deepest.depth, deepest.point[0], deepest.point[1], deepest.point[2]);
   }
-  return supine_error_set(error, SUPINE_ERROR_MESH,
-                          "%s: the lungs are %.3g mm long, which is impossible: %s%s. To use this "
-                          "size all the same, add --units mm",
-                          source->name, side, unit != NULL ? "add --units " : "check its units",
-                          unit != NULL ? unit : "");
+  free(corners);
 }
 
 /* Divide the triangles between two lungs along the axis on which the two overlap least. Return the
@@ -133,39 +255,50 @@ static size_t part_lungs(const supine_lungs *lungs, supine_mesh parts[2]) {
   return failed ? 0 : along < 0 ? 1 : 2;
 }
 
-/* Compare the axes with the shape of the lungs. Refuse one component with both lungs. Write whether
- * the shape confirms the axes, and the side of a single lung: +1 left, -1 right, 0 unknown. */
-static supine_status check_shape(const supine_lungs *lungs, const supine_lungs_source *source,
-                                 int *side, bool *axes_hold, supine_findings *findings,
-                                 supine_error *error) {
-  supine_mesh parts[2];
-  const size_t count = part_lungs(lungs, parts);
-  if (count == 0) {
+/* Check the surface's unit, that it is closed, and that its shape fits the axes, its size, and the
+ * tips of lungs. Refuse one component with both lungs. Write whether the shape confirms the axes,
+ * and the side of a single lung: +1 left, -1 right, 0 unknown. */
+static void check_shape(checks *c, const supine_lungs *lungs, int *side, bool *axes_hold) {
+  const supine_topology *t = &lungs->topology;
+  supine_mesh parts[2] = {{0}};
+  supine_mesh_anatomy found = {.axes = SUPINE_AXES_LPS};
+  const char *unit = NULL;
+  const double length = supine_mesh_box(&lungs->mesh, (double[3]){0}, (double[3]){0});
+  const bool likely = supine_mesh_unit_is_likely(length, &unit);
+  const bool given = c->source->units_given;
+  char letters[4];
+  check(c, likely || unit == NULL, given ? SUPINE_OK : SUPINE_ERROR_MESH,
+        "the lungs are %.3g mm long, which is impossible: add --units %s%s", length, unit,
+        given ? "" : to_accept);
+  check(
+      c, t->closed, SUPINE_ERROR_OPEN_SURFACE,
+      "the surface is open (edges: %zu boundary, %zu non-manifold, %zu inconsistent) and encloses "
+      "no volume: close its holes in a mesh editor, or give the label map that it was made from",
+      t->boundary_edges, t->non_manifold_edges, t->inconsistent_edges);
+  if (c->status == SUPINE_OK) {
+    const size_t count = part_lungs(lungs, parts);
+    check(c, count > 0, SUPINE_ERROR_MEMORY, "no memory for the two lungs");
+    found = count > 0 ? supine_mesh_anatomy_find(parts, count) : found;
     free(parts[0].triangles);
     free(parts[1].triangles);
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the two lungs");
   }
-  const supine_mesh_anatomy found = supine_mesh_anatomy_find(parts, count);
-  free(parts[0].triangles);
-  free(parts[1].triangles);
   *side = found.side;
   *axes_hold = found.certain && found.axes == SUPINE_AXES_LPS;
-  if (found.joined && source->midline == NULL) {
-    return supine_error_set(
-        error, SUPINE_ERROR_MESH,
-        "%s: this surface looks like both lungs in one piece: separate them (for a label map by "
-        "--labels one). If it is a single lung, give --midline",
-        source->name);
+  supine_mesh_axes_letters(supine_mesh_axes_after(c->source->axes, found.axes), letters);
+  check(c, found.axes == SUPINE_AXES_LPS, SUPINE_OK,
+        "the axes are doubtful: the shape of the lungs fits %s; if those are the axes, add --axes "
+        "%s%s",
+        letters, letters,
+        supine_mesh_axes_mirrored(found.axes)
+            ? ". A scan pitched by more than 25 degrees has such a shape, too: turn it upright"
+            : "");
+  for (size_t lung = 0; lung < lungs->lung_count && c->status == SUPINE_OK; ++lung) {
+    check_tips(c, lungs, lung);
   }
-  if (found.axes != SUPINE_AXES_LPS) {
-    char letters[4];
-    supine_mesh_axes_letters(supine_mesh_axes_after(source->axes, found.axes), letters);
-    supine_findings_add(findings,
-                        "%s: warning: the axes are doubtful: the shape of the lungs fits %s; if "
-                        "those are the axes, add --axes %s",
-                        source->name, letters, letters);
-  }
-  return SUPINE_OK;
+  check(c, !found.joined || c->source->midline != NULL, SUPINE_ERROR_MESH,
+        "this surface looks like both lungs in one piece: separate them (for a label map by "
+        "--labels one). If it is a single lung, give --midline");
+  check_size(c, lungs, likely);
 }
 
 /* Choose the side of a single lung by its shape or, if that is unclear, by its position. */
@@ -217,10 +350,10 @@ supine_status supine_lungs_gate(supine_mesh *meshes, size_t count,
   if (status != SUPINE_OK) {
     return status;
   }
-  status = check_size(lungs, source, findings, error);
-  status = status == SUPINE_OK ? check_closed(lungs, source->name, error) : status;
-  status =
-      status == SUPINE_OK ? check_shape(lungs, source, &side, axes_hold, findings, error) : status;
+  checks c = {source, findings, error, SUPINE_OK};
+  check_shape(&c, lungs, &side, axes_hold);
+  check_overlap(&c, lungs);
+  status = c.status;
   if (status == SUPINE_OK && lungs->lung_count == 1 && source->midline == NULL) {
     status = take_side(meshes, count, source, side, lungs, findings, error);
   }

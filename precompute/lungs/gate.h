@@ -12,7 +12,6 @@
 typedef struct supine_lungs_source {
   const char *name; /**< name of the first file, for messages */
   supine_axes axes; /**< axes of all files; SUPINE_AXES_AUTO if files differ in their axes */
-  bool axes_given;
   bool units_given;
   const double *midline; /**< x of the midline, mm; NULL to find it from the lungs */
 } supine_lungs_source;
@@ -21,14 +20,17 @@ typedef struct supine_lungs_source {
  *
  * - Surfaces are repaired by supine_mesh_repair. Connected components with less than 1 % of
  *   the volume of their surface are dropped.
- * - The longest side of the bounding box must be plausible for lungs. If the user gave the axes or
- *   units, an implausible size is only a warning.
+ * - The longest side of the bounding box, its height, and the volume must be possible for lungs. If
+ *   the user gave the units, an impossible size is only a warning.
+ * - No component may reach deep into another. A tip of a lung with little volume is a warning, and
+ *   refused if it is very long. A flat end towards the head or the feet is a warning.
  * - Axes that the shape contradicts (supine_mesh_anatomy_find) are a warning.
  * - The side of a single lung follows from its shape or, if that is unclear, from its position.
  * @param meshes     [count] changed in place
  * @param axes_hold  output: whether the shape fits the axes LPS clearly better than all other axes
  * @param findings   notes and warnings are added
- * @retval SUPINE_ERROR_MESH  a size impossible for lungs, or one component with both lungs
+ * @retval SUPINE_ERROR_MESH  a size or tip impossible for lungs, one component with both lungs, or
+ *   components that overlap
  * @retval SUPINE_ERROR_OPEN_SURFACE  a surface that is not closed
  * @retval the statuses of supine_lungs_create */
 supine_status supine_lungs_gate(supine_mesh *meshes, size_t count,

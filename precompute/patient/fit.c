@@ -186,7 +186,8 @@ static supine_status hold_all_out(study *s, squares *held_out, supine_error *err
     const squares *item_sums = &s->held_out[item];
     if (s->failed[item] != SUPINE_OK) {
       return supine_error_set(error, s->failed[item],
-                              "fitting without the held-out blocks failed: %s",
+                              "the points outside some blocks of 40 mm do not determine the law "
+                              "(%s): give more points, spread over both lungs",
                               supine_status_string(s->failed[item]));
     }
     for (size_t k = 0; k < sizeof *item_sums / sizeof(double); ++k) {

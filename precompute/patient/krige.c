@@ -13,8 +13,9 @@
 
 enum {
   TERMS = SUPINE_PATIENT_TERMS,
-  MOTION = SUPINE_PATIENT_CONSTANTS, /* index of the first unknown of the body's motion */
-  SCALE = TERMS - 1, /* index of the unknown that multiplies the whole displacement law */
+  MOTION =
+      SUPINE_PATIENT_BY_TRANSLATION, /* first unknown of the body's motion; its rotation follows */
+  SCALE = SUPINE_PATIENT_BY_SCALE,
   STEPS = 60
 };
 

@@ -38,10 +38,16 @@ void supine_patient_rows_of_pairs(const supine_patient_frame *frame,
 size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patient_row *rows,
                                  size_t count, unsigned long seed);
 
-/* The unknowns of a fit are, in order: c1, c3, c5; log c2, log c4, log c6; c7, c8, c9 (constants
- * of the displacement law, patient.h); translation [3]; small rotation [3]; and a factor on the
- * whole displacement law. */
-enum { SUPINE_PATIENT_TERMS = 16 };
+/* Index of the first of the unknowns of each kind in a fit (constants c1 to c9: patient.h). */
+enum {
+  SUPINE_PATIENT_BY_SIZE = 0,        /* [3] c1, c3, c5 */
+  SUPINE_PATIENT_BY_EXPONENT = 3,    /* [3] log c2, log c4, log c6 */
+  SUPINE_PATIENT_BY_SLOPE = 6,       /* [3] c7, c8, c9 */
+  SUPINE_PATIENT_BY_TRANSLATION = 9, /* [3] translation of the body */
+  SUPINE_PATIENT_BY_ROTATION = 12,   /* [3] small rotation of the body */
+  SUPINE_PATIENT_BY_SCALE = 15,      /* factor on the whole displacement law */
+  SUPINE_PATIENT_TERMS
+};
 
 /* Predict a measurement by the displacement law and the motion of the body. Return the prediction
  * minus the measured value, mm. Write its derivatives with respect to the constants of the law, the

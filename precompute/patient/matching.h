@@ -3,7 +3,7 @@
 #ifndef SUPINE_PATIENT_MATCHING_H
 #define SUPINE_PATIENT_MATCHING_H
 
-#include "precompute/inside/surface.h"
+#include "precompute/lungs/surface.h"
 #include "precompute/patient/patient_file.h"
 #include "precompute/physics/model.h"
 

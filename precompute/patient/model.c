@@ -266,7 +266,10 @@ supine_status supine_patient_check_place(const supine_patient_record *record,
       off[s] = fmax(off[s], apart);
     }
   }
-  *state = off[1] < off[0] ? 1 : 0;
+  *state =
+      record->volume[0] > 0.0 && record->volume[1] > 0.0 && only_side == frame->only_side
+          ? 1e-3 * supine_mesh_volume(&lungs->mesh) < sqrt(record->volume[0] * record->volume[1])
+          : off[1] < off[0];
   const size_t k = axis[*state];
   return off[*state] <= apart_most[record->from_surface]
              ? SUPINE_OK
@@ -290,9 +293,10 @@ void supine_patient_resting(const supine_patient_record *record, supine_resting 
     const double share = (record->volume[k] - shown->volume.ml) / full;
     if (share > share_least && share < share_most) {
       const double assumed = supine_reference_resting_total(resting, shown->gravity);
+      resting->assumed *= share / assumed;
+      (void)supine_reference_resting_settle(resting, 0, NULL, NULL, NULL);
       for (size_t a = 0; a < 6; ++a) {
-        resting->share[0][a] *= share / assumed;
-        resting->share[1][a] *= share / assumed;
+        resting->given[a] = true;
       }
     }
   }

@@ -135,7 +135,8 @@ supine_status supine_patient_model(const supine_patient_record *record,
                                    size_t state, double *arrays, supine_model *model,
                                    supine_error *error);
 
-/** Find which of the two scanned states a surface shows, by comparing the bounding boxes.
+/** Find which of the two scanned states a surface shows, by its volume or, if the volumes of the
+ * states are unknown, by its bounding box.
  * @param state  written: 0 for the fuller state, 1 for the emptier one
  * @retval SUPINE_ERROR_MESH  the surface is too far from both states, or is the other lung */
 supine_status supine_patient_check_place(const supine_patient_record *record,

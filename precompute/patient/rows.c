@@ -59,30 +59,37 @@ size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patie
   return blocks;
 }
 
+/* Along axis k, a force f displaces by f c_(2k-1) d_k, where d_k is proportional to box_k^c_(2k),
+ * and f is linear in c7, c8 and c9. With e_k = axis_k d_k, the prediction is
+ *
+ *     f sum_k c_(2k-1) e_k + axis . motion */
 double supine_patient_power_design(const supine_patient_power *law, const supine_patient_row *row,
                                    double x[SUPINE_PATIENT_TERMS]) {
-  const double force = supine_patient_force_at(law, &row->place);
-  double along[3]; /* [x, y, z] share in the measurement for force 1 and c1, c3 or c5 of 1 mm */
+  const supine_patient_place *place = &row->place;
+  const double force = supine_patient_force_at(law, place);
+  double e[3];
   double motion[3];
   double turned[3];
-  double unit_force = 0.0; /* displacement along row->axis for a force of 1, mm */
+  double sum = 0.0;
   supine_patient_power unit = *law;
   unit.c[0] = unit.c[2] = unit.c[4] = 1.0;
-  supine_patient_direction(&unit, &row->place, 1.0, along);
-  supine_patient_motion(law, &row->place, motion);
-  supine_cross(row->place.offset, row->axis, turned);
+  supine_patient_direction(&unit, place, 1.0, e);
+  supine_patient_motion(law, place, motion);
+  supine_cross(place->offset, row->axis, turned);
   for (size_t a = 0; a < 3; ++a) {
-    along[a] *= row->axis[a];
-    unit_force += law->c[2 * a] * along[a];
+    e[a] *= row->axis[a];
+    sum += law->c[2 * a] * e[a];
   }
   for (size_t a = 0; a < 3; ++a) {
-    const double box = fmin(1.0, fmax(1e-12, row->place.box[a]));
-    x[a] = force * along[a];
-    x[3 + a] = law->c[2 * a] * x[a] * law->c[2 * a + 1] * log(box);
-    x[6 + a] = unit_force * row->place.force[1 + a];
-    x[9 + a] = row->axis[a];
-    x[12 + a] = turned[a];
+    const double size = law->c[2 * a];
+    const double exponent = law->c[2 * a + 1];
+    const double box = fmin(1.0, fmax(1e-12, place->box[a]));
+    x[SUPINE_PATIENT_BY_SIZE + a] = force * e[a];
+    x[SUPINE_PATIENT_BY_EXPONENT + a] = size * (force * e[a]) * exponent * log(box);
+    x[SUPINE_PATIENT_BY_SLOPE + a] = sum * place->force[1 + a];
+    x[SUPINE_PATIENT_BY_TRANSLATION + a] = row->axis[a];
+    x[SUPINE_PATIENT_BY_ROTATION + a] = turned[a];
   }
-  x[15] = unit_force * force;
-  return x[15] + supine_dot(motion, row->axis) - row->value;
+  x[SUPINE_PATIENT_BY_SCALE] = sum * force;
+  return x[SUPINE_PATIENT_BY_SCALE] + supine_dot(motion, row->axis) - row->value;
 }

@@ -1,25 +1,24 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Estimate the volume at full inflation, and warn of an implausible scan state.
+/* Estimate the volumes at full inflation and at rest, and warn of an implausible scan state.
  *
  * The total lung capacity of adults of height H in m (ECSC: Quanjer et al., Eur Respir J 6 Suppl
  * 16, 1993) is 7.99 H - 7.08 L in men (SD 0.7 L) and 6.60 H - 5.79 L in women (SD 0.6 L). This is
  * the gas volume in upright posture. The code divides it by 1 + SUPINE_FULL_UPRIGHT_GAIN to get the
- * volume in supine posture, and adds 0.86 L of tissue (Denison 1986, Thorax 41:620: 431 mL in each
- * lung, 12 people). The coefficients were checked against an R implementation of the ECSC table
- * (getQuanjerPred, getQuanjerLLN), not against the paper. For usual heights (below), capacities are
- * within 5 % of the medians of Hall et al. at age 40 (Eur Respir J 57: 2000289, 2021). */
+ * volume in supine posture, and adds the tissue. The coefficients were checked against an R
+ * implementation of the ECSC table (getQuanjerPred, getQuanjerLLN), not against the paper. For
+ * usual heights (below), capacities are within 5 % of the medians of Hall et al. at age 40 (Eur
+ * Respir J 57: 2000289, 2021). */
 #include <math.h>
 
 #include "base/text.h"
 #include "precompute/physics/reference.h"
-
-static const double tissue = 860.0; /* volume of the tissue of both lungs, mL */
 
 /* The state given for a scan is doubtful if it implies a volume of both lungs at full inflation
  * below `least_share` of the expected volume, below `least_ml`, or above `most_ml`. */
 static const double least_share = 0.75;
 static const double least_ml = 3500.0;
 static const double most_ml = 10000.0;
+static const double least_gas = 1000.0; /* or below this gas at rest, supine, mL */
 
 /* Largest accepted relative difference between the scan's volume and that given by --resting. */
 static const double agreement = 0.05;
@@ -38,7 +37,7 @@ void supine_reference_capacity(const supine_person *person, double range[2]) {
     for (int end = 0; end < 2; ++end) {
       const double height = person->height > 0.0 ? person->height : of[sex].usual[end];
       const double upright = 1e3 * (of[sex].slope * 1e-2 * height - of[sex].offset);
-      const double full = upright / (1.0 + SUPINE_FULL_UPRIGHT_GAIN) + tissue;
+      const double full = upright / (1.0 + SUPINE_FULL_UPRIGHT_GAIN) + SUPINE_TISSUE_ML;
       range[0] = fmin(range[0], full);
       range[1] = fmax(range[1], full);
     }
@@ -50,6 +49,23 @@ static double part_of_pair(const supine_reference *reference) {
   return reference->lung_count == 2 ? 1.0
          : reference->side[0] > 0   ? SUPINE_LEFT_SHARE
                                     : 1.0 - SUPINE_LEFT_SHARE;
+}
+
+/* The FRC of adults upright (Hall et al. 2021, above; SD 21 % in men, 20 % in women) is
+ * exp(-13.4898 + 0.1111 ln A + 2.7634 ln H) L in men of A years and H cm, exp(-12.7674 + 0.1251 ln
+ * A
+ * + 2.6049 ln H) L in women, times a spline of age that is left out (0.97 in men of 45 years). A is
+ * 45, as the age is unknown: from 25 to 70 years, FRC changes by -7 to +6 %. */
+void supine_reference_predict_rest(const supine_reference *reference, const supine_person *person,
+                                   supine_resting *resting) {
+  static const double of[2][2] = {{-12.2912, 2.6049}, {-13.0669, 2.7634}}; /* [0] women, [1] men */
+  const double *c = of[person->sex == SUPINE_SEX_MALE];
+  if (reference->scan.state.volume.kind == SUPINE_VOLUME_FULL && person->height > 0.0 &&
+      person->sex != SUPINE_SEX_UNKNOWN && !supine_reference_resting_given(resting) &&
+      resting->assumed == SUPINE_REST_SHARE) {
+    resting->ml[2] = part_of_pair(reference) * (1e3 * exp(c[0] + c[1] * log(person->height)) -
+                                                SUPINE_LYING_ML + SUPINE_TISSUE_ML);
+  }
 }
 
 void supine_reference_compare(const supine_reference *reference, const supine_person *person,
@@ -65,10 +81,13 @@ void supine_reference_compare(const supine_reference *reference, const supine_pe
 void supine_reference_doubt(const supine_reference *reference, const supine_person *person,
                             const supine_resting *given, char *text, size_t size) {
   const supine_state *state = &reference->scan.state;
+  const bool at_rest = state->volume.kind == SUPINE_VOLUME_REST;
   const double part = part_of_pair(reference);
   double range[2];
   double full = 0.0;
   double held = 0.0;
+  static const double supine[3] = {0.0, 1.0, 0.0};
+  double rest[2];
   char expected[64] = "";
   text[0] = '\0';
   supine_reference_capacity(person, range);
@@ -77,7 +96,7 @@ void supine_reference_doubt(const supine_reference *reference, const supine_pers
     full += reference->full_volume[lung];
     held += reference->full_volume[lung] + reference->scan_volume[lung];
   }
-  for (size_t axis = 0; axis < 6 && state->volume.kind == SUPINE_VOLUME_REST; ++axis) {
+  for (size_t axis = 0; axis < 6 && at_rest; ++axis) {
     const double along = (axis % 2 == 0 ? 1.0 : -1.0) * state->gravity[axis / 2];
     const double ml = given->ml[axis] + state->volume.ml;
     if (along > 1.0 - 1e-9 && given->ml[axis] > 0.0 && fabs(held - ml) > agreement * ml) {
@@ -88,17 +107,22 @@ void supine_reference_doubt(const supine_reference *reference, const supine_pers
     }
   }
   const char *separator = text[0] == '\0' ? "" : "; ";
-  if (full < part * fmax(least_share * range[0], least_ml)) {
-    supine_text_add(
-        text, size,
-        "%sat full inflation the lungs hold %.0f mL (%s mL): if the scan was not at full "
-        "inflation, give its state with --scanned, such as supine:rest or full-1000",
-        separator, full, expected);
+  const double gas = supine_reference_rest(reference, supine, rest) - part * SUPINE_TISSUE_ML;
+  if (full < part * fmax(least_share * range[0], least_ml) || gas < part * least_gas) {
+    supine_text_add(text, size,
+                    "%sat full inflation the lungs hold %.0f mL (%s mL), at rest %.0f mL of gas, "
+                    "where %.0f mL (SD 600 mL) remain after a full expiration: %s",
+                    separator, full, expected, gas, part * SUPINE_RESIDUAL_ML,
+                    at_rest ? "check the voxel spacing and --resting; if the scan was emptier than "
+                              "rest, say so, as in --scanned supine:rest-300"
+                            : "the scan was probably not at full inflation: give its state with "
+                              "--scanned, such as supine:rest or full-1000");
   } else if (full > part * most_ml) {
     supine_text_add(
-        text, size,
-        "%sat full inflation the lungs hold %.0f mL (%s mL): if the scan was fuller than "
-        "rest, give --scanned full or supine:rest+1000, or change --resting",
-        separator, full, expected);
+        text, size, "%sat full inflation the lungs hold %.0f mL (%s mL): %s", separator, full,
+        expected,
+        at_rest ? "if the scan was fuller than rest, give --scanned full or supine:rest+1000, or "
+                  "change --resting"
+                : "check the voxel spacing or the unit, and that all of the mask is lung");
   }
 }

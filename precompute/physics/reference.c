@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Find the volumes at full inflation from the state of a scan, and inflate the lungs to them. */
+#include <math.h>
 #include <string.h>
 
 #include <supine/volume.h>
@@ -10,7 +11,7 @@ static const double tissue_share = 0.1; /* volume of the tissue as a share of th
 
 supine_status supine_reference_scan_parse(const char *text, supine_scan *scan,
                                           supine_error *error) {
-  supine_scan read = {true, {.gravity = {0.0, 1.0, 0.0}}};
+  supine_scan read = {.known = true, .state = {.gravity = {0.0, 1.0, 0.0}}};
   if (strcmp(text, "none") == 0) {
     *scan = (supine_scan){0};
     return SUPINE_OK;
@@ -114,6 +115,25 @@ static supine_status find_full(supine_reference *found, const double *volume, su
   return SUPINE_OK;
 }
 
+/* Find the share at rest at which full inflation has the known volume found->scan.full, to which it
+ * is inversely proportional (nearly, if the scan was not exactly at rest). */
+static supine_status find_rest(supine_reference *found, const double *volume, supine_error *error) {
+  supine_status status = find_full(found, volume, error);
+  double off = INFINITY;
+  for (int step = 0; step < 30 && status == SUPINE_OK && fabs(off - 1.0) > 1e-9; ++step) {
+    off = (found->full_volume[0] + found->full_volume[1]) / found->scan.full;
+    found->resting.assumed = fmin(1.0, found->resting.assumed * off);
+    (void)supine_reference_resting_settle(&found->resting, 0, NULL, NULL, NULL);
+    status = find_full(found, volume, error);
+  }
+  return status != SUPINE_OK || fabs(off - 1.0) <= 1e-9
+             ? status
+             : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                "a scan of %.0f mL at rest does not belong to lungs of %.0f mL at "
+                                "full inflation: change --full, --scanned or --resting",
+                                volume[0] + volume[1], found->scan.full);
+}
+
 supine_status supine_reference_find(supine_lungs *lungs, const supine_model *model,
                                     const supine_scan *scan, const supine_resting *resting,
                                     supine_reference *reference, supine_error *error) {
@@ -131,7 +151,8 @@ supine_status supine_reference_find(supine_lungs *lungs, const supine_model *mod
     const supine_mesh part = supine_lungs_part(lungs, lung);
     held[lung] = 1e-3 * supine_mesh_volume(&part);
   }
-  supine_status status = find_full(&found, held, error);
+  supine_status status =
+      scan->full > 0.0 ? find_rest(&found, held, error) : find_full(&found, held, error);
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     apart = apart || found.scan_volume[lung] != 0.0;
   }

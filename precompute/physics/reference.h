@@ -30,6 +30,7 @@
 typedef struct supine_scan {
   bool known;         /**< whether the state is known; if not, the scan is the reference surface */
   supine_state state; /**< posture, and rest or full inflation plus or minus a volume in mL */
+  double full;        /**< known volume at full inflation of the scanned lungs, mL; 0 if unknown */
 } supine_scan;
 
 /** Parse a scan's state: "full", "supine:rest", "left:rest+300", "full-2000", or "none". The
@@ -107,6 +108,12 @@ typedef struct supine_person {
  * If the height or the sex is unknown, the range covers the usual heights of adults or both sexes.
  * If both are known, the two values are equal. */
 void supine_reference_capacity(const supine_person *person, double range[2]);
+
+/** Set resting->ml for supine to the volume at rest that height and sex predict, unless these are
+ * unknown, a volume at rest is given or the scan was at rest.
+ * @param reference  `scan`, `lung_count` and `side` are used */
+void supine_reference_predict_rest(const supine_reference *reference, const supine_person *person,
+                                   supine_resting *resting);
 
 /** Append the expected volume at full inflation, mL, to text [size]: "expected 6500", or "an
  * adult's 4566 to 8525" if height or sex is unknown. */

@@ -10,27 +10,27 @@
 
 #include "precompute/physics/resting.h"
 
-/* Volumes at rest of healthy people divided by the volume at full inflation, all with tissue.
- * Rows: left lung, right lung. Columns: lying on the left, on the right, supine, prone, head down,
- * upright. Sources, for both lungs together:
+/* Volumes at rest of healthy people divided by the volume at full inflation supine, both with
+ * tissue. Rows: left lung, right lung. Columns: lying on the left, on the right, supine, prone,
+ * head down, upright. Sources of the supine share of both lungs, 0.48:
  *
- *   supine     0.43 = (3.39 L - 0.806 L + 0.86 L) / (7.21 L + 0.86 L)
- *              3.39, 7.21  functional residual and total lung capacity upright, man of 45 years,
- *                          1.78 m (GLI 2021, Hall et al., Eur Respir J 57)
- *              0.806       decrease of the functional residual capacity from upright to supine
- *                          (SD 0.293; Lumb & Nimmo 1991, Anesth Analg 73:422, 13 people)
- *              0.86        tissue (Denison 1986, Thorax 41:620, 12 people)
- *   prone, on either side   0.47, 0.35 L above supine (Lumb & Nimmo; one figure for all three)
- *   upright    15 % above supine (Yamada 2020, Sci Rep 10, 100 people: 3.2 L seated, 2.7 L supine)
- *   head down  set to the value of supine, because no volume in litres was found. From upright to
- *              horizontal, end-expiratory volume falls nearly to its minimum, as sine of the tilt
- *              ("Effects of body tilting on respiratory mechanics", J Appl Physiol 1956)
+ *   0.473     (3.39 - 0.806 + 0.86 L) / (7.21 L / 1.109 + 0.86 L): FRC and TLC of a man of 45
+ *             years, 1.78 m (GLI: Hall, Eur Respir J 57, 2021); 0.502 from (3.39 + 0.86 L) / 1.15
+ *   0.484     (SD 0.038) FRC 2.7 L and TLC 6.5 L of the same people, supine; not found
+ *   0.40      density at TLC / at FRC, n 10 (MRI: Theilmann, J Magn Reson Imaging 30, 2009)
+ *   0.53-0.60 if scans hold 90 to 80 % of TLC, which skews the spread upwards; TLC by CT was 5.34,
+ *             by plethysmography 6.46 L in COPD, n 59 (PMC3292389)
  *
- * The ratio of the left to the right lung's share is from a table after Svanberg 1957. The only
- * exception is 0.563, the left lung when lying on the right. No source was found for it; it follows
- * from the lower lung's share of a breath in that posture. */
-static const supine_resting usual = {.share = {{0.413, 0.563, 0.418, 0.464, 0.418, 0.481},
-                                               {0.546, 0.435, 0.440, 0.475, 0.440, 0.506}}};
+ * Prone and on either side: FRC + 0.35 L, one figure for all three, n 13 (Lumb & Nimmo 1991).
+ * Upright: + 15 %; lobes at expiration + 5.3 to 14.7 %, n 100 (Yamada, Sci Rep 10, 2020), FRC +
+ * 0.806 L (Lumb & Nimmo). Head down: as supine, because no volume in litres was found. Left to
+ * right lung: a table after Svanberg 1957 (not found), except the left lung when lying on the
+ * right: 0.629 gives the lower lung its share of a breath; that table gives (2.07 + 0.43) / (1.39 +
+ * 0.43) x 0.467 = 0.642. */
+static const supine_resting usual = {.share = {{0.462, 0.629, 0.467, 0.519, 0.467, 0.538},
+                                               {0.610, 0.486, 0.492, 0.531, 0.492, 0.566}},
+                                     .assumed = SUPINE_REST_SHARE,
+                                     .spread = SUPINE_REST_SPREAD};
 
 /* Limits of (volume at rest) / (volume at full inflation). Without gas, this ratio is 0.1. */
 static const double least_share = 0.1;
@@ -44,8 +44,22 @@ static bool is_share(double share) {
   return share > least_share && share <= most_share;
 }
 
+/* Return the volume at rest in a posture, in the unit of `full` [count], volumes at full inflation.
+ */
+static double at_rest(const supine_resting *resting, size_t axis, size_t count, const int *side,
+                      const double *full) {
+  double rest = 0.0;
+  for (size_t lung = 0; lung < count; ++lung) {
+    rest += full[lung] * resting->share[side[lung] < 0][axis];
+  }
+  return rest;
+}
+
+static const int sides[2] = {1, -1};
+static const double parts[2] = {SUPINE_LEFT_SHARE, 1.0 - SUPINE_LEFT_SHARE};
+
 /* Read the volume at rest with gravity along an axis: a share of the full volume of both lungs
- * ("0.43") or of the left and the right lung ("0.42/0.44"), or mL of both lungs ("2600mL"). Return
+ * ("0.48") or of the left and the right lung ("0.47/0.49"), or mL of both lungs ("2600mL"). Return
  * false if the text has another form or is out of range. */
 static bool read_value(supine_resting *resting, size_t axis, const char *text) {
   char *end = NULL;
@@ -54,6 +68,7 @@ static bool read_value(supine_resting *resting, size_t axis, const char *text) {
   if (end == text) {
     return false;
   }
+  resting->given[axis] = true;
   if (strcmp(end, "mL") == 0) {
     resting->ml[axis] = first;
     return first > 0.0 && isfinite(first);
@@ -65,8 +80,7 @@ static bool read_value(supine_resting *resting, size_t axis, const char *text) {
       return false;
     }
   } else {
-    const double both =
-        SUPINE_LEFT_SHARE * usual.share[0][axis] + (1.0 - SUPINE_LEFT_SHARE) * usual.share[1][axis];
+    const double both = at_rest(&usual, axis, 2, sides, parts);
     share[0] *= usual.share[0][axis] / both;
     share[1] *= usual.share[1][axis] / both;
   }
@@ -76,26 +90,34 @@ static bool read_value(supine_resting *resting, size_t axis, const char *text) {
   return *end == '\0' && is_share(first) && is_share(share[0]) && is_share(share[1]);
 }
 
+bool supine_reference_resting_given(const supine_resting *resting) {
+  static const bool none[6] = {false};
+  return memcmp(resting->given, none, sizeof none) != 0;
+}
+
 supine_status supine_reference_resting_set(supine_resting *resting, const char *posture,
                                            const char *value, supine_error *error) {
   double g[3];
   supine_resting set = *resting;
-  if (supine_posture_gravity(posture, g) != SUPINE_OK) {
+  if (strcmp(posture, "copd") == 0) {
+    set.assumed = SUPINE_COPD_SHARE;
+    set.spread = SUPINE_COPD_SPREAD;
+  } else if (supine_posture_gravity(posture, g) != SUPINE_OK) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--resting: '%s' is not a posture; did you mean '%s'?", posture,
+                            "'%s' is not a posture; did you mean '%s'?", posture,
                             supine_posture_nearest(posture));
   }
-  for (size_t k = 0; k < 3; ++k) {
+  for (size_t k = 0; k < 3 && value != NULL; ++k) {
     if (g[k] != 0.0 && !read_value(&set, 2 * k + (g[k] < 0.0), value)) {
       return supine_error_set(
           error, SUPINE_ERROR_ARGUMENT,
-          "--resting %s=%s: give a share of the full volume above %g and at most %g (0.43, or "
-          "0.42/0.44 for the left and the right lung) or a volume of gas and tissue (2600mL)",
+          "%s=%s: give a share of the full volume above %g and at most %g (0.48, or "
+          "0.47/0.49 for the left and the right lung) or a volume of gas and tissue (2600mL)",
           posture, value, least_share, most_share);
     }
   }
   *resting = set;
-  return SUPINE_OK;
+  return supine_reference_resting_settle(resting, 0, NULL, NULL, error);
 }
 
 static const char *const names[] = {"left", "right", "supine", "prone", "inverted", "upright"};
@@ -111,41 +133,42 @@ void supine_reference_resting_print(const supine_resting *resting, char *text, s
 supine_status supine_reference_resting_settle(supine_resting *resting, size_t count,
                                               const int *side, const double *full,
                                               supine_error *error) {
-  double sum = 0.0; /* sum of (given volume) / (default volume) over all postures given in mL */
-  size_t known = 0;
+  const bool relative = full == NULL;
+  double factor[6]; /* [posture] (known volume) / (default volume), or 0 */
+  double sum = 0.0;
+  double known = 0.0;
+  count = relative ? 2 : count;
+  side = relative ? sides : side;
+  full = relative ? parts : full;
   for (size_t axis = 0; axis < 6; ++axis) {
-    double rest = 0.0;
-    for (size_t lung = 0; lung < count; ++lung) {
-      rest += full[lung] * resting->share[side[lung] < 0][axis];
-    }
-    const double factor = resting->ml[axis] / rest;
-    sum += factor;
-    known += resting->ml[axis] > 0.0;
-    for (size_t k = 0; k < 2 && resting->ml[axis] > 0.0; ++k) {
-      resting->share[k][axis] *= factor;
-      if (!is_share(resting->share[k][axis])) {
-        return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                "lungs with a full volume of %.0f mL do not hold %.0f mL at rest "
-                                "in posture %s: change --resting or --scanned",
-                                full[0] + (count > 1 ? full[1] : 0.0), resting->ml[axis],
-                                names[axis]);
-      }
-    }
+    const double rest = resting->ml[axis] > 0.0 ? (relative ? 0.0 : resting->ml[axis])
+                        : resting->given[axis]  ? at_rest(resting, axis, count, side, full)
+                                                : 0.0;
+    factor[axis] = rest / at_rest(&usual, axis, count, side, full);
+    sum += factor[axis];
+    known += factor[axis] > 0.0 ? 1.0 : 0.0;
   }
-  for (size_t axis = 0; axis < 6 && known > 0; ++axis) {
-    for (size_t k = 0; k < 2 && resting->ml[axis] == 0.0; ++k) {
+  const double others = known > 0.0 ? sum / known : resting->assumed / SUPINE_REST_SHARE;
+  for (size_t axis = 0; axis < 6; ++axis) {
+    bool fits = true;
+    for (size_t k = 0; k < 2; ++k) {
       double *share = &resting->share[k][axis];
-      if (*share == usual.share[k][axis]) {
-        *share = fmin(*share * sum / (double)known, most_share);
+      if (factor[axis] == 0.0) {
+        *share = fmin(usual.share[k][axis] * others, most_share);
+      } else if (resting->ml[axis] > 0.0) {
+        *share = usual.share[k][axis] * factor[axis];
       }
-      if (!is_share(*share)) {
-        return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                "--resting makes the volume at rest in posture %s less than that "
-                                "of the tissue: give --resting for this posture too",
-                                names[axis]);
-      }
+      fits = fits && is_share(*share);
     }
-    resting->ml[axis] = 0.0;
+    if (!relative && !fits) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "lungs with a full volume of %.0f mL do not hold %.0f mL at rest in "
+                              "posture %s: if the scan was not at full inflation, give its state, "
+                              "such as --scanned supine:rest; otherwise change --resting",
+                              full[0] + (count > 1 ? full[1] : 0.0),
+                              at_rest(resting, axis, count, side, full), names[axis]);
+    }
+    resting->ml[axis] = relative ? resting->ml[axis] : 0.0;
   }
   return SUPINE_OK;
 }

@@ -13,13 +13,27 @@
 #ifndef SUPINE_RESTING_H
 #define SUPINE_RESTING_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 #include <supine/status.h>
 
-/** Relative increase of the volume of both lungs at full inflation from supine to upright (left
- * 0.116, right 0.103; mean of 32 people; Yamada et al., Respiration 99:598, 2020). */
-#define SUPINE_FULL_UPRIGHT_GAIN 0.109
+/** Published volumes with their standard deviation between people (SD), number of people (n) and
+ * source. FRC, the functional residual capacity, is gas alone. "Not found": a search of public
+ * texts did not show the source again. */
+/* clang-format off */
+#define SUPINE_REST_SHARE 0.48  /**< at rest / at full inflation, supine: sources in resting.c */
+#define SUPINE_REST_SPREAD 0.08 /**< SD of this share */
+#define SUPINE_COPD_SHARE 0.64  /**< the same in COPD, n 10, 0.49 to 0.81 (CTs, DIR-Lab COPDgene) */
+#define SUPINE_COPD_SPREAD 0.11 /**< SD of the share in COPD */
+#define SUPINE_FULL_UPRIGHT_GAIN 0.109 /**< growth of full inflation, supine to upright, n 32; left
+                                        * 0.116, right 0.103 (Yamada, Respiration 99:598, 2020) */
+#define SUPINE_LYING_ML 806.0    /**< FRC sitting minus supine, SD 293, n 13 (Lumb & Nimmo, Anesth
+                                  * Analg 73:422, 1991) */
+#define SUPINE_RESIDUAL_ML 1400.0 /**< gas left by a full expiration, supine, SD 600; not found */
+#define SUPINE_TISSUE_ML 860.0   /**< tissue of both lungs, n 12 (Denison, Thorax 41:620, 1986; not
+                                  * found); 836, SD 393, n 15 (Qanadli, 1999, by MRI) */
+/* clang-format on */
 
 /** Usual share of the left lung in the full volume of both lungs. */
 #define SUPINE_LEFT_SHARE 0.45
@@ -28,27 +42,36 @@
  * on the right, supine, prone, head down, upright. */
 typedef struct supine_resting {
   double share[2][6]; /**< [lung, posture] volume at rest / reference volume; left lung first */
-  double ml[6]; /**< [posture] volume of both lungs at rest, mL; 0 if `share` gives it instead */
+  double ml[6];   /**< [posture] volume of both lungs at rest, mL; 0 if `share` gives it instead */
+  bool given[6];  /**< [posture] whether the volume is the patient's own, not assumed */
+  double assumed; /**< share of both lungs, supine, from which other volumes are assumed */
+  double spread;  /**< standard deviation of an assumed volume at rest / volume at full inflation */
 } supine_resting;
 
 /** Return the default volumes at rest, those of healthy people; resting.c names their sources. */
 supine_resting supine_reference_resting_default(void);
 
-/** Set the volume at rest in a posture with gravity along an axis, such as "prone" (posture.h).
- * @param value  "0.43", a share of the full volume; "0.42/0.44", shares for the left and the right
- *   lung; "2600mL", gas and tissue of both lungs together
+/** Set the volume at rest in a posture with gravity along an axis, such as "prone" (posture.h). A
+ * share scales the default shares of the postures that are not given, by the mean of (given share)
+ * / (default share). The posture "copd" stands for the usual share in COPD, supine.
+ * @param value  "0.48", a share of the full volume; "0.47/0.49", shares for the left and the right
+ *   lung; "2600mL", gas and tissue of both lungs together; NULL for "copd"
  * @retval SUPINE_ERROR_ARGUMENT  no such posture, or a volume out of range */
 supine_status supine_reference_resting_set(supine_resting *resting, const char *posture,
                                            const char *value, supine_error *error);
 
 /** Print the volumes at rest as shares of the full volume, left lung/right lung, in the form of the
- * option --resting: "left=0.413/0.546,...,upright=0.481/0.506". 256 characters are enough. */
+ * option --resting: "left=0.462/0.61,...,upright=0.538/0.566". 256 characters are enough. */
 void supine_reference_resting_print(const supine_resting *resting, char *text, size_t size);
 
-/** Convert volumes at rest that are given in mL into shares of the reference volumes. Scale the
- * default shares of the other postures by the mean of (given volume) / (default volume).
+/** Return whether the volume at rest in a posture is the patient's own. */
+bool supine_reference_resting_given(const supine_resting *resting);
+
+/** Convert volumes at rest in mL into shares of the reference volumes. Set the shares of the
+ * postures that are not given to their defaults, times the mean of (given volume) / (default
+ * volume), or times resting->assumed / SUPINE_REST_SHARE if none is given.
  * @param side  [count] +1: left lung, -1: right lung
- * @param full  [count] reference volume of each lung, mL
+ * @param full  [count] reference volume of each lung, mL; if NULL, volumes in mL are kept for later
  * @retval SUPINE_ERROR_ARGUMENT  a share is below that of the tissue alone, or above 1 */
 supine_status supine_reference_resting_settle(supine_resting *resting, size_t count,
                                               const int *side, const double *full,

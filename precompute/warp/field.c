@@ -8,6 +8,8 @@
 
 #include "precompute/warp/field.h"
 
+const double supine_field_aerated = -300.0;
+
 void supine_field_find_cell(const supine_image *image, const double point[3],
                             supine_field_cell *cell) {
   double voxel[3];
@@ -222,4 +224,32 @@ void supine_field_at(const supine_field *field, const double point[3], double u[
   supine_field_cell cell;
   supine_field_find_cell(&field->nodes, point, &cell);
   supine_field_interpolate(&field->nodes, &cell, u, NULL);
+}
+
+double supine_field_stretch(const supine_image *nodes, const supine_field_cell *cell) {
+  double u[3];
+  double slope[3][3];
+  double edge[3][3];
+  supine_field_interpolate(nodes, cell, u, slope);
+  for (size_t k = 0; k < 9; ++k) {
+    edge[k / 3][k % 3] = nodes->step[k / 3][k % 3] + slope[k % 3][k / 3];
+  }
+  return supine_triple(edge[0], edge[1], edge[2]) /
+         supine_triple(nodes->step[0], nodes->step[1], nodes->step[2]);
+}
+
+double supine_field_folded(const supine_field *field) {
+  const size_t *size = field->nodes.size;
+  size_t inside = 0;
+  size_t folded = 0;
+  for (size_t i = 0; i < size[0] * size[1] * size[2]; ++i) {
+    const supine_field_cell cell = {{i % size[0], i / size[0] % size[1], i / size[0] / size[1]},
+                                    {0.5, 0.5, 0.5}};
+    if (cell.corner[0] + 1 < size[0] && cell.corner[1] + 1 < size[1] &&
+        cell.corner[2] + 1 < size[2]) {
+      inside += ((const float *)field->depth.values)[i] > 0.0F ? 1 : 0;
+      folded += supine_field_stretch(&field->nodes, &cell) > 0.0 ? 0 : 1;
+    }
+  }
+  return (double)folded / fmax((double)inside, 1.0);
 }

@@ -28,6 +28,10 @@ void supine_field_free(supine_field *field);
 /** Interpolate the field at a point. */
 void supine_field_at(const supine_field *field, const double point[3], double u[3]);
 
+/** Count the cells that the field u turns over (det(I + du/dx) is not positive at their centre), as
+ * a share of the number of cells inside the lungs. Near each of them, lung or body is lost. */
+double supine_field_folded(const supine_field *field);
+
 /** Residual u(x) + v(x + u(x)) of a field u and its inverse v. */
 typedef struct supine_field_residual {
   double rms, largest; /**< RMS and largest length of the residual inside the lungs, mm */
@@ -41,6 +45,10 @@ typedef struct supine_field_residual {
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_field_invert(const supine_field *field, supine_field *inverse,
                                   supine_field_residual *residual, supine_error *error);
+
+/** Density below which a voxel near the surface of the lungs belongs to them, HU. All lungs have
+ * such voxels. */
+extern const double supine_field_aerated;
 
 /** Move an image: moved(y) = image(y + v(y)) at the voxels y of the image; places outside the image
  * have the value of the nearest voxel. If `depth` is given, densities (Hounsfield units + 1000)
@@ -64,6 +72,9 @@ typedef struct supine_field_cell {
 /* Find the cell that contains a point, mm; a point outside the image is clamped to its border. */
 void supine_field_find_cell(const supine_image *image, const double point[3],
                             supine_field_cell *cell);
+
+/* Return det(I + du/dx) at a point in a cell of the field u. */
+double supine_field_stretch(const supine_image *nodes, const supine_field_cell *cell);
 
 /* Interpolate all channels of an F32 image at a point in a cell. Unless `slope` is NULL, also
  * compute the derivatives [channels, 3] with respect to cell->share, the position of the point in

@@ -13,12 +13,16 @@
 /* Number of voxels of a row that are processed together, with vector instructions. */
 enum { RUN = 128 };
 
+/* Kinds of voxels when densities are scaled: 0 and 1 outside the lungs, LUNG and LUNG + 1 inside
+ * them; odd ones are aerated. */
+enum { LUNG = 2 };
+
 #define INLINE static inline __attribute__((always_inline))
 
 typedef struct resampling {
   const supine_field *inverse;
   const supine_image *depth; /* depth below the lungs' surface, mm; NULL: densities not scaled */
-  supine_image inside;       /* 1 at voxels of `from` in the lungs, else 0; for scaling densities */
+  supine_image kind;         /* kind of each voxel of `from`; for scaling densities */
   const supine_image *from;
   supine_image *to;
   bool labels;
@@ -134,57 +138,56 @@ INLINE void take_nearest(const supine_image *image, cells in, double *values) {
  * This is det(I + dv/dy) for the inverse field v; return 0 if the field folds at y. */
 static double volume_ratio(const supine_image *nodes, const supine_image *image, size_t index) {
   double point[3];
-  double v[3];
-  double slope[3][3];
-  double edge[3][3];
   supine_field_cell cell;
   supine_image_place(image, index, point);
   supine_field_find_cell(nodes, point, &cell);
-  supine_field_interpolate(nodes, &cell, v, slope);
-  for (size_t k = 0; k < 9; ++k) {
-    edge[k / 3][k % 3] = nodes->step[k / 3][k % 3] + slope[k % 3][k / 3];
-  }
-  return fmax(0.0, supine_triple(edge[0], edge[1], edge[2]) /
-                       supine_triple(nodes->step[0], nodes->step[1], nodes->step[2]));
+  return fmax(0.0, supine_field_stretch(nodes, &cell));
 }
 
 /* Interpolate densities, and multiply those inside the lungs by volume_ratio(). A point is
- * interpolated only from corners of its cell that lie on the same side of the lungs' surface as its
- * nearest corner. The chest wall thus adds no mass to the lungs.
+ * interpolated only from corners of its cell that are of the same kind as its nearest corner. The
+ * chest wall thus adds no mass to the lungs, and vessels none to the tissue around them.
  * @param first  index of the first of the RUN voxels in the moved image */
 INLINE void interpolate_density(const resampling *work, const cells *in, size_t first,
                                 double *values) {
   double weight[8][RUN];
   double value[RUN];
   double nearest[RUN];
-  double inside[RUN];
+  double kind[RUN];
   double sum[RUN] = {0.0};
   size_t offset[8];
   weigh_corners(work->from, in, weight, offset);
-  take_nearest(&work->inside, *in, nearest);
+  take_nearest(&work->kind, *in, nearest);
   memset(values, 0, RUN * sizeof *values);
   for (size_t corner = 0; corner < 8; ++corner) {
     supine_image_gather(work->from, offset[corner], in->first, RUN, value);
-    supine_image_gather(&work->inside, offset[corner], in->first, RUN, inside);
+    supine_image_gather(&work->kind, offset[corner], in->first, RUN, kind);
     for (size_t i = 0; i < RUN; ++i) {
-      const double part = inside[i] == nearest[i] ? weight[corner][i] : 0.0;
+      const double part = kind[i] == nearest[i] ? weight[corner][i] : 0.0;
       values[i] += part * (value[i] + 1000.0);
       sum[i] += part;
     }
   }
   for (size_t i = 0; i < RUN; ++i) {
-    const bool scaled = nearest[i] > 0.0;
+    const bool scaled = nearest[i] >= LUNG;
     values[i] = values[i] / sum[i] *
                     (scaled ? volume_ratio(&work->inverse->nodes, work->from, first + i) : 1.0) -
                 1000.0;
   }
 }
 
-/* Mark the voxels inside the lungs in the rows `begin` to `end` - 1. */
+/* Find the kind of each voxel in the rows `begin` to `end` - 1. Smoothing of the surface, and the
+ * nodes between which its depth is interpolated, displace it by up to the diagonal of a cell. This
+ * close to the surface, the density of a voxel decides whether it belongs to the lungs. */
 static void mark_rows(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const resampling *work = context;
-  unsigned char *inside = work->inside.values;
+  unsigned char *kind = work->kind.values;
+  static const double air = -950.0; /* air outside the lungs is below this density, HU */
+  double rim = 0.0;
+  for (size_t k = 0; k < 3; ++k) {
+    rim += supine_length(work->depth->step[k]);
+  }
   for (size_t i = begin * work->from->size[0]; i < end * work->from->size[0]; ++i) {
     supine_field_cell cell;
     double point[3];
@@ -192,7 +195,10 @@ static void mark_rows(void *context, size_t begin, size_t end, size_t thread) {
     supine_image_place(work->from, i, point);
     supine_field_find_cell(work->depth, point, &cell);
     supine_field_interpolate(work->depth, &cell, &depth, NULL);
-    inside[i] = depth > 0.0;
+    const double value = supine_image_get(work->from, i);
+    const bool aerated = value < supine_field_aerated;
+    const bool near = depth > -rim && aerated && (depth > 0.0 || value > air);
+    kind[i] = (unsigned char)((depth > rim || near ? LUNG : 0) + (aerated ? 1 : 0));
   }
 }
 
@@ -239,13 +245,13 @@ supine_status supine_field_resample(const supine_field *inverse, const supine_im
                                     supine_error *error) {
   const size_t count = image->size[0] * image->size[1] * image->size[2];
   resampling work = {inverse, depth, *image, image, moved, labels};
-  work.inside.voxel = SUPINE_VOXEL_U8;
-  work.inside.values = depth == NULL ? NULL : malloc(count);
+  work.kind.voxel = SUPINE_VOXEL_U8;
+  work.kind.values = depth == NULL ? NULL : malloc(count);
   *moved = *image;
   moved->values = malloc(count * supine_image_voxel_size(image->voxel));
-  if (moved->values == NULL || (depth != NULL && work.inside.values == NULL)) {
+  if (moved->values == NULL || (depth != NULL && work.kind.values == NULL)) {
     supine_image_free(moved);
-    supine_image_free(&work.inside);
+    supine_image_free(&work.kind);
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for an image of %zu voxels",
                             count);
   }
@@ -253,6 +259,6 @@ supine_status supine_field_resample(const supine_field *inverse, const supine_im
     supine_parallel_for(image->size[1] * image->size[2], 1, 0, mark_rows, &work);
   }
   supine_parallel_for(image->size[1] * image->size[2], 1, 0, resample_rows, &work);
-  supine_image_free(&work.inside);
+  supine_image_free(&work.kind);
   return SUPINE_OK;
 }

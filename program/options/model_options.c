@@ -5,15 +5,21 @@
 #include <string.h>
 
 #include "program/options/model_options.h"
+#include "program/options/state_options.h"
 #include "program/options/surface_options.h"
 
 static supine_status read_scan(const char *text, void *field, supine_error *error) {
   supine_model_choice *choice = field;
+  supine_state posture = {.volume = {SUPINE_VOLUME_DEFAULT, 0.0}};
   choice->has_scan = true;
+  if (supine_state_parse_posture(text, &posture, NULL) == SUPINE_OK) {
+    choice->scan = (supine_scan){.known = true, .state = posture};
+    return SUPINE_OK;
+  }
   return supine_reference_scan_parse(text, &choice->scan, error);
 }
 
-/* Read volumes at rest, such as "supine=0.43,prone=2600mL". */
+/* Read volumes at rest, such as "supine=0.48,prone=2600mL" or "copd". */
 static supine_status read_resting(const char *text, void *field, supine_error *error) {
   supine_model_choice *choice = field;
   char copy[256];
@@ -21,11 +27,12 @@ static supine_status read_resting(const char *text, void *field, supine_error *e
   supine_status status = SUPINE_OK;
   for (char *rest = copy, *piece; status == SUPINE_OK && (piece = strsep(&rest, ",")) != NULL;) {
     char *value = strchr(piece, '=');
-    if (value == NULL) {
+    if (value != NULL) {
+      *value++ = '\0';
+    } else if (strcmp(piece, "copd") != 0) {
       return SUPINE_ERROR_ARGUMENT;
     }
-    *value = '\0';
-    status = supine_reference_resting_set(&choice->resting, piece, value + 1, error);
+    status = supine_reference_resting_set(&choice->resting, piece, value, error);
   }
   return status;
 }
@@ -138,19 +145,28 @@ const supine_option supine_command_model_options[] = {
      "state of the lungs in the scan\nfull: a breath-hold at full inflation (TLC)\nPOSTURE:rest: "
      "the end of a quiet expiration (FRC). POSTURE is supine, prone, left or right (lying on that "
      "side), upright or inverted\nnone: unknown. Breaths are added to the shape in the scan, and a "
-     "change of posture alone does not deform it\nfull and rest may have +ML or -ML, for both "
+     "change of posture alone does not deform it\nPOSTURE alone: with --fields, which then do not "
+     "displace the surface in this posture\nfull and rest may have +ML or -ML, for both "
      "lungs together: supine:rest+300, full-2000. Default full",
      FILLS(choice), .read = read_scan,
      .wants = "full or POSTURE:rest, optionally with +ML or -ML, or none"},
     {"resting", 0, "LIST",
      "volume of the patient's lungs at rest (FRC), for one posture or several, separated by "
      "commas\nPOSTURE=2600mL: gas and tissue of both lungs, as measured in a CT at rest\n"
-     "POSTURE=0.43: a share of the volume at full inflation\nPOSTURE=0.42/0.44: shares for the "
-     "left and the right lung\nThe volumes of other postures keep the default proportions to "
-     "these. A lung-function test gives the gas alone, seated: add about 0.9 L of tissue, and give "
-     "the sum as upright. Default, from healthy people: supine 0.418/0.440, prone 0.464/0.475, "
-     "left 0.413/0.546, right 0.563/0.435, upright 0.481/0.506, inverted as supine",
-     FILLS(choice), .read = read_resting, .wants = "POSTURE=2600mL or POSTURE=SHARE,..."},
+     "POSTURE=0.48: a share of the volume at full inflation\nPOSTURE=0.47/0.49: shares for the "
+     "left and the right lung\ncopd: the usual share in COPD, 0.64 supine (SD 0.11; ten patients)\n"
+     "The volumes of other postures keep the default proportions to these. A lung-function test "
+     "gives the gas alone, seated: add about 0.9 L of tissue, and give the sum as upright. "
+     "Default, "
+     "from healthy people (SD 0.08): supine 0.467/0.492, prone 0.519/0.531, left 0.462/0.610, "
+     "right "
+     "0.629/0.486, upright 0.538/0.566, inverted as supine; with --height and --sex, mL that these "
+     "predict (GLI 2021, less 0.806 L for lying, plus 0.86 L of tissue)",
+     FILLS(choice), .read = read_resting, .wants = "copd, POSTURE=2600mL or POSTURE=SHARE,..."},
+    {"full", 0, "VOLUME",
+     "for a scan at rest: volume of gas and tissue of the scanned lungs at full inflation, such as "
+     "4200mL or 4.2L. Without it, full inflation is assumed from the usual share at rest",
+     FILLS(choice.full), .read = supine_options_read_volume},
     {"height", 0, "CM",
      "height of the patient. Height and --sex give the volume expected at TLC (ECSC 1993, less 10 "
      "% for lying, plus 0.86 L of tissue), which is printed beside the volume of the scan. Without "
@@ -283,19 +299,26 @@ static supine_status take_patient(supine_model_options *options, supine_error *e
   return status;
 }
 
-supine_status supine_command_model_load(supine_model_options *options, const char *command,
-                                        char **paths, size_t count, bool keep,
-                                        supine_error *error) {
+supine_status supine_command_source_load(supine_model_options *options, char **paths, size_t count,
+                                         supine_error *error) {
   supine_progress progress = supine_options_progress_begin("label map");
   supine_source *source = &options->made_from;
   options->source.labels.progress = supine_options_progress_step;
   options->source.labels.progress_context = &progress;
-  supine_status status = supine_precompute_source_load(&options->source, paths, count, source,
-                                                       &options->findings, error);
+  const supine_status status = supine_precompute_source_load(&options->source, paths, count, source,
+                                                             &options->findings, error);
   supine_options_progress_end(&progress);
   if (status == SUPINE_OK && source->is_map) {
     print_map(paths[0], source);
   }
+  return status;
+}
+
+supine_status supine_command_model_load(supine_model_options *options, const char *command,
+                                        char **paths, size_t count, bool keep,
+                                        supine_error *error) {
+  supine_source *source = &options->made_from;
+  supine_status status = supine_command_source_load(options, paths, count, error);
   if (keep) {
     options->choice.scan.known = false;
     options->choice.has_scan = true;

@@ -25,6 +25,11 @@ typedef struct supine_model_options {
   supine_findings findings;
 } supine_model_options;
 
+/* Load the lungs from the files `paths` into options->made_from, and add what the checks of the
+ * files found to options->findings. */
+supine_status supine_command_source_load(supine_model_options *options, char **paths, size_t count,
+                                         supine_error *error);
+
 /* Load the lungs from the files `paths`, print what the checks of the files found, and prepare the
  * model.
  * @param keep  whether to use the loaded surface as the reference surface, and ignore --scanned */

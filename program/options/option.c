@@ -212,6 +212,25 @@ static bool has_ending(const char *path, const char *endings) {
   return false;
 }
 
+/* Refuse options that would have no effect, as an option that is given does not list them among its
+ * partners. */
+static supine_status check_partners(const reading *r, const supine_option *option,
+                                    supine_error *error) {
+  char listed[160];
+  (void)snprintf(listed, sizeof listed, " %s ", option->partners);
+  for (size_t i = 0; i < r->count; ++i) {
+    const supine_option *other = r->rows[i].option;
+    char name[40];
+    (void)snprintf(name, sizeof name, " %s ", other->name);
+    if (r->rows[i].given && other != option && strstr(listed, name) == NULL) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "--%s has no effect with --%s: leave one of them out", other->name,
+                              option->name);
+    }
+  }
+  return SUPINE_OK;
+}
+
 static supine_status check_given(const reading *r, size_t operands, char **argv,
                                  supine_error *error) {
   const supine_command *command = r->command;
@@ -236,6 +255,10 @@ static supine_status check_given(const reading *r, size_t operands, char **argv,
         !has_ending(r->rows[i].value, option->endings)) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%s: the name must end in %s",
                               r->rows[i].value, option->endings);
+    }
+    if (option->partners != NULL && r->rows[i].given &&
+        check_partners(r, option, error) != SUPINE_OK) {
+      return SUPINE_ERROR_ARGUMENT;
     }
   }
   return SUPINE_OK;

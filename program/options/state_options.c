@@ -12,17 +12,9 @@ static const double least_of_full = 0.1;
 static const double most_of_full = 1.2;
 static const double folded_limit = 0.01; /* largest plausible share of triangles turned over */
 
-supine_status supine_options_posture(const char *text, double gravity[3], supine_error *error) {
-  supine_state state;
-  const supine_status status = supine_state_parse_posture(text, &state, error);
-  if (status == SUPINE_OK) {
-    memcpy(gravity, state.gravity, sizeof state.gravity);
-  }
-  return status;
-}
-
 static supine_status read_posture(const char *text, void *field, supine_error *error) {
-  return supine_options_posture(text, field, error);
+  *(supine_state *)field = (supine_state){.gravity = {0.0}}; /* zero if the text has no posture */
+  return supine_state_parse(text, field, error);
 }
 
 /* Read the direction X,Y,Z of gravity, by parsing it as the posture X:Y:Z. */
@@ -36,22 +28,23 @@ static supine_status read_gravity(const char *text, void *field, supine_error *e
   for (char *comma = posture; (comma = strchr(comma, ',')) != NULL;) {
     *comma = ':';
   }
-  return supine_options_posture(posture, field, error);
+  return supine_state_parse_posture(posture, field, error);
 }
 
 #define GRAVITY                                                                                    \
-  SUPINE_FILLS(supine_orientation, gravity), SUPINE_SAYS_GIVEN(supine_orientation, given),         \
+  SUPINE_FILLS(supine_orientation, state), SUPINE_SAYS_GIVEN(supine_orientation, given),           \
       .rivals = "gravity"
 
 static const char *const postures[] = {"supine",  "prone",    "left", "right",
                                        "upright", "inverted", NULL};
 
 const supine_option supine_options_orientation[] = {
-    {"posture", 0, "POSTURE",
+    {"posture", 0, "STATE",
      "supine, prone, left or right (lying on that side), upright, inverted (head down), or a "
      "DICOM patient position: HFS, FFS, HFP, FFP, HFDL, FFDL, HFDR, FFDR. +DEGREES turns gravity "
      "about the left-right axis, from the back towards the head, and -DEGREES the other way: "
-     "supine+15 and prone-15 lower the head (Trendelenburg)",
+     "supine+15 and prone-15 lower the head (Trendelenburg). With a volume, it is a state: "
+     "prone:rest+500",
      GRAVITY, .read = read_posture, .choices = postures},
     {"gravity", 0, "X,Y,Z",
      "direction of gravity in body axes, instead of a posture: x to the left, y to the back, z to "
@@ -59,17 +52,21 @@ const supine_option supine_options_orientation[] = {
      GRAVITY, .read = read_gravity, .wants = "three finite numbers, X,Y,Z"},
     {.name = NULL}};
 
-supine_status supine_options_gravity(const supine_orientation *orientation, double gravity[3],
-                                     supine_error *error) {
-  memcpy(gravity, orientation->gravity, sizeof orientation->gravity);
-  return orientation->given
+supine_status supine_options_state(const supine_orientation *orientation, supine_state *state,
+                                   supine_error *error) {
+  const supine_state *given = &orientation->state;
+  if (given->volume.kind != SUPINE_VOLUME_DEFAULT || given->lung_count > 0) {
+    *state = *given;
+  }
+  memcpy(state->gravity, given->gravity, sizeof given->gravity);
+  return given->gravity[0] != 0.0 || given->gravity[1] != 0.0 || given->gravity[2] != 0.0
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                                 "the posture is missing: give --posture or --gravity");
 }
 
-supine_status supine_options_posture_list_parse(const char *text, supine_posture_list *list,
-                                                supine_error *error) {
+supine_status supine_options_posture_list_parse(const char *text, const supine_state *standard,
+                                                supine_posture_list *list, supine_error *error) {
   supine_status status = SUPINE_OK;
   list->count = 0;
   for (const char *at = text; status == SUPINE_OK;) {
@@ -87,7 +84,9 @@ supine_status supine_options_posture_list_parse(const char *text, supine_posture
     }
     memcpy(item->name, at, length);
     item->name[length] = '\0';
-    status = supine_options_posture(item->name, item->gravity, error);
+    item->state = *standard;
+    item->state.gravity[1] = 1.0; /* supine, if the state names no posture */
+    status = supine_state_parse(item->name, &item->state, error);
     if (at[length] == '\0') {
       break;
     }
@@ -112,8 +111,9 @@ static supine_status read_from(const char *text, void *field, supine_error *erro
 
 const supine_option supine_options_folds[] = {
     {"allow-folds", 0, NULL,
-     "allow volumes below 10 % or above 120 % of full inflation, and surfaces with more than 1 % "
-     "of their triangles turned over",
+     "allow volumes below 10 % or above 120 % of full inflation, surfaces with more than 1 % of "
+     "their triangles turned over, and fields that fold in more than 1 % as many cells as are "
+     "inside the lungs",
      .kind = SUPINE_OPTION_FLAG, .size = sizeof(bool)},
     {.name = NULL}};
 
@@ -121,8 +121,8 @@ const supine_option supine_options_volume[] = {
     {"volume", 0, "VOLUME",
      SUPINE_VOLUME_HELP
      "\nleft=VOLUME,right=VOLUME: a volume for each lung; name every lung\nDefault rest; for a "
-     "basis made by 'supine precompute' with --scanned none or --law paper, scan+500; for one made "
-     "with its option --fields, the given displacements, unscaled",
+     "basis made by 'supine precompute' with --scanned none or --law paper, scan+500. A basis "
+     "made with --fields has no volumes",
      SUPINE_FILLS(supine_volume_options, state), .read = supine_options_read_volume,
      .rivals = "breath"},
     {.table = supine_options_folds, SUPINE_FILLS(supine_volume_options, allow_folds)},
@@ -166,6 +166,9 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
   if (status != SUPINE_OK) {
     return supine_error_set(error, status, "%s%s", from->given ? "--from: " : "", inner.message);
   }
+  if (state.lung_count == 0 && state.volume.kind == SUPINE_VOLUME_DEFAULT) {
+    state.volume = supine_basis_default_volume(basis); /* the name states the volume */
+  }
   if (scan) {
     (void)snprintf(reference->name, sizeof reference->name, "the scan");
   } else {
@@ -185,49 +188,56 @@ static double turned_over(const supine_basis *basis, const supine_pose *pose) {
   return turned;
 }
 
-supine_status supine_options_pose_check(const supine_basis *basis, const char *command,
-                                        bool allow_folds, const supine_pose *pose,
-                                        supine_error *error) {
-  const supine_basis_info *info = supine_basis_get_info(basis);
-  const double volume = supine_options_basis_volume(basis, pose);
-  double full = 0.0;
-  char wrong[192] = "";
-  for (size_t lung = 0; lung < info->lung_count; ++lung) {
-    full += info->reference_volume[lung];
-  }
-  const double share = volume / full;
-  if (info->has_rest && !(share >= least_of_full && share <= most_of_full)) {
+supine_status supine_options_plausible(const supine_plausible *lungs, supine_error *error) {
+  char state[160];
+  char wrong[192];
+  const double share = lungs->full > 0.0 ? lungs->volume / lungs->full : 1.0;
+  (void)supine_state_describe(lungs->state, state, sizeof state);
+  if (!(share >= least_of_full && share <= most_of_full)) {
     (void)snprintf(wrong, sizeof wrong,
                    "%.0f mL are %.0f %% of full inflation (%.0f mL), outside the %.0f to %.0f %% "
                    "that lungs hold",
-                   volume, 100.0 * share, full, 100.0 * least_of_full, 100.0 * most_of_full);
+                   lungs->volume, 100.0 * share, lungs->full, 100.0 * least_of_full,
+                   100.0 * most_of_full);
+  } else if (lungs->folded > folded_limit) {
+    (void)snprintf(wrong, sizeof wrong, "%s: %.3g %% (at most %g %%)", lungs->parts,
+                   100.0 * lungs->folded, 100.0 * folded_limit);
   } else {
-    const double turned = turned_over(basis, pose);
-    if (turned < 0.0) {
-      return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
-                              info->vertex_count);
-    }
-    if (turned > folded_limit) {
-      (void)snprintf(wrong, sizeof wrong, "the surface folds: %.3g %% of its triangles turn over",
-                     100.0 * turned);
-    }
+    return SUPINE_OK;
   }
-  if (wrong[0] != '\0' && info->has_rest && !allow_folds) {
-    return supine_error_set(error, SUPINE_ERROR_NUMERICAL, "%s; --allow-folds accepts this", wrong);
+  if (!lungs->allowed) {
+    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                            "%s: %s: choose a volume nearer to rest, or accept this with "
+                            "--allow-folds",
+                            state, wrong);
   }
-  if (wrong[0] != '\0') {
-    supine_options_say(command, "%s", wrong);
-  }
+  supine_options_say(lungs->command, "warning: %s: %s", state, wrong);
   return SUPINE_OK;
 }
 
-supine_status supine_options_pose(const supine_basis *basis, const char *command,
-                                  const supine_volume_options *wanted, const double gravity[3],
-                                  supine_pose *pose, supine_error *error) {
-  supine_state state = wanted->state;
-  memcpy(state.gravity, gravity, sizeof state.gravity);
-  const supine_status status = supine_basis_pose(basis, &state, pose, error);
+supine_status supine_options_pose_check(const supine_basis *basis, const char *command,
+                                        bool allow_folds, const supine_state *state,
+                                        const supine_pose *pose, supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  supine_plausible lungs = {.command = command,
+                            .state = state,
+                            .volume = supine_options_basis_volume(basis, pose),
+                            .folded = turned_over(basis, pose),
+                            .parts = "the surface folds; triangles that turn over",
+                            .allowed = allow_folds || !info->has_rest};
+  for (size_t lung = 0; lung < info->lung_count && info->has_rest; ++lung) {
+    lungs.full += info->reference_volume[lung];
+  }
+  return lungs.folded < 0.0 ? supine_error_set(error, SUPINE_ERROR_MEMORY,
+                                               "no memory for %zu vertices", info->vertex_count)
+                            : supine_options_plausible(&lungs, error);
+}
+
+supine_status supine_options_pose(const supine_basis *basis, const char *command, bool allow_folds,
+                                  const supine_state *state, supine_pose *pose,
+                                  supine_error *error) {
+  const supine_status status = supine_basis_pose(basis, state, pose, error);
   return status == SUPINE_OK
-             ? supine_options_pose_check(basis, command, wanted->allow_folds, pose, error)
+             ? supine_options_pose_check(basis, command, allow_folds, state, pose, error)
              : status;
 }

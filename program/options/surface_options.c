@@ -31,7 +31,8 @@ const supine_option supine_options_surface_frame[] = {
      .wants = "three letters, one each of L or R, P or A, S or I, such as LPS"},
     {"units", 0, "UNIT",
      "unit of the coordinates: mm, cm, m, um, in, or the length of the unit in mm, such as 25.4; "
-     "default mm",
+     "default mm. If given, also for a label map (mm), lungs of a size impossible for a person are "
+     "accepted, such as an animal's or a phantom",
      SUPINE_FILLS(supine_mesh_load_options, millimetres_per_unit), .read = read_units,
      .wants = "mm, cm, m, um, in, or a number of millimetres"},
     {.name = NULL}};

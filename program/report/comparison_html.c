@@ -90,7 +90,10 @@ supine_status supine_report_html(const supine_comparison *c, FILE *file, supine_
     (void)json_object_set_new(data, "outlined",
                               json_pack("{s:o, s:O}", "outlines", outlines, "drawn", drawn));
   }
-  (void)json_object_set_new(data, "profiles", supine_report_profiles(c));
+  if (c->breath > 0.0) {
+    (void)json_object_set_new(data, "ventilation",
+                              json_pack("{s:o}", "profiles", supine_report_profiles(c)));
+  }
   json_t *pictures = supine_report_pictures(c, error);
   if (pictures != NULL) {
     (void)json_object_set_new(data, "pictures", pictures);

@@ -160,14 +160,10 @@ static double product(const double *gram, const double *q, const double *p, size
   return sum;
 }
 
-static bool have_poses(const supine_compare *compare, const supine_pose *pose,
-                       const supine_pose *from) {
-  return supine_basis_has_pose(compare->basis, pose) && supine_basis_has_pose(compare->basis, from);
-}
-
 /* For each lung, axis and mode, write the displacement factor times the weight of `pose` to `q`.
- * Unless `from` is NULL, subtract the same product of `from`. */
-static void products_of(const supine_compare *compare, const supine_pose *pose,
+ * Unless `from` is NULL, subtract the same product of `from`. Return false if a pose is of another
+ * basis. */
+static bool products_of(const supine_compare *compare, const supine_pose *pose,
                         const supine_pose *from, double *q) {
   for (size_t i = 0; i < 3 * compare->basis->info.lung_count; ++i) {
     for (size_t k = 0; k < compare->basis->info.mode_count; ++k) {
@@ -175,6 +171,7 @@ static void products_of(const supine_compare *compare, const supine_pose *pose,
              (from == NULL ? 0 : from->gains[i / 3][i % 3] * from->weights[k]);
     }
   }
+  return supine_basis_has_pose(compare->basis, pose) && supine_basis_has_pose(compare->basis, from);
 }
 
 double supine_compare_rms(const supine_compare *compare, const supine_pose *pose,
@@ -182,10 +179,9 @@ double supine_compare_rms(const supine_compare *compare, const supine_pose *pose
   const size_t count = compare->basis->info.mode_count;
   double q[3 * SUPINE_LUNGS_MAX * SUPINE_MODES_MAX];
   double square = 0;
-  if (!have_poses(compare, pose, from)) {
+  if (!products_of(compare, pose, from, q)) {
     return INFINITY;
   }
-  products_of(compare, pose, from, q);
   for (size_t i = 0; i < 3 * compare->basis->info.lung_count; ++i) {
     square += product(compare->gram + i * count * count, q + i * count, q + i * count, count);
   }
@@ -238,10 +234,9 @@ supine_status supine_compare_distances(const supine_compare *compare, const supi
                                        const supine_pose *from, float *distance) {
   const supine_basis *basis = compare->basis;
   double q[3 * SUPINE_LUNGS_MAX * SUPINE_MODES_MAX];
-  if (!have_poses(compare, pose, from)) {
+  if (!products_of(compare, pose, from, q)) {
     return SUPINE_ERROR_ARGUMENT;
   }
-  products_of(compare, pose, from, q);
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     for (size_t i = basis->lung_begin[lung]; i < basis->lung_begin[lung + 1]; ++i) {
       distance[i] = (float)displacement(basis, q + 3 * lung * basis->info.mode_count, i);

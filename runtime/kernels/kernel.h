@@ -161,6 +161,8 @@ INLINE triples interleave(const row *x, const row *y, const row *z) {
   }
   return t;
 #undef PIECE
+#undef FROM_Z
+#undef FROM_XY
 }
 
 /* Repeat the value of each vertex three times, for x, y and z. */
@@ -240,6 +242,7 @@ INLINE void deform_tiles(const supine_tiles *any, const float *scales, size_t fi
   const float *g = scales + tiles.modes;
 #define GAIN(j, i) g[AXIS(j, i)]
   const vf gain[3] = {{EACH(GAIN, 0)}, {EACH(GAIN, 1)}, {EACH(GAIN, 2)}};
+#undef GAIN
   writer out = writer_open(target);
   weights w = {.at = scales};
   for (size_t k = 0; k < KNOWN_MODES; ++k) {

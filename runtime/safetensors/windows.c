@@ -79,13 +79,6 @@ void supine_platform_free(void *memory) {
   _aligned_free(memory);
 }
 
-static supine_status output_fail(const char *path, supine_output *output, supine_error *error) {
-  (void)supine_error_set(error, SUPINE_ERROR_WRITE, "%s: cannot write: Windows error %lu", path,
-                         (unsigned long)GetLastError());
-  supine_output_abandon(output);
-  return SUPINE_ERROR_WRITE;
-}
-
 /* Write to a file beside the target, which no other process can open for writing. */
 supine_status supine_output_open(const char *path, supine_output *output, supine_error *error) {
   const size_t size = strlen(path) + sizeof ".part";
@@ -96,37 +89,31 @@ supine_status supine_output_open(const char *path, supine_output *output, supine
     output->file = wide != NULL ? _wfsopen(wide, L"wb", _SH_DENYWR) : NULL;
     free(wide);
   }
-  return output->file != NULL ? SUPINE_OK : output_fail(path, output, error);
-}
-
-supine_status supine_output_commit(supine_output *output, supine_error *error) {
-  const bool written =
-      fflush(output->file) == 0 && ferror(output->file) == 0 && _commit(_fileno(output->file)) == 0;
-  wchar_t *from = widen(output->temporary);
-  wchar_t *to = widen(output->path);
-  (void)fclose(output->file);
-  output->file = NULL;
-  const bool moved = written && from != NULL && to != NULL &&
-                     MoveFileExW(from, to, MOVEFILE_REPLACE_EXISTING | MOVEFILE_WRITE_THROUGH);
-  free(from);
-  free(to);
-  if (!moved) {
-    return output_fail(output->path, output, error);
+  if (output->file == NULL) {
+    free(output->path);
+    free(output->temporary);
+    return supine_error_set(error, SUPINE_ERROR_WRITE, "%s: cannot write: Windows error %lu", path,
+                            (unsigned long)GetLastError());
   }
-  supine_output_abandon(output);
   return SUPINE_OK;
 }
 
-void supine_output_abandon(supine_output *output) {
-  wchar_t *wide = output->temporary != NULL ? widen(output->temporary) : NULL;
-  if (output->file != NULL) {
-    (void)fclose(output->file);
+supine_status supine_output_commit(supine_output *output, supine_error *error) {
+  wchar_t *from = widen(output->temporary);
+  wchar_t *to = widen(output->path);
+  bool done =
+      fflush(output->file) == 0 && ferror(output->file) == 0 && _commit(_fileno(output->file)) == 0;
+  (void)fclose(output->file);
+  done = done && from != NULL && to != NULL &&
+         MoveFileExW(from, to, MOVEFILE_REPLACE_EXISTING | MOVEFILE_WRITE_THROUGH);
+  if (!done) {
+    (void)supine_error_set(error, SUPINE_ERROR_WRITE, "%s: cannot write: Windows error %lu",
+                           output->path, (unsigned long)GetLastError());
+    (void)(from != NULL && DeleteFileW(from));
   }
-  if (wide != NULL) {
-    (void)DeleteFileW(wide); /* fails if the file was moved to its final name */
-  }
-  free(wide);
-  free(output->temporary);
+  free(from);
+  free(to);
   free(output->path);
-  *output = (supine_output){0};
+  free(output->temporary);
+  return done ? SUPINE_OK : SUPINE_ERROR_WRITE;
 }

@@ -66,7 +66,8 @@ static double run_ours(pair *files, const char *out, double times[STAGES], size_
   supine_mesh_free(&files->mesh[1]);
   const double joined = supine_clock_seconds();
   *vertices = lungs.mesh.vertex_count;
-  static const supine_scan full = {true, {.gravity = {0, 1, 0}, .volume = {SUPINE_VOLUME_FULL, 0}}};
+  static const supine_scan full = {.known = true,
+                                   .state = {.gravity = {0, 1, 0}, .volume = {SUPINE_VOLUME_FULL}}};
   const supine_resting resting = supine_reference_resting_default();
   const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
   supine_reference reference;

@@ -6,7 +6,7 @@
     faults.py PROGRAM            run each command once without faults, for a program built with a sanitizer
 
 By default, a command runs once for each call that it makes, and in the n-th run the n-th call fails. If EACH is above
-0, only about EACH of these runs are made, spread over all calls (CTest uses 1). If WORD is given, only commands that
+0, only about EACH of these runs are made, spread over all calls (CTest uses 3). If WORD is given, only commands that
 contain WORD run.
 
 Each run must end within a minute and without a signal. It must either write its complete outputs, or exit with a code
@@ -34,7 +34,7 @@ precompute lungs.ply --band 2 -o lungs.safetensors
 solve lungs.ply --posture supine --reach 10 -o state.ply
 embed lungs.safetensors points.csv -o points.safetensors
 embed lungs.safetensors --grid 60 -o grid.safetensors
-fit --landmarks pairs.csv --law deep -o patient.json
+fit --landmarks pairs.csv --rest 2600mL --other 5400mL --law deep -o patient.json
 pv fit samples.csv -o patient.pv.json
 """
 
@@ -51,7 +51,7 @@ precompute lungs.ply --fields fields.safetensors -o out/a.safetensors
 precompute lungs.ply --band 2 --patient patient.json -o out/a.safetensors
 solve lungs.ply --posture prone -o out/a.vtp
 solve lungs.ply --unit-force 3 -o out/a.csv
-fit --landmarks pairs.csv -o out/a.json
+fit --landmarks pairs.csv --rest 2600mL --other 5400mL -o out/a.json
 fit lungs.ply state.ply -o out/a.json
 validate lungs.safetensors --state supine:state.ply
 embed lungs.safetensors points.csv lungs.ply -o out/a.safetensors

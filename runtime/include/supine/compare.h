@@ -55,8 +55,7 @@ SUPINE_API double supine_compare_rms(const supine_compare *compare, const supine
 /** Compute the distance between the positions of every vertex in two poses. Cost: one pass over the
  * vertices, with 3 K + 6 multiplications per vertex for K modes.
  * @param from      NULL for the reference surface
- * @param distance  [N] mm, written
- * @retval SUPINE_ERROR_ARGUMENT  a pose is of another basis; nothing is written */
+ * @param distance  [N] mm, written */
 SUPINE_API supine_status supine_compare_distances(const supine_compare *compare,
                                                   const supine_pose *pose, const supine_pose *from,
                                                   float *distance);

@@ -89,8 +89,8 @@ typedef struct supine_basis_info {
   double bytes_per_vertex; /**< bytes that an evaluation reads for each vertex */
   /** Largest position error of any vertex from storage and rounding, mm: the largest
    * supine_basis_error for 26 directions of gravity, towards the faces, edges and corners of a
-   * cube. The lungs hold 500 mL more than the reference surface or, if the surface is open, move by
-   * at most 20 mm. */
+   * cube. The lungs hold 500 mL more than the reference surface; an open surface moves by at most
+   * 20 mm; another simulator's fields are not scaled. */
   double storage_error;
   const char *const *lung_names; /**< [lung_count] such as "left", or an index such as "0" */
   const float *bounds;   /**< [lung_count, 2, 3] lowest and highest corner of each lung's box, mm */
@@ -132,8 +132,9 @@ typedef struct supine_basis_info {
 typedef struct supine_pose {
   double weights[SUPINE_MODES_MAX];
   double gains[SUPINE_LUNGS_MAX][3]; /**< factor of each lung's displacement along x, y and z */
-  /** supine_basis_info.identity of the basis that made the pose. Functions refuse a pose of a basis
-   * with another identity, but not 0, for a pose whose weights the program sets itself. */
+  /** supine_basis_info.identity of the basis that made the pose. For a basis with another identity,
+   * functions that return a status return SUPINE_ERROR_ARGUMENT, and write nothing. The identity 0
+   * is not checked: a program may set the weights of a pose itself. */
   uint64_t basis;
 } supine_pose;
 
@@ -235,7 +236,6 @@ SUPINE_API supine_state supine_basis_scan(const supine_basis *basis);
 
 /** Compute the volume of each lung in a pose.
  * @param volumes  [lung_count] volumes of gas and tissue, mL, written
- * @retval SUPINE_ERROR_ARGUMENT      the pose is of another basis
  * @retval SUPINE_ERROR_OPEN_SURFACE  the basis has no volumes (supine_basis_info.has_volume) */
 SUPINE_API supine_status supine_basis_volumes(const supine_basis *basis, const supine_pose *pose,
                                               double *volumes);
@@ -256,16 +256,14 @@ SUPINE_API double supine_basis_error(const supine_basis *basis, const supine_pos
  * Cost per vertex: K + 6 multiplications and K + 2 additions for K modes. If the positions and the
  * basis exceed 4 MiB, positions are written with stores that bypass the caches. These are fastest
  * if `xyz` is aligned to 64 bytes.
- * @param xyz  [N, 3] mm, LPS, written; aligned like a float
- * @retval SUPINE_ERROR_ARGUMENT  the pose is of another basis; nothing is written */
+ * @param xyz  [N, 3] mm, LPS, written; aligned like a float */
 SUPINE_API supine_status supine_deform(const supine_basis *basis, const supine_pose *pose,
                                        float *xyz);
 
 /** Compute supine_deform for vertices begin <= i < end, so that several threads can share the work.
  * Ranges that begin at multiples of 16 are fastest.
  * @param xyz  [end - begin, 3] mm, written
- * @retval SUPINE_ERROR_ARGUMENT  the pose is of another basis, or the range is not in 0 to N;
- *                                nothing is written */
+ * @retval SUPINE_ERROR_ARGUMENT  the range does not lie within 0 to N */
 SUPINE_API supine_status supine_deform_range(const supine_basis *basis, const supine_pose *pose,
                                              size_t begin, size_t end, float *xyz);
 
@@ -310,8 +308,7 @@ SUPINE_API void supine_step(size_t count, const float *step, float *xyz);
  *
  * In files of versions 1 and 2, v = V_0 + a sum_k A_k w_k + a^2 sum_(k <= l) C_kl w_k w_l.
  * Cost: 1.5 Q K^2 multiplications for each lung, once a frame, for K modes and Q vectors.
- * @param normal_weights  [lung_count, normal_count] v, written
- * @retval SUPINE_ERROR_ARGUMENT  the pose is of another basis */
+ * @param normal_weights  [lung_count, normal_count] v, written */
 SUPINE_API supine_status supine_basis_normal_weights(const supine_basis *basis,
                                                      const supine_pose *pose,
                                                      double *normal_weights);
@@ -330,7 +327,6 @@ SUPINE_API supine_status supine_basis_normal_weights(const supine_basis *basis,
  * A file without a volume at rest has "normals_range_mm" instead, for the largest displacement.
  * @param xyz      [N, 3] mm, written; NULL to compute only normals
  * @param normals  [N, 3], written; 0 for a vertex without triangles
- * @retval SUPINE_ERROR_ARGUMENT     the pose is of another basis
  * @retval SUPINE_ERROR_UNSUPPORTED  the file has no normals, or it was opened without_normals */
 SUPINE_API supine_status supine_deform_lit(const supine_basis *basis, const supine_pose *pose,
                                            float *xyz, float *normals);
@@ -365,7 +361,6 @@ SUPINE_API supine_status supine_gl_pack(const supine_basis *basis, size_t begin,
 /** Compute the uniforms supine_weights and supine_gains of supine.glsl.
  * @param weights  [4 ceil(mode_count / 4)], written
  * @param gains    [lung_count, 3], written
- * @retval SUPINE_ERROR_ARGUMENT     the pose is of another basis
  * @retval SUPINE_ERROR_UNSUPPORTED  as supine_gl_pack */
 SUPINE_API supine_status supine_gl_weights(const supine_basis *basis, const supine_pose *pose,
                                            float *weights, float *gains);
@@ -382,7 +377,6 @@ SUPINE_API supine_status supine_gl_pack_normals(const supine_basis *basis, size_
 /** Compute the uniform supine_normal_weights of supine.glsl. W is the macro SUPINE_WORDS of
  * supine.glsl, the number of uvec3 attributes for normals.
  * @param uniforms  [lung_count, W, 3], written, for glUniform3fv with a count of lung_count * W
- * @retval SUPINE_ERROR_ARGUMENT     the pose is of another basis
  * @retval SUPINE_ERROR_UNSUPPORTED  as supine_gl_pack_normals */
 SUPINE_API supine_status supine_gl_normal_weights(const supine_basis *basis,
                                                   const supine_pose *pose, float *uniforms);

@@ -8,7 +8,7 @@
 #include "base/parallel.h"
 #include "base/vec3.h"
 
-#include "precompute/inside/surface.h"
+#include "precompute/lungs/surface.h"
 
 enum { LEAF = 8, DISTANCE_GRAIN = 64 };
 

@@ -7,6 +7,7 @@
 
 #include "base/lapack.h"
 #include "base/vec3.h"
+#include "precompute/basis_file.h"
 #include "precompute/fields/fields.h"
 #include "precompute/projection/tally.h"
 #include <supine/sh.h>
@@ -22,6 +23,9 @@ static const double leverage_max = 0.999;
  * is rounding error. */
 static const double worthwhile = 0.99;
 static const double exact = 1e-6;
+
+/* Relative error that is small beside that of any simulator. Modes are not kept to lower it. */
+static const double negligible = 1e-4;
 
 /* A least-squares fit of harmonics to displacement fields for several directions of gravity. The
  * coefficient of each harmonic is a field; the coefficients are `pinv` times the given fields. */
@@ -292,6 +296,35 @@ static supine_status cross_validate(const fitting *w, size_t modes, supine_accur
   return status;
 }
 
+/* Compress the chosen fit to modes, or use its harmonics. */
+static supine_status compress(const supine_expansion *expansion, const supine_fit_options *options,
+                              double fit_error, supine_compression *made, supine_error *error) {
+  double singular[SUPINE_MODES_MADE_MAX];
+  double total = 0.0;
+  if (options->modes == 0) {
+    return supine_sh_compress_harmonics(expansion, made, error);
+  }
+  const supine_status status =
+      supine_sh_compress_modes(expansion, NULL, options->modes, made, singular, &total, error);
+  if (status == SUPINE_OK && options->fewest_modes) {
+    supine_sh_compression_truncate(
+        made, expansion->rank,
+        supine_sh_modes_needed(made->mode_count, singular, total, fmax(fit_error, negligible)));
+  }
+  return status;
+}
+
+/* Subtract from each mode its weight w in the posture of the scan. The constant harmonic is
+ * 1 / sqrt(4 pi), so that its coefficient falls by sqrt(4 pi) w. */
+static void subtract_scan(const double scan_gravity[3], supine_compression *made) {
+  static const double sqrt_4pi = 3.5449077018110321;
+  double weights[SUPINE_MODES_MADE_MAX];
+  supine_sh_compression_weights(made, scan_gravity, weights);
+  for (size_t k = 0; k < made->mode_count; ++k) {
+    made->modes[k * supine_sh_count(made->band)] -= sqrt_4pi * weights[k];
+  }
+}
+
 supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_options *options,
                                 supine_compression *compression, supine_fit_report *report,
                                 supine_error *error) {
@@ -319,14 +352,16 @@ supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_op
     status = project(&w, found.band, &expansion, error);
   }
   if (status == SUPINE_OK) {
-    status = options->modes == 0 ? supine_sh_compress_harmonics(&expansion, &made, error)
-                                 : supine_sh_compress_modes(&expansion, NULL, options->modes, &made,
-                                                            NULL, NULL, error);
+    status = compress(&expansion, options, found.error[found.band], &made, error);
   }
   if (status == SUPINE_OK) {
     status = cross_validate(&w, options->modes == 0 ? 0 : made.mode_count, &found.accuracy, error);
   }
   if (status == SUPINE_OK) {
+    if (options->scan_gravity != NULL) {
+      subtract_scan(options->scan_gravity, &made);
+    }
+    found.mode_count = made.mode_count;
     *compression = made;
     *report = found;
   } else {
@@ -335,5 +370,35 @@ supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_op
   supine_sh_expansion_free(&expansion);
   free(w.gram);
   fit_free(&w.chosen);
+  return status;
+}
+
+supine_status supine_fields_write(const supine_lungs *lungs, const supine_fields *fields,
+                                  const supine_fit_options *options, const char *path,
+                                  supine_fit_report *report, supine_error *error) {
+  supine_compression field = {0};
+  supine_volume_forms forms = {0};
+  supine_status status = supine_fields_fit(fields, options, &field, report, error);
+  if (status == SUPINE_OK) {
+    status = supine_projection_volume_forms(&field, lungs, NULL, NULL, &forms, error);
+  }
+  if (status == SUPINE_OK) {
+    const supine_precompute_options basis = {.modes = options->modes,
+                                             .assumed = options->assumed,
+                                             .findings = options->findings,
+                                             .frame = options->frame,
+                                             .made_by = options->made_by};
+    const supine_basis_fit summary = {report->band_highest, report->condition,
+                                      options->scan_gravity};
+    const supine_basis_content content = {.lungs = lungs,
+                                          .options = &basis,
+                                          .fit = &summary,
+                                          .compression = &field,
+                                          .forms = &forms,
+                                          .accuracy = &report->accuracy};
+    status = supine_writer_basis_write(path, &content, error);
+  }
+  supine_sh_compression_free(&field);
+  supine_physics_volume_forms_free(&forms);
   return status;
 }
