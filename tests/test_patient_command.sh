@@ -157,7 +157,10 @@ grep -q 'source of the gain.*scans of --state do not' fit.txt || fail "a gain at
   --constants 5,2.2,9,1.1,20,1.4 --volume scan-1000 --lesion 97,-135,-190,65,3 -o stiff.ply >/dev/null ||
   fail "solve with a lesion"
 "$supine" fit rest.ply stiff.ply --rest 6000mL --other 5000mL --expandability -o stiff.json \
-  >fit.txt || fail "fit a lesion"
+  --map stiff.csv >fit.txt || fail "fit a lesion"
+[ "$(wc -l <stiff.csv)" -gt 300 ] || fail "rows of the map: $(wc -l <stiff.csv)"
+"$supine" precompute rest.ply --expandability stiff.csv --held-out 10 -o map.safetensors >/dev/null 2>&1 ||
+  fail "precompute with the map"
 grep -q 'kept *yes' fit.txt || fail "no expandability kept"
 near "$(number unseen_regions stiff.json)" 60 59.9 || fail "regions seen: $(cat fit.txt)"
 near "$(number correlation_with_height stiff.json)" 1 0.015 || fail "the force: $(cat fit.txt)"
