@@ -271,7 +271,7 @@ refused 2 'exchange --rest and --other' fit --landmarks empty.csv --other supine
 refused 2 'the two surfaces are the same' fit rest.ply rest.ply
 for beside in '--law deep' '--base 1' '--gain 0.3' '--box-force 0,0,0' '--constants 1,1,1,1,1,1' \
   '--reach 10'; do
-  refused 1 'has its own law and force' precompute s.ply --patient points.json $beside \
+  refused 1 'has no effect with --patient' precompute s.ply --patient points.json $beside \
     -o x.safetensors
 done
 refused 1 'leave --expandability out' precompute rest.ply --patient stiff.json \
