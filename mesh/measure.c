@@ -8,6 +8,16 @@
 
 #include "mesh/mesh.h"
 
+supine_status supine_mesh_allocate(size_t vertices, size_t triangles, supine_mesh *mesh) {
+  *mesh = (supine_mesh){vertices, malloc((3 * vertices + 1) * sizeof(double)), triangles,
+                        malloc((3 * triangles + 1) * sizeof(uint32_t))};
+  if (mesh->vertices == NULL || mesh->triangles == NULL) {
+    supine_mesh_free(mesh);
+    return SUPINE_ERROR_MEMORY;
+  }
+  return SUPINE_OK;
+}
+
 void supine_mesh_free(supine_mesh *mesh) {
   free(mesh->vertices);
   free(mesh->triangles);
