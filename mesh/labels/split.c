@@ -2,7 +2,6 @@
 /* Split a mask of two lungs. Where they touch, erode the mask until it falls into two connected
  * pieces beside each other. Then assign each voxel to the nearer piece. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "mesh/labels/mask.h"
@@ -80,72 +79,59 @@ static void mark_pair(const labels_mask *mask, const labels_pieces *pieces, cons
 static supine_status share_out(labels_mask *both, uint8_t *marks, float *squares) {
   const size_t count = supine_labels_mask_count(both);
   labels_mask one = *both;
-  float *other = malloc(count * sizeof *other);
-  one.at = malloc(count);
-  supine_status status = other == NULL || one.at == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
-  for (uint8_t value = LABELS_LEFT; value <= LABELS_RIGHT && status == SUPINE_OK; ++value) {
+  SUPINE_ARENA arena = {0};
+  float *other = supine_arena_take(&arena, count, sizeof *other);
+  one.at = supine_arena_take(&arena, count, 1);
+  if (arena.failed) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  for (uint8_t value = LABELS_LEFT; value <= LABELS_RIGHT; ++value) {
     for (size_t i = 0; i < count; ++i) {
       one.at[i] = marks[i] == value;
     }
-    status = supine_labels_distance(&one, false, value == LABELS_LEFT ? squares : other);
+    SUPINE_TRY(supine_labels_distance(&one, false, value == LABELS_LEFT ? squares : other));
   }
-  for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
+  for (size_t i = 0; i < count; ++i) {
     both->at[i] = both->at[i] == 0 ? 0 : squares[i] <= other[i] ? LABELS_LEFT : LABELS_RIGHT;
   }
-  free(one.at);
-  free(other);
-  return status;
+  return SUPINE_OK;
 }
 
 supine_status supine_labels_split(const char *path, labels_mask *both, double *neck,
                                   supine_error *error) {
   const size_t count = supine_labels_mask_count(both);
   const double step = fmax(both->spacing[0], fmax(both->spacing[1], both->spacing[2]));
+  SUPINE_ARENA arena = {0};
+  float *squares = supine_arena_take(&arena, count, sizeof *squares);
   labels_mask eroded = *both;
-  float *squares = malloc(count * sizeof *squares);
-  supine_status status = SUPINE_ERROR_MEMORY;
-  bool found_pair = false;
-  eroded.at = malloc(count);
-  *neck = 0.0;
-  if (squares == NULL || eroded.at == NULL) {
-    goto cleanup;
+  eroded.at = supine_arena_take(&arena, count, 1);
+  if (arena.failed) {
+    return SUPINE_ERROR_MEMORY;
   }
-  status = SUPINE_OK;
-  bool all = false; /* whether the two pieces together hold all voxels of the mask */
-  for (double depth = 0.0; status == SUPINE_OK && !found_pair && 2.0 * depth <= widest_neck;
-       depth += step) {
-    labels_pieces pieces = {0};
+  for (double depth = 0.0; 2.0 * depth <= widest_neck; depth += step) {
+    SUPINE_ARENA pass = {0};
+    labels_pieces pieces;
     pair found;
     if (depth == step) { /* first erosion: compute the depth of each voxel */
-      status = supine_labels_distance(both, true, squares);
+      SUPINE_TRY(supine_labels_distance(both, true, squares));
     }
     erode(both, squares, depth, eroded.at);
-    status = status == SUPINE_OK ? supine_labels_pieces_find(&eroded, false, &pieces) : status;
-    found_pair = status == SUPINE_OK && pieces.run_count > 0 && find_pair(both, &pieces, &found);
-    if (found_pair) {
-      *neck = 2.0 * depth;
-      all = depth == 0.0 && pieces.piece_count == 2;
-      mark_pair(both, &pieces, &found, eroded.at);
+    SUPINE_TRY(supine_labels_pieces_find(&eroded, false, &pass, &pieces));
+    if (pieces.run_count == 0 || !find_pair(both, &pieces, &found)) {
+      continue;
     }
-    supine_labels_pieces_free(&pieces);
-  }
-  if (found_pair && all) {
+    *neck = 2.0 * depth;
+    mark_pair(both, &pieces, &found, eroded.at);
+    if (depth > 0.0 || pieces.piece_count > 2) { /* not all voxels are in the two pieces */
+      supine_arena_free(&pass);
+      return share_out(both, eroded.at, squares);
+    }
     memcpy(both->at, eroded.at, count);
-  } else if (found_pair) {
-    status = share_out(both, eroded.at, squares);
+    return SUPINE_OK;
   }
-cleanup:
-  free(squares);
-  free(eroded.at);
-  if (status != SUPINE_OK) {
-    return supine_error_set(error, status, "%s: no memory for a label map of %zu voxels", path,
-                            count);
-  }
-  return found_pair
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_MESH,
-                                "%s: cannot split the mask into two lungs: erosion leaves no "
-                                "two pieces beside each other. If it is one lung, name the "
-                                "side: --labels left=LABEL or right=LABEL",
-                                path);
+  return supine_error_set(error, SUPINE_ERROR_MESH,
+                          "%s: cannot split the mask into two lungs: erosion leaves no two pieces "
+                          "beside each other. If it is one lung, name the side: --labels "
+                          "left=LABEL or right=LABEL",
+                          path);
 }
