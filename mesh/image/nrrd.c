@@ -4,6 +4,7 @@
 
 #include <teem/nrrd.h>
 
+#include "base/arena.h"
 #include "base/library.h"
 #include "mesh/image/image_formats.h"
 
@@ -100,33 +101,25 @@ static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState
   return SUPINE_OK;
 }
 
-supine_status supine_image_describe_nrrd(const char *path, supine_image *image,
+supine_status supine_image_describe_nrrd(const char *path, FILE *file, supine_image *image,
                                          image_storage *storage, supine_error *error) {
-  supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_TEEM, FUNCTIONS, &teem, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(SUPINE_LIBRARY_LOAD(SUPINE_TEEM, FUNCTIONS, &teem, error));
   Nrrd *nrrd = teem.nrrdNew();
   NrrdIoState *io = teem.nrrdIoStateNew();
-  FILE *file = fopen(path, "rb");
-  if (nrrd == NULL || io == NULL || file == NULL) {
-    status = supine_error_set(error, file == NULL ? SUPINE_ERROR_READ : SUPINE_ERROR_MEMORY,
-                              "%s: cannot read: check its permissions, and the free memory", path);
-    goto cleanup;
+  supine_status status = SUPINE_ERROR_MEMORY;
+  if (nrrd == NULL || io == NULL) {
+    (void)supine_error_memory(error, "the header of %s", path);
+  } else {
+    io->skipData = AIR_TRUE;
+    io->keepNrrdDataFileOpen = AIR_TRUE;
+    status = teem.nrrdRead(nrrd, file, io) != 0 ? teem_fails(path, error)
+                                                : check(path, nrrd, io, image, storage, error);
+    storage->offset = ftello(file);
   }
-  io->skipData = AIR_TRUE;
-  io->keepNrrdDataFileOpen = AIR_TRUE;
-  status = teem.nrrdRead(nrrd, file, io) != 0 ? teem_fails(path, error)
-                                              : check(path, nrrd, io, image, storage, error);
-  storage->offset = status == SUPINE_OK ? ftello(file) : 0;
-cleanup:
   if (io != NULL) {
     (void)teem.nrrdIoStateNix(io);
   }
   (void)teem.nrrdNuke(nrrd);
-  if (file != NULL) {
-    (void)fclose(file);
-  }
   return status;
 }
 
