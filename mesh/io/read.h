@@ -74,8 +74,7 @@ typedef struct mesh_faces {
 } mesh_faces;
 
 /** Cut a face into triangles, and add them. A face of more than MESH_CORNERS_MAX corners is refused
- * without reading `corners`.
- * @retval SUPINE_ERROR_FORMAT  a corner names no vertex, or there are too many corners */
+ * without reading `corners`. */
 supine_status supine_mesh_faces_add(mesh_faces *faces, const double *corners, size_t count,
                                     supine_error *error);
 

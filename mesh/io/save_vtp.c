@@ -6,6 +6,7 @@
 
 #include <libdeflate.h>
 
+#include "base/arena.h"
 #include "base/output.h"
 #include "base/parallel.h"
 
@@ -29,6 +30,7 @@ typedef struct vtp_array {
 } vtp_array;
 
 struct vtp {
+  supine_arena arena;
   mesh_writer writer;
   vtp_array arrays[VTP_ARRAYS]; /* points, connectivity, offsets, then point data */
   size_t array_count;
@@ -97,12 +99,7 @@ static void put_lung(const vtp *file, size_t i, unsigned char **at) {
 }
 
 static void vtp_end(vtp *file) {
-  free(file->offsets);
-  free(file->raw);
-  free(file->packed);
-  free(file->sizes);
-  file->offsets = file->sizes = NULL;
-  file->raw = file->packed = NULL;
+  supine_arena_free(&file->arena);
 }
 
 static supine_status vtp_begin(vtp *file) {
@@ -127,17 +124,14 @@ static supine_status vtp_begin(vtp *file) {
     *to++ = (vtp_array){"UInt8", "lung", 1, 1, points, true, put_lung};
   }
   file->array_count = (size_t)(to - file->arrays);
-  file->offsets = calloc(file->frames * file->array_count, sizeof *file->offsets);
+  file->offsets =
+      supine_arena_zeros(&file->arena, file->frames * file->array_count, sizeof *file->offsets);
   const size_t blocks = 12 * (points > triangles ? points : triangles) / BLOCK + 1;
   file->threads = supine_thread_count();
-  file->raw = malloc(file->threads * BLOCK);
-  file->packed = malloc(blocks * room_of_block());
-  file->sizes = calloc(blocks + 3, sizeof *file->sizes);
-  if (file->offsets == NULL || file->raw == NULL || file->packed == NULL || file->sizes == NULL) {
-    vtp_end(file);
-    return SUPINE_ERROR_MEMORY;
-  }
-  return SUPINE_OK;
+  file->raw = supine_arena_take(&file->arena, file->threads, BLOCK);
+  file->packed = supine_arena_take(&file->arena, blocks, room_of_block());
+  file->sizes = supine_arena_zeros(&file->arena, blocks + 3, sizeof *file->sizes);
+  return file->arena.failed ? SUPINE_ERROR_MEMORY : SUPINE_OK;
 }
 
 static void put_sizes(FILE *out, const uint64_t *sizes, size_t count) {
@@ -197,17 +191,16 @@ static supine_status put_array(vtp *file, const vtp_array *array, FILE *out) {
 
 static supine_status vtp_frame(vtp *file, FILE *out) {
   const size_t frame = file->next_frame++;
-  supine_status status = SUPINE_OK;
-  for (size_t i = 0; i < file->array_count && status == SUPINE_OK; ++i) {
+  for (size_t i = 0; i < file->array_count; ++i) {
     uint64_t *offset = &file->offsets[frame * file->array_count + i];
     if (frame > 0 && file->arrays[i].constant) {
       *offset = file->offsets[i];
     } else {
       *offset = file->bytes_written;
-      status = put_array(file, &file->arrays[i], out);
+      SUPINE_TRY(put_array(file, &file->arrays[i], out));
     }
   }
-  return status;
+  return SUPINE_OK;
 }
 
 /* Write the DataArray elements of an array, one for each frame. Offsets are padded to one length,
@@ -315,15 +308,12 @@ static void vtp_foot(FILE *out) {
 
 /* Compress the arrays into memory first, because the header of the file states their offsets. */
 supine_status supine_mesh_save_vtp(const mesh_writer *writer) {
-  vtp file = {.writer = *writer, .frames = 1};
+  SUPINE_FREED_BY(vtp_end) vtp file = {.writer = *writer, .frames = 1};
   char *bytes = NULL;
   size_t size = 0;
-  supine_status status = vtp_begin(&file);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(vtp_begin(&file));
   FILE *memory = open_memstream(&bytes, &size);
-  status = memory == NULL ? SUPINE_ERROR_MEMORY : vtp_frame(&file, memory);
+  supine_status status = memory == NULL ? SUPINE_ERROR_MEMORY : vtp_frame(&file, memory);
   if (memory != NULL && fclose(memory) != 0) {
     status = SUPINE_ERROR_MEMORY;
   }
@@ -333,7 +323,6 @@ supine_status supine_mesh_save_vtp(const mesh_writer *writer) {
     vtp_foot(writer->out);
   }
   free(bytes);
-  vtp_end(&file);
   return status;
 }
 
@@ -342,37 +331,27 @@ struct supine_mesh_series {
   vtp file;
 };
 
-static supine_status no_memory(const char *path, supine_error *error) {
-  return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
-}
-
 supine_status supine_mesh_series_open(const char *path, const supine_mesh *mesh,
                                       const supine_mesh_save_options *options, size_t frames,
                                       const double *times, supine_mesh_series **series,
                                       supine_error *error) {
   *series = NULL;
-  supine_status status = supine_mesh_writer_check(path, mesh, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(supine_mesh_writer_check(path, mesh, error));
   supine_mesh_series *made = calloc(1, sizeof *made);
   if (made == NULL) {
-    return no_memory(path, error);
+    return supine_error_memory(error, "writing %s", path);
   }
-  status = supine_output_open(path, &made->output, error);
+  supine_status status = supine_output_open(path, &made->output, error);
   if (status == SUPINE_OK && fseeko(made->output.file, 0, SEEK_SET) != 0) {
     status =
         supine_error_set(error, SUPINE_ERROR_WRITE,
                          "%s: a series cannot be written into a pipe or device: give a file", path);
   }
-  if (status == SUPINE_OK) {
-    made->file.frames = frames;
-    made->file.times = times;
-    supine_mesh_writer_begin(mesh, options, &made->file.writer);
-    status = vtp_begin(&made->file);
-    if (status != SUPINE_OK) {
-      (void)no_memory(path, error);
-    }
+  supine_mesh_writer_begin(mesh, options, &made->file.writer);
+  made->file.frames = frames;
+  made->file.times = times;
+  if (status == SUPINE_OK && vtp_begin(&made->file) != SUPINE_OK) {
+    status = supine_error_memory(error, "writing %s", path);
   }
   if (status != SUPINE_OK) {
     supine_mesh_series_close(made);
@@ -385,14 +364,10 @@ supine_status supine_mesh_series_open(const char *path, const supine_mesh *mesh,
 
 supine_status supine_mesh_series_add(supine_mesh_series *series, supine_error *error) {
   const char *path = series->output.path;
-  supine_status status = supine_mesh_writer_check(path, series->file.writer.mesh, error);
-  if (status == SUPINE_OK) {
-    status = vtp_frame(&series->file, series->output.file);
-    if (status != SUPINE_OK) {
-      (void)no_memory(path, error);
-    }
-  }
-  return status;
+  SUPINE_TRY(supine_mesh_writer_check(path, series->file.writer.mesh, error));
+  return vtp_frame(&series->file, series->output.file) == SUPINE_OK
+             ? SUPINE_OK
+             : supine_error_memory(error, "writing %s", path);
 }
 
 supine_status supine_mesh_series_commit(supine_mesh_series *series, supine_error *error) {
