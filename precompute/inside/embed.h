@@ -56,9 +56,7 @@ typedef struct supine_inside_report {
  *     grid       F64 [4, 3]  position of the first node, then the three steps, mm (for a grid)
  *     grid_size  U32 [3]     number of nodes along the three steps (for a grid)
  *
- * The metadata "content" is "points", "mesh" or "grid". Uses all cores; cost: see biharmonic.h.
- * @retval SUPINE_ERROR_MESH  `content` has no points
- * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY, SUPINE_ERROR_WRITE */
+ * The metadata "content" is "points", "mesh" or "grid". Uses all cores; cost: see biharmonic.h. */
 supine_status supine_inside_embed(const supine_inside_shells *shells,
                                   const supine_inside_content *content,
                                   const supine_inside_options *options, const char *path,
