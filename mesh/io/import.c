@@ -227,9 +227,10 @@ supine_status supine_mesh_import(mesh_file *file, supine_mesh *mesh, size_t *dro
 }
 
 /* Check that three numbers follow `keyword` in every line that begins with it, because assimp does
- * not check this. Return the number of the first wrong line, or 0. Also turn mtllib lines, which
- * name a file of colours, into comments, and set `last` to the first word of the last line. */
-static size_t check_lines(mesh_file *file, const char *keyword, mesh_text *last) {
+ * not check this. Also turn mtllib lines, which name a file of colours, into comments, and set
+ * `last` to the first word of the last line. */
+static supine_status check_lines(mesh_file *file, const char *keyword, mesh_text *last,
+                                 supine_error *error) {
   mesh_text text = {file->bytes, file->bytes + file->size};
   mesh_text line;
   for (size_t number = 1; supine_mesh_text_line(&text, &line); ++number) {
@@ -242,26 +243,20 @@ static size_t check_lines(mesh_file *file, const char *keyword, mesh_text *last)
     if (supine_mesh_text_is(word, "mtllib")) {
       file->bytes[word.at - file->bytes] = '#';
     } else if (supine_mesh_text_is(word, keyword) && !supine_mesh_text_position(&line, position)) {
-      return number;
+      return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "%s: line %zu: a vertex needs three numbers; save the mesh again",
+                              file->path, number);
     }
   }
-  return 0;
-}
-
-static supine_status bad_line(const mesh_file *file, size_t number, supine_error *error) {
-  return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                          "%s: line %zu: a vertex needs three numbers; save the mesh again",
-                          file->path, number);
+  return SUPINE_OK;
 }
 
 supine_status supine_mesh_read_obj(mesh_file *file, supine_mesh *mesh, size_t *dropped,
                                    supine_error *error) {
   mesh_text last;
-  if (!supine_mesh_guard_text(file, error)) {
-    return SUPINE_ERROR_FORMAT;
-  }
-  const size_t bad = check_lines(file, "v", &last);
-  return bad > 0 ? bad_line(file, bad, error) : import_file(file, "obj", mesh, dropped, error);
+  SUPINE_TRY(supine_mesh_guard_text(file, error));
+  SUPINE_TRY(check_lines(file, "v", &last, error));
+  return import_file(file, "obj", mesh, dropped, error);
 }
 
 /* Read STL, as text or binary. A file with a NUL byte is binary, even if it begins with "solid". */
@@ -269,10 +264,7 @@ supine_status supine_mesh_read_stl(mesh_file *file, supine_mesh *mesh, size_t *d
                                    supine_error *error) {
   mesh_text last = {0};
   if (memchr(file->bytes, '\0', file->size) == NULL) {
-    const size_t bad = check_lines(file, "vertex", &last);
-    if (bad > 0) {
-      return bad_line(file, bad, error);
-    }
+    SUPINE_TRY(check_lines(file, "vertex", &last, error));
     if (!supine_mesh_text_is(last, "endsolid")) {
       return supine_error_set(
           error, SUPINE_ERROR_FORMAT,

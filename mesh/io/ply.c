@@ -41,6 +41,10 @@ typedef struct ply {
   mesh_faces faces;
 } ply;
 
+static supine_status malformed(const ply *in, const char *what) {
+  return supine_error_set(in->error, SUPINE_ERROR_FORMAT, "%s: %s", in->file->path, what);
+}
+
 /* Return the index of a word in a list that ends with NULL, or the index of the NULL. */
 static int find_name(mesh_text word, const char *const *names) {
   int index = 0;
@@ -118,32 +122,25 @@ static bool read_line(ply *in, mesh_text line, bool *has_format) {
 }
 
 static supine_status read_header(ply *in) {
-  const char *path = in->file->path;
   mesh_text line;
   bool has_format = false;
   if (!supine_mesh_text_line(&in->text, &line) || !supine_mesh_text_is(line, "ply")) {
-    return supine_error_set(in->error, SUPINE_ERROR_FORMAT,
-                            "%s: does not begin with \"ply\"; give a PLY file", path);
+    return malformed(in, "does not begin with \"ply\"; give a PLY file");
   }
   for (size_t number = 2; supine_mesh_text_line(&in->text, &line); ++number) {
     mesh_text rest = line;
     mesh_text word;
     if (supine_mesh_text_word(&rest, &word) && supine_mesh_text_is(word, "end_header")) {
       return has_format ? SUPINE_OK
-                        : supine_error_set(in->error, SUPINE_ERROR_FORMAT,
-                                           "%s: the PLY header has no format line; save the mesh "
-                                           "again",
-                                           path);
+                        : malformed(in, "the PLY header has no format line; save the mesh again");
     }
     if (!read_line(in, line, &has_format)) {
       return supine_error_set(in->error, SUPINE_ERROR_FORMAT,
                               "%s: line %zu of the PLY header is malformed; save the mesh again",
-                              path, number);
+                              in->file->path, number);
     }
   }
-  return supine_error_set(
-      in->error, SUPINE_ERROR_FORMAT,
-      "%s: the PLY header has no end_header: the file is truncated; save it again", path);
+  return malformed(in, "the PLY header has no end_header: the file is truncated; save it again");
 }
 
 static supine_status check_header(const ply *in) {
@@ -160,9 +157,7 @@ static supine_status check_header(const ply *in) {
                               "%s: it has strips of triangles; save the mesh as triangles", path);
     }
   }
-  if (in->encoding == ASCII && !supine_mesh_guard_text(in->file, in->error)) {
-    return SUPINE_ERROR_FORMAT;
-  }
+  SUPINE_TRY(in->encoding == ASCII ? supine_mesh_guard_text(in->file, in->error) : SUPINE_OK);
   return (in->present & needed) == needed
              ? SUPINE_OK
              : supine_error_set(
@@ -287,9 +282,7 @@ supine_status supine_mesh_read_ply(mesh_file *file, supine_mesh *mesh, size_t *d
   for (size_t e = 0; e < in.element_count; ++e) {
     const element *of = &in.elements[e];
     if (of->kind == FACES && mesh->vertices == NULL) {
-      return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s: its faces come before its vertices; save the mesh again",
-                              file->path);
+      return malformed(&in, "its faces come before its vertices; save the mesh again");
     }
     SUPINE_TRY(of->kind == VERTICES ? make_room(&in, of, mesh) : SUPINE_OK);
     SUPINE_TRY(take_items(&in, of));

@@ -54,8 +54,8 @@ typedef struct mesh_file {
 } mesh_file;
 
 /** Refuse a text with a NUL byte, or with a CR that no LF follows: other readers would split its
- * lines differently. Return false, with SUPINE_ERROR_FORMAT set, if the text is refused. */
-bool supine_mesh_guard_text(const mesh_file *file, supine_error *error);
+ * lines differently. */
+supine_status supine_mesh_guard_text(const mesh_file *file, supine_error *error);
 
 /* ---- faces.c: add faces to a mesh that already has its vertices. ---- */
 

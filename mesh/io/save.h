@@ -35,8 +35,7 @@ void supine_mesh_writer_triangle(const mesh_writer *writer, size_t t, uint32_t c
 /** Fill a writer, except `out`, from the arguments of supine_mesh_save. */
 void supine_mesh_writer_begin(const supine_mesh *mesh, const supine_mesh_save_options *options,
                               mesh_writer *writer);
-/** Check that a surface can be saved. Return SUPINE_ERROR_ARGUMENT if its counts exceed what files
- * can hold, SUPINE_ERROR_MESH if a coordinate is not finite. */
+/** Check that files can hold a surface of this size, and that its coordinates are finite. */
 supine_status supine_mesh_writer_check(const char *path, const supine_mesh *mesh,
                                        supine_error *error);
 

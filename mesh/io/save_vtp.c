@@ -18,6 +18,8 @@ typedef struct vtp vtp;
 
 /* Write the bytes of item `i` of an array to *at, and advance *at. */
 typedef void vtp_put(const vtp *file, size_t i, unsigned char **at);
+/* Compute the numbers of item `i`. */
+typedef void vtp_numbers(const mesh_writer *writer, size_t i, float *numbers);
 
 typedef struct vtp_array {
   const char *type;
@@ -25,8 +27,10 @@ typedef struct vtp_array {
   unsigned components;
   size_t item_size; /* size of the data of one point or triangle, bytes: 1, 4 or 12 */
   size_t count;
-  bool constant; /* whether the array is equal in all frames and written once */
-  vtp_put *put;
+  bool constant;        /* whether the array is equal in all frames and written once */
+  vtp_put *put;         /* NULL for the numbers that `numbers` computes, */
+  vtp_numbers *numbers; /* without the first `skip` */
+  size_t skip;
 } vtp_array;
 
 struct vtp {
@@ -54,12 +58,6 @@ static size_t room_of_block(void) {
   return libdeflate_zlib_compress_bound(NULL, BLOCK);
 }
 
-static void put_point(const vtp *file, size_t i, unsigned char **at) {
-  float position[3];
-  supine_mesh_writer_position(&file->writer, i, position);
-  supine_mesh_put_f32(at, position, 3);
-}
-
 static void put_connectivity(const vtp *file, size_t i, unsigned char **at) {
   uint32_t corner[3];
   supine_mesh_writer_triangle(&file->writer, i, corner);
@@ -72,26 +70,8 @@ static void put_offset(const vtp *file, size_t i, unsigned char **at) {
   supine_mesh_put_u32(at, &stop, 1);
 }
 
-static void put_displacement(const vtp *file, size_t i, unsigned char **at) {
-  float displacement[4];
-  supine_mesh_writer_displacement(&file->writer, i, displacement);
-  supine_mesh_put_f32(at, displacement, 3);
-}
-
-static void put_magnitude(const vtp *file, size_t i, unsigned char **at) {
-  float displacement[4];
-  supine_mesh_writer_displacement(&file->writer, i, displacement);
-  supine_mesh_put_f32(at, displacement + 3, 1);
-}
-
 static void put_expected_error(const vtp *file, size_t i, unsigned char **at) {
   supine_mesh_put_f32(at, file->writer.options.expected_error + i, 1);
-}
-
-static void put_normal(const vtp *file, size_t i, unsigned char **at) {
-  float normal[3];
-  supine_mesh_writer_normal(&file->writer, i, normal);
-  supine_mesh_put_f32(at, normal, 3);
 }
 
 static void put_lung(const vtp *file, size_t i, unsigned char **at) {
@@ -107,21 +87,25 @@ static supine_status vtp_begin(vtp *file) {
   const size_t points = writer->mesh->vertex_count;
   const size_t triangles = writer->mesh->triangle_count;
   vtp_array *to = file->arrays;
-  *to++ = (vtp_array){"Float32", "Points", 3, 12, points, false, put_point};
-  *to++ = (vtp_array){"Int32", "connectivity", 1, 12, triangles, true, put_connectivity};
-  *to++ = (vtp_array){"Int32", "offsets", 1, 4, triangles, true, put_offset};
+  *to++ =
+      (vtp_array){"Float32", "Points", 3, 12, points, false, NULL, supine_mesh_writer_position, 0};
+  *to++ = (vtp_array){"Int32", "connectivity", 1, 12, triangles, true, put_connectivity, NULL, 0};
+  *to++ = (vtp_array){"Int32", "offsets", 1, 4, triangles, true, put_offset, NULL, 0};
   if (writer->options.from != NULL) {
-    *to++ = (vtp_array){"Float32", "displacement", 3, 12, points, false, put_displacement};
-    *to++ = (vtp_array){"Float32", "displacement_magnitude", 1, 4, points, false, put_magnitude};
+    vtp_numbers *const numbers = supine_mesh_writer_displacement;
+    *to++ = (vtp_array){"Float32", "displacement", 3, 12, points, false, NULL, numbers, 0};
+    *to++ = (vtp_array){"Float32", "displacement_magnitude", 1, 4, points, false, NULL, numbers, 3};
   }
   if (writer->options.expected_error != NULL) {
-    *to++ = (vtp_array){"Float32", "expected_error_mm", 1, 4, points, false, put_expected_error};
+    *to++ = (vtp_array){"Float32", "expected_error_mm", 1,    4, points,
+                        false,     put_expected_error,  NULL, 0};
   }
   if (writer->options.normals != NULL) {
-    *to++ = (vtp_array){"Float32", "Normals", 3, 12, points, false, put_normal};
+    *to++ =
+        (vtp_array){"Float32", "Normals", 3, 12, points, false, NULL, supine_mesh_writer_normal, 0};
   }
   if (writer->options.lung != NULL) {
-    *to++ = (vtp_array){"UInt8", "lung", 1, 1, points, true, put_lung};
+    *to++ = (vtp_array){"UInt8", "lung", 1, 1, points, true, put_lung, NULL, 0};
   }
   file->array_count = (size_t)(to - file->arrays);
   file->offsets =
@@ -156,7 +140,13 @@ static void pack_blocks(void *context, size_t begin, size_t end, size_t thread) 
     const size_t items = remaining < each ? remaining : each;
     unsigned char *at = raw;
     for (size_t k = 0; k < items; ++k) {
-      array->put(file, i * each + k, &at);
+      float numbers[4];
+      if (array->put != NULL) {
+        array->put(file, i * each + k, &at);
+      } else {
+        array->numbers(&file->writer, i * each + k, numbers);
+        supine_mesh_put_f32(&at, numbers + array->skip, array->components);
+      }
     }
     struct libdeflate_compressor *compressor = libdeflate_alloc_compressor(LEVEL);
     file->sizes[3 + i] =
