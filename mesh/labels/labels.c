@@ -40,18 +40,15 @@ static bool same_frame(const supine_image *a, const supine_image *b) {
   if (memcmp(a->size, b->size, sizeof a->size) != 0) {
     return false;
   }
-  for (int corner = 0; corner < 8; ++corner) {
+  for (size_t corner = 0; corner < 8; ++corner) {
+    const size_t at[3] = {(corner & 1U) * (a->size[0] - 1), (corner >> 1 & 1U) * (a->size[1] - 1),
+                          (corner >> 2) * (a->size[2] - 1)};
     double place[3];
     double voxel[3];
-    for (int k = 0; k < 3; ++k) {
-      place[k] = b->origin[k];
-      for (int x = 0; x < 3; ++x) {
-        place[k] += (corner >> x & 1) * (double)(b->size[x] - 1) * b->step[x][k];
-      }
-    }
+    supine_image_place(b, at[0] + a->size[0] * (at[1] + a->size[1] * at[2]), place);
     supine_image_locate(a, place, voxel);
     for (int x = 0; x < 3; ++x) {
-      if (fabs(voxel[x] - (corner >> x & 1) * (double)(a->size[x] - 1)) > 0.01) {
+      if (fabs(voxel[x] - (double)at[x]) > 0.01) {
         return false;
       }
     }

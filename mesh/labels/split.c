@@ -11,14 +11,10 @@ static const double least_share = 0.1;
 /* A bridge between touching lungs is cut if it is at most this wide, mm. */
 static const double widest_neck = 40.0;
 
-typedef struct pair {
-  /* index of the first run of voxels of each connected piece, left piece first */
-  uint32_t piece[2];
-} pair;
-
 /* Find the two largest connected pieces. Return false unless they lie side by side along x, and the
- * smaller one has at least `least_share` of the volume of the larger one. */
-static bool find_pair(const labels_mask *mask, const labels_pieces *pieces, pair *found) {
+ * smaller one has at least `least_share` of the volume of the larger one.
+ * @param found  written: index of the first run of voxels of each piece, left piece first */
+static bool find_pair(const labels_mask *mask, const labels_pieces *pieces, uint32_t found[2]) {
   uint32_t top[2] = {0, 0};
   for (uint32_t r = 1; r < pieces->run_count; ++r) {
     if (pieces->piece[r].count > pieces->piece[top[0]].count) {
@@ -38,14 +34,11 @@ static bool find_pair(const labels_mask *mask, const labels_pieces *pieces, pair
     const labels_piece *piece = &pieces->piece[top[p]];
     const double voxel[3] = {piece->sum[0] / counts[p], piece->sum[1] / counts[p],
                              piece->sum[2] / counts[p]};
-    found->piece[p] = top[p];
     supine_labels_mask_place(mask, voxel, centre[p]);
   }
   const double apart = centre[0][0] - centre[1][0];
-  if (apart < 0.0) {
-    found->piece[0] = top[1];
-    found->piece[1] = top[0];
-  }
+  found[0] = top[apart < 0.0];
+  found[1] = top[apart >= 0.0];
   return fabs(apart) > fabs(centre[0][1] - centre[1][1]) &&
          fabs(apart) > fabs(centre[0][2] - centre[1][2]);
 }
@@ -60,15 +53,15 @@ static void erode(const labels_mask *both, const float *squares, double depth, u
 }
 
 /* Mark the voxels of two pieces as LABELS_LEFT and LABELS_RIGHT, all others as 0. */
-static void mark_pair(const labels_mask *mask, const labels_pieces *pieces, const pair *found,
+static void mark_pair(const labels_mask *mask, const labels_pieces *pieces, const uint32_t found[2],
                       uint8_t *marks) {
   memset(marks, 0, supine_labels_mask_count(mask));
   for (size_t row = 0; row < mask->size[1] * mask->size[2]; ++row) {
     for (size_t r = pieces->row[row]; r < pieces->row[row + 1]; ++r) {
       const labels_run *run = &pieces->run[r];
-      const uint8_t mark = run->parent == found->piece[0]   ? LABELS_LEFT
-                           : run->parent == found->piece[1] ? LABELS_RIGHT
-                                                            : 0;
+      const uint8_t mark = run->parent == found[0]   ? LABELS_LEFT
+                           : run->parent == found[1] ? LABELS_RIGHT
+                                                     : 0;
       memset(marks + row * mask->size[0] + run->begin, mark, run->end - run->begin);
     }
   }
@@ -111,17 +104,17 @@ supine_status supine_labels_split(const char *path, labels_mask *both, double *n
   for (double depth = 0.0; 2.0 * depth <= widest_neck; depth += step) {
     SUPINE_ARENA pass = {0};
     labels_pieces pieces;
-    pair found;
+    uint32_t found[2];
     if (depth == step) { /* first erosion: compute the depth of each voxel */
       SUPINE_TRY(supine_labels_distance(both, true, squares));
     }
     erode(both, squares, depth, eroded.at);
     SUPINE_TRY(supine_labels_pieces_find(&eroded, false, &pass, &pieces));
-    if (pieces.run_count == 0 || !find_pair(both, &pieces, &found)) {
+    if (pieces.run_count == 0 || !find_pair(both, &pieces, found)) {
       continue;
     }
     *neck = 2.0 * depth;
-    mark_pair(both, &pieces, &found, eroded.at);
+    mark_pair(both, &pieces, found, eroded.at);
     if (depth > 0.0 || pieces.piece_count > 2) { /* not all voxels are in the two pieces */
       supine_arena_free(&pass);
       return share_out(both, eroded.at, squares);
