@@ -24,6 +24,10 @@ static const struct {
                                {nrrdTypeInt, "int32"},   {nrrdTypeUInt, "uint32"},
                                {nrrdTypeFloat, "float"}, {nrrdTypeDouble, "double"}};
 
+static supine_status malformed(const char *path, const char *what, supine_error *error) {
+  return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: %s", path, what);
+}
+
 /* Set the error to the last line of teem's message. */
 static supine_status teem_fails(const char *path, supine_error *error) {
   char *text = teem.biffGetDone(*teem.nrrdBiffKey);
@@ -43,8 +47,7 @@ static supine_status teem_fails(const char *path, supine_error *error) {
 static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState *io,
                            supine_image *image, image_storage *storage, supine_error *error) {
   if (io->detachedHeader || io->dataFNFormat != NULL || io->dataFNArr->len > 0) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: its voxels are in another file; save all in one file", path);
+    return malformed(path, "its voxels are in another file; save all in one file", error);
   }
   if (nrrd->dim != 3 || nrrd->spaceDim != 3) {
     return supine_error_set(
@@ -53,28 +56,23 @@ static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState
                        : "%s: the header lacks space directions for its %u axes; add them",
         path, nrrd->dim);
   }
-  double turn = 0.0;
-  switch (nrrd->space) {
-  case nrrdSpaceLeftPosteriorSuperior:
-    turn = 1.0;
-    break;
-  case nrrdSpaceRightAnteriorSuperior:
-    turn = -1.0;
-    break;
-  default:
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: its space is neither left-posterior-superior nor "
-                            "right-anterior-superior; convert the image to one of them",
-                            path);
+  const double turn = nrrd->space == nrrdSpaceLeftPosteriorSuperior   ? 1.0
+                      : nrrd->space == nrrdSpaceRightAnteriorSuperior ? -1.0
+                                                                      : 0.0;
+  if (turn == 0.0) {
+    return malformed(path,
+                     "its space is neither left-posterior-superior nor right-anterior-superior; "
+                     "convert the image to one of them",
+                     error);
   }
   storage->packed = io->encoding == *teem.nrrdEncodingGzip;
   storage->text = io->encoding == *teem.nrrdEncodingAscii;
   if ((io->encoding != *teem.nrrdEncodingRaw && !storage->packed && !storage->text) ||
       io->lineSkip != 0 || io->byteSkip != 0) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: its encoding is not raw, gzip or ascii, or its header skips lines "
-                            "or bytes; save the image again as gzip",
-                            path);
+    return malformed(path,
+                     "its encoding is not raw, gzip or ascii, or its header skips lines or bytes; "
+                     "save the image again as gzip",
+                     error);
   }
   const bool wide = nrrd->type == nrrdTypeLLong || nrrd->type == nrrdTypeULLong;
   size_t type = 0;
