@@ -263,9 +263,8 @@ static void find_volumes(const supine_mesh *mesh, const supine_topology *topolog
     piece *of = &pieces[topology->component[mesh->triangles[3 * t]]];
     const double *origin = mesh->vertices + 3 * (size_t)of->first_vertex;
     double corner[3][3];
-    for (size_t k = 0; k < 9; ++k) {
-      corner[k / 3][k % 3] =
-          mesh->vertices[3 * (size_t)mesh->triangles[3 * t + k / 3] + k % 3] - origin[k % 3];
+    for (size_t k = 0; k < 3; ++k) {
+      supine_subtract(mesh->vertices + 3 * (size_t)mesh->triangles[3 * t + k], origin, corner[k]);
     }
     of->volume += supine_triple(corner[0], corner[1], corner[2]) / 6.0;
   }
