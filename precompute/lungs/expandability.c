@@ -10,10 +10,6 @@
 
 #include "precompute/lungs/expandability.h"
 
-static bool positive(double value) {
-  return value > 0.0 && isfinite(value) && isfinite(1.0 / value);
-}
-
 void supine_tissue_expandability_regional(const supine_lungs *lungs,
                                           const supine_expandability_law *law, double *a) {
   for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
@@ -47,8 +43,9 @@ static supine_status take_row(const supine_csv *csv, size_t row, size_t count, d
                             csv->path, csv->line, number);
   }
   SUPINE_TRY(supine_csv_number(csv, 0, "expandability", &value, error));
+  const bool positive = value > 0.0 && isfinite(value) && isfinite(1.0 / value);
   const char *wrong = vertex >= count    ? "there is no such vertex"
-                      : !positive(value) ? "it must be positive"
+                      : !positive        ? "it must be positive"
                       : a[vertex] != 0.0 ? "the vertex was given before"
                                          : NULL;
   if (wrong != NULL) {

@@ -309,16 +309,6 @@ static supine_status take_side(const supine_mesh *meshes, size_t count,
   return supine_lungs_create(meshes, count, &midline, lungs, error);
 }
 
-static void note_lungs(const supine_lungs *lungs, const char *name, supine_findings *findings) {
-  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-    if (lungs->reversed[lung]) {
-      supine_findings_add(findings,
-                          "%s: note: the triangles of the %s lung faced inwards: reversed", name,
-                          supine_lungs_name(lungs, lung));
-    }
-  }
-}
-
 supine_status supine_lungs_gate(supine_mesh *meshes, size_t count,
                                 const supine_lungs_source *source, supine_lungs *lungs,
                                 bool *axes_hold, supine_findings *findings, supine_error *error) {
@@ -338,10 +328,15 @@ supine_status supine_lungs_gate(supine_mesh *meshes, size_t count,
   if (c.status == SUPINE_OK && lungs->lung_count == 1 && source->midline == NULL) {
     c.status = take_side(meshes, count, source, side, lungs, findings, error);
   }
-  if (c.status == SUPINE_OK) {
-    note_lungs(lungs, source->name, findings);
-  } else {
+  if (c.status != SUPINE_OK) {
     supine_lungs_free(lungs);
+  }
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+    if (lungs->reversed[lung]) {
+      supine_findings_add(findings,
+                          "%s: note: the triangles of the %s lung faced inwards: reversed",
+                          source->name, supine_lungs_name(lungs, lung));
+    }
   }
   return c.status;
 }

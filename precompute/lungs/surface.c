@@ -331,23 +331,14 @@ static void search(const supine_inside_surface *s, size_t at, const double x[3],
                    supine_inside_place *place) {
   const node *n = &s->nodes[at];
   if (n->right != 0) {
-    size_t first = at + 1;
-    size_t second = n->right;
-    double near = box_square(&s->nodes[first], x);
-    double far = box_square(&s->nodes[second], x);
-    if (far < near) {
-      const size_t swap = first;
-      first = second;
-      second = swap;
-      const double square = near;
-      near = far;
-      far = square;
-    }
-    if (near < *best) {
-      search(s, first, x, best, place);
-    }
-    if (far < *best) {
-      search(s, second, x, best, place);
+    const size_t child[2] = {at + 1, n->right};
+    const double square[2] = {box_square(&s->nodes[child[0]], x),
+                              box_square(&s->nodes[child[1]], x)};
+    const int nearer = square[1] < square[0];
+    for (int k = 0; k < 2; ++k) {
+      if (square[nearer ^ k] < *best) {
+        search(s, child[nearer ^ k], x, best, place);
+      }
     }
     return;
   }
