@@ -75,8 +75,8 @@ static void add_model(entries *list, const supine_lungs *lungs, const supine_mod
   add(list, "force", "base=%.9g gain=%.9g cx=%.9g cy=%.9g cz=%.9g soften=%.9g", force->base,
       force->gain, force->box[0], force->box[1], force->box[2], force->soften);
   add(list, "direction", "box");
-  add(list, "direction_constants", "c1=%.9g c2=%.9g c3=%.9g c4=%.9g c5=%.9g c6=%.9g", c[0], c[1],
-      c[2], c[3], c[4], c[5]);
+  add(list, "direction_constants", "c1=%.9g c2=%.9g c3=%.9g c4=%.9g c5=%.9g c6=%.9g shear=%.9g",
+      c[0], c[1], c[2], c[3], c[4], c[5], model->direction.shear);
   add(list, "stiffness", "%s", model->stiffness == NULL ? "uniform" : "per vertex");
   if (model->lesions != NULL) {
     add_lesions(list, lungs->mesh.vertex_count, model->lesions);

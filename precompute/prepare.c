@@ -15,6 +15,7 @@ supine_model_choice supine_precompute_choice_default(void) {
                                 .resting = supine_reference_resting_default()};
   choice.model.reach = choice.model.force.base = choice.model.force.gain = NAN;
   choice.model.force.box[0] = choice.model.direction.c[0] = NAN;
+  choice.model.direction.shear = NAN;
   return choice;
 }
 
@@ -34,6 +35,8 @@ static supine_model choose_law(const supine_model_choice *choice) {
   model.reach = isnan(model.reach) ? law.reach : model.reach;
   model.force.base = isnan(model.force.base) ? law.force.base : model.force.base;
   model.force.gain = isnan(model.force.gain) ? law.force.gain : model.force.gain;
+  model.direction.shear =
+      isnan(model.direction.shear) ? law.direction.shear : model.direction.shear;
   if (isnan(model.force.box[0])) {
     memcpy(model.force.box, law.force.box, sizeof law.force.box);
   }
@@ -223,6 +226,10 @@ supine_status supine_precompute_prepare(supine_lungs *lungs, const supine_model_
   supine_status status = set_expandability(lungs, choice, p, error);
   status = status == SUPINE_OK ? set_lesions(lungs, choice, p, findings, error) : status;
   status = status == SUPINE_OK ? set_shares(lungs, choice, p, error) : status;
+  if (status == SUPINE_OK && p->model.reach > 0.0 && (p->stiffness != NULL || p->lesions != NULL)) {
+    status = supine_physics_strain_create(lungs, p->stiffness, p->lesions, &p->strain, error);
+    p->model.strain = p->strain;
+  }
   const supine_reference scanned = {
       .scan = scan, .lung_count = lungs->lung_count, .side = {lungs->side[0], lungs->side[1]}};
   supine_resting resting = choice->resting;
@@ -245,5 +252,6 @@ supine_status supine_precompute_prepare(supine_lungs *lungs, const supine_model_
 void supine_precompute_prepared_free(supine_prepared *prepared) {
   free(prepared->stiffness);
   free(prepared->lesions);
+  supine_physics_strain_destroy(prepared->strain);
   *prepared = (supine_prepared){0};
 }

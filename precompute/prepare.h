@@ -34,11 +34,12 @@ supine_model_choice supine_precompute_choice_default(void);
 
 /** A physical model, the volumes of the lungs, and a description of the assumptions. */
 typedef struct supine_prepared {
-  supine_model model; /**< uses the arrays `stiffness` and `lesions` of this struct */
+  supine_model model; /**< uses `stiffness`, `lesions` and `strain` of this struct */
   supine_reference reference;
-  char summary[512]; /**< for the user: displacement law, state of the scan and volumes */
-  double *stiffness; /**< [N] relative stiffness of each vertex, or NULL if uniform */
-  double *lesions;   /**< [N] factors by which lesions multiply the stiffness, or NULL */
+  char summary[512];     /**< for the user: displacement law, state of the scan and volumes */
+  double *stiffness;     /**< [N] relative stiffness of each vertex, or NULL if uniform */
+  double *lesions;       /**< [N] factors by which lesions multiply the stiffness, or NULL */
+  supine_strain *strain; /**< their effect if the law has a smoothing length, or NULL */
 } supine_prepared;
 
 /** Select the displacement law, set stiffness and lesions, and move the vertices of the scan to the

@@ -248,11 +248,12 @@ static supine_status check_patient(const supine_model_choice *choice, supine_err
   const supine_model *model = &choice->model;
   const bool given = choice->law != SUPINE_LAW_COUNT || !isnan(model->force.base) ||
                      !isnan(model->force.gain) || !isnan(model->force.box[0]) ||
-                     !isnan(model->direction.c[0]) || !isnan(model->reach);
+                     !isnan(model->direction.c[0]) || !isnan(model->direction.shear) ||
+                     !isnan(model->reach);
   return given ? supine_error_set(
                      error, SUPINE_ERROR_ARGUMENT,
                      "the model of --patient has its own law and force: leave --law, --base, "
-                     "--gain, --box-force, --constants and --reach out")
+                     "--gain, --box-force, --constants, --shear and --reach out")
                : SUPINE_OK;
 }
 

@@ -489,11 +489,11 @@ TEST(test_force_in_fitted_posture_linear_in_box) {
       assert_true(fabs(force - expected) < 1e-14);
     }
   }
-  /* The force of the default law (`deep`) in the supine posture is 0.9 + 0.4 h - 0.2 Y. h is the
+  /* The force of the default law (`deep`) in the supine posture is 0.875 + 0.4 h - 0.15 Y. h is the
    * height, and Y the y coordinate, both 0 to 1 in the lungs' bounding box. */
   const supine_patient_power shape = supine_patient_deep(postures[0], (const double[3]){0});
   const supine_force_law deep = supine_patient_force(&shape, 0.4, postures[0]);
-  assert_true(fabs(deep.base - 0.9) < 1e-14 && fabs(deep.box[1] + 0.2) < 1e-14);
+  assert_true(fabs(deep.base - 0.875) < 1e-14 && fabs(deep.box[1] + 0.15) < 1e-14);
   supine_patient_pairs_free(&pairs);
 }
 

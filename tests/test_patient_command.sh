@@ -153,7 +153,7 @@ grep -q 'source of the gain.*scans of --state do not' fit.txt || fail "a gain at
 
 # The fit recovers a stiff region. A basis with the fitted stiffness predicts the second state.
 "$supine" phantom -o rest.ply --vertices 400 >/dev/null || fail phantom
-"$supine" solve rest.ply --posture supine --scanned none --reach 10 --base 0.9 --gain 0.4 --box-force 0,-0.2,0 \
+"$supine" solve rest.ply --posture supine --scanned none --reach 10 --base 0.875 --gain 0.4 --box-force 0,-0.15,0 \
   --constants 5,2.2,9,1.1,20,1.4 --volume scan-1000 --lesion 97,-135,-190,65,3 -o stiff.ply >/dev/null ||
   fail "solve with a lesion"
 "$supine" fit rest.ply stiff.ply --rest 6000mL --other 5000mL --expandability -o stiff.json \

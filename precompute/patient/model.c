@@ -229,6 +229,7 @@ supine_status supine_patient_model(const supine_patient_record *record,
   model->force = record->force;
   model->stiffness = record->stiffness.count > 0 ? stiffness : NULL;
   model->direction.vectors = directions;
+  model->direction.shear = 0.0; /* the fitted law has none */
   for (size_t k = 0; k < 3; ++k) {
     model->direction.c[2 * k] = -record->patient.power.c[2 * k] / path_span[k];
     model->direction.c[2 * k + 1] = record->patient.power.c[2 * k + 1];

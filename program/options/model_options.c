@@ -114,12 +114,14 @@ static const char *const sexes[] = {"unknown", "female", "male", NULL};
 
 /* Parts of help texts: a line that describes each displacement law, and the defaults of its
  * constants. */
-#define LAW_HELP(id, name, base, gain, box, constants, bend, reach, pair, what) name ": " what "\n"
+#define LAW_HELP(id, name, base, gain, box, constants, shear, bend, reach, pair, what)             \
+  name ": " what "\n"
 #define LAW_BASE(id, name, base, ...) "; default " #base " for " name
 #define LAW_GAIN(id, name, base, gain, ...) "; default " #gain " for " name
 #define LAW_BOX(id, name, base, gain, box, ...) "; default " #box " for " name
 #define LAW_CONSTANTS(id, name, base, gain, box, constants, ...)                                   \
   "; default " #constants " for " name
+#define LAW_SHEAR(id, name, base, gain, box, constants, shear, ...) "; default " #shear " for " name
 
 #define FILLS(member) SUPINE_FILLS(supine_model_options, member)
 
@@ -205,6 +207,10 @@ const supine_option supine_command_model_options[] = {
      "fitted to landmarks in ten full breaths (DIR-Lab COPDgene). Those of paper are fitted to "
      "landmarks in ten 4-D CTs (DIR-Lab), as the original ones are lost" SUPINE_LAWS(LAW_CONSTANTS),
      FILLS(choice.model.direction.c), .wants = "six numbers, C1,C2,C3,C4,C5,C6", .more = true},
+    {"shear", 0, "BETA",
+     "motion from back to front that grows from apex to base as lungs fill: BETA (Z - 1/2) times "
+     "the RMS displacement" SUPINE_LAWS(LAW_SHEAR),
+     FILLS(choice.model.direction.shear), .more = true},
     {"reach", 0, "MM",
      "distance over which a force spreads along the surface: the force falls with the distance r "
      "about as exp(-r/MM). Without --reach, the paper law spreads it over a few edges of the mesh; "

@@ -145,7 +145,7 @@ class Lungs:
         out["lower half / upper third, to prone"] = move[height < 1 / 2].mean() / move[height > 2 / 3].mean()
         over, more = 0, 0
         for p in POSTURES:
-            for share in (0.35, 0.5, 0.7, 0.9, 1.1):
+            for share in (0.3, 0.5, 0.7, 0.9, 1.1):
                 total = share * full_ml.sum()
                 bent = self.turned_over(self.at(f"{p}:{total:.3f}mL")[0])
                 over = max(over, bent)
