@@ -119,18 +119,21 @@ static void add_reference(entries *list, const supine_reference *reference, cons
   add(list, "full_upright_gain", "%g", SUPINE_FULL_UPRIGHT_GAIN);
   supine_reference_resting_print(&reference->resting, shares, sizeof shares);
   add(list, "resting_shares", "%s", shares);
+  /* State whether the ratio of the volumes at rest (FRC) and at full inflation is the patient's own
+   * or, if not, the standard deviation of its logarithm. */
+  if (supine_reference_resting_given(&reference->resting) || reference->scan.full > 0.0) {
+    add(list, "resting_known", "yes");
+  } else {
+    add(list, "resting_spread", "%.4g", reference->resting.spread / reference->resting.assumed);
+  }
 }
 
-/* Add the constant c of the expected position error (supine/locate.h), and whether the resting
- * volume (FRC) of a posture is the patient's own. */
+/* Add the constant c of the expected position error (supine/locate.h). */
 static void add_expected_error(entries *list, const supine_basis_content *content) {
   if (content->fit == NULL) {
     const double own = content->options->expected_error;
     add(list, "expected_error_mm", "%g",
         own > 0.0 ? fmin(own, SUPINE_EXPECTED_ERROR_MM) : SUPINE_EXPECTED_ERROR_MM);
-  }
-  if (content->reference != NULL && supine_reference_resting_given(&content->reference->resting)) {
-    add(list, "resting_known", "yes");
   }
 }
 

@@ -20,7 +20,7 @@ typedef struct supine_model_choice {
   const double *stiffness; /**< [N] relative stiffness fitted to the patient, or NULL */
   bool has_scan; /**< whether `scan` was given; SUPINE_LAW_DEEP assumes full inflation if not */
   supine_scan scan;
-  double full; /**< volume at full inflation, if the scan is at rest, mL; 0 if unknown */
+  supine_state full; /**< its volume: absolute, at full inflation, for a scan at rest; or DEFAULT */
   supine_resting resting;
   supine_person person;
   const char *expandability; /**< path of a CSV file, or NULL to use `expandability_law` */

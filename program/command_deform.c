@@ -135,8 +135,8 @@ static supine_status deform(const supine_basis *basis, const request *wanted, su
   char comment[128];
   supine_status status = supine_options_reference(basis, &wanted->from, false, &moved.from, error);
   if (status == SUPINE_OK) {
-    status =
-        supine_options_pose(basis, name, &wanted->volume, moved.state.gravity, &moved.pose, error);
+    status = supine_options_pose(basis, name, wanted->volume.allow_folds, &moved.state, &moved.pose,
+                                 error);
   }
   if (status == SUPINE_OK) {
     status = supine_options_expected_find(basis, &moved.state, &moved.from.state, &moved.expected,
@@ -244,7 +244,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   supine_status status = many ? read_rows(given->operand[0], wanted, &rows, &count, error)
                               : supine_command_deform_content_check(&wanted->content, error);
   if (status == SUPINE_OK && !many) {
-    status = supine_options_gravity(&wanted->orientation, wanted->volume.state.gravity, error);
+    status = supine_options_state(&wanted->orientation, &wanted->volume.state, error);
   }
   if (status == SUPINE_OK) {
     status = supine_options_basis_open(given->operand[0], SUPINE_STORAGE_EXACT, &basis, error);
@@ -268,7 +268,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
 const supine_command supine_command_deform = {
     name,
     "deform a basis for a posture and a volume",
-    .usage = "BASIS --posture NAME [--volume VOLUME] -o FILE\n"
+    .usage = "BASIS --posture STATE -o FILE\n"
              "BASIS --states LIST",
     .about = "Deforms the lungs of a basis file to a posture and a volume, as the run-time library "
              "does in each frame, and writes the surface. Each point has its expected error, "
@@ -276,7 +276,7 @@ const supine_command supine_command_deform = {
     .options = table,
     .notes =
         "Examples:\n"
-        "  supine deform lungs.safetensors --posture prone --volume rest+500 -o prone.vtp\n"
+        "  supine deform lungs.safetensors --posture prone:rest+500 -o prone.vtp\n"
         "  supine deform lungs.safetensors --gravity 0.6,0,-0.8 --volume left=rest,right=rest+250 "
         "-o out.ply\n"
         "  supine deform nodules.safetensors --posture prone --from supine:rest -o nodules.csv\n"

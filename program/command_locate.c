@@ -382,7 +382,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   observations observed = {0};
   supine_status status = SUPINE_OK;
   if (wanted->orientation.given) {
-    status = supine_options_gravity(&wanted->orientation, wanted->state.gravity, error);
+    status = supine_options_state(&wanted->orientation, &wanted->state, error);
   }
   if (status == SUPINE_OK) {
     status = supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &lungs, error);

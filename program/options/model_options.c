@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "program/options/model_options.h"
+#include "program/options/state_options.h"
 #include "program/options/surface_options.h"
 
 static supine_status read_scan(const char *text, void *field, supine_error *error) {
@@ -34,16 +35,6 @@ static supine_status read_resting(const char *text, void *field, supine_error *e
     status = supine_reference_resting_set(&choice->resting, piece, value, error);
   }
   return status;
-}
-
-/* Read an absolute volume, such as "4.2L". */
-static supine_status read_full(const char *text, void *field, supine_error *error) {
-  supine_state state = {.lung_count = 0};
-  const supine_status status = supine_state_parse_volume(text, &state, error);
-  *(double *)field = state.volume.ml;
-  return status == SUPINE_OK ? supine_options_fits(state.volume.kind == SUPINE_VOLUME_ABSOLUTE &&
-                                                   state.lung_count == 0)
-                             : status;
 }
 
 /* Read "uniform", or "linear:AXIS:FROM:TO" or "exp:AXIS:FROM:TO" with the expandability at both
@@ -175,7 +166,7 @@ const supine_option supine_command_model_options[] = {
     {"full", 0, "VOLUME",
      "for a scan at rest: volume of gas and tissue of the scanned lungs at full inflation, such as "
      "4200mL or 4.2L. Without it, full inflation is assumed from the usual share at rest",
-     FILLS(choice.full), .read = read_full, .wants = "a volume such as 4200mL"},
+     FILLS(choice.full), .read = supine_options_read_volume},
     {"height", 0, "CM",
      "height of the patient. Height and --sex give the volume expected at TLC (ECSC 1993, less 10 "
      "% for lying, plus 0.86 L of tissue), which is printed beside the volume of the scan. Without "
