@@ -130,9 +130,9 @@ static supine_status print(const supine_patient_record *record, const char *made
   return SUPINE_OK;
 }
 
-/* Return the volume that the lungs' surface encloses, mL; 0 if there is no surface. */
+/* Return the volume of the lungs in a scan, mL; 0 if it has no surface. */
 static double volume_of(const supine_lungs *lungs) {
-  return lungs->mesh.vertex_count > 0 ? 1e-3 * supine_mesh_volume(&lungs->mesh) : 0.0;
+  return lungs->volume[0] + lungs->volume[1];
 }
 
 /* Assign each landmark to the lung whose surface is nearest to it in the first scan. */

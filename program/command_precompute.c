@@ -7,18 +7,17 @@
 #include <supine/sh.h>
 
 #include "precompute/fields/fields.h"
-#include "precompute/patient/patient_file.h"
+#include "precompute/precompute.h"
 #include "program/options/model_options.h"
 #include "program/options/surface_options.h"
 
 static const char name[] = "precompute";
 
 typedef struct request {
-  supine_model_options model;
-  supine_precompute_options basis;
+  supine_model_choice model;
+  size_t band, modes, held_out;
   const char *path;
   const char *fields, *patient;
-  char summary[256];
   bool has_band, has_modes;
 } request;
 
@@ -37,19 +36,19 @@ static const supine_option table[] = {
     {"output", 'o', "FILE", "basis file to write (.safetensors)", SUPINE_FILLS(request, path),
      .required = true, .file = SUPINE_FILE_OUT},
     {"band", 0, "L", "highest band L of the spherical harmonics, 0 to 64",
-     SUPINE_FILLS(request, basis.band), SUPINE_SAYS_GIVEN(request, has_band), .standard = "23",
+     SUPINE_FILLS(request, band), SUPINE_SAYS_GIVEN(request, has_band), .standard = "23",
      .range = {0.0, SUPINE_SH_BAND_MAX}, .more = true},
     {"modes", 0, "K|harmonics",
      "basis functions to store\nharmonics: all (L+1)^2 spherical harmonics up to --band L, as in "
      "Santhanam 2008 with --band 3\nK: the K functions (modes) that describe the displacement "
      "best, or fewer if fewer suffice. More modes are more accurate, but each costs a "
      "multiplication per vertex at run time",
-     SUPINE_FILLS(request, basis.modes), SUPINE_SAYS_GIVEN(request, has_modes), .read = read_modes,
+     SUPINE_FILLS(request, modes), SUPINE_SAYS_GIVEN(request, has_modes), .read = read_modes,
      .standard = "16", .wants = "1 to 64 or 'harmonics'", .more = true},
     {"held-out", 0, "N",
      "number of held-out directions in which the error is measured; default 1000; fewer, but at "
      "least 100, for more than 20000 vertices",
-     SUPINE_FILLS(request, basis.held_out), .range = {1.0, 100000.0}, .more = true},
+     SUPINE_FILLS(request, held_out), .range = {1.0, 100000.0}, .more = true},
     {"patient", 0, "FILE",
      "model of the patient's motion, made by 'supine fit', to use instead of the built-in law",
      SUPINE_FILLS(request, patient), .file = SUPINE_FILE_IN, .rivals = "directions"},
@@ -150,100 +149,117 @@ static void report_fit(const char *path, const char *assumed, const supine_field
                fit->accuracy.max_mm);
 }
 
-static supine_status compress_fields(request *wanted, const supine_arguments *given,
-                                     supine_error *error) {
-  const supine_source *source = &wanted->model.made_from;
-  const supine_scan *scan = &wanted->model.choice.scan;
+static supine_status compress_fields(request *wanted, const supine_source *source,
+                                     const char *made_by, supine_error *error) {
+  const supine_scan *scan = &wanted->model.scan;
   supine_fields fields = {0};
   supine_fit_report report;
-  if (scan->known && scan->state.volume.kind != SUPINE_VOLUME_DEFAULT) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--scanned: with --fields, give the posture alone, such as supine, as "
-                            "fields of gravity have no volume");
+  char posture[160] = "not displaced by gravity";
+  char assumed[sizeof source->summary + sizeof posture + 8];
+  SUPINE_TRY(supine_fields_load(wanted->fields, &source->lungs, &source->frame, &fields, error));
+  if (scan->known) {
+    (void)supine_state_describe(&scan->state, posture, sizeof posture);
   }
-  supine_status status =
-      supine_command_source_load(&wanted->model, given->operand, given->count, error);
-  supine_options_say_findings(name, &wanted->model.findings);
+  (void)snprintf(assumed, sizeof assumed, "%s; scan %s", source->summary, posture);
+  const supine_fit_options options = {.band = wanted->has_band ? (int)wanted->band : -1,
+                                      .modes =
+                                          wanted->has_modes ? wanted->modes : SUPINE_MODES_MADE_MAX,
+                                      .fewest_modes = !wanted->has_modes,
+                                      .scan_gravity = scan->known ? scan->state.gravity : NULL,
+                                      .frame = source->frame,
+                                      .assumed = assumed,
+                                      .findings = source->findings.text,
+                                      .made_by = made_by};
+  const supine_status status =
+      supine_fields_write(&source->lungs, &fields, &options, wanted->path, &report, error);
   if (status == SUPINE_OK) {
-    status = supine_fields_load(wanted->fields, &source->lungs, &source->frame, &fields, error);
-  }
-  if (status == SUPINE_OK) {
-    char posture[160] = "not displaced by gravity";
-    if (scan->known) {
-      (void)supine_state_describe(&scan->state, posture, sizeof posture);
-    }
-    (void)snprintf(wanted->model.assumed, sizeof wanted->model.assumed, "%s; scan %s",
-                   source->summary, posture);
-    const supine_fit_options options = {.band = wanted->has_band ? (int)wanted->basis.band : -1,
-                                        .modes = wanted->has_modes ? wanted->basis.modes
-                                                                   : SUPINE_MODES_MADE_MAX,
-                                        .fewest_modes = !wanted->has_modes,
-                                        .scan_gravity = scan->known ? scan->state.gravity : NULL,
-                                        .frame = source->frame,
-                                        .assumed = wanted->model.assumed,
-                                        .findings = wanted->model.findings.text,
-                                        .made_by = given->made_by};
-    status = supine_fields_write(&source->lungs, &fields, &options, wanted->path, &report, error);
-  }
-  if (status == SUPINE_OK) {
-    report_fit(wanted->path, wanted->model.assumed, &fields, &report);
+    report_fit(wanted->path, assumed, &fields, &report);
   }
   supine_fields_free(&fields);
   return status;
 }
 
-static supine_status compute(const supine_lungs *lungs, request *wanted, const char *made_by,
-                             supine_error *error) {
-  supine_precompute_report report;
-  wanted->basis.model = wanted->model.prepared.model;
-  wanted->basis.reference = &wanted->model.prepared.reference;
-  wanted->basis.made_by = made_by;
-  wanted->basis.assumed = wanted->model.assumed;
-  wanted->basis.findings = wanted->model.findings.text;
-  wanted->basis.frame = wanted->model.made_from.frame;
-  const supine_status status =
-      supine_precompute(lungs, &wanted->basis, wanted->path, &report, error);
-  if (status == SUPINE_OK) {
-    report_result(wanted->path, lungs, &wanted->basis, &report);
+static supine_status load_fields(request *wanted, const supine_arguments *given,
+                                 supine_error *error) {
+  const supine_scan *scan = &wanted->model.scan;
+  supine_source source = {.is_map = false};
+  if (scan->known && scan->state.volume.kind != SUPINE_VOLUME_DEFAULT) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "--scanned: with --fields, give the posture alone, such as supine, as "
+                            "fields of gravity have no volume");
   }
+  supine_status status = supine_command_source_load(name, &wanted->model.source, given->operand,
+                                                    given->count, &source, error);
+  if (status == SUPINE_OK) {
+    status = compress_fields(wanted, &source, given->made_by, error);
+  }
+  supine_lungs_free(&source.lungs);
   return status;
 }
 
-/* Read a patient model and encode it as text for the basis. The caller frees the text. */
-static supine_status take_patient(request *wanted, supine_patient_record *record, char **text,
-                                  supine_error *error) {
-  supine_status status = supine_patient_read(wanted->patient, record, error);
-  if (status != SUPINE_OK) {
-    return status;
+/* Make the model, and the basis from it.
+ * @param patient  JSON text of the model fitted to the patient, or NULL; summary: its description
+ */
+static supine_status compute(request *wanted, const supine_arguments *given, const char *patient,
+                             const char *summary, supine_error *error) {
+  supine_prepared prepared = {.source = {.is_map = false}};
+  supine_precompute_report report;
+  supine_status status =
+      supine_command_prepare(name, &wanted->model, given->operand, given->count, &prepared, error);
+  const supine_patient_record *record = wanted->model.patient;
+  const supine_precompute_options options = {
+      .model = prepared.model,
+      .reference = &prepared.reference,
+      .band = wanted->band,
+      .modes = wanted->modes,
+      .held_out = wanted->held_out,
+      .expected_error = record != NULL ? record->report.expected_constant : 0.0,
+      .frame = prepared.source.frame,
+      .made_by = given->made_by,
+      .patient = patient,
+      .patient_summary = summary,
+      .assumed = prepared.assumed,
+      .findings = prepared.source.findings.text};
+  if (status == SUPINE_OK) {
+    status = supine_precompute(&prepared.source.lungs, &options, wanted->path, &report, error);
   }
-  *text = supine_patient_text(record, NULL);
-  if (*text == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %s", wanted->patient);
+  if (status == SUPINE_OK) {
+    report_result(wanted->path, &prepared.source.lungs, &options, &report);
   }
-  wanted->model.patient = record;
-  /* Later, the constants of this law are replaced by those of the patient. */
-  wanted->model.choice.law = SUPINE_LAW_DEEP;
-  wanted->basis.patient = *text;
-  const supine_patient_fit_report *report = &record->report;
-  (void)snprintf(wanted->summary, sizeof wanted->summary,
+  supine_precompute_prepared_free(&prepared);
+  return status;
+}
+
+/* Make a basis with the model that was fitted to a patient. */
+static supine_status compute_patient(request *wanted, const supine_arguments *given,
+                                     supine_error *error) {
+  static supine_patient_record record; /* static, as it is too large for the stack */
+  const supine_patient_fit_report *report = &record.report;
+  char summary[256];
+  SUPINE_TRY(supine_patient_read(wanted->patient, &record, error));
+  char *text = supine_patient_text(&record, NULL);
+  if (text == NULL) {
+    return supine_error_memory(error, "%s", wanted->patient);
+  }
+  wanted->model.patient = &record;
+  (void)snprintf(summary, sizeof summary,
                  "%s: %s law%s from %.0f points; held-out residual %.1f of %.1f mm RMS, %.0f %% "
                  "explained; expected error %.1f mm RMS",
-                 record->name, supine_patient_law_names[record->patient.law],
-                 record->patient.centre_count > 0 ? " and kriging" : "", report->points,
+                 record.name, supine_patient_law_names[record.patient.law],
+                 record.patient.centre_count > 0 ? " and kriging" : "", report->points,
                  report->held_out[SUPINE_PATIENT_SCORE_CORRECTED], report->baseline,
                  report->explained, report->expected_point);
-  wanted->basis.patient_summary = wanted->summary;
-  wanted->basis.expected_error = report->expected_constant;
-  (void)printf("%s\n", wanted->summary);
-  return SUPINE_OK;
+  (void)printf("%s\n", summary);
+  const supine_status status = compute(wanted, given, text, summary, error);
+  free(text);
+  return status;
 }
 
 static void begin(void *chosen) {
-  ((request *)chosen)->model.choice = supine_precompute_choice_default();
+  ((request *)chosen)->model = supine_precompute_choice_default();
 }
 
-/* Refuse options that set constants of the displacement law, as the patient's model has its own.
- * Call this before supine_command_model_load, which sets all constants that were not given. */
+/* Refuse options that set constants of the displacement law, as the patient's model has its own. */
 static supine_status check_patient(const supine_model_choice *choice, supine_error *error) {
   const supine_model *model = &choice->model;
   const bool given = choice->law != SUPINE_LAW_COUNT || !isnan(model->force.base) ||
@@ -259,31 +275,17 @@ static supine_status check_patient(const supine_model_choice *choice, supine_err
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
-  const supine_lungs *lungs = &wanted->model.made_from.lungs;
-  char *text = NULL;
-  static supine_patient_record record; /* static, as it is too large for the stack */
   if (supine_mesh_save_supports(wanted->path)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "%s: this is the name of a mesh: give a name that ends in .safetensors",
                             wanted->path);
   }
-  supine_status status = SUPINE_OK;
   if (wanted->patient != NULL) {
-    status = check_patient(&wanted->model.choice, error);
-    if (status == SUPINE_OK) {
-      status = take_patient(wanted, &record, &text, error);
-    }
+    SUPINE_TRY(check_patient(&wanted->model, error));
+    return compute_patient(wanted, given, error);
   }
-  if (status == SUPINE_OK && wanted->fields != NULL) {
-    status = compress_fields(wanted, given, error);
-  } else if (status == SUPINE_OK) {
-    status =
-        supine_command_model_load(&wanted->model, name, given->operand, given->count, false, error);
-    status = status == SUPINE_OK ? compute(lungs, wanted, given->made_by, error) : status;
-  }
-  free(text);
-  supine_command_model_options_free(&wanted->model);
-  return status;
+  return wanted->fields != NULL ? load_fields(wanted, given, error)
+                                : compute(wanted, given, NULL, NULL, error);
 }
 
 const supine_command supine_command_precompute = {

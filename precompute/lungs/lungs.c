@@ -229,7 +229,9 @@ static supine_status check_midline(const supine_lungs *lungs, bool two_sided, su
 static void face_outwards(supine_lungs *lungs) {
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     const supine_mesh part = supine_lungs_part(lungs, lung);
-    lungs->reversed[lung] = supine_mesh_volume(&part) < 0.0;
+    const double volume = supine_mesh_volume(&part);
+    lungs->reversed[lung] = volume < 0.0;
+    lungs->volume[lung] = 1e-3 * fabs(volume);
     if (lungs->reversed[lung]) {
       supine_mesh_reverse(&part);
     }
