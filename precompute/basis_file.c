@@ -130,18 +130,15 @@ static void add_reference(entries *list, const supine_reference *reference, cons
 
 /* Add the constant c of the expected position error (supine/locate.h). */
 static void add_expected_error(entries *list, const supine_basis_content *content) {
-  if (content->fit == NULL) {
+  if (!content->is_fields) {
     const double own = content->options->expected_error;
     add(list, "expected_error_mm", "%g",
         own > 0.0 ? fmin(own, SUPINE_EXPECTED_ERROR_MM) : SUPINE_EXPECTED_ERROR_MM);
   }
 }
 
-static void add_fit(entries *list, const supine_basis_fit *fit) {
-  const double *g = fit->scan_gravity;
+static void add_fields(entries *list, const double *g) {
   add(list, "route", "fields");
-  add(list, "condition", "%.4g", fit->condition);
-  add(list, "band_determined", "%zu", fit->band_highest);
   add(list, "error_method", "leave-one-out");
   if (g != NULL) {
     add(list, "scan_gravity", "%.9g,%.9g,%.9g", g[0], g[1], g[2]);
@@ -209,7 +206,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
                                         supine_error *error) {
   const supine_lungs *lungs = content->lungs;
   const supine_precompute_options *options = content->options;
-  const supine_model *model = content->fit == NULL ? &options->model : NULL;
+  const supine_model *model = !content->is_fields ? &options->model : NULL;
   const supine_compression *field = content->compression;
   const size_t n = lungs->mesh.vertex_count;
   const size_t k = field->mode_count;
@@ -257,8 +254,8 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
     add_reference(&list, content->reference, share);
   }
   add_expected_error(&list, content);
-  if (content->fit != NULL) {
-    add_fit(&list, content->fit);
+  if (content->is_fields) {
+    add_fields(&list, content->scan_gravity);
   }
   add_accuracy(&list, content->accuracy, content->reference != NULL);
   if (content->turned_over != NULL) {

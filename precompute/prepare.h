@@ -21,7 +21,7 @@ typedef struct supine_model_choice {
   const supine_patient_record *patient; /**< fitted model, which replaces the law, or NULL */
   bool has_scan; /**< whether `scan` was given; SUPINE_LAW_DEEP assumes full inflation if not */
   supine_scan scan;
-  supine_state full; /**< its volume: absolute, at full inflation, for a scan at rest; or DEFAULT */
+  supine_state full; /**< volume at full inflation, for a scan at rest; DEFAULT if unknown */
   supine_resting resting;
   supine_person person;
   const char *expandability; /**< path of a CSV file, or NULL to use `expandability_law` */

@@ -58,7 +58,7 @@ typedef struct structures {
   supine_command_names names;
   float *xyz;            /* [N, 3] position of each vertex in one posture, mm */
   double *mean;          /* [postures, structures, 3] mean position, mm */
-  double *volumes;       /* [postures, structures] mL; NAN if the triangles enclose no volume */
+  double *volumes;       /* [postures, structures] mL; NAN if not closed; follows `mean` */
   double *square_errors; /* [structures] mean squared expected error, mm^2; NAN if unknown */
 } structures;
 
@@ -78,32 +78,30 @@ static void average(const structures *c, size_t width, const float *values, doub
   }
 }
 
-/* Compute the volume of each named structure. Where its triangles enclose one, their normals sum to
- * 0, and the volume is a sixth of the sum of a . (b x c) over the corners a, b, c. */
+/* Compute the volume of each named structure. The normals of a closed surface sum to 0, and its
+ * volume is a sixth of the sum of (corner) . (normal) over its triangles. */
 static void find_volumes(const structures *c, double *volumes) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);
   for (size_t part = 0; part < c->names.count; ++part) {
-    double normal[3] = {0.0, 0.0, 0.0};
-    double area = 0.0;
-    volumes[part] = 0.0;
+    double sum[5] = {0.0}; /* of the normals x, y, z, of their lengths, and of corner . normal */
     for (size_t t = 0; t < 3 * info->triangle_count; t += 3) {
       const uint32_t *corner = info->triangles + t;
+      const bool own = c->names.part[corner[0]] == part;
       double x[3][3];
-      double one[3];
-      if (c->names.part[corner[0]] != part) {
-        continue;
-      }
-      for (size_t k = 0; k < 9; ++k) {
+      double normal[3];
+      for (size_t k = 0; k < 9 && own; ++k) {
         x[k / 3][k % 3] = (double)c->xyz[3 * corner[k / 3] + k % 3];
       }
-      supine_normal(x[0], x[1], x[2], one);
-      area += supine_length(one);
-      for (size_t k = 0; k < 3; ++k) {
-        normal[k] += one[k];
+      if (own) {
+        supine_normal(x[0], x[1], x[2], normal);
+        for (size_t k = 0; k < 3; ++k) {
+          sum[k] += normal[k];
+        }
+        sum[3] += supine_length(normal);
+        sum[4] += supine_dot(x[0], normal);
       }
-      volumes[part] += supine_triple(x[0], x[1], x[2]) / 6000.0;
     }
-    volumes[part] = supine_length(normal) < 1e-3 * area ? volumes[part] : (double)NAN;
+    volumes[part] = supine_length(sum) < 1e-3 * sum[3] ? sum[4] / 6000.0 : (double)NAN;
   }
 }
 
@@ -187,10 +185,10 @@ static supine_status compare_content(const supine_basis *basis, const supine_pos
   supine_status status = supine_command_names_open(basis, &c.names, error);
   if (status == SUPINE_OK) {
     c.xyz = malloc(3 * n * sizeof *c.xyz);
-    c.volumes = calloc(postures->count * c.names.count, sizeof *c.volumes);
-    c.mean = calloc(3 * postures->count * c.names.count, sizeof *c.mean);
+    c.mean = calloc(4 * postures->count * c.names.count, sizeof *c.mean);
+    c.volumes = c.mean + 3 * postures->count * c.names.count;
     c.square_errors = calloc(c.names.count, sizeof *c.square_errors);
-    if (c.xyz == NULL || c.mean == NULL || c.volumes == NULL || c.square_errors == NULL) {
+    if (c.xyz == NULL || c.mean == NULL || c.square_errors == NULL) {
       status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
     }
   }
@@ -202,7 +200,6 @@ static supine_status compare_content(const supine_basis *basis, const supine_pos
   }
   json_decref(list);
   free(c.xyz);
-  free(c.volumes);
   free(c.mean);
   free(c.square_errors);
   supine_command_names_close(&c.names);

@@ -6,10 +6,10 @@
 
 #include <supine/sh.h>
 
+#include "base/vec3.h"
 #include "precompute/fields/fields.h"
 #include "precompute/precompute.h"
 #include "program/options/model_options.h"
-#include "program/options/surface_options.h"
 
 static const char name[] = "precompute";
 
@@ -19,6 +19,7 @@ typedef struct request {
   const char *path;
   const char *fields, *patient;
   bool has_band, has_modes;
+  size_t directions; /* number of directions of gravity to print; 0 to make a basis */
 } request;
 
 static supine_status read_modes(const char *text, void *field, supine_error *error) {
@@ -51,7 +52,9 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, held_out), .range = {1.0, 100000.0}, .more = true},
     {"patient", 0, "FILE",
      "model of the patient's motion, made by 'supine fit', to use instead of the built-in law",
-     SUPINE_FILLS(request, patient), .file = SUPINE_FILE_IN, .rivals = "directions"},
+     SUPINE_FILLS(request, patient), .file = SUPINE_FILE_IN, .rivals = "directions",
+     .partners = "output band modes held-out axes units midline labels edge close surfaces-out "
+                 "scanned resting full height sex expandability lesion lung"},
     {.help = "Displacements from another simulator, instead of the built-in physics:"},
     {"fields", 0, "FILE",
      "safetensors file with three tensors: points [P,3], the positions of P points; gravity [M,3], "
@@ -62,6 +65,9 @@ static const supine_option table[] = {
      "Without --band and --modes, cross-validation chooses both",
      SUPINE_FILLS(request, fields), .file = SUPINE_FILE_IN, .rivals = "directions",
      .partners = "output band modes axes units midline labels edge close surfaces-out scanned"},
+    {"directions", 0, "N",
+     "only print N directions of gravity that cover the sphere evenly, as CSV, to simulate",
+     SUPINE_FILLS(request, directions), .range = {2.0, 1000.0}, .partners = ""},
     {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
     {.name = NULL}};
 
@@ -135,7 +141,6 @@ static void report_fit(const char *path, const char *assumed, const supine_field
     (void)printf("  band %-2zu  %8.3g %%%s\n", band, 100.0 * fit->error[band],
                  band == fit->band ? "  <- chosen" : "");
   }
-  (void)printf("condition number of the harmonics at these directions: %.3g\n", fit->condition);
   if (fit->band == highest && highest < SUPINE_FIT_BAND_MAX) {
     (void)printf("the error is still falling at the highest band, so detail beyond band %zu is "
                  "missing: about\n%zu evenly spread directions would determine band %zu\n",
@@ -149,29 +154,31 @@ static void report_fit(const char *path, const char *assumed, const supine_field
                fit->accuracy.max_mm);
 }
 
-static supine_status compress_fields(request *wanted, const supine_source *source,
-                                     const char *made_by, supine_error *error) {
-  const supine_scan *scan = &wanted->model.scan;
-  supine_fields fields = {0};
-  supine_fit_report report;
+/* Compress the fields, and write a basis of them.
+ * @param scan  posture of the scan; a copy, as the model takes the scan as it is */
+static supine_status compress_fields(const request *wanted, const supine_scan *scan,
+                                     const supine_source *source,
+                                     supine_precompute_options *options, supine_error *error) {
+  options->modes = wanted->has_modes ? wanted->modes : SUPINE_MODES_MADE_MAX;
+  const supine_fit_options fit = {.band = wanted->has_band ? (int)wanted->band : -1,
+                                  .modes = options->modes,
+                                  .fewest_modes = !wanted->has_modes,
+                                  .scan_gravity = scan->known ? scan->state.gravity : NULL};
   char posture[160] = "not displaced by gravity";
   char assumed[sizeof source->summary + sizeof posture + 8];
-  SUPINE_TRY(supine_fields_load(wanted->fields, &source->lungs, &source->frame, &fields, error));
+  supine_fields fields = {0};
+  supine_fit_report report;
   if (scan->known) {
     (void)supine_state_describe(&scan->state, posture, sizeof posture);
   }
   (void)snprintf(assumed, sizeof assumed, "%s; scan %s", source->summary, posture);
-  const supine_fit_options options = {.band = wanted->has_band ? (int)wanted->band : -1,
-                                      .modes =
-                                          wanted->has_modes ? wanted->modes : SUPINE_MODES_MADE_MAX,
-                                      .fewest_modes = !wanted->has_modes,
-                                      .scan_gravity = scan->known ? scan->state.gravity : NULL,
-                                      .frame = source->frame,
-                                      .assumed = assumed,
-                                      .findings = source->findings.text,
-                                      .made_by = made_by};
-  const supine_status status =
-      supine_fields_write(&source->lungs, &fields, &options, wanted->path, &report, error);
+  options->assumed = assumed;
+  supine_status status =
+      supine_fields_load(wanted->fields, &source->lungs, &source->frame, &fields, error);
+  if (status == SUPINE_OK) {
+    status =
+        supine_fields_write(&source->lungs, &fields, &fit, options, wanted->path, &report, error);
+  }
   if (status == SUPINE_OK) {
     report_fit(wanted->path, assumed, &fields, &report);
   }
@@ -179,120 +186,105 @@ static supine_status compress_fields(request *wanted, const supine_source *sourc
   return status;
 }
 
-static supine_status load_fields(request *wanted, const supine_arguments *given,
-                                 supine_error *error) {
-  const supine_scan *scan = &wanted->model.scan;
-  supine_source source = {.is_map = false};
-  if (scan->known && scan->state.volume.kind != SUPINE_VOLUME_DEFAULT) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--scanned: with --fields, give the posture alone, such as supine, as "
-                            "fields of gravity have no volume");
-  }
-  supine_status status = supine_command_source_load(name, &wanted->model.source, given->operand,
-                                                    given->count, &source, error);
-  if (status == SUPINE_OK) {
-    status = compress_fields(wanted, &source, given->made_by, error);
-  }
-  supine_lungs_free(&source.lungs);
-  return status;
-}
-
-/* Make the model, and the basis from it.
- * @param patient  JSON text of the model fitted to the patient, or NULL; summary: its description
- */
-static supine_status compute(request *wanted, const supine_arguments *given, const char *patient,
-                             const char *summary, supine_error *error) {
-  supine_prepared prepared = {.source = {.is_map = false}};
+static supine_status compute(const request *wanted, const supine_lungs *lungs,
+                             const supine_precompute_options *options, supine_error *error) {
   supine_precompute_report report;
-  supine_status status =
-      supine_command_prepare(name, &wanted->model, given->operand, given->count, &prepared, error);
-  const supine_patient_record *record = wanted->model.patient;
-  const supine_precompute_options options = {
-      .model = prepared.model,
-      .reference = &prepared.reference,
-      .band = wanted->band,
-      .modes = wanted->modes,
-      .held_out = wanted->held_out,
-      .expected_error = record != NULL ? record->report.expected_constant : 0.0,
-      .frame = prepared.source.frame,
-      .made_by = given->made_by,
-      .patient = patient,
-      .patient_summary = summary,
-      .assumed = prepared.assumed,
-      .findings = prepared.source.findings.text};
-  if (status == SUPINE_OK) {
-    status = supine_precompute(&prepared.source.lungs, &options, wanted->path, &report, error);
-  }
-  if (status == SUPINE_OK) {
-    report_result(wanted->path, &prepared.source.lungs, &options, &report);
-  }
-  supine_precompute_prepared_free(&prepared);
-  return status;
+  SUPINE_TRY(supine_precompute(lungs, options, wanted->path, &report, error));
+  report_result(wanted->path, lungs, options, &report);
+  return SUPINE_OK;
 }
 
-/* Make a basis with the model that was fitted to a patient. */
-static supine_status compute_patient(request *wanted, const supine_arguments *given,
-                                     supine_error *error) {
-  static supine_patient_record record; /* static, as it is too large for the stack */
-  const supine_patient_fit_report *report = &record.report;
-  char summary[256];
-  SUPINE_TRY(supine_patient_read(wanted->patient, &record, error));
-  char *text = supine_patient_text(&record, NULL);
-  if (text == NULL) {
-    return supine_error_memory(error, "%s", wanted->patient);
-  }
-  wanted->model.patient = &record;
-  (void)snprintf(summary, sizeof summary,
+/* Read the model that was fitted to a patient, and describe it in `summary`. */
+static supine_status read_patient(const char *path, supine_patient_record *record, char *summary,
+                                  size_t size, supine_error *error) {
+  const supine_patient_fit_report *report = &record->report;
+  SUPINE_TRY(supine_patient_read(path, record, error));
+  (void)snprintf(summary, size,
                  "%s: %s law%s from %.0f points; held-out residual %.1f of %.1f mm RMS, %.0f %% "
                  "explained; expected error %.1f mm RMS",
-                 record.name, supine_patient_law_names[record.patient.law],
-                 record.patient.centre_count > 0 ? " and kriging" : "", report->points,
+                 record->name, supine_patient_law_names[record->patient.law],
+                 record->patient.centre_count > 0 ? " and kriging" : "", report->points,
                  report->held_out[SUPINE_PATIENT_SCORE_CORRECTED], report->baseline,
                  report->explained, report->expected_point);
   (void)printf("%s\n", summary);
-  const supine_status status = compute(wanted, given, text, summary, error);
-  free(text);
-  return status;
+  return SUPINE_OK;
+}
+
+static void print_directions(size_t count) {
+  (void)puts("x,y,z");
+  for (size_t i = 0; i < count; ++i) {
+    double g[3];
+    supine_spiral((double)i, (double)count, 0.0, g);
+    (void)printf("%.9g,%.9g,%.9g\n", g[0], g[1], g[2]);
+  }
 }
 
 static void begin(void *chosen) {
   ((request *)chosen)->model = supine_precompute_choice_default();
 }
 
-/* Refuse options that set constants of the displacement law, as the patient's model has its own. */
-static supine_status check_patient(const supine_model_choice *choice, supine_error *error) {
-  const supine_model *model = &choice->model;
-  const bool given = choice->law != SUPINE_LAW_COUNT || !isnan(model->force.base) ||
-                     !isnan(model->force.gain) || !isnan(model->force.box[0]) ||
-                     !isnan(model->direction.c[0]) || !isnan(model->direction.shear) ||
-                     !isnan(model->reach);
-  return given ? supine_error_set(
-                     error, SUPINE_ERROR_ARGUMENT,
-                     "the model of --patient has its own law and force: leave --law, --base, "
-                     "--gain, --box-force, --constants, --shear and --reach out")
-               : SUPINE_OK;
-}
-
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
+  const bool fields = wanted->fields != NULL;
+  const supine_scan scan = wanted->model.scan;
+  supine_prepared prepared = {.source = {.is_map = false}};
+  static supine_patient_record record; /* static, as it is too large for the stack */
+  char summary[256];
+  if (wanted->directions > 0) {
+    print_directions(wanted->directions);
+    return SUPINE_OK;
+  }
   if (supine_mesh_save_supports(wanted->path)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "%s: this is the name of a mesh: give a name that ends in .safetensors",
                             wanted->path);
   }
-  if (wanted->patient != NULL) {
-    SUPINE_TRY(check_patient(&wanted->model, error));
-    return compute_patient(wanted, given, error);
+  if (fields && scan.known && scan.state.volume.kind != SUPINE_VOLUME_DEFAULT) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "--scanned: with --fields, give the posture alone, such as supine, as "
+                            "fields of gravity have no volume");
   }
-  return wanted->fields != NULL ? load_fields(wanted, given, error)
-                                : compute(wanted, given, NULL, NULL, error);
+  if (wanted->patient != NULL) {
+    SUPINE_TRY(read_patient(wanted->patient, &record, summary, sizeof summary, error));
+    wanted->model.patient = &record;
+  }
+  if (fields) { /* they displace the surface as it is */
+    wanted->model.scan.known = false;
+    wanted->model.has_scan = true;
+  }
+  supine_status status =
+      supine_command_prepare(name, &wanted->model, given->operand, given->count, &prepared, error);
+  supine_precompute_options options = {
+      .model = prepared.model,
+      .reference = &prepared.reference,
+      .band = wanted->band,
+      .modes = wanted->modes,
+      .held_out = wanted->held_out,
+      .expected_error = wanted->patient != NULL ? record.report.expected_constant : 0.0,
+      .frame = prepared.source.frame,
+      .made_by = given->made_by,
+      .patient = wanted->patient != NULL ? supine_patient_text(&record, NULL) : NULL,
+      .patient_summary = summary,
+      .assumed = prepared.assumed,
+      .findings = prepared.source.findings.text};
+  if (status == SUPINE_OK && wanted->patient != NULL && options.patient == NULL) {
+    status = supine_error_memory(error, "%s", wanted->patient);
+  }
+  if (status == SUPINE_OK) {
+    status = fields ? compress_fields(wanted, &scan, &prepared.source, &options, error)
+                    : compute(wanted, &prepared.source.lungs, &options, error);
+  }
+  free((char *)options.patient);
+  supine_precompute_prepared_free(&prepared);
+  return status;
 }
 
 const supine_command supine_command_precompute = {
     name,
     "solve the physics once, and write a basis file for any posture",
     .usage = "MESH... -o FILE [OPTIONS]\n"
-             "LABELS... -o FILE [OPTIONS]",
+             "LABELS... -o FILE [OPTIONS]\n"
+             "--directions N",
     .about = "Solves the physics of one or two lungs for all directions of gravity, and writes a "
              "basis file. From this file, 'supine deform' and the run-time library compute "
              "deformed lungs in real time. MESH is any surface that assimp reads (PLY, OBJ, STL, "

@@ -244,7 +244,7 @@ static supine_status run(study *s, size_t triples, supine_patient *patient,
   squares held_out = {.points = 0};
   double mean_displacement = 0.0;
   supine_patient_krige krige = {0};
-  const bool sliding_unseen = triples == 0 && s->options.region_count == 0;
+  const bool sliding_unseen = triples == 0;
   supine_patient_krige population = {0}; /* a fit with the covariance found in other patients */
   supine_status status =
       supine_patient_krige_fit(&s->options, s->rows, s->row_count, &krige, error);

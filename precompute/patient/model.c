@@ -112,14 +112,12 @@ static void move(work *w) {
   supine_mesh_box(&w->lungs.mesh, w->lungs.minimum, w->lungs.maximum);
 }
 
-/* Compute w->smoothing_ratio and the stiffness of each vertex, for the posture of the two scans. */
-static supine_status find_ratio(const work *w, double *stiffness, supine_error *error) {
+/* Compute w->smoothing_ratio of each vertex, for the posture of the two scans. */
+static supine_status find_ratio(const work *w, supine_error *error) {
   const supine_patient_record *record = w->record;
   supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
   supine_solution solution = {0};
   model.force = record->force;
-  supine_patient_stiffness_of(&record->stiffness, &w->lungs, stiffness);
-  model.stiffness = stiffness;
   const supine_status status =
       supine_physics_solve(&w->lungs, &model, record->state[1].gravity, &solution, error);
   for (size_t i = 0; i < w->lungs.mesh.vertex_count && status == SUPINE_OK; ++i) {
@@ -213,7 +211,7 @@ supine_status supine_patient_model(const supine_patient_record *record,
     move(&w);
   }
   for (int pass = 0; pass < (w.scan != NULL ? 2 : 1) && status == SUPINE_OK; ++pass) {
-    status = find_ratio(&w, stiffness, error);
+    status = find_ratio(&w, error);
     move(&w);
   }
   find_path_span(&w, resting, w.smoothing_ratio + n, path_span);
@@ -226,6 +224,7 @@ supine_status supine_patient_model(const supine_patient_record *record,
       directions[3 * i + k] /= -force * path_span[k];
     }
   }
+  supine_patient_stiffness_of(&record->stiffness, &w.lungs, stiffness);
   model->force = record->force;
   model->stiffness = record->stiffness.count > 0 ? stiffness : NULL;
   model->direction.vectors = directions;

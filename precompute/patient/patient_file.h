@@ -7,7 +7,12 @@
 #include "precompute/patient/krige.h"
 #include "precompute/physics/reference.h"
 
-enum { SUPINE_PATIENT_TEXT = 48, SUPINE_PATIENT_OTHERS_MAX = 8, SUPINE_PATIENT_STATE_TEXT = 160 };
+enum {
+  SUPINE_PATIENT_REGIONS_MAX = 256,
+  SUPINE_PATIENT_TEXT = 48,
+  SUPINE_PATIENT_OTHERS_MAX = 8,
+  SUPINE_PATIENT_STATE_TEXT = 160
+};
 
 /** Result of a fit to a third scan, besides the two to which the displacement law was fitted. The
  * gain is the increase of the force from the uppermost to the lowest point of the lungs. */

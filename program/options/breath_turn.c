@@ -59,7 +59,7 @@ supine_status supine_breath_turn_read(const char *text, void *turn, supine_error
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "'%s': the time must be above 0 s, as in supine:left:5s", text);
   }
-  supine_state state[2];
+  supine_state state[2] = {{.lung_count = 0}};
   supine_status status = supine_state_parse_posture(from, &state[0], error);
   status = status == SUPINE_OK ? supine_state_parse_posture(to, &state[1], error) : status;
   memcpy(made->from, state[0].gravity, sizeof made->from);

@@ -257,13 +257,6 @@ static void print_map(const char *path, const supine_source *source) {
   }
 }
 
-static void tell(const char *command, const char *path, const supine_source *source) {
-  if (source->is_map) {
-    print_map(path, source);
-  }
-  supine_options_say_findings(command, &source->findings);
-}
-
 supine_status supine_command_prepare(const char *command, supine_model_choice *choice, char **paths,
                                      size_t count, supine_prepared *prepared, supine_error *error) {
   supine_progress progress = supine_options_progress_begin("label map");
@@ -271,19 +264,10 @@ supine_status supine_command_prepare(const char *command, supine_model_choice *c
   choice->source.labels.progress_context = &progress;
   const supine_status status = supine_precompute_prepare(choice, paths, count, prepared, error);
   supine_options_progress_end(&progress);
-  tell(command, paths[0], &prepared->source);
-  return status;
-}
-
-supine_status supine_command_source_load(const char *command, supine_source_options *options,
-                                         char **paths, size_t count, supine_source *source,
-                                         supine_error *error) {
-  supine_progress progress = supine_options_progress_begin("label map");
-  options->labels.progress = supine_options_progress_step;
-  options->labels.progress_context = &progress;
-  const supine_status status = supine_precompute_source_load(options, paths, count, source, error);
-  supine_options_progress_end(&progress);
-  tell(command, paths[0], source);
+  if (prepared->source.is_map) {
+    print_map(paths[0], &prepared->source);
+  }
+  supine_options_say_findings(command, &prepared->source.findings);
   return status;
 }
 

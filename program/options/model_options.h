@@ -14,12 +14,6 @@ extern const supine_option supine_command_model_options[];
 supine_status supine_command_prepare(const char *command, supine_model_choice *choice, char **paths,
                                      size_t count, supine_prepared *prepared, supine_error *error);
 
-/* Load the lungs alone. Print what the checks found.
- * @param source  zeroed; release source->lungs */
-supine_status supine_command_source_load(const char *command, supine_source_options *options,
-                                         char **paths, size_t count, supine_source *source,
-                                         supine_error *error);
-
 /* Load lungs from one or two surfaces, such as "left.ply,right.ply", or from a label map, and print
  * what the checks of the files found.
  * @param lungs  must be initialised to zero */

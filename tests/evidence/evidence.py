@@ -217,7 +217,7 @@ def main(arguments):
         bad = [(low is not None and v < low) or (high is not None and v > high) for v in values]
         misses += sum(bad)
         held = "shown" if high is None else f"{'' if low is None else low}..{high}"
-        text = "".join("%16s" % ("-" if v != v else f"{v:.3g}" + "!" * b) for v, b in zip(values, bad))
+        text = "".join("%16s" % ("-" if v != v else f"{v:.3g}" + "!" * int(b)) for v, b in zip(values, bad))
         print("%-36s%s  %-14s %s" % (what + (f", {unit}" if unit else ""), text, held, published))
     print(f"values outside their range (marked !): {misses}")
     return 1 if check and misses else 0
