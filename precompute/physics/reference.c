@@ -17,10 +17,7 @@ supine_status supine_reference_scan_parse(const char *text, supine_scan *scan,
     *scan = (supine_scan){0};
     return SUPINE_OK;
   }
-  const supine_status status = supine_state_parse(text, &read.state, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(supine_state_parse(text, &read.state, error));
   const supine_volume_kind kind = read.state.volume.kind;
   if (read.state.lung_count > 0 || (kind != SUPINE_VOLUME_REST && kind != SUPINE_VOLUME_FULL)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
