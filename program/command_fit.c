@@ -282,7 +282,7 @@ static supine_status fit_gravity_factor(const request *wanted, scan_data *data,
   if (from->mesh.vertex_count == 0) {
     from = &data->lungs[1];
     supine_patient_points_to_fuller(&record->patient, from->mesh.vertex_count, from->mesh.vertices);
-    supine_mesh_box(&from->mesh, from->minimum, from->maximum);
+    supine_lungs_measure(from);
   }
   for (size_t k = 0; k < wanted->further_count && status == SUPINE_OK; ++k) {
     status = fit_further(wanted, data, k, from, record, error);

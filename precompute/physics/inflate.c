@@ -255,6 +255,6 @@ supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *
   memcpy(lungs->scanned, lungs->mesh.vertices, size * sizeof(double));
   const supine_status status = iterate(&a, error);
   supine_physics_solution_free(&a.field);
-  supine_mesh_box(&lungs->mesh, lungs->minimum, lungs->maximum);
+  supine_lungs_measure(lungs);
   return status == SUPINE_OK ? check_folds(&a, error) : status;
 }

@@ -24,8 +24,7 @@ typedef struct supine_strain supine_strain;
  * @param lungs      must outlive `strain`; its vertices may move
  * @param stiffness  [vertices] 1 / a up to a factor, or NULL for 1
  * @param lesions    [vertices] factors on the stiffness in lesions, or NULL
- * @param strain     written; release with supine_physics_strain_destroy, also
- *   after an error */
+ * @param strain     written; release with supine_physics_strain_destroy, also after an error */
 supine_status supine_physics_strain_create(const supine_lungs *lungs, const double *stiffness,
                                            const double *lesions, supine_strain **strain,
                                            supine_error *error);
