@@ -49,34 +49,61 @@ typedef struct meaning {
   supine_resting resting;
 } meaning;
 
+/* Say what volume the law gives the lungs in the state that was not scanned, beside the measured
+ * one. The law is not rescaled to the latter.
+ * @param measured  volume of both lungs in this state when the law was fitted, mL, or 0 */
+static void tell_volume(const supine_patient_record *record, double measured,
+                        supine_findings *findings) {
+  static const double different = 1.0 / 3.0; /* ratio of volumes minus 1 from which to warn */
+  const size_t other = record->shown == 1.0 ? 0 : 1;
+  const double *lung = record->lung_volume[other];
+  const bool both = (lung[0] > 0.0 && lung[1] > 0.0) || record->patient.frame.only_side != 0;
+  char state[160];
+  char beside[64] = "";
+  (void)supine_state_describe(&record->state[other], state, sizeof state);
+  if (measured > 0.0 && both) {
+    (void)snprintf(beside, sizeof beside, "; measured: %.0f mL", measured);
+  }
+  const double off = beside[0] != '\0' ? fabs((lung[0] + lung[1]) / measured - 1.0) : 0.0;
+  supine_findings_add(findings, "%s: by the fitted law, the lungs hold %.0f mL %s%s%s",
+                      off > different ? "warning" : "note", lung[0] + lung[1], state, beside,
+                      off > different ? ". Check that the scans show the same lungs; give "
+                                        "--landmarks to 'supine fit'"
+                                      : "");
+}
+
 /* Use the displacement law and the force that were fitted to a patient. If the state of the scan is
  * not given, use the state in the fit. */
-static supine_status take_patient(const supine_patient_record *record, supine_prepared *p,
+static supine_status take_patient(const supine_patient_record *fitted, supine_prepared *p,
                                   meaning *means, supine_error *error) {
-  const supine_lungs *lungs = &p->source.lungs;
-  size_t state = 0;
-  SUPINE_TRY(supine_patient_check_place(record, lungs, &state, error));
-  p->model = supine_physics_model(SUPINE_LAW_DEEP);
-  supine_patient_resting(record, &means->resting);
-  if (!means->has_scan) {
-    means->has_scan = true;
-    means->scan =
-        supine_patient_scan(record, state, lungs->volume[0] + lungs->volume[1], &means->resting);
-    if (state == 1 && !means->scan.known) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "this scan is the emptier of the two that were fitted, and how far "
-                              "it is below full inflation is unknown: give its state, such as "
-                              "--scanned supine:rest, or use the fuller scan");
-    }
-    supine_findings_add(&p->source.findings,
-                        "note: the scan is assumed to be the %s of the two that were fitted; "
-                        "--scanned changes this",
-                        state == 0 ? "fuller" : "emptier");
+  const size_t n = p->source.lungs.mesh.vertex_count;
+  supine_patient_record *record = supine_arena_take(&p->memory, 1, sizeof *record);
+  double *arrays = supine_arena_take(&p->memory, 4 * n, sizeof *arrays);
+  supine_scan scan;
+  if (p->memory.failed) {
+    return supine_error_memory(error, "%zu vertices", n);
   }
-  double *arrays = supine_arena_take(&p->memory, 4 * lungs->mesh.vertex_count, sizeof *arrays);
-  return arrays == NULL ? supine_error_memory(error, "%zu vertices", lungs->mesh.vertex_count)
-                        : supine_patient_model(record, &means->resting, lungs, state, arrays,
-                                               &p->model, error);
+  *record = *fitted;
+  p->patient = record;
+  p->model = supine_physics_model(SUPINE_LAW_DEEP);
+  SUPINE_TRY(supine_patient_model(record, &p->source.lungs, &means->resting, &scan, arrays,
+                                  &p->model, error));
+  tell_volume(record, fitted->volume[record->shown == 1.0 ? 0 : 1], &p->source.findings);
+  if (means->has_scan) {
+    return SUPINE_OK;
+  }
+  means->has_scan = true;
+  means->scan = scan;
+  supine_findings_add(&p->source.findings,
+                      "note: the scan is assumed to be the %s of the two that were fitted; "
+                      "--scanned changes this",
+                      record->shown == 0.0 ? "fuller" : "emptier");
+  return record->shown == 0.0 || scan.known
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                "this scan is the emptier of the two that were fitted, and how far "
+                                "it is below full inflation is unknown: give its state, such as "
+                                "--scanned supine:rest, or use the fuller scan");
 }
 
 static supine_status set_expandability(const supine_model_choice *choice, supine_prepared *p,

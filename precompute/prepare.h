@@ -37,6 +37,7 @@ supine_model_choice supine_precompute_choice_default(void);
 typedef struct supine_prepared {
   supine_source source; /**< what was read; its findings also hold those about the model */
   supine_model model;
+  const supine_patient_record *patient; /**< the patient's, with what these lungs add, or NULL */
   supine_reference reference;
   char assumed[800];   /**< for the user: axes, unit, displacement law, state and volumes */
   supine_arena memory; /**< of the arrays of the model */

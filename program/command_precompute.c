@@ -260,14 +260,16 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
       .band = wanted->band,
       .modes = wanted->modes,
       .held_out = wanted->held_out,
-      .expected_error = wanted->patient != NULL ? record.report.expected_constant : 0.0,
+      .expected_error = record.report.expected_constant,
+      .expected_from = record.report.expected_from,
+      .turn_fitted = record.gain_error > 0.0,
       .frame = prepared.source.frame,
       .made_by = given->made_by,
-      .patient = wanted->patient != NULL ? supine_patient_text(&record, NULL) : NULL,
+      .patient = prepared.patient != NULL ? supine_patient_text(prepared.patient, NULL) : NULL,
       .patient_summary = summary,
       .assumed = prepared.assumed,
       .findings = prepared.source.findings.text};
-  if (status == SUPINE_OK && wanted->patient != NULL && options.patient == NULL) {
+  if (status == SUPINE_OK && prepared.patient != NULL && options.patient == NULL) {
     status = supine_error_memory(error, "%s", wanted->patient);
   }
   if (status == SUPINE_OK) {

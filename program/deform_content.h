@@ -14,6 +14,7 @@ typedef struct supine_deform_content {
   /* Files of -o, --field-out, --image and --labels; NULL if not given. */
   const char *path, *field, *image, *labels;
   bool inverse, density;
+  bool vertices;       /* whether a CSV file has a row for each vertex */
   supine_image source; /* the image or the label map to move, once it has been read */
 } supine_deform_content;
 
@@ -27,6 +28,8 @@ typedef struct supine_deformation {
   bool allow_folds;           /* whether folded fields cause only a warning */
   bool from_given;            /* whether --from was given; otherwise `from` is the scan */
   supine_expected expected;
+  double hilum[3];               /* displacement of the hilum, LPS, mm */
+  bool subtract_hilum;           /* whether outputs are in the frame of the hilum */
   supine_mesh_save_options save; /* axes, unit and comment of the output */
 } supine_deformation;
 
