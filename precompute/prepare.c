@@ -193,6 +193,16 @@ static supine_status set_shares(const supine_model_choice *choice, supine_prepar
   return SUPINE_OK;
 }
 
+/* Whether the expandability differs between vertices. */
+static bool varies(const supine_model *model, size_t count) {
+  bool same = true;
+  for (size_t i = 0; i < count && same; ++i) {
+    same = (model->stiffness == NULL || model->stiffness[i] == model->stiffness[0]) &&
+           (model->lesions == NULL || model->lesions[i] == 1.0);
+  }
+  return !same;
+}
+
 static void summarize(const supine_model_choice *choice, const supine_resting *resting,
                       bool predicted, supine_prepared *p) {
   static const double supine[3] = {0.0, 1.0, 0.0};
@@ -291,7 +301,7 @@ supine_status supine_precompute_prepare(const supine_model_choice *choice, char 
   SUPINE_TRY(set_expandability(choice, p, error));
   SUPINE_TRY(set_lesions(choice, p, error));
   SUPINE_TRY(set_shares(choice, p, error));
-  if (p->model.reach > 0.0 && (p->model.stiffness != NULL || p->model.lesions != NULL)) {
+  if (p->model.reach > 0.0 && varies(&p->model, lungs->mesh.vertex_count)) {
     SUPINE_TRY(supine_physics_strain_create(lungs, p->model.stiffness, p->model.lesions,
                                             &p->model.strain, error));
   }
