@@ -41,14 +41,16 @@ function distancesOf(basis, after, before) {
   return { mean: sum / area, p95: (bin / 2000) * far[at], largest: far[at], at, rms: Math.sqrt(squares / far.length) };
 }
 
-/** Return the number b of the formula of the expected error: about 1 at a point p beside the heart, 0 far from it. */
-function nearHeart(basis, p) {
+/** Return the number b of the formula of the expected error at the point places[i] to places[i + 2]: about 1 beside the
+ * heart, 0 far from it. */
+function nearHeart(basis, places, i) {
   basis.box ??= [Math.min, Math.max].map((end, side) => basis.surface.reduce((box, x, i) => { box[i % 3] = end(box[i % 3], x); return box; }, [0, 0, 0].fill(side ? -Infinity : Infinity)));
   const [low, high] = basis.box;
   const midline = Number(basis.metadata.midline_mm ?? (low[0] + high[0]) / 2);
-  const width = p[0] > midline ? high[0] - midline : midline - low[0];
-  const [y, z] = [1, 2].map((axis) => (high[axis] - p[axis]) / (high[axis] - low[axis]));
-  return Math.max(0, 1 - (width > 0 ? Math.abs(p[0] - midline) / width : 0) / 0.7) * Math.max(0, 4 * y * (1 - y)) * Math.max(0, 1 - Math.abs(z - 0.65) / 0.35);
+  const width = places[i] > midline ? high[0] - midline : midline - low[0];
+  const y = (high[1] - places[i + 1]) / (high[1] - low[1]);
+  const z = (high[2] - places[i + 2]) / (high[2] - low[2]);
+  return Math.max(0, 1 - (width > 0 ? Math.abs(places[i] - midline) / width : 0) / 0.7) * Math.max(0, 4 * y * (1 - y)) * Math.max(0, 1 - Math.abs(z - 0.65) / 0.35);
 }
 
 /** Return the RMS over points of the expected error of their displacement, mm, by the formula of supine/locate.h.
@@ -59,6 +61,7 @@ function expectedError(basis, { now, from, law, turn, perStep, fuller, level }, 
   const reference = places({ ...now, gains: now.gains.map(() => 0) });
   const [g, f] = [now, from].map(({ gravity }) => gravity.map((x) => x / Math.hypot(...gravity)));
   const change = g.map((x, axis) => x - f[axis]);
+  const across = 12 * Math.hypot(change[0], change[1]);
   let sum = 0;
   for (let i = 0; i < a.length; i += 3) {
     let [square, slope, turned] = [0, 0, 0];
@@ -68,7 +71,7 @@ function expectedError(basis, { now, from, law, turn, perStep, fuller, level }, 
       if (more) slope += (more[0][k] - more[1][k] - u) ** 2;
       if (flat) turned += (u - flat[0][k] + flat[1][k]) ** 2;
     }
-    const heart = 12 * Math.hypot(change[0], change[1]) * nearHeart(basis, [0, 1, 2].map((axis) => reference[i + axis]));
+    const heart = across > 0 ? across * nearHeart(basis, reference, i) : 0;
     sum += Math.sqrt(square) * law + Math.sqrt(turned) * turn + slope * perStep ** 2 + heart ** 2 + (3 * change[0]) ** 2;
   }
   return Math.sqrt(sum / (a.length / 3));
