@@ -66,7 +66,7 @@ static void add_target(const supine_posture_item *const item[2], const supine_ta
   (void)json_array_append_new(list, entry);
 }
 
-/* Append to a list the displacements of the hilum and of each named structure between two postures.
+/* Append to a list the displacements of each named structure and of the hilum between two postures.
  * If `in_hilum`, subtract the hilum's from the others. */
 static supine_status add_pair(const supine_basis *basis, const supine_command_names *names,
                               const supine_posture_item *const item[2], bool in_hilum, json_t *list,
@@ -91,16 +91,16 @@ static supine_status add_pair(const supine_basis *basis, const supine_command_na
   if (status == SUPINE_OK) {
     status = supine_options_hilum(basis, &pose[1], &pose[0], in_hilum, hilum.move, error);
   }
-  if (status == SUPINE_OK && supine_length(hilum.move) > 0.0) {
-    hilum.moved = supine_length(hilum.move);
-    hilum.volume[0] = hilum.volume[1] = targets[0].volume[0] != 0.0 ? (double)NAN : 0.0;
-    add_target(item, &hilum, list);
-  }
   for (size_t i = 0; status == SUPINE_OK && i < names->count; ++i) {
     if (in_hilum) {
       supine_command_target_shift(&targets[i], hilum.move);
     }
     add_target(item, &targets[i], list);
+  }
+  if (status == SUPINE_OK && supine_length(hilum.move) > 0.0) {
+    hilum.moved = supine_length(hilum.move);
+    hilum.volume[0] = hilum.volume[1] = targets[0].volume[0] != 0.0 ? (double)NAN : 0.0;
+    add_target(item, &hilum, list);
   }
   free(targets);
   supine_options_expected_free(&expected);

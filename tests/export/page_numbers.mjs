@@ -62,7 +62,7 @@ for (const [from, name] of [['supine:rest', 'supine at rest'], ['scan', 'the sca
     near(largest, program.max, `${posture} from ${name}: largest displacement, page and compare`);
     near(program.largest, program.max, `${posture} from ${name}: largest displacement, deform and compare`);
     near(error, program.error, `${posture} from ${name}: expected error of the surface, page and compare`);
-    seen.lungs.forEach((lung, i) => assert.ok(Math.abs(seen.held[i] - program.held[lung.replace(' lung', '')]) < 0.01, `${lung}: ${seen.held[i]}`));
+    seen.lungs.forEach((lung, i) => assert.ok(Math.abs(seen.held[i] - program.held[lung.replace(' lung', '')].value) < 0.01, `${lung}: ${seen.held[i]}`));
     if (posture === 'left') assert.match(seen.finding, /^Lying on the left side, nodule/);
   }
   assert.deepEqual(complaints, []);

@@ -41,22 +41,38 @@ function distancesOf(basis, after, before) {
   return { mean: sum / area, p95: (bin / 2000) * far[at], largest: far[at], at, rms: Math.sqrt(squares / far.length) };
 }
 
-/** Return the RMS over points of the expected error of their displacement u, mm, as the library defines it: the squared
- * error of a point is |u| constant, plus (5 d)^2 if the volume at rest is only assumed. Here d is the change of u if the
- * volumes of the states that count from rest grow by 1 % of the reference volume. `places(moment)` returns the points in
- * a state of the lungs, and `terms` is the result of movedBetween. */
-function expectedError({ now, from, constant, fuller }, places) {
+/** Return the number b of the formula of the expected error at the point places[i] to places[i + 2]: about 1 beside the
+ * heart, 0 far from it. */
+function nearHeart(basis, places, i) {
+  basis.box ??= [Math.min, Math.max].map((end, side) => basis.surface.reduce((box, x, i) => { box[i % 3] = end(box[i % 3], x); return box; }, [0, 0, 0].fill(side ? -Infinity : Infinity)));
+  const [low, high] = basis.box;
+  const midline = Number(basis.metadata.midline_mm ?? (low[0] + high[0]) / 2);
+  const width = places[i] > midline ? high[0] - midline : midline - low[0];
+  const y = (high[1] - places[i + 1]) / (high[1] - low[1]);
+  const z = (high[2] - places[i + 2]) / (high[2] - low[2]);
+  return Math.max(0, 1 - (width > 0 ? Math.abs(places[i] - midline) / width : 0) / 0.7) * Math.max(0, 4 * y * (1 - y)) * Math.max(0, 1 - Math.abs(z - 0.65) / 0.35);
+}
+
+/** Return the RMS over points of the expected error of their displacement, mm, by the formula of supine/locate.h.
+ * `places(moment)` returns the points in a state of the lungs, and `terms` is the result of movedBetween. */
+function expectedError(basis, { now, from, law, turn, perStep, fuller, level }, places) {
   const [a, b] = [places(now), places(from)];
-  const more = fuller?.map(places);
+  const [more, flat] = [fuller, level].map((moments) => moments?.map(places));
+  const reference = places({ ...now, gains: now.gains.map(() => 0) });
+  const [g, f] = [now, from].map(({ gravity }) => gravity.map((x) => x / Math.hypot(...gravity)));
+  const change = g.map((x, axis) => x - f[axis]);
+  const across = 12 * Math.hypot(change[0], change[1]);
   let sum = 0;
   for (let i = 0; i < a.length; i += 3) {
-    let [square, slope] = [0, 0];
+    let [square, slope, turned] = [0, 0, 0];
     for (let k = i; k < i + 3; ++k) {
       const u = a[k] - b[k];
       square += u * u;
       if (more) slope += (more[0][k] - more[1][k] - u) ** 2;
+      if (flat) turned += (u - flat[0][k] + flat[1][k]) ** 2;
     }
-    sum += Math.sqrt(square) * constant + slope * (0.05 / 0.01) ** 2;
+    const heart = across > 0 ? across * nearHeart(basis, reference, i) : 0;
+    sum += Math.sqrt(square) * law + Math.sqrt(turned) * turn + slope * perStep ** 2 + heart ** 2 + (3 * change[0]) ** 2;
   }
   return Math.sqrt(sum / (a.length / 3));
 }
@@ -69,9 +85,14 @@ function movedBetween(basis, now, depth, from) {
   const assumed = basis.hasResting && !metadata.resting_known && metadata.scanned !== 'rest' && !metadata.scan_state?.includes('rest');
   const more = 0.01 * sumOf(basis.references);
   const fuller = assumed ? [momentFor(basis, now.gravity, depth + more), from.above === null ? from : momentFor(basis, from.gravity, from.above + more)] : null;
-  const terms = { now, from, constant: Math.min(Number(metadata.expected_error_mm), surface.rms), fuller };
+  const scanned = (metadata.scan_gravity ?? '0,1,0').split(',').map(Number);
+  const perStep = assumed ? Number(metadata.resting_spread ?? 0.17) * (1 + sumOf(volumesFor(basis, scanned).rest) / sumOf(basis.references)) / 0.01 : 0;
+  const law = Number(metadata.expected_error_mm) * Math.min(1, surface.rms / Number(metadata.expected_error_from_mm ?? 18));
+  const turn = metadata.turn_fitted ? 0 : Math.max(0, 4.5 * Math.min(1, surface.rms / 18) - law);
+  const level = turn > 0 ? [momentFor(basis, scanned, depth), from.above === null ? from : momentFor(basis, scanned, from.above)] : null;
+  const terms = { now, from, law, turn, perStep, fuller, level };
   const known = metadata.expected_error_mm && now.held;
-  return { ...surface, ...terms, known, error: known ? expectedError(terms, (moment) => placesOf(basis, moment)) : null };
+  return { basis, ...surface, ...terms, known, error: known ? expectedError(basis, terms, (moment) => placesOf(basis, moment)) : null };
 }
 
 /** Return how a structure inside the lungs moves: the mean position of its vertices `at` and before, `was`, its
@@ -80,7 +101,7 @@ function targetOf(inside, part, moved) {
   const mean = (places) => [0, 1, 2].map((axis) => places.reduce((sum, p) => sum + p[axis], 0) / places.length);
   const [at, was] = [moved.now, moved.from].map((moment) => mean(insidePlaces(inside, moment, part)));
   const move = at.map((x, i) => x - was[i]);
-  return { name: inside.names[part] || '(no name)', at, was, move, mm: Math.hypot(...move), error: moved.known ? expectedError(moved, (moment) => insidePlaces(inside, moment, part).flat()) : null };
+  return { name: inside.names[part] || '(no name)', at, was, move, mm: Math.hypot(...move), error: moved.known ? expectedError(moved.basis, moved, (moment) => insidePlaces(inside, moment, part).flat()) : null };
 }
 
 /** Return whether a displacement exceeds its expected error. */
