@@ -127,7 +127,7 @@ function sentenceOf(basis, moved, target, gravity, above) {
   if (moved.largest < 0.05) return { before: `This is ${name}, from which displacements are measured.`, told: '', after: '', error: '', meaning: '' };
   const stated = error === null ? '' : `expected error ${errorText(error)}`;
   const meaning = error === null ? '' : `Half of all points lie within ${(0.9 * error).toFixed(0)} mm of the computed place, 95 % within ${(1.8 * error).toFixed(0)} mm${near(gravity, moved.from.gravity) ? '' : '; for a change of posture the error is an extrapolation'}.`;
-  if (!isTold({ mm, error })) return { before: `${where}${who}: ${UNTOLD} from ${name} (${mm.toFixed(1)} mm; `, told: '', after: '', error: `${stated}).`, meaning };
+  if (!isTold({ mm, error })) return { before: `${where}${who}: ${UNTOLD} from ${name} (${mm.toFixed(1)} mm; `, told: '', after: '', error: `expected error ${error.toFixed(1)} mm).`, meaning };
   const [told, after] = target ? [`moves ${mm.toFixed(1)} mm`, `: ${wayWords(target.move, 2)}`] : [`moves ${mm.toFixed(1)} mm on average`, `, ${moved.largest.toFixed(1)} mm at most, ${spotWords(basis, moved.at)}`];
   return { before: where, told: `${who} ${told}`, after: ` from ${name}${after}${stated && '; '}`, error: stated && `${stated}.`, meaning };
 }
