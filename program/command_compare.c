@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/output.h"
+#include "base/vec3.h"
 
 #include "program/options/basis_input.h"
 #include "program/options/inside.h"
@@ -33,6 +34,7 @@ typedef struct request {
   bool json;
   supine_volume_options volume;
   supine_from from;
+  int frame;     /* 1 if the hilum stays in place, 0 if the body does */
   double breath; /* tidal volume, mL */
   bool has_breath;
 } request;
@@ -43,6 +45,7 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, postures), .standard = "supine,prone,left,right"},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
+    {.table = supine_options_hilum_frame, SUPINE_FILLS(request, frame)},
     {"breath", 0, "ML", "tidal volume of the breath whose ventilation by height is computed",
      SUPINE_FILLS(request, breath), SUPINE_SAYS_GIVEN(request, has_breath), .standard = "500",
      SUPINE_ABOVE_ZERO},
@@ -55,13 +58,15 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, html), .file = SUPINE_FILE_OUT, .endings = ".html"},
     {.name = NULL}};
 
-/* Append to a list the displacement of each named structure between two postures. */
+/* Append to a list the displacements of the hilum and of each named structure between two postures.
+ * If `in_hilum` is true, subtract the displacement of the hilum. */
 static supine_status add_pair(const supine_basis *basis, const supine_command_names *names,
-                              const supine_posture_item *const item[2], json_t *list,
+                              const supine_posture_item *const item[2], bool in_hilum, json_t *list,
                               supine_error *error) {
   supine_pose pose[2];
   supine_expected expected = {0};
   supine_target *targets = NULL;
+  double h[3] = {0.0};
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < 2 && status == SUPINE_OK; ++i) {
     status = supine_basis_pose(basis, &item[i]->state, &pose[i], error);
@@ -71,12 +76,22 @@ static supine_status add_pair(const supine_basis *basis, const supine_command_na
         supine_options_expected_find(basis, &item[1]->state, &item[0]->state, &expected, error);
   }
   if (status == SUPINE_OK) {
+    status = supine_options_hilum(basis, &pose[1], &pose[0], in_hilum, h, error);
+  }
+  if (status == SUPINE_OK) {
     status =
         supine_command_targets_find(basis, names, (const supine_pose *const[2]){&pose[0], &pose[1]},
                                     expected.sigma, false, &targets, error);
   }
+  if (status == SUPINE_OK && supine_length(h) > 0.0) {
+    (void)json_array_append_new(
+        list, json_pack("{s:s, s:s, s:s, s:[f,f,f], s:f, s:n}", "from", item[0]->name, "to",
+                        item[1]->name, "name", in_hilum ? "hilum, subtracted" : "hilum", "move",
+                        h[0], h[1], h[2], "mm", supine_length(h), "expected_error_mm"));
+  }
   for (size_t i = 0; status == SUPINE_OK && i < names->count; ++i) {
     json_t *entry = json_pack("{s:s, s:s}", "from", item[0]->name, "to", item[1]->name);
+    supine_command_target_subtract(&targets[i], in_hilum ? h : NULL);
     (void)json_object_update_new(entry, supine_command_target_json(&targets[i]));
     (void)json_array_append_new(list, entry);
   }
@@ -87,18 +102,18 @@ static supine_status add_pair(const supine_basis *basis, const supine_command_na
 
 /* Print the displacement of each named structure between every two postures. */
 static supine_status compare_content(const supine_basis *basis, const supine_posture_list *postures,
-                                     bool json, supine_error *error) {
+                                     const request *wanted, supine_error *error) {
   supine_command_names names;
   json_t *list = json_array();
   supine_status status = supine_command_names_open(basis, &names, error);
   for (size_t i = 0; i < postures->count; ++i) {
     for (size_t j = i + 1; j < postures->count && status == SUPINE_OK; ++j) {
       const supine_posture_item *const item[2] = {&postures->item[i], &postures->item[j]};
-      status = add_pair(basis, &names, item, list, error);
+      status = add_pair(basis, &names, item, wanted->frame == 1, list, error);
     }
   }
   if (status == SUPINE_OK) {
-    supine_options_print(json_incref(list), json);
+    supine_options_print(json_incref(list), wanted->json);
   }
   json_decref(list);
   supine_command_names_close(&names);
@@ -141,7 +156,13 @@ static supine_status compare(const char *path, const char *made_by, const supine
                                   "%s holds structures inside the lungs, but -o needs the lungs: "
                                   "give the basis of the lungs, and the structures by --inside",
                                   path)
-               : compare_content(basis, &comparison.postures, wanted->json, error);
+               : compare_content(basis, &comparison.postures, wanted, error);
+  }
+  if (wanted->frame == 1) {
+    return supine_error_set(
+        error, SUPINE_ERROR_ARGUMENT,
+        "--frame hilum is for structures inside the lungs: give a basis made by "
+        "'supine embed', or use 'supine deform --frame hilum'");
   }
   if (wanted->inside != NULL) {
     status = supine_command_inside_open(basis, wanted->inside, &comparison.inside,

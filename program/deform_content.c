@@ -155,6 +155,12 @@ static supine_status write_points(const char *path, const supine_basis *basis,
     status = supine_output_open(path, &output, error);
   }
   if (status == SUPINE_OK) {
+    for (size_t i = 0; i < count && moved->subtract_hilum; ++i) {
+      for (size_t k = 0; k < 3; ++k) {
+        rows[i].at[k] -= moved->hilum[k];
+      }
+      supine_command_target_subtract(&rows[i], moved->hilum);
+    }
     print_rows(moved, info, rows, count, output.file);
     status = supine_output_commit(&output, error);
   }
@@ -323,6 +329,7 @@ supine_status supine_command_deform_content(const supine_deform_content *wanted,
     status = write_points(wanted->path, basis, moved, wanted->vertices, error);
     if (status == SUPINE_OK) {
       supine_options_expected_print(&moved->expected, stdout);
+      supine_options_hilum_print(moved->hilum, moved->subtract_hilum);
     }
   }
   return status;

@@ -200,6 +200,13 @@ supine_status supine_command_targets_find(const supine_basis *inside,
                 : supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu points", n);
 }
 
+void supine_command_target_subtract(supine_target *target, const double *shift) {
+  for (size_t k = 0; k < 3 && shift != NULL; ++k) {
+    target->move[k] -= shift[k];
+  }
+  target->moved = supine_length(target->move);
+}
+
 const char *supine_command_target_way(const supine_target *target, size_t most, char way[96]) {
   static const char *const names[3][2] = {{"right", "left"}, {"front", "back"}, {"feet", "head"}};
   double left[3] = {fabs(target->move[0]), fabs(target->move[1]), fabs(target->move[2])};

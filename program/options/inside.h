@@ -57,6 +57,9 @@ supine_status supine_command_targets_find(const supine_basis *inside,
                                           const supine_pose *const pose[2], const float *sigma,
                                           bool each, supine_target **targets, supine_error *error);
 
+/* Subtract a displacement, mm, such as that of the hilum, from a target's; NULL for none. */
+void supine_command_target_subtract(supine_target *target, const double *shift);
+
 #define SUPINE_TARGET_UNTOLD "no change that the model can tell"
 
 /* Write the direction of a target's displacement in words, with at most `most` parts and the
