@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine compare: compute the displacement and the ventilation by height in several postures. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -58,11 +59,19 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, html), .file = SUPINE_FILE_OUT, .endings = ".html"},
     {.name = NULL}};
 
+static void add_target(const supine_posture_item *const item[2], const supine_target *target,
+                       json_t *list) {
+  json_t *entry = json_pack("{s:s, s:s}", "from", item[0]->name, "to", item[1]->name);
+  (void)json_object_update_new(entry, supine_command_target_json(target));
+  (void)json_array_append_new(list, entry);
+}
+
 /* Append to a list the displacements of the hilum and of each named structure between two postures.
- * If `in_hilum` is true, subtract the displacement of the hilum. */
+ * If `in_hilum`, subtract the hilum's from the others. */
 static supine_status add_pair(const supine_basis *basis, const supine_command_names *names,
                               const supine_posture_item *const item[2], bool in_hilum, json_t *list,
                               supine_error *error) {
+  supine_target hilum = {.name = in_hilum ? "hilum, subtracted" : "hilum", .expected = (double)NAN};
   supine_pose pose[2];
   supine_expected expected = {0};
   supine_target *targets = NULL;
@@ -83,17 +92,19 @@ static supine_status add_pair(const supine_basis *basis, const supine_command_na
         supine_command_targets_find(basis, names, (const supine_pose *const[2]){&pose[0], &pose[1]},
                                     expected.sigma, false, &targets, error);
   }
-  if (status == SUPINE_OK && supine_length(h) > 0.0) {
-    (void)json_array_append_new(
-        list, json_pack("{s:s, s:s, s:s, s:[f,f,f], s:f, s:n}", "from", item[0]->name, "to",
-                        item[1]->name, "name", in_hilum ? "hilum, subtracted" : "hilum", "move",
-                        h[0], h[1], h[2], "mm", supine_length(h), "expected_error_mm"));
+  if (status == SUPINE_OK) {
+    status = supine_options_hilum(basis, &pose[1], &pose[0], in_hilum, hilum.move, error);
+  }
+  if (status == SUPINE_OK && supine_length(hilum.move) > 0.0) {
+    hilum.moved = supine_length(hilum.move);
+    hilum.volume[0] = hilum.volume[1] = targets[0].volume[0] != 0.0 ? (double)NAN : 0.0;
+    add_target(item, &hilum, list);
   }
   for (size_t i = 0; status == SUPINE_OK && i < names->count; ++i) {
-    json_t *entry = json_pack("{s:s, s:s}", "from", item[0]->name, "to", item[1]->name);
-    supine_command_target_subtract(&targets[i], in_hilum ? h : NULL);
-    (void)json_object_update_new(entry, supine_command_target_json(&targets[i]));
-    (void)json_array_append_new(list, entry);
+    if (in_hilum) {
+      supine_command_target_shift(&targets[i], hilum.move);
+    }
+    add_target(item, &targets[i], list);
   }
   free(targets);
   supine_options_expected_free(&expected);
@@ -163,27 +174,23 @@ static supine_status compare(const char *path, const char *made_by, const supine
   if (status != SUPINE_OK) {
     return status;
   }
-  const bool content = supine_basis_metadata(basis, "content") != NULL;
-  if (content && wanted->from.given) {
-    return supine_error_set(
-        error, SUPINE_ERROR_ARGUMENT,
-        "%s holds structures inside the lungs, which are compared between every "
-        "two postures: leave --from out, or use 'supine deform --from'",
-        path);
+  const bool content = supine_basis_metadata(basis, "content") != NULL; /* by 'supine embed' */
+  const char *refused =
+      content && wanted->from.given
+          ? "%s holds structures inside the lungs, which are compared between every two postures: "
+            "leave --from out, or use 'supine deform --from'"
+      : content && wanted->html != NULL
+          ? "%s holds structures inside the lungs, but -o needs the lungs: give the basis of the "
+            "lungs, and the structures by --inside"
+      : !content && wanted->frame == 1 ? "%s holds no structures inside the lungs, which --frame "
+                                         "hilum is for: give a basis made "
+                                         "by 'supine embed', or use 'supine deform --frame hilum'"
+                                       : NULL;
+  if (refused != NULL) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, refused, path);
   }
-  if (content) { /* only 'supine embed' writes this key */
-    return wanted->html != NULL
-               ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                  "%s holds structures inside the lungs, but -o needs the lungs: "
-                                  "give the basis of the lungs, and the structures by --inside",
-                                  path)
-               : compare_content(basis, &comparison.postures, wanted, error);
-  }
-  if (wanted->frame == 1) {
-    return supine_error_set(
-        error, SUPINE_ERROR_ARGUMENT,
-        "--frame hilum is for structures inside the lungs: give a basis made by "
-        "'supine embed', or use 'supine deform --frame hilum'");
+  if (content) {
+    return compare_content(basis, &comparison.postures, wanted, error);
   }
   return report(&comparison, wanted, error);
 }

@@ -156,10 +156,7 @@ static supine_status write_points(const char *path, const supine_basis *basis,
   }
   if (status == SUPINE_OK) {
     for (size_t i = 0; i < count && moved->subtract_hilum; ++i) {
-      for (size_t k = 0; k < 3; ++k) {
-        rows[i].at[k] -= moved->hilum[k];
-      }
-      supine_command_target_subtract(&rows[i], moved->hilum);
+      supine_command_target_shift(&rows[i], moved->hilum);
     }
     print_rows(moved, info, rows, count, output.file);
     status = supine_output_commit(&output, error);

@@ -5,8 +5,8 @@
 #include <string.h>
 
 #include "base/text.h"
-
 #include "precompute/inside/shells.h"
+
 #include "program/options/basis_input.h"
 
 const supine_option supine_options_as_scanned[] = {

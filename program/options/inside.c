@@ -200,13 +200,6 @@ supine_status supine_command_targets_find(const supine_basis *inside,
                 : supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu points", n);
 }
 
-void supine_command_target_subtract(supine_target *target, const double *shift) {
-  for (size_t k = 0; k < 3 && shift != NULL; ++k) {
-    target->move[k] -= shift[k];
-  }
-  target->moved = supine_length(target->move);
-}
-
 const char *supine_command_target_way(const supine_target *target, size_t most, char way[96]) {
   static const char *const names[3][2] = {{"right", "left"}, {"front", "back"}, {"feet", "head"}};
   double left[3] = {fabs(target->move[0]), fabs(target->move[1]), fabs(target->move[2])};
@@ -221,6 +214,14 @@ const char *supine_command_target_way(const supine_target *target, size_t most, 
     left[axis] = 0;
   }
   return way;
+}
+
+void supine_command_target_shift(supine_target *target, const double shift[3]) {
+  for (size_t k = 0; k < 3; ++k) {
+    target->at[k] -= shift[k];
+    target->move[k] -= shift[k];
+  }
+  target->moved = supine_length(target->move);
 }
 
 json_t *supine_command_target_json(const supine_target *t) {

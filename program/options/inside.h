@@ -57,15 +57,16 @@ supine_status supine_command_targets_find(const supine_basis *inside,
                                           const supine_pose *const pose[2], const float *sigma,
                                           bool each, supine_target **targets, supine_error *error);
 
-/* Subtract a displacement, mm, such as that of the hilum, from a target's; NULL for none. */
-void supine_command_target_subtract(supine_target *target, const double *shift);
-
 #define SUPINE_TARGET_UNTOLD "no change that the model can tell"
 
 /* Write the direction of a target's displacement in words, with at most `most` parts and the
  * largest first: "12 to the feet, 7 to the front". A displacement below its expected error is
  * SUPINE_TARGET_UNTOLD. Return `way`. */
 const char *supine_command_target_way(const supine_target *target, size_t most, char way[96]);
+
+/* Subtract a displacement, mm, such as that of the hilum, from a target's position and
+ * displacement. */
+void supine_command_target_shift(supine_target *target, const double shift[3]);
 
 /* Return a target as JSON: its name, displacement, and the expected error. */
 json_t *supine_command_target_json(const supine_target *target);
