@@ -176,6 +176,7 @@ async function checkSizes() {
     const { page, complaints } = await openLungs(files['inside.html'], { viewport: { width, height }, colorScheme, ...(touch && { hasTouch: true }) }, '#posture=left&target=4');
     assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth && [...document.querySelectorAll('#panel button, #panel input, #inside-table td')].every((e) => { const b = e.getBoundingClientRect(); return b.width === 0 || (b.left >= 0 && b.right <= innerWidth + 0.5); })), `${width} x ${height}: something is cut`);
     if (touch) {
+      await page.locator('#picture').evaluate((canvas) => canvas.scrollIntoView({ block: 'center' }));
       await page.touchscreen.tap(...await onPage(page, 'carina'));
       await page.waitForFunction(() => window.supine.basis.inside.names[window.supine.state.chosen] === 'carina');
     }
