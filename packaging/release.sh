@@ -118,10 +118,12 @@ done | xargs ldd "$top/bin/supine" | awk '$1 ~ /:$/ { print substr($1, 1, length
   grep '/lib[^/]*\.so' | grep -vE '/lib(c|m|dl|rt|pthread|resolv)\.so' | sort -u >"$work/stage/libraries"
 while read -r library; do
   cp -L "$library" "$top/lib"
-  package=$(dpkg -S "$(readlink -f "$library")" | cut -d: -f1)
+  file=$(readlink -f "$library") # packages name the file in /usr/lib or in /lib
+  package=$({ dpkg -S "$file" || dpkg -S "${file#/usr}"; } 2>/dev/null | cut -d: -f1)
   cp "/usr/share/doc/$package/copyright" "$top/share/doc/supine/libraries/$package.copyright"
-  dpkg-query -W -f '${source:Package} ${source:Version}\n' "$package"
-done <"$work/stage/libraries" | sort -u >"$top/share/doc/supine/libraries/sources"
+  dpkg-query -W -f '${source:Package} ${source:Version}\n' "$package" >>"$work/stage/sources"
+done <"$work/stage/libraries"
+sort -u "$work/stage/sources" >"$top/share/doc/supine/libraries/sources"
 chmod -R u=rwX,go=rX "$top"
 glibc=$(find "$top" -type f \( -path '*/bin/*' -o -path '*/lib/*' \) -exec objdump -T {} + | grep -o 'GLIBC_2\.[0-9]*' | sort -Vu | tail -1)
 pack "$work/stage" "$name" "$out/$name-linux-x86_64-glibc${glibc#GLIBC_}.tar.gz"
