@@ -23,7 +23,10 @@
  *
  *     max(|u_i|, 2 mm) min(c, max(RMS of |u|, 2 mm)) + (|dx_i/dV| D)^2
  *
- * D is 0.17 V_full for an unknown volume, and 0 for a given volume. */
+ * D is 0.17 V_full for an unknown volume, and 0 for a given volume.
+ *
+ * Stability: growing. A minor version may change functions and structs without a replacement;
+ * CHANGELOG.md names the change. */
 #ifndef SUPINE_LOCATE_H
 #define SUPINE_LOCATE_H
 
