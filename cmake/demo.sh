@@ -28,5 +28,5 @@ $picture
 
 To view them, open $folder/lungs.html in any browser, or the four .vtp files in ParaView,
 coloured by displacement_magnitude.
-A further example: $supine deform $folder/lungs.safetensors --gravity 0.6,0,-0.8 --volume rest+800 -o mine.ply
+A further example: $supine deform $folder/lungs.safetensors --posture 0.6:0:-0.8:rest+800 -o mine.ply
 END

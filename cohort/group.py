@@ -24,7 +24,9 @@ def numbers(result):
         found[f"{lung}_lung_ml"] = float(volume) if volume else None
     for posture in comparison["postures"]:
         found[f"rms_in_{posture['name']}_mm"] = posture["displacement_mm"]["rms"]
-        for lung, gain in posture.get("gain_ml", {}).items():
+        for lung, volume in posture.get("volume_ml", {}).items():
+            found[f"{lung}_lung_in_{posture['name']}_ml"] = volume["value"]
+        for lung, gain in (posture.get("gain_ml") or {}).items():
             found[f"gain_of_{lung}_lung_in_{posture['name']}_ml"] = gain
     return found
 

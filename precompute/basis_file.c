@@ -75,8 +75,8 @@ static void add_model(entries *list, const supine_lungs *lungs, const supine_mod
   add(list, "force", "base=%.9g gain=%.9g cx=%.9g cy=%.9g cz=%.9g soften=%.9g", force->base,
       force->gain, force->box[0], force->box[1], force->box[2], force->soften);
   add(list, "direction", "box");
-  add(list, "direction_constants", "c1=%.9g c2=%.9g c3=%.9g c4=%.9g c5=%.9g c6=%.9g", c[0], c[1],
-      c[2], c[3], c[4], c[5]);
+  add(list, "direction_constants", "c1=%.9g c2=%.9g c3=%.9g c4=%.9g c5=%.9g c6=%.9g shear=%.9g",
+      c[0], c[1], c[2], c[3], c[4], c[5], model->direction.shear);
   add(list, "stiffness", "%s", model->stiffness == NULL ? "uniform" : "per vertex");
   if (model->lesions != NULL) {
     add_lesions(list, lungs->mesh.vertex_count, model->lesions);
@@ -119,26 +119,34 @@ static void add_reference(entries *list, const supine_reference *reference, cons
   add(list, "full_upright_gain", "%g", SUPINE_FULL_UPRIGHT_GAIN);
   supine_reference_resting_print(&reference->resting, shares, sizeof shares);
   add(list, "resting_shares", "%s", shares);
-}
-
-/* Add the constant c of the expected position error (supine/locate.h), and whether the resting
- * volume (FRC) of a posture is the patient's own. */
-static void add_expected_error(entries *list, const supine_basis_content *content) {
-  if (content->fit == NULL) {
-    const double own = content->options->expected_error;
-    add(list, "expected_error_mm", "%g",
-        own > 0.0 ? fmin(own, SUPINE_EXPECTED_ERROR_MM) : SUPINE_EXPECTED_ERROR_MM);
-  }
-  if (content->reference != NULL && supine_reference_resting_given(&content->reference->resting)) {
+  /* State whether the ratio of the volumes at rest (FRC) and at full inflation is the patient's own
+   * or, if not, the standard deviation of its logarithm. */
+  if (supine_reference_resting_given(&reference->resting) || reference->scan.full > 0.0) {
     add(list, "resting_known", "yes");
+  } else {
+    add(list, "resting_spread", "%.4g", reference->resting.spread / reference->resting.assumed);
   }
 }
 
-static void add_fit(entries *list, const supine_basis_fit *fit) {
-  const double *g = fit->scan_gravity;
+/* Add the constants of the expected position error (supine/locate.h). */
+static void add_expected_error(entries *list, const supine_basis_content *content) {
+  const supine_precompute_options *options = content->options;
+  const bool fitted = !content->is_fields && options->expected_error > 0.0;
+  if (!content->is_fields) {
+    add(list, "expected_error_mm", "%g",
+        fitted ? options->expected_error : SUPINE_EXPECTED_ERROR_MM);
+  }
+  if (fitted) {
+    add(list, "expected_error_from_mm", "%g", options->expected_from);
+    add(list, "expected_error_source", "%s", options->patient_summary);
+  }
+  if (fitted && options->turn_fitted) {
+    add(list, "turn_fitted", "yes");
+  }
+}
+
+static void add_fields(entries *list, const double *g) {
   add(list, "route", "fields");
-  add(list, "condition", "%.4g", fit->condition);
-  add(list, "band_determined", "%zu", fit->band_highest);
   add(list, "error_method", "leave-one-out");
   if (g != NULL) {
     add(list, "scan_gravity", "%.9g,%.9g,%.9g", g[0], g[1], g[2]);
@@ -206,7 +214,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
                                         supine_error *error) {
   const supine_lungs *lungs = content->lungs;
   const supine_precompute_options *options = content->options;
-  const supine_model *model = content->fit == NULL ? &options->model : NULL;
+  const supine_model *model = !content->is_fields ? &options->model : NULL;
   const supine_compression *field = content->compression;
   const size_t n = lungs->mesh.vertex_count;
   const size_t k = field->mode_count;
@@ -254,8 +262,8 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
     add_reference(&list, content->reference, share);
   }
   add_expected_error(&list, content);
-  if (content->fit != NULL) {
-    add_fit(&list, content->fit);
+  if (content->is_fields) {
+    add_fields(&list, content->scan_gravity);
   }
   add_accuracy(&list, content->accuracy, content->reference != NULL);
   if (content->turned_over != NULL) {

@@ -7,20 +7,14 @@
 
 #include "precompute/projection/accuracy.h"
 
-/** A fit to the displacements that another simulator computed for several directions of gravity. */
-typedef struct supine_basis_fit {
-  size_t band_highest;        /**< highest degree of harmonics that the directions determine */
-  double condition;           /**< condition number of the matrix of harmonics */
-  const double *scan_gravity; /**< [3] gravity in the scan, or NULL if it is unknown */
-} supine_basis_fit;
-
 /** Content of a basis file with N vertices. */
 typedef struct supine_basis_content {
   const supine_lungs *lungs;
-  const supine_precompute_options *options; /**< options->model is unused if `fit` is not NULL */
-  const supine_basis_fit *fit; /**< NULL if the displacements are not another simulator's */
-  const double *directions;    /**< [N, 3] displacement of each vertex per unit force, mm; NULL if
-                                  `compression` holds the displacement itself */
+  const supine_precompute_options *options; /**< options->model is unused if `is_fields` */
+  bool is_fields;             /**< whether another simulator computed the displacements; if so: */
+  const double *scan_gravity; /**< [3] gravity in the scan, or NULL if it is unknown */
+  const double *directions;   /**< [N, 3] displacement of each vertex per unit force, mm; NULL if
+                                 `compression` holds the displacement itself */
   const supine_compression *compression;
   const supine_volume_forms *forms;
   const supine_accuracy *accuracy;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Make a basis file: expand displacements in harmonics, compress, measure the error, and write. */
+#include <cblas.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -28,7 +29,7 @@ typedef struct pipeline {
   const supine_precompute_options *options;
   supine_lungs anchored; /* copy of `given` whose vertices anchor() has corrected, or all zero */
   supine_reference reference;
-  double *directions; /* [N, 3] displacement of each vertex per unit force, mm */
+  double *directions; /* [N, 3] displacement of each vertex per unit force, mm, or NULL */
   /* [N] squared length of the vector in `directions`. With these weights, the modes minimise the
    * error of the displacement: 0.34 % RMS for a left lung, 0.40 % without weights. */
   double *weight;
@@ -66,8 +67,8 @@ static supine_status find_directions(pipeline *p, supine_error *error) {
   if (p->directions == NULL || p->weight == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
   }
-  const supine_status status =
-      supine_physics_directions(p->lungs, &p->options->model.direction, p->directions, error);
+  const supine_status status = supine_physics_directions(
+      p->lungs, &p->options->model.force, &p->options->model.direction, p->directions, error);
   for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
     const double *d = p->directions + 3 * i;
     p->weight[i] = supine_dot(d, d);
@@ -80,6 +81,30 @@ static supine_status project(pipeline *p, supine_error *error) {
   return supine_projection_create(p->lungs, &options->model, options->band, &p->projection, error);
 }
 
+/* If expandability varies, replace the forces of the projection by displacements, mm. */
+static supine_status find_strain(pipeline *p, supine_error *error) {
+  supine_expansion *expansion = &p->projection.expansion;
+  const size_t rank = expansion->rank;
+  const size_t rows = 3 * expansion->row_count;
+  if (p->options->model.strain == NULL) {
+    return SUPINE_OK;
+  }
+  double *columns = malloc(rows * rank * sizeof *columns);
+  if (columns == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", rows / 3);
+  }
+  for (size_t i = 0; i < rows * rank; ++i) {
+    columns[i] = expansion->columns[i / (3 * rank) * rank + i % rank] * p->directions[i / rank];
+  }
+  free(expansion->columns);
+  free(p->directions);
+  free(p->weight);
+  p->directions = p->weight = NULL;
+  expansion->columns = columns;
+  expansion->row_count = rows;
+  return supine_physics_strain_apply(p->options->model.strain, NULL, 3 * rank, columns, error);
+}
+
 static supine_status compress(pipeline *p, supine_error *error) {
   return p->options->modes == 0
              ? supine_sh_compress_harmonics(&p->projection.expansion, &p->compression, error)
@@ -90,10 +115,10 @@ static supine_status compress(pipeline *p, supine_error *error) {
 /* Correct the vertices of the reference surface so that the displacement computed from the modes
  * moves them exactly to the scan, in the posture of the scan. The corrected position of a vertex is
  *
- *     p_j = scan_j - A_j F d_j        along axis j
+ *     p_j = scan_j - A_j u_j        along axis j
  *
- * A_j is the gain (factor on the displacement) at which its lung has the volume of the scan, F is
- * the force on the vertex computed from the modes, and d is its displacement per unit force. */
+ * A_j is the gain (factor on the displacement) at which its lung has the volume of the scan, and u
+ * is the displacement computed from the modes. */
 static supine_status anchor(pipeline *p, supine_error *error) {
   const supine_lungs *lungs = p->given;
   const supine_compression *field = &p->compression;
@@ -102,26 +127,28 @@ static supine_status anchor(pipeline *p, supine_error *error) {
   if (!p->reference.known || lungs->scanned == NULL) {
     return SUPINE_OK;
   }
-  double *amounts = malloc(n * sizeof *amounts);
+  double *u = malloc(4 * n * sizeof *u);
   if (p->anchored.mesh.vertices == NULL) {
     p->anchored = *lungs;
     p->anchored.mesh.vertices = malloc(3 * n * sizeof(double));
   }
-  if (amounts == NULL || p->anchored.mesh.vertices == NULL) {
-    free(amounts);
+  if (u == NULL || p->anchored.mesh.vertices == NULL) {
+    free(u);
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
   }
   supine_sh_compression_weights(field, p->reference.scan.state.gravity, weights);
-  supine_sh_compression_field(field, weights, amounts);
+  supine_projection_displacement(field, p->directions, weights, u);
+  for (size_t i = 3 * n; i < 4 * n; ++i) {
+    u[i] = 1.0;
+  }
   memcpy(p->anchored.mesh.vertices, lungs->scanned, 3 * n * sizeof(double));
-  const supine_status status = supine_reference_find_gains(
-      &p->anchored, p->options->model.bend, p->directions, amounts, &p->reference, error);
+  const supine_status status = supine_reference_find_gains(&p->anchored, p->options->model.bend, u,
+                                                           u + 3 * n, &p->reference, error);
   for (size_t i = 0; i < 3 * n; ++i) {
     const size_t lung = lungs->lung_count == 2 && i >= 3 * lungs->lung_begin[1];
-    p->anchored.mesh.vertices[i] -=
-        p->reference.scan_gains[lung][i % 3] * amounts[i / 3] * p->directions[i];
+    p->anchored.mesh.vertices[i] -= p->reference.scan_gains[lung][i % 3] * u[i];
   }
-  free(amounts);
+  free(u);
   p->lungs = &p->anchored;
   return status;
 }
@@ -244,6 +271,11 @@ static supine_status find_turned_over(pipeline *p, supine_error *error) {
 }
 
 static supine_status write_file(const pipeline *p, const char *path, supine_error *error) {
+  for (size_t i = 0; i < 3 * p->lungs->mesh.vertex_count && p->directions == NULL; ++i) {
+    const size_t lung = p->lungs->lung_count == 2 && i >= 3 * p->lungs->lung_begin[1];
+    cblas_sscal((int)p->compression.mode_count, (float)cbrt(p->options->model.share[lung]),
+                p->compression.coefficients + i * p->compression.mode_count, 1);
+  }
   const supine_basis_content content = {.lungs = p->lungs,
                                         .options = p->options,
                                         .directions = p->directions,
@@ -265,8 +297,8 @@ supine_status supine_precompute(const supine_lungs *lungs, const supine_precompu
     p.reference = *options->reference;
   }
   supine_status (*const steps[])(pipeline *, supine_error *) = {
-      project,  find_directions, compress, anchor,     find_forms,      find_rest,
-      hold_out, measure,         tabulate, drop_modes, find_turned_over};
+      project,   find_directions, find_strain, compress, anchor,     find_forms,
+      find_rest, hold_out,        measure,     tabulate, drop_modes, find_turned_over};
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < sizeof steps / sizeof *steps && status == SUPINE_OK; ++i) {
     status = steps[i](&p, error);

@@ -15,6 +15,7 @@ supine_model_choice supine_precompute_choice_default(void) {
                                 .resting = supine_reference_resting_default()};
   choice.model.reach = choice.model.force.base = choice.model.force.gain = NAN;
   choice.model.force.box[0] = choice.model.direction.c[0] = NAN;
+  choice.model.direction.shear = NAN;
   return choice;
 }
 
@@ -34,6 +35,8 @@ static supine_model choose_law(const supine_model_choice *choice) {
   model.reach = isnan(model.reach) ? law.reach : model.reach;
   model.force.base = isnan(model.force.base) ? law.force.base : model.force.base;
   model.force.gain = isnan(model.force.gain) ? law.force.gain : model.force.gain;
+  model.direction.shear =
+      isnan(model.direction.shear) ? law.direction.shear : model.direction.shear;
   if (isnan(model.force.box[0])) {
     memcpy(model.force.box, law.force.box, sizeof law.force.box);
   }
@@ -155,32 +158,30 @@ static void summarize(const supine_model_choice *choice, bool predicted, supine_
   (void)supine_state_describe(&reference->scan.state, state, sizeof state);
   const double full = reference->full_volume[0] + reference->full_volume[1];
   const double held = full + reference->scan_volume[0] + reference->scan_volume[1];
-  const bool given = supine_reference_resting_given(&choice->resting);
+  const bool known = supine_reference_resting_given(&choice->resting);
   const bool at_rest = reference->scan.state.volume.kind == SUPINE_VOLUME_REST;
   if (held != full) {
     supine_text_add(p->summary, size, "%s, %.0f mL; ", state, held);
   }
   supine_text_add(p->summary, size, "%sfull inflation %.0f mL (%s", held != full ? "" : "at ", full,
-                  choice->full > 0.0 ? "given, "
-                  : at_rest && given ? "from rest, "
-                  : at_rest          ? "assumed from rest, "
-                                     : "");
+                  reference->scan.full > 0.0 ? "given, "
+                  : !at_rest                 ? ""
+                  : known                    ? "from rest, "
+                                             : "assumed from rest, ");
   supine_reference_compare(reference, &choice->person, p->summary, size);
   const double rest = supine_reference_rest(reference, supine, ml);
   const double ratio = exp(choice->resting.spread / choice->resting.assumed);
   supine_text_add(p->summary, size, "); rest supine %.0f mL (", rest);
-  if (at_rest || given) {
-    supine_text_add(p->summary, size, "by %s)",
-                    at_rest                       ? "the scan"
-                    : choice->patient_law != NULL ? "the fit"
-                                                  : "--resting");
-  } else {
-    supine_text_add(p->summary, size, "%.0f to %.0f by %s, which --resting changes)", rest / ratio,
-                    rest * ratio,
-                    predicted                                      ? "height and sex"
-                    : choice->resting.assumed == SUPINE_REST_SHARE ? "healthy people's share"
-                                                                   : "the share in COPD");
+  if (!at_rest && !known) {
+    supine_text_add(p->summary, size, "%.0f to %.0f ", rest / ratio, rest * ratio);
   }
+  supine_text_add(p->summary, size, "by %s)",
+                  at_rest                                        ? "the scan"
+                  : choice->patient_law != NULL                  ? "the fit"
+                  : known                                        ? "--resting"
+                  : predicted                                    ? "height and sex"
+                  : choice->resting.assumed == SUPINE_REST_SHARE ? "healthy people's share"
+                                                                 : "the share in COPD");
   double collapsed = 0.0; /* volume in the scan as the basis holds it, mL */
   for (size_t lung = 0; lung < reference->lung_count; ++lung) {
     collapsed +=
@@ -214,11 +215,13 @@ supine_status supine_precompute_prepare(supine_lungs *lungs, const supine_model_
                             "--scanned: a posture alone is only for --fields: add the volume, as "
                             "in supine:rest, or give full or none");
   }
-  scan.full = choice->full;
-  if (scan.full > 0.0 && (!scan.known || scan.state.volume.kind != SUPINE_VOLUME_REST)) {
+  const supine_volume *full = &choice->full.volume;
+  scan.full = full->ml;
+  if (full->kind != SUPINE_VOLUME_DEFAULT &&
+      (full->kind != SUPINE_VOLUME_ABSOLUTE || scan.state.volume.kind != SUPINE_VOLUME_REST)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--full is for a scan at rest: give --scanned supine:rest too, or "
-                            "leave --full out");
+                            "--full is for a scan at rest: give a volume such as 4200mL, and "
+                            "--scanned supine:rest too");
   }
   supine_status status = set_expandability(lungs, choice, p, error);
   status = status == SUPINE_OK ? set_lesions(lungs, choice, p, findings, error) : status;
@@ -227,6 +230,10 @@ supine_status supine_precompute_prepare(supine_lungs *lungs, const supine_model_
       .scan = scan, .lung_count = lungs->lung_count, .side = {lungs->side[0], lungs->side[1]}};
   supine_resting resting = choice->resting;
   supine_reference_predict_rest(&scanned, &choice->person, &resting);
+  if (status == SUPINE_OK && p->model.reach > 0.0 && (p->stiffness != NULL || p->lesions != NULL)) {
+    status = supine_physics_strain_create(lungs, p->stiffness, p->lesions, &p->strain, error);
+    p->model.strain = p->strain;
+  }
   status = status == SUPINE_OK
                ? supine_reference_find(lungs, &p->model, &scan, &resting, &p->reference, error)
                : status;
@@ -245,5 +252,6 @@ supine_status supine_precompute_prepare(supine_lungs *lungs, const supine_model_
 void supine_precompute_prepared_free(supine_prepared *prepared) {
   free(prepared->stiffness);
   free(prepared->lesions);
+  supine_physics_strain_destroy(prepared->strain);
   *prepared = (supine_prepared){0};
 }

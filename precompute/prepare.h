@@ -20,7 +20,7 @@ typedef struct supine_model_choice {
   const double *stiffness; /**< [N] relative stiffness fitted to the patient, or NULL */
   bool has_scan; /**< whether `scan` was given; SUPINE_LAW_DEEP assumes full inflation if not */
   supine_scan scan;
-  double full; /**< volume at full inflation, if the scan is at rest, mL; 0 if unknown */
+  supine_state full; /**< volume at full inflation, for a scan at rest; DEFAULT if unknown */
   supine_resting resting;
   supine_person person;
   const char *expandability; /**< path of a CSV file, or NULL to use `expandability_law` */
@@ -34,11 +34,12 @@ supine_model_choice supine_precompute_choice_default(void);
 
 /** A physical model, the volumes of the lungs, and a description of the assumptions. */
 typedef struct supine_prepared {
-  supine_model model; /**< uses the arrays `stiffness` and `lesions` of this struct */
+  supine_model model; /**< uses `stiffness`, `lesions` and `strain` of this struct */
   supine_reference reference;
-  char summary[512]; /**< for the user: displacement law, state of the scan and volumes */
-  double *stiffness; /**< [N] relative stiffness of each vertex, or NULL if uniform */
-  double *lesions;   /**< [N] factors by which lesions multiply the stiffness, or NULL */
+  char summary[512];     /**< for the user: displacement law, state of the scan and volumes */
+  double *stiffness;     /**< [N] relative stiffness of each vertex, or NULL if uniform */
+  double *lesions;       /**< [N] factors by which lesions multiply the stiffness, or NULL */
+  supine_strain *strain; /**< their effect if the law has a smoothing length, or NULL */
 } supine_prepared;
 
 /** Select the displacement law, set stiffness and lesions, and move the vertices of the scan to the

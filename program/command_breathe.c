@@ -97,11 +97,16 @@ static supine_status complete(request *wanted, size_t *count, supine_error *erro
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give --turn or one posture, not both");
   }
   if (!wanted->turns) {
-    const supine_status status =
-        supine_options_gravity(&wanted->orientation, wanted->turn.to, error);
+    supine_state state = {.lung_count = 0};
+    const supine_status status = supine_options_state(&wanted->orientation, &state, error);
     if (status != SUPINE_OK) {
       return status;
     }
+    if (state.volume.kind != SUPINE_VOLUME_DEFAULT || state.lung_count > 0) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "a breath starts at rest: give --posture without a volume");
+    }
+    memcpy(wanted->turn.to, state.gravity, sizeof wanted->turn.to);
     memcpy(wanted->turn.from, wanted->turn.to, sizeof wanted->turn.from);
   }
   double seconds = wanted->turns ? wanted->turn.seconds : 60.0 / breath->rate;

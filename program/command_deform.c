@@ -22,6 +22,7 @@ typedef struct request {
   supine_volume_options volume;
   supine_from from;
   bool as_scanned;
+  int frame; /* 1 if the hilum stays in place, 0 if the body does */
   supine_deform_content content;
   const char *states; /* CSV file of states; NULL if the options give one state */
   /* Outputs in the columns output, labels and field of a row; the request owns these texts. */
@@ -49,6 +50,7 @@ static const supine_option table[] = {
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {.table = supine_options_from_scan, SUPINE_FILLS(request, from)},
     {.table = supine_options_as_scanned, SUPINE_FILLS(request, as_scanned)},
+    {.table = supine_options_hilum_frame, SUPINE_FILLS(request, frame)},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.table = supine_command_deform_content_options, SUPINE_FILLS(request, content)},
     {.name = NULL}};
@@ -110,6 +112,9 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
   if (status == SUPINE_OK) {
     status = deformed_mesh(basis, &moved->pose, &mesh, normals);
   }
+  for (size_t i = 0; i < 3 * mesh.vertex_count && moved->subtract_hilum; ++i) {
+    mesh.vertices[i] -= moved->hilum[i % 3];
+  }
   (void)supine_basis_volumes(basis, &moved->pose, volumes);
   save->from = from.vertices;
   save->normals = mesh.triangle_count > 0 ? normals : NULL;
@@ -124,6 +129,7 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
     report(path, gravity, &mesh, &from, moved->from.name,
            supine_basis_metadata(basis, "content") == NULL);
     supine_options_expected_print(&moved->expected, stdout);
+    supine_options_hilum_print(moved->hilum, moved->subtract_hilum);
   }
   free(normals);
   supine_mesh_free(&from);
@@ -134,19 +140,25 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
 static supine_status deform(const supine_basis *basis, const request *wanted, supine_error *error) {
   supine_deformation moved = {.state = wanted->volume.state,
                               .from_given = wanted->from.given,
-                              .allow_folds = wanted->volume.allow_folds};
-  char comment[128];
+                              .allow_folds = wanted->volume.allow_folds,
+                              .subtract_hilum = wanted->frame == 1};
+  char comment[192];
   supine_status status = supine_options_reference(basis, &wanted->from, false, &moved.from, error);
   if (status == SUPINE_OK) {
-    status =
-        supine_options_pose(basis, name, &wanted->volume, moved.state.gravity, &moved.pose, error);
+    status = supine_options_pose(basis, name, wanted->volume.allow_folds, &moved.state, &moved.pose,
+                                 error);
   }
   if (status == SUPINE_OK) {
     status = supine_options_expected_find(basis, &moved.state, &moved.from.state, &moved.expected,
                                           error);
   }
   if (status == SUPINE_OK) {
-    (void)snprintf(comment, sizeof comment, "displacement from %s", moved.from.name);
+    status = supine_options_hilum(basis, &moved.pose, &moved.from.pose, wanted->frame == 1,
+                                  moved.hilum, error);
+  }
+  if (status == SUPINE_OK) {
+    (void)snprintf(comment, sizeof comment, "displacement from %s%s", moved.from.name,
+                   wanted->frame == 1 ? ", in the frame of the hilum" : "");
     moved.save.comment = comment;
     status = supine_options_basis_frame(basis, wanted->as_scanned, &moved.save, error);
   }
@@ -264,7 +276,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   supine_status status = many ? read_rows(given->operand[0], wanted, &rows, &count, error)
                               : supine_command_deform_content_check(&wanted->content, error);
   if (status == SUPINE_OK && !many) {
-    status = supine_options_gravity(&wanted->orientation, wanted->volume.state.gravity, error);
+    status = supine_options_state(&wanted->orientation, &wanted->volume.state, error);
   }
   if (status == SUPINE_OK) {
     status = supine_options_basis_open(given->operand[0], SUPINE_STORAGE_EXACT, &basis, error);
@@ -292,7 +304,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
 const supine_command supine_command_deform = {
     name,
     "deform a basis for a posture and a volume",
-    .usage = "BASIS --posture NAME [--volume VOLUME] -o FILE\n"
+    .usage = "BASIS --posture STATE -o FILE\n"
              "BASIS --states LIST",
     .about = "Deforms the lungs of a basis file to a posture and a volume, as the run-time library "
              "does in each frame, and writes the surface. Each point has its expected error, "
@@ -300,7 +312,7 @@ const supine_command supine_command_deform = {
     .options = table,
     .notes =
         "Examples:\n"
-        "  supine deform lungs.safetensors --posture prone --volume rest+500 -o prone.vtp\n"
+        "  supine deform lungs.safetensors --posture prone:rest+500 -o prone.vtp\n"
         "  supine deform lungs.safetensors --gravity 0.6,0,-0.8 --volume left=rest,right=rest+250 "
         "-o out.ply\n"
         "  supine deform nodules.safetensors --posture prone --from supine:rest -o nodules.csv\n"

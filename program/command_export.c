@@ -122,7 +122,12 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   }
   supine_status status = supine_export_source_open(path, &source, error);
   if (status == SUPINE_OK) {
-    status = supine_options_basis_closed(source.basis, path, error);
+    status = source.info->is_fields
+                 ? supine_error_set(error, SUPINE_ERROR_UNSUPPORTED,
+                                    "%s: another simulator's fields cannot be exported: use "
+                                    "'supine compare -o report.html' or 'supine render'",
+                                    path)
+                 : supine_options_basis_closed(source.basis, path, error);
   }
   if (status == SUPINE_OK) {
     status = page ? write_page(&source, wanted, path, error) : write_glb(&source, wanted, error);

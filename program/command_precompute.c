@@ -6,10 +6,10 @@
 
 #include <supine/sh.h>
 
+#include "base/vec3.h"
 #include "precompute/fields/fields.h"
 #include "precompute/patient/patient_file.h"
 #include "program/options/model_options.h"
-#include "program/options/surface_options.h"
 
 static const char name[] = "precompute";
 
@@ -20,6 +20,7 @@ typedef struct request {
   const char *fields, *patient;
   char summary[256];
   bool has_band, has_modes;
+  size_t directions; /* number of directions of gravity to print; 0 to make a basis */
 } request;
 
 static supine_status read_modes(const char *text, void *field, supine_error *error) {
@@ -52,7 +53,9 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, basis.held_out), .range = {1.0, 100000.0}, .more = true},
     {"patient", 0, "FILE",
      "model of the patient's motion, made by 'supine fit', to use instead of the built-in law",
-     SUPINE_FILLS(request, patient), .file = SUPINE_FILE_IN, .rivals = "directions"},
+     SUPINE_FILLS(request, patient), .file = SUPINE_FILE_IN, .rivals = "directions",
+     .partners = "output band modes held-out axes units midline labels edge close surfaces-out "
+                 "scanned resting full height sex expandability lesion lung"},
     {.help = "Displacements from another simulator, instead of the built-in physics:"},
     {"fields", 0, "FILE",
      "safetensors file with three tensors: points [P,3], the positions of P points; gravity [M,3], "
@@ -63,6 +66,9 @@ static const supine_option table[] = {
      "Without --band and --modes, cross-validation chooses both",
      SUPINE_FILLS(request, fields), .file = SUPINE_FILE_IN, .rivals = "directions",
      .partners = "output band modes axes units midline labels edge close surfaces-out scanned"},
+    {"directions", 0, "N",
+     "only print N directions of gravity that cover the sphere evenly, as CSV, to simulate",
+     SUPINE_FILLS(request, directions), .range = {2.0, 1000.0}, .partners = ""},
     {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
     {.name = NULL}};
 
@@ -136,7 +142,6 @@ static void report_fit(const char *path, const char *assumed, const supine_field
     (void)printf("  band %-2zu  %8.3g %%%s\n", band, 100.0 * fit->error[band],
                  band == fit->band ? "  <- chosen" : "");
   }
-  (void)printf("condition number of the harmonics at these directions: %.3g\n", fit->condition);
   if (fit->band == highest && highest < SUPINE_FIT_BAND_MAX) {
     (void)printf("the error is still falling at the highest band, so detail beyond band %zu is "
                  "missing: about\n%zu evenly spread directions would determine band %zu\n",
@@ -150,40 +155,27 @@ static void report_fit(const char *path, const char *assumed, const supine_field
                fit->accuracy.max_mm);
 }
 
-static supine_status compress_fields(request *wanted, const supine_arguments *given,
+static supine_status compress_fields(request *wanted, const supine_scan *scan,
                                      supine_error *error) {
   const supine_source *source = &wanted->model.made_from;
-  const supine_scan *scan = &wanted->model.choice.scan;
+  wanted->basis.modes = wanted->has_modes ? wanted->basis.modes : SUPINE_MODES_MADE_MAX;
+  const supine_fit_options options = {.band = wanted->has_band ? (int)wanted->basis.band : -1,
+                                      .modes = wanted->basis.modes,
+                                      .fewest_modes = !wanted->has_modes,
+                                      .scan_gravity = scan->known ? scan->state.gravity : NULL};
+  char posture[160] = "not displaced by gravity";
   supine_fields fields = {0};
   supine_fit_report report;
-  if (scan->known && scan->state.volume.kind != SUPINE_VOLUME_DEFAULT) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--scanned: with --fields, give the posture alone, such as supine, as "
-                            "fields of gravity have no volume");
+  if (scan->known) {
+    (void)supine_state_describe(&scan->state, posture, sizeof posture);
   }
+  (void)snprintf(wanted->model.assumed, sizeof wanted->model.assumed, "%s; scan %s",
+                 source->summary, posture);
   supine_status status =
-      supine_command_source_load(&wanted->model, given->operand, given->count, error);
-  supine_options_say_findings(name, &wanted->model.findings);
+      supine_fields_load(wanted->fields, &source->lungs, &source->frame, &fields, error);
   if (status == SUPINE_OK) {
-    status = supine_fields_load(wanted->fields, &source->lungs, &source->frame, &fields, error);
-  }
-  if (status == SUPINE_OK) {
-    char posture[160] = "not displaced by gravity";
-    if (scan->known) {
-      (void)supine_state_describe(&scan->state, posture, sizeof posture);
-    }
-    (void)snprintf(wanted->model.assumed, sizeof wanted->model.assumed, "%s; scan %s",
-                   source->summary, posture);
-    const supine_fit_options options = {.band = wanted->has_band ? (int)wanted->basis.band : -1,
-                                        .modes = wanted->has_modes ? wanted->basis.modes
-                                                                   : SUPINE_MODES_MADE_MAX,
-                                        .fewest_modes = !wanted->has_modes,
-                                        .scan_gravity = scan->known ? scan->state.gravity : NULL,
-                                        .frame = source->frame,
-                                        .assumed = wanted->model.assumed,
-                                        .findings = wanted->model.findings.text,
-                                        .made_by = given->made_by};
-    status = supine_fields_write(&source->lungs, &fields, &options, wanted->path, &report, error);
+    status = supine_fields_write(&source->lungs, &fields, &options, &wanted->basis, wanted->path,
+                                 &report, error);
   }
   if (status == SUPINE_OK) {
     report_fit(wanted->path, wanted->model.assumed, &fields, &report);
@@ -192,38 +184,34 @@ static supine_status compress_fields(request *wanted, const supine_arguments *gi
   return status;
 }
 
-static supine_status compute(const supine_lungs *lungs, request *wanted, const char *made_by,
-                             supine_error *error) {
+static supine_status compute(request *wanted, supine_error *error) {
+  const supine_lungs *lungs = &wanted->model.made_from.lungs;
   supine_precompute_report report;
+  char *text = wanted->patient != NULL ? supine_patient_text(wanted->model.patient, NULL) : NULL;
+  if (wanted->patient != NULL && text == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %s", wanted->patient);
+  }
+  wanted->basis.patient = text;
   wanted->basis.model = wanted->model.prepared.model;
   wanted->basis.reference = &wanted->model.prepared.reference;
-  wanted->basis.made_by = made_by;
-  wanted->basis.assumed = wanted->model.assumed;
-  wanted->basis.findings = wanted->model.findings.text;
-  wanted->basis.frame = wanted->model.made_from.frame;
   const supine_status status =
       supine_precompute(lungs, &wanted->basis, wanted->path, &report, error);
   if (status == SUPINE_OK) {
     report_result(wanted->path, lungs, &wanted->basis, &report);
   }
+  free(text);
   return status;
 }
 
-/* Read a patient model and encode it as text for the basis. The caller frees the text. */
-static supine_status take_patient(request *wanted, supine_patient_record *record, char **text,
+static supine_status take_patient(request *wanted, supine_patient_record *record,
                                   supine_error *error) {
   supine_status status = supine_patient_read(wanted->patient, record, error);
   if (status != SUPINE_OK) {
     return status;
   }
-  *text = supine_patient_text(record, NULL);
-  if (*text == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %s", wanted->patient);
-  }
   wanted->model.patient = record;
   /* Later, the constants of this law are replaced by those of the patient. */
   wanted->model.choice.law = SUPINE_LAW_DEEP;
-  wanted->basis.patient = *text;
   const supine_patient_fit_report *report = &record->report;
   (void)snprintf(wanted->summary, sizeof wanted->summary,
                  "%s: %s law%s from %.0f points; held-out residual %.1f of %.1f mm RMS, %.0f %% "
@@ -234,6 +222,8 @@ static supine_status take_patient(request *wanted, supine_patient_record *record
                  report->explained, report->expected_point);
   wanted->basis.patient_summary = wanted->summary;
   wanted->basis.expected_error = report->expected_constant;
+  wanted->basis.expected_from = report->expected_from;
+  wanted->basis.turn_fitted = record->gain_error > 0.0;
   (void)printf("%s\n", wanted->summary);
   return SUPINE_OK;
 }
@@ -242,45 +232,42 @@ static void begin(void *chosen) {
   ((request *)chosen)->model.choice = supine_precompute_choice_default();
 }
 
-/* Refuse options that set constants of the displacement law, as the patient's model has its own.
- * Call this before supine_command_model_load, which sets all constants that were not given. */
-static supine_status check_patient(const supine_model_choice *choice, supine_error *error) {
-  const supine_model *model = &choice->model;
-  const bool given = choice->law != SUPINE_LAW_COUNT || !isnan(model->force.base) ||
-                     !isnan(model->force.gain) || !isnan(model->force.box[0]) ||
-                     !isnan(model->direction.c[0]) || !isnan(model->reach);
-  return given ? supine_error_set(
-                     error, SUPINE_ERROR_ARGUMENT,
-                     "the model of --patient has its own law and force: leave --law, --base, "
-                     "--gain, --box-force, --constants and --reach out")
-               : SUPINE_OK;
-}
-
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
-  const supine_lungs *lungs = &wanted->model.made_from.lungs;
-  char *text = NULL;
+  const bool fields = wanted->fields != NULL;
+  const supine_scan scan = wanted->model.choice.scan;
   static supine_patient_record record; /* static, as it is too large for the stack */
+  if (wanted->directions > 0) {
+    (void)puts("x,y,z");
+    for (size_t i = 0; i < wanted->directions; ++i) {
+      double g[3];
+      supine_spiral((double)i, (double)wanted->directions, 0.0, g);
+      (void)printf("%.9g,%.9g,%.9g\n", g[0], g[1], g[2]);
+    }
+    return SUPINE_OK;
+  }
   if (supine_mesh_save_supports(wanted->path)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "%s: this is the name of a mesh: give a name that ends in .safetensors",
                             wanted->path);
   }
-  supine_status status = SUPINE_OK;
-  if (wanted->patient != NULL) {
-    status = check_patient(&wanted->model.choice, error);
-    if (status == SUPINE_OK) {
-      status = take_patient(wanted, &record, &text, error);
-    }
+  if (fields && scan.known && scan.state.volume.kind != SUPINE_VOLUME_DEFAULT) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "--scanned: with --fields, give the posture alone, such as supine, as "
+                            "fields of gravity have no volume");
   }
-  if (status == SUPINE_OK && wanted->fields != NULL) {
-    status = compress_fields(wanted, given, error);
-  } else if (status == SUPINE_OK) {
-    status =
-        supine_command_model_load(&wanted->model, name, given->operand, given->count, false, error);
-    status = status == SUPINE_OK ? compute(lungs, wanted, given->made_by, error) : status;
+  supine_status status = wanted->patient != NULL ? take_patient(wanted, &record, error) : SUPINE_OK;
+  if (status == SUPINE_OK) {
+    status = supine_command_model_load(&wanted->model, name, given->operand, given->count, fields,
+                                       error);
   }
-  free(text);
+  if (status == SUPINE_OK) {
+    wanted->basis.made_by = given->made_by;
+    wanted->basis.assumed = wanted->model.assumed;
+    wanted->basis.findings = wanted->model.findings.text;
+    wanted->basis.frame = wanted->model.made_from.frame;
+    status = fields ? compress_fields(wanted, &scan, error) : compute(wanted, error);
+  }
   supine_command_model_options_free(&wanted->model);
   return status;
 }
@@ -289,7 +276,8 @@ const supine_command supine_command_precompute = {
     name,
     "solve the physics once, and write a basis file for any posture",
     .usage = "MESH... -o FILE [OPTIONS]\n"
-             "LABELS... -o FILE [OPTIONS]",
+             "LABELS... -o FILE [OPTIONS]\n"
+             "--directions N",
     .about = "Solves the physics of one or two lungs for all directions of gravity, and writes a "
              "basis file. From this file, 'supine deform' and the run-time library compute "
              "deformed lungs in real time. MESH is any surface that assimp reads (PLY, OBJ, STL, "

@@ -100,8 +100,8 @@ static supine_status open_studio(studio *s, const char *path, supine_error *erro
 static supine_status fill_panel(studio *s, size_t i, supine_error *error) {
   const supine_posture_item *item = &s->postures.item[i];
   drawn *shown = &s->shown[i];
-  supine_status status =
-      supine_options_pose(s->basis, name, &s->wanted->volume, item->gravity, &shown->pose, error);
+  supine_status status = supine_options_pose(s->basis, name, s->wanted->volume.allow_folds,
+                                             &item->state, &shown->pose, error);
   if (status != SUPINE_OK) {
     return status;
   }
@@ -117,7 +117,7 @@ static supine_status fill_panel(studio *s, size_t i, supine_error *error) {
                                .subtitle = shown->subtitle,
                                .pose = &shown->pose,
                                .value = shown->value};
-  memcpy(s->panel[i].gravity, item->gravity, sizeof s->panel[i].gravity);
+  memcpy(s->panel[i].gravity, item->state.gravity, sizeof s->panel[i].gravity);
   return SUPINE_OK;
 }
 
@@ -175,10 +175,11 @@ static supine_status draw_postures(studio *s, supine_error *error) {
 static supine_status find_frame(studio *s, size_t frame, size_t count, supine_error *error) {
   const breath_turn *turn = &s->wanted->turn;
   supine_posture_item *item = &s->postures.item[0];
+  item->state = s->wanted->volume.state;
   const double cosine = fmax(-1.0, fmin(1.0, supine_dot(turn->from, turn->to)));
   const double angle = acos(cosine) * 180.0 / 3.14159265358979323846;
   const double share = (double)frame / (double)(count - 1);
-  supine_breath_turn_gravity(turn, share * turn->seconds, item->gravity);
+  supine_breath_turn_gravity(turn, share * turn->seconds, item->state.gravity);
   (void)snprintf(item->name, sizeof item->name, "turned by %.0f of %.0f degrees", share * angle,
                  angle);
   return fill_panel(s, 0, error);
@@ -362,7 +363,8 @@ static supine_status check(const request *wanted, supine_posture_list *postures,
   }
   const supine_status status =
       wanted->turns ? SUPINE_OK
-                    : supine_options_posture_list_parse(wanted->postures, postures, error);
+                    : supine_options_posture_list_parse(wanted->postures, &wanted->volume.state,
+                                                        postures, error);
   return status == SUPINE_OK && postures->count > SUPINE_PANELS_MAX
              ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                                 "a picture holds at most %d postures: name fewer",
@@ -393,7 +395,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
 const supine_command supine_command_render = {
     name,
     "draw the lungs: postures side by side, or an animated turn",
-    .usage = "BASIS --posture NAME[,NAME...] -o lung.png [OPTIONS]\n"
+    .usage = "BASIS --posture STATE[,STATE...] -o lung.png [OPTIONS]\n"
              "BASIS --turn FROM:TO:SECONDS -o turn.webp [OPTIONS]",
     .about = "Draws the lungs in each posture, side by side; no display is needed. Colours show "
              "the displacement, with contour lines at the ticks of the colour bar. A ball shows "

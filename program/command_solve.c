@@ -291,7 +291,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
                             "%s: the name must end in " SUPINE_MESH_ENDINGS, wanted->path);
   }
   if (!wanted->has_vertex) {
-    status = supine_options_gravity(&wanted->orientation, wanted->state.gravity, error);
+    status = supine_options_state(&wanted->orientation, &wanted->state, error);
   }
   if (status == SUPINE_OK) {
     status = supine_command_model_load(&wanted->model, name, given->operand, given->count,

@@ -6,6 +6,7 @@
 #include <supine/sh.h>
 #include <supine/volume.h>
 
+#include "base/vec3.h"
 #include "runtime/internal.h"
 
 static const double default_above_scan = 500; /* default volume minus the volume in the scan, mL */
@@ -235,18 +236,14 @@ static supine_status named_gains(const supine_basis *basis, const volumes *v,
 static supine_status reference_gains(const supine_basis *basis, const supine_state *state,
                                      supine_pose *pose, supine_error *error) {
   const supine_volume *volume = &state->volume;
-  bool reference = (volume->kind == SUPINE_VOLUME_SCAN ||
-                    (volume->kind == SUPINE_VOLUME_FULL && basis->info.has_full)) &&
-                   volume->ml == 0 && state->lung_count == 0;
-  if (basis->info.is_fields) {
-    for (int k = 0; k < 3; ++k) {
-      reference = reference && fabs(state->gravity[k] - basis->scan_gravity[k]) < 1e-6;
-    }
-    if (!reference) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "this basis holds another simulator's fields of gravity, which have "
-                              "no volumes and no breaths: give the posture alone");
-    }
+  const bool reference = (volume->kind == SUPINE_VOLUME_SCAN ||
+                          (volume->kind == SUPINE_VOLUME_FULL && basis->info.has_full)) &&
+                         volume->ml == 0 && state->lung_count == 0;
+  if (basis->info.is_fields &&
+      !(reference && supine_distance(state->gravity, basis->scan_gravity) < 1e-6)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "this basis holds another simulator's fields of gravity, which have "
+                            "no volumes and no breaths: give the posture alone");
   }
   if (!reference) {
     return supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,

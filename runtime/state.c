@@ -20,30 +20,41 @@ static const char *const kinds[] = {[SUPINE_VOLUME_DEFAULT] = "",
 _Static_assert(sizeof kinds / sizeof *kinds == SUPINE_VOLUME_KIND_COUNT,
                "each kind of volume needs a name");
 
+static const struct {
+  const char *word;
+  supine_volume_kind kind;
+} words[] = {{"rest", SUPINE_VOLUME_REST},
+             {"FRC", SUPINE_VOLUME_REST},
+             {"full", SUPINE_VOLUME_FULL},
+             {"TLC", SUPINE_VOLUME_FULL},
+             {"scan", SUPINE_VOLUME_SCAN}};
+
 enum { PIECE = 64 }; /* size of a posture or volume as text, in bytes with its NUL */
 
-/* Read a number, with or without the unit "mL". */
+/* Read a number, with or without the unit "mL" or "L"; the value is then in mL. */
 static bool read_number(const char *text, double *value, bool *has_unit) {
   char *end = NULL;
   *value = strtod(text, &end);
-  *has_unit = supine_words_same(end, "mL");
+  const bool litres = supine_words_same(end, "L");
+  *has_unit = litres || supine_words_same(end, "mL");
+  *value *= litres ? 1000 : 1;
   return end != text && (*has_unit || *end == '\0') && isfinite(*value);
 }
 
 static supine_status read_volume(const char *text, supine_volume *volume, supine_error *error) {
   bool has_unit = false;
   double value = 0;
-  for (int kind = SUPINE_VOLUME_REST; kind < SUPINE_VOLUME_ABSOLUTE; ++kind) {
-    const size_t length = strlen(kinds[kind]);
+  for (int i = 0; i < (int)(sizeof words / sizeof *words); ++i) {
+    const size_t length = strlen(words[i].word);
     char front[PIECE];
     (void)snprintf(front, sizeof front, "%.*s", (int)length, text);
-    if (!supine_words_same(front, kinds[kind])) {
+    if (!supine_words_same(front, words[i].word)) {
       continue;
     }
     const char *offset = text + length;
     if (*offset == '\0' ||
         ((*offset == '+' || *offset == '-') && read_number(offset, &value, &has_unit))) {
-      *volume = (supine_volume){(supine_volume_kind)kind, value};
+      *volume = (supine_volume){words[i].kind, value};
       return SUPINE_OK;
     }
   }
@@ -62,7 +73,7 @@ static supine_status read_volume(const char *text, supine_volume *volume, supine
   }
   return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                           "no volume '%s': give rest, full or scan, with +ML or -ML (rest+500), "
-                          "or an absolute volume (2600mL)",
+                          "or an absolute volume (2600mL, 2.6L)",
                           text);
 }
 
@@ -153,7 +164,7 @@ supine_status supine_state_parse_posture(const char *text, supine_state *state,
     memcpy(state->gravity, gravity, sizeof gravity);
     return SUPINE_OK;
   }
-  if (strchr(text, ':') != NULL) {
+  if (strchr(text, ':') != NULL || strchr("+-.0123456789", text[0]) != NULL) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "'%s': gravity is three numbers X:Y:Z, not all 0; supine is 0:1:0",
                             text);

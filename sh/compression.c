@@ -95,14 +95,11 @@ size_t supine_sh_modes_needed(size_t count, const double *singular, double total
   static const double same_error = 1.01;
   const double limit = (same_error * same_error - 1.0) * error * error;
   double dropped = 0.0;
-  while (count > 1) {
-    dropped += singular[count - 1] * singular[count - 1] / total;
-    if (dropped > limit) {
-      break;
-    }
+  do {
     --count;
-  }
-  return count;
+    dropped += singular[count] * singular[count] / total;
+  } while (count > 0 && dropped <= limit);
+  return count + 1;
 }
 
 void supine_sh_compression_truncate(supine_compression *compression, size_t rank, size_t count) {

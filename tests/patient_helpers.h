@@ -14,7 +14,7 @@ static const double supine_gravity[3] = {0.0, 1.0, 0.0};
 static supine_model truth(void) {
   supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   model.reach = 10.0;
-  model.force = (supine_force_law){.base = 0.9, .gain = 0.4, .box = {0.0, -0.2, 0.0}};
+  model.force = (supine_force_law){.base = 0.875, .gain = 0.4, .box = {0.0, -0.15, 0.0}};
   model.direction = (supine_direction_law){.c = {6.0, 2.6, 15.0, 1.0, 26.0, 1.3}};
   return model;
 }

@@ -164,10 +164,11 @@ static void check_stated_error(const supine_lungs *of, const char *what) {
   supine_fields fields = physics_fields(of, 60, 2008, 1.0);
   supine_fields others = physics_fields(of, 40, 1999, 1.0);
   const supine_fit_options options = {.band = -1, .modes = 16};
+  const supine_precompute_options file = {.modes = 16};
   const char *path = in_folder("basis.safetensors");
   supine_fit_report report;
   supine_error error;
-  if (supine_fields_write(of, &fields, &options, path, &report, &error) != SUPINE_OK) {
+  if (supine_fields_write(of, &fields, &options, &file, path, &report, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
   const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
@@ -267,9 +268,11 @@ TEST(test_fit_band_reducing_error_by_half_a_percent_not_chosen) {
 TEST(test_fit_vector_volumes_exact) {
   supine_fields fields = physics_fields(&lungs, 30, 21, 1.0);
   const supine_fit_options options = {.band = -1, .modes = 8};
+  const supine_precompute_options file = {.modes = 8};
   const char *path = in_folder("volume.safetensors");
   supine_fit_report report;
-  assert_int_equal(supine_fields_write(&lungs, &fields, &options, path, &report, NULL), SUPINE_OK);
+  assert_int_equal(supine_fields_write(&lungs, &fields, &options, &file, path, &report, NULL),
+                   SUPINE_OK);
   const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
   supine_basis *basis = NULL;
   assert_int_equal(supine_basis_open_with(path, &exact, &basis, NULL), SUPINE_OK);
@@ -430,7 +433,7 @@ TEST(test_fields_load_points_elsewhere_or_missing_refused) {
   expect_failure(tensors, 3, &ras_cm, SUPINE_ERROR_FORMAT, "point 0 is not finite");
   expect_failure(tensors + 1, 2, &ras_cm, SUPINE_ERROR_FORMAT, "supine.save_fields(");
   --tensors[0].shape[0];
-  expect_failure(tensors, 3, &ras_cm, SUPINE_ERROR_FORMAT, "has another shape");
+  expect_failure(tensors, 3, &ras_cm, SUPINE_ERROR_FORMAT, "expected tensors points [P,3]");
   free_tensors(tensors);
 }
 
@@ -504,9 +507,11 @@ TEST(test_precompute_fields_every_option_used_or_refused) {
                {"close", "3", 1, "are for label maps"},
                {"surfaces-out", "s.ply", 1, "are for label maps"},
                {"patient", "m.obj", 1, "give --fields or --patient, not both"},
+               {"directions", "32", 1, no_effect},
                {"held-out", "200", 1, no_effect},
                {"resting", "supine=0.4", 1, no_effect},
                {"full", "5000mL", 1, no_effect},
+               {"full", "6000mL", 1, no_effect},
                {"height", "170", 1, no_effect},
                {"sex", "male", 1, no_effect},
                {"law", "paper", 1, no_effect},
@@ -516,6 +521,8 @@ TEST(test_precompute_fields_every_option_used_or_refused) {
                {"soften", "1", 1, no_effect},
                {"constants", "1,2,3,4,5,6", 1, no_effect},
                {"reach", "20", 1, no_effect},
+               {"shear", "0.3", 1, no_effect},
+               {"shear", "0.1", 1, no_effect},
                {"expandability", "uniform", 1, no_effect},
                {"lesion", "0,0,0,9,2", 1, no_effect},
                {"lung", "left:0.3", 1, no_effect}};
@@ -555,6 +562,35 @@ TEST(test_precompute_fields_scanned_posture_not_displaced) {
   EXPECT(1, "give the posture alone", FIELDS "--scanned supine:rest");
   EXPECT(1, "only for --fields",
          "precompute m.obj --axes RAS --units cm --scanned supine -o c.safetensors");
+}
+
+TEST(test_fields_file_of_another_program_named) {
+  write_input();
+  assert_int_equal(rename(in_folder("m.obj"), in_folder("m.frd")), 0);
+  write_input();
+  EXPECT(2, "m.frd: no safetensors file: convert the results of another program",
+         "precompute m.obj --axes RAS --units cm --fields m.frd -o c.safetensors");
+}
+
+TEST(test_directions_printed_evenly_spread) {
+  double g[3] = {0.0};
+  int used = 0;
+  int length = 0;
+  EXPECT(0, "x,y,z\n", "precompute --directions 32");
+  for (int count = 0; count < 32; ++count) {
+    double next[3];
+    assert_int_equal(
+        sscanf(printed + 6 + used, "%lf,%lf,%lf\n%n", &next[0], &next[1], &next[2], &length), 3);
+    assert_close(supine_length(next), 1.0, 1e-8);
+    used += length;
+    for (int k = 0; k < 3; ++k) {
+      g[k] += next[k] / 32.0;
+    }
+  }
+  assert_int_equal(printed[6 + used], '\0');
+  assert_true(supine_length(g) < 0.02);
+  EXPECT(1, "--modes has no effect with --directions", "precompute --directions 32 --modes 3");
+  EXPECT(1, "unexpected argument 'm.obj'", "precompute m.obj --directions 32");
 }
 
 TEST(test_fields_basis_volumes_and_breaths_refused) {

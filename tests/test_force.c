@@ -163,7 +163,7 @@ TEST(test_directions_box_model_literal_values) {
   assert_int_equal(supine_lungs_create(&mesh, 1, NULL, &lungs, NULL), SUPINE_OK);
   assert_close(lungs.midline, 10.0, 0.0);
   assert_int_equal(lungs.side[0], 1);
-  assert_int_equal(supine_physics_directions(&lungs, &law, d, NULL), SUPINE_OK);
+  assert_int_equal(supine_physics_directions(&lungs, NULL, &law, d, NULL), SUPINE_OK);
   /* vertex 1 is outermost, frontmost and at the base, where (15)-(17) are largest */
   assert_close(d[3], 2.0, 1e-14);
   assert_close(d[4], -1.5, 1e-14);
@@ -179,12 +179,32 @@ TEST(test_directions_box_model_literal_values) {
   supine_lungs_free(&lungs);
 }
 
+/* The shear of a force of 2 h, which is 0 on one vertex, has literal values. */
+TEST(test_directions_shear_literal_values) {
+  double vertices[] = {10, 0, 0, 110, 0, 0, 10, 200, 0, 10, 0, 300, 60, 100, 150};
+  uint32_t triangles[] = {0, 1, 2, 0, 3, 1, 1, 3, 4, 1, 4, 2, 0, 2, 3, 2, 4, 3};
+  const supine_mesh mesh = {5, vertices, 6, triangles};
+  const supine_force_law force = {.gain = 2.0};
+  supine_direction_law law = {.c = {0.0, 1.0, 0.0, 1.0, 12.0, 1.0}, .shear = 0.5};
+  supine_lungs lungs = {0};
+  double d[15];
+  assert_int_equal(supine_lungs_create(&mesh, 1, NULL, &lungs, NULL), SUPINE_OK);
+  assert_int_equal(supine_physics_directions(&lungs, &force, &law, d, NULL), SUPINE_OK);
+  /* h = 0, 0, 1, 0, 1/2 and Z = 1, 1, 1, 0, 1/2: D^2 = ((2 12)^2 + (1 6)^2) / 5; RMS force 1 */
+  const double rms = sqrt((576.0 + 36.0) / 5.0);
+  assert_close(d[7], -0.5 * 0.5 * rms / 2.0, 1e-13);
+  assert_close(d[10], 0.5 * 0.5 * rms / 0.2, 1e-13); /* the smallest divisor: 0.2 of RMS */
+  assert_close(d[13], 0.0, 1e-14);
+  assert_close(d[8], -12.0, 1e-14);
+  supine_lungs_free(&lungs);
+}
+
 TEST(test_directions_two_lungs_move_outwards) {
   const supine_lungs *lungs = *state;
   const size_t n = lungs->mesh.vertex_count;
   const supine_direction_law law = supine_physics_model(SUPINE_LAW_PAPER).direction;
   double *d = malloc(3 * n * sizeof *d);
-  assert_int_equal(supine_physics_directions(lungs, &law, d, NULL), SUPINE_OK);
+  assert_int_equal(supine_physics_directions(lungs, NULL, &law, d, NULL), SUPINE_OK);
   for (size_t i = 0; i < n; ++i) {
     assert_true(i < lungs->lung_begin[1] ? d[3 * i] >= 0.0 : d[3 * i] <= 0.0);
     assert_true(d[3 * i + 1] <= 0.0 && d[3 * i + 2] <= 0.0);
@@ -197,11 +217,11 @@ TEST(test_directions_bad_constants_refused) {
   supine_error error;
   supine_direction_law law = supine_physics_model(SUPINE_LAW_PAPER).direction;
   law.c[3] = 0.0;
-  assert_int_equal(supine_physics_directions(*state, &law, d, &error), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_physics_directions(*state, NULL, &law, d, &error), SUPINE_ERROR_ARGUMENT);
   assert_says(error.message, "c4");
   law = supine_physics_model(SUPINE_LAW_PAPER).direction;
   law.c[4] = NAN;
-  assert_int_equal(supine_physics_directions(*state, &law, d, &error), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_physics_directions(*state, NULL, &law, d, &error), SUPINE_ERROR_ARGUMENT);
   assert_says(error.message, "c5");
 }
 

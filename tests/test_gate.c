@@ -118,6 +118,22 @@ TEST(test_gate_clean_lungs_no_message) {
   supine_mesh_free((supine_mesh *)&before);
 }
 
+/* Turned by 40 degrees about the left-right axis, lungs look mirrored. */
+TEST(test_lungs_gate_pitched_scan_warned_of) {
+  supine_mesh mesh = phantom();
+  for (size_t i = 0; i < mesh.vertex_count; ++i) {
+    double *p = mesh.vertices + 3 * i;
+    const double y = p[1];
+    p[1] = 0.766 * y - 0.643 * p[2];
+    p[2] = 0.643 * y + 0.766 * p[2];
+  }
+  outcome out = pass(&mesh, NULL);
+  assert_int_equal(out.status, SUPINE_OK);
+  assert_says(out.findings.text, "pitched by more than 25 degrees");
+  supine_lungs_free(&out.lungs);
+  supine_mesh_free(&mesh);
+}
+
 /* A mesh in any of the 47 axis conventions other than LPS is read as if it were in LPS. The warning
  * proposes the true axes. */
 TEST(test_gate_any_wrong_axes_proposes_correct_ones) {

@@ -300,7 +300,7 @@ TEST(test_volume_forms_any_scale_equal_measured_volume) {
   double *d = malloc(3 * n * sizeof *d);
   uint64_t seed = 44;
   const supine_direction_law law = supine_physics_model(SUPINE_LAW_PAPER).direction;
-  assert_int_equal(supine_physics_directions(&lungs, &law, d, NULL), SUPINE_OK);
+  assert_int_equal(supine_physics_directions(&lungs, NULL, &law, d, NULL), SUPINE_OK);
   for (size_t i = 0; i < n * COLUMNS; ++i) {
     columns[i] = helper_random(&seed);
   }

@@ -153,7 +153,7 @@ grep -q 'source of the gain.*scans of --state do not' fit.txt || fail "a gain at
 
 # The fit recovers a stiff region. A basis with the fitted stiffness predicts the second state.
 "$supine" phantom -o rest.ply --vertices 400 >/dev/null || fail phantom
-"$supine" solve rest.ply --posture supine --scanned none --reach 10 --base 0.9 --gain 0.4 --box-force 0,-0.2,0 \
+"$supine" solve rest.ply --posture supine --scanned none --reach 10 --base 0.875 --gain 0.4 --box-force 0,-0.15,0 \
   --constants 5,2.2,9,1.1,20,1.4 --volume scan-1000 --lesion 97,-135,-190,65,3 -o stiff.ply >/dev/null ||
   fail "solve with a lesion"
 "$supine" fit rest.ply stiff.ply --rest 6000mL --other 5000mL --expandability -o stiff.json \
@@ -205,6 +205,13 @@ near "$(number volume_ml valid.json 3)" 1500 1 || fail "volume $(number volume_m
 near "$(number off_percent valid.json)" 2.5 2.5 || fail "line off by $(number off_percent valid.json)"
 near "$(number nearest_scale valid.json 2)" "$(number scale valid.json 2)" 0.001 ||
   fail "not the nearest scale"
+# At full inflation the predicted scale is 0, but the nearest scale of a surface 300 mL below it is not.
+"$supine" phantom --vertices 1000 -o full.ply >/dev/null && "$supine" precompute full.ply --held-out 20 -o full.safetensors \
+  >/dev/null 2>&1 && "$supine" deform full.safetensors --posture supine --volume full-300 -o below.ply >/dev/null &&
+  "$supine" validate full.safetensors --from supine:rest --state supine:full:below.ply --state supine:rest:full.ply \
+    --json >valid.json || fail "validate at full inflation"
+near "$(number scale valid.json)" 0 0.001 || fail "scale at full inflation: $(number scale valid.json)"
+near "$(number nearest_scale valid.json)" -0.36 0.1 || fail "nearest scale: $(number nearest_scale valid.json)"
 "$supine" validate scanned.safetensors --state supine:rest+400.ply --from supine:rest+900 --json \
   >valid.json || fail "validate from another state"
 near "$(number volume_ml valid.json)" -500 1 || fail "from: $(number volume_ml valid.json)"
@@ -261,7 +268,7 @@ refused 2 'exchange --rest and --other' fit --landmarks empty.csv --other supine
 refused 2 'the two surfaces are the same' fit rest.ply rest.ply
 for beside in '--law deep' '--base 1' '--gain 0.3' '--box-force 0,0,0' '--constants 1,1,1,1,1,1' \
   '--reach 10'; do
-  refused 1 'has its own law and force' precompute s.ply --patient points.json $beside \
+  refused 1 'has no effect with --patient' precompute s.ply --patient points.json $beside \
     -o x.safetensors
 done
 refused 1 'leave --expandability out' precompute rest.ply --patient stiff.json \

@@ -71,8 +71,15 @@ static void check_posture(const json_t *posture) {
   assert_true(fabs(gain - 400) < 0.05); /* tolerance in mL, for positions rounded to float */
   assert_true(fabs(share - 1) < 1e-4);
   /* The volumes of the ten slabs add up to the volume of both lungs. */
-  assert_true(fabs(volume - number(posture, "volume_ml", "left") -
-                   number(posture, "volume_ml", "right")) < 0.05);
+  const json_t *held = json_object_get(posture, "volume_ml");
+  const double left = number(held, "left", "value");
+  assert_true(fabs(volume - left - number(held, "right", "value")) < 0.05);
+  /* The volume at rest is assumed; its range, one standard deviation of 0.08 / 0.48 of its
+   * logarithm to either side, is longer upwards. */
+  assert_string_equal(json_string_value(json_object_get(json_object_get(held, "left"), "source")),
+                      "assumed");
+  assert_true(fabs(log(number(held, "left", "high") / left) - 1.0 / 6.0) < 1e-4);
+  assert_true(fabs(log(left / number(held, "left", "low")) - 1.0 / 6.0) < 1e-4);
   const json_t *top = json_array_get(slabs, 1);
   const json_t *low = json_array_get(slabs, 8);
   assert_true(json_number_value(json_object_get(low, "expansion")) >

@@ -533,8 +533,9 @@ TEST(test_turned_over_one_posture_emptied_finds_more_reversed) {
   supine_projection projection;
   supine_compression field;
   supine_volume_forms forms = {0};
-  assert_int_equal(supine_physics_directions(&lungs, &model.direction, directions, NULL),
-                   SUPINE_OK);
+  assert_int_equal(
+      supine_physics_directions(&lungs, &model.force, &model.direction, directions, NULL),
+      SUPINE_OK);
   assert_int_equal(supine_projection_create(&lungs, &model, 3, &projection, NULL), SUPINE_OK);
   assert_int_equal(supine_sh_compress_harmonics(&projection.expansion, &field, NULL), SUPINE_OK);
   assert_int_equal(

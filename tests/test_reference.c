@@ -242,11 +242,11 @@ TEST(test_share_out_any_volume_divided_along_straight_lines) {
 TEST(test_law_constants_equal_table) {
   static const struct {
     const char *name;
-    double base, gain, box[3], c[6], reach;
+    double base, gain, box[3], c[6], shear, reach;
     bool pair;
   } table[SUPINE_LAW_COUNT] = {
-      {"deep", 0.9, 0.4, {0, -0.2, 0}, {6, 2.6, 15, 1, 16, 1.3}, 10.0, true},
-      {"paper", 0.0, 1.0, {0, 0, 0}, {2, 1.5, 1.5, 1, 16, 1.4}, 0.0, false}};
+      {"deep", 0.875, 0.4, {0, -0.15, 0}, {6, 2.6, 15, 1, 16, 1.3}, 0.4, 10.0, true},
+      {"paper", 0.0, 1.0, {0, 0, 0}, {2, 1.5, 1.5, 1, 16, 1.4}, 0.0, 0.0, false}};
   for (int law = 0; law < SUPINE_LAW_COUNT; ++law) {
     const supine_model model = supine_physics_model((supine_law)law);
     assert_string_equal(supine_physics_law_names[law], table[law].name);
@@ -254,6 +254,7 @@ TEST(test_law_constants_equal_table) {
     assert_true(model.force.gain == table[law].gain && model.reach == table[law].reach);
     assert_memory_equal(model.force.box, table[law].box, sizeof table[law].box);
     assert_memory_equal(model.direction.c, table[law].c, sizeof table[law].c);
+    assert_true(model.direction.shear == table[law].shear);
     assert_true(model.force.pair == table[law].pair && model.force.soften == 0.0);
     assert_true(model.share[0] == 1.0 && model.share[1] == 1.0);
   }

@@ -13,8 +13,7 @@
 #define SUPINE_FIELDS_H
 
 #include "precompute/lungs/lungs.h"
-#include "precompute/physics/reference.h"
-#include "precompute/projection/accuracy.h"
+#include "precompute/precompute.h"
 
 /** Displacements of all vertices for several directions of gravity, made by another simulator. */
 typedef struct supine_fields {
@@ -48,7 +47,6 @@ enum { SUPINE_FIT_BAND_MAX = 11 };
 typedef struct supine_fit_report {
   size_t band_highest; /**< highest degree that the directions of gravity determine */
   size_t band;         /**< highest degree of the harmonics in the chosen fit */
-  double condition;    /**< condition number of the matrix of harmonics */
   size_t mode_count;   /**< number of modes, or of harmonics instead of modes */
   /** [l] relative RMS leave-one-out error with harmonics to degree l. */
   double error[SUPINE_FIT_BAND_MAX + 1];
@@ -63,10 +61,6 @@ typedef struct supine_fit_options {
   /** [3] gravity in the scan, which is then not displaced in its own posture; NULL if the reference
    * surface is not displaced by gravity */
   const double *scan_gravity;
-  supine_scan_frame frame; /**< axes and unit of the files, for the metadata */
-  const char *assumed;     /**< assumptions about the surface, for the metadata, or NULL */
-  const char *findings;    /**< notes on the surface for the metadata, one per line, or NULL */
-  const char *made_by;     /**< command line that makes the basis, for the metadata, or NULL */
 } supine_fit_options;
 
 /** Fit harmonics to the fields, compress the fit, and measure its leave-one-out error.
@@ -80,10 +74,12 @@ supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_op
                                 supine_error *error);
 
 /** Fit the fields (supine_fields_fit), and write a basis file. Gain 1 (the factor on the
- * displacement) reproduces the given displacements.
+ * displacement) reproduces the given displacements. Of `basis`, only the number of modes and the
+ * texts are used.
  * @retval SUPINE_ERROR_WRITE, and those of supine_fields_fit */
 supine_status supine_fields_write(const supine_lungs *lungs, const supine_fields *fields,
-                                  const supine_fit_options *options, const char *path,
+                                  const supine_fit_options *options,
+                                  const supine_precompute_options *basis, const char *path,
                                   supine_fit_report *report, supine_error *error);
 
 #endif

@@ -116,21 +116,14 @@ static bool fit_is_determined(const fit *f) {
  * of fields, because only fits with fewer than M harmonics are tried. */
 static supine_status allocate(fitting *w, supine_error *error) {
   const size_t m = w->fields->direction_count;
-  double *next = w->gram = malloc((5 * m * m + 4 * m) * sizeof *next);
+  const size_t square = m * m;
+  double *next = w->gram = malloc((5 * square + 4 * m) * sizeof *next);
   if (next == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu fields", m);
   }
-  double **const squares[] = {&w->work.pinv, &w->work.pinv_gram, &w->work.coefficient_gram,
-                              &w->work.eigenvectors};
-  double **const lists[] = {&w->work.eigenvalues, &w->work.target, &w->work.residual,
-                            &w->work.gram_residual};
-  for (size_t i = 0; i < 4; ++i) {
-    *squares[i] = next += m * m;
-  }
-  next += m * m;
-  for (size_t i = 0; i < 4; ++i, next += m) {
-    *lists[i] = next;
-  }
+  double *lists = next + 5 * square;
+  w->work = (prediction){next + square,     next + 2 * square, next + 3 * square, lists,
+                         next + 4 * square, lists + m,         lists + 2 * m,     lists + 3 * m};
   return SUPINE_OK;
 }
 
@@ -179,11 +172,8 @@ static supine_status predict(const fitting *w, const fit *f, size_t d, size_t mo
 
 /* Sum the squared displacements of all fields, mm^2. */
 static double square_sum(const fitting *w) {
-  double sum = 0.0;
-  for (size_t i = 0; i < w->fields->direction_count; ++i) {
-    sum += w->gram[i * w->fields->direction_count + i];
-  }
-  return sum;
+  const int m = (int)w->fields->direction_count;
+  return cblas_dasum(m, w->gram, m + 1);
 }
 
 /* Compute the relative RMS leave-one-out error of a fit before its compression to modes. */
@@ -235,7 +225,6 @@ static supine_status choose_band(fitting *w, int wanted, supine_fit_report *repo
         m, wanted, (wanted + 1) * (wanted + 1), (int)determined_count - 1);
   }
   report->band_highest = determined_count - 1;
-  report->condition = w->chosen.condition;
   return SUPINE_OK;
 }
 
@@ -374,7 +363,8 @@ supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_op
 }
 
 supine_status supine_fields_write(const supine_lungs *lungs, const supine_fields *fields,
-                                  const supine_fit_options *options, const char *path,
+                                  const supine_fit_options *options,
+                                  const supine_precompute_options *basis, const char *path,
                                   supine_fit_report *report, supine_error *error) {
   supine_compression field = {0};
   supine_volume_forms forms = {0};
@@ -383,16 +373,10 @@ supine_status supine_fields_write(const supine_lungs *lungs, const supine_fields
     status = supine_projection_volume_forms(&field, lungs, NULL, NULL, &forms, error);
   }
   if (status == SUPINE_OK) {
-    const supine_precompute_options basis = {.modes = options->modes,
-                                             .assumed = options->assumed,
-                                             .findings = options->findings,
-                                             .frame = options->frame,
-                                             .made_by = options->made_by};
-    const supine_basis_fit summary = {report->band_highest, report->condition,
-                                      options->scan_gravity};
     const supine_basis_content content = {.lungs = lungs,
-                                          .options = &basis,
-                                          .fit = &summary,
+                                          .options = basis,
+                                          .is_fields = true,
+                                          .scan_gravity = options->scan_gravity,
                                           .compression = &field,
                                           .forms = &forms,
                                           .accuracy = &report->accuracy};

@@ -15,14 +15,17 @@ static const double same_direction = 1e-6;
 /* Largest distance of a vertex from its point, as a fraction of the diagonal of the lungs' box. */
 static const double farthest_point = 1e-4;
 
+#define WRITE "supine.save_fields(\"fields.safetensors\", points, gravity, displacement)"
+
 /* A file being read. */
 typedef struct reading {
   const char *path;
   const supine_lungs *lungs;
   supine_scan_frame frame;
   const supine_tensor *points, *gravity, *displacement;
-  double *at;       /* [P, 3] points, mm, LPS */
   size_t *point_of; /* [N] the point at the position of each vertex */
+  double *apart;    /* [N] distance of each vertex from this point, mm */
+  uint32_t *corner; /* [N, 3] the number of each vertex, three times */
   supine_fields fields;
   supine_error *error;
 } reading;
@@ -36,12 +39,13 @@ void supine_fields_free(supine_fields *fields) {
 static supine_status allocate(reading *r) {
   const size_t m = r->fields.direction_count = r->gravity->shape[0];
   const size_t n = r->fields.vertex_count = r->lungs->mesh.vertex_count;
-  r->at = malloc((3 * r->points->shape[0] + 1) * sizeof *r->at);
   r->point_of = malloc(n * sizeof *r->point_of);
+  r->apart = malloc(n * sizeof *r->apart);
+  r->corner = malloc(3 * n * sizeof *r->corner);
   r->fields.directions = malloc(3 * m * sizeof *r->fields.directions);
   r->fields.displacement = malloc(3 * m * n * sizeof *r->fields.displacement);
-  return r->at != NULL && r->point_of != NULL && r->fields.directions != NULL &&
-                 r->fields.displacement != NULL
+  return r->point_of != NULL && r->apart != NULL && r->corner != NULL &&
+                 r->fields.directions != NULL && r->fields.displacement != NULL
              ? SUPINE_OK
              : supine_error_set(r->error, SUPINE_ERROR_MEMORY,
                                 "no memory for %zu fields of %zu vertices", m, n);
@@ -81,83 +85,57 @@ static supine_status read_direction(const reading *r, size_t row) {
   return SUPINE_OK;
 }
 
-static supine_status refuse_vertex(const reading *r, size_t vertex, double limit) {
-  const double *v = r->lungs->mesh.vertices + 3 * vertex;
-  double low[3];
-  double high[3];
-  const supine_mesh points = {.vertex_count = r->points->shape[0], .vertices = r->at};
-  supine_mesh_box(&points, low, high);
-  return supine_error_set(
-      r->error, SUPINE_ERROR_MESH,
-      "%s: the vertex at %.3f,%.3f,%.3f mm (LPS) has no point of its own within %.2g mm. The "
-      "points span %.0f to %.0f, %.0f to %.0f and %.0f to %.0f mm: give the surface and the points "
-      "in the same axes and unit, and a point for each vertex",
-      r->path, v[0], v[1], v[2], limit, low[0], high[0], low[1], high[1], low[2], high[2]);
-}
-
-/* Find the point at the position of each vertex. Each point belongs to the vertex nearest to it, so
- * that no two vertices share a point. Points far from all vertices, such as inner nodes of a
- * volume mesh, are left out. */
-static supine_status match(const reading *r, const supine_inside_surface *vertices,
-                           double *distance) {
-  const supine_lungs *lungs = r->lungs;
-  const size_t n = lungs->mesh.vertex_count;
-  const double limit = farthest_point * supine_distance(lungs->minimum, lungs->maximum);
-  for (size_t i = 0; i < n; ++i) {
-    distance[i] = INFINITY;
+/* Match point p to the vertex nearest to it, unless that is far away or has a nearer point. */
+static supine_status match_point(const reading *r, const supine_inside_surface *vertices,
+                                 double limit, size_t p) {
+  double at[3];
+  if (!read_row(r, r->points, p, r->frame.millimetres_per_unit, at)) {
+    return supine_error_set(r->error, SUPINE_ERROR_FORMAT,
+                            "%s: point %zu is not finite: correct it", r->path, p);
   }
-  for (size_t p = 0; p < r->points->shape[0]; ++p) {
-    const supine_inside_place place = supine_inside_surface_nearest(vertices, r->at + 3 * p, NULL);
-    const size_t i = place.triangle;
-    if (place.depth <= limit && fabs(place.depth - distance[i]) <= 1e-3 * limit) {
-      return supine_error_set(r->error, SUPINE_ERROR_MESH,
-                              "%s: points %zu and %zu are at the same place: keep the one that "
-                              "belongs to the lungs",
-                              r->path, r->point_of[i], p);
-    }
-    if (place.depth <= limit && place.depth < distance[i]) {
-      distance[i] = place.depth;
-      r->point_of[i] = p;
-    }
+  const supine_inside_place place = supine_inside_surface_nearest(vertices, at, NULL);
+  const size_t i = place.triangle;
+  if (place.depth <= limit && fabs(place.depth - r->apart[i]) <= 1e-3 * limit) {
+    return supine_error_set(r->error, SUPINE_ERROR_MESH,
+                            "%s: points %zu and %zu are at the same place: keep the one that "
+                            "belongs to the lungs",
+                            r->path, r->point_of[i], p);
   }
-  for (size_t i = 0; i < n; ++i) {
-    if (isinf(distance[i])) {
-      return refuse_vertex(r, i, limit);
-    }
+  if (place.depth <= limit && place.depth < r->apart[i]) {
+    r->apart[i] = place.depth;
+    r->point_of[i] = p;
   }
   return SUPINE_OK;
 }
 
-/* Read the points, and match them to the vertices by a search tree over triangles whose three
- * corners are the same vertex. */
+/* Find the point at the position of each vertex. A point belongs only to the vertex nearest to it,
+ * so that no two vertices share a point. The search tree is that of triangles whose three corners
+ * are one vertex. */
 static supine_status match_points(const reading *r) {
-  const size_t n = r->lungs->mesh.vertex_count;
+  const supine_lungs *lungs = r->lungs;
+  const size_t n = lungs->mesh.vertex_count;
+  const double limit = farthest_point * supine_distance(lungs->minimum, lungs->maximum);
   supine_inside_surface *tree = NULL;
-  double *distance = malloc(n * sizeof *distance);
-  uint32_t *corners = malloc(3 * n * sizeof *corners);
-  supine_status status = SUPINE_OK;
+  for (size_t i = 0; i < n; ++i) {
+    r->apart[i] = INFINITY;
+    r->corner[3 * i] = r->corner[3 * i + 1] = r->corner[3 * i + 2] = (uint32_t)i;
+  }
+  supine_status status =
+      supine_inside_surface_create(lungs->mesh.vertices, n, r->corner, false, &tree, r->error);
   for (size_t p = 0; p < r->points->shape[0] && status == SUPINE_OK; ++p) {
-    if (!read_row(r, r->points, p, r->frame.millimetres_per_unit, r->at + 3 * p)) {
-      status = supine_error_set(r->error, SUPINE_ERROR_FORMAT,
-                                "%s: point %zu is not finite: correct it", r->path, p);
+    status = match_point(r, tree, limit, p);
+  }
+  for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
+    const double *v = lungs->mesh.vertices + 3 * i;
+    if (isinf(r->apart[i])) {
+      status = supine_error_set(
+          r->error, SUPINE_ERROR_MESH,
+          "%s: the vertex at %.3f,%.3f,%.3f mm (LPS) has no point of its own within %.2g mm: give "
+          "a point for each vertex of the surface, in the axes and unit of its file",
+          r->path, v[0], v[1], v[2], limit);
     }
   }
-  if (distance == NULL || corners == NULL) {
-    status = supine_error_set(r->error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
-  }
-  for (size_t i = 0; i < 3 * n && status == SUPINE_OK; ++i) {
-    corners[i] = (uint32_t)(i / 3);
-  }
-  if (status == SUPINE_OK) {
-    status =
-        supine_inside_surface_create(r->lungs->mesh.vertices, n, corners, false, &tree, r->error);
-  }
-  if (status == SUPINE_OK) {
-    status = match(r, tree, distance);
-  }
   supine_inside_surface_destroy(tree);
-  free(corners);
-  free(distance);
   return status;
 }
 
@@ -183,22 +161,15 @@ static bool is_real(const supine_tensor *tensor, size_t rank) {
 
 static supine_status check_tensors(const reading *r) {
   const supine_tensor *u = r->displacement;
-  if (!is_real(r->gravity, 2) || !is_real(u, 3) || r->gravity->shape[0] != u->shape[0] ||
-      r->gravity->shape[0] == 0) {
-    return supine_error_set(r->error, SUPINE_ERROR_FORMAT,
-                            "%s: expected tensors points [P,3], gravity [M,3] and displacement "
-                            "[M,P,3], F32 or F64: write all three",
-                            r->path);
-  }
-  return is_real(r->points, 2) && r->points->shape[0] == u->shape[1]
-             ? SUPINE_OK
-             : supine_error_set(
-                   r->error, SUPINE_ERROR_FORMAT,
-                   "%s: the tensor points [%zu,3] is missing or has another shape: it gives the "
-                   "position of each point that the displacements belong to. In Python: t = "
-                   "safetensors.numpy.load_file(\"%s\"); supine.save_fields(\"%s\", points, "
-                   "t[\"gravity\"], t[\"displacement\"])",
-                   r->path, u->shape[1], r->path, r->path);
+  const bool valid = is_real(r->points, 2) && is_real(r->gravity, 2) && is_real(u, 3) &&
+                     r->gravity->shape[0] == u->shape[0] && r->points->shape[0] == u->shape[1] &&
+                     u->shape[0] > 0;
+  return valid ? SUPINE_OK
+               : supine_error_set(r->error, SUPINE_ERROR_FORMAT,
+                                  "%s: expected tensors points [P,3], gravity [M,3] and "
+                                  "displacement [M,P,3], F32 or F64. Write all three, with the "
+                                  "position of each point that is displaced, in Python: " WRITE,
+                                  r->path);
 }
 
 static supine_status take_tensors(reading *r) {
@@ -221,6 +192,12 @@ supine_status supine_fields_load(const char *path, const supine_lungs *lungs,
   r.frame.millimetres_per_unit += r.frame.millimetres_per_unit == 0.0;
   supine_safetensors *file = NULL;
   supine_status status = supine_safetensors_open(path, &file, error);
+  if (status == SUPINE_ERROR_FORMAT && !supine_text_ends_in(path, ".safetensors")) {
+    (void)supine_error_set(error, status,
+                           "%s: no safetensors file: convert the results of another program, such "
+                           "as .frd or .dat of CalculiX or .xplt of FEBio, in Python with " WRITE,
+                           path);
+  }
   if (status == SUPINE_OK) {
     r.points = supine_safetensors_find(file, "points");
     r.gravity = supine_safetensors_find(file, "gravity");
@@ -228,8 +205,9 @@ supine_status supine_fields_load(const char *path, const supine_lungs *lungs,
     status = take_tensors(&r);
   }
   supine_safetensors_close(file);
-  free(r.at);
   free(r.point_of);
+  free(r.apart);
+  free(r.corner);
   if (status != SUPINE_OK) {
     supine_fields_free(&r.fields);
     return status;

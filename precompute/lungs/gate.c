@@ -285,10 +285,13 @@ static void check_shape(checks *c, const supine_lungs *lungs, int *side, bool *a
   *side = found.side;
   *axes_hold = found.certain && found.axes == SUPINE_AXES_LPS;
   supine_mesh_axes_letters(supine_mesh_axes_after(c->source->axes, found.axes), letters);
-  check(
-      c, found.axes == SUPINE_AXES_LPS, SUPINE_OK,
-      "the axes are doubtful: the shape of the lungs fits %s; if those are the axes, add --axes %s",
-      letters, letters);
+  check(c, found.axes == SUPINE_AXES_LPS, SUPINE_OK,
+        "the axes are doubtful: the shape of the lungs fits %s; if those are the axes, add --axes "
+        "%s%s",
+        letters, letters,
+        supine_mesh_axes_mirrored(found.axes)
+            ? ". A scan pitched by more than 25 degrees has such a shape, too: turn it upright"
+            : "");
   for (size_t lung = 0; lung < lungs->lung_count && c->status == SUPINE_OK; ++lung) {
     check_tips(c, lungs, lung);
   }

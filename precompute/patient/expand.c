@@ -5,6 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <cblas.h>
+#include <lapacke.h>
+
 #include "precompute/patient/matching.h"
 
 #include "base/vec3.h"
@@ -17,7 +20,7 @@ static const double radius_ratio = 1.5;
 
 enum {
   CANDIDATES = 8192, /* largest number of vertices tried as the centre of a region */
-  LANES = 16,        /* largest number of regions in one call of the equilibrium solver */
+  FOLDS = 5,         /* number of parts that cross-validation holds out in turn */
   ROUNDS = 5         /* number of fits, each followed by a matching of the surfaces */
 };
 
@@ -36,6 +39,11 @@ static const double neighbour_distance_ratio = 1.7;
 
 /* Regions are kept if the held-out error with regions / that without is less than this. */
 static const double kept_ratio = 0.95;
+
+static const double expandability_least = 0.02;
+
+/* Factors on the precision of the prior, of which cross-validation chooses one. */
+static const double ridges[] = {1.0, 0.3, 0.1, 0.03};
 
 /* Find the vertex of one lung that is farthest from all centres of regions. Write its distance from
  * the nearest centre into `distance`. */
@@ -100,135 +108,317 @@ static void find_prior_precision(const supine_patient_stiffness *regions, double
   }
 }
 
-/* Compute response [vertex, region]: the force at each vertex listed in m->match if only one region
- * can expand, with the expandability (1 / stiffness) 1. Each response is
- * smoothed over the surface. */
-static supine_status find_responses(const supine_patient_matching *m,
-                                    const supine_patient_stiffness *regions,
-                                    const double gravity[3], double *response,
-                                    supine_error *error) {
-  const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
-  const size_t n = m->fuller->mesh.vertex_count;
-  double range[2];
-  double *force = malloc(n * sizeof *force);
-  double *region_force = malloc(n * LANES * sizeof *region_force);
-  double *spread_force = malloc(n * LANES * sizeof *spread_force);
-  supine_status status = SUPINE_ERROR_MEMORY;
-  if (force == NULL || region_force == NULL || spread_force == NULL ||
-      supine_physics_height_range(m->fuller, model.force.pair, 1, gravity, range, range + 1) !=
-          SUPINE_OK) {
-    (void)supine_error_set(error, status, "no memory for %zu vertices", n);
-    goto cleanup;
-  }
-  const supine_gravities gravities = {1, gravity, range, range + 1};
-  supine_physics_force(m->fuller, &model.force, &gravities, n, NULL, force);
-  status = supine_physics_equilibrium_set_stiffness(m->equilibrium, NULL, error);
-  for (size_t first = 0; first < regions->count && status == SUPINE_OK; first += LANES) {
-    const size_t lanes = regions->count - first < LANES ? regions->count - first : LANES;
-    for (size_t i = 0; i < n; ++i) {
-      double shares[SUPINE_PATIENT_REGIONS_MAX];
-      supine_patient_stiffness_shares(regions, m->fuller, i, shares);
-      for (size_t r = 0; r < lanes; ++r) {
-        region_force[i * lanes + r] = force[i] * shares[first + r];
-      }
-    }
-    status =
-        supine_physics_equilibrium_solve(m->equilibrium, lanes, region_force, spread_force, error);
-    for (size_t i = 0; i < m->count && status == SUPINE_OK; ++i) {
-      memcpy(response + i * regions->count + first, spread_force + m->match[i].vertex * lanes,
-             lanes * sizeof *spread_force);
-    }
-  }
-cleanup:
-  free(force);
-  free(region_force);
-  free(spread_force);
-  return status;
-}
+/* The unknowns of the fit are, in order: the expandability of each region, factors on the default
+ * displacement along x, y and z, and the motion of the body between the scans. */
+enum { AXES = 3, MOTION = 6, UNKNOWNS_MAX = SUPINE_PATIENT_REGIONS_MAX + AXES + MOTION };
 
-/* Set the force at each vertex listed in m->match to the sum over all regions of a[region] *
- * response[vertex, region]. `a` holds the regions' values of 1 / stiffness, or is NULL for 1. */
-static void set_forces(supine_patient_matching *m, size_t count, const double *response,
-                       const double *a) {
-  for (size_t i = 0; i < m->count; ++i) {
-    supine_patient_row *row = &m->rows[i];
-    row->response = response + i * count;
-    memset(row->place.force, 0, sizeof row->place.force);
-    for (size_t k = 0; k < count; ++k) {
-      row->place.force[0] += row->response[k] * (a != NULL ? a[k] : 1.0);
-    }
+/* Linear equations of the fit. */
+typedef struct work {
+  supine_patient_matching *m;
+  const supine_patient_stiffness *stiffness;
+  size_t motion;     /* number of fitted unknowns of the body's motion */
+  double *response;  /* [count, regions + 1, 3] displacement, mm, of each matched vertex if only one
+                        region expands, with the expandability 1; last, if none does */
+  double *precision; /* [regions, regions] inverse of the prior covariance of the expandability */
+  double ridge;      /* factor on `precision` */
+  double *matrix;    /* [UNKNOWNS_MAX, UNKNOWNS_MAX] normal matrix, then its Cholesky factor */
+  double x[UNKNOWNS_MAX]; /* unknowns; see above */
+} work;
+
+/* Compute the displacement u [N, 3] of uniform tissue, mm, by a displacement law. */
+static void find_uniform(const supine_patient_matching *m, const supine_patient_power *law,
+                         double *u) {
+  for (size_t i = 0; i < m->fuller->mesh.vertex_count; ++i) {
+    supine_patient_place place = supine_patient_find_vertex(m->fuller, i);
+    memcpy(place.force, m->smoothed_force + SUPINE_PATIENT_COLUMNS * i, sizeof place.force);
+    supine_patient_direction(law, &place, supine_patient_force_at(law, &place), u + 3 * i);
   }
 }
 
-/* Fit the stiffness of the regions and match the surfaces in turn, without robust weights. */
-static supine_status iterate(supine_patient_matching *m, const double *response,
-                             supine_patient_fit_options *options, supine_patient *patient,
-                             supine_patient_stiffness *regions, supine_error *error) {
-  supine_patient_krige krige = {0};
-  double share[SUPINE_PATIENT_REGIONS_MAX];
-  supine_patient_matching_find(m);
-  supine_status status = supine_patient_matching_weigh(m, INFINITY, error);
-  for (size_t round = 0; round < ROUNDS && status == SUPINE_OK; ++round) {
-    options->noise = sqrt(vertices_per_error) * fmax(noise_least, m->rms) / m->rows[0].noise;
-    set_forces(m, regions->count, response, NULL);
-    status = supine_patient_krige_fit(options, m->rows, m->count, &krige, error);
+supine_status supine_patient_matching_set_tissue(supine_patient_matching *matching,
+                                                 const supine_patient_power *law,
+                                                 const supine_patient_stiffness *stiffness,
+                                                 supine_error *error) {
+  const size_t n = matching->fuller->mesh.vertex_count;
+  supine_strain *strain = NULL;
+  double *e = malloc(4 * n * sizeof *e);
+  free(matching->tissue);
+  matching->tissue = stiffness->count > 0 ? malloc(3 * n * sizeof(double)) : NULL;
+  supine_status status =
+      e == NULL || (stiffness->count > 0 && matching->tissue == NULL)
+          ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n)
+          : SUPINE_OK;
+  if (status == SUPINE_OK && stiffness->count > 0) {
+    supine_patient_stiffness_of(stiffness, matching->fuller, e);
+    find_uniform(matching, law, matching->tissue);
+    memcpy(e + n, matching->tissue, 3 * n * sizeof *e);
+    status = supine_physics_strain_create(matching->fuller, e, NULL, &strain, error);
     if (status == SUPINE_OK) {
-      supine_patient_krige_copy_law(&krige, patient);
-      supine_patient_krige_resolution(&krige, share);
-      for (size_t k = 0; k < regions->count; ++k) {
-        regions->region[k].expandability = krige.region[k];
-        regions->region[k].determined = share[k];
-      }
-      set_forces(m, regions->count, response, krige.region);
-      (void)supine_patient_matching_place(m, patient);
-      supine_patient_matching_find(m);
-      status = supine_patient_matching_weigh(m, INFINITY, error);
+      status = supine_physics_strain_apply(strain, NULL, 3, matching->tissue, error);
     }
-    supine_patient_krige_free(&krige);
+    for (size_t i = 0; i < 3 * n && status == SUPINE_OK; ++i) {
+      matching->tissue[i] -= e[n + i];
+    }
   }
-  set_forces(m, regions->count, response, NULL);
+  supine_physics_strain_destroy(strain);
+  free(e);
   return status;
+}
+
+/* Compute w->response: one solve for each region. */
+static supine_status find_responses(work *w, const supine_patient_power *law, supine_error *error) {
+  const supine_patient_matching *m = w->m;
+  const size_t n = m->fuller->mesh.vertex_count;
+  const size_t regions = w->stiffness->count;
+  supine_strain *strain = NULL;
+  double *shares = malloc((regions + 1) * n * sizeof *shares);
+  double *u = malloc(6 * n * sizeof *u);
+  supine_status status =
+      shares == NULL || u == NULL
+          ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n)
+          : supine_physics_strain_create(m->fuller, NULL, NULL, &strain, error);
+  for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
+    double of[SUPINE_PATIENT_REGIONS_MAX + 1] = {0.0};
+    supine_patient_stiffness_shares(w->stiffness, m->fuller, i, of);
+    for (size_t k = 0; k <= regions; ++k) {
+      shares[k * n + i] = k < regions ? of[k] : 0.0;
+    }
+  }
+  if (status == SUPINE_OK) {
+    find_uniform(m, law, u + 3 * n);
+  }
+  for (size_t k = regions + 1; k-- > 0 && status == SUPINE_OK;) {
+    memcpy(u, u + 3 * n, 3 * n * sizeof *u);
+    status = supine_physics_strain_apply(strain, shares + k * n, AXES, u, error);
+    for (size_t i = 0; i < m->count * AXES && status == SUPINE_OK; ++i) {
+      double *row = w->response + i / AXES * (regions + 1) * AXES + i % AXES;
+      row[k * AXES] =
+          u[3 * m->match[i / AXES].vertex + i % AXES] - (k < regions ? row[regions * AXES] : 0.0);
+    }
+  }
+  supine_physics_strain_destroy(strain);
+  free(shares);
+  free(u);
+  return status;
+}
+
+/* Compute the displacement u of matched vertex i, mm. Write its derivatives with respect to the
+ * unknowns, along the normal of the match, into x unless that is NULL. */
+static void predict(const work *w, size_t i, double u[3], double *x) {
+  const supine_patient_row *row = &w->m->rows[i];
+  const size_t regions = w->stiffness->count;
+  const double *scale = w->x + regions;
+  const double *response = w->response + i * (regions + 1) * AXES;
+  double turned[3];
+  supine_patient_power motion = {.motion = {0.0}};
+  memcpy(motion.motion, scale + AXES, sizeof motion.motion);
+  supine_patient_motion(&motion, &row->place, u);
+  supine_cross(row->place.offset, row->axis, turned);
+  for (size_t axis = 0; axis < AXES; ++axis) {
+    double unscaled = 0.0;
+    for (size_t k = 0; k <= regions; ++k) {
+      unscaled += (k < regions ? w->x[k] : 1.0) * response[k * AXES + axis];
+    }
+    u[axis] += scale[axis] * unscaled;
+    if (x != NULL) {
+      x[regions + axis] = row->axis[axis] * unscaled;
+      x[regions + AXES + axis] = row->axis[axis];
+      x[regions + AXES + 3 + axis] = turned[axis];
+    }
+  }
+  for (size_t k = 0; k < regions && x != NULL; ++k) {
+    x[k] = row->axis[0] * scale[0] * response[k * AXES] +
+           row->axis[1] * scale[1] * response[k * AXES + 1] +
+           row->axis[2] * scale[2] * response[k * AXES + 2];
+  }
+}
+
+/* Make one Gauss-Newton step of all unknowns, without the measurements of one fold.
+ * @param uniform  whether to keep the expandability as it is
+ * @param noise    standard deviation of a measurement, mm
+ * @param without  fold to leave out, or FOLDS */
+static bool step(work *w, bool uniform, double noise, size_t without) {
+  const size_t regions = w->stiffness->count;
+  const size_t size = regions + AXES + w->motion;
+  double right[UNKNOWNS_MAX] = {0.0};
+  memset(w->matrix, 0, size * size * sizeof *w->matrix);
+  for (size_t i = 0; i < w->m->count; ++i) {
+    const supine_patient_row *row = &w->m->rows[i];
+    double x[UNKNOWNS_MAX];
+    double u[3];
+    const double weight = row->block % FOLDS == without ? 0.0 : row->weight / (noise * noise);
+    predict(w, i, u, x);
+    for (size_t k = 0; k < regions && uniform; ++k) {
+      x[k] = 0.0;
+    }
+    cblas_dsyr(CblasColMajor, CblasUpper, (int)size, weight, x, 1, w->matrix, (int)size);
+    cblas_daxpy((int)size, weight * (row->value - supine_dot(row->axis, u)), x, 1, right, 1);
+  }
+  for (size_t k = 0; k < regions; ++k) {
+    for (size_t l = 0; l < regions; ++l) {
+      const double precision = w->ridge * w->precision[l * regions + k];
+      w->matrix[l * size + k] += precision;
+      right[k] -= uniform ? 0.0 : precision * (w->x[l] - 1.0);
+    }
+  }
+  if (LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', (lapack_int)size, 1, w->matrix, (lapack_int)size, right,
+                    (lapack_int)size) != 0) {
+    return false;
+  }
+  for (size_t t = 0; t < size; ++t) {
+    w->x[t] = t < regions ? fmax(expandability_least, w->x[t] + right[t]) : w->x[t] + right[t];
+  }
+  return true;
+}
+
+/* Return the RMS residual, mm, of the measurements in one fold, or of all if it is FOLDS; if
+ * `squares` is not NULL, add the sums of squares and weights to it. */
+static double residual(const work *w, size_t fold, double squares[2]) {
+  double sums[2] = {0.0, 0.0};
+  for (size_t i = 0; i < w->m->count; ++i) {
+    const supine_patient_row *row = &w->m->rows[i];
+    double u[3];
+    if (fold == FOLDS || row->block % FOLDS == fold) {
+      predict(w, i, u, NULL);
+      sums[0] += row->weight * pow(row->value - supine_dot(row->axis, u), 2.0);
+      sums[1] += row->weight;
+    }
+  }
+  for (size_t k = 0; k < 2 && squares != NULL; ++k) {
+    squares[k] += sums[k];
+  }
+  return sqrt(sums[0] / sums[1]);
+}
+
+/* Fit the unknowns to the present matches without each fold in turn, then to all. Write the RMS
+ * residual of the held-out and of all measurements, mm. */
+static bool cross_validate(work *w, bool uniform, double noise, double *held_out, double *fitted) {
+  double squares[2] = {0.0, 0.0};
+  bool solved = true;
+  for (size_t fold = 0; fold <= FOLDS && solved; ++fold) {
+    for (size_t k = 0; k < w->stiffness->count; ++k) {
+      w->x[k] = 1.0;
+    }
+    for (size_t round = 0; round < ROUNDS && solved; ++round) {
+      solved = step(w, uniform, noise, fold);
+    }
+    *fitted = residual(w, fold, fold < FOLDS ? squares : NULL);
+  }
+  *held_out = sqrt(squares[0] / squares[1]);
+  return solved;
+}
+
+/* Choose w->ridge, and compare with uniform tissue. */
+static bool choose_ridge(work *w, double noise, supine_patient_expand_report *report) {
+  enum { COUNT = sizeof ridges / sizeof *ridges };
+  double best = ridges[0];
+  double least = INFINITY;
+  bool solved = cross_validate(w, true, noise, &report->held_out[0], &report->fitted[0]);
+  for (size_t i = 0; i < COUNT && solved; ++i) {
+    w->ridge = ridges[i];
+    solved = cross_validate(w, false, noise, &report->held_out[1], &report->fitted[1]);
+    best = report->held_out[1] < least ? w->ridge : best;
+    least = fmin(least, report->held_out[1]);
+  }
+  w->ridge = best;
+  report->held_out[1] = least;
+  return solved;
+}
+
+static supine_status undetermined(supine_error *error) {
+  return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                          "the surfaces do not determine the expandability of the lungs");
+}
+
+/* Fit and match the surfaces in turn, without robust weights. */
+static supine_status iterate(work *w, double *noise, supine_error *error) {
+  supine_patient_matching *m = w->m;
+  supine_status status = SUPINE_OK;
+  for (size_t round = 0; round < ROUNDS && status == SUPINE_OK; ++round) {
+    status = supine_patient_matching_weigh(m, INFINITY, error);
+    *noise = sqrt(vertices_per_error) * fmax(noise_least, residual(w, FOLDS, NULL));
+    if (status == SUPINE_OK &&
+        !(step(w, round == 0, *noise, FOLDS) && step(w, false, *noise, FOLDS))) {
+      status = undetermined(error);
+    }
+    for (size_t i = 0; i < m->count; ++i) {
+      double u[3];
+      predict(w, i, u, NULL);
+      for (size_t k = 0; k < 3; ++k) {
+        m->match[i].position[k] = m->fuller->mesh.vertices[3 * m->match[i].vertex + k] + u[k];
+      }
+    }
+    supine_patient_matching_find(m);
+  }
+  return status;
+}
+
+/* Set the regions and the displacement law to the solution. After the last step, w->matrix holds
+ * the Cholesky factor of the normal matrix: its inverse times the prior's precision is the part of
+ * each region that the prior determines. */
+static void conclude(work *w, supine_patient_power *law, supine_patient_stiffness *stiffness,
+                     supine_patient_expand_report *report) {
+  const size_t regions = stiffness->count;
+  const size_t size = regions + AXES + w->motion;
+  for (size_t k = 0; k < regions; ++k) {
+    double x[UNKNOWNS_MAX] = {0.0};
+    for (size_t l = 0; l < regions; ++l) {
+      x[l] = w->ridge * w->precision[k * regions + l];
+    }
+    (void)LAPACKE_dpotrs(LAPACK_COL_MAJOR, 'U', (lapack_int)size, 1, w->matrix, (lapack_int)size, x,
+                         (lapack_int)size);
+    stiffness->region[k].expandability = exp(w->x[k]);
+    stiffness->region[k].determined = 1.0 - x[k];
+    report->undetermined += stiffness->region[k].determined < SUPINE_PATIENT_DETERMINED ? 1.0 : 0.0;
+  }
+  for (size_t axis = 0; axis < AXES; ++axis) {
+    law->c[2 * axis] *= w->x[regions + axis];
+  }
+  memcpy(law->motion, w->x + regions + AXES, sizeof law->motion);
 }
 
 supine_status supine_patient_expand(supine_patient_matching *matching,
                                     const supine_patient_fit_options *options,
                                     supine_patient *patient, supine_patient_stiffness *stiffness,
                                     supine_patient_expand_report *report, supine_error *error) {
-  supine_patient_matching *m = matching;
-  supine_patient_fit_options region_options = *options;
-  supine_patient_fit_report fit_report;
+  supine_patient_power law = supine_patient_deep(options->gravity, options->path_span);
+  double noise = 0.0;
   *report = (supine_patient_expand_report){.tried = true};
-  place_regions(m->fuller, stiffness);
+  place_regions(matching->fuller, stiffness);
   const size_t n = stiffness->count;
-  double *response = malloc((m->count * n + 1) * sizeof *response);
-  double *precision = malloc((n * n + 1) * sizeof *precision);
+  work w = {.m = matching,
+            .stiffness = stiffness,
+            .motion = (size_t)options->scan_motion,
+            .ridge = ridges[0],
+            .response = malloc(matching->count * (n + 1) * AXES * sizeof(double)),
+            .precision = malloc((n * n + 1) * sizeof(double)),
+            .matrix = malloc((size_t)UNKNOWNS_MAX * UNKNOWNS_MAX * sizeof(double))};
   supine_status status =
-      response == NULL || precision == NULL
+      w.response == NULL || w.precision == NULL || w.matrix == NULL ||
+              supine_patient_rows_block(&matching->frame, matching->rows, matching->count, 1) == 0
           ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu regions", n)
-          : find_responses(m, stiffness, options->gravity, response, error);
+          : find_responses(&w, &law, error);
   if (status == SUPINE_OK) {
-    find_prior_precision(stiffness, precision);
-    region_options.region_count = n;
-    region_options.prior_precision = precision;
-    status = iterate(m, response, &region_options, patient, stiffness, error);
-  }
-  if (status == SUPINE_OK) {
-    status = supine_patient_fit(&region_options, m->rows, m->count, 0, patient, &fit_report, error);
-  }
-  if (status == SUPINE_OK) {
-    for (size_t with = 0; with < 2; ++with) {
-      report->fitted[with] = fit_report.fitted[SUPINE_PATIENT_SCORE_LAW + with];
-      report->held_out[with] = fit_report.held_out[SUPINE_PATIENT_SCORE_LAW + with];
+    find_prior_precision(stiffness, w.precision);
+    for (size_t t = 0; t < n + AXES; ++t) {
+      w.x[t] = 1.0;
     }
+    status = iterate(&w, &noise, error);
+  }
+  if (status == SUPINE_OK && !choose_ridge(&w, noise, report)) {
+    status = undetermined(error);
+  }
+  status = status == SUPINE_OK ? iterate(&w, &noise, error) : status;
+  if (status == SUPINE_OK) {
+    report->fitted[1] = residual(&w, FOLDS, NULL);
+    conclude(&w, &law, stiffness, report);
     report->kept = report->held_out[1] < kept_ratio * report->held_out[0];
     stiffness->count = report->kept ? n : 0;
-    for (size_t k = 0; k < stiffness->count; ++k) {
-      report->undetermined +=
-          stiffness->region[k].determined < SUPINE_PATIENT_DETERMINED ? 1.0 : 0.0;
-    }
-    status = supine_patient_matching_solve(m, stiffness, error);
+    patient->power = report->kept ? law : patient->power;
+    status = supine_patient_matching_set_tissue(matching, &law, stiffness, error);
   }
-  free(response);
-  free(precision);
+  free(w.response);
+  free(w.precision);
+  free(w.matrix);
   return status;
 }

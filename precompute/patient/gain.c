@@ -110,8 +110,11 @@ static supine_status make_rows(work *w, const supine_lungs *lungs,
     w->matching.count = 3 * pairs->count;
     w->matching.rows = malloc(w->matching.count * sizeof *w->matching.rows);
   } else {
-    status = supine_patient_matching_create(lungs, surface, &w->record->stiffness, VERTICES_MAX, 0,
-                                            &w->matching, error);
+    status = supine_patient_matching_create(lungs, surface, VERTICES_MAX, 0, &w->matching, error);
+    if (status == SUPINE_OK) {
+      status = supine_patient_matching_set_tissue(&w->matching, &w->record->patient.power,
+                                                  &w->record->stiffness, error);
+    }
   }
   w->motion = malloc(w->matching.count * sizeof *w->motion);
   if (status == SUPINE_OK && (w->matching.rows == NULL || w->motion == NULL)) {
@@ -145,6 +148,7 @@ static void find_motion(work *w, const double gravity[3]) {
     }
     supine_patient_displacement(patient, &place, 1.0, w->motion[i].u);
     for (size_t k = 0; k < 3; ++k) {
+      w->motion[i].u[k] += m->tissue != NULL ? m->tissue[3 * m->match[i].vertex + k] : 0.0;
       w->motion[i].u[k] /= w->state_share[1][k] - w->state_share[0][k];
     }
   }

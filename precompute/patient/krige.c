@@ -16,7 +16,6 @@ enum {
   MOTION =
       SUPINE_PATIENT_BY_TRANSLATION, /* first unknown of the body's motion; its rotation follows */
   SCALE = SUPINE_PATIENT_BY_SCALE,
-  TERMS_MAX = TERMS + SUPINE_PATIENT_REGIONS_MAX,
   STEPS = 60
 };
 
@@ -24,7 +23,6 @@ enum {
 static const double scale_deviation = 0.3;
 static const double converged = 1e-10;   /* relative decrease of k->objective that ends a fit */
 static const double damping_most = 1e10; /* a larger damping of the steps ends a fit */
-static const double expandability_least = 0.02;
 
 /* Bounds of constants of the displacement law (patient.h): the exponents c2, c4 and c6, and the
  * absolute values of the slopes c7, c8 and c9. */
@@ -82,21 +80,6 @@ static supine_patient_power take_step(const supine_patient_power *law, const dou
   return stepped;
 }
 
-/* Extend supine_patient_power_design to a fit of lung regions: take the force from k->region, the
- * values of 1 / stiffness, and append the derivatives with respect to these values to x. */
-static double design_row(const supine_patient_krige *k, const supine_patient_row *row, double *x) {
-  if (k->options.region_count == 0) {
-    return supine_patient_power_design(&k->law, row, x);
-  }
-  supine_patient_row with = *row;
-  with.place.force[0] = cblas_ddot((int)k->options.region_count, row->response, 1, k->region, 1);
-  const double difference = supine_patient_power_design(&k->law, &with, x);
-  for (size_t t = TERMS; t < k->terms; ++t) {
-    x[t] = x[SCALE] / with.place.force[0] * row->response[t - TERMS];
-  }
-  return difference;
-}
-
 static double noise_of(const supine_patient_krige *k, const supine_patient_row *row) {
   return k->noise * row->noise / sqrt(fmin(1.0, fmax(1e-12, row->weight)));
 }
@@ -133,40 +116,28 @@ static double factor_covariance(supine_patient_krige *k) {
 }
 
 static void add_prior(supine_patient_krige *k) {
-  const size_t terms = k->terms;
   for (size_t t = 0; t < TERMS; ++t) {
     const double deviation = prior_deviation(k, t);
     if (deviation == 0.0) { /* the unknown is not fitted: make its step 0 */
       k->right_side[t] = 0.0;
-      for (size_t s = 0; s < terms; ++s) {
-        k->normal_matrix[s < t ? t * terms + s : s * terms + t] = s == t ? 1.0 : 0.0;
+      for (size_t s = 0; s < TERMS; ++s) {
+        k->normal_matrix[s < t ? t * TERMS + s : s * TERMS + t] = s == t ? 1.0 : 0.0;
       }
     } else if (isfinite(deviation)) {
-      k->normal_matrix[t * terms + t] += pow(deviation, -2.0);
+      k->normal_matrix[t * TERMS + t] += pow(deviation, -2.0);
       k->right_side[t] -= offset_from_prior(k, t) * pow(deviation, -2.0);
       k->objective += pow(offset_from_prior(k, t) / deviation, 2.0);
     }
   }
-  for (size_t t = TERMS; t < terms; ++t) {
-    const double *precision = k->options.prior_precision + (t - TERMS) * k->options.region_count;
-    double gradient = 0.0;
-    for (size_t s = TERMS; s < terms; ++s) {
-      gradient += precision[s - TERMS] * (k->region[s - TERMS] - 1.0);
-      k->normal_matrix[t * terms + s] += s <= t ? precision[s - TERMS] : 0.0;
-    }
-    k->right_side[t] -= gradient;
-    k->objective += gradient * (k->region[t - TERMS] - 1.0);
-  }
 }
 
-/* Compute the normal equations and k->objective at the present k->law and k->region. */
+/* Compute the normal equations and k->objective at the present k->law. */
 static void linearise(supine_patient_krige *k) {
   const int n = (int)k->count;
-  const int terms = (int)k->terms;
-  const int width = terms + 1; /* one column for each unknown, and one for the residual */
+  const int width = TERMS + 1; /* one column for each unknown, and one for the residual */
   for (size_t i = 0; i < k->count; ++i) {
     double *row = k->design + (size_t)width * i;
-    row[terms] = -design_row(k, &k->rows[i], row);
+    row[TERMS] = -supine_patient_power_design(&k->law, &k->rows[i], row);
     if (k->sill <= 0.0) {
       cblas_dscal(width, 1.0 / noise_of(k, &k->rows[i]), row, 1);
     }
@@ -175,29 +146,27 @@ static void linearise(supine_patient_krige *k) {
     cblas_dtrsm(CblasRowMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, n, width, 1.0,
                 k->cholesky, n, k->design, width);
   }
-  cblas_dsyrk(CblasRowMajor, CblasLower, CblasTrans, terms, n, 1.0, k->design, width, 0.0,
-              k->normal_matrix, terms);
-  cblas_dgemv(CblasRowMajor, CblasTrans, n, terms, 1.0, k->design, width, k->design + terms, width,
+  cblas_dsyrk(CblasRowMajor, CblasLower, CblasTrans, TERMS, n, 1.0, k->design, width, 0.0,
+              k->normal_matrix, TERMS);
+  cblas_dgemv(CblasRowMajor, CblasTrans, n, TERMS, 1.0, k->design, width, k->design + TERMS, width,
               0.0, k->right_side, 1);
-  k->objective = cblas_ddot(n, k->design + terms, width, k->design + terms, width);
+  k->objective = cblas_ddot(n, k->design + TERMS, width, k->design + TERMS, width);
   add_prior(k);
 }
 
 /* Solve the damped normal equations for a step of all unknowns. Return false on failure. */
-static bool find_step(const supine_patient_krige *k, double damping, double step[TERMS_MAX]) {
-  const lapack_int terms = (lapack_int)k->terms;
-  double *matrix = k->normal_matrix + k->terms * k->terms;
-  memcpy(matrix, k->normal_matrix, k->terms * k->terms * sizeof *matrix);
-  memcpy(step, k->right_side, k->terms * sizeof *step);
-  for (size_t t = 0; t < k->terms; ++t) {
-    matrix[t * k->terms + t] *= 1.0 + damping;
+static bool find_step(const supine_patient_krige *k, double damping, double step[TERMS]) {
+  double *matrix = k->normal_matrix + TERMS * TERMS;
+  memcpy(matrix, k->normal_matrix, TERMS * TERMS * sizeof *matrix);
+  memcpy(step, k->right_side, TERMS * sizeof *step);
+  for (size_t t = 0; t < TERMS; ++t) {
+    matrix[t * TERMS + t] *= 1.0 + damping;
   }
-  return LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', terms, 1, matrix, terms, step, terms) == 0;
+  return LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', TERMS, 1, matrix, TERMS, step, TERMS) == 0;
 }
 
 static bool factor_normal_matrix(supine_patient_krige *k) {
-  const lapack_int terms = (lapack_int)k->terms;
-  return LAPACKE_dpotrf(LAPACK_COL_MAJOR, 'U', terms, k->normal_matrix, terms) == 0;
+  return LAPACKE_dpotrf(LAPACK_COL_MAJOR, 'U', TERMS, k->normal_matrix, TERMS) == 0;
 }
 
 /* Minimise k->objective. Return false if the measurements do not determine the unknowns. */
@@ -207,16 +176,11 @@ static bool descend(supine_patient_krige *k) {
   for (size_t steps = 0; steps < STEPS && damping < damping_most; ++steps) {
     const supine_patient_power before = k->law;
     const double squares = k->objective;
-    double region[SUPINE_PATIENT_REGIONS_MAX];
-    double step[TERMS_MAX];
-    memcpy(region, k->region, sizeof region);
+    double step[TERMS];
     if (!isfinite(squares) || !find_step(k, damping, step)) {
       return false;
     }
     k->law = take_step(&before, step);
-    for (size_t t = TERMS; t < k->terms; ++t) {
-      k->region[t - TERMS] = fmax(expandability_least, region[t - TERMS] + step[t]);
-    }
     linearise(k);
     if (k->objective <= squares && squares - k->objective <= converged * squares) {
       break;
@@ -225,7 +189,6 @@ static bool descend(supine_patient_krige *k) {
     damping = decreased ? 0.1 * damping : fmax(1e-3, 10.0 * damping);
     if (!decreased) {
       k->law = before;
-      memcpy(k->region, region, sizeof region);
       linearise(k);
     }
   }
@@ -244,7 +207,7 @@ static double likelihood_of(supine_patient_krige *k, double sill, double noise) 
   }
   for (size_t t = 0; t < TERMS; ++t) {
     const double deviation = prior_deviation(k, t);
-    likelihood -= log(k->normal_matrix[t * k->terms + t]);
+    likelihood -= log(k->normal_matrix[t * TERMS + t]);
     likelihood -= deviation > 0.0 && isfinite(deviation) ? log(deviation) : 0.0;
   }
   k->law = before;
@@ -282,11 +245,9 @@ static bool fit_uncorrected(supine_patient_krige *k, bool size_only) {
   k->noise = 1.0;
   k->options.size_only = size_only;
   k->law = k->mean;
-  k->terms = TERMS;
   (void)factor_covariance(k);
   const bool determined = descend(k);
   k->options.size_only = false;
-  k->terms = TERMS + k->options.region_count;
   k->uncorrected_law = k->law;
   return determined;
 }
@@ -296,20 +257,16 @@ static supine_status krige_create(supine_patient_krige *k,
                                   const supine_patient_row *rows, size_t count,
                                   supine_error *error) {
   const bool corrected = !options->uncorrected && !options->size_only;
-  const size_t terms = TERMS + options->region_count;
   *k = (supine_patient_krige){.rows = rows,
                               .count = count,
                               .options = *options,
                               .mean = supine_patient_deep(options->gravity, options->path_span),
                               .centre = malloc(count * sizeof *k->centre),
                               .cholesky = corrected ? malloc(count * count * sizeof(double)) : NULL,
-                              .design = malloc((terms + 1) * count * sizeof *k->design),
-                              .normal_matrix = malloc(2 * terms * terms * sizeof *k->normal_matrix),
+                              .design = malloc((TERMS + 1) * count * sizeof *k->design),
+                              .normal_matrix = malloc(2 * TERMS * TERMS * sizeof *k->normal_matrix),
                               .kernel_weight = malloc(count * sizeof *k->kernel_weight),
                               .scratch = malloc(count * sizeof *k->scratch)};
-  for (size_t r = 0; r < k->options.region_count; ++r) {
-    k->region[r] = 1.0;
-  }
   return k->centre == NULL || (corrected && k->cholesky == NULL) || k->design == NULL ||
                  k->normal_matrix == NULL || k->kernel_weight == NULL || k->scratch == NULL
              ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu values", count)
@@ -357,7 +314,7 @@ supine_status supine_patient_krige_fit(const supine_patient_fit_options *options
   if (!determined || !factor_normal_matrix(k)) {
     return undetermined(error);
   }
-  cblas_dcopy(n, k->design + k->terms, (int)k->terms + 1, k->kernel_weight, 1);
+  cblas_dcopy(n, k->design + TERMS, TERMS + 1, k->kernel_weight, 1);
   if (k->sill > 0.0) {
     cblas_dtrsv(CblasRowMajor, CblasLower, CblasTrans, CblasNonUnit, n, k->cholesky, n,
                 k->kernel_weight, 1);
@@ -366,22 +323,10 @@ supine_status supine_patient_krige_fit(const supine_patient_fit_options *options
 }
 
 /* Return x^T C x, where C is the posterior covariance matrix of the unknowns. Overwrite x. */
-static double variance_of(const supine_patient_krige *k, double x[TERMS_MAX]) {
-  const int terms = (int)k->terms;
-  cblas_dtrsv(CblasRowMajor, CblasLower, CblasNoTrans, CblasNonUnit, terms, k->normal_matrix, terms,
+static double variance_of(const supine_patient_krige *k, double x[TERMS]) {
+  cblas_dtrsv(CblasRowMajor, CblasLower, CblasNoTrans, CblasNonUnit, TERMS, k->normal_matrix, TERMS,
               x, 1);
-  return cblas_ddot(terms, x, 1, x, 1);
-}
-
-void supine_patient_krige_resolution(const supine_patient_krige *krige, double *share) {
-  const lapack_int terms = (lapack_int)krige->terms;
-  for (size_t r = 0; r < krige->options.region_count; ++r) {
-    double x[TERMS_MAX] = {0.0};
-    memcpy(x + TERMS, krige->options.prior_precision + r * krige->options.region_count,
-           krige->options.region_count * sizeof *x);
-    (void)LAPACKE_dpotrs(LAPACK_COL_MAJOR, 'U', terms, 1, krige->normal_matrix, terms, x, terms);
-    share[r] = 1.0 - x[TERMS + r];
-  }
+  return cblas_ddot(TERMS, x, 1, x, 1);
 }
 
 void supine_patient_krige_errors(const supine_patient_krige *krige,
@@ -389,37 +334,23 @@ void supine_patient_krige_errors(const supine_patient_krige *krige,
   for (size_t t = 0; t < MOTION; ++t) {
     const bool exponent = t >= 3 && t < 6;
     const size_t c = t < 3 ? 2 * t : exponent ? 2 * t - 5 : t;
-    double x[TERMS_MAX] = {0.0};
+    double x[TERMS] = {0.0};
     x[t] = exponent ? krige->law.c[c] : 1.0;
     error[c] = prior_deviation(krige, t) > 0.0 ? sqrt(variance_of(krige, x)) : 0.0;
   }
 }
 
-double supine_patient_krige_predict(supine_patient_krige *krige, const supine_patient_row *row,
-                                    double *variance) {
-  const int n = (int)krige->count;
-  double x[TERMS_MAX];
-  double value = design_row(krige, row, x) + row->value;
-  *variance = 0.0;
+double supine_patient_krige_predict(supine_patient_krige *krige, const supine_patient_row *row) {
+  double x[TERMS];
+  double value = supine_patient_power_design(&krige->law, row, x) + row->value;
   if (krige->sill > 0.0) {
     const supine_patient_centre at = centre_of(&krige->law, &row->place);
     supine_patient_covariances(&at, krige->count, krige->centre, krige->scratch);
-    supine_patient_covariances(&at, 1, &at, variance);
     for (size_t i = 0; i < krige->count; ++i) {
-      krige->scratch[i] *= krige->scaled_sill * supine_dot(row->axis, krige->rows[i].axis);
+      value += krige->scaled_sill * supine_dot(row->axis, krige->rows[i].axis) * krige->scratch[i] *
+               krige->kernel_weight[i];
     }
-    value += cblas_ddot(n, krige->scratch, 1, krige->kernel_weight, 1);
-    cblas_dtrsv(CblasRowMajor, CblasLower, CblasNoTrans, CblasNonUnit, n, krige->cholesky, n,
-                krige->scratch, 1);
-    cblas_dgemv(CblasRowMajor, CblasTrans, n, (int)krige->terms, -1.0, krige->design,
-                (int)krige->terms + 1, krige->scratch, 1, 1.0, x, 1);
-    *variance =
-        krige->scaled_sill * *variance - cblas_ddot(n, krige->scratch, 1, krige->scratch, 1);
   }
-  for (size_t t = 0; t < TERMS; ++t) {
-    x[t] = prior_deviation(krige, t) > 0.0 ? x[t] : 0.0;
-  }
-  *variance = fmax(0.0, *variance) + variance_of(krige, x);
   return value;
 }
 

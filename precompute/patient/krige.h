@@ -22,14 +22,12 @@
 /* One measured component of a displacement. */
 typedef struct supine_patient_row {
   supine_patient_place place;
-  double axis[3]; /* unit vector along which the displacement was measured */
-  double value;   /* measured displacement along `axis`, mm */
-  double weight;  /* factor on the squared residual of this measurement */
-  double noise;   /* standard deviation of `value`, mm */
-  size_t block;   /* index of the 40 mm cube whose measurements are held out together */
-  /* [regions] contribution of each lung region to the force at this vertex if the region's
-   * expandability (1 / stiffness) is 1; NULL if stiffness is not fitted */
-  const double *response;
+  double axis[3];  /* unit vector along which the displacement was measured */
+  double value;    /* measured displacement along `axis`, mm */
+  double weight;   /* factor on the squared residual of this measurement */
+  double noise;    /* standard deviation of `value`, mm */
+  size_t block;    /* index of the 40 mm cube whose measurements are held out together */
+  size_t landmark; /* index of the landmark, plus 1; 0 for a vertex of a surface */
 } supine_patient_row;
 
 /* Write into rows, for each pair of points, its displacement along x, y and z. */
@@ -41,8 +39,7 @@ void supine_patient_rows_of_pairs(const supine_patient_frame *frame,
 size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patient_row *rows,
                                  size_t count, unsigned long seed);
 
-/* Index of the first of the unknowns of each kind in a fit (constants c1 to c9: patient.h). The
- * values of 1 / stiffness of lung regions follow if they are fitted. */
+/* Index of the first of the unknowns of each kind in a fit (constants c1 to c9: patient.h). */
 enum {
   SUPINE_PATIENT_BY_SIZE = 0,        /* [3] c1, c3, c5 */
   SUPINE_PATIENT_BY_EXPONENT = 3,    /* [3] log c2, log c4, log c6 */
@@ -50,8 +47,7 @@ enum {
   SUPINE_PATIENT_BY_TRANSLATION = 9, /* [3] translation of the body */
   SUPINE_PATIENT_BY_ROTATION = 12,   /* [3] small rotation of the body */
   SUPINE_PATIENT_BY_SCALE = 15,      /* factor on the whole displacement law */
-  SUPINE_PATIENT_TERMS,
-  SUPINE_PATIENT_REGIONS_MAX = 256
+  SUPINE_PATIENT_TERMS
 };
 
 /* Predict a measurement by the displacement law and the motion of the body. Return the prediction
@@ -72,16 +68,12 @@ typedef struct supine_patient_fit_options {
   double path_span[3];
   double sill;  /* factor on the covariance of the kriging correction; 0: find it by likelihood */
   double noise; /* factor on the noise of every measurement; 0: find it by likelihood */
-  size_t region_count;           /* number of lung regions whose expandability is fitted */
-  const double *prior_precision; /* [region_count, region_count] inverse of their covariance */
 } supine_patient_fit_options;
 
 typedef struct supine_patient_krige {
   const supine_patient_row *rows; /* [count] measurements */
   size_t count;
   supine_patient_fit_options options;
-  size_t terms;
-  double region[SUPINE_PATIENT_REGIONS_MAX]; /* expandability (1 / stiffness) of each region */
   double sill, noise; /* factors on the covariance of the kriging correction, and on the noise */
   supine_patient_power mean; /* prior mean of the displacement law's constants */
   supine_patient_power uncorrected_law;
@@ -95,7 +87,7 @@ typedef struct supine_patient_krige {
   double *normal_matrix; /* [2, terms, terms] normal matrix, after the fit its Cholesky factor; then
                             work space */
   double objective;      /* squared whitened residuals plus squared deviations from the prior */
-  double right_side[SUPINE_PATIENT_TERMS + SUPINE_PATIENT_REGIONS_MAX];
+  double right_side[SUPINE_PATIENT_TERMS];
 } supine_patient_krige;
 
 /* Fit a displacement law (patient.h) and its kriging correction in two steps:
@@ -112,19 +104,13 @@ supine_status supine_patient_krige_fit(const supine_patient_fit_options *options
                                        supine_patient_krige *krige, supine_error *error);
 void supine_patient_krige_free(supine_patient_krige *krige);
 
-/* Compute how far the measurements, not the prior, determine the stiffness of each region: 0
- * not at all, 1 fully. `share` [region_count] is the diagonal of the resolution matrix. */
-void supine_patient_krige_resolution(const supine_patient_krige *krige, double *share);
-
 /* Compute standard errors of the displacement law's constants c1 to c9; 0 for those not fitted. */
 void supine_patient_krige_errors(const supine_patient_krige *krige,
                                  double error[SUPINE_PATIENT_CONSTANTS]);
 
 /* Predict the displacement, mm, along row->axis at row->place. Not thread-safe: overwrites
- * krige->scratch.
- * @param variance  written: variance of the prediction, without measurement noise, mm^2 */
-double supine_patient_krige_predict(supine_patient_krige *krige, const supine_patient_row *row,
-                                    double *variance);
+ * krige->scratch. */
+double supine_patient_krige_predict(supine_patient_krige *krige, const supine_patient_row *row);
 void supine_patient_krige_copy_law(const supine_patient_krige *krige, supine_patient *patient);
 
 /** Predictors of a displacement, whose errors are compared: no displacement, a translation, an
@@ -138,20 +124,22 @@ typedef enum supine_patient_score {
   SUPINE_PATIENT_SCORES
 } supine_patient_score;
 
-/** Result of a fit; errors are RMS distances, in mm. */
+/** Result of a fit; errors are RMS distances, in mm. If there are landmarks, they are those of
+ * landmarks; otherwise, of vertices along the normals of the other surface. */
 typedef struct supine_patient_fit_report {
-  double points;                          /**< number of landmarks, or of matched vertices */
-  double blocks;                          /**< number of cubes of 40 mm with points */
+  double points; /**< number of landmarks or, without landmarks, of matched vertices */
+  double blocks; /**< number of cubes of 40 mm with points */
   double fitted[SUPINE_PATIENT_SCORES];   /**< RMS error of each predictor at fitted points, mm */
   double held_out[SUPINE_PATIENT_SCORES]; /**< the same residuals at held-out points, mm */
   /** RMS error at held-out points, mm, of a translation, or of no displacement if no motion of the
    * body is fitted. */
   double baseline;
-  double band;      /**< share of the held-out points with an error below its 95 % bound, % */
+  double band; /**< share of the held-out landmarks with an error below its 95 % bound, %, or 0 */
   double explained; /**< percentage by which the law with its kriging correction reduces the squared
                        `baseline` */
   double expected_point;    /**< expected error of the predicted position of a point, mm */
   double expected_constant; /**< expected squared error, mm^2, per mm of displacement */
+  double expected_from; /**< RMS displacement, mm, below which this constant falls in proportion */
   double error[SUPINE_PATIENT_CONSTANTS]; /**< standard errors of c1 to c9 (patient.h) */
 } supine_patient_fit_report;
 

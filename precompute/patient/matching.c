@@ -121,33 +121,6 @@ void supine_patient_stiffness_of(const supine_patient_stiffness *stiffness,
   }
 }
 
-supine_status supine_patient_matching_solve(supine_patient_matching *matching,
-                                            const supine_patient_stiffness *stiffness,
-                                            supine_error *error) {
-  supine_patient_matching *m = matching;
-  const size_t n = m->fuller->mesh.vertex_count;
-  double *e = malloc(n * sizeof *e);
-  if (e == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
-  }
-  for (size_t i = 0; i < n; ++i) {
-    const supine_patient_place place = supine_patient_find_vertex(m->fuller, i);
-    memcpy(m->smoothed_force + SUPINE_PATIENT_COLUMNS * i, place.force, sizeof place.force);
-  }
-  supine_patient_stiffness_of(stiffness, m->fuller, e);
-  supine_status status = supine_physics_equilibrium_set_stiffness(m->equilibrium, e, error);
-  if (status == SUPINE_OK) {
-    status = supine_physics_equilibrium_solve(m->equilibrium, SUPINE_PATIENT_COLUMNS,
-                                              m->smoothed_force, m->smoothed_force, error);
-  }
-  for (size_t i = 0; i < m->count && status == SUPINE_OK; ++i) {
-    memcpy(m->rows[i].place.force, m->smoothed_force + SUPINE_PATIENT_COLUMNS * m->match[i].vertex,
-           sizeof m->rows[i].place.force);
-  }
-  free(e);
-  return status;
-}
-
 void supine_patient_matching_choose(supine_patient_matching *matching, size_t limit) {
   supine_patient_matching *m = matching;
   const size_t n = m->fuller->mesh.vertex_count;
@@ -165,7 +138,6 @@ void supine_patient_matching_choose(supine_patient_matching *matching, size_t li
 }
 
 supine_status supine_patient_matching_create(const supine_lungs *fuller, const supine_mesh *state,
-                                             const supine_patient_stiffness *stiffness,
                                              size_t limit, size_t landmarks,
                                              supine_patient_matching *matching,
                                              supine_error *error) {
@@ -187,8 +159,13 @@ supine_status supine_patient_matching_create(const supine_lungs *fuller, const s
   supine_mesh_vertex_normals(state, m->state_normals);
   const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
   supine_status status = supine_physics_model_equilibrium(fuller, &model, &m->equilibrium, error);
+  for (size_t i = 0; i < n; ++i) {
+    const supine_patient_place place = supine_patient_find_vertex(fuller, i);
+    memcpy(m->smoothed_force + SUPINE_PATIENT_COLUMNS * i, place.force, sizeof place.force);
+  }
   if (status == SUPINE_OK) {
-    status = supine_patient_matching_solve(m, stiffness, error);
+    status = supine_physics_equilibrium_solve(m->equilibrium, SUPINE_PATIENT_COLUMNS,
+                                              m->smoothed_force, m->smoothed_force, error);
   }
   if (status == SUPINE_OK) {
     supine_patient_matching_choose(m, limit);
@@ -202,6 +179,7 @@ void supine_patient_matching_free(supine_patient_matching *matching) {
   supine_inside_surface_destroy(matching->tree);
   supine_physics_equilibrium_destroy(matching->equilibrium);
   free(matching->smoothed_force);
+  free(matching->tissue);
   free(matching->fuller_normals);
   free(matching->state_normals);
   free(matching->match);
@@ -221,7 +199,9 @@ static void place_range(void *context, size_t begin, size_t end, size_t thread) 
     supine_patient_motion(&m->patient->power, place, motion);
     m->space[i] = 0.0;
     for (size_t a = 0; a < 3; ++a) {
-      const double at = m->fuller->mesh.vertices[3 * match->vertex + a] + u[a] + motion[a];
+      const size_t from = 3 * match->vertex + a;
+      const double at = m->fuller->mesh.vertices[from] + u[a] + motion[a] +
+                        (m->tissue != NULL ? m->tissue[from] : 0.0);
       m->space[i] += pow(at - match->position[a], 2.0);
       match->position[a] = at;
     }

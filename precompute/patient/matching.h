@@ -24,6 +24,7 @@ typedef struct supine_patient_matching {
   /* [vertices, 4] 1, X - 1/2, Y - 1/2 and Z - 1/2, smoothed over the surface; X, Y and Z are
    * coordinates 0 to 1 in the lungs' bounding box */
   double *smoothed_force;
+  double *tissue; /* [vertices, 3] displacement minus that of uniform tissue, mm; NULL if uniform */
   double *fuller_normals;      /* [fuller->mesh.vertex_count, 3] unit normals of `fuller` */
   double *state_normals;       /* [state->vertex_count, 3] unit normals */
   size_t count;                /* number of vertices to match, spread over `fuller` */
@@ -41,7 +42,6 @@ typedef struct supine_patient_matching {
  * Call supine_patient_matching_free also after a failure.
  * @retval SUPINE_ERROR_MEMORY, those of supine_physics_equilibrium_solve */
 supine_status supine_patient_matching_create(const supine_lungs *fuller, const supine_mesh *state,
-                                             const supine_patient_stiffness *stiffness,
                                              size_t limit, size_t landmarks,
                                              supine_patient_matching *matching,
                                              supine_error *error);
@@ -51,14 +51,15 @@ void supine_patient_matching_free(supine_patient_matching *matching);
  * measurements. Measurements of landmarks are dropped. */
 void supine_patient_matching_choose(supine_patient_matching *matching, size_t limit);
 
-/* Compute matching->smoothed_force by solving the equilibrium of the surface (equilibrium.h) with
- * the given stiffness, and copy it into the vertices' measurements.
- * @retval SUPINE_ERROR_MEMORY, those of supine_physics_equilibrium_solve */
-supine_status supine_patient_matching_solve(supine_patient_matching *matching,
-                                            const supine_patient_stiffness *stiffness,
-                                            supine_error *error);
+/* Compute matching->tissue for displacements of uniform tissue by `law`.
+ * @retval SUPINE_ERROR_MEMORY, those of strain.h */
+supine_status supine_patient_matching_set_tissue(supine_patient_matching *matching,
+                                                 const supine_patient_power *law,
+                                                 const supine_patient_stiffness *stiffness,
+                                                 supine_error *error);
 
-/* Displace the vertices to match by a displacement law. Return the RMS change of position, mm. */
+/* Displace the vertices to match by a displacement law and matching->tissue. Return the RMS change
+ * of position, mm. */
 double supine_patient_matching_place(supine_patient_matching *matching,
                                      const supine_patient *patient);
 
@@ -86,19 +87,19 @@ void supine_patient_stiffness_of(const supine_patient_stiffness *stiffness,
 /** Find the expandability a (1 / stiffness) of each lung region from the displacement between the
  * surfaces of two states ([Santhanam2008] VI).
  *
- * The displacement depends only on the product of a and the force f, so f is set to the force of
- * the default displacement law. F, the product a f after smoothing over the surface
- * (equilibrium.h), is linear in the expandabilities a_k of the regions:
+ * Surfaces show the motion along the normal n. By strain.h, n.u is linear in the expandabilities
+ * a_k of the regions:
  *
- *     F = sum over k of a_k F_k
+ *     n.u = n.(u_0 + sum over k of a_k u_k)
  *
- * F_k is F for a_k = 1 and no force on all other regions. The a_k are fitted together with the nine
- * constants of the displacement law and the motion of the body between the scans (krige.h). The
- * prior expects every a_k to be near 1 and similar in neighbouring regions. After each fit, the
- * surfaces are matched again. The result is kept only if it reduces the held-out error.
- * @param matching   without landmarks; on return, its smoothed_force is that of the new stiffness
- * @param options    law must be SUPINE_PATIENT_PAPER
- * @param patient    in: `frame`, the bounding box of the lungs; out: the fitted displacement law
+ * u_k is the displacement if only region k expands, with a_k = 1, and the rest moves with it. The
+ * displacement of uniform tissue is that of the default law, with a factor for each axis. These
+ * factors, the motion of the body and the a_k are found by least squares. The prior expects every
+ * a_k to be near 1 and similar in neighbouring regions. After each step, the surfaces are matched
+ * again. The result is kept only if it reduces the held-out error.
+ * @param matching   without landmarks, matched by the law of uniform tissue; its `tissue` is set
+ * @param patient    in: `frame`, the bounding box of the lungs; out: the fitted displacement law if
+ *   the result is kept
  * @param stiffness  written; uniform (no regions) if the fitted regions do not reduce the error
  * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
 supine_status supine_patient_expand(supine_patient_matching *matching,
@@ -109,7 +110,7 @@ supine_status supine_patient_expand(supine_patient_matching *matching,
 /** Compute the force on each vertex that would cause the displacement between the two surfaces.
  * Average it in cubes of 40 mm, and fit a linear function of the coordinates in the lungs' bounding
  * box to the means.
- * @param matching  created with the patient's stiffness; on return all vertices are matched
+ * @param matching  on return all vertices are matched
  * @param patient   displacement law fitted to these surfaces; its kriging correction is not used
  * @param gravity   unit vector in the emptier state
  * @retval SUPINE_ERROR_NUMERICAL  the means do not determine the linear function

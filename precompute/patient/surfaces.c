@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Fit a displacement law to two surfaces by iterative closest points with robust weights. */
 #include <math.h>
+#include <string.h>
 
 #include <gsl/gsl_statistics.h>
 
@@ -8,7 +9,7 @@
 
 enum {
   VERTICES_MAX = 600,  /* largest number of matched vertices */
-  REGIONAL_MAX = 2000, /* the same, if the stiffness of lung regions is fitted */
+  REGIONAL_MAX = 4000, /* the same, if the stiffness of lung regions is fitted */
   ROUNDS_MAX = 60
 };
 
@@ -99,9 +100,13 @@ static supine_status check_apart(supine_patient_matching *m, supine_patient_surf
 static supine_status measure(supine_patient_matching *m, const supine_patient_fit_options *wanted,
                              supine_patient_record *record, supine_error *error) {
   supine_patient_fit_report *report = &record->report;
+  const supine_patient_power expanding = record->patient.power;
   supine_status status = supine_patient_fit(wanted, m->rows, m->count, m->landmark_row_count / 3,
                                             &record->patient, report, error);
   if (status == SUPINE_OK && record->expand.kept) {
+    record->patient.power = expanding;
+    record->patient.law = SUPINE_PATIENT_DEEP;
+    memset(report->error, 0, sizeof report->error);
     report->held_out[SUPINE_PATIENT_SCORE_CORRECTED] = record->expand.held_out[1];
     report->explained = 100.0 * (1.0 - pow(record->expand.held_out[1] / report->baseline, 2.0));
   }
@@ -120,9 +125,7 @@ static supine_status run(supine_patient_matching *m, const supine_patient_fit_op
   if (status == SUPINE_OK && expandability) {
     status = supine_patient_expand(m, wanted, &record->patient, &record->stiffness, &record->expand,
                                    error);
-    if (status == SUPINE_OK) { /* fit again, because the stiffness changes the forces */
-      status = iterate(m, wanted, &record->patient, &record->surface, error);
-    }
+    record->surface.after = record->expand.kept ? record->expand.fitted[1] : record->surface.after;
   }
   return status == SUPINE_OK ? measure(m, wanted, record, error) : status;
 }
@@ -142,9 +145,8 @@ supine_status supine_patient_fit_surface(const supine_lungs *fuller, const supin
   record->stiffness.count = 0;
   supine_status status = supine_patient_check_boxes(&fuller->mesh, emptier, error);
   if (status == SUPINE_OK) {
-    status = supine_patient_matching_create(fuller, emptier, &record->stiffness,
-                                            expandability ? REGIONAL_MAX : VERTICES_MAX,
-                                            landmark_count, &m, error);
+    status = supine_patient_matching_create(
+        fuller, emptier, expandability ? REGIONAL_MAX : VERTICES_MAX, landmark_count, &m, error);
   }
   if (status == SUPINE_OK && landmark_count > 0) {
     supine_patient_rows_of_pairs(&m.frame, landmarks, m.rows + m.count);

@@ -216,41 +216,6 @@ static void set_reach(supine_equilibrium *eq, const supine_mesh *mesh) {
   }
 }
 
-supine_status supine_physics_equilibrium_create(const supine_mesh *mesh,
-                                                const supine_topology *topology, double reach,
-                                                const double *lesions,
-                                                supine_equilibrium **equilibrium,
-                                                supine_error *error) {
-  const size_t n = mesh->vertex_count;
-  *equilibrium = NULL;
-  const supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_CHOLMOD, FUNCTIONS, &cholmod, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  supine_equilibrium *made = calloc(1, sizeof *made);
-  if (made == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the equilibrium");
-  }
-  made->vertex_count = n;
-  made->topology = topology;
-  made->area = reach > 0.0 ? malloc(n * sizeof *made->area) : NULL;
-  made->edge_term = malloc((topology->edge_count + 1) * sizeof *made->edge_term);
-  made->lesions = lesions != NULL ? malloc(n * sizeof *made->lesions) : NULL;
-  made->mass_weight = malloc(n * sizeof *made->mass_weight);
-  made->load_factor = malloc(n * sizeof *made->load_factor);
-  if (made->edge_term == NULL || made->mass_weight == NULL || made->load_factor == NULL ||
-      (lesions != NULL && made->lesions == NULL) || (reach > 0.0 && made->area == NULL) ||
-      !create_matrices(made)) {
-    supine_physics_equilibrium_destroy(made);
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to solve %zu vertices", n);
-  }
-  if (lesions != NULL) {
-    memcpy(made->lesions, lesions, n * sizeof *lesions);
-  }
-  *equilibrium = made;
-  return supine_physics_equilibrium_set_shape(made, mesh, reach, NULL, error);
-}
-
 static void set_values(const supine_equilibrium *eq, part *p) {
   const int *begin = p->matrix->p;
   double *value = p->matrix->x;
@@ -278,6 +243,69 @@ static void set_values(const supine_equilibrium *eq, part *p) {
   p->factorised = false;
 }
 
+static supine_status create(const supine_topology *topology, size_t n, bool smoothing,
+                            const double *lesions, supine_equilibrium **equilibrium,
+                            supine_error *error) {
+  *equilibrium = NULL;
+  const supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_CHOLMOD, FUNCTIONS, &cholmod, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  supine_equilibrium *made = calloc(1, sizeof *made);
+  if (made == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the equilibrium");
+  }
+  made->vertex_count = n;
+  made->topology = topology;
+  made->area = smoothing ? malloc(n * sizeof *made->area) : NULL;
+  made->edge_term = malloc((topology->edge_count + 1) * sizeof *made->edge_term);
+  made->lesions = lesions != NULL ? malloc(n * sizeof *made->lesions) : NULL;
+  made->mass_weight = malloc(n * sizeof *made->mass_weight);
+  made->load_factor = malloc(n * sizeof *made->load_factor);
+  if (made->edge_term == NULL || made->mass_weight == NULL || made->load_factor == NULL ||
+      (lesions != NULL && made->lesions == NULL) || (smoothing && made->area == NULL) ||
+      !create_matrices(made)) {
+    supine_physics_equilibrium_destroy(made);
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to solve %zu vertices", n);
+  }
+  if (lesions != NULL) {
+    memcpy(made->lesions, lesions, n * sizeof *lesions);
+  }
+  *equilibrium = made;
+  return status;
+}
+
+supine_status supine_physics_equilibrium_create(const supine_mesh *mesh,
+                                                const supine_topology *topology, double reach,
+                                                const double *lesions,
+                                                supine_equilibrium **equilibrium,
+                                                supine_error *error) {
+  const supine_status status =
+      create(topology, mesh->vertex_count, reach > 0.0, lesions, equilibrium, error);
+  return status == SUPINE_OK
+             ? supine_physics_equilibrium_set_shape(*equilibrium, mesh, reach, NULL, error)
+             : status;
+}
+
+supine_status
+supine_physics_equilibrium_create_weighted(const supine_topology *topology, size_t vertex_count,
+                                           const double *diagonal, const double *weight,
+                                           supine_equilibrium **equilibrium, supine_error *error) {
+  const supine_status status = create(topology, vertex_count, true, NULL, equilibrium, error);
+  if (status == SUPINE_OK) {
+    supine_equilibrium *eq = *equilibrium;
+    memcpy(eq->area, diagonal, vertex_count * sizeof *diagonal);
+    memcpy(eq->edge_term, weight, topology->edge_count * sizeof *weight);
+    for (size_t i = 0; i < vertex_count; ++i) {
+      eq->mass_weight[i] = eq->load_factor[i] = 1.0;
+    }
+    for (size_t k = 0; k < eq->part_count; ++k) {
+      set_values(eq, &eq->parts[k]);
+    }
+  }
+  return status;
+}
+
 supine_status supine_physics_equilibrium_set_stiffness(supine_equilibrium *equilibrium,
                                                        const double *stiffness,
                                                        supine_error *error) {
@@ -287,7 +315,7 @@ supine_status supine_physics_equilibrium_set_stiffness(supine_equilibrium *equil
   for (size_t i = 0; status == SUPINE_OK && i < eq->vertex_count; ++i) {
     const double a = 1.0 / (eq->load_factor[i] * (eq->lesions != NULL ? eq->lesions[i] : 1.0));
     eq->mass_weight[i] = eq->area != NULL ? 1.0 : a;
-    eq->load_factor[i] = eq->area != NULL ? eq->area[i] * a : 1.0;
+    eq->load_factor[i] = eq->area != NULL ? eq->area[i] : 1.0;
   }
   for (size_t k = 0; k < eq->part_count && status == SUPINE_OK; ++k) {
     if (eq->area == NULL || !eq->parts[k].factorised) {

@@ -29,16 +29,16 @@
  * Smoothing. In the network, a mass with more edges keeps a smaller share, so results change as the
  * mesh is refined. With a smoothing length (reach) R > 0 in mm, these equations apply instead:
  *
- *     area_i F_i + sum over edges ij of (w_ij / 2) (F_i - F_j) = area_i f_i / E_i
+ *     area_i F_i + sum over edges ij of (w_ij / 2) (F_i - F_j) = area_i f_i
  *
  *     area_i  area of vertex i divided by the mean vertex area
  *     w_ij    weight of edge ij: 4 (R^2 / mean vertex area) s / h^2
  *     h       length of the edge
  *     s       sum of a third of the area of each triangle at the edge
  *
- * They are a discrete form of (1 - R^2 Laplacian) F = f / E on the surface. On any mesh, a
- * disturbance decays as exp(-r / R) with the distance r. In a region wider than R, F is about
- * f / E. The sum of area_i F_i equals the sum of area_i f_i / E_i.
+ * They are a discrete form of (1 - R^2 Laplacian) F = f on the surface. On any mesh, a disturbance
+ * decays as exp(-r / R) with the distance r. The sum of area_i F_i equals the sum of area_i f_i.
+ * Stiffness does not change F, but the displacement (strain.h).
  *
  * Both matrices are symmetric and positive definite. CHOLMOD factorises a matrix once and then
  * solves for any number of forces.
@@ -68,6 +68,13 @@ supine_status supine_physics_equilibrium_create(const supine_mesh *mesh,
                                                 supine_error *error);
 void supine_physics_equilibrium_destroy(supine_equilibrium *equilibrium);
 
+/** Assemble the equations diagonal_i F_i + sum over edges ij of weight_ij (F_i - F_j) = f_i.
+ * Statuses as supine_physics_equilibrium_create. */
+supine_status
+supine_physics_equilibrium_create_weighted(const supine_topology *topology, size_t vertex_count,
+                                           const double *diagonal, const double *weight,
+                                           supine_equilibrium **equilibrium, supine_error *error);
+
 /** Replace the vertex positions, the smoothing length and the stiffness of an equilibrium. This is
  * faster than creating a new equilibrium.
  * @param reach  smoothing length, mm; may be above 0 only if it was above 0 at creation
@@ -76,8 +83,8 @@ supine_status supine_physics_equilibrium_set_shape(supine_equilibrium *equilibri
                                                    const supine_mesh *mesh, double reach,
                                                    const double *stiffness, supine_error *error);
 
-/** Set the stiffness of the vertices. If the smoothing length (reach) is 0, this changes the
- * matrix, which the next solve factorises again.
+/** Set the stiffness of the vertices. It acts only if the smoothing length (reach) is 0, and
+ * changes the matrix, which the next solve factorises again.
  * @param stiffness  [vertices] above 0, scaled to a geometric mean of 1; NULL for 1 everywhere
  * @retval SUPINE_ERROR_ARGUMENT  a stiffness, named in `error`, is not positive and finite */
 supine_status supine_physics_equilibrium_set_stiffness(supine_equilibrium *equilibrium,

@@ -2,6 +2,7 @@
 /* Compute the applied force and the displacements at force 1, (15)-(18) of [Santhanam2008]. */
 #include <math.h>
 #include <stddef.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "base/parallel.h"
@@ -66,8 +67,42 @@ static void box_direction(const supine_lungs *lungs, const double c[6], size_t v
   d[2] = -c[4] * pow(box[2], c[5]);
 }
 
-supine_status supine_physics_directions(const supine_lungs *lungs, const supine_direction_law *law,
-                                        double *directions, supine_error *error) {
+/* Add the shear to displacements [vertices, 3] at a force of 1. In the supine posture, forces below
+ * a fifth of their RMS are raised to that value, against a division by zero. */
+static supine_status add_shear(const supine_lungs *lungs, const supine_force_law *law, double shear,
+                               double *directions, supine_error *error) {
+  static const double supine[3] = {0.0, 1.0, 0.0};
+  static const double least = 0.2;
+  const size_t n = lungs->mesh.vertex_count;
+  double range[2];
+  double forces = 0.0; /* sums of squares */
+  double moved = 0.0;
+  double *force = malloc(n * sizeof *force);
+  if (force == NULL ||
+      supine_physics_height_range(lungs, law->pair, 1, supine, range, range + 1) != SUPINE_OK) {
+    free(force);
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
+  }
+  const supine_gravities gravity = {1, supine, range, range + 1};
+  supine_physics_force(lungs, law, &gravity, n, NULL, force);
+  for (size_t i = 0; i < n; ++i) {
+    const double *d = directions + 3 * i;
+    forces += force[i] * force[i];
+    moved += force[i] * force[i] * supine_dot(d, d);
+  }
+  for (size_t i = 0; i < n; ++i) {
+    double box[3];
+    supine_lungs_box_coordinates(lungs, i, box);
+    directions[3 * i + 1] -= shear * (box[2] - 0.5) * sqrt(moved / (double)n) /
+                             fmax(force[i], least * sqrt(forces / (double)n));
+  }
+  free(force);
+  return SUPINE_OK;
+}
+
+supine_status supine_physics_directions(const supine_lungs *lungs, const supine_force_law *force,
+                                        const supine_direction_law *law, double *directions,
+                                        supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   for (size_t k = 0; k < 6; ++k) {
     if (!isfinite(law->c[k]) || (k % 2 == 1 && !(law->c[k] > 0.0))) {
@@ -84,7 +119,9 @@ supine_status supine_physics_directions(const supine_lungs *lungs, const supine_
   }
   for (size_t i = 0; i < 3 * n; ++i) {
     if (directions[i] != 0.0) {
-      return SUPINE_OK;
+      return law->vectors != NULL || law->shear == 0.0
+                 ? SUPINE_OK
+                 : add_shear(lungs, force, law->shear, directions, error);
     }
   }
   return supine_error_set(error, SUPINE_ERROR_MESH,

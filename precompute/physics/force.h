@@ -52,18 +52,28 @@ void supine_physics_force(const supine_lungs *lungs, const supine_force_law *law
                           const size_t *vertices, double *force);
 
 /** Displacement d of each vertex, mm, at a force of 1 (without a unit). Either d is fitted to a
- * patient, or it is (+-c1 X^c2, -c3 Y^c4, -c5 Z^c6), with + in the left lung and - in the right. X,
- * Y and Z are the vertex's coordinates from 0 to 1 in the lungs' bounding box. */
+ * patient, or it is (+-c1 X^c2, -c3 Y^c4, -c5 Z^c6), with + in the left lung and - in the right,
+ * plus a shear. X, Y and Z are the vertex's coordinates from 0 to 1 in the lungs' bounding box.
+ *
+ * The shear moves the base to the front and the apex to the back as the lungs fill, without a
+ * change of volume. It is fixed to the body, as it was observed in supine patients only:
+ *
+ *     d_y -= beta (Z - 1/2) D / f(supine),  D: RMS of |f(supine) d| over all vertices, without
+ * shear
+ */
 typedef struct supine_direction_law {
+  double shear; /**< beta: displacement along y between apex and base / RMS displacement */
   double c[6]; /**< c1 to c6 of [Santhanam2008] (15)-(17): c1, c3, c5 in mm; c2, c4, c6 exponents */
   const double *vectors; /**< [vertices, 3] displacement per unit force, mm, not owned; NULL to
                             compute it from the constants `c` */
 } supine_direction_law;
 
 /** Compute the displacement of each vertex, mm, at a force of 1 into directions [vertices, 3].
+ * @param force  law of the applied force, for the shear
  * @retval SUPINE_ERROR_ARGUMENT  a constant is not finite, or an exponent is not positive
  * @retval SUPINE_ERROR_MESH      every displacement is zero */
-supine_status supine_physics_directions(const supine_lungs *lungs, const supine_direction_law *law,
-                                        double *directions, supine_error *error);
+supine_status supine_physics_directions(const supine_lungs *lungs, const supine_force_law *force,
+                                        const supine_direction_law *law, double *directions,
+                                        supine_error *error);
 
 #endif

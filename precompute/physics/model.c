@@ -7,10 +7,10 @@
 
 #define LIST(...)                                                                                  \
   { __VA_ARGS__ }
-#define MODEL(id, name, base_, gain_, box_, constants, bend_, reach_, pair_, what)                 \
+#define MODEL(id, name, base_, gain_, box_, constants, shear_, bend_, reach_, pair_, what)         \
   {.law = SUPINE_LAW_##id,                                                                         \
    .force = {.base = base_, .gain = gain_, .box = LIST box_, .pair = pair_},                       \
-   .direction = {.c = LIST constants},                                                             \
+   .direction = {.c = LIST constants, .shear = shear_},                                            \
    .bend = LIST bend_,                                                                             \
    .reach = reach_,                                                                                \
    .share = {1.0, 1.0}},

@@ -115,21 +115,18 @@ static supine_status find_full(supine_reference *found, const double *volume, su
   return SUPINE_OK;
 }
 
-/* Find the volumes at rest, as multiples of the default ones, at which full inflation has the known
- * volume found->scan.full. The smaller they are, the larger is full inflation. */
+/* Find the share at rest at which full inflation has the known volume found->scan.full, to which it
+ * is inversely proportional (nearly, if the scan was not exactly at rest). */
 static supine_status find_rest(supine_reference *found, const double *volume, supine_error *error) {
-  double low = 0.0;
-  double high = 1.0;
-  double whole = 0.0;
-  supine_status status = SUPINE_OK;
-  for (int halving = 0; halving < 60; ++halving) {
-    found->resting.assumed = 0.5 * (low + high);
+  supine_status status = find_full(found, volume, error);
+  double off = INFINITY;
+  for (int step = 0; step < 30 && status == SUPINE_OK && fabs(off - 1.0) > 1e-9; ++step) {
+    off = (found->full_volume[0] + found->full_volume[1]) / found->scan.full;
+    found->resting.assumed = fmin(1.0, found->resting.assumed * off);
     (void)supine_reference_resting_settle(&found->resting, 0, NULL, NULL, NULL);
     status = find_full(found, volume, error);
-    whole = found->full_volume[0] + found->full_volume[1];
-    *(whole > found->scan.full ? &low : &high) = found->resting.assumed;
   }
-  return status != SUPINE_OK || fabs(whole - found->scan.full) < 1e-6 * whole
+  return status != SUPINE_OK || fabs(off - 1.0) <= 1e-9
              ? status
              : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                                 "a scan of %.0f mL at rest does not belong to lungs of %.0f mL at "

@@ -41,13 +41,26 @@ supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model
     (void)supine_error_set(error, status, "no memory to solve %zu vertices", n);
     goto cleanup;
   }
-  status = supine_physics_directions(lungs, &model->direction, made.directions, error);
+  status =
+      supine_physics_directions(lungs, &model->force, &model->direction, made.directions, error);
   if (status != SUPINE_OK) {
     goto cleanup;
   }
   const supine_gravities gravity = {1, g, range, range + 1};
   supine_physics_force(lungs, &model->force, &gravity, n, NULL, work);
   status = supine_physics_equilibrium_solve(made.equilibrium, 1, work, made.catch_, error);
+  if (status != SUPINE_OK) {
+    goto cleanup;
+  }
+  if (model->strain != NULL) {
+    for (size_t i = 0; i < 3 * n; ++i) {
+      made.directions[i] *= made.catch_[i / 3];
+    }
+    status = supine_physics_strain_apply(model->strain, NULL, 3, made.directions, error);
+    for (size_t i = 0; i < n; ++i) {
+      made.catch_[i] = 1.0;
+    }
+  }
   if (status != SUPINE_OK) {
     goto cleanup;
   }

@@ -17,7 +17,8 @@ typedef struct supine_solution {
   double *catch_;     /**< [vertices] force that each vertex retains after exchanging force
                          with its neighbours */
   double *directions; /**< [vertices, 3] displacement of each vertex at a force of 1, mm;
-                         shorter in a collapsed lung */
+                         shorter in a collapsed lung. With model->strain it is the
+                         displacement itself, and catch_ is 1 */
   double cubic[3];    /**< volume, mL, added at scale s: cubic[0] s + cubic[1] s^2 + cubic[2] s^3 */
   supine_volume_form form[2]; /**< [lung] added volume, mL, as a polynomial of the factors that
                                  scale displacements along x, y and z */

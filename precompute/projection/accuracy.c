@@ -38,13 +38,21 @@ typedef struct accuracy_work {
 } accuracy_work;
 
 /* Compute the errors of n displacements, mm. The displacement of vertex i is its gain (a factor)
- * times the force on it, approximate[i] or exact[i], times length[i], mm per unit force. */
-SUPINE_CLONES static void find_errors(size_t n, const double *approximate, const double *exact,
-                                      const double *length, double approximate_gain,
-                                      double exact_gain, double *out) {
-  for (size_t i = 0; i < n; ++i) {
-    out[i] = fabs(approximate_gain * approximate[i] - exact_gain * exact[i]) * length[i];
+ * times the force on it, approximate[i] or exact[i], times length[i], mm per unit force. If axes is
+ * 3, approximate and exact [n, 3] are displacements. */
+SUPINE_CLONES static void find_errors(size_t n, size_t axes, const double *const field[2],
+                                      const double *length, const double gain[2], double *out) {
+  for (size_t i = 0; i < axes * n; ++i) {
+    out[i] = fabs(gain[1] * field[1][i] - gain[0] * field[0][i]) * (axes == 1 ? length[i] : 1.0);
   }
+  for (size_t i = 0; axes == 3 && i < n; ++i) {
+    out[i] = supine_length(out + 3 * i);
+  }
+}
+
+/* Return the number of rows of the compression for each vertex. */
+static size_t axes_of(const accuracy_work *work) {
+  return work->directions == NULL ? 3 : 1;
 }
 
 static void compare_block(const accuracy_work *work, size_t begin, size_t n, double *space,
@@ -53,37 +61,43 @@ static void compare_block(const accuracy_work *work, size_t begin, size_t n, dou
   const int rank = (int)truth->rank;
   const int count = (int)truth->direction_count;
   const size_t modes = work->compression->mode_count;
+  const size_t axes = axes_of(work);
+  const size_t rows = axes * n;
   double *coefficients = space;
-  double *approximate = coefficients + modes * BLOCK; /* [direction_count, n] force by modes */
-  double *exact = approximate + truth->direction_count * BLOCK;
+  double *approximate = coefficients + modes * axes * BLOCK; /* [direction_count, rows] */
+  double *exact = approximate + truth->direction_count * axes * BLOCK;
   double length[BLOCK];
-  double errors[BLOCK];
-  for (size_t i = 0; i < n; ++i) {
+  double errors[3 * BLOCK];
+  for (size_t i = 0; i < n && axes == 1; ++i) {
     length[i] = supine_length(work->directions + 3 * (begin + i));
   }
-  for (size_t i = 0; i < n * modes; ++i) {
-    coefficients[i] = (double)work->compression->coefficients[begin * modes + i];
+  for (size_t i = 0; i < rows * modes; ++i) {
+    coefficients[i] = (double)work->compression->coefficients[axes * begin * modes + i];
   }
-  cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, count, (int)n, (int)modes, 1.0,
-              work->weights, (int)modes, coefficients, (int)modes, 0.0, approximate, (int)n);
-  cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, count, (int)n, rank, 1.0, truth->functions,
-              rank, truth->columns + begin * truth->rank, rank, 0.0, exact, (int)n);
-  for (size_t d = 0; d < truth->direction_count; ++d, approximate += n, exact += n) {
-    for (size_t i = 0; i < n; ++i) {
-      const double field = exact[i] * length[i];
+  cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, count, (int)rows, (int)modes, 1.0,
+              work->weights, (int)modes, coefficients, (int)modes, 0.0, approximate, (int)rows);
+  cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, count, (int)rows, rank, 1.0,
+              truth->functions, rank, truth->columns + axes * begin * truth->rank, rank, 0.0, exact,
+              (int)rows);
+  for (size_t d = 0; d < truth->direction_count; ++d, approximate += rows, exact += rows) {
+    static const double same[2] = {1.0, 1.0};
+    const double *const fields[2] = {exact, approximate};
+    for (size_t i = 0; i < rows; ++i) {
+      const double field = exact[i] * (axes == 1 ? length[i] : 1.0);
       sums->square_sum_mm2 += field * field;
     }
-    find_errors(n, approximate, exact, length, 1.0, 1.0, errors);
+    find_errors(n, axes, fields, length, same, errors);
     supine_accuracy_tally_add(&sums->same_gain, n, errors);
-    find_errors(n, approximate, exact, length, work->gains[2 * d + 1], work->gains[2 * d], errors);
+    find_errors(n, axes, fields, length, work->gains + 2 * d, errors);
     supine_accuracy_tally_add(&sums->same_volume, n, errors);
   }
 }
 
 static void compare_range(void *context, size_t begin, size_t end, size_t thread) {
   const accuracy_work *work = context;
-  const size_t n = work->compression->row_count;
-  const size_t room = BLOCK * (work->compression->mode_count + 2 * work->truth->direction_count);
+  const size_t n = work->compression->row_count / axes_of(work);
+  const size_t room =
+      BLOCK * axes_of(work) * (work->compression->mode_count + 2 * work->truth->direction_count);
   for (size_t part = begin; part < end; ++part) {
     const size_t last = n * (part + 1) / PARTS;
     for (size_t i = n * part / PARTS; i < last; i += BLOCK) {
@@ -136,7 +150,7 @@ static double find_fraction(const accuracy_work *work, const supine_volume_forms
 
 static void conclude(const accuracy_work *work, supine_accuracy *made) {
   const double samples =
-      (double)work->compression->row_count * (double)work->truth->direction_count;
+      (double)(work->compression->row_count / axes_of(work)) * (double)work->truth->direction_count;
   tally *all = &work->tallies[0];
   for (size_t t = 1; t < PARTS; ++t) {
     all->square_sum_mm2 += work->tallies[t].square_sum_mm2;
@@ -162,7 +176,7 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
   const size_t threads = supine_thread_count();
   double *weights = malloc(count * (modes + 3) * sizeof *weights);
   tally *tallies = calloc(PARTS, sizeof *tallies);
-  double *space = malloc(threads * BLOCK * (modes + 2 * count) * sizeof *space);
+  double *space = malloc(threads * 3 * BLOCK * (modes + 2 * count) * sizeof *space);
   supine_status status = SUPINE_OK;
   *accuracy = (supine_accuracy){.direction_count = count};
   if (weights == NULL || tallies == NULL || space == NULL) {
@@ -205,9 +219,8 @@ supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const doubl
   const size_t stride = (mesh->triangle_count + SAMPLES_MAX - 1) / SAMPLES_MAX;
   supine_mesh sample = {n, mesh->vertices, (mesh->triangle_count + stride - 1) / stride,
                         malloc(3 * SAMPLES_MAX * sizeof *sample.triangles)};
-  double *amounts = malloc(n * sizeof *amounts);
   double *moved = malloc(3 * n * sizeof *moved);
-  const bool memory = sample.triangles != NULL && amounts != NULL && moved != NULL;
+  const bool memory = sample.triangles != NULL && moved != NULL;
   for (size_t t = 0; t < sample.triangle_count && memory; ++t) {
     memcpy(sample.triangles + 3 * t, mesh->triangles + 3 * t * stride,
            3 * sizeof *sample.triangles);
@@ -224,14 +237,13 @@ supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const doubl
     if (supine_volume_scale(cubic, volume_along(volume, g), &scale, NULL) != SUPINE_OK) {
       continue;
     }
-    supine_sh_compression_field(compression, weights, amounts);
+    supine_projection_displacement(compression, directions, weights, moved);
     for (size_t i = 0; i < 3 * n; ++i) {
-      moved[i] = mesh->vertices[i] + scale * amounts[i / 3] * directions[i];
+      moved[i] = mesh->vertices[i] + scale * moved[i];
     }
     *share = fmax(*share, supine_mesh_turned_over(&sample, moved));
   }
   free(sample.triangles);
-  free(amounts);
   free(moved);
   return memory ? SUPINE_OK : SUPINE_ERROR_MEMORY;
 }

@@ -42,7 +42,8 @@ typedef struct supine_truth {
 
 /** Solve the physical model for `count` held-out directions of gravity. `truth` refers to
  * `projection`, which must outlive it.
- * @param directions  [N, 3] displacement of each vertex per unit force, mm
+ * @param directions  [N, 3] displacement of each vertex per unit force, mm; NULL if rows of the
+ *   projection are coordinates of displacements
  * @param truth       release with supine_accuracy_truth_free
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_accuracy_truth_create(const supine_lungs *lungs, const supine_model *model,

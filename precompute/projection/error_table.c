@@ -15,16 +15,21 @@ enum { VERTICES_MAX = 4096 };
 
 /* Compute the scalar products gram [rank, rank] of the columns of truth->columns over evenly chosen
  * vertices. Each vertex has the weight |d|^2, where d is its displacement per unit force. For any
- * vector w, w^T gram w is then the sum of the squared displacements by the forces columns * w. */
-static void find_gram(const supine_truth *truth, size_t vertex_count, const double *directions,
+ * vector w, w^T gram w is then the sum of the squared displacements by the forces columns * w.
+ * Without directions, the rows of truth->columns are coordinates of displacements. */
+static void find_gram(const supine_truth *truth, size_t row_count, const double *directions,
                       double *gram) {
   const size_t rank = truth->rank;
+  const size_t axes = directions == NULL ? 3 : 1;
+  const size_t vertex_count = row_count / axes;
   const size_t stride = (vertex_count + VERTICES_MAX - 1) / VERTICES_MAX;
   memset(gram, 0, rank * rank * sizeof *gram);
   for (size_t i = 0; i < vertex_count; i += stride) {
-    const double *row = truth->columns + i * rank;
-    const double *d = directions + 3 * i;
-    cblas_dsyr(CblasRowMajor, CblasLower, (int)rank, supine_dot(d, d), row, 1, gram, (int)rank);
+    for (size_t row = axes * i; row < axes * (i + 1); ++row) {
+      const double *d = directions + 3 * i;
+      cblas_dsyr(CblasRowMajor, CblasLower, (int)rank, directions == NULL ? 1.0 : supine_dot(d, d),
+                 truth->columns + row * rank, 1, gram, (int)rank);
+    }
   }
 }
 

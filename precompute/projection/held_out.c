@@ -28,11 +28,13 @@ void supine_accuracy_truth_free(supine_truth *truth) {
 static supine_status find_cubics(const supine_lungs *lungs, const double *share,
                                  const double *directions, const supine_truth *truth) {
   enum { FEW = 8, AT_ONCE = SUPINE_VOLUME_FIELDS };
-  const size_t n = lungs->mesh.vertex_count;
+  const size_t axes = directions == NULL ? 3 : 1;
+  const size_t n = axes * lungs->mesh.vertex_count;
+  const size_t most = axes == 3 ? 1 : AT_ONCE;
   const size_t rank = truth->rank;
   supine_volume_forms columns = {0};
   supine_volume_form forms[2 * AT_ONCE];
-  double *fields = malloc(AT_ONCE * n * sizeof *fields);
+  double *fields = malloc((most + 1) * n * sizeof *fields);
   if (fields == NULL ||
       (rank <= FEW && supine_physics_volume_forms_create(lungs, share, directions, truth->columns,
                                                          rank, &columns, NULL) != SUPINE_OK)) {
@@ -44,13 +46,17 @@ static supine_status find_cubics(const supine_lungs *lungs, const double *share,
     supine_physics_volume_forms_contract(&columns, truth->functions + d * rank,
                                          truth->cubic + 3 * d);
   }
-  for (size_t first = 0; first < truth->direction_count && rank > FEW; first += AT_ONCE) {
+  for (size_t first = 0; first < truth->direction_count && rank > FEW; first += most) {
     const size_t left = truth->direction_count - first;
-    const size_t count = left < AT_ONCE ? left : AT_ONCE;
+    const size_t count = left < most ? left : most;
     cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)n, (int)count, (int)rank, 1.0,
                 truth->columns, (int)rank, truth->functions + first * rank, (int)rank, 0.0, fields,
                 (int)count);
-    supine_physics_volume_of_fields(lungs, share, directions, fields, count, forms);
+    for (size_t i = 0; i < n; ++i) {
+      fields[most * n + i] = 1.0;
+    }
+    supine_physics_volume_of_fields(lungs, share, axes == 3 ? fields : directions,
+                                    axes == 3 ? fields + n : fields, count, forms);
     for (size_t i = 0; i < lungs->lung_count * count; ++i) {
       supine_physics_volume_form_add(&forms[i], truth->cubic + 3 * (first + i % count));
     }

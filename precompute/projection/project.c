@@ -135,6 +135,14 @@ supine_status supine_projection_create(const supine_lungs *lungs, const supine_m
   return status;
 }
 
+void supine_projection_displacement(const supine_compression *compression, const double *directions,
+                                    const double *weights, double *u) {
+  supine_sh_compression_field(compression, weights, u);
+  for (size_t i = directions != NULL ? 3 * compression->row_count : 0; i-- > 0;) {
+    u[i] = u[i / 3] * directions[i];
+  }
+}
+
 supine_status supine_projection_volume_forms(const supine_compression *compression,
                                              const supine_lungs *lungs, const double *share,
                                              const double *directions, supine_volume_forms *forms,

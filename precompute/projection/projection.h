@@ -33,6 +33,11 @@ supine_status supine_projection_create(const supine_lungs *lungs, const supine_m
                                        size_t band, supine_projection *projection,
                                        supine_error *error);
 
+/** Compute the displacement of each vertex, mm, at mode weights: u [N, 3].
+ * @param directions  as for supine_projection_volume_forms */
+void supine_projection_displacement(const supine_compression *compression, const double *directions,
+                                    const double *weights, double *u);
+
 /** Compute the volume of each lung as a polynomial of the weights of the modes and the gains
  * (volume_forms.h), from the coefficients in single precision that a basis file stores.
  * @param share       [lungs] volume of each lung divided by its healthy volume, or NULL for 1

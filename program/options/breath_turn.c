@@ -59,8 +59,12 @@ supine_status supine_breath_turn_read(const char *text, void *turn, supine_error
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "'%s': the time must be above 0 s, as in supine:left:5s", text);
   }
-  const supine_status status = supine_options_posture(from, made->from, error);
-  return status == SUPINE_OK ? supine_options_posture(to, made->to, error) : status;
+  supine_state state[2] = {{.lung_count = 0}};
+  supine_status status = supine_state_parse_posture(from, &state[0], error);
+  status = status == SUPINE_OK ? supine_state_parse_posture(to, &state[1], error) : status;
+  memcpy(made->from, state[0].gravity, sizeof made->from);
+  memcpy(made->to, state[1].gravity, sizeof made->to);
+  return status;
 }
 
 supine_state supine_breath_state(const supine_basis *basis, const double gravity[3], double ml) {

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "program/options/model_options.h"
+#include "program/options/state_options.h"
 #include "program/options/surface_options.h"
 
 static supine_status read_scan(const char *text, void *field, supine_error *error) {
@@ -34,16 +35,6 @@ static supine_status read_resting(const char *text, void *field, supine_error *e
     status = supine_reference_resting_set(&choice->resting, piece, value, error);
   }
   return status;
-}
-
-/* Read an absolute volume, such as "4.2L". */
-static supine_status read_full(const char *text, void *field, supine_error *error) {
-  supine_state state = {.lung_count = 0};
-  const supine_status status = supine_state_parse_volume(text, &state, error);
-  *(double *)field = state.volume.ml;
-  return status == SUPINE_OK ? supine_options_fits(state.volume.kind == SUPINE_VOLUME_ABSOLUTE &&
-                                                   state.lung_count == 0)
-                             : status;
 }
 
 /* Read "uniform", or "linear:AXIS:FROM:TO" or "exp:AXIS:FROM:TO" with the expandability at both
@@ -114,12 +105,14 @@ static const char *const sexes[] = {"unknown", "female", "male", NULL};
 
 /* Parts of help texts: a line that describes each displacement law, and the defaults of its
  * constants. */
-#define LAW_HELP(id, name, base, gain, box, constants, bend, reach, pair, what) name ": " what "\n"
+#define LAW_HELP(id, name, base, gain, box, constants, shear, bend, reach, pair, what)             \
+  name ": " what "\n"
 #define LAW_BASE(id, name, base, ...) "; default " #base " for " name
 #define LAW_GAIN(id, name, base, gain, ...) "; default " #gain " for " name
 #define LAW_BOX(id, name, base, gain, box, ...) "; default " #box " for " name
 #define LAW_CONSTANTS(id, name, base, gain, box, constants, ...)                                   \
   "; default " #constants " for " name
+#define LAW_SHEAR(id, name, base, gain, box, constants, shear, ...) "; default " #shear " for " name
 
 #define FILLS(member) SUPINE_FILLS(supine_model_options, member)
 
@@ -173,7 +166,7 @@ const supine_option supine_command_model_options[] = {
     {"full", 0, "VOLUME",
      "for a scan at rest: volume of gas and tissue of the scanned lungs at full inflation, such as "
      "4200mL or 4.2L. Without it, full inflation is assumed from the usual share at rest",
-     FILLS(choice.full), .read = read_full, .wants = "a volume such as 4200mL"},
+     FILLS(choice.full), .read = supine_options_read_volume},
     {"height", 0, "CM",
      "height of the patient. Height and --sex give the volume expected at TLC (ECSC 1993, less 10 "
      "% for lying, plus 0.86 L of tissue), which is printed beside the volume of the scan. Without "
@@ -205,6 +198,10 @@ const supine_option supine_command_model_options[] = {
      "fitted to landmarks in ten full breaths (DIR-Lab COPDgene). Those of paper are fitted to "
      "landmarks in ten 4-D CTs (DIR-Lab), as the original ones are lost" SUPINE_LAWS(LAW_CONSTANTS),
      FILLS(choice.model.direction.c), .wants = "six numbers, C1,C2,C3,C4,C5,C6", .more = true},
+    {"shear", 0, "BETA",
+     "motion from back to front that grows from apex to base as lungs fill: BETA (Z - 1/2) times "
+     "the RMS displacement" SUPINE_LAWS(LAW_SHEAR),
+     FILLS(choice.model.direction.shear), .more = true},
     {"reach", 0, "MM",
      "distance over which a force spreads along the surface: the force falls with the distance r "
      "about as exp(-r/MM). Without --reach, the paper law spreads it over a few edges of the mesh; "
@@ -263,65 +260,81 @@ static void print_map(const char *path, const supine_source *source) {
   }
 }
 
+/* Say what volume the law gives the lungs in the state that was not scanned, beside the measured
+ * one. The law is not rescaled to the latter.
+ * @param measured  volume of both lungs in this state when the law was fitted, mL, or 0 */
+static void tell_volume(const supine_patient_record *record, double measured,
+                        supine_findings *findings) {
+  static const double different = 1.0 / 3.0; /* ratio of volumes minus 1 from which to warn */
+  const size_t other = record->shown == 1.0 ? 0 : 1;
+  const double *lung = record->lung_volume[other];
+  const bool both = (lung[0] > 0.0 && lung[1] > 0.0) || record->patient.frame.only_side != 0;
+  char state[160];
+  char beside[64] = "";
+  (void)supine_state_describe(&record->state[other], state, sizeof state);
+  if (measured > 0.0 && both) {
+    (void)snprintf(beside, sizeof beside, "; measured: %.0f mL", measured);
+  }
+  const double off = beside[0] != '\0' ? fabs((lung[0] + lung[1]) / measured - 1.0) : 0.0;
+  supine_findings_add(findings, "%s: by the fitted law, the lungs hold %.0f mL %s%s%s",
+                      off > different ? "warning" : "note", lung[0] + lung[1], state, beside,
+                      off > different ? ". Check that the scans show the same lungs; give "
+                                        "--landmarks to 'supine fit'"
+                                      : "");
+}
+
 /* Set options->choice to the displacement law and the force that were fitted to a patient. If the
  * state of the scan is not given, use the state in the fit. */
 static supine_status take_patient(supine_model_options *options, supine_error *error) {
-  const supine_patient_record *record = options->patient;
+  supine_patient_record *record = options->patient;
   const supine_lungs *lungs = &options->made_from.lungs;
   supine_model_choice *choice = &options->choice;
-  size_t state = 0;
-  supine_status status = supine_patient_check_place(record, lungs, &state, error);
+  const double measured[2] = {record->volume[0], record->volume[1]};
+  supine_scan scan;
+  choice->patient_law = "the patient's own";
+  choice->model = supine_physics_model(SUPINE_LAW_DEEP);
+  options->patient_arrays = malloc(4 * lungs->mesh.vertex_count * sizeof(double));
+  const supine_status status =
+      options->patient_arrays == NULL
+          ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
+                             lungs->mesh.vertex_count)
+          : supine_patient_model(record, lungs, &choice->resting, &scan, options->patient_arrays,
+                                 &choice->model, error);
   if (status != SUPINE_OK) {
     return status;
   }
-  choice->patient_law = "the patient's own";
-  choice->model = supine_physics_model(SUPINE_LAW_DEEP);
-  supine_patient_resting(record, &choice->resting);
-  if (!choice->has_scan) {
-    const double volume = 1e-3 * supine_mesh_volume(&lungs->mesh);
-    choice->has_scan = true;
-    choice->scan = supine_patient_scan(record, state, volume, &choice->resting);
-    if (state == 1 && !choice->scan.known) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "this scan is the emptier of the two that were fitted, and how far "
-                              "it is below full inflation is unknown: give its state, such as "
-                              "--scanned supine:rest, or use the fuller scan");
-    }
-    supine_findings_add(&options->findings,
-                        "note: the scan is assumed to be the %s of the two that were fitted; "
-                        "--scanned changes this",
-                        state == 0 ? "fuller" : "emptier");
-  }
-  options->patient_arrays = malloc(4 * lungs->mesh.vertex_count * sizeof(double));
-  status = options->patient_arrays == NULL
-               ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
-                                  lungs->mesh.vertex_count)
-               : supine_patient_model(record, &choice->resting, lungs, state,
-                                      options->patient_arrays, &choice->model, error);
+  tell_volume(record, measured[record->shown == 1.0 ? 0 : 1], &options->findings);
   choice->stiffness = choice->model.stiffness;
-  return status;
-}
-
-supine_status supine_command_source_load(supine_model_options *options, char **paths, size_t count,
-                                         supine_error *error) {
-  supine_progress progress = supine_options_progress_begin("label map");
-  supine_source *source = &options->made_from;
-  options->source.labels.progress = supine_options_progress_step;
-  options->source.labels.progress_context = &progress;
-  const supine_status status = supine_precompute_source_load(&options->source, paths, count, source,
-                                                             &options->findings, error);
-  supine_options_progress_end(&progress);
-  if (status == SUPINE_OK && source->is_map) {
-    print_map(paths[0], source);
+  if (choice->has_scan) {
+    return SUPINE_OK;
   }
-  return status;
+  choice->has_scan = true;
+  choice->scan = scan;
+  supine_findings_add(&options->findings,
+                      "note: the scan is assumed to be the %s of the two that were fitted; "
+                      "--scanned changes this",
+                      record->shown == 0.0 ? "fuller" : "emptier");
+  return record->shown == 0.0 || scan.known
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                "this scan is the emptier of the two that were fitted, and how far "
+                                "it is below full inflation is unknown: give its state, such as "
+                                "--scanned supine:rest, or use the fuller scan");
 }
 
 supine_status supine_command_model_load(supine_model_options *options, const char *command,
                                         char **paths, size_t count, bool keep,
                                         supine_error *error) {
+  supine_progress progress = supine_options_progress_begin("label map");
   supine_source *source = &options->made_from;
-  supine_status status = supine_command_source_load(options, paths, count, error);
+  options->source.labels.progress = supine_options_progress_step;
+  options->source.labels.progress_context = &progress;
+  supine_status status = supine_precompute_source_load(&options->source, paths, count, source,
+                                                       &options->findings, error);
+  supine_options_progress_end(&progress);
+  if (status == SUPINE_OK && source->is_map) {
+    print_map(paths[0], source);
+  }
   if (keep) {
     options->choice.scan.known = false;
     options->choice.has_scan = true;

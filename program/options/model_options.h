@@ -17,18 +17,13 @@ extern const supine_option supine_command_model_options[];
 typedef struct supine_model_options {
   supine_source_options source;
   supine_model_choice choice;
-  const supine_patient_record *patient; /* owned by the caller; NULL if there is no patient model */
+  supine_patient_record *patient; /* owned by the caller; NULL if there is no patient model */
   double *patient_arrays; /* [4 N] displacement per unit force [N, 3], mm; relative stiffness [N] */
   supine_source made_from; /* the loaded lungs, with the axes and units of their files */
   supine_prepared prepared;
   char assumed[800]; /* assumptions about the scan and the model, in words */
   supine_findings findings;
 } supine_model_options;
-
-/* Load the lungs from the files `paths` into options->made_from, and add what the checks of the
- * files found to options->findings. */
-supine_status supine_command_source_load(supine_model_options *options, char **paths, size_t count,
-                                         supine_error *error);
 
 /* Load the lungs from the files `paths`, print what the checks of the files found, and prepare the
  * model.

@@ -234,9 +234,24 @@ static supine_status check_partners(const reading *r, const supine_option *optio
 static supine_status check_given(const reading *r, size_t operands, char **argv,
                                  supine_error *error) {
   const supine_command *command = r->command;
-  if (operands > command->operands_most && command->operands_most == 0) {
+  size_t most = command->operands_most;
+  bool alone = false;
+  for (size_t i = 0; i < r->count; ++i) {
+    const supine_option *option = r->rows[i].option;
+    if (option->partners != NULL && r->rows[i].given) {
+      if (check_partners(r, option, error) != SUPINE_OK) {
+        return SUPINE_ERROR_ARGUMENT;
+      }
+      alone = option->partners[0] == '\0';
+      most = alone ? 0 : most;
+    }
+  }
+  if (operands > most && most == 0) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "unexpected argument '%s': remove it",
                             argv[optind]);
+  }
+  if (alone) {
+    return SUPINE_OK;
   }
   if (operands < command->operands_least || operands > command->operands_most) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%s", command->operands_missing);
@@ -255,10 +270,6 @@ static supine_status check_given(const reading *r, size_t operands, char **argv,
         !has_ending(r->rows[i].value, option->endings)) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%s: the name must end in %s",
                               r->rows[i].value, option->endings);
-    }
-    if (option->partners != NULL && r->rows[i].given &&
-        check_partners(r, option, error) != SUPINE_OK) {
-      return SUPINE_ERROR_ARGUMENT;
     }
   }
   return SUPINE_OK;

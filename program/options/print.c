@@ -96,6 +96,7 @@ static const struct {
               {NULL, "error_modes", "error by number of modes, share"},
               {NULL, "expected_constant_mm", "expected error^2 / displacement, mm"},
               {NULL, "expected_error", "expected error of a displacement from the scan"},
+              {NULL, "expected_error_terms", "terms of the expected error"},
               {NULL, "expected_largest_mm", "expected error, largest, mm"},
               {NULL, "expected_rms_mm", "expected error, RMS, mm"},
               {NULL, "fitted_rms_mm", "residual at the fitted points, RMS, mm"},
@@ -154,6 +155,7 @@ static const struct {
               {"states", "landmarks", "distance between landmarks"},
               {"states", "surface", "distance between surfaces"},
               {"states", "volume_ml", "volume above the start, mL"},
+              {NULL, "volumes_ml", "volumes, mL"},
               {NULL, "volume_deviation_ml", "volume, standard deviation, mL"},
               {NULL, "volume_interval_mL", "  confidence interval, +- mL"},
               {NULL, "volume_mL", "volume, from and to, mL"}};

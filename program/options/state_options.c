@@ -12,17 +12,9 @@ static const double least_of_full = 0.1;
 static const double most_of_full = 1.2;
 static const double folded_limit = 0.01; /* largest plausible share of triangles turned over */
 
-supine_status supine_options_posture(const char *text, double gravity[3], supine_error *error) {
-  supine_state state;
-  const supine_status status = supine_state_parse_posture(text, &state, error);
-  if (status == SUPINE_OK) {
-    memcpy(gravity, state.gravity, sizeof state.gravity);
-  }
-  return status;
-}
-
 static supine_status read_posture(const char *text, void *field, supine_error *error) {
-  return supine_options_posture(text, field, error);
+  *(supine_state *)field = (supine_state){.gravity = {0.0}}; /* zero if the text has no posture */
+  return supine_state_parse(text, field, error);
 }
 
 /* Read the direction X,Y,Z of gravity, by parsing it as the posture X:Y:Z. */
@@ -36,22 +28,23 @@ static supine_status read_gravity(const char *text, void *field, supine_error *e
   for (char *comma = posture; (comma = strchr(comma, ',')) != NULL;) {
     *comma = ':';
   }
-  return supine_options_posture(posture, field, error);
+  return supine_state_parse_posture(posture, field, error);
 }
 
 #define GRAVITY                                                                                    \
-  SUPINE_FILLS(supine_orientation, gravity), SUPINE_SAYS_GIVEN(supine_orientation, given),         \
+  SUPINE_FILLS(supine_orientation, state), SUPINE_SAYS_GIVEN(supine_orientation, given),           \
       .rivals = "gravity"
 
 static const char *const postures[] = {"supine",  "prone",    "left", "right",
                                        "upright", "inverted", NULL};
 
 const supine_option supine_options_orientation[] = {
-    {"posture", 0, "POSTURE",
+    {"posture", 0, "STATE",
      "supine, prone, left or right (lying on that side), upright, inverted (head down), or a "
      "DICOM patient position: HFS, FFS, HFP, FFP, HFDL, FFDL, HFDR, FFDR. +DEGREES turns gravity "
      "about the left-right axis, from the back towards the head, and -DEGREES the other way: "
-     "supine+15 and prone-15 lower the head (Trendelenburg)",
+     "supine+15 and prone-15 lower the head (Trendelenburg). With a volume, it is a state: "
+     "prone:rest+500",
      GRAVITY, .read = read_posture, .choices = postures},
     {"gravity", 0, "X,Y,Z",
      "direction of gravity in body axes, instead of a posture: x to the left, y to the back, z to "
@@ -59,17 +52,21 @@ const supine_option supine_options_orientation[] = {
      GRAVITY, .read = read_gravity, .wants = "three finite numbers, X,Y,Z"},
     {.name = NULL}};
 
-supine_status supine_options_gravity(const supine_orientation *orientation, double gravity[3],
-                                     supine_error *error) {
-  memcpy(gravity, orientation->gravity, sizeof orientation->gravity);
-  return orientation->given
+supine_status supine_options_state(const supine_orientation *orientation, supine_state *state,
+                                   supine_error *error) {
+  const supine_state *given = &orientation->state;
+  if (given->volume.kind != SUPINE_VOLUME_DEFAULT || given->lung_count > 0) {
+    *state = *given;
+  }
+  memcpy(state->gravity, given->gravity, sizeof given->gravity);
+  return given->gravity[0] != 0.0 || given->gravity[1] != 0.0 || given->gravity[2] != 0.0
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                                 "the posture is missing: give --posture or --gravity");
 }
 
-supine_status supine_options_posture_list_parse(const char *text, supine_posture_list *list,
-                                                supine_error *error) {
+supine_status supine_options_posture_list_parse(const char *text, const supine_state *standard,
+                                                supine_posture_list *list, supine_error *error) {
   supine_status status = SUPINE_OK;
   list->count = 0;
   for (const char *at = text; status == SUPINE_OK;) {
@@ -87,7 +84,9 @@ supine_status supine_options_posture_list_parse(const char *text, supine_posture
     }
     memcpy(item->name, at, length);
     item->name[length] = '\0';
-    status = supine_options_posture(item->name, item->gravity, error);
+    item->state = *standard;
+    item->state.gravity[1] = 1.0; /* supine, if the state names no posture */
+    status = supine_state_parse(item->name, &item->state, error);
     if (at[length] == '\0') {
       break;
     }
@@ -234,13 +233,11 @@ supine_status supine_options_pose_check(const supine_basis *basis, const char *c
                             : supine_options_plausible(&lungs, error);
 }
 
-supine_status supine_options_pose(const supine_basis *basis, const char *command,
-                                  const supine_volume_options *wanted, const double gravity[3],
-                                  supine_pose *pose, supine_error *error) {
-  supine_state state = wanted->state;
-  memcpy(state.gravity, gravity, sizeof state.gravity);
-  const supine_status status = supine_basis_pose(basis, &state, pose, error);
+supine_status supine_options_pose(const supine_basis *basis, const char *command, bool allow_folds,
+                                  const supine_state *state, supine_pose *pose,
+                                  supine_error *error) {
+  const supine_status status = supine_basis_pose(basis, state, pose, error);
   return status == SUPINE_OK
-             ? supine_options_pose_check(basis, command, wanted->allow_folds, &state, pose, error)
+             ? supine_options_pose_check(basis, command, allow_folds, state, pose, error)
              : status;
 }

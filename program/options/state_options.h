@@ -12,25 +12,21 @@ extern const supine_option supine_options_orientation[];
 
 typedef struct supine_orientation {
   bool given;
-  double gravity[3]; /* unit vector in body axes */
+  supine_state state; /* gravity, and the volume that --posture names, or SUPINE_VOLUME_DEFAULT */
 } supine_orientation;
 
-/* Parse a posture, such as "prone", "supine+15" (Trendelenburg, 15 degrees head down) or
- * "0.6:0:-0.8" (gravity in body axes), into a unit vector along gravity. Statuses as
- * supine_state_parse_posture. */
-supine_status supine_options_posture(const char *text, double gravity[3], supine_error *error);
-
-/* Copy the direction of gravity that --posture or --gravity has set.
- * @retval SUPINE_ERROR_ARGUMENT  neither option was given */
-supine_status supine_options_gravity(const supine_orientation *orientation, double gravity[3],
-                                     supine_error *error);
+/* Copy the direction of gravity that --posture or --gravity has set, and the volume if --posture
+ * names one. Other volumes stay in `state`.
+ * @retval SUPINE_ERROR_ARGUMENT  neither option gave a posture */
+supine_status supine_options_state(const supine_orientation *orientation, supine_state *state,
+                                   supine_error *error);
 
 enum { SUPINE_POSTURE_NAME_MAX = 48, SUPINE_POSTURE_LIST_MAX = 32 };
 
-/* A posture as the user wrote it, and the unit vector along gravity in this posture. */
+/* A state as the user wrote it. */
 typedef struct supine_posture_item {
   char name[SUPINE_POSTURE_NAME_MAX];
-  double gravity[3];
+  supine_state state;
 } supine_posture_item;
 
 typedef struct supine_posture_list {
@@ -41,12 +37,14 @@ typedef struct supine_posture_list {
 #define SUPINE_POSTURE_LIST_HELP                                                                   \
   "A posture is a name (supine, prone, left, right, upright, inverted, or a DICOM patient "        \
   "position), a name with degrees by which gravity turns from the back towards the head "          \
-  "(supine+15: Trendelenburg), or a direction of gravity in body axes, X:Y:Z (0.6:0:-0.8)."
+  "(supine+15: Trendelenburg), or a direction of gravity in body axes, X:Y:Z (0.6:0:-0.8). With "  \
+  "a volume it is a state: prone:rest+500."
 
-/* Parse a list of postures, such as "supine,prone,supine+15,0.6:0:-0.8".
+/* Parse a list of states, such as "supine,prone:rest+500,supine+15,0.6:0:-0.8".
+ * @param standard  its volume is that of states that name none
  * @retval SUPINE_ERROR_ARGUMENT */
-supine_status supine_options_posture_list_parse(const char *text, supine_posture_list *list,
-                                                supine_error *error);
+supine_status supine_options_posture_list_parse(const char *text, const supine_state *standard,
+                                                supine_posture_list *list, supine_error *error);
 
 /* Return "left side" for "left", "right side" for "right", and any other name unchanged. */
 const char *supine_options_posture_label(const char *name);
@@ -114,10 +112,10 @@ supine_status supine_options_pose_check(const supine_basis *basis, const char *c
                                         bool allow_folds, const supine_state *state,
                                         const supine_pose *pose, supine_error *error);
 
-/* Compute the pose for a direction of gravity and the requested volume, and check it. Statuses as
- * supine_basis_pose and supine_options_pose_check. */
-supine_status supine_options_pose(const supine_basis *basis, const char *command,
-                                  const supine_volume_options *wanted, const double gravity[3],
-                                  supine_pose *pose, supine_error *error);
+/* Compute the pose of a state, and check it. Statuses as supine_basis_pose and
+ * supine_options_pose_check. */
+supine_status supine_options_pose(const supine_basis *basis, const char *command, bool allow_folds,
+                                  const supine_state *state, supine_pose *pose,
+                                  supine_error *error);
 
 #endif

@@ -16,8 +16,9 @@ static supine_status find_breath(const supine_comparison *c, const supine_postur
   const supine_basis_info *info = supine_basis_get_info(c->basis);
   supine_slab slabs[SUPINE_LUNGS_MAX * SUPINE_COMPARISON_SLABS];
   supine_pose after = posture->pose;
-  supine_state state = {.volume = {SUPINE_VOLUME_ABSOLUTE, c->breath}};
-  memcpy(state.gravity, item->gravity, sizeof state.gravity);
+  supine_state state = item->state;
+  state.volume = (supine_volume){SUPINE_VOLUME_ABSOLUTE, c->breath};
+  state.lung_count = 0;
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     state.volume.ml += posture->volume[lung];
   }
@@ -31,16 +32,14 @@ static supine_status find_breath(const supine_comparison *c, const supine_postur
   if (status != SUPINE_OK) {
     return status;
   }
-  double total = 0.0;
   (void)supine_basis_volumes(c->basis, &after, posture->gain);
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     posture->gain[lung] -= posture->volume[lung];
-    total += posture->gain[lung];
   }
   (void)supine_deform(c->basis, &posture->pose, xyz[0]);
   (void)supine_deform(c->basis, &after, xyz[1]);
-  status = supine_compare_slabs(c->basis, item->gravity, xyz[0], xyz[1], SUPINE_COMPARISON_SLABS,
-                                slabs, error);
+  status = supine_compare_slabs(c->basis, item->state.gravity, xyz[0], xyz[1],
+                                SUPINE_COMPARISON_SLABS, slabs, error);
   for (size_t i = 0; status == SUPINE_OK && i < info->lung_count * SUPINE_COMPARISON_SLABS; ++i) {
     posture->slab[i % SUPINE_COMPARISON_SLABS].volume += slabs[i].volume;
     posture->slab[i % SUPINE_COMPARISON_SLABS].gain += slabs[i].gain;
@@ -48,7 +47,7 @@ static supine_status find_breath(const supine_comparison *c, const supine_postur
   for (size_t i = 0; i < SUPINE_COMPARISON_SLABS; ++i) {
     const supine_slab *slab = &posture->slab[i];
     posture->expansion[i] = slab->volume > 0.0 ? slab->gain / slab->volume : 0.0;
-    posture->share[i] = total != 0.0 ? slab->gain / total : 0.0;
+    posture->share[i] = slab->gain / c->breath;
   }
   return status;
 }
@@ -56,20 +55,27 @@ static supine_status find_breath(const supine_comparison *c, const supine_postur
 static supine_status find_posture(const supine_comparison *c, const supine_posture_item *item,
                                   float *distance, float *xyz[2], supine_compared_posture *posture,
                                   supine_error *error) {
-  supine_state state = c->state;
-  memcpy(state.gravity, item->gravity, sizeof state.gravity);
   supine_error wrong;
-  supine_status status = supine_basis_pose(c->basis, &state, &posture->pose, &wrong);
+  supine_status status = supine_basis_pose(c->basis, &item->state, &posture->pose, &wrong);
   if (status != SUPINE_OK) {
     return supine_error_set(error, status, "%s: %s", item->name, wrong.message);
   }
   (void)supine_compare_distances(c->compare, &posture->pose, &c->reference.pose, distance);
   supine_compare_statistics(c->compare, distance, &posture->displacement);
   (void)supine_basis_volumes(c->basis, &posture->pose, posture->volume);
-  status = supine_options_pose_check(c->basis, c->command, c->allow_folds, &state, &posture->pose,
-                                     error);
-  return status == SUPINE_OK && c->breath > 0.0 ? find_breath(c, item, xyz, posture, error)
-                                                : status;
+  (void)supine_options_hilum(c->basis, &posture->pose, &c->reference.pose, false, posture->hilum,
+                             NULL);
+  status = supine_options_pose_check(c->basis, c->command, c->allow_folds, &item->state,
+                                     &posture->pose, error);
+  if (status == SUPINE_OK && c->breath > 0.0) {
+    status = find_breath(c, item, xyz, posture, error);
+    posture->has_breath = status == SUPINE_OK;
+    if (status == SUPINE_ERROR_NUMERICAL) { /* the lungs cannot hold that much more */
+      supine_options_say(c->command, "note: without a breath: %s", error->message);
+      return SUPINE_OK;
+    }
+  }
+  return status;
 }
 
 /* Compute the expected error of each posture's displacement, mm RMS; 0 if it is unknown. */
@@ -77,9 +83,8 @@ static supine_status find_errors(supine_comparison *c, supine_error *error) {
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < c->postures.count && status == SUPINE_OK; ++i) {
     supine_expected expected = {0};
-    supine_state state = c->state;
-    memcpy(state.gravity, c->postures.item[i].gravity, sizeof state.gravity);
-    status = supine_options_expected_find(c->basis, &state, &c->reference.state, &expected, error);
+    status = supine_options_expected_find(c->basis, &c->postures.item[i].state, &c->reference.state,
+                                          &expected, error);
     c->posture[i].expected_error = expected.rms;
     supine_options_expected_free(&expected);
   }
@@ -160,6 +165,13 @@ void supine_report_free(supine_comparison *c) {
 
 void supine_report_volume(const supine_comparison *c, char *text, size_t size) {
   char whole[160];
+  for (size_t i = 0; i < c->postures.count; ++i) {
+    const supine_state *state = &c->postures.item[i].state;
+    if (state->volume.kind != c->state.volume.kind || state->volume.ml != c->state.volume.ml) {
+      (void)snprintf(text, size, "of each state");
+      return;
+    }
+  }
   (void)supine_state_describe(&c->state, whole, sizeof whole);
   const char *space = strchr(whole, ' '); /* end of the posture's name */
   (void)snprintf(text, size, "%s", space == NULL ? "as given" : space + 1);
@@ -171,12 +183,4 @@ bool supine_report_has_errors(const supine_comparison *c) {
     sum += c->posture[i].expected_error;
   }
   return sum > 0.0;
-}
-
-double supine_report_gain(const supine_comparison *c, size_t posture) {
-  double gain = 0.0;
-  for (size_t lung = 0; lung < supine_basis_get_info(c->basis)->lung_count; ++lung) {
-    gain += c->posture[posture].gain[lung];
-  }
-  return gain;
 }

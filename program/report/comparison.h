@@ -15,8 +15,11 @@ enum { SUPINE_COMPARISON_SLABS = 10 };
 /* Results for one posture. */
 typedef struct supine_compared_posture {
   supine_pose pose;
-  supine_distance_statistics displacement;   /* displacement from the reference pose, mm */
-  double expected_error;                     /* expected RMS error, mm; 0 if unknown */
+  supine_distance_statistics displacement; /* displacement from the reference pose, mm */
+  double expected_error;                   /* expected RMS error, mm; 0 if unknown */
+  double hilum[3]; /* displacement of the hilum from the reference pose, mm; 0 if unknown */
+  bool has_breath; /* whether the lungs can hold the breath; if not, the members from `gain` on are
+                      0 */
   double volume[SUPINE_LUNGS_MAX];           /* volume of each lung, gas and tissue, mL */
   double gain[SUPINE_LUNGS_MAX];             /* volume that each lung gains in the breath, mL */
   supine_slab slab[SUPINE_COMPARISON_SLABS]; /* horizontal slabs, uppermost first */
@@ -30,7 +33,7 @@ typedef struct supine_comparison {
   const char *made_by; /* command line, which the report prints */
   bool allow_folds;
   const supine_basis *basis;
-  supine_state state; /* supine, at the volume used for all postures */
+  supine_state state; /* supine, at the volume of all postures that name none */
   supine_from from;
   double breath; /* volume that a breath adds, mL; 0 if no breath is computed */
   supine_posture_list postures;
@@ -58,8 +61,11 @@ double supine_report_from_supine(const supine_comparison *comparison, const doub
 /* Return whether the expected error of any posture is known. */
 bool supine_report_has_errors(const supine_comparison *comparison);
 
-/* Return the volume of the breath in one of the compared postures, summed over all lungs, mL. */
-double supine_report_gain(const supine_comparison *comparison, size_t posture);
+/* Return the volume of a lung in a posture as {value, low, high, source}, or as text. The source is
+ * "measured" in the scan, "given" in mL or by --resting, "assumed" from other people, or "computed"
+ * from the scan or from a given volume. */
+struct json_t *supine_report_held(const supine_comparison *comparison, size_t posture, size_t lung,
+                                  bool as_text);
 
 /* Print the comparison to standard output, as JSON or as text with tables of the postures. */
 void supine_report_print(const supine_comparison *comparison, bool json);

@@ -49,6 +49,9 @@ static json_t *profile(const supine_comparison *c, const char *axis, bool share)
                          "value", json_sprintf("%g", low + i * step)));
   }
   for (size_t i = 0; i < c->postures.count; ++i) {
+    if (!c->posture[i].has_breath) {
+      continue;
+    }
     json_t *dots = json_array();
     for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
       const double value = percent(c, share, i, s);
@@ -110,7 +113,7 @@ json_t *supine_report_map(const supine_comparison *c) {
   for (size_t i = 0; i < c->postures.count; ++i) {
     double x;
     double y;
-    place(c->postures.item[i].gravity, &x, &y);
+    place(c->postures.item[i].state.gravity, &x, &y);
     (void)json_array_append_new(
         dots, json_pack("{s:o, s:o, s:s, s:s}", "x", json_sprintf("%.1f", x), "y",
                         json_sprintf("%.1f", y), "line", supine_report_line(i), "name",

@@ -116,13 +116,16 @@ static void print_profile(const supine_comparison *c, size_t last, bool share, F
                     : "Expansion, lowest 30 % of the height divided by uppermost 30 %:",
               to);
   for (size_t i = 0; i <= last; ++i) {
+    if (!c->posture[i].has_breath) {
+      continue;
+    }
     double gain = 0;
     for (size_t s = SUPINE_COMPARISON_SLABS / 2; s < SUPINE_COMPARISON_SLABS; ++s) {
       gain += c->posture[i].slab[s].gain;
     }
     (void)fprintf(to, share ? "%s %s %.0f %%" : "%s %s %.1f", i > 0 ? "," : "",
                   supine_options_posture_label(c->postures.item[i].name),
-                  share ? 100 * gain / supine_report_gain(c, i) : lowest_over_uppermost(c, i));
+                  share ? 100 * gain / c->breath : lowest_over_uppermost(c, i));
   }
 }
 
@@ -151,9 +154,9 @@ json_t *supine_report_postures(const supine_comparison *c) {
     find_changes(c, i, percent, ml);
     for (size_t lung = 0; lung < info->lung_count; ++lung) {
       (void)json_array_append_new(
-          lungs,
-          json_pack("{s:o, s:o}", "ml", json_sprintf("%.0f", c->posture[i].volume[lung]), "percent",
-                    json_sprintf(fabs(percent[lung]) < 0.5 ? "0" : "%+.0f", percent[lung])));
+          lungs, json_pack("{s:o, s:o, s:o}", "range", supine_report_held(c, i, lung, true), "ml",
+                           json_sprintf("%.0f", c->posture[i].volume[lung]), "percent",
+                           json_sprintf(fabs(percent[lung]) < 0.5 ? "0" : "%+.0f", percent[lung])));
     }
     for (size_t j = 0; j < sizeof published / sizeof *published; ++j) {
       if (strcmp(published[j].posture, c->postures.item[i].name) == 0) {

@@ -73,10 +73,10 @@ static json_t *picture(const supine_comparison *c, supine_renderer *renderer, si
   if (png == NULL) {
     return NULL;
   }
-  json_t *made = json_pack("{s:s, s:o, s:o}", "name",
-                           supine_options_posture_label(c->postures.item[posture].name), "png", png,
-                           "points", supine_report_direction(c->postures.item[posture].gravity));
-  set_gravity(c->postures.item[posture].gravity, made);
+  json_t *made = json_pack(
+      "{s:s, s:o, s:o}", "name", supine_options_posture_label(c->postures.item[posture].name),
+      "png", png, "points", supine_report_direction(c->postures.item[posture].state.gravity));
+  set_gravity(c->postures.item[posture].state.gravity, made);
   return made;
 }
 

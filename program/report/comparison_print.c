@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Print the comparison of postures as JSON, or as text. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
 #include "program/report/comparison.h"
 
 static json_t *statistics(const supine_distance_statistics *d) {
@@ -20,6 +24,51 @@ static json_t *by_lung(const supine_comparison *c, const double *values) {
   return list;
 }
 
+/* The logarithm of an assumed volume has a normal distribution, so that its range, one standard
+ * deviation to either side, is longer upwards. */
+json_t *supine_report_held(const supine_comparison *c, size_t posture, size_t lung, bool as_text) {
+  const supine_compared_posture *of = &c->posture[posture];
+  const supine_state *state = &c->postures.item[posture].state;
+  const char *name = supine_basis_get_info(c->basis)->lung_names[lung];
+  const bool named = state->lung_count > 0;
+  const supine_volume *volume =
+      named ? &state->lungs[strcmp(state->lungs[0].name, name) != 0].volume : &state->volume;
+  const char *spread = supine_basis_metadata(c->basis, "resting_spread");
+  const char *scanned = supine_basis_metadata(c->basis, "scan_state");
+  const bool at_rest = scanned != NULL && strstr(scanned, "rest") != NULL;
+  const supine_state scan = supine_basis_scan(c->basis);
+  double in_scan[SUPINE_LUNGS_MAX] = {0.0};
+  supine_pose pose;
+  if (supine_basis_pose(c->basis, &scan, &pose, NULL) == SUPINE_OK) {
+    supine_basis_volumes(c->basis, &pose, in_scan);
+  }
+  const double held = of->volume[lung];
+  const double share = named ? 1.0 : held / supine_options_basis_volume(c->basis, &of->pose);
+  const double above = share * volume->ml; /* part of the volume that is given */
+  const bool other = volume->kind == (at_rest ? SUPINE_VOLUME_FULL : SUPINE_VOLUME_REST);
+  const bool measured = fabs(held - in_scan[lung]) < 0.05;
+  const bool assumed = !measured && other && spread != NULL;
+  const bool given = volume->kind == SUPINE_VOLUME_ABSOLUTE || other;
+  const double ratio = assumed ? exp(strtod(spread, NULL)) : 1.0;
+  const double low = above + (held - above) / ratio;
+  const double high = above + (held - above) * ratio;
+  const char *source = measured ? "measured" : assumed ? "assumed" : given ? "given" : "computed";
+  return !as_text  ? json_pack("{s:f, s:f, s:f, s:s}", "value", held, "low", low, "high", high,
+                               "source", source)
+         : assumed ? json_sprintf("%.0f (%.0f to %.0f, %s)", held, low, high, source)
+                   : json_sprintf("%.0f (%s)", held, source);
+}
+
+static json_t *volumes(const supine_comparison *c, size_t posture, bool as_text) {
+  const supine_basis_info *info = supine_basis_get_info(c->basis);
+  json_t *list = json_object();
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    (void)json_object_set_new(list, info->lung_names[lung],
+                              supine_report_held(c, posture, lung, as_text));
+  }
+  return list;
+}
+
 static json_t *encode_slab(const supine_compared_posture *posture, size_t s) {
   const supine_slab *slab = &posture->slab[s];
   const double thickness = 1.0 / SUPINE_COMPARISON_SLABS;
@@ -33,14 +82,16 @@ static json_t *encode_postures(const supine_comparison *c) {
   for (size_t i = 0; i < c->postures.count; ++i) {
     const supine_posture_item *item = &c->postures.item[i];
     json_t *posture =
-        json_pack("{s:s, s:o, s:o}", "name", item->name, "gravity", direction(item->gravity),
+        json_pack("{s:s, s:o, s:o}", "name", item->name, "gravity", direction(item->state.gravity),
                   "displacement_mm", statistics(&c->posture[i].displacement));
+    (void)json_object_set_new(posture, "hilum_mm",
+                              supine_options_json_numbers(3, c->posture[i].hilum));
     if (supine_report_has_errors(c)) {
       (void)json_object_set_new(posture, "expected_error_mm",
                                 json_real(c->posture[i].expected_error));
     }
-    (void)json_object_set_new(posture, "volume_ml", by_lung(c, c->posture[i].volume));
-    if (c->breath > 0.0) {
+    (void)json_object_set_new(posture, "volume_ml", volumes(c, i, false));
+    if (c->posture[i].has_breath) {
       json_t *slabs = json_array();
       for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
         (void)json_array_append_new(slabs, encode_slab(&c->posture[i], s));
@@ -69,16 +120,18 @@ static void add_row(json_t *tables, const char *heading, const char *name, const
 static void add_tables(const supine_comparison *c, json_t *text) {
   char gained[64];
   (void)snprintf(gained, sizeof gained, "volume (mL) that each lung gains in a breath of %.4g mL",
-                 supine_report_gain(c, 0));
+                 c->breath);
   for (size_t i = 0; i < c->postures.count; ++i) {
     const char *name = supine_options_posture_label(c->postures.item[i].name);
     json_t *moved = statistics(&c->posture[i].displacement);
+    (void)json_object_set_new(moved, "hilum x, y, z",
+                              supine_options_json_numbers(3, c->posture[i].hilum));
     if (supine_report_has_errors(c)) {
       (void)json_object_set_new(moved, "expected error", json_real(c->posture[i].expected_error));
     }
     add_row(text, "displacement, mm", "posture", name, moved);
-    add_row(text, "volume of each lung, mL", "posture", name, by_lung(c, c->posture[i].volume));
-    if (c->breath > 0.0) {
+    add_row(text, "volume of each lung, mL", "posture", name, volumes(c, i, true));
+    if (c->posture[i].has_breath) {
       add_row(text, gained, "posture", name, by_lung(c, c->posture[i].gain));
     }
   }
@@ -88,6 +141,9 @@ static void add_tables(const supine_comparison *c, json_t *text) {
     (void)snprintf(height, sizeof height, "%zu-%zu", 100 - 10 * (s + 1), 100 - 10 * s);
     for (size_t i = 0; i < c->postures.count; ++i) {
       const char *name = supine_options_posture_label(c->postures.item[i].name);
+      if (!c->posture[i].has_breath) {
+        continue;
+      }
       (void)json_object_set_new(values[0], name, json_real(100.0 * c->posture[i].expansion[s]));
       (void)json_object_set_new(values[1], name, json_real(100.0 * c->posture[i].share[s]));
     }

@@ -4,6 +4,6 @@ import { join } from 'node:path';
 import { folder, supine } from './support.mjs';
 
 export const [mesh, basis, html] = ['lungs.ply', 'lungs.safetensors', 'lungs.html'].map((name) => join(folder, name));
-supine('phantom', '-o', mesh, '--vertices', '1500');
+supine('phantom', '-o', mesh, '--vertices', '2000');
 supine('precompute', mesh, '-o', basis);
 supine('export', basis, '-o', html);

@@ -18,14 +18,14 @@ const cards = await page.evaluate(() => [...document.querySelectorAll('#postures
 json.postures.forEach(({ name, volume_ml: ml, displacement_mm: mm }, i) => {
   if (i === 0) return assert.equal(cards[0], 'reference');
   const [, left, right, mean] = /^L (\S+) %, R (\S+) %, ([\d.]+).mm$/.exec(cards[i].replaceAll('\u2212', '-'));
-  for (const [lung, percent] of [['left', left], ['right', right]]) assert.ok(Math.abs(Number(percent) - (100 * ml[lung]) / rest.volume_ml[lung] + 100) <= 0.5, `${name}: ${cards[i]}`);
+  for (const [lung, percent] of [['left', left], ['right', right]]) assert.ok(Math.abs(Number(percent) - (100 * ml[lung].value) / rest.volume_ml[lung].value + 100) <= 0.5, `${name}: ${cards[i]}`);
   return assert.ok(Math.abs(Number(mean) - mm.mean) <= 0.051, `${name}: ${cards[i]}, not ${mm.mean}`);
 });
 const bars = await page.evaluate(() => [...document.querySelectorAll('.hold')].map((e) => [e.querySelector('.who').textContent, e.querySelector('.ml').textContent, e.querySelector('.published').hidden]));
 for (const [who, text, hidden] of bars) {
   const lung = who.split(' ')[0];
   assert.equal(who, `${lung} lung (${lung === 'left' ? 'lowermost' : 'uppermost'})`);
-  text.split(' \u2192 ').forEach((ml, i) => assert.ok(Math.abs(Number(ml) - [rest, json.postures[2]][i].volume_ml[lung]) <= 0.51, `${who}: ${text}`));
+  text.split(' \u2192 ').forEach((ml, i) => assert.ok(Math.abs(Number(ml) - [rest, json.postures[2]][i].volume_ml[lung].value) <= 0.51, `${who}: ${text}`));
   assert.equal(hidden, false);
 }
 

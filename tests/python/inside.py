@@ -225,7 +225,7 @@ assert "--held-out 60" in apart.metadata["made_by"]
 assert supine.precompute(lungs.vertices, lungs.faces, band=3, modes=2).mode_count == 2  # `faces` has VTK's layout
 with warnings.catch_warnings(record=True) as warned:
     warnings.simplefilter("always")
-    supine.precompute(1.4 * lungs.vertices, lungs.triangles, band=3)
+    supine.precompute(1.2 * lungs.vertices, lungs.triangles, band=3)
 assert warned and "an adult's" in str(warned[0].message) and warned[0].filename == __file__, warned
 refused(supine.MeshError, f"surface 1: face 0 names vertex {n + 3}", supine.precompute, lungs.vertices,
         lungs.triangles[:1].astype(np.int64) * 0 + n + 3)
@@ -236,6 +236,23 @@ refused(supine.ReadError, "nowhere.ply: cannot read", supine.precompute, "nowher
 refused(ValueError, "[N, 3]", supine.precompute, lungs.vertices[:, :2], lungs.triangles)
 refused(ValueError, "integers", supine.precompute, lungs.vertices, lungs.vertices)
 refused(TypeError, "array", supine.precompute, lungs.vertices, lungs.triangles, expandability=np.ones(n))
+
+# Another simulator's fields, of all vertices in any order and of an inner point, come back as given.
+turns = np.random.default_rng(4).normal(size=(20, 3))
+turns /= np.linalg.norm(turns, axis=1)[:, None]
+shuffled = np.random.default_rng(5).permutation(n)
+points = np.vstack([lungs.vertices.mean(0), lungs.vertices[shuffled]])
+fields = points, turns, np.einsum("mk,pk->mpk", turns, 0.02 * points)
+given = supine.precompute(lungs.vertices, lungs.triangles, fields=fields, scanned="supine")
+moved = given.deform(given.pose("prone")) - lungs.vertices
+assert np.abs(moved - lungs.vertices * (0, -0.04, 0)).max() < 2e-3 and given.mode_count == 3
+assert np.abs(given.deform(given.pose("supine")) - lungs.vertices).max() <= given.storage_error + 1e-5
+refused(supine.ArgumentError, "no volumes and no breaths", given.pose, "prone:scan+500")
+supine.save_fields(path + ".fields", *fields)
+from_file = supine.precompute(lungs.vertices, lungs.triangles, fields=path + ".fields", scanned="supine")
+assert (from_file.coefficients == given.coefficients).all()
+refused(ValueError, "displacement [M, P, 3]", supine.save_fields, path + ".fields", points[1:], *fields[1:])
+refused(supine.MeshError, "fields: the vertex at", supine.precompute, lungs.vertices + 1, lungs.triangles, fields=fields)
 
 
 def interrupt(part):

@@ -184,7 +184,7 @@ static void round_changes(const export_source *source, const export_targets *tar
                           double (*weights)[EXPORT_TARGETS_MAX], const uint32_t *order, float *base,
                           float *added) {
   /* A component that differs by at most this from that of the previous vertex becomes equal. */
-  static const float near = 2.0F / INT8_MAX;
+  static const float near = 2.5F / INT8_MAX;
   const supine_basis_info *info = source->info;
   for (size_t i = 0, lung = 0; i < info->vertex_count; ++i) {
     lung += i == info->lung_begin[lung + 1];
@@ -213,7 +213,7 @@ supine_status supine_export_targets_normals(const export_source *source, double 
   static const double supine[3] = {0, 1, 0};
   static const double step = 0.2; /* change of a weight for central differences */
   /* Changes of a lung's normals by a morph target are set to 0 if their RMS is less, radians. */
-  static const double least = 0.044;
+  static const double least = 0.035;
   const size_t n = source->info->vertex_count;
   supine_pose pose;
   double(*weights)[EXPORT_TARGETS_MAX] = malloc(source->info->lung_count * sizeof *weights);

@@ -4,11 +4,11 @@
  *
  *     POSTURE  supine, prone, left, right (lying on that side), upright, inverted, a DICOM patient
  *              position, any of them tilted (supine+15), or gravity X:Y:Z
- *     VOLUME   rest   the end of a quiet expiration in that posture (FRC, with the tissue)
- *              full   full inflation (TLC, with the tissue)
+ *     VOLUME   rest   the end of a quiet expiration in that posture, with the tissue; or FRC
+ *              full   full inflation, with the tissue; or TLC
  *              scan   the volume in the scan
  *              each alone or with +ML or -ML, such as rest+500 or full-3000;
- *              2600mL, an absolute volume of gas and tissue;
+ *              2600mL or 2.6L, an absolute volume of gas and tissue;
  *              left=VOLUME,right=VOLUME for each lung
  *     STATE    POSTURE, VOLUME or POSTURE:VOLUME
  *

@@ -30,8 +30,10 @@ from . import _augment, _program
 from ._augment import Deform, Sample, augment, random_states
 from ._library import (ArgumentError, Error, FormatError, MeshError, NumericalError, OpenSurfaceError,
                        OutOfMemoryError, ReadError, UnsupportedError)
+from ._program import save_fields
 
-__all__ = ["open", "precompute", "embed", "augment", "random_states", "Deform", "Sample", "Basis", "Pose", "Location", "gravity", "gravity_of_quaternion", "tilt", "postures", "breath", "Gravity",
+__all__ = ["open", "precompute", "save_fields", "embed", "augment", "random_states", "Deform", "Sample", "Basis",
+           "Pose", "Location", "gravity", "gravity_of_quaternion", "tilt", "postures", "breath", "Gravity",
            "Error", "ArgumentError", "FormatError", "MeshError", "NumericalError", "OpenSurfaceError",
            "OutOfMemoryError", "ReadError", "UnsupportedError"]
 __version__: str = _c.string(_c.version())
@@ -438,6 +440,7 @@ def precompute(*surfaces: Any, progress: Optional[_program.Progress] = None, **o
         precompute(vertices, faces, scanned="supine:rest")      # vertices [N, 3], faces [M, 3] of one lung or both
         precompute((vertices, faces), (vertices, faces))        # one surface for each lung
         precompute("lungs.nii.gz", resting={"supine": "2600mL"}, output="lungs.safetensors")
+        precompute(vertices, faces, fields=(points, gravity, displacement))  # of another simulator: `save_fields`
 
     The basis has the vertices of the left lung first, and the vertices of each lung in the given order. Options are
     those of `supine precompute --help`: held_out=200 becomes --held-out 200. The value True becomes a flag, a tuple

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import os
 import re
 import shutil
@@ -77,6 +78,29 @@ def _write_points(path: str, points: Union[ArrayLike, Mapping[str, Sequence[floa
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["x", "y", "z", "name"] if names else ["x", "y", "z"])
         writer.writerows([row + name for row, name in zip(rows, names)] if names else rows)
+
+
+def save_fields(path: Union[str, "os.PathLike[str]"], points: ArrayLike, gravity: ArrayLike,
+                displacement: ArrayLike) -> None:
+    """Write another simulator's displacement fields as a safetensors file for `supine precompute --fields`.
+
+    points: [P, 3], positions of the points before they move, such as the nodes of a volume mesh; each vertex of the
+        surface must be among them
+    gravity: [M, 3], direction of gravity of each simulation
+    displacement: [M, P, 3], displacement of each point in each simulation
+    All in the axes and unit of the file of the surface. Numbers are stored as float32."""
+    arrays = {"points": np.asarray(points, "<f4"), "gravity": np.asarray(gravity, "<f4"),
+              "displacement": np.asarray(displacement, "<f4")}
+    shapes = [array.shape for array in arrays.values()]
+    if shapes[1:] != [shapes[2][:1] + (3,), shapes[2][:1] + shapes[0]] or shapes[0][1:] != (3,):
+        raise ValueError(f"expected points [P, 3], gravity [M, 3] and displacement [M, P, 3], not {shapes}")
+    header, end = {}, 0
+    for name, array in arrays.items():
+        header[name] = {"dtype": "F32", "shape": array.shape, "data_offsets": [end, end + array.nbytes]}
+        end += array.nbytes
+    text = json.dumps(header).encode()
+    with open(path, "wb") as file:
+        file.write(len(text).to_bytes(8, "little") + text + b"".join(array.tobytes() for array in arrays.values()))
 
 
 def _listen(terminal: int, command: str, progress: Optional[Progress]) -> str:
@@ -175,6 +199,10 @@ def make(command: str, lungs: Any, content: Sequence[Any], options: dict[str, An
                 _write_mesh(new_file(f"surface {number}", ".ply"), *item)
             else:
                 _write_points(new_file(f"points {number}", ".csv"), item)
+        if isinstance(options.get("fields"), tuple):
+            fields = os.path.join(folder, "fields")
+            save_fields(fields, *options["fields"])
+            options["fields"], names[fields] = fields, "fields"
         kept = options.pop("output", None)
         made = os.path.join(folder, "basis.safetensors") if kept is None else os.fspath(kept)
         names[made] = "basis" if kept is None else made
