@@ -75,7 +75,6 @@ static supine_status add_pair(const supine_basis *basis, const supine_command_na
   supine_pose pose[2];
   supine_expected expected = {0};
   supine_target *targets = NULL;
-  double h[3] = {0.0};
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < 2 && status == SUPINE_OK; ++i) {
     status = supine_basis_pose(basis, &item[i]->state, &pose[i], error);
@@ -83,9 +82,6 @@ static supine_status add_pair(const supine_basis *basis, const supine_command_na
   if (status == SUPINE_OK) {
     status =
         supine_options_expected_find(basis, &item[1]->state, &item[0]->state, &expected, error);
-  }
-  if (status == SUPINE_OK) {
-    status = supine_options_hilum(basis, &pose[1], &pose[0], in_hilum, h, error);
   }
   if (status == SUPINE_OK) {
     status =
