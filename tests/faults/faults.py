@@ -46,7 +46,7 @@ precompute lungs.ply --band 2 -o out/a.safetensors
 precompute lungs.stl --band 2 --law paper --modes harmonics -o out/a.safetensors
 precompute lungs.obj --band 2 --law paper --reach 10 --soften 1 -o out/a.safetensors
 precompute lungs.ply --band 2 --lesion 0,0,0,5,3 --lung left:0.3 --scanned full-500 -o out/a.safetensors
-precompute mask.nrrd --labels left=1,right=2 --edge 20 --band 2 -o out/a.safetensors
+precompute mask.nrrd --labels left=1,right=2 --edge 20 --band 2 --units mm -o out/a.safetensors
 precompute lungs.ply --fields fields.safetensors -o out/a.safetensors
 precompute lungs.ply --band 2 --patient patient.json -o out/a.safetensors
 solve lungs.ply --posture prone -o out/a.vtp
@@ -173,13 +173,6 @@ def samples(folder):
     (folder / "points.csv").write_text("name,x,y,z\ncarina,60,-180,-60\nnodule,-80,-120,-90\n")
     (folder / "samples.csv").write_text("pressure_cmH2O,volume_mL\n" + "".join(
         f"{p},{3000 / (1 + 2.718281828 ** ((8 - p) / 5)):.3f}\n" for p in range(-10, 36, 2)))
-    vertices, made = 84, random.Random(5)  # lungs.ply has 84 vertices
-    shapes = {"gravity": [3, 3], "displacement": [3, vertices, 3]}
-    values = [0, 1, 0, 0, -1, 0, 1, 0, 0] + [made.uniform(-9, 9) for _ in range(9 * vertices)]
-    header = json.dumps({name: {"dtype": "F64", "shape": shapes[name], "data_offsets": at} for name, at in
-                         (("gravity", [0, 72]), ("displacement", [72, 72 + 72 * vertices]))}).encode()
-    (folder / "fields.safetensors").write_bytes(struct.pack(f"<Q{len(header)}s{len(values)}d", len(header),
-                                                            header, *values))
     (folder / "image.nrrd").write_text(
         "NRRD0004\ntype: float\ndimension: 3\nspace: LPS\nsizes: 6 6 5\nspace directions: "
         "(60,0,0) (0,60,0) (0,0,60)\nspace origin: (-150,-340,-260)\nencoding: ascii\n\n"
@@ -197,6 +190,20 @@ def samples(folder):
     (folder / "pairs.csv").write_text("x,y,z,to_x,to_y,to_z\n" + "".join(rows))
 
 
+def write_fields(folder):
+    """Write displacements of the vertices of lungs.ply, which must exist, for three directions of gravity."""
+    data = (folder / "lungs.ply").read_bytes()
+    vertices, made = int(re.search(rb"element vertex (\d+)", data).group(1)), random.Random(5)
+    points = struct.unpack_from(f"<{3 * vertices}f", data, data.index(b"end_header\n") + 11)
+    shapes = {"points": [vertices, 3], "gravity": [3, 3], "displacement": [3, vertices, 3]}
+    values = [*points, 0, 1, 0, 0, -1, 0, 1, 0, 0] + [made.uniform(-9, 9) for _ in range(9 * vertices)]
+    ends = [0, 24 * vertices, 24 * vertices + 72, 96 * vertices + 72]
+    header = json.dumps({name: {"dtype": "F64", "shape": shapes[name], "data_offsets": ends[i:i + 2]}
+                         for i, name in enumerate(shapes)}).encode()
+    (folder / "fields.safetensors").write_bytes(struct.pack(f"<Q{len(header)}s{len(values)}d", len(header),
+                                                            header, *values))
+
+
 def main():
     program = Path(sys.argv[1]).resolve()
     library = Path(sys.argv[2]).resolve() if len(sys.argv) > 2 else None
@@ -211,6 +218,7 @@ def main():
         for line in BEFORE.split("\n"):
             if line and trial.run(line.split())[0] != 0:
                 sys.exit(f"{line}: {trial.run(line.split())[2]}")
+        write_fields(trial.folder)
         kept = trial.folder / "kept"
         for line in filter(lambda text: text and word in text, COMMANDS.split("\n")):
             if library is None:
