@@ -6,11 +6,7 @@
 
 #include "precompute/normals/normal_modes.h"
 
-/* Return the number of monomials in the component of a normal along one axis. Let w_k be the
- * weights of the displacement modes, and let a and b be the gains (factors on the displacement) of
- * the next two axes in cyclic order. The monomials are
- *
- *     1, a w_k, b w_k, a b w_k w_l for k <= l */
+/* Return the number of monomials phi_c (normal_modes.h) of a normal along one axis. */
 static inline size_t supine_normals_terms(size_t modes) {
   return 1 + 2 * modes + modes * (modes + 1) / 2;
 }

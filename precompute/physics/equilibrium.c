@@ -174,14 +174,10 @@ static size_t find_edge(const supine_equilibrium *eq, uint32_t a, uint32_t b) {
   return e;
 }
 
-/* Compute eq->area and eq->edge_term for a smoothing length R = eq->reach > 0.
- *
- * The linear system is the weak form of (1 - R^2 Laplacian) F = b on the surface, divided by the
- * mean vertex area A. The term of the edge between vertices i and j is (R^2 c / A) (F_i - F_j),
- * with a factor c such that the sum of c (F_i - F_j)^2 over all edges approximates the integral of
- * |grad F|^2. Here c = 2 s / h^2, where h is the length of the edge, and s is the sum of a third of
- * the area of each triangle at the edge. This is exact if edges run equally in all directions.
- * Unlike cotangent weights, c is never negative, but R^2 is accurate only to about 10 %. */
+/* Compute eq->area and eq->edge_term = w_ij / 2 for a smoothing length R = eq->reach > 0. With
+ * these weights, the sum of 2 s / h^2 (F_i - F_j)^2 over all edges approximates the integral of
+ * |grad F|^2; it is exact if edges run equally in all directions. Unlike cotangent weights, they
+ * are never negative, but R^2 is accurate only to about 10 %. */
 static void set_reach(supine_equilibrium *eq, const supine_mesh *mesh) {
   const size_t n = eq->vertex_count;
   const double *p = mesh->vertices;

@@ -65,9 +65,8 @@ static supine_status check_folds(const ascent *a, supine_error *error) {
  *     sigma  position of the scan on the lung's path: 0 at full inflation, 1 at rest
  *     ratio  gains on this path as multiples of s (supine_volume_bend)
  *
- * Displacing the scan with gains -A leads to full inflation, and with gains s - A to rest. This
- * changes the volume, mL, by form(-A) = to_full and form(s - A) = to_rest. For any sigma, the first
- * equation gives s. Secant steps find the sigma that satisfies the second equation. */
+ * The volumes at full inflation and at rest demand form(-A) = to_full and form(s - A) = to_rest,
+ * mL. For any sigma, the first equation gives s; secant steps find the sigma of the second. */
 static supine_status find_lung_gains(const supine_volume_form *form, const double bend[3],
                                      bool at_rest, double to_full, double to_rest, double gains[3],
                                      supine_error *error) {
