@@ -66,7 +66,7 @@ static void add_target(const supine_posture_item *const item[2], const supine_ta
   (void)json_array_append_new(list, entry);
 }
 
-/* Append to a list the displacements of the hilum and of each named structure between two postures.
+/* Append to a list the displacements of each named structure and of the hilum between two postures.
  * If `in_hilum`, subtract the hilum's from the others. */
 static supine_status add_pair(const supine_basis *basis, const supine_command_names *names,
                               const supine_posture_item *const item[2], bool in_hilum, json_t *list,
@@ -91,16 +91,16 @@ static supine_status add_pair(const supine_basis *basis, const supine_command_na
   if (status == SUPINE_OK) {
     status = supine_options_hilum(basis, &pose[1], &pose[0], in_hilum, hilum.move, error);
   }
-  if (status == SUPINE_OK && supine_length(hilum.move) > 0.0) {
-    hilum.moved = supine_length(hilum.move);
-    hilum.volume[0] = hilum.volume[1] = targets[0].volume[0] != 0.0 ? (double)NAN : 0.0;
-    add_target(item, &hilum, list);
-  }
   for (size_t i = 0; status == SUPINE_OK && i < names->count; ++i) {
     if (in_hilum) {
       supine_command_target_shift(&targets[i], hilum.move);
     }
     add_target(item, &targets[i], list);
+  }
+  if (status == SUPINE_OK && supine_length(hilum.move) > 0.0) {
+    hilum.moved = supine_length(hilum.move);
+    hilum.volume[0] = hilum.volume[1] = targets[0].volume[0] != 0.0 ? (double)NAN : 0.0;
+    add_target(item, &hilum, list);
   }
   free(targets);
   supine_options_expected_free(&expected);
@@ -124,6 +124,27 @@ static supine_status compare_content(const supine_basis *basis, const supine_pos
   }
   json_decref(list);
   supine_command_names_close(&names);
+  return status;
+}
+
+/* Compute, print and write the comparison of the lungs. */
+static supine_status report(supine_comparison *c, const request *wanted, supine_error *error) {
+  supine_status status = SUPINE_OK;
+  if (wanted->inside != NULL) {
+    status = supine_command_inside_open(c->basis, wanted->inside, &c->inside, &c->names, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_report_find(c, error);
+  }
+  if (status == SUPINE_OK) {
+    supine_report_print(c, wanted->json);
+  }
+  if (status == SUPINE_OK && wanted->html != NULL) {
+    status = write_html(wanted->html, c, error);
+  }
+  supine_report_free(c);
+  supine_command_names_close(&c->names);
+  supine_basis_close(c->inside);
   return status;
 }
 
@@ -167,23 +188,7 @@ static supine_status compare(const char *path, const char *made_by, const supine
   if (content) {
     return compare_content(basis, &comparison.postures, wanted, error);
   }
-  if (wanted->inside != NULL) {
-    status = supine_command_inside_open(basis, wanted->inside, &comparison.inside,
-                                        &comparison.names, error);
-  }
-  if (status == SUPINE_OK) {
-    status = supine_report_find(&comparison, error);
-  }
-  if (status == SUPINE_OK) {
-    supine_report_print(&comparison, wanted->json);
-  }
-  if (status == SUPINE_OK && wanted->html != NULL) {
-    status = write_html(wanted->html, &comparison, error);
-  }
-  supine_report_free(&comparison);
-  supine_command_names_close(&comparison.names);
-  supine_basis_close(comparison.inside);
-  return status;
+  return report(&comparison, wanted, error);
 }
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {

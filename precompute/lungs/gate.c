@@ -107,7 +107,7 @@ static const char to_accept[] = ". To use this size all the same, add --units mm
 static void check_size(checks *c, const supine_lungs *lungs, bool likely) {
   const supine_status refuse = c->source->units_given ? SUPINE_OK : SUPINE_ERROR_MESH;
   const char *accept = refuse == SUPINE_OK ? "" : to_accept;
-  const double ml = 1e-3 * supine_mesh_volume(&lungs->mesh);
+  const double ml = lungs->volume[0] + lungs->volume[1];
   const double most = lungs->lung_count == 2 ? 1.0 : 0.6; /* largest share of a pair's volume */
   const double height = lungs->maximum[2] - lungs->minimum[2];
   const double ratio = height / (lungs->maximum[0] - lungs->minimum[0]);
@@ -153,7 +153,7 @@ static double volume_beyond(const supine_mesh *mesh, int axis, double sign, doub
 /* Check that a lung has no long, thin tip, as of a stray vertex or a trachea, and no flat end. */
 static void check_tips(checks *c, const supine_lungs *lungs, size_t lung) {
   const supine_mesh part = supine_lungs_part(lungs, lung);
-  const double volume = supine_mesh_volume(&part);
+  const double volume = 1e3 * lungs->volume[lung];
   for (int tip = 0; tip < 6; ++tip) {
     const int axis = tip / 2;
     const double sign = tip % 2 == 0 ? -1.0 : 1.0;

@@ -222,10 +222,19 @@ static supine_status check_midline(const supine_lungs *lungs, bool two_sided, su
   return SUPINE_OK;
 }
 
+void supine_lungs_measure(supine_lungs *lungs) {
+  supine_mesh_box(&lungs->mesh, lungs->minimum, lungs->maximum);
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+    const supine_mesh part = supine_lungs_part(lungs, lung);
+    lungs->volume[lung] = 1e-3 * supine_mesh_volume(&part);
+  }
+}
+
 static void face_outwards(supine_lungs *lungs) {
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     const supine_mesh part = supine_lungs_part(lungs, lung);
-    lungs->reversed[lung] = supine_mesh_volume(&part) < 0.0;
+    lungs->reversed[lung] = lungs->volume[lung] < 0.0;
+    lungs->volume[lung] = fabs(lungs->volume[lung]);
     if (lungs->reversed[lung]) {
       supine_mesh_reverse(&part);
     }
@@ -276,6 +285,7 @@ supine_status supine_lungs_create(const supine_mesh *meshes, size_t count, const
   SUPINE_TRY(check_surfaces(meshes, count, error));
   SUPINE_TRY(join(meshes, count, &made.mesh, error));
   SUPINE_TRY(measure(&made, midline, error));
+  supine_lungs_measure(&made);
   face_outwards(&made);
   *lungs = made;
   made = (supine_lungs){0};

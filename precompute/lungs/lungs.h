@@ -18,6 +18,7 @@ typedef struct supine_lungs {
   size_t triangle_begin[3]; /**< lung j: triangle_begin[j] <= triangle < triangle_begin[j + 1] */
   int side[2];              /**< [lung] +1 left, -1 right */
   bool reversed[2];         /**< whether the lung's triangles faced inwards and were reversed */
+  double volume[2];         /**< [lung] volume that its surface encloses, mL */
   double minimum[3];        /**< bounding box over all lungs, mm */
   double maximum[3];
   double *scanned; /**< [vertices, 3] positions in the scan, mm, if `mesh` shows full inflation
@@ -39,6 +40,9 @@ typedef struct supine_lungs {
  */
 supine_status supine_lungs_create(const supine_mesh *meshes, size_t count, const double *midline,
                                   supine_lungs *lungs, supine_error *error);
+
+/** Update the bounding box and the volumes after vertices have moved. */
+void supine_lungs_measure(supine_lungs *lungs);
 
 /** Free the arrays; a zeroed struct is legal. */
 void supine_lungs_free(supine_lungs *lungs);
