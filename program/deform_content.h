@@ -15,7 +15,7 @@ typedef struct supine_deform_content {
   const char *path, *field, *image, *labels;
   const char *labels_path; /* output of --labels, if --image is given, too; or NULL */
   bool inverse, density;
-  bool vertices; /* whether a CSV file has a row for each vertex */
+  bool vertices;                     /* whether a CSV file has a row for each vertex */
   supine_image source, label_source; /* the image and the label map to move, once read */
 } supine_deform_content;
 
