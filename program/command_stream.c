@@ -239,9 +239,11 @@ static supine_status open_page(const request *wanted, const supine_basis *basis,
     status = supine_options_reference(basis, &wanted->from, true, &from, error);
   }
   if (status == SUPINE_OK) {
+    const export_reference reference = {&from.pose, from.name, from.state.gravity,
+                                        supine_options_above_rest(&from.state)};
     const export_page shown = {.breath = wanted->breath.tidal,
-                               .from = &from.pose,
-                               .from_name = from.name,
+                               .from = &reference,
+                               .from_count = 1,
                                .title = "Lungs, live",
                                .live = true};
     status = make_page(path, &shown, page, &site.page_size, error);

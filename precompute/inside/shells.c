@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/vec3.h"
 
 #include "precompute/inside/shells.h"
@@ -31,8 +32,7 @@ static supine_status create_shell(const supine_basis_info *info, const float *sc
   shell->vertices = malloc(3 * shell->vertex_count * sizeof *shell->vertices);
   shell->triangles = malloc(3 * (info->triangle_count + 1) * sizeof *shell->triangles);
   if (shell->vertices == NULL || shell->triangles == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the surface of %zu vertices",
-                            shell->vertex_count);
+    return supine_error_memory(error, "the surface of %zu vertices", shell->vertex_count);
   }
   for (size_t i = 0; i < 3 * shell->vertex_count; ++i) {
     shell->vertices[i] = (double)scanned[3 * begin + i];
@@ -61,36 +61,41 @@ static supine_status create_shell(const supine_basis_info *info, const float *sc
                                       true, &shell->surface, error);
 }
 
-supine_status supine_inside_shells_create(const supine_basis *basis, supine_inside_shells *shells,
-                                          supine_error *error) {
+static supine_status create_shells(supine_inside_shells *shells, supine_error *error) {
+  const supine_basis *basis = shells->basis;
   const supine_basis_info *info = supine_basis_get_info(basis);
-  *shells = (supine_inside_shells){.basis = basis, .count = info->lung_count};
+  const supine_state scan = supine_basis_scan(basis);
   if (supine_basis_metadata(basis, "content") != NULL) {
     return supine_error_set(
         error, SUPINE_ERROR_FORMAT,
         "the basis already holds %s inside lungs: give the basis of the lungs' surface",
         supine_basis_metadata(basis, "content"));
   }
-  float *scanned = malloc(3 * info->vertex_count * sizeof *scanned);
-  const supine_state scan = supine_basis_scan(basis);
-  supine_status status = scanned != NULL
-                             ? supine_basis_pose(basis, &scan, &shells->scan, error)
-                             : supine_error_set(error, SUPINE_ERROR_MEMORY,
-                                                "no memory for %zu vertices", info->vertex_count);
-  if (status == SUPINE_OK) {
-    (void)supine_deform(basis, &shells->scan, scanned);
+  SUPINE_ARENA arena = {0};
+  float *scanned = supine_arena_take(&arena, 3 * info->vertex_count, sizeof *scanned);
+  if (arena.failed) {
+    return supine_error_memory(error, "%zu vertices", info->vertex_count);
   }
-  for (size_t i = 0; i < 3 * info->vertex_count && status == SUPINE_OK; ++i) {
+  SUPINE_TRY(supine_basis_pose(basis, &scan, &shells->scan, error));
+  (void)supine_deform(basis, &shells->scan, scanned);
+  for (size_t i = 0; i < 3 * info->vertex_count; ++i) {
     if (!isfinite(scanned[i])) {
-      status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                                "the basis cannot reach the scan's volume: make a new basis, and "
-                                "state with --scanned how full the lungs were in the scan");
+      return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                              "the basis cannot reach the scan's volume: make a new basis, and "
+                              "state with --scanned how full the lungs were in the scan");
     }
   }
-  for (size_t lung = 0; lung < shells->count && status == SUPINE_OK; ++lung) {
-    status = create_shell(info, scanned, lung, &shells->shell[lung], error);
+  for (size_t lung = 0; lung < shells->count; ++lung) {
+    SUPINE_TRY(create_shell(info, scanned, lung, &shells->shell[lung], error));
   }
-  free(scanned);
+  return SUPINE_OK;
+}
+
+supine_status supine_inside_shells_create(const supine_basis *basis, supine_inside_shells *shells,
+                                          supine_error *error) {
+  *shells =
+      (supine_inside_shells){.basis = basis, .count = supine_basis_get_info(basis)->lung_count};
+  const supine_status status = create_shells(shells, error);
   if (status != SUPINE_OK) {
     supine_inside_shells_free(shells);
   }
@@ -205,42 +210,34 @@ void supine_inside_shells_reading(const supine_inside_shells *shells,
   }
 }
 
-/* Return whether a point of the reference surface belongs to a hilum. */
-static bool is_hilar(const float *p, float box[2][3], double midline) {
-  const double from_midline = (double)p[0] - midline;
-  const double width =
-      from_midline > 0.0 ? (double)box[1][0] - midline : midline - (double)box[0][0];
-  bool hilar = fabs(from_midline) < 0.35 * width;
-  for (size_t k = 1; k < 3; ++k) {
-    const double at = (double)(p[k] - box[0][k]) / (double)(box[1][k] - box[0][k]);
-    hilar = hilar && fabs(at - 0.5) < 0.2;
+/* Return whether a point of the reference surface belongs to the hilum of its lung.
+ * @param box  lowest and highest corner of the box around the lung, mm */
+static bool is_hilar(const float *p, const float box[6], bool left) {
+  float at[3]; /* 0 to 1: from the midline, from the front, from the base */
+  for (size_t k = 0; k < 3; ++k) {
+    at[k] = (p[k] - box[k]) / (box[3 + k] - box[k]);
   }
-  return hilar;
+  return (left ? at[0] : 1.0F - at[0]) < 0.35F && fabsf(at[1] - 0.5F) < 0.2F &&
+         fabsf(at[2] - 0.5F) < 0.2F;
 }
 
 bool supine_inside_hilum(const supine_basis *basis, double *mean) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const supine_tensor *stored = supine_basis_tensor(basis, "lungs_hilum");
-  const char *midline = supine_basis_metadata(basis, "midline_mm");
   const size_t modes = info->mode_count;
   const size_t columns = 3 * modes;
-  float box[2][3];
+  bool found = supine_basis_metadata(basis, "content") == NULL;
   memset(mean, 0, info->lung_count * columns * sizeof *mean);
   if (stored != NULL && stored->dtype == SUPINE_F64 && stored->rank == 3 &&
       stored->shape[0] == info->lung_count && stored->shape[1] * stored->shape[2] == columns) {
     memcpy(mean, stored->data, info->lung_count * columns * sizeof *mean);
     return true;
   }
-  for (size_t i = 0; i < 3 * info->vertex_count; ++i) {
-    const float x = info->vertices[i];
-    box[0][i % 3] = i < 3 ? x : fminf(box[0][i % 3], x);
-    box[1][i % 3] = i < 3 ? x : fmaxf(box[1][i % 3], x);
-  }
-  bool found = midline != NULL && supine_basis_metadata(basis, "content") == NULL;
   for (size_t lung = 0; lung < info->lung_count && found; ++lung) {
     double count = 0.0;
     for (size_t i = info->lung_begin[lung]; i < info->lung_begin[lung + 1]; ++i) {
-      const bool hilar = is_hilar(info->vertices + 3 * i, box, strtod(midline, NULL));
+      const bool hilar = is_hilar(info->vertices + 3 * i, info->bounds + 6 * lung,
+                                  info->lung_names[lung][0] == 'l');
       count += hilar ? 1.0 : 0.0;
       for (size_t k = 0; k < columns && hilar; ++k) {
         mean[lung * columns + k] += info->vector
@@ -252,7 +249,7 @@ bool supine_inside_hilum(const supine_basis *basis, double *mean) {
     for (size_t k = 0; k < columns; ++k) {
       mean[lung * columns + k] /= fmax(1.0, count);
     }
-    found = found && count > 0.0;
+    found = count > 0.0;
   }
   return found;
 }
