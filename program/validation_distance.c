@@ -9,6 +9,7 @@
 
 #include "program/validation.h"
 
+#include "base/arena.h"
 #include "base/vec3.h"
 #include "precompute/lungs/surface.h"
 
@@ -152,46 +153,51 @@ static bool fit_map(supine_patient_map kind, size_t n, const double *vertices,
   return true;
 }
 
+/* Build the trees of both surfaces, fit all maps and measure their distances; see
+ * supine_command_compare_surfaces. */
+static supine_status compare(surfaces *s, const supine_mesh *start,
+                             supine_patient_scan_motion moved, double *predicted, double *nearest,
+                             supine_command_distance *distance, supine_error *error) {
+  const supine_mesh *state = s->state;
+  const size_t bytes = 3 * s->count * sizeof(double);
+  memcpy(s->moved, predicted, bytes);
+  SUPINE_TRY(supine_inside_surface_create(state->vertices, state->triangle_count, state->triangles,
+                                          false, &s->state_tree, error));
+  SUPINE_TRY(supine_inside_surface_create(s->moved, start->triangle_count, start->triangles, false,
+                                          &s->tree, error));
+  for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT; ++k) {
+    const bool own = k == SUPINE_PATIENT_MAP_PREDICTED;
+    if (!fit_map(map_of(k, moved), s->count, own ? predicted : start->vertices, s->state_tree,
+                 s->space, s->moved)) {
+      return undetermined(error);
+    }
+    surface_distance(s, own ? nearest : NULL, &distance[k]);
+    if (own) {
+      memcpy(predicted, s->moved, bytes);
+    }
+  }
+  explain(moved, distance);
+  return SUPINE_OK;
+}
+
 supine_status
 supine_command_compare_surfaces(const supine_mesh *start, supine_patient_scan_motion moved,
                                 double *predicted, const supine_mesh *state, double *nearest,
                                 supine_command_distance distance[SUPINE_PATIENT_MAP_COUNT],
                                 supine_error *error) {
+  SUPINE_ARENA arena = {0};
   const size_t n = start->vertex_count;
   const size_t numbers = 10 * (size_t)FITTED_MAX + 4 * (n + state->vertex_count);
-  surfaces s = {n,    malloc(3 * n * sizeof(double)),  state, NULL,
-                NULL, malloc(numbers * sizeof(double))};
-  supine_status status = supine_patient_check_boxes(start, state, error);
-  if (status == SUPINE_OK && (s.space == NULL || s.moved == NULL)) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
+  surfaces s = {.count = n,
+                .moved = supine_arena_take(&arena, 3 * n, sizeof(double)),
+                .state = state,
+                .space = supine_arena_take(&arena, numbers, sizeof(double))};
+  SUPINE_TRY(supine_patient_check_boxes(start, state, error));
+  if (arena.failed) {
+    return supine_error_memory(error, "%zu vertices", n);
   }
-  if (status == SUPINE_OK) {
-    status = supine_inside_surface_create(state->vertices, state->triangle_count, state->triangles,
-                                          false, &s.state_tree, error);
-  }
-  if (status == SUPINE_OK) {
-    memcpy(s.moved, predicted, 3 * n * sizeof(double));
-    status = supine_inside_surface_create(s.moved, start->triangle_count, start->triangles, false,
-                                          &s.tree, error);
-  }
-  for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT && status == SUPINE_OK; ++k) {
-    const bool own = k == SUPINE_PATIENT_MAP_PREDICTED;
-    if (fit_map(map_of(k, moved), n, own ? predicted : start->vertices, s.state_tree, s.space,
-                s.moved)) {
-      surface_distance(&s, own ? nearest : NULL, &distance[k]);
-    } else {
-      status = undetermined(error);
-    }
-    if (own && status == SUPINE_OK) {
-      memcpy(predicted, s.moved, 3 * n * sizeof(double));
-    }
-  }
-  if (status == SUPINE_OK) {
-    explain(moved, distance);
-  }
+  const supine_status status = compare(&s, start, moved, predicted, nearest, distance, error);
   supine_inside_surface_destroy(s.state_tree);
   supine_inside_surface_destroy(s.tree);
-  free(s.space);
-  free(s.moved);
   return status;
 }

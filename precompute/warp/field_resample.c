@@ -29,7 +29,7 @@ struct resampling {
   const supine_image *from;
   supine_image *to;
   bool labels;
-  double voxels[3][3]; /* matrix from a displacement, mm, to one in voxels of `from` */
+  double axes[3][3]; /* [k] a displacement of 1 mm along x, y or z, in voxels of `from` */
   void (*run)(const resampling *work, size_t row, size_t begin); /* process RUN voxels of a row */
 };
 
@@ -257,7 +257,8 @@ SUPINE_CLONES static void resample_run(const resampling *work, size_t row, size_
     const double u[3] = {shift[0][i], shift[1][i], shift[2][i]};
     still &= u[0] == 0.0 && u[1] == 0.0 && u[2] == 0.0;
     for (size_t a = 0; a < 3; ++a) {
-      at[a][i] = (a == 0 ? (double)(begin + i) : line[a - 1]) + supine_dot(work->voxels[a], u);
+      at[a][i] = (a == 0 ? (double)(begin + i) : line[a - 1]) + u[0] * work->axes[0][a] +
+                 u[1] * work->axes[1][a] + u[2] * work->axes[2][a];
     }
   }
   if (still) {
@@ -296,12 +297,7 @@ supine_status supine_field_resample(const supine_field *inverse, const supine_im
   supine_image steps = *image;
   memset(steps.origin, 0, sizeof steps.origin);
   for (size_t k = 0; k < 3; ++k) {
-    const double axis[3] = {k == 0, k == 1, k == 2};
-    double column[3];
-    supine_image_locate(&steps, axis, column);
-    for (size_t a = 0; a < 3; ++a) {
-      work.voxels[a][k] = column[a];
-    }
+    supine_image_locate(&steps, (const double[]){k == 0, k == 1, k == 2}, work.axes[k]);
   }
   work.kind.voxel = SUPINE_VOXEL_U8;
   work.kind.values = depth == NULL ? NULL : malloc(count);
