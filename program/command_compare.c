@@ -127,6 +127,27 @@ static supine_status compare_content(const supine_basis *basis, const supine_pos
   return status;
 }
 
+/* Compute, print and write the comparison of the lungs. */
+static supine_status report(supine_comparison *c, const request *wanted, supine_error *error) {
+  supine_status status = SUPINE_OK;
+  if (wanted->inside != NULL) {
+    status = supine_command_inside_open(c->basis, wanted->inside, &c->inside, &c->names, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_report_find(c, error);
+  }
+  if (status == SUPINE_OK) {
+    supine_report_print(c, wanted->json);
+  }
+  if (status == SUPINE_OK && wanted->html != NULL) {
+    status = write_html(wanted->html, c, error);
+  }
+  supine_report_free(c);
+  supine_command_names_close(&c->names);
+  supine_basis_close(c->inside);
+  return status;
+}
+
 static supine_status compare(const char *path, const char *made_by, const supine_basis *basis,
                              const request *wanted, supine_error *error) {
   supine_comparison comparison = {.path = path,
@@ -167,23 +188,7 @@ static supine_status compare(const char *path, const char *made_by, const supine
   if (content) {
     return compare_content(basis, &comparison.postures, wanted, error);
   }
-  if (wanted->inside != NULL) {
-    status = supine_command_inside_open(basis, wanted->inside, &comparison.inside,
-                                        &comparison.names, error);
-  }
-  if (status == SUPINE_OK) {
-    status = supine_report_find(&comparison, error);
-  }
-  if (status == SUPINE_OK) {
-    supine_report_print(&comparison, wanted->json);
-  }
-  if (status == SUPINE_OK && wanted->html != NULL) {
-    status = write_html(wanted->html, &comparison, error);
-  }
-  supine_report_free(&comparison);
-  supine_command_names_close(&comparison.names);
-  supine_basis_close(comparison.inside);
-  return status;
+  return report(&comparison, wanted, error);
 }
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {

@@ -34,14 +34,14 @@ const supine_option supine_command_deform_content_options[] = {
      SUPINE_FILLS(supine_deform_content, inverse)},
     {"image", 0, "FILE",
      "image to move and write to -o (.nrrd, .nii, .nii.gz or .mha), interpolated linearly",
-     SUPINE_FILLS(supine_deform_content, image), .file = SUPINE_FILE_IN, .rivals = "moved image"},
+     SUPINE_FILLS(supine_deform_content, image), .file = SUPINE_FILE_IN},
     {"density", 0, NULL,
      "with --image, if it is a CT in Hounsfield units: scale densities inside the lungs by the "
      "local change of volume, so that the mass stays the same; the header of the output says so",
      SUPINE_FILLS(supine_deform_content, density)},
     {"labels", 0, "FILE",
      "label map to move and write to -o; each voxel takes the label of the nearest voxel",
-     SUPINE_FILLS(supine_deform_content, labels), .file = SUPINE_FILE_IN, .rivals = "moved image"},
+     SUPINE_FILLS(supine_deform_content, labels), .file = SUPINE_FILE_IN},
     {.name = NULL}};
 
 supine_status supine_command_deform_content_check(const supine_deform_content *wanted,
@@ -59,6 +59,17 @@ supine_status supine_command_deform_content_check(const supine_deform_content *w
               : "%s: no image to write: give --image FILE or --labels FILE",
         wanted->path);
   }
+  if ((wanted->image != NULL && wanted->labels != NULL) != (wanted->labels_path != NULL)) {
+    return supine_error_set(
+        error, SUPINE_ERROR_ARGUMENT,
+        "--image with --labels needs a list of --states with the column labels, "
+        "and this column needs both");
+  }
+  if (wanted->labels_path != NULL && !supine_image_supports(wanted->labels_path)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "%s: the name must end in .nrrd, .nii, .nii.gz or .mha",
+                            wanted->labels_path);
+  }
   if (wanted->inverse && wanted->field == NULL) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "--inverse needs --field-out FILE: give both");
@@ -71,10 +82,16 @@ supine_status supine_command_deform_content_check(const supine_deform_content *w
 
 supine_status supine_command_deform_content_read(supine_deform_content *wanted, const char *command,
                                                  supine_error *error) {
-  const char *path = wanted->image != NULL ? wanted->image : wanted->labels;
-  supine_image *image = &wanted->source;
-  const supine_status status = path != NULL ? supine_image_read(path, image, error) : SUPINE_OK;
-  if (status != SUPINE_OK || wanted->image == NULL) {
+  const char *path = wanted->image;
+  const supine_image *image = &wanted->source;
+  supine_status status = SUPINE_OK;
+  if (wanted->labels != NULL) {
+    status = supine_image_read(wanted->labels, &wanted->label_source, error);
+  }
+  if (status == SUPINE_OK && path != NULL) {
+    status = supine_image_read(path, &wanted->source, error);
+  }
+  if (status != SUPINE_OK || path == NULL) {
     return status;
   }
   if (!wanted->density) {
@@ -189,24 +206,24 @@ static supine_status write_field(const supine_deform_content *wanted, const char
   return status;
 }
 
-static supine_status write_image(const supine_deform_content *wanted, const supine_field *forward,
-                                 const supine_field *inverse, supine_error *error) {
+/* Move an image to the file `path`. Unless `depth` is NULL, scale its densities. */
+static supine_status write_image(const char *path, const supine_image *source, bool labels,
+                                 const supine_image *depth, const supine_field *inverse,
+                                 supine_error *error) {
   supine_image moved;
-  supine_status status =
-      supine_field_resample(inverse, wanted->density ? &forward->depth : NULL,
-                            wanted->labels != NULL, &wanted->source, &moved, error);
+  supine_status status = supine_field_resample(inverse, depth, labels, source, &moved, error);
   if (status == SUPINE_OK) {
-    status = supine_image_write(wanted->path, &moved,
-                                wanted->density ? "HU + 1000 inside the lungs scaled by the local "
-                                                  "change of volume: mass is kept"
-                                                : NULL,
+    status = supine_image_write(path, &moved,
+                                depth != NULL ? "HU + 1000 inside the lungs scaled by the local "
+                                                "change of volume: mass is kept"
+                                              : NULL,
                                 error);
     supine_image_free(&moved);
   }
   if (status == SUPINE_OK) {
-    const size_t *size = wanted->source.size;
-    (void)printf("%s: %zu x %zu x %zu voxels%s\n", wanted->path, size[0], size[1], size[2],
-                 wanted->density ? ", densities scaled inside the lungs" : "");
+    const size_t *size = source->size;
+    (void)printf("%s: %zu x %zu x %zu voxels%s\n", path, size[0], size[1], size[2],
+                 depth != NULL ? ", densities scaled inside the lungs" : "");
   }
   return status;
 }
@@ -296,18 +313,24 @@ static supine_status find_field(const supine_basis *basis, const supine_deformat
 
 static supine_status move_grid(const supine_deform_content *wanted, const supine_basis *basis,
                                const supine_deformation *moved, supine_error *error) {
-  const bool image = wanted->source.values != NULL;
+  const bool image = wanted->image != NULL;
+  const bool labels = wanted->labels != NULL;
   supine_field forward = {0};
   supine_field inverse = {0};
   supine_status status = find_field(basis, moved, &forward, error);
-  if (status == SUPINE_OK && (image || wanted->inverse)) {
+  if (status == SUPINE_OK && (image || labels || wanted->inverse)) {
     status = invert(&forward, &inverse, error);
   }
   if (status == SUPINE_OK && wanted->field != NULL) {
     status = write_field(wanted, moved->from.name, &forward, &inverse, error);
   }
   if (status == SUPINE_OK && image) {
-    status = write_image(wanted, &forward, &inverse, error);
+    status = write_image(wanted->path, &wanted->source, false,
+                         wanted->density ? &forward.depth : NULL, &inverse, error);
+  }
+  if (status == SUPINE_OK && labels) {
+    status = write_image(image ? wanted->labels_path : wanted->path, &wanted->label_source, true,
+                         NULL, &inverse, error);
   }
   supine_field_free(&forward);
   supine_field_free(&inverse);
