@@ -99,16 +99,15 @@ supine_status supine_command_deform_content_read(supine_deform_content *wanted, 
                                 "--density to keep the tissue's mass");
     return SUPINE_OK;
   }
-  double least = INFINITY;
-  for (size_t i = 0; i < image->size[0] * image->size[1] * image->size[2]; ++i) {
-    least = fmin(least, supine_image_get(image, i));
+  bool aerated = false;
+  for (size_t i = 0; i < image->size[0] * image->size[1] * image->size[2] && !aerated; ++i) {
+    aerated = supine_image_get(image, i) < supine_field_aerated;
   }
-  return least < supine_field_aerated
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%s: no voxel is below %g, so the image is not in "
-                                "Hounsfield units: convert it, or leave --density out",
-                                path, supine_field_aerated);
+  return aerated ? SUPINE_OK
+                 : supine_error_set(error, SUPINE_ERROR_FORMAT,
+                                    "%s: no voxel is below %g, so the image is not in "
+                                    "Hounsfield units: convert it, or leave --density out",
+                                    path, supine_field_aerated);
 }
 
 bool supine_command_deform_content_wanted(const supine_deform_content *wanted) {

@@ -105,11 +105,13 @@ supine_command_compare_points(const supine_patient_pairs *pairs, const double *p
 
 /* Compute the distances between `state`, a scanned surface, and a predicted surface, from the
  * vertices of each to the other, for each prediction in supine_command_map_names: `predicted`, and
- * maps fitted to `start`. Fit maps and body motion by the iterative closest point (ICP) method.
+ * maps fitted to `start`. Fit maps and body motion by the iterative closest point (ICP) method. For
+ * the fitted maps, measure at most 20,000 vertices of the larger surface, and the same share of the
+ * other.
  * @param start      surface before the motion, N vertices
  * @param moved      body motion between the scans to fit to `predicted` and remove before comparing
  * @param predicted  [N, 3] positions predicted by the basis, mm; on return, after the fitted motion
- * @param nearest    [N, 3] point of `state` nearest to each predicted vertex, mm; output, or NULL
+ * @param nearest    [N, 3] point of `state` nearest to each predicted vertex, mm; output
  * @retval SUPINE_ERROR_MESH  as supine_patient_check_boxes
  * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
 supine_status

@@ -9,13 +9,15 @@
 
 #include "program/validation.h"
 
+#include "base/arena.h"
 #include "base/vec3.h"
 #include "precompute/lungs/surface.h"
 
 const char *const supine_command_map_names[SUPINE_PATIENT_MAP_COUNT] = {"predicted", "none",
                                                                         "translation", "affine"};
 
-enum { ROUNDS = 20, FITTED_MAX = 2000 };
+/* SAMPLED_MAX: most vertices of a surface from which distances of the fitted maps are measured. */
+enum { ROUNDS = 20, FITTED_MAX = 2000, SAMPLED_MAX = 20000 };
 
 /* A motion whose RMS is below this, mm, counts as none: scans and landmarks are less precise. */
 static const double still = 0.05;
@@ -85,42 +87,57 @@ supine_command_compare_points(const supine_patient_pairs *pairs, const double *p
   return SUPINE_OK;
 }
 
-/* Compute statistics of the distances from the vertices of one surface to the other, both ways. */
-static supine_status surface_distance(const supine_mesh *start, const double *moved,
-                                      const supine_mesh *state,
-                                      const supine_inside_surface *state_tree, double *nearest,
-                                      supine_command_distance *of, supine_error *error) {
-  const size_t n = start->vertex_count;
-  supine_inside_surface *tree = NULL;
-  double *space = malloc((n + state->vertex_count) * sizeof *space);
-  supine_status status =
-      space == NULL ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for distances")
-                    : supine_inside_surface_create(moved, start->triangle_count, start->triangles,
-                                                   false, &tree, error);
-  if (status == SUPINE_OK) {
-    supine_inside_surface_distances(state_tree, n, moved, space, nearest);
-    supine_inside_surface_distances(tree, state->vertex_count, state->vertices, space + n, NULL);
-    summarise(space, n + state->vertex_count, of);
+/* Copy `count` of n points, evenly spread over their indices. */
+static void sample(size_t n, const double *points, size_t count, double *chosen) {
+  for (size_t i = 0; i < count; ++i) {
+    memcpy(chosen + 3 * i, points + 3 * (i * n / count), 3 * sizeof(double));
   }
-  supine_inside_surface_destroy(tree);
-  free(space);
-  return status;
+}
+
+static size_t at_most(size_t count, size_t most) {
+  return count < most ? count : most;
+}
+
+/* Two surfaces with their trees, and work space for 4 numbers per vertex of both. */
+typedef struct surfaces {
+  size_t count;
+  double *moved; /* [count, 3] vertices of the first surface, mm */
+  const supine_mesh *state;
+  supine_inside_surface *tree, *state_tree;
+  double *space;
+} surfaces;
+
+/* Compute statistics of the distances from the vertices of one surface to the other, both ways.
+ * @param nearest  as supine_command_compare_surfaces, for all vertices; NULL to sample an equal
+ * share of the vertices of both */
+static void surface_distance(const surfaces *s, double *nearest, supine_command_distance *of) {
+  const size_t total = s->state->vertex_count;
+  const size_t larger = s->count > total ? s->count : total;
+  const size_t most = nearest != NULL ? larger : at_most(larger, SAMPLED_MAX);
+  const size_t n = (s->count * most + larger - 1) / larger;
+  const size_t m = (total * most + larger - 1) / larger;
+  double *distance = s->space;
+  double *points = distance + n + m;
+  sample(s->count, s->moved, n, points);
+  supine_inside_surface_distances(s->state_tree, n, points, distance, nearest);
+  sample(total, s->state->vertices, m, points);
+  supine_inside_surface_refit(s->tree);
+  supine_inside_surface_distances(s->tree, m, points, distance + n, NULL);
+  summarise(distance, n + m, of);
 }
 
 /* Fit a map from vertices onto a surface by iterated nearest points; apply it to all n vertices.
  * Return false if the map is undetermined. `space` holds 10 * FITTED_MAX numbers. */
 static bool fit_map(supine_patient_map kind, size_t n, const double *vertices,
                     const supine_inside_surface *tree, double *space, double *moved) {
-  const size_t count = n < FITTED_MAX ? n : FITTED_MAX;
+  const size_t count = at_most(n, FITTED_MAX);
   double *from = space;
   double *at = from + 3 * count;
   double *to = at + 3 * count;
   double *distance = to + 3 * count;
   supine_patient_affinity by;
   (void)supine_patient_map_fit(SUPINE_PATIENT_MAP_NONE, 0, NULL, NULL, &by);
-  for (size_t i = 0; i < count; ++i) {
-    memcpy(from + 3 * i, vertices + 3 * (i * n / count), 3 * sizeof(double));
-  }
+  sample(n, vertices, count, from);
   for (int round = 0; round < (kind == SUPINE_PATIENT_MAP_NONE ? 0 : ROUNDS); ++round) {
     for (size_t i = 0; i < count; ++i) {
       supine_patient_map_apply(&by, from + 3 * i, at + 3 * i);
@@ -136,39 +153,51 @@ static bool fit_map(supine_patient_map kind, size_t n, const double *vertices,
   return true;
 }
 
+/* Build the trees of both surfaces, fit all maps and measure their distances; see
+ * supine_command_compare_surfaces. */
+static supine_status compare(surfaces *s, const supine_mesh *start,
+                             supine_patient_scan_motion moved, double *predicted, double *nearest,
+                             supine_command_distance *distance, supine_error *error) {
+  const supine_mesh *state = s->state;
+  const size_t bytes = 3 * s->count * sizeof(double);
+  memcpy(s->moved, predicted, bytes);
+  SUPINE_TRY(supine_inside_surface_create(state->vertices, state->triangle_count, state->triangles,
+                                          false, &s->state_tree, error));
+  SUPINE_TRY(supine_inside_surface_create(s->moved, start->triangle_count, start->triangles, false,
+                                          &s->tree, error));
+  for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT; ++k) {
+    const bool own = k == SUPINE_PATIENT_MAP_PREDICTED;
+    if (!fit_map(map_of(k, moved), s->count, own ? predicted : start->vertices, s->state_tree,
+                 s->space, s->moved)) {
+      return undetermined(error);
+    }
+    surface_distance(s, own ? nearest : NULL, &distance[k]);
+    if (own) {
+      memcpy(predicted, s->moved, bytes);
+    }
+  }
+  explain(moved, distance);
+  return SUPINE_OK;
+}
+
 supine_status
 supine_command_compare_surfaces(const supine_mesh *start, supine_patient_scan_motion moved,
                                 double *predicted, const supine_mesh *state, double *nearest,
                                 supine_command_distance distance[SUPINE_PATIENT_MAP_COUNT],
                                 supine_error *error) {
-  supine_inside_surface *tree = NULL;
-  double *space = malloc(10 * (size_t)FITTED_MAX * sizeof *space);
+  SUPINE_ARENA arena = {0};
   const size_t n = start->vertex_count;
-  double *at = malloc(3 * n * sizeof *at);
-  supine_status status = supine_patient_check_boxes(start, state, error);
-  if (status == SUPINE_OK && (space == NULL || at == NULL)) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
-                              start->vertex_count);
+  const size_t numbers = 10 * (size_t)FITTED_MAX + 4 * (n + state->vertex_count);
+  surfaces s = {.count = n,
+                .moved = supine_arena_take(&arena, 3 * n, sizeof(double)),
+                .state = state,
+                .space = supine_arena_take(&arena, numbers, sizeof(double))};
+  SUPINE_TRY(supine_patient_check_boxes(start, state, error));
+  if (arena.failed) {
+    return supine_error_memory(error, "%zu vertices", n);
   }
-  if (status == SUPINE_OK) {
-    status = supine_inside_surface_create(state->vertices, state->triangle_count, state->triangles,
-                                          false, &tree, error);
-  }
-  for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT && status == SUPINE_OK; ++k) {
-    const bool own = k == SUPINE_PATIENT_MAP_PREDICTED;
-    status =
-        fit_map(map_of(k, moved), n, own ? predicted : start->vertices, tree, space, at)
-            ? surface_distance(start, at, state, tree, own ? nearest : NULL, &distance[k], error)
-            : undetermined(error);
-    if (own && status == SUPINE_OK) {
-      memcpy(predicted, at, 3 * n * sizeof *at);
-    }
-  }
-  if (status == SUPINE_OK) {
-    explain(moved, distance);
-  }
-  supine_inside_surface_destroy(tree);
-  free(space);
-  free(at);
+  const supine_status status = compare(&s, start, moved, predicted, nearest, distance, error);
+  supine_inside_surface_destroy(s.state_tree);
+  supine_inside_surface_destroy(s.tree);
   return status;
 }

@@ -24,6 +24,9 @@ target_compile_definitions(test_program PRIVATE SUPINE_PROGRAM="$<TARGET_FILE:su
 add_test(NAME command_output COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_command_output.sh
   $<TARGET_FILE:supine> ${CMAKE_CURRENT_SOURCE_DIR}/golden)
 set_tests_properties(command_output PROPERTIES TIMEOUT 900)
+# Run the commands that README.md and FIGURES.md quote.
+add_test(NAME quoted COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/test_quoted.py $<TARGET_FILE:supine>
+  ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR})
 # Check manual pages and completions, which are made from the tables of options.
 add_test(NAME manual COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_manual.sh $<TARGET_FILE:supine>
   ${PROJECT_BINARY_DIR}/packaging/manual)

@@ -511,6 +511,33 @@ TEST(test_elastix_inverse_field_warps_landmarks) {
                   "mv result.nrrd warped.nrrd");
 }
 
+TEST(test_resample_displacement_0_voxels_copied_exactly) {
+  enum { COUNT = 150 * 9 * 8 };
+  float u[3 * 27 * 9 * 8] = {0.0F};
+  const supine_field field = {.nodes = {.size = {27, 9, 8},
+                                        .origin = {-11.3, 4.7, 90.1},
+                                        .step = {{4.3, 0, 0}, {0, 0.7, 0}, {0, 0, 0.9}},
+                                        .voxel = SUPINE_VOXEL_F32,
+                                        .channels = 3,
+                                        .values = u}};
+  supine_image image = field.nodes;
+  supine_image moved;
+  image.size[0] = 150;
+  image.step[0][0] = 0.75;
+  image.channels = 1;
+  for (int voxel = 0; voxel < SUPINE_VOXEL_COUNT; ++voxel) {
+    image.voxel = (supine_image_voxel)voxel;
+    image.values = calloc(COUNT, sizeof(double));
+    for (size_t i = 0; i < COUNT; ++i) {
+      supine_image_put(&image, i, 1, &(double){60.0 + 59.0 * sin((double)i)});
+    }
+    assert_int_equal(supine_field_resample(&field, NULL, false, &image, &moved, NULL), SUPINE_OK);
+    assert_memory_equal(moved.values, image.values, COUNT * supine_image_voxel_size(image.voxel));
+    supine_image_free(&moved);
+    free(image.values);
+  }
+}
+
 TEST(test_field_create_without_grid_refused) {
   supine_field field;
   supine_error error;

@@ -170,6 +170,32 @@ TEST(test_surface_find_surface_with_hole_side_correct) {
   supine_inside_surface_destroy(torn);
 }
 
+TEST(test_surface_refit_moved_vertices_as_new_tree) {
+  const supine_inside_shell *shell = &shells.shell[0];
+  supine_inside_surface *tree[2];
+  uint64_t seed = 23;
+  double *moved = malloc(3 * shell->vertex_count * sizeof *moved);
+  memcpy(moved, shell->vertices, 3 * shell->vertex_count * sizeof *moved);
+  for (size_t i = 0; i < 2; ++i) {
+    assert_int_equal(supine_inside_surface_create(moved, shell->triangle_count, shell->triangles,
+                                                  true, &tree[i], NULL),
+                     SUPINE_OK);
+    for (size_t v = 0; v < 3 * shell->vertex_count && i == 0; ++v) {
+      moved[v] = 1.2 * moved[v] + 30.0 * sin(moved[v] / 50.0);
+    }
+  }
+  supine_inside_surface_refit(tree[0]);
+  for (int i = 0; i < 300; ++i) {
+    double p[3];
+    point_at_share(0, &seed, 2.0 * helper_random(&seed), p);
+    const double depth = supine_inside_surface_find(tree[1], p, NULL).depth;
+    assert_true(fabs(supine_inside_surface_find(tree[0], p, NULL).depth - depth) < 1e-9);
+  }
+  supine_inside_surface_destroy(tree[0]);
+  supine_inside_surface_destroy(tree[1]);
+  free(moved);
+}
+
 TEST(test_biharmonic_fit_centres_and_affine_values_exact) {
   enum { COUNT = 300, COLUMNS = 4, CENTRES = 120 };
   double points[3 * COUNT];

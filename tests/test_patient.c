@@ -8,6 +8,8 @@
 
 #include <supine/volume.h>
 
+#include "precompute/lungs/phantom.h"
+#include "precompute/lungs/surface.h"
 #include "precompute/patient/krige.h"
 #include "precompute/patient/patient_file.h"
 #include "program/validation.h"
@@ -619,4 +621,47 @@ TEST(test_compare_points_each_map_explains_its_motions) {
   assert_true(isnan(distance[SUPINE_PATIENT_MAP_PREDICTED].explained));
   free(turned_by);
   supine_patient_pairs_free(&pairs);
+}
+
+/* The distances of fitted maps are measured at 20,000 vertices of larger surfaces. Their mean is
+ * near that of all vertices. */
+TEST(test_compare_surfaces_sampled_vertices_keep_statistics) {
+  supine_mesh start = {0};
+  assert_int_equal(supine_phantom_create(30000, 3000.0, &start, NULL), SUPINE_OK);
+  const size_t n = start.vertex_count;
+  supine_mesh end = start;
+  end.vertices = malloc(3 * n * sizeof(double));
+  double *predicted = malloc(3 * n * sizeof *predicted);
+  double *nearest = malloc(3 * n * sizeof *nearest);
+  double mean = 0.0;
+  for (size_t i = 0; i < 3 * n; ++i) {
+    predicted[i] = end.vertices[i] = 1.1 * start.vertices[i] + 4.0 * (i % 3 == 1);
+  }
+  for (int way = 0; way < 2; ++way) {
+    const supine_mesh *mesh = way == 0 ? &start : &end;
+    supine_inside_surface *tree;
+    assert_int_equal(supine_inside_surface_create(mesh->vertices, mesh->triangle_count,
+                                                  mesh->triangles, false, &tree, NULL),
+                     SUPINE_OK);
+    double *distance = malloc(n * sizeof *distance);
+    supine_inside_surface_distances(tree, n, (way == 0 ? &end : &start)->vertices, distance, NULL);
+    for (size_t i = 0; i < n; ++i) {
+      mean += 0.5 * distance[i] / (double)n;
+    }
+    supine_inside_surface_destroy(tree);
+    free(distance);
+  }
+  supine_command_distance of[SUPINE_PATIENT_MAP_COUNT];
+  assert_int_equal(supine_command_compare_surfaces(&start, SUPINE_PATIENT_STILL, predicted, &end,
+                                                   nearest, of, NULL),
+                   SUPINE_OK);
+  print_message("without motion: mean %.4f mm, of all vertices %.4f mm\n",
+                of[SUPINE_PATIENT_MAP_NONE].mean, mean);
+  assert_true(of[SUPINE_PATIENT_MAP_PREDICTED].largest < 1e-6);
+  assert_true(fabs(of[SUPINE_PATIENT_MAP_NONE].mean - mean) < 0.01 * mean);
+  assert_true(of[SUPINE_PATIENT_MAP_NONE].mean != mean);
+  supine_mesh_free(&start);
+  free(end.vertices);
+  free(predicted);
+  free(nearest);
 }

@@ -172,8 +172,6 @@ static void build(supine_inside_surface *s, keyed *space, uint32_t begin, uint32
   n->right = 0;
   if (end - begin <= LEAF) {
     n->leaf = s->leaf_count++;
-    find_box(s, n, &s->leaves[n->leaf]);
-    find_dipole(s, n);
     return;
   }
   find_box(s, n, NULL);
@@ -194,7 +192,20 @@ static void build(supine_inside_surface *s, keyed *space, uint32_t begin, uint32
   build(s, space, begin, middle);
   n->right = s->node_count;
   build(s, space, middle, end);
-  find_dipole(s, n);
+}
+
+void supine_inside_surface_refit(supine_inside_surface *surface) {
+  for (node *n = surface->nodes + surface->node_count; n-- > surface->nodes;) {
+    const node *child[2] = {n + 1, &surface->nodes[n->right]};
+    if (n->right == 0) {
+      find_box(surface, n, &surface->leaves[n->leaf]);
+    }
+    for (int k = 0; k < 3 && n->right != 0; ++k) {
+      n->low[k] = least(child[0]->low[k], child[1]->low[k]);
+      n->high[k] = greatest(child[0]->high[k], child[1]->high[k]);
+    }
+    find_dipole(surface, n);
+  }
 }
 
 supine_status supine_inside_surface_create(const double *vertices, size_t count,
@@ -222,6 +233,7 @@ supine_status supine_inside_surface_create(const double *vertices, size_t count,
     s->order[i] = i;
   }
   build(s, space, 0, (uint32_t)count);
+  supine_inside_surface_refit(s);
   s->arena = arena;
   arena = (supine_arena){0};
   *surface = s;

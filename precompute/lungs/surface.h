@@ -27,6 +27,8 @@ typedef struct supine_inside_place {
 supine_status supine_inside_surface_create(const double *vertices, size_t count,
                                            const uint32_t *triangles, bool sides,
                                            supine_inside_surface **surface, supine_error *error);
+/** Update the tree after vertices have moved. Large relative motions make searches slower. */
+void supine_inside_surface_refit(supine_inside_surface *surface);
 /** Free a surface; NULL is allowed. */
 void supine_inside_surface_destroy(supine_inside_surface *surface);
 

@@ -24,10 +24,13 @@ void supine_field_find_cell(const supine_image *image, const double point[3],
   }
 }
 
-void supine_field_interpolate(const supine_image *image, const supine_field_cell *cell,
-                              double *values, double (*slope)[3]) {
+/* Inlined, so that the loops over a constant number of channels are unrolled. */
+static inline __attribute__((always_inline)) void interpolate(const supine_image *image,
+                                                              size_t channels,
+                                                              const supine_field_cell *cell,
+                                                              double *values, double (*slope)[3]) {
   const float *numbers = image->values;
-  for (size_t c = 0; c < image->channels; ++c) {
+  for (size_t c = 0; c < channels; ++c) {
     values[c] = 0.0;
     for (size_t k = 0; k < 3 && slope != NULL; ++k) {
       slope[c][k] = 0.0;
@@ -44,14 +47,23 @@ void supine_field_interpolate(const supine_image *image, const supine_field_cell
       at[a] -= at[a] == image->size[a];
     }
     const size_t voxel = at[0] + image->size[0] * (at[1] + image->size[1] * at[2]);
-    for (size_t c = 0; c < image->channels; ++c) {
-      const double value = (double)numbers[image->channels * voxel + c];
+    for (size_t c = 0; c < channels; ++c) {
+      const double value = (double)numbers[channels * voxel + c];
       values[c] += weight[0] * weight[1] * weight[2] * value;
       for (size_t k = 0; k < 3 && slope != NULL; ++k) {
         const double sign = corner >> k & 1U ? 1.0 : -1.0;
         slope[c][k] += sign * weight[(k + 1) % 3] * weight[(k + 2) % 3] * value;
       }
     }
+  }
+}
+
+void supine_field_interpolate(const supine_image *image, const supine_field_cell *cell,
+                              double *values, double (*slope)[3]) {
+  if (image->channels == 3) {
+    interpolate(image, 3, cell, values, slope);
+  } else {
+    interpolate(image, image->channels, cell, values, slope);
   }
 }
 
@@ -103,19 +115,19 @@ static supine_status read_grid(const supine_basis *basis, supine_image *nodes,
   return SUPINE_OK;
 }
 
-/* Average the displacements of those neighbours of node i whose displacement is known: their mark
- * in `known` is neither 0 (unknown) nor `now` (set in the layer that is being added). Return false
- * if there are none. */
+/* Average the displacements of those neighbours of the node `at` whose displacement is known: their
+ * mark in `known` is neither 0 (unknown) nor `now` (set in the layer that is being added). Return
+ * false if there are none. */
 static bool mean_neighbour(const supine_image *nodes, const unsigned char *known, unsigned char now,
-                           size_t i, float mean[3]) {
+                           const size_t at[3], float mean[3]) {
   const float *u = nodes->values;
   const size_t stride[3] = {1, nodes->size[0], nodes->size[0] * nodes->size[1]};
+  const size_t i = at[0] + stride[1] * at[1] + stride[2] * at[2];
   size_t count = 0;
   mean[0] = mean[1] = mean[2] = 0.0F;
   for (size_t a = 0; a < 3; ++a) {
-    const size_t at = i / stride[a] % nodes->size[a];
     for (int side = 0; side < 2; ++side) {
-      if (side == 0 ? at == 0 : at + 1 == nodes->size[a]) {
+      if (side == 0 ? at[a] == 0 : at[a] + 1 == nodes->size[a]) {
         continue;
       }
       const size_t j = side == 0 ? i - stride[a] : i + stride[a];
@@ -148,14 +160,18 @@ static void fade_out(supine_image *nodes, unsigned char *known, double fade) {
     const float share = (float)(layers - layer) / (float)(layers - layer + 1);
     const unsigned char now = layer % 2 == 1 ? 2 : 3;
     bool any = false;
+    size_t at[3] = {0};
     for (size_t i = 0; i < count; ++i) {
       float mean[3];
-      if (known[i] == 0 && mean_neighbour(nodes, known, now, i, mean)) {
+      if (known[i] == 0 && mean_neighbour(nodes, known, now, at, mean)) {
         known[i] = now;
         any = true;
         for (size_t k = 0; k < 3; ++k) {
           u[3 * i + k] = share * mean[k];
         }
+      }
+      for (size_t a = 0; a < 3 && ++at[a] == nodes->size[a]; ++a) {
+        at[a] = 0;
       }
     }
     if (!any) {

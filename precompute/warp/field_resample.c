@@ -20,14 +20,18 @@ enum { LUNG = 2 };
 
 #define INLINE static inline __attribute__((always_inline))
 
-typedef struct resampling {
+typedef struct resampling resampling;
+
+struct resampling {
   const supine_field *inverse;
   const supine_image *depth; /* depth below the lungs' surface, mm; NULL: densities not scaled */
   supine_image kind;         /* kind of each voxel of `from`; for scaling densities */
   const supine_image *from;
   supine_image *to;
   bool labels;
-} resampling;
+  double axes[3][3]; /* [k] a displacement of 1 mm along x, y or z, in voxels of `from` */
+  void (*run)(const resampling *work, size_t row, size_t begin); /* process RUN voxels of a row */
+};
 
 /* For each of RUN points, the cell of an image that contains it. */
 typedef struct cells {
@@ -35,21 +39,12 @@ typedef struct cells {
   double share[3][RUN]; /* position of each point in its cell, 0 to 1 along each axis */
 } cells;
 
-/* Find the cells that contain points, mm. The operations and their order are those of
- * supine_field_find_cell, so that both give the same bits. */
-INLINE void find_cells(const supine_image *image, double (*point)[RUN], cells *found) {
+/* The x, y and z of a vector, and an unused number. */
+typedef double vector __attribute__((vector_size(4 * sizeof(double))));
+
+/* Find the cells that contain points, given in voxels. */
+INLINE void find_cells(const supine_image *image, double (*at)[RUN], cells *found) {
   const supine_image frame = *image; /* a local copy, so that stores cannot alias it */
-  double at[3][RUN];
-  double across[3];
-  supine_cross(frame.step[1], frame.step[2], across);
-  const double whole = supine_dot(frame.step[0], across);
-  for (size_t i = 0; i < RUN; ++i) { /* Cramer's rule */
-    const double from[3] = {point[0][i] - frame.origin[0], point[1][i] - frame.origin[1],
-                            point[2][i] - frame.origin[2]};
-    at[0][i] = supine_dot(from, across) / whole;
-    at[1][i] = supine_triple(frame.step[0], from, frame.step[2]) / whole;
-    at[2][i] = supine_triple(frame.step[0], frame.step[1], from) / whole;
-  }
   for (size_t a = 0; a < 3; ++a) {
     const double last = (double)frame.size[a] - 1.0;
     const double top = last > 1.0 ? last - 1.0 : 0.0;
@@ -66,6 +61,30 @@ INLINE void find_cells(const supine_image *image, double (*point)[RUN], cells *f
     /* The sum is exact, as its terms are whole numbers. */
     found->first[i] = frame.channels * (size_t)(at[0][i] + row * at[1][i] + slice * at[2][i]);
   }
+}
+
+/* Find the nodes around RUN voxels of a row of `from`. The operations and their order are those of
+ * supine_image_place and supine_field_find_cell, so that both give the same bits. */
+INLINE void find_nodes(const supine_image *from, size_t row, size_t begin,
+                       const supine_image *nodes, cells *found) {
+  const double line[2] = {(double)(row % from->size[1]), (double)(row / from->size[1])};
+  const supine_image frame = *nodes;
+  const supine_image voxels = *from;
+  double at[3][RUN];
+  double across[3];
+  supine_cross(frame.step[1], frame.step[2], across);
+  const double whole = supine_dot(frame.step[0], across);
+  for (size_t i = 0; i < RUN; ++i) { /* Cramer's rule */
+    double apart[3];
+    for (size_t k = 0; k < 3; ++k) {
+      apart[k] = voxels.origin[k] + (double)(begin + i) * voxels.step[0][k] +
+                 line[0] * voxels.step[1][k] + line[1] * voxels.step[2][k] - frame.origin[k];
+    }
+    at[0][i] = supine_dot(apart, across) / whole;
+    at[1][i] = supine_triple(frame.step[0], apart, frame.step[2]) / whole;
+    at[2][i] = supine_triple(frame.step[0], frame.step[1], apart) / whole;
+  }
+  find_cells(nodes, at, found);
 }
 
 /* Compute the weights of the corners of each cell, and the offset of each corner's value from the
@@ -88,22 +107,26 @@ INLINE void weigh_corners(const supine_image *image, const cells *in, double (*w
   }
 }
 
-/* Add to each point its displacement, mm. The operations and their order are those of
+/* Interpolate the displacements, mm. The operations and their order are those of
  * supine_field_interpolate, so that both give the same bits. */
-INLINE void displace(const supine_image *nodes, const cells *in, double (*point)[RUN]) {
+INLINE void displace(const supine_image *nodes, const cells *in, double (*shift)[RUN]) {
   double weight[8][RUN];
   size_t offset[8];
+  vector corners[8] = {{0.0}};
   weigh_corners(nodes, in, weight, offset);
   for (size_t i = 0; i < RUN; ++i) {
-    const float *first = (const float *)nodes->values + in->first[i];
-    double u[3] = {0.0, 0.0, 0.0};
-    for (size_t corner = 0; corner < 8; ++corner) {
-      for (size_t k = 0; k < 3; ++k) {
-        u[k] += weight[corner][i] * (double)first[offset[corner] + k];
+    if (i == 0 || in->first[i] != in->first[i - 1]) {
+      for (size_t corner = 0; corner < 8; ++corner) {
+        const float *u = (const float *)nodes->values + in->first[i] + offset[corner];
+        corners[corner] = (vector){(double)u[0], (double)u[1], (double)u[2], 0.0};
       }
     }
+    vector u = {0.0, 0.0, 0.0, 0.0};
+    for (size_t corner = 0; corner < 8; ++corner) {
+      u += weight[corner][i] * corners[corner];
+    }
     for (size_t k = 0; k < 3; ++k) {
-      point[k][i] += u[k];
+      shift[k][i] = u[k];
     }
   }
 }
@@ -137,106 +160,130 @@ INLINE void take_nearest(const supine_image *image, cells in, double *values) {
 
 /* Return the volume of the tissue at a voxel y before the motion, divided by its volume after it.
  * This is det(I + dv/dy) for the inverse field v; return 0 if the field folds at y. */
-static double volume_ratio(const supine_image *nodes, const supine_image *image, size_t index) {
-  double point[3];
-  supine_field_cell cell;
-  supine_image_place(image, index, point);
-  supine_field_find_cell(nodes, point, &cell);
+static double volume_ratio(const supine_image *nodes, const cells *in, size_t i) {
+  const size_t node = in->first[i] / 3;
+  const supine_field_cell cell = {{node % nodes->size[0], node / nodes->size[0] % nodes->size[1],
+                                   node / nodes->size[0] / nodes->size[1]},
+                                  {in->share[0][i], in->share[1][i], in->share[2][i]}};
   return fmax(0.0, supine_field_stretch(nodes, &cell));
 }
 
 /* Interpolate densities, and multiply those inside the lungs by volume_ratio(). A point is
  * interpolated only from corners of its cell that are of the same kind as its nearest corner. The
  * chest wall thus adds no mass to the lungs, and vessels none to the tissue around them.
- * @param first  index of the first of the RUN voxels in the moved image */
-INLINE void interpolate_density(const resampling *work, const cells *in, size_t first,
+ * @param nodes  cells of the field around the voxels of the moved image */
+INLINE void interpolate_density(const resampling *work, const cells *nodes, const cells *in,
                                 double *values) {
   double weight[8][RUN];
   double value[RUN];
-  double nearest[RUN];
-  double kind[RUN];
+  unsigned char kind[8][RUN];
+  unsigned char nearest[RUN];
   double sum[RUN] = {0.0};
   size_t offset[8];
   weigh_corners(work->from, in, weight, offset);
-  take_nearest(&work->kind, *in, nearest);
+  for (size_t corner = 0; corner < 8; ++corner) {
+    for (size_t i = 0; i < RUN; ++i) {
+      kind[corner][i] = ((const unsigned char *)work->kind.values)[in->first[i] + offset[corner]];
+    }
+  }
+  for (size_t i = 0; i < RUN; ++i) {
+    nearest[i] = kind[(in->share[0][i] > 0.5) + 2 * (in->share[1][i] > 0.5) +
+                      4 * (in->share[2][i] > 0.5)][i];
+  }
   memset(values, 0, RUN * sizeof *values);
   for (size_t corner = 0; corner < 8; ++corner) {
     supine_image_gather(work->from, offset[corner], in->first, RUN, value);
-    supine_image_gather(&work->kind, offset[corner], in->first, RUN, kind);
     for (size_t i = 0; i < RUN; ++i) {
-      const double part = kind[i] == nearest[i] ? weight[corner][i] : 0.0;
+      const double part = kind[corner][i] == nearest[i] ? weight[corner][i] : 0.0;
       values[i] += part * (value[i] + 1000.0);
       sum[i] += part;
     }
   }
   for (size_t i = 0; i < RUN; ++i) {
     const bool scaled = nearest[i] >= LUNG;
-    values[i] = values[i] / sum[i] *
-                    (scaled ? volume_ratio(&work->inverse->nodes, work->from, first + i) : 1.0) -
-                1000.0;
+    values[i] =
+        values[i] / sum[i] * (scaled ? volume_ratio(&work->inverse->nodes, nodes, i) : 1.0) -
+        1000.0;
   }
 }
 
-/* Find the kind of each voxel in the rows `begin` to `end` - 1. Smoothing of the surface, and the
- * nodes between which its depth is interpolated, displace it by up to the diagonal of a cell. This
- * close to the surface, the density of a voxel decides whether it belongs to the lungs. */
-static void mark_rows(void *context, size_t begin, size_t end, size_t thread) {
-  (void)thread;
-  const resampling *work = context;
-  unsigned char *kind = work->kind.values;
+/* Find the kinds of RUN voxels of a row. Smoothing of the surface, and the nodes between which its
+ * depth is interpolated, displace it by up to the diagonal of a cell. This close to the surface,
+ * the density of a voxel decides whether it belongs to the lungs. */
+SUPINE_CLONES static void mark_run(const resampling *work, size_t row, size_t begin) {
   static const double air = -950.0; /* air outside the lungs is below this density, HU */
+  const size_t left = work->from->size[0] - begin;
+  const size_t first = row * work->from->size[0] + begin;
   double rim = 0.0;
+  double depth[RUN];
+  double value[RUN] = {0.0};
+  size_t index[RUN];
+  unsigned char kind[RUN];
+  cells in;
   for (size_t k = 0; k < 3; ++k) {
     rim += supine_length(work->depth->step[k]);
   }
-  for (size_t i = begin * work->from->size[0]; i < end * work->from->size[0]; ++i) {
-    supine_field_cell cell;
-    double point[3];
-    double depth;
-    supine_image_place(work->from, i, point);
-    supine_field_find_cell(work->depth, point, &cell);
-    supine_field_interpolate(work->depth, &cell, &depth, NULL);
-    const double value = supine_image_get(work->from, i);
-    const bool aerated = value < supine_field_aerated;
-    const bool near = depth > -rim && aerated && (depth > 0.0 || value > air);
-    kind[i] = (unsigned char)((depth > rim || near ? LUNG : 0) + (aerated ? 1 : 0));
+  for (size_t i = 0; i < RUN; ++i) {
+    index[i] = i;
   }
+  find_nodes(work->from, row, begin, work->depth, &in);
+  interpolate(work->depth, &in, depth);
+  supine_image_gather(work->from, first, index, left < RUN ? left : RUN, value);
+  for (size_t i = 0; i < RUN; ++i) {
+    const bool aerated = value[i] < supine_field_aerated;
+    const bool near = depth[i] > -rim && aerated && (depth[i] > 0.0 || value[i] > air);
+    kind[i] = (unsigned char)((depth[i] > rim || near ? LUNG : 0) + (aerated ? 1 : 0));
+  }
+  memcpy((unsigned char *)work->kind.values + first, kind, left < RUN ? left : RUN);
 }
 
-/* Resample RUN voxels of a row from `begin` on; do not store voxels past the end of the row. */
+/* Resample RUN voxels of a row from `begin` on; do not store voxels past the end of the row.
+ * Copy voxels that do not move. */
 SUPINE_CLONES static void resample_run(const resampling *work, size_t row, size_t begin) {
   const supine_image *from = work->from;
-  const double at[2] = {(double)(row % from->size[1]), (double)(row / from->size[1])};
+  const double line[2] = {(double)(row % from->size[1]), (double)(row / from->size[1])};
+  const size_t first = row * from->size[0] + begin;
   const size_t left = from->size[0] - begin;
-  double point[3][RUN];
+  const size_t count = left < RUN ? left : RUN;
+  double at[3][RUN];
+  double shift[3][RUN];
   double values[RUN];
+  bool still = true;
+  cells nodes;
   cells in;
-  for (size_t k = 0; k < 3; ++k) {
-    const double step[3] = {from->step[0][k], from->step[1][k], from->step[2][k]};
-    for (size_t i = 0; i < RUN; ++i) {
-      point[k][i] =
-          from->origin[k] + (double)(begin + i) * step[0] + at[0] * step[1] + at[1] * step[2];
+  find_nodes(from, row, begin, &work->inverse->nodes, &nodes);
+  displace(&work->inverse->nodes, &nodes, shift);
+  for (size_t i = 0; i < RUN; ++i) {
+    const double u[3] = {shift[0][i], shift[1][i], shift[2][i]};
+    still &= u[0] == 0.0 && u[1] == 0.0 && u[2] == 0.0;
+    for (size_t a = 0; a < 3; ++a) {
+      at[a][i] = (a == 0 ? (double)(begin + i) : line[a - 1]) + u[0] * work->axes[0][a] +
+                 u[1] * work->axes[1][a] + u[2] * work->axes[2][a];
     }
   }
-  find_cells(&work->inverse->nodes, point, &in);
-  displace(&work->inverse->nodes, &in, point);
-  find_cells(from, point, &in);
+  if (still) {
+    const size_t size = supine_image_voxel_size(from->voxel);
+    memcpy((char *)work->to->values + first * size, (const char *)from->values + first * size,
+           count * size);
+    return;
+  }
+  find_cells(from, at, &in);
   if (work->labels) {
     take_nearest(from, in, values);
   } else if (work->depth != NULL) {
-    interpolate_density(work, &in, row * from->size[0] + begin, values);
+    interpolate_density(work, &nodes, &in, values);
   } else {
     interpolate(from, &in, values);
   }
-  supine_image_put(work->to, row * from->size[0] + begin, left < RUN ? left : RUN, values);
+  supine_image_put(work->to, first, count, values);
 }
 
-static void resample_rows(void *context, size_t begin, size_t end, size_t thread) {
+static void process_rows(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const resampling *work = context;
   for (size_t row = begin; row < end; ++row) {
     for (size_t i = 0; i < work->from->size[0]; i += RUN) {
-      resample_run(work, row, i);
+      work->run(work, row, i);
     }
   }
 }
@@ -245,7 +292,13 @@ supine_status supine_field_resample(const supine_field *inverse, const supine_im
                                     bool labels, const supine_image *image, supine_image *moved,
                                     supine_error *error) {
   const size_t count = image->size[0] * image->size[1] * image->size[2];
-  resampling work = {inverse, depth, *image, image, moved, labels};
+  const size_t rows = image->size[1] * image->size[2];
+  resampling work = {inverse, depth, *image, image, moved, labels, {{0.0}}, mark_run};
+  supine_image steps = *image;
+  memset(steps.origin, 0, sizeof steps.origin);
+  for (size_t k = 0; k < 3; ++k) {
+    supine_image_locate(&steps, (const double[]){k == 0, k == 1, k == 2}, work.axes[k]);
+  }
   work.kind.voxel = SUPINE_VOXEL_U8;
   work.kind.values = depth == NULL ? NULL : malloc(count);
   *moved = *image;
@@ -256,9 +309,10 @@ supine_status supine_field_resample(const supine_field *inverse, const supine_im
     return supine_error_memory(error, "an image of %zu voxels", count);
   }
   if (depth != NULL) {
-    supine_parallel_for(image->size[1] * image->size[2], 1, 0, mark_rows, &work);
+    supine_parallel_for(rows, 1, 0, process_rows, &work);
   }
-  supine_parallel_for(image->size[1] * image->size[2], 1, 0, resample_rows, &work);
+  work.run = resample_run;
+  supine_parallel_for(rows, 1, 0, process_rows, &work);
   supine_image_free(&work.kind);
   return SUPINE_OK;
 }

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Run each command that README.md and tests/FIGURES.md quote, and check that each quoted program exists.
+
+    test_quoted.py SUPINE SOURCE BUILD
+"""
+import gzip
+import os
+import re
+import struct
+import subprocess
+import sys
+import tempfile
+
+supine, source, build = map(os.path.abspath, sys.argv[1:4])
+SERVERS = ("stream",)  # run until they are stopped; the tests of the stream run them
+PLACEHOLDER = re.compile(r"[A-Z]{4,}")
+failures = []
+
+
+def run(*words):
+    return subprocess.run([supine, *words], capture_output=True, text=True, check=False)
+
+
+def make_inputs():
+    """Write the files that the commands name into the current folder."""
+    run("phantom", "--vertices", "500", "-o", "lungs.ply")
+    run("precompute", "lungs.ply", "-o", "lungs.safetensors")
+    run("phantom", "--vertices", "500", "-o", "lungs.obj")
+    with open("lungs.obj", encoding="ascii") as file:
+        lines = list(file)
+    rows = {kind: [line for line in lines if line.startswith(kind)] for kind in ("v ", "f ")}
+    half = len(rows["v "]) // 2  # the left lung comes first
+    for side, begin in (("left", 0), ("right", half)):
+        with open(side + ".obj", "w", encoding="ascii") as file:
+            file.writelines(rows["v "][begin:begin + half])
+            for line in rows["f "]:
+                corners = [int(word.split("/")[0]) - begin for word in line.split()[1:]]
+                if 0 < corners[0] <= half:
+                    file.write("f %d %d %d\n" % tuple(corners))
+    with open("nodules.csv", "w", encoding="ascii") as file:
+        file.write("name,x,y,z\na,71,3,-40\nb,90,20,10\n")
+    with open("list.csv", "w", encoding="ascii") as file:
+        file.write("posture,volume,output\nprone,rest,moved.nii.gz\n")
+    run("embed", "lungs.safetensors", "nodules.csv", "-o", "inside.safetensors")
+    run("embed", "lungs.safetensors", "--grid", "20", "-o", "grid.safetensors")
+    run("deform", "inside.safetensors", "--posture", "prone", "-o", "seen.csv")
+    header = bytearray(352)
+    struct.pack_into("<i", header, 0, 348)
+    struct.pack_into("<8h", header, 40, 3, 20, 20, 20, 1, 1, 1, 1)
+    struct.pack_into("<hh", header, 70, 4, 16)
+    struct.pack_into("<8f", header, 76, 1, 20, 20, 20, 0, 0, 0, 352)
+    struct.pack_into("<fbb", header, 112, 1, 0, 2)
+    struct.pack_into("<hh", header, 252, 0, 1)
+    struct.pack_into("<12f", header, 280, 20, 0, 0, -200, 0, 20, 0, -200, 0, 0, 20, -300)
+    header[344:347] = b"n+1"
+    with gzip.open("ct.nii.gz", "wb") as file:
+        file.write(bytes(header) + struct.pack("<h", -800) * 8000)
+
+
+def check(code):
+    """Run a quoted command, or check that the program or the option that it names exists."""
+    words = code.split()
+    if words[0] == "supine":
+        named = len(words) == 2 or words[1] in SERVERS or PLACEHOLDER.search(code)
+        done = run(*(words[1:2] + ["--help"] if named
+                     else [re.sub(r"^(left|right)\.ply", r"\1.obj", word) for word in words[1:]]))
+        if PLACEHOLDER.fullmatch(words[1]) is None and done.returncode != 0:
+            failures.append(f"{code}: {done.stderr}")
+    elif words[0].startswith("--") and len(words) > 1 and not PLACEHOLDER.search(code):
+        done = run("precompute", "lungs.ply", *words, "-o", "other.safetensors")
+        if done.returncode != 0 and "no option" not in done.stderr:
+            failures.append(f"supine precompute lungs.ply {code}: {done.stderr}")
+    elif words[0].startswith("tests/"):
+        if not any(os.path.exists(os.path.join(folder, words[0])) for folder in (source, build)):
+            failures.append(f"{code}: no such file")
+
+
+commands = []
+for page in ("README.md", "tests/FIGURES.md"):
+    with open(os.path.join(source, page), encoding="utf-8") as text:
+        commands += re.findall(r"`([^`]+)`", re.sub(r"```.*?```", "", text.read(), flags=re.S))
+with tempfile.TemporaryDirectory() as folder:
+    os.chdir(folder)
+    make_inputs()
+    for command in dict.fromkeys(commands):
+        check(command)
+    os.chdir(source)
+print("\n".join(failures) if failures else f"{len(set(commands))} quoted words and commands checked")
+sys.exit(1 if failures else 0)
