@@ -25,8 +25,12 @@ typedef struct supine_arena {
   bool failed;                     /**< whether an allocation has failed */
 } supine_arena;
 
+/** Begin the declaration of a variable that is freed when its scope ends: by a function that takes
+ * its address, such as supine_mesh_free. */
+#define SUPINE_FREED_BY(function) __attribute__((cleanup(function)))
+
 /** Declare an arena that is freed when its scope ends. */
-#define SUPINE_ARENA __attribute__((cleanup(supine_arena_free))) supine_arena
+#define SUPINE_ARENA SUPINE_FREED_BY(supine_arena_free) supine_arena
 
 /** Return the status of a call from the calling function, unless it is SUPINE_OK. */
 #define SUPINE_TRY(call)                                                                           \
