@@ -128,12 +128,20 @@ static void add_reference(entries *list, const supine_reference *reference, cons
   }
 }
 
-/* Add the constant c of the expected position error (supine/locate.h). */
+/* Add the constants of the expected position error (supine/locate.h). */
 static void add_expected_error(entries *list, const supine_basis_content *content) {
+  const supine_precompute_options *options = content->options;
+  const bool fitted = !content->is_fields && options->expected_error > 0.0;
   if (!content->is_fields) {
-    const double own = content->options->expected_error;
     add(list, "expected_error_mm", "%g",
-        own > 0.0 ? fmin(own, SUPINE_EXPECTED_ERROR_MM) : SUPINE_EXPECTED_ERROR_MM);
+        fitted ? options->expected_error : SUPINE_EXPECTED_ERROR_MM);
+  }
+  if (fitted) {
+    add(list, "expected_error_from_mm", "%g", options->expected_from);
+    add(list, "expected_error_source", "%s", options->patient_summary);
+  }
+  if (fitted && options->turn_fitted) {
+    add(list, "turn_fitted", "yes");
   }
 }
 

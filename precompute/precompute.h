@@ -14,10 +14,14 @@ typedef struct supine_precompute_options {
   supine_model model;
   const supine_reference *reference; /**< NULL if the resting volume (FRC) is unknown */
   size_t band;                       /**< highest degree of the harmonics */
-  size_t modes;          /**< largest number of modes; 0 uses the harmonics instead of modes */
-  size_t held_out;       /**< number of held-out directions of gravity, or 0 for the default */
-  double expected_error; /**< constant c of the expected position error (supine/locate.h), mm; 0 or
-                            a value above the default selects the default */
+  size_t modes;    /**< largest number of modes; 0 uses the harmonics instead of modes */
+  size_t held_out; /**< number of held-out directions of gravity, or 0 for the default */
+  /** @{ Constants of the expected position error (supine/locate.h) of a patient's fit, or 0: the
+   * metadata expected_error_mm and expected_error_from_mm; and whether the fit had a scan in
+   * another posture. */
+  double expected_error, expected_from;
+  bool turn_fitted;
+  /** @} */
   supine_scan_frame frame;
   /** @{ Texts for the metadata of the basis file. Each may be NULL. */
   const char *made_by;         /**< command line that makes the basis */

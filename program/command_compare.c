@@ -34,6 +34,7 @@ typedef struct request {
   bool json;
   supine_volume_options volume;
   supine_from from;
+  int frame;     /* 1 if the hilum stays in place, 0 if the body does */
   double breath; /* tidal volume, mL */
   bool has_breath;
 } request;
@@ -44,6 +45,7 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, postures), .standard = "supine,prone,left,right"},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
+    {.table = supine_options_hilum_frame, SUPINE_FILLS(request, frame)},
     {"breath", 0, "ML", "tidal volume of the breath whose ventilation by height is computed",
      SUPINE_FILLS(request, breath), SUPINE_SAYS_GIVEN(request, has_breath), .standard = "500",
      SUPINE_ABOVE_ZERO},
@@ -60,6 +62,8 @@ typedef struct structures {
   double *mean;          /* [postures, structures, 3] mean position, mm */
   double *volumes;       /* [postures, structures] mL; NAN if not closed; follows `mean` */
   double *square_errors; /* [structures] mean squared expected error, mm^2; NAN if unknown */
+  bool in_hilum;         /* whether to subtract the displacement of the hilum */
+  double hilum[3];       /* displacement of the hilum between two postures, mm */
 } structures;
 
 /* Average values [N, width] over each structure's vertices; the mean over no vertices is 0. */
@@ -138,6 +142,26 @@ static supine_status find_square_errors(const structures *c, const supine_state 
   return status;
 }
 
+/* Append to a list the displacement of the hilum from one posture to another. Keep it as
+ * c->hilum. */
+static supine_status add_hilum(structures *c, size_t from, size_t to, json_t *list,
+                               supine_error *error) {
+  const supine_posture_item *item = c->postures->item;
+  const double *h = c->hilum;
+  supine_pose pose[2];
+  (void)supine_basis_pose(c->basis, &item[from].state, &pose[0], NULL); /* find_means found both */
+  (void)supine_basis_pose(c->basis, &item[to].state, &pose[1], NULL);
+  const supine_status status =
+      supine_options_hilum(c->basis, &pose[1], &pose[0], c->in_hilum, c->hilum, error);
+  if (status == SUPINE_OK && supine_length(h) > 0.0) {
+    (void)json_array_append_new(
+        list, json_pack("{s:s, s:s, s:s, s:[f,f,f], s:f, s:n}", "from", item[from].name, "to",
+                        item[to].name, "name", c->in_hilum ? "hilum, subtracted" : "hilum", "move",
+                        h[0], h[1], h[2], "mm", supine_length(h), "expected_error_mm"));
+  }
+  return status;
+}
+
 /* Append to a list the displacement and volumes of each structure from one posture to another. */
 static void add_pair(const structures *c, size_t from, size_t to, json_t *list) {
   for (size_t part = 0; part < c->names.count; ++part) {
@@ -145,7 +169,10 @@ static void add_pair(const structures *c, size_t from, size_t to, json_t *list) 
                                 c->names.text[part]};
     const double *before = c->mean + 3 * (from * c->names.count + part);
     const double *after = c->mean + 3 * (to * c->names.count + part);
-    const double move[3] = {after[0] - before[0], after[1] - before[1], after[2] - before[2]};
+    const double kept = c->in_hilum ? 1.0 : 0.0;
+    const double move[3] = {after[0] - before[0] - kept * c->hilum[0],
+                            after[1] - before[1] - kept * c->hilum[1],
+                            after[2] - before[2] - kept * c->hilum[2]};
     const double length = supine_length(move);
     const double sigma = sqrt(c->square_errors[part]);
     const double ml[2] = {c->volumes[from * c->names.count + part],
@@ -161,7 +188,7 @@ static void add_pair(const structures *c, size_t from, size_t to, json_t *list) 
 }
 
 /* Append to a list the displacement of each named structure between every two postures. */
-static supine_status find_pairs(const structures *c, json_t *list, supine_error *error) {
+static supine_status find_pairs(structures *c, json_t *list, supine_error *error) {
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < c->postures->count && status == SUPINE_OK; ++i) {
     status = find_means(c, &c->postures->item[i].state, i, error);
@@ -170,6 +197,7 @@ static supine_status find_pairs(const structures *c, json_t *list, supine_error 
     for (size_t j = i + 1; j < c->postures->count && status == SUPINE_OK; ++j) {
       status =
           find_square_errors(c, &c->postures->item[j].state, &c->postures->item[i].state, error);
+      status = status == SUPINE_OK ? add_hilum(c, i, j, list, error) : status;
       add_pair(c, i, j, list);
     }
   }
@@ -178,9 +206,9 @@ static supine_status find_pairs(const structures *c, json_t *list, supine_error 
 
 /* Print the mean displacement of each named structure between every two postures. */
 static supine_status compare_content(const supine_basis *basis, const supine_posture_list *postures,
-                                     bool json, supine_error *error) {
+                                     const request *wanted, supine_error *error) {
   const size_t n = supine_basis_get_info(basis)->vertex_count;
-  structures c = {.basis = basis, .postures = postures};
+  structures c = {.basis = basis, .postures = postures, .in_hilum = wanted->frame == 1};
   json_t *list = json_array();
   supine_status status = supine_command_names_open(basis, &c.names, error);
   if (status == SUPINE_OK) {
@@ -196,7 +224,7 @@ static supine_status compare_content(const supine_basis *basis, const supine_pos
     status = find_pairs(&c, list, error);
   }
   if (status == SUPINE_OK) {
-    supine_options_print(json_incref(list), json);
+    supine_options_print(json_incref(list), wanted->json);
   }
   json_decref(list);
   free(c.xyz);
@@ -242,7 +270,13 @@ static supine_status compare(const char *path, const char *made_by, const supine
                                   "%s holds structures inside the lungs, but -o needs the lungs: "
                                   "give the basis of the lungs, or leave -o out",
                                   path)
-               : compare_content(basis, &comparison.postures, wanted->json, error);
+               : compare_content(basis, &comparison.postures, wanted, error);
+  }
+  if (wanted->frame == 1) {
+    return supine_error_set(
+        error, SUPINE_ERROR_ARGUMENT,
+        "--frame hilum is for structures inside the lungs: give a basis made by "
+        "'supine embed', or use 'supine deform --frame hilum'");
   }
   status = supine_report_find(&comparison, error);
   if (status == SUPINE_OK) {

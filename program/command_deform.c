@@ -22,6 +22,7 @@ typedef struct request {
   supine_volume_options volume;
   supine_from from;
   bool as_scanned;
+  int frame; /* 1 if the hilum stays in place, 0 if the body does */
   supine_deform_content content;
   const char *states; /* CSV file of states; NULL if the options give one state */
   char *output; /* output file named in a row of the file `states`; the request owns this text */
@@ -46,6 +47,7 @@ static const supine_option table[] = {
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {.table = supine_options_from_scan, SUPINE_FILLS(request, from)},
     {.table = supine_options_as_scanned, SUPINE_FILLS(request, as_scanned)},
+    {.table = supine_options_hilum_frame, SUPINE_FILLS(request, frame)},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.table = supine_command_deform_content_options, SUPINE_FILLS(request, content)},
     {.name = NULL}};
@@ -107,6 +109,9 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
   if (status == SUPINE_OK) {
     status = deformed_mesh(basis, &moved->pose, &mesh, normals);
   }
+  for (size_t i = 0; i < 3 * mesh.vertex_count && moved->subtract_hilum; ++i) {
+    mesh.vertices[i] -= moved->hilum[i % 3];
+  }
   (void)supine_basis_volumes(basis, &moved->pose, volumes);
   save->from = from.vertices;
   save->normals = mesh.triangle_count > 0 ? normals : NULL;
@@ -121,6 +126,7 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
     report(path, gravity, &mesh, &from, moved->from.name,
            supine_basis_metadata(basis, "content") == NULL);
     supine_options_expected_print(&moved->expected, stdout);
+    supine_options_hilum_print(moved->hilum, moved->subtract_hilum);
   }
   free(normals);
   supine_mesh_free(&from);
@@ -131,8 +137,9 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
 static supine_status deform(const supine_basis *basis, const request *wanted, supine_error *error) {
   supine_deformation moved = {.state = wanted->volume.state,
                               .from_given = wanted->from.given,
-                              .allow_folds = wanted->volume.allow_folds};
-  char comment[128];
+                              .allow_folds = wanted->volume.allow_folds,
+                              .subtract_hilum = wanted->frame == 1};
+  char comment[192];
   supine_status status = supine_options_reference(basis, &wanted->from, false, &moved.from, error);
   if (status == SUPINE_OK) {
     status = supine_options_pose(basis, name, wanted->volume.allow_folds, &moved.state, &moved.pose,
@@ -143,7 +150,12 @@ static supine_status deform(const supine_basis *basis, const request *wanted, su
                                           error);
   }
   if (status == SUPINE_OK) {
-    (void)snprintf(comment, sizeof comment, "displacement from %s", moved.from.name);
+    status = supine_options_hilum(basis, &moved.pose, &moved.from.pose, wanted->frame == 1,
+                                  moved.hilum, error);
+  }
+  if (status == SUPINE_OK) {
+    (void)snprintf(comment, sizeof comment, "displacement from %s%s", moved.from.name,
+                   wanted->frame == 1 ? ", in the frame of the hilum" : "");
     moved.save.comment = comment;
     status = supine_options_basis_frame(basis, wanted->as_scanned, &moved.save, error);
   }

@@ -8,6 +8,7 @@
 #include "mesh/labels/shapes.h"
 #include "precompute/inside/content.h"
 #include "precompute/inside/embed.h"
+#include "precompute/patient/patient_file.h"
 
 #include "program/options/basis_input.h"
 #include "program/options/command.h"
@@ -215,11 +216,18 @@ static supine_status check_content(const supine_inside_shells *shells, const req
 
 static supine_status embed(const supine_basis *basis, const request *wanted,
                            const supine_arguments *given, supine_error *error) {
-  const supine_inside_options options = {.clamp = wanted->clamp, .made_by = given->made_by};
+  static supine_patient_record record; /* static, as it is too large for the stack */
+  const char *law = supine_basis_metadata(basis, "patient_law");
+  supine_inside_options options = {.clamp = wanted->clamp, .made_by = given->made_by};
   supine_inside_shells shells = {0};
   supine_inside_content content = {0};
   supine_inside_report report;
   supine_status status = supine_inside_shells_create(basis, &shells, error);
+  if (status == SUPINE_OK && law != NULL && !supine_basis_get_info(basis)->vector) {
+    status = supine_patient_decode(given->operand[0], law, &record, error);
+    options.context = &record;
+    options.field = record.path_span[0] != 0.0 ? supine_patient_field : NULL;
+  }
   if (status == SUPINE_OK) {
     status = read_content(&shells, wanted, given->operand + 1, given->count - 1, &content, error);
   }

@@ -82,16 +82,20 @@ static void add_content(json_t *root, const supine_basis *basis) {
   (void)json_object_set_new(root, "embedded", counts);
 }
 
-/* Add the expected errors, if known, of two displacements: from the scan to supine, and from the
- * scan to prone, both at the default volume. Return SUPINE_OK or SUPINE_ERROR_MEMORY. */
+/* Add the expected errors, if known, and their terms, of two displacements: from the scan to
+ * supine, and from the scan to prone, both at the default volume. Return SUPINE_OK or
+ * SUPINE_ERROR_MEMORY.
+ */
 static supine_status add_expected(json_t *root, const supine_basis *basis, supine_error *error) {
   const supine_state scan = supine_basis_scan(basis);
   json_t *rows = json_array();
+  json_t *terms = json_array();
   supine_status status = SUPINE_OK;
   for (int prone = 0; prone < 2 && status != SUPINE_ERROR_MEMORY; ++prone) {
     const supine_state state = {.gravity = {0.0, prone == 1 ? -1.0 : 1.0, 0.0},
                                 .volume = supine_basis_default_volume(basis)};
     supine_expected expected = {0};
+    supine_expected_part parts[SUPINE_EXPECTED_TERMS];
     char text[160];
     status = supine_options_expected_find(basis, &state, &scan, &expected, error);
     if (status == SUPINE_OK && expected.largest > 0.0) {
@@ -99,10 +103,19 @@ static supine_status add_expected(json_t *root, const supine_basis *basis, supin
       (void)json_array_append_new(rows, json_pack("{s:s, s:f, s:f, s:b}", "state", text, "rms_mm",
                                                   expected.rms, "largest_mm", expected.largest,
                                                   "extrapolated", (int)expected.turned));
+      (void)supine_expected_parts(basis, &state, &scan, parts, NULL);
+      for (size_t k = 0; k < SUPINE_EXPECTED_TERMS; ++k) {
+        if (parts[k].rms > 0.0) {
+          (void)json_array_append_new(terms, json_pack("{s:s, s:s, s:f, s:s}", "state", text,
+                                                       "term", parts[k].name, "rms_mm",
+                                                       parts[k].rms, "source", parts[k].source));
+        }
+      }
     }
     supine_options_expected_free(&expected);
   }
   (void)json_object_set_new(root, "expected_error", rows);
+  (void)json_object_set_new(root, "expected_error_terms", terms);
   return status == SUPINE_ERROR_MEMORY ? status : SUPINE_OK;
 }
 

@@ -7,13 +7,14 @@
 #include <supine/locate.h>
 #include <supine/posture.h>
 
-#include "base/csv.h"
 #include "base/output.h"
 #include "base/text.h"
 
+#include "mesh/io/points.h"
 #include "program/options/basis_input.h"
 #include "program/options/inside.h"
 #include "program/options/state_options.h"
+#include "program/options/surface_options.h"
 
 static const char name[] = "locate";
 
@@ -23,6 +24,7 @@ typedef struct request {
   supine_state state; /* the volume is fitted if its kind is SUPINE_VOLUME_DEFAULT */
   double noise;
   bool rigid, json;
+  supine_mesh_load_options load;
 } request;
 
 static const supine_option table[] = {
@@ -36,13 +38,15 @@ static const supine_option table[] = {
     {"volume", 0, "VOLUME", SUPINE_VOLUME_HELP ". By default, it is fitted to the points",
      SUPINE_FILLS(request, state), .read = supine_options_read_volume},
     {"rigid", 0, NULL,
-     "also fit a rotation, which needs at least three points; by default only a translation is "
-     "fitted",
+     "also fit a rotation, which needs at least three points. It is expected to be small (standard "
+     "deviation 3 degrees), unless the points show more than 30 degrees. By default only a "
+     "translation is fitted",
      SUPINE_FILLS(request, rigid)},
     {"noise", 0, "MM", "standard deviation of an observed coordinate", SUPINE_FILLS(request, noise),
      .standard = "2", SUPINE_ABOVE_ZERO, .wants = "millimetres"},
     {"json", 0, NULL, "print JSON instead of text", SUPINE_FILLS(request, json)},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
+    {.table = supine_options_surface_frame, SUPINE_FILLS(request, load)},
     {.name = NULL}};
 
 typedef struct observations {
@@ -50,10 +54,10 @@ typedef struct observations {
   supine_observation *points;
 } observations;
 
-/* Find the vertex of the point that the current row of a CSV file names. */
-static supine_status find_vertex(const supine_csv *csv, const supine_command_names *names,
-                                 size_t *vertex, supine_error *error) {
-  const char *text = supine_csv_text(csv, 0);
+/* Find the vertex of the embedded point that is called `text` in the file `path`. */
+static supine_status find_vertex(const char *path, const char *text,
+                                 const supine_command_names *names, size_t *vertex,
+                                 supine_error *error) {
   size_t found = 0;
   for (size_t part = 0; part < names->count; ++part) {
     const size_t own = names->begin[part + 1] - names->begin[part];
@@ -68,60 +72,37 @@ static supine_status find_vertex(const supine_csv *csv, const supine_command_nam
   if (found > 1) {
     return supine_error_set(
         error, SUPINE_ERROR_FORMAT,
-        "%s:%zu: '%s' has %zu vertices, so it is not a point: give the name of a point", csv->path,
-        csv->line, text, found);
+        "%s: '%s' has %zu vertices, so it is not a point: give the name of a point", path, text,
+        found);
   }
   const char *nearest =
       supine_options_suggest(text, (const char *const *)names->text, names->count);
   return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                          "%s:%zu: no point '%s' in the file of --points%s%s%s", csv->path,
-                          csv->line, text, nearest == NULL ? "" : "; did you mean '",
-                          nearest == NULL ? "" : nearest, nearest == NULL ? "" : "'?");
+                          "%s: no point '%s' in the file of --points%s%s%s", path, text,
+                          nearest == NULL ? "" : "; did you mean '", nearest == NULL ? "" : nearest,
+                          nearest == NULL ? "" : "'?");
 }
 
-static supine_status read_rows(supine_csv *csv, const supine_command_names *names, double noise,
-                               observations *observed, supine_error *error) {
-  static const char *const axes[] = {"x", "y", "z"};
-  for (bool more = true;;) {
-    supine_status status = supine_csv_next(csv, &more, error);
-    if (status != SUPINE_OK || !more) {
-      return status;
-    }
-    if (observed->count == SUPINE_LOCATE_POINTS_MAX) {
-      return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s:%zu: more than %d points: leave some out", csv->path, csv->line,
-                              (int)SUPINE_LOCATE_POINTS_MAX);
-    }
+static supine_status load_observed(const char *path, const request *wanted,
+                                   const supine_command_names *names, observations *observed,
+                                   supine_error *error) {
+  supine_mesh_points read = {0};
+  supine_status status = supine_mesh_points_read(path, &wanted->load, &read, error);
+  observed->points = calloc(read.count + 1, sizeof *observed->points);
+  if (status == SUPINE_OK && read.count > SUPINE_LOCATE_POINTS_MAX) {
+    status =
+        supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: %zu points, more than %d: leave some out",
+                         path, read.count, (int)SUPINE_LOCATE_POINTS_MAX);
+  } else if (status == SUPINE_OK && observed->points == NULL) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
+  }
+  for (; observed->count < read.count && status == SUPINE_OK; ++observed->count) {
     supine_observation *point = &observed->points[observed->count];
-    point->noise = noise;
-    status = find_vertex(csv, names, &point->vertex, error);
-    for (size_t i = 0; i < 3 && status == SUPINE_OK; ++i) {
-      status = supine_csv_number(csv, 1 + i, axes[i], &point->position[i], error);
-    }
-    if (status != SUPINE_OK) {
-      return status;
-    }
-    ++observed->count;
+    point->noise = wanted->noise;
+    memcpy(point->position, read.at + 3 * observed->count, sizeof point->position);
+    status = find_vertex(path, read.names[observed->count], names, &point->vertex, error);
   }
-}
-
-static supine_status load_observed(const char *path, const supine_command_names *names,
-                                   double noise, observations *observed, supine_error *error) {
-  static const char *const columns[] = {"name", "x", "y", "z"};
-  supine_csv csv = {0};
-  observed->points = calloc(SUPINE_LOCATE_POINTS_MAX, sizeof *observed->points);
-  if (observed->points == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
-  }
-  supine_status status = supine_csv_open(path, columns, 4, 4, &csv, error);
-  if (status == SUPINE_OK) {
-    status = read_rows(&csv, names, noise, observed, error);
-  }
-  if (status == SUPINE_OK && observed->count == 0) {
-    status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s: no observed point: give at least one row name,x,y,z", path);
-  }
-  supine_csv_close(&csv);
+  supine_mesh_points_free(&read);
   return status;
 }
 
@@ -140,6 +121,7 @@ typedef struct lungs_found {
   supine_locate_residual *residuals; /* [postures, points] residual of each fitted point */
   float *xyz;                        /* [N, 3] positions in the most probable posture, mm */
   float *sigma;                      /* [N] expected errors of the positions, mm */
+  double volume;                     /* volume of the lungs, mL; of the surface if it is written */
   void *space;                       /* a workspace of supine_locate for each posture */
 } lungs_found;
 
@@ -178,6 +160,41 @@ static supine_status try_postures(const supine_locate_task *task, bool posture_g
     located->probability[k] /= sum;
   }
   return SUPINE_OK;
+}
+
+/* If points that do not fit fit ten times better (mean squared residual) when they are read in
+ * another way, say so in the error. */
+static void suggest_reading(const supine_locate_task *task, bool posture_given,
+                            lungs_found *located, supine_error *error) {
+  static const double residual_most = 40.0; /* largest residual that supine_locate accepts, mm */
+  static const struct {
+    const char *way;
+    double factor[3];
+  } readings[] = {{"in centimetres (--units cm)", {10.0, 10.0, 10.0}},
+                  {"in RAS (--axes RAS)", {-1.0, -1.0, 1.0}},
+                  {"mirrored (--axes RPS)", {-1.0, 1.0, 1.0}}};
+  const supine_observation *given = task->observed;
+  supine_observation other[SUPINE_LOCATE_POINTS_MAX];
+  supine_locate_task changed = *task;
+  double most = residual_most;
+  for (size_t k = 0; k < located->count; ++k) {
+    most = fmax(most, located->location[k].residual_rms);
+  }
+  changed.observed = other;
+  for (size_t i = 0; i < sizeof readings / sizeof *readings && task->count > 2; ++i) {
+    for (size_t j = 0; j < 3 * task->count; ++j) {
+      other[j / 3] = j % 3 == 0 ? given[j / 3] : other[j / 3];
+      other[j / 3].position[j % 3] *= readings[i].factor[j % 3];
+    }
+    if (try_postures(&changed, posture_given, located, NULL) == SUPINE_OK &&
+        10.0 * pow(located->best->residual_rms, 2.0) < most * most) {
+      const size_t length = strlen(error->message);
+      (void)snprintf(error->message + length, sizeof error->message - length,
+                     ". Read %s, they fit within %.1f mm", readings[i].way,
+                     located->best->residual_rms);
+      return;
+    }
+  }
 }
 
 /* Compute located->xyz, the positions x in the most probable posture, and located->sigma. If
@@ -233,7 +250,11 @@ static supine_status find(const supine_locate_task *task, bool posture_given,
   } else {
     status = try_postures(task, posture_given, located, error);
   }
+  if (status == SUPINE_ERROR_NUMERICAL) {
+    suggest_reading(task, posture_given, located, error);
+  }
   if (status == SUPINE_OK) {
+    located->volume = located->best->volume;
     status = find_positions(shown, xyz, sigma, located, error);
   }
   free(xyz);
@@ -241,29 +262,33 @@ static supine_status find(const supine_locate_task *task, bool posture_given,
   return status;
 }
 
-static supine_status write_surface(const char *path, const supine_basis *basis,
-                                   const lungs_found *located, supine_error *error) {
-  const supine_tensor *lung = supine_basis_tensor(basis, "lung");
+/* Make the located surface, and set located->volume to the volume that it encloses. */
+static supine_status make_surface(const supine_basis *basis, lungs_found *located,
+                                  supine_mesh *mesh, supine_error *error) {
   const size_t n = supine_basis_get_info(basis)->vertex_count;
-  supine_mesh mesh = {0};
-  double volume = located->best->volume;
+  const supine_status status = supine_options_basis_mesh(basis, mesh);
+  if (status != SUPINE_OK) {
+    return supine_error_set(error, status, "no memory for %zu vertices", n);
+  }
+  for (size_t i = 0; i < 3 * n; ++i) {
+    mesh->vertices[i] = (double)located->xyz[i];
+  }
+  located->volume = 1e-3 * supine_mesh_volume(mesh);
+  return SUPINE_OK;
+}
+
+static supine_status write_surface(const char *path, const supine_basis *basis,
+                                   const supine_mesh *mesh, const lungs_found *located,
+                                   supine_error *error) {
+  const supine_tensor *lung = supine_basis_tensor(basis, "lung");
   const supine_mesh_field fields[] = {{"gravity_LPS", 3, located->best->state.gravity},
-                                      {"volume_mL", 1, &volume}};
+                                      {"volume_mL", 1, &located->volume}};
   const supine_mesh_save_options save = {.comment = "in the frame of the observations",
                                          .expected_error = located->sigma,
                                          .lung = lung == NULL ? NULL : lung->data,
                                          .fields = fields,
                                          .field_count = 2};
-  supine_status status = supine_options_basis_mesh(basis, &mesh);
-  if (status != SUPINE_OK) {
-    return supine_error_set(error, status, "no memory for %zu vertices", n);
-  }
-  for (size_t i = 0; i < 3 * n; ++i) {
-    mesh.vertices[i] = (double)located->xyz[i];
-  }
-  status = supine_mesh_save(path, &mesh, &save, error);
-  supine_mesh_free(&mesh);
-  return status;
+  return supine_mesh_save(path, mesh, &save, error);
 }
 
 static supine_status write_points(const char *path, const supine_basis *inside,
@@ -314,7 +339,7 @@ static void print(const request *wanted, const supine_command_names *names,
     (void)json_object_update_new(root, json_pack("{s:f, s:b}", "probability_percent", 100.0 * share,
                                                  "determined", (int)(share >= determined)));
   }
-  (void)json_object_set_new(root, "volume_ml", json_real(best->volume));
+  (void)json_object_set_new(root, "volume_ml", json_real(located->volume));
   if (best->volume_error > 0.0) {
     (void)json_object_update_new(root, json_pack("{s:f, s:f}", "volume_deviation_ml",
                                                  best->volume_error, "deviation_without_points_ml",
@@ -350,7 +375,9 @@ static supine_status locate(const request *wanted, const supine_basis *lungs,
                             const observations *observed, supine_error *error) {
   const bool csv = supine_text_ends_in(wanted->output, ".csv");
   const supine_basis *shown = csv ? inside : lungs;
+  enum { OUTLIER_POINTS = 5 }; /* supine_locate leaves out at most a fifth of the points */
   lungs_found located = {0};
+  supine_mesh mesh = {0};
   const supine_locate_task task = {.inside = inside,
                                    .count = observed->count,
                                    .observed = observed->points,
@@ -361,12 +388,20 @@ static supine_status locate(const request *wanted, const supine_basis *lungs,
     /* Report a format error: the points in the file do not determine a rotation. */
     status = error->status = SUPINE_ERROR_FORMAT;
   }
+  if (status == SUPINE_OK && !csv) {
+    status = make_surface(lungs, &located, &mesh, error);
+  }
   if (status == SUPINE_OK) {
     /* Print first and write last, so that a failure leaves no file. */
+    if (observed->count < OUTLIER_POINTS) {
+      supine_options_say(name, "with fewer than %d points, a wrong one cannot be found: check them",
+                         (int)OUTLIER_POINTS);
+    }
     print(wanted, names, observed, supine_basis_get_info(shown)->vertex_count, &located);
     status = csv ? write_points(wanted->output, inside, names, &located, error)
-                 : write_surface(wanted->output, lungs, &located, error);
+                 : write_surface(wanted->output, lungs, &mesh, &located, error);
   }
+  supine_mesh_free(&mesh);
   free(located.residuals);
   free(located.xyz);
   free(located.sigma);
@@ -391,7 +426,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
     status = supine_command_inside_open(lungs, wanted->points, &inside, &names, error);
   }
   if (status == SUPINE_OK) {
-    status = load_observed(given->operand[1], &names, wanted->noise, &observed, error);
+    status = load_observed(given->operand[1], wanted, &names, &observed, error);
   }
   if (status == SUPINE_OK) {
     status = locate(wanted, lungs, inside, &names, &observed, error);
@@ -406,15 +441,17 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
 const supine_command supine_command_locate = {
     name,
     "find the whole lung from a few observed points",
-    .usage = "BASIS OBSERVED.csv --points INSIDE [--posture NAME] [--volume VOLUME] -o FILE",
+    .usage = "BASIS OBSERVED --points INSIDE [--posture NAME] [--volume VOLUME] -o FILE",
     .about = "Fits the lungs to a few points observed inside them, for example by a navigation "
              "system. Finds the volume and the translation between the frames of the scan and of "
-             "the observations, and corrects the predicted positions near the points. OBSERVED.csv "
-             "has the columns name,x,y,z, in mm and LPS, with the names given to 'supine embed'.",
+             "the observations, and corrects the predicted positions near the points. OBSERVED is "
+             "a .mrk.json of 3D Slicer, or a CSV with the columns name,x,y,z, with the names given "
+             "to 'supine embed'.",
     .options = table,
     .notes =
         "Expected errors are " SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT
-        " A few points seldom determine the posture: give --posture. Without it, six postures are "
+        " They are multiplied by a factor that the residuals of the points decide. A few points "
+        "seldom determine the posture: give --posture. Without it, six postures are "
         "tried, and the error includes the differences between them.\n"
         "\n"
         "Examples:\n"
@@ -425,6 +462,6 @@ const supine_command supine_command_locate = {
         "--volume rest --rigid -o found.csv",
     .operands_least = 2,
     .operands_most = 2,
-    .operands_missing = "name a basis file and a CSV file of observed points",
+    .operands_missing = "name a basis file and a file of observed points",
     .request_size = sizeof(request),
     .run = run};

@@ -187,6 +187,11 @@ static supine_status compress_fields(request *wanted, const supine_scan *scan,
 static supine_status compute(request *wanted, supine_error *error) {
   const supine_lungs *lungs = &wanted->model.made_from.lungs;
   supine_precompute_report report;
+  char *text = wanted->patient != NULL ? supine_patient_text(wanted->model.patient, NULL) : NULL;
+  if (wanted->patient != NULL && text == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %s", wanted->patient);
+  }
+  wanted->basis.patient = text;
   wanted->basis.model = wanted->model.prepared.model;
   wanted->basis.reference = &wanted->model.prepared.reference;
   const supine_status status =
@@ -194,24 +199,19 @@ static supine_status compute(request *wanted, supine_error *error) {
   if (status == SUPINE_OK) {
     report_result(wanted->path, lungs, &wanted->basis, &report);
   }
+  free(text);
   return status;
 }
 
-/* Read a patient model and encode it as text for the basis. The caller frees the text. */
-static supine_status take_patient(request *wanted, supine_patient_record *record, char **text,
+static supine_status take_patient(request *wanted, supine_patient_record *record,
                                   supine_error *error) {
   supine_status status = supine_patient_read(wanted->patient, record, error);
   if (status != SUPINE_OK) {
     return status;
   }
-  *text = supine_patient_text(record, NULL);
-  if (*text == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %s", wanted->patient);
-  }
   wanted->model.patient = record;
   /* Later, the constants of this law are replaced by those of the patient. */
   wanted->model.choice.law = SUPINE_LAW_DEEP;
-  wanted->basis.patient = *text;
   const supine_patient_fit_report *report = &record->report;
   (void)snprintf(wanted->summary, sizeof wanted->summary,
                  "%s: %s law%s from %.0f points; held-out residual %.1f of %.1f mm RMS, %.0f %% "
@@ -222,6 +222,8 @@ static supine_status take_patient(request *wanted, supine_patient_record *record
                  report->explained, report->expected_point);
   wanted->basis.patient_summary = wanted->summary;
   wanted->basis.expected_error = report->expected_constant;
+  wanted->basis.expected_from = report->expected_from;
+  wanted->basis.turn_fitted = record->gain_error > 0.0;
   (void)printf("%s\n", wanted->summary);
   return SUPINE_OK;
 }
@@ -234,7 +236,6 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   request *wanted = chosen;
   const bool fields = wanted->fields != NULL;
   const supine_scan scan = wanted->model.choice.scan;
-  char *text = NULL;
   static supine_patient_record record; /* static, as it is too large for the stack */
   if (wanted->directions > 0) {
     (void)puts("x,y,z");
@@ -255,8 +256,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
                             "--scanned: with --fields, give the posture alone, such as supine, as "
                             "fields of gravity have no volume");
   }
-  supine_status status =
-      wanted->patient != NULL ? take_patient(wanted, &record, &text, error) : SUPINE_OK;
+  supine_status status = wanted->patient != NULL ? take_patient(wanted, &record, error) : SUPINE_OK;
   if (status == SUPINE_OK) {
     status = supine_command_model_load(&wanted->model, name, given->operand, given->count, fields,
                                        error);
@@ -268,7 +268,6 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
     wanted->basis.frame = wanted->model.made_from.frame;
     status = fields ? compress_fields(wanted, &scan, error) : compute(wanted, error);
   }
-  free(text);
   supine_command_model_options_free(&wanted->model);
   return status;
 }

@@ -105,7 +105,13 @@ static json_t *encode_state(const supine_command_state *state,
     (void)json_object_set_new(root, "surface", encode(outcome->surface));
   }
   if (outcome->has_points) {
+    const supine_command_distance *own = &outcome->points[SUPINE_PATIENT_MAP_PREDICTED];
     (void)json_object_set_new(root, "landmarks", encode(outcome->points));
+    if (own->expected > 0.0) {
+      (void)json_object_update_new(
+          root, json_pack("{s:f, s:f, s:f}", "expected_rms_mm", own->expected, "expected_over_true",
+                          own->expected / own->rms, "within_band_percent", 100.0 * own->within));
+    }
   }
   if (outcome->has_best) {
     (void)json_object_update_new(root, json_pack("{s:f, s:f}", "nearest_scale", outcome->best_scale,

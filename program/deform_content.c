@@ -146,7 +146,10 @@ static supine_status write_points(const char *path, const supine_basis *basis,
       const size_t at = names.order[i];
       const float *p = xyz + 3 * at;
       const float *q = before + 3 * at;
-      const double to[3] = {(double)p[0], (double)p[1], (double)p[2]};
+      double to[3] = {(double)p[0], (double)p[1], (double)p[2]};
+      for (size_t k = 0; k < 3 && moved->subtract_hilum; ++k) {
+        to[k] -= moved->hilum[k];
+      }
       const double d[3] = {to[0] - (double)q[0], to[1] - (double)q[1], to[2] - (double)q[2]};
       double there[3];
       double shift[3];
@@ -328,6 +331,7 @@ supine_status supine_command_deform_content(const supine_deform_content *wanted,
     status = write_points(wanted->path, basis, moved, error);
     if (status == SUPINE_OK) {
       supine_options_expected_print(&moved->expected, stdout);
+      supine_options_hilum_print(moved->hilum, moved->subtract_hilum);
     }
   }
   return status;

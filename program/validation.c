@@ -90,6 +90,7 @@ static supine_status find_gains(const supine_command_subject *s, const supine_co
     asked.volume = (supine_volume){SUPINE_VOLUME_ABSOLUTE, 1e-3 * supine_mesh_volume(mesh)};
   }
   const supine_status status = supine_basis_gains(s->basis, &asked, &outcome->pose, error);
+  outcome->state = asked;
   if (status == SUPINE_OK) {
     outcome->scale = outcome->pose.gains[0][0];
     outcome->millilitres =
@@ -219,7 +220,9 @@ void supine_command_find_line(supine_command_subject *subject) {
   s->line_off = most > 0.0 ? off / most : 0.0;
 }
 
-/* Predict landmark positions, mm, by biharmonic interpolation of the surface's displacement. */
+/* Predict landmark positions [count, 3], mm, and then their squared expected errors [count], mm^2,
+ * by biharmonic interpolation of those of the surface.
+ * @param predicted  written, followed by workspace of the same size */
 static supine_status predict_points(const supine_command_subject *s, size_t which,
                                     const supine_patient_pairs *pairs, double *predicted,
                                     supine_error *error) {
@@ -227,25 +230,34 @@ static supine_status predict_points(const supine_command_subject *s, size_t whic
   const supine_command_outcome *outcome = &s->outcome[which];
   const size_t n = s->start.vertex_count;
   supine_inside_biharmonic fit = {0};
-  double *displacement = malloc(3 * n * sizeof *displacement);
-  supine_status status = displacement == NULL ? supine_error_set(error, SUPINE_ERROR_MEMORY,
-                                                                 "no memory for %zu vertices", n)
-                                              : SUPINE_OK;
-  for (size_t i = 0; i < 3 * n && status == SUPINE_OK; ++i) {
-    displacement[i] = outcome->predicted[i] - s->start.vertices[i];
+  const size_t count = pairs->count;
+  supine_expected expected = {0};
+  double *values = calloc(4 * n, sizeof *values);
+  supine_status status =
+      values == NULL ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n)
+                     : supine_options_expected_find(s->basis, &outcome->state, &s->from.state,
+                                                    &expected, error);
+  for (size_t i = 0; i < 4 * n && status == SUPINE_OK; ++i) {
+    const size_t k = 3 * (i / 4) + i % 4;
+    values[i] = i % 4 < 3 ? outcome->predicted[k] - s->start.vertices[k]
+                : expected.sigma != NULL
+                    ? (double)expected.sigma[i / 4] * (double)expected.sigma[i / 4]
+                    : 0.0;
   }
   if (status == SUPINE_OK) {
-    status =
-        supine_inside_biharmonic_fit(n, s->start.vertices, 3, displacement, CENTRES, &fit, error);
+    status = supine_inside_biharmonic_fit(n, s->start.vertices, 4, values, CENTRES, &fit, error);
   }
   if (status == SUPINE_OK) {
-    supine_inside_biharmonic_evaluate(&fit, pairs->count, pairs->from, predicted);
+    supine_inside_biharmonic_evaluate(&fit, pairs->count, pairs->from, predicted + 4 * count);
   }
-  for (size_t i = 0; i < 3 * pairs->count && status == SUPINE_OK; ++i) {
-    predicted[i] += pairs->from[i];
+  for (size_t i = 0; i < 4 * count && status == SUPINE_OK; ++i) {
+    const size_t k = 3 * (i / 4) + i % 4;
+    predicted[i % 4 < 3 ? k : 3 * count + i / 4] =
+        predicted[4 * count + i] + (i % 4 < 3 ? pairs->from[k] : 0.0);
   }
   supine_inside_biharmonic_free(&fit);
-  free(displacement);
+  supine_options_expected_free(&expected);
+  free(values);
   return status;
 }
 
@@ -282,14 +294,14 @@ static supine_status validate_points(supine_command_subject *s, size_t which, co
     status = check_points(s, &pairs, error);
   }
   if (status == SUPINE_OK) {
-    predicted = malloc(3 * pairs.count * sizeof *predicted);
+    predicted = malloc(8 * pairs.count * sizeof *predicted);
     status = predicted == NULL ? supine_error_set(error, SUPINE_ERROR_MEMORY,
                                                   "no memory for %zu landmarks", pairs.count)
                                : predict_points(s, which, &pairs, predicted, error);
   }
   if (status == SUPINE_OK) {
-    status =
-        supine_command_compare_points(&pairs, predicted, s->moved, s->outcome[which].points, error);
+    status = supine_command_compare_points(&pairs, predicted, predicted + 3 * pairs.count, s->moved,
+                                           s->outcome[which].points, error);
     s->outcome[which].has_points = true;
   }
   free(predicted);

@@ -27,10 +27,14 @@ typedef struct supine_command_distance {
    * distance of the prediction "none", or of "translation" if body motion is removed; NAN if r is
    * nearly 0 */
   double explained;
+  /* Of the prediction at landmarks: RMS expected error, mm, or 0 if unknown; and the share of the
+   * landmarks within 1.8 expected errors, 0 to 1. */
+  double expected, within;
 } supine_command_distance;
 
 /* A predicted state, and the distances of the prediction from the scan of that state. */
 typedef struct supine_command_outcome {
+  supine_state state; /* state->state, with the volume of the scan if none is given */
   supine_pose pose;
   double scale;       /* pose.gains[0][0], the factor on the first lung's displacement along x */
   double millilitres; /* volume minus the volume before the predicted motion, mL */
@@ -90,11 +94,14 @@ supine_status supine_command_draw_errors(const supine_command_subject *subject, 
  * supine_command_map_names: `predicted`, and maps fitted to the pairs.
  * @param moved      body motion between the scans to fit to `predicted` and remove before comparing
  * @param predicted  [count, 3] positions predicted from the first points of the pairs, mm
+ * @param squares    [count] their squared expected errors, mm^2, 0 if unknown; or NULL
  * @retval SUPINE_ERROR_NUMERICAL  the points lie in one plane
  * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_command_compare_points(
-    const supine_patient_pairs *pairs, const double *predicted, supine_patient_scan_motion moved,
-    supine_command_distance distance[SUPINE_PATIENT_MAP_COUNT], supine_error *error);
+supine_status
+supine_command_compare_points(const supine_patient_pairs *pairs, const double *predicted,
+                              const double *squares, supine_patient_scan_motion moved,
+                              supine_command_distance distance[SUPINE_PATIENT_MAP_COUNT],
+                              supine_error *error);
 
 /* Compute the distances between `state`, a scanned surface, and a predicted surface, from the
  * vertices of each to the other, for each prediction in supine_command_map_names: `predicted`, and

@@ -51,16 +51,20 @@ static supine_status undetermined(supine_error *error) {
                           "the points lie in one plane: give points spread over the lungs");
 }
 
-supine_status supine_command_compare_points(
-    const supine_patient_pairs *pairs, const double *predicted, supine_patient_scan_motion moved,
-    supine_command_distance distance[SUPINE_PATIENT_MAP_COUNT], supine_error *error) {
+supine_status
+supine_command_compare_points(const supine_patient_pairs *pairs, const double *predicted,
+                              const double *squares, supine_patient_scan_motion moved,
+                              supine_command_distance distance[SUPINE_PATIENT_MAP_COUNT],
+                              supine_error *error) {
   double *space = malloc(pairs->count * sizeof *space);
   if (space == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu points", pairs->count);
   }
   for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT; ++k) {
     supine_patient_affinity by;
-    const double *from = k == SUPINE_PATIENT_MAP_PREDICTED ? predicted : pairs->from;
+    distance[k].expected = distance[k].within = 0.0;
+    const bool own = k == SUPINE_PATIENT_MAP_PREDICTED;
+    const double *from = own ? predicted : pairs->from;
     if (!supine_patient_map_fit(map_of(k, moved), pairs->count, from, pairs->to, &by)) {
       free(space);
       return undetermined(error);
@@ -69,7 +73,11 @@ supine_status supine_command_compare_points(
       double at[3];
       supine_patient_map_apply(&by, from + 3 * i, at);
       space[i] = supine_distance(at, pairs->to + 3 * i);
+      const double square = own && squares != NULL ? fmax(0.0, squares[i]) : 0.0;
+      distance[k].expected += square / (double)pairs->count;
+      distance[k].within += space[i] <= 1.8 * sqrt(square) ? 1.0 / (double)pairs->count : 0.0;
     }
+    distance[k].expected = sqrt(distance[k].expected);
     summarise(space, pairs->count, &distance[k]);
   }
   explain(moved, distance);

@@ -182,6 +182,11 @@ static void bound_lungs(supine_basis *basis) {
     }
   }
   basis->info.bounds = basis->bounds[0][0];
+  for (size_t i = 0; i < 3 * basis->info.vertex_count; ++i) {
+    const double x = (double)basis->info.vertices[i];
+    basis->box[0][i % 3] = i < 3 || x < basis->box[0][i % 3] ? x : basis->box[0][i % 3];
+    basis->box[1][i % 3] = i < 3 || x > basis->box[1][i % 3] ? x : basis->box[1][i % 3];
+  }
 }
 
 /* Read the names of the lungs from the metadata "lungs", such as "left,right". Name the remaining
@@ -499,6 +504,24 @@ static supine_status check_rigid(const check *c, supine_basis *basis) {
   return SUPINE_OK;
 }
 
+/* Check the optional tensors from which the expected errors of embedded points are computed: the
+ * box around the lungs, and the mean products of the coefficients of their vertices. */
+static supine_status check_expected(const check *c, supine_basis *basis) {
+  const size_t k = basis->info.mode_count;
+  size_t corners[] = {2, 3};
+  size_t products[] = {basis->info.lung_count, 3, k, k};
+  if (supine_safetensors_find(c->file, "lungs_squares") != NULL) {
+    const double *box = require(c, "lungs_box", SUPINE_F64, 2, corners);
+    basis->squares = require(c, "lungs_squares", SUPINE_F64, 4, products);
+    if (box == NULL || basis->squares == NULL) {
+      return SUPINE_ERROR_FORMAT;
+    }
+    memcpy(basis->box, box, sizeof basis->box);
+  }
+  basis->midline = 0.5 * (basis->box[0][0] + basis->box[1][0]);
+  return read_numbers(c, "midline_mm", 1, &basis->midline);
+}
+
 /* Make a basis from an open file. The basis then owns the file. On failure, close the file. */
 static supine_status open_file(supine_safetensors *file, const char *name,
                                const supine_basis_options *options, supine_basis **result,
@@ -515,8 +538,8 @@ static supine_status open_file(supine_safetensors *file, const char *name,
   basis->file = file;
   status = check_metadata(&c, &basis->info);
   static supine_status (*const steps[])(const check *, supine_basis *) = {
-      check_surface, check_field, check_modes,   check_lungs, check_volume, check_reference,
-      check_rest,    check_scan,  check_normals, check_rigid, identify};
+      check_surface, check_field, check_modes,   check_lungs, check_volume,   check_reference,
+      check_rest,    check_scan,  check_normals, check_rigid, check_expected, identify};
   for (size_t i = 0; status == SUPINE_OK && i < sizeof steps / sizeof *steps; ++i) {
     status = steps[i](&c, basis);
   }

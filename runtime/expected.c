@@ -5,15 +5,38 @@
 #include <string.h>
 
 #include "runtime/expected.h"
+#include "runtime/internal.h"
 
-/* Standard deviation of an assumed volume at rest, as a fraction of the reference volume. */
-static const double resting_spread = 0.05;
+/* Relative standard deviation of an assumed volume, that at rest if full inflation was scanned and
+ * full inflation if rest was scanned, unless metadata "resting_spread" gives it: 0.08 / 0.48. */
+static const double usual_spread = 0.17;
+/* RMS displacement of a full breath, mm, below which c falls in proportion: 4.5 mm / 0.25, where
+ * 0.25 was measured on quiet breaths. */
+static const double full_breath = 18;
+/* Error beside the heart for a change of gravity of 1 across the body, and the error along gravity
+ * for a change of 1 sideways, mm. */
+static const double beside_heart = 12, sliding = 3;
 const double supine_expected_shift = 0.01;
 
-double supine_expected_constant(const supine_basis *basis) {
-  const char *text = supine_basis_metadata(basis, "expected_error_mm");
+static const struct {
+  const char *name, *source;
+} terms[SUPINE_EXPECTED_TERMS] = {
+    {"displacement", "landmarks of full breaths (15 people) and of quiet breaths (10 people)"},
+    {"turn", "a fit in one posture does not show the effect of a turn"},
+    {"assumed volume",
+     "standard deviation of the share at rest in other people (supine info: resting shares)"},
+    {"heart", "motion of the heart, supine to prone (Chino & Marks 2008, n 16)"},
+    {"sliding", "sliding of the lungs along gravity, which the model lacks"}};
+
+/* Return the positive number that the metadata `key` holds, or `usual`. */
+static double number_of(const supine_basis *basis, const char *key, double usual) {
+  const char *text = supine_basis_metadata(basis, key);
   const double stated = text == NULL ? 0 : strtod(text, NULL);
-  return stated > 0 && isfinite(stated) ? stated : SUPINE_EXPECTED_ERROR_MM;
+  return stated > 0 && isfinite(stated) ? stated : usual;
+}
+
+double supine_expected_constant(const supine_basis *basis) {
+  return number_of(basis, "expected_error_mm", SUPINE_EXPECTED_ERROR_MM);
 }
 
 double supine_expected_reference(const supine_basis *basis) {
@@ -25,8 +48,9 @@ double supine_expected_reference(const supine_basis *basis) {
   return sum;
 }
 
-double supine_expected_rms(const supine_basis *basis, const supine_pose *pose,
-                           const supine_pose *from) {
+/* Return the mean squared displacement between two poses over all vertices, mm^2. */
+static double mean_square(const supine_basis *basis, const supine_pose *pose,
+                          const supine_pose *from) {
   const size_t n = supine_basis_get_info(basis)->vertex_count;
   float x[3 * LOCATE_BLOCK];
   float origin[3 * LOCATE_BLOCK];
@@ -40,27 +64,66 @@ double supine_expected_rms(const supine_basis *basis, const supine_pose *pose,
       sum += d * d;
     }
   }
-  return sqrt(sum / (double)n);
+  return sum / (double)n;
 }
 
-/* Return whether the basis has a volume at rest that was assumed instead of measured. */
-static bool rest_is_assumed(const supine_basis *basis) {
+/* Return the same for the lungs around embedded points, from the products in their file. */
+static double mean_square_of_lungs(const supine_basis *basis, const supine_pose *pose,
+                                   const supine_pose *from) {
+  const size_t k = basis->info.mode_count;
+  double sum = 0;
+  for (size_t row = 0; row < basis->info.lung_count * 3 * k; ++row) {
+    const double *gain[2] = {&pose->gains[row / k / 3][row / k % 3],
+                             &from->gains[row / k / 3][row / k % 3]};
+    const double a = *gain[0] * pose->weights[row % k] - *gain[1] * from->weights[row % k];
+    for (size_t l = 0; l < k; ++l) {
+      sum += basis->squares[row * k + l] * a *
+             (*gain[0] * pose->weights[l] - *gain[1] * from->weights[l]);
+    }
+  }
+  return fmax(0, sum);
+}
+
+/* Return the kind of volume that was assumed instead of measured: rest, full inflation, or DEFAULT
+ * for none. */
+static supine_volume_kind assumed_kind(const supine_basis *basis) {
   const char *scanned = supine_basis_metadata(basis, "scanned");
   const char *state = supine_basis_metadata(basis, "scan_state");
-  return supine_basis_get_info(basis)->has_rest &&
-         supine_basis_metadata(basis, "resting_known") == NULL &&
-         (scanned == NULL || strcmp(scanned, "rest") != 0) &&
-         (state == NULL || strstr(state, "rest") == NULL);
+  const bool at_rest = (scanned != NULL && strcmp(scanned, "rest") == 0) ||
+                       (state != NULL && strstr(state, "rest") != NULL);
+  return !supine_basis_get_info(basis)->has_rest ||
+                 supine_basis_metadata(basis, "resting_known") != NULL
+             ? SUPINE_VOLUME_DEFAULT
+         : at_rest ? SUPINE_VOLUME_FULL
+                   : SUPINE_VOLUME_REST;
 }
 
-/* Return whether the volume of a state, of all lungs or of one lung, is relative to rest. */
-static bool counts_from_rest(const supine_state *state) {
-  bool rest = state->lung_count == 0 && (state->volume.kind == SUPINE_VOLUME_REST ||
-                                         state->volume.kind == SUPINE_VOLUME_DEFAULT);
-  for (size_t i = 0; i < state->lung_count; ++i) {
-    rest = rest || state->lungs[i].volume.kind == SUPINE_VOLUME_REST;
+/* Return the volume of all lungs at rest, in the posture of the scan, divided by that at full
+ * inflation. */
+static double resting_share(const supine_basis *basis) {
+  supine_state rest = supine_basis_scan(basis);
+  supine_pose pose;
+  double volumes[SUPINE_LUNGS_MAX];
+  double sum = 0;
+  rest.volume.kind = SUPINE_VOLUME_REST;
+  if (supine_basis_pose(basis, &rest, &pose, NULL) == SUPINE_OK) {
+    (void)supine_basis_volumes(basis, &pose, volumes);
+    for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+      sum += volumes[lung];
+    }
   }
-  return rest;
+  return sum / supine_expected_reference(basis);
+}
+
+/* Return whether the volume of a state, of all lungs or of one lung, is relative to `kind`. */
+static bool counts_from(const supine_state *state, supine_volume_kind kind) {
+  const supine_volume_kind own = state->volume.kind;
+  bool counts = state->lung_count == 0 &&
+                (own == kind || (own == SUPINE_VOLUME_DEFAULT && kind == SUPINE_VOLUME_REST));
+  for (size_t i = 0; i < state->lung_count; ++i) {
+    counts = counts || state->lungs[i].volume.kind == kind;
+  }
+  return counts && kind != SUPINE_VOLUME_DEFAULT;
 }
 
 supine_status supine_expected_shifted(const supine_basis *basis, const supine_state *state,
@@ -77,77 +140,156 @@ supine_status supine_expected_shifted(const supine_basis *basis, const supine_st
   return supine_basis_pose(basis, &shifted, pose, error);
 }
 
-/* Poses from which the expected errors of a state are computed. */
-typedef struct poses {
-  supine_pose at;   /* pose whose errors are computed */
-  supine_pose from; /* pose whose positions are taken to be exact */
-  /* Copies of `at` and `from`. If the volume of a state is relative to an assumed volume at rest,
-   * its copy holds 1 % of the reference volume more. */
-  supine_pose fuller_at, fuller_from;
-  bool assumed; /* whether `fuller_at` or `fuller_from` holds more than its original */
-} poses;
+/* Set the change of unit gravity between two states across the body and sideways. */
+static void find_turn(const supine_state *state, const supine_state *from,
+                      supine_expected_model *m) {
+  double change[3];
+  const double *g = state->gravity;
+  const double *f = from->gravity;
+  const double length = sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+  const double other = sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
+  for (size_t i = 0; i < 3; ++i) {
+    change[i] = g[i] / length - f[i] / other;
+  }
+  m->across = sqrt(change[0] * change[0] + change[1] * change[1]);
+  m->sideways = fabs(change[0]);
+}
 
-static supine_status find_poses(const supine_basis *basis, const supine_state *state,
-                                const supine_state *from, poses *p, supine_error *error) {
-  const bool assumed = rest_is_assumed(basis);
-  supine_status status = supine_basis_pose(basis, state, &p->at, error);
-  if (status == SUPINE_OK) {
-    status = supine_basis_pose(basis, from, &p->from, error);
+supine_status supine_expected_prepare(const supine_basis *basis, const supine_state *state,
+                                      const supine_state *from, double deviation, double least,
+                                      supine_expected_model *m, supine_error *error) {
+  const supine_state *const states[2] = {state, from};
+  const supine_volume_kind assumed = assumed_kind(basis);
+  const double spread = number_of(basis, "resting_spread", usual_spread) *
+                        (assumed == SUPINE_VOLUME_REST ? resting_share(basis) : 1);
+  const double own = supine_expected_constant(basis);
+  supine_status status = SUPINE_OK;
+  *m = (supine_expected_model){.basis = basis, .least = least};
+  for (size_t k = 0; k < 2 && status == SUPINE_OK; ++k) {
+    status = supine_basis_pose(basis, states[k], &m->pose[k], error);
+    m->pose[EXPECTED_FULLER + k] = m->pose[k];
+    if (status == SUPINE_OK && (deviation > 0 ? k == 0 : counts_from(states[k], assumed))) {
+      status = supine_expected_shifted(basis, states[k], &m->pose[EXPECTED_FULLER + k], error);
+      m->per_step = (deviation > 0 ? deviation / supine_expected_reference(basis) : spread) /
+                    supine_expected_shift;
+    }
   }
-  p->fuller_at = p->at;
-  p->fuller_from = p->from;
-  p->assumed = assumed && (counts_from_rest(state) || counts_from_rest(from));
-  if (status == SUPINE_OK && assumed && counts_from_rest(state)) {
-    status = supine_expected_shifted(basis, state, &p->fuller_at, error);
+  if (status != SUPINE_OK) {
+    return status;
   }
-  if (status == SUPINE_OK && assumed && counts_from_rest(from)) {
-    status = supine_expected_shifted(basis, from, &p->fuller_from, error);
+  find_turn(state, from, m);
+  const double square = basis->squares != NULL
+                            ? mean_square_of_lungs(basis, &m->pose[0], &m->pose[1])
+                            : mean_square(basis, &m->pose[0], &m->pose[1]);
+  const double rms = fmax(least, sqrt(square));
+  m->law = own * fmin(1, rms / number_of(basis, "expected_error_from_mm", full_breath));
+  if (supine_basis_metadata(basis, "turn_fitted") == NULL) {
+    m->turn = fmax(0, SUPINE_EXPECTED_ERROR_MM * fmin(1, rms / full_breath) - m->law);
+  }
+  for (size_t k = 0; k < 2 && m->turn > 0 && status == SUPINE_OK; ++k) {
+    supine_state level = *states[k];
+    memcpy(level.gravity, basis->scan_gravity, sizeof level.gravity);
+    status = supine_basis_pose(basis, &level, &m->pose[EXPECTED_LEVEL + k], error);
   }
   return status;
 }
 
-/* Compute the expected errors of at most LOCATE_BLOCK vertices, begin <= i < end, mm. */
-static void fill_block(const supine_basis *basis, const poses *p, double constant, size_t begin,
-                       size_t end, float *sigma) {
-  const supine_pose *const of[4] = {&p->at, &p->from, &p->fuller_at, &p->fuller_from};
-  float x[4][3 * LOCATE_BLOCK];
-  for (size_t k = 0; k < (p->assumed ? 4U : 2U); ++k) {
-    (void)supine_displace_range(basis, of[k], begin, end, x[k]);
+/* Return the number b of the formula at a point p, mm: about 1 beside the heart, 0 far from it. */
+static double near_heart(const supine_basis *basis, const float *p) {
+  const double *low = basis->box[0];
+  const double *high = basis->box[1];
+  const double from_midline = (double)p[0] - basis->midline;
+  const double width = from_midline > 0 ? high[0] - basis->midline : basis->midline - low[0];
+  const double x = width > 0 ? fabs(from_midline) / width : 0;
+  const double y = high[1] > low[1] ? (high[1] - (double)p[1]) / (high[1] - low[1]) : 0.5;
+  const double z = high[2] > low[2] ? (high[2] - (double)p[2]) / (high[2] - low[2]) : 0.5;
+  return fmax(0, 1 - x / 0.7) * fmax(0, 4 * y * (1 - y)) * fmax(0, 1 - fabs(z - 0.65) / 0.35);
+}
+
+void supine_expected_evaluate(const supine_expected_model *m, size_t begin, size_t end,
+                              supine_expected_block *b) {
+  const float *vertices = supine_basis_vertices(m->basis);
+  const bool used[EXPECTED_POSES / 2] = {true, m->per_step > 0, m->turn > 0};
+  for (size_t k = 0; k < EXPECTED_POSES; ++k) {
+    if (used[k / 2]) {
+      (void)supine_displace_range(m->basis, &m->pose[k], begin, end, b->x[k]);
+    } else {
+      memset(b->x[k], 0, sizeof b->x[k]);
+    }
   }
   for (size_t i = 0; i < end - begin; ++i) {
     double moved = 0;
     double slope = 0;
+    double turned = 0;
     for (size_t j = 3 * i; j < 3 * i + 3; ++j) {
-      const double u = (double)x[0][j] - (double)x[1][j];
-      const double fuller = p->assumed ? (double)x[2][j] - (double)x[3][j] - u : 0;
-      moved += u * u;
-      slope += fuller * fuller;
+      double u[EXPECTED_POSES / 2];
+      for (size_t k = 0; k < EXPECTED_POSES; k += 2) {
+        u[k / 2] = (double)b->x[k][j] - (double)b->x[k + 1][j];
+      }
+      moved += u[0] * u[0];
+      slope += (u[1] - u[0]) * (u[1] - u[0]);
+      turned += (u[0] - u[2]) * (u[0] - u[2]);
     }
-    const double rest = resting_spread / supine_expected_shift;
-    sigma[begin + i] = (float)sqrt(sqrt(moved) * constant + slope * rest * rest);
+    const double heart =
+        beside_heart * m->across * near_heart(m->basis, vertices + 3 * (begin + i));
+    b->square[SUPINE_EXPECTED_DISPLACEMENT][i] = m->law * fmax(m->least, sqrt(moved));
+    b->square[SUPINE_EXPECTED_TURN][i] = m->turn * sqrt(turned);
+    b->square[SUPINE_EXPECTED_VOLUME][i] = m->per_step * m->per_step * slope;
+    b->square[SUPINE_EXPECTED_HEART][i] = heart * heart;
+    b->square[SUPINE_EXPECTED_SLIDING][i] = sliding * sliding * m->sideways * m->sideways;
   }
 }
 
-supine_status supine_expected_error(const supine_basis *basis, const supine_state *state,
-                                    const supine_state *from, float *sigma, supine_error *error) {
+/* Write the expected error of every vertex to `sigma`, if it is not NULL, and the mean squared
+ * error of each term to `mean`. */
+static supine_status evaluate_all(const supine_basis *basis, const supine_state *state,
+                                  const supine_state *from, float *sigma,
+                                  double mean[SUPINE_EXPECTED_TERMS], supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const supine_state scan = supine_basis_scan(basis);
-  poses p;
+  supine_expected_model model;
+  supine_expected_block block;
   if (info->is_fields) {
     return supine_error_set(
         error, SUPINE_ERROR_UNSUPPORTED,
         "the basis holds another simulator's displacements, whose error is unknown");
   }
-  const supine_status status = find_poses(basis, state, from == NULL ? &scan : from, &p, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  const double rms = supine_expected_rms(basis, &p.at, &p.from);
-  const double constant = fmin(supine_expected_constant(basis), rms);
-  for (size_t begin = 0; begin < info->vertex_count; begin += LOCATE_BLOCK) {
+  const supine_status status =
+      supine_expected_prepare(basis, state, from == NULL ? &scan : from, 0, 0, &model, error);
+  memset(mean, 0, SUPINE_EXPECTED_TERMS * sizeof *mean);
+  for (size_t begin = 0; begin < info->vertex_count && status == SUPINE_OK; begin += LOCATE_BLOCK) {
     const size_t left = info->vertex_count - begin;
-    fill_block(basis, &p, constant, begin, begin + (left < LOCATE_BLOCK ? left : LOCATE_BLOCK),
-               sigma);
+    const size_t count = left < LOCATE_BLOCK ? left : LOCATE_BLOCK;
+    supine_expected_evaluate(&model, begin, begin + count, &block);
+    for (size_t i = 0; i < count; ++i) {
+      double square = 0;
+      for (size_t k = 0; k < SUPINE_EXPECTED_TERMS; ++k) {
+        square += block.square[k][i];
+        mean[k] += block.square[k][i] / (double)info->vertex_count;
+      }
+      if (sigma != NULL) {
+        sigma[begin + i] = (float)sqrt(square);
+      }
+    }
   }
-  return SUPINE_OK;
+  return status;
+}
+
+supine_status supine_expected_error(const supine_basis *basis, const supine_state *state,
+                                    const supine_state *from, float *sigma, supine_error *error) {
+  double mean[SUPINE_EXPECTED_TERMS];
+  return evaluate_all(basis, state, from, sigma, mean, error);
+}
+
+supine_status supine_expected_parts(const supine_basis *basis, const supine_state *state,
+                                    const supine_state *from, supine_expected_part *parts,
+                                    supine_error *error) {
+  const char *own = supine_basis_metadata(basis, "expected_error_source");
+  double mean[SUPINE_EXPECTED_TERMS];
+  const supine_status status = evaluate_all(basis, state, from, NULL, mean, error);
+  for (size_t k = 0; k < SUPINE_EXPECTED_TERMS && status == SUPINE_OK; ++k) {
+    const bool fitted = k == SUPINE_EXPECTED_DISPLACEMENT && own != NULL;
+    parts[k] = (supine_expected_part){terms[k].name, fitted ? own : terms[k].source, sqrt(mean[k])};
+  }
+  return status;
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * Expected errors of predicted positions: constants and shared functions. */
+ * Expected errors of predicted positions: the terms of the formula in supine/locate.h. */
 #ifndef SUPINE_LOCATE_INTERNAL_H
 #define SUPINE_LOCATE_INTERNAL_H
 
@@ -17,6 +17,7 @@ typedef struct supine_locate_fit {
   /** Mean of the observed positions, minus the rotated mean of the predicted positions, mm. */
   double origin[3];
   double deviation; /**< prior standard deviation of the volume, mL; 0 if the volume is known */
+  double factor;    /**< factor on the expected errors, from the residuals of the points */
 } supine_locate_fit;
 
 /** Return the constant c of the formula of the expected error (supine/locate.h), mm. It is the
@@ -29,14 +30,54 @@ double supine_expected_reference(const supine_basis *basis);
 /** Fraction of the reference volume that supine_expected_shifted adds to the lungs: 0.01. */
 extern const double supine_expected_shift;
 
-/** Return the RMS over all vertices of the displacement between two poses, mm. */
-double supine_expected_rms(const supine_basis *basis, const supine_pose *pose,
-                           const supine_pose *from);
-
 /** Compute the pose of a state whose volume is increased by 1 % of the volume of the reference
  * surface. If the state gives a volume for each lung, each lung gets an equal part of the
  * increase. Statuses: as supine_basis_pose. */
 supine_status supine_expected_shifted(const supine_basis *basis, const supine_state *state,
                                       supine_pose *pose, supine_error *error);
+
+/** Poses of the state whose errors are computed, and of the state whose positions are exact: as
+ * given; with 1 % of the reference volume added, if their volume is uncertain; and with the gravity
+ * of the scan, if a fit has not seen their posture. */
+enum {
+  EXPECTED_AT,
+  EXPECTED_FROM,
+  EXPECTED_FULLER,
+  EXPECTED_FULLER_FROM,
+  EXPECTED_LEVEL,
+  EXPECTED_LEVEL_FROM,
+  EXPECTED_POSES
+};
+
+/** All numbers of the formula that are the same for all vertices. */
+typedef struct supine_expected_model {
+  const supine_basis *basis;
+  supine_pose pose[EXPECTED_POSES];
+  double least;    /**< shorter displacements count as displacements of this length, mm */
+  double law;      /**< squared error per mm of displacement, mm */
+  double turn;     /**< additional squared error per mm of displacement by a turn, mm */
+  double per_step; /**< standard deviation of the volume / volume added in EXPECTED_FULLER */
+  double across;   /**< length of the change of unit gravity in the x-y plane */
+  double sideways; /**< length of the change of unit gravity along x */
+} supine_expected_model;
+
+/** Displacements of vertices in each pose of a model, and their squared errors by term, mm^2. */
+typedef struct supine_expected_block {
+  float x[EXPECTED_POSES][3 * LOCATE_BLOCK];
+  double square[SUPINE_EXPECTED_TERMS][LOCATE_BLOCK];
+} supine_expected_block;
+
+/** Prepare the formula for the displacement from state `from` to `state`.
+ * @param deviation  standard deviation of the volume of `state`, mL, which then replaces that of an
+ *                   assumed volume; 0 to use the latter
+ * @param least      supine_expected_model.least
+ * @return as supine_basis_pose */
+supine_status supine_expected_prepare(const supine_basis *basis, const supine_state *state,
+                                      const supine_state *from, double deviation, double least,
+                                      supine_expected_model *model, supine_error *error);
+
+/** Evaluate vertices begin <= i < end, at most LOCATE_BLOCK. */
+void supine_expected_evaluate(const supine_expected_model *model, size_t begin, size_t end,
+                              supine_expected_block *block);
 
 #endif

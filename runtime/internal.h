@@ -28,6 +28,11 @@ struct supine_basis {
   char names[SUPINE_LUNGS_MAX][LUNG_NAME_SIZE];
   const char *name_of[SUPINE_LUNGS_MAX]; /**< pointers to `names`, for info.lung_names */
   float bounds[SUPINE_LUNGS_MAX][2][3];
+  double box[2][3]; /**< lowest and highest corner of the box around all lungs, mm */
+  double midline;   /**< x of the plane between the lungs, mm */
+  /** [lung_count, 3, mode_count, mode_count] mean over the vertices of the lungs of the products of
+   * two coefficients, mm^2, in a file made by 'supine embed'; otherwise NULL */
+  const double *squares;
 
   supine_tiles lit;   /**< info.normals, packed; lit.bytes is NULL if the basis has none */
   supine_tiles tiles; /**< packed coefficients, directions and reference positions */

@@ -109,6 +109,15 @@ static bool is_known(const supine_kriging_options *options, size_t term) {
   return term == 3 ? !options->volume : term > 3 && !options->rotation;
 }
 
+/* Return the inverse of the prior variance of a term, or 0 if it has no prior. Write its prior
+ * mean.
+ */
+static double prior_of(const supine_kriging_options *options, size_t term, double *mean) {
+  const double deviation = term > 3 && options->rotation ? options->rotation_deviation : 0;
+  *mean = term == 3 ? options->volume_mean : term > 3 ? options->rotation_mean[term - 4] : 0;
+  return term == 3 && options->volume ? 1 : deviation > 0 ? 1 / (deviation * deviation) : 0;
+}
+
 /* Compute A and the right side of the normal equations for the fitted terms: translation, volume
  * and rotation.
  *
@@ -117,7 +126,7 @@ static bool is_known(const supine_kriging_options *options, size_t term) {
  *     X  what each term, if it is 1, adds to each coordinate of each point
  *     K  covariance matrix of the coordinates of the points
  *     y  residuals: observed minus predicted coordinates of the points
- *     P  inverse covariance of the prior of the terms; 0 but for the volume
+ *     P  inverse covariance of the prior of the terms (prior_of)
  *     m  mean of the prior
  *
  * If a term is not fitted, its row of A is a row of the identity. */
@@ -126,9 +135,10 @@ static void normal_equations(const supine_kriging *fit, const supine_kriging_opt
   const size_t n = fit->count;
   memset(a, 0, TERMS * TERMS * sizeof *a);
   for (size_t k = 0; k < TERMS; ++k) {
-    const bool prior = k == 3 && options->volume;
-    right[k] = prior ? options->volume_mean : 0;
-    a[k * TERMS + k] = prior || is_known(options, k) ? 1 : 0;
+    double mean = 0;
+    const double precision = prior_of(options, k, &mean);
+    right[k] = precision * mean;
+    a[k * TERMS + k] = is_known(options, k) ? 1 : precision;
     for (size_t axis = 0; axis < 3 && !is_known(options, k); ++axis) {
       double sign = 0;
       const double *x = fit->whitened + (size_t)column_of(k, axis, &sign) * n;
@@ -230,13 +240,15 @@ supine_status supine_kriging_fit(const supine_kriging_options *options, size_t c
   }
   solve_terms(fit, options, factor, right);
   find_weights(fit);
-  const double mean = options->volume ? options->volume_mean : 0;
-  double sum = mean * mean - dot(TERMS, fit->terms, right);
+  double sum = -dot(TERMS, fit->terms, right);
   for (size_t i = 0; i < count; ++i) {
     sum += 6 * log(fit->factor[i * count + i]);
   }
   for (size_t k = 0; k < TERMS; ++k) {
-    sum += 2 * log(factor[k * TERMS + k]);
+    double mean = 0;
+    const double precision = prior_of(options, k, &mean);
+    sum += 2 * log(factor[k * TERMS + k]) + precision * mean * mean -
+           (precision > 0 ? log(precision) : 0);
   }
   for (size_t axis = 0; axis < 3; ++axis) {
     const double *y = fit->whitened + (VALUE + axis) * count;

@@ -64,6 +64,8 @@ typedef struct supine_kriging_options {
   supine_kriging_model model;
   bool volume, rotation;
   double volume_mean; /**< prior mean of the change of the volume, in prior standard deviations */
+  double rotation_mean[3];   /**< prior mean of the rotation vector, rad */
+  double rotation_deviation; /**< prior standard deviation about each axis, rad; 0 for no prior */
 } supine_kriging_options;
 
 typedef struct supine_kriging {
@@ -104,7 +106,8 @@ size_t supine_kriging_space(size_t count);
  * @param count   1 to SUPINE_KRIGING_POINTS_MAX
  * @param points  [count]; keep them as long as the fit is used
  * @param space   [supine_kriging_space(count)]; keep it as long as the fit is used
- * @retval SUPINE_ERROR_ARGUMENT   a rotation is to be fitted, but the points lie on one line
+ * @retval SUPINE_ERROR_ARGUMENT   a rotation without a prior is to be fitted, but the points lie on
+ *                                 one line
  * @retval SUPINE_ERROR_NUMERICAL  the covariance of the points is not positive definite: a number
  *                                 is not finite, or points at one position have a noise of 0 */
 supine_status supine_kriging_fit(const supine_kriging_options *options, size_t count,

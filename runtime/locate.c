@@ -17,6 +17,18 @@ static const double outlier_limit = 3.0; /* outliers exceed this number of stand
 static const double outlier_noise = 300; /* standard deviation assigned to an outlier, mm */
 static const double volume_step = 1;     /* the search ends when steps are smaller than this, mL */
 static const double angle_step = 1e-4;   /* the search ends when steps are smaller than this, rad */
+/* Prior standard deviation of a rotation, rad (3 degrees). If the points are turned by more than
+ * 10 times this angle, their frame is another one, and nothing is assumed about the rotation. */
+static const double rotation_spread = 0.052, other_frame = 0.52;
+/* Points whose residuals exceed this, mm RMS, are not of these lungs: the law alone misses the
+ * landmarks of ten people's full breaths by 6 to 19 mm. */
+static const double residual_most = 40;
+static const double share_least = 0.1; /* least plausible volume, as a share of full inflation */
+/* If the spread of the observed points is below this share of their spread in the scan, they are at
+ * one place. */
+static const double spread_least = 0.05;
+/* The factor on the expected errors counts as estimated from this number of points before. */
+static const double prior_points = 10;
 /* Ratio of supine_kriging_model.sill, 6 mm, to the factor c of the expected error in
  * supine/locate.h, 4.5 mm. Both are variances (mm^2) per mm of displacement. c is smaller because
  * the translation that fits best had been subtracted before c was measured. */
@@ -183,6 +195,16 @@ static void find_residuals(workspace *s) {
   }
 }
 
+/* Return the angle of a rotation matrix, rad. Write its rotation vector. */
+static double angle_of(const double r[9], double vector[3]) {
+  const double angle = acos(fmax(-1, fmin(1, 0.5 * (r[0] + r[4] + r[8] - 1))));
+  const double factor = angle < 1e-9 ? 0.5 : 0.5 * angle / fmax(1e-9, sin(angle));
+  vector[0] = factor * (r[7] - r[5]);
+  vector[1] = factor * (r[2] - r[6]);
+  vector[2] = factor * (r[3] - r[1]);
+  return angle;
+}
+
 /* Set the rotation to the one that moves the predicted positions closest to the observed ones. */
 static void rotate_roughly(workspace *s) {
   double h[3][3] = {{0}};
@@ -202,6 +224,8 @@ static void rotate_roughly(workspace *s) {
     }
   }
   supine_rigid_rotation((const double(*)[3])h, s->found->rotation);
+  s->fit->options.rotation_deviation =
+      angle_of(s->found->rotation, mean) > other_frame ? 0 : rotation_spread;
 }
 
 /* Replace the rotation R by R exp(r) for a rotation vector r in rad, by Rodrigues' formula. */
@@ -239,13 +263,15 @@ static supine_status change_volume(workspace *s, double ml, supine_error *error)
   supine_status status = SUPINE_OK;
   for (int halving = 0; halving < HALVINGS_MAX; ++halving) {
     s->found->state.volume.ml = before + ml;
-    status = evaluate(s, error);
+    status = evaluate(s, NULL);
     if (status == SUPINE_OK) {
       return status;
     }
     ml /= 2;
   }
-  return status;
+  return supine_error_set(error, status,
+                          "the points need a volume that the lungs cannot hold: check their names, "
+                          "unit and axes, or give --volume");
 }
 
 /* Find the unknown volume and rotation by Gauss-Newton steps. */
@@ -254,7 +280,12 @@ static supine_status iterate(workspace *s, supine_error *error) {
   const double deviation = fit->deviation;
   for (int step = 0;; ++step) {
     find_residuals(s);
+    double vector[3];
     fit->options.volume_mean = fit->options.volume ? -s->found->state.volume.ml / deviation : 0;
+    (void)angle_of(s->found->rotation, vector);
+    for (size_t i = 0; i < 3; ++i) {
+      fit->options.rotation_mean[i] = -vector[i];
+    }
     supine_status status = supine_kriging_fit(&fit->options, s->task->count, s->points, s->kriging,
                                               &fit->kriging, error);
     if (status != SUPINE_OK) {
@@ -283,6 +314,7 @@ static size_t find_worst(workspace *s, supine_locate_residual *residuals) {
   size_t worst = n;
   double largest = outlier_limit;
   double sum = 0;
+  double ratios = 0;
   size_t used = 0;
   for (size_t j = 0; j < n; ++j) {
     supine_locate_residual *r = &residuals[j];
@@ -297,18 +329,62 @@ static size_t find_worst(workspace *s, supine_locate_residual *residuals) {
     }
     sum += r->distance * r->distance;
     ++used;
-    if (r->sigma > 0 && r->distance > largest * r->sigma) {
-      largest = r->distance / r->sigma;
+    const double ratio = r->sigma > 0 ? r->distance / r->sigma : 1;
+    ratios += ratio * ratio;
+    if (ratio > largest) {
+      largest = ratio;
       worst = j;
     }
   }
+  s->fit->factor = sqrt((prior_points + ratios) / (prior_points + (double)used));
   s->found->residual_rms = used > 0 ? sqrt(sum / (double)used) : 0;
   return worst;
+}
+
+/* Refuse observed points that are at one place, although the points in the scan are not. */
+static supine_status refuse_place(const workspace *s, supine_error *error) {
+  double seen = 0;
+  double scanned = 0;
+  for (size_t j = 0; j < 3 * s->task->count; ++j) {
+    const supine_observation *o = s->task->observed;
+    seen += pow(o[j / 3].position[j % 3] - o->position[j % 3], 2);
+    scanned += pow(s->points[j / 3].position[j % 3] - s->points->position[j % 3], 2);
+  }
+  return seen >= spread_least * spread_least * scanned
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                                "the observed points are at one place, unlike those in the scan: "
+                                "check their positions and unit");
+}
+
+/* Refuse what no patient has: large residuals, or lungs that are nearly empty. */
+static supine_status refuse_residuals(const workspace *s, const supine_locate_residual *residuals,
+                                      supine_error *error) {
+  const double full = supine_expected_reference(s->task->inside);
+  double square = 0;
+  for (size_t j = 0; j < s->task->count; ++j) {
+    square += residuals[j].distance * residuals[j].distance / (double)s->task->count;
+  }
+  if (sqrt(square) > residual_most) {
+    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                            "the points do not fit these lungs: each differs by %.0f mm (RMS) "
+                            "from its prediction by the others. Check their names, unit and axes",
+                            sqrt(square));
+  }
+  return !s->fit->options.volume || s->found->volume >= share_least * full
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                                "the points fit lungs of %.0f mL, under %.0f %% of full inflation "
+                                "(%.0f mL): check their names, unit and axes, or give --volume",
+                                s->found->volume, 100 * share_least, full);
 }
 
 static supine_status locate(workspace *s, supine_locate_residual *residuals, supine_error *error) {
   const size_t n = s->task->count;
   supine_status status = initialise(s, error);
+  if (status == SUPINE_OK) {
+    status = refuse_place(s, error);
+  }
   if (status == SUPINE_OK) {
     status = evaluate(s, error);
   }
@@ -353,8 +429,9 @@ supine_status supine_locate(const supine_locate_task *task, supine_locate_residu
     for (size_t lung = 0; lung < info->lung_count; ++lung) {
       found->volume += volumes[lung];
     }
-    found->volume_error = s.fit->deviation * sqrt(s.fit->kriging.covariance[3][3]);
+    found->volume_error = s.fit->factor * s.fit->deviation * sqrt(s.fit->kriging.covariance[3][3]);
   }
+  status = refuse_residuals(&s, residuals, error);
   if (s.fit->options.volume) {
     found->volume_prior_error = s.fit->deviation;
     found->state.volume = (supine_volume){SUPINE_VOLUME_ABSOLUTE, found->volume};
@@ -365,5 +442,5 @@ supine_status supine_locate(const supine_locate_task *task, supine_locate_residu
   }
   found->log_evidence = s.fit->kriging.log_likelihood;
   found->fit = s.fit;
-  return SUPINE_OK;
+  return status;
 }

@@ -260,54 +260,107 @@ TEST(test_locate_bad_task_refused) {
   task.count = 2;
   assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, &error),
                    SUPINE_ERROR_ARGUMENT);
-  task.count = 3;
-  w->seen[1] = w->seen[2] =
-      w->seen[0]; /* three points at one position do not determine a rotation */
-  assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, &error),
-                   SUPINE_ERROR_ARGUMENT);
 }
 
-/* The expected error of a vertex is sqrt(c |u|), where u is its displacement from the scan and c is
- * the smaller of 4.5 mm and the RMS displacement of all vertices. If the volume is given relative
- * to rest, the volume at rest is uncertain by 5 % of full inflation. The resulting displacement is
- * added to the error in quadrature. */
+/* The formula of supine/locate.h, written again: displacement, assumed volume at rest, heart and
+ * sliding. The terms that supine_expected_parts returns add up to the error. */
 TEST(test_expected_error_any_state_equals_formula) {
   world *w = *state;
   const supine_basis_info *info = supine_basis_get_info(w->basis);
   const double full = info->reference_volume[0] + info->reference_volume[1];
   const char *const states[] = {"prone:scan-900", "supine:scan-20", "left:rest+100"};
+  double low[3] = {INFINITY, INFINITY, INFINITY};
+  double high[3] = {-INFINITY, -INFINITY, -INFINITY};
+  for (size_t i = 0; i < (size_t)3 * VERTICES; ++i) {
+    low[i % 3] = fmin(low[i % 3], (double)info->vertices[i]);
+    high[i % 3] = fmax(high[i % 3], (double)info->vertices[i]);
+  }
   for (size_t s = 0; s < 3; ++s) {
     const supine_state asked = state_of(states[s]);
     const supine_state scan = supine_basis_scan(w->basis);
     supine_state fuller = asked;
-    fuller.volume.ml += 0.05 * full;
+    fuller.volume.ml += 0.08 * full;
     float x[3][3 * VERTICES];
     float sigma[VERTICES];
+    supine_expected_part parts[SUPINE_EXPECTED_TERMS];
     double squares = 0;
+    double sum[2] = {0, 0};
     deform(w->basis, &asked, x[0]);
     deform(w->basis, &scan, x[1]);
     deform(w->basis, &fuller, x[2]);
     for (size_t i = 0; i < (size_t)3 * VERTICES; ++i) {
       squares += pow((double)(x[0][i] - x[1][i]), 2) / VERTICES;
     }
-    const double c = fmin(4.5, sqrt(squares));
+    const double c = fmin(4.5, 0.25 * sqrt(squares));
+    const double turn[2] = {fabs(asked.gravity[0]), fabs(asked.gravity[1] - 1)};
     assert_int_equal(supine_expected_error(w->basis, &asked, NULL, sigma, NULL), SUPINE_OK);
     for (size_t i = 0; i < VERTICES; ++i) {
+      const float *p = info->vertices + 3 * i;
+      const double middle = 0.5 * (low[0] + high[0]);
+      const double side = fabs((double)p[0] - middle) / (high[0] - middle);
+      const double back = (high[1] - (double)p[1]) / (high[1] - low[1]);
+      const double apex = (high[2] - (double)p[2]) / (high[2] - low[2]);
+      const double heart = 12 * hypot(turn[0], turn[1]) * fmax(0, 1 - side / 0.7) * 4 * back *
+                           (1 - back) * fmax(0, 1 - fabs(apex - 0.65) / 0.35);
       double u = 0;
       double slope = 0;
       for (size_t j = 3 * i; j < 3 * i + 3; ++j) {
         u += pow((double)(x[0][j] - x[1][j]), 2);
         slope += asked.volume.kind == SUPINE_VOLUME_REST ? pow((double)(x[2][j] - x[0][j]), 2) : 0;
       }
-      const double expected = sqrt(c * sqrt(u) + slope);
+      const double expected = sqrt(c * sqrt(u) + slope + heart * heart + pow(3 * turn[0], 2));
       assert_true(fabs((double)sigma[i] - expected) < 1e-3 + 0.03 * expected);
+      sum[0] += pow((double)sigma[i], 2) / VERTICES;
     }
+    assert_int_equal(supine_expected_parts(w->basis, &asked, NULL, parts, NULL), SUPINE_OK);
+    for (size_t k = 0; k < SUPINE_EXPECTED_TERMS; ++k) {
+      assert_true(strlen(parts[k].name) > 0 && strlen(parts[k].source) > 0);
+      sum[1] += parts[k].rms * parts[k].rms;
+    }
+    assert_true(fabs(sum[1] - sum[0]) < 1e-5 * sum[0]);
   }
   const supine_state scan = supine_basis_scan(w->basis);
   float sigma[VERTICES];
   assert_int_equal(supine_expected_error(w->basis, &scan, NULL, sigma, NULL), SUPINE_OK);
   for (size_t i = 0; i < VERTICES; ++i) {
     assert_true(sigma[i] == 0);
+  }
+}
+
+/* A random wrong half of the points must raise the stated errors; what no patient has is refused.
+ */
+TEST(test_locate_residuals_beyond_stated_errors_raise_them_or_are_refused) {
+  world *w = *state;
+  const supine_state truth = state_of("supine:full-700");
+  float xyz[3 * VERTICES];
+  float sigma[2][VERTICES];
+  supine_location found;
+  supine_error error;
+  for (int off = 0; off < 2; ++off) {
+    observe(w, &truth, false);
+    for (size_t j = 0; j < SEEN; ++j) {
+      w->seen[j].position[j % 3] += off * (j % 2 == 0 ? 20 : -20);
+    }
+    found = locate(w, &truth, false);
+    assert_int_equal(supine_locate_positions(&found, w->basis, xyz, sigma[off], NULL), SUPINE_OK);
+  }
+  assert_true(sigma[1][0] > 1.5F * sigma[0][0]);
+  const supine_locate_task task = {
+      .inside = w->basis, .count = SEEN, .observed = w->seen, .state = state_of("supine")};
+  const struct {
+    double factor; /* on the positions that were observed */
+    const char *said;
+  } bad[] = {{0, "at one place"}, {-1, "do not fit"}, {0.2, "under 10 %"}};
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
+    observe(w, &truth, false);
+    for (size_t j = 0; j < SEEN; ++j) {
+      w->seen[j].position[0] *= bad[i].factor;
+      w->seen[j].position[1] *= fabs(bad[i].factor);
+      w->seen[j].position[2] *= fabs(bad[i].factor);
+    }
+    assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, &error),
+                     SUPINE_ERROR_NUMERICAL);
+    assert_says(error.message, bad[i].said);
   }
 }
 

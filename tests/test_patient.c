@@ -576,7 +576,7 @@ TEST(test_compare_points_each_map_explains_its_motions) {
     }
   }
   assert_int_equal(
-      supine_command_compare_points(&pairs, pairs.to, SUPINE_PATIENT_STILL, distance, &error),
+      supine_command_compare_points(&pairs, pairs.to, NULL, SUPINE_PATIENT_STILL, distance, &error),
       SUPINE_OK);
   const double none = distance[SUPINE_PATIENT_MAP_NONE].rms;
   assert_true(none > 10.0);
@@ -587,9 +587,9 @@ TEST(test_compare_points_each_map_explains_its_motions) {
   for (size_t i = 0; i < pairs.count; ++i) {
     pairs.to[3 * i] += 0.2 * pairs.from[3 * i + 1]; /* a shear */
   }
-  assert_int_equal(
-      supine_command_compare_points(&pairs, pairs.from, SUPINE_PATIENT_STILL, distance, &error),
-      SUPINE_OK);
+  assert_int_equal(supine_command_compare_points(&pairs, pairs.from, NULL, SUPINE_PATIENT_STILL,
+                                                 distance, &error),
+                   SUPINE_OK);
   assert_true(distance[SUPINE_PATIENT_MAP_AFFINE].largest < 1e-9 * none);
   /* If the predicted displacement is 0, the error equals that without a prediction. */
   assert_true(distance[SUPINE_PATIENT_MAP_PREDICTED].rms == distance[SUPINE_PATIENT_MAP_NONE].rms);
@@ -602,20 +602,20 @@ TEST(test_compare_points_each_map_explains_its_motions) {
     turned_by[3 * i + 1] = pairs.to[3 * i];
     turned_by[3 * i + 2] = pairs.to[3 * i + 2] - 7.0;
   }
-  assert_int_equal(
-      supine_command_compare_points(&pairs, turned_by, SUPINE_PATIENT_RIGID, distance, &error),
-      SUPINE_OK);
-  assert_true(distance[SUPINE_PATIENT_MAP_PREDICTED].largest < 1e-9);
-  assert_int_equal(supine_command_compare_points(&pairs, turned_by, SUPINE_PATIENT_TRANSLATION,
+  assert_int_equal(supine_command_compare_points(&pairs, turned_by, NULL, SUPINE_PATIENT_RIGID,
                                                  distance, &error),
+                   SUPINE_OK);
+  assert_true(distance[SUPINE_PATIENT_MAP_PREDICTED].largest < 1e-9);
+  assert_int_equal(supine_command_compare_points(&pairs, turned_by, NULL,
+                                                 SUPINE_PATIENT_TRANSLATION, distance, &error),
                    SUPINE_OK);
   assert_true(distance[SUPINE_PATIENT_MAP_PREDICTED].rms > 10.0);
   assert_true(distance[SUPINE_PATIENT_MAP_TRANSLATION].explained == 0.0);
   /* Without motion, the explained fraction of the motion is undefined. */
   memcpy(pairs.to, pairs.from, 3 * pairs.count * sizeof *pairs.to);
-  assert_int_equal(
-      supine_command_compare_points(&pairs, turned_by, SUPINE_PATIENT_STILL, distance, &error),
-      SUPINE_OK);
+  assert_int_equal(supine_command_compare_points(&pairs, turned_by, NULL, SUPINE_PATIENT_STILL,
+                                                 distance, &error),
+                   SUPINE_OK);
   assert_true(isnan(distance[SUPINE_PATIENT_MAP_PREDICTED].explained));
   free(turned_by);
   supine_patient_pairs_free(&pairs);

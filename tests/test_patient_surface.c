@@ -6,8 +6,6 @@
 #include <gsl/gsl_cdf.h>
 #include <gsl/gsl_randist.h>
 #include <gsl/gsl_rng.h>
-#include <gsl/gsl_sort.h>
-#include <lapacke.h>
 
 #include "base/vec3.h"
 #include "precompute/patient/matching.h"
@@ -65,10 +63,11 @@ TEST(test_fit_surface_known_law_recovered_on_another_mesh) {
   memcpy(record.state[1].gravity, supine_gravity, sizeof supine_gravity);
   record.force = supine_patient_force(&patient.power, 0.4, supine_gravity);
   supine_model found = truth();
-  const supine_resting resting = supine_reference_resting_default();
+  supine_resting resting = supine_reference_resting_default();
+  supine_scan scan;
   double *directions = malloc(4 * rest.mesh.vertex_count * sizeof *directions);
-  assert_int_equal(supine_patient_model(&record, &resting, &rest, 0, directions, &found, &error),
-                   SUPINE_OK);
+  assert_int_equal(
+      supine_patient_model(&record, &rest, &resting, &scan, directions, &found, &error), SUPINE_OK);
   supine_solution solution = {0};
   assert_int_equal(supine_physics_solve(&rest, &found, supine_gravity, &solution, &error),
                    SUPINE_OK);
@@ -139,6 +138,8 @@ TEST(test_fit_surface_other_law_reaches_state_and_volume) {
   assert_true(fit.report.held_out[SUPINE_PATIENT_SCORE_LAW] >
               4.0 * fit.report.held_out[SUPINE_PATIENT_SCORE_CORRECTED]);
   assert_true(fit.surface.before > 3.0 && fit.surface.after < 0.2);
+  /* A close surface does not show sliding: the expected error is that of other patients' fits. */
+  assert_true(fit.report.expected_constant > 4.5 && fit.report.expected_point > 3.0);
   assert_true(fit.report.held_out[SUPINE_PATIENT_SCORE_CORRECTED] < 0.4);
   const double change = supine_mesh_volume(&moved) - supine_mesh_volume(&other.mesh);
   const double before = supine_mesh_volume(&rest.mesh);
@@ -158,103 +159,6 @@ TEST(test_fit_surface_other_law_reaches_state_and_volume) {
   supine_mesh_free(&fine);
   supine_lungs_free(&rest);
   supine_lungs_free(&other);
-}
-
-/* Add a random displacement, tangential to the surface, to the positions. */
-static void slide(const supine_lungs *lungs, const supine_patient_power *law, unsigned long seed,
-                  double *positions) {
-  const size_t n = lungs->mesh.vertex_count;
-  supine_patient_centre *centre = calloc(n, sizeof *centre);
-  double *factor = malloc(n * n * sizeof *factor);
-  double *g = malloc(3 * n * sizeof *g);
-  double *normals = malloc(3 * n * sizeof *normals);
-  gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
-  gsl_rng_set(random, seed);
-  const supine_mesh moved = {.vertices = positions,
-                             .vertex_count = n,
-                             .triangles = lungs->mesh.triangles,
-                             .triangle_count = lungs->mesh.triangle_count};
-  supine_mesh_vertex_normals(&moved, normals);
-  for (size_t i = 0; i < n; ++i) {
-    const supine_patient_place place = supine_patient_find_vertex(lungs, i);
-    double u[3];
-    supine_patient_direction(law, &place, supine_patient_force_at(law, &place), u);
-    centre[i] = (supine_patient_centre){.side = place.side, .size = supine_length(u)};
-    memcpy(centre[i].offset, place.offset, sizeof centre[i].offset);
-    supine_patient_covariances(&centre[i], i + 1, centre, factor + i * n);
-    factor[i * n + i] += 1e-6;
-    for (size_t k = 0; k < 3; ++k) {
-      g[3 * i + k] = gsl_ran_gaussian(random, 1.0);
-    }
-  }
-  assert_int_equal(LAPACKE_dpotrf(LAPACK_ROW_MAJOR, 'L', (int)n, factor, (int)n), 0);
-  cblas_dtrmm(CblasRowMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, (int)n, 3, 1.0,
-              factor, (int)n, g, 3);
-  for (size_t i = 0; i < n; ++i) {
-    const double across = supine_dot(g + 3 * i, normals + 3 * i);
-    for (size_t k = 0; k < 3; ++k) {
-      positions[3 * i + k] += g[3 * i + k] - across * normals[3 * i + k];
-    }
-  }
-  gsl_rng_free(random);
-  free(centre);
-  free(factor);
-  free(g);
-  free(normals);
-}
-
-/* A surface does not show tangential motion. Add a random tangential displacement to that of the
- * law `deep`. The fit then matches the surface to a fraction of a millimetre, although points err
- * by millimetres. The expected error must include this error of points. */
-TEST(test_fit_surface_alone_expected_error_includes_sliding) {
-  enum { SEEDS = 5 };
-  supine_mesh lump = helper_lump(6, 70.3, 5);
-  supine_lungs rest = {0};
-  supine_error error;
-  assert_int_equal(supine_lungs_create(&lump, 1, NULL, &rest, &error), SUPINE_OK);
-  const size_t n = rest.mesh.vertex_count;
-  const supine_patient_fit_options options = {.gravity = {0.0, 1.0, 0.0}};
-  const supine_patient_power law = supine_patient_deep(supine_gravity, (double[3]){0.7, 0.7, 0.7});
-  supine_mesh moved = rest.mesh;
-  moved.vertices = malloc(3 * n * sizeof *moved.vertices);
-  double ratio[SEEDS];
-  for (size_t seed = 0; seed < SEEDS; ++seed) {
-    static supine_patient_record fit;
-    double square = 0.0;
-    for (size_t i = 0; i < n; ++i) {
-      const supine_patient_place place = supine_patient_find_vertex(&rest, i);
-      double u[3];
-      supine_patient_direction(&law, &place, supine_patient_force_at(&law, &place), u);
-      for (size_t k = 0; k < 3; ++k) {
-        moved.vertices[3 * i + k] = rest.mesh.vertices[3 * i + k] + u[k];
-      }
-    }
-    slide(&rest, &law, 1 + seed, moved.vertices);
-    assert_int_equal(
-        supine_patient_fit_surface(&rest, &moved, &no_landmarks, &options, false, &fit, &error),
-        SUPINE_OK);
-    for (size_t i = 0; i < n; ++i) {
-      const supine_patient_place place = supine_patient_find_vertex(&rest, i);
-      double u[3];
-      supine_patient_displacement(&fit.patient, &place, 1.0, u);
-      for (size_t k = 0; k < 3; ++k) {
-        u[k] -= moved.vertices[3 * i + k] - rest.mesh.vertices[3 * i + k];
-      }
-      square += supine_dot(u, u) / (double)n;
-    }
-    ratio[seed] = fit.report.expected_point / sqrt(square);
-    printf("true error %.2f mm, expected %.2f mm; distance of the surfaces %.2f mm, after the fit "
-           "%.3f mm, held out %.3f mm\n",
-           sqrt(square), fit.report.expected_point, fit.surface.before, fit.surface.after,
-           fit.report.held_out[SUPINE_PATIENT_SCORE_CORRECTED]);
-  }
-  gsl_sort(ratio, 1, SEEDS);
-  printf("expected error over true error: median %.2f, range %.2f to %.2f\n", ratio[SEEDS / 2],
-         ratio[0], ratio[SEEDS - 1]);
-  assert_true(ratio[SEEDS / 2] > 0.75 && ratio[SEEDS / 2] < 1.35);
-  free(moved.vertices);
-  supine_mesh_free(&lump);
-  supine_lungs_free(&rest);
 }
 
 /* The correlation of the force with height is low for a force fixed to the body, high for a force

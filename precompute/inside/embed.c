@@ -8,6 +8,7 @@
 #include <supine/safetensors.h>
 
 #include "base/parallel.h"
+#include "base/vec3.h"
 #include "runtime/rigid.h"
 
 #include "precompute/inside/biharmonic.h"
@@ -32,6 +33,8 @@ typedef struct embedding {
   uint32_t *triangles;  /* [triangles, 3] indices of vertices */
   uint32_t *rigid;      /* [rigid_count, 2] begin and end of the vertices of each rigid part */
   size_t rigid_count;
+  double *squares; /* [lungs, 3, modes, modes] the tensor lungs_squares */
+  double *hilum;   /* [lungs, 3, modes] the tensor lungs_hilum */
 } embedding;
 
 static void find_places(void *context, size_t begin, size_t end, size_t thread) {
@@ -140,6 +143,34 @@ static void points_to_full(embedding *e, size_t lung, size_t begin, size_t end,
   }
 }
 
+/* Scale the interpolated displacements b_k by each mode k at `count` positions, so that with the
+ * weights w of the scan's posture they add up to the displacement u of options->field:
+ *
+ *     b_k := u (b_k . B) / (B . B),    B = sum over k of w_k b_k */
+static void take_field(const embedding *e, size_t lung, size_t count, const double *positions,
+                       double *values) {
+  const size_t modes = e->columns / 3;
+  const double *weights = e->shells->scan.weights;
+  const char *name = supine_basis_get_info(e->shells->basis)->lung_names[lung];
+  for (size_t i = 0; i < count && e->options->field != NULL; ++i) {
+    double *of[3] = {values + 3 * i * modes, values + (3 * i + 1) * modes,
+                     values + (3 * i + 2) * modes};
+    double sum[3] = {0.0, 0.0, 0.0};
+    double u[3];
+    for (size_t k = 0; k < 3 * modes; ++k) {
+      sum[k / modes] += weights[k % modes] * of[k / modes][k % modes];
+    }
+    const double square = supine_dot(sum, sum);
+    e->options->field(e->options->context, positions + 3 * i, name[0] == 'l' ? 1.0 : -1.0, u);
+    for (size_t k = 0; k < modes && square > 0.0; ++k) {
+      const double factor = (of[0][k] * sum[0] + of[1][k] * sum[1] + of[2][k] * sum[2]) / square;
+      for (size_t axis = 0; axis < 3; ++axis) {
+        of[axis][k] = factor * u[axis];
+      }
+    }
+  }
+}
+
 /* Find the displacements of the points order[begin] to order[end - 1], at most BLOCK, of one lung.
  * @param displacement  [vertices of the lung, columns] displacement of the surface by each mode, mm
  * @param reach  distance from the surface, mm, below which the interpolation `fit` is corrected
@@ -166,6 +197,7 @@ static void move_block(embedding *e, const double *displacement,
     }
   }
   supine_inside_biharmonic_evaluate(fit, count + near_count, positions, values);
+  take_field(e, lung, count + near_count, positions, values);
   double *motion = values + (size_t)2 * BLOCK * e->columns;
   for (size_t j = 0; j < near_count; ++j) {
     const supine_inside_place *place = &e->place[e->order[begin + near[j]]];
@@ -183,6 +215,20 @@ static void move_block(embedding *e, const double *displacement,
     e->coefficients[begin * e->columns + i] = (float)values[i];
   }
   points_to_full(e, lung, begin, end, values);
+}
+
+/* Add the products of the displacements of one lung's vertices by two modes, divided by the number
+ * of vertices of all lungs, to e->squares. */
+static void add_squares(embedding *e, size_t lung, const double *displacement) {
+  const size_t modes = e->columns / 3;
+  const double share = 1.0 / (double)supine_basis_get_info(e->shells->basis)->vertex_count;
+  for (size_t row = 0; row < 3 * e->shells->shell[lung].vertex_count; ++row) {
+    const double *d = displacement + row * modes;
+    double *sum = e->squares + (3 * lung + row % 3) * modes * modes;
+    for (size_t k = 0; k < modes * modes; ++k) {
+      sum[k] += share * d[k / modes] * d[k % modes];
+    }
+  }
 }
 
 static supine_status embed_lung(embedding *e, size_t lung, size_t begin, size_t end,
@@ -203,9 +249,13 @@ static supine_status embed_lung(embedding *e, size_t lung, size_t begin, size_t 
     goto cleanup;
   }
   supine_inside_shell_displacement(e->shells, lung, displacement);
-  status = supine_inside_biharmonic_fit(shell->vertex_count, shell->vertices, e->columns,
-                                        displacement, centres, &fit, error);
-  const double reach = reach_spacings * (fit.spacing + shell->edge);
+  add_squares(e, lung, displacement);
+  status = begin == end
+               ? SUPINE_OK
+               : supine_inside_biharmonic_fit(shell->vertex_count, shell->vertices, e->columns,
+                                              displacement, centres, &fit, error);
+  const double reach =
+      e->options->field != NULL ? shell->edge : reach_spacings * (fit.spacing + shell->edge);
   for (size_t at = begin; at < end && status == SUPINE_OK; at += BLOCK) {
     move_block(e, displacement, &fit, reach, at, at + BLOCK < end ? at + BLOCK : end, space);
   }
@@ -308,6 +358,13 @@ static supine_status write_content(const embedding *e, const char *path, supine_
                               {grid->step[2][0], grid->step[2][1], grid->step[2][2]}};
   const uint32_t size[3] = {(uint32_t)grid->size[0], (uint32_t)grid->size[1],
                             (uint32_t)grid->size[2]};
+  const supine_basis_info *info = supine_basis_get_info(e->shells->basis);
+  double box[2][3];
+  for (size_t i = 0; i < 6 * e->shells->count; ++i) {
+    double *corner = &box[i / 3 % 2][i % 3];
+    const double x = (double)info->bounds[i];
+    *corner = i < 6 || (i / 3 % 2 == 0 ? x < *corner : x > *corner) ? x : *corner;
+  }
   supine_tensor tensors[16] = {
       {"vertices", SUPINE_F32, 2, {n, 3}, e->vertices},
       {"triangles", SUPINE_U32, 2, {content->triangle_count, 3}, e->triangles},
@@ -315,8 +372,14 @@ static supine_status write_content(const embedding *e, const char *path, supine_
       {"coefficients", SUPINE_F32, 3, {n, 3, e->columns / 3}, e->coefficients},
       {"part", SUPINE_U32, 1, {n}, e->part},
       {"depth", SUPINE_F32, 1, {n}, e->depth},
+      {"lungs_box", SUPINE_F64, 2, {2, 3}, box},
+      {"lungs_squares",
+       SUPINE_F64,
+       4,
+       {e->shells->count, 3, e->columns / 3, e->columns / 3},
+       e->squares},
   };
-  size_t count = 6;
+  size_t count = 8;
   for (size_t i = 0; i < sizeof shared / sizeof *shared; ++i) {
     const supine_tensor *tensor = supine_basis_tensor(e->shells->basis, shared[i]);
     if (tensor != NULL) {
@@ -329,6 +392,10 @@ static supine_status write_content(const embedding *e, const char *path, supine_
   } else {
     tensors[count++] =
         (supine_tensor){"names", SUPINE_U8, 1, {strlen(content->names)}, content->names};
+  }
+  if (supine_inside_hilum(e->shells->basis, e->hilum)) {
+    tensors[count++] = (supine_tensor){
+        "lungs_hilum", SUPINE_F64, 3, {e->shells->count, 3, e->columns / 3}, e->hilum};
   }
   if (e->rigid_count > 0) {
     tensors[count++] = (supine_tensor){"rigid", SUPINE_U32, 2, {e->rigid_count, 2}, e->rigid};
@@ -348,9 +415,11 @@ static bool allocate(embedding *e) {
   e->group = malloc(n);
   e->triangles = malloc((3 * e->content->triangle_count + 1) * sizeof *e->triangles);
   e->rigid = malloc((2 * e->content->part_count + 1) * sizeof *e->rigid);
-  return e->rigid != NULL && e->place != NULL && e->lung != NULL && e->order != NULL &&
-         e->vertices != NULL && e->coefficients != NULL && e->depth != NULL && e->part != NULL &&
-         e->group != NULL && e->triangles != NULL;
+  e->hilum = malloc(e->shells->count * e->columns * sizeof *e->hilum);
+  e->squares = calloc(e->shells->count * e->columns * e->columns, sizeof *e->squares);
+  return e->hilum != NULL && e->squares != NULL && e->rigid != NULL && e->place != NULL &&
+         e->lung != NULL && e->order != NULL && e->vertices != NULL && e->coefficients != NULL &&
+         e->depth != NULL && e->part != NULL && e->group != NULL && e->triangles != NULL;
 }
 
 supine_status supine_inside_embed(const supine_inside_shells *shells,
@@ -383,9 +452,7 @@ supine_status supine_inside_embed(const supine_inside_shells *shells,
   size_t begin = 0;
   for (size_t lung = 0; lung < shells->count && status == SUPINE_OK; ++lung) {
     const size_t end = begin + report->in_lung[lung];
-    if (begin < end) {
-      status = embed_lung(&e, lung, begin, end, error);
-    }
+    status = embed_lung(&e, lung, begin, end, error);
     begin = end;
   }
   for (size_t i = 0; i < e.rigid_count && status == SUPINE_OK; ++i) {
@@ -405,5 +472,7 @@ cleanup:
   free(e.group);
   free(e.triangles);
   free(e.rigid);
+  free(e.squares);
+  free(e.hilum);
   return status;
 }

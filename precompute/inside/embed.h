@@ -31,7 +31,17 @@
  * the displacement at the other vertices, and 0.05 % inside; this takes a few seconds. */
 enum { SUPINE_INSIDE_CENTRES = 4000 };
 
+/** A displacement of the lungs that is known at every point, not only on the surface.
+ * @param point  position in the scan, mm
+ * @param side   lung of the point: +1 left, -1 right
+ * @param u      written: displacement by all modes with their weights in the scan's posture, mm */
+typedef void supine_inside_field(const void *context, const double point[3], double side,
+                                 double u[3]);
+
 typedef struct supine_inside_options {
+  supine_inside_field *field; /**< if not NULL, replaces the interpolated displacement: points keep
+                                 the interpolated dependence on gravity, as a factor on u */
+  const void *context;        /**< argument of `field` */
   bool clamp;     /**< whether points outside a lung move like the surface point nearest to them */
   size_t centres; /**< most interpolation centres per lung; 0 for SUPINE_INSIDE_CENTRES */
   const char *made_by; /**< program that writes the basis file, for the metadata; optional */
@@ -53,9 +63,14 @@ typedef struct supine_inside_report {
  *     depth      F32 [N]     mm below the surface in the scan, negative outside
  *     names      U8 [bytes]  names of points and meshes, separated by newlines (not for a grid)
  *     rigid      U32 [R, 2]  vertices begin <= i < end of each rigid mesh (if there are any)
- *     grid       F64 [4, 3]  position of the first node, then the three steps, mm (for a grid)
+ *     lungs_box      F64 [2, 3]           corners of the box around the lungs' surface, mm
+ *     lungs_squares  F64 [lungs, 3, K, K] for each lung, axis and two modes: the sum over its
+ *                                         vertices of the product of their displacements by these
+ *                                         modes, divided by the number of vertices of all lungs,
+ * mm^2 grid       F64 [4, 3]  position of the first node, then the three steps, mm (for a grid)
  *     grid_size  U32 [3]     number of nodes along the three steps (for a grid)
  *
+ * The tensors lungs_* give the expected errors of the points (supine/locate.h).
  * The metadata "content" is "points", "mesh" or "grid". Uses all cores; cost: see biharmonic.h.
  * @retval SUPINE_ERROR_MESH  `content` has no points
  * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY, SUPINE_ERROR_WRITE */

@@ -340,31 +340,17 @@ void supine_patient_krige_errors(const supine_patient_krige *krige,
   }
 }
 
-double supine_patient_krige_predict(supine_patient_krige *krige, const supine_patient_row *row,
-                                    double *variance) {
-  const int n = (int)krige->count;
+double supine_patient_krige_predict(supine_patient_krige *krige, const supine_patient_row *row) {
   double x[TERMS];
   double value = supine_patient_power_design(&krige->law, row, x) + row->value;
-  *variance = 0.0;
   if (krige->sill > 0.0) {
     const supine_patient_centre at = centre_of(&krige->law, &row->place);
     supine_patient_covariances(&at, krige->count, krige->centre, krige->scratch);
-    supine_patient_covariances(&at, 1, &at, variance);
     for (size_t i = 0; i < krige->count; ++i) {
-      krige->scratch[i] *= krige->scaled_sill * supine_dot(row->axis, krige->rows[i].axis);
+      value += krige->scaled_sill * supine_dot(row->axis, krige->rows[i].axis) * krige->scratch[i] *
+               krige->kernel_weight[i];
     }
-    value += cblas_ddot(n, krige->scratch, 1, krige->kernel_weight, 1);
-    cblas_dtrsv(CblasRowMajor, CblasLower, CblasNoTrans, CblasNonUnit, n, krige->cholesky, n,
-                krige->scratch, 1);
-    cblas_dgemv(CblasRowMajor, CblasTrans, n, TERMS, -1.0, krige->design, TERMS + 1, krige->scratch,
-                1, 1.0, x, 1);
-    *variance =
-        krige->scaled_sill * *variance - cblas_ddot(n, krige->scratch, 1, krige->scratch, 1);
   }
-  for (size_t t = 0; t < TERMS; ++t) {
-    x[t] = prior_deviation(krige, t) > 0.0 ? x[t] : 0.0;
-  }
-  *variance = fmax(0.0, *variance) + variance_of(krige, x);
   return value;
 }
 

@@ -22,11 +22,12 @@
 /* One measured component of a displacement. */
 typedef struct supine_patient_row {
   supine_patient_place place;
-  double axis[3]; /* unit vector along which the displacement was measured */
-  double value;   /* measured displacement along `axis`, mm */
-  double weight;  /* factor on the squared residual of this measurement */
-  double noise;   /* standard deviation of `value`, mm */
-  size_t block;   /* index of the 40 mm cube whose measurements are held out together */
+  double axis[3];  /* unit vector along which the displacement was measured */
+  double value;    /* measured displacement along `axis`, mm */
+  double weight;   /* factor on the squared residual of this measurement */
+  double noise;    /* standard deviation of `value`, mm */
+  size_t block;    /* index of the 40 mm cube whose measurements are held out together */
+  size_t landmark; /* index of the landmark, plus 1; 0 for a vertex of a surface */
 } supine_patient_row;
 
 /* Write into rows, for each pair of points, its displacement along x, y and z. */
@@ -108,10 +109,8 @@ void supine_patient_krige_errors(const supine_patient_krige *krige,
                                  double error[SUPINE_PATIENT_CONSTANTS]);
 
 /* Predict the displacement, mm, along row->axis at row->place. Not thread-safe: overwrites
- * krige->scratch.
- * @param variance  written: variance of the prediction, without measurement noise, mm^2 */
-double supine_patient_krige_predict(supine_patient_krige *krige, const supine_patient_row *row,
-                                    double *variance);
+ * krige->scratch. */
+double supine_patient_krige_predict(supine_patient_krige *krige, const supine_patient_row *row);
 void supine_patient_krige_copy_law(const supine_patient_krige *krige, supine_patient *patient);
 
 /** Predictors of a displacement, whose errors are compared: no displacement, a translation, an
@@ -125,20 +124,22 @@ typedef enum supine_patient_score {
   SUPINE_PATIENT_SCORES
 } supine_patient_score;
 
-/** Result of a fit; errors are RMS distances, in mm. */
+/** Result of a fit; errors are RMS distances, in mm. If there are landmarks, they are those of
+ * landmarks; otherwise, of vertices along the normals of the other surface. */
 typedef struct supine_patient_fit_report {
-  double points;                          /**< number of landmarks, or of matched vertices */
-  double blocks;                          /**< number of cubes of 40 mm with points */
+  double points; /**< number of landmarks or, without landmarks, of matched vertices */
+  double blocks; /**< number of cubes of 40 mm with points */
   double fitted[SUPINE_PATIENT_SCORES];   /**< RMS error of each predictor at fitted points, mm */
   double held_out[SUPINE_PATIENT_SCORES]; /**< the same residuals at held-out points, mm */
   /** RMS error at held-out points, mm, of a translation, or of no displacement if no motion of the
    * body is fitted. */
   double baseline;
-  double band;      /**< share of the held-out points with an error below its 95 % bound, % */
+  double band; /**< share of the held-out landmarks with an error below its 95 % bound, %, or 0 */
   double explained; /**< percentage by which the law with its kriging correction reduces the squared
                        `baseline` */
   double expected_point;    /**< expected error of the predicted position of a point, mm */
   double expected_constant; /**< expected squared error, mm^2, per mm of displacement */
+  double expected_from; /**< RMS displacement, mm, below which this constant falls in proportion */
   double error[SUPINE_PATIENT_CONSTANTS]; /**< standard errors of c1 to c9 (patient.h) */
 } supine_patient_fit_report;
 

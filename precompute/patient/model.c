@@ -130,6 +130,24 @@ static supine_status find_ratio(const work *w, supine_error *error) {
   return status;
 }
 
+/* Compute w->displacement and, if `scan` [vertices, 3] shows the emptier state, the vertices of
+ * w->lungs in the fuller state. Set the last [vertices] of w->smoothing_ratio to 1. */
+static supine_status displace(work *w, const double *scan, supine_error *error) {
+  supine_status status = SUPINE_OK;
+  w->scan = scan;
+  for (size_t i = 0; i < 2 * w->lungs.mesh.vertex_count; ++i) {
+    w->smoothing_ratio[i] = 1.0;
+  }
+  if (scan != NULL) {
+    move(w);
+  }
+  for (int pass = 0; pass < (scan != NULL ? 2 : 1) && status == SUPINE_OK; ++pass) {
+    status = find_ratio(w, error);
+    move(w);
+  }
+  return status;
+}
+
 /* Extrapolate the displacement between the two scanned states to full inflation (end 0) or to rest
  * (end 1). Return the change of volume, mL, from the fuller scanned state to this end.
  * @param part  positions of the two states on the path from full inflation (0) to rest (1) */
@@ -146,9 +164,9 @@ static double volume_to_end(const supine_volume_form *form, const double part[2]
 /* Compute, along x, y and z, the share of the displacement from full inflation to rest that lies
  * between the two scanned states. To find it, adjust the positions of the states on this path until
  * the extrapolated displacement gives the known volumes at full inflation and at rest.
- * @param ones  [vertices] 1 for each vertex */
-static void find_path_span(const work *w, const supine_resting *resting, const double *ones,
-                           double path_span[3]) {
+ * @param form  the displacement between the two states, of all lungs */
+static void find_path_span(const work *w, const supine_resting *resting,
+                           const supine_volume_form *form, double path_span[3]) {
   enum { ROUNDS = 30 };
   static const double step = 1e-4;
   const supine_patient_record *record = w->record;
@@ -157,16 +175,9 @@ static void find_path_span(const work *w, const supine_resting *resting, const d
   const double volume[2] = {
       full, full * supine_reference_resting_total(resting, record->state[1].gravity)};
   const bool known = full > 0.0;
-  supine_volume_form form[2] = {{{0.0}}};
   double part[2];
   double gains[2][3];
   find_parts(record, part);
-  if (known) {
-    supine_physics_volume_of_fields(&w->lungs, NULL, w->displacement, ones, 1, form);
-    for (size_t i = 0; i < sizeof form[0].of / sizeof *form[0].of; ++i) {
-      form[0].of[i] += form[1].of[i];
-    }
-  }
   for (int round = 0; round < ROUNDS && known; ++round) {
     const size_t k = (size_t)round % 2;
     const supine_volume *stated = &record->state[k].volume;
@@ -184,37 +195,148 @@ static void find_path_span(const work *w, const supine_resting *resting, const d
   }
 }
 
-supine_status supine_patient_model(const supine_patient_record *record,
-                                   const supine_resting *resting, const supine_lungs *lungs,
-                                   size_t state, double *arrays, supine_model *model,
-                                   supine_error *error) {
+/* Find which of the two scanned states the lungs show, by comparing the bounding boxes. Refuse
+ * lungs that are too far from both. */
+static supine_status find_state(supine_patient_record *record, const supine_lungs *lungs,
+                                supine_error *error) {
+  const supine_patient_frame *frame = &record->patient.frame;
+  const int only_side = lungs->lung_count == 1 ? lungs->side[0] : 0;
+  const double *low[2] = {frame->minimum, record->emptier[0]};
+  const double *high[2] = {frame->maximum, record->emptier[1]};
+  double off[2] = {0.0, 0.0}; /* [state] largest distance of its bounding box's faces from the
+                                 surface's, divided by the width of the state's box */
+  double sum[2] = {0.0, 0.0}; /* [state] sum of the squares of all these distances */
+  size_t axis[2] = {0};
+  if (frame->only_side != 0 && frame->only_side != only_side) {
+    return supine_error_set(
+        error, SUPINE_ERROR_MESH,
+        "the patient's law was fitted to the %s lung alone: give that lung, or fit "
+        "the law to both lungs",
+        frame->only_side > 0 ? "left" : "right");
+  }
+  for (size_t s = 0; s < 2; ++s) {
+    /* Do not compare x if the surface lacks one of two fitted lungs. */
+    for (size_t k = only_side != frame->only_side ? 1 : 0; k < 3; ++k) {
+      const double ends[2] = {lungs->minimum[k] - low[s][k], lungs->maximum[k] - high[s][k]};
+      const double apart = fmax(fabs(ends[0]), fabs(ends[1])) / (high[s][k] - low[s][k]);
+      sum[s] += ends[0] * ends[0] + ends[1] * ends[1];
+      axis[s] = apart > off[s] ? k : axis[s];
+      off[s] = fmax(off[s], apart);
+    }
+  }
+  const size_t state =
+      record->volume[0] > 0.0 && record->volume[1] > 0.0 && only_side == frame->only_side
+          ? 1e-3 * supine_mesh_volume(&lungs->mesh) < sqrt(record->volume[0] * record->volume[1])
+          : sum[1] < sum[0];
+  const size_t k = axis[state];
+  record->shown = (double)state;
+  return off[state] <= apart_most[record->from_surface]
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_MESH,
+                                "the patient's law was fitted to lungs from %c = %.0f to %.0f mm, "
+                                "but this surface extends from %.0f to %.0f mm: check that it has "
+                                "the same coordinate frame and unit, and shows the same person",
+                                "xyz"[k], low[state][k], high[state][k], lungs -> minimum[k],
+                                lungs -> maximum[k]);
+}
+
+void supine_patient_resting(const supine_patient_record *record, supine_resting *resting) {
+  for (size_t k = 0; k < 2; ++k) {
+    const supine_state *shown = &record->state[k];
+    const double full = record->state[1 - k].volume.kind == SUPINE_VOLUME_FULL
+                            ? full_volume(record, 1 - k, resting)
+                            : 0.0;
+    if (shown->volume.kind != SUPINE_VOLUME_REST || record->volume[k] <= 0.0 || full <= 0.0) {
+      continue;
+    }
+    const double share = (record->volume[k] - shown->volume.ml) / full;
+    if (share <= share_least || share >= share_most) {
+      continue;
+    }
+    resting->assumed *= share / supine_reference_resting_total(resting, shown->gravity);
+    (void)supine_reference_resting_settle(resting, 0, NULL, NULL, NULL);
+    const double *of = record->lung_volume[k];
+    const double *full_of = record->lung_volume[1 - k];
+    const double own[2] = {supine_reference_along_axes(resting->share[0], shown->gravity),
+                           supine_reference_along_axes(resting->share[1], shown->gravity)};
+    for (size_t i = 0; i < 12; ++i) {
+      const size_t side = i / 6;
+      const double found =
+          share * of[side] / record->volume[k] * record->volume[1 - k] / full_of[side];
+      resting->share[side][i % 6] =
+          fmin(1.0, resting->share[side][i % 6] * (of[side] > 0.0 ? found / own[side] : 1.0));
+      resting->given[i % 6] = true;
+    }
+  }
+}
+
+supine_scan supine_patient_scan(const supine_patient_record *record, size_t state, double volume,
+                                const supine_resting *resting) {
+  const supine_state *shown = &record->state[state];
+  supine_scan scan = {.state = *shown};
+  const double full = full_volume(record, 1 - state, resting);
+  scan.known = shown->volume.kind == SUPINE_VOLUME_REST || shown->volume.kind == SUPINE_VOLUME_FULL;
+  if (!scan.known && full > 0.0) {
+    scan.known = true;
+    scan.state.volume = (supine_volume){SUPINE_VOLUME_FULL, fmin(0.0, volume - full)};
+  }
+  return scan;
+}
+
+/* Set record->lung_volume to the volumes of the scan and of its surface displaced to the other
+ * state. If one state is full inflation, also set record->volume, so that later volumes agree with
+ * the displacement. */
+static void set_volumes(supine_patient_record *record, const supine_lungs *fuller,
+                        const supine_volume_form forms[2]) {
+  static const double ones[3] = {1.0, 1.0, 1.0};
+  double sum[2] = {0.0, 0.0};
+  memset(record->lung_volume, 0, sizeof record->lung_volume);
+  for (size_t lung = 0; lung < fuller->lung_count; ++lung) {
+    const supine_mesh part = supine_lungs_part(fuller, lung);
+    const size_t side = fuller->side[lung] > 0 ? 0 : 1;
+    const double volume = 1e-3 * supine_mesh_volume(&part);
+    record->lung_volume[0][side] = volume;
+    record->lung_volume[1][side] = volume + supine_volume_form_at(&forms[lung], ones);
+    sum[0] += record->lung_volume[0][side];
+    sum[1] += record->lung_volume[1][side];
+  }
+  if (record->state[0].volume.kind == SUPINE_VOLUME_FULL ||
+      record->state[1].volume.kind == SUPINE_VOLUME_FULL) {
+    memcpy(record->volume, sum, sizeof sum);
+  }
+}
+
+supine_status supine_patient_model(supine_patient_record *record, const supine_lungs *lungs,
+                                   supine_resting *resting, supine_scan *scan, double *arrays,
+                                   supine_model *model, supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   double *directions = arrays;
   double *stiffness = arrays + 3 * n;
   work w = {.record = record,
             .lungs = *lungs,
-            .scan = state == 1 ? lungs->mesh.vertices : NULL,
             .smoothing_ratio = malloc(2 * n * sizeof(double)),
             .displacement = directions};
-  double path_span[3];
-  supine_status status = SUPINE_OK;
+  double *path_span = record->path_span;
+  supine_volume_form forms[2] = {{{0.0}}};
+  supine_status status = find_state(record, lungs, error);
   w.lungs.mesh.vertices = malloc(3 * n * sizeof(double));
-  if (w.smoothing_ratio == NULL || w.lungs.mesh.vertices == NULL) {
+  if (status == SUPINE_OK && (w.smoothing_ratio == NULL || w.lungs.mesh.vertices == NULL)) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
+  }
+  if (status != SUPINE_OK) {
     goto cleanup;
   }
   memcpy(w.lungs.mesh.vertices, lungs->mesh.vertices, 3 * n * sizeof(double));
-  for (size_t i = 0; i < 2 * n; ++i) {
-    w.smoothing_ratio[i] = 1.0;
+  status = displace(&w, record->shown == 1.0 ? lungs->mesh.vertices : NULL, error);
+  supine_physics_volume_of_fields(&w.lungs, NULL, w.displacement, w.smoothing_ratio + n, 1, forms);
+  set_volumes(record, &w.lungs, forms);
+  supine_patient_resting(record, resting);
+  *scan = supine_patient_scan(record, (size_t)record->shown,
+                              1e-3 * supine_mesh_volume(&lungs->mesh), resting);
+  for (size_t i = 0; i < sizeof forms[0].of / sizeof *forms[0].of; ++i) {
+    forms[0].of[i] += forms[1].of[i];
   }
-  if (w.scan != NULL) {
-    move(&w);
-  }
-  for (int pass = 0; pass < (w.scan != NULL ? 2 : 1) && status == SUPINE_OK; ++pass) {
-    status = find_ratio(&w, error);
-    move(&w);
-  }
-  find_path_span(&w, resting, w.smoothing_ratio + n, path_span);
+  find_path_span(&w, resting, forms, path_span);
   for (size_t i = 0; i < n; ++i) {
     const supine_patient_place place = supine_patient_find_vertex(&w.lungs, i);
     const double force =
@@ -239,78 +361,16 @@ cleanup:
   return status;
 }
 
-supine_status supine_patient_check_place(const supine_patient_record *record,
-                                         const supine_lungs *lungs, size_t *state,
-                                         supine_error *error) {
-  const supine_patient_frame *frame = &record->patient.frame;
-  const int only_side = lungs->lung_count == 1 ? lungs->side[0] : 0;
-  const double *low[2] = {frame->minimum, record->emptier[0]};
-  const double *high[2] = {frame->maximum, record->emptier[1]};
-  double off[2] = {0.0, 0.0}; /* [state] largest distance of its bounding box's faces from the
-                                 surface's, divided by the width of the state's box */
-  size_t axis[2] = {0};
-  if (frame->only_side != 0 && frame->only_side != only_side) {
-    return supine_error_set(
-        error, SUPINE_ERROR_MESH,
-        "the patient's law was fitted to the %s lung alone: give that lung, or fit "
-        "the law to both lungs",
-        frame->only_side > 0 ? "left" : "right");
+void supine_patient_field(const void *record, const double point[3], double side, double u[3]) {
+  const supine_patient_record *of = record;
+  double at[3] = {point[0], point[1], point[2]};
+  if (of->shown == 1.0) {
+    supine_patient_find_in_fuller(&of->patient, point, side, 1.0, at, u);
+  } else {
+    const supine_patient_place place = supine_patient_find(&of->patient.frame, point, side);
+    supine_patient_displacement(&of->patient, &place, 1.0, u);
   }
-  for (size_t s = 0; s < 2; ++s) {
-    /* Do not compare x if the surface lacks one of two fitted lungs. */
-    for (size_t k = only_side != frame->only_side ? 1 : 0; k < 3; ++k) {
-      const double apart =
-          fmax(fabs(lungs->minimum[k] - low[s][k]), fabs(lungs->maximum[k] - high[s][k])) /
-          (high[s][k] - low[s][k]);
-      axis[s] = apart > off[s] ? k : axis[s];
-      off[s] = fmax(off[s], apart);
-    }
+  for (size_t k = 0; k < 3; ++k) {
+    u[k] /= -of->path_span[k];
   }
-  *state =
-      record->volume[0] > 0.0 && record->volume[1] > 0.0 && only_side == frame->only_side
-          ? 1e-3 * supine_mesh_volume(&lungs->mesh) < sqrt(record->volume[0] * record->volume[1])
-          : off[1] < off[0];
-  const size_t k = axis[*state];
-  return off[*state] <= apart_most[record->from_surface]
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_MESH,
-                                "the patient's law was fitted to lungs from %c = %.0f to %.0f mm, "
-                                "but this surface extends from %.0f to %.0f mm: check that it has "
-                                "the same coordinate frame and unit, and shows the same person",
-                                "xyz"[k], low[*state][k], high[*state][k], lungs -> minimum[k],
-                                lungs -> maximum[k]);
-}
-
-void supine_patient_resting(const supine_patient_record *record, supine_resting *resting) {
-  for (size_t k = 0; k < 2; ++k) {
-    const supine_state *shown = &record->state[k];
-    const double full = record->state[1 - k].volume.kind == SUPINE_VOLUME_FULL
-                            ? full_volume(record, 1 - k, resting)
-                            : 0.0;
-    if (shown->volume.kind != SUPINE_VOLUME_REST || record->volume[k] <= 0.0 || full <= 0.0) {
-      continue;
-    }
-    const double share = (record->volume[k] - shown->volume.ml) / full;
-    if (share > share_least && share < share_most) {
-      const double assumed = supine_reference_resting_total(resting, shown->gravity);
-      resting->assumed *= share / assumed;
-      (void)supine_reference_resting_settle(resting, 0, NULL, NULL, NULL);
-      for (size_t a = 0; a < 6; ++a) {
-        resting->given[a] = true;
-      }
-    }
-  }
-}
-
-supine_scan supine_patient_scan(const supine_patient_record *record, size_t state, double volume,
-                                const supine_resting *resting) {
-  const supine_state *shown = &record->state[state];
-  supine_scan scan = {.state = *shown};
-  const double full = full_volume(record, 1 - state, resting);
-  scan.known = shown->volume.kind == SUPINE_VOLUME_REST || shown->volume.kind == SUPINE_VOLUME_FULL;
-  if (!scan.known && full > 0.0) {
-    scan.known = true;
-    scan.state.volume = (supine_volume){SUPINE_VOLUME_FULL, fmin(0.0, volume - full)};
-  }
-  return scan;
 }

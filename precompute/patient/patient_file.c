@@ -13,7 +13,7 @@
 
 static const char format[] = "supine-patient";
 enum {
-  VERSION = 3,
+  VERSION = 4,
   CENTRE = sizeof(supine_patient_centre) / sizeof(double),
   REGION = sizeof(supine_patient_region) / sizeof(double)
 };
@@ -45,7 +45,8 @@ static const numbers table[] = {
     {NULL, "explained_percent", 1, AT(report.explained), false},
     {NULL, "expected_rms_mm", 1, AT(report.expected_point), false},
     {NULL, "expected_constant_mm", 1, AT(report.expected_constant), false},
-    {NULL, "band_95_percent_holds", 1, AT(report.band), false},
+    {NULL, "expected_from_mm", 1, AT(report.expected_from), false},
+    {NULL, "band_95_percent_holds", 1, AT(report.band), true},
     {"frame", "minimum_mm", 3, AT(patient.frame.minimum), false},
     {"frame", "maximum_mm", 3, AT(patient.frame.maximum), false},
     {"frame", "midline_mm", 1, AT(patient.frame.midline), false},
@@ -61,6 +62,8 @@ static const numbers table[] = {
     {"motion", "rotation_rad", 3, AT(patient.power.motion[3]), false},
     {NULL, "c1_to_c9", SUPINE_PATIENT_CONSTANTS, AT(patient.power.c), false},
     {NULL, "standard_errors", SUPINE_PATIENT_CONSTANTS, AT(report.error), true},
+    {"basis", "emptier_scan", 1, AT(shown), true},
+    {"basis", "path_span", 3, AT(path_span), true},
     {"surface", "vertices", 1, AT(surface.vertices), true},
     {"surface", "matched_share", 1, AT(surface.matched), true},
     {"surface", "rms_before_mm", 1, AT(surface.before), true},
@@ -282,18 +285,13 @@ static const char *read_record(const json_t *root, supine_patient_record *record
                                                                              : NULL;
 }
 
-supine_status supine_patient_read(const char *path, supine_patient_record *record,
-                                  supine_error *error) {
-  json_error_t where;
+/* Decode the record in `root`, which is NULL if the text is no JSON, and release `root`. */
+static supine_status decode(const char *name, json_t *root, const json_error_t *where,
+                            supine_patient_record *record, supine_error *error) {
   double version = 0.0;
-  FILE *file = fopen(path, "rb");
-  if (file == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot open: %s", path, strerror(errno));
-  }
-  json_t *root = json_loadf(file, 0, &where);
-  (void)fclose(file);
   if (root == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s:%d: %s", path, where.line, where.text);
+    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s:%d: %s", name, where->line,
+                            where->text);
   }
   memset(record, 0, sizeof *record);
   const bool known = strcmp(text_of(root, NULL, "format"), format) == 0 &&
@@ -304,11 +302,30 @@ supine_status supine_patient_read(const char *path, supine_patient_record *recor
   return !known ? supine_error_set(error, SUPINE_ERROR_FORMAT,
                                    "%s: not a patient file of version %d: make a new one with "
                                    "'supine fit'",
-                                   path, VERSION)
+                                   name, VERSION)
          : invalid_key != NULL
              ? supine_error_set(error, SUPINE_ERROR_FORMAT,
                                 "%s: \"%s\" is missing or invalid: make a new file with "
                                 "'supine fit'",
-                                path, invalid_key)
+                                name, invalid_key)
              : SUPINE_OK;
+}
+
+supine_status supine_patient_decode(const char *name, const char *text,
+                                    supine_patient_record *record, supine_error *error) {
+  json_error_t where;
+  json_t *root = json_loads(text, 0, &where);
+  return decode(name, root, &where, record, error);
+}
+
+supine_status supine_patient_read(const char *path, supine_patient_record *record,
+                                  supine_error *error) {
+  json_error_t where;
+  FILE *file = fopen(path, "rb");
+  if (file == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot open: %s", path, strerror(errno));
+  }
+  json_t *root = json_loadf(file, 0, &where);
+  (void)fclose(file);
+  return decode(path, root, &where, record, error);
 }

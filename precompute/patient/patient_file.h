@@ -99,6 +99,14 @@ typedef struct supine_patient_record {
   size_t further_count; /**< number of elements of `further`; 0 after supine_patient_read */
   supine_patient_further further[SUPINE_PATIENT_OTHERS_MAX];
   bool gain_undetermined; /**< whether the fitted gain is outside 0.01 to 2 and ignored */
+  /** @{ Set by supine_patient_model, for a basis: the state that its scan shows (0 fuller, 1
+   * emptier), and the displacement between the two states as a share of that from full inflation
+   * to rest, along x, y and z. */
+  double shown, path_span[3];
+  /** @} */
+  /** [state][left, right lung] volumes of that scan and of its surface, displaced by the law to the
+   * other state, mL; 0 if unknown */
+  double lung_volume[2][2];
 } supine_patient_record;
 
 /** Write the record to a JSON file. A failure leaves no incomplete file.
@@ -113,6 +121,15 @@ struct json_t *supine_patient_encode(const supine_patient_record *record, const 
 /** Return the record as JSON text that the caller frees, or NULL if out of memory. */
 char *supine_patient_text(const supine_patient_record *record, const char *made_by);
 
+/** Compute the displacement of a point by a patient's law, for a basis that was made with this law.
+ * A supine_inside_field; its context is a supine_patient_record. */
+void supine_patient_field(const void *record, const double point[3], double side, double u[3]);
+
+/** Read the record of a patient's displacement law from JSON text, of a file named `name`. Other
+ * statuses: as supine_patient_read. */
+supine_status supine_patient_decode(const char *name, const char *text,
+                                    supine_patient_record *record, supine_error *error);
+
 /** Read the record of a patient's displacement law from a JSON file.
  * @retval SUPINE_ERROR_READ    the file cannot be opened
  * @retval SUPINE_ERROR_FORMAT  a key is missing or invalid */
@@ -120,28 +137,26 @@ supine_status supine_patient_read(const char *path, supine_patient_record *recor
                                   supine_error *error);
 
 /** Set the force, the directions of displacement and the stiffness of a model to those of a
- * patient. The direction of a vertex is d = -u / F:
+ * patient. Set the volumes at rest and the state of the scan, so that the fitted displacement
+ * between the two states is neither enlarged nor reduced: if one of them is full inflation, the
+ * other state has the volume of the scan's surface after this displacement, record->lung_volume,
+ * whatever volume was measured. The direction of a vertex is d = -u / F:
  * - u is the patient's displacement of the vertex between the two scanned states, extrapolated to
  *   the displacement from full inflation to rest.
  * - F is the patient's force on the vertex, smoothed over the surface (equilibrium.h). The
  *   unsmoothed force, and the ratio of F to it, are at least 0.2.
+ * @param record   `shown`, `path_span`, `volume` and `lung_volume` are written
  * @param lungs    scan of one of the two states
- * @param state    0 if the scan shows the fuller state, 1 if the emptier one
+ * @param resting  default volumes at rest; on return those of the patient
+ * @param scan     written: the state of the scan; `known` is false if its volume relative to full
+ *   inflation is unknown
  * @param arrays   [4 N], written: the directions [N, 3], mm, then the relative stiffness [N]; must
  *   outlive the model
+ * @retval SUPINE_ERROR_MESH  the surface is too far from both states, or is the other lung
  * @retval SUPINE_ERROR_MEMORY, those of supine_physics_solve */
-supine_status supine_patient_model(const supine_patient_record *record,
-                                   const supine_resting *resting, const supine_lungs *lungs,
-                                   size_t state, double *arrays, supine_model *model,
-                                   supine_error *error);
-
-/** Find which of the two scanned states a surface shows, by its volume or, if the volumes of the
- * states are unknown, by its bounding box.
- * @param state  written: 0 for the fuller state, 1 for the emptier one
- * @retval SUPINE_ERROR_MESH  the surface is too far from both states, or is the other lung */
-supine_status supine_patient_check_place(const supine_patient_record *record,
-                                         const supine_lungs *lungs, size_t *state,
-                                         supine_error *error);
+supine_status supine_patient_model(supine_patient_record *record, const supine_lungs *lungs,
+                                   supine_resting *resting, supine_scan *scan, double *arrays,
+                                   supine_model *model, supine_error *error);
 
 /** Compute gains [state][axis]: the displacement from full inflation to the fuller [0] and to the
  * emptier [1] scanned state, divided by the displacement to rest. The default displacement law

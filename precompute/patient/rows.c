@@ -24,6 +24,7 @@ void supine_patient_rows_of_pairs(const supine_patient_frame *frame,
                                      pairs->side != NULL ? pairs->side[i / 3] : 0.0),
         .value = pairs->to[i] - pairs->from[i],
         .weight = 1.0,
+        .landmark = 1 + i / 3,
         .noise = landmark_noise};
     rows[i].axis[i % 3] = 1.0;
   }

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "precompute/inside/shells.h"
 #include "program/options/basis_input.h"
 
 const supine_option supine_options_as_scanned[] = {
@@ -88,6 +89,48 @@ supine_status supine_options_basis_mesh(const supine_basis *basis, supine_mesh *
   memcpy(made.triangles, supine_basis_triangles(basis), bytes);
   *mesh = made;
   return SUPINE_OK;
+}
+
+static const char *const frames[] = {"body", "hilum", NULL};
+
+const supine_option supine_options_hilum_frame[] = {
+    {"frame", 0, "body|hilum",
+     "what stays in place: the body (spine, apex and back wall), or the hilum, whose displacement "
+     "is "
+     "then subtracted, as bronchoscopy registers the airways there",
+     .kind = SUPINE_OPTION_CHOICE, .size = sizeof(int), .choices = frames, .standard = "body"},
+    {.name = NULL}};
+
+supine_status supine_options_hilum(const supine_basis *basis, const supine_pose *pose,
+                                   const supine_pose *from, bool needed, double shift[3],
+                                   supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const size_t modes = info->mode_count;
+  double *mean = malloc(info->lung_count * 3 * modes * sizeof *mean);
+  memset(shift, 0, 3 * sizeof *shift);
+  if (mean == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  }
+  const bool known = supine_inside_hilum(basis, mean);
+  for (size_t i = 0; i < info->lung_count * 3 * modes && known; ++i) {
+    const size_t axis = i / modes % 3;
+    const size_t lung = i / modes / 3;
+    shift[axis] += mean[i] / (double)info->lung_count *
+                   (pose->gains[lung][axis] * pose->weights[i % modes] -
+                    from->gains[lung][axis] * from->weights[i % modes]);
+  }
+  free(mean);
+  return known || !needed ? SUPINE_OK
+                          : supine_error_set(error, SUPINE_ERROR_UNSUPPORTED,
+                                             "--frame hilum: the file does not say how the hilum "
+                                             "moves: make it again with 'supine embed'");
+}
+
+void supine_options_hilum_print(const double shift[3], bool subtracted) {
+  if (shift[0] != 0.0 || shift[1] != 0.0 || shift[2] != 0.0) {
+    (void)printf("the hilum moves by %.1f, %.1f, %.1f mm (to the left, back and head)%s\n",
+                 shift[0], shift[1], shift[2], subtracted ? ", subtracted from all positions" : "");
+  }
 }
 
 supine_status supine_options_expected_find(const supine_basis *basis, const supine_state *state,

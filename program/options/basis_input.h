@@ -42,12 +42,27 @@ double *supine_options_basis_positions(const supine_basis *basis, const supine_p
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_options_basis_mesh(const supine_basis *basis, supine_mesh *mesh);
 
+/* Option table that holds only --frame, which sets an int: 1 to subtract the displacement of the
+ * hilum, else 0. */
+extern const supine_option supine_options_hilum_frame[];
+
+/* Compute the displacement of the hilum (precompute/inside/shells.h) from one pose to another, mm;
+ * 0 if the file does not determine it.
+ * @retval SUPINE_ERROR_UNSUPPORTED  `needed` is true and the file does not determine it
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_options_hilum(const supine_basis *basis, const supine_pose *pose,
+                                   const supine_pose *from, bool needed, double shift[3],
+                                   supine_error *error);
+
+/* Print the displacement of the hilum in one line, and whether it was subtracted. */
+void supine_options_hilum_print(const double shift[3], bool subtracted);
+
 #define SUPINE_EXPECTED_MEANING                                                                    \
   "3-D RMS; half of all points lie within 0.9 times this distance of their true position, 95 % "   \
   "within 1.8 times"
 #define SUPINE_EXPECTED_SUPPORT                                                                    \
-  "The expected error was measured on full breaths in one posture; for a change of posture it is " \
-  "an extrapolation."
+  "The expected error was measured on breaths in one posture; for a change of posture it is an "   \
+  "extrapolation. 'supine info' lists its terms."
 
 /* Expected errors of the displacements from one state to another. Initialise with zeros, and
  * release with supine_options_expected_free. */

@@ -260,43 +260,66 @@ static void print_map(const char *path, const supine_source *source) {
   }
 }
 
+/* Say what volume the law gives the lungs in the state that was not scanned, beside the measured
+ * one. The law is not rescaled to the latter.
+ * @param measured  volume of both lungs in this state when the law was fitted, mL, or 0 */
+static void tell_volume(const supine_patient_record *record, double measured,
+                        supine_findings *findings) {
+  static const double different = 1.0 / 3.0; /* ratio of volumes minus 1 from which to warn */
+  const size_t other = record->shown == 1.0 ? 0 : 1;
+  const double *lung = record->lung_volume[other];
+  const bool both = (lung[0] > 0.0 && lung[1] > 0.0) || record->patient.frame.only_side != 0;
+  char state[160];
+  char beside[64] = "";
+  (void)supine_state_describe(&record->state[other], state, sizeof state);
+  if (measured > 0.0 && both) {
+    (void)snprintf(beside, sizeof beside, "; measured: %.0f mL", measured);
+  }
+  const double off = beside[0] != '\0' ? fabs((lung[0] + lung[1]) / measured - 1.0) : 0.0;
+  supine_findings_add(findings, "%s: by the fitted law, the lungs hold %.0f mL %s%s%s",
+                      off > different ? "warning" : "note", lung[0] + lung[1], state, beside,
+                      off > different ? ". Check that the scans show the same lungs; give "
+                                        "--landmarks to 'supine fit'"
+                                      : "");
+}
+
 /* Set options->choice to the displacement law and the force that were fitted to a patient. If the
  * state of the scan is not given, use the state in the fit. */
 static supine_status take_patient(supine_model_options *options, supine_error *error) {
-  const supine_patient_record *record = options->patient;
+  supine_patient_record *record = options->patient;
   const supine_lungs *lungs = &options->made_from.lungs;
   supine_model_choice *choice = &options->choice;
-  size_t state = 0;
-  supine_status status = supine_patient_check_place(record, lungs, &state, error);
+  const double measured[2] = {record->volume[0], record->volume[1]};
+  supine_scan scan;
+  choice->patient_law = "the patient's own";
+  choice->model = supine_physics_model(SUPINE_LAW_DEEP);
+  options->patient_arrays = malloc(4 * lungs->mesh.vertex_count * sizeof(double));
+  const supine_status status =
+      options->patient_arrays == NULL
+          ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
+                             lungs->mesh.vertex_count)
+          : supine_patient_model(record, lungs, &choice->resting, &scan, options->patient_arrays,
+                                 &choice->model, error);
   if (status != SUPINE_OK) {
     return status;
   }
-  choice->patient_law = "the patient's own";
-  choice->model = supine_physics_model(SUPINE_LAW_DEEP);
-  supine_patient_resting(record, &choice->resting);
-  if (!choice->has_scan) {
-    const double volume = 1e-3 * supine_mesh_volume(&lungs->mesh);
-    choice->has_scan = true;
-    choice->scan = supine_patient_scan(record, state, volume, &choice->resting);
-    if (state == 1 && !choice->scan.known) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "this scan is the emptier of the two that were fitted, and how far "
-                              "it is below full inflation is unknown: give its state, such as "
-                              "--scanned supine:rest, or use the fuller scan");
-    }
-    supine_findings_add(&options->findings,
-                        "note: the scan is assumed to be the %s of the two that were fitted; "
-                        "--scanned changes this",
-                        state == 0 ? "fuller" : "emptier");
-  }
-  options->patient_arrays = malloc(4 * lungs->mesh.vertex_count * sizeof(double));
-  status = options->patient_arrays == NULL
-               ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
-                                  lungs->mesh.vertex_count)
-               : supine_patient_model(record, &choice->resting, lungs, state,
-                                      options->patient_arrays, &choice->model, error);
+  tell_volume(record, measured[record->shown == 1.0 ? 0 : 1], &options->findings);
   choice->stiffness = choice->model.stiffness;
-  return status;
+  if (choice->has_scan) {
+    return SUPINE_OK;
+  }
+  choice->has_scan = true;
+  choice->scan = scan;
+  supine_findings_add(&options->findings,
+                      "note: the scan is assumed to be the %s of the two that were fitted; "
+                      "--scanned changes this",
+                      record->shown == 0.0 ? "fuller" : "emptier");
+  return record->shown == 0.0 || scan.known
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                "this scan is the emptier of the two that were fitted, and how far "
+                                "it is below full inflation is unknown: give its state, such as "
+                                "--scanned supine:rest, or use the fuller scan");
 }
 
 supine_status supine_command_model_load(supine_model_options *options, const char *command,

@@ -17,7 +17,7 @@ extern const supine_option supine_command_model_options[];
 typedef struct supine_model_options {
   supine_source_options source;
   supine_model_choice choice;
-  const supine_patient_record *patient; /* owned by the caller; NULL if there is no patient model */
+  supine_patient_record *patient; /* owned by the caller; NULL if there is no patient model */
   double *patient_arrays; /* [4 N] displacement per unit force [N, 3], mm; relative stiffness [N] */
   supine_source made_from; /* the loaded lungs, with the axes and units of their files */
   supine_prepared prepared;

@@ -96,6 +96,7 @@ static const struct {
               {NULL, "error_modes", "error by number of modes, share"},
               {NULL, "expected_constant_mm", "expected error^2 / displacement, mm"},
               {NULL, "expected_error", "expected error of a displacement from the scan"},
+              {NULL, "expected_error_terms", "terms of the expected error"},
               {NULL, "expected_largest_mm", "expected error, largest, mm"},
               {NULL, "expected_rms_mm", "expected error, RMS, mm"},
               {NULL, "fitted_rms_mm", "residual at the fitted points, RMS, mm"},

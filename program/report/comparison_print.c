@@ -84,6 +84,8 @@ static json_t *encode_postures(const supine_comparison *c) {
     json_t *posture =
         json_pack("{s:s, s:o, s:o}", "name", item->name, "gravity", direction(item->state.gravity),
                   "displacement_mm", statistics(&c->posture[i].displacement));
+    (void)json_object_set_new(posture, "hilum_mm",
+                              supine_options_json_numbers(3, c->posture[i].hilum));
     if (supine_report_has_errors(c)) {
       (void)json_object_set_new(posture, "expected_error_mm",
                                 json_real(c->posture[i].expected_error));
@@ -122,6 +124,8 @@ static void add_tables(const supine_comparison *c, json_t *text) {
   for (size_t i = 0; i < c->postures.count; ++i) {
     const char *name = supine_options_posture_label(c->postures.item[i].name);
     json_t *moved = statistics(&c->posture[i].displacement);
+    (void)json_object_set_new(moved, "hilum x, y, z",
+                              supine_options_json_numbers(3, c->posture[i].hilum));
     if (supine_report_has_errors(c)) {
       (void)json_object_set_new(moved, "expected error", json_real(c->posture[i].expected_error));
     }

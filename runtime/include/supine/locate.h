@@ -3,27 +3,38 @@
  * Expected errors of predicted positions, and lungs found from a few observed points.
  *
  * The expected error sigma_i of vertex i is the 3-D RMS distance between its true and its predicted
- * position, after the translation that fits best:
+ * position, after the translation that fits best. It is the root of a sum of terms:
  *
- *     sigma_i^2 = |u_i| min(c, RMS of |u|) + (|dx_i/dV| 0.05 V_full)^2
+ *     sigma_i^2 = |u_i| c s                              displacement
+ *               + |w_i| max(0, 4.5 mm s_0 - c s)         turn, after a fit in one posture
+ *               + (|dx_i/dV| s_V)^2                      assumed volume
+ *               + (12 mm |Dg_xy| b_i)^2                  heart
+ *               + (3 mm |Dg_x|)^2                        sliding
  *
  *     u_i     displacement of the vertex from a state whose positions are exact, mm
  *     c       4.5 mm (95 % interval 3.7 to 5.7), measured on full breaths of 15 people in one
- *             posture; for a change of posture, this is an extrapolation
+ *             posture; or the constant of a patient's fit, metadata "expected_error_mm"
+ *     s       min(1, RMS of |u| over the lungs / R). R is 18 mm, measured on quiet breaths of 10
+ *             people; or the RMS displacement of a fit, metadata "expected_error_from_mm"
+ *     s_0     s with R = 18 mm
+ *     w_i     part of u_i that a change of posture adds, mm. The term is 0 after a fit to a scan
+ *             in another posture too, metadata "turn_fitted"
  *     x_i     position of the vertex, mm
  *     V       volume of all lungs, mL
- *     V_full  volume of the reference surface, mL
+ *     s_V     0.17, or metadata "resting_spread", of the volume that was assumed: at rest, that is
+ *             0.08 of full inflation. The error is common to all postures: two states at rest
+ * differ by |d(u_i)/dV| s_V Dg      change of the unit vector of gravity b_i     max(0, 1 - X /
+ * 0.7) 4 Y (1 - Y) max(0, 1 - |Z - 0.65| / 0.35), with X from the midline outwards, Y from the back
+ * and Z from the apex, 0 to 1 in the box around the lungs. The heart moves by up to 19 mm (Chino &
+ * Marks 2008, n 16), but not in the model
  *
- * The second term applies only if the volume of a state is given relative to rest and the volume at
- * rest was assumed. Half of all points lie within 0.9 sigma of the truth, 95 % within 1.8 sigma.
+ * For a change of posture, all terms are extrapolations: nobody was scanned in two postures. Half
+ * of all points lie within 0.9 sigma of the truth, 95 % within 1.8 sigma.
  *
- * Observed points correct the predicted positions by kriging. This reduces the expected errors near
- * the points. If at least three points were observed and no rotation is fitted, no expected error
- * exceeds the square root of
- *
- *     max(|u_i|, 2 mm) min(c, max(RMS of |u|, 2 mm)) + (|dx_i/dV| D)^2
- *
- * D is 0.17 V_full for an unknown volume, and 0 for a given volume. */
+ * Observed points correct the predicted positions by kriging, and the kriging variance replaces the
+ * first three terms where it is smaller. If a rotation is fitted, or fewer than three points were
+ * observed, it always replaces them. All errors are then multiplied by a factor that the points
+ * decide (supine_locate). |u_i| and its RMS count as 2 mm at least. */
 #ifndef SUPINE_LOCATE_H
 #define SUPINE_LOCATE_H
 
@@ -40,13 +51,22 @@ extern "C" {
 /** Default of the factor c in the formula of the expected error (top of this file), mm. */
 #define SUPINE_EXPECTED_ERROR_MM 4.5
 
+/** Terms of the formula of the expected error (top of this file). */
+typedef enum supine_expected_term {
+  SUPINE_EXPECTED_DISPLACEMENT = 0,
+  SUPINE_EXPECTED_TURN,
+  SUPINE_EXPECTED_VOLUME,
+  SUPINE_EXPECTED_HEART,
+  SUPINE_EXPECTED_SLIDING,
+  SUPINE_EXPECTED_TERMS
+} supine_expected_term;
+
 /** Compute the expected error of every vertex in a state, if the positions in state `from` are
  * exact.
  *
- * The factor c in the formula of the expected error (top of this file) is the metadata
- * "expected_error_mm" or, if the file lacks it, SUPINE_EXPECTED_ERROR_MM. The volume at rest was
- * measured if the file has metadata "resting_known" or was scanned at rest; otherwise it was
- * assumed. Cost: four evaluations of every vertex, or six if the volume at rest was assumed.
+ * Full inflation was assumed if the file was scanned at rest, and the volume at rest if it was not;
+ * neither was, if the file has metadata "resting_known". Cost: up to eight evaluations of every
+ * vertex.
  * @param from   NULL for the state of the scan
  * @param sigma  [N] expected 3-D RMS errors, mm, written
  * @return a status of supine_basis_pose, or one of these:
@@ -54,6 +74,20 @@ extern "C" {
 SUPINE_API supine_status supine_expected_error(const supine_basis *basis, const supine_state *state,
                                                const supine_state *from, float *sigma,
                                                supine_error *error);
+
+/** A term of the expected error. The strings live as long as the basis. */
+typedef struct supine_expected_part {
+  const char *name;   /**< such as "heart" */
+  const char *source; /**< where the constants of the term come from */
+  double rms;         /**< RMS of the term over all vertices, mm */
+} supine_expected_part;
+
+/** Compute the terms of supine_expected_error. The sum of the squares of their RMS is the mean of
+ * sigma^2. Other parameters and statuses: as supine_expected_error.
+ * @param parts  [SUPINE_EXPECTED_TERMS] written */
+SUPINE_API supine_status supine_expected_parts(const supine_basis *basis, const supine_state *state,
+                                               const supine_state *from,
+                                               supine_expected_part *parts, supine_error *error);
 
 enum { SUPINE_LOCATE_POINTS_MAX = 300 };
 
@@ -107,15 +141,25 @@ SUPINE_API size_t supine_locate_space(size_t count);
  *
  * A point is an outlier if its distance from the prediction by all other points exceeds 3 standard
  * deviations of this distance. Outliers are left out, the worst first, as long as at least four
- * fifths of the points remain. Cost: about 0.2 ms for 20 points, 0.1 s for 300.
+ * fifths of the points remain.
+ *
+ * The expected errors are multiplied by sqrt((10 + sum of z^2) / (10 + n)). z are the distances of
+ * the n points that are no outliers from their predictions by all other points, divided by the
+ * expected distances. With three or four points, an outlier cannot be found.
+ *
+ * A rotation has a prior with standard deviation 3 degrees about each axis, unless the points are
+ * turned by more than 30 degrees: then their frame is another one. Cost: about 0.2 ms for 20
+ * points, 0.1 s for 300.
  * @param residuals  [count], written
  * @param space      [supine_locate_space(count)]; keep it as long as `found` is used
  * @param found      written
  * @return a status of supine_basis_pose, or one of these:
  * @retval SUPINE_ERROR_ARGUMENT   a count, vertex, position or noise is out of range, or a
- *                                 rotation is to be found from fewer than three points or from
- *                                 points on one line
- * @retval SUPINE_ERROR_NUMERICAL  the fit needs a volume that the lungs cannot hold */
+ *                                 rotation is to be found from fewer than three points, or one of
+ *                                 more than 30 degrees from points on one line
+ * @retval SUPINE_ERROR_NUMERICAL  the points are at one place, or differ from their predictions by
+ *                                 more than 40 mm (RMS), or the fit needs a volume that the lungs
+ *                                 cannot hold or that is below a tenth of full inflation */
 SUPINE_API supine_status supine_locate(const supine_locate_task *task,
                                        supine_locate_residual *residuals, double *space,
                                        supine_location *found, supine_error *error);
