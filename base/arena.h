@@ -17,6 +17,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdio.h>
 
 #include <supine/status.h>
 
@@ -28,6 +29,13 @@ typedef struct supine_arena {
 /** Begin the declaration of a variable that is freed when its scope ends: by a function that takes
  * its address, such as supine_mesh_free. */
 #define SUPINE_FREED_BY(function) __attribute__((cleanup(function)))
+
+/** Close a file that was opened for reading; for SUPINE_FREED_BY. */
+static inline void supine_file_close(FILE **file) {
+  if (*file != NULL) {
+    (void)fclose(*file);
+  }
+}
 
 /** Declare an arena that is freed when its scope ends. */
 #define SUPINE_ARENA SUPINE_FREED_BY(supine_arena_free) supine_arena

@@ -8,6 +8,7 @@
 #include <string.h>
 #include <strings.h>
 
+#include "base/arena.h"
 #include "base/csv.h"
 
 static char *trim(char *text) {
@@ -21,36 +22,30 @@ static char *trim(char *text) {
   return text;
 }
 
-/* Return the next line that is neither blank nor a comment, trimmed; NULL at the end or on
- * failure. */
-static char *csv_line(supine_csv *csv, supine_status *status, supine_error *error) {
-  *status = SUPINE_OK;
-  for (;;) {
+/* Set `text` to the next line that is neither blank nor a comment, trimmed; NULL at the end. */
+static supine_status csv_line(supine_csv *csv, char **text, supine_error *error) {
+  do {
     errno = 0;
     const ssize_t length = getline(&csv->text, &csv->capacity, csv->file);
+    *text = NULL;
     if (length < 0) {
-      if (errno == ENOMEM) {
-        *status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", csv->path);
-      } else if (ferror(csv->file) != 0) {
-        *status = supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", csv->path,
-                                   strerror(errno));
-      }
-      return NULL;
+      return errno == ENOMEM ? supine_error_memory(error, "a line of %s", csv->path)
+             : ferror(csv->file) != 0
+                 ? supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", csv->path,
+                                    strerror(errno))
+                 : SUPINE_OK;
     }
     ++csv->line;
     if (strlen(csv->text) != (size_t)length) {
-      *status =
-          supine_error_set(error, SUPINE_ERROR_FORMAT,
-                           "%s:%zu: a NUL byte: save the file as CSV text", csv->path, csv->line);
-      return NULL;
+      return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "%s:%zu: a NUL byte: save the file as CSV text", csv->path,
+                              csv->line);
     }
     static const char mark[] = "\xEF\xBB\xBF"; /* byte-order mark of UTF-8 */
     const size_t skip = csv->line == 1 && strncmp(csv->text, mark, 3) == 0 ? 3 : 0;
-    char *text = trim(csv->text + skip);
-    if (*text != '\0' && *text != '#') {
-      return text;
-    }
-  }
+    *text = trim(csv->text + skip);
+  } while (**text == '\0' || **text == '#');
+  return SUPINE_OK;
 }
 
 /* Return the field at *rest, ended by a NUL. Move *rest to the next field, or set it to NULL after
@@ -106,6 +101,17 @@ static supine_status csv_split(supine_csv *csv, char *text, supine_error *error)
 
 static supine_status csv_header(supine_csv *csv, const char *const *names, size_t count,
                                 size_t required, supine_error *error) {
+  char *text = NULL;
+  SUPINE_TRY(csv_line(csv, &text, error));
+  if (text == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s: the file is empty; expected a header %s,...", csv->path, names[0]);
+  }
+  csv->separator = strchr(text, ',') != NULL    ? ','
+                   : strchr(text, ';') != NULL  ? ';'
+                   : strchr(text, '\t') != NULL ? '\t'
+                                                : ',';
+  SUPINE_TRY(csv_split(csv, text, error));
   for (size_t c = 0; c < SUPINE_CSV_FIELDS_MAX; ++c) {
     csv->column[c] = SIZE_MAX;
   }
@@ -141,22 +147,7 @@ supine_status supine_csv_open(const char *path, const char *const *names, size_t
   if (csv->file == NULL) {
     return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot open: %s", path, strerror(errno));
   }
-  supine_status status = SUPINE_OK;
-  char *text = csv_line(csv, &status, error);
-  if (status == SUPINE_OK && text == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s: the file is empty; expected a header %s,...", path, names[0]);
-  }
-  if (status == SUPINE_OK) {
-    csv->separator = strchr(text, ',') != NULL    ? ','
-                     : strchr(text, ';') != NULL  ? ';'
-                     : strchr(text, '\t') != NULL ? '\t'
-                                                  : ',';
-    status = csv_split(csv, text, error);
-  }
-  if (status == SUPINE_OK) {
-    status = csv_header(csv, names, count, required, error);
-  }
+  const supine_status status = csv_header(csv, names, count, required, error);
   if (status != SUPINE_OK) {
     supine_csv_close(csv);
   }
@@ -164,20 +155,20 @@ supine_status supine_csv_open(const char *path, const char *const *names, size_t
 }
 
 supine_status supine_csv_next(supine_csv *csv, bool *more, supine_error *error) {
-  supine_status status = SUPINE_OK;
-  char *text = csv_line(csv, &status, error);
+  char *text = NULL;
+  SUPINE_TRY(csv_line(csv, &text, error));
   *more = text != NULL;
   if (text == NULL) {
-    return status;
+    return SUPINE_OK;
   }
-  status = csv_split(csv, text, error);
-  if (status == SUPINE_OK && csv->field_count != csv->column_count) {
-    status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s:%zu: %zu field%s, but the header has %zu: add or delete fields",
-                              csv->path, csv->line, csv->field_count,
-                              csv->field_count == 1 ? "" : "s", csv->column_count);
+  SUPINE_TRY(csv_split(csv, text, error));
+  if (csv->field_count != csv->column_count) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s:%zu: %zu field%s, but the header has %zu: add or delete fields",
+                            csv->path, csv->line, csv->field_count,
+                            csv->field_count == 1 ? "" : "s", csv->column_count);
   }
-  return status;
+  return SUPINE_OK;
 }
 
 const char *supine_csv_text(const supine_csv *csv, size_t column) {
@@ -202,9 +193,7 @@ supine_status supine_csv_number(const supine_csv *csv, size_t column, const char
 }
 
 void supine_csv_close(supine_csv *csv) {
-  if (csv->file != NULL) {
-    (void)fclose(csv->file);
-  }
+  supine_file_close(&csv->file);
   free(csv->text);
   *csv = (supine_csv){0};
 }
