@@ -22,6 +22,10 @@ supine_status supine_options_basis_closed(const supine_basis *basis, const char 
                                 path);
 }
 
+void supine_options_basis_close(supine_basis **basis) {
+  supine_basis_close(*basis);
+}
+
 supine_status supine_options_basis_open(const char *path, supine_storage storage,
                                         supine_basis **basis, supine_error *error) {
   const supine_basis_options options = {sizeof options, .storage = storage,

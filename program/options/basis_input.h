@@ -22,6 +22,9 @@ extern const supine_option supine_options_as_scanned[];
 supine_status supine_options_basis_open(const char *path, supine_storage storage,
                                         supine_basis **basis, supine_error *error);
 
+/* Close *basis; for SUPINE_FREED_BY. */
+void supine_options_basis_close(supine_basis **basis);
+
 /* Check that the surface of a basis encloses a volume. `path` names the file in the message.
  * @retval SUPINE_ERROR_OPEN_SURFACE */
 supine_status supine_options_basis_closed(const supine_basis *basis, const char *path,
