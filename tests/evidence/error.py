@@ -10,8 +10,8 @@ expiration and of inspiration of a quiet breath, without scans: the lungs are th
 30 mm. All in mm and LPS. Distances are RMS after the translation that fits best, but for 'locate', which finds it.
 
 needed: the constant c of <supine/locate.h> at which the stated error is the true one, with the other terms as stated.
-The last line of a path has the median ratio of stated to true error and, leaving out each patient in turn, the mean
-constant of the others and the ratio that it gives. Exit code 77: no data.
+The last lines have, for each path, the median ratio of stated to true error, the geometric mean of the needed
+constants and, leaving out each patient in turn, that of the others and the ratio that it gives. Exit code 77: no data.
 """
 import csv
 import pathlib
@@ -129,9 +129,9 @@ def main():
                           % (path, pairs.stem, *row, paths[path][-1][4], c), flush=True)
     for path, rows in paths.items():
         c, true, stated, _, need = np.array(rows).T
-        other = [np.delete(need, i).mean() if len(need) > 1 else np.nan for i in range(len(need))]
+        other = [np.exp(np.log(np.delete(need, i)).mean()) for i in range(len(need))] if len(need) > 1 else [np.nan]
         print("%-24s stated / true %.2f (%.2f to %.2f); needed %.1f; of the others %s, ratio %s" % (
-            path, np.median(stated / true), (stated / true).min(), (stated / true).max(), need.mean(),
+            path, np.median(stated / true), (stated / true).min(), (stated / true).max(), np.exp(np.log(need).mean()),
             np.round(other, 1), np.round(np.sqrt(other / need), 2)))
     sys.exit(0 if paths else 77)
 
