@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/findings.h"
 
 #include <supine/compare.h>
@@ -179,26 +180,20 @@ static const supine_option table[] = {
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   const request *wanted = chosen;
   const char *path = given->operand[0];
-  supine_basis *basis = NULL;
-  double *energy = NULL;
-  json_t *described = NULL;
   static const supine_basis_options options = {sizeof options, .without_normals = true};
-  supine_status status = supine_basis_open_with(path, &options, &basis, error);
-  if (status == SUPINE_OK) {
-    energy = calloc(supine_basis_get_info(basis)->band + 1, sizeof *energy);
-    status = energy != NULL ? band_energy(basis, energy, error) : SUPINE_ERROR_MEMORY;
+  SUPINE_FREED_BY(supine_options_basis_close) supine_basis *basis = NULL;
+  SUPINE_ARENA arena = {0};
+  json_auto_t *described = NULL;
+  SUPINE_TRY(supine_basis_open_with(path, &options, &basis, error));
+  const size_t bands = supine_basis_get_info(basis)->band + 1;
+  double *energy = supine_arena_zeros(&arena, bands, sizeof *energy);
+  if (energy == NULL) {
+    return supine_error_memory(error, "%zu bands", bands);
   }
-  if (status == SUPINE_OK) {
-    status = describe(path, basis, energy, &described, error);
-  }
-  if (status == SUPINE_OK) {
-    supine_options_print(described, wanted->json);
-  } else {
-    json_decref(described);
-  }
-  free(energy);
-  supine_basis_close(basis);
-  return status;
+  SUPINE_TRY(band_energy(basis, energy, error));
+  SUPINE_TRY(describe(path, basis, energy, &described, error));
+  supine_options_print(json_incref(described), wanted->json);
+  return SUPINE_OK;
 }
 
 const supine_command supine_command_info = {

@@ -118,7 +118,6 @@ static supine_status mark_panel(studio *s, size_t i, supine_error *error) {
   if (s->inside == NULL) {
     return SUPINE_OK;
   }
-  supine_command_marks_free(marks);
   s->panel[i].marks = &marks->marks;
   return supine_command_marks_make(s->inside, &s->names, &s->shown[i].pose, &s->from.pose, marks,
                                    error);

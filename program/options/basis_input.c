@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "precompute/inside/shells.h"
 #include "program/options/basis_input.h"
 
@@ -30,8 +31,8 @@ supine_status supine_options_basis_open(const char *path, supine_storage storage
                                         supine_basis **basis, supine_error *error) {
   const supine_basis_options options = {sizeof options, .storage = storage,
                                         .without_normals = true};
-  const supine_status status = supine_basis_open_with(path, &options, basis, error);
-  return status == SUPINE_OK ? supine_options_basis_closed(*basis, path, error) : status;
+  SUPINE_TRY(supine_basis_open_with(path, &options, basis, error));
+  return supine_options_basis_closed(*basis, path, error);
 }
 
 supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,

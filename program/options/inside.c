@@ -4,16 +4,16 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "program/options/basis_input.h"
 #include "program/options/inside.h"
 
-/* Sort the vertices by structure, then in input order; return false if out of memory. */
-static bool sort_by_name(supine_command_names *names, size_t n) {
-  size_t *begin = calloc(names->count + 2, sizeof *begin);
-  names->begin = begin;
-  names->order = malloc(n * sizeof *names->order);
-  if (begin == NULL || names->order == NULL) {
-    return false;
+/* Sort the vertices by structure, then in input order. */
+static supine_status sort_by_name(supine_command_names *names, size_t n, supine_error *error) {
+  size_t *begin = names->begin = supine_arena_zeros(&names->arena, names->count + 2, sizeof *begin);
+  names->order = supine_arena_take(&names->arena, n, sizeof *names->order);
+  if (names->arena.failed) {
+    return supine_error_memory(error, "the names of %zu vertices", n);
   }
   for (size_t i = 0; i < n; ++i) {
     ++begin[names->part[i] + 2];
@@ -24,7 +24,7 @@ static bool sort_by_name(supine_command_names *names, size_t n) {
   for (size_t i = 0; i < n; ++i) {
     names->order[begin[names->part[i] + 1]++] = i;
   }
-  return true;
+  return SUPINE_OK;
 }
 
 supine_status supine_command_names_open(const supine_basis *basis, supine_command_names *names,
@@ -40,48 +40,33 @@ supine_status supine_command_names_open(const supine_basis *basis, supine_comman
         "the basis names no points: make one with 'supine embed BASIS POINTS.csv'");
   }
   const size_t length = text->shape[0];
+  char *space = supine_arena_zeros(&names->arena, length + 1, 1);
   names->part = part->data;
-  names->space = malloc(length + 1);
-  names->text = malloc((length + 1) * sizeof *names->text);
-  if (names->space == NULL || names->text == NULL) {
-    supine_command_names_close(names);
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the names of %zu vertices",
-                            n);
+  names->text = supine_arena_take(&names->arena, length + 1, sizeof *names->text);
+  if (names->arena.failed) {
+    return supine_error_memory(error, "the names of %zu vertices", n);
   }
-  memcpy(names->space, text->data, length);
-  names->space[length] = '\0';
-  names->text[names->count++] = names->space;
+  memcpy(space, text->data, length);
+  names->text[names->count++] = space;
   for (size_t i = 0; i < length; ++i) {
-    if (names->space[i] == '\n') {
-      names->space[i] = '\0';
-      names->text[names->count++] = names->space + i + 1;
+    if (space[i] == '\n') {
+      space[i] = '\0';
+      names->text[names->count++] = space + i + 1;
     }
   }
-  supine_status status = SUPINE_OK;
-  for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
+  for (size_t i = 0; i < n; ++i) {
     if (names->part[i] >= names->count) {
-      status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "point %zu of the basis has no name: make the file again with "
-                                "'supine embed BASIS POINTS.csv'",
-                                i);
+      return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "point %zu of the basis has no name: make the file again with "
+                              "'supine embed BASIS POINTS.csv'",
+                              i);
     }
   }
-  if (status == SUPINE_OK && !sort_by_name(names, n)) {
-    status =
-        supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the names of %zu vertices", n);
-  }
-  if (status != SUPINE_OK) {
-    supine_command_names_close(names);
-  }
-  return status;
+  return sort_by_name(names, n, error);
 }
 
 void supine_command_names_close(supine_command_names *names) {
-  free(names->space);
-  free(names->text);
-  free(names->order);
-  free(names->begin);
-  *names = (supine_command_names){0};
+  supine_arena_free(&names->arena);
 }
 
 size_t supine_command_lung_of(const supine_basis_info *info, size_t vertex) {
@@ -108,9 +93,9 @@ supine_status supine_command_inside_check(const supine_basis *lungs, const supin
 supine_status supine_command_inside_open(const supine_basis *lungs, const char *path,
                                          supine_basis **inside, supine_command_names *names,
                                          supine_error *error) {
-  supine_status status = supine_options_basis_open(path, SUPINE_STORAGE_AUTO, inside, error);
-  status = status == SUPINE_OK ? supine_command_names_open(*inside, names, error) : status;
-  return status == SUPINE_OK ? supine_command_inside_check(lungs, *inside, path, error) : status;
+  SUPINE_TRY(supine_options_basis_open(path, SUPINE_STORAGE_AUTO, inside, error));
+  SUPINE_TRY(supine_command_names_open(*inside, names, error));
+  return supine_command_inside_check(lungs, *inside, path, error);
 }
 
 /* Add the marks of one structure: its vertices, and its name at their mean position. */
@@ -144,31 +129,25 @@ supine_status supine_command_marks_make(const supine_basis *inside,
                                         supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(inside);
   const size_t n = info->vertex_count;
-  float *xyz = malloc(3 * n * sizeof *xyz);
-  float *before = malloc(3 * n * sizeof *before);
-  supine_command_marks made = {.mark = malloc((n + names->count) * sizeof(supine_mark)),
-                               .label = calloc(names->count, sizeof *made.label)};
-  supine_status status = SUPINE_ERROR_MEMORY;
-  if (xyz != NULL && before != NULL && made.mark != NULL && made.label != NULL) {
-    (void)supine_deform(inside, pose, xyz);
-    (void)supine_deform(inside, from, before);
-    for (size_t part = 0; part < names->count; ++part) {
-      add_part(names, part, xyz, before, &made);
-    }
-    made.marks.mark = made.mark;
-    *marks = made;
-    made = (supine_command_marks){.mark = NULL};
-    status = SUPINE_OK;
+  SUPINE_ARENA arena = {0};
+  float *xyz = supine_arena_take(&arena, 3 * n, sizeof *xyz);
+  float *before = supine_arena_take(&arena, 3 * n, sizeof *before);
+  supine_command_marks_free(marks);
+  marks->mark = supine_arena_take(&marks->arena, n + names->count, sizeof *marks->mark);
+  marks->label = supine_arena_take(&marks->arena, names->count, sizeof *marks->label);
+  if (arena.failed || marks->arena.failed) {
+    return supine_error_memory(error, "%zu points", n);
   }
-  free(xyz);
-  free(before);
-  supine_command_marks_free(&made);
-  return status == SUPINE_OK ? status
-                             : supine_error_set(error, status, "no memory for %zu points", n);
+  (void)supine_deform(inside, pose, xyz);
+  (void)supine_deform(inside, from, before);
+  for (size_t part = 0; part < names->count; ++part) {
+    add_part(names, part, xyz, before, marks);
+  }
+  marks->marks.mark = marks->mark;
+  return SUPINE_OK;
 }
 
 void supine_command_marks_free(supine_command_marks *marks) {
-  free(marks->mark);
-  free(marks->label);
+  supine_arena_free(&marks->arena);
   *marks = (supine_command_marks){.mark = NULL};
 }

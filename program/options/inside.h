@@ -3,6 +3,7 @@
 #ifndef SUPINE_COMMAND_INSIDE_H
 #define SUPINE_COMMAND_INSIDE_H
 
+#include "base/arena.h"
 #include "program/view/render/render.h"
 
 typedef struct supine_command_names {
@@ -11,10 +12,10 @@ typedef struct supine_command_names {
   const uint32_t *part; /* [N] index of each vertex's name in `text` */
   size_t *order;        /* [N] indices of the vertices, sorted by structure, then in input order */
   size_t *begin;        /* [count + 1] index of each structure's first vertex in `order` */
-  char *space;          /* memory that `text` points into */
+  supine_arena arena;
 } supine_command_names;
 
-/* Read the names of embedded structures.
+/* Read the names of embedded structures. Close `names` even after a failure.
  * @retval SUPINE_ERROR_FORMAT  the basis has no names, or malformed ones */
 supine_status supine_command_names_open(const supine_basis *basis, supine_command_names *names,
                                         supine_error *error);
@@ -39,6 +40,7 @@ typedef struct supine_command_marks {
   supine_marks marks;
   supine_mark *mark;
   char (*label)[48];
+  supine_arena arena;
 } supine_command_marks;
 
 /* Make the marks that show the structures in a pose.

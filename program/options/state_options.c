@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "program/options/basis_input.h"
 #include "program/options/state_options.h"
 
@@ -67,9 +68,8 @@ supine_status supine_options_state(const supine_orientation *orientation, supine
 
 supine_status supine_options_posture_list_parse(const char *text, const supine_state *standard,
                                                 supine_posture_list *list, supine_error *error) {
-  supine_status status = SUPINE_OK;
   list->count = 0;
-  for (const char *at = text; status == SUPINE_OK;) {
+  for (const char *at = text;;) {
     const size_t length = strcspn(at, ",");
     if (list->count == SUPINE_POSTURE_LIST_MAX) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "more than %d postures: name fewer",
@@ -86,13 +86,12 @@ supine_status supine_options_posture_list_parse(const char *text, const supine_s
     item->name[length] = '\0';
     item->state = *standard;
     item->state.gravity[1] = 1.0; /* supine, if the state names no posture */
-    status = supine_state_parse(item->name, &item->state, error);
+    SUPINE_TRY(supine_state_parse(item->name, &item->state, error));
     if (at[length] == '\0') {
-      break;
+      return SUPINE_OK;
     }
     at += length + 1;
   }
-  return status;
 }
 
 const char *supine_options_posture_label(const char *name) {
@@ -236,8 +235,6 @@ supine_status supine_options_pose_check(const supine_basis *basis, const char *c
 supine_status supine_options_pose(const supine_basis *basis, const char *command, bool allow_folds,
                                   const supine_state *state, supine_pose *pose,
                                   supine_error *error) {
-  const supine_status status = supine_basis_pose(basis, state, pose, error);
-  return status == SUPINE_OK
-             ? supine_options_pose_check(basis, command, allow_folds, state, pose, error)
-             : status;
+  SUPINE_TRY(supine_basis_pose(basis, state, pose, error));
+  return supine_options_pose_check(basis, command, allow_folds, state, pose, error);
 }
