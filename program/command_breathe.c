@@ -156,7 +156,8 @@ static supine_status begin_frames(playing *p, size_t count, bool series, supine_
   p->volumes = supine_arena_take(&p->arena, count, p->lung_count * sizeof *p->volumes);
   p->compute_time = supine_arena_take(&p->arena, count, sizeof *p->compute_time);
   p->normals = supine_arena_take(&p->arena, frame, sizeof *p->normals);
-  if (p->arena.failed || supine_options_basis_mesh(p->basis, &p->mesh) != SUPINE_OK) {
+  SUPINE_TRY(supine_options_basis_mesh(p->basis, NULL, &p->mesh, error));
+  if (p->arena.failed) {
     return supine_error_memory(error, "%zu vertices", frame / 3);
   }
   const size_t kept = series ? 1 : 1 + count;
@@ -330,7 +331,7 @@ static supine_status play(playing *p, size_t count, const char *made_by, supine_
   SUPINE_TRY(check_ends(p, error));
   p->origin = supine_options_basis_positions(p->basis, &from.pose);
   if (p->origin == NULL) {
-    return SUPINE_ERROR_MEMORY;
+    return supine_error_memory(error, "%zu vertices", p->mesh.vertex_count);
   }
   supine_options_signals_catch(true);
   (void)snprintf(p->vtp_comment, sizeof p->vtp_comment,

@@ -66,11 +66,7 @@ supine_status supine_command_subject_open(const char *path, supine_command_subje
   if (status == SUPINE_OK) {
     s->from_millilitres = supine_options_basis_volume(s->basis, &pose);
     s->from_scale = pose.gains[0][0];
-    status = supine_options_basis_mesh(s->basis, &s->start);
-  }
-  if (status == SUPINE_OK) {
-    free(s->start.vertices);
-    status = deform(s->basis, &pose, &s->start.vertices, error);
+    status = supine_options_basis_mesh(s->basis, &pose, &s->start, error);
   }
   return status;
 }

@@ -60,36 +60,32 @@ double supine_options_basis_volume(const supine_basis *basis, const supine_pose 
   return sum;
 }
 
-static double *to_doubles(const supine_basis *basis, const float *xyz) {
-  const size_t count = 3 * supine_basis_get_info(basis)->vertex_count;
-  double *converted = malloc(count * sizeof *converted);
-  for (size_t i = 0; converted != NULL && i < count; ++i) {
-    converted[i] = (double)xyz[i];
-  }
-  return converted;
-}
-
 double *supine_options_basis_positions(const supine_basis *basis, const supine_pose *pose) {
-  float *xyz = malloc(3 * supine_basis_get_info(basis)->vertex_count * sizeof *xyz);
-  double *positions = NULL;
-  if (xyz != NULL) {
+  const size_t count = 3 * supine_basis_get_info(basis)->vertex_count;
+  SUPINE_ARENA arena = {0};
+  float *xyz = supine_arena_take(&arena, count, sizeof *xyz);
+  double *positions = xyz == NULL ? NULL : malloc(count * sizeof *positions);
+  if (positions != NULL && pose != NULL) {
     (void)supine_deform(basis, pose, xyz);
-    positions = to_doubles(basis, xyz);
   }
-  free(xyz);
+  const float *from = pose != NULL ? xyz : supine_basis_vertices(basis);
+  for (size_t i = 0; positions != NULL && i < count; ++i) {
+    positions[i] = (double)from[i];
+  }
   return positions;
 }
 
-supine_status supine_options_basis_mesh(const supine_basis *basis, supine_mesh *mesh) {
+supine_status supine_options_basis_mesh(const supine_basis *basis, const supine_pose *pose,
+                                        supine_mesh *mesh, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const size_t bytes = 3 * info->triangle_count * sizeof *mesh->triangles;
   supine_mesh made = {.vertex_count = info->vertex_count,
-                      .vertices = to_doubles(basis, supine_basis_vertices(basis)),
+                      .vertices = supine_options_basis_positions(basis, pose),
                       .triangle_count = info->triangle_count,
                       .triangles = malloc(bytes)};
   if (made.vertices == NULL || made.triangles == NULL) {
     supine_mesh_free(&made);
-    return SUPINE_ERROR_MEMORY;
+    return supine_error_memory(error, "%zu vertices", info->vertex_count);
   }
   memcpy(made.triangles, supine_basis_triangles(basis), bytes);
   *mesh = made;

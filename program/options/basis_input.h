@@ -38,12 +38,14 @@ supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,
 /* Return the volume of all lungs together in a pose, mL. */
 double supine_options_basis_volume(const supine_basis *basis, const supine_pose *pose);
 
-/* Return all vertices [N, 3] in a pose, mm, or NULL if out of memory. The caller frees them. */
+/* Return all vertices [N, 3] in a pose (NULL: of the reference surface), mm, or NULL if out of
+ * memory. The caller frees them. */
 double *supine_options_basis_positions(const supine_basis *basis, const supine_pose *pose);
 
-/* Copy the reference surface into a mesh; release the mesh with supine_mesh_free.
- * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_options_basis_mesh(const supine_basis *basis, supine_mesh *mesh);
+/* Copy the surface in a pose or, if `pose` is NULL, the reference surface into a mesh; release the
+ * mesh with supine_mesh_free. */
+supine_status supine_options_basis_mesh(const supine_basis *basis, const supine_pose *pose,
+                                        supine_mesh *mesh, supine_error *error);
 
 /* Option table that holds only --frame, which sets an int: 1 to subtract the displacement of the
  * hilum, else 0. */

@@ -178,11 +178,11 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
 
 /* Return the fraction of the triangles that turn over in a pose, or -1 if out of memory. */
 static double turned_over(const supine_basis *basis, const supine_pose *pose) {
-  supine_mesh mesh = {0};
+  SUPINE_FREED_BY(supine_mesh_free) supine_mesh mesh = {0};
   double *moved = supine_options_basis_positions(basis, pose);
-  const bool made = moved != NULL && supine_options_basis_mesh(basis, &mesh) == SUPINE_OK;
+  const bool made =
+      moved != NULL && supine_options_basis_mesh(basis, NULL, &mesh, NULL) == SUPINE_OK;
   const double turned = made ? supine_mesh_turned_over(&mesh, moved) : -1.0;
-  supine_mesh_free(&mesh);
   free(moved);
   return turned;
 }
