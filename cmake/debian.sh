@@ -53,7 +53,7 @@ build | test | platforms)
   command -v chromium >/dev/null || tests="$tests chromium"
   # shellcheck disable=SC2086
   install_missing $build $tests
-  [ -d tests/export/node_modules/vtk.js ] ||
+  [ -d tests/export/node_modules/vtk.js ] && [ -d tests/export/node_modules/iwer ] ||
     npm install --prefix tests/export --no-package-lock --no-audit --no-fund --silent ||
     echo "npm could not install vtk.js and other packages: tests that need them are skipped" >&2
   cmake --preset release -DBUILD_TESTING=ON

@@ -142,6 +142,16 @@ static supine_status set_shares(const supine_lungs *lungs, const supine_model_ch
   return status;
 }
 
+/* Whether the expandability differs between vertices. */
+static bool varies(const supine_prepared *p, size_t count) {
+  bool same = true;
+  for (size_t i = 0; i < count && same; ++i) {
+    same = (p->stiffness == NULL || p->stiffness[i] == p->stiffness[0]) &&
+           (p->lesions == NULL || p->lesions[i] == 1.0);
+  }
+  return !same;
+}
+
 static void summarize(const supine_model_choice *choice, bool predicted, supine_prepared *p) {
   static const double supine[3] = {0.0, 1.0, 0.0};
   const supine_reference *reference = &p->reference;
@@ -230,7 +240,7 @@ supine_status supine_precompute_prepare(supine_lungs *lungs, const supine_model_
       .scan = scan, .lung_count = lungs->lung_count, .side = {lungs->side[0], lungs->side[1]}};
   supine_resting resting = choice->resting;
   supine_reference_predict_rest(&scanned, &choice->person, &resting);
-  if (status == SUPINE_OK && p->model.reach > 0.0 && (p->stiffness != NULL || p->lesions != NULL)) {
+  if (status == SUPINE_OK && p->model.reach > 0.0 && varies(p, lungs->mesh.vertex_count)) {
     status = supine_physics_strain_create(lungs, p->stiffness, p->lesions, &p->strain, error);
     p->model.strain = p->strain;
   }

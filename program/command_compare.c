@@ -31,6 +31,7 @@ static supine_status write_html(const char *path, const supine_comparison *compa
 typedef struct request {
   const char *postures;
   const char *html;
+  const char *inside;
   bool json;
   supine_volume_options volume;
   supine_from from;
@@ -49,188 +50,80 @@ static const supine_option table[] = {
     {"breath", 0, "ML", "tidal volume of the breath whose ventilation by height is computed",
      SUPINE_FILLS(request, breath), SUPINE_SAYS_GIVEN(request, has_breath), .standard = "500",
      SUPINE_ABOVE_ZERO},
+    {"inside", 0, "FILE",
+     "structures made by 'supine embed' from the same basis: the report has the displacement of "
+     "each, with its expected error",
+     SUPINE_FILLS(request, inside), .file = SUPINE_FILE_IN},
     {"json", 0, NULL, "print JSON to standard output instead of text", SUPINE_FILLS(request, json)},
     {"output", 'o', "FILE", ".html file to write: a report with charts and pictures",
      SUPINE_FILLS(request, html), .file = SUPINE_FILE_OUT, .endings = ".html"},
     {.name = NULL}};
 
-typedef struct structures {
-  const supine_basis *basis;
-  const supine_posture_list *postures;
-  supine_command_names names;
-  float *xyz;            /* [N, 3] position of each vertex in one posture, mm */
-  double *mean;          /* [postures, structures, 3] mean position, mm */
-  double *volumes;       /* [postures, structures] mL; NAN if not closed; follows `mean` */
-  double *square_errors; /* [structures] mean squared expected error, mm^2; NAN if unknown */
-  bool in_hilum;         /* whether to subtract the displacement of the hilum */
-  double hilum[3];       /* displacement of the hilum between two postures, mm */
-} structures;
-
-/* Average values [N, width] over each structure's vertices; the mean over no vertices is 0. */
-static void average(const structures *c, size_t width, const float *values, double *mean) {
-  const supine_command_names *names = &c->names;
-  for (size_t part = 0; part < names->count; ++part) {
-    const size_t begin = names->begin[part];
-    const size_t end = names->begin[part + 1];
-    for (size_t k = 0; k < width; ++k) {
-      double sum = 0.0;
-      for (size_t i = begin; i < end; ++i) {
-        sum += (double)values[width * names->order[i] + k];
-      }
-      mean[width * part + k] = end > begin ? sum / (double)(end - begin) : 0.0;
-    }
-  }
+static void add_target(const supine_posture_item *const item[2], const supine_target *target,
+                       json_t *list) {
+  json_t *entry = json_pack("{s:s, s:s}", "from", item[0]->name, "to", item[1]->name);
+  (void)json_object_update_new(entry, supine_command_target_json(target));
+  (void)json_array_append_new(list, entry);
 }
 
-/* Compute the volume of each named structure. The normals of a closed surface sum to 0, and its
- * volume is a sixth of the sum of (corner) . (normal) over its triangles. */
-static void find_volumes(const structures *c, double *volumes) {
-  const supine_basis_info *info = supine_basis_get_info(c->basis);
-  for (size_t part = 0; part < c->names.count; ++part) {
-    double sum[5] = {0.0}; /* of the normals x, y, z, of their lengths, and of corner . normal */
-    for (size_t t = 0; t < 3 * info->triangle_count; t += 3) {
-      const uint32_t *corner = info->triangles + t;
-      const bool own = c->names.part[corner[0]] == part;
-      double x[3][3];
-      double normal[3];
-      for (size_t k = 0; k < 9 && own; ++k) {
-        x[k / 3][k % 3] = (double)c->xyz[3 * corner[k / 3] + k % 3];
-      }
-      if (own) {
-        supine_normal(x[0], x[1], x[2], normal);
-        for (size_t k = 0; k < 3; ++k) {
-          sum[k] += normal[k];
-        }
-        sum[3] += supine_length(normal);
-        sum[4] += supine_dot(x[0], normal);
-      }
-    }
-    volumes[part] = supine_length(sum) < 1e-3 * sum[3] ? sum[4] / 6000.0 : (double)NAN;
-  }
-}
-
-/* Compute the mean position and the volume of each named structure in posture i. */
-static supine_status find_means(const structures *c, const supine_state *state, size_t i,
-                                supine_error *error) {
-  supine_pose pose;
-  const supine_status status = supine_basis_pose(c->basis, state, &pose, error);
-  if (status == SUPINE_OK) {
-    (void)supine_deform(c->basis, &pose, c->xyz);
-    average(c, 3, c->xyz, c->mean + 3 * i * c->names.count);
-    find_volumes(c, c->volumes + i * c->names.count);
-  }
-  return status;
-}
-
-/* For each structure, average the squared expected error of the displacement between two states
- * over the vertices, mm^2. */
-static supine_status find_square_errors(const structures *c, const supine_state *to,
-                                        const supine_state *from, supine_error *error) {
-  const size_t n = supine_basis_get_info(c->basis)->vertex_count;
+/* Append to a list the displacements of the hilum and of each named structure between two postures.
+ * If `in_hilum`, subtract the hilum's from the others. */
+static supine_status add_pair(const supine_basis *basis, const supine_command_names *names,
+                              const supine_posture_item *const item[2], bool in_hilum, json_t *list,
+                              supine_error *error) {
+  supine_target hilum = {.name = in_hilum ? "hilum, subtracted" : "hilum", .expected = (double)NAN};
+  supine_pose pose[2];
   supine_expected expected = {0};
-  const supine_status status = supine_options_expected_find(c->basis, to, from, &expected, error);
-  for (size_t i = 0; i < n && expected.sigma != NULL; ++i) {
-    expected.sigma[i] *= expected.sigma[i];
+  supine_target *targets = NULL;
+  supine_status status = SUPINE_OK;
+  for (size_t i = 0; i < 2 && status == SUPINE_OK; ++i) {
+    status = supine_basis_pose(basis, &item[i]->state, &pose[i], error);
   }
-  for (size_t part = 0; part < c->names.count; ++part) {
-    c->square_errors[part] = (double)NAN;
+  if (status == SUPINE_OK) {
+    status =
+        supine_options_expected_find(basis, &item[1]->state, &item[0]->state, &expected, error);
   }
-  if (expected.sigma != NULL) {
-    average(c, 1, expected.sigma, c->square_errors);
+  if (status == SUPINE_OK) {
+    status =
+        supine_command_targets_find(basis, names, (const supine_pose *const[2]){&pose[0], &pose[1]},
+                                    expected.sigma, false, &targets, error);
   }
+  if (status == SUPINE_OK) {
+    status = supine_options_hilum(basis, &pose[1], &pose[0], in_hilum, hilum.move, error);
+  }
+  if (status == SUPINE_OK && supine_length(hilum.move) > 0.0) {
+    hilum.moved = supine_length(hilum.move);
+    hilum.volume[0] = hilum.volume[1] = targets[0].volume[0] != 0.0 ? (double)NAN : 0.0;
+    add_target(item, &hilum, list);
+  }
+  for (size_t i = 0; status == SUPINE_OK && i < names->count; ++i) {
+    if (in_hilum) {
+      supine_command_target_shift(&targets[i], hilum.move);
+    }
+    add_target(item, &targets[i], list);
+  }
+  free(targets);
   supine_options_expected_free(&expected);
   return status;
 }
 
-/* Append to a list the displacement of the hilum from one posture to another. Keep it as
- * c->hilum. */
-static supine_status add_hilum(structures *c, size_t from, size_t to, json_t *list,
-                               supine_error *error) {
-  const supine_posture_item *item = c->postures->item;
-  const double *h = c->hilum;
-  supine_pose pose[2];
-  (void)supine_basis_pose(c->basis, &item[from].state, &pose[0], NULL); /* find_means found both */
-  (void)supine_basis_pose(c->basis, &item[to].state, &pose[1], NULL);
-  const supine_status status =
-      supine_options_hilum(c->basis, &pose[1], &pose[0], c->in_hilum, c->hilum, error);
-  if (status == SUPINE_OK && supine_length(h) > 0.0) {
-    (void)json_array_append_new(
-        list, json_pack("{s:s, s:s, s:s, s:[f,f,f], s:f, s:n}", "from", item[from].name, "to",
-                        item[to].name, "name", c->in_hilum ? "hilum, subtracted" : "hilum", "move",
-                        h[0], h[1], h[2], "mm", supine_length(h), "expected_error_mm"));
-  }
-  return status;
-}
-
-/* Append to a list the displacement and volumes of each structure from one posture to another. */
-static void add_pair(const structures *c, size_t from, size_t to, json_t *list) {
-  for (size_t part = 0; part < c->names.count; ++part) {
-    const char *const text[] = {c->postures->item[from].name, c->postures->item[to].name,
-                                c->names.text[part]};
-    const double *before = c->mean + 3 * (from * c->names.count + part);
-    const double *after = c->mean + 3 * (to * c->names.count + part);
-    const double kept = c->in_hilum ? 1.0 : 0.0;
-    const double move[3] = {after[0] - before[0] - kept * c->hilum[0],
-                            after[1] - before[1] - kept * c->hilum[1],
-                            after[2] - before[2] - kept * c->hilum[2]};
-    const double length = supine_length(move);
-    const double sigma = sqrt(c->square_errors[part]);
-    const double ml[2] = {c->volumes[from * c->names.count + part],
-                          c->volumes[to * c->names.count + part]};
-    json_t *row = json_pack("{s:s, s:s, s:s, s:[f,f,f], s:f, s:o}", "from", text[0], "to", text[1],
-                            "name", text[2], "move", move[0], move[1], move[2], "mm", length,
-                            "expected_error_mm", isnan(sigma) ? json_null() : json_real(sigma));
-    if (supine_basis_get_info(c->basis)->triangle_count > 0) {
-      (void)json_object_set_new(row, "volumes_ml", supine_options_json_numbers(2, ml));
-    }
-    (void)json_array_append_new(list, row);
-  }
-}
-
-/* Append to a list the displacement of each named structure between every two postures. */
-static supine_status find_pairs(structures *c, json_t *list, supine_error *error) {
-  supine_status status = SUPINE_OK;
-  for (size_t i = 0; i < c->postures->count && status == SUPINE_OK; ++i) {
-    status = find_means(c, &c->postures->item[i].state, i, error);
-  }
-  for (size_t i = 0; i < c->postures->count; ++i) {
-    for (size_t j = i + 1; j < c->postures->count && status == SUPINE_OK; ++j) {
-      status =
-          find_square_errors(c, &c->postures->item[j].state, &c->postures->item[i].state, error);
-      status = status == SUPINE_OK ? add_hilum(c, i, j, list, error) : status;
-      add_pair(c, i, j, list);
-    }
-  }
-  return status;
-}
-
-/* Print the mean displacement of each named structure between every two postures. */
+/* Print the displacement of each named structure between every two postures. */
 static supine_status compare_content(const supine_basis *basis, const supine_posture_list *postures,
                                      const request *wanted, supine_error *error) {
-  const size_t n = supine_basis_get_info(basis)->vertex_count;
-  structures c = {.basis = basis, .postures = postures, .in_hilum = wanted->frame == 1};
+  supine_command_names names;
   json_t *list = json_array();
-  supine_status status = supine_command_names_open(basis, &c.names, error);
-  if (status == SUPINE_OK) {
-    c.xyz = malloc(3 * n * sizeof *c.xyz);
-    c.mean = calloc(4 * postures->count * c.names.count, sizeof *c.mean);
-    c.volumes = c.mean + 3 * postures->count * c.names.count;
-    c.square_errors = calloc(c.names.count, sizeof *c.square_errors);
-    if (c.xyz == NULL || c.mean == NULL || c.square_errors == NULL) {
-      status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  supine_status status = supine_command_names_open(basis, &names, error);
+  for (size_t i = 0; i < postures->count; ++i) {
+    for (size_t j = i + 1; j < postures->count && status == SUPINE_OK; ++j) {
+      const supine_posture_item *const item[2] = {&postures->item[i], &postures->item[j]};
+      status = add_pair(basis, &names, item, wanted->frame == 1, list, error);
     }
-  }
-  if (status == SUPINE_OK) {
-    status = find_pairs(&c, list, error);
   }
   if (status == SUPINE_OK) {
     supine_options_print(json_incref(list), wanted->json);
   }
   json_decref(list);
-  free(c.xyz);
-  free(c.mean);
-  free(c.square_errors);
-  supine_command_names_close(&c.names);
+  supine_command_names_close(&names);
   return status;
 }
 
@@ -256,29 +149,31 @@ static supine_status compare(const char *path, const char *made_by, const supine
   if (status != SUPINE_OK) {
     return status;
   }
-  const bool content = supine_basis_metadata(basis, "content") != NULL;
-  if (content && wanted->from.given) {
-    return supine_error_set(
-        error, SUPINE_ERROR_ARGUMENT,
-        "%s holds structures inside the lungs, which are compared between every "
-        "two postures: leave --from out, or use 'supine deform --from'",
-        path);
+  const bool content = supine_basis_metadata(basis, "content") != NULL; /* by 'supine embed' */
+  const char *refused =
+      content && wanted->from.given
+          ? "%s holds structures inside the lungs, which are compared between every two postures: "
+            "leave --from out, or use 'supine deform --from'"
+      : content && wanted->html != NULL
+          ? "%s holds structures inside the lungs, but -o needs the lungs: give the basis of the "
+            "lungs, and the structures by --inside"
+      : !content && wanted->frame == 1 ? "%s holds no structures inside the lungs, which --frame "
+                                         "hilum is for: give a basis made "
+                                         "by 'supine embed', or use 'supine deform --frame hilum'"
+                                       : NULL;
+  if (refused != NULL) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, refused, path);
   }
-  if (content) { /* only 'supine embed' writes this key */
-    return wanted->html != NULL
-               ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                  "%s holds structures inside the lungs, but -o needs the lungs: "
-                                  "give the basis of the lungs, or leave -o out",
-                                  path)
-               : compare_content(basis, &comparison.postures, wanted, error);
+  if (content) {
+    return compare_content(basis, &comparison.postures, wanted, error);
   }
-  if (wanted->frame == 1) {
-    return supine_error_set(
-        error, SUPINE_ERROR_ARGUMENT,
-        "--frame hilum is for structures inside the lungs: give a basis made by "
-        "'supine embed', or use 'supine deform --frame hilum'");
+  if (wanted->inside != NULL) {
+    status = supine_command_inside_open(basis, wanted->inside, &comparison.inside,
+                                        &comparison.names, error);
   }
-  status = supine_report_find(&comparison, error);
+  if (status == SUPINE_OK) {
+    status = supine_report_find(&comparison, error);
+  }
   if (status == SUPINE_OK) {
     supine_report_print(&comparison, wanted->json);
   }
@@ -286,6 +181,8 @@ static supine_status compare(const char *path, const char *made_by, const supine
     status = write_html(wanted->html, &comparison, error);
   }
   supine_report_free(&comparison);
+  supine_command_names_close(&comparison.names);
+  supine_basis_close(comparison.inside);
   return status;
 }
 
@@ -305,8 +202,7 @@ const supine_command supine_command_compare = {
     "compare postures: displacement, and ventilation by height",
     .usage = "BASIS [--postures LIST] [--volume VOLUME] [-o report.html] [OPTIONS]",
     .about = "For each posture, reports the displacement from supine at rest or from the state of "
-             "--from, the volume of each lung, and the ventilation by height in a breath. Then "
-             "finds the direction of gravity with the largest displacement from supine. If BASIS "
+             "--from, the volume of each lung, and the ventilation by height in a breath. If BASIS "
              "was made by 'supine embed', reports only the displacement of each named part between "
              "every two postures, and the volumes of closed parts in both.",
     .options = table,
@@ -321,7 +217,7 @@ const supine_command supine_command_compare = {
     "\n"
     "Examples:\n"
     "  supine compare lungs.safetensors --postures supine,prone:rest+500,supine+15,0.6:0:-0.8\n"
-    "  supine compare lungs.safetensors --volume rest --breath 800 -o report.html",
+    "  supine compare lungs.safetensors --inside nodules.safetensors -o report.html",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),
     .run = run};

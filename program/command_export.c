@@ -67,12 +67,43 @@ static supine_status write_glb(const export_source *source, const request *wante
   return SUPINE_OK;
 }
 
+enum { REFERENCES = 3 };
+
+/* Find the states from which the page measures displacements: that of --from or its default, the
+ * scan, and supine at rest, each once. */
+static supine_status find_references(const supine_basis *basis, const supine_from *from,
+                                     supine_reference_pose found[REFERENCES],
+                                     export_reference list[REFERENCES], size_t *count,
+                                     supine_error *error) {
+  const supine_from none = {.given = false};
+  for (size_t i = 0; i < REFERENCES; ++i) {
+    const supine_status status =
+        supine_options_reference(basis, i == 0 ? from : &none, i != 1, &found[i], error);
+    if (status != SUPINE_OK) {
+      return status;
+    }
+    bool again = false;
+    for (size_t j = 0; j < *count; ++j) {
+      again = again || strcmp(list[j].name, found[i].name) == 0;
+    }
+    if (!again) {
+      list[(*count)++] = (export_reference){&found[i].pose, found[i].name, found[i].state.gravity,
+                                            supine_options_above_rest(&found[i].state)};
+    }
+  }
+  return SUPINE_OK;
+}
+
 static supine_status write_page(const export_source *source, const request *wanted,
                                 const char *basis_path, supine_error *error) {
-  supine_reference_pose from;
+  supine_reference_pose found[REFERENCES];
+  export_reference from[REFERENCES];
+  size_t from_count = 0;
+  char title[256];
   export_source inside = {0};
   supine_command_names names = {0};
-  supine_status status = supine_options_reference(source->basis, &wanted->from, true, &from, error);
+  supine_status status =
+      find_references(source->basis, &wanted->from, found, from, &from_count, error);
   if (status == SUPINE_OK && wanted->inside != NULL) {
     status = supine_export_source_open(wanted->inside, &inside, error);
     if (status == SUPINE_OK) {
@@ -82,11 +113,12 @@ static supine_status write_page(const export_source *source, const request *want
       status = supine_command_inside_check(source->basis, inside.basis, wanted->inside, error);
     }
   }
+  supine_options_basis_title(basis_path, title, sizeof title);
   const export_parts parts = {names.count, names.text, names.part};
   const export_page page = {.breath = wanted->glb.breath,
-                            .from = &from.pose,
-                            .from_name = from.name,
-                            .title = wanted->title != NULL ? wanted->title : basename(basis_path),
+                            .from = from,
+                            .from_count = from_count,
+                            .title = wanted->title != NULL ? wanted->title : title,
                             .inside = wanted->inside != NULL ? &inside : NULL,
                             .parts = &parts};
   if (status == SUPINE_OK) {

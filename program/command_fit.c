@@ -6,9 +6,11 @@
 
 #include <jansson.h>
 
+#include "base/output.h"
 #include "base/text.h"
 
 #include "precompute/lungs/surface.h"
+#include "precompute/patient/matching.h"
 #include "precompute/patient/patient_file.h"
 #include "program/options/model_options.h"
 #include "program/options/surface_options.h"
@@ -16,7 +18,7 @@
 static const char name[] = "fit";
 
 typedef struct request {
-  const char *path, *name;
+  const char *path, *name, *map;
   supine_landmark_options landmarks;
   bool has_law, expandability, json;
   int law;
@@ -108,10 +110,14 @@ static const supine_option table[] = {
     {.table = supine_options_surface_frame, FILLS(source.load)},
     {"expandability", 0, NULL,
      "for surfaces: instead of kriging, fit the expandability (the inverse of the stiffness) of "
-     "regions about 45 mm wide. The constants of (15)-(17) of Santhanam 2008 are fitted as with "
-     "--law paper, and those of (18), the force, stay those of the deep law. The result is used "
-     "only if it lowers the held-out residual by 5 % or more",
+     "regions about 45 mm wide, relative to the deep law with one factor for each axis. The result "
+     "is used only if it lowers the held-out residual by 5 % or more",
      FILLS(expandability), .more = true},
+    {"map", 0, "FILE.csv",
+     "with --expandability: write the expandability of every vertex of the fuller scan, and how "
+     "far "
+     "the surfaces determine it, 0 to 1. 'supine precompute --expandability' reads this file",
+     FILLS(map), .file = SUPINE_FILE_OUT, .more = true},
     {"json", 0, NULL, "print JSON instead of text", FILLS(json)},
     {.name = NULL}};
 
@@ -377,6 +383,31 @@ static void set_name_and_force(const request *wanted, supine_patient_record *rec
       supine_patient_force(&record->patient.power, deep.force.gain, record->state[1].gravity);
 }
 
+/* Write the expandability of every vertex to a CSV file. */
+static supine_status write_map(const char *path, const supine_lungs *lungs,
+                               const supine_patient_stiffness *stiffness, supine_error *error) {
+  supine_output output = {0};
+  const supine_status status = supine_output_open(path, &output, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  (void)fputs("vertex,x_mm,y_mm,z_mm,expandability,determined\n", output.file);
+  for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
+    const double *p = lungs->mesh.vertices + 3 * i;
+    double shares[SUPINE_PATIENT_REGIONS_MAX];
+    double a = stiffness->count == 0 ? 1.0 : 0.0;
+    double determined = 0.0;
+    supine_patient_stiffness_shares(stiffness, lungs, i, shares);
+    for (size_t k = 0; k < stiffness->count; ++k) {
+      a += shares[k] * stiffness->region[k].expandability;
+      determined += shares[k] * stiffness->region[k].determined;
+    }
+    (void)fprintf(output.file, "%zu,%.6g,%.6g,%.6g,%.5g,%.3g\n", i, p[0], p[1], p[2], a,
+                  determined);
+  }
+  return supine_output_commit(&output, error);
+}
+
 static supine_status fit(const request *wanted, supine_patient_record *record,
                          supine_error *error) {
   supine_patient_fit_options options = {
@@ -415,6 +446,9 @@ static supine_status fit(const request *wanted, supine_patient_record *record,
     set_name_and_force(wanted, record);
     status = fit_gravity_factor(wanted, &data, record, error);
   }
+  if (status == SUPINE_OK && wanted->map != NULL) {
+    status = write_map(wanted->map, &data.lungs[0], &record->stiffness, error);
+  }
   supine_lungs_free(&data.lungs[0]);
   supine_lungs_free(&data.lungs[1]);
   supine_patient_pairs_free(&data.pairs);
@@ -436,8 +470,10 @@ static supine_status check(request *wanted, const supine_arguments *given, supin
           ? "--state with a surface needs a first scan: name the surface of the first scan too"
       : wanted->expandability && wanted->second_path == NULL
           ? "--expandability needs surfaces: give those of both scans"
-      : wanted->expandability && wanted->has_law && wanted->law == SUPINE_PATIENT_DEEP
-          ? "--expandability uses the paper law: leave --law out"
+      : wanted->map != NULL && !wanted->expandability
+          ? "--map writes what --expandability finds: give both"
+      : wanted->expandability && wanted->has_law && wanted->law == SUPINE_PATIENT_PAPER
+          ? "--expandability uses the deep law: leave --law out"
           : NULL;
   return wrong != NULL ? supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%s", wrong) : SUPINE_OK;
 }

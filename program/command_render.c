@@ -40,7 +40,8 @@ typedef struct request {
 typedef struct drawn {
   supine_pose pose;
   float *value; /* [N] length of the displacement, mm */
-  char subtitle[96];
+  char subtitle[160];
+  char note[48];
   supine_command_marks marks;
 } drawn;
 
@@ -56,8 +57,7 @@ typedef struct studio {
   supine_posture_list postures; /* posture of each panel */
   drawn shown[SUPINE_PANELS_MAX];
   supine_panel panel[SUPINE_PANELS_MAX];
-  double p95,
-      max; /* 95th percentile and maximum of displacement, mm; largest of all panels so far */
+  double max; /* largest displacement of all panels so far, mm */
   char label[128];
   supine_arena arena;
 } studio;
@@ -99,13 +99,13 @@ static supine_status fill_panel(studio *s, size_t i, supine_error *error) {
   supine_distance_statistics statistics;
   (void)supine_compare_distances(s->compare, &shown->pose, &s->from.pose, shown->value);
   supine_compare_statistics(s->compare, shown->value, &statistics);
-  s->p95 = fmax(s->p95, statistics.p95);
   s->max = fmax(s->max, statistics.max);
   (void)snprintf(shown->subtitle, sizeof shown->subtitle, "%.0f mL, mean %.1f, max %.1f mm",
                  supine_options_basis_volume(s->basis, &shown->pose), statistics.mean,
                  statistics.max);
   s->panel[i] = (supine_panel){.title = supine_options_posture_label(item->name),
                                .subtitle = shown->subtitle,
+                               .note = shown->note,
                                .pose = &shown->pose,
                                .value = shown->value};
   memcpy(s->panel[i].gravity, item->state.gravity, sizeof s->panel[i].gravity);
@@ -119,8 +119,21 @@ static supine_status mark_panel(studio *s, size_t i, supine_error *error) {
     return SUPINE_OK;
   }
   s->panel[i].marks = &marks->marks;
-  return supine_command_marks_make(s->inside, &s->names, &s->shown[i].pose, &s->from.pose, marks,
-                                   error);
+  const supine_pose *const pose[2] = {&s->from.pose, &s->shown[i].pose};
+  SUPINE_FREED_BY(supine_options_expected_free) supine_expected expected = {0};
+  SUPINE_TRY(supine_options_expected_find(s->inside, &s->postures.item[i].state, &s->from.state,
+                                          &expected, error));
+  SUPINE_TRY(supine_command_marks_make(s->inside, &s->names, pose, expected.sigma, marks, error));
+  const supine_target *t = &marks->first;
+  char way[96];
+  const bool still = t->moved < 0.05;
+  (void)snprintf(s->shown[i].subtitle, sizeof s->shown[i].subtitle, "%s: %s", t->name,
+                 still ? "where arrows begin" : supine_command_target_way(t, 2, way));
+  if (!still && !isnan(t->expected)) {
+    (void)snprintf(s->shown[i].note, sizeof s->shown[i].note, "expected error %.1f mm",
+                   t->expected);
+  }
+  return SUPINE_OK;
 }
 
 static supine_picture make_picture(studio *s) {
@@ -129,7 +142,7 @@ static supine_picture make_picture(studio *s) {
   const double opacity = wanted->opacity > 0.0    ? wanted->opacity
                          : wanted->inside != NULL ? inside_opacity
                                                   : 1.0;
-  const double largest = wanted->largest > 0.0 ? wanted->largest : supine_render_bar_end(s->p95);
+  const double largest = wanted->largest > 0.0 ? wanted->largest : supine_render_bar_end(s->max);
   (void)snprintf(s->label, sizeof s->label, "displacement from %s, mm", s->from.name);
   return (supine_picture){.panel = s->panel,
                           .panel_count = count,
@@ -298,12 +311,13 @@ static const supine_option table[] = {
      .read = read_size, .wants = "WIDTHxHEIGHT, up to 16384 each"},
     {"view", 0, "LIST",
      "views to draw, one below another, separated by commas: anterior, posterior, left (or "
-     "lateral), right, head, feet, oblique (from the front, left and above); default anterior",
+     "lateral), right, head, feet, oblique (from the front, left and above), lying (gravity down, "
+     "head left); default lying, or anterior with --turn",
      .read = read_views},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {"largest", 0, "MM",
-     "end of the colour bar. If values exceed it, the bar has a pointed end. Default the 95th "
-     "percentile over the surface, rounded up",
+     "end of the colour bar. If values exceed it, the bar has a pointed end. Default the "
+     "largest displacement, rounded up",
      SUPINE_FILLS(request, largest), SUPINE_ABOVE_ZERO, .wants = "millimetres above 0",
      .more = true},
     {"inside", 0, "FILE",
@@ -343,12 +357,15 @@ static supine_status check(const request *wanted, supine_posture_list *postures,
 
 static void begin(void *chosen) {
   request *wanted = chosen;
-  wanted->view[0] = SUPINE_VIEW_ANTERIOR;
+  wanted->view[0] = SUPINE_VIEW_LYING;
   wanted->view_count = 1;
 }
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
-  const request *wanted = chosen;
+  request *wanted = chosen;
+  if (wanted->turns && wanted->view[0] == SUPINE_VIEW_LYING) {
+    wanted->view[0] = SUPINE_VIEW_ANTERIOR; /* the camera of a film stays where it is */
+  }
   SUPINE_FREED_BY(close_studio) studio s = {.wanted = wanted, .postures = {.count = 1}};
   SUPINE_TRY(check(wanted, &s.postures, error));
   SUPINE_TRY(open_studio(&s, given->operand[0], error));

@@ -224,9 +224,11 @@ static supine_status open_page(const request *wanted, const supine_basis *basis,
   }
   SUPINE_TRY(supine_stream_address_read(wanted->web, true, &address, error));
   SUPINE_TRY(supine_options_reference(basis, &wanted->from, true, &from, error));
+  const export_reference reference = {&from.pose, from.name, from.state.gravity,
+                                      supine_options_above_rest(&from.state)};
   const export_page shown = {.breath = wanted->breath.tidal,
-                             .from = &from.pose,
-                             .from_name = from.name,
+                             .from = &reference,
+                             .from_count = 1,
                              .title = "Lungs, live",
                              .live = true};
   SUPINE_TRY(make_page(path, &shown, page, &site.page_size, error));

@@ -5,7 +5,6 @@
 
 #include "base/output.h"
 #include "base/text.h"
-#include "base/vec3.h"
 
 #include "mesh/mesh.h"
 #include "precompute/warp/field.h"
@@ -17,8 +16,11 @@
 static const double fade = 60.0;
 
 const supine_option supine_command_deform_content_options[] = {
-    {.help = "For structures made by 'supine embed', -o FILE.csv writes the moved points by name. "
-             "For an embedded grid:"},
+    {.help = "For structures made by 'supine embed', -o FILE.csv writes a row for each named "
+             "structure: the mean position of its vertices, its displacement and expected error:"},
+    {"vertices", 0, NULL, "write a row for each vertex instead",
+     SUPINE_FILLS(supine_deform_content, vertices)},
+    {.help = "For an embedded grid:"},
     {"field-out", 0, "FILE",
      "displacement field to write (.nrrd, .nii, .nii.gz or .mha): the displacement of the tissue "
      "that is at each node in the scan, or in the state of --from. It is in mm and LPS, also in "
@@ -106,71 +108,64 @@ static void in_frame(supine_axes axes, double unit, const double lps[3], double 
   }
 }
 
-/* Write the name, lung, position, displacement and expected error of each point as CSV. The
- * function has more than 60 lines, as each of the ten columns needs some. */
-static supine_status write_points(const char *path, const supine_basis *basis,
-                                  const supine_deformation *moved, supine_error *error) {
+/* Print the rows of a CSV file: name, lung, position, displacement and expected error. */
+static void print_rows(const supine_deformation *moved, const supine_basis_info *info,
+                       const supine_target *rows, size_t count, FILE *file) {
   const supine_mesh_save_options *frame = &moved->save;
-  const float *sigma = moved->expected.sigma;
   const double unit = frame->millimetres_per_unit > 0.0 ? frame->millimetres_per_unit : 1.0;
+  const bool known = moved->expected.sigma != NULL;
   char axes[4];
   char unit_name[24];
+  supine_mesh_unit_name(unit, unit_name);
+  supine_mesh_axes_letters(frame->axes, axes);
+  (void)fprintf(file,
+                "# x,y,z,dx,dy,dz: position and displacement from %s, %s, %s; moved_mm: length of "
+                "the displacement%s\nname,lung,x,y,z,dx,dy,dz,moved_mm%s\n",
+                moved->from.name, axes, unit_name,
+                known ? "; expected_error_mm: " SUPINE_EXPECTED_MEANING : "",
+                known ? ",expected_error_mm" : "");
+  for (const supine_target *row = rows; row < rows + count; ++row) {
+    double at[3];
+    double move[3];
+    in_frame(frame->axes, unit, row->at, at);
+    in_frame(frame->axes, unit, row->move, move);
+    (void)fprintf(file, "%s,%s,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f", row->name,
+                  info->lung_names[row->lung], at[0], at[1], at[2], move[0], move[1], move[2],
+                  row->moved);
+    (void)fprintf(file, known ? ",%.3f\n" : "\n", row->expected);
+  }
+}
+
+/* Write a CSV file with a row for each structure, or for each vertex if `each` is true. */
+static supine_status write_points(const char *path, const supine_basis *basis,
+                                  const supine_deformation *moved, bool each, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
-  const size_t n = info->vertex_count;
+  const supine_pose *const pose[2] = {&moved->from.pose, &moved->pose};
   supine_command_names names;
+  supine_target *rows = NULL;
   supine_output output = {0};
   supine_status status = supine_command_names_open(basis, &names, error);
   if (status != SUPINE_OK) {
     return status;
   }
-  float *xyz = malloc(3 * n * sizeof *xyz);
-  float *before = malloc(3 * n * sizeof *before);
-  if (xyz == NULL || before == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu points", n);
-  } else {
+  const size_t count = each ? info->vertex_count : names.count;
+  status =
+      supine_command_targets_find(basis, &names, pose, moved->expected.sigma, each, &rows, error);
+  if (status == SUPINE_OK) {
     status = supine_output_open(path, &output, error);
   }
   if (status == SUPINE_OK) {
-    (void)supine_deform(basis, &moved->pose, xyz);
-    (void)supine_deform(basis, &moved->from.pose, before);
-    supine_mesh_unit_name(unit, unit_name);
-    supine_mesh_axes_letters(frame->axes, axes);
-    (void)fprintf(
-        output.file,
-        "# x,y,z,dx,dy,dz: position and displacement from %s, %s, %s; moved_mm: its length%s\n"
-        "name,lung,x,y,z,dx,dy,dz,moved_mm%s\n",
-        moved->from.name, axes, unit_name,
-        sigma == NULL ? "" : "; expected_error_mm: " SUPINE_EXPECTED_MEANING,
-        sigma == NULL ? "" : ",expected_error_mm");
-    for (size_t i = 0; i < n; ++i) {
-      const size_t at = names.order[i];
-      const float *p = xyz + 3 * at;
-      const float *q = before + 3 * at;
-      double to[3] = {(double)p[0], (double)p[1], (double)p[2]};
-      for (size_t k = 0; k < 3 && moved->subtract_hilum; ++k) {
-        to[k] -= moved->hilum[k];
-      }
-      const double d[3] = {to[0] - (double)q[0], to[1] - (double)q[1], to[2] - (double)q[2]};
-      double there[3];
-      double shift[3];
-      in_frame(frame->axes, unit, to, there);
-      in_frame(frame->axes, unit, d, shift);
-      (void)fprintf(output.file, "%s,%s,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f",
-                    names.text[names.part[at]], info->lung_names[supine_command_lung_of(info, at)],
-                    there[0], there[1], there[2], shift[0], shift[1], shift[2], supine_length(d));
-      if (sigma != NULL) {
-        (void)fprintf(output.file, ",%.3f", (double)sigma[at]);
-      }
-      (void)fputc('\n', output.file);
+    for (size_t i = 0; i < count && moved->subtract_hilum; ++i) {
+      supine_command_target_shift(&rows[i], moved->hilum);
     }
+    print_rows(moved, info, rows, count, output.file);
     status = supine_output_commit(&output, error);
   }
   if (status == SUPINE_OK) {
-    (void)printf("%s: %zu %s, displacement from %s\n", path, n, n == 1 ? "point" : "points",
-                 moved->from.name);
+    (void)printf("%s: %zu %s%s, displacement from %s\n", path, count, each ? "point" : "structure",
+                 count == 1 ? "" : "s", moved->from.name);
   }
-  free(xyz);
-  free(before);
+  free(rows);
   supine_command_names_close(&names);
   return status;
 }
@@ -328,7 +323,7 @@ supine_status supine_command_deform_content(const supine_deform_content *wanted,
     status = move_grid(wanted, basis, moved, error);
   }
   if (status == SUPINE_OK && wanted->path != NULL && supine_text_ends_in(wanted->path, ".csv")) {
-    status = write_points(wanted->path, basis, moved, error);
+    status = write_points(wanted->path, basis, moved, wanted->vertices, error);
     if (status == SUPINE_OK) {
       supine_options_expected_print(&moved->expected, stdout);
       supine_options_hilum_print(moved->hilum, moved->subtract_hilum);

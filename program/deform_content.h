@@ -14,6 +14,7 @@ typedef struct supine_deform_content {
   /* Files of -o, --field-out, --image and --labels; NULL if not given. */
   const char *path, *field, *image, *labels;
   bool inverse, density;
+  bool vertices;       /* whether a CSV file has a row for each vertex */
   supine_image source; /* the image or the label map to move, once it has been read */
 } supine_deform_content;
 

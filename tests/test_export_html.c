@@ -197,11 +197,31 @@ TEST(test_page_title_with_markup_escaped) {
   free(page);
 }
 
-TEST(test_page_too_many_modes_or_vectors_refused) {
+TEST(test_page_too_many_modes_refused) {
   assert_int_equal(EXPORT_RUN(text, many, "-o", out), 3);
   assert_says(text, "--modes 16");
-  assert_int_equal(EXPORT_RUN(text, vector, "-o", out), 3);
-  assert_says(text, "vector displacements");
+}
+
+TEST(test_page_of_vector_basis_coefficients_equal_basis) {
+  assert_int_equal(EXPORT_RUN(text, vector, "-o", out), 0);
+  char *page = read_page();
+  export_source s = {0};
+  export_order order;
+  assert_int_equal(supine_export_source_open(vector, &s, NULL), SUPINE_OK);
+  assert_int_equal(supine_export_order_make(&s, true, &order, NULL), SUPINE_OK);
+  const size_t columns = 3 * s.info->mode_count;
+  const double unit = number_of(page, "unit");
+  int16_t *counts = take_rows(page, "coefficients", s.info->vertex_count, columns);
+  for (size_t i = 0; i < columns * s.info->vertex_count; ++i) {
+    const double c =
+        (double)s.info->coefficients[order.vertex[i / columns] * columns + i % columns];
+    assert_true(fabs(counts[i] * unit - c) <= 0.5001 * unit);
+  }
+  assert_null(strstr(page, "tensor-direction"));
+  supine_export_order_free(&order);
+  supine_export_source_close(&s);
+  free(counts);
+  free(page);
 }
 
 TEST_GROUP(setup, teardown)

@@ -557,7 +557,7 @@ TEST(test_precompute_fields_scanned_posture_not_displaced) {
   EXPECT(0, "  scan supine\n", FIELDS "--scanned supine");
   EXPECT(0, "largest displacement 0.000 mm", "deform b.safetensors --posture supine -o a.ply");
   EXPECT(0, "largest displacement 2.000 mm", "deform b.safetensors --posture prone -o a.ply");
-  EXPECT(0, "sampled directions", "compare b.safetensors --postures supine,prone");
+  EXPECT(0, "displacement, mm", "compare b.safetensors --postures supine,prone");
   assert_null(strstr(printed, "breath"));
   EXPECT(1, "give the posture alone", FIELDS "--scanned supine:rest");
   EXPECT(1, "only for --fields",

@@ -64,12 +64,8 @@ TEST(test_reach_solution_equals_dense_solution) {
   const supine_mesh *mesh = &lungs.mesh;
   const size_t n = mesh->vertex_count;
   const size_t nodes = n + lungs.topology.edge_count;
-  double *e = irregular(n, 0.5, 2.0, 3);
+  double *e = irregular(n, 0.5, 2.0, 3); /* does not change the forces */
   double *force = irregular(n, 0.0, 1.0, 4);
-  double mean_log = 0.0;
-  for (size_t i = 0; i < n; ++i) {
-    mean_log += log(e[i]) / (double)n;
-  }
   double *area = calloc(n + 1, sizeof *area);
   double mean = 0.0;
   supine_mesh_vertex_area(mesh, area);
@@ -78,9 +74,7 @@ TEST(test_reach_solution_equals_dense_solution) {
   }
   gsl_matrix *link_weight = gsl_matrix_calloc(nodes, nodes);
   double *s = calloc(nodes, sizeof *s);
-  double *a = calloc(n, sizeof *a);
   for (size_t i = 0; i < n; ++i) {
-    a[i] = 1.0 / (e[i] / exp(mean_log)); /* compliance / its geometric mean; multiplies the force */
     s[i] = 1.0;
     gsl_matrix_set(link_weight, i, i, area[i] / mean);
   }
@@ -124,7 +118,7 @@ TEST(test_reach_solution_equals_dense_solution) {
     }
   }
   for (size_t i = 0; i < n; ++i) {
-    gsl_vector_set(b, i, area[i] / mean * a[i] * force[i]);
+    gsl_vector_set(b, i, area[i] / mean * force[i]);
   }
   gsl_permutation *p = gsl_permutation_alloc(nodes);
   int sign;
@@ -140,7 +134,7 @@ TEST(test_reach_solution_equals_dense_solution) {
     const double expected = s[i] * own / z[i] * gsl_vector_get(x, i);
     assert_true(fabs(own * found[i] - expected) < 1e-10 * largest);
     balance += own * found[i];
-    given += own * a[i] * force[i];
+    given += own * force[i];
   }
   assert_true(fabs(balance - given) < 1e-10 * given);
   gsl_permutation_free(p);
@@ -152,7 +146,6 @@ TEST(test_reach_solution_equals_dense_solution) {
   free(force);
   free(area);
   free(s);
-  free(a);
   free(z);
   free(found);
   supine_lungs_free(&lungs);
@@ -283,36 +276,77 @@ TEST(test_reach_finer_mesh_spreads_same_distance) {
   assert_true(without[2] < 0.6 * without[0]);
 }
 
-/* Tissue that is twice as expandable moves twice as far, except near its boundary. */
-TEST(test_reach_half_twice_expandable_moves_twice_as_far) {
-  const double reach = 10.0;
-  supine_lungs lungs = lungs_of(sphere(24, 0.1), reach);
+/* Return displacements [n, 3] of tissue of stiffness e, if uniform tissue stretches by 1 % along x
+ * and moves by 3 mm along y (malloc). */
+static double *stretched(const supine_lungs *lungs, const double *e, const double *lesions) {
+  supine_strain *strain = NULL;
+  double *u = calloc(3 * lungs->mesh.vertex_count, sizeof *u);
+  for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
+    u[3 * i] = 0.01 * lungs->mesh.vertices[3 * i];
+    u[3 * i + 1] = 3.0;
+  }
+  assert_int_equal(supine_physics_strain_create(lungs, e, lesions, &strain, NULL), SUPINE_OK);
+  assert_int_equal(supine_physics_strain_apply(strain, NULL, 3, u, NULL), SUPINE_OK);
+  supine_physics_strain_destroy(strain);
+  return u;
+}
+
+/* Tissue that is twice as expandable stretches twice as much, and the rest moves with it. */
+TEST(test_strain_half_twice_expandable_stretches_twice_as_much) {
+  supine_lungs lungs = lungs_of(sphere(24, 0.1), 10.0);
   const size_t n = lungs.mesh.vertex_count;
-  double *force = irregular(n, 0.7, 0.0, 1);
   double *e = irregular(n, 1.0, 0.0, 1);
   for (size_t i = 0; i < n; ++i) {
-    e[i] = lungs.mesh.vertices[3 * i + 2] > 0.0 ? 0.5 : 1.0;
+    e[i] = lungs.mesh.vertices[3 * i] > 0.0 ? 0.5 : 1.0;
   }
-  double *even = solve(&lungs, NULL, force);
-  double *uneven = solve(&lungs, e, force);
-  double largest = 0.0;
-  double ratio[2] = {0.0, 0.0};
-  double count[2] = {0.0, 0.0};
-  for (size_t i = 0; i < n; ++i) {
-    const double z = lungs.mesh.vertices[3 * i + 2];
-    if (fabs(z) > 5.0 * reach) {
-      ratio[z > 0.0] += uneven[i] / even[i];
-      count[z > 0.0] += 1.0;
-      largest = fmax(largest, fabs(uneven[i] / even[i] / (z > 0.0 ? M_SQRT2 : M_SQRT1_2) - 1.0));
+  double *u = stretched(&lungs, e, NULL);
+  double stretch[2] = {0.0, 0.0};
+  double sum[2] = {0.0, 0.0};
+  for (size_t k = 0; k < lungs.topology.edge_count; ++k) {
+    const uint32_t *edge = lungs.topology.edges + 2 * k;
+    const double *p = lungs.mesh.vertices;
+    const double along = p[3 * edge[0]] - p[3 * edge[1]];
+    const double moved = u[3 * edge[0]] - u[3 * edge[1]];
+    if (fabs(p[3 * edge[0]]) > 20.0) {
+      stretch[p[3 * edge[0]] > 0.0] += moved * along;
+      sum[p[3 * edge[0]] > 0.0] += 0.01 * along * along;
     }
+    assert_true(fabs(moved) < 0.02 * fabs(along) + 0.1);
+    assert_true(fabs(u[3 * edge[0] + 1] - 3.0) < 1e-9);
   }
-  printf("expandability 2 beside 1: displacement over that of uniform tissue %.3f and %.3f\n",
-         ratio[1] / count[1], ratio[0] / count[0]);
-  assert_true(largest < 0.02);
-  assert_true(fabs(ratio[1] / count[1] / (ratio[0] / count[0]) - 2.0) < 0.02);
-  free(force);
+  printf("expandability 2 beside 1: stretch over that of uniform tissue %.3f and %.3f\n",
+         stretch[1] / sum[1], stretch[0] / sum[0]);
+  assert_true(fabs(stretch[1] / sum[1] - M_SQRT2) < 0.03);
+  assert_true(fabs(stretch[0] / sum[0] - M_SQRT1_2) < 0.03);
   free(e);
+  free(u);
+  supine_lungs_free(&lungs);
+}
+
+TEST(test_strain_uniform_tissue_unchanged_lesion_strains_less) {
+  supine_lungs lungs = lungs_of(sphere(24, 0.1), 10.0);
+  const size_t n = lungs.mesh.vertex_count;
+  double *lesions = irregular(n, 1.0, 0.0, 1);
+  double *even = stretched(&lungs, lesions, NULL);
+  for (size_t i = 0; i < n; ++i) {
+    lesions[i] = lungs.mesh.vertices[3 * i + 1] > 70.0 ? 3.0 : 1.0;
+    assert_true(fabs(even[3 * i] - 0.01 * lungs.mesh.vertices[3 * i]) < 1e-9);
+  }
+  double *u = stretched(&lungs, NULL, lesions);
+  double squares[2] = {0.0, 0.0};
+  double largest = 0.0;
+  for (size_t i = 0; i < n; ++i) {
+    const double y = lungs.mesh.vertices[3 * i + 1];
+    squares[0] += y > 80.0 ? even[3 * i] * even[3 * i] : 0.0;
+    squares[1] += y > 80.0 ? u[3 * i] * u[3 * i] : 0.0;
+    largest = fmax(largest, fabs(u[3 * i] - even[3 * i]));
+  }
+  printf("in a lesion 3 times as stiff: %.3f of the stretch of uniform tissue; at most %.3f mm\n",
+         sqrt(squares[1] / squares[0]), largest);
+  assert_true(sqrt(squares[1] / squares[0]) < 0.75);
+  assert_true(largest < 0.5); /* the whole sphere stretches by 2 mm */
+  free(lesions);
   free(even);
-  free(uneven);
+  free(u);
   supine_lungs_free(&lungs);
 }

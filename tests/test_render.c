@@ -2,16 +2,33 @@
 /* Test pictures: views, colours, colour bars and drawings. */
 #include "test.h"
 
+#include "base/vec3.h"
+
 #include "program/view/render/render.h"
 #include "runtime_fixture.h"
 
 #include "tests/poses.h"
 
+static const double gravity[3] = {0.8, 0.6, 0};
+
+/* As the patient lies, gravity points down and the head is on the left. */
+TEST(test_view_axes_lying_gravity_down_head_left) {
+  static const double lying[][3] = {
+      {0, 1, 0}, {0, -1, 0}, {1, 0, 0}, {-1, 0, 0}, {0.8, 0.36, 0.48}};
+  for (size_t i = 0; i < sizeof lying / sizeof *lying; ++i) {
+    double a[3][3];
+    supine_render_view_axes(SUPINE_VIEW_LYING, lying[i], a);
+    assert_true(fabs(supine_dot(a[1], lying[i]) + 1) < 1e-12);
+    assert_true(a[0][2] < -0.8);
+    assert_true(fabs(supine_dot(a[0], a[1])) < 1e-12 && fabs(supine_dot(a[0], a[0]) - 1) < 1e-12);
+  }
+}
+
 TEST(test_view_axes_any_view_right_handed_orthonormal) {
   for (supine_view view = 0; view < SUPINE_VIEW_COUNT; ++view) {
     double a[3][3];
     assert_non_null(supine_render_view_name(view));
-    supine_render_view_axes(view, a);
+    supine_render_view_axes(view, gravity, a);
     for (int i = 0; i < 3; ++i) {
       const int j = (i + 1) % 3;
       const int k = (i + 2) % 3;
@@ -36,7 +53,7 @@ TEST(test_view_axes_each_view_points_to_viewer) {
                {SUPINE_VIEW_HEAD, {0, 0, 1}},      {SUPINE_VIEW_FEET, {0, 0, -1}}};
   for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
     double axes[3][3];
-    supine_render_view_axes(cases[i].view, axes);
+    supine_render_view_axes(cases[i].view, NULL, axes);
     assert_memory_equal(axes[2], cases[i].towards, sizeof axes[2]);
   }
 }
@@ -135,6 +152,7 @@ static void draw(const drawing *m, supine_view view, const double *weights, doub
                               .value = m->value,
                               .largest = 10,
                               .view = view,
+                              .gravity = gravity,
                               .width = WIDTH,
                               .height = HEIGHT};
   supine_error error;
@@ -203,12 +221,15 @@ TEST(test_project_outer_vertices_match_drawing) {
   }
   const supine_marks marks = {info->vertex_count, mark};
   for (supine_view view = 0; view < SUPINE_VIEW_COUNT; ++view) {
-    const supine_scene scene = {
-        .pose = POSED(m.basis, weights, scales), .view = view, .width = WIDTH, .height = HEIGHT};
+    const supine_scene scene = {.pose = POSED(m.basis, weights, scales),
+                                .view = view,
+                                .gravity = gravity,
+                                .width = WIDTH,
+                                .height = HEIGHT};
     double projected[4] = {INFINITY, -INFINITY, INFINITY, -INFINITY};
     double drawn[4] = {INFINITY, -INFINITY, INFINITY, -INFINITY};
     draw(&m, view, weights, 1, pixels);
-    supine_render_project(m.renderer, &scene, &marks, at);
+    supine_render_project(m.renderer, &scene, &marks, false, at);
     for (size_t i = 0; i < info->vertex_count; ++i) {
       for (int side = 0; side < 2; ++side) {
         projected[2 * side] = fmin(projected[2 * side], at[i][side]);

@@ -58,6 +58,8 @@ def check_surface(surface, points, triangles, rest, lung):
     fields = surface.GetFieldData()
     assert fields.GetAbstractArray("SPACE").GetValue(0) == "LPS"
     assert fields.GetAbstractArray("units").GetValue(0) == "mm, mL, s"
+    assert fields.GetAbstractArray("note").GetValue(0).startswith("displacement from ")
+    assert data.GetScalars().GetName() == "displacement_magnitude"
     return fields
 
 

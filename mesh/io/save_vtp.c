@@ -269,6 +269,9 @@ static void write_field_data(const vtp *file, FILE *out) {
   (void)fputs("<FieldData>\n", out);
   write_text("SPACE", writer->space, out);
   write_text("units", units, out);
+  if (writer->comment[0] != '\0') {
+    write_text("note", writer->comment, out);
+  }
   if (file->times != NULL) {
     write_numbers(file, &(supine_mesh_field){"time_s", 1, file->times}, out);
   }
@@ -301,7 +304,8 @@ static void vtp_head(const vtp *file, FILE *out) {
   (void)fputs("</Points>\n<Polys>\n", out);
   write_array(file, 1, out);
   write_array(file, 2, out);
-  (void)fprintf(out, "</Polys>\n<PointData%s>\n",
+  (void)fprintf(out, "</Polys>\n<PointData%s%s>\n",
+                writer->options.from != NULL ? " Scalars=\"displacement_magnitude\"" : "",
                 writer->options.normals != NULL ? " Normals=\"Normals\"" : "");
   for (size_t i = VTP_FIRST_OF_POINTS; i < file->array_count; ++i) {
     write_array(file, i, out);

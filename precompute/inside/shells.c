@@ -205,42 +205,34 @@ void supine_inside_shells_reading(const supine_inside_shells *shells,
   }
 }
 
-/* Return whether a point of the reference surface belongs to a hilum. */
-static bool is_hilar(const float *p, float box[2][3], double midline) {
-  const double from_midline = (double)p[0] - midline;
-  const double width =
-      from_midline > 0.0 ? (double)box[1][0] - midline : midline - (double)box[0][0];
-  bool hilar = fabs(from_midline) < 0.35 * width;
-  for (size_t k = 1; k < 3; ++k) {
-    const double at = (double)(p[k] - box[0][k]) / (double)(box[1][k] - box[0][k]);
-    hilar = hilar && fabs(at - 0.5) < 0.2;
+/* Return whether a point of the reference surface belongs to the hilum of its lung.
+ * @param box  lowest and highest corner of the box around the lung, mm */
+static bool is_hilar(const float *p, const float box[6], bool left) {
+  float at[3]; /* 0 to 1: from the midline, from the front, from the base */
+  for (size_t k = 0; k < 3; ++k) {
+    at[k] = (p[k] - box[k]) / (box[3 + k] - box[k]);
   }
-  return hilar;
+  return (left ? at[0] : 1.0F - at[0]) < 0.35F && fabsf(at[1] - 0.5F) < 0.2F &&
+         fabsf(at[2] - 0.5F) < 0.2F;
 }
 
 bool supine_inside_hilum(const supine_basis *basis, double *mean) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const supine_tensor *stored = supine_basis_tensor(basis, "lungs_hilum");
-  const char *midline = supine_basis_metadata(basis, "midline_mm");
   const size_t modes = info->mode_count;
   const size_t columns = 3 * modes;
-  float box[2][3];
+  bool found = supine_basis_metadata(basis, "content") == NULL;
   memset(mean, 0, info->lung_count * columns * sizeof *mean);
   if (stored != NULL && stored->dtype == SUPINE_F64 && stored->rank == 3 &&
       stored->shape[0] == info->lung_count && stored->shape[1] * stored->shape[2] == columns) {
     memcpy(mean, stored->data, info->lung_count * columns * sizeof *mean);
     return true;
   }
-  for (size_t i = 0; i < 3 * info->vertex_count; ++i) {
-    const float x = info->vertices[i];
-    box[0][i % 3] = i < 3 ? x : fminf(box[0][i % 3], x);
-    box[1][i % 3] = i < 3 ? x : fmaxf(box[1][i % 3], x);
-  }
-  bool found = midline != NULL && supine_basis_metadata(basis, "content") == NULL;
   for (size_t lung = 0; lung < info->lung_count && found; ++lung) {
     double count = 0.0;
     for (size_t i = info->lung_begin[lung]; i < info->lung_begin[lung + 1]; ++i) {
-      const bool hilar = is_hilar(info->vertices + 3 * i, box, strtod(midline, NULL));
+      const bool hilar = is_hilar(info->vertices + 3 * i, info->bounds + 6 * lung,
+                                  info->lung_names[lung][0] == 'l');
       count += hilar ? 1.0 : 0.0;
       for (size_t k = 0; k < columns && hilar; ++k) {
         mean[lung * columns + k] += info->vector
@@ -252,7 +244,7 @@ bool supine_inside_hilum(const supine_basis *basis, double *mean) {
     for (size_t k = 0; k < columns; ++k) {
       mean[lung * columns + k] /= fmax(1.0, count);
     }
-    found = found && count > 0.0;
+    found = count > 0.0;
   }
   return found;
 }

@@ -74,8 +74,8 @@ void supine_inside_shells_reading(const supine_inside_shells *shells,
                                   size_t count, supine_inside_reading *reading);
 
 /** Compute the mean displacement of the hila by each mode at weight and gain 1. The hilum of a lung
- * is the part of its surface that is less than 0.35 of the width of the lung away from the midline,
- * and between 0.3 and 0.7 of the box around the lungs from back to front and from apex to base.
+ * is the part of its surface in the first 0.35 of the box around the lung from the midline, and in
+ * the middle 0.4 of it along y and z.
  * @param mean  [lungs, 3, modes] written, mm; from the file, if it holds structures inside lungs
  * @return whether the file determines it */
 bool supine_inside_hilum(const supine_basis *basis, double *mean);

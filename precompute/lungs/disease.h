@@ -26,7 +26,8 @@ typedef struct supine_lesion {
 /** Multiply `factors` [N], which start as 1, by the stiffness factors of a lesion. The factors
  * multiply the stiffness after it is scaled to geometric mean 1. In the reverse order, a stiff
  * lesion would soften all other tissue, by 4 % for a lesion of factor 10 over 2 % of the vertices.
- * With the same gain (factor on the displacement), a lesion does not change how other tissue moves.
+ * Without a smoothing length of the force, a lesion does not change how other tissue moves with the
+ * same gain (factor on the displacement).
  * At the same volume of the lungs, all displacements grow by one ratio, to make up for the
  * lesion.
  * @param reached  optional output: number of vertices nearer to the lesion's centre than the radius

@@ -5,7 +5,9 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/text.h"
 #include "precompute/inside/shells.h"
+
 #include "program/options/basis_input.h"
 
 const supine_option supine_options_as_scanned[] = {
@@ -48,6 +50,14 @@ supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,
                             "--as-scanned, or make the basis again from the scan");
   }
   return SUPINE_OK;
+}
+
+void supine_options_basis_title(const char *path, char *title, size_t size) {
+  static const char ending[] = ".safetensors";
+  const char *name = basename(path);
+  const size_t cut = supine_text_ends_in(name, ending) ? sizeof ending - 1 : 0;
+  (void)snprintf(title, size, "%.*s", (int)(strlen(name) - cut), name);
+  (void)supine_text_make_utf8(title);
 }
 
 double supine_options_basis_volume(const supine_basis *basis, const supine_pose *pose) {

@@ -35,6 +35,9 @@ supine_status supine_options_basis_closed(const supine_basis *basis, const char 
 supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,
                                          supine_mesh_save_options *save, supine_error *error);
 
+/* Write the name of a basis file without its folder and the ending .safetensors, as UTF-8. */
+void supine_options_basis_title(const char *path, char *title, size_t size);
+
 /* Return the volume of all lungs together in a pose, mL. */
 double supine_options_basis_volume(const supine_basis *basis, const supine_pose *pose);
 

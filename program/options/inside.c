@@ -5,6 +5,9 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/text.h"
+#include "base/vec3.h"
+
 #include "program/options/basis_input.h"
 #include "program/options/inside.h"
 
@@ -98,52 +101,163 @@ supine_status supine_command_inside_open(const supine_basis *lungs, const char *
   return supine_command_inside_check(lungs, *inside, path, error);
 }
 
-/* Add the marks of one structure: its vertices, and its name at their mean position. */
-static void add_part(const supine_command_names *names, size_t part, const float *xyz,
-                     const float *from, supine_command_marks *out) {
-  const size_t *order = names->order + names->begin[part];
-  const size_t count = names->begin[part + 1] - names->begin[part];
-  supine_mark middle = {.xyz = {0.0F, 0.0F, 0.0F}, .point = count == 1, .label = out->label[part]};
-  for (size_t i = 0; i < count; ++i) {
-    const float *p = xyz + 3 * order[i];
-    const float *q = from + 3 * order[i];
-    const float moved = hypotf(hypotf(p[0] - q[0], p[1] - q[1]), p[2] - q[2]);
+/* Average the vertices order[begin] to order[end - 1] to a target; [N, 3] positions before and
+ * after.
+ */
+static supine_target average(const supine_command_names *names, size_t begin, size_t end,
+                             const float *after, const float *before, const float *sigma) {
+  const double count = (double)(end - begin);
+  supine_target target = {.name = names->text[names->part[names->order[begin]]]};
+  double square = 0;
+  for (size_t i = begin; i < end; ++i) {
+    const size_t vertex = names->order[i];
     for (size_t k = 0; k < 3; ++k) {
-      middle.xyz[k] += p[k] / (float)count;
+      const double x = (double)after[3 * vertex + k];
+      target.at[k] += x / count;
+      target.move[k] += (x - (double)before[3 * vertex + k]) / count;
     }
-    middle.value += moved / (float)count;
-    if (count > 1) {
-      out->mark[out->marks.count++] = (supine_mark){{p[0], p[1], p[2]}, moved, false, NULL};
-    }
+    square += sigma == NULL ? (double)NAN : (double)sigma[vertex] * (double)sigma[vertex] / count;
   }
-  (void)snprintf(out->label[part], sizeof out->label[part], "%.30s moved %.1f mm",
-                 names->text[part], (double)middle.value);
-  if (count > 0) {
-    out->mark[out->marks.count++] = middle;
+  target.moved = supine_length(target.move);
+  target.expected = sqrt(square);
+  return target;
+}
+
+/* Compute the volume of each structure whose positions are `xyz` [N, 3]. The normals of a closed
+ * surface sum to 0, and its volume is a sixth of the sum of (corner) . (normal) over its triangles.
+ */
+static void find_volumes(const supine_basis_info *info, const supine_command_names *names,
+                         const float *xyz, int side, supine_target *targets) {
+  for (size_t part = 0; part < names->count; ++part) {
+    double sum[5] = {0.0}; /* of the normals x, y, z, of their lengths, and of corner . normal */
+    for (size_t t = 0; t < 3 * info->triangle_count; t += 3) {
+      const uint32_t *corner = info->triangles + t;
+      double x[3][3];
+      double normal[3];
+      if (names->part[corner[0]] != part) {
+        continue;
+      }
+      for (size_t k = 0; k < 9; ++k) {
+        x[k / 3][k % 3] = (double)xyz[3 * corner[k / 3] + k % 3];
+      }
+      supine_normal(x[0], x[1], x[2], normal);
+      for (size_t k = 0; k < 3; ++k) {
+        sum[k] += normal[k];
+      }
+      sum[3] += supine_length(normal);
+      sum[4] += supine_dot(x[0], normal);
+    }
+    targets[part].volume[side] = supine_length(sum) < 1e-3 * sum[3] ? sum[4] / 6000.0 : (double)NAN;
   }
 }
 
-supine_status supine_command_marks_make(const supine_basis *inside,
-                                        const supine_command_names *names, const supine_pose *pose,
-                                        const supine_pose *from, supine_command_marks *marks,
-                                        supine_error *error) {
+supine_status supine_command_targets_find(const supine_basis *inside,
+                                          const supine_command_names *names,
+                                          const supine_pose *const pose[2], const float *sigma,
+                                          bool each, supine_target **targets, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(inside);
   const size_t n = info->vertex_count;
+  const size_t count = each ? n : names->count;
   SUPINE_ARENA arena = {0};
-  float *xyz = supine_arena_take(&arena, 3 * n, sizeof *xyz);
+  float *after = supine_arena_take(&arena, 3 * n, sizeof *after);
   float *before = supine_arena_take(&arena, 3 * n, sizeof *before);
+  *targets = calloc(count, sizeof **targets);
+  if (arena.failed || *targets == NULL) {
+    return supine_error_memory(error, "%zu points", n);
+  }
+  (void)supine_deform(inside, pose[0], before);
+  (void)supine_deform(inside, pose[1], after);
+  for (size_t i = 0; i < count; ++i) {
+    const size_t begin = each ? i : names->begin[i];
+    const size_t end = each ? i + 1 : names->begin[i + 1];
+    if (end > begin) {
+      (*targets)[i] = average(names, begin, end, after, before, sigma);
+      (*targets)[i].lung = supine_command_lung_of(info, names->order[begin]);
+    } else { /* a name may have no vertices */
+      (*targets)[i].name = names->text[i];
+    }
+  }
+  if (!each && info->triangle_count > 0) {
+    find_volumes(info, names, before, 0, *targets);
+    find_volumes(info, names, after, 1, *targets);
+  }
+  return SUPINE_OK;
+}
+
+void supine_command_targets_free(supine_target **targets) {
+  free(*targets);
+}
+
+const char *supine_command_target_way(const supine_target *target, size_t most, char way[96]) {
+  static const char *const names[3][2] = {{"right", "left"}, {"front", "back"}, {"feet", "head"}};
+  double left[3] = {fabs(target->move[0]), fabs(target->move[1]), fabs(target->move[2])};
+  (void)snprintf(way, 96, "%s", target->moved <= target->expected ? SUPINE_TARGET_UNTOLD : "");
+  for (size_t i = 0; target->moved > target->expected && i < most; ++i) {
+    size_t axis = left[0] > left[1] ? 0U : 1U;
+    axis = left[2] > left[axis] ? 2 : axis;
+    if (left[axis] >= 0.5) {
+      supine_text_add(way, 96, "%s%.0f to the %s", i > 0 ? ", " : "", left[axis],
+                      names[axis][target->move[axis] > 0]);
+    }
+    left[axis] = 0;
+  }
+  return way;
+}
+
+void supine_command_target_shift(supine_target *target, const double shift[3]) {
+  for (size_t k = 0; k < 3; ++k) {
+    target->at[k] -= shift[k];
+    target->move[k] -= shift[k];
+  }
+  target->moved = supine_length(target->move);
+}
+
+json_t *supine_command_target_json(const supine_target *t) {
+  json_t *made = json_pack("{s:s, s:[f, f, f], s:f, s:o}", "name", t->name, "move", t->move[0],
+                           t->move[1], t->move[2], "mm", t->moved, "expected_error_mm",
+                           isnan(t->expected) ? json_null() : json_real(t->expected));
+  if (t->volume[0] != 0) {
+    (void)json_object_set_new(made, "volumes_ml", supine_options_json_numbers(2, t->volume));
+  }
+  return made;
+}
+
+supine_status supine_command_marks_make(const supine_basis *inside,
+                                        const supine_command_names *names,
+                                        const supine_pose *const pose[2], const float *sigma,
+                                        supine_command_marks *marks, supine_error *error) {
+  const size_t n = supine_basis_get_info(inside)->vertex_count;
+  SUPINE_ARENA arena = {0};
+  SUPINE_FREED_BY(supine_command_targets_free) supine_target *targets = NULL;
+  float *xyz = supine_arena_take(&arena, 3 * n, sizeof *xyz);
   supine_command_marks_free(marks);
-  marks->mark = supine_arena_take(&marks->arena, n + names->count, sizeof *marks->mark);
-  marks->label = supine_arena_take(&marks->arena, names->count, sizeof *marks->label);
+  marks->mark = supine_arena_zeros(&marks->arena, n + names->count, sizeof *marks->mark);
+  marks->label = supine_arena_zeros(&marks->arena, names->count, sizeof *marks->label);
   if (arena.failed || marks->arena.failed) {
     return supine_error_memory(error, "%zu points", n);
   }
-  (void)supine_deform(inside, pose, xyz);
-  (void)supine_deform(inside, from, before);
-  for (size_t part = 0; part < names->count; ++part) {
-    add_part(names, part, xyz, before, marks);
-  }
+  SUPINE_TRY(supine_command_targets_find(inside, names, pose, sigma, false, &targets, error));
+  (void)supine_deform(inside, pose[1], xyz);
   marks->marks.mark = marks->mark;
+  marks->first = targets[0];
+  for (size_t part = 0; part < names->count; ++part) {
+    const supine_target *t = &targets[part];
+    const size_t count = names->begin[part + 1] - names->begin[part];
+    for (size_t i = 0; count > 1 && i < count; ++i) {
+      supine_mark *mark = &marks->mark[marks->marks.count++];
+      memcpy(mark->xyz, xyz + 3 * names->order[names->begin[part] + i], sizeof mark->xyz);
+    }
+    supine_mark *middle = &marks->mark[marks->marks.count];
+    for (size_t k = 0; k < 3; ++k) {
+      middle->xyz[k] = (float)t->at[k];
+      middle->from[k] = (float)(t->at[k] - t->move[k]);
+    }
+    (void)snprintf(marks->label[part], sizeof marks->label[part],
+                   t->moved <= t->expected ? "%.30s" : "%.30s %.1f mm", t->name, t->moved);
+    middle->label = marks->label[part];
+    middle->point = count == 1;
+    marks->marks.count += count > 0;
+  }
   return SUPINE_OK;
 }
 

@@ -3,7 +3,10 @@
 #ifndef SUPINE_COMMAND_INSIDE_H
 #define SUPINE_COMMAND_INSIDE_H
 
+#include <jansson.h>
+
 #include "base/arena.h"
+
 #include "program/view/render/render.h"
 
 typedef struct supine_command_names {
@@ -35,21 +38,61 @@ supine_status supine_command_inside_open(const supine_basis *lungs, const char *
                                          supine_basis **inside, supine_command_names *names,
                                          supine_error *error);
 
+/* Where a group of vertices is, and how it has moved. */
+typedef struct supine_target {
+  const char *name;
+  size_t lung;      /* index of the lung of the first vertex */
+  double at[3];     /* mean position of the vertices, mm */
+  double move[3];   /* displacement of the mean position, mm */
+  double moved;     /* length of `move`, mm */
+  double volume[2]; /* volume before and after, mL; NAN if it is no closed mesh; 0 without meshes */
+  double expected;  /* RMS of the vertices' expected errors, mm; NAN if unknown */
+} supine_target;
+
+/* Compute where the structures are in pose[1], and how they have moved from pose[0].
+ * @param sigma    [N] expected error of each vertex, mm; NULL if unknown
+ * @param each     true for a target for each vertex, false for one for each structure
+ * @param targets  output: array of targets in the order of `names`, which the caller frees
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_command_targets_find(const supine_basis *inside,
+                                          const supine_command_names *names,
+                                          const supine_pose *const pose[2], const float *sigma,
+                                          bool each, supine_target **targets, supine_error *error);
+
+/* Free *targets; for SUPINE_FREED_BY. */
+void supine_command_targets_free(supine_target **targets);
+
+#define SUPINE_TARGET_UNTOLD "no change that the model can tell"
+
+/* Write the direction of a target's displacement in words, with at most `most` parts and the
+ * largest first: "12 to the feet, 7 to the front". A displacement below its expected error is
+ * SUPINE_TARGET_UNTOLD. Return `way`. */
+const char *supine_command_target_way(const supine_target *target, size_t most, char way[96]);
+
+/* Subtract a displacement, mm, such as that of the hilum, from a target's position and
+ * displacement. */
+void supine_command_target_shift(supine_target *target, const double shift[3]);
+
+/* Return a target as JSON: its name, displacement, and the expected error. */
+json_t *supine_command_target_json(const supine_target *target);
+
 /* Marks of a picture: the vertices of each structure, and a label with name and displacement. */
 typedef struct supine_command_marks {
   supine_marks marks;
   supine_mark *mark;
-  char (*label)[48];
+  char (*label)[64];
+  supine_target first; /* the first structure */
   supine_arena arena;
 } supine_command_marks;
 
-/* Make the marks that show the structures in a pose.
- * @param from  pose from which displacements are measured
+/* Make the marks that show the structures in pose[1], with arrows from where they were in pose[0].
+ * Those that `marks` held before are freed.
+ * @param sigma  [N] expected error of each vertex, mm; NULL if unknown
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_command_marks_make(const supine_basis *inside,
-                                        const supine_command_names *names, const supine_pose *pose,
-                                        const supine_pose *from, supine_command_marks *marks,
-                                        supine_error *error);
+                                        const supine_command_names *names,
+                                        const supine_pose *const pose[2], const float *sigma,
+                                        supine_command_marks *marks, supine_error *error);
 void supine_command_marks_free(supine_command_marks *marks);
 
 #endif

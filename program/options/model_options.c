@@ -223,7 +223,7 @@ const supine_option supine_command_model_options[] = {
     {"lesion", 0, "X,Y,Z,RADIUS,FACTOR",
      "lesion with its centre at X,Y,Z (mm, LPS). Within half of RADIUS (mm), the stiffness is "
      "multiplied by FACTOR; from there to RADIUS the multiplier changes smoothly to 1. A FACTOR "
-     "above 1 stiffens the tissue, which then moves less. May be repeated, up to 64 times",
+     "above 1 stiffens the tissue, which then strains less. May be repeated, up to 64 times",
      FILLS(choice), .read = read_lesion,
      .wants = "X,Y,Z,RADIUS,FACTOR, the last two above 0 (at most 64 times)"},
     {"lung", 0, "SIDE:SHARE",

@@ -176,6 +176,12 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
   return SUPINE_OK;
 }
 
+double supine_options_above_rest(const supine_state *state) {
+  const bool rest = state->lung_count == 0 && (state->volume.kind == SUPINE_VOLUME_REST ||
+                                               state->volume.kind == SUPINE_VOLUME_DEFAULT);
+  return rest ? state->volume.ml : (double)NAN;
+}
+
 /* Return the fraction of the triangles that turn over in a pose, or -1 if out of memory. */
 static double turned_over(const supine_basis *basis, const supine_pose *pose) {
   SUPINE_FREED_BY(supine_mesh_free) supine_mesh mesh = {0};

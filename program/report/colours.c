@@ -18,7 +18,7 @@ const char *supine_report_line(size_t posture) {
   return lines[posture % (sizeof lines / sizeof *lines)];
 }
 
-json_t *supine_report_bar(supine_colours map, double largest, bool beyond, const char *words) {
+json_t *supine_report_bar(supine_colours map, double largest, const char *words) {
   enum { STOPS = 16 };
   const double step = supine_render_bar_step(largest);
   json_t *stops = json_array();
@@ -31,6 +31,5 @@ json_t *supine_report_bar(supine_colours map, double largest, bool beyond, const
                                                  json_sprintf("%.2f", 100.0 * i * step / largest),
                                                  "value", json_sprintf("%g", i * step)));
   }
-  return json_pack("{s:o, s:o, s:b, s:s}", "stops", stops, "ticks", ticks, "beyond", (int)beyond,
-                   "words", words);
+  return json_pack("{s:o, s:o, s:s}", "stops", stops, "ticks", ticks, "words", words);
 }

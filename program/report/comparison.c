@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute the displacement of the lungs in each posture from a reference state, and find the
- * direction of gravity that moves the lungs farthest from supine. */
+/* Compute the displacement of the lungs, and of targets inside them, in each posture from a
+ * reference state. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -78,6 +78,20 @@ static supine_status find_posture(const supine_comparison *c, const supine_postu
   return status;
 }
 
+/* Compute the targets in each posture, with their expected errors. */
+static supine_status find_targets(supine_comparison *c, size_t i, supine_error *error) {
+  const supine_pose *const pose[2] = {&c->reference.pose, &c->posture[i].pose};
+  supine_expected expected = {0};
+  supine_status status = supine_options_expected_find(c->inside, &c->postures.item[i].state,
+                                                      &c->reference.state, &expected, error);
+  if (status == SUPINE_OK) {
+    status = supine_command_targets_find(c->inside, &c->names, pose, expected.sigma, false,
+                                         &c->posture[i].targets, error);
+  }
+  supine_options_expected_free(&expected);
+  return status;
+}
+
 /* Compute the expected error of each posture's displacement, mm RMS; 0 if it is unknown. */
 static supine_status find_errors(supine_comparison *c, supine_error *error) {
   supine_status status = SUPINE_OK;
@@ -87,38 +101,11 @@ static supine_status find_errors(supine_comparison *c, supine_error *error) {
                                           &expected, error);
     c->posture[i].expected_error = expected.rms;
     supine_options_expected_free(&expected);
+    if (status == SUPINE_OK && c->inside != NULL) {
+      status = find_targets(c, i, error);
+    }
   }
   return status;
-}
-
-double supine_report_from_supine(const supine_comparison *c, const double gravity[3]) {
-  static const double supine[3] = {0.0, 1.0, 0.0};
-  const double *direction[2] = {supine, gravity};
-  supine_pose pose[2];
-  for (int side = 0; side < 2; ++side) {
-    supine_state state = c->state;
-    memcpy(state.gravity, direction[side], sizeof state.gravity);
-    if (supine_basis_pose(c->basis, &state, &pose[side], NULL) != SUPINE_OK) {
-      return NAN;
-    }
-  }
-  return supine_compare_rms(c->compare, &pose[1], &pose[0]);
-}
-
-/* Among 2048 directions of gravity, evenly spread about 4.5 degrees apart, find the one in which
- * the surface is farthest (RMS) from its supine position. */
-static void find_farthest(supine_comparison *c) {
-  enum { DIRECTIONS = 2048 };
-  for (size_t i = 0; i < DIRECTIONS; ++i) {
-    double g[3];
-    supine_spiral((double)i, DIRECTIONS, 0.0, g);
-    const double rms = supine_report_from_supine(c, g);
-    c->directions += isnan(rms) ? 0 : 1;
-    if (rms > c->farthest_rms) {
-      c->farthest_rms = rms;
-      memcpy(c->farthest, g, sizeof g);
-    }
-  }
 }
 
 supine_status supine_report_find(supine_comparison *c, supine_error *error) {
@@ -148,9 +135,6 @@ supine_status supine_report_find(supine_comparison *c, supine_error *error) {
   if (status == SUPINE_OK) {
     status = find_errors(c, error);
   }
-  if (status == SUPINE_OK) {
-    find_farthest(c);
-  }
 cleanup:
   free(distance);
   free(xyz[0]);
@@ -159,6 +143,9 @@ cleanup:
 }
 
 void supine_report_free(supine_comparison *c) {
+  for (size_t i = 0; c->posture != NULL && i < c->postures.count; ++i) {
+    free(c->posture[i].targets);
+  }
   supine_compare_destroy(c->compare);
   free(c->posture);
 }

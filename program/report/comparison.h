@@ -8,6 +8,7 @@
 #include <supine/compare.h>
 
 #include "program/options/basis_input.h"
+#include "program/options/inside.h"
 #include "program/options/state_options.h"
 
 enum { SUPINE_COMPARISON_SLABS = 10 };
@@ -18,6 +19,7 @@ typedef struct supine_compared_posture {
   supine_distance_statistics displacement; /* displacement from the reference pose, mm */
   double expected_error;                   /* expected RMS error, mm; 0 if unknown */
   double hilum[3]; /* displacement of the hilum from the reference pose, mm; 0 if unknown */
+  supine_target *targets;                  /* [names.count] structures inside the lungs, or NULL */
   bool has_breath; /* whether the lungs can hold the breath; if not, the members from `gain` on are
                       0 */
   double volume[SUPINE_LUNGS_MAX];           /* volume of each lung, gas and tissue, mL */
@@ -33,16 +35,15 @@ typedef struct supine_comparison {
   const char *made_by; /* command line, which the report prints */
   bool allow_folds;
   const supine_basis *basis;
-  supine_state state; /* supine, at the volume of all postures that name none */
+  supine_basis *inside;       /* structures inside the lungs; NULL if there are none */
+  supine_command_names names; /* their names */
+  supine_state state;         /* supine, at the volume of all postures that name none */
   supine_from from;
   double breath; /* volume that a breath adds, mL; 0 if no breath is computed */
   supine_posture_list postures;
   supine_reference_pose reference; /* pose from which displacements are measured */
   supine_compare *compare;
   supine_compared_posture *posture; /* [postures.count] */
-  size_t directions;                /* number of sampled directions of gravity with a valid pose */
-  double farthest[3];  /* direction of gravity that moves the lungs farthest from supine */
-  double farthest_rms; /* RMS distance from supine with gravity along `farthest`, mm */
 } supine_comparison;
 
 /* Compute the results: `reference` and all members below it. Free them with supine_report_free,
@@ -53,10 +54,6 @@ void supine_report_free(supine_comparison *comparison);
 
 /* Write the volume of `comparison->state` to `text`, for example "at rest + 300 mL". */
 void supine_report_volume(const supine_comparison *comparison, char *text, size_t size);
-
-/* Return the RMS distance of the surface from its supine position, mm, for a direction of gravity
- * at the volume of `comparison->state`; NaN if the lungs cannot reach that volume. */
-double supine_report_from_supine(const supine_comparison *comparison, const double gravity[3]);
 
 /* Return whether the expected error of any posture is known. */
 bool supine_report_has_errors(const supine_comparison *comparison);

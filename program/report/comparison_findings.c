@@ -8,13 +8,10 @@
 
 #include "program/report/comparison_parts.h"
 
-/* Published values for the postures' table rows; report.html names the sources. */
+/* Published values, mean (SD), for the postures' table rows; report.html names the sources. */
 static const struct {
-  const char *posture, *words;
-} published[] = {
-    {"supine", "1.75"},
-    {"left", "0 and +25 %"},
-};
+  const char *posture, *percent, *ratio;
+} published[] = {{"supine", "", "1.75"}, {"left", "0 (44), +25 (11)", ""}};
 
 /* Compute the change of each lung's volume between the reference pose and a posture, % and mL. */
 static void find_changes(const supine_comparison *c, size_t posture, double *percent, double *ml) {
@@ -26,17 +23,18 @@ static void find_changes(const supine_comparison *c, size_t posture, double *per
   }
 }
 
-/* Return the ratio of the regional expansion of the three lowest slabs to that of the three
- * uppermost slabs. */
+/* Return the ratio of the regional expansion of the lowest third of the height to that of the
+ * uppermost third. The slab at the edge of a third counts in part. */
 static double lowest_over_uppermost(const supine_comparison *c, size_t posture) {
   double gain[2] = {0, 0};
   double volume[2] = {0, 0};
-  for (size_t s = 0; s < 3; ++s) {
+  for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
+    const double part = fmax(0, fmin(1, SUPINE_COMPARISON_SLABS / 3.0 - (double)s));
     for (int end = 0; end < 2; ++end) {
       const supine_slab *slab =
           &c->posture[posture].slab[end == 0 ? s : SUPINE_COMPARISON_SLABS - 1 - s];
-      gain[end] += slab->gain;
-      volume[end] += slab->volume;
+      gain[end] += part * slab->gain;
+      volume[end] += part * slab->volume;
     }
   }
   return gain[1] / volume[1] / (gain[0] / volume[0]);
@@ -45,7 +43,7 @@ static double lowest_over_uppermost(const supine_comparison *c, size_t posture) 
 static void print_where(const char *name, FILE *to) {
   const char *label = supine_options_posture_label(name);
   if (label != name) {
-    (void)fprintf(to, "On the %s", label);
+    (void)fprintf(to, "Lying on the %s,", label);
   } else if (isalpha((unsigned char)name[0])) {
     (void)fprintf(to, "%c%s,", toupper((unsigned char)name[0]), name + 1);
   } else {
@@ -53,33 +51,27 @@ static void print_where(const char *name, FILE *to) {
   }
 }
 
-/* Print a sentence on a posture: the change of volume of each lung, beginning with the largest
- * change, and the mean and the largest displacement. */
+/* Print a sentence on a posture: how far the first target or, without targets, the surface moves. A
+ * displacement below its expected error is no change that the model can tell. */
 static void print_finding(const supine_comparison *c, size_t posture, FILE *to) {
-  const supine_basis_info *info = supine_basis_get_info(c->basis);
-  double percent[SUPINE_LUNGS_MAX];
-  double ml[SUPINE_LUNGS_MAX];
-  bool done[SUPINE_LUNGS_MAX] = {false};
+  const supine_compared_posture *p = &c->posture[posture];
+  const supine_target *t = p->targets;
+  const double moved = t != NULL ? t->moved : p->displacement.mean;
+  const double error = t != NULL ? t->expected : p->expected_error;
+  char way[96];
   print_where(c->postures.item[posture].name, to);
-  find_changes(c, posture, percent, ml);
-  for (size_t i = 0; i < info->lung_count; ++i) {
-    size_t most = info->lung_count;
-    for (size_t lung = 0; lung < info->lung_count; ++lung) {
-      if (!done[lung] && (most == info->lung_count || fabs(ml[lung]) > fabs(ml[most]))) {
-        most = lung;
-      }
-    }
-    done[most] = true;
-    (void)fprintf(to, "%s the %s lung ", i > 0 ? ";" : "", info->lung_names[most]);
-    if (fabs(percent[most]) < 1.5) {
-      (void)fprintf(to, "keeps its volume (%+.0f %%)", percent[most]);
-    } else {
-      (void)fprintf(to, "%s %.0f mL (%+.0f %%)", ml[most] < 0 ? "loses" : "gains", fabs(ml[most]),
-                    percent[most]);
-    }
+  (void)fprintf(to, " %s", t != NULL ? t->name : "the surface");
+  if (moved <= error) {
+    (void)fprintf(to, ": " SUPINE_TARGET_UNTOLD " (%.1f mm", moved);
+  } else if (t != NULL) {
+    (void)fprintf(to, " moves %.1f mm: %s", moved, supine_command_target_way(t, 2, way));
+  } else {
+    (void)fprintf(to, " moves %.1f mm on average, %.1f mm at most", moved, p->displacement.max);
   }
-  (void)fprintf(to, "; the surface moves %.1f mm on average, %.1f mm at most.",
-                c->posture[posture].displacement.mean, c->posture[posture].displacement.max);
+  if (error > 0) {
+    (void)fprintf(to, "; expected error %.1f mm", error);
+  }
+  (void)fputs(moved <= error ? ")." : ".", to);
 }
 
 static json_t *printed(const supine_comparison *c, size_t posture,
@@ -107,39 +99,40 @@ json_t *supine_report_findings(const supine_comparison *c) {
   return list;
 }
 
-/* Print the title of a chart: a heading, then the name and value of each posture up to index
- * `last`. If `share` is true, the value is the fraction of the inhaled volume that enters the lower
- * half of the lungs. Otherwise it is the ratio of the expansions of the lowest and uppermost three
- * slabs. */
-static void print_profile(const supine_comparison *c, size_t last, bool share, FILE *to) {
-  (void)fputs(share ? "Share of a breath that goes to the lower half:"
-                    : "Expansion, lowest 30 % of the height divided by uppermost 30 %:",
-              to);
+static void print_profile(const supine_comparison *c, size_t last, FILE *to) {
+  (void)fputs("Expansion, lowest third of the height divided by uppermost third:", to);
   for (size_t i = 0; i <= last; ++i) {
-    if (!c->posture[i].has_breath) {
-      continue;
-    }
-    double gain = 0;
-    for (size_t s = SUPINE_COMPARISON_SLABS / 2; s < SUPINE_COMPARISON_SLABS; ++s) {
-      gain += c->posture[i].slab[s].gain;
-    }
-    (void)fprintf(to, share ? "%s %s %.0f %%" : "%s %s %.1f", i > 0 ? "," : "",
+    (void)fprintf(to, "%s %s %.2f", i > 0 ? "," : "",
                   supine_options_posture_label(c->postures.item[i].name),
-                  share ? 100 * gain / c->breath : lowest_over_uppermost(c, i));
+                  lowest_over_uppermost(c, i));
   }
 }
 
-static void print_ratios(const supine_comparison *c, size_t last, FILE *to) {
-  print_profile(c, last, false, to);
+json_t *supine_report_profile_finding(const supine_comparison *c) {
+  return printed(c, (c->postures.count < 4 ? c->postures.count : 4) - 1, print_profile);
 }
 
-static void print_shares(const supine_comparison *c, size_t last, FILE *to) {
-  print_profile(c, last, true, to);
-}
-
-json_t *supine_report_profile_finding(const supine_comparison *c, bool share) {
-  const size_t last = (c->postures.count < 4 ? c->postures.count : 4) - 1;
-  return printed(c, last, share ? print_shares : print_ratios);
+json_t *supine_report_targets(const supine_comparison *c) {
+  json_t *list = json_array();
+  for (size_t k = 0; c->inside != NULL && k < c->names.count; ++k) {
+    const char *name = c->names.text[k];
+    for (size_t i = 0; i < c->postures.count; ++i) {
+      const supine_target *t = &c->posture[i].targets[k];
+      char way[96];
+      if (c->posture[i].displacement.max < 0.05) { /* this posture is the reference */
+        continue;
+      }
+      (void)json_array_append_new(
+          list, json_pack("{s:s, s:s, s:o, s:s, s:o}", "name", name, "posture",
+                          supine_options_posture_label(c->postures.item[i].name), "moved",
+                          json_sprintf("%.1f", t->moved), "way",
+                          supine_command_target_way(t, 3, way), "error",
+                          isnan(t->expected) ? json_string("unknown")
+                                             : json_sprintf("%.1f", t->expected)));
+      name = "";
+    }
+  }
+  return list;
 }
 
 json_t *supine_report_postures(const supine_comparison *c) {
@@ -149,7 +142,7 @@ json_t *supine_report_postures(const supine_comparison *c) {
     json_t *lungs = json_array();
     double percent[SUPINE_LUNGS_MAX] = {0};
     double ml[SUPINE_LUNGS_MAX] = {0};
-    const char *words = "";
+    const char *words[2] = {"", ""};
     const double ratio = lowest_over_uppermost(c, i); /* NaN if no breath is computed */
     find_changes(c, i, percent, ml);
     for (size_t lung = 0; lung < info->lung_count; ++lung) {
@@ -160,16 +153,20 @@ json_t *supine_report_postures(const supine_comparison *c) {
     }
     for (size_t j = 0; j < sizeof published / sizeof *published; ++j) {
       if (strcmp(published[j].posture, c->postures.item[i].name) == 0) {
-        words = published[j].words;
+        words[0] = published[j].percent;
+        words[1] = published[j].ratio;
       }
     }
+    const double error = c->posture[i].expected_error;
     (void)json_array_append_new(
-        list, json_pack("{s:s, s:s, s:o, s:o, s:o, s:s, s:o}", "name",
+        list, json_pack("{s:s, s:s, s:o, s:o, s:o, s:o, s:s, s:s, s:o}", "name",
                         supine_options_posture_label(c->postures.item[i].name), "line",
                         supine_report_line(i), "held", lungs, "mean",
                         json_sprintf("%.1f", c->posture[i].displacement.mean), "max",
-                        json_sprintf("%.1f", c->posture[i].displacement.max), "published", words,
-                        "ratio", json_sprintf(isnan(ratio) ? "" : "%.2f", ratio)));
+                        json_sprintf("%.1f", c->posture[i].displacement.max), "error",
+                        error > 0 ? json_sprintf("%.1f", error) : json_string(""),
+                        "published_percent", words[0], "published_ratio", words[1], "ratio",
+                        json_sprintf(isnan(ratio) ? "" : "%.2f", ratio)));
   }
   return list;
 }

@@ -57,21 +57,20 @@ static json_t *provenance(const supine_comparison *c, json_t *file) {
   return list;
 }
 
-/* Return the values of these tags of report.html: {{provenance}}, those in the heading, and those
- * in the section on all directions of gravity. */
+/* Return the values of these tags of report.html: {{provenance}}, and those in the heading. */
 static json_t *facts(const supine_comparison *c) {
-  json_t *file = supine_options_json_text(basename(c->path));
+  char title[256];
   char volume[160];
+  supine_options_basis_title(c->path, title, sizeof title);
+  json_t *file = json_string(title);
   supine_report_volume(c, volume, sizeof volume);
   json_t *list = provenance(c, file);
   return json_pack(
-      "{s:o, s:o, s:o, s:o, s:s, s:I, s:o, s:s, s:I, s:o, s:o}", "file", file, "provenance", list,
-      "date", date(), "count",
-      json_sprintf("%zu posture%s", c->postures.count, c->postures.count == 1 ? "" : "s"), "volume",
-      volume, "vertices", (json_int_t)supine_basis_get_info(c->basis)->vertex_count, "area",
-      json_sprintf("%.0f", supine_compare_area(c->compare) / 100.0), "version", SUPINE_VERSION,
-      "directions", (json_int_t)c->directions, "farthest", supine_report_direction(c->farthest),
-      "farthest_rms", json_sprintf("%.2f", c->farthest_rms));
+      "{s:o, s:o, s:o, s:o, s:s, s:I, s:o, s:s}", "file", file, "provenance", list, "date", date(),
+      "count", json_sprintf("%zu posture%s", c->postures.count, c->postures.count == 1 ? "" : "s"),
+      "volume", volume, "vertices", (json_int_t)supine_basis_get_info(c->basis)->vertex_count,
+      "area", json_sprintf("%.0f", supine_compare_area(c->compare) / 100.0), "version",
+      SUPINE_VERSION);
 }
 
 supine_status supine_report_html(const supine_comparison *c, FILE *file, supine_error *error) {
@@ -80,10 +79,17 @@ supine_status supine_report_html(const supine_comparison *c, FILE *file, supine_
   (void)json_object_set_new(data, "findings", supine_report_findings(c));
   (void)json_object_set_new(data, "lungs", lungs(c));
   (void)json_object_set_new(data, "reference", json_string(c->reference.name));
-  (void)json_object_set_new(data, "map", supine_report_map(c));
-  (void)json_object_set_new(data, "map_bar",
-                            supine_report_bar(SUPINE_COLOURS_DIFFERENCE, c->farthest_rms, false,
-                                              "RMS distance from supine, mm"));
+  if (c->inside != NULL) {
+    (void)json_object_set_new(data, "targeted",
+                              json_pack("{s:o}", "targets", supine_report_targets(c)));
+  }
+  if (supine_report_has_errors(c)) {
+    (void)json_object_set_new(data, "meaning",
+                              json_string(SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT));
+  }
+  if (supine_basis_metadata(c->basis, "resting_known") == NULL) {
+    (void)json_object_set_new(data, "assumed", json_true());
+  }
   if (c->postures.count > 1) {
     json_t *outlines = supine_report_outlines(c);
     json_t *drawn = json_object_get(json_array_get(outlines, 0), "lines");
@@ -92,7 +98,7 @@ supine_status supine_report_html(const supine_comparison *c, FILE *file, supine_
   }
   if (c->breath > 0.0) {
     (void)json_object_set_new(data, "ventilation",
-                              json_pack("{s:o}", "profiles", supine_report_profiles(c)));
+                              json_pack("{s:o}", "profile", supine_report_profile(c)));
   }
   json_t *pictures = supine_report_pictures(c, error);
   if (pictures != NULL) {

@@ -45,7 +45,7 @@ static json_t *draw(supine_renderer *renderer, const supine_scene *scene, supine
 static void set_gravity(const double g[3], json_t *shot) {
   double axes[3][3];
   double seen[3] = {0.0, 0.0, 0.0};
-  supine_render_view_axes(view, axes);
+  supine_render_view_axes(view, g, axes);
   for (int row = 0; row < 3; ++row) {
     for (int axis = 0; axis < 3; ++axis) {
       seen[row] += axes[row][axis] * g[axis];
@@ -73,9 +73,9 @@ static json_t *picture(const supine_comparison *c, supine_renderer *renderer, si
   if (png == NULL) {
     return NULL;
   }
-  json_t *made = json_pack(
-      "{s:s, s:o, s:o}", "name", supine_options_posture_label(c->postures.item[posture].name),
-      "png", png, "points", supine_report_direction(c->postures.item[posture].state.gravity));
+  json_t *made =
+      json_pack("{s:s, s:o}", "name", supine_options_posture_label(c->postures.item[posture].name),
+                "png", png);
   set_gravity(c->postures.item[posture].state.gravity, made);
   return made;
 }
@@ -85,7 +85,6 @@ json_t *supine_report_pictures(const supine_comparison *c, supine_error *error) 
   const size_t count = c->postures.count;
   const size_t rows = (count + PER_ROW - 1) / PER_ROW;
   double extent[4] = SUPINE_EXTENT_NONE;
-  double p95 = 0.0;
   double most = 0.0;
   supine_renderer *renderer = NULL;
   json_t *cells = json_array();
@@ -98,20 +97,19 @@ json_t *supine_report_pictures(const supine_comparison *c, supine_error *error) 
   for (size_t i = 0; i < count; ++i) {
     const supine_scene scene = make_scene(c, i, NULL);
     supine_render_extent(renderer, &scene, extent);
-    p95 = fmax(p95, c->posture[i].displacement.p95);
     most = fmax(most, c->posture[i].displacement.max);
   }
-  const double largest = supine_render_bar_end(p95);
+  const double largest = supine_render_bar_end(most);
   for (size_t i = 0; i < count; ++i) {
     if (json_array_append_new(cells, picture(c, renderer, i, largest, extent, value, error)) != 0) {
       goto cleanup;
     }
   }
   char words[224];
-  (void)snprintf(
-      words, sizeof words, "displacement from %s, mm; contour lines at the ticks of the bar%s",
-      c->reference.name, most > largest ? "; the last colour also stands for larger values" : "");
-  pictures = supine_report_bar(SUPINE_COLOURS_DISPLACEMENT, largest, most > largest, words);
+  (void)snprintf(words, sizeof words,
+                 "displacement from %s, mm; contour lines at the ticks of the bar",
+                 c->reference.name);
+  pictures = supine_report_bar(SUPINE_COLOURS_DISPLACEMENT, largest, words);
   (void)json_object_set(pictures, "cells", cells);
   (void)json_object_set_new(pictures, "widest", json_integer(WIDTH));
   (void)json_object_set_new(pictures, "columns",

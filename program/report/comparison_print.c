@@ -77,6 +77,14 @@ static json_t *encode_slab(const supine_compared_posture *posture, size_t s) {
                    "expansion", posture->expansion[s], "share", posture->share[s]);
 }
 
+static json_t *encode_targets(const supine_comparison *c, size_t posture) {
+  json_t *list = json_array();
+  for (size_t i = 0; i < c->names.count; ++i) {
+    (void)json_array_append_new(list, supine_command_target_json(&c->posture[posture].targets[i]));
+  }
+  return list;
+}
+
 static json_t *encode_postures(const supine_comparison *c) {
   json_t *list = json_array();
   for (size_t i = 0; i < c->postures.count; ++i) {
@@ -98,6 +106,9 @@ static json_t *encode_postures(const supine_comparison *c) {
       }
       (void)json_object_set_new(posture, "gain_ml", by_lung(c, c->posture[i].gain));
       (void)json_object_set_new(posture, "slabs", slabs);
+    }
+    if (c->inside != NULL) {
+      (void)json_object_set_new(posture, "targets", encode_targets(c, i));
     }
     (void)json_array_append_new(list, posture);
   }
@@ -130,6 +141,10 @@ static void add_tables(const supine_comparison *c, json_t *text) {
       (void)json_object_set_new(moved, "expected error", json_real(c->posture[i].expected_error));
     }
     add_row(text, "displacement, mm", "posture", name, moved);
+    for (size_t k = 0; c->inside != NULL && k < c->names.count; ++k) {
+      add_row(text, "targets", "posture", name,
+              supine_command_target_json(&c->posture[i].targets[k]));
+    }
     add_row(text, "volume of each lung, mL", "posture", name, volumes(c, i, true));
     if (c->posture[i].has_breath) {
       add_row(text, gained, "posture", name, by_lung(c, c->posture[i].gain));
@@ -169,9 +184,5 @@ void supine_report_print(const supine_comparison *c, bool json) {
     (void)json_object_set_new(root, "expected error",
                               json_string(SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT));
   }
-  (void)json_object_set_new(root, "sphere",
-                            json_pack("{s:I, s:{s:o, s:f}}", "directions",
-                                      (json_int_t)c->directions, "farthest_from_supine", "gravity",
-                                      direction(c->farthest), "rms_mm", c->farthest_rms));
   supine_options_print(root, json);
 }

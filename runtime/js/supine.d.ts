@@ -11,6 +11,17 @@ export interface Tensor {
   data: Uint8Array | Uint32Array | Float32Array | Float64Array | Int16Array;
 }
 
+/** A named structure: the mean position `at` of its vertices, its displacement `move`, the length `mm` of this
+ * displacement, and its expected error (3-D RMS). Lengths are in mm. */
+export interface Target {
+  name: string;
+  lung: string;
+  at: number[];
+  move: number[];
+  mm: number;
+  expectedError: number;
+}
+
 /** An open basis and its posed surface. Arrays are views of WebAssembly memory that never moves: write only to
  * `positions` and `normals`. Lengths are in mm, volumes in mL, axes are LPS: +x left, +y posterior, +z head. */
 export interface Basis {
@@ -44,6 +55,10 @@ export interface Basis {
    * `since`, or in the scan, are exact. The next call overwrites the result.
    * @throws SupineError */
   expectedError(since?: State): Float32Array;
+  /** Compute where each named structure of a basis made by 'supine embed' is in the pose, and how far it has moved from
+   * the state `since`, or from the scan. `positions` are then those of the pose.
+   * @throws SupineError */
+  targets(since?: State): Target[];
 }
 
 /** A failure that the library reports, with its message. */

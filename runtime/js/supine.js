@@ -115,6 +115,30 @@ class Basis {
     return this.#view(Float32Array, this.#expected, this.vertexCount);
   }
 
+  targets(since) {
+    const after = this.deform().slice();
+    const sigma = this.expectedError(since);
+    if (since === undefined) this.#c.supine_basis_scan(this.#nextState, this.#basis);
+    this.#check(this.#c.supine_basis_pose(this.#basis, this.#nextState, this.#nextPose, this.#error));
+    this.#c.supine_deform(this.#basis, this.#nextPose, this.#positions);
+    const [part, names] = [this.tensor('part')?.data ?? [], this.tensor('names')?.data ?? new Uint8Array()];
+    const made = new TextDecoder().decode(names).split('\n').map((name) => ({ name, lung: '', at: [0, 0, 0], move: [0, 0, 0], mm: 0, expectedError: 0, count: 0 }));
+    part.forEach((index, v) => {
+      const target = made[index];
+      if (target.count++ === 0) target.lung = Object.keys(this.lungs).find((name) => v < this.lungs[name][1]);
+      for (let k = 0; k < 3; ++k) {
+        target.at[k] += after[3 * v + k];
+        target.move[k] += after[3 * v + k] - this.positions[3 * v + k];
+      }
+      target.expectedError += sigma[v] ** 2;
+    });
+    this.deform();
+    return made.filter(({ count }) => count > 0).map(({ count, at, move, expectedError, ...target }) => {
+      const mean = move.map((x) => x / count);
+      return { ...target, at: at.map((x) => x / count), move: mean, mm: Math.hypot(...mean), expectedError: Math.sqrt(expectedError / count) };
+    });
+  }
+
   /** Write a state to #nextState. The default posture is supine; the default volume is the default of the basis. */
   #read(state) {
     const { gravity = [0, 1, 0], volume = '' } = typeof state === 'string' ? { volume: state } : state;

@@ -49,6 +49,8 @@ ROWS = (
     ("density, back third, prone", None, None, "g/mL", "-0.11 (Prisk 2007): missed"),
     ("mean displacement to prone, rest", 6, 20, "mm", ""),
     ("lower half / upper third, to prone", 2, 10, "", "lesions move below the carina (Yankelevitz 1995)"),
+    ("expansion of upper / lower lobes, supine", 0.61, 0.94, "", "0.61 to 0.94 (Shin 2020, n 56)"),
+    ("expansion of upper / lower lobes, prone", 0.93, 1.06, "", "0.98 to 1.06 (Shin 2020, n 34)"),
     ("reversed triangles, at most", 0, 0.03, "%", ""),
     ("reversed triangles added by the bend", None, 2, "", ""),
 )
@@ -164,7 +166,8 @@ class Lungs:
 
 
 def lobes(program, path, folder):
-    """Return the change of volume of the lobes of a label map (1, 2: left; 3, 4, 5: right) from supine to upright, %."""
+    """Return the change of volume of the lobes of a label map (1, 2: left; 3, 4, 5: right) from supine to upright, %, and
+    the expansion of the upper lobes from rest to full, divided by that of the lower ones."""
     def run(*words):
         return subprocess.run([program, *words], check=True, capture_output=True, text=True).stdout
     out = {}
@@ -174,8 +177,14 @@ def lobes(program, path, folder):
     run("embed", basis, path, "--labels", names, "-o", inside)
     for volume, words in (("full", "full"), ("rest", "at rest")):
         for row in json.loads(run("compare", inside, "--postures", f"supine:{volume},upright:{volume}", "--json")):
-            before, after = row["volumes_ml"]
+            before, after = row.get("volumes_ml", (1, 1))
             out[f"{row['name']} lobe {words}, upright"] = 100 * (after / before - 1)
+    for posture in ("supine", "prone"):
+        ml = {row["name"]: row.get("volumes_ml") for row in
+              json.loads(run("compare", inside, "--postures", f"{posture}:rest,{posture}:full", "--json"))}
+        upper, lower = (sum(ml[f"{side} {part}"][1] for side in ("left", "right")) /
+                        sum(ml[f"{side} {part}"][0] for side in ("left", "right")) for part in ("upper", "lower"))
+        out[f"expansion of upper / lower lobes, {posture}"] = upper / lower
     return out
 
 
@@ -214,7 +223,7 @@ def main(arguments):
     misses = 0
     for what, low, high, unit, published in ROWS:
         values = [column.get(what, float("nan")) for column in columns.values()]
-        bad = [(low is not None and v < low) or (high is not None and v > high) for v in values]
+        bad = [bool((low is not None and v < low) or (high is not None and v > high)) for v in values]
         misses += sum(bad)
         held = "shown" if high is None else f"{'' if low is None else low}..{high}"
         text = "".join("%16s" % ("-" if v != v else f"{v:.3g}" + "!" * int(b)) for v, b in zip(values, bad))

@@ -38,10 +38,10 @@ for (const colorScheme of ['light', 'dark']) {
   assert.deepEqual(nameless, []);
   const colours = await page.evaluate(() => {
     const style = getComputedStyle(document.documentElement);
-    return Object.fromEntries(['edge', 'accent', 'accent-ink', 'paper-solid', 'field', 'gravity', 'back-inner', 'back-outer'].map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+    return Object.fromEntries(['edge', 'accent', 'accent-ink', 'paper-solid', 'field', 'change', 'ink', 'back'].map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
   });
   const long = (hex) => (hex.length === 4 ? `#${[...hex.slice(1)].map((c) => c + c).join('')}` : hex);
-  for (const [a, b] of [['edge', 'paper-solid'], ['accent', 'paper-solid'], ['accent', 'field'], ['accent', 'accent-ink'], ['gravity', 'back-inner'], ['gravity', 'back-outer']]) {
+  for (const [a, b] of [['edge', 'paper-solid'], ['accent', 'paper-solid'], ['accent', 'field'], ['accent', 'accent-ink'], ['change', 'paper-solid'], ['ink', 'back']]) {
     const ratio = contrast(long(colours[a]), long(colours[b]));
     assert.ok(ratio >= 3, `${colorScheme}: ${a} on ${b} is ${ratio.toFixed(2)}`);
   }

@@ -85,7 +85,7 @@ export async function press(page, key) {
 }
 
 /** Return the picture without the texts over it. */
-const screenshot = (page) => page.locator('#picture').screenshot({ style: '#stage > :not(#picture) { visibility: hidden !important }' });
+const screenshot = (page) => page.locator('#picture').screenshot({ style: '#stage > :not(#picture):not(#notes) { visibility: hidden !important }' });
 
 /** Return the picture after it has been drawn and no longer changes. */
 export async function picture(page) {

@@ -42,22 +42,18 @@ for (const name of ['displacement', 'difference']) {
   assert.ok(ratio < 1.1, `${name}: steps differ by a factor of ${ratio}`);
 }
 
-// Each colour bar of the report shows one of the two colour maps. The chart of all directions of gravity uses the colour
-// map of differences.
+// The colour bar of the report shows the colour map of displacements.
 supine('compare', join(folder, 'lungs.safetensors'), '--postures', 'supine,prone', '-o', join(folder, 'report.html'));
 const report = readFileSync(join(folder, 'report.html'), 'utf8');
 const bytesOf = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
 const apart = (hex, name, i) => Math.max(...bytesOf(hex).map((x, k) => Math.abs(x - Buffer.from(colours[name], 'hex')[3 * i + k])));
 const bars = [...report.matchAll(/linear-gradient\(90deg,(#[^)]*)\)/g)].map((found) => found[1].split(','));
-assert.equal(bars.length, 2);
+assert.equal(bars.length, 1);
 for (const stops of bars) {
   assert.equal(stops.length, 17);
   const off = Object.keys(colours).map((name) => Math.max(...stops.map((hex, i) => apart(hex, name, Math.round((255 * i) / 16)))));
   assert.ok(Math.min(...off) <= 3, `colours of a bar differ by ${off}: ${stops}`);
 }
-const fills = [...new Set([...report.matchAll(/<path fill="(#[0-9a-f]{6})"/g)].map((found) => found[1]))];
-assert.ok(fills.length > 50, `the map has ${fills.length} colours`);
-for (const hex of fills) assert.ok(Array.from({ length: 256 }, (_, i) => i).some((i) => apart(hex, 'difference', i) <= 2), `${hex} is not in the colour map`);
 
 // Ranges end at the same round numbers as those of pictures and reports: the cases are from tests/test_render.c.
 for (const [value, step, end] of [[31.6, 5, 35], [18.7, 2, 20], [20, 5, 20], [0.043, 0.01, 0.05], [7.99, 1, 8], [8, 2, 8], [0, 0.2, 1]]) {

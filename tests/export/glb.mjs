@@ -195,18 +195,12 @@ async function checkAnimations(basis) {
   }
 }
 
-/** Check colours: green, which rises along the colour map, follows the largest displacement in any
- * lying posture. */
+/** Check that lungs have the colour of tissue, which says nothing of displacements. */
 async function checkColours(basis) {
   const path = join(folder, 'coloured.glb');
   supine('export', basis, '-o', path, '--plain');
   const { lungs } = await open(path);
-  const [back, ...lying] = evaluate(basis, [[0, 1, 0], [1, 0, 0], [0, -1, 0], [-1, 0, 0]].map((g) => [g, 0])).map(({ xyz }) => xyz);
-  const moves = Array.from({ length: back.length / 3 }, (_, i) => Math.max(...lying.map((xyz) => Math.hypot(...[0, 1, 2].map((k) => xyz[3 * i + k] - back[3 * i + k])))));
-  const green = lungs.flatMap((lung) => { const c = lung.geometry.attributes.color; return Array.from({ length: c.count }, (_, i) => c.getY(i)); });
-  const order = moves.map((_, i) => i).sort((a, b) => moves[a] - moves[b]);
-  const third = (from) => mean(order.slice(from, from + Math.floor(order.length / 3)).map((i) => green[i]));
-  assert.ok(third(0) < third(Math.floor(order.length / 3)) && third(Math.floor(order.length / 3)) < third(2 * Math.floor(order.length / 3)));
+  for (const { geometry, material } of lungs) assert.ok(!geometry.attributes.color && material.color.r > 1.5 * material.color.b);
 }
 
 const mesh = join(folder, 'lungs.ply');

@@ -45,7 +45,7 @@ async function checkControls(page) {
     await page.mouse.move(5, 5);
   };
   await changes('dragging the picture', () => drag('#picture', 90, 30));
-  await changes('dragging the ball', () => drag('#ball', 30, 10));
+  await changes('dragging the silhouette', () => drag('#patient', 30, 10));
   await changes('the tilt slider', () => page.locator('#tilt').fill('30'));
   await changes('the volume slider', () => page.locator('#depth').fill('900'));
   await changes('a key', () => press(page, '5'));

@@ -55,8 +55,8 @@ async function checkNormals(page) {
   assert.ok(mean < 0.1 && p999 < 1, `mean ${mean}, 99.9th percentile ${p999}`);
 }
 
-/** Check that a single lung right of x = 0 is called "right lung", and that the letters L and R are on the patient's left
- * and right. */
+/** Check that a single lung right of x = 0 is called "right lung", and that it is seen from the front and
+ * the back as it should. */
 async function checkRight(page) {
   const { xyz, corners } = await page.evaluate(() => {
     const { basis: b } = window.supine;
@@ -78,8 +78,7 @@ async function checkRight(page) {
   for (const [key, behind] of [['a', false], ['p', true]]) { // from the front, then from behind
     await press(alone, key);
     await settled(alone);
-    const [at, ends] = await alone.evaluate(() => {
-      const letters = Object.fromEntries([...document.querySelectorAll('.letter:not([hidden])')].map((e) => { const box = e.getBoundingClientRect(); return [e.textContent, box.x + box.width / 2]; }));
+    const ends = await alone.evaluate(() => {
       const { surface } = window.supine.basis;
       const m = window.supine.panes()[0].toEye;
       const seen = (v) => m[0] * surface[3 * v] + m[4] * surface[3 * v + 1] + m[8] * surface[3 * v + 2] + m[12];
@@ -88,11 +87,9 @@ async function checkRight(page) {
         if (surface[3 * v] > surface[3 * leftmost]) leftmost = v;
         if (surface[3 * v] < surface[3 * rightmost]) rightmost = v;
       }
-      return [letters, [seen(leftmost), seen(rightmost)]];
+      return [seen(leftmost), seen(rightmost)];
     });
-    assert.deepEqual(Object.keys(at).sort(), ['F', 'H', 'L', 'R']);
     assert.equal(ends[0] > ends[1], !behind);
-    assert.equal(at.L > at.R, !behind, `from ${key}: ${JSON.stringify(at)}`);
   }
   assert.deepEqual(complaints, []);
   await close(alone);

@@ -63,6 +63,16 @@ assert.deepEqual(lungs.tensor('coefficients').shape[0], lungs.vertexCount);
 assert.equal(lungs.tensor('none'), undefined);
 assert.equal((await open(readFileSync(inside))).tensor('names').data.length > 0, true);
 
+/* The targets are the rows of 'supine deform': a row for each name, also of a mesh. */
+const [parts, table] = [await open(readFileSync(inside)), join(folder, 'targets.csv')];
+for (const [since, from] of [['supine:rest', ['--from', 'supine:rest']], [undefined, []]]) {
+  supine('deform', inside, '--posture', 'left', ...from, '-o', table);
+  const rows = readFileSync(table, 'utf8').trim().split('\n').slice(2).map((line) => line.split(','));
+  const targets = parts.pose('left').targets(since);
+  assert.deepEqual(targets.map(({ name, lung }) => [name, lung]), rows.map((row) => row.slice(0, 2)));
+  targets.forEach(({ at, move, mm, expectedError }, i) => [...at, ...move, mm, expectedError].forEach((x, k) => assert.ok(Math.abs(x - rows[i][2 + k]) < 5e-3, `${rows[i]}: ${x}`)));
+}
+
 /* A basis of an open surface, made by an older version, has no volumes. A pose needs a gain, the displacement factor. */
 const opened = await open(readFileSync(join(dirname(process.env.GOLDEN), 'open_surface.safetensors')));
 assert.throws(() => opened.volumes, { status: 'open surface' });

@@ -273,6 +273,18 @@ for basis in (lungs, made):
     assert set(inside.points) == {"on, the surface", "other"} and "2 points" in inside.report
     moved = inside.deform(inside.pose("prone:rest"))[inside.points["on, the surface"]]
     assert np.abs(moved - lungs.deform(lungs.pose("prone:rest"))[7]).max() < 0.05
+parts = supine.embed(made, {"nodule": place}, (0.2 * lungs.vertices + 0.8 * place, lungs.triangles))
+wanted = parts.targets("left", since="supine:rest")
+table = path + ".csv"
+with open(path + ".parts", "wb") as file:
+    file.write(parts._owner.source)
+subprocess.run(["supine", "deform", file.name, "--posture", "left", "--from", "supine:rest", "-o", table], check=True, stdout=subprocess.DEVNULL)
+with open(table) as file:
+    rows = [line.split(",") for line in file.read().split("\n")[2:-1]]
+assert len(rows) == len(wanted) == 2 and all(t.mm > 0 for t in wanted)
+for row, t in zip(rows, wanted):
+    assert row[:2] == [t.name, t.lung] and np.allclose(np.array(row[2:], float), [*t.at, *t.move, t.mm, t.expected_error], atol=2e-3), (row, t)
+refused(supine.ArgumentError, "no structures", lungs.targets, "left")
 assert supine.embed(made, place).vertex_count == 1
 assert supine.embed(made, (0.9 * lungs.vertices, lungs.triangles), np.array([place])).vertex_count == n + 1
 assert supine.embed(made, grid=40, clamp=True).vertex_count > 100

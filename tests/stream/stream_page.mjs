@@ -50,6 +50,11 @@ async function view() {
 const viewers = [await view(), await view()];
 const ages = () => Promise.all(viewers.map((page) => page.evaluate(() => window.supineLive.age())));
 assert.deepEqual(await ages(), ['no tracker yet', 'no tracker yet']);
+assert.ok(await viewers[0].evaluate(() => document.body.classList.contains('waiting')), 'not grey before the first pose');
+await viewers[0].evaluate(() => { // count the announcements of a screen reader
+  window.announced = 0;
+  new MutationObserver(() => { window.announced += 1; }).observe(document.getElementById('finding'), { childList: true, subtree: true, characterData: true });
+});
 
 /** Wait until every viewer shows this direction of gravity and the server's volume. */
 async function expectGravity(wanted, what) {
@@ -89,6 +94,13 @@ for (let i = 0; i <= 400; ++i) {
   tracker.write(transform([Math.cos(a), 0, Math.sin(a)], [Math.sin(a), 0, -Math.cos(a)], [0, 1, 0]));
 }
 await expectGravity([-Math.sin(2.1), Math.cos(2.1), 0], 'the last of many');
+
+await viewers[0].waitForFunction(() => /^With gravity along /.test(document.getElementById('finding').textContent));
+// The sentence changed only after each posture had settled, and says nothing of the breath.
+const [announced, sentence, cards] = await viewers[0].evaluate(() => [window.announced, document.getElementById('finding').textContent, [...document.querySelectorAll('#postures small')].map((e) => e.textContent)]);
+assert.ok(announced >= 1 && announced <= lies.length + 2, `${announced} announcements`);
+assert.ok(!/above/.test(sentence) && cards.every((text) => text !== ''), `${sentence} ${cards}`);
+assert.ok(await viewers[0].evaluate(() => !document.body.classList.contains('waiting')));
 
 // The tilt sensor of a phone on the breastbone gives the posture.
 const phone = await context.newCDPSession(viewers[0]);

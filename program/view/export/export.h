@@ -68,8 +68,7 @@ typedef struct export_glb_options {
  *
  * base_i is the stored position, target_ij the displacement stored in target j. The `extras` of the
  * file and of each lung's mesh say how to compute the weights from gravity and volume. Targets also
- * change normals. The colour of a vertex shows its largest displacement between
- * supine and another lying posture, at the start of a breath. The node "patient" lies on a table
+ * change normals. The node "patient" lies on a table
  * and rotates about the centre of the lungs; an arrow shows gravity. Units are metres, y points up.
  * @param bytes  output: size of the file
  * @retval SUPINE_ERROR_MESH         the basis has no triangles
@@ -81,15 +80,24 @@ supine_status supine_export_glb_write(const char *path, const export_source *sou
                                       const export_glb_options *options, size_t *bytes,
                                       supine_error *error);
 
-/** Largest number of modes on an HTML page: four vertex attributes hold four coefficients each. */
+/** Largest number of modes on an HTML page: 12 vertex attributes hold the coefficients of a vector
+ * basis, four each. */
 enum { EXPORT_PAGE_MODES_MAX = 16 };
+
+/** A state from which displacements are measured. */
+typedef struct export_reference {
+  const supine_pose *pose;
+  const char *name;      /**< for example "supine at rest" */
+  const double *gravity; /**< [3] direction of gravity */
+  double above; /**< volume of the state, mL above rest; NAN if it is not stated relative to rest */
+} export_reference;
 
 /** Options of the exported HTML page. */
 typedef struct export_page {
-  double breath;           /**< tidal volume, mL */
-  const supine_pose *from; /**< pose from which displacements are measured */
-  const char *from_name;   /**< name of `from`, for example "supine at rest" */
-  const char *title;       /**< title of the page, UTF-8 */
+  double breath;                /**< tidal volume, mL */
+  const export_reference *from; /**< [from_count] states to choose from; the first is shown */
+  size_t from_count;            /**< at least 1 */
+  const char *title;            /**< title of the page, UTF-8 */
   /** Basis of the structures inside the lungs, made by 'supine embed'; NULL to show none. */
   const export_source *inside;
   const export_parts *parts; /**< names of the structures; unused if `inside` is NULL */
@@ -99,9 +107,8 @@ typedef struct export_page {
 /** Print one self-contained HTML page that shows the lungs in a browser (WebGL 2) without a
  * network. Vertices, displacements and triangles are compressed by meshoptimizer. In lungs up to
  * 650 mm long, positions err by at most 0.02 mm. A write error sets the error indicator of `file`.
- * @retval SUPINE_ERROR_UNSUPPORTED  the modes displace a vertex in different directions, there are
- *                                   more than EXPORT_PAGE_MODES_MAX modes, or meshoptimizer is not
- *                                   installed
+ * @retval SUPINE_ERROR_UNSUPPORTED  there are more than EXPORT_PAGE_MODES_MAX modes, or
+ *                                   meshoptimizer is not installed
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_export_html_print(FILE *file, const export_source *source,
                                        const export_page *shown, supine_error *error);

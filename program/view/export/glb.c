@@ -8,78 +8,33 @@
 
 #include "base/output.h"
 #include "program/view/export/packed.h"
-#include "program/view/render/render.h"
 
 /* Smallest quantisation step of positions. Lungs longer than 1.47 m need a larger one. */
 static const double step_min_mm = 0.045;
 
-/* Compute the largest displacement of each vertex, mm, from supine to another lying posture at the
- * start of a breath. Return the maximum over all vertices. Overwrite g->xyz and g->normals. */
-static double find_displacements(const glb *g, float *displacement) {
-  static const double lying[][3] = {{0, 1, 0}, {1, 0, 0}, {0, -1, 0}, {-1, 0, 0}};
-  float *from = g->normals;
-  double largest = 0;
-  for (size_t p = 0; p < sizeof lying / sizeof *lying; ++p) {
-    supine_pose pose;
-    if (supine_export_breath_pose(g->source, g->options->breath, lying[p], 0, &pose, NULL) !=
-        SUPINE_OK) {
-      continue;
-    }
-    (void)supine_deform(g->source->basis, &pose, p == 0 ? from : g->xyz);
-    for (size_t i = 0; p > 0 && i < g->source->info->vertex_count; ++i) {
-      const float *to = g->xyz + 3 * i;
-      const float away[3] = {to[0] - from[3 * i], to[1] - from[3 * i + 1], to[2] - from[3 * i + 2]};
-      displacement[i] = fmaxf(displacement[i], hypotf(hypotf(away[0], away[1]), away[2]));
-      largest = fmax(largest, (double)displacement[i]);
-    }
-  }
-  return largest;
-}
-
-/* Compute linear RGBA colours from displacements, mm, on a scale of 0 to `end` mm. */
-static void colour(const float *displacement, size_t count, double end, uint8_t *colours) {
-  for (size_t i = 0; i < count; ++i) {
-    double rgb[3];
-    supine_render_colour(SUPINE_COLOURS_DISPLACEMENT, fmin(1, (double)displacement[i] / end), rgb);
-    for (size_t k = 0; k < 3; ++k) {
-      const double linear = rgb[k] <= 0.04045 ? rgb[k] / 12.92 : pow((rgb[k] + 0.055) / 1.055, 2.4);
-      colours[4 * i + k] = (uint8_t)lrint(255 * linear);
-    }
-    colours[4 * i + 3] = 255;
-  }
-}
-
-/* Compute the normals and colours of vertices. Set `end` to the displacement, mm, at which the
- * colour scale ends. */
-static supine_status prepare(glb *g, double *end, supine_error *error) {
+/* Compute the normals of vertices. */
+static supine_status prepare(glb *g, supine_error *error) {
   const size_t n = g->source->info->vertex_count;
-  float *displacement = calloc(n, sizeof *displacement);
   g->xyz = malloc(3 * n * sizeof *g->xyz);
   g->normals = malloc(3 * n * sizeof *g->normals);
   g->added = malloc(3 * n * g->targets.count * sizeof *g->added);
-  g->colours = malloc(4 * n);
   supine_status status = supine_export_order_make(g->source, !g->options->plain, &g->order, error);
-  if (status == SUPINE_OK && (displacement == NULL || g->xyz == NULL || g->normals == NULL ||
-                              g->added == NULL || g->colours == NULL)) {
+  if (status == SUPINE_OK && (g->xyz == NULL || g->normals == NULL || g->added == NULL)) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
   }
   if (status == SUPINE_OK) {
-    *end = supine_render_bar_end(find_displacements(g, displacement));
-    colour(displacement, n, *end, g->colours);
     status = supine_export_targets_normals(g->source, g->options->breath, &g->targets,
                                            g->options->plain ? NULL : g->order.vertex, g->normals,
                                            g->added, error);
   }
-  free(displacement);
   return status;
 }
 
 /* Append the patient with the lungs, the animations, the table under the patient and the arrow of
- * gravity. Set `roots` to the root nodes of the scene, and `end` to the displacement, mm, at which
- * the colour scale ends. */
-static supine_status add_all(glb *g, double *end, json_t **roots, supine_error *error) {
+ * gravity. Set `roots` to the root nodes of the scene. */
+static supine_status add_all(glb *g, json_t **roots, supine_error *error) {
   float q[4];
-  const supine_status status = prepare(g, end, error);
+  const supine_status status = prepare(g, error);
   if (status != SUPINE_OK) {
     return status;
   }
@@ -100,14 +55,14 @@ static supine_status add_all(glb *g, double *end, json_t **roots, supine_error *
 
 /* Build the file's JSON. A compressed file has a second buffer, the fallback that
  * EXT_meshopt_compression requires: it has the size of the decompressed arrays, but no data. */
-static json_t *make_root(glb *g, size_t bytes, double end, json_t *roots) {
+static json_t *make_root(glb *g, size_t bytes, json_t *roots) {
   static const char packed[] = "EXT_meshopt_compression";
   json_t *root =
       json_pack("{s:{s:s, s:s}, s:i, s:[{s:s, s:o}], s:O, s:O, s:O, s:O, s:O, s:[{s:I}], s:o}",
                 "asset", "version", "2.0", "generator", "supine", "scene", 0, "scenes", "name",
                 "lungs", "nodes", roots, "nodes", g->nodes, "meshes", g->meshes, "materials",
                 g->materials, "bufferViews", g->views, "accessors", g->accessors, "buffers",
-                "byteLength", (json_int_t)bytes, "extras", supine_export_glb_extras(g, end));
+                "byteLength", (json_int_t)bytes, "extras", supine_export_glb_extras(g));
   if (!g->options->plain) {
     (void)json_array_append_new(json_object_get(root, "buffers"),
                                 json_pack("{s:I, s:{s:{s:b}}}", "byteLength",
@@ -158,19 +113,18 @@ static supine_status write_file(const char *path, const char *text, const char *
 static supine_status make_and_write(glb *g, const char *path, size_t *total, supine_error *error) {
   char *numbers = NULL;
   size_t bytes = 0;
-  double end = 0;
   json_t *roots = NULL;
   g->numbers = open_memstream(&numbers, &bytes);
   if (g->numbers == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
   }
-  supine_status status = add_all(g, &end, &roots, error);
+  supine_status status = add_all(g, &roots, error);
   const bool whole = ferror(g->numbers) == 0;
   if (fclose(g->numbers) != 0 || !whole) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
   }
   if (status == SUPINE_OK) {
-    json_t *root = make_root(g, bytes, end, roots);
+    json_t *root = make_root(g, bytes, roots);
     char *text = json_dumps(root, JSON_COMPACT | JSON_REAL_PRECISION(9));
     status = text == NULL ? supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path)
                           : write_file(path, text, numbers, bytes, total, error);
@@ -212,7 +166,6 @@ supine_status supine_export_glb_write(const char *path, const export_source *sou
   free(g->xyz);
   free(g->normals);
   free(g->added);
-  free(g->colours);
   free(g);
   return status;
 }

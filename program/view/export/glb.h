@@ -17,7 +17,6 @@ typedef enum glb_kind {
   GLB_POSITIONS,      /**< float [3]: positions or displacements in units of glb.step */
   GLB_NORMALS,        /**< float [3]: unit normals */
   GLB_NORMAL_CHANGES, /**< float [3]: vectors that a morph target adds to normals */
-  GLB_COLOURS,        /**< uint8_t [4]: RGBA, linear */
   GLB_TIMES,          /**< float: times of an animation's frames, s */
   GLB_WEIGHTS,        /**< float: weights of morph targets in an animation, 0 to 1 */
   GLB_ROTATIONS       /**< float [4]: quaternions x, y, z, w */
@@ -32,8 +31,7 @@ typedef struct glb {
   float *xyz;     /**< [N, 3] workspace */
   float *normals; /**< [N, 3] unit normals of the base mesh */
   float *added; /**< [targets.count, N, 3] change of the normals by each morph target at weight 1 */
-  uint8_t *colours; /**< [N, 4] linear RGBA of vertices */
-  double step;      /**< unit of stored positions and displacements, mm; 1 if options->plain */
+  double step;  /**< unit of stored positions and displacements, mm; 1 if options->plain */
   json_t *views, *accessors, *meshes, *nodes, *materials, *animations;
   FILE *numbers;        /**< binary chunk of the file */
   size_t unpacked;      /**< total size of the compressed arrays after decompression, bytes */
@@ -59,9 +57,8 @@ json_int_t supine_export_glb_add(glb *g, size_t lung);
 
 json_int_t supine_export_glb_material(glb *g, const char *name, const double rgb[3]);
 
-/** Return the `extras` of the file, which say how to compute weights from gravity and volume.
- * @param end  displacement at which the colour scale ends, mm */
-json_t *supine_export_glb_extras(const glb *g, double end);
+/** Return the `extras` of the file, which say how to compute weights from gravity and volume. */
+json_t *supine_export_glb_extras(const glb *g);
 
 /** Return the `extras` of a lung's mesh: constants for the formulas in the `extras` of the file. */
 json_t *supine_export_glb_lung_extras(const glb *g, size_t lung);

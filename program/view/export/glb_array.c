@@ -25,8 +25,6 @@ static layout layout_of(const glb *g, glb_kind kind) {
   switch (kind) {
   case GLB_CORNERS:
     return (layout){"SCALAR", 1, 4, UNSIGNED_INT, 0, CORNERS};
-  case GLB_COLOURS:
-    return (layout){"VEC4", 4, 4, UNSIGNED_BYTE, 0, VERTICES};
   case GLB_TIMES:
     return (layout){"SCALAR", 1, 4, FLOAT, 0, 0};
   case GLB_WEIGHTS:
@@ -130,7 +128,7 @@ json_int_t supine_export_glb_put_zeros(glb *g, glb_kind kind, size_t count) {
                               json_pack("{s:i, s:I, s:s}", "componentType", l.component, "count",
                                         (json_int_t)count, "type", l.type));
   const size_t at = json_array_size(g->accessors) - 1;
-  if (kind == GLB_COLOURS || (l.limit != 0 && kind != GLB_POSITIONS)) {
+  if (l.limit != 0 && kind != GLB_POSITIONS) {
     (void)json_object_set_new(json_array_get(g->accessors, at), "normalized", json_true());
   }
   return (json_int_t)at;

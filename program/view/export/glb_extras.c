@@ -60,7 +60,7 @@ static json_t *origin(const export_source *source) {
   return object;
 }
 
-json_t *supine_export_glb_extras(const glb *g, double end) {
+json_t *supine_export_glb_extras(const glb *g) {
   const export_source *s = g->source;
   const char *full = supine_basis_metadata(s->basis, "full_upright_gain");
   const double unit = 1e-8; /* value of one integer step in `modes` */
@@ -73,12 +73,12 @@ json_t *supine_export_glb_extras(const glb *g, double end) {
     }
     (void)json_array_append_new(modes, row);
   }
-  json_t *supine = json_pack(
-      "{s:s, s:s, s:i, s:o, s:f, s:o, s:o, s:f, s:f, s:f, s:o}", "frame", frame_text, "weights",
-      weights_text, "band", (int)s->info->band, "modes", modes, "modeUnit", unit, "bend",
-      supine_template_numbers(s->info->bend, 3), "middle",
-      supine_template_numbers(g->targets.middle, 3), "millimetresPerUnit", g->step, "breathVolume",
-      g->options->breath, "largestDisplacementColoured", end, "basis", origin(s));
+  json_t *supine =
+      json_pack("{s:s, s:s, s:i, s:o, s:f, s:o, s:o, s:f, s:f, s:f, s:o}", "frame", frame_text,
+                "weights", weights_text, "band", (int)s->info->band, "modes", modes, "modeUnit",
+                unit, "bend", supine_template_numbers(s->info->bend, 3), "middle",
+                supine_template_numbers(g->targets.middle, 3), "millimetresPerUnit", g->step,
+                "breathVolume", g->options->breath, "basis", origin(s));
   if (g->targets.count <= VOLUME_TARGETS_MAX) {
     (void)json_object_set_new(supine, "volume", json_string(volume_text));
   }

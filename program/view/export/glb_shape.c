@@ -100,7 +100,7 @@ static json_int_t put_corners(glb *g, size_t lung) {
 
 json_int_t supine_export_glb_add(glb *g, size_t lung) {
   static const double supine[3] = {0, 1, 0};
-  static const double white[3] = {1, 1, 1};
+  static const double tissue[3] = {0.66, 0.32, 0.29}; /* linear */
   json_t *targets = json_array();
   json_t *weights = json_array();
   double rest[EXPORT_TARGETS_MAX];
@@ -117,12 +117,11 @@ json_int_t supine_export_glb_add(glb *g, size_t lung) {
   }
   const json_int_t places = put_places(g, lung, g->targets.count, rest);
   const json_int_t normals = put(g, lung, GLB_NORMALS, g->normals);
-  const json_int_t colours = put(g, lung, GLB_COLOURS, g->colours);
   const json_int_t corners = put_corners(g, lung);
   return supine_export_glb_show(
       g, name,
-      json_pack("{s:[{s:{s:I, s:I, s:I}, s:I, s:I, s:o}], s:o, s:o}", "primitives", "attributes",
-                "POSITION", places, "NORMAL", normals, "COLOR_0", colours, "indices", corners,
-                "material", supine_export_glb_material(g, name, white), "targets", targets,
-                "weights", weights, "extras", supine_export_glb_lung_extras(g, lung)));
+      json_pack("{s:[{s:{s:I, s:I}, s:I, s:I, s:o}], s:o, s:o}", "primitives", "attributes",
+                "POSITION", places, "NORMAL", normals, "indices", corners, "material",
+                supine_export_glb_material(g, name, tissue), "targets", targets, "weights", weights,
+                "extras", supine_export_glb_lung_extras(g, lung)));
 }

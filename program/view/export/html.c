@@ -13,7 +13,7 @@
 
 extern const supine_asset supine_export_assets[]; /* the files of program/view/page */
 
-enum { STORED_MAX = 32767, NORMAL_WORDS = (SUPINE_NORMAL_MODES_MAX + 2) / 3, NORMAL_BIAS = 128 };
+enum { STORED_MAX = 32767 };
 
 /* State while a page is printed. The page stores positions and coefficients as 16-bit integers,
  * which the browser multiplies by a quantisation step. */
@@ -68,43 +68,22 @@ static void direction_row(const page *p, const export_source *s, size_t vertex, 
   supine_export_pack_direction(length > 0 ? unit : none, 4 * sizeof *row, row);
 }
 
+/* Return the length of the vector that multiplies the coefficients of a vertex, mm. */
+static double reach_of(const export_source *s, size_t vertex) {
+  return s->info->vector ? 1 : length_of(s->info->direction + 3 * vertex);
+}
+
+/* Return the number of coefficients of a vertex. */
+static size_t columns_of(const export_source *s) {
+  return (s->info->vector ? 3 : 1) * s->info->mode_count;
+}
+
 static void coefficient_row(const page *p, const export_source *s, size_t vertex, int16_t *row) {
-  const size_t k = s->info->mode_count;
-  for (size_t i = 0; i < k; ++i) {
-    row[i] = quantise((double)s->info->coefficients[vertex * k + i] *
-                          length_of(s->info->direction + 3 * vertex),
-                      p->coefficient_step);
-  }
-}
-
-static void inside_row(const page *p, const export_source *s, size_t vertex, int16_t *row) {
-  const size_t columns = 3 * s->info->mode_count;
+  const size_t columns = columns_of(s);
+  const double step = s == p->source ? p->coefficient_step : p->inside_step;
   for (size_t i = 0; i < columns; ++i) {
-    row[i] = quantise((double)s->info->coefficients[vertex * columns + i], p->inside_step);
-  }
-}
-
-/* Divide a number between -(1 << bits) and 1 << bits by 1 << shift, round it and add NORMAL_BIAS.
- * With the bias, small positive and negative numbers have the same high byte and compress well. */
-static int16_t coarse(int32_t number, int bits, int shift) {
-  const int32_t most = (1 << (bits - shift)) - 1;
-  const int32_t steps = (number + (1 << shift) / 2) >> shift;
-  return (int16_t)((steps < most ? steps : most) + NORMAL_BIAS);
-}
-
-/* Fill `row` [3, count] with the vectors of which the normal of a vertex is a weighted sum. They
- * are stored in `count` words, each with three signed numbers of 13, 10 and 9 bits. Round each
- * number to the bits of its place in the word; store number j of word i at row[j * count + i], as
- * takeNormals in basis.js expects it. */
-static void normal_row(const page *p, const export_source *s, size_t vertex, int16_t *row) {
-  uint32_t words[3 * NORMAL_WORDS];
-  const size_t count = (s->info->normal_count + 2) / 3 * 3;
-  (void)p;
-  (void)supine_gl_pack_normals(s->basis, vertex, vertex + 1, words);
-  for (size_t i = 0; i < count; ++i) {
-    row[i] = coarse((int32_t)words[i] >> 19, 12, 2);                    /* round to 11 bits */
-    row[count + i] = coarse((int32_t)(words[i] << 13) >> 22, 9, 2);     /* round to 8 bits */
-    row[2 * count + i] = coarse((int32_t)(words[i] << 23) >> 23, 8, 1); /* round to 8 bits */
+    row[i] =
+        quantise((double)s->info->coefficients[vertex * columns + i] * reach_of(s, vertex), step);
   }
 }
 
@@ -137,6 +116,16 @@ static void write_corners(const page *p, FILE *file, const char *name, const exp
   write_packed(p, file, name, status, packed);
 }
 
+/* Return the largest displacement of a vertex along an axis by one mode, mm. */
+static double largest_coefficient(const export_source *s) {
+  const size_t columns = columns_of(s);
+  double largest = 0;
+  for (size_t i = 0; i < s->info->vertex_count * columns; ++i) {
+    largest = fmax(largest, fabs((double)s->info->coefficients[i]) * reach_of(s, i / columns));
+  }
+  return largest;
+}
+
 /* Choose the origin of positions and the quantisation steps. Positions then err by at most 0.02 mm,
  * unless larger steps are needed to keep the stored integers below STORED_MAX. */
 static void find_steps(page *p) {
@@ -146,32 +135,24 @@ static void find_steps(page *p) {
   const size_t k = s->info->mode_count;
   double low[3] = {INFINITY, INFINITY, INFINITY};
   double high[3] = {-INFINITY, -INFINITY, -INFINITY};
-  double largest = 0;
-  double largest_inside = 0;
   supine_export_box(s, low, high);
-  for (size_t i = 0; i < s->info->vertex_count * k; ++i) {
-    largest = fmax(largest, fabs((double)s->info->coefficients[i]) *
-                                length_of(s->info->direction + 3 * (i / k)));
-  }
   if (inside != NULL) {
     supine_export_box(inside, low, high);
-    for (size_t i = 0; i < 3 * k * inside->info->vertex_count; ++i) {
-      largest_inside = fmax(largest_inside, fabs((double)inside->info->coefficients[i]));
-    }
   }
   p->position_step = step;
   for (size_t axis = 0; axis < 3; ++axis) {
     p->middle[axis] = (low[axis] + high[axis]) / 2;
     p->position_step = fmax(p->position_step, (high[axis] - low[axis]) / (2 * STORED_MAX));
   }
-  p->coefficient_step = fmax(2 * step / (double)k, largest / STORED_MAX);
-  p->inside_step = fmax(2 * step / (double)k, largest_inside / STORED_MAX);
+  p->coefficient_step = fmax(2 * step / (double)k, largest_coefficient(s) / STORED_MAX);
+  p->inside_step =
+      inside == NULL ? 1 : fmax(2 * step / (double)k, largest_coefficient(inside) / STORED_MAX);
 }
 
 /* Write the tensors of 64-bit floats, such as modes and volume coefficients, uncompressed. */
 static void write_doubles(FILE *file, const supine_basis *basis) {
-  static const char *const names[] = {"modes",         "normal_weights",   "resting_volume",
-                                      "volume_linear", "volume_quadratic", "volume_cubic"};
+  static const char *const names[] = {"modes", "resting_volume", "volume_linear",
+                                      "volume_quadratic", "volume_cubic"};
   for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
     const supine_tensor *tensor = supine_basis_tensor(basis, names[i]);
     size_t bytes = sizeof(double);
@@ -253,12 +234,21 @@ static double scan_volume(const export_source *s) {
   return beyond;
 }
 
-/* Return the pose from which displacements are measured, as JSON. */
-static json_t *describe_from(const page *p) {
-  return json_pack(
-      "{s:s, s:o, s:o}", "name", p->shown->from_name, "weights",
-      supine_template_numbers(p->shown->from->weights, p->source->info->mode_count), "gains",
-      supine_template_numbers(p->shown->from->gains[0], 3 * p->source->info->lung_count));
+/* Return the states from which displacements can be measured, as JSON. */
+static json_t *describe_froms(const page *p) {
+  json_t *list = json_array();
+  for (size_t i = 0; i < p->shown->from_count; ++i) {
+    const export_reference *from = &p->shown->from[i];
+    (void)json_array_append_new(
+        list,
+        json_pack("{s:s, s:o, s:o, s:o, s:o}", "name", from->name, "gravity",
+                  supine_template_numbers(from->gravity, 3), "above",
+                  isnan(from->above) ? json_null() : json_real(from->above), "weights",
+                  supine_template_numbers(from->pose->weights, p->source->info->mode_count),
+                  "gains",
+                  supine_template_numbers(from->pose->gains[0], 3 * p->source->info->lung_count)));
+  }
+  return list;
 }
 
 static json_t *describe(const page *p) {
@@ -271,16 +261,16 @@ static json_t *describe(const page *p) {
   }
   json_t *title = json_string(p->shown->title);
   return json_pack(
-      "{s:I, s:I, s:I, s:I, s:I, s:o, s:o, s:b, s:o, s:f, s:o, s:o, s:o, s:f, s:f, "
+      "{s:I, s:I, s:I, s:I, s:b, s:o, s:o, s:b, s:o, s:f, s:o, s:o, s:o, s:f, s:f, "
       "s:o, s:o, s:o, s:f, s:I, s:o}",
       "vertices", (json_int_t)info->vertex_count, "triangles", (json_int_t)info->triangle_count,
-      "modes", (json_int_t)info->mode_count, "normalModes", (json_int_t)info->normal_count, "band",
-      (json_int_t)info->band, "lungBegin", begins(p->source, info->lung_begin), "cornerBegin",
+      "modes", (json_int_t)info->mode_count, "band", (json_int_t)info->band, "vector",
+      (int)info->vector, "lungBegin", begins(p->source, info->lung_begin), "cornerBegin",
       begins(p->source, p->order.corner_begin), "hasResting", (int)(p->source->info->has_rest),
       "colours", colours(), "breathVolume", p->shown->breath, "metadata", metadata, "title",
       title != NULL ? title : json_string("lungs"), "middle", supine_template_numbers(p->middle, 3),
       "placeUnit", p->position_step, "unit", p->coefficient_step, "inside", describe_inside(p),
-      "from", describe_from(p), "references",
+      "froms", describe_froms(p), "references",
       supine_template_numbers(info->reference_volume, info->lung_count), "scanVolume",
       scan_volume(p->source), "volumeAxes", (json_int_t)info->volume_axes, "bend",
       supine_template_numbers(info->bend, 3));
@@ -293,19 +283,17 @@ static void write_tensors(const void *context, const char *name, FILE *file) {
   if (strcmp(name, "tensors") != 0) {
     return;
   }
-  const size_t k = s->info->mode_count;
   write_rows(p, file, "vertices", s, 3, place_row);
-  write_rows(p, file, "direction", s, 4, direction_row);
-  write_rows(p, file, "coefficients", s, k, coefficient_row);
-  write_corners(p, file, "triangles", s, p->order.corners);
-  if (s->info->normal_count > 0) {
-    write_rows(p, file, "normals", s, (s->info->normal_count + 2) / 3 * 9, normal_row);
+  if (!s->info->vector) {
+    write_rows(p, file, "direction", s, 4, direction_row);
   }
+  write_rows(p, file, "coefficients", s, columns_of(s), coefficient_row);
+  write_corners(p, file, "triangles", s, p->order.corners);
   write_doubles(file, s->basis);
   if (p->shown->inside != NULL) {
     const export_source *inside = p->shown->inside;
     write_rows(p, file, "inside-vertices", inside, 3, place_row);
-    write_rows(p, file, "inside-coefficients", inside, 3 * k, inside_row);
+    write_rows(p, file, "inside-coefficients", inside, columns_of(inside), coefficient_row);
     write_corners(p, file, "inside-triangles", inside, inside->info->triangles);
     write_tensor(file, "inside-parts", p->shown->parts->of,
                  inside->info->vertex_count * sizeof *p->shown->parts->of);
@@ -315,10 +303,6 @@ static void write_tensors(const void *context, const char *name, FILE *file) {
 supine_status supine_export_html_print(FILE *file, const export_source *source,
                                        const export_page *shown, supine_error *error) {
   const supine_basis_info *info = source->info;
-  if (info->vector) {
-    return supine_error_set(error, SUPINE_ERROR_UNSUPPORTED,
-                            "a page cannot show vector displacements: export .glb");
-  }
   if (info->mode_count > EXPORT_PAGE_MODES_MAX) {
     return supine_error_set(error, SUPINE_ERROR_UNSUPPORTED,
                             "a page shows up to %d modes, not %zu: precompute the basis with "

@@ -48,20 +48,6 @@ function takeTriangles(name, count) {
   return corners;
 }
 
-/** Return the normals as the 32-bit words that supine.glsl reads. A word has three signed numbers, of 13, 10 and 9
- * bits. The page stores these numbers rounded to 11, 8 and 8 bits, and has added 128 to each of the three. */
-function takeNormals(vertices, words) {
-  const columns = 3 * words;
-  const counts = takeCounts('normals', vertices, 3 * columns);
-  const packed = new Uint32Array(vertices * columns);
-  const stride = counts.length / vertices;
-  for (let i = 0; i < packed.length; ++i) {
-    const at = Math.floor(i / columns) * stride + (i % columns);
-    packed[i] = ((counts[at] - 128) << 21) | (((counts[at + columns] - 128) & 255) << 11) | (((counts[at + 2 * columns] - 128) & 255) << 1);
-  }
-  return packed;
-}
-
 /** Convert RGB colours in hexadecimal digits to RGBA bytes. */
 function readColours(text) {
   const bytes = new Uint8Array((text.length / 6) * 4).fill(255);
@@ -72,30 +58,28 @@ function readColours(text) {
 function readBasis() {
   const basis = JSON.parse(document.getElementById('basis').textContent);
   for (const [name, text] of Object.entries(basis.colours)) basis.colours[name] = readColours(text);
-  basis.colours.expansion = divergingMap();
+  Object.assign(basis.colours, { expansion: divergingMap(), plain: new Uint8Array(1024).map((_, i) => [184, 196, 212, 255][i % 4]) });
   const { vertices: n } = basis;
   basis.surface = takeRows('vertices', n, 3, basis.placeUnit, basis.middle);
-  const directions = takeCounts('direction', n, 4, 'OCTAHEDRAL');
-  basis.direction = Float32Array.from({ length: 3 * n }, (_, i) => directions[4 * Math.floor(i / 3) + (i % 3)] / 32767);
-  basis.coefficients = takeRows('coefficients', n, basis.modes, basis.unit);
+  const directions = basis.vector ? [] : takeCounts('direction', n, 4, 'OCTAHEDRAL');
+  basis.direction = Float32Array.from({ length: directions.length / 4 * 3 }, (_, i) => directions[4 * Math.floor(i / 3) + (i % 3)] / 32767);
+  basis.coefficients = takeRows('coefficients', n, (basis.vector ? 3 : 1) * basis.modes, basis.unit);
   basis.corners = takeTriangles('triangles', basis.triangles);
   basis.mixes = takeTensor('modes', Float64Array);
   basis.linear = takeTensor('volume_linear', Float64Array);
   basis.quadratic = takeTensor('volume_quadratic', Float64Array);
   basis.cubic = takeTensor('volume_cubic', Float64Array);
-  basis.words = Math.ceil(basis.normalModes / 3);
-  basis.normals = basis.words ? takeNormals(n, basis.words) : new Uint32Array(0);
-  basis.turns = basis.words ? takeTensor('normal_weights', Float64Array) : null;
   basis.resting = basis.hasResting ? takeTensor('resting_volume', Float64Array) : null;
   basis.byLung = basis.resting?.length > 9;
   basis.lungs = basis.lungBegin.length - 1;
   const names = (basis.metadata.lungs ?? '').split(',');
   basis.lungNames = Array.from({ length: basis.lungs }, (_, i) => (names[i] ? `${names[i]} lung` : `lung ${i}`));
-  basis.lungMiddles = basis.lungNames.map((_, lung) => [0, 1, 2].map((axis) => {
-    let sum = 0;
-    for (let v = basis.lungBegin[lung]; v < basis.lungBegin[lung + 1]; ++v) sum += basis.surface[3 * v + axis];
-    return sum / (basis.lungBegin[lung + 1] - basis.lungBegin[lung]);
-  }));
+  const same = (a, b) => ['weights', 'gains'].every((key) => a[key].every((x, i) => Math.abs(x - b[key][i]) < 1e-6));
+  basis.froms = basis.froms.filter((from, i) => !basis.froms.slice(0, i).some((other) => same(from, other)));
+  basis.lungBoxes = basis.lungNames.map((_, lung) => boundsOf(Array.from({ length: basis.lungBegin[lung + 1] - basis.lungBegin[lung] }, (_, i) => basis.surface.subarray(3 * (basis.lungBegin[lung] + i), 3 * (basis.lungBegin[lung] + i) + 3))));
+  const [low, high] = ['low', 'high'].map((end, i) => [0, 1, 2].map((axis) => Math[i ? 'max' : 'min'](...basis.lungBoxes.map((box) => box[end][axis]))));
+  if (basis.lungs === 1) [low[0], high[0]] = [Math.min(low[0], -high[0]), Math.max(high[0], -low[0])]; // room for the other lung
+  basis.torso = { centre: low.map((x, i) => (x + high[i]) / 2), half: low.map((x, i) => (high[i] - x) / 2) };
   if (basis.inside) takeInside(basis);
   return basis;
 }
@@ -302,69 +286,40 @@ function momentFor(basis, gravity, depth) {
   return { gravity, weights, gains: Float64Array.from(gains.flat()), held, folds: !gains.flat().every(Number.isFinite) };
 }
 
-/** Return the uniforms of supine.glsl for a state of the lungs:
- *
- *     weights  weight w_k of each mode k, in vectors of four
- *     gains    factors of the displacement along x, y and z, for each lung
- *     turns    for each lung, the weights of the vectors whose weighted sum is the normal, in groups of three: group
- *              j of `words` groups has the weights of the vectors j, j + words and j + 2 words
- *
- * Each weight in `turns` is a sum over the axes. The summand of an axis has the terms 1, a w_k, b w_k and a b w_k w_l
- * for all modes k and l, times coefficients of the basis; a and b are the factors of the displacement along the other
- * two axes. If these factors are equal on all axes (volumeAxes 1), there is one summand, without the terms b w_k. */
-function uniformsOf(basis, moment) {
-  const { modes: k, words, lungs, normalModes } = basis;
-  const weights = new Float32Array(4 * Math.ceil(k / 4));
-  const turns = new Float32Array(3 * words * lungs);
-  weights.set(moment.weights);
-  for (let lung = 0, at = 0; lung < lungs; ++lung) {
-    const gain = (axis) => moment.gains[3 * lung + (axis % 3)];
-    const w = moment.weights;
-    for (let j = 0; j < normalModes; ++j) {
-      let sum = 0;
-      for (let axis = 0; axis < basis.volumeAxes; ++axis) {
-        sum += basis.turns[at++];
-        for (let side = 1; side <= (basis.volumeAxes === 3 ? 2 : 1); ++side) {
-          for (let a = 0; a < k; ++a) sum += basis.turns[at++] * gain(axis + side) * w[a];
-        }
-        for (let a = 0; a < k; ++a) {
-          let row = 0;
-          for (let b = a; b < k; ++b) row += basis.turns[at++] * w[b];
-          sum += row * w[a] * gain(axis + 1) * gain(axis + 2);
-        }
-      }
-      turns[3 * (lung * words + (j % words)) + Math.floor(j / words)] = sum;
-    }
-  }
-  return { weights, gains: Float32Array.from(moment.gains), turns };
-}
-
 function lungOf({ lungBegin }, vertex) {
   let lung = 0;
   while (vertex >= lungBegin[lung + 1]) ++lung;
   return lung;
 }
 
-/** Compute the position of a vertex in a state of the lungs, mm. */
-function placeOf(basis, { weights, gains }, vertex) {
-  const lung = lungOf(basis, vertex);
-  let amount = 0;
-  for (let k = 0; k < basis.modes; ++k) amount += weights[k] * basis.coefficients[vertex * basis.modes + k];
-  return [0, 1, 2].map((axis) => basis.surface[3 * vertex + axis] + gains[3 * lung + axis] * amount * basis.direction[3 * vertex + axis]);
+/** Write the displacement of a vertex of the surface by the modes at their weights, mm, before the gains multiply it,
+ * to `out`. */
+function fieldOf({ coefficients, direction, modes, vector }, weights, vertex, out) {
+  for (let axis = 0; axis < 3; ++axis) {
+    if (axis > 0 && !vector) {
+      out[axis] = out[0];
+      continue;
+    }
+    out[axis] = 0;
+    for (let k = 0, at = (vector ? 3 * vertex + axis : vertex) * modes; k < modes; ++k) out[axis] += weights[k] * coefficients[at + k];
+  }
+  if (!vector) for (let axis = 0; axis < 3; ++axis) out[axis] *= direction[3 * vertex + axis];
 }
 
-/** Compute the positions of all vertices in a state of the lungs, mm. */
-function placesOf({ surface, direction, coefficients, modes, lungBegin, lungs }, { weights, gains }) {
-  const places = new Float32Array(surface.length);
-  for (let lung = 0; lung < lungs; ++lung) {
-    for (let v = lungBegin[lung]; v < lungBegin[lung + 1]; ++v) {
-      let amount = 0;
-      for (let k = 0; k < modes; ++k) amount += weights[k] * coefficients[v * modes + k];
-      for (let axis = 0; axis < 3; ++axis) places[3 * v + axis] = surface[3 * v + axis] + gains[3 * lung + axis] * amount * direction[3 * v + axis];
-    }
+/** Compute the positions of the vertices `begin` to `end`, by default of all, in a state of the lungs, mm. */
+function placesOf(basis, { weights, gains }, begin = 0, end = basis.vertices) {
+  const places = new Float32Array(3 * (end - begin));
+  const field = [0, 0, 0];
+  for (let v = begin, lung = lungOf(basis, begin); v < end; ++v) {
+    while (v >= basis.lungBegin[lung + 1]) ++lung;
+    fieldOf(basis, weights, v, field);
+    for (let axis = 0; axis < 3; ++axis) places[3 * (v - begin) + axis] = basis.surface[3 * v + axis] + gains[3 * lung + axis] * field[axis];
   }
   return places;
 }
+
+/** Compute the position of a vertex in a state of the lungs, mm. */
+const placeOf = (basis, moment, vertex) => Array.from(placesOf(basis, moment, vertex, vertex + 1));
 
 /** Compute the positions of the corners of up to 3000 triangles, mm. They suffice to choose the range of the colours.
  * */

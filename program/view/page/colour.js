@@ -17,10 +17,10 @@ function rangeEnd(value) {
 
 /** Quantities that colours can show. `measure` is the value of the shaders' uniform `kind`; `map` is a colour map. */
 const KINDS = {
+  plain: { measure: 0, map: 'plain', unit: 'mm' },
   displacement: { measure: 0, map: 'displacement', unit: 'mm' },
   difference: { measure: 0, map: 'difference', unit: 'mm' },
   expansion: { measure: 1, map: 'expansion', unit: '%' },
-  height: { measure: 2, map: 'displacement', unit: 'mm' },
 };
 
 /** Return the RGBA bytes of a diverging colour map: blue below its middle, orange above. */

@@ -4,13 +4,11 @@
 layout(location = 0) in vec3 ball;
 layout(location = 1) in vec3 normal;
 layout(location = 2) in vec3 moved;
-layout(location = 3) in vec3 origin; // position from which displacements are measured
-layout(location = 4) in float number; // index of the structure
+layout(location = 3) in float number; // index of the structure
 uniform mat4 toEye;
 uniform mat4 projection;
 uniform vec4 lens;
-uniform int kind;
-uniform vec4 gravity;
+uniform float chosen; // index of the chosen structure
 uniform float radius; // radius of a ball, mm
 out vec3 eye;
 out vec3 facing;
@@ -23,7 +21,7 @@ void main() {
   vec4 at = toEye * vec4(body, 1.0);
   eye = at.xyz;
   facing = mat3(toEye) * normal;
-  value = kind == 2 ? gravity.w - dot(gravity.xyz, moved) : distance(moved, origin);
+  value = number == chosen ? 1.0 : 0.0;
   part = uint(number);
   vec4 clip = projection * at;
   gl_Position = vec4((clip.xy - lens.xy * clip.w) * lens.zw, clip.zw);

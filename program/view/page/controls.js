@@ -102,6 +102,7 @@ function makePostureButtons(choose) {
 
 /** Show the colour bar and its ticks. An end of the bar is pointed if values lie beyond it. */
 function drawLegend(kind, range, title, colours) {
+  $('legend').hidden = kind === 'plain';
   $('colours').style.background = gradient(colours);
   $('colours').classList.toggle('beyond', range.beyond);
   $('colours').classList.toggle('beneath', range.beyond && range.begin < 0);

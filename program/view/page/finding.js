@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Write in words what each lung gains or loses, and how far the surface moves.
+// Compute how far targets and the surface move, with the expected error, and write it in words.
 
-const signed = (value) => `${value < 0 ? '\u2212' : value > 0 ? '+' : ''}${Math.abs(value)}`;
-
-/** Published changes, %, of the volume that each lung has at rest, relative to the supine posture: mean and standard
- * deviation, by posture. */
-const PUBLISHED = { left: { source: 'Little 2021, n 10', 'left lung': [0, 44], 'right lung': [25, 11] } };
+/** Published changes, %, of the volume that each lung has at rest, relative to the supine posture: mean (standard
+ * deviation), by posture. */
+const PUBLISHED = { left: 'left lung 0 (44), right lung +25 (11) (Little 2021, n 10)' };
 
 /** Return the volume (gas plus tissue) of each lung, mL. */
 const heldBy = (basis, { weights, gains }) => basis.references.map((ml, lung) => ml + formAt(lungForm(basis, lung, weights), gains.slice(3 * lung, 3 * lung + 3)));
@@ -21,72 +19,36 @@ function areasOf({ surface, corners, vertices }) {
   return areas;
 }
 
-/** Return statistics of the displacement from the state `from` to the state `now`, mm, over every `stride`th vertex:
- * the mean over the area, the 95th percentile (rounded up to a multiple of 1/2000 of the largest) and the largest. */
-function displacementBetween(basis, now, from, stride) {
+/** Return statistics of the distance of the surface's vertices between positions `after` and `before`, mm: the mean over
+ * the area, the 95th percentile (rounded up to a multiple of 1/2000 of the largest), the largest, the vertex where it is,
+ * and the RMS over the vertices. */
+function distancesOf(basis, after, before) {
   basis.areas ??= areasOf(basis);
-  const { modes, coefficients, direction, areas } = basis;
-  const far = new Float32Array(Math.ceil(basis.vertices / stride));
-  let [sum, area, largest] = [0, 0, 0];
-  for (let at = 0, lung = 0; at < far.length; ++at) {
-    const v = at * stride;
-    while (v >= basis.lungBegin[lung + 1]) ++lung;
-    let [a, b] = [0, 0];
-    for (let k = 0; k < modes; ++k) {
-      a += now.weights[k] * coefficients[v * modes + k];
-      b += from.weights[k] * coefficients[v * modes + k];
-    }
-    let square = 0;
-    for (let axis = 0; axis < 3; ++axis) square += ((a * now.gains[3 * lung + axis] - b * from.gains[3 * lung + axis]) * direction[3 * v + axis]) ** 2;
-    far[at] = Math.sqrt(square);
-    sum += areas[v] * far[at];
+  const { areas } = basis;
+  const far = new Float32Array(basis.vertices);
+  let [sum, area, squares, at] = [0, 0, 0, 0];
+  for (let v = 0; v < far.length; ++v) {
+    far[v] = Math.hypot(after[3 * v] - before[3 * v], after[3 * v + 1] - before[3 * v + 1], after[3 * v + 2] - before[3 * v + 2]);
+    sum += areas[v] * far[v];
+    squares += far[v] * far[v];
     area += areas[v];
-    largest = Math.max(largest, far[at]);
+    if (far[v] > far[at]) at = v;
   }
   const bins = new Float64Array(2001);
-  far.forEach((mm, at) => { bins[Math.ceil((2000 * mm) / (largest || 1))] += areas[at * stride]; });
+  far.forEach((mm, v) => { bins[Math.ceil((2000 * mm) / (far[at] || 1))] += areas[v]; });
   let [bin, within] = [0, bins[0]];
   while (within < 0.95 * area && bin < 2000) within += bins[++bin];
-  return { mean: sum / area, p95: (bin / 2000) * largest, largest };
+  return { mean: sum / area, p95: (bin / 2000) * far[at], largest: far[at], at, rms: Math.sqrt(squares / far.length) };
 }
 
-/** Return the beginning of a sentence on a posture: "On the left side", "Supine, 15 degrees head down,". */
-function whereWords(gravity) {
-  const text = postureText(gravity);
-  const [, name, tilt] = /^([a-z]+)([+-]\d+)?$/.exec(text) ?? [];
-  if (!name) return `With gravity along ${text.replaceAll('-', '\u2212')},`;
-  if (name === 'left' || name === 'right') return `On the ${name} side`;
-  return `${name[0].toUpperCase()}${name.slice(1)},${tilt ? ` ${Math.abs(tilt)} degrees head ${tilt > 0 ? 'down' : 'up'},` : ''}`;
-}
-
-/** Return a phrase for each lung, the largest change first: "the right lung gains 122 mL (+18 %)". */
-function lungWords(basis, held, before) {
-  return held.map((ml, lung) => ({ name: basis.lungNames[lung], ml: Math.round(ml - before[lung]), percent: Math.round((100 * (ml - before[lung])) / before[lung]) }))
-    .sort((a, b) => Math.abs(b.ml) - Math.abs(a.ml))
-    .map(({ name, ml, percent }) => `the ${name} ${Math.abs(percent) < 2 ? 'keeps its volume' : `${ml < 0 ? 'loses' : 'gains'} ${Math.abs(ml)} mL`} (${signed(percent)} %)`);
-}
-
-/** Return two sentences on the state of the lungs: one on volumes, one on displacements of every `stride`th vertex.
- * `volume` is a phrase such as "500 mL above rest", or empty. */
-function findingOf(basis, moment, gravity, volume, stride) {
-  const { from } = basis;
-  const { mean, p95, largest } = displacementBetween(basis, moment, from, stride);
-  if (largest < 0.05) return [`This is ${from.name}, from which displacements are measured.`, ''];
-  const where = `${whereWords(gravity)}${volume ? `${whereWords(gravity).endsWith(',') ? '' : ','} ${volume},` : ''}`;
-  const displacement = `the surface moves ${mean.toFixed(1)} mm on average and ${largest.toFixed(1)} mm at most, 95 % of it within ${p95.toFixed(1)} mm, from ${from.name}.`;
-  if (!moment.held) return [`${where} ${displacement}`, ''];
-  basis.fromHeld ??= heldBy(basis, from);
-  return [`${where} ${lungWords(basis, moment.held, basis.fromHeld).join('; ')}.`, displacement.replace(/^t/, 'T')];
-}
-
-/** Return the expected error of the displacement u from the state `from` to the state `now`, mm RMS over the vertices,
- * as the library defines it. The squared error of a vertex is |u| min(expected_error_mm, RMS of u). If the volume at
- * rest is only assumed, add (5 d)^2. Here d is the change of u if the volumes of both states, `now` and `from`, grow by
- * 1 % of the reference volume. `fuller` has both states with these volumes; null if the volume at rest is known. */
-function expectedError(basis, now, from, fuller) {
-  const [a, b] = [placesOf(basis, now), placesOf(basis, from)];
-  const more = fuller?.map((moment) => placesOf(basis, moment));
-  let [lengths, squares, slopes] = [0, 0, 0];
+/** Return the RMS over points of the expected error of their displacement u, mm, as the library defines it: the squared
+ * error of a point is |u| constant, plus (5 d)^2 if the volume at rest is only assumed. Here d is the change of u if the
+ * volumes of the states that count from rest grow by 1 % of the reference volume. `places(moment)` returns the points in
+ * a state of the lungs, and `terms` is the result of movedBetween. */
+function expectedError({ now, from, constant, fuller }, places) {
+  const [a, b] = [places(now), places(from)];
+  const more = fuller?.map(places);
+  let sum = 0;
   for (let i = 0; i < a.length; i += 3) {
     let [square, slope] = [0, 0];
     for (let k = i; k < i + 3; ++k) {
@@ -94,86 +56,140 @@ function expectedError(basis, now, from, fuller) {
       square += u * u;
       if (more) slope += (more[0][k] - more[1][k] - u) ** 2;
     }
-    lengths += Math.sqrt(square);
-    squares += square;
-    slopes += slope;
+    sum += Math.sqrt(square) * constant + slope * (0.05 / 0.01) ** 2;
   }
-  const n = a.length / 3;
-  return Math.sqrt((Math.min(Number(basis.metadata.expected_error_mm), Math.sqrt(squares / n)) * lengths + slopes * (0.05 / 0.01) ** 2) / n);
+  return Math.sqrt(sum / (a.length / 3));
 }
 
-/** Return a sentence on the expected error at a volume `depth` mL above rest. It is empty if the basis states no
- * expected error, or if displacements are not measured from supine at rest. */
-function errorWords(basis, moment, depth) {
-  const { metadata, from } = basis;
-  if (!metadata.expected_error_mm || !moment.held || from.name !== 'supine at rest') return '';
+/** Return how the lungs move from the state `from` to the state `now`, which has `depth` mL above rest: the statistics of
+ * distancesOf, and what expectedError needs. `error` is that of the surface, mm; null if it is unknown. */
+function movedBetween(basis, now, depth, from) {
+  const { metadata } = basis;
+  const surface = distancesOf(basis, placesOf(basis, now), placesOf(basis, from));
   const assumed = basis.hasResting && !metadata.resting_known && metadata.scanned !== 'rest' && !metadata.scan_state?.includes('rest');
   const more = 0.01 * sumOf(basis.references);
-  const fuller = assumed ? [[moment.gravity, depth], [[0, 1, 0], 0]].map(([gravity, ml]) => momentFor(basis, gravity, ml + more)) : null;
-  return `Expected error ${expectedError(basis, moment, from, fuller).toFixed(1)} mm (RMS), an extrapolation.`;
+  const fuller = assumed ? [momentFor(basis, now.gravity, depth + more), from.above === null ? from : momentFor(basis, from.gravity, from.above + more)] : null;
+  const terms = { now, from, constant: Math.min(Number(metadata.expected_error_mm), surface.rms), fuller };
+  const known = metadata.expected_error_mm && now.held;
+  return { ...surface, ...terms, known, error: known ? expectedError(terms, (moment) => placesOf(basis, moment)) : null };
 }
 
-/** Return the changes of volume and the mean displacement for the card of a posture: "L \u22121 %, R +18 %, 6.9 mm".
- * */
-function answerOf(basis, moment) {
-  const { mean, largest } = displacementBetween(basis, moment, basis.from, 1);
-  if (largest < 0.05) return 'reference';
-  if (moment.held) basis.fromHeld ??= heldBy(basis, basis.from);
-  const lungs = moment.held.map((ml, lung) => `${basis.lungNames[lung].slice(0, 1).toUpperCase()} ${signed(Math.round((100 * ml) / basis.fromHeld[lung] - 100))} %, `);
-  return `${lungs.join('')}${mean.toFixed(1)}\u00a0mm`;
+/** Return how a structure inside the lungs moves: the mean position of its vertices `at` and before, `was`, its
+ * displacement and distance, mm, and the expected error, null if it is unknown. */
+function targetOf(inside, part, moved) {
+  const mean = (places) => [0, 1, 2].map((axis) => places.reduce((sum, p) => sum + p[axis], 0) / places.length);
+  const [at, was] = [moved.now, moved.from].map((moment) => mean(insidePlaces(inside, moment, part)));
+  const move = at.map((x, i) => x - was[i]);
+  return { name: inside.names[part] || '(no name)', at, was, move, mm: Math.hypot(...move), error: moved.known ? expectedError(moved, (moment) => insidePlaces(inside, moment, part).flat()) : null };
 }
 
-/** Write a text to an element, with the lungs' changes of volume emphasised. */
-function writeFinding(element, text) {
+/** Return whether a displacement exceeds its expected error. */
+const isTold = ({ mm, error }) => error === null || mm > error;
+const UNTOLD = 'no change that the model can tell';
+
+/** Return a displacement in words, with at most `most` directions and the largest first: "12 to the feet, 7 to the
+ * front". With gravity, a direction along it is marked "(up)" or "(down)". */
+function wayWords(move, most, gravity) {
+  const ways = [['left', 'right'], ['back', 'front'], ['head', 'feet']];
+  const parts = move.map((x, axis) => ({ mm: Math.round(Math.abs(x)), way: ways[axis][x > 0 ? 0 : 1], down: gravity ? Math.sign(x) * gravity[axis] : 0 }));
+  const words = parts.filter(({ mm }) => mm > 0).sort((a, b) => b.mm - a.mm).slice(0, most)
+    .map(({ mm, way, down }) => `${mm} to the ${way}${Math.abs(down) > 0.9 ? ` (${down > 0 ? 'down' : 'up'})` : ''}`);
+  return words.join(', ') || 'less than 1 in any direction';
+}
+
+/** Return the beginning of a sentence on a posture: "Lying on the left side", "Supine, 15 degrees head down". */
+function whereWords(gravity) {
+  const text = postureText(gravity);
+  const [, name, tilt] = /^([a-z]+)([+-]\d+)?$/.exec(text) ?? [];
+  if (!name) return `With gravity along ${text.replaceAll('-', '\u2212')}`;
+  if (name === 'left' || name === 'right') return `Lying on the ${name} side`;
+  return `${name[0].toUpperCase()}${name.slice(1)}${tilt ? `, ${Math.abs(tilt)} degrees head ${tilt > 0 ? 'down' : 'up'}` : ''}`;
+}
+
+/** Return where a vertex is on its lung: "at the base of the right lung". */
+function spotWords(basis, vertex) {
+  const lung = lungOf(basis, vertex);
+  const { centre, half } = basis.lungBoxes[lung];
+  const [x, y, z] = centre.map((c, i) => (basis.surface[3 * vertex + i] - c) / half[i]);
+  const outwards = centre[0] < basis.lungBoxes.reduce((sum, box) => sum + box.centre[0] / basis.lungs, 0) ? -x : x;
+  const spots = [[outwards, 'on the outer side'], [-outwards, 'on the inner side'], [y, 'at the back'], [-y, 'at the front'], [z, 'at the apex'], [-z, 'at the base']];
+  return `${spots.reduce((most, spot) => (spot[0] > most[0] ? spot : most))[1]} of the ${basis.lungNames[lung]}`;
+}
+
+/** Return the sentence on a state of the lungs as {before, told, after, error, meaning}; `told`, which the page
+ * emphasises, is empty if the change is within its expected error. `target` is the result of targetOf, or null if the
+ * sentence is about the surface, and `above` a phrase such as "500 mL above rest", or empty. */
+function sentenceOf(basis, moved, target, gravity, above) {
+  const { name } = moved.from;
+  const where = `${whereWords(gravity)}${above && `, ${above}`}, `;
+  const who = target ? target.name : 'the surface';
+  const { mm, error } = target ?? { mm: moved.mean, error: moved.error };
+  if (moved.largest < 0.05) return { before: `This is ${name}, from which displacements are measured.`, told: '', after: '', error: '', meaning: '' };
+  const stated = error === null ? '' : `expected error ${errorText(error)}`;
+  const meaning = error === null ? '' : `Half of all points lie within ${(0.9 * error).toFixed(0)} mm of the computed place, 95 % within ${(1.8 * error).toFixed(0)} mm${near(gravity, moved.from.gravity) ? '' : '; for a change of posture the error is an extrapolation'}.`;
+  if (!isTold({ mm, error })) return { before: `${where}${who}: ${UNTOLD} from ${name} (${mm.toFixed(1)} mm; `, told: '', after: '', error: `${stated}).`, meaning };
+  const [told, after] = target ? [`moves ${mm.toFixed(1)} mm`, `: ${wayWords(target.move, 2)}`] : [`moves ${mm.toFixed(1)} mm on average`, `, ${moved.largest.toFixed(1)} mm at most, ${spotWords(basis, moved.at)}`];
+  return { before: where, told: `${who} ${told}`, after: ` from ${name}${after}${stated && '; '}`, error: stated && `${stated}.`, meaning };
+}
+
+const errorText = (mm) => `${mm < 3 ? mm.toFixed(1) : mm.toFixed(0)} mm`;
+
+/** Write a sentence of sentenceOf to an element, with its parts emphasised or toned down. */
+function writeSentence(element, sentence) {
+  const text = ['before', 'told', 'after', 'error'].map((key) => sentence[key]).join('');
   if (element.written === text) return;
   element.written = text;
-  element.replaceChildren(...text.split(/(\S+ \S+ (?:gains|loses) [^;]*?\))/).map((part, i) => {
-    if (i % 2 === 0) return part;
-    const change = document.createElement('em');
-    change.textContent = part;
-    return change;
+  element.replaceChildren(sentence.before, ...[['em', sentence.told], ['', sentence.after], ['small', sentence.error]].map(([tag, words]) => {
+    if (!tag) return words;
+    const part = document.createElement(tag);
+    part.textContent = words;
+    return part;
   }));
 }
 
-/** Bars that show the lungs' volumes: grey for the earlier volume, then orange for a gain or hatched for a loss. */
+/** Return the second line of a posture's card: "13.9 mm, 12 to the feet", or "within the error". */
+function answerOf(moved, target) {
+  const told = target ?? { mm: moved.mean, error: moved.error };
+  if (moved.largest < 0.05) return 'reference';
+  if (!isTold(told)) return `${told.mm.toFixed(1)} mm, within the error`;
+  return `${told.mm.toFixed(1)} mm${target ? `, ${wayWords(target.move, 1)}` : ' on average'}`;
+}
+
+/** Bars with the lungs' volumes: a tick for the earlier volume, a dot for that now, and a band for its range. */
 class Holds {
   constructor(parent, { lungNames }) {
     this.rows = lungNames.map(() => {
       const row = document.createElement('div');
       row.className = 'hold';
-      const parts = Object.fromEntries([['who', 'span'], ['percent', 'strong'], ['amount', 'div'], ['was', 'i'], ['change', 'i'], ['published', 'i'], ['ml', 'span']].map(([name, tag]) => {
-        const part = document.createElement(tag);
+      const parts = Object.fromEntries(['who', 'bar', 'band', 'was', 'now', 'ml'].map((name) => {
+        const part = document.createElement(['who', 'ml'].includes(name) ? 'span' : 'i');
         part.className = name;
         return [name, part];
       }));
-      parts.amount.append(parts.was, parts.change, parts.published, parts.ml);
-      row.append(parts.who, parts.percent, parts.amount);
+      parts.bar.append(parts.band, parts.was, parts.now);
+      row.append(parts.who, parts.bar, parts.ml);
       parent.append(row);
       return parts;
     });
   }
 
-  /** Show the volume of each lung, mL: `held` now, and `before` in the state from which displacements are measured.
-   * Bars are scaled to `most`, the largest volume of a lung in any posture. `heights`, mm, tell which lung is
-   * uppermost. `measured` has the published changes of volume in this posture; undefined if there are none. */
-  show({ lungNames }, held, before, most, heights, measured) {
-    const full = 1.06 * Math.max(most, ...held, ...before.map((ml, lung) => ml * (1 + (measured?.[lungNames[lung]] ?? [0, 0]).reduce((sum, x) => sum + x, 0) / 100)));
+  /** Show the volume of each lung, mL: `held` now, `depth` above rest in all lungs, and `before` in the state from which
+   * displacements are measured. `heights`, mm, tell which lung is uppermost. The logarithm of an assumed volume at rest
+   * has a normal distribution; the range is one standard deviation to either side. */
+  show({ lungNames, references, metadata }, held, depth, before, heights) {
     const apart = heights.length === 2 && Math.abs(heights[0] - heights[1]) > 30; // one lung is > 30 mm higher
-    this.rows.forEach(({ who, percent, was, change, published, ml }, lung) => {
+    this.rows.forEach(({ who, band, was, now, ml }, lung) => {
       const [from, to] = [before[lung], held[lung]];
-      const place = (part, begin, end) => {
-        part.style.left = `${(100 * begin) / full}%`;
-        part.style.width = `${(100 * (end - begin)) / full}%`;
-      };
-      who.textContent = `${lungNames[lung]}${apart ? (heights[lung] > heights[1 - lung] ? ' (uppermost)' : ' (lowermost)') : ''}`;
-      percent.textContent = `${signed(Math.round((100 * to) / from - 100))} %`;
-      ml.textContent = `${from.toFixed(0)} \u2192 ${to.toFixed(0)}`;
-      place(was, 0, Math.min(from, to));
-      place(change, Math.min(from, to), Math.max(from, to));
-      change.classList.toggle('lost', to < from);
-      const [mean, deviation] = measured?.[lungNames[lung]] ?? [];
-      published.hidden = mean === undefined;
-      if (mean !== undefined) place(published, from * (1 + (mean - deviation) / 100), from * (1 + (mean + deviation) / 100));
+      const above = (depth * to) / sumOf(held);
+      const ends = [-1, 1].map((sign) => above + (to - above) * Math.exp(sign * Number(metadata.resting_spread)));
+      const known = !metadata.resting_spread;
+      const at = (volume) => `${Math.max(0, Math.min(100, (100 * volume) / references[lung]))}%`;
+      who.textContent = `${lungNames[lung]}${apart ? ` (${heights[lung] > heights[1 - lung] ? 'up' : 'down'})` : ''}`;
+      ml.textContent = `${Math.abs(to - from) < 0.5 ? '' : `${from.toFixed(0)} \u2192 `}${to.toFixed(0)} mL${known ? '' : `, range ${ends[0].toFixed(0)} to ${ends[1].toFixed(0)}`}`;
+      was.style.left = at(from);
+      now.style.left = at(to);
+      band.hidden = known;
+      [band.style.left, band.style.right] = [at(ends[0]), `calc(100% - ${at(ends[1])})`];
     });
   }
 }

@@ -93,20 +93,6 @@ function insidePlace(inside, moment, vertex) {
   return inside.rigid.includes(inside.part[vertex]) ? insidePlaces(inside, moment, inside.part[vertex])[vertex - inside.members[inside.part[vertex]][0]] : fieldPlace(inside, moment, vertex);
 }
 
-/** Return the mean position of the vertices of a part in the state `now`, and their mean displacement from the state
- * `from`, mm. */
-function insidePart(inside, part, now, from) {
-  const [places, before] = [now, from].map((moment) => insidePlaces(inside, moment, part));
-  const place = [0, 0, 0];
-  let displacement = 0;
-  places.forEach((a, j) => {
-    const b = before[j];
-    a.forEach((x, i) => { place[i] += x / places.length; });
-    displacement += Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) / places.length;
-  });
-  return { place, displacement };
-}
-
 /** Return the vertex of a part that is nearest to the position `place`, mm. */
 function insideNearest(inside, part, moment, place) {
   let [best, least] = [inside.members[part][0], Infinity];
@@ -120,13 +106,12 @@ function insideNearest(inside, part, moment, place) {
 /** Largest number of rows in the table of parts; a search by name finds other parts. */
 const ROWS_SHOWN = 200;
 
-/** Table of the parts inside the lungs. A row has a part's position, its displacement, and a button that shows or
- * hides its name in the picture. `state.named` lists the parts with names in the picture; `redraw` requests a new
- * picture. */
-class InsideTable {
-  constructor(inside, state, redraw) {
-    Object.assign(this, { inside, state, redraw, rows: [], pointed: -1, written: null });
-    $('inside-section').hidden = false;
+/** Table of the targets, the parts inside the lungs: name, distance, direction and expected error. A click on a name
+ * chooses the target that the sentence is about; `choose` is called with its index. */
+class TargetTable {
+  constructor(inside, state, choose) {
+    Object.assign(this, { inside, state, choose, rows: [], pointed: -1, moved: null });
+    $('targets').hidden = false;
     $('inside-find').hidden = inside.names.length <= 20;
     $('inside-find').addEventListener('input', () => this.list());
     this.list();
@@ -141,80 +126,37 @@ class InsideTable {
     this.rows = found.slice(0, ROWS_SHOWN).map((part) => this.row(part));
     $('inside-rows').replaceChildren(...this.rows.map(({ row }) => row));
     this.press();
-    this.written = null;
+    if (this.moved) this.show(this.moved);
   }
 
   row(part) {
-    const [row, head, button, place, displacement] = ['tr', 'th', 'button', 'td', 'td'].map((tag) => document.createElement(tag));
+    const [row, head, button, ...cells] = ['tr', 'th', 'button', 'td', 'td', 'td'].map((tag) => document.createElement(tag));
     head.scope = 'row';
     button.type = 'button';
     button.textContent = this.inside.names[part] || '(no name)';
-    button.title = 'Show or hide this name in the picture';
-    button.addEventListener('click', () => this.keep(part));
-    const point = (to) => () => { this.pointed = to; this.redraw(); };
-    for (const [type, to] of [['focus', part], ['blur', -1]]) button.addEventListener(type, point(to));
-    for (const [type, to] of [['mouseenter', part], ['mouseleave', -1]]) row.addEventListener(type, point(to));
+    button.addEventListener('click', () => this.choose(part));
     head.append(button);
-    row.append(head, place, displacement);
-    return { part, row, button, place, displacement };
+    row.append(head, ...cells);
+    return { part, row, button, cells };
   }
 
-  /** Toggle whether a part's name stays visible in the picture. */
-  keep(part) {
-    const { state } = this;
-    state.named = state.named.includes(part) ? state.named.filter((p) => p !== part) : [...state.named, part];
-    this.press();
-  }
-
+  /** Mark the chosen target's row. */
   press() {
-    for (const { part, button } of this.rows) button.setAttribute('aria-pressed', String(this.state.named.includes(part)));
-    this.redraw();
-  }
-
-  /** Write the positions in the state `now` and the displacements from the state `from`, unless the table shows them
-   * already. */
-  show(now, from) {
-    if (this.written?.now === now && this.written.from === from) return;
-    this.written = { now, from };
-    const of = (part) => insidePart(this.inside, part, now, from);
-    for (const { part, button, place, displacement } of this.rows) {
-      const { place: at, displacement: far } = of(part);
-      const texts = [placeText(at).replace(' mm', ''), far.toFixed(1)];
-      if (place.textContent !== texts[0]) place.textContent = texts[0];
-      if (displacement.textContent !== texts[1]) displacement.textContent = texts[1];
-      const words = `${button.textContent}, moved ${texts[1]} mm, at ${texts[0]} mm`;
-      if (button.getAttribute('aria-label') !== words) button.setAttribute('aria-label', words);
+    for (const { part, button, row } of this.rows) {
+      button.setAttribute('aria-pressed', String(this.state.chosen === part));
+      row.classList.toggle('chosen', this.state.chosen === part);
     }
   }
-}
 
-/** Labels with the names of parts inside the lungs, placed over the picture next to the parts. */
-class InsideNames {
-  constructor(parent) {
-    Object.assign(this, { parent, plates: [] });
-  }
-
-  /** Show names, {text, at}, where `at` is a position in CSS pixels, or null for a hidden name. If two names would
-   * overlap, the lower one moves down. */
-  show(names) {
-    const taken = [];
-    for (const name of names.filter(({ at }) => at).sort((a, b) => a.at.y - b.at.y)) {
-      const half = 3.7 * name.text.length + 10; // half of the label's width, px; estimated, because measuring forces a layout
-      for (const other of taken) {
-        if (Math.abs(other.at.x - name.at.x) < half + other.half && name.at.y < other.at.y + 20) name.at.y = other.at.y + 20;
-      }
-      taken.push({ ...name, half });
+  /** Write the numbers of every row; `moved` is the result of movedBetween. */
+  show(moved) {
+    this.moved = moved;
+    for (const { part, row, cells } of this.rows) {
+      const target = targetOf(this.inside, part, moved);
+      const told = isTold(target);
+      row.classList.toggle('untold', !told);
+      const texts = [`${target.mm.toFixed(1)} mm`, moved.largest < 0.05 ? 'the reference' : told ? wayWords(target.move, 3, moved.now.gravity) : UNTOLD, target.error === null ? 'unknown' : `${target.error.toFixed(1)} mm`];
+      cells.forEach((cell, i) => { if (cell.textContent !== texts[i]) cell.textContent = texts[i]; });
     }
-    while (this.plates.length < names.length) {
-      const plate = document.createElement('span');
-      plate.className = 'name plate';
-      this.parent.append(plate);
-      this.plates.push(plate);
-    }
-    this.plates.forEach((plate, i) => {
-      const { text, at } = names[i] ?? {};
-      if (text && plate.textContent !== text) plate.textContent = text;
-      placed(plate, at, Boolean(at));
-    });
   }
 }

@@ -17,7 +17,8 @@ function linkOf(state) {
     cut: state.cut.axis < 0 ? '' : `${'xyz'[state.cut.axis]}:${round(state.cut.at)}`,
     range: state.ownRanges[state.kind] ? `${state.ownRanges[state.kind].begin}:${state.ownRanges[state.kind].end}` : '',
     camera: [camera.azimuth, camera.elevation, camera.zoom, ...camera.pan, ...(camera.pivot ?? [])].map((x) => round(x)).join(':'),
-    slices: state.slices.map((x) => round(x, 1)).join(':'), probes: state.probes.join('.'), names: state.named.join('.'), inside: state.basis.inside && !state.inside ? '0' : '',
+    slices: state.slices ? state.slices.map((x) => round(x, 1)).join(':') : '', probes: state.probes.join('.'), target: state.chosen ? String(state.chosen) : '',
+    since: state.basis.froms.length > 1 ? String(state.basis.froms.indexOf(state.from)) : '', inside: state.basis.inside && !state.inside ? '0' : '',
   };
   return new URLSearchParams(Object.entries(all).filter(([, value]) => value !== '')).toString().replaceAll('%3A', ':').replaceAll('%2B', '%2b');
 }
@@ -36,7 +37,7 @@ function takeLink(text, state) {
   if (KINDS[link.get('colour')]) state.kind = link.get('colour');
   state.room = link.get('room') !== '0';
   state.roomBlend = state.room ? 1 : 0;
-  const shown = (link.get('show') ?? 'contours.ghost').split('.');
+  const shown = (link.get('show') ?? (state.basis.inside ? 'contours' : 'contours.ghost')).split('.');
   for (const name of SHOWN) state[name] = shown.includes(name);
   const opacity = numbers('lungs');
   if (opacity.length === state.opacity.length && opacity.every((x) => x >= 0 && x <= 1)) state.opacity = opacity;
@@ -49,15 +50,17 @@ function takeLink(text, state) {
     state.camera = { azimuth: camera[0], elevation: within(camera[1], -1.58, 1.58, 0), zoom: within(camera[2], 0.3, 30, 1), pan: camera.slice(3, 5), pivot: camera.length === 8 ? camera.slice(5) : null };
   }
   const slices = numbers('slices');
-  if (slices.length === 2 && [2, 1].every((axis, i) => slices[i] > state.body.low[axis] && slices[i] < state.body.high[axis])) state.slices = slices;
+  if (slices.length === 3 && slices.every((x, axis) => x > state.body.low[axis] && x < state.body.high[axis])) state.slices = slices;
   state.inside = Boolean(state.basis.inside) && link.get('inside') !== '0';
-  state.named = numbers('names', '.').filter((part) => Number.isInteger(part) && part >= 0 && part < (state.basis.inside?.names.length ?? 0));
+  const target = numbers('target')[0];
+  state.chosen = Number.isInteger(target) ? within(target, 0, (state.basis.inside?.names.length ?? 1) - 1, 0) : 0;
+  state.from = state.basis.froms[numbers('since')[0] ?? 0] ?? state.basis.froms[0];
   state.probes = numbers('probes', '.').filter((v) => Number.isInteger(v) && v >= 0 && v < state.basis.vertices).slice(0, 8);
 }
 
-/** Return the picture with title, `lines` of text, colour bar and labels as a PNG blob. `draw` is called first,
- * because the canvas keeps its pixels only until the end of the frame. */
-function savePicture(canvas, draw, title, lines, range, colours, labels) {
+/** Return the picture with the notes, title, `lines` of text and, unless `range` is null, the colour bar as a PNG blob.
+ * `draw` is called first, because the canvas keeps its pixels only until the end of the frame. */
+function savePicture(canvas, draw, title, lines, range, colours) {
   draw();
   const ratio = canvas.width / canvas.clientWidth;
   const paper = document.createElement('canvas');
@@ -65,25 +68,22 @@ function savePicture(canvas, draw, title, lines, range, colours, labels) {
   const context = paper.getContext('2d');
   context.fillStyle = theme['paper-solid'];
   context.fillRect(0, 0, paper.width, paper.height);
-  context.drawImage(canvas, 0, 0);
+  for (const layer of [canvas, $('notes')]) context.drawImage(layer, 0, 0, paper.width, paper.height);
   context.scale(ratio, ratio);
-  const text = (words, x, y, font, align = 'left', colour = theme.ink) => {
-    context.font = `${font} system-ui, sans-serif`;
-    context.textAlign = align;
-    context.fillStyle = colour;
+  const text = (words, x, y, font, align = 'left') => {
+    Object.assign(context, { font: `${font} system-ui, sans-serif`, textAlign: align, fillStyle: theme.ink });
     context.fillText(words, x, y);
   };
-  text(title, 20, 34, '650 19px');
+  text(title, 20, 34, '600 18px');
   lines.forEach((line, i) => text(line, 20, 56 + 18 * i, '13px'));
-  for (const { x, y, words } of labels) text(words, x, y + 5, '650 14px', 'center');
   const [left, top, width] = [20, canvas.clientHeight - 44, Math.min(320, canvas.clientWidth - 40)];
-  for (let i = 0; i < width; ++i) {
+  for (let i = 0; range && i < width; ++i) {
     const at = 4 * Math.round((255 * i) / (width - 1));
     context.fillStyle = `rgb(${colours[at]} ${colours[at + 1]} ${colours[at + 2]})`;
     context.fillRect(left + i, top, 1.5, 12);
   }
-  text(range.title, left, top - 8, '600 13px');
-  for (let i = Math.ceil(range.begin / range.step - 1e-9); i * range.step <= range.end * (1 + 1e-9); ++i) {
+  if (range) text(range.title, left, top - 8, '600 13px');
+  for (let i = Math.ceil((range?.begin ?? 0) / (range?.step ?? 1) - 1e-9); range && i * range.step <= range.end * (1 + 1e-9); ++i) {
     text(plain(i * range.step), left + (width * (i * range.step - range.begin)) / (range.end - range.begin), top + 28, '12px', 'center');
   }
   return new Promise((done) => { paper.toBlob(done, 'image/png'); });

@@ -16,7 +16,8 @@ window.supineLive = (() => {
   tilt.title = 'Lay the phone on the breastbone, screen outwards, top towards the head';
   tilt.hidden = typeof DeviceOrientationEvent === 'undefined' || !window.isSecureContext;
   bar.append(said, aged, tilt);
-  (document.querySelector('#title > :last-child') ?? document.body).append(bar);
+  (document.querySelector('#title') ?? document.body).append(bar);
+  document.body.classList.add('waiting'); // grey until the first pose
 
   let socket = null;
   let moments = 0;
@@ -47,6 +48,8 @@ window.supineLive = (() => {
     if (!page) return;
     moments += 1;
     page.state.playing = false;
+    page.state.live = true;
+    document.body.classList.toggle('waiting', Number.isNaN(posed));
     page.state.depth = above;
     page.state.settle(turned(page.state.q, gravity), 0, 0);
     page.touch();

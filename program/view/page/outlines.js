@@ -36,31 +36,45 @@ function linesAcross({ corners, vertices }, places, axis, at) {
   return lines;
 }
 
-/** The two section planes. A drag in the picture of one plane moves the other plane.
- *     axis  index of the axis normal to the plane
- *     sign  1 if the plane's second axis points down in the picture, -1 if it points up
- *     ends  letters at the ends of the plane's axes */
-const PLANES = [
-  { name: 'axial', axis: 2, sign: 1, ends: { L: [1, 0], R: [-1, 0], P: [0, 1], A: [0, -1] } },
-  { name: 'coronal', axis: 1, sign: -1, ends: { L: [1, 0], R: [-1, 0], H: [0, 1], F: [0, -1] } },
-];
+/** Section planes by their normal axis: name, and name of the plane's position. */
+const PLANES = [{ name: 'sagittal', from: 'right' }, { name: 'coronal', from: 'front' }, { name: 'axial', from: 'apex' }];
+
+/** Return the two section planes that show the lungs as the picture does for a direction of gravity: the axial plane, and
+ * the coronal or sagittal plane that contains gravity. Each is {axis, right, up, from}: the index of its normal's axis,
+ * the body's directions that point right and up in the drawing, and the side that it is seen from. Gravity points down;
+ * the head is on the left or, if the patient stands, at the top. */
+function planesFor(gravity) {
+  const lengthwise = Math.abs(gravity[0]) >= Math.abs(gravity[1]) ? 1 : 0;
+  return [2, lengthwise].map((axis) => {
+    const flat = gravity.map((g, i) => (i === axis ? 0 : -g));
+    const standing = Math.hypot(...flat) < 0.3 || (axis !== 2 && Math.abs(flat[2]) > 0.8);
+    const up = standing ? (axis === 2 ? ENDS.A : flat[2] < 0 && axis !== 2 ? ENDS.F : ENDS.H) : unit(flat);
+    let towards = axis === 2 ? ENDS.F : axis === 1 ? ENDS.A : ENDS.R; // the side that the plane is seen from
+    if (axis !== 2 && !standing && cross(up, towards)[2] > 0) towards = towards.map((x) => -x);
+    const [side] = Object.entries(ENDS).find(([, end]) => dot(end, towards) > 0.9);
+    return { axis, up, right: cross(up, towards), from: VIEWS[side].toLowerCase() };
+  });
+}
 
 class Outlines {
   /** Make a canvas for each plane. `redraw` requests a new drawing. */
   constructor(parent, basis, state, redraw) {
-    Object.assign(this, { basis, state, kept: {} });
-    this.canvases = PLANES.map((plane, i) => {
+    Object.assign(this, { basis, state, kept: {}, planes: planesFor(state.gravity), scale: 1 });
+    this.canvases = [0, 1].map((i) => {
       const canvas = document.createElement('canvas');
       canvas.tabIndex = 0;
       canvas.setAttribute('role', 'slider');
       canvas.setAttribute('aria-orientation', 'vertical');
-      const move = (mm) => {
+      const move = (mm) => { // a drag in one drawing moves the plane of the other
         const { low, high } = state.body;
-        const { axis } = PLANES[1 - i];
-        state.slices[1 - i] = Math.max(low[axis] + 1, Math.min(high[axis] - 1, state.slices[1 - i] + mm));
+        const { axis } = this.planes[1 - i];
+        state.slices = this.at.with(axis, Math.max(low[axis] + 1, Math.min(high[axis] - 1, this.at[axis] + mm)));
         redraw();
       };
-      onDrag(canvas, (dx, dy) => move((this.across[i][0] * dx + this.across[i][1] * dy) / this.scale));
+      onDrag(canvas, (dx, dy) => {
+        const { axis } = this.planes[1 - i];
+        move((this.planes[i].right[axis] * dx - this.planes[i].up[axis] * dy) / this.scale);
+      });
       canvas.addEventListener('keydown', (event) => {
         const arrow = ARROWS[event.key];
         if (!arrow) return;
@@ -70,90 +84,82 @@ class Outlines {
       parent.append(canvas);
       return canvas;
     });
-    this.across = [[0, 1], [0, 1]]; // direction of each section plane's second axis on its canvas, a unit vector (x right, y down)
   }
 
-  /** Return the position of plane `i` of PLANES as text. */
-  placeWords(i) {
-    const { state: { slices, body } } = this;
-    return i === 0 ? `axial, ${(body.high[2] - slices[0]).toFixed(0)} mm from the apex` : `coronal, ${(slices[1] - body.low[1]).toFixed(0)} mm from the front`;
+  /** Return the position of the plane with a normal axis as text. */
+  placeWords(axis) {
+    const { at, state: { body: { low, high } } } = this;
+    return `${PLANES[axis].name}, ${Math.abs(at[axis] - (axis === 2 ? high : low)[axis]).toFixed(0)} mm from the ${PLANES[axis].from}`;
   }
 
-  /** Draw the outlines in the state `now`, and dashed outlines in the state `from`. */
-  show(now, from) {
+  /** Draw the outlines in the state `now`, and dashed outlines in the state `from`, through `target` (see targetOf) or,
+   * if it is null, through the middle of a lung, unless the user has moved the planes. */
+  show(now, from, target, radius) {
     const { basis, state, kept } = this;
+    const [box] = basis.lungBoxes;
+    this.planes = planesFor(now.gravity);
+    this.at = state.slices ?? target?.at ?? [box.centre[0], basis.torso.centre[1], box.centre[2] - 0.3 * box.half[2]];
     if (kept.from !== from) Object.assign(kept, { from, before: placesOf(basis, from) });
     if (kept.now !== now) Object.assign(kept, { now, places: placesOf(basis, now) });
-    PLANES.forEach((plane, i) => {
-      this.draw(i, linesAcross(basis, kept.before, plane.axis, state.slices[i]), linesAcross(basis, kept.places, plane.axis, state.slices[i]), now.gravity);
-      const { axis } = PLANES[1 - i];
+    this.planes.forEach((plane, i) => {
+      this.draw(i, ...[kept.before, kept.places].map((places) => linesAcross(basis, places, plane.axis, this.at[plane.axis])), target, radius);
+      const { axis } = this.planes[1 - i];
       const canvas = this.canvases[i];
-      canvas.setAttribute('aria-label', `Outlines, ${this.placeWords(i)}; a drag or the arrow keys move the ${PLANES[1 - i].name} plane`);
+      canvas.setAttribute('aria-label', `Outlines, ${this.placeWords(plane.axis)}; a drag or the arrow keys move the ${PLANES[axis].name} plane`);
       canvas.setAttribute('aria-valuemin', state.body.low[axis].toFixed(0));
       canvas.setAttribute('aria-valuemax', state.body.high[axis].toFixed(0));
-      canvas.setAttribute('aria-valuenow', state.slices[1 - i].toFixed(0));
-      canvas.setAttribute('aria-valuetext', this.placeWords(1 - i));
+      canvas.setAttribute('aria-valuenow', this.at[axis].toFixed(0));
+      canvas.setAttribute('aria-valuetext', this.placeWords(axis));
     });
   }
 
-  draw(i, before, after, gravity) {
-    const { axis, sign, ends } = PLANES[i];
-    const { body, slices } = this.state;
+  draw(i, before, after, target, radius) {
+    const { axis, right, up, from } = this.planes[i];
+    const { body } = this.state;
     const others = [0, 1, 2].filter((k) => k !== axis);
     const context = freshContext(this.canvases[i]);
     const { width, height } = sizeOf(this.canvases[i]);
-    const middle = others.map((k) => (body.low[k] + body.high[k]) / 2);
-    this.scale = (Math.min(width, height - 30) / 2 - 16) / Math.max(...body.half);
+    const reach = (way) => way.reduce((sum, x, k) => sum + Math.abs(x) * body.half[k], 0);
+    if (i === 0) this.scale = Math.min(...this.planes.flatMap((plane) => [(width - 44) / 2 / reach(plane.right), (height - 84) / 2 / reach(plane.up)]));
     const { scale } = this;
-    const along = [gravity[others[0]], sign * gravity[others[1]]];
-    const size = Math.hypot(...along);
-    // direction, within the section plane, that points down in the picture: gravity, unless nearly normal to the plane
-    const [a, b] = size < 0.3 ? [0, 1] : along.map((x) => x / size);
-    const turned = (u, v) => [u * b - sign * v * a, u * a + sign * v * b];
-    const place = ([u, v]) => {
-      const [x, y] = turned(u - middle[0], v - middle[1]);
-      return [width / 2 + scale * x, 16 + (height - 30) / 2 + scale * y];
+    const middle = (height - 40) / 2;
+    const place = (at) => {
+      const off = at.map((x, k) => x - body.centre[k]);
+      return [width / 2 + scale * dot(off, right), middle - scale * dot(off, up)];
     };
-    this.across[i] = turned(0, 1);
+    const inPlane = ([u, v]) => place(body.centre.with(others[0], u).with(others[1], v));
     const path = (lines) => {
       context.beginPath();
       for (const line of lines) {
-        line.forEach((point, j) => context[j ? 'lineTo' : 'moveTo'](...place(point)));
+        line.forEach((point, j) => context[j ? 'lineTo' : 'moveTo'](...inPlane(point)));
         context.closePath();
       }
     };
-    context.lineWidth = 2;
-    context.strokeStyle = context.fillStyle = css('--gravity');
+    context.strokeStyle = context.fillStyle = css('--ink');
     path(after);
     context.globalAlpha = 0.1;
     context.fill('evenodd');
     context.globalAlpha = 1;
+    context.lineWidth = 1.7;
     context.stroke();
     context.setLineDash([4, 3]);
-    context.lineWidth = 1.5;
-    context.strokeStyle = css('--ink');
+    context.lineWidth = 1;
     path(before);
     context.stroke();
     context.setLineDash([]);
-    context.strokeStyle = css('--accent'); // line where the other section plane crosses this one
-    context.globalAlpha = 0.8;
-    context.beginPath();
-    for (const side of [-1, 1]) context[side < 0 ? 'moveTo' : 'lineTo'](...place([middle[0] + side * body.half[0] * 1.12, slices[1 - i]]));
-    context.stroke();
-    context.globalAlpha = 1;
-    context.fillStyle = css('--ink');
-    context.textAlign = 'center';
-    context.textBaseline = 'middle';
-    context.font = '12px system-ui, sans-serif';
-    context.fillText(this.placeWords(i), width / 2, 8, width);
-    context.fillRect(6, height - 4, 40 * scale, 2);
-    context.textAlign = 'left';
-    context.fillText('4 cm', 6, height - 13);
-    context.textAlign = 'center';
-    context.font = '700 12px system-ui, sans-serif';
-    for (const [letter, end] of Object.entries(ends)) {
-      const [x, y] = place(end.map((e, k) => middle[k] + e * (body.half[others[k]] + 10 / scale)));
-      context.fillText(letter, Math.max(8, Math.min(width - 8, x)), Math.max(22, Math.min(height - 8, y)));
+    if (target) drawTrace(context, place(target.was), place(target.at), radius * scale, 0);
+    const text = (words, x, y, align, colour = '--soft', font = '12px') => {
+      [context.textAlign, context.textBaseline, context.fillStyle, context.font] = [align, 'middle', css(colour), `${font} system-ui, sans-serif`];
+      context.fillText(words, x, y, width);
+    };
+    for (const [letter, end] of Object.entries(ENDS)) {
+      const [x, y] = [dot(end, right), -dot(end, up)];
+      if (end[axis] || Math.hypot(x, y) < 0.7) continue;
+      text(letter, width / 2 + x * (scale * reach(right) + 12), middle + y * (scale * reach(up) + 13), 'center', '--ink', '600 12px');
     }
+    context.fillStyle = css('--ink');
+    context.fillRect(0, height - 29, 40 * scale, 1.5);
+    text('4 cm', 40 * scale + 6, height - 28, 'left');
+    text(`${PLANES[axis].name}, seen ${from}`, 0, height - 9, 'left');
   }
 }

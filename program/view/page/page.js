@@ -7,7 +7,7 @@ const KIND_TEXT = {
   displacement: 'Distance of each point from its position FROM.',
   difference: 'Distance of each point from its position in the other posture at the same breath.',
   expansion: 'Growth of the surface area around each point, relative to its area FROM.',
-  height: 'Height of each point above the lowest one, along gravity.',
+  plain: '',
 };
 
 /** Compute the bounding box and sphere of positions. */
@@ -19,13 +19,6 @@ function boundsOf(places) {
   const centre = low.map((x, i) => (x + high[i]) / 2);
   const radius = places.reduce((most, [x, y, z]) => Math.max(most, Math.hypot(x - centre[0], y - centre[1], z - centre[2])), 0);
   return { centre, low, high, half: low.map((x, i) => (high[i] - x) / 2), radius: radius || 1 };
-}
-
-/** Return the quaternion of a rotation that maps the direction -z, along which arrows point, to a unit vector. */
-function arrowTurn(direction) {
-  const axis = cross([0, 0, -1], direction);
-  const w = 1 - direction[2];
-  return w < 1e-6 ? turn([1, 0, 0], Math.PI) : unit([...axis, w]);
 }
 
 const colourReader = document.createElement('canvas').getContext('2d');
@@ -42,10 +35,10 @@ function start() {
   state.measure(); // the URL may have set a larger volume, which changes the ranges of the colour bar
   const canvas = $('picture');
   let picture = pictureOn(canvas, basis);
-  const letters = new Letters($('letters'), 2);
+  const notes = new Notes($('notes'));
   const { inside } = basis;
-  const fromWhere = basis.from.name.replace(/^the /, 'in the '); // for example "in the scan"
-  const restOrScan = basis.resting ? 'rest' : 'scan';
+  const fromWhere = () => state.from.name.replace(/^the /, 'in the '); // for example "in the scan"
+  const restOrScan = basis.resting ? 'rest' : 'the scan';
   const redraw = () => { unseen = true; };
   const tangent = Math.tan(VIEW_ANGLE / 2);
   let stale = true;     // whether the vertices are out of date
@@ -59,8 +52,11 @@ function start() {
   let frameTime = NaN;  // smoothed time between frames, ms
   let idle = null;      // timer that writes the view to the URL
   let panes = [];
-  const marks = [];
-  let tabled = -Infinity; // time when the descriptions and the table of inner structures were last written during motion, ms
+  const radii = inside?.members.map((members, part) => { // RMS distance of a target's vertices from their mean, mm
+    const places = members.map((v) => [...inside.reference.subarray(4 * v, 4 * v + 3)]);
+    const { centre } = boundsOf(places);
+    return members.length === 1 ? BALL_RADIUS : Math.sqrt(places.reduce((sum, p) => sum + p.reduce((square, x, i) => square + (x - centre[i]) ** 2, 0), 0) / members.length);
+  });
 
   const ratio = () => canvas.width / Math.max(1, sizeOf(canvas).width);
   const blend = () => state.roomBlend * state.roomBlend * (3 - 2 * state.roomBlend);
@@ -68,26 +64,7 @@ function start() {
   const cameraTurn = () => compose(turn([1, 0, 0], state.camera.elevation - RIGHT_ANGLE), turn([0, 0, 1], state.camera.azimuth));
   const isDark = () => document.documentElement.dataset.theme === 'dark';
 
-  /** Return the largest coordinate of the lungs along a direction, mm. If colours show heights, use all vertices,
-   * otherwise about 400, which are enough to place gravity's arrow and the table under the patient. */
-  function reachAlong(moment, towards) {
-    const { surface, direction, coefficients, modes } = basis;
-    const { weights, gains } = moment;
-    const [x, y, z] = towards;
-    const along = basis.references.map((_, lung) => towards.map((g, axis) => g * gains[3 * lung + axis]));
-    const stride = state.kind === 'height' ? 1 : Math.ceil(basis.vertices / 400);
-    let reach = -Infinity;
-    for (let i = 0; i < basis.vertices; i += stride) {
-      let amount = 0;
-      for (let k = 0; k < modes; ++k) amount += weights[k] * coefficients[i * modes + k];
-      const at = 3 * i;
-      const [u, v, w] = along[lungOf(basis, i)];
-      reach = Math.max(reach, x * surface[at] + y * surface[at + 1] + z * surface[at + 2] + amount * (u * direction[at] + v * direction[at + 1] + w * direction[at + 2]));
-    }
-    return reach;
-  }
-
-  const distanceNow = (aspect) => (state.body.radius * 1.2 * Math.max(1, 0.86 / aspect)) / Math.sin(VIEW_ANGLE / 2) / state.camera.zoom;
+  const distanceNow = (aspect) => (state.body.radius * 1.6 * Math.max(1, 0.8 / aspect)) / Math.sin(VIEW_ANGLE / 2) / state.camera.zoom;
 
   function makePane(name, moment, q, box) {
     const aspect = box[2] / box[3];
@@ -97,53 +74,35 @@ function start() {
     const pivot = state.camera.pivot ?? centre;
     const toRoom = compose(cameraTurn(), modelTurn(q));
     const away = rotate(toRoom, pivot);
-    const offset = [pan[0] - away[0], pan[1] - away[1] + 0.2 * radius * blend(), -away[2] - distance]; // 0.2: raises the lungs, to show the table
+    const offset = [pan[0] - away[0], pan[1] - away[1] + 0.1 * radius * blend(), -away[2] - distance]; // 0.1: raises the lungs, to show the table
     const { gravity } = moment;
-    const lowestAt = pane_lowest(name, moment);
-    const tail = lowestAt - dot(gravity, centre) + 0.08 * radius;
-    const tailAt = rotate(toRoom, centre.map((c, i) => c + gravity[i] * tail));
-    const arrow = rigid(compose(toRoom, arrowTurn(gravity)), tailAt.map((x, i) => x + offset[i]));
-    const length = 0.34 * radius;
-    for (let i = 0; i < 12; ++i) arrow[i] *= length;
-    const reach = 2.5 * radius + Math.hypot(...pivot.map((x, i) => x - centre[i]));
+    const reach = 4 * radius + Math.hypot(...pivot.map((x, i) => x - centre[i]));
     const { axis, at } = state.cut;
     const kind = KINDS[state.kind];
-    const tableToEye = pane_table(name, moment, toRoom, offset);
+    const tableToEye = tableOf(gravity, toRoom, offset, Math.min(2.3 * radius, 0.85 * tangent * aspect * (distance * state.camera.zoom - 0.5 * radius)));
+    const { torso } = basis;
     return {
       name, distance, state: name, origin: state.kind === 'difference' ? 'pinned' : 'from', box, canvasHeight: canvas.height,
-      toEye: rigid(toRoom, offset), projection: perspective(VIEW_ANGLE, aspect, Math.max(distance - reach, distance * 0.02), distance + reach),
-      arrowToEye: arrow, arrowEnds: [tail, tail + length].map((far) => centre.map((c, i) => c + gravity[i] * far)), gravity, lowest: lowestAt, measure: kind.measure, map: kind.map, range: state.range,
-      pixel: (2 * tangent * distance * ratio()) / box[3], inside: state.inside, contours: state.contours, dark: isDark(), tint: rgb(theme.gravity), ink: [...rgb(theme.ink), 1], radius,
+      toEye: rigid(toRoom, offset), turn: toRoom, projection: perspective(VIEW_ANGLE, aspect, Math.max(distance - reach, distance * 0.02), distance + reach),
+      gravity, measure: kind.measure, map: kind.map, plain: state.kind === 'plain', range: state.range, fade: [-3.6, -1.2].map((z) => torso.centre[2] + z * torso.half[2]),
+      pixel: (2 * tangent * distance * ratio()) / box[3], inside: state.inside, chosen: state.chosen, targetTints: ['accent', 'change'].map((tint) => rgb(theme[tint])), contours: state.contours && state.kind !== 'plain', dark: isDark(), ink: [...rgb(theme.ink), 1], radius,
       opacity: state.opacity, wires: state.wires, ghost: state.ghost, arrows: state.arrows,
-      tableToEye, tableTint: [...rgb(theme.table), tableToEye && tableToEye[10] < 0 ? 1 : 0.25], // the table is opaque from above, translucent from below
+      tableToEye, tableTint: [...rgb(theme.table), 0.3],
       cut: axis < 0 ? NO_CUT : [...[0, 1, 2].map((i) => (i === axis ? 1 : 0)), low[axis] + at * (high[axis] - low[axis])],
     };
   }
 
-  const depths = {}; // results of pane_depth for the state 'now' and for the other posture, 'pinned'
-  /** Return the coordinate along gravity of the lowest point (`value`), and the normal and coordinate of the table
-   * under the patient, mm. The result is cached until the state changes. */
-  function pane_depth(name, moment) {
-    const { kind } = state;
-    if (depths[name]?.moment !== moment || depths[name].kind !== kind) {
-      const { gravity } = moment;
-      const flat = Math.hypot(gravity[0], gravity[1]);
-      const down = flat > 0.4 ? [gravity[0] / flat, gravity[1] / flat, 0] : null; // normal to the table, downwards; a standing patient has no table
-      depths[name] = { moment, kind, value: reachAlong(moment, gravity), down, table: down && reachAlong(moment, down) };
-    }
-    return depths[name];
-  }
-  const pane_lowest = (name, moment) => pane_depth(name, moment).value;
-
-  /** Return the matrix from the box [-1, 1]^3 to the table under the patient in camera coordinates; null if the
-   * posture has no table. The table tilts with the patient. */
-  function pane_table(name, moment, toRoom, offset) {
-    const { down, table } = pane_depth(name, moment);
-    if (!down) return null;
-    const { centre, radius } = state.body;
-    const far = table - dot(down, centre) + 0.46 * radius;
+  /** Return the matrix from the box [-1, 1]^3 to the table under the patient's body, in camera coordinates; null if the
+   * patient stands. The table tilts with the patient; `length` is half its length, mm. */
+  function tableOf(gravity, toRoom, offset, length) {
+    const flat = Math.hypot(gravity[0], gravity[1]);
+    if (flat <= 0.4) return null;
+    const down = [gravity[0] / flat, gravity[1] / flat, 0];
+    const { radius } = state.body;
+    const { centre, half } = basis.torso;
+    const far = Math.hypot(1.25 * half[0] * down[0], 1.1 * half[1] * down[1]) + 0.12 * radius;
     const at = rotate(toRoom, centre.map((c, i) => c + down[i] * far)).map((x, i) => x + offset[i]);
-    const columns = [cross(down, [0, 0, 1]).map((x) => 0.55 * radius * x), [0, 0, 1.25 * radius], down.map((x) => 0.02 * radius * x)].map((v) => rotate(toRoom, v));
+    const columns = [cross(down, [0, 0, 1]).map((x) => 0.5 * radius * x), [0, 0, length], down.map((x) => 0.12 * radius * x)].map((v) => rotate(toRoom, v));
     return new Float32Array([...columns[0], 0, ...columns[1], 0, ...columns[2], 0, ...at, 1]);
   }
 
@@ -205,26 +164,12 @@ function start() {
   const originMoment = () => (state.kind === 'difference' ? state.pinned : state.from);
   /** Return the value that the colour at a marked vertex shows; null if it has none. */
   function probeValue(vertex) {
-    const at = placeOf(basis, state.moment, vertex);
-    if (state.kind === 'height') return pane_lowest('now', state.moment) - dot(state.gravity, at);
     if (state.kind === 'expansion') return null;
-    const from = placeOf(basis, originMoment(), vertex);
+    const [at, from] = [state.moment, originMoment()].map((moment) => placeOf(basis, moment, vertex));
     return Math.hypot(...at.map((x, i) => x - from[i]));
   }
 
   function showProbes() {
-    while (marks.length < state.probes.length) {
-      const mark = document.createElement('span');
-      mark.className = 'probe';
-      mark.textContent = String(marks.length + 1);
-      $('letters').append(mark);
-      marks.push(mark);
-    }
-    const pane = panes.at(-1);
-    marks.forEach((mark, i) => {
-      const at = i < state.probes.length ? project(pane, placeOf(basis, state.moment, state.probes[i]), ratio()) : null;
-      placed(mark, at, Boolean(at) && at.x > pane.box[0] / ratio());
-    });
     const list = $('probes');
     while (list.children.length > state.probes.length) list.lastChild.remove();
     while (list.children.length < state.probes.length) {
@@ -249,35 +194,58 @@ function start() {
       const places = (moment) => state.probes.slice(-2).map((vertex) => placeOf(basis, moment, vertex));
       const apart = ([a, b]) => Math.hypot(...a.map((x, i) => x - b[i]));
       const n = state.probes.length;
-      return `${n - 1} to ${n}: ${apart(places(state.moment)).toFixed(1)} mm; ${fromWhere} ${apart(places(state.from)).toFixed(1)} mm`;
+      return `${n - 1} to ${n}: ${apart(places(state.moment)).toFixed(1)} mm; ${fromWhere()} ${apart(places(state.from)).toFixed(1)} mm`;
     };
     write('probes-text', state.probes.length === 0 ? 'Click or tap the lungs to place a probe. Two probes measure the distance between them.' : state.probes.length === 1 ? 'Place a second probe to measure the distance.' : between());
     $('probes-clear').hidden = state.probes.length === 0;
   }
 
-  const insideTable = inside && new InsideTable(inside, state, redraw);
-  const insideNames = new InsideNames($('letters'));
+  const choose = (part) => {
+    state.chosen = part;
+    table.press();
+    told = null;
+    redraw();
+  };
+  const table = inside && new TargetTable(inside, state, choose);
 
-  /** Return the position and displacement, mm, of the vertex nearest to the position `at` in a part inside the lungs,
-   * and the value that its colour shows. */
+  /** Return the position and displacement, mm, of the vertex nearest to the position `at` in a part inside the lungs. */
   function insideAt({ part, at, pane }) {
     const moment = pane === 'pinned' ? state.pinned : state.moment;
     const vertex = insideNearest(inside, part, moment, at);
     const [place, from] = [insidePlace(inside, moment, vertex), insidePlace(inside, originMoment(), vertex)];
-    const displacement = Math.hypot(...place.map((x, i) => x - from[i]));
-    const height = pane_lowest(pane, moment) - dot(moment.gravity, place);
-    return { place, displacement, value: { displacement, difference: displacement, height }[state.kind] };
+    return { place, displacement: Math.hypot(...place.map((x, i) => x - from[i])) };
   }
 
-  function showInside() {
-    const partNow = (part) => insidePart(inside, part, state.moment, originMoment());
-    const shown = state.inside ? [...new Set([...state.named, insideTable.pointed])].filter((part) => part >= 0) : [];
+  /** Draw the notes over the picture. */
+  function drawNotes() {
+    const { width, height } = sizeOf(notes.canvas);
     const pane = panes.at(-1);
-    insideNames.show(shown.map((part) => {
-      const { place, displacement } = partNow(part);
-      const at = project(pane, place, ratio());
-      return { text: `${inside.names[part]} moved ${displacement.toFixed(1)} mm`, at: at && at.x > pane.box[0] / ratio() ? at : null };
-    }));
+    notes.context = freshContext(notes.canvas);
+    notes.taken = [];
+    const small = width < 520;
+    notes.gravity(pane, small ? 34 : width - 44, height - (small ? 100 : 92));
+    if (inside && state.inside && state.moment && !state.turning) {
+      const moved = { ...(told ? table.moved : {}), now: state.moment, from: originMoment() };
+      const few = inside.names.length <= 6;
+      for (const part of inside.names.map((_, i) => i).sort((a, b) => (b === state.chosen) - (a === state.chosen))) {
+        if (!few && part !== state.chosen) break;
+        const target = targetOf(inside, part, moved);
+        if (part === state.chosen && target.mm > 0.05) notes.lens(pane, target, radii[part], state.from.name, ratio(), { width, height });
+        else {
+          const [was, at] = [target.was, target.at].map((p) => project(pane, p, ratio()));
+          if (!was || !at) continue;
+          notes.context.strokeStyle = notes.context.fillStyle = css('--ink');
+          notes.context.lineWidth = 1.5;
+          if (Math.hypot(at[0] - was[0], at[1] - was[1]) > 6) drawArrow(notes.context, was, at, 6);
+          notes.name(target, at, [target.name, ...(small ? [] : [`${target.mm.toFixed(1)} mm${isTold(target) ? '' : `: ${UNTOLD}`}`])], width);
+        }
+      }
+    }
+    state.probes.forEach((vertex, i) => {
+      const at = project(pane, placeOf(basis, state.moment, vertex), ratio());
+      if (at) notes.text(`\u25cf ${i + 1}`, ...at, { font: '700 13px' });
+    });
+    if (state.beside) [state.pinnedQ, state.goal].forEach((q, i) => notes.text(postureWords(gravityOf(q)), width * (0.25 + 0.5 * i), height - 16, { align: 'center', font: '600 14px' }));
   }
 
   /** Request the point at a position on the canvas, CSS pixels; `then` receives the result of Picture.picked(). */
@@ -287,7 +255,7 @@ function start() {
   }
 
   function addProbe(found) {
-    if (found?.part !== undefined) insideTable.keep(found.part);
+    if (found?.part !== undefined) choose(found.part);
     if (!found || found.part !== undefined || state.probes.length === 8) return;
     const moment = found.pane === 'pinned' ? state.pinned : state.moment;
     state.probes.push(nearestVertex(basis, picture.read(moment)[0], found.at));
@@ -302,48 +270,57 @@ function start() {
   const amount = (value) => `${value.toFixed(0)} mL`;
 
   const holds = new Holds($('holds'), basis);
-  const outlines = new Outlines($('outlines'), basis, state, () => { described = null; redraw(); });
-
-  let answered = { depth: null }; // {depth, most}: volume above rest on the posture cards, mL; largest lung volume on them, mL
-  /** Write the changes of the lungs' volumes and the displacement in each posture on its card. */
-  function answerCards() {
-    if (answered.depth === state.depth) return;
-    answered = { depth: state.depth, most: 0 };
-    for (const { posture, answer } of buttons) {
-      const moment = momentFor(basis, gravityOf(tilted(posture.q, posture.tilt)), state.depth);
-      answer.textContent = moment.folds ? 'out of reach' : answerOf(basis, moment);
-      answered.most = Math.max(answered.most, ...(moment.folds ? [] : moment.held));
-    }
-  }
+  const outlines = new Outlines($('outlines'), basis, state, () => { told = null; redraw(); });
 
   /** Return the height of the centre of each lung, mm, measured opposite to gravity. */
-  const lungHeights = (gravity) => basis.lungMiddles.map((middle) => -dot(gravity, middle));
+  const lungHeights = (gravity) => basis.lungBoxes.map(({ centre }) => -dot(gravity, centre));
 
-  let described = null; // {moment, stride}: state and vertex stride for which tellFinding last wrote its text; null makes it write again
-  /** Write the texts, volume bars and outlines that describe the state of the lungs. Statistics of the displacement use
-   * every `stride`th vertex. */
-  function tellFinding(stride) {
-    if (described?.moment === state.moment && described.stride <= stride) return;
-    described = { moment: state.moment, stride };
-    if (!state.playing && stride === 1) answerCards();
-    const above = Math.round(state.depth) ? `${amount(state.depth)} above ${basis.resting ? 'rest' : 'the scan'}` : '';
-    const { held } = state.moment;
-    const measured = Math.round(state.depth) === 0 && basis.from.name === 'supine at rest' ? PUBLISHED[postureText(state.gravity)] : undefined;
-    if (held) {
-      basis.fromHeld ??= heldBy(basis, basis.from);
-      holds.show(basis, held, basis.fromHeld, answered.most ?? 0, lungHeights(state.gravity), measured);
-      write('holds-text', `Grey: ${basis.from.name}. Orange: gain. Hatched: loss.${measured ? ` Bracket: published mean and SD (${measured.source}).` : ''}`);
+  let told = null; // {gravity, depth, from, chosen}: what the texts describe; null makes them be written again
+  let since = 0;   // time when what the texts should describe last changed, ms
+  let next = null; // what the texts should describe
+  const alike = (a, b) => a && b && a.depth === b.depth && a.from === b.from && a.chosen === b.chosen && dot(a.gravity, b.gravity) > Math.cos(0.03);
+
+  /** Once the posture has settled, write the texts, bars, cards and outlines that describe the lungs. During a breath,
+   * and while a tracker moves the patient, they describe the end of an expiration. */
+  function tellSettled(now) {
+    const depth = state.playing || state.live ? 0 : state.depth;
+    const wish = { gravity: state.gravity, depth, from: state.from, chosen: state.chosen };
+    if (!alike(wish, next)) [next, since] = [wish, now];
+    if (alike(wish, told) || state.turning || now - since < (state.live ? 700 : 0)) return;
+    told = wish;
+    const moment = momentFor(basis, state.gravity, depth);
+    if (moment.folds) return;
+    const moved = movedBetween(basis, moment, depth, state.from);
+    const target = inside ? targetOf(inside, state.chosen, moved) : null;
+    const above = Math.round(depth) ? `${amount(depth)} above ${restOrScan}` : '';
+    const sentence = sentenceOf(basis, moved, target, state.gravity, above);
+    writeSentence($('finding'), sentence);
+    write('meaning', sentence.meaning);
+    write('surface-text', moved.largest < 0.05 ? `This is ${state.from.name}.` : `${moved.mean.toFixed(1)} mm on average from ${state.from.name}, 95 % within ${moved.p95.toFixed(1)}, at most ${moved.largest.toFixed(1)}${moved.error === null ? '' : `; expected error ${moved.error.toFixed(1)} mm`}.`);
+    table?.show(moved);
+    write('targets-title', `Targets, ${whereWords(state.gravity).replace(/^./, (c) => c.toLowerCase())}`);
+    tellVolumes(moment, moved);
+    outlines.show(moment, state.from, target, radii?.[state.chosen]);
+    write('outlines-title', target && !state.slices ? `Outlines through ${target.name}` : 'Outlines');
+    write('outlines-text', `Dashed: ${state.from.name}. Solid: ${postureWords(state.gravity)}${above && `, ${above}`}. Drag to move a slice.`);
+    for (const { posture, answer } of buttons) {
+      const there = momentFor(basis, gravityOf(tilted(posture.q, posture.tilt)), depth);
+      const far = there.folds ? null : movedBetween(basis, there, depth, state.from);
+      answer.textContent = far ? answerOf(far, inside ? targetOf(inside, state.chosen, far) : null) : 'out of reach';
     }
-    outlines.show(state.moment, state.from);
-    write('outlines-text', `Dashed: ${basis.from.name}. Solid: ${postureWords(state.gravity)}${above && `, ${above}`}. Seen from the feet and the front; drag a line to move the slice.`);
-    changed('breathing', state.playing, () => $('finding').setAttribute('aria-live', state.playing ? 'off' : 'polite'));
-    const [finding, displacement] = findingOf(basis, state.moment, state.gravity, above, stride);
-    writeFinding($('finding'), finding);
-    write('finding-displacement', displacement);
-    write('finding-error', stride === 1 && displacement ? errorWords(basis, state.moment, state.depth) : '');
+    redraw();
   }
 
-  const volumeWords = () => (Math.round(state.depth) ? `${restOrScan} + ${amount(state.depth)}` : restOrScan); // for example "rest + 500 mL"
+  function tellVolumes(moment, { from }) {
+    $('holds-section').hidden = !moment.held;
+    if (!moment.held) return;
+    const measured = told.depth === 0 && from.name === 'supine at rest' ? PUBLISHED[postureText(state.gravity)] : undefined;
+    holds.show(basis, moment.held, told.depth, heldBy(basis, from), lungHeights(state.gravity));
+    write('holds-source', basis.metadata.resting_spread ? 'assumed from healthy people' : '');
+    write('holds-text', `Dashed tick: ${from.name}. Dot: now.${basis.metadata.resting_spread ? ' Band: one SD.' : ''} Full bar: the reference.${measured ? ` Published change, %, mean (SD): ${measured}.` : ''}`);
+  }
+
+  const volumeWords = () => `${amount(state.tidal)}, ${state.rate} a minute${Math.round(state.depth) ? `; now ${restOrScan} + ${amount(state.depth)}` : ''}`;
 
   const last = {};
   /** Call act(value) if `value` has changed since the last call for the same name `what`. `last` stores the values,
@@ -362,6 +339,7 @@ function start() {
     });
     changed('pressed', buttons.findIndex(({ posture }) => posture.name === name), (pressed) => {
       buttons.forEach(({ button }, i) => button.setAttribute('aria-pressed', String(i === pressed)));
+      if (pressed >= 0) $('postures').scrollLeft = buttons[pressed].button.offsetLeft - $('postures').offsetLeft - 104; // where the cards are in one row that scrolls
     });
     write('gravity', `gravity  L ${gravity[0].toFixed(2)}  P ${gravity[1].toFixed(2)}  H ${gravity[2].toFixed(2)}`.replaceAll('-', '\u2212').replaceAll('\u22120.00', '0.00'));
     setSlider('tilt', state.standing.tilt, `${state.standing.tilt} degrees`);
@@ -375,32 +353,26 @@ function start() {
     });
     const held = state.moment?.held?.map((ml, lung) => `${basis.lungNames[lung]} ${ml.toFixed(0)} mL`).join('   ');
     write('held', `${held} (gas and tissue)`);
-    drawBall($('ball'), compose(cameraTurn(), modelTurn()), gravity);
-    changed('beside', state.beside, () => { $('left-name').hidden = $('right-name').hidden = !state.beside; });
-    if (state.beside) {
-      write('left-name', postureWords(gravityOf(state.pinnedQ)));
-      write('right-name', postureWords(gravityOf(state.goal)));
-    }
+    const eye = compose(cameraTurn(), modelTurn());
+    changed('patient', [...eye, isDark()].join(), () => drawSilhouette($('patient'), eye));
+    const [side, share] = Object.entries(ENDS).map(([letter, end]) => [letter, rotate(eye, end)[2]]).sort((a, b) => b[1] - a[1])[0];
+    write('seen', share > 0.8 ? `seen ${VIEWS[side].toLowerCase()}` : '');
   }
 
   function legendTitle() {
-    const { name } = basis.from;
-    return { displacement: `Displacement from ${name}`, difference: `Difference from ${postureWords(gravityOf(state.pinnedQ))}`, expansion: `Growth of area from ${name}`, height: 'Height above the lowest point' }[state.kind];
+    const { name } = state.from;
+    return { plain: '', displacement: `Displacement from ${name}`, difference: `Difference from ${postureWords(gravityOf(state.pinnedQ))}`, expansion: `Growth of area from ${name}` }[state.kind];
   }
 
   function showLegend() {
     drawLegend(state.kind, state.range, legendTitle(), basis.colours[KINDS[state.kind].map]);
-    write('kind-text', KIND_TEXT[state.kind].replace('FROM', fromWhere));
+    write('kind-text', KIND_TEXT[state.kind].replace('FROM', fromWhere()));
     write('pinned', `other posture: ${postureWords(gravityOf(state.pinnedQ))}`);
     for (const input of document.getElementsByName('kind')) input.checked = input.value === state.kind;
     for (const input of document.getElementsByName('frame')) input.checked = (input.value === 'room') === state.room;
     for (const id of CHECKBOXES) $(id).checked = state[id];
-    if (inside) {
-      const from = state.kind === 'difference' ? `${postureWords(gravityOf(state.pinnedQ))} at the same breath` : basis.from.name;
-      write('inside-text', `Displacement from ${from}${inside.corners.length ? '; for a mesh, the mean of its vertices' : ''}`);
-      $('inside-legend').hidden = !state.inside;
-      write('inside-legend', state.kind === 'expansion' ? 'Content: grey, because points have no area' : 'Content: balls and meshes in the same colours');
-    }
+    $('coloured').checked = state.kind !== 'plain';
+    for (const input of document.getElementsByName('since')) input.checked = Number(input.value) === basis.froms.indexOf(state.from);
     state.opacity.forEach((opacity, lung) => { for (const input of document.getElementsByName(`lung-${lung}`)) input.checked = Number(input.value) === opacity; });
     $('cut-axis').value = String(state.cut.axis);
     $('cut').disabled = state.cut.axis < 0;
@@ -411,7 +383,8 @@ function start() {
   function showTheme() {
     $('theme').textContent = isDark() ? 'Light' : 'Dark';
     readTheme();
-    for (const { icon, posture } of buttons) drawIcon(icon, tilted(posture.q, posture.tilt));
+    for (const { icon, posture } of buttons) drawSilhouette(icon, compose(turn([1, 0, 0], -RIGHT_ANGLE), tilted(posture.q, posture.tilt)));
+    told = null; // outlines are drawn in the colours of the theme
   }
 
   const touch = () => { stale = unseen = true; };
@@ -423,8 +396,7 @@ function start() {
     const moving = state.advance(before === null ? 0 : (now - before) / 1000);
     if (moving) stale = unseen = true;
     if (!unseen) {
-      if (inside && state.moment) insideTable.show(state.moment, originMoment());
-      if (state.moment) tellFinding(1);
+      if (state.moment) tellSettled(now);
       before = null;
       streak = 0;
       return;
@@ -442,11 +414,7 @@ function start() {
       deform();
     }
     if (state.moment) draw();
-    if (state.moment && now - tabled > 250) { // to write texts in every frame of a breath would be slow
-      if (inside) insideTable.show(state.moment, originMoment());
-      tellFinding(Math.ceil(basis.vertices / 3000));
-      tabled = now;
-    }
+    if (state.moment && (state.playing || state.live)) tellSettled(now);
     asked = false;
     showState();
     stale = unseen = false;
@@ -470,19 +438,10 @@ function start() {
     if (state.kind === 'difference' || state.beside) picture.deform('pinned', state.pinned);
   }
 
-  let covers = null; // boxes of colour bar and gravity ball over the picture, CSS pixels; null to measure them again
-  const covered = new ResizeObserver(() => { covers = null; redraw(); });
-  for (const plate of ['legend', 'ball']) covered.observe($(plate));
-  function plates() {
-    covers ??= ['legend', 'ball'].map((id) => ({ left: $(id).offsetLeft, top: $(id).offsetTop, right: $(id).offsetLeft + $(id).offsetWidth, bottom: $(id).offsetTop + $(id).offsetHeight }));
-    return covers;
-  }
-
   function draw() {
     panes = makePanes();
     picture.draw(panes);
-    letters.show(panes, state.body, ratio(), plates());
-    if (inside) showInside();
+    drawNotes();
     if (state.probes.length || $('probes').children.length || !$('probes-text').textContent) showProbes();
   }
 
@@ -490,17 +449,23 @@ function start() {
   /** Advance the state to the time `now`, ms, and return the view of the lungs (pane) for a headset; null before the
    * first state is computed. */
   function headsetFrame(now) {
-    if (state.advance(inHeadset && before !== null ? (now - before) / 1000 : 0) || stale || !inHeadset) {
+    if (state.advance(inHeadset && before !== null ? (now - before) / 1000 : 0) || stale || !inHeadset || dot(state.gravity, state.moment.gravity) < 1 - 1e-9) {
       state.compute();
       deform();
       showState();
     }
+    if (state.moment) tellSettled(now);
     inHeadset = true;
     before = now;
     stale = false;
     return state.moment && picture ? makePane('now', state.moment, state.q, [0, 0, 1, 1]) : null;
   }
-  offerXr($('vr'), () => picture, headsetFrame, () => { inHeadset = false; before = null; touch(); });
+  const headset = {
+    getPicture: () => picture, frame: headsetFrame, sentence: () => $('finding').textContent,
+    over: () => { inHeadset = false; before = null; touch(); },
+  };
+  offerXr('immersive-vr', $('vr'), state, headset);
+  offerXr('immersive-ar', $('ar'), state, headset);
 
   function keepLink() {
     try {
@@ -551,7 +516,7 @@ function start() {
   canvas.addEventListener('dblclick', (event) => ask(within(event.clientX, event.clientY), (found) => {
     if (!found) return;
     if (found.part === undefined) state.probes.pop(); // the probe that the first click placed
-    else insideTable.keep(found.part);
+    else choose(found.part);
     state.camera.pivot = found.at;
     state.camera.pan = [0, 0];
     redraw();
@@ -582,7 +547,7 @@ function start() {
     redraw();
   };
 
-  /** Turn the patient (or gravity, if the view is fixed to the patient) by a drag of the gravity ball, angles in
+  /** Turn the patient (or gravity, if the view is fixed to the patient) by a drag of the silhouette, angles in
    * radians. */
   const spin = (dx, dy) => {
     const sense = state.room ? 1 : -1;
@@ -592,8 +557,8 @@ function start() {
     }
     touch();
   };
-  onDrag($('ball'), (dx, dy) => spin(dx / 66, dy / 66));
-  $('ball').addEventListener('keydown', (event) => {
+  onDrag($('patient'), (dx, dy) => spin(dx / 66, dy / 66));
+  $('patient').addEventListener('keydown', (event) => {
     const arrow = ARROWS[event.key];
     if (!arrow) return;
     event.preventDefault();
@@ -629,6 +594,11 @@ function start() {
   const change = (act) => () => { act(); showLegend(); touch(); };
   const pin = change(() => { state.pinnedQ = state.goal; });
   const colourBy = (kind) => change(() => { state.kind = kind; })();
+  const measureFrom = (from) => change(() => {
+    state.from = from;
+    kept = null;
+    state.measure();
+  })();
   const holdStill = (room) => change(() => { state.room = room; })();
   const flip = (name) => change(() => { state[name] = !state[name]; })();
   const reset = () => { state.camera = { ...FIRST_CAMERA }; redraw(); };
@@ -636,6 +606,20 @@ function start() {
   $('pin').addEventListener('click', pin);
   $('reset').addEventListener('click', reset);
   for (const id of CHECKBOXES) $(id).addEventListener('change', () => flip(id));
+  $('coloured').addEventListener('change', () => colourBy($('coloured').checked ? 'displacement' : 'plain'));
+  if (basis.froms.length > 1) {
+    const group = document.createElement('div');
+    Object.assign(group, { id: 'since', role: 'radiogroup', ariaLabel: 'Displacements are measured' });
+    basis.froms.forEach((from, i) => {
+      const [label, input, words] = ['label', 'input', 'span'].map((tag) => document.createElement(tag));
+      Object.assign(input, { type: 'radio', name: 'since', value: i });
+      words.textContent = `since ${from.name.replace('scan', 'CT')}`;
+      input.addEventListener('change', () => measureFrom(from));
+      label.append(input, words);
+      group.prepend(label);
+    });
+    document.querySelector(inside ? '#targets .head' : '#surface-section .head').append(group);
+  }
   for (const input of document.getElementsByName('kind')) input.addEventListener('change', () => colourBy(input.value));
   for (const input of document.getElementsByName('frame')) input.addEventListener('change', () => holdStill(input.value === 'room'));
   $('cut-axis').addEventListener('change', change(() => { state.cut.axis = Number($('cut-axis').value); }));
@@ -687,11 +671,7 @@ function start() {
   $('full').addEventListener('click', () => (document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen()));
   const picturePng = () => savePicture(canvas, draw, document.title,
     [`${state.beside ? `${postureWords(gravityOf(state.pinnedQ))} and beside it ` : ''}${postureWords(gravityOf(state.goal))}, ${$('depth-value').textContent}`, 'computed, not for diagnosis'],
-    { ...state.range, title: `${legendTitle()}, ${KINDS[state.kind].unit}` }, basis.colours[KINDS[state.kind].map],
-    [...$('letters').querySelectorAll(':not([hidden])')].map((element) => {
-      const [box, stage] = [element.getBoundingClientRect(), canvas.getBoundingClientRect()];
-      return { x: box.x + box.width / 2 - stage.x, y: box.y + box.height / 2 - stage.y, words: element.textContent };
-    }));
+    state.kind === 'plain' ? null : { ...state.range, title: `${legendTitle()}, ${KINDS[state.kind].unit}` }, basis.colours[KINDS[state.kind].map]);
   $('save').addEventListener('click', async () => {
     const link = document.createElement('a');
     link.href = URL.createObjectURL(await picturePng());
@@ -711,7 +691,8 @@ function start() {
   });
   window.addEventListener('hashchange', () => {
     takeLink(location.hash, state);
-    insideTable?.press();
+    table?.press();
+    told = null;
     remeasure();
     touch();
   });
@@ -734,8 +715,12 @@ function start() {
   for (const end of ['depth', 'depth-number']) $(end).step = state.tidal / 100;
   for (const end of ['tidal-number', 'depth-number']) $(end).step = 'any';
   document.querySelector('[name=kind][value=expansion]').disabled = basis.words === 0;
-  write('depth-name', `Above ${basis.resting ? 'rest' : 'the scan'}`);
-  write('ghost-name', `${basis.from.name.replace(/^./, (c) => c.toUpperCase())} as a ghost`);
+  write('depth-name', `Above ${restOrScan}`);
+  write('ghost-name', 'Ghost of the reference');
+  write('state', `at ${basis.resting ? 'rest, after a quiet expiration' : 'the volume of the scan'}; ${/scan at [^;()]*/.exec(basis.metadata.assumed)?.[0].replace('scan at', 'CT assumed at').trim() ?? ''}`.replace(/; $/, ''));
+  $('credit').hidden = !basis.metadata.attribution;
+  write('credit', `Lungs: ${basis.metadata.attribution}`);
+  $('inside').disabled = !inside;
   showFacts(basis);
 
   const resize = () => {
@@ -774,8 +759,8 @@ function start() {
     insidePositions: (gravity, volume) => picture.readInside(momentFor(basis, unit(gravity), volume)),
     moment: (gravity, volume) => momentFor(basis, unit(gravity), volume),
     /** Do the CPU part of the work of one frame. */
-    frameScript: () => { state.compute(); panes = makePanes(); letters.show(panes, state.body, ratio(), plates()); showState(); },
-    findingOf, linesAcross, placesOf, rangeEnd, tickStep, postureText, postureFrom, gravityOf, picturePng, basis, state, touch,
+    frameScript: () => { state.compute(); panes = makePanes(); drawNotes(); showState(); },
+    sentenceOf, movedBetween, targetOf, planesFor, linesAcross, placesOf, rangeEnd, tickStep, postureText, postureFrom, gravityOf, picturePng, basis, state, touch,
   };
 }
 

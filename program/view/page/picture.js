@@ -1,11 +1,24 @@
 // SPDX-License-Identifier: MIT
-// Draw with WebGL 2. For each state of the lungs (gravity and volume), one pass over the vertices stores positions and
-// normals on the graphics card by transform feedback. A change of the camera needs no such pass.
+// Draw with WebGL 2. For each state of the lungs (gravity and volume), one pass over the vertices stores positions on
+// the graphics card by transform feedback, and a second pass the normals of the triangles around each vertex. A change
+// of the camera needs no such pass.
 
 const source = (id) => document.getElementById(id).textContent;
 
 const NO_CUT = [0, 0, 0, 1e10];
 const ARROWS_SHOWN = 500;
+const WIDTH = 1024; // width of the textures that hold lists, texels
+
+/** Outline of the patient's body: height of the section's centre above the centre of the lungs, and its half widths to
+ * the sides and to front and back, as multiples of half the lungs' extent along each axis. */
+const TORSO = [[-4.4, 1.2, 1.16], [-3, 1.2, 1.14], [-2, 1.1, 1.08], [-1, 1.16, 1.18], [0, 1.3, 1.22], [0.6, 1.45, 1.14], [1, 1.42, 0.94], [1.25, 0.95, 0.72], [1.45, 0.44, 0.54], [1.7, 0.4, 0.52], [1.92, 0.46, 0.7], [2.3, 0.56, 0.84], [2.65, 0.52, 0.78], [2.9, 0.34, 0.5], [3, 0.001, 0.001]];
+
+/** Return rows of numbers with `count` - 1 rows between each two, on a Catmull-Rom spline. */
+const smooth = (rows, count) => Array.from({ length: (rows.length - 1) * count + 1 }, (_, i) => {
+  const [at, t] = [Math.min(Math.floor(i / count), rows.length - 2), i / count - Math.min(Math.floor(i / count), rows.length - 2)];
+  const [a, b, c, d] = [at - 1, at, at + 1, at + 2].map((j) => rows[Math.max(0, Math.min(rows.length - 1, j))]);
+  return b.map((x, k) => x + 0.5 * t * (c[k] - a[k] + t * (2 * a[k] - 5 * x + 4 * c[k] - d[k] + t * (3 * (x - c[k]) + d[k] - a[k]))));
+});
 
 class Picture {
   constructor(canvas, basis) {
@@ -14,7 +27,8 @@ class Picture {
     this.gl = gl;
     this.canvas = canvas;
     this.basis = basis;
-    this.moving = this.program('vertex.vert.glsl', null, ['moved', 'turned'], this.library());
+    this.moving = this.program(basis.vector ? 'inside.vert.glsl' : 'vertex.vert.glsl', null, ['moved'], basis.vector ? this.vectorLibrary() : [...this.sized(), source('vertex.vert.glsl')].join('\n'));
+    this.turning = this.program('normal.vert.glsl', null, ['turned']);
     this.surface = this.program('surface.vert.glsl', 'surface.frag.glsl');
     this.picker = this.program('surface.vert.glsl', 'pick.frag.glsl');
     this.solid = this.program('solid.vert.glsl', 'solid.frag.glsl');
@@ -26,6 +40,7 @@ class Picture {
     this.maps = Object.fromEntries(Object.keys(basis.colours).map((name) => [name, this.makeMap(name)]));
     this.arrow = this.makeArrow();
     this.table = this.makeTable();
+    this.torso = this.makeTorso();
     this.timer = gl.getExtension('EXT_disjoint_timer_query_webgl2');
     this.timing = null;
     this.gpuTime = NaN;
@@ -34,21 +49,12 @@ class Picture {
   /** Return supine.glsl preceded by lines that define the sizes of this basis. */
   sized() {
     const { basis } = this;
-    return [`#define SUPINE_LUNGS ${basis.lungs}`, `#define SUPINE_VECTORS ${Math.ceil(basis.modes / 4)}`, `#define SUPINE_WORDS ${Math.max(1, basis.words)}`, source('supine.glsl')];
+    return [`#define SUPINE_LUNGS ${basis.lungs}`, `#define SUPINE_VECTORS ${Math.ceil(basis.modes / 4)}`, source('supine.glsl')];
   }
 
-  /** Return the shader that deforms the surface. The attributes from location 6 on hold packed vectors, of which a
-   * weighted sum is the normal. */
-  library() {
-    const all = Array.from({ length: this.basis.words }, (_, j) => j);
-    return [...this.sized(), source('vertex.vert.glsl'),
-      ...all.map((j) => `layout(location = ${6 + j}) in uvec3 n${j};`),
-      `vec3 turned_by_words() { return ${all.map((j) => `supine_normal(reference, ${j}, n${j})`).join(' + ') || 'vec3(0.0)'}; }`].join('\n');
-  }
-
-  /** Return the shader that deforms the structures inside the lungs. Each attribute from location 1 on has the
-   * coefficients for one axis and four modes. */
-  insideLibrary() {
+  /** Return the shader that deforms vertices of a vector basis. Each attribute from location 1 on has the coefficients
+   * for one axis and four modes. */
+  vectorLibrary() {
     const vectors = Math.ceil(this.basis.modes / 4);
     const all = [0, 1, 2].flatMap((axis) => Array.from({ length: vectors }, (_, j) => ({ axis, j, name: `c${axis}_${j}` })));
     const sum = (axis) => all.filter((c) => c.axis === axis).map(({ j, name }) => `dot(supine_weights[${j}], ${name})`).join(' + ');
@@ -87,59 +93,83 @@ class Picture {
     return made;
   }
 
-  /** Return a vertex array. Each attribute is [buffer, size, stride, offset, divisor, integer], or null if it is not
-   * used. */
+  /** Return a vertex array. Each attribute is [buffer, size, stride, offset, divisor], or null if it is not used. */
   array(attributes) {
     const { gl } = this;
     const made = gl.createVertexArray();
     gl.bindVertexArray(made);
     attributes.forEach((attribute, i) => {
       if (!attribute) return;
-      const [buffer, size, stride, offset, divisor = 0, whole = false] = attribute;
+      const [buffer, size, stride, offset, divisor = 0] = attribute;
       gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
       gl.enableVertexAttribArray(i);
-      if (whole) gl.vertexAttribIPointer(i, size, gl.UNSIGNED_INT, stride, offset);
-      else gl.vertexAttribPointer(i, size, gl.FLOAT, false, stride, offset);
+      gl.vertexAttribPointer(i, size, gl.FLOAT, false, stride, offset);
       gl.vertexAttribDivisor(i, divisor);
     });
     gl.bindVertexArray(null);
     return made;
   }
 
-  /** Make the inputs of vertex.vert.glsl, for all vertices and for the few vertices that have arrows: reference
-   * position and lung, direction, up to 16 coefficients, and packed vectors for the normals. If there are fewer
-   * coefficients, the shader reads the others as (0, 0, 0, 1), but their weights are 0. */
+  /** Return the attributes of the coefficients of a vector basis, four modes each: those of x, y, then z. */
+  vectorAttributes(fields) {
+    const { modes: k } = this.basis;
+    const buffer = this.buffer(fields);
+    const attributes = [];
+    for (let axis = 0; axis < 3; ++axis) for (let first = 0; first < k; first += 4) attributes.push([buffer, Math.min(4, k - first), 12 * k, 4 * (axis * k + first)]);
+    return attributes;
+  }
+
+  /** Make the inputs of the shader that deforms the surface, for all vertices and for the few vertices that have arrows:
+   * reference position and lung, and the coefficients. If there are fewer coefficients than places, the shader reads the
+   * others as (0, 0, 0, 1), but their weights are 0. */
   makeInputs() {
     const { basis } = this;
     const k = basis.modes;
-    const { words } = basis;
-    const inputs = (reference, direction, coefficients, normals) => {
-      const [buffer, turns] = [this.buffer(coefficients), this.buffer(normals)];
-      const attributes = [[this.buffer(reference), 4, 16, 0], [this.buffer(direction), 3, 12, 0]];
+    const inputs = (reference, direction, coefficients) => {
+      const attributes = [[this.buffer(reference), 4, 16, 0]];
+      if (basis.vector) return this.array([...attributes, ...this.vectorAttributes(coefficients)]);
+      const buffer = this.buffer(coefficients);
+      attributes.push([this.buffer(direction), 3, 12, 0]);
       for (let first = 0; first < 16; first += 4) attributes.push(first < k ? [buffer, Math.min(4, k - first), 4 * k, 4 * first] : null);
-      for (let j = 0; j < words; ++j) attributes.push([turns, 3, 12 * words, 12 * j, 0, true]);
       return this.array(attributes);
     };
     const reference = new Float32Array(4 * basis.vertices);
     for (let i = 0; i < basis.vertices; ++i) reference.set([...basis.surface.subarray(3 * i, 3 * i + 3), lungOf(basis, i)], 4 * i);
     const every = Math.max(1, Math.floor(basis.vertices / ARROWS_SHOWN));
     this.fewCount = Math.ceil(basis.vertices / every);
-    const few = (values, size) => values.constructor.from({ length: this.fewCount * size }, (_, i) => values[Math.floor(i / size) * every * size + (i % size)]);
-    this.inputs = inputs(reference, basis.direction, basis.coefficients, basis.normals);
-    this.fewInputs = inputs(few(reference, 4), few(basis.direction, 3), few(basis.coefficients, k), few(basis.normals, 3 * words));
+    const few = (values, size) => values.constructor.from({ length: size ? this.fewCount * size : 0 }, (_, i) => values[Math.floor(i / size) * every * size + (i % size)]);
+    this.inputs = inputs(reference, basis.direction, basis.coefficients);
+    this.fewInputs = inputs(few(reference, 4), few(basis.direction, basis.vector ? 0 : 3), few(basis.coefficients, (basis.vector ? 3 : 1) * k));
+    this.makeFans();
+  }
+
+  /** Make the inputs of normal.vert.glsl: for each vertex, the other two corners of each triangle around it. */
+  makeFans() {
+    const { gl, basis: { corners, vertices } } = this;
+    const begin = new Uint32Array(vertices + 1);
+    for (const corner of corners) ++begin[corner + 1];
+    for (let v = 0; v < vertices; ++v) begin[v + 1] += begin[v];
+    const rows = Math.ceil(corners.length / WIDTH) || 1;
+    const pairs = new Uint32Array(2 * WIDTH * rows);
+    const filled = begin.slice();
+    corners.forEach((corner, i) => {
+      const first = i - (i % 3);
+      pairs.set([corners[first + ((i + 1) % 3)], corners[first + ((i + 2) % 3)]], 2 * filled[corner]++);
+    });
+    this.fans = this.texture(gl.RG32UI, gl.RG_INTEGER, gl.UNSIGNED_INT, WIDTH, rows, pairs);
+    this.places = this.texture(gl.RGBA32F, gl.RGBA, gl.FLOAT, WIDTH, Math.ceil(vertices / WIDTH), null);
+    const ranges = new Float32Array(2 * vertices).map((_, i) => begin[Math.floor(i / 2) + (i % 2)]);
+    this.fanInputs = this.array([[this.buffer(ranges), 2, 8, 0]]);
   }
 
   /** Make the shader programs for structures inside the lungs, and buffers for the vertices of the structures and of
    * the ball that marks a point. */
   makeInside() {
-    const { gl, basis: { inside, modes: k } } = this;
-    this.insideMoving = this.program('inside.vert.glsl', null, ['moved'], this.insideLibrary());
+    const { gl, basis: { inside } } = this;
+    this.insideMoving = this.program('inside.vert.glsl', null, ['moved'], this.vectorLibrary());
     this.content = this.program('content.vert.glsl', 'surface.frag.glsl');
     this.contentPicker = this.program('content.vert.glsl', 'content_pick.frag.glsl');
-    const fields = this.buffer(inside.fields);
-    const attributes = [[this.buffer(inside.reference), 4, 16, 0]];
-    for (let axis = 0; axis < 3; ++axis) for (let first = 0; first < k; first += 4) attributes.push([fields, Math.min(4, k - first), 12 * k, 4 * (axis * k + first)]);
-    this.insideInputs = this.array(attributes);
+    this.insideInputs = this.array([[this.buffer(inside.reference), 4, 16, 0], ...this.vectorAttributes(inside.fields)]);
     this.insideParts = this.buffer(inside.part);
     this.insideNormals = this.buffer(inside.normals);
     this.insideIndices = this.buffer(inside.corners, gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER);
@@ -151,7 +181,7 @@ class Picture {
     const ball = [];
     for (let i = 0; i < rings; ++i) for (let j = 0; j < sides; ++j) ball.push(...at(i, j), ...at(i + 1, j), ...at(i + 1, j + 1), ...at(i, j), ...at(i + 1, j + 1), ...at(i, j + 1));
     this.ball = { buffer: this.buffer(new Float32Array(ball)), count: ball.length / 3 };
-    this.plainMap = this.texture(gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, 1, 1, new Uint8Array([140, 150, 160, 255]));
+    this.targetMap = this.texture(gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, 2, 1, null);
   }
 
   texture(internal, format, type, width, height, data) {
@@ -169,7 +199,6 @@ class Picture {
   makeOutputs() {
     const { gl, basis } = this;
     this.indices = this.buffer(basis.corners, gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER);
-    this.unread = this.buffer(16 * basis.vertices, gl.DYNAMIC_COPY); // receives normals where arrows start; nothing reads them
     this.edges = null;
     this.states = {};
     this.arrays = {};
@@ -177,7 +206,7 @@ class Picture {
 
   state(name) {
     const { gl, basis } = this;
-    const room = 16 * basis.vertices;
+    const room = 16 * WIDTH * Math.ceil(basis.vertices / WIDTH); // whole rows of the texture `places`
     this.states[name] ??= { moved: this.buffer(room, gl.DYNAMIC_COPY), turned: this.buffer(room, gl.DYNAMIC_COPY), few: this.buffer(16 * this.fewCount, gl.DYNAMIC_COPY), inside: basis.inside ? this.buffer(16 * basis.inside.vertices, gl.DYNAMIC_COPY) : null };
     return this.states[name];
   }
@@ -255,8 +284,7 @@ class Picture {
       quad(i, 0.045, -0.6, 0.14, -0.6);
       quad(i, 0.14, -0.6, 0.001, -1);
     }
-    const made = { places: this.buffer(new Float32Array(places)), normals: this.buffer(new Float32Array(normals)), count: places.length / 3 };
-    return { ...made, array: this.array([[made.places, 3, 12, 0], [made.normals, 3, 12, 0]]) };
+    return { places: this.buffer(new Float32Array(places)), normals: this.buffer(new Float32Array(normals)), count: places.length / 3 };
   }
 
   /** Return the vertex array of a box from -1 to 1 along each axis. */
@@ -274,15 +302,40 @@ class Picture {
     return this.array([[this.buffer(new Float32Array(places)), 3, 12, 0], [this.buffer(new Float32Array(normals)), 3, 12, 0]]);
   }
 
+  /** Return the vertex array, indices and their count of the patient's body, a tube of the half widths in TORSO. */
+  makeTorso() {
+    const { gl, basis: { torso: { centre, half } } } = this;
+    const sides = 48;
+    const rings = smooth(TORSO, 6);
+    const [places, normals, indices] = [[], [], []];
+    rings.forEach(([z, rx, ry], i) => {
+      const [below, above] = [rings[Math.max(0, i - 1)], rings[Math.min(rings.length - 1, i + 1)]];
+      const slope = [1, 2].map((k) => ((above[k] - below[k]) * half[k - 1]) / ((above[0] - below[0]) * half[2] || 1));
+      for (let j = 0; j < sides; ++j) {
+        const [cos, sin] = [Math.cos((2 * Math.PI * j) / sides), Math.sin((2 * Math.PI * j) / sides)];
+        places.push(centre[0] + rx * half[0] * cos, centre[1] + ry * half[1] * sin, centre[2] + z * half[2]);
+        const n = [cos / (rx * half[0]), sin / (ry * half[1])];
+        const size = Math.hypot(...n);
+        normals.push(n[0] / size, n[1] / size, -(slope[0] * cos * cos + slope[1] * sin * sin));
+        const [a, b] = [i * sides + j, i * sides + ((j + 1) % sides)];
+        if (i + 1 < rings.length) indices.push(a, b, b + sides, a, b + sides, a + sides);
+      }
+    });
+    return { array: this.array([[this.buffer(new Float32Array(places)), 3, 12, 0], [this.buffer(new Float32Array(normals)), 3, 12, 0]]),
+      indices: this.buffer(new Uint32Array(indices), gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER), count: indices.length };
+  }
+
   /** Run the shader program `moving` on the `count` vertices of the vertex array `array`, for the state `moment` of the
    * lungs, and store its outputs in the buffers `targets`. */
   capture(moment, array, targets, count, moving = this.moving) {
     const { gl } = this;
     gl.useProgram(moving.program);
-    const { weights, gains, turns } = this.uniforms(moment);
-    gl.uniform4fv(moving.at.supine_weights, weights);
-    gl.uniform3fv(moving.at.supine_gains, gains);
-    if (moving.at.supine_normal_weights) gl.uniform3fv(moving.at.supine_normal_weights, turns);
+    if (moment) {
+      const weights = new Float32Array(4 * Math.ceil(this.basis.modes / 4));
+      weights.set(moment.weights);
+      gl.uniform4fv(moving.at.supine_weights, weights);
+      gl.uniform3fv(moving.at.supine_gains, moment.gains);
+    }
     gl.bindBuffer(gl.ARRAY_BUFFER, null); // WebGL refuses to write a buffer that is bound elsewhere
     gl.bindVertexArray(array);
     gl.bindTransformFeedback(gl.TRANSFORM_FEEDBACK, this.feedback);
@@ -301,9 +354,25 @@ class Picture {
    * `name`. */
   deform(name, moment) {
     const { moved, turned, few, inside } = this.state(name);
-    this.capture(moment, this.inputs, [moved, turned], this.basis.vertices);
-    this.capture(moment, this.fewInputs, [few, this.unread], this.fewCount);
+    this.captureSurface(moment, moved, turned);
+    this.capture(moment, this.fewInputs, [few], this.fewCount);
     if (inside) this.captureInside(moment, inside);
+  }
+
+  /** Compute the positions of the surface's vertices, then their normals, which a shader sums over the triangles. */
+  captureSurface(moment, moved, turned) {
+    const { gl, basis: { vertices } } = this;
+    this.capture(moment, this.inputs, [moved], vertices);
+    gl.bindTexture(gl.TEXTURE_2D, this.places);
+    gl.bindBuffer(gl.PIXEL_UNPACK_BUFFER, moved);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, WIDTH, Math.ceil(vertices / WIDTH), gl.RGBA, gl.FLOAT, 0);
+    gl.bindBuffer(gl.PIXEL_UNPACK_BUFFER, null);
+    gl.useProgram(this.turning.program);
+    gl.uniform1i(this.turning.at.fans, 1);
+    gl.activeTexture(gl.TEXTURE1);
+    gl.bindTexture(gl.TEXTURE_2D, this.fans);
+    gl.activeTexture(gl.TEXTURE0);
+    this.capture(null, this.fanInputs, [turned], vertices, this.turning);
   }
 
   /** Deform the structures inside the lungs by the modes in the shader. In a rigid structure, the motion of a vertex
@@ -316,22 +385,12 @@ class Picture {
     gl.bindBuffer(gl.ARRAY_BUFFER, null);
   }
 
-  /** Return the uniforms of the deforming shaders for the state `moment` of the lungs. Keep the last result for the
-   * next call. */
-  uniforms(moment) {
-    if (this.uniformsMoment !== moment) {
-      this.uniformsMoment = moment;
-      this.uniformsNow = uniformsOf(this.basis, moment);
-    }
-    return this.uniformsNow;
-  }
-
   /** Deform the surface to the state `moment`, and read back the positions, mm LPS, and unit normals of its vertices.
    * */
   read(moment) {
     const { gl, basis } = this;
-    const targets = [0, 1].map(() => this.buffer(16 * basis.vertices, gl.DYNAMIC_READ));
-    this.capture(moment, this.inputs, targets, basis.vertices);
+    const targets = [0, 1].map(() => this.buffer(16 * WIDTH * Math.ceil(basis.vertices / WIDTH), gl.DYNAMIC_READ));
+    this.captureSurface(moment, ...targets);
     return targets.map((target) => this.take(target, basis.vertices));
   }
 
@@ -364,7 +423,6 @@ class Picture {
     gl.uniform4fv(program.at.cut, pane.cut);
     if (lens) gl.uniform4fv(program.at.lens, lens);
     if (lens) gl.uniform1i(program.at.kind, pane.measure);
-    if (lens) gl.uniform4fv(program.at.gravity, [...pane.gravity, pane.lowest]);
   }
 
   drawLung(lung, mode) {
@@ -403,6 +461,13 @@ class Picture {
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.indices);
     for (const { opacity, lung } of lungs) {
       const through = opacity < 1 || pane.wires;
+      if (opacity < 1 && pane.plain) { // a shell through which its own folds and the content are seen
+        set('ghost', 4);
+        gl.depthMask(false);
+        this.drawLung(lung, gl.TRIANGLES);
+        gl.depthMask(true);
+        continue;
+      }
       set('opacity', opacity);
       gl.colorMask(!through, !through, !through, !through);
       gl.enable(gl.POLYGON_OFFSET_FILL);
@@ -426,10 +491,10 @@ class Picture {
    * radius `radius`, mm. */
   drawInside(program, pane, radius) {
     const { gl, basis: { inside } } = this;
-    const [now, from] = [this.state(pane.state).inside, this.state(pane.origin).inside];
+    const now = this.state(pane.state).inside;
     const array = (kind, shape, each) => {
-      const key = `${kind} ${pane.state} ${pane.origin}`;
-      this.arrays[key] ??= this.array([...shape, [now, 3, 16, 0, each], [from, 3, 16, 0, each], [this.insideParts, 1, 4, 0, each]]);
+      const key = `${kind} ${pane.state}`;
+      this.arrays[key] ??= this.array([...shape, [now, 3, 16, 0, each], [this.insideParts, 1, 4, 0, each]]);
       gl.bindVertexArray(this.arrays[key]);
     };
     gl.uniform1f(program.at.radius, radius);
@@ -445,14 +510,16 @@ class Picture {
     }
   }
 
-  /** Draw the structures inside the lungs in the colours of the lungs. If colours show the growth of the surface area,
-   * draw the structures in grey, because points have no area. */
+  /** Draw the structures inside the lungs in one colour, and the chosen structure in another. */
   drawContent(pane) {
     const { gl, content } = this;
     this.usePane(content, pane, [0, 0, 1, 1]);
-    gl.bindTexture(gl.TEXTURE_2D, pane.measure === 1 ? this.plainMap : this.maps[pane.map]);
+    gl.bindTexture(gl.TEXTURE_2D, this.targetMap);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, 2, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(pane.targetTints.flatMap((tint) => [...tint.map((x) => 255 * x), 255])));
     gl.uniform4fv(content.at.cut, NO_CUT); // only the lungs are cut
-    gl.uniform2f(content.at.range, pane.range.begin, pane.range.end);
+    gl.uniform1f(content.at.chosen, pane.chosen);
+    gl.uniform2f(content.at.range, 0, 1);
+    gl.uniform1f(content.at.spacing, 0);
     gl.uniform1f(content.at.dark, pane.dark ? 1 : 0);
     gl.uniform1f(content.at.opacity, 1);
     this.drawInside(content, pane, Math.max(BALL_RADIUS, 4 * pane.pixel)); // radius of at least 4 pixels
@@ -475,20 +542,19 @@ class Picture {
     }
   }
 
-  /** Draw the arrow of gravity, faded where the lungs hide it. */
-  drawGravity(pane) {
-    const { gl, solid } = this;
-    this.usePane(solid, pane);
-    gl.uniformMatrix4fv(solid.at.toEye, false, pane.arrowToEye);
-    gl.uniform4fv(solid.at.cut, NO_CUT);
-    gl.uniform1f(solid.at.thick, 0);
-    gl.bindVertexArray(this.arrow.array);
-    for (const [order, alpha] of [[gl.GREATER, 0.8], [gl.LEQUAL, 1]]) {
-      gl.depthFunc(order);
-      gl.depthMask(order === gl.LEQUAL);
-      gl.uniform4fv(solid.at.tint, [...pane.tint, alpha]);
-      gl.drawArrays(gl.TRIANGLES, 0, this.arrow.count);
-    }
+  /** Draw the patient's body around the lungs, faint, and fading out towards the feet. */
+  drawTorso(pane) {
+    const { gl, surface } = this;
+    this.usePane(surface, pane, [0, 0, 1, 1]);
+    gl.uniform4fv(surface.at.cut, NO_CUT);
+    gl.uniform2f(surface.at.range, ...pane.fade);
+    gl.uniform1f(surface.at.ghost, 3);
+    gl.uniform1f(surface.at.dark, pane.dark ? 1 : 0);
+    gl.bindVertexArray(this.torso.array);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.torso.indices);
+    gl.depthMask(false);
+    gl.drawElements(gl.TRIANGLES, this.torso.count, gl.UNSIGNED_INT, 0);
+    gl.depthMask(true);
   }
 
   drawTable(pane) {
@@ -500,6 +566,39 @@ class Picture {
     gl.uniform4fv(solid.at.tint, pane.tableTint);
     gl.bindVertexArray(this.table);
     gl.drawArrays(gl.TRIANGLES, 0, 36);
+  }
+
+  /** Draw a text, wrapped, on a panel before a headset's viewer; `at` is its place in the room, m. */
+  drawNote(pane, { text, toEye, at }) {
+    const { gl } = this;
+    this.note ??= { program: this.program('note.vert.glsl', 'note.frag.glsl'), array: this.array([[this.buffer(new Float32Array([-1, -1, 1, -1, -1, 1, 1, 1])), 2, 8, 0]]), map: this.texture(gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, 1024, 256, null), text: null };
+    const { note } = this;
+    gl.bindTexture(gl.TEXTURE_2D, note.map);
+    if (note.text !== text) {
+      const paper = Object.assign(document.createElement('canvas'), { width: 1024, height: 256 });
+      const context = paper.getContext('2d');
+      Object.assign(context, { fillStyle: '#121d2bcc', font: '600 36px system-ui, sans-serif' });
+      context.fillRect(0, 0, 1024, 256);
+      context.fillStyle = '#fff';
+      let [line, y] = ['', 52];
+      for (const word of [...text.split(' '), null]) {
+        if (word !== null && context.measureText(`${line} ${word}`).width < 960) line += ` ${word}`;
+        else {
+          context.fillText(line.trim(), 32, y);
+          [line, y] = [word ?? '', y + 46];
+        }
+      }
+      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, gl.RGBA, gl.UNSIGNED_BYTE, paper);
+      for (const side of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, side, gl.LINEAR);
+      note.text = text;
+    }
+    gl.useProgram(note.program.program);
+    gl.uniformMatrix4fv(note.program.at.toEye, false, toEye);
+    gl.uniformMatrix4fv(note.program.at.projection, false, pane.projection);
+    gl.uniform3fv(note.program.at.place, at);
+    gl.uniform2f(note.program.at.size, 0.32, 0.08);
+    gl.bindVertexArray(note.array);
+    gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
   }
 
   /** Draw panes (views of the lungs) to `framebuffer`, or to the canvas if `framebuffer` is null. */
@@ -515,12 +614,13 @@ class Picture {
     for (const pane of panes) {
       gl.viewport(...pane.box);
       gl.depthFunc(gl.LEQUAL);
+      if (pane.fade) this.drawTorso(pane);
       if (pane.tableToEye) this.drawTable(pane);
       if (pane.inside) this.drawContent(pane); // before the lungs, which may be translucent
       gl.bindTexture(gl.TEXTURE_2D, this.maps[pane.map]);
       this.drawLungs(pane);
       if (pane.arrows) this.drawArrows(pane);
-      this.drawGravity(pane);
+      if (pane.note?.text) this.drawNote(pane, pane.note);
     }
     gl.depthFunc(gl.LEQUAL);
     gl.disable(gl.BLEND);

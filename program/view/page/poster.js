@@ -24,7 +24,7 @@ class Poster {
     for (const pane of panes) this.paint(pane);
   }
 
-  paint({ state, origin, toEye: m, projection, box: [left, bottom, width, height], canvasHeight, range, map, opacity, measure, gravity, lowest }) {
+  paint({ state, origin, toEye: m, projection, box: [left, bottom, width, height], canvasHeight, range, map, opacity, measure }) {
     const { context, basis: { corners, cornerBegin, vertices, colours } } = this;
     const [now, from] = [this.places[state], this.places[origin]];
     const screen = new Float32Array(3 * vertices);
@@ -40,7 +40,7 @@ class Poster {
     const value = (t) => {
       if (measure === 1) return 100 * (Math.hypot(...normal(now, t)) / Math.hypot(...normal(from, t)) - 1);
       const at = 3 * corners[t];
-      return measure === 2 ? lowest - dot(gravity, now.subarray(at, at + 3)) : Math.hypot(now[at] - from[at], now[at + 1] - from[at + 1], now[at + 2] - from[at + 2]);
+      return Math.hypot(now[at] - from[at], now[at + 1] - from[at + 1], now[at + 2] - from[at + 2]);
     };
     const seen = [];
     opacity.forEach((amount, lung) => {

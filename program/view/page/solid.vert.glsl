@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Project the arrow of gravity, the table under the patient, or the arrows that show displacements. `position` is on
+// Project the table under the patient, or the arrows that show displacements. `position` is on
 // an arrow of length 1 from the origin along -z, or on the table, a box from -1 to 1 along each axis.
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
@@ -7,7 +7,7 @@ layout(location = 2) in vec3 tail;     // start of each arrow of a displacement,
 layout(location = 3) in vec3 head;     // end of each arrow of a displacement, mm
 uniform mat4 toEye;
 uniform mat4 projection;
-uniform float thick; // largest width of a displacement's arrow, mm; 0 for gravity's arrow and the patient's table
+uniform float thick; // largest width of a displacement's arrow, mm; 0 for the patient's table
 out vec3 facing;
 out vec3 body;
 

@@ -58,7 +58,7 @@ function postureFrom(text) {
 
 const FADED = 0.35; // opacity of translucent lungs
 
-const FIRST_CAMERA = { azimuth: -0.4, elevation: 0.16, zoom: 1, pan: [0, 0], pivot: null };
+const FIRST_CAMERA = { azimuth: 0, elevation: 0.05, zoom: 1, pan: [0, 0], pivot: null };
 
 /** Names of the views. The key is the direction of the body that faces the viewer, such as A for anterior. */
 const VIEWS = { A: 'From the front', P: 'From the back', L: 'From the left', R: 'From the right', H: 'From the head', F: 'From the feet' };
@@ -75,15 +75,15 @@ class State {
     this.rate = 12;
     this.phase = 0.5;
     this.playing = false;
-    this.kind = 'displacement';
+    this.kind = basis.inside ? 'plain' : 'displacement';
     this.pinnedQ = POSTURES[0].q;
     this.contours = true;
-    this.ghost = true;
+    this.ghost = !basis.inside;
     this.arrows = false;
     this.wires = false;
     this.beside = false;                           // whether the other posture is shown beside the chosen one
     this.inside = Boolean(basis.inside);           // whether structures inside the lungs are shown
-    this.named = [];                               // structures inside the lungs whose names stay visible
+    this.chosen = 0;                               // structure inside the lungs that the sentence is about
     this.opacity = Array(basis.lungs).fill(basis.inside ? FADED : 1);
     this.cut = { axis: -1, at: 0.5 };              // cutting plane: axis, or -1 for no cut; position as a fraction of the lungs' extent
     this.ownRanges = {};                           // for each of KINDS, the range {begin, end} of the colour bar if the user typed one
@@ -92,9 +92,10 @@ class State {
     this.roomBlend = 1; // 0: the view is fixed to the patient; 1: to the room; in between during the change
     this.camera = { ...FIRST_CAMERA };
     this.moment = null;
-    this.from = basis.from;                        // state of the lungs from which displacements are measured
+    [this.from] = basis.froms;                     // state of the lungs from which displacements are measured
+    this.live = false;                             // whether a tracker moves the patient
     this.measure();
-    this.slices = [this.body.high[2] - 80, (this.body.low[1] + this.body.high[1]) / 2]; // z of the axial and y of the coronal plane, mm
+    this.slices = null;                            // x, y, z of the sagittal, coronal and axial plane, mm; null for those through the chosen structure
   }
 
   get gravity() {
@@ -156,8 +157,8 @@ class State {
     return true;
   }
 
-  /** Range of values of the colour bar: the range that the user typed, or one that contains 95 % of the surface in
-   * each of POSTURES at the largest volume in use. */
+  /** Range of values of the colour bar: the range that the user typed, or one that contains the surface in each of
+   * POSTURES at the largest volume in use. */
   get range() {
     const own = this.ownRanges[this.kind];
     if (!own) return this.ranges[this.kind];
@@ -166,39 +167,31 @@ class State {
 
   measure() {
     const deepest = this.playing || this.depth > 0 ? Math.max(this.tidal, this.depth) : 0;
-    if (deepest === this.measured) return;
-    this.measured = deepest;
-    const at95 = (values) => values.sort((a, b) => a - b)[Math.floor(0.95 * values.length)];
+    if (deepest === this.measured && this.from === this.measuredFrom) return;
+    [this.measured, this.measuredFrom] = [deepest, this.from];
     const before = samplePlaces(this.basis, this.from);
     const areas = (places) => Float64Array.from({ length: places.length / 3 }, (_, i) => {
       const [a, b, c] = places.slice(3 * i, 3 * i + 3);
       return Math.hypot(...cross(b.map((x, j) => x - a[j]), c.map((x, j) => x - a[j])));
     });
     const far = (a, b) => a.map((p, i) => Math.hypot(p[0] - b[i][0], p[1] - b[i][1], p[2] - b[i][2]));
-    const found = { displacement: [], difference: [], expansion: [], height: [] };
-    const most = { displacement: 0, difference: 0, expansion: 0, height: 0 };
-    const take = (kind, values) => {
-      for (const value of values) most[kind] = Math.max(most[kind], value);
-      found[kind].push(at95(values) || 0);
-    };
+    const most = { plain: 1, displacement: 0, difference: 0, expansion: 0 };
+    const take = (kind, values) => { for (const value of values) most[kind] = Math.max(most[kind], value); };
     const areasBefore = areas(before);
     const all = [before];
     const states = POSTURES.map((p) => momentFor(this.basis, gravityOf(tilted(p.q, p.tilt)), deepest))
-      .filter((m) => !m.folds).map((m) => ({ gravity: m.gravity, places: samplePlaces(this.basis, m) }));
-    states.forEach(({ gravity, places }, i) => {
+      .filter((m) => !m.folds).map((m) => samplePlaces(this.basis, m));
+    states.forEach((places, i) => {
       take('displacement', far(places, before));
       all.push(places);
-      take('expansion', Array.from(areas(places), (area, j) => Math.abs(100 * (area / areasBefore[j] - 1))));
-      const along = places.map((p) => dot(p, gravity));
-      const lowest = along.reduce((a, b) => Math.max(a, b), -Infinity);
-      take('height', along.map((x) => lowest - x));
-      for (const other of states.slice(i + 1)) take('difference', far(places, other.places));
+      const growth = areas(places).map((area, j) => Math.abs(100 * (area / areasBefore[j] - 1))).sort();
+      take('expansion', growth.slice(0, Math.ceil(0.95 * growth.length))); // without the narrowest triangles
+      for (const other of states.slice(i + 1)) take('difference', far(places, other));
     });
-    this.ranges = Object.fromEntries(Object.keys(found).map((kind) => {
-      const value = Math.max(...found[kind], 0);
-      const end = rangeEnd(value > 1e-3 ? value : 0);
+    this.ranges = Object.fromEntries(Object.keys(most).map((kind) => {
+      const end = rangeEnd(most[kind] > 1e-3 ? most[kind] : 0);
       const begin = kind === 'expansion' ? -end : 0; // -end: shrinkage of the area has the same range as growth
-      return [kind, { begin, end, step: tickStep(end - begin), beyond: most[kind] > end, most: most[kind] }];
+      return [kind, { begin, end, step: tickStep(end - begin), beyond: kind === 'expansion', most: most[kind] }];
     }));
     this.body = boundsOf(all.flat());
   }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Compute the position and the normal of each vertex of the surface, for transform feedback. picture.js appends to this
-// text: attributes with packed vectors, and the function `turned_by_words()`, which sums them to the normal.
+// Compute the position of each vertex of the surface, for transform feedback.
 layout(location = 0) in vec4 reference; // reference position, mm; w: lung
 layout(location = 1) in vec3 direction;
 layout(location = 2) in vec4 c0;
@@ -8,16 +7,10 @@ layout(location = 3) in vec4 c1;
 layout(location = 4) in vec4 c2;
 layout(location = 5) in vec4 c3;
 out vec4 moved;
-out vec4 turned; // unit normal; w: area relative to the reference surface
-
-vec3 turned_by_words();
 
 void main() {
   vec4 c[4] = vec4[4](c0, c1, c2, c3);
   float amount = 0.0;
   for (int i = 0; i < SUPINE_VECTORS; ++i) amount += dot(supine_weights[i], c[i]);
   moved = vec4(supine_place(reference, direction, amount), 1.0);
-  vec3 sum = turned_by_words();
-  float size = length(sum);
-  turned = vec4(size > 0.0 ? sum / size : vec3(0.0), size);
 }

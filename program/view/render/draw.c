@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/parallel.h"
+#include "base/vec3.h"
 #include "program/view/render/render.h"
 
 /* Names of the views, and rotations from the body's axes (LPS) to the viewer's axes. */
@@ -23,14 +24,24 @@ static const struct {
      {{0.8191520442889918, 0.57357643635104605, 0},
       {-0.17724486640549356, 0.25313190266227803, 0.95105651629515353},
       {0.54550360738501469, -0.77905988955754191, 0.3090169943749474}}},
+    {"lying", {{1, 0, 0}, {0, 0, 1}, {0, -1, 0}}}, /* of a patient who stands */
 };
 
 const char *supine_render_view_name(supine_view view) {
   return view < SUPINE_VIEW_COUNT ? views[view].name : NULL;
 }
 
-void supine_render_view_axes(supine_view view, double axes[3][3]) {
+void supine_render_view_axes(supine_view view, const double gravity[3], double axes[3][3]) {
   memcpy(axes, views[view].axes, sizeof views[view].axes);
+  if (view != SUPINE_VIEW_LYING || fabs(gravity[2]) > 0.8) {
+    return;
+  }
+  const double flat = sqrt(1 - gravity[2] * gravity[2]);
+  for (size_t k = 0; k < 3; ++k) {
+    axes[1][k] = -gravity[k];
+    axes[0][k] = ((k == 2 ? -1 : 0) + gravity[2] * gravity[k]) / flat; /* towards the feet */
+  }
+  supine_cross(axes[0], axes[1], axes[2]);
 }
 
 enum { SIDE_MAX = 16384, SHADES = 4096, NO_TRIANGLE = UINT32_MAX, ROWS_PER_JOB = 16 };
@@ -95,7 +106,7 @@ static camera find_camera(const supine_renderer *r, const supine_scene *scene) {
   camera c = {.radius = 1e-3};
   double low[3] = {INFINITY, INFINITY, INFINITY};
   double high[3] = {-INFINITY, -INFINITY, -INFINITY};
-  supine_render_view_axes(scene->view, c.axes);
+  supine_render_view_axes(scene->view, scene->gravity, c.axes);
   for (size_t i = 0; i < 3 * r->info->vertex_count; ++i) {
     low[i % 3] = fmin(low[i % 3], (double)r->info->vertices[i]);
     high[i % 3] = fmax(high[i % 3], (double)r->info->vertices[i]);
@@ -167,14 +178,14 @@ static void project(const camera *c, const double frame[4], const double p[3], c
 }
 
 void supine_render_project(supine_renderer *r, const supine_scene *scene, const supine_marks *marks,
-                           double (*pixel)[2]) {
+                           bool from, double (*pixel)[2]) {
   const camera c = find_camera(r, scene);
   const double size[2] = {(double)scene->width, (double)scene->height};
   double frame[4];
   find_frame(r, scene, frame);
   for (size_t i = 0; i < marks->count; ++i) {
     double p[3];
-    place(&c, marks->mark[i].xyz, p);
+    place(&c, from ? marks->mark[i].from : marks->mark[i].xyz, p);
     project(&c, frame, p, size, pixel[i]);
   }
 }

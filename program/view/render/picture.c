@@ -25,7 +25,7 @@
   EACH(cairo_, status_to_string) EACH(cairo_, stroke) EACH(cairo_, stroke_preserve)                \
   EACH(cairo_, surface_destroy) EACH(cairo_, surface_flush) EACH(cairo_, surface_mark_dirty)       \
   EACH(cairo_, surface_status) EACH(cairo_, surface_write_to_png_stream)                           \
-  EACH(cairo_, text_extents) EACH(cairo_, text_path)
+  EACH(cairo_, text_extents) EACH(cairo_, text_path) EACH(cairo_, translate)
 /* clang-format on */
 
 /* Functions of cairo. They are loaded at the first use, so that all commands that draw nothing run
@@ -41,6 +41,7 @@ static const double edge[3] = {0.86, 0.885, 0.91};
 static const double ink[3] = {0.09, 0.13, 0.18};
 static const double faint[3] = {0.37, 0.43, 0.49};
 static const double gravity_colour[3] = {0.91, 0.33, 0.17};
+static const double mark_colour[3] = {0.69, 0.24, 0.05};
 
 /* Layout of the picture, pixels. */
 typedef struct layout {
@@ -153,7 +154,7 @@ static void ball(cairo_t *cr, double x, double y, double radius, supine_view vie
   static const char *const ends[3][2] = {{"L", "R"}, {"P", "A"}, {"H", "F"}};
   double axes[3][3];
   double seen[3] = {0, 0, 0};
-  supine_render_view_axes(view, axes);
+  supine_render_view_axes(view, gravity, axes);
   cairo.arc(cr, x, y, radius, 0, 2 * pi);
   cairo.set_source_rgba(cr, faint[0], faint[1], faint[2], 0.13);
   cairo.fill_preserve(cr);
@@ -196,11 +197,56 @@ static void place_name(double (*box)[3], size_t count, double line) {
   }
 }
 
-/* Draw discs and dots at the marks, then the labels over them. (x, y) is the upper left corner of
- * the scene; `size` is the size of the font, pixels. */
+/* Draw an arrow that shows how a mark has moved. */
+static void trace(cairo_t *cr, const double from[2], const double to[2], double size) {
+  const double length = hypot(to[0] - from[0], to[1] - from[1]);
+  const double head = fmin(size * 0.55, 0.6 * length);
+  if (length < 0.3 * size) {
+    return;
+  }
+  const double dx = (to[0] - from[0]) / length;
+  const double dy = (to[1] - from[1]) / length;
+  colour(cr, ink);
+  cairo.set_line_width(cr, size * 0.12);
+  cairo.move_to(cr, from[0], from[1]);
+  cairo.line_to(cr, to[0] - head * dx, to[1] - head * dy);
+  cairo.stroke(cr);
+  cairo.move_to(cr, to[0], to[1]);
+  cairo.line_to(cr, to[0] - head * dx - 0.45 * head * dy, to[1] - head * dy + 0.45 * head * dx);
+  cairo.line_to(cr, to[0] - head * dx + 0.45 * head * dy, to[1] - head * dy - 0.45 * head * dx);
+  cairo.close_path(cr);
+  cairo.fill(cr);
+}
+
+/* Draw a label, and a line from it to its mark at `at`. `box` is as in place_name. */
+static void name(cairo_t *cr, const supine_mark *mark, const double at[2], double (*box)[3],
+                 size_t placed, double size, const supine_scene *scene) {
+  double *own = box[placed];
+  font(cr, size * 0.75, false);
+  own[2] = text_width(cr, mark->label);
+  const bool right = at[0] + 2.2 * size + own[2] < (double)scene->width;
+  own[0] = right ? at[0] + 2.2 * size : fmax(0, at[0] - 2.2 * size - own[2]);
+  own[1] = at[1] - size * 0.6;
+  place_name(box, placed, size);
+  colour(cr, faint);
+  cairo.set_line_width(cr, size * 0.06);
+  cairo.move_to(cr, at[0] + (right ? 0.5 : -0.5) * size, at[1]);
+  cairo.line_to(cr, own[0] + (right ? -0.2 * size : own[2] + 0.2 * size), own[1] - 0.25 * size);
+  cairo.stroke(cr);
+  cairo.move_to(cr, own[0], own[1]);
+  cairo.text_path(cr, mark->label);
+  cairo.set_source_rgba(cr, card[0], card[1], card[2], 0.85);
+  cairo.set_line_width(cr, size * 0.25);
+  cairo.stroke_preserve(cr);
+  colour(cr, ink);
+  cairo.fill(cr);
+}
+
+/* Draw discs and dots at the marks, then arrows, then labels. The origin of the picture is the
+ * upper left corner of the scene; `size` is the size of the font, pixels. */
 static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const supine_scene *scene,
-                                const supine_marks *marks, double size, double x, double y) {
-  double(*pixel)[2] = malloc((marks->count + 1) * sizeof *pixel);
+                                const supine_marks *marks, double size) {
+  double(*pixel)[2] = malloc(2 * (marks->count + 1) * sizeof *pixel);
   double(*box)[3] = malloc((marks->count + 1) * sizeof *box);
   size_t placed = 0;
   if (pixel == NULL || box == NULL) {
@@ -208,39 +254,26 @@ static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const su
     free(box);
     return SUPINE_ERROR_MEMORY;
   }
-  supine_render_project(renderer, scene, marks, pixel);
-  for (int names = 0; names < 2; ++names) {
-    for (size_t i = 0; i < marks->count; ++i) {
-      const supine_mark *mark = &marks->mark[i];
-      const double *at = pixel[i];
-      double rgb[3];
-      if (names == 1 ? mark->label == NULL : mark->label != NULL && !mark->point) {
-        continue;
-      }
-      supine_render_colour(scene->colours, fmin(1, (double)mark->value / scene->largest), rgb);
-      if (names == 0) {
-        cairo.new_path(cr);
-        cairo.arc(cr, x + at[0], y + at[1], size * (mark->point ? 0.32 : 0.07), 0, 2 * pi);
-        colour(cr, rgb);
-        cairo.fill_preserve(cr);
-        cairo.set_line_width(cr, size * 0.1);
-        colour(cr, mark->point ? ink : rgb);
-        cairo.stroke(cr);
-        continue;
-      }
-      font(cr, size * 0.75, false);
-      double *own = box[placed];
-      own[2] = text_width(cr, mark->label);
-      own[0] = fmax(0, fmin(at[0] + size * 0.5, (double)scene->width - own[2]));
-      own[1] = at[1] - size * 0.3;
-      place_name(box, placed++, size);
-      cairo.move_to(cr, x + own[0], y + own[1]);
-      cairo.text_path(cr, mark->label);
-      cairo.set_source_rgba(cr, card[0], card[1], card[2], 0.85);
-      cairo.set_line_width(cr, size * 0.25);
-      cairo.stroke_preserve(cr);
-      colour(cr, ink);
+  double(*from)[2] = pixel + marks->count;
+  supine_render_project(renderer, scene, marks, false, pixel);
+  supine_render_project(renderer, scene, marks, true, from);
+  for (size_t i = 0; i < marks->count; ++i) {
+    const supine_mark *mark = &marks->mark[i];
+    if (mark->point || mark->label == NULL) {
+      cairo.new_path(cr);
+      cairo.arc(cr, pixel[i][0], pixel[i][1], size * (mark->point ? 0.32 : 0.1), 0, 2 * pi);
+      colour(cr, mark_colour);
       cairo.fill(cr);
+    }
+  }
+  for (size_t i = 0; i < marks->count; ++i) {
+    if (marks->mark[i].label != NULL) {
+      trace(cr, from[i], pixel[i], size);
+    }
+  }
+  for (size_t i = 0; i < marks->count; ++i) {
+    if (marks->mark[i].label != NULL) {
+      name(cr, &marks->mark[i], pixel[i], box, placed++, size, scene);
     }
   }
   free(pixel);
@@ -269,16 +302,25 @@ static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_
                            const supine_panel *panel, supine_view view, const bar_scale *bar,
                            double x, double y, double width, double height, double size,
                            const double *extent, supine_error *error) {
+  double shown[4] = {extent[0], extent[1], extent[2], extent[3]};
+  double own[4] = SUPINE_EXTENT_NONE;
+  if (view == SUPINE_VIEW_LYING) { /* put the lungs of every posture on the table */
+    const supine_scene alone = {.pose = panel->pose, .view = view, .gravity = panel->gravity};
+    supine_render_extent(renderer, &alone, own);
+    shown[2] = own[2];
+    shown[3] += own[2] - extent[2];
+  }
   const supine_scene scene = {.pose = panel->pose,
                               .value = panel->value,
                               .largest = bar->largest,
                               .line_step = bar->step,
                               .colours = picture->colours,
                               .view = view,
+                              .gravity = panel->gravity,
                               .shell = picture->transparency > 0,
                               .width = (size_t)width,
                               .height = (size_t)height,
-                              .extent = extent};
+                              .extent = shown};
   cairo_surface_t *image = NULL;
   supine_status status = draw_scene(renderer, &scene, &image, error);
   if (status == SUPINE_OK) {
@@ -286,7 +328,9 @@ static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_
     cairo.paint_with_alpha(cr, picture->transparency > 0 ? fmin(1, 2 * (1 - picture->transparency))
                                                          : 1);
     if (panel->marks != NULL) {
-      status = draw_marks(cr, renderer, &scene, panel->marks, size, floor(x), floor(y));
+      cairo.translate(cr, floor(x), floor(y));
+      status = draw_marks(cr, renderer, &scene, panel->marks, size);
+      cairo.translate(cr, -floor(x), -floor(y));
     }
   }
   cairo.surface_destroy(image);
@@ -321,10 +365,18 @@ static supine_status cell(cairo_t *cr, supine_renderer *renderer, const supine_p
   fitted_text(cr, words, y + at->heading_height / 2 + at->font * 0.95, at->font * 0.82, false, room,
               panel->subtitle);
   fitted_text(cr, words, y + at->heading_height / 2 + at->font * 2.0, at->font * 0.82, false, room,
-              supine_render_view_name(view));
+              view == SUPINE_VIEW_LYING ? panel->note : supine_render_view_name(view));
+  double below = at->font * 0.5; /* height of the space below the lungs */
+  if (view == SUPINE_VIEW_LYING && fabs(panel->gravity[2]) < 0.8) { /* the table */
+    cairo.rectangle(cr, x + at->font, y + at->cell_height - 2 * at->font,
+                    at->cell_width - 2 * at->font, at->font * 0.9);
+    cairo.set_source_rgba(cr, faint[0], faint[1], faint[2], 0.35);
+    cairo.fill(cr);
+    below = at->font * 3;
+  }
   return lungs(cr, renderer, picture, panel, view, bar, x + at->font * 0.5, y + at->heading_height,
-               at->cell_width - at->font, at->cell_height - at->heading_height - at->font * 0.5,
-               at->font, extent, error);
+               at->cell_width - at->font, at->cell_height - at->heading_height - below, at->font,
+               extent, error);
 }
 
 static void colour_bar(cairo_t *cr, const supine_picture *picture, const layout *at,
@@ -374,7 +426,7 @@ static layout make_layout(const supine_picture *picture) {
   at.font = fmin(28, at.font);
   at.margin = at.font * 0.9;
   at.heading_height = at.font * 5.2;
-  at.footer_height = at.font * 4.6;
+  at.footer_height = picture->transparency == 0 ? at.font * 4.6 : at.margin;
   const double gap = at.margin / 2;
   at.cell_width = (width - 2 * at.margin - gap * (double)(picture->panel_count - 1)) /
                   (double)picture->panel_count;
@@ -388,7 +440,9 @@ void supine_render_picture_extent(supine_renderer *renderer, const supine_pictur
                                   double (*extent)[4]) {
   for (size_t row = 0; row < picture->view_count; ++row) {
     for (size_t column = 0; column < picture->panel_count; ++column) {
-      const supine_scene scene = {.pose = picture->panel[column].pose, .view = picture->view[row]};
+      const supine_scene scene = {.pose = picture->panel[column].pose,
+                                  .view = picture->view[row],
+                                  .gravity = picture->panel[column].gravity};
       supine_render_extent(renderer, &scene, extent[row]);
     }
   }
@@ -421,7 +475,9 @@ static supine_status compose(cairo_t *cr, supine_renderer *renderer, const supin
                     picture->extent != NULL ? picture->extent[row] : own[row], error);
     }
   }
-  colour_bar(cr, picture, &at, &bar);
+  if (picture->transparency == 0) { /* a shell has no colours */
+    colour_bar(cr, picture, &at, &bar);
+  }
   return status;
 }
 

@@ -23,6 +23,8 @@ typedef enum supine_view {
   SUPINE_VIEW_HEAD,
   SUPINE_VIEW_FEET,
   SUPINE_VIEW_OBLIQUE, /**< in front, to the patient's left, and higher than the lungs */
+  SUPINE_VIEW_LYING, /**< gravity points down, and the head is on the left; a patient who stands is
+                        seen from the front */
   SUPINE_VIEW_COUNT
 } supine_view;
 
@@ -30,8 +32,9 @@ typedef enum supine_view {
 const char *supine_render_view_name(supine_view view);
 
 /** Compute the rotation from the body's axes (LPS) to the viewer's axes: right, up, towards the
- * viewer. */
-void supine_render_view_axes(supine_view view, double axes[3][3]);
+ * viewer.
+ * @param gravity  unit vector, which only SUPINE_VIEW_LYING needs; otherwise it may be NULL */
+void supine_render_view_axes(supine_view view, const double gravity[3], double axes[3][3]);
 
 /** Colour maps: for the displacement in one state, and for the difference between two states. */
 typedef enum supine_colours {
@@ -64,6 +67,7 @@ typedef struct supine_scene {
   double line_step;   /**< difference of the value between contour lines, mm; 0 for no lines */
   supine_colours colours;
   supine_view view;
+  const double *gravity; /**< [3] unit vector; needed if `view` is SUPINE_VIEW_LYING */
   bool shell; /**< whether to draw a grey, transparent shell with an outline instead of colours */
   size_t width, height; /**< size of the drawing, pixels */
   const double *extent; /**< [4] smallest and largest x, then y, mm; NULL: those of this scene */
@@ -93,9 +97,9 @@ supine_status supine_render_png(supine_renderer *renderer, const supine_scene *s
 
 /** A point, or a vertex of a mesh, inside the lungs. */
 typedef struct supine_mark {
-  float xyz[3]; /**< position, mm */
-  float value;  /**< value that the colour shows, mm */
-  bool point;   /**< true: a point, drawn as a disc; false: a vertex of a mesh, drawn as a dot */
+  float xyz[3];  /**< position, mm */
+  float from[3]; /**< position from which an arrow points to a mark with a label, mm */
+  bool point;    /**< true: a point, drawn as a disc; false: a vertex of a mesh, drawn as a dot */
   const char *label; /**< text written beside the mark, or NULL */
 } supine_mark;
 
@@ -104,22 +108,23 @@ typedef struct supine_marks {
   const supine_mark *mark;
 } supine_marks;
 
-/** Compute the positions of marks in the drawing of a scene.
+/** Compute the positions of marks in the drawing of a scene, or those of supine_mark.from.
  * @param pixel  [count, 2] pixels from the left and upper edges; output */
 void supine_render_project(supine_renderer *renderer, const supine_scene *scene,
-                           const supine_marks *marks, double (*pixel)[2]);
+                           const supine_marks *marks, bool from, double (*pixel)[2]);
 
 /** A column of a picture: the lungs in one posture. */
 typedef struct supine_panel {
   const char *title;
   const char *subtitle;
+  const char *note; /**< third line, in place of the name of the view SUPINE_VIEW_LYING */
   double gravity[3];
   const supine_pose *pose;
   const float *value;
   const supine_marks *marks; /**< marks drawn over the lungs, or NULL */
 } supine_panel;
 
-enum { SUPINE_PANELS_MAX = 8, SUPINE_VIEWS_MAX = 7 };
+enum { SUPINE_PANELS_MAX = 8, SUPINE_VIEWS_MAX = 8 };
 
 /** A picture: a column for each posture, a row for each view, and a colour bar below them. */
 typedef struct supine_picture {

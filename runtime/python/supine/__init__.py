@@ -20,7 +20,7 @@ import gzip
 import io
 import os
 import tempfile
-from typing import Any, Optional, Sequence, Union
+from typing import Any, NamedTuple, Optional, Sequence, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,7 +31,7 @@ from ._library import (ArgumentError, Error, FormatError, MeshError, NumericalEr
                        OutOfMemoryError, ReadError, UnsupportedError)
 from ._program import save_fields
 
-__all__ = ["open", "precompute", "save_fields", "embed", "Basis", "Pose", "Location", "gravity", "gravity_of_quaternion", "tilt", "postures", "breath", "Gravity",
+__all__ = ["open", "precompute", "save_fields", "embed", "Basis", "Pose", "Location", "Target", "gravity", "gravity_of_quaternion", "tilt", "postures", "breath", "Gravity",
            "Error", "ArgumentError", "FormatError", "MeshError", "NumericalError", "OpenSurfaceError",
            "OutOfMemoryError", "ReadError", "UnsupportedError"]
 __version__: str = _c.string(_c.version())
@@ -174,6 +174,17 @@ class _Owner:
         return array
 
 
+class Target(NamedTuple):
+    """A named structure: its lung, the mean position `at` of its vertices, the displacement `move` of this position, its
+    length `mm`, and the expected error, mm (3-D RMS; NaN if unknown). Vectors are in mm, LPS."""
+    name: str
+    lung: str
+    at: Doubles
+    move: Doubles
+    mm: float
+    expected_error: float
+
+
 class Basis:
     """An open basis file, made by `supine.open`. It is closed when nothing uses it any more.
 
@@ -260,6 +271,30 @@ class Basis:
         _c.expected_error(self._c, _state(state, volume), None if since is None else _state(since),
                           _address(sigma, self.vertex_count, "sigma"))
         return sigma
+
+    def targets(self, state: Gravity, volume: str = "", since: Optional[Gravity] = None) -> list[Target]:
+        """Compute where each named structure of a basis made by `embed` is in a state, and how far it has moved from
+        the state `since`, or from the scan. The numbers are those of `supine deform -o FILE.csv`."""
+        names, part = self.tensor("names"), self.tensor("part")
+        if names is None or part is None:
+            raise ArgumentError("the basis names no structures: make one with embed")
+        origin = Pose()
+        _c.basis_pose(self._c, _c.basis_scan(self._c) if since is None else _state(since), origin)
+        after, before = self.deform(self.pose(state, volume)).astype(np.float64), self.deform(origin).astype(np.float64)
+        try:
+            sigma: Any = self.expected_error(state, volume, since)
+        except UnsupportedError:
+            sigma = np.full(self.vertex_count, np.nan)
+        values = np.column_stack([after, after - before, sigma.astype(np.float64) ** 2])
+        names_of = [name for name, lung in self.lungs.items() for _ in range(lung.start, lung.stop)]
+        made = []
+        for i, name in enumerate(names.tobytes().decode().split("\n")):
+            vertices = np.flatnonzero(part == i)
+            if vertices.size:
+                mean = values[vertices].mean(axis=0)
+                made.append(Target(name, names_of[vertices[0]], mean[:3], mean[3:6], float(np.linalg.norm(mean[3:6])),
+                                   float(np.sqrt(mean[6]))))
+        return made
 
     @property
     def points(self) -> dict[str, int]:

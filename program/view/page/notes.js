@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: MIT
+// Draw notes over the picture on a 2-D canvas: gravity, the traces and names of targets, a lens that enlarges the trace
+// of the chosen one, and marked points.
+
+/** Return the position on the canvas, CSS pixels, of a point in the patient's axes, mm; null if it is behind the
+ * viewer. `ratio` is the number of pixels of the canvas for each CSS pixel. */
+function project(pane, [x, y, z], ratio) {
+  const m = pane.toEye;
+  const eye = [0, 1, 2].map((i) => m[i] * x + m[4 + i] * y + m[8 + i] * z + m[12 + i]);
+  if (eye[2] >= 0) return null;
+  const [left, bottom, width, height] = pane.box;
+  const ndc = [0, 1].map((i) => (pane.projection[5 * i] * eye[i]) / -eye[2]);
+  return [(left + ((ndc[0] + 1) / 2) * width) / ratio, (pane.canvasHeight - bottom - ((ndc[1] + 1) / 2) * height) / ratio];
+}
+
+/** Draw a line with the head of an arrow at its end. */
+function drawArrow(context, [x, y], [u, v], head) {
+  const size = Math.hypot(u - x, v - y);
+  const [dx, dy] = [(u - x) / size, (v - y) / size];
+  context.beginPath();
+  context.moveTo(x, y);
+  context.lineTo(u - dx * head, v - dy * head);
+  context.stroke();
+  context.beginPath();
+  context.moveTo(u, v);
+  for (const side of [-0.5, 0.5]) context.lineTo(u - head * dx + side * head * dy, v - head * dy - side * head * dx);
+  context.fill();
+}
+
+/** Draw the trace of a target: a dashed circle where it was, a ball where it is with a halo as wide as the expected error,
+ * and an arrow. Positions and sizes are pixels. */
+function drawTrace(context, was, at, radius, halo) {
+  const circle = ([x, y], r) => {
+    context.beginPath();
+    context.arc(x, y, r, 0, 2 * Math.PI);
+  };
+  if (halo > 0) {
+    const shade = context.createRadialGradient(...at, radius, ...at, radius + halo);
+    shade.addColorStop(0, `${css('--change')}66`);
+    shade.addColorStop(1, `${css('--change')}00`);
+    context.fillStyle = shade;
+    circle(at, radius + halo);
+    context.fill();
+  }
+  context.fillStyle = css('--change');
+  context.globalAlpha = 0.85;
+  circle(at, radius);
+  context.fill();
+  context.globalAlpha = 1;
+  context.strokeStyle = context.fillStyle = css('--ink');
+  context.lineWidth = 1.2;
+  context.setLineDash([3, 2.5]);
+  circle(was, radius);
+  context.stroke();
+  context.setLineDash([]);
+  context.lineWidth = radius > 20 ? 2.5 : 1.5;
+  if (Math.hypot(at[0] - was[0], at[1] - was[1]) > 4) drawArrow(context, was, at, Math.min(radius > 20 ? 13 : 7, 0.6 * Math.hypot(at[0] - was[0], at[1] - was[1])));
+}
+
+/** The canvas with the notes. `avoid` returns the boxes, CSS pixels, that names may not cover. */
+class Notes {
+  constructor(canvas) {
+    this.canvas = canvas;
+  }
+
+  text(words, x, y, { align = 'left', colour = '--ink', font = '13px' } = {}) {
+    const { context } = this;
+    Object.assign(context, { textAlign: align, textBaseline: 'middle', font: `${font} system-ui, sans-serif`, lineJoin: 'round', strokeStyle: css('--paper-solid'), fillStyle: css(colour) });
+    context.lineWidth = 3;
+    context.strokeText(words, x, y);
+    context.fillText(words, x, y);
+  }
+
+  /** Draw gravity as an arrow from the upper end of a line at (x, y), 90 pixels long if it is in the plane of the
+   * picture. */
+  gravity(pane, x, y) {
+    const { context } = this;
+    const [gx, gy] = rotate(pane.turn, pane.gravity);
+    const size = Math.hypot(gx, gy);
+    context.strokeStyle = context.fillStyle = css('--ink');
+    context.lineWidth = 3;
+    if (size > 0.15) drawArrow(context, [x - 40 * gx, y + 40 * gy], [x + 40 * gx, y - 40 * gy], 11);
+    const [word, from] = size > 0.15 ? ['gravity', -40 * Math.abs(gy) - 12] : [`gravity, ${rotate(pane.turn, pane.gravity)[2] > 0 ? 'towards you' : 'away from you'}`, 0];
+    this.text(word, x, y + from, { align: 'center', font: '12px' });
+  }
+
+  /** Draw a target's name, and a line from it to the target. If names overlap, the lower one moves down. */
+  name(target, at, lines, width) {
+    const { context, taken } = this;
+    context.font = '600 13px system-ui, sans-serif';
+    const side = at[0] + 70 + Math.max(...lines.map((line) => context.measureText(line).width)) < width ? 1 : -1;
+    const place = [at[0] + side * 60, at[1] + 4];
+    while (taken.some(([x, y]) => Math.abs(y - place[1]) < 34 && Math.abs(x - place[0]) < 200)) place[1] += 8;
+    taken.push(place);
+    context.strokeStyle = css('--soft');
+    context.lineWidth = 1;
+    context.beginPath();
+    context.moveTo(at[0] + side * 6, at[1]);
+    context.lineTo(place[0] - side * 5, place[1]);
+    context.stroke();
+    lines.forEach((line, i) => this.text(line, place[0], place[1] + 16 * i, { align: side > 0 ? 'left' : 'right', font: i ? '12px' : '600 13px' }));
+  }
+
+  /** Draw the chosen target's trace, and enlarged in a circle at the upper right, with its numbers beside or below. */
+  lens(pane, target, radius, from, ratio, { width, height }) {
+    const { context, taken } = this;
+    const [was, at] = [target.was, target.at].map((p) => project(pane, p, ratio));
+    if (!was || !at) return;
+    const scale = (1 / pane.pixel); // CSS pixels for each mm
+    const small = width < 520;
+    const size = small ? 54 : Math.min(92, height * 0.2);
+    const middle = [width - (small ? size + 10 : size + 172), size + (small ? 8 : 16)];
+    const error = target.error ?? 0;
+    const grown = (0.92 * size) / Math.max(radius + error + 0.5 * target.mm, 10); // pixels for each mm in the lens
+    drawTrace(context, was, at, Math.max(4, radius * scale), 0);
+    context.fillStyle = context.strokeStyle = css('--line');
+    context.lineWidth = 1;
+    for (const side of [-1, 1]) { // lines from the trace to the circle
+      const [dx, dy] = [middle[0] - at[0], middle[1] - at[1]];
+      const far = Math.hypot(dx, dy);
+      context.beginPath();
+      context.moveTo(at[0] - (side * dy * 9) / far, at[1] + (side * dx * 9) / far);
+      context.lineTo(middle[0] - (side * dy * size) / far, middle[1] + (side * dx * size) / far);
+      context.stroke();
+    }
+    context.save();
+    context.beginPath();
+    context.arc(...middle, size, 0, 2 * Math.PI);
+    context.fillStyle = css('--paper-solid');
+    context.fill();
+    context.strokeStyle = css('--edge');
+    context.stroke();
+    context.clip();
+    const centre = [0, 1].map((k) => (was[k] + at[k]) / 2);
+    const [old, now] = [was, at].map((p) => p.map((x, k) => middle[k] + ((x - centre[k]) / scale) * grown));
+    drawTrace(context, old, now, radius * grown, error * grown);
+    context.restore();
+    if (small) {
+      this.text(target.name, Math.min(middle[0], width - 60), middle[1] + size + 12, { align: 'center', colour: '--change', font: '600 12px' });
+      return;
+    }
+    const ways = isTold(target) ? wayWords(target.move, 3, pane.gravity).split(', ') : [UNTOLD.slice(0, 19), UNTOLD.slice(20)];
+    const lines = [[target.name, '--change', '650 14px'], [`${target.mm.toFixed(1)} mm`, '--ink', '650 14px'], ...ways.map((way) => [way, '--ink', '12px']), [`dashed: ${from}`, '--soft', '12px'], [`halo: ${errorText(error)} error`, '--soft', '12px']].slice(0, target.error === null ? -1 : undefined);
+    lines.forEach(([words, colour, font], i) => this.text(words, middle[0] + size + 12, middle[1] - size + 24 + 18 * i, { colour, font }));
+    taken.push([middle[0], middle[1]], [middle[0] + size, middle[1] + 40]);
+  }
+}
+
+function nearestVertex(basis, xyz, place) {
+  let best = -1;
+  let least = Infinity;
+  for (let i = 0; i < basis.vertices; ++i) {
+    const square = (xyz[3 * i] - place[0]) ** 2 + (xyz[3 * i + 1] - place[1]) ** 2 + (xyz[3 * i + 2] - place[2]) ** 2;
+    if (square < least) [best, least] = [i, square];
+  }
+  return best;
+}
