@@ -140,7 +140,6 @@ typedef struct playing {
 static void end(playing *p) {
   supine_arena_free(&p->arena);
   supine_mesh_free(&p->mesh);
-  free(p->origin);
   supine_basis_close(p->basis);
 }
 
@@ -155,8 +154,9 @@ static supine_status begin_frames(playing *p, size_t count, bool series, supine_
   p->gravity = supine_arena_take(&p->arena, count, 3 * sizeof *p->gravity);
   p->volumes = supine_arena_take(&p->arena, count, p->lung_count * sizeof *p->volumes);
   p->compute_time = supine_arena_take(&p->arena, count, sizeof *p->compute_time);
+  p->origin = supine_arena_take(&p->arena, frame, sizeof *p->origin);
   p->normals = supine_arena_take(&p->arena, frame, sizeof *p->normals);
-  SUPINE_TRY(supine_options_basis_mesh(p->basis, NULL, &p->mesh, error));
+  SUPINE_TRY(supine_posed_mesh(p->basis, NULL, &p->mesh, error));
   if (p->arena.failed) {
     return supine_error_memory(error, "%zu vertices", frame / 3);
   }
@@ -329,10 +329,7 @@ static supine_status play(playing *p, size_t count, const char *made_by, supine_
   SUPINE_TRY(find_volumes(p, &pv, error));
   SUPINE_TRY(supine_options_reference(p->basis, &wanted->from, false, &from, error));
   SUPINE_TRY(check_ends(p, error));
-  p->origin = supine_options_basis_positions(p->basis, &from.pose);
-  if (p->origin == NULL) {
-    return supine_error_memory(error, "%zu vertices", p->mesh.vertex_count);
-  }
+  SUPINE_TRY(supine_posed_positions(p->basis, &from.pose, p->origin, error));
   supine_options_signals_catch(true);
   (void)snprintf(p->vtp_comment, sizeof p->vtp_comment,
                  "displacement from %s; volumes are gas and tissue of each lung; %s", from.name,

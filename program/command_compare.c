@@ -81,7 +81,7 @@ static supine_status add_pair(const supine_basis *basis, const supine_command_na
   }
   if (status == SUPINE_OK) {
     status =
-        supine_options_expected_find(basis, &item[1]->state, &item[0]->state, &expected, error);
+        supine_posed_expected(basis, &item[1]->state, &item[0]->state, &expected, error);
   }
   if (status == SUPINE_OK) {
     status =
@@ -103,7 +103,7 @@ static supine_status add_pair(const supine_basis *basis, const supine_command_na
     add_target(item, &targets[i], list);
   }
   free(targets);
-  supine_options_expected_free(&expected);
+  supine_posed_expected_free(&expected);
   return status;
 }
 

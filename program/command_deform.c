@@ -91,8 +91,8 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
   if (arena.failed) {
     return supine_error_memory(error, "%zu vertices", info->vertex_count);
   }
-  SUPINE_TRY(supine_options_basis_mesh(basis, &moved->from.pose, &from, error));
-  SUPINE_TRY(supine_options_basis_mesh(basis, &moved->pose, &mesh, error));
+  SUPINE_TRY(supine_posed_mesh(basis, &moved->from.pose, &from, error));
+  SUPINE_TRY(supine_posed_mesh(basis, &moved->pose, &mesh, error));
   (void)supine_deform(basis, &moved->pose, xyz);
   supine_normals(basis, xyz, normals);
   for (size_t i = 0; i < 3 * mesh.vertex_count && moved->subtract_hilum; ++i) {
@@ -114,7 +114,7 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
 }
 
 static void free_expected(supine_deformation *moved) {
-  supine_options_expected_free(&moved->expected);
+  supine_posed_expected_free(&moved->expected);
 }
 
 static supine_status deform(const supine_basis *basis, const request *wanted, supine_error *error) {
@@ -128,7 +128,7 @@ static supine_status deform(const supine_basis *basis, const request *wanted, su
   SUPINE_TRY(supine_options_pose(basis, name, wanted->volume.allow_folds, &moved.state, &moved.pose,
                                  error));
   SUPINE_TRY(
-      supine_options_expected_find(basis, &moved.state, &moved.from.state, &moved.expected, error));
+      supine_posed_expected(basis, &moved.state, &moved.from.state, &moved.expected, error));
   SUPINE_TRY(supine_options_hilum(basis, &moved.pose, &moved.from.pose, wanted->frame == 1,
                                   moved.hilum, error));
   (void)snprintf(comment, sizeof comment, "displacement from %s%s", moved.from.name,

@@ -98,7 +98,7 @@ static supine_status add_expected(json_t *root, const supine_basis *basis, supin
     supine_expected expected = {0};
     supine_expected_part parts[SUPINE_EXPECTED_TERMS];
     char text[160];
-    status = supine_options_expected_find(basis, &state, &scan, &expected, error);
+    status = supine_posed_expected(basis, &state, &scan, &expected, error);
     if (status == SUPINE_OK && expected.largest > 0.0) {
       (void)supine_state_describe(&state, text, sizeof text);
       (void)json_array_append_new(rows, json_pack("{s:s, s:f, s:f, s:b}", "state", text, "rms_mm",
@@ -113,7 +113,7 @@ static supine_status add_expected(json_t *root, const supine_basis *basis, supin
         }
       }
     }
-    supine_options_expected_free(&expected);
+    supine_posed_expected_free(&expected);
   }
   (void)json_object_set_new(root, "expected_error", rows);
   (void)json_object_set_new(root, "expected_error_terms", terms);

@@ -259,7 +259,7 @@ static supine_status find(const supine_locate_task *task, bool posture_given,
 static supine_status make_surface(const supine_basis *basis, lungs_found *located,
                                   supine_mesh *mesh, supine_error *error) {
   const size_t n = supine_basis_get_info(basis)->vertex_count;
-  SUPINE_TRY(supine_options_basis_mesh(basis, NULL, mesh, error));
+  SUPINE_TRY(supine_posed_mesh(basis, NULL, mesh, error));
   for (size_t i = 0; i < 3 * n; ++i) {
     mesh->vertices[i] = (double)located->xyz[i];
   }

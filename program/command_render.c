@@ -101,7 +101,7 @@ static supine_status fill_panel(studio *s, size_t i, supine_error *error) {
   supine_compare_statistics(s->compare, shown->value, &statistics);
   s->max = fmax(s->max, statistics.max);
   (void)snprintf(shown->subtitle, sizeof shown->subtitle, "%.0f mL, mean %.1f, max %.1f mm",
-                 supine_options_basis_volume(s->basis, &shown->pose), statistics.mean,
+                 supine_posed_volume(s->basis, &shown->pose), statistics.mean,
                  statistics.max);
   s->panel[i] = (supine_panel){.title = supine_options_posture_label(item->name),
                                .subtitle = shown->subtitle,
@@ -120,8 +120,8 @@ static supine_status mark_panel(studio *s, size_t i, supine_error *error) {
   }
   s->panel[i].marks = &marks->marks;
   const supine_pose *const pose[2] = {&s->from.pose, &s->shown[i].pose};
-  SUPINE_FREED_BY(supine_options_expected_free) supine_expected expected = {0};
-  SUPINE_TRY(supine_options_expected_find(s->inside, &s->postures.item[i].state, &s->from.state,
+  SUPINE_FREED_BY(supine_posed_expected_free) supine_expected expected = {0};
+  SUPINE_TRY(supine_posed_expected(s->inside, &s->postures.item[i].state, &s->from.state,
                                           &expected, error));
   SUPINE_TRY(supine_command_marks_make(s->inside, &s->names, pose, expected.sigma, marks, error));
   const supine_target *t = &marks->first;

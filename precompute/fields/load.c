@@ -109,10 +109,6 @@ static supine_status match_point(const reading *r, const supine_inside_surface *
   return SUPINE_OK;
 }
 
-static void destroy_tree(supine_inside_surface **tree) {
-  supine_inside_surface_destroy(*tree);
-}
-
 /* Find the point at the position of each vertex. A point belongs only to the vertex nearest to it,
  * so that no two vertices share a point. The search tree is that of triangles whose three corners
  * are one vertex. */
@@ -120,7 +116,7 @@ static supine_status match_points(const reading *r) {
   const supine_lungs *lungs = r->lungs;
   const size_t n = lungs->mesh.vertex_count;
   const double limit = farthest_point * supine_distance(lungs->minimum, lungs->maximum);
-  SUPINE_FREED_BY(destroy_tree) supine_inside_surface *tree = NULL;
+  SUPINE_FREED_BY(supine_inside_surface_drop) supine_inside_surface *tree = NULL;
   for (size_t i = 0; i < n; ++i) {
     r->apart[i] = INFINITY;
     r->corner[3 * i] = r->corner[3 * i + 1] = r->corner[3 * i + 2] = (uint32_t)i;

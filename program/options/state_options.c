@@ -182,15 +182,15 @@ double supine_options_above_rest(const supine_state *state) {
   return rest ? state->volume.ml : (double)NAN;
 }
 
-/* Return the fraction of the triangles that turn over in a pose, or -1 if out of memory. */
-static double turned_over(const supine_basis *basis, const supine_pose *pose) {
+/* Compute the fraction of the triangles that turn over in a pose. */
+static supine_status turned_over(const supine_basis *basis, const supine_pose *pose, double *share,
+                                 supine_error *error) {
   SUPINE_FREED_BY(supine_mesh_free) supine_mesh mesh = {0};
-  double *moved = supine_options_basis_positions(basis, pose);
-  const bool made =
-      moved != NULL && supine_options_basis_mesh(basis, NULL, &mesh, NULL) == SUPINE_OK;
-  const double turned = made ? supine_mesh_turned_over(&mesh, moved) : -1.0;
-  free(moved);
-  return turned;
+  SUPINE_FREED_BY(supine_mesh_free) supine_mesh moved = {0};
+  SUPINE_TRY(supine_posed_mesh(basis, NULL, &mesh, error));
+  SUPINE_TRY(supine_posed_mesh(basis, pose, &moved, error));
+  *share = supine_mesh_turned_over(&mesh, moved.vertices);
+  return SUPINE_OK;
 }
 
 supine_status supine_options_plausible(const supine_plausible *lungs, supine_error *error) {
@@ -226,16 +226,14 @@ supine_status supine_options_pose_check(const supine_basis *basis, const char *c
   const supine_basis_info *info = supine_basis_get_info(basis);
   supine_plausible lungs = {.command = command,
                             .state = state,
-                            .volume = supine_options_basis_volume(basis, pose),
-                            .folded = turned_over(basis, pose),
+                            .volume = supine_posed_volume(basis, pose),
                             .parts = "the surface folds; triangles that turn over",
                             .allowed = allow_folds || !info->has_rest};
+  SUPINE_TRY(turned_over(basis, pose, &lungs.folded, error));
   for (size_t lung = 0; lung < info->lung_count && info->has_rest; ++lung) {
     lungs.full += info->reference_volume[lung];
   }
-  return lungs.folded < 0.0 ? supine_error_set(error, SUPINE_ERROR_MEMORY,
-                                               "no memory for %zu vertices", info->vertex_count)
-                            : supine_options_plausible(&lungs, error);
+  return supine_options_plausible(&lungs, error);
 }
 
 supine_status supine_options_pose(const supine_basis *basis, const char *command, bool allow_folds,

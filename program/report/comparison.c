@@ -82,13 +82,13 @@ static supine_status find_posture(const supine_comparison *c, const supine_postu
 static supine_status find_targets(supine_comparison *c, size_t i, supine_error *error) {
   const supine_pose *const pose[2] = {&c->reference.pose, &c->posture[i].pose};
   supine_expected expected = {0};
-  supine_status status = supine_options_expected_find(c->inside, &c->postures.item[i].state,
+  supine_status status = supine_posed_expected(c->inside, &c->postures.item[i].state,
                                                       &c->reference.state, &expected, error);
   if (status == SUPINE_OK) {
     status = supine_command_targets_find(c->inside, &c->names, pose, expected.sigma, false,
                                          &c->posture[i].targets, error);
   }
-  supine_options_expected_free(&expected);
+  supine_posed_expected_free(&expected);
   return status;
 }
 
@@ -97,10 +97,10 @@ static supine_status find_errors(supine_comparison *c, supine_error *error) {
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < c->postures.count && status == SUPINE_OK; ++i) {
     supine_expected expected = {0};
-    status = supine_options_expected_find(c->basis, &c->postures.item[i].state, &c->reference.state,
+    status = supine_posed_expected(c->basis, &c->postures.item[i].state, &c->reference.state,
                                           &expected, error);
     c->posture[i].expected_error = expected.rms;
-    supine_options_expected_free(&expected);
+    supine_posed_expected_free(&expected);
     if (status == SUPINE_OK && c->inside != NULL) {
       status = find_targets(c, i, error);
     }

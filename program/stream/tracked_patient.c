@@ -218,7 +218,7 @@ static void find_gains(supine_stream_patient *patient, double now,
   const supine_state rest = supine_breath_state(basis, snapshot->gravity, 0.0);
   supine_error error;
   if (supine_basis_gains(basis, &rest, &snapshot->pose, NULL) == SUPINE_OK) {
-    snapshot->above = -supine_options_basis_volume(basis, &snapshot->pose);
+    snapshot->above = -supine_posed_volume(basis, &snapshot->pose);
   }
   if (supine_basis_gains(basis, &state, &snapshot->pose, &error) == SUPINE_OK) {
     memcpy(patient->gains, snapshot->pose.gains, sizeof patient->gains);
@@ -230,7 +230,7 @@ static void find_gains(supine_stream_patient *patient, double now,
                                error.message);
   }
   memcpy(snapshot->pose.gains, patient->gains, sizeof patient->gains);
-  snapshot->volume = supine_options_basis_volume(basis, &snapshot->pose);
+  snapshot->volume = supine_posed_volume(basis, &snapshot->pose);
   snapshot->above += snapshot->volume;
 }
 

@@ -1,26 +1,26 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Compute how far a prediction, a translation and an affine map of the lungs are from a scan. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include <gsl/gsl_sort.h>
 #include <gsl/gsl_statistics.h>
 
-#include "program/validation.h"
+#include "base/arena.h"
+#include "precompute/validation/validation.h"
 
 #include "base/vec3.h"
 #include "precompute/lungs/surface.h"
 
-const char *const supine_command_map_names[SUPINE_PATIENT_MAP_COUNT] = {"predicted", "none",
-                                                                        "translation", "affine"};
+const char *const supine_validation_map_names[SUPINE_PATIENT_MAP_COUNT] = {"predicted", "none",
+                                                                           "translation", "affine"};
 
 enum { ROUNDS = 20, FITTED_MAX = 2000 };
 
 /* A motion whose RMS is below this, mm, counts as none: scans and landmarks are less precise. */
 static const double still = 0.05;
 
-static void summarise(double *distances, size_t count, supine_command_distance *of) {
+static void summarise(double *distances, size_t count, supine_validation_distance *of) {
   gsl_sort(distances, 1, count);
   of->mean = gsl_stats_mean(distances, 1, count);
   of->rms = sqrt(gsl_stats_tss_m(distances, 1, count, 0.0) / (double)count);
@@ -29,7 +29,7 @@ static void summarise(double *distances, size_t count, supine_command_distance *
 }
 
 static void explain(supine_patient_scan_motion moved,
-                    supine_command_distance distance[SUPINE_PATIENT_MAP_COUNT]) {
+                    supine_validation_distance distance[SUPINE_PATIENT_MAP_COUNT]) {
   const double none = distance[moved == SUPINE_PATIENT_STILL ? SUPINE_PATIENT_MAP_NONE
                                                              : SUPINE_PATIENT_MAP_TRANSLATION]
                           .rms;
@@ -52,13 +52,14 @@ static supine_status undetermined(supine_error *error) {
 }
 
 supine_status
-supine_command_compare_points(const supine_patient_pairs *pairs, const double *predicted,
-                              const double *squares, supine_patient_scan_motion moved,
-                              supine_command_distance distance[SUPINE_PATIENT_MAP_COUNT],
-                              supine_error *error) {
-  double *space = malloc(pairs->count * sizeof *space);
+supine_validation_points(const supine_patient_pairs *pairs, const double *predicted,
+                         const double *squares, supine_patient_scan_motion moved,
+                         supine_validation_distance distance[SUPINE_PATIENT_MAP_COUNT],
+                         supine_error *error) {
+  SUPINE_ARENA arena = {0};
+  double *space = supine_arena_take(&arena, pairs->count, sizeof *space);
   if (space == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu points", pairs->count);
+    return supine_error_memory(error, "%zu points", pairs->count);
   }
   for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT; ++k) {
     supine_patient_affinity by;
@@ -66,7 +67,6 @@ supine_command_compare_points(const supine_patient_pairs *pairs, const double *p
     const bool own = k == SUPINE_PATIENT_MAP_PREDICTED;
     const double *from = own ? predicted : pairs->from;
     if (!supine_patient_map_fit(map_of(k, moved), pairs->count, from, pairs->to, &by)) {
-      free(space);
       return undetermined(error);
     }
     for (size_t i = 0; i < pairs->count; ++i) {
@@ -81,7 +81,6 @@ supine_command_compare_points(const supine_patient_pairs *pairs, const double *p
     summarise(space, pairs->count, &distance[k]);
   }
   explain(moved, distance);
-  free(space);
   return SUPINE_OK;
 }
 
@@ -89,22 +88,20 @@ supine_command_compare_points(const supine_patient_pairs *pairs, const double *p
 static supine_status surface_distance(const supine_mesh *start, const double *moved,
                                       const supine_mesh *state,
                                       const supine_inside_surface *state_tree, double *nearest,
-                                      supine_command_distance *of, supine_error *error) {
+                                      supine_validation_distance *of, supine_error *error) {
   const size_t n = start->vertex_count;
-  supine_inside_surface *tree = NULL;
-  double *space = malloc((n + state->vertex_count) * sizeof *space);
-  supine_status status =
-      space == NULL ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for distances")
-                    : supine_inside_surface_create(moved, start->triangle_count, start->triangles,
-                                                   false, &tree, error);
-  if (status == SUPINE_OK) {
-    supine_inside_surface_distances(state_tree, n, moved, space, nearest);
-    supine_inside_surface_distances(tree, state->vertex_count, state->vertices, space + n, NULL);
-    summarise(space, n + state->vertex_count, of);
+  SUPINE_FREED_BY(supine_inside_surface_drop) supine_inside_surface *tree = NULL;
+  SUPINE_ARENA arena = {0};
+  double *space = supine_arena_take(&arena, n + state->vertex_count, sizeof *space);
+  if (space == NULL) {
+    return supine_error_memory(error, "%zu distances", n + state->vertex_count);
   }
-  supine_inside_surface_destroy(tree);
-  free(space);
-  return status;
+  SUPINE_TRY(supine_inside_surface_create(moved, start->triangle_count, start->triangles, false,
+                                          &tree, error));
+  supine_inside_surface_distances(state_tree, n, moved, space, nearest);
+  supine_inside_surface_distances(tree, state->vertex_count, state->vertices, space + n, NULL);
+  summarise(space, n + state->vertex_count, of);
+  return SUPINE_OK;
 }
 
 /* Fit a map from vertices onto a surface by iterated nearest points; apply it to all n vertices.
@@ -137,38 +134,31 @@ static bool fit_map(supine_patient_map kind, size_t n, const double *vertices,
 }
 
 supine_status
-supine_command_compare_surfaces(const supine_mesh *start, supine_patient_scan_motion moved,
-                                double *predicted, const supine_mesh *state, double *nearest,
-                                supine_command_distance distance[SUPINE_PATIENT_MAP_COUNT],
-                                supine_error *error) {
-  supine_inside_surface *tree = NULL;
-  double *space = malloc(10 * (size_t)FITTED_MAX * sizeof *space);
+supine_validation_surfaces(const supine_mesh *start, supine_patient_scan_motion moved,
+                           double *predicted, const supine_mesh *state, double *nearest,
+                           supine_validation_distance distance[SUPINE_PATIENT_MAP_COUNT],
+                           supine_error *error) {
+  SUPINE_FREED_BY(supine_inside_surface_drop) supine_inside_surface *tree = NULL;
+  SUPINE_ARENA arena = {0};
   const size_t n = start->vertex_count;
-  double *at = malloc(3 * n * sizeof *at);
-  supine_status status = supine_patient_check_boxes(start, state, error);
-  if (status == SUPINE_OK && (space == NULL || at == NULL)) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
-                              start->vertex_count);
+  double *space = supine_arena_take(&arena, FITTED_MAX, 10 * sizeof *space);
+  double *at = supine_arena_take(&arena, n, 3 * sizeof *at);
+  if (arena.failed) {
+    return supine_error_memory(error, "%zu vertices", n);
   }
-  if (status == SUPINE_OK) {
-    status = supine_inside_surface_create(state->vertices, state->triangle_count, state->triangles,
-                                          false, &tree, error);
-  }
-  for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT && status == SUPINE_OK; ++k) {
+  SUPINE_TRY(supine_patient_check_boxes(start, state, error));
+  SUPINE_TRY(supine_inside_surface_create(state->vertices, state->triangle_count, state->triangles,
+                                          false, &tree, error));
+  for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT; ++k) {
     const bool own = k == SUPINE_PATIENT_MAP_PREDICTED;
-    status =
+    SUPINE_TRY(
         fit_map(map_of(k, moved), n, own ? predicted : start->vertices, tree, space, at)
             ? surface_distance(start, at, state, tree, own ? nearest : NULL, &distance[k], error)
-            : undetermined(error);
-    if (own && status == SUPINE_OK) {
+            : undetermined(error));
+    if (own) {
       memcpy(predicted, at, 3 * n * sizeof *at);
     }
   }
-  if (status == SUPINE_OK) {
-    explain(moved, distance);
-  }
-  supine_inside_surface_destroy(tree);
-  free(space);
-  free(at);
-  return status;
+  explain(moved, distance);
+  return SUPINE_OK;
 }
