@@ -18,16 +18,14 @@ extern const supine_option supine_options_as_scanned[];
 
 /* Open a basis without its stored normals, and check that its surface is closed. The caller must
  * close the basis even after a failure.
- * @retval SUPINE_ERROR_OPEN_SURFACE  the surface encloses no volume
- * @retval any status of supine_basis_open_with */
+ * @retval SUPINE_ERROR_OPEN_SURFACE  the surface encloses no volume */
 supine_status supine_options_basis_open(const char *path, supine_storage storage,
                                         supine_basis **basis, supine_error *error);
 
 /* Close *basis; for SUPINE_FREED_BY. */
 void supine_options_basis_close(supine_basis **basis);
 
-/* Check that the surface of a basis encloses a volume. `path` names the file in the message.
- * @retval SUPINE_ERROR_OPEN_SURFACE */
+/* Check that the surface of a basis encloses a volume. `path` names the file in the message. */
 supine_status supine_options_basis_closed(const supine_basis *basis, const char *path,
                                           supine_error *error);
 
@@ -45,8 +43,7 @@ extern const supine_option supine_options_hilum_frame[];
 
 /* Compute the displacement of the hilum (precompute/inside/shells.h) from one pose to another, mm;
  * 0 if the file does not determine it.
- * @retval SUPINE_ERROR_UNSUPPORTED  `needed` is true and the file does not determine it
- * @retval SUPINE_ERROR_MEMORY */
+ * @retval SUPINE_ERROR_UNSUPPORTED  `needed` is true and the file does not determine it */
 supine_status supine_options_hilum(const supine_basis *basis, const supine_pose *pose,
                                    const supine_pose *from, bool needed, double shift[3],
                                    supine_error *error);

@@ -52,8 +52,7 @@ typedef struct supine_target {
 /* Compute where the structures are in pose[1], and how they have moved from pose[0].
  * @param sigma    [N] expected error of each vertex, mm; NULL if unknown
  * @param each     true for a target for each vertex, false for one for each structure
- * @param targets  output: array of targets in the order of `names`, which the caller frees
- * @retval SUPINE_ERROR_MEMORY */
+ * @param targets  output: array of targets in the order of `names`, which the caller frees */
 supine_status supine_command_targets_find(const supine_basis *inside,
                                           const supine_command_names *names,
                                           const supine_pose *const pose[2], const float *sigma,
@@ -87,8 +86,7 @@ typedef struct supine_command_marks {
 
 /* Make the marks that show the structures in pose[1], with arrows from where they were in pose[0].
  * Those that `marks` held before are freed.
- * @param sigma  [N] expected error of each vertex, mm; NULL if unknown
- * @retval SUPINE_ERROR_MEMORY */
+ * @param sigma  [N] expected error of each vertex, mm; NULL if unknown */
 supine_status supine_command_marks_make(const supine_basis *inside,
                                         const supine_command_names *names,
                                         const supine_pose *const pose[2], const float *sigma,

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/vec3.h"
 #include "program/report/comparison.h"
 
@@ -81,31 +82,26 @@ static supine_status find_posture(const supine_comparison *c, const supine_postu
 /* Compute the targets in each posture, with their expected errors. */
 static supine_status find_targets(supine_comparison *c, size_t i, supine_error *error) {
   const supine_pose *const pose[2] = {&c->reference.pose, &c->posture[i].pose};
-  supine_expected expected = {0};
-  supine_status status = supine_posed_expected(c->inside, &c->postures.item[i].state,
-                                                      &c->reference.state, &expected, error);
-  if (status == SUPINE_OK) {
-    status = supine_command_targets_find(c->inside, &c->names, pose, expected.sigma, false,
-                                         &c->posture[i].targets, error);
-  }
-  supine_posed_expected_free(&expected);
-  return status;
+  SUPINE_FREED_BY(supine_posed_expected_free) supine_expected expected = {0};
+  SUPINE_TRY(supine_posed_expected(c->inside, &c->postures.item[i].state, &c->reference.state,
+                                   &expected, error));
+  return supine_command_targets_find(c->inside, &c->names, pose, expected.sigma, false,
+                                     &c->posture[i].targets, error);
 }
 
 /* Compute the expected error of each posture's displacement, mm RMS; 0 if it is unknown. */
 static supine_status find_errors(supine_comparison *c, supine_error *error) {
-  supine_status status = SUPINE_OK;
-  for (size_t i = 0; i < c->postures.count && status == SUPINE_OK; ++i) {
+  for (size_t i = 0; i < c->postures.count; ++i) {
     supine_expected expected = {0};
-    status = supine_posed_expected(c->basis, &c->postures.item[i].state, &c->reference.state,
-                                          &expected, error);
+    SUPINE_TRY(supine_posed_expected(c->basis, &c->postures.item[i].state, &c->reference.state,
+                                     &expected, error));
     c->posture[i].expected_error = expected.rms;
     supine_posed_expected_free(&expected);
-    if (status == SUPINE_OK && c->inside != NULL) {
-      status = find_targets(c, i, error);
+    if (c->inside != NULL) {
+      SUPINE_TRY(find_targets(c, i, error));
     }
   }
-  return status;
+  return SUPINE_OK;
 }
 
 supine_status supine_report_find(supine_comparison *c, supine_error *error) {

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Write a glTF 2.0 binary file: a header, a JSON chunk and a binary chunk. */
 #include "program/view/export/glb.h"
+#include "base/arena.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -91,11 +92,8 @@ static supine_status write_file(const char *path, const char *text, const char *
                             "vertices",
                             path, *total);
   }
-  supine_output output = {0};
-  supine_status status = supine_output_open(path, &output, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
+  SUPINE_TRY(supine_output_open(path, &output, error));
   const uint32_t head[] = {magic, VERSION, (uint32_t)*total, (uint32_t)(length + padding),
                            json_chunk};
   const uint32_t tail[] = {(uint32_t)bytes, binary_chunk};
@@ -104,9 +102,7 @@ static supine_status write_file(const char *path, const char *text, const char *
   (void)fwrite("   ", 1, padding, output.file);
   (void)fwrite(tail, sizeof tail, 1, output.file);
   (void)fwrite(numbers, 1, bytes, output.file);
-  status = supine_output_commit(&output, error);
-  supine_output_abandon(&output);
-  return status;
+  return supine_output_commit(&output, error);
 }
 
 /* Build both chunks in memory, then write the file. Set `total` to the size of the file, bytes. */

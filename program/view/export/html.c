@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/output.h"
 
 #include "program/view/export/base64.h"
@@ -335,14 +336,8 @@ supine_status supine_export_html_print(FILE *file, const export_source *source,
 
 supine_status supine_export_html_write(const char *path, const export_source *source,
                                        const export_page *shown, supine_error *error) {
-  supine_output output = {0};
-  supine_status status = supine_output_open(path, &output, error);
-  if (status == SUPINE_OK) {
-    status = supine_export_html_print(output.file, source, shown, error);
-  }
-  if (status == SUPINE_OK) {
-    status = supine_output_commit(&output, error);
-  }
-  supine_output_abandon(&output);
-  return status;
+  SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
+  SUPINE_TRY(supine_output_open(path, &output, error));
+  SUPINE_TRY(supine_export_html_print(output.file, source, shown, error));
+  return supine_output_commit(&output, error);
 }

@@ -6,6 +6,7 @@
 
 #include <cairo.h>
 
+#include "base/arena.h"
 #include "base/library.h"
 #include "base/output.h"
 #include "program/view/render/render.h"
@@ -453,7 +454,6 @@ static supine_status compose(cairo_t *cr, supine_renderer *renderer, const supin
   const layout at = make_layout(picture);
   const bar_scale bar = {picture->largest, supine_render_bar_step(picture->largest)};
   double own[SUPINE_VIEWS_MAX][4];
-  supine_status status = SUPINE_OK;
   if (at.font < 4) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "%zu x %zu pixels are too few for %zu posture%s and %zu view%s: give "
@@ -469,16 +469,16 @@ static supine_status compose(cairo_t *cr, supine_renderer *renderer, const supin
     }
     supine_render_picture_extent(renderer, picture, own);
   }
-  for (size_t row = 0; row < picture->view_count && status == SUPINE_OK; ++row) {
-    for (size_t column = 0; column < picture->panel_count && status == SUPINE_OK; ++column) {
-      status = cell(cr, renderer, picture, &at, &bar, column, row,
-                    picture->extent != NULL ? picture->extent[row] : own[row], error);
+  for (size_t row = 0; row < picture->view_count; ++row) {
+    for (size_t column = 0; column < picture->panel_count; ++column) {
+      SUPINE_TRY(cell(cr, renderer, picture, &at, &bar, column, row,
+                      picture->extent != NULL ? picture->extent[row] : own[row], error));
     }
   }
   if (picture->transparency == 0) { /* a shell has no colours */
     colour_bar(cr, picture, &at, &bar);
   }
-  return status;
+  return SUPINE_OK;
 }
 
 static cairo_status_t to_file(void *file, const unsigned char *bytes, unsigned length) {
