@@ -6,10 +6,8 @@
 #include <stdatomic.h>
 #include <stdbool.h>
 #include <stdio.h>
-#include <stdio_ext.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/random.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -94,27 +92,20 @@ static char *follow_links(const char *path) {
   return at;
 }
 
-static void descriptor_path(int descriptor, char path[32]) {
-  (void)snprintf(path, 32, "/proc/self/fd/%d", descriptor);
-}
-
-/* Choose a unique temporary name beside the target. If `link` is NULL, create a file of that name
- * and return its descriptor. Otherwise, hard-link an open, unnamed file to that name, and return 0;
- * `link` is then the file's path in /proc. Return -1 and set errno on failure. */
-static int take_temporary(supine_output *output, const char *link) {
-  enum { TRIES = 100 };
-  const size_t size = strlen(output->target) + sizeof ".part-0123456789abcdef";
-  int result = -1;
+/* Create a file with a unique temporary name beside the target. Return its descriptor, or -1 and
+ * set errno. */
+static int open_temporary(supine_output *output) {
+  enum { TRIES = 100, ENDING = 64 };
+  static atomic_uint counter;
+  const size_t size = strlen(output->target) + ENDING;
   output->temporary = malloc(size);
   for (int i = 0; output->temporary != NULL && i < TRIES; ++i) {
-    unsigned long long number = 0;
-    (void)!getrandom(&number, sizeof number, 0);
-    (void)snprintf(output->temporary, size, "%s.part-%llx", output->target, number);
-    result = link != NULL ? linkat(AT_FDCWD, link, AT_FDCWD, output->temporary, AT_SYMLINK_FOLLOW)
-                          : open(output->temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    if (result >= 0) {
+    (void)snprintf(output->temporary, size, "%s.part-%ld-%u", output->target, (long)getpid(),
+                   atomic_fetch_add(&counter, 1));
+    const int descriptor = open(output->temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (descriptor >= 0) {
       replace_name(NULL, output->temporary);
-      return result;
+      return descriptor;
     }
     if (errno != EEXIST) {
       break;
@@ -125,27 +116,6 @@ static int take_temporary(supine_output *output, const char *link) {
   return -1;
 }
 
-/* Open a file in the target's folder: without a name if it can be named later, otherwise with a
- * temporary name. Return its descriptor, or -1 and set errno. */
-static int open_regular(supine_output *output) {
-  char *folder = supine_path_beside(output->target, ".");
-  if (folder == NULL) {
-    errno = ENOMEM;
-    return -1;
-  }
-  const int descriptor = open(folder, O_WRONLY | O_TMPFILE | O_CLOEXEC, 0666);
-  free(folder);
-  if (descriptor >= 0) {
-    char link[32];
-    descriptor_path(descriptor, link);
-    if (access(link, F_OK) == 0) {
-      return descriptor;
-    }
-    (void)close(descriptor); /* without /proc, the unnamed file cannot get a name later */
-  }
-  return take_temporary(output, NULL);
-}
-
 static int open_descriptor(supine_output *output) {
   struct stat old;
   if (output->standard) {
@@ -153,7 +123,7 @@ static int open_descriptor(supine_output *output) {
     return fcntl(kept >= 0 ? kept : STDOUT_FILENO, F_DUPFD_CLOEXEC, STDERR_FILENO + 1);
   }
   if (stat(output->target, &old) != 0) {
-    return open_regular(output);
+    return open_temporary(output);
   }
   if (S_ISDIR(old.st_mode)) {
     errno = EISDIR;
@@ -166,7 +136,7 @@ static int open_descriptor(supine_output *output) {
     errno = EACCES;
     return -1;
   }
-  const int descriptor = open_regular(output);
+  const int descriptor = open_temporary(output);
   if (descriptor >= 0) {
     (void)fchmod(descriptor, old.st_mode & 0777);
   }
@@ -197,22 +167,6 @@ supine_status supine_output_open(const char *path, supine_output *output, supine
   return SUPINE_OK;
 }
 
-/* Give the finished file its final name. Return false and set errno on failure. */
-static bool give_name(supine_output *output) {
-  if (output->temporary == NULL) {
-    char link[32];
-    descriptor_path(fileno(output->file), link);
-    if (linkat(AT_FDCWD, link, AT_FDCWD, output->target, AT_SYMLINK_FOLLOW) == 0) {
-      return true;
-    }
-    /* If a file of that name exists, linkat() fails: link to a temporary name, then rename it. */
-    if (errno != EEXIST || take_temporary(output, link) < 0) {
-      return false;
-    }
-  }
-  return rename(output->temporary, output->target) == 0;
-}
-
 /* Wait until the file's entry in its folder is on the disk, if the file system supports that. */
 static void sync_folder(const char *target) {
   char *folder = supine_path_beside(target, ".");
@@ -238,13 +192,11 @@ supine_status supine_output_commit(supine_output *output, supine_error *error) {
     return output_fail(output, error, "cannot write");
   }
   if (regular) {
-    if (!give_name(output)) {
+    if (rename(output->temporary, output->target) != 0) {
       return output_fail(output, error, "cannot replace");
     }
-    if (output->temporary != NULL) {
-      replace_name(output->temporary, NULL);
-      output->temporary[0] = '\0'; /* the file was renamed: do not remove it */
-    }
+    replace_name(output->temporary, NULL);
+    output->temporary[0] = '\0'; /* the file was renamed: do not remove it */
     sync_folder(output->target);
   }
   supine_output_abandon(output);
@@ -257,7 +209,10 @@ void supine_output_abandon(supine_output *output) {
     replace_name(output->temporary, NULL);
   }
   if (output->file != NULL) {
-    __fpurge(output->file); /* keep fclose from writing the rest of the buffer */
+    /* keep fclose from writing the rest of the buffer into a pipe */
+    const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
+    (void)dup2(nowhere, fileno(output->file));
+    (void)close(nowhere);
     (void)fclose(output->file);
   }
   free(output->temporary);

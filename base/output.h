@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /** @file Write output files whole or not at all.
  *
- * A file is written in its folder without a name (O_TMPFILE), so that it vanishes if the program
- * ends early; if the file system does not support that, it is written under a temporary name. The
- * file gets its final name when it is complete and on the disk. */
+ * A file is written under a temporary name in its folder. It gets its final name when it is complete
+ * and on the disk. */
 #ifndef SUPINE_OUTPUT_H
 #define SUPINE_OUTPUT_H
 
@@ -24,15 +23,11 @@ typedef struct supine_output {
 
 /** Open an output file. A new file gets its mode from the umask; a replaced file keeps its mode. If
  * the path is a symbolic link, replace its target. Write directly to a device, pipe or standard
- * output.
- * @retval SUPINE_ERROR_WRITE   the folder is missing or not writable, or the path is a folder or a
- *                              read-only file
- * @retval SUPINE_ERROR_MEMORY  an allocation failed */
+ * output. */
 supine_status supine_output_open(const char *path, supine_output *output, supine_error *error);
 
 /** Flush, wait until the file is on the disk, and give the file its name. On failure, remove the
- * new file and leave an existing file unchanged.
- * @retval SUPINE_ERROR_WRITE  a write failed; the message says why, such as a full disk */
+ * new file and leave an existing file unchanged. */
 supine_status supine_output_commit(supine_output *output, supine_error *error);
 
 /** Discard the file unless it was committed. This is allowed after a failed open, and for a zeroed
@@ -46,7 +41,7 @@ bool supine_output_is_standard(const char *path);
  * error. Return false if standard output is closed. */
 bool supine_output_take_standard(void);
 
-/** Check that a file can be written. Leave no new file. Statuses: as supine_output_open. */
+/** Check that a file can be written. Leave no new file. */
 supine_status supine_output_try(const char *path, supine_error *error);
 
 /** Return the path of `name` in the folder of the file `path`, or `name` if it is absolute; the

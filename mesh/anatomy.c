@@ -94,11 +94,8 @@ static double integrate(const supine_mesh *mesh, const double origin[3], double 
   memset(fourth, 0, 3 * sizeof(double));
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
     double corner[3][3];
-    for (int v = 0; v < 3; ++v) {
-      const double *p = mesh->vertices + 3 * (size_t)mesh->triangles[3 * t + (size_t)v];
-      for (int k = 0; k < 3; ++k) {
-        corner[v][k] = p[k] - origin[k];
-      }
+    for (size_t v = 0; v < 3; ++v) {
+      supine_subtract(mesh->vertices + 3 * (size_t)mesh->triangles[3 * t + v], origin, corner[v]);
     }
     const double part = supine_triple(corner[0], corner[1], corner[2]) / 6.0;
     volume += part;

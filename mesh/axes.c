@@ -58,24 +58,19 @@ bool supine_mesh_axes_parse(const char *letters, supine_axes *axes) {
 }
 
 supine_axes supine_mesh_axes_after(supine_axes first, supine_axes then) {
-  double a[3][3];
-  double b[3][3];
-  supine_mesh_axes_matrix(first, a);
-  supine_mesh_axes_matrix(then, b);
-  for (unsigned code = 1; code <= CODES; ++code) {
-    double c[3][3];
-    bool same = true;
-    supine_mesh_axes_matrix((supine_axes)code, c);
-    for (int i = 0; i < 9; ++i) {
-      const double product =
-          b[i / 3][0] * a[0][i % 3] + b[i / 3][1] * a[1][i % 3] + b[i / 3][2] * a[2][i % 3];
-      same = same && fabs(product - c[i / 3][i % 3]) < 0.5;
-    }
-    if (same) {
-      return (supine_axes)code;
-    }
+  static const char all[] = "LPSRAI"; /* three directions, then their opposites */
+  char from[4];
+  char to[4];
+  char letters[4] = "";
+  supine_axes found = SUPINE_AXES_AUTO;
+  supine_mesh_axes_letters(first, from);
+  supine_mesh_axes_letters(then, to);
+  for (int k = 0; k < 3; ++k) {
+    const long at = strchr(all, from[k]) - all;
+    letters[k] = all[(strchr(all, to[at % 3]) - all + at / 3 * 3) % 6];
   }
-  return SUPINE_AXES_AUTO;
+  (void)supine_mesh_axes_parse(letters, &found);
+  return found;
 }
 
 bool supine_mesh_axes_mirrored(supine_axes axes) {

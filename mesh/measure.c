@@ -8,6 +8,16 @@
 
 #include "mesh/mesh.h"
 
+supine_status supine_mesh_allocate(size_t vertices, size_t triangles, supine_mesh *mesh) {
+  *mesh = (supine_mesh){vertices, malloc((3 * vertices + 1) * sizeof(double)), triangles,
+                        malloc((3 * triangles + 1) * sizeof(uint32_t))};
+  if (mesh->vertices == NULL || mesh->triangles == NULL) {
+    supine_mesh_free(mesh);
+    return SUPINE_ERROR_MEMORY;
+  }
+  return SUPINE_OK;
+}
+
 void supine_mesh_free(supine_mesh *mesh) {
   free(mesh->vertices);
   free(mesh->triangles);
@@ -18,14 +28,13 @@ double supine_mesh_volume(const supine_mesh *mesh) {
   double minimum[3];
   double maximum[3];
   supine_mesh_box(mesh, minimum, maximum);
+  const double centre[3] = {0.5 * (minimum[0] + maximum[0]), 0.5 * (minimum[1] + maximum[1]),
+                            0.5 * (minimum[2] + maximum[2])};
   double sum = 0.0;
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
     double p[3][3]; /* corners relative to the centre of the bounding box, to avoid cancellation */
-    for (int k = 0; k < 3; ++k) {
-      const double *vertex = mesh->vertices + 3 * (size_t)mesh->triangles[3 * t + (size_t)k];
-      for (int axis = 0; axis < 3; ++axis) {
-        p[k][axis] = vertex[axis] - 0.5 * (minimum[axis] + maximum[axis]);
-      }
+    for (size_t k = 0; k < 3; ++k) {
+      supine_subtract(mesh->vertices + 3 * (size_t)mesh->triangles[3 * t + k], centre, p[k]);
     }
     sum += supine_triple(p[0], p[1], p[2]);
   }

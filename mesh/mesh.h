@@ -68,11 +68,6 @@ typedef struct supine_mesh_report {
  * @param options  NULL for the defaults
  * @param mesh     zero-initialised; written only on success
  * @param report   optional
- * @retval SUPINE_ERROR_READ    the file is missing, a folder or unreadable
- * @retval SUPINE_ERROR_FORMAT  the file is empty, truncated or malformed, or has no importer
- * @retval SUPINE_ERROR_MESH    the file has no triangles, or a coordinate that is not finite
- * @retval SUPINE_ERROR_ARGUMENT  millimetres_per_unit is negative or not finite
- * @retval SUPINE_ERROR_MEMORY
  * Thread-safe. */
 supine_status supine_mesh_load(const char *path, const supine_mesh_load_options *options,
                                supine_mesh *mesh, supine_mesh_report *report, supine_error *error);
@@ -86,6 +81,9 @@ bool supine_mesh_unit_find(const char *name, double *millimetres);
 /** Name a unit of length: "mm", "cm", "m", "um", "in" or, for others, a text such as "2.5 mm".
  * @param text  [24] output */
 void supine_mesh_unit_name(double millimetres, char *text);
+
+/** Allocate the arrays of a mesh. */
+supine_status supine_mesh_allocate(size_t vertices, size_t triangles, supine_mesh *mesh);
 
 /** Free the arrays and zero the struct, which may be zero already. */
 void supine_mesh_free(supine_mesh *mesh);
@@ -108,8 +106,7 @@ typedef struct supine_topology {
 /** Find edges and components in linear time, except for sorting the edges of each vertex.
  * @param topology  zero-initialised; written only on success
  * @retval SUPINE_ERROR_ARGUMENT  a triangle names a vertex twice or out of range, or there are more
- *             than 2^31 - 1 vertices
- * @retval SUPINE_ERROR_MEMORY */
+ *             than 2^31 - 1 vertices */
 supine_status supine_mesh_topology_create(const supine_mesh *mesh, supine_topology *topology);
 void supine_mesh_topology_free(supine_topology *topology);
 
@@ -164,10 +161,7 @@ typedef struct supine_mesh_save_options {
 
 /** Write the surface in the format of the name's ending: .ply (binary), .obj, .stl (binary), .vtp.
  * The file appears completely or not at all.
- * @param options  NULL for LPS without displacements and comment
- * @retval SUPINE_ERROR_ARGUMENT  the ending is unknown, or the mesh is too large to write
- * @retval SUPINE_ERROR_MESH      a coordinate is not finite
- * @retval SUPINE_ERROR_WRITE     the folder is missing or not writable, or the disk is full */
+ * @param options  NULL for LPS without displacements and comment */
 supine_status supine_mesh_save(const char *path, const supine_mesh *mesh,
                                const supine_mesh_save_options *options, supine_error *error);
 
@@ -178,19 +172,14 @@ typedef struct supine_mesh_series supine_mesh_series;
 
 /** Begin a series. All arguments must outlive it; before each frame the caller updates the arrays
  * `mesh->vertices` and `options->normals`.
- * @param times  [frames] in s
- * @retval SUPINE_ERROR_ARGUMENT  the mesh is too large to write
- * @retval SUPINE_ERROR_MESH      a coordinate is not finite
- * @retval SUPINE_ERROR_WRITE     the file cannot be written, or is a pipe or device
- * @retval SUPINE_ERROR_MEMORY */
+ * @param times  [frames] in s */
 supine_status supine_mesh_series_open(const char *path, const supine_mesh *mesh,
                                       const supine_mesh_save_options *options, size_t frames,
                                       const double *times, supine_mesh_series **series,
                                       supine_error *error);
-/** Add the next frame. Return SUPINE_ERROR_MESH if a coordinate is not finite, or
- * SUPINE_ERROR_MEMORY. */
+/** Add the next frame. */
 supine_status supine_mesh_series_add(supine_mesh_series *series, supine_error *error);
-/** Complete the file, which then appears at its path. Return SUPINE_ERROR_WRITE on failure. */
+/** Complete the file, which then appears at its path. */
 supine_status supine_mesh_series_commit(supine_mesh_series *series, supine_error *error);
 /** Free a series. If it was not committed, no file appears. NULL is allowed. */
 void supine_mesh_series_close(supine_mesh_series *series);

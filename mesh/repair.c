@@ -153,14 +153,15 @@ static supine_status separate_touching(supine_mesh *mesh, const triangle_forest 
                                        size_t *separated) {
   const size_t corners = 3 * mesh->triangle_count;
   size_t count = mesh->vertex_count;
-  uint32_t *surface_of = malloc((count + corners + 1) * sizeof *surface_of);
-  uint32_t *next_copy = calloc(count + corners + 1, sizeof *next_copy);
-  supine_status status = surface_of == NULL || next_copy == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
-  if (status == SUPINE_OK) {
-    /* sets all to UINT32_MAX, which means unknown */
-    memset(surface_of, 0xFF, (count + corners) * sizeof *surface_of);
+  SUPINE_ARENA arena = {0};
+  uint32_t *surface_of = supine_arena_take(&arena, count + corners, sizeof *surface_of);
+  uint32_t *next_copy = supine_arena_zeros(&arena, count + corners, sizeof *next_copy);
+  if (arena.failed) {
+    return SUPINE_ERROR_MEMORY;
   }
-  for (size_t i = 0; i < corners && status == SUPINE_OK; ++i) {
+  /* sets all to UINT32_MAX, which means unknown */
+  memset(surface_of, 0xFF, (count + corners) * sizeof *surface_of);
+  for (size_t i = 0; i < corners; ++i) {
     uint8_t turned;
     const uint32_t root = find_root(l, (uint32_t)(i / 3), &turned);
     uint32_t v = mesh->triangles[i];
@@ -172,20 +173,21 @@ static supine_status separate_touching(supine_mesh *mesh, const triangle_forest 
     mesh->triangles[i] = v;
   }
   *separated = count - mesh->vertex_count;
-  if (status == SUPINE_OK && *separated > 0) {
-    double *grown = realloc(mesh->vertices, 3 * count * sizeof *grown);
-    status = grown == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
-    mesh->vertices = grown != NULL ? grown : mesh->vertices;
-    for (size_t v = 0; v < mesh->vertex_count && status == SUPINE_OK; ++v) {
-      for (size_t c = next_copy[v]; c != 0; c = next_copy[c]) {
-        memcpy(grown + 3 * c, grown + 3 * v, 3 * sizeof *grown);
-      }
-    }
-    mesh->vertex_count = count;
+  if (*separated == 0) {
+    return SUPINE_OK;
   }
-  free(surface_of);
-  free(next_copy);
-  return status;
+  double *grown = realloc(mesh->vertices, 3 * count * sizeof *grown);
+  if (grown == NULL) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  for (size_t v = 0; v < mesh->vertex_count; ++v) {
+    for (size_t c = next_copy[v]; c != 0; c = next_copy[c]) {
+      memcpy(grown + 3 * c, grown + 3 * v, 3 * sizeof *grown);
+    }
+  }
+  mesh->vertices = grown;
+  mesh->vertex_count = count;
+  return SUPINE_OK;
 }
 
 /* In each surface, reverse the triangles that face the other way than the majority. If every edge
@@ -193,48 +195,38 @@ static supine_status separate_touching(supine_mesh *mesh, const triangle_forest 
 static supine_status mend_links(supine_mesh *mesh, const supine_mesh_side *sides,
                                 supine_mesh_repair_report *report) {
   const size_t n = mesh->triangle_count;
-  triangle_forest l = {malloc((n + 1) * sizeof(uint32_t)), malloc(n + 1)};
-  uint32_t(*count)[2] = calloc(n + 1, sizeof *count);
-  supine_status status = SUPINE_ERROR_MEMORY;
-  if (l.parent != NULL && l.turned != NULL && count != NULL) {
-    bool closed;
-    status = SUPINE_OK;
-    if (link_triangles(mesh, sides, &l, &closed)) {
-      report->reversed = turn_minority(mesh, &l, count);
-    }
-    if (closed) {
-      status = separate_touching(mesh, &l, &report->separated);
-    }
+  SUPINE_ARENA arena = {0};
+  const triangle_forest l = {supine_arena_take(&arena, n, sizeof(uint32_t)),
+                             supine_arena_take(&arena, n, 1)};
+  uint32_t(*count)[2] = supine_arena_zeros(&arena, n, sizeof *count);
+  bool closed;
+  if (arena.failed) {
+    return SUPINE_ERROR_MEMORY;
   }
-  free(l.parent);
-  free(l.turned);
-  free(count);
-  return status;
+  if (link_triangles(mesh, sides, &l, &closed)) {
+    report->reversed = turn_minority(mesh, &l, count);
+  }
+  return closed ? separate_touching(mesh, &l, &report->separated) : SUPINE_OK;
 }
 
 supine_status supine_mesh_repair(supine_mesh *mesh, supine_mesh_repair_report *report) {
   typedef void marker(const supine_mesh *mesh, const supine_mesh_side *sides, uint8_t *drop);
   static marker *const markers[] = {mark_duplicates, mark_loose};
   size_t *const counts[] = {&report->duplicates, &report->loose};
-  uint8_t *drop = calloc(mesh->triangle_count + 1, 1);
-  supine_mesh_side *sides = supine_mesh_sides_sort(mesh);
+  SUPINE_ARENA arena = {0};
+  SUPINE_ARENA of_sides = {0};
+  uint8_t *drop = supine_arena_zeros(&arena, mesh->triangle_count, 1);
+  const supine_mesh_side *sides = supine_mesh_sides_sort(mesh, &of_sides);
   *report = (supine_mesh_repair_report){0};
-  supine_status status = drop == NULL || sides == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
-  for (size_t m = 0; m < 2 && status == SUPINE_OK; ++m) {
+  for (size_t m = 0; m < 2 && drop != NULL && sides != NULL; ++m) {
     markers[m](mesh, sides, drop);
     *counts[m] = drop_marked(mesh, drop);
     if (*counts[m] > 0) {
-      free(sides);
-      sides = supine_mesh_sides_sort(mesh);
-      status = sides == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
+      supine_arena_free(&of_sides);
+      sides = supine_mesh_sides_sort(mesh, &of_sides);
     }
   }
-  if (status == SUPINE_OK) {
-    status = mend_links(mesh, sides, report);
-  }
-  free(sides);
-  free(drop);
-  return status;
+  return drop != NULL && sides != NULL ? mend_links(mesh, sides, report) : SUPINE_ERROR_MEMORY;
 }
 
 size_t supine_mesh_drop_unreferenced(supine_mesh *mesh, uint32_t *space) {
@@ -271,9 +263,8 @@ static void find_volumes(const supine_mesh *mesh, const supine_topology *topolog
     piece *of = &pieces[topology->component[mesh->triangles[3 * t]]];
     const double *origin = mesh->vertices + 3 * (size_t)of->first_vertex;
     double corner[3][3];
-    for (size_t k = 0; k < 9; ++k) {
-      corner[k / 3][k % 3] =
-          mesh->vertices[3 * (size_t)mesh->triangles[3 * t + k / 3] + k % 3] - origin[k % 3];
+    for (size_t k = 0; k < 3; ++k) {
+      supine_subtract(mesh->vertices + 3 * (size_t)mesh->triangles[3 * t + k], origin, corner[k]);
     }
     of->volume += supine_triple(corner[0], corner[1], corner[2]) / 6.0;
   }
@@ -281,37 +272,32 @@ static void find_volumes(const supine_mesh *mesh, const supine_topology *topolog
 
 supine_status supine_mesh_drop_specks(supine_mesh *mesh, double share, size_t *pieces,
                                       size_t *specks) {
-  supine_topology topology = {0};
-  supine_status status = supine_mesh_topology_create(mesh, &topology);
+  SUPINE_ARENA arena = {0};
+  SUPINE_FREED_BY(supine_mesh_topology_free) supine_topology topology = {0};
+  SUPINE_TRY(supine_mesh_topology_create(mesh, &topology));
   const size_t count = topology.component_count;
-  piece *found = calloc(count + 1, sizeof *found);
-  uint8_t *drop = malloc(mesh->triangle_count + 1);
+  piece *found = supine_arena_zeros(&arena, count, sizeof *found);
+  uint8_t *drop = supine_arena_take(&arena, mesh->triangle_count, 1);
   double whole = 0.0;
-  *pieces = count;
-  *specks = 0;
-  if (status == SUPINE_OK && (found == NULL || drop == NULL)) {
-    status = SUPINE_ERROR_MEMORY;
+  if (arena.failed) {
+    return SUPINE_ERROR_MEMORY;
   }
-  if (status == SUPINE_OK && count > 1) {
-    find_volumes(mesh, &topology, found);
-    for (size_t p = 0; p < count; ++p) {
-      whole += fabs(found[p].volume);
-    }
+  find_volumes(mesh, &topology, found);
+  for (size_t p = 0; p < count; ++p) {
+    whole += fabs(found[p].volume);
+  }
+  *specks = 0;
+  for (size_t p = 0; p < count; ++p) {
+    *specks += fabs(found[p].volume) < share * whole;
+  }
+  *pieces = count - *specks;
+  if (*specks > 0) {
     for (size_t t = 0; t < mesh->triangle_count; ++t) {
       const piece *of = &found[topology.component[mesh->triangles[3 * t]]];
       drop[t] = fabs(of->volume) < share * whole;
     }
-    for (size_t p = 0; p < count; ++p) {
-      *specks += fabs(found[p].volume) < share * whole;
-    }
-  }
-  if (*specks > 0) {
-    *pieces -= *specks;
     (void)drop_marked(mesh, drop);
     (void)supine_mesh_drop_unreferenced(mesh, topology.component);
   }
-  free(found);
-  free(drop);
-  supine_mesh_topology_free(&topology);
-  return status;
+  return SUPINE_OK;
 }

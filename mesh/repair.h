@@ -3,6 +3,8 @@
 #ifndef SUPINE_MESH_REPAIR_H
 #define SUPINE_MESH_REPAIR_H
 
+#include "base/arena.h"
+
 #include "mesh/mesh.h"
 
 typedef struct supine_mesh_repair_report {
@@ -12,8 +14,7 @@ typedef struct supine_mesh_repair_report {
   size_t separated;  /**< number of vertices added where closed surfaces shared a vertex */
 } supine_mesh_repair_report;
 
-/** Repair a surface in place. A surface without defects is not changed.
- * @retval SUPINE_ERROR_MEMORY */
+/** Repair a surface in place. A surface without defects is not changed. */
 supine_status supine_mesh_repair(supine_mesh *mesh, supine_mesh_repair_report *report);
 
 /** Drop vertices that are in no triangle, and keep the order of the others. Return the number of
@@ -23,8 +24,7 @@ size_t supine_mesh_drop_unreferenced(supine_mesh *mesh, uint32_t *space);
 
 /** Drop connected components with less than the fraction `share` of the total volume.
  * @param pieces  output: number of components kept
- * @param specks  output: number of components dropped
- * @retval SUPINE_ERROR_MEMORY */
+ * @param specks  output: number of components dropped */
 supine_status supine_mesh_drop_specks(supine_mesh *mesh, double share, size_t *pieces,
                                       size_t *specks);
 
@@ -34,9 +34,9 @@ typedef struct supine_mesh_side {
   uint32_t at; /**< position in mesh.triangles of the corner where the side starts */
 } supine_mesh_side;
 
-/** Return the sides of all triangles, sorted by `low`, then `high`, then `at`. Return NULL if out
- * of memory. The caller frees the array. */
-supine_mesh_side *supine_mesh_sides_sort(const supine_mesh *mesh);
+/** Return the sides of all triangles, sorted by `low`, then `high`, then `at`; NULL if out of
+ * memory. */
+supine_mesh_side *supine_mesh_sides_sort(const supine_mesh *mesh, supine_arena *arena);
 
 /** Return the number of triangles that share an edge: count how many of the sorted sides, from
  * sides[i] on, have the same two vertices as sides[i]. */

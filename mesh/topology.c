@@ -31,13 +31,12 @@ static void sort_sides(supine_mesh_side *sides, size_t count) {
   }
 }
 
-supine_mesh_side *supine_mesh_sides_sort(const supine_mesh *mesh) {
+supine_mesh_side *supine_mesh_sides_sort(const supine_mesh *mesh, supine_arena *arena) {
   const size_t count = 3 * mesh->triangle_count;
-  uint32_t *next = calloc(mesh->vertex_count + 2, sizeof *next);
-  supine_mesh_side *sides = malloc((count + 1) * sizeof *sides);
+  SUPINE_ARENA temporary = {0};
+  uint32_t *next = supine_arena_zeros(&temporary, mesh->vertex_count + 2, sizeof *next);
+  supine_mesh_side *sides = supine_arena_take(arena, count, sizeof *sides);
   if (next == NULL || sides == NULL) {
-    free(next);
-    free(sides);
     return NULL;
   }
   /* bucket sort by the smaller vertex index of each side: pass 0 counts, pass 1 stores */
@@ -59,7 +58,6 @@ supine_mesh_side *supine_mesh_sides_sort(const supine_mesh *mesh) {
   for (size_t v = 0, begin = 0; v < mesh->vertex_count; begin = next[v++]) {
     sort_sides(sides + begin, next[v] - begin);
   }
-  free(next);
   return sides;
 }
 
@@ -134,17 +132,17 @@ supine_status supine_mesh_topology_create(const supine_mesh *mesh, supine_topolo
   if (vertices > INT32_MAX || mesh->triangle_count > UINT32_MAX / 3 || !triangles_legal(mesh)) {
     return SUPINE_ERROR_ARGUMENT;
   }
-  supine_status status = SUPINE_ERROR_MEMORY;
-  supine_topology result = {0};
-  supine_mesh_side *sides = supine_mesh_sides_sort(mesh);
+  SUPINE_ARENA arena = {0};
+  SUPINE_FREED_BY(supine_mesh_topology_free) supine_topology result = {0};
+  const supine_mesh_side *sides = supine_mesh_sides_sort(mesh, &arena);
   if (sides == NULL) {
-    goto cleanup;
+    return SUPINE_ERROR_MEMORY;
   }
   edges_count(mesh, sides, &result);
   result.edges = malloc((2 * result.edge_count + 1) * sizeof *result.edges);
   result.component = malloc((vertices + 1) * sizeof *result.component);
   if (result.edges == NULL || result.component == NULL) {
-    goto cleanup;
+    return SUPINE_ERROR_MEMORY;
   }
   edges_fill(sides, 3 * mesh->triangle_count, result.edges);
   components_find(vertices, &result);
@@ -157,12 +155,7 @@ supine_status supine_mesh_topology_create(const supine_mesh *mesh, supine_topolo
   result.genus = result.closed && holes >= 0 && holes % 2 == 0 ? holes / 2 : -1;
   *topology = result;
   result = (supine_topology){0};
-  status = SUPINE_OK;
-
-cleanup:
-  supine_mesh_topology_free(&result);
-  free(sides);
-  return status;
+  return SUPINE_OK;
 }
 
 void supine_mesh_topology_free(supine_topology *topology) {

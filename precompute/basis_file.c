@@ -3,13 +3,13 @@
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include <supine/locate.h>
 #include <supine/safetensors.h>
 #include <supine/sh.h>
 
+#include "base/arena.h"
 #include "base/text.h"
 #include "precompute/basis_file.h"
 #include "precompute/lungs/disease.h"
@@ -17,25 +17,28 @@
 
 enum { ENTRIES_MAX = 64 };
 
-/* Metadata entries of a basis file. Release their values with free. */
+/* Metadata entries of a basis file. */
 typedef struct entries {
   size_t count;
   supine_metadata metadata[ENTRIES_MAX];
-  bool failed; /* whether memory ran out, or more than ENTRIES_MAX entries were added */
+  supine_arena *memory; /* of their values; failed if more than ENTRIES_MAX entries are added */
 } entries;
 
 SUPINE_PRINTF(3, 4)
 static void add(entries *list, const char *key, const char *format, ...) {
-  char *text = NULL;
   va_list arguments;
   va_start(arguments, format);
-  const int length = list->count < ENTRIES_MAX ? vasprintf(&text, format, arguments) : -1;
+  const int length = vsnprintf(NULL, 0, format, arguments);
   va_end(arguments);
-  if (length < 0) {
-    list->failed = true;
-  } else {
+  char *text = supine_arena_take(list->memory, (size_t)length + 1, 1);
+  va_start(arguments, format);
+  if (list->count == ENTRIES_MAX) {
+    list->memory->failed = true;
+  } else if (text != NULL) {
+    (void)vsnprintf(text, (size_t)length + 1, format, arguments);
     list->metadata[list->count++] = (supine_metadata){key, supine_text_make_utf8(text)};
   }
+  va_end(arguments);
 }
 
 static void add_accuracy(entries *list, const supine_accuracy *accuracy, bool at_rest) {
@@ -170,19 +173,16 @@ static void add_lungs(entries *list, const supine_lungs *lungs, const double sha
   }
 }
 
-/* Convert doubles to an array of floats, which the caller frees. Return NULL if out of memory. */
-static float *to_float(const double *values, size_t count) {
-  float *out = malloc(count * sizeof *out);
-  for (size_t i = 0; out != NULL && i < count; ++i) {
+static void to_float(const double *values, size_t count, float *out) {
+  for (size_t i = 0; i < count; ++i) {
     out[i] = (float)values[i];
   }
-  return out;
 }
 
 /* Find the modes of the vertex normals from vertices and displacements rounded as in the file. */
 static supine_status find_normals(const supine_basis_content *content, const float *vertices,
-                                  const float *directions, supine_normals_modes *normals,
-                                  supine_error *error) {
+                                  const float *directions, supine_arena *arena,
+                                  supine_normals_modes *normals, supine_error *error) {
   static const double straight[3] = {0.0, 0.0, 0.0};
   const double *bend = content->reference != NULL ? content->options->model.bend : straight;
   const supine_lungs *lungs = content->lungs;
@@ -197,7 +197,7 @@ static supine_status find_normals(const supine_basis_content *content, const flo
                                           .resting = content->resting,
                                           .forms = content->forms,
                                           .bend = {bend[0], bend[1], bend[2]}};
-  return supine_normals_modes_create(&surface, normals, error);
+  return supine_normals_modes_create(&surface, arena, normals, error);
 }
 
 static void add_normals(entries *list, const supine_normals_modes *normals, bool rest_known) {
@@ -209,137 +209,123 @@ static void add_normals(entries *list, const supine_normals_modes *normals, bool
   }
 }
 
-/* This function has more than 60 lines: it lists all metadata and tensors in the file's order. */
-supine_status supine_writer_basis_write(const char *path, const supine_basis_content *content,
-                                        supine_error *error) {
-  const supine_lungs *lungs = content->lungs;
-  const supine_precompute_options *options = content->options;
-  const supine_model *model = !content->is_fields ? &options->model : NULL;
-  const supine_compression *field = content->compression;
-  const size_t n = lungs->mesh.vertex_count;
-  const size_t k = field->mode_count;
-  const size_t g = lungs->lung_count;
-  supine_status status = SUPINE_OK;
-  entries list = {0};
-  supine_normals_modes normals = {0};
-  const bool vector = content->directions == NULL;
-  static const double healthy[2] = {1.0, 1.0};
-  const double *share = model != NULL ? model->share : healthy;
-  float *vertices = NULL;
-  float *directions = NULL;
-  double *collapsed = malloc(3 * n * sizeof *collapsed);
-  unsigned char *lung = malloc(n);
-  if (collapsed != NULL) {
-    supine_tissue_collapse(lungs, share, collapsed);
-    vertices = to_float(collapsed, 3 * n);
-  }
-  if (collapsed != NULL && !vector) {
-    memcpy(collapsed, content->directions, 3 * n * sizeof *collapsed);
-    supine_tissue_collapse_directions(lungs, share, collapsed);
-    directions = to_float(collapsed, 3 * n);
-  }
-  if (vertices == NULL || (directions == NULL && !vector) || lung == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: no memory to write %zu vertices",
-                              path, n);
-    goto cleanup;
-  }
-  for (size_t i = 0; i < n; ++i) {
-    lung[i] = g == 2 && i >= lungs->lung_begin[1] ? 1 : 0;
-  }
-  add(&list, "format", "supine-basis");
-  add(&list, "version", "3");
-  add(&list, "kind", "%s", vector ? "vector" : "scalar");
-  add(&list, "band", "%zu", field->band);
-  add(&list, "modes", "%s", options->modes == 0 ? "harmonics" : "best");
-  add(&list, "mode_count", "%zu", k);
-  add(&list, "units", "mm");
-  add(&list, "axes", "LPS");
-  add_lungs(&list, lungs, share);
-  if (model != NULL) {
-    add_model(&list, lungs, model, content->reference != NULL);
-  }
-  if (content->reference != NULL) {
-    add_reference(&list, content->reference, share);
-  }
-  add_expected_error(&list, content);
-  if (content->is_fields) {
-    add_fields(&list, content->scan_gravity);
-  }
-  add_accuracy(&list, content->accuracy, content->reference != NULL);
-  if (content->turned_over != NULL) {
-    add(&list, "turned_over_percent", "%.3g", 100.0 * *content->turned_over);
-  }
+static void add_texts(entries *list, const supine_precompute_options *options) {
   if (options->patient != NULL) {
-    add(&list, "patient_law", "%s", options->patient);
-    add(&list, "patient", "%s", options->patient_summary);
+    add(list, "patient_law", "%s", options->patient);
+    add(list, "patient", "%s", options->patient_summary);
   }
   if (options->assumed != NULL) {
-    add(&list, "assumed", "%s", options->assumed);
+    add(list, "assumed", "%s", options->assumed);
   }
   if (options->findings != NULL && options->findings[0] != '\0') {
-    add(&list, "warnings", "%.*s", (int)strlen(options->findings) - 1, options->findings);
+    add(list, "warnings", "%.*s", (int)strlen(options->findings) - 1, options->findings);
   }
   if (options->frame.millimetres_per_unit > 0.0) {
     char letters[4];
     supine_mesh_axes_letters(options->frame.axes, letters);
-    add(&list, "scan_axes", "%s", letters);
-    add(&list, "scan_unit_mm", "%.17g", options->frame.millimetres_per_unit);
+    add(list, "scan_axes", "%s", letters);
+    add(list, "scan_unit_mm", "%.17g", options->frame.millimetres_per_unit);
   }
-  status = find_normals(content, vertices, directions, &normals, error);
-  if (status != SUPINE_OK) {
-    goto cleanup;
+}
+
+/* Add all metadata in the file's order. */
+static void add_all(entries *list, const supine_basis_content *content, const double share[2],
+                    const supine_normals_modes *normals) {
+  const supine_precompute_options *options = content->options;
+  add(list, "format", "supine-basis");
+  add(list, "version", "3");
+  add(list, "kind", "%s", content->directions == NULL ? "vector" : "scalar");
+  add(list, "band", "%zu", content->compression->band);
+  add(list, "modes", "%s", options->modes == 0 ? "harmonics" : "best");
+  add(list, "mode_count", "%zu", content->compression->mode_count);
+  add(list, "units", "mm");
+  add(list, "axes", "LPS");
+  add_lungs(list, content->lungs, share);
+  if (!content->is_fields) {
+    add_model(list, content->lungs, &options->model, content->reference != NULL);
   }
-  add_normals(&list, &normals, content->resting != NULL);
-  add(&list, "made_by", "%s", options->made_by != NULL ? options->made_by : "supine_precompute");
-  if (list.failed) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
-    goto cleanup;
+  if (content->reference != NULL) {
+    add_reference(list, content->reference, share);
   }
-  supine_tensor tensors[14] = {
+  add_expected_error(list, content);
+  if (content->is_fields) {
+    add_fields(list, content->scan_gravity);
+  }
+  add_accuracy(list, content->accuracy, content->reference != NULL);
+  if (content->turned_over != NULL) {
+    add(list, "turned_over_percent", "%.3g", 100.0 * *content->turned_over);
+  }
+  add_texts(list, options);
+  add_normals(list, normals, content->resting != NULL);
+  add(list, "made_by", "%s", options->made_by != NULL ? options->made_by : "supine_precompute");
+}
+
+/* This function has more than 60 lines: it lists all tensors in the file's order. */
+supine_status supine_writer_basis_write(const char *path, const supine_basis_content *content,
+                                        supine_error *error) {
+  static const double healthy[2] = {1.0, 1.0};
+  static const supine_error_table no_table;
+  const supine_lungs *lungs = content->lungs;
+  const double *share = content->is_fields ? healthy : content->options->model.share;
+  const supine_compression *field = content->compression;
+  const supine_volume_forms *forms = content->forms;
+  const supine_error_table *table = content->table != NULL ? content->table : &no_table;
+  const size_t n = lungs->mesh.vertex_count;
+  const size_t k = field->mode_count;
+  const size_t g = lungs->lung_count;
+  const bool vector = content->directions == NULL;
+  SUPINE_ARENA arena = {0};
+  entries list = {.memory = &arena};
+  supine_normals_modes normals = {0};
+  double *collapsed = supine_arena_take(&arena, 3 * n, sizeof *collapsed);
+  float *vertices = supine_arena_take(&arena, 3 * n, sizeof *vertices);
+  float *directions = vector ? NULL : supine_arena_take(&arena, 3 * n, sizeof *directions);
+  unsigned char *lung = supine_arena_take(&arena, n, 1);
+  if (arena.failed) {
+    return supine_error_memory(error, "%zu vertices of %s", n, path);
+  }
+  supine_tissue_collapse(lungs, share, collapsed);
+  to_float(collapsed, 3 * n, vertices);
+  if (!vector) {
+    memcpy(collapsed, content->directions, 3 * n * sizeof *collapsed);
+    supine_tissue_collapse_directions(lungs, share, collapsed);
+    to_float(collapsed, 3 * n, directions);
+  }
+  for (size_t i = 0; i < n; ++i) {
+    lung[i] = g == 2 && i >= lungs->lung_begin[1] ? 1 : 0;
+  }
+  SUPINE_TRY(find_normals(content, vertices, directions, &arena, &normals, error));
+  add_all(&list, content, share, &normals);
+  if (arena.failed) {
+    return supine_error_memory(error, "metadata of %s", path);
+  }
+  const size_t q = normals.count;
+  const supine_tensor all[] = {
       {"vertices", SUPINE_F32, 2, {n, 3}, vertices},
       {"triangles", SUPINE_U32, 2, {lungs->mesh.triangle_count, 3}, lungs->mesh.triangles},
       {"modes", SUPINE_F64, 2, {k, supine_sh_count(field->band)}, field->modes},
       {"lung", SUPINE_U8, 1, {n}, lung},
-  };
-  size_t count = 4;
-  if (vector) {
-    tensors[count++] =
-        (supine_tensor){"coefficients", SUPINE_F32, 3, {n, 3, k}, field->coefficients};
-  } else {
-    tensors[count++] = (supine_tensor){"coefficients", SUPINE_F32, 2, {n, k}, field->coefficients};
-    tensors[count++] = (supine_tensor){"direction", SUPINE_F32, 2, {n, 3}, directions};
+      vector ? (supine_tensor){"coefficients", SUPINE_F32, 3, {n, 3, k}, field->coefficients}
+             : (supine_tensor){"coefficients", SUPINE_F32, 2, {n, k}, field->coefficients},
+      {"direction", SUPINE_F32, 2, {n, 3}, directions},
+      {"volume_linear", SUPINE_F64, 3, {g, 3, k}, forms->linear},
+      {"volume_quadratic", SUPINE_F64, 4, {g, 3, k, k}, forms->quadratic},
+      {"volume_cubic", SUPINE_F64, 4, {g, k, k, k}, forms->cubic},
+      {"resting_volume", SUPINE_F64, 2, {g, 9}, content->resting},
+      {"error_harmonics",
+       SUPINE_F64,
+       1,
+       {table->band_count},
+       table == &no_table ? NULL : table->harmonics},
+      {"error_modes", SUPINE_F64, 1, {table->mode_count}, table == &no_table ? NULL : table->modes},
+      {"normals", SUPINE_I16, 3, {n, 3, q}, normals.modes},
+      {"normal_weights", SUPINE_F64, 4, {g, q, 3, 1 + 2 * k + k * (k + 1) / 2}, normals.weights}};
+  supine_tensor given[sizeof all / sizeof *all];
+  size_t count = 0;
+  for (size_t i = 0; i < sizeof all / sizeof *all; ++i) {
+    if (all[i].data != NULL) {
+      given[count++] = all[i];
+    }
   }
-  tensors[count++] =
-      (supine_tensor){"volume_linear", SUPINE_F64, 3, {g, 3, k}, content->forms->linear};
-  tensors[count++] =
-      (supine_tensor){"volume_quadratic", SUPINE_F64, 4, {g, 3, k, k}, content->forms->quadratic};
-  tensors[count++] =
-      (supine_tensor){"volume_cubic", SUPINE_F64, 4, {g, k, k, k}, content->forms->cubic};
-  if (content->resting != NULL) {
-    tensors[count++] = (supine_tensor){"resting_volume", SUPINE_F64, 2, {g, 9}, content->resting};
-  }
-  if (content->table != NULL) {
-    const supine_error_table *table = content->table;
-    tensors[count++] =
-        (supine_tensor){"error_harmonics", SUPINE_F64, 1, {table->band_count}, table->harmonics};
-    tensors[count++] =
-        (supine_tensor){"error_modes", SUPINE_F64, 1, {table->mode_count}, table->modes};
-  }
-  if (normals.count > 0) {
-    const size_t q = normals.count;
-    tensors[count++] = (supine_tensor){"normals", SUPINE_I16, 3, {n, 3, q}, normals.modes};
-    tensors[count++] = (supine_tensor){
-        "normal_weights", SUPINE_F64, 4, {g, q, 3, 1 + 2 * k + k * (k + 1) / 2}, normals.weights};
-  }
-  status = supine_safetensors_write(path, tensors, count, list.metadata, list.count, error);
-cleanup:
-  for (size_t i = 0; i < list.count; ++i) {
-    free((char *)list.metadata[i].value);
-  }
-  supine_normals_modes_free(&normals);
-  free(collapsed);
-  free(vertices);
-  free(directions);
-  free(lung);
-  return status;
+  return supine_safetensors_write(path, given, count, list.metadata, list.count, error);
 }

@@ -28,8 +28,7 @@ typedef struct supine_basis_content {
   const supine_error_table *table;
 } supine_basis_content;
 
-/** Write a basis file atomically: a failure leaves no partial file.
- * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */
+/** Write a basis file atomically: a failure leaves no partial file. */
 supine_status supine_writer_basis_write(const char *path, const supine_basis_content *content,
                                         supine_error *error);
 

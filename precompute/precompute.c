@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/vec3.h"
 #include <supine/volume.h>
 
@@ -27,6 +28,8 @@ typedef struct pipeline {
   const supine_lungs *given;
   const supine_lungs *lungs; /* lungs in use: `given`, or `anchored` after anchor() */
   const supine_precompute_options *options;
+  supine_arena memory;   /* of the corrected vertices */
+  supine_arena lengths;  /* of `directions` and `weight` */
   supine_lungs anchored; /* copy of `given` whose vertices anchor() has corrected, or all zero */
   supine_reference reference;
   double *directions; /* [N, 3] displacement of each vertex per unit force, mm, or NULL */
@@ -51,9 +54,8 @@ typedef struct pipeline {
 } pipeline;
 
 static void pipeline_free(pipeline *p) {
-  free(p->anchored.mesh.vertices);
-  free(p->directions);
-  free(p->weight);
+  supine_arena_free(&p->memory);
+  supine_arena_free(&p->lengths);
   supine_projection_free(&p->projection);
   supine_sh_compression_free(&p->compression);
   supine_physics_volume_forms_free(&p->forms);
@@ -62,18 +64,18 @@ static void pipeline_free(pipeline *p) {
 
 static supine_status find_directions(pipeline *p, supine_error *error) {
   const size_t n = p->lungs->mesh.vertex_count;
-  p->directions = malloc(3 * n * sizeof *p->directions);
-  p->weight = malloc(n * sizeof *p->weight);
-  if (p->directions == NULL || p->weight == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
+  p->directions = supine_arena_take(&p->lengths, 3 * n, sizeof *p->directions);
+  p->weight = supine_arena_take(&p->lengths, n, sizeof *p->weight);
+  if (p->lengths.failed) {
+    return supine_error_memory(error, "%zu vertices", n);
   }
-  const supine_status status = supine_physics_directions(
-      p->lungs, &p->options->model.force, &p->options->model.direction, p->directions, error);
-  for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
+  SUPINE_TRY(supine_physics_directions(p->lungs, &p->options->model.force,
+                                       &p->options->model.direction, p->directions, error));
+  for (size_t i = 0; i < n; ++i) {
     const double *d = p->directions + 3 * i;
     p->weight[i] = supine_dot(d, d);
   }
-  return status;
+  return SUPINE_OK;
 }
 
 static supine_status project(pipeline *p, supine_error *error) {
@@ -91,14 +93,13 @@ static supine_status find_strain(pipeline *p, supine_error *error) {
   }
   double *columns = malloc(rows * rank * sizeof *columns);
   if (columns == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", rows / 3);
+    return supine_error_memory(error, "%zu vertices", rows / 3);
   }
   for (size_t i = 0; i < rows * rank; ++i) {
     columns[i] = expansion->columns[i / (3 * rank) * rank + i % rank] * p->directions[i / rank];
   }
   free(expansion->columns);
-  free(p->directions);
-  free(p->weight);
+  supine_arena_free(&p->lengths);
   p->directions = p->weight = NULL;
   expansion->columns = columns;
   expansion->row_count = rows;
@@ -127,14 +128,14 @@ static supine_status anchor(pipeline *p, supine_error *error) {
   if (!p->reference.known || lungs->scanned == NULL) {
     return SUPINE_OK;
   }
-  double *u = malloc(4 * n * sizeof *u);
+  SUPINE_ARENA arena = {0};
+  double *u = supine_arena_take(&arena, 4 * n, sizeof *u);
   if (p->anchored.mesh.vertices == NULL) {
     p->anchored = *lungs;
-    p->anchored.mesh.vertices = malloc(3 * n * sizeof(double));
+    p->anchored.mesh.vertices = supine_arena_take(&p->memory, 3 * n, sizeof(double));
   }
-  if (u == NULL || p->anchored.mesh.vertices == NULL) {
-    free(u);
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
+  if (arena.failed || p->memory.failed) {
+    return supine_error_memory(error, "%zu vertices", n);
   }
   supine_sh_compression_weights(field, p->reference.scan.state.gravity, weights);
   supine_projection_displacement(field, p->directions, weights, u);
@@ -148,7 +149,6 @@ static supine_status anchor(pipeline *p, supine_error *error) {
     const size_t lung = lungs->lung_count == 2 && i >= 3 * lungs->lung_begin[1];
     p->anchored.mesh.vertices[i] -= p->reference.scan_gains[lung][i % 3] * u[i];
   }
-  free(u);
   p->lungs = &p->anchored;
   return status;
 }
@@ -185,15 +185,13 @@ static supine_status check_rest(const supine_compression *compression,
 /* Find the resting volume (FRC) of each lung minus the volume of its reference surface, mL, as
  * coefficients of spherical harmonics of the direction of gravity. They interpolate the volumes for
  * gravity along the six axes.
- * @param share  volume of each lung divided by its healthy volume
- * @retval SUPINE_ERROR_NUMERICAL  the surface folds before a lung reaches its resting volume */
+ * @param share  volume of each lung divided by its healthy volume */
 static supine_status rest_harmonics(const supine_reference *reference, const double share[2],
                                     const supine_compression *compression,
                                     const supine_volume_forms *forms, double harmonics[2][9],
                                     supine_error *error) {
   double volume[2][6];
-  supine_status status = SUPINE_OK;
-  for (size_t axis = 0; axis < 6 && status == SUPINE_OK; ++axis) {
+  for (size_t axis = 0; axis < 6; ++axis) {
     double g[3] = {0.0, 0.0, 0.0};
     double rest[2];
     g[axis / 2] = axis % 2 == 0 ? 1.0 : -1.0;
@@ -202,12 +200,12 @@ static supine_status rest_harmonics(const supine_reference *reference, const dou
       rest[lung] = share[lung] * (rest[lung] - reference->full_volume[lung]);
       volume[lung][axis] = rest[lung];
     }
-    status = check_rest(compression, forms, g, rest, error);
+    SUPINE_TRY(check_rest(compression, forms, g, rest, error));
   }
-  for (size_t lung = 0; lung < reference->lung_count && status == SUPINE_OK; ++lung) {
+  for (size_t lung = 0; lung < reference->lung_count; ++lung) {
     supine_reference_harmonics(volume[lung], harmonics[lung]);
   }
-  return status;
+  return SUPINE_OK;
 }
 
 /* Find the resting volumes (FRC) if known, and the volume at which errors in mm are measured. */
@@ -217,12 +215,12 @@ static supine_status find_rest(pipeline *p, supine_error *error) {
   if (!p->reference.known) {
     return SUPINE_OK;
   }
-  const supine_status status = rest_harmonics(&p->reference, options->model.share, &p->compression,
-                                              &p->forms, p->resting, error);
+  SUPINE_TRY(rest_harmonics(&p->reference, options->model.share, &p->compression, &p->forms,
+                            p->resting, error));
   for (size_t t = 0; t < 9; ++t) {
     p->volume[t] = p->resting[0][t] + p->resting[1][t];
   }
-  return status;
+  return SUPINE_OK;
 }
 
 static size_t held_out_default(const pipeline *p) {
@@ -244,10 +242,8 @@ static supine_status measure(pipeline *p, supine_error *error) {
 }
 
 static supine_status tabulate(pipeline *p, supine_error *error) {
-  const supine_status status = supine_accuracy_error_table_create(
-      &p->truth, &p->projection, &p->compression, p->directions, &p->table);
-  return status == SUPINE_OK ? status
-                             : supine_error_set(error, status, "no memory for the table of errors");
+  return supine_accuracy_error_table_create(&p->truth, &p->projection, &p->compression,
+                                            p->directions, &p->table, error);
 }
 
 static supine_status drop_modes(pipeline *p, supine_error *error) {
@@ -258,16 +254,15 @@ static supine_status drop_modes(pipeline *p, supine_error *error) {
   }
   supine_sh_compression_truncate(&p->compression, p->projection.expansion.rank, needed);
   supine_physics_volume_forms_free(&p->forms);
-  supine_status status = anchor(p, error);
-  status = status == SUPINE_OK ? find_forms(p, error) : status;
-  status = status == SUPINE_OK ? find_rest(p, error) : status;
-  return status == SUPINE_OK ? measure(p, error) : status;
+  SUPINE_TRY(anchor(p, error));
+  SUPINE_TRY(find_forms(p, error));
+  SUPINE_TRY(find_rest(p, error));
+  return measure(p, error);
 }
 
 static supine_status find_turned_over(pipeline *p, supine_error *error) {
-  const supine_status status = supine_accuracy_turned_over(p->lungs, p->directions, &p->compression,
-                                                           &p->forms, p->volume, &p->turned_over);
-  return status == SUPINE_OK ? status : supine_error_set(error, status, "no memory to count folds");
+  return supine_accuracy_turned_over(p->lungs, p->directions, &p->compression, &p->forms, p->volume,
+                                     &p->turned_over, error);
 }
 
 static supine_status write_file(const pipeline *p, const char *path, supine_error *error) {

@@ -40,7 +40,7 @@ typedef struct supine_precompute_report {
 } supine_precompute_report;
 
 /** Make a basis from lungs and a physical model, measure its error, and write the file atomically.
- * @retval SUPINE_ERROR_WRITE, and those of projection.h and accuracy.h */
+ */
 supine_status supine_precompute(const supine_lungs *lungs, const supine_precompute_options *options,
                                 const char *path, supine_precompute_report *report,
                                 supine_error *error);

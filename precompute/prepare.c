@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Select the displacement law, stiffness, lesions and reference volumes of a model. */
 #include <math.h>
-#include <stdlib.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "base/text.h"
@@ -26,9 +26,6 @@ static supine_model choose_law(const supine_model_choice *choice) {
                                                     ? (supine_law)choice->law
                                                     : (none ? SUPINE_LAW_PAPER : SUPINE_LAW_DEEP));
   supine_model model = choice->model;
-  if (choice->patient_law != NULL) {
-    return model;
-  }
   model.law = law.law;
   model.force.pair = law.force.pair;
   memcpy(model.bend, law.bend, sizeof law.bend);
@@ -46,42 +43,95 @@ static supine_model choose_law(const supine_model_choice *choice) {
   return model;
 }
 
-static double *allocate(size_t count, supine_status *status, supine_error *error) {
-  double *values = malloc(count * sizeof *values);
-  if (values == NULL) {
-    *status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu numbers", count);
+/* What a choice means for lungs that were read. */
+typedef struct meaning {
+  bool has_scan;
+  supine_scan scan;
+  supine_resting resting;
+} meaning;
+
+/* Say what volume the law gives the lungs in the state that was not scanned, beside the measured
+ * one. The law is not rescaled to the latter.
+ * @param measured  volume of both lungs in this state when the law was fitted, mL, or 0 */
+static void tell_volume(const supine_patient_record *record, double measured,
+                        supine_findings *findings) {
+  static const double different = 1.0 / 3.0; /* ratio of volumes minus 1 from which to warn */
+  const size_t other = record->shown == 1.0 ? 0 : 1;
+  const double *lung = record->lung_volume[other];
+  const bool both = (lung[0] > 0.0 && lung[1] > 0.0) || record->patient.frame.only_side != 0;
+  char state[160];
+  char beside[64] = "";
+  (void)supine_state_describe(&record->state[other], state, sizeof state);
+  if (measured > 0.0 && both) {
+    (void)snprintf(beside, sizeof beside, "; measured: %.0f mL", measured);
   }
-  return values;
+  const double off = beside[0] != '\0' ? fabs((lung[0] + lung[1]) / measured - 1.0) : 0.0;
+  supine_findings_add(findings, "%s: by the fitted law, the lungs hold %.0f mL %s%s%s",
+                      off > different ? "warning" : "note", lung[0] + lung[1], state, beside,
+                      off > different ? ". Check that the scans show the same lungs; give "
+                                        "--landmarks to 'supine fit'"
+                                      : "");
 }
 
-static supine_status set_expandability(const supine_lungs *lungs, const supine_model_choice *choice,
-                                       supine_prepared *p, supine_error *error) {
-  const size_t n = lungs->mesh.vertex_count;
-  supine_status status = SUPINE_OK;
-  const bool given = choice->expandability != NULL ||
-                     choice->expandability_law.shape != SUPINE_EXPANDABILITY_UNIFORM;
-  if (choice->stiffness != NULL && given) {
+/* Use the displacement law and the force that were fitted to a patient. If the state of the scan is
+ * not given, use the state in the fit. */
+static supine_status take_patient(const supine_patient_record *fitted, supine_prepared *p,
+                                  meaning *means, supine_error *error) {
+  const size_t n = p->source.lungs.mesh.vertex_count;
+  supine_patient_record *record = supine_arena_take(&p->memory, 1, sizeof *record);
+  double *arrays = supine_arena_take(&p->memory, 4 * n, sizeof *arrays);
+  supine_scan scan;
+  if (p->memory.failed) {
+    return supine_error_memory(error, "%zu vertices", n);
+  }
+  *record = *fitted;
+  p->patient = record;
+  p->model = supine_physics_model(SUPINE_LAW_DEEP);
+  SUPINE_TRY(supine_patient_model(record, &p->source.lungs, &means->resting, &scan, arrays,
+                                  &p->model, error));
+  tell_volume(record, fitted->volume[record->shown == 1.0 ? 0 : 1], &p->source.findings);
+  if (means->has_scan) {
+    return SUPINE_OK;
+  }
+  means->has_scan = true;
+  means->scan = scan;
+  supine_findings_add(&p->source.findings,
+                      "note: the scan is assumed to be the %s of the two that were fitted; "
+                      "--scanned changes this",
+                      record->shown == 0.0 ? "fuller" : "emptier");
+  return record->shown == 0.0 || scan.known
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                "this scan is the emptier of the two that were fitted, and how far "
+                                "it is below full inflation is unknown: give its state, such as "
+                                "--scanned supine:rest, or use the fuller scan");
+}
+
+static supine_status set_expandability(const supine_model_choice *choice, supine_prepared *p,
+                                       supine_error *error) {
+  const size_t n = p->source.lungs.mesh.vertex_count;
+  if (choice->expandability == NULL &&
+      choice->expandability_law.shape == SUPINE_EXPANDABILITY_UNIFORM) {
+    return SUPINE_OK;
+  }
+  if (p->model.stiffness != NULL) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "the file of --patient sets the stiffness: leave --expandability out");
   }
-  if (choice->stiffness == NULL && !given) {
-    return SUPINE_OK;
+  double *a = supine_arena_take(&p->memory, n, sizeof *a);
+  if (a == NULL) {
+    return supine_error_memory(error, "%zu vertices", n);
   }
-  double *a = p->stiffness = allocate(n, &status, error);
-  p->model.stiffness = a;
-  if (a != NULL && choice->stiffness != NULL) {
-    memcpy(a, choice->stiffness, n * sizeof *a);
-    return SUPINE_OK;
+  if (choice->expandability != NULL) {
+    SUPINE_TRY(supine_tissue_expandability_load(choice->expandability, n, a, error));
+  } else {
+    supine_tissue_expandability_regional(&p->source.lungs, &choice->expandability_law, a);
   }
-  if (a != NULL && choice->expandability != NULL) {
-    status = supine_tissue_expandability_load(choice->expandability, n, a, error);
-  } else if (a != NULL) {
-    supine_tissue_expandability_regional(lungs, &choice->expandability_law, a);
-  }
-  for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
+  for (size_t i = 0; i < n; ++i) {
     a[i] = 1.0 / a[i];
   }
-  return status;
+  p->model.stiffness = a;
+  return SUPINE_OK;
 }
 
 /* Warn of a lesion that contains no vertex and therefore changes no stiffness. */
@@ -99,169 +149,182 @@ static void warn_of_lesion(const supine_lungs *lungs, const supine_lesion *lesio
       c[0], c[1], c[2], nearest, lesion->radius);
 }
 
-static supine_status set_lesions(const supine_lungs *lungs, const supine_model_choice *choice,
-                                 supine_prepared *p, supine_findings *findings,
+static supine_status set_lesions(const supine_model_choice *choice, supine_prepared *p,
                                  supine_error *error) {
+  const supine_lungs *lungs = &p->source.lungs;
   const size_t n = lungs->mesh.vertex_count;
-  supine_status status = SUPINE_OK;
   if (choice->lesion_count == 0) {
     return SUPINE_OK;
   }
-  p->lesions = allocate(n, &status, error);
-  p->model.lesions = p->lesions;
-  for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
-    p->lesions[i] = 1.0;
+  double *factors = supine_arena_take(&p->memory, n, sizeof *factors);
+  if (factors == NULL) {
+    return supine_error_memory(error, "%zu vertices", n);
   }
-  for (size_t l = 0; l < choice->lesion_count && status == SUPINE_OK; ++l) {
+  for (size_t i = 0; i < n; ++i) {
+    factors[i] = 1.0;
+  }
+  for (size_t l = 0; l < choice->lesion_count; ++l) {
     size_t reached = 0;
-    status = supine_tissue_add_lesion(lungs, &choice->lesions[l], p->lesions, &reached, error);
-    if (status == SUPINE_OK && reached == 0) {
-      warn_of_lesion(lungs, &choice->lesions[l], findings);
+    SUPINE_TRY(supine_tissue_add_lesion(lungs, &choice->lesions[l], factors, &reached, error));
+    if (reached == 0) {
+      warn_of_lesion(lungs, &choice->lesions[l], &p->source.findings);
     }
   }
-  return status;
+  p->model.lesions = factors;
+  return SUPINE_OK;
 }
 
-static supine_status set_shares(const supine_lungs *lungs, const supine_model_choice *choice,
-                                supine_prepared *p, supine_error *error) {
-  static const char *const names[] = {"left", "right"};
-  supine_status status = SUPINE_OK;
-  for (size_t side = 0; side < 2 && status == SUPINE_OK; ++side) {
+static supine_status set_shares(const supine_model_choice *choice, supine_prepared *p,
+                                supine_error *error) {
+  const supine_lungs *lungs = &p->source.lungs;
+  for (size_t side = 0; side < 2; ++side) {
+    const char *name = side == 0 ? "left" : "right";
     size_t lung = 0;
     while (lung < lungs->lung_count && lungs->side[lung] != (side == 0 ? 1 : -1)) {
       ++lung;
     }
     if (choice->share[side] > 0.0 && lung == lungs->lung_count) {
-      status = supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                "--lung %s: the model has no %s lung: leave it out", names[side],
-                                names[side]);
-    } else if (choice->share[side] > 0.0) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "--lung %s: the model has no %s lung: leave it out", name, name);
+    }
+    if (choice->share[side] > 0.0) {
       p->model.share[lung] = choice->share[side];
     }
   }
-  return status;
+  return SUPINE_OK;
 }
 
 /* Whether the expandability differs between vertices. */
-static bool varies(const supine_prepared *p, size_t count) {
+static bool varies(const supine_model *model, size_t count) {
   bool same = true;
   for (size_t i = 0; i < count && same; ++i) {
-    same = (p->stiffness == NULL || p->stiffness[i] == p->stiffness[0]) &&
-           (p->lesions == NULL || p->lesions[i] == 1.0);
+    same = (model->stiffness == NULL || model->stiffness[i] == model->stiffness[0]) &&
+           (model->lesions == NULL || model->lesions[i] == 1.0);
   }
   return !same;
 }
 
-static void summarize(const supine_model_choice *choice, bool predicted, supine_prepared *p) {
+static void summarize(const supine_model_choice *choice, const supine_resting *resting,
+                      bool predicted, supine_prepared *p) {
   static const double supine[3] = {0.0, 1.0, 0.0};
   const supine_reference *reference = &p->reference;
-  const size_t size = sizeof p->summary;
+  const size_t size = sizeof p->assumed;
   char state[160];
   double ml[2];
-  supine_text_add(p->summary, size, "%s law; scan ",
-                  choice->patient_law != NULL ? choice->patient_law
-                                              : supine_physics_law_names[p->model.law]);
+  supine_text_add(p->assumed, size, "%s; %s law; scan ", p->source.summary,
+                  choice->patient != NULL ? "the patient's own"
+                                          : supine_physics_law_names[p->model.law]);
   if (!reference->known) {
-    supine_text_add(p->summary, size, "taken as the reference of every posture");
+    supine_text_add(p->assumed, size, "taken as the reference of every posture");
     return;
   }
   (void)supine_state_describe(&reference->scan.state, state, sizeof state);
   const double full = reference->full_volume[0] + reference->full_volume[1];
   const double held = full + reference->scan_volume[0] + reference->scan_volume[1];
-  const bool known = supine_reference_resting_given(&choice->resting);
+  const bool known = supine_reference_resting_given(resting);
   const bool at_rest = reference->scan.state.volume.kind == SUPINE_VOLUME_REST;
   if (held != full) {
-    supine_text_add(p->summary, size, "%s, %.0f mL; ", state, held);
+    supine_text_add(p->assumed, size, "%s, %.0f mL; ", state, held);
   }
-  supine_text_add(p->summary, size, "%sfull inflation %.0f mL (%s", held != full ? "" : "at ", full,
+  supine_text_add(p->assumed, size, "%sfull inflation %.0f mL (%s", held != full ? "" : "at ", full,
                   reference->scan.full > 0.0 ? "given, "
                   : !at_rest                 ? ""
                   : known                    ? "from rest, "
                                              : "assumed from rest, ");
-  supine_reference_compare(reference, &choice->person, p->summary, size);
+  supine_reference_compare(reference, &choice->person, p->assumed, size);
   const double rest = supine_reference_rest(reference, supine, ml);
-  const double ratio = exp(choice->resting.spread / choice->resting.assumed);
-  supine_text_add(p->summary, size, "); rest supine %.0f mL (", rest);
+  const double ratio = exp(resting->spread / resting->assumed);
+  supine_text_add(p->assumed, size, "); rest supine %.0f mL (", rest);
   if (!at_rest && !known) {
-    supine_text_add(p->summary, size, "%.0f to %.0f ", rest / ratio, rest * ratio);
+    supine_text_add(p->assumed, size, "%.0f to %.0f ", rest / ratio, rest * ratio);
   }
-  supine_text_add(p->summary, size, "by %s)",
-                  at_rest                                        ? "the scan"
-                  : choice->patient_law != NULL                  ? "the fit"
-                  : known                                        ? "--resting"
-                  : predicted                                    ? "height and sex"
-                  : choice->resting.assumed == SUPINE_REST_SHARE ? "healthy people's share"
-                                                                 : "the share in COPD");
+  supine_text_add(p->assumed, size, "by %s)",
+                  at_rest                                 ? "the scan"
+                  : choice->patient != NULL               ? "the fit"
+                  : known                                 ? "--resting"
+                  : predicted                             ? "height and sex"
+                  : resting->assumed == SUPINE_REST_SHARE ? "healthy people's share"
+                                                          : "the share in COPD");
   double collapsed = 0.0; /* volume in the scan as the basis holds it, mL */
   for (size_t lung = 0; lung < reference->lung_count; ++lung) {
     collapsed +=
         p->model.share[lung] * (reference->full_volume[lung] + reference->scan_volume[lung]);
   }
   if (p->model.share[0] != 1.0 || p->model.share[1] != 1.0) {
-    supine_text_add(p->summary, size,
+    supine_text_add(p->assumed, size,
                     "; collapsed in every state by --lung, also in the scan, which then holds %.0f "
                     "mL: no displacement contains the collapse",
                     collapsed);
   }
 }
 
-supine_status supine_precompute_prepare(supine_lungs *lungs, const supine_model_choice *choice,
-                                        supine_prepared *prepared, supine_findings *findings,
-                                        supine_error *error) {
-  supine_prepared *p = prepared;
-  supine_scan scan = choice->scan;
-  char doubt[512];
-  p->model = choose_law(choice);
-  if (!choice->has_scan && p->model.law != SUPINE_LAW_PAPER) {
-    (void)supine_reference_scan_parse("full", &scan, NULL);
+/* Decide what state the scan shows, and check that the law and --full go with it. */
+static supine_status find_scan(const supine_model_choice *choice, supine_law law, meaning *means,
+                               supine_error *error) {
+  supine_scan *scan = &means->scan;
+  if (!means->has_scan && law != SUPINE_LAW_PAPER) {
+    (void)supine_reference_scan_parse("full", scan, NULL);
   }
-  if (p->model.law == SUPINE_LAW_PAPER && scan.known) {
+  if (law == SUPINE_LAW_PAPER && scan->known) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "--law paper takes the scan as the reference: leave --scanned out, or "
                             "use --law deep");
   }
-  if (scan.known && scan.state.volume.kind == SUPINE_VOLUME_DEFAULT) {
+  if (scan->known && scan->state.volume.kind == SUPINE_VOLUME_DEFAULT) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "--scanned: a posture alone is only for --fields: add the volume, as "
                             "in supine:rest, or give full or none");
   }
   const supine_volume *full = &choice->full.volume;
-  scan.full = full->ml;
+  scan->full = full->ml;
   if (full->kind != SUPINE_VOLUME_DEFAULT &&
-      (full->kind != SUPINE_VOLUME_ABSOLUTE || scan.state.volume.kind != SUPINE_VOLUME_REST)) {
+      (full->kind != SUPINE_VOLUME_ABSOLUTE || scan->state.volume.kind != SUPINE_VOLUME_REST)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "--full is for a scan at rest: give a volume such as 4200mL, and "
                             "--scanned supine:rest too");
   }
-  supine_status status = set_expandability(lungs, choice, p, error);
-  status = status == SUPINE_OK ? set_lesions(lungs, choice, p, findings, error) : status;
-  status = status == SUPINE_OK ? set_shares(lungs, choice, p, error) : status;
-  const supine_reference scanned = {
-      .scan = scan, .lung_count = lungs->lung_count, .side = {lungs->side[0], lungs->side[1]}};
-  supine_resting resting = choice->resting;
+  return SUPINE_OK;
+}
+
+supine_status supine_precompute_prepare(const supine_model_choice *choice, char **paths,
+                                        size_t count, supine_prepared *prepared,
+                                        supine_error *error) {
+  supine_prepared *p = prepared;
+  supine_lungs *lungs = &p->source.lungs;
+  meaning means = {choice->has_scan, choice->scan, choice->resting};
+  SUPINE_TRY(supine_precompute_source_load(&choice->source, paths, count, &p->source, error));
+  if (choice->patient != NULL) {
+    SUPINE_TRY(take_patient(choice->patient, p, &means, error));
+  } else {
+    p->model = choose_law(choice);
+  }
+  SUPINE_TRY(find_scan(choice, p->model.law, &means, error));
+  SUPINE_TRY(set_expandability(choice, p, error));
+  SUPINE_TRY(set_lesions(choice, p, error));
+  SUPINE_TRY(set_shares(choice, p, error));
+  if (p->model.reach > 0.0 && varies(&p->model, lungs->mesh.vertex_count)) {
+    SUPINE_TRY(supine_physics_strain_create(lungs, p->model.stiffness, p->model.lesions,
+                                            &p->model.strain, error));
+  }
+  const supine_reference scanned = {.scan = means.scan,
+                                    .lung_count = lungs->lung_count,
+                                    .side = {lungs->side[0], lungs->side[1]}};
+  supine_resting resting = means.resting;
   supine_reference_predict_rest(&scanned, &choice->person, &resting);
-  if (status == SUPINE_OK && p->model.reach > 0.0 && varies(p, lungs->mesh.vertex_count)) {
-    status = supine_physics_strain_create(lungs, p->stiffness, p->lesions, &p->strain, error);
-    p->model.strain = p->strain;
+  SUPINE_TRY(supine_reference_find(lungs, &p->model, &means.scan, &resting, &p->reference, error));
+  summarize(choice, &means.resting, resting.ml[2] != means.resting.ml[2], p);
+  char doubt[512] = "";
+  if (p->reference.known) {
+    supine_reference_doubt(&p->reference, &choice->person, &means.resting, doubt, sizeof doubt);
   }
-  status = status == SUPINE_OK
-               ? supine_reference_find(lungs, &p->model, &scan, &resting, &p->reference, error)
-               : status;
-  if (status == SUPINE_OK) {
-    summarize(choice, resting.ml[2] != choice->resting.ml[2], p);
+  if (doubt[0] != '\0') {
+    supine_findings_add(&p->source.findings, "warning: %s", doubt);
   }
-  if (status == SUPINE_OK && p->reference.known) {
-    supine_reference_doubt(&p->reference, &choice->person, &choice->resting, doubt, sizeof doubt);
-    if (doubt[0] != '\0') {
-      supine_findings_add(findings, "warning: %s", doubt);
-    }
-  }
-  return status;
+  return SUPINE_OK;
 }
 
 void supine_precompute_prepared_free(supine_prepared *prepared) {
-  free(prepared->stiffness);
-  free(prepared->lesions);
-  supine_physics_strain_destroy(prepared->strain);
-  *prepared = (supine_prepared){0};
+  supine_physics_strain_destroy(prepared->model.strain);
+  supine_lungs_free(&prepared->source.lungs);
+  supine_arena_free(&prepared->memory);
 }

@@ -1,23 +1,24 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Make a physical model from the user's choices, and move lungs to the reference surface. */
+ * From files and the user's choices, make lungs at the reference surface and their model. */
 #ifndef SUPINE_PREPARE_H
 #define SUPINE_PREPARE_H
 
-#include "base/findings.h"
+#include "base/arena.h"
 
 #include "precompute/lungs/disease.h"
 #include "precompute/lungs/expandability.h"
-#include "precompute/physics/reference.h"
+#include "precompute/patient/patient_file.h"
+#include "precompute/source.h"
 
 enum { SUPINE_LESIONS_MAX = 64 };
 
-/** The user's choices for the physical model and the scan. */
+/** The user's choices for the files, the physical model and the scan. */
 typedef struct supine_model_choice {
+  supine_source_options source;
   int law;            /**< displacement law: a supine_law, or SUPINE_LAW_COUNT for the default */
   supine_model model; /**< constants; each that is NAN is taken from the displacement law */
-  const char *patient_law; /**< name of the displacement law fitted to the patient, or NULL */
-  const double *stiffness; /**< [N] relative stiffness fitted to the patient, or NULL */
+  const supine_patient_record *patient; /**< fitted model, which replaces the law, or NULL */
   bool has_scan; /**< whether `scan` was given; SUPINE_LAW_DEEP assumes full inflation if not */
   supine_scan scan;
   supine_state full; /**< volume at full inflation, for a scan at rest; DEFAULT if unknown */
@@ -32,27 +33,21 @@ typedef struct supine_model_choice {
 
 supine_model_choice supine_precompute_choice_default(void);
 
-/** A physical model, the volumes of the lungs, and a description of the assumptions. */
+/** Lungs at the reference surface, and their physical model. */
 typedef struct supine_prepared {
-  supine_model model; /**< uses `stiffness`, `lesions` and `strain` of this struct */
+  supine_source source; /**< what was read; its findings also hold those about the model */
+  supine_model model;
+  const supine_patient_record *patient; /**< the patient's, with what these lungs add, or NULL */
   supine_reference reference;
-  char summary[512];     /**< for the user: displacement law, state of the scan and volumes */
-  double *stiffness;     /**< [N] relative stiffness of each vertex, or NULL if uniform */
-  double *lesions;       /**< [N] factors by which lesions multiply the stiffness, or NULL */
-  supine_strain *strain; /**< their effect if the law has a smoothing length, or NULL */
+  char assumed[800];   /**< for the user: axes, unit, displacement law, state and volumes */
+  supine_arena memory; /**< of the arrays of the model */
 } supine_prepared;
 
-/** Select the displacement law, set stiffness and lesions, and move the vertices of the scan to the
- * reference surface.
- * @param lungs     in: the scan; out: the reference surface
- * @param prepared  zeroed; release with supine_precompute_prepared_free, also after an error
- * @param findings  warnings are added
- * @retval SUPINE_ERROR_ARGUMENT  a scan's posture without its volume; SUPINE_LAW_PAPER with a known
- *   state of the scan; expandability in
- *   addition to a stiffness fitted to the patient; a volume share for a lung that the model lacks
- * @retval the statuses of supine_tissue_add_lesion and supine_reference_find */
-supine_status supine_precompute_prepare(supine_lungs *lungs, const supine_model_choice *choice,
-                                        supine_prepared *prepared, supine_findings *findings,
+/** Load lungs from files, select the displacement law, set stiffness and lesions, and move the
+ * vertices of the scan to the reference surface.
+ * @param prepared  zeroed; release with supine_precompute_prepared_free, also after an error */
+supine_status supine_precompute_prepare(const supine_model_choice *choice, char **paths,
+                                        size_t count, supine_prepared *prepared,
                                         supine_error *error);
 
 void supine_precompute_prepared_free(supine_prepared *prepared);

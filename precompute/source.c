@@ -3,10 +3,10 @@
 #include <limits.h>
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/arena.h"
 #include "base/parallel.h"
 #include "base/text.h"
 
@@ -46,13 +46,13 @@ static void note_mesh(const char *path, const supine_mesh_report *report,
   }
 }
 
-static supine_status load_meshes(reading *r, supine_findings *findings, supine_error *error) {
+static supine_status load_meshes(reading *r, supine_source *source, supine_error *error) {
   supine_parallel_for(r->count, 1, r->count, load_range, r);
   for (size_t i = 0; i < r->count; ++i) {
     if (r->errors[i].status != SUPINE_OK) {
       return supine_error_set(error, r->errors[i].status, "%s", r->errors[i].message);
     }
-    note_mesh(r->paths[i], &r->reports[i], findings);
+    note_mesh(r->paths[i], &r->reports[i], &source->findings);
   }
   r->axes = r->reports[0].axes;
   return SUPINE_OK;
@@ -124,13 +124,12 @@ static supine_status find_lobes(const char *folder, lobe_files *found, supine_er
 
 /* Load label maps. If they show a single lung and no midline was given, use the medial face of the
  * lung's bounding box as midline. */
-static supine_status load_maps(reading *r, supine_source *source, supine_findings *findings,
-                               supine_error *error) {
+static supine_status load_maps(reading *r, supine_source *source, supine_error *error) {
   supine_labels_options wanted = r->options->labels;
   const bool folder = r->count == 1 && is_folder(r->paths[0]);
   lobe_files lobes = {.left = 0};
-  if (folder && find_lobes(r->paths[0], &lobes, error) != SUPINE_OK) {
-    return SUPINE_ERROR_READ;
+  if (folder) {
+    SUPINE_TRY(find_lobes(r->paths[0], &lobes, error));
   }
   wanted.left_masks = lobes.left;
   wanted.right_masks = lobes.right;
@@ -141,12 +140,9 @@ static supine_status load_maps(reading *r, supine_source *source, supine_finding
                             "a label map's header states its unit: leave --units out, or give "
                             "--units mm to accept any size of the lungs");
   }
-  const supine_status status = supine_labels_surfaces(
-      (const char *const *)(folder ? lobes.list : r->paths),
-      folder ? lobes.left + lobes.right : r->count, &wanted, r->meshes, &source->report, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(supine_labels_surfaces((const char *const *)(folder ? lobes.list : r->paths),
+                                    folder ? lobes.left + lobes.right : r->count, &wanted,
+                                    r->meshes, &source->report, error));
   r->count = source->report.lung_count;
   r->axes = source->report.coordinates;
   for (size_t i = 0; i < r->count; ++i) {
@@ -159,7 +155,7 @@ static supine_status load_maps(reading *r, supine_source *source, supine_finding
     r->midline = source->report.lung[0].side > 0 ? low[0] : high[0];
     r->has_midline = true;
   }
-  note_map(r->paths[0], &source->report, findings);
+  note_map(r->paths[0], &source->report, &source->findings);
   return SUPINE_OK;
 }
 
@@ -224,52 +220,44 @@ static supine_status check_kinds(const supine_source_options *options, char **pa
   return SUPINE_OK;
 }
 
-static supine_status join(reading *r, supine_source *source, supine_findings *findings,
-                          supine_error *error) {
+static supine_status read_files(reading *r, supine_source *source, supine_error *error) {
+  bool is_map = false;
+  SUPINE_TRY(check_kinds(r->options, r->paths, r->count, &is_map, error));
+  SUPINE_TRY(is_map ? load_maps(r, source, error) : load_meshes(r, source, error));
   const supine_lungs_source given = {.name = r->paths[0],
                                      .axes = r->axes,
                                      .units_given = r->options->load.millimetres_per_unit != 0.0,
                                      .midline = r->has_midline ? &r->midline : NULL};
-  supine_status status = supine_lungs_gate(r->meshes, r->count, &given, &source->lungs,
-                                           &source->axes_hold, findings, error);
-  if (status == SUPINE_OK && r->options->surfaces_out != NULL) {
-    status = supine_mesh_save(r->options->surfaces_out, &source->lungs.mesh, NULL, error);
+  SUPINE_TRY(supine_lungs_gate(r->meshes, r->count, &given, &source->lungs, &source->axes_hold,
+                               &source->findings, error));
+  if (r->options->surfaces_out != NULL) {
+    SUPINE_TRY(supine_mesh_save(r->options->surfaces_out, &source->lungs.mesh, NULL, error));
   }
-  if (status == SUPINE_OK) {
-    source->frame = frame_of(r);
-    summarize(r, source);
-  }
-  return status;
+  source->is_map = is_map;
+  source->frame = frame_of(r);
+  summarize(r, source);
+  return SUPINE_OK;
 }
 
 supine_status supine_precompute_source_load(const supine_source_options *options, char **paths,
                                             size_t count, supine_source *source,
-                                            supine_findings *findings, supine_error *error) {
+                                            supine_error *error) {
   const size_t most = count > 2 ? count : 2;
+  SUPINE_ARENA arena = {0};
   reading r = {.options = options,
                .paths = paths,
                .count = count,
+               .meshes = supine_arena_zeros(&arena, most, sizeof *r.meshes),
+               .reports = supine_arena_zeros(&arena, most, sizeof *r.reports),
+               .errors = supine_arena_zeros(&arena, most, sizeof *r.errors),
                .has_midline = options->has_midline,
                .midline = options->midline};
-  supine_status status = check_kinds(options, paths, count, &source->is_map, error);
-  if (status != SUPINE_OK) {
-    return status;
+  if (arena.failed) {
+    return supine_error_memory(error, "%zu files", count);
   }
-  r.meshes = calloc(most, sizeof *r.meshes);
-  r.reports = calloc(most, sizeof *r.reports);
-  r.errors = calloc(most, sizeof *r.errors);
-  status = r.meshes == NULL || r.reports == NULL || r.errors == NULL
-               ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu files", count)
-           : source->is_map ? load_maps(&r, source, findings, error)
-                            : load_meshes(&r, findings, error);
-  if (status == SUPINE_OK) {
-    status = join(&r, source, findings, error);
-  }
-  for (size_t i = 0; r.meshes != NULL && i < most; ++i) {
+  const supine_status status = read_files(&r, source, error);
+  for (size_t i = 0; i < most; ++i) {
     supine_mesh_free(&r.meshes[i]);
   }
-  free(r.meshes);
-  free(r.reports);
-  free(r.errors);
   return status;
 }

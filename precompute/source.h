@@ -21,19 +21,17 @@ typedef struct supine_source_options {
 typedef struct supine_source {
   supine_lungs lungs;
   supine_scan_frame frame;
-  bool is_map;    /**< whether the files are label maps; if so, `report` is set */
+  bool is_map;    /**< whether lungs were read from label maps; if so, `report` is set */
   bool axes_hold; /**< whether the shape of the lungs clearly confirms the axes */
   supine_labels_report report;
-  char summary[256]; /**< for the user: axes, unit and bounding boxes of the lungs */
+  char summary[256];        /**< for the user: axes, unit and bounding boxes of the lungs */
+  supine_findings findings; /**< notes and warnings, also after a failure */
 } supine_source;
 
 /** Load surfaces (in parallel) or label maps, check them and join them into lungs.
- * @param source    zeroed; release source->lungs with supine_lungs_free
- * @param findings  notes and warnings are added, also after a failure
- * @retval SUPINE_ERROR_ARGUMENT  both label maps and surfaces, or an option for the other kind
- * @retval the statuses of supine_mesh_load, supine_labels_surfaces and supine_lungs_gate */
+ * @param source  zeroed; release source->lungs with supine_lungs_free, also after a failure */
 supine_status supine_precompute_source_load(const supine_source_options *options, char **paths,
                                             size_t count, supine_source *source,
-                                            supine_findings *findings, supine_error *error);
+                                            supine_error *error);
 
 #endif

@@ -61,7 +61,7 @@ static void add_target(const supine_posture_item *const item[2], const supine_ta
   (void)json_array_append_new(list, entry);
 }
 
-/* Append to a list the displacements of the hilum and of each named structure between two postures.
+/* Append to a list the displacements of each named structure and of the hilum between two postures.
  * If `in_hilum`, subtract the hilum's from the others. */
 static supine_status add_pair(const supine_basis *basis, const supine_command_names *names,
                               const supine_posture_item *const item[2], bool in_hilum, json_t *list,
@@ -78,16 +78,16 @@ static supine_status add_pair(const supine_basis *basis, const supine_command_na
                                          (const supine_pose *const[2]){&pose[0], &pose[1]},
                                          expected.sigma, false, &targets, error));
   SUPINE_TRY(supine_options_hilum(basis, &pose[1], &pose[0], in_hilum, hilum.move, error));
-  if (supine_length(hilum.move) > 0.0) {
-    hilum.moved = supine_length(hilum.move);
-    hilum.volume[0] = hilum.volume[1] = targets[0].volume[0] != 0.0 ? (double)NAN : 0.0;
-    add_target(item, &hilum, list);
-  }
   for (size_t i = 0; i < names->count; ++i) {
     if (in_hilum) {
       supine_command_target_shift(&targets[i], hilum.move);
     }
     add_target(item, &targets[i], list);
+  }
+  if (supine_length(hilum.move) > 0.0) {
+    hilum.moved = supine_length(hilum.move);
+    hilum.volume[0] = hilum.volume[1] = targets[0].volume[0] != 0.0 ? (double)NAN : 0.0;
+    add_target(item, &hilum, list);
   }
   return SUPINE_OK;
 }
@@ -112,6 +112,16 @@ static void end(supine_comparison *comparison) {
   supine_report_free(comparison);
   supine_command_names_close(&comparison->names);
   supine_basis_close(comparison->inside);
+}
+
+/* Compute, print and write the comparison of the lungs. */
+static supine_status report(supine_comparison *c, const request *wanted, supine_error *error) {
+  if (wanted->inside != NULL) {
+    SUPINE_TRY(supine_command_inside_open(c->basis, wanted->inside, &c->inside, &c->names, error));
+  }
+  SUPINE_TRY(supine_report_find(c, error));
+  supine_report_print(c, wanted->json);
+  return wanted->html != NULL ? write_html(wanted->html, c, error) : SUPINE_OK;
 }
 
 static supine_status compare(const char *path, const char *made_by, const supine_basis *basis,
@@ -152,13 +162,7 @@ static supine_status compare(const char *path, const char *made_by, const supine
   if (content) {
     return compare_content(basis, &comparison.postures, wanted, error);
   }
-  if (wanted->inside != NULL) {
-    SUPINE_TRY(supine_command_inside_open(basis, wanted->inside, &comparison.inside,
-                                          &comparison.names, error));
-  }
-  SUPINE_TRY(supine_report_find(&comparison, error));
-  supine_report_print(&comparison, wanted->json);
-  return wanted->html != NULL ? write_html(wanted->html, &comparison, error) : SUPINE_OK;
+  return report(&comparison, wanted, error);
 }
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {

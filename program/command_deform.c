@@ -26,7 +26,8 @@ typedef struct request {
   int frame; /* 1 if the hilum stays in place, 0 if the body does */
   supine_deform_content content;
   const char *states; /* CSV file of states; NULL if the options give one state */
-  char *output; /* output file named in a row of the file `states`; the request owns this text */
+  /* Outputs in the columns output, labels and field of a row; the request owns these texts. */
+  char *outputs[3];
 } request;
 
 #define ENDINGS SUPINE_MESH_ENDINGS ", .csv, .nrrd, .nii, .nii.gz or .mha"
@@ -40,9 +41,11 @@ static const supine_option table[] = {
      .rivals = "output"},
     {"states", 0, "LIST",
      "CSV file with a state in each row, in the columns posture, volume and output; the basis and "
-     "the image are read once for all states. An output is a surface, points, or "
+     "the images are read once for all states. An output is a surface, points, or "
      "an image: the image of --image or --labels, moved, or without these the displacement field. "
-     "Its path is relative to the folder of LIST",
+     "With --image and --labels, the column labels has the file of the moved labels; the column "
+     "field has that of the field. Each state's field is computed once. Paths are relative to the "
+     "folder of LIST",
      SUPINE_FILLS(request, states), .file = SUPINE_FILE_IN, .wants = "a CSV file",
      .rivals = "output"},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
@@ -127,8 +130,7 @@ static supine_status deform(const supine_basis *basis, const request *wanted, su
   SUPINE_TRY(supine_options_reference(basis, &wanted->from, false, &moved.from, error));
   SUPINE_TRY(supine_options_pose(basis, name, wanted->volume.allow_folds, &moved.state, &moved.pose,
                                  error));
-  SUPINE_TRY(
-      supine_posed_expected(basis, &moved.state, &moved.from.state, &moved.expected, error));
+  SUPINE_TRY(supine_posed_expected(basis, &moved.state, &moved.from.state, &moved.expected, error));
   SUPINE_TRY(supine_options_hilum(basis, &moved.pose, &moved.from.pose, wanted->frame == 1,
                                   moved.hilum, error));
   (void)snprintf(comment, sizeof comment, "displacement from %s%s", moved.from.name,
@@ -160,31 +162,44 @@ static supine_status read_row(const supine_csv *csv, request *row, supine_error 
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%s:%zu: %s: the name must end in %s",
                             csv->path, csv->line, output, ENDINGS);
   }
-  row->output = supine_path_beside(csv->path, output);
-  *(voxels && !image ? &row->content.field : &row->content.path) = row->output;
-  return row->output == NULL ? SUPINE_ERROR_MEMORY
-                             : supine_command_deform_content_check(&row->content, error);
+  for (size_t i = 0; i < 3; ++i) { /* the columns output, labels and field are 1, 3 and 4 */
+    const char *const named = i == 0 ? output : supine_csv_text(csv, i + 2);
+    if (named != NULL && named[0] != '\0') {
+      row->outputs[i] = supine_path_beside(csv->path, named);
+      if (row->outputs[i] == NULL) {
+        return SUPINE_ERROR_MEMORY;
+      }
+    }
+  }
+  if (row->outputs[2] != NULL) {
+    row->content.field = row->outputs[2];
+  }
+  row->content.labels_path = row->outputs[1];
+  *(voxels && !image ? &row->content.field : &row->content.path) = row->outputs[0];
+  return supine_command_deform_content_check(&row->content, error);
 }
 
-/* Check that the output of the last request can be written, and is neither an input nor the output
- * of another request. */
-static supine_status check_row(const char *basis, const request *rows, size_t count,
-                               supine_error *error) {
+/* Check that one output of the last request can be written, and is neither an input nor an earlier
+ * output. */
+static supine_status check_output(const char *basis, const request *rows, size_t count,
+                                  size_t which, supine_error *error) {
   const request *row = &rows[count - 1];
+  const char *const output = row->outputs[which];
   const char *const inputs[] = {basis, row->states, row->content.image, row->content.labels};
   for (size_t i = 0; i < sizeof inputs / sizeof *inputs; ++i) {
     if (inputs[i] != NULL) {
-      SUPINE_TRY(supine_options_check_output(row->output, inputs[i], error));
+      SUPINE_TRY(supine_options_check_output(output, inputs[i], error));
     }
   }
-  for (size_t i = 0; i + 1 < count; ++i) {
-    if (strcmp(rows[i].output, row->output) == 0) {
+  for (size_t i = 0; i < 3 * (count - 1) + which; ++i) {
+    const char *const earlier = rows[i / 3].outputs[i % 3];
+    if (earlier != NULL && strcmp(earlier, output) == 0) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                               "%s: two rows write %s: give each row its own file", row->states,
-                              row->output);
+                              output);
     }
   }
-  return supine_output_try(row->output, error);
+  return supine_output_try(output, error);
 }
 
 /* What a run needs: the basis, and a request for each state. */
@@ -196,11 +211,12 @@ typedef struct batch {
 } batch;
 
 static void end(batch *b) {
-  for (size_t i = 0; i < b->count; ++i) {
-    free(b->rows[i].output);
+  for (size_t i = 0; i < 3 * b->count; ++i) {
+    free(b->rows[i / 3].outputs[i % 3]);
   }
   free(b->rows);
   supine_image_free(&b->wanted->content.source);
+  supine_image_free(&b->wanted->content.label_source);
   supine_basis_close(b->basis);
 }
 
@@ -216,12 +232,12 @@ static supine_status add_row(batch *b, supine_error *error) {
 
 /* Make a request for each row of --states, and check all rows before any state is computed. */
 static supine_status read_rows(const char *basis, batch *b, supine_error *error) {
-  static const char *const columns[] = {"posture", "output", "volume"};
+  static const char *const columns[] = {"posture", "output", "volume", "labels", "field"};
   SUPINE_FREED_BY(supine_csv_close) supine_csv csv = {0};
   if (b->wanted->orientation.given) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give a posture or --states, not both");
   }
-  SUPINE_TRY(supine_csv_open(b->wanted->states, columns, 3, 2, &csv, error));
+  SUPINE_TRY(supine_csv_open(b->wanted->states, columns, 5, 2, &csv, error));
   for (;;) {
     bool more = false;
     SUPINE_TRY(supine_csv_next(&csv, &more, error));
@@ -230,7 +246,11 @@ static supine_status read_rows(const char *basis, batch *b, supine_error *error)
     }
     SUPINE_TRY(add_row(b, error));
     SUPINE_TRY(read_row(&csv, &b->rows[b->count - 1], error));
-    SUPINE_TRY(check_row(basis, b->rows, b->count, error));
+    for (size_t i = 0; i < 3; ++i) {
+      if (b->rows[b->count - 1].outputs[i] != NULL) {
+        SUPINE_TRY(check_output(basis, b->rows, b->count, i, error));
+      }
+    }
   }
   return b->count > 0 ? SUPINE_OK
                       : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
@@ -252,6 +272,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   SUPINE_TRY(supine_command_deform_content_read(&wanted->content, name, error));
   for (size_t i = 0; i < b.count; ++i) {
     b.rows[i].content.source = wanted->content.source;
+    b.rows[i].content.label_source = wanted->content.label_source;
     SUPINE_TRY(deform(b.basis, &b.rows[i], error));
   }
   return SUPINE_OK;

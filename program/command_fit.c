@@ -136,9 +136,9 @@ static supine_status print(const supine_patient_record *record, const char *made
   return SUPINE_OK;
 }
 
-/* Return the volume that the lungs' surface encloses, mL; 0 if there is no surface. */
+/* Return the volume of the lungs in a scan, mL; 0 if it has no surface. */
 static double volume_of(const supine_lungs *lungs) {
-  return lungs->mesh.vertex_count > 0 ? 1e-3 * supine_mesh_volume(&lungs->mesh) : 0.0;
+  return lungs->volume[0] + lungs->volume[1];
 }
 
 /* Assign each landmark to the lung whose surface is nearest to it in the first scan. */
@@ -288,7 +288,7 @@ static supine_status fit_gravity_factor(const request *wanted, scan_data *data,
   if (from->mesh.vertex_count == 0) {
     from = &data->lungs[1];
     supine_patient_points_to_fuller(&record->patient, from->mesh.vertex_count, from->mesh.vertices);
-    supine_mesh_box(&from->mesh, from->minimum, from->maximum);
+    supine_lungs_measure(from);
   }
   for (size_t k = 0; k < wanted->further_count && status == SUPINE_OK; ++k) {
     status = fit_further(wanted, data, k, from, record, error);

@@ -8,17 +8,16 @@
 
 #include "base/vec3.h"
 #include "precompute/fields/fields.h"
-#include "precompute/patient/patient_file.h"
+#include "precompute/precompute.h"
 #include "program/options/model_options.h"
 
 static const char name[] = "precompute";
 
 typedef struct request {
-  supine_model_options model;
-  supine_precompute_options basis;
+  supine_model_choice model;
+  size_t band, modes, held_out;
   const char *path;
   const char *fields, *patient;
-  char summary[256];
   bool has_band, has_modes;
   size_t directions; /* number of directions of gravity to print; 0 to make a basis */
 } request;
@@ -38,19 +37,19 @@ static const supine_option table[] = {
     {"output", 'o', "FILE", "basis file to write (.safetensors)", SUPINE_FILLS(request, path),
      .required = true, .file = SUPINE_FILE_OUT},
     {"band", 0, "L", "highest band L of the spherical harmonics, 0 to 64",
-     SUPINE_FILLS(request, basis.band), SUPINE_SAYS_GIVEN(request, has_band), .standard = "23",
+     SUPINE_FILLS(request, band), SUPINE_SAYS_GIVEN(request, has_band), .standard = "23",
      .range = {0.0, SUPINE_SH_BAND_MAX}, .more = true},
     {"modes", 0, "K|harmonics",
      "basis functions to store\nharmonics: all (L+1)^2 spherical harmonics up to --band L, as in "
      "Santhanam 2008 with --band 3\nK: the K functions (modes) that describe the displacement "
      "best, or fewer if fewer suffice. More modes are more accurate, but each costs a "
      "multiplication per vertex at run time",
-     SUPINE_FILLS(request, basis.modes), SUPINE_SAYS_GIVEN(request, has_modes), .read = read_modes,
+     SUPINE_FILLS(request, modes), SUPINE_SAYS_GIVEN(request, has_modes), .read = read_modes,
      .standard = "16", .wants = "1 to 64 or 'harmonics'", .more = true},
     {"held-out", 0, "N",
      "number of held-out directions in which the error is measured; default 1000; fewer, but at "
      "least 100, for more than 20000 vertices",
-     SUPINE_FILLS(request, basis.held_out), .range = {1.0, 100000.0}, .more = true},
+     SUPINE_FILLS(request, held_out), .range = {1.0, 100000.0}, .more = true},
     {"patient", 0, "FILE",
      "model of the patient's motion, made by 'supine fit', to use instead of the built-in law",
      SUPINE_FILLS(request, patient), .file = SUPINE_FILE_IN, .rivals = "directions",
@@ -155,95 +154,84 @@ static void report_fit(const char *path, const char *assumed, const supine_field
                fit->accuracy.max_mm);
 }
 
-static supine_status compress_fields(request *wanted, const supine_scan *scan,
-                                     supine_error *error) {
-  const supine_source *source = &wanted->model.made_from;
-  wanted->basis.modes = wanted->has_modes ? wanted->basis.modes : SUPINE_MODES_MADE_MAX;
-  const supine_fit_options options = {.band = wanted->has_band ? (int)wanted->basis.band : -1,
-                                      .modes = wanted->basis.modes,
-                                      .fewest_modes = !wanted->has_modes,
-                                      .scan_gravity = scan->known ? scan->state.gravity : NULL};
+/* Compress the fields, and write a basis of them.
+ * @param scan  posture of the scan; a copy, as the model takes the scan as it is */
+static supine_status compress_fields(const request *wanted, const supine_scan *scan,
+                                     const supine_source *source,
+                                     supine_precompute_options *options, supine_error *error) {
+  options->modes = wanted->has_modes ? wanted->modes : SUPINE_MODES_MADE_MAX;
+  const supine_fit_options fit = {.band = wanted->has_band ? (int)wanted->band : -1,
+                                  .modes = options->modes,
+                                  .fewest_modes = !wanted->has_modes,
+                                  .scan_gravity = scan->known ? scan->state.gravity : NULL};
   char posture[160] = "not displaced by gravity";
+  char assumed[sizeof source->summary + sizeof posture + 8];
   supine_fields fields = {0};
   supine_fit_report report;
   if (scan->known) {
     (void)supine_state_describe(&scan->state, posture, sizeof posture);
   }
-  (void)snprintf(wanted->model.assumed, sizeof wanted->model.assumed, "%s; scan %s",
-                 source->summary, posture);
+  (void)snprintf(assumed, sizeof assumed, "%s; scan %s", source->summary, posture);
+  options->assumed = assumed;
   supine_status status =
       supine_fields_load(wanted->fields, &source->lungs, &source->frame, &fields, error);
   if (status == SUPINE_OK) {
-    status = supine_fields_write(&source->lungs, &fields, &options, &wanted->basis, wanted->path,
-                                 &report, error);
+    status =
+        supine_fields_write(&source->lungs, &fields, &fit, options, wanted->path, &report, error);
   }
   if (status == SUPINE_OK) {
-    report_fit(wanted->path, wanted->model.assumed, &fields, &report);
+    report_fit(wanted->path, assumed, &fields, &report);
   }
   supine_fields_free(&fields);
   return status;
 }
 
-static supine_status compute(request *wanted, supine_error *error) {
-  const supine_lungs *lungs = &wanted->model.made_from.lungs;
+static supine_status compute(const request *wanted, const supine_lungs *lungs,
+                             const supine_precompute_options *options, supine_error *error) {
   supine_precompute_report report;
-  char *text = wanted->patient != NULL ? supine_patient_text(wanted->model.patient, NULL) : NULL;
-  if (wanted->patient != NULL && text == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %s", wanted->patient);
-  }
-  wanted->basis.patient = text;
-  wanted->basis.model = wanted->model.prepared.model;
-  wanted->basis.reference = &wanted->model.prepared.reference;
-  const supine_status status =
-      supine_precompute(lungs, &wanted->basis, wanted->path, &report, error);
-  if (status == SUPINE_OK) {
-    report_result(wanted->path, lungs, &wanted->basis, &report);
-  }
-  free(text);
-  return status;
+  SUPINE_TRY(supine_precompute(lungs, options, wanted->path, &report, error));
+  report_result(wanted->path, lungs, options, &report);
+  return SUPINE_OK;
 }
 
-static supine_status take_patient(request *wanted, supine_patient_record *record,
-                                  supine_error *error) {
-  supine_status status = supine_patient_read(wanted->patient, record, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  wanted->model.patient = record;
-  /* Later, the constants of this law are replaced by those of the patient. */
-  wanted->model.choice.law = SUPINE_LAW_DEEP;
+/* Read the model that was fitted to a patient, and describe it in `summary`. */
+static supine_status read_patient(const char *path, supine_patient_record *record, char *summary,
+                                  size_t size, supine_error *error) {
   const supine_patient_fit_report *report = &record->report;
-  (void)snprintf(wanted->summary, sizeof wanted->summary,
+  SUPINE_TRY(supine_patient_read(path, record, error));
+  (void)snprintf(summary, size,
                  "%s: %s law%s from %.0f points; held-out residual %.1f of %.1f mm RMS, %.0f %% "
                  "explained; expected error %.1f mm RMS",
                  record->name, supine_patient_law_names[record->patient.law],
                  record->patient.centre_count > 0 ? " and kriging" : "", report->points,
                  report->held_out[SUPINE_PATIENT_SCORE_CORRECTED], report->baseline,
                  report->explained, report->expected_point);
-  wanted->basis.patient_summary = wanted->summary;
-  wanted->basis.expected_error = report->expected_constant;
-  wanted->basis.expected_from = report->expected_from;
-  wanted->basis.turn_fitted = record->gain_error > 0.0;
-  (void)printf("%s\n", wanted->summary);
+  (void)printf("%s\n", summary);
   return SUPINE_OK;
 }
 
+static void print_directions(size_t count) {
+  (void)puts("x,y,z");
+  for (size_t i = 0; i < count; ++i) {
+    double g[3];
+    supine_spiral((double)i, (double)count, 0.0, g);
+    (void)printf("%.9g,%.9g,%.9g\n", g[0], g[1], g[2]);
+  }
+}
+
 static void begin(void *chosen) {
-  ((request *)chosen)->model.choice = supine_precompute_choice_default();
+  ((request *)chosen)->model = supine_precompute_choice_default();
 }
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
   const bool fields = wanted->fields != NULL;
-  const supine_scan scan = wanted->model.choice.scan;
+  const supine_scan scan = wanted->model.scan;
+  supine_prepared prepared = {.source = {.is_map = false}};
   static supine_patient_record record; /* static, as it is too large for the stack */
+  char summary[256];
   if (wanted->directions > 0) {
-    (void)puts("x,y,z");
-    for (size_t i = 0; i < wanted->directions; ++i) {
-      double g[3];
-      supine_spiral((double)i, (double)wanted->directions, 0.0, g);
-      (void)printf("%.9g,%.9g,%.9g\n", g[0], g[1], g[2]);
-    }
+    print_directions(wanted->directions);
     return SUPINE_OK;
   }
   if (supine_mesh_save_supports(wanted->path)) {
@@ -256,19 +244,40 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
                             "--scanned: with --fields, give the posture alone, such as supine, as "
                             "fields of gravity have no volume");
   }
-  supine_status status = wanted->patient != NULL ? take_patient(wanted, &record, error) : SUPINE_OK;
-  if (status == SUPINE_OK) {
-    status = supine_command_model_load(&wanted->model, name, given->operand, given->count, fields,
-                                       error);
+  if (wanted->patient != NULL) {
+    SUPINE_TRY(read_patient(wanted->patient, &record, summary, sizeof summary, error));
+    wanted->model.patient = &record;
+  }
+  if (fields) { /* they displace the surface as it is */
+    wanted->model.scan.known = false;
+    wanted->model.has_scan = true;
+  }
+  supine_status status =
+      supine_command_prepare(name, &wanted->model, given->operand, given->count, &prepared, error);
+  supine_precompute_options options = {
+      .model = prepared.model,
+      .reference = &prepared.reference,
+      .band = wanted->band,
+      .modes = wanted->modes,
+      .held_out = wanted->held_out,
+      .expected_error = record.report.expected_constant,
+      .expected_from = record.report.expected_from,
+      .turn_fitted = record.gain_error > 0.0,
+      .frame = prepared.source.frame,
+      .made_by = given->made_by,
+      .patient = prepared.patient != NULL ? supine_patient_text(prepared.patient, NULL) : NULL,
+      .patient_summary = summary,
+      .assumed = prepared.assumed,
+      .findings = prepared.source.findings.text};
+  if (status == SUPINE_OK && prepared.patient != NULL && options.patient == NULL) {
+    status = supine_error_memory(error, "%s", wanted->patient);
   }
   if (status == SUPINE_OK) {
-    wanted->basis.made_by = given->made_by;
-    wanted->basis.assumed = wanted->model.assumed;
-    wanted->basis.findings = wanted->model.findings.text;
-    wanted->basis.frame = wanted->model.made_from.frame;
-    status = fields ? compress_fields(wanted, &scan, error) : compute(wanted, error);
+    status = fields ? compress_fields(wanted, &scan, &prepared.source, &options, error)
+                    : compute(wanted, &prepared.source.lungs, &options, error);
   }
-  supine_command_model_options_free(&wanted->model);
+  free((char *)options.patient);
+  supine_precompute_prepared_free(&prepared);
   return status;
 }
 

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine solve: solve the full physics for one direction of gravity. */
 #include <math.h>
-#include <stdlib.h>
 
 #include "base/output.h"
 #include "precompute/lungs/disease.h"
+#include "precompute/physics/solve.h"
 #include <supine/volume.h>
 
 #include "program/options/model_options.h"
@@ -13,7 +13,7 @@
 static const char name[] = "solve";
 
 typedef struct request {
-  supine_model_options model;
+  supine_model_choice model;
   supine_orientation orientation;
   const char *path;
   supine_state state; /* the kind of its volume is SUPINE_VOLUME_DEFAULT if none is given */
@@ -47,37 +47,31 @@ static const supine_option table[] = {
 
 /* Write a CSV file of the response of every vertex to a unit force on the vertex that --unit-force
  * gives. */
-static supine_status write_column(const supine_lungs *lungs, const request *wanted,
+static supine_status write_column(const supine_prepared *prepared, const request *wanted,
                                   supine_error *error) {
+  const supine_lungs *lungs = &prepared->source.lungs;
   const size_t n = lungs->mesh.vertex_count;
   supine_equilibrium *equilibrium = NULL;
   supine_output output = {0};
-  double *column = malloc(n * sizeof *column);
-  supine_status status = SUPINE_ERROR_MEMORY;
+  SUPINE_ARENA arena = {0};
+  double *column = supine_arena_take(&arena, n, sizeof *column);
   if (column == NULL) {
-    (void)supine_error_set(error, status, "no memory for %zu vertices", n);
-    goto cleanup;
+    return supine_error_memory(error, "%zu vertices", n);
   }
-  status =
-      supine_physics_model_equilibrium(lungs, &wanted->model.prepared.model, &equilibrium, error);
+  supine_status status =
+      supine_physics_model_equilibrium(lungs, &prepared->model, &equilibrium, error);
   if (status == SUPINE_OK) {
     status = supine_physics_transfer_column(equilibrium, wanted->vertex, column, error);
   }
-  if (status == SUPINE_OK) {
-    status = supine_output_open(wanted->path, &output, error);
-  }
-  if (status == SUPINE_OK) {
-    (void)fputs("vertex,x_mm,y_mm,z_mm,response\n", output.file);
-    for (size_t i = 0; i < n; ++i) {
-      const double *p = lungs->mesh.vertices + 3 * i;
-      (void)fprintf(output.file, "%zu,%.9g,%.9g,%.9g,%.17g\n", i, p[0], p[1], p[2], column[i]);
-    }
-    status = supine_output_commit(&output, error);
-  }
-cleanup:
   supine_physics_equilibrium_destroy(equilibrium);
-  free(column);
-  return status;
+  SUPINE_TRY(status);
+  SUPINE_TRY(supine_output_open(wanted->path, &output, error));
+  (void)fputs("vertex,x_mm,y_mm,z_mm,response\n", output.file);
+  for (size_t i = 0; i < n; ++i) {
+    const double *p = lungs->mesh.vertices + 3 * i;
+    (void)fprintf(output.file, "%zu,%.9g,%.9g,%.9g,%.17g\n", i, p[0], p[1], p[2], column[i]);
+  }
+  return supine_output_commit(&output, error);
 }
 
 /* Compute each lung's volume minus the volume of its reference surface, mL, as if no lung had
@@ -120,10 +114,11 @@ static void fill(double gains[2][3], double gain) {
 
 /* Find the gains (factors on each lung's displacement along x, y and z) that give each lung its
  * volume. If the volume at rest is unknown, all gains are equal, and 1 if --volume is missing. */
-static supine_status find_gains(const supine_lungs *lungs, const request *wanted,
+static supine_status find_gains(const supine_prepared *prepared, const request *wanted,
                                 const supine_solution *solution, double gains[2][3],
                                 supine_error *error) {
-  const supine_reference *reference = &wanted->model.prepared.reference;
+  const supine_lungs *lungs = &prepared->source.lungs;
+  const supine_reference *reference = &prepared->reference;
   const supine_volume *volume = &wanted->state.volume;
   fill(gains, 1.0);
   if (volume->kind == SUPINE_VOLUME_DEFAULT && !reference->known) {
@@ -131,7 +126,7 @@ static supine_status find_gains(const supine_lungs *lungs, const request *wanted
   }
   if (!reference->known) {
     const double held =
-        volume->kind == SUPINE_VOLUME_ABSOLUTE ? 1e-3 * supine_mesh_volume(&lungs->mesh) : 0.0;
+        volume->kind == SUPINE_VOLUME_ABSOLUTE ? lungs->volume[0] + lungs->volume[1] : 0.0;
     double scale = 0.0;
     const supine_status status =
         volume->kind == SUPINE_VOLUME_SCAN || volume->kind == SUPINE_VOLUME_ABSOLUTE
@@ -142,18 +137,18 @@ static supine_status find_gains(const supine_lungs *lungs, const request *wanted
     fill(gains, scale);
     return status;
   }
-  const supine_model *model = &wanted->model.prepared.model;
+  const supine_model *model = &prepared->model;
   double ml[2];
   double rest[2];
   (void)supine_reference_rest(reference, wanted->state.gravity, rest);
-  supine_status status = find_volumes(reference, &wanted->state, ml, error);
-  for (size_t lung = 0; lung < lungs->lung_count && status == SUPINE_OK; ++lung) {
+  SUPINE_TRY(find_volumes(reference, &wanted->state, ml, error));
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     const double share = model->share[lung];
-    status = supine_volume_form_gains(&solution->form[lung], model->bend,
-                                      share * (rest[lung] - reference->full_volume[lung]),
-                                      share * ml[lung], gains[lung], error);
+    SUPINE_TRY(supine_volume_form_gains(&solution->form[lung], model->bend,
+                                        share * (rest[lung] - reference->full_volume[lung]),
+                                        share * ml[lung], gains[lung], error));
   }
-  return status;
+  return SUPINE_OK;
 }
 
 /* The Pitcher/Catcher iteration of [Santhanam2008] stops when the force that remains on each vertex
@@ -176,35 +171,29 @@ static supine_status iterate(const supine_lungs *lungs, const supine_model *mode
   size_t n = lungs->mesh.vertex_count;
   double range[2];
   double difference = 0.0;
-  double *force = malloc(n * sizeof *force);
-  double *caught = malloc(n * sizeof *caught);
-  supine_status status = SUPINE_OK;
+  SUPINE_ARENA arena = {0};
+  double *force = supine_arena_take(&arena, n, sizeof *force);
+  double *caught = supine_arena_take(&arena, n, sizeof *caught);
   if (model->reach > 0.0 || model->lesions != NULL) {
-    status =
-        supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                         "--pitcher-catcher needs --law paper, and cannot be combined with --reach "
-                         "or --lesion");
-  } else if (force == NULL || caught == NULL ||
-             supine_physics_height_range(lungs, model->force.pair, 1, g, range, range + 1) !=
-                 SUPINE_OK) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "--pitcher-catcher needs --law paper, and cannot be combined with "
+                            "--reach or --lesion");
   }
-  if (status == SUPINE_OK) {
-    const supine_gravities gravity = {1, g, range, range + 1};
-    supine_physics_force(lungs, &model->force, &gravity, n, NULL, force);
-    status = supine_physics_pitcher_catcher(&lungs->mesh, &lungs->topology, model->stiffness, force,
-                                            pitcher_tolerance, caught, report_remaining, &n, error);
+  if (arena.failed ||
+      supine_physics_height_range(lungs, model->force.pair, 1, g, range, range + 1) != SUPINE_OK) {
+    return supine_error_memory(error, "%zu vertices", n);
   }
-  for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
+  const supine_gravities gravity = {1, g, range, range + 1};
+  supine_physics_force(lungs, &model->force, &gravity, n, NULL, force);
+  SUPINE_TRY(supine_physics_pitcher_catcher(&lungs->mesh, &lungs->topology, model->stiffness, force,
+                                            pitcher_tolerance, caught, report_remaining, &n,
+                                            error));
+  for (size_t i = 0; i < n; ++i) {
     difference = fmax(difference, fabs(caught[i] - solution->catch_[i]));
     solution->catch_[i] = caught[i];
   }
-  if (status == SUPINE_OK) {
-    (void)printf("Pitcher/Catcher: largest difference from the direct solution %.2g\n", difference);
-  }
-  free(force);
-  free(caught);
-  return status;
+  (void)printf("Pitcher/Catcher: largest difference from the direct solution %.2g\n", difference);
+  return SUPINE_OK;
 }
 
 static void print_gains(const supine_lungs *lungs, double gains[2][3]) {
@@ -217,40 +206,29 @@ static void print_gains(const supine_lungs *lungs, double gains[2][3]) {
   }
 }
 
-static supine_status write_solution(const supine_lungs *lungs, const request *wanted,
-                                    supine_error *error) {
+/* Scale a solution to the volume that --volume gives, and write the deformed surface. */
+static supine_status write_solution(const supine_prepared *prepared, const request *wanted,
+                                    supine_solution *solution, supine_error *error) {
+  const supine_lungs *lungs = &prepared->source.lungs;
   const double *g = wanted->state.gravity;
-  supine_solution solution = {0};
+  const size_t values = 3 * lungs->mesh.vertex_count;
+  SUPINE_ARENA arena = {0};
   supine_mesh deformed = lungs->mesh;
   supine_mesh reference = lungs->mesh;
   double gains[2][3];
-  deformed.vertices = NULL;
-  reference.vertices = NULL;
-  const supine_model *model = &wanted->model.prepared.model;
-  supine_status status = supine_physics_solve(lungs, model, g, &solution, error);
-  if (status == SUPINE_OK && wanted->pitcher_catcher) {
-    status = iterate(lungs, model, g, &solution, error);
+  SUPINE_TRY(find_gains(prepared, wanted, solution, gains, error));
+  deformed.vertices = supine_arena_take(&arena, values, sizeof(double));
+  reference.vertices = supine_arena_take(&arena, values, sizeof(double));
+  if (arena.failed) {
+    return supine_error_memory(error, "%zu vertices", deformed.vertex_count);
   }
-  if (status != SUPINE_OK) {
-    goto cleanup;
+  supine_tissue_collapse(lungs, prepared->model.share, reference.vertices);
+  for (size_t i = 0; i < values; ++i) {
+    solution->directions[i] *=
+        gains[lungs->lung_count == 2 && i >= 3 * lungs->lung_begin[1]][i % 3];
   }
-  status = find_gains(lungs, wanted, &solution, gains, error);
-  if (status != SUPINE_OK) {
-    goto cleanup;
-  }
-  deformed.vertices = malloc(3 * deformed.vertex_count * sizeof(double));
-  reference.vertices = malloc(3 * reference.vertex_count * sizeof(double));
-  if (deformed.vertices == NULL || reference.vertices == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
-                              deformed.vertex_count);
-    goto cleanup;
-  }
-  supine_tissue_collapse(lungs, model->share, reference.vertices);
-  for (size_t i = 0; i < 3 * solution.vertex_count; ++i) {
-    solution.directions[i] *= gains[lungs->lung_count == 2 && i >= 3 * lungs->lung_begin[1]][i % 3];
-  }
-  supine_physics_solution_apply(&solution, &reference, 1.0, deformed.vertices);
-  const bool known = wanted->model.prepared.reference.known;
+  supine_physics_solution_apply(solution, &reference, 1.0, deformed.vertices);
+  const bool known = prepared->reference.known;
   const double full = 1e-3 * supine_mesh_volume(&reference);
   const double volume = 1e-3 * supine_mesh_volume(&deformed);
   const supine_plausible result = {.command = name,
@@ -261,47 +239,54 @@ static supine_status write_solution(const supine_lungs *lungs, const request *wa
                                    .parts = "the surface folds; triangles that turn over",
                                    .allowed = wanted->allow_folds || !known};
   const supine_mesh_save_options save = {.from = reference.vertices};
-  status = supine_options_plausible(&result, error);
-  if (status == SUPINE_OK) {
-    status = supine_mesh_save(wanted->path, &deformed, &save, error);
+  SUPINE_TRY(supine_options_plausible(&result, error));
+  SUPINE_TRY(supine_mesh_save(wanted->path, &deformed, &save, error));
+  (void)printf("%s: gravity %.4g,%.4g,%.4g", wanted->path, g[0], g[1], g[2]);
+  print_gains(lungs, gains);
+  (void)printf(", largest displacement %.3f mm, %+.2f mL\n",
+               supine_physics_solution_largest(solution), volume - full);
+  return SUPINE_OK;
+}
+
+static supine_status solve(const supine_prepared *prepared, const request *wanted,
+                           supine_error *error) {
+  const supine_lungs *lungs = &prepared->source.lungs;
+  const double *g = wanted->state.gravity;
+  supine_solution solution = {0};
+  supine_status status = supine_physics_solve(lungs, &prepared->model, g, &solution, error);
+  if (status == SUPINE_OK && wanted->pitcher_catcher) {
+    status = iterate(lungs, &prepared->model, g, &solution, error);
   }
   if (status == SUPINE_OK) {
-    (void)printf("%s: gravity %.4g,%.4g,%.4g", wanted->path, g[0], g[1], g[2]);
-    print_gains(lungs, gains);
-    (void)printf(", largest displacement %.3f mm, %+.2f mL\n",
-                 supine_physics_solution_largest(&solution), volume - full);
+    status = write_solution(prepared, wanted, &solution, error);
   }
-cleanup:
-  free(deformed.vertices);
-  free(reference.vertices);
   supine_physics_solution_free(&solution);
   return status;
 }
 
 static void begin(void *chosen) {
-  ((request *)chosen)->model.choice = supine_precompute_choice_default();
+  ((request *)chosen)->model = supine_precompute_choice_default();
 }
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
-  const supine_lungs *lungs = &wanted->model.made_from.lungs;
-  supine_status status = SUPINE_OK;
-  if (!wanted->has_vertex && !supine_mesh_save_supports(wanted->path)) {
+  supine_prepared prepared = {.source = {.is_map = false}};
+  if (wanted->has_vertex) { /* the response is that of the surface as it is */
+    wanted->model.scan.known = false;
+    wanted->model.has_scan = true;
+  } else if (!supine_mesh_save_supports(wanted->path)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "%s: the name must end in " SUPINE_MESH_ENDINGS, wanted->path);
+  } else {
+    SUPINE_TRY(supine_options_state(&wanted->orientation, &wanted->state, error));
   }
-  if (!wanted->has_vertex) {
-    status = supine_options_state(&wanted->orientation, &wanted->state, error);
-  }
+  supine_status status =
+      supine_command_prepare(name, &wanted->model, given->operand, given->count, &prepared, error);
   if (status == SUPINE_OK) {
-    status = supine_command_model_load(&wanted->model, name, given->operand, given->count,
-                                       wanted->has_vertex, error);
+    status = wanted->has_vertex ? write_column(&prepared, wanted, error)
+                                : solve(&prepared, wanted, error);
   }
-  if (status == SUPINE_OK) {
-    status = wanted->has_vertex ? write_column(lungs, wanted, error)
-                                : write_solution(lungs, wanted, error);
-  }
-  supine_command_model_options_free(&wanted->model);
+  supine_precompute_prepared_free(&prepared);
   return status;
 }
 

@@ -35,14 +35,14 @@ const supine_option supine_command_deform_content_options[] = {
      SUPINE_FILLS(supine_deform_content, inverse)},
     {"image", 0, "FILE",
      "image to move and write to -o (.nrrd, .nii, .nii.gz or .mha), interpolated linearly",
-     SUPINE_FILLS(supine_deform_content, image), .file = SUPINE_FILE_IN, .rivals = "moved image"},
+     SUPINE_FILLS(supine_deform_content, image), .file = SUPINE_FILE_IN},
     {"density", 0, NULL,
      "with --image, if it is a CT in Hounsfield units: scale densities inside the lungs by the "
      "local change of volume, so that the mass stays the same; the header of the output says so",
      SUPINE_FILLS(supine_deform_content, density)},
     {"labels", 0, "FILE",
      "label map to move and write to -o; each voxel takes the label of the nearest voxel",
-     SUPINE_FILLS(supine_deform_content, labels), .file = SUPINE_FILE_IN, .rivals = "moved image"},
+     SUPINE_FILLS(supine_deform_content, labels), .file = SUPINE_FILE_IN},
     {.name = NULL}};
 
 supine_status supine_command_deform_content_check(const supine_deform_content *wanted,
@@ -60,6 +60,17 @@ supine_status supine_command_deform_content_check(const supine_deform_content *w
               : "%s: no image to write: give --image FILE or --labels FILE",
         wanted->path);
   }
+  if ((wanted->image != NULL && wanted->labels != NULL) != (wanted->labels_path != NULL)) {
+    return supine_error_set(
+        error, SUPINE_ERROR_ARGUMENT,
+        "--image with --labels needs a list of --states with the column labels, "
+        "and this column needs both");
+  }
+  if (wanted->labels_path != NULL && !supine_image_supports(wanted->labels_path)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "%s: the name must end in .nrrd, .nii, .nii.gz or .mha",
+                            wanted->labels_path);
+  }
   if (wanted->inverse && wanted->field == NULL) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "--inverse needs --field-out FILE: give both");
@@ -72,20 +83,19 @@ supine_status supine_command_deform_content_check(const supine_deform_content *w
 
 supine_status supine_command_deform_content_read(supine_deform_content *wanted, const char *command,
                                                  supine_error *error) {
-  const char *path = wanted->image != NULL ? wanted->image : wanted->labels;
-  supine_image *image = &wanted->source;
-  if (path != NULL) {
-    SUPINE_TRY(supine_image_read(path, image, error));
+  if (wanted->labels != NULL) {
+    SUPINE_TRY(supine_image_read(wanted->labels, &wanted->label_source, error));
   }
   if (wanted->image == NULL) {
     return SUPINE_OK;
   }
+  SUPINE_TRY(supine_image_read(wanted->image, &wanted->source, error));
   if (!wanted->density) {
     supine_options_say(command, "densities are not scaled by the change of volume; for a CT, give "
                                 "--density to keep the tissue's mass");
     return SUPINE_OK;
   }
-  return supine_field_check_hounsfield(image, path, error);
+  return supine_field_check_hounsfield(&wanted->source, wanted->image, error);
 }
 
 bool supine_command_deform_content_wanted(const supine_deform_content *wanted) {
@@ -171,19 +181,20 @@ static supine_status write_field(const supine_deform_content *wanted, const char
   return SUPINE_OK;
 }
 
-static supine_status write_image(const supine_deform_content *wanted, const supine_field *forward,
-                                 const supine_field *inverse, supine_error *error) {
+/* Move an image to the file `path`. Unless `depth` is NULL, scale its densities. */
+static supine_status write_image(const char *path, const supine_image *source, bool labels,
+                                 const supine_image *depth, const supine_field *inverse,
+                                 supine_error *error) {
   SUPINE_FREED_BY(supine_image_free) supine_image moved = {0};
-  SUPINE_TRY(supine_field_resample(inverse, wanted->density ? &forward->depth : NULL,
-                                   wanted->labels != NULL, &wanted->source, &moved, error));
-  SUPINE_TRY(supine_image_write(wanted->path, &moved,
-                                wanted->density ? "HU + 1000 inside the lungs scaled by the local "
-                                                  "change of volume: mass is kept"
-                                                : NULL,
+  SUPINE_TRY(supine_field_resample(inverse, depth, labels, source, &moved, error));
+  SUPINE_TRY(supine_image_write(path, &moved,
+                                depth != NULL ? "HU + 1000 inside the lungs scaled by the local "
+                                                "change of volume: mass is kept"
+                                              : NULL,
                                 error));
-  const size_t *size = wanted->source.size;
-  (void)printf("%s: %zu x %zu x %zu voxels%s\n", wanted->path, size[0], size[1], size[2],
-               wanted->density ? ", densities scaled inside the lungs" : "");
+  const size_t *size = source->size;
+  (void)printf("%s: %zu x %zu x %zu voxels%s\n", path, size[0], size[1], size[2],
+               depth != NULL ? ", densities scaled inside the lungs" : "");
   return SUPINE_OK;
 }
 
@@ -218,18 +229,24 @@ static supine_status find_field(const supine_basis *basis, const supine_deformat
 
 static supine_status move_grid(const supine_deform_content *wanted, const supine_basis *basis,
                                const supine_deformation *moved, supine_error *error) {
-  const bool image = wanted->source.values != NULL;
+  const bool image = wanted->image != NULL;
+  const bool labels = wanted->labels != NULL;
   SUPINE_FREED_BY(supine_field_free) supine_field forward = {0};
   SUPINE_FREED_BY(supine_field_free) supine_field inverse = {0};
   SUPINE_TRY(find_field(basis, moved, &forward, error));
-  if (image || wanted->inverse) {
+  if (image || labels || wanted->inverse) {
     SUPINE_TRY(invert(&forward, &inverse, error));
   }
   if (wanted->field != NULL) {
     SUPINE_TRY(write_field(wanted, moved->from.name, &forward, &inverse, error));
   }
   if (image) {
-    SUPINE_TRY(write_image(wanted, &forward, &inverse, error));
+    SUPINE_TRY(write_image(wanted->path, &wanted->source, false,
+                           wanted->density ? &forward.depth : NULL, &inverse, error));
+  }
+  if (labels) {
+    SUPINE_TRY(write_image(image ? wanted->labels_path : wanted->path, &wanted->label_source, true,
+                           NULL, &inverse, error));
   }
   return SUPINE_OK;
 }

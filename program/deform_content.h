@@ -13,9 +13,10 @@
 typedef struct supine_deform_content {
   /* Files of -o, --field-out, --image and --labels; NULL if not given. */
   const char *path, *field, *image, *labels;
+  const char *labels_path; /* output of --labels, if --image is given, too; or NULL */
   bool inverse, density;
-  bool vertices;       /* whether a CSV file has a row for each vertex */
-  supine_image source; /* the image or the label map to move, once it has been read */
+  bool vertices; /* whether a CSV file has a row for each vertex */
+  supine_image source, label_source; /* the image and the label map to move, once read */
 } supine_deform_content;
 
 extern const supine_option supine_command_deform_content_options[];
@@ -37,7 +38,7 @@ typedef struct supine_deformation {
 supine_status supine_command_deform_content_check(const supine_deform_content *wanted,
                                                   supine_error *error);
 
-/* Read the image of --image or --labels. With --density, check that it is in Hounsfield units;
+/* Read the images of --image and --labels. With --density, check that it is in Hounsfield units;
  * without it, print that the densities of --image are not scaled. */
 supine_status supine_command_deform_content_read(supine_deform_content *wanted, const char *command,
                                                  supine_error *error);

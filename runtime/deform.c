@@ -126,6 +126,24 @@ supine_status supine_deform(const supine_basis *basis, const supine_pose *pose, 
   return supine_deform_range(basis, pose, 0, basis->info.vertex_count, xyz);
 }
 
+supine_status supine_deform_strided(const supine_basis *basis, const supine_pose *pose,
+                                    size_t begin, size_t end, size_t stride, void *positions) {
+  enum { BLOCK = 1024 };
+  float xyz[3 * BLOCK];
+  const size_t bytes = 3 * sizeof *xyz;
+  if (stride < bytes || !supine_basis_has_range(basis, pose, begin, end)) {
+    return SUPINE_ERROR_ARGUMENT;
+  }
+  for (size_t at = begin; at < end; at += BLOCK) {
+    const size_t count = end - at < BLOCK ? end - at : BLOCK;
+    (void)supine_deform_range(basis, pose, at, at + count, xyz);
+    for (size_t i = 0; i < count; ++i) {
+      memcpy((unsigned char *)positions + (at - begin + i) * stride, xyz + 3 * i, bytes);
+    }
+  }
+  return SUPINE_OK;
+}
+
 supine_status supine_deform_batch(const supine_basis *basis, size_t count, const supine_pose *poses,
                                   size_t begin, size_t end, float *xyz) {
   enum { BLOCK_BYTES = 1 << 18 }; /* bytes of packed vertices, few enough for the cache */

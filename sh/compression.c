@@ -6,6 +6,7 @@
 
 #include <supine/sh.h>
 
+#include "base/arena.h"
 #include "base/parallel.h"
 #include "sh/compression.h"
 
@@ -71,15 +72,13 @@ supine_status supine_sh_compress_harmonics(const supine_expansion *expansion,
                             "give --modes 16, or --band 7 or less",
                             expansion->band, terms, SUPINE_MODES_MADE_MAX);
   }
-  supine_compression made;
-  if (supine_sh_compression_create(expansion, terms, &made) != SUPINE_OK) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu harmonics", terms);
+  if (supine_sh_compression_create(expansion, terms, compression) != SUPINE_OK) {
+    return supine_error_memory(error, "%zu harmonics", terms);
   }
   for (size_t t = 0; t < terms; ++t) {
-    made.modes[t * terms + t] = 1.0;
+    compression->modes[t * terms + t] = 1.0;
   }
-  supine_sh_compression_mix(expansion, &made);
-  *compression = made;
+  supine_sh_compression_mix(expansion, compression);
   return SUPINE_OK;
 }
 

@@ -23,9 +23,7 @@ typedef struct supine_compression {
 
 void supine_sh_compression_free(supine_compression *compression);
 
-/** Use the (band + 1)^2 harmonics themselves as modes, as [Santhanam2008] does.
- * @retval SUPINE_ERROR_ARGUMENT  more than SUPINE_MODES_MADE_MAX harmonics
- * @retval SUPINE_ERROR_MEMORY */
+/** Use the (band + 1)^2 harmonics, at most SUPINE_MODES_MADE_MAX, as modes, as [Santhanam2008]. */
 supine_status supine_sh_compress_harmonics(const supine_expansion *expansion,
                                            supine_compression *compression, supine_error *error);
 
@@ -35,10 +33,7 @@ supine_status supine_sh_compress_harmonics(const supine_expansion *expansion,
  * @param mode_max   largest number of modes, 1 to SUPINE_MODES_MADE_MAX; there are fewer if the
  *   matrix has lower rank
  * @param singular   [mode_max] singular values of the modes in falling order, then zeros, or NULL
- * @param total      written: sum of the squares of all singular values; may be NULL
- * @retval SUPINE_ERROR_ARGUMENT   `mode_max` is out of range
- * @retval SUPINE_ERROR_NUMERICAL  all columns are zero, or an eigenvalue problem failed
- * @retval SUPINE_ERROR_MEMORY */
+ * @param total      written: sum of the squares of all singular values; may be NULL */
 supine_status supine_sh_compress_modes(const supine_expansion *expansion, const double *weight,
                                        size_t mode_max, supine_compression *compression,
                                        double *singular, double *total, supine_error *error);
@@ -53,8 +48,7 @@ size_t supine_sh_modes_needed(size_t count, const double *singular, double total
 void supine_sh_compression_truncate(supine_compression *compression, size_t rank, size_t count);
 
 /** Allocate a compression with the numbers of rows and of harmonics of `expansion`. Its arrays
- * `modes` and `mix` are zero; its `coefficients` are not set.
- * @retval SUPINE_ERROR_MEMORY */
+ * `modes` and `mix` are zero; its `coefficients` are not set. */
 supine_status supine_sh_compression_create(const supine_expansion *expansion, size_t mode_count,
                                            supine_compression *made);
 
@@ -64,8 +58,7 @@ void supine_sh_compression_mix(const supine_expansion *expansion, supine_compres
 
 /** Find the `count` leading eigenpairs of a symmetric matrix [n, n], largest eigenvalue first, into
  * vectors [count, n] and the first `count` of values [n]; the other values are work space. The
- * matrix is overwritten; only its lower triangle in column-major order is read.
- * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
+ * matrix is overwritten; only its lower triangle in column-major order is read. */
 supine_status supine_sh_leading_eigenpairs(size_t n, double *matrix, size_t count, double *values,
                                            double *vectors);
 

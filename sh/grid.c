@@ -6,6 +6,7 @@
 #include <gsl/gsl_integration.h>
 #include <gsl/gsl_sf_legendre.h>
 
+#include "base/arena.h"
 #include "sh/grid.h"
 
 /* Refine the n nodes z and the weights w to rounding error by one Newton step on the Legendre
@@ -35,39 +36,30 @@ supine_status supine_sh_grid_create(size_t latitudes, size_t longitudes, supine_
       longitudes > SUPINE_SH_GRID_MAX) {
     return SUPINE_ERROR_ARGUMENT;
   }
-  supine_status status = SUPINE_ERROR_MEMORY;
+  SUPINE_ARENA arena = {0};
   supine_sh_grid *made = calloc(1, sizeof *made);
-  gsl_integration_glfixed_table *table = NULL;
-  double *work = malloc(2 * (latitudes + 1) * sizeof *work);
-  if (made == NULL || work == NULL) {
-    goto cleanup;
+  double *work = supine_arena_take(&arena, 2 * (latitudes + 1), sizeof *work);
+  gsl_integration_glfixed_table *table = gsl_integration_glfixed_table_alloc(latitudes);
+  if (made != NULL) {
+    *made = (supine_sh_grid){latitudes, longitudes, malloc(latitudes * sizeof *made->z),
+                             malloc(latitudes * sizeof *made->weight)};
   }
-  made->latitudes = latitudes;
-  made->longitudes = longitudes;
-  made->z = malloc(latitudes * sizeof *made->z);
-  made->weight = malloc(latitudes * sizeof *made->weight);
-  table = gsl_integration_glfixed_table_alloc(latitudes);
-  if (made->z == NULL || made->weight == NULL || table == NULL) {
-    goto cleanup;
+  if (made == NULL || work == NULL || table == NULL || made->z == NULL || made->weight == NULL) {
+    supine_sh_grid_destroy(made);
+    made = NULL;
   }
-  for (size_t j = 0; j < latitudes; ++j) { /* GSL's nodes ascend, the grid's nodes descend */
+  for (size_t j = 0; j < latitudes && made != NULL; ++j) { /* GSL's nodes ascend, these descend */
     const size_t south = latitudes - 1 - j;
     (void)gsl_integration_glfixed_point(-1, 1, j, &made->z[south], &made->weight[south], table);
   }
-  if (table->precomputed == 0) {
+  if (made != NULL && table->precomputed == 0) {
     refine(made, work);
   }
-  *grid = made;
-  made = NULL;
-  status = SUPINE_OK;
-
-cleanup:
   if (table != NULL) { /* GSL 2.7 does not accept NULL here */
     gsl_integration_glfixed_table_free(table);
   }
-  free(work);
-  supine_sh_grid_destroy(made);
-  return status;
+  *grid = made;
+  return made != NULL ? SUPINE_OK : SUPINE_ERROR_MEMORY;
 }
 
 void supine_sh_grid_destroy(supine_sh_grid *grid) {

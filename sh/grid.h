@@ -22,9 +22,7 @@ typedef struct supine_sh_grid {
 /** Create a quadrature rule on the sphere with these numbers of latitudes and longitudes, 1 to
  * SUPINE_SH_GRID_MAX each. It integrates products of two spherical harmonics of degrees up to L
  * exactly if latitudes > L and longitudes > 2 L.
- * @param grid  written, NULL on failure; free it with supine_sh_grid_destroy
- * @retval SUPINE_ERROR_ARGUMENT  a number is out of range
- * @retval SUPINE_ERROR_MEMORY    an allocation failed (GSL first calls its error handler) */
+ * @param grid  written, NULL on failure; free it with supine_sh_grid_destroy */
 supine_status supine_sh_grid_create(size_t latitudes, size_t longitudes, supine_sh_grid **grid);
 
 /** Free a quadrature rule. NULL is allowed. */

@@ -3,11 +3,11 @@
  * Only small Gram matrices are decomposed. */
 #include <cblas.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include <supine/sh.h>
 
+#include "base/arena.h"
 #include "base/lapack.h"
 #include "sh/compression.h"
 
@@ -21,7 +21,8 @@ static supine_status gram_matrix(const supine_expansion *expansion, const double
                                  double *gram) {
   enum { BLOCK = 1024 };
   const size_t rank = expansion->rank;
-  double *block = malloc(BLOCK * rank * sizeof *block);
+  SUPINE_ARENA arena = {0};
+  double *block = supine_arena_take(&arena, BLOCK * rank, sizeof *block);
   if (block == NULL) {
     return SUPINE_ERROR_MEMORY;
   }
@@ -38,37 +39,34 @@ static supine_status gram_matrix(const supine_expansion *expansion, const double
     cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, (int)rank, (int)count, 1.0, block,
                 (int)rank, 1.0, gram, (int)rank);
   }
-  free(block);
   return SUPINE_OK;
 }
 
 supine_status supine_sh_leading_eigenpairs(size_t n, double *matrix, size_t count, double *values,
                                            double *vectors) {
+  const lapack_int size = (lapack_int)n;
   lapack_int found = 0;
-  lapack_int *support = malloc(2 * n * sizeof *support);
-  double *rising = malloc(n * count * sizeof *rising);
-  supine_status status = SUPINE_ERROR_MEMORY;
-  if (support != NULL && rising != NULL) {
-    const lapack_int size = (lapack_int)n;
-    const lapack_int result = LAPACKE_dsyevr(LAPACK_COL_MAJOR, 'V', 'I', 'L', size, matrix, size,
-                                             0.0, 0.0, size - (lapack_int)count + 1, size, 0.0,
-                                             &found, values, rising, size, support);
-    status = supine_lapack_status(result);
-    if (status == SUPINE_OK && (size_t)found != count) {
-      status = SUPINE_ERROR_NUMERICAL;
-    }
-    for (size_t k = 0; k < count && status == SUPINE_OK; ++k) {
-      memcpy(vectors + k * n, rising + (count - 1 - k) * n, n * sizeof *vectors);
-    }
-    for (size_t k = 0; k < count / 2 && status == SUPINE_OK; ++k) {
-      const double swap = values[k];
-      values[k] = values[count - 1 - k];
-      values[count - 1 - k] = swap;
-    }
+  SUPINE_ARENA arena = {0};
+  lapack_int *support = supine_arena_take(&arena, 2 * n, sizeof *support);
+  double *rising = supine_arena_take(&arena, n * count, sizeof *rising);
+  if (arena.failed) {
+    return SUPINE_ERROR_MEMORY;
   }
-  free(support);
-  free(rising);
-  return status;
+  SUPINE_TRY(supine_lapack_status(LAPACKE_dsyevr(LAPACK_COL_MAJOR, 'V', 'I', 'L', size, matrix,
+                                                 size, 0.0, 0.0, size - (lapack_int)count + 1, size,
+                                                 0.0, &found, values, rising, size, support)));
+  if ((size_t)found != count) {
+    return SUPINE_ERROR_NUMERICAL;
+  }
+  for (size_t k = 0; k < count; ++k) {
+    memcpy(vectors + k * n, rising + (count - 1 - k) * n, n * sizeof *vectors);
+  }
+  for (size_t k = 0; k < count / 2; ++k) {
+    const double swap = values[k];
+    values[k] = values[count - 1 - k];
+    values[count - 1 - k] = swap;
+  }
+  return SUPINE_OK;
 }
 
 /* Find the leading right singular vectors of C = sqrt(W) P Q, where W is the diagonal matrix of the
@@ -83,16 +81,13 @@ static supine_status find_modes(const supine_expansion *expansion, double *gram,
                                 double *values, double *modes, double *total) {
   const size_t rank = expansion->rank;
   const size_t terms = supine_sh_count(expansion->band);
-  double *vectors = malloc(rank * rank * sizeof *vectors);
-  double *reduced = malloc(rank * terms * sizeof *reduced);
-  supine_status status = SUPINE_ERROR_MEMORY;
-  if (vectors == NULL || reduced == NULL) {
-    goto cleanup;
+  SUPINE_ARENA arena = {0};
+  double *vectors = supine_arena_take(&arena, rank * rank, sizeof *vectors);
+  double *reduced = supine_arena_take(&arena, rank * terms, sizeof *reduced);
+  if (arena.failed) {
+    return SUPINE_ERROR_MEMORY;
   }
-  status = supine_sh_leading_eigenpairs(rank, gram, rank, values, vectors);
-  if (status != SUPINE_OK) {
-    goto cleanup;
-  }
+  SUPINE_TRY(supine_sh_leading_eigenpairs(rank, gram, rank, values, vectors));
   for (size_t k = 0; k < rank; ++k) {
     cblas_dscal((int)rank, sqrt(fmax(values[k], 0.0)), vectors + k * rank, 1);
   }
@@ -104,16 +99,13 @@ static supine_status find_modes(const supine_expansion *expansion, double *gram,
   for (size_t r = 0; r < rank; ++r) {
     *total += gram[r * rank + r];
   }
-  status = supine_sh_leading_eigenpairs(rank, gram, rank, values, vectors);
-  for (size_t k = 0; k < count && status == SUPINE_OK; ++k) {
+  SUPINE_TRY(supine_sh_leading_eigenpairs(rank, gram, rank, values, vectors));
+  for (size_t k = 0; k < count; ++k) {
     const double inverse = values[k] > 0.0 ? 1.0 / sqrt(values[k]) : 0.0;
     cblas_dgemv(CblasRowMajor, CblasTrans, (int)rank, (int)terms, inverse, reduced, (int)terms,
                 vectors + k * rank, 1, 0.0, modes + k * terms, 1);
   }
-cleanup:
-  free(vectors);
-  free(reduced);
-  return status;
+  return SUPINE_OK;
 }
 
 supine_status supine_sh_compress_modes(const supine_expansion *expansion, const double *weight,
@@ -123,53 +115,41 @@ supine_status supine_sh_compress_modes(const supine_expansion *expansion, const 
   const size_t terms = supine_sh_count(expansion->band);
   const size_t most = mode_max < rank ? mode_max : rank;
   const size_t kept = most < terms ? most : terms;
-  supine_compression made = {0};
   double energy = 0.0;
   if (mode_max < 1 || mode_max > SUPINE_MODES_MADE_MAX) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%zu modes: give 1 to %d", mode_max,
                             SUPINE_MODES_MADE_MAX);
   }
-  double *gram = malloc(rank * rank * sizeof *gram);
-  double *values = malloc(rank * sizeof *values);
-  double *modes = malloc(kept * terms * sizeof *modes);
-  supine_status status = SUPINE_ERROR_MEMORY;
-  if (gram != NULL && values != NULL && modes != NULL) {
-    status = gram_matrix(expansion, weight, gram);
-  }
+  SUPINE_ARENA arena = {0};
+  double *gram = supine_arena_take(&arena, rank * rank, sizeof *gram);
+  double *values = supine_arena_take(&arena, rank, sizeof *values);
+  double *modes = supine_arena_take(&arena, kept * terms, sizeof *modes);
+  supine_status status = arena.failed ? SUPINE_ERROR_MEMORY : gram_matrix(expansion, weight, gram);
   if (status == SUPINE_OK) {
     status = find_modes(expansion, gram, kept, values, modes, &energy);
   }
   if (status != SUPINE_OK) {
-    (void)supine_error_set(error, status, "modes of band %zu: %s", expansion->band,
-                           supine_status_string(status));
-    goto cleanup;
+    return supine_error_set(error, status, "modes of band %zu: %s", expansion->band,
+                            supine_status_string(status));
   }
   size_t count = 0;
   while (count < kept && values[count] > rank_tolerance * rank_tolerance * values[0]) {
     ++count;
   }
   if (count == 0) {
-    status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                              "the field is zero everywhere: change --base or --gain");
-    goto cleanup;
+    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                            "the field is zero everywhere: change --base or --gain");
   }
-  status = supine_sh_compression_create(expansion, count, &made);
-  if (status != SUPINE_OK) {
-    (void)supine_error_set(error, status, "no memory for %zu modes", count);
-    goto cleanup;
+  if (supine_sh_compression_create(expansion, count, compression) != SUPINE_OK) {
+    return supine_error_memory(error, "%zu modes", count);
   }
-  memcpy(made.modes, modes, count * terms * sizeof *modes);
-  supine_sh_compression_mix(expansion, &made);
+  memcpy(compression->modes, modes, count * terms * sizeof *modes);
+  supine_sh_compression_mix(expansion, compression);
   for (size_t k = 0; singular != NULL && k < mode_max; ++k) {
     singular[k] = k < count ? sqrt(values[k]) : 0.0;
   }
   if (total != NULL) {
     *total = energy;
   }
-  *compression = made;
-cleanup:
-  free(gram);
-  free(values);
-  free(modes);
-  return status;
+  return SUPINE_OK;
 }

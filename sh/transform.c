@@ -9,6 +9,7 @@
 
 #include <supine/sh.h>
 
+#include "base/arena.h"
 #include "sh/transform.h"
 
 struct supine_sh_transform {
@@ -23,15 +24,13 @@ struct supine_sh_transform {
 static fftw_plan plan_fft(supine_sh_transform *plan) {
   const int longitudes = (int)plan->grid->longitudes;
   const int fields = (int)plan->fields;
-  double *ring = malloc(plan->grid->longitudes * plan->fields * sizeof *ring);
-  fftw_plan made = NULL;
-  if (ring != NULL) {
-    made =
-        fftw_plan_many_dft_r2c(1, &longitudes, fields, ring, NULL, fields, 1, plan->spectrum, NULL,
-                               fields, 1, FFTW_ESTIMATE | FFTW_PRESERVE_INPUT | FFTW_UNALIGNED);
-  }
-  free(ring);
-  return made;
+  SUPINE_ARENA arena = {0};
+  double *ring = supine_arena_take(&arena, plan->grid->longitudes * plan->fields, sizeof *ring);
+  return ring == NULL
+             ? NULL
+             : fftw_plan_many_dft_r2c(1, &longitudes, fields, ring, NULL, fields, 1, plan->spectrum,
+                                      NULL, fields, 1,
+                                      FFTW_ESTIMATE | FFTW_PRESERVE_INPUT | FFTW_UNALIGNED);
 }
 
 supine_status supine_sh_transform_create(size_t band, const supine_sh_grid *grid, size_t fields,
@@ -53,8 +52,7 @@ supine_status supine_sh_transform_create(size_t band, const supine_sh_grid *grid
   }
   if (made == NULL || made->legendre == NULL || made->fft == NULL) {
     supine_sh_transform_destroy(made);
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory for a transform of band %zu",
-                            band);
+    return supine_error_memory(error, "a transform of band %zu", band);
   }
   *plan = made;
   return SUPINE_OK;

@@ -22,9 +22,7 @@ typedef struct supine_sh_transform supine_sh_transform;
  * @param band    0 to SUPINE_SH_BAND_MAX; the grid needs latitudes > band, longitudes > 2 band
  * @param grid    must outlive the plan
  * @param fields  number of fields, at least 1
- * @param plan    written, NULL on failure
- * @retval SUPINE_ERROR_ARGUMENT  the band is too high, or the grid is too small for the band
- * @retval SUPINE_ERROR_MEMORY    an allocation failed */
+ * @param plan    written, NULL on failure */
 supine_status supine_sh_transform_create(size_t band, const supine_sh_grid *grid, size_t fields,
                                          supine_sh_transform **plan, supine_error *error);
 

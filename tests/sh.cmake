@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 supine_test(base supine_base)
-target_link_options(test_base PRIVATE -Wl,--wrap=open)
 supine_test(sh_basis supine_sh m)
 supine_test(sh_grid supine_sh m)
 supine_test(transform supine_sh m)

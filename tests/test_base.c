@@ -93,23 +93,6 @@ TEST(test_output_full_disk_or_missing_folder_write_error) {
   assert_says(error.message, "/dev/full");
 }
 
-/* If true, open fails for O_TMPFILE, as on file systems without it. */
-static bool tmpfile_unsupported;
-
-int __real_open(const char *path, int flags, ...);
-int __wrap_open(const char *path, int flags, ...);
-int __wrap_open(const char *path, int flags, ...) {
-  va_list list;
-  va_start(list, flags);
-  const unsigned mode = (flags & (O_CREAT | O_TMPFILE)) != 0 ? va_arg(list, unsigned) : 0;
-  va_end(list);
-  if (tmpfile_unsupported && (flags & O_TMPFILE) == O_TMPFILE) {
-    errno = EOPNOTSUPP;
-    return -1;
-  }
-  return __real_open(path, flags, mode);
-}
-
 static void write_output(const char *path, const char *text) {
   supine_output output;
   assert_int_equal(supine_output_open(path, &output, NULL), SUPINE_OK);
@@ -210,15 +193,10 @@ static void check_full_disk(void) {
   assert_int_equal(rmdir(folder), 0);
 }
 
-TEST(test_output_any_file_system_keeps_modes_links_and_old_files) {
-  for (int i = 0; i < 2; ++i) {
-    tmpfile_unsupported = i == 1;
-    check_modes();
-    check_links();
-    check_full_disk();
-    test_output_commit_replaces_file_abandon_keeps_it(state);
-  }
-  tmpfile_unsupported = false;
+TEST(test_output_commit_keeps_modes_links_and_old_files) {
+  check_modes();
+  check_links();
+  check_full_disk();
 }
 
 TEST(test_output_abandon_all_removes_temporary_files) {
@@ -227,9 +205,7 @@ TEST(test_output_abandon_all_removes_temporary_files) {
   assert_non_null(mkdtemp(folder));
   (void)snprintf(path, sizeof path, "%s/out", folder);
   supine_output output;
-  tmpfile_unsupported = true;
   assert_int_equal(supine_output_open(path, &output, NULL), SUPINE_OK);
-  tmpfile_unsupported = false;
   assert_int_equal(access(output.temporary, F_OK), 0);
   supine_output_abandon_all();
   assert_int_equal(rmdir(folder), 0); /* fails if a temporary file is left in the folder */

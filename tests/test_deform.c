@@ -327,6 +327,36 @@ TEST(test_deform_range_any_part_same_bits) {
   }
 }
 
+TEST(test_deform_strided_interleaved_same_bits) {
+  enum { VERTICES = 2500, STRIDE = 20 };
+  opened o = made(fixture_create(VERTICES, 5, 1, 3, false, false, 11, 8));
+  supine_basis *basis = open_as(&o, SUPINE_STORAGE_EXACT, SUPINE_SIMD_PORTABLE);
+  static float whole[3 * VERTICES];
+  static unsigned char buffer[VERTICES * STRIDE];
+  uint64_t random = 23;
+  double weights[SUPINE_MODES_MAX];
+  double scales[SUPINE_LUNGS_MAX];
+  random_frame(basis, &random, weights, scales);
+  const supine_pose *pose = POSED(basis, weights, scales);
+  supine_deform(basis, pose, whole);
+  memset(buffer, 0x5a, sizeof buffer);
+  assert_int_equal(supine_deform_strided(basis, pose, 7, VERTICES, STRIDE, buffer + 7 * STRIDE),
+                   SUPINE_OK);
+  for (size_t i = 0; i < VERTICES; ++i) {
+    unsigned char kept[STRIDE];
+    memset(kept, 0x5a, STRIDE);
+    const unsigned char *at = buffer + i * STRIDE;
+    assert_memory_equal(at, i < 7 ? (const void *)kept : (const void *)(whole + 3 * i),
+                        3 * sizeof *whole);
+    assert_memory_equal(at + 12, kept, STRIDE - 12);
+  }
+  assert_int_equal(supine_deform_strided(basis, pose, 0, 2, 11, buffer), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_deform_strided(basis, pose, 0, VERTICES + 1, STRIDE, buffer),
+                   SUPINE_ERROR_ARGUMENT);
+  supine_basis_close(basis);
+  drop(&o);
+}
+
 TEST(test_deform_range_larger_than_cache_same_bits) {
   for (int simd = 1; simd < SUPINE_SIMD_COUNT; ++simd) {
     check_ranges(300007, 16, 2, (supine_simd)simd, 18);

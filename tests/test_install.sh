@@ -52,6 +52,7 @@ if grep -Ev '^(supine_[a-z0-9_]*@@SUPINE_0|SUPINE_0.*)$' "$work/names"; then exi
 # library exports exactly the functions that these headers declare.
 for header in "$prefix"/include/supine/*.h; do
   name=supine/$(basename "$header")
+  grep -q '^ \* Stability: ' "$header" || { echo "$name does not state its stability" >&2; exit 1; }
   printf '#include <%s>\n' "$name" >"$work/one.c"
   cp "$work/one.c" "$work/one.cc"
   "$cc" -std=c17 -Wall -Wextra -Wpedantic -Werror -fsyntax-only -I"$prefix/include" "$work/one.c"

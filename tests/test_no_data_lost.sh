@@ -3,8 +3,9 @@
 # Check that no command loses data: test_no_data_lost.sh PROGRAM [KILLS [SIGNALS]]
 #
 # An output that is also an input is refused, even if it is named by a link. A missing folder is reported before the
-# inputs are read. A full disk, a size limit or a signal leaves no incomplete file. Each command that writes a file is
-# ended by each of the SIGNALS (default KILL TERM INT) at KILLS random moments (default 1).
+# inputs are read. A full disk, a size limit or a signal leaves no incomplete file under the name of the output, and none
+# under another name, except for KILL. Each command that writes a file is ended by each of the SIGNALS (default KILL TERM
+# INT) at KILLS random moments (default 1).
 set -u
 export SOURCE_DATE_EPOCH=0 # so that a report made again is the same, even after midnight
 supine=$1
@@ -108,6 +109,7 @@ writer() {
     for i in $(seq "$kills"); do
       moment=$(awk -v seed="$i$took" -v took="$took" 'BEGIN { srand(seed); for (k = 0; k < 9; ++k) rand(); printf "%.4f", rand() * took / 1000 }')
       timeout -s $signal "$moment" "$supine" "$@" -o "out/$name" >/dev/null 2>&1
+      [ $signal = KILL ] && rm -f "out/$name".part-*
       case "$(ls -A out)" in
       "") ;;
       "$name")

@@ -555,14 +555,15 @@ TEST(test_turned_over_one_posture_emptied_finds_more_reversed) {
     double share = 0.0;
     double least = 0.0;
     assert_int_equal(
-        supine_accuracy_turned_over(&lungs, directions, &field, &forms, resting, &share),
+        supine_accuracy_turned_over(&lungs, directions, &field, &forms, resting, &share, NULL),
         SUPINE_OK);
-    assert_int_equal(supine_accuracy_turned_over(&lungs, directions, &field, &forms, even, &least),
-                     SUPINE_OK);
+    assert_int_equal(
+        supine_accuracy_turned_over(&lungs, directions, &field, &forms, even, &least, NULL),
+        SUPINE_OK);
     supine_lungs dense = with_more_triangles(&lungs);
     double sampled = 0.0;
     assert_int_equal(
-        supine_accuracy_turned_over(&dense, directions, &field, &forms, resting, &sampled),
+        supine_accuracy_turned_over(&dense, directions, &field, &forms, resting, &sampled, NULL),
         SUPINE_OK);
     free(dense.mesh.triangles);
     assert_close(sampled, share, 1e-12);

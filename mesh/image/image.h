@@ -48,12 +48,8 @@ bool supine_image_is_named(const char *path);
 
 /** Read an image of one number per voxel. If a NIfTI header gives a slope and an intercept, the
  * voxels are scaled and stored as F32.
+ * Files that refer to other files, or have no orientation, are refused.
  * @param image  zero-initialised; written only on success
- * @retval SUPINE_ERROR_READ    the file is missing or unreadable
- * @retval SUPINE_ERROR_FORMAT  the file has an unsupported ending or type of voxels, is truncated
- *             or malformed, states more voxels than it can hold, does not have three dimensions and
- *             one number per voxel, has dependent axes or no orientation, or refers to other files
- * @retval SUPINE_ERROR_MEMORY
  * Memory: the voxels, at most 1,032 times the file's size, because gzip expands no further. */
 supine_status supine_image_read(const char *path, supine_image *image, supine_error *error);
 void supine_image_free(supine_image *image);
@@ -61,10 +57,7 @@ void supine_image_free(supine_image *image);
 /** Write an image in the format of its name's ending; .nrrd, .nii.gz and .mha are compressed. The
  * file appears completely or not at all. An image of three channels is a field of
  * displacements, which every format stores in mm and LPS, as ITK and ANTs expect.
- * @param note  optional: one line for the header
- * @retval SUPINE_ERROR_ARGUMENT  the ending is not supported, or the image is too large or has too
- *             many channels for NIfTI-1
- * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */
+ * @param note  optional: one line for the header */
 supine_status supine_image_write(const char *path, const supine_image *image, const char *note,
                                  supine_error *error);
 

@@ -5,6 +5,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "base/arena.h"
 #include "base/output.h"
 #include "base/text.h"
 #include "base/vec3.h"
@@ -59,8 +60,9 @@ static bool is_frame(const supine_image *image) {
 }
 
 supine_status supine_image_read(const char *path, supine_image *image, supine_error *error) {
-  struct stat file = {0};
-  supine_image read = {.channels = 1};
+  struct stat about = {0};
+  SUPINE_FREED_BY(supine_image_free) supine_image read = {.channels = 1};
+  SUPINE_FREED_BY(supine_file_close) FILE *file = NULL;
   image_storage storage = {0};
   if (!supine_image_supports(path)) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
@@ -68,24 +70,20 @@ supine_status supine_image_read(const char *path, supine_image *image, supine_er
                             "other formats, for example with 3D Slicer",
                             path);
   }
-  if (stat(path, &file) != 0 || !S_ISREG(file.st_mode)) {
+  if (stat(path, &about) != 0 || !S_ISREG(about.st_mode) || (file = fopen(path, "rb")) == NULL) {
+    const bool other = about.st_mode != 0 && !S_ISREG(about.st_mode);
     return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path,
-                            file.st_mode == 0 ? strerror(errno) : "it is not a regular file");
+                            other ? "it is not a regular file" : strerror(errno));
   }
-  supine_status status = formats[format_of(path)].describe(path, &read, &storage, error);
-  if (status == SUPINE_OK && !is_frame(&read)) {
-    status = supine_error_set(
+  SUPINE_TRY(formats[format_of(path)].describe(path, file, &read, &storage, error));
+  if (!is_frame(&read)) {
+    return supine_error_set(
         error, SUPINE_ERROR_FORMAT,
         "%s: the header's axis directions are linearly dependent: write the image again", path);
   }
-  if (status == SUPINE_OK) {
-    status = supine_image_read_voxels(path, (size_t)file.st_size, &storage, &read, error);
-  }
-  if (status != SUPINE_OK) {
-    supine_image_free(&read);
-    return status;
-  }
+  SUPINE_TRY(supine_image_read_voxels(path, file, (size_t)about.st_size, &storage, &read, error));
   *image = read;
+  read.values = NULL;
   return SUPINE_OK;
 }
 
@@ -95,17 +93,11 @@ supine_status supine_image_write(const char *path, const supine_image *image, co
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "%s: end the name of an image in .nrrd, .nii, .nii.gz or .mha", path);
   }
-  supine_output output = {0};
-  supine_status status = supine_output_open(path, &output, error);
-  if (status == SUPINE_OK) {
-    status = formats[format_of(path)].write(path, image, note, output.file, error);
-    if (status == SUPINE_ERROR_MEMORY) {
-      (void)supine_error_set(error, status, "%s: out of memory", path);
-    }
-    if (status == SUPINE_OK) {
-      return supine_output_commit(&output, error);
-    }
-    supine_output_abandon(&output);
-  }
-  return status;
+  SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
+  SUPINE_TRY(supine_output_open(path, &output, error));
+  const supine_status status =
+      formats[format_of(path)].write(path, image, note, output.file, error);
+  return status == SUPINE_OK             ? supine_output_commit(&output, error)
+         : status == SUPINE_ERROR_MEMORY ? supine_error_memory(error, "writing %s", path)
+                                         : status;
 }

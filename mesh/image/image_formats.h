@@ -19,12 +19,11 @@ typedef struct image_storage {
   double slope, intercept; /* voxel = slope x number + intercept; not scaled if slope is 0 */
 } image_storage;
 
-/* Read the header, and fill `storage` and the image except its voxels.
- * Return SUPINE_ERROR_FORMAT, SUPINE_ERROR_READ or SUPINE_ERROR_MEMORY. */
-typedef supine_status image_describe(const char *path, supine_image *image, image_storage *storage,
-                                     supine_error *error);
-/* Write the header and the voxels. The caller checks the stream for write errors.
- * On failure, return SUPINE_ERROR_ARGUMENT or SUPINE_ERROR_MEMORY. */
+/* Read the header from `file`, and fill `storage` and the image except its voxels. */
+typedef supine_status image_describe(const char *path, FILE *file, supine_image *image,
+                                     image_storage *storage, supine_error *error);
+/* Write the header and the voxels. The caller checks the stream for write errors, and sets the
+ * error if the memory is short. */
 typedef supine_status image_write(const char *path, const supine_image *image, const char *note,
                                   FILE *file, supine_error *error);
 
@@ -35,14 +34,13 @@ image_write supine_image_write_nrrd, supine_image_write_nifti, supine_image_writ
 enum { IMAGE_ZLIB = 15, IMAGE_GZIP = 31 };
 
 /* Read the voxels. Refuse more voxels than a file of `file_size` bytes can hold, incomplete
- * streams, and wrong checksums.
- * Return SUPINE_ERROR_FORMAT, SUPINE_ERROR_READ or SUPINE_ERROR_MEMORY. */
-supine_status supine_image_read_voxels(const char *path, size_t file_size,
+ * streams, and wrong checksums. */
+supine_status supine_image_read_voxels(const char *path, FILE *file, size_t file_size,
                                        const image_storage *storage, supine_image *image,
                                        supine_error *error);
 
 /* Compress `head` (the header) and the voxels `values` into the file, in the format IMAGE_ZLIB or
- * IMAGE_GZIP. Return SUPINE_ERROR_MEMORY on failure. */
+ * IMAGE_GZIP. */
 supine_status supine_image_pack(int format, const void *head, size_t head_size,
                                 const supine_image *image, const void *values, FILE *file);
 

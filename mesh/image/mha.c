@@ -7,6 +7,7 @@
 #include <string.h>
 #include <strings.h>
 
+#include "base/arena.h"
 #include "base/vec3.h"
 
 #include "mesh/image/image_formats.h"
@@ -164,33 +165,28 @@ static const char *describe(const header *h, supine_image *image, size_t *type_i
   return NULL;
 }
 
-supine_status supine_image_describe_mha(const char *path, supine_image *image,
+supine_status supine_image_describe_mha(const char *path, FILE *file, supine_image *image,
                                         image_storage *storage, supine_error *error) {
-  FILE *file = fopen(path, "rb");
-  char *text = malloc(HEADER_MAX + 1);
-  const char *wrong = "cannot read: check its permissions, and the free memory";
-  supine_status status = file == NULL ? SUPINE_ERROR_READ : SUPINE_ERROR_MEMORY;
-  if (file != NULL && text != NULL) {
-    header h;
-    size_t type = 0;
-    text[fread(text, 1, HEADER_MAX, file)] = '\0';
-    wrong = read_header(text, &h);
-    wrong = wrong == NULL ? check(&h) : wrong;
-    wrong = wrong == NULL ? describe(&h, image, &type) : wrong;
-    status = wrong == NULL ? SUPINE_OK : SUPINE_ERROR_FORMAT;
-    *storage = (image_storage){
-        .offset = (int64_t)h.length,
-        .packed = is_true(value_of(&h, "CompressedData", "", "")),
-        .big_endian = is_true(value_of(&h, "BinaryDataByteOrderMSB", "ElementByteOrderMSB", "")),
-        .integer = !types[type].wide            ? 0
-                   : types[type].name[4] != 'U' ? 1
-                                                : -1};
+  SUPINE_ARENA arena = {0};
+  char *text = supine_arena_take(&arena, HEADER_MAX + 1, 1);
+  if (arena.failed) {
+    return supine_error_memory(error, "the header of %s", path);
   }
-  free(text);
-  if (file != NULL) {
-    (void)fclose(file);
-  }
-  return status == SUPINE_OK ? status : supine_error_set(error, status, "%s: %s", path, wrong);
+  header h;
+  size_t type = 0;
+  text[fread(text, 1, HEADER_MAX, file)] = '\0';
+  const char *wrong = read_header(text, &h);
+  wrong = wrong == NULL ? check(&h) : wrong;
+  wrong = wrong == NULL ? describe(&h, image, &type) : wrong;
+  *storage = (image_storage){
+      .offset = (int64_t)h.length,
+      .packed = is_true(value_of(&h, "CompressedData", "", "")),
+      .big_endian = is_true(value_of(&h, "BinaryDataByteOrderMSB", "ElementByteOrderMSB", "")),
+      .integer = !types[type].wide            ? 0
+                 : types[type].name[4] != 'U' ? 1
+                                              : -1};
+  return wrong == NULL ? SUPINE_OK
+                       : supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: %s", path, wrong);
 }
 
 static void write_header(const supine_image *image, const char *note, size_t packed, FILE *file) {

@@ -6,6 +6,7 @@
 
 #include <nifti2_io.h>
 
+#include "base/arena.h"
 #include "base/text.h"
 #include "base/vec3.h"
 
@@ -89,8 +90,9 @@ static supine_status check(const char *path, const nifti_image *nifti, supine_im
   return SUPINE_OK;
 }
 
-supine_status supine_image_describe_nifti(const char *path, supine_image *image,
+supine_status supine_image_describe_nifti(const char *path, FILE *file, supine_image *image,
                                           image_storage *storage, supine_error *error) {
+  (void)file;
   nifti_set_debug_level(0);
   nifti_image *nifti = nifti_image_read(path, 0);
   if (nifti == NULL) {
@@ -143,9 +145,9 @@ static void make_header(const supine_image *image, const char *note, unsigned ch
 /* Copy the vectors: first all x, then all y, then all z. Return NULL if out of memory. The vectors
  * stay in LPS: ITK and ANTs do not convert NIFTI_INTENT_VECTOR, and ITK before 5.3 reads only the
  * first component of NIFTI_INTENT_DISPVECT. */
-static float *planes(const supine_image *image) {
+static float *planes(const supine_image *image, supine_arena *arena) {
   const size_t count = image->size[0] * image->size[1] * image->size[2];
-  float *made = malloc(3 * count * sizeof *made);
+  float *made = supine_arena_take(arena, 3 * count, sizeof *made);
   for (size_t i = 0; made != NULL && i < 3 * count; ++i) {
     made[i % 3 * count + i / 3] = (float)supine_image_get(image, i);
   }
@@ -163,19 +165,16 @@ supine_status supine_image_write_nifti(const char *path, const supine_image *ima
                             "%d voxels along an axis: save it as .nrrd",
                             path, INT16_MAX);
   }
-  float *planar = vectors ? planes(image) : NULL;
-  if (vectors && planar == NULL) {
+  SUPINE_ARENA arena = {0};
+  const void *values = vectors ? planes(image, &arena) : image->values;
+  if (arena.failed) {
     return SUPINE_ERROR_MEMORY;
   }
-  supine_status status = SUPINE_OK;
-  const void *values = vectors ? planar : image->values;
   make_header(image, note, header);
   if (supine_text_ends_in(path, ".gz")) {
-    status = supine_image_pack(IMAGE_GZIP, header, sizeof header, image, values, file);
-  } else {
-    (void)fwrite(header, 1, sizeof header, file);
-    (void)fwrite(values, 1, supine_image_bytes(image), file);
+    return supine_image_pack(IMAGE_GZIP, header, sizeof header, image, values, file);
   }
-  free(planar);
-  return status;
+  (void)fwrite(header, 1, sizeof header, file);
+  (void)fwrite(values, 1, supine_image_bytes(image), file);
+  return SUPINE_OK;
 }

@@ -4,6 +4,7 @@
 
 #include <teem/nrrd.h>
 
+#include "base/arena.h"
 #include "base/library.h"
 #include "mesh/image/image_formats.h"
 
@@ -22,6 +23,10 @@ static const struct {
                                {nrrdTypeShort, "int16"}, {nrrdTypeUShort, "uint16"},
                                {nrrdTypeInt, "int32"},   {nrrdTypeUInt, "uint32"},
                                {nrrdTypeFloat, "float"}, {nrrdTypeDouble, "double"}};
+
+static supine_status malformed(const char *path, const char *what, supine_error *error) {
+  return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: %s", path, what);
+}
 
 /* Set the error to the last line of teem's message. */
 static supine_status teem_fails(const char *path, supine_error *error) {
@@ -42,8 +47,7 @@ static supine_status teem_fails(const char *path, supine_error *error) {
 static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState *io,
                            supine_image *image, image_storage *storage, supine_error *error) {
   if (io->detachedHeader || io->dataFNFormat != NULL || io->dataFNArr->len > 0) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: its voxels are in another file; save all in one file", path);
+    return malformed(path, "its voxels are in another file; save all in one file", error);
   }
   if (nrrd->dim != 3 || nrrd->spaceDim != 3) {
     return supine_error_set(
@@ -52,28 +56,23 @@ static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState
                        : "%s: the header lacks space directions for its %u axes; add them",
         path, nrrd->dim);
   }
-  double turn = 0.0;
-  switch (nrrd->space) {
-  case nrrdSpaceLeftPosteriorSuperior:
-    turn = 1.0;
-    break;
-  case nrrdSpaceRightAnteriorSuperior:
-    turn = -1.0;
-    break;
-  default:
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: its space is neither left-posterior-superior nor "
-                            "right-anterior-superior; convert the image to one of them",
-                            path);
+  const double turn = nrrd->space == nrrdSpaceLeftPosteriorSuperior   ? 1.0
+                      : nrrd->space == nrrdSpaceRightAnteriorSuperior ? -1.0
+                                                                      : 0.0;
+  if (turn == 0.0) {
+    return malformed(path,
+                     "its space is neither left-posterior-superior nor right-anterior-superior; "
+                     "convert the image to one of them",
+                     error);
   }
   storage->packed = io->encoding == *teem.nrrdEncodingGzip;
   storage->text = io->encoding == *teem.nrrdEncodingAscii;
   if ((io->encoding != *teem.nrrdEncodingRaw && !storage->packed && !storage->text) ||
       io->lineSkip != 0 || io->byteSkip != 0) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: its encoding is not raw, gzip or ascii, or its header skips lines "
-                            "or bytes; save the image again as gzip",
-                            path);
+    return malformed(path,
+                     "its encoding is not raw, gzip or ascii, or its header skips lines or bytes; "
+                     "save the image again as gzip",
+                     error);
   }
   const bool wide = nrrd->type == nrrdTypeLLong || nrrd->type == nrrdTypeULLong;
   size_t type = 0;
@@ -100,33 +99,25 @@ static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState
   return SUPINE_OK;
 }
 
-supine_status supine_image_describe_nrrd(const char *path, supine_image *image,
+supine_status supine_image_describe_nrrd(const char *path, FILE *file, supine_image *image,
                                          image_storage *storage, supine_error *error) {
-  supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_TEEM, FUNCTIONS, &teem, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(SUPINE_LIBRARY_LOAD(SUPINE_TEEM, FUNCTIONS, &teem, error));
   Nrrd *nrrd = teem.nrrdNew();
   NrrdIoState *io = teem.nrrdIoStateNew();
-  FILE *file = fopen(path, "rb");
-  if (nrrd == NULL || io == NULL || file == NULL) {
-    status = supine_error_set(error, file == NULL ? SUPINE_ERROR_READ : SUPINE_ERROR_MEMORY,
-                              "%s: cannot read: check its permissions, and the free memory", path);
-    goto cleanup;
+  supine_status status = SUPINE_ERROR_MEMORY;
+  if (nrrd == NULL || io == NULL) {
+    (void)supine_error_memory(error, "the header of %s", path);
+  } else {
+    io->skipData = AIR_TRUE;
+    io->keepNrrdDataFileOpen = AIR_TRUE;
+    status = teem.nrrdRead(nrrd, file, io) != 0 ? teem_fails(path, error)
+                                                : check(path, nrrd, io, image, storage, error);
+    storage->offset = ftello(file);
   }
-  io->skipData = AIR_TRUE;
-  io->keepNrrdDataFileOpen = AIR_TRUE;
-  status = teem.nrrdRead(nrrd, file, io) != 0 ? teem_fails(path, error)
-                                              : check(path, nrrd, io, image, storage, error);
-  storage->offset = status == SUPINE_OK ? ftello(file) : 0;
-cleanup:
   if (io != NULL) {
     (void)teem.nrrdIoStateNix(io);
   }
   (void)teem.nrrdNuke(nrrd);
-  if (file != NULL) {
-    (void)fclose(file);
-  }
   return status;
 }
 

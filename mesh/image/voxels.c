@@ -8,6 +8,8 @@
 #define ZLIB_CONST /* makes zlib declare next_in const */
 #include <zlib.h>
 
+#include "base/arena.h"
+
 #include "mesh/image/image_formats.h"
 
 enum { PIECE = 1 << 16, ANY_HEADER = 32 };
@@ -71,7 +73,7 @@ static supine_status rescale(const char *path, const image_storage *storage, sup
   const size_t count = image->size[0] * image->size[1] * image->size[2];
   float *values = malloc(count * sizeof *values);
   if (values == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
+    return supine_error_memory(error, "%zu voxels of %s", count, path);
   }
   for (size_t i = 0; i < count; ++i) {
     values[i] = (float)(slope * supine_image_get(image, i) + intercept);
@@ -91,7 +93,7 @@ static bool read_text(FILE *file, supine_image *image, size_t count) {
   return i == count;
 }
 
-supine_status supine_image_read_voxels(const char *path, size_t file_size,
+supine_status supine_image_read_voxels(const char *path, FILE *file, size_t file_size,
                                        const image_storage *storage, supine_image *image,
                                        supine_error *error) {
   static const double gzip_ratio = 1032.0; /* largest ratio of unpacked to packed size */
@@ -105,30 +107,24 @@ supine_status supine_image_read_voxels(const char *path, size_t file_size,
                             path, image->size[0], image->size[1], image->size[2], file_size);
   }
   const size_t count = image->size[0] * image->size[1] * image->size[2];
-  FILE *file = fopen(path, "rb");
   image->values = malloc(count * each);
-  supine_status status = SUPINE_OK;
-  if (file == NULL || image->values == NULL) {
-    status = supine_error_set(error, file == NULL ? SUPINE_ERROR_READ : SUPINE_ERROR_MEMORY,
-                              "%s: cannot read: check its permissions, and the free memory", path);
-  } else if (fseeko(file, storage->offset, SEEK_SET) != 0 ||
-             !(storage->packed
-                   ? inflate_into(file, (uint64_t)storage->skip, image->values, count * each)
-               : storage->text ? read_text(file, image, count)
-                               : fread(image->values, each, count, file) == count)) {
-    status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s: truncated or damaged; fetch or write the file again", path);
+  if (image->values == NULL) {
+    return supine_error_memory(error, "%zu voxels of %s", count, path);
   }
-  if (file != NULL) {
-    (void)fclose(file);
+  if (fseeko(file, storage->offset, SEEK_SET) != 0 ||
+      !(storage->packed ? inflate_into(file, (uint64_t)storage->skip, image->values, count * each)
+        : storage->text ? read_text(file, image, count)
+                        : fread(image->values, each, count, file) == count)) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s: truncated or damaged; fetch or write the file again", path);
   }
-  if (status == SUPINE_OK && storage->big_endian && !storage->text) {
+  if (storage->big_endian && !storage->text) {
     swap_bytes(image->values, count, each);
   }
-  if (status == SUPINE_OK && storage->integer != 0 && !storage->text) {
+  if (storage->integer != 0 && !storage->text) {
     widen(image->values, count, storage->integer > 0);
   }
-  return status == SUPINE_OK ? rescale(path, storage, image, error) : status;
+  return rescale(path, storage, image, error);
 }
 
 supine_status supine_image_pack(int format, const void *head, size_t head_size,

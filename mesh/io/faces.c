@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/vec3.h"
 
 #include "mesh/io/read.h"
@@ -61,8 +62,7 @@ static supine_status make_room(mesh_faces *faces, size_t triangles, supine_error
                         ? NULL
                         : realloc(faces->mesh->triangles, 3 * capacity * sizeof *grown);
   if (grown == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory for %zu triangles",
-                            faces->path, capacity);
+    return supine_error_memory(error, "%zu triangles of %s", capacity, faces->path);
   }
   faces->mesh->triangles = grown;
   faces->capacity = capacity;
@@ -92,10 +92,8 @@ supine_status supine_mesh_faces_add(mesh_faces *faces, const double *corners, si
     ++faces->dropped;
     return SUPINE_OK;
   }
-  const supine_status status = make_room(faces, count - 2, error);
-  if (status == SUPINE_OK) {
-    cut(mesh->vertices, corner, count, mesh->triangles + 3 * mesh->triangle_count);
-    mesh->triangle_count += count - 2;
-  }
-  return status;
+  SUPINE_TRY(make_room(faces, count - 2, error));
+  cut(mesh->vertices, corner, count, mesh->triangles + 3 * mesh->triangle_count);
+  mesh->triangle_count += count - 2;
+  return SUPINE_OK;
 }

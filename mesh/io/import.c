@@ -16,6 +16,7 @@
 #include <assimp/config.h>
 #include <assimp/scene.h>
 
+#include "base/arena.h"
 #include "base/library.h"
 #include "mesh/io/read.h"
 
@@ -82,8 +83,7 @@ static bool take_vertices(const struct aiMesh *part, const struct aiMatrix4x4 *t
   double *grown =
       count > MESH_VERTICES_MAX ? NULL : realloc(mesh->vertices, (3 * count + 1) * sizeof *grown);
   if (grown == NULL) {
-    (void)supine_error_set(out->error, SUPINE_ERROR_MEMORY, "%s: out of memory for %zu vertices",
-                           out->faces.path, count);
+    (void)supine_error_memory(out->error, "%zu vertices of %s", count, out->faces.path);
     return false;
   }
   mesh->vertices = grown;
@@ -185,16 +185,13 @@ static supine_status take_outcome(const char *path, FILE *stream, supine_mesh *m
       return supine_error_set(error, result.error.status, "%s", result.error.message);
     }
     *dropped = result.dropped;
-    mesh->vertices = malloc((3 * result.vertex_count + 1) * sizeof *mesh->vertices);
-    mesh->triangles = malloc((3 * result.triangle_count + 1) * sizeof *mesh->triangles);
-    if (mesh->vertices == NULL || mesh->triangles == NULL) {
-      return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
+    const size_t n = result.vertex_count;
+    const size_t triangles = result.triangle_count;
+    if (supine_mesh_allocate(n, triangles, mesh) != SUPINE_OK) {
+      return supine_error_memory(error, "%zu vertices of %s", n, path);
     }
-    mesh->vertex_count = fread(mesh->vertices, 3 * sizeof(double), result.vertex_count, stream);
-    mesh->triangle_count =
-        fread(mesh->triangles, 3 * sizeof(uint32_t), result.triangle_count, stream);
-    if (mesh->vertex_count == result.vertex_count &&
-        mesh->triangle_count == result.triangle_count) {
+    if (fread(mesh->vertices, 3 * sizeof(double), n, stream) == n &&
+        fread(mesh->triangles, 3 * sizeof(uint32_t), triangles, stream) == triangles) {
       return SUPINE_OK;
     }
   }
@@ -208,12 +205,11 @@ static supine_status import_file(const mesh_file *file, const char *kind, supine
                                  size_t *dropped, supine_error *error) {
   struct stat about = {0};
   const int descriptor = memfd_create("mesh", MFD_CLOEXEC);
+  SUPINE_FREED_BY(supine_file_close)
   FILE *stream = descriptor < 0 ? NULL : fdopen(descriptor, "w+b");
   if (stream == NULL) {
-    if (descriptor >= 0) {
-      (void)close(descriptor);
-    }
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", file->path);
+    (void)close(descriptor);
+    return supine_error_memory(error, "%s", file->path);
   }
   (void)stat(file->path, &about);
   const pid_t child = fork();
@@ -222,9 +218,7 @@ static supine_status import_file(const mesh_file *file, const char *kind, supine
   }
   while (child > 0 && waitpid(child, NULL, 0) < 0 && errno == EINTR) {
   }
-  const supine_status status = take_outcome(file->path, stream, mesh, dropped, error);
-  (void)fclose(stream);
-  return status;
+  return take_outcome(file->path, stream, mesh, dropped, error);
 }
 
 supine_status supine_mesh_import(mesh_file *file, supine_mesh *mesh, size_t *dropped,
@@ -233,9 +227,10 @@ supine_status supine_mesh_import(mesh_file *file, supine_mesh *mesh, size_t *dro
 }
 
 /* Check that three numbers follow `keyword` in every line that begins with it, because assimp does
- * not check this. Return the number of the first wrong line, or 0. Also turn mtllib lines, which
- * name a file of colours, into comments, and set `last` to the first word of the last line. */
-static size_t check_lines(mesh_file *file, const char *keyword, mesh_text *last) {
+ * not check this. Also turn mtllib lines, which name a file of colours, into comments, and set
+ * `last` to the first word of the last line. */
+static supine_status check_lines(mesh_file *file, const char *keyword, mesh_text *last,
+                                 supine_error *error) {
   mesh_text text = {file->bytes, file->bytes + file->size};
   mesh_text line;
   for (size_t number = 1; supine_mesh_text_line(&text, &line); ++number) {
@@ -248,26 +243,20 @@ static size_t check_lines(mesh_file *file, const char *keyword, mesh_text *last)
     if (supine_mesh_text_is(word, "mtllib")) {
       file->bytes[word.at - file->bytes] = '#';
     } else if (supine_mesh_text_is(word, keyword) && !supine_mesh_text_position(&line, position)) {
-      return number;
+      return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "%s: line %zu: a vertex needs three numbers; save the mesh again",
+                              file->path, number);
     }
   }
-  return 0;
-}
-
-static supine_status bad_line(const mesh_file *file, size_t number, supine_error *error) {
-  return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                          "%s: line %zu: a vertex needs three numbers; save the mesh again",
-                          file->path, number);
+  return SUPINE_OK;
 }
 
 supine_status supine_mesh_read_obj(mesh_file *file, supine_mesh *mesh, size_t *dropped,
                                    supine_error *error) {
   mesh_text last;
-  if (!supine_mesh_guard_text(file, error)) {
-    return SUPINE_ERROR_FORMAT;
-  }
-  const size_t bad = check_lines(file, "v", &last);
-  return bad > 0 ? bad_line(file, bad, error) : import_file(file, "obj", mesh, dropped, error);
+  SUPINE_TRY(supine_mesh_guard_text(file, error));
+  SUPINE_TRY(check_lines(file, "v", &last, error));
+  return import_file(file, "obj", mesh, dropped, error);
 }
 
 /* Read STL, as text or binary. A file with a NUL byte is binary, even if it begins with "solid". */
@@ -275,10 +264,7 @@ supine_status supine_mesh_read_stl(mesh_file *file, supine_mesh *mesh, size_t *d
                                    supine_error *error) {
   mesh_text last = {0};
   if (memchr(file->bytes, '\0', file->size) == NULL) {
-    const size_t bad = check_lines(file, "vertex", &last);
-    if (bad > 0) {
-      return bad_line(file, bad, error);
-    }
+    SUPINE_TRY(check_lines(file, "vertex", &last, error));
     if (!supine_mesh_text_is(last, "endsolid")) {
       return supine_error_set(
           error, SUPINE_ERROR_FORMAT,

@@ -4,10 +4,10 @@
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 
+#include "base/arena.h"
 #include "base/text.h"
 
 #include "mesh/io/read.h"
@@ -76,29 +76,23 @@ static void find_space(mesh_file *file) {
   }
 }
 
-static supine_status read_file(mesh_file *file, mesh_reader **reader, supine_error *error) {
+static supine_status read_file(mesh_file *file, supine_arena *arena, mesh_reader **reader,
+                               supine_error *error) {
   size_t size = 0;
-  supine_status status = check_file(file->path, &size, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  FILE *stream = fopen(file->path, "rb");
+  SUPINE_TRY(check_file(file->path, &size, error));
+  SUPINE_FREED_BY(supine_file_close) FILE *stream = fopen(file->path, "rb");
   if (stream == NULL) {
     return cannot_read(file->path, error);
   }
-  file->bytes = malloc(size + 1);
-  if (file->bytes == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory for %zu bytes",
-                              file->path, size);
-  } else {
-    errno = 0;
-    file->size = fread(file->bytes, 1, size, stream);
-    file->bytes[file->size] = '\0';
-    status = ferror(stream) != 0 ? cannot_read(file->path, error) : SUPINE_OK;
+  file->bytes = supine_arena_take(arena, size + 1, 1);
+  if (arena->failed) {
+    return supine_error_memory(error, "%zu bytes of %s", size, file->path);
   }
-  (void)fclose(stream);
-  if (status != SUPINE_OK) {
-    return status;
+  errno = 0;
+  file->size = fread(file->bytes, 1, size, stream);
+  file->bytes[file->size] = '\0';
+  if (ferror(stream) != 0) {
+    return cannot_read(file->path, error);
   }
   find_space(file);
   *reader = find_reader(file->path);
@@ -164,35 +158,26 @@ supine_status supine_mesh_load(const char *path, const supine_mesh_load_options 
                             "%s: %g mm per unit is not a positive number; correct --units", path,
                             scale);
   }
-  supine_mesh loaded = {0};
+  SUPINE_ARENA arena = {0};
+  SUPINE_FREED_BY(supine_mesh_free) supine_mesh loaded = {0};
   supine_mesh_report found = {0};
   mesh_file file = {.path = path};
   mesh_reader *reader = NULL;
-  supine_status status = SUPINE_OK;
-  if ((status = read_file(&file, &reader, error)) != SUPINE_OK ||
-      (status = reader(&file, &loaded, &found.degenerate_faces, error)) != SUPINE_OK ||
-      (status = choose_axes(&file, chosen.axes, &found, error)) != SUPINE_OK ||
-      (status = convert(path, scale, found.axes, &loaded, error)) != SUPINE_OK) {
-    goto cleanup;
-  }
-  status = supine_mesh_weld(&loaded, &found);
-  if (status != SUPINE_OK) {
-    (void)supine_error_set(error, status, "%s: out of memory", path);
-    goto cleanup;
+  SUPINE_TRY(read_file(&file, &arena, &reader, error));
+  SUPINE_TRY(reader(&file, &loaded, &found.degenerate_faces, error));
+  SUPINE_TRY(choose_axes(&file, chosen.axes, &found, error));
+  SUPINE_TRY(convert(path, scale, found.axes, &loaded, error));
+  if (supine_mesh_weld(&loaded, &found) != SUPINE_OK) {
+    return supine_error_memory(error, "%zu vertices of %s", loaded.vertex_count, path);
   }
   if (loaded.triangle_count == 0) {
-    status = supine_error_set(error, SUPINE_ERROR_MESH,
-                              "%s: no triangles; give a surface, not points or lines", path);
-    goto cleanup;
+    return supine_error_set(error, SUPINE_ERROR_MESH,
+                            "%s: no triangles; give a surface, not points or lines", path);
   }
   *mesh = loaded;
   loaded = (supine_mesh){0};
   if (report != NULL) {
     *report = found;
   }
-
-cleanup:
-  supine_mesh_free(&loaded);
-  free(file.bytes);
-  return status;
+  return SUPINE_OK;
 }

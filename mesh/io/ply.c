@@ -2,6 +2,8 @@
 /* Read the vertices and faces of a PLY file. A file shorter than its header says is refused. */
 #include <stdlib.h>
 
+#include "base/arena.h"
+
 #include "mesh/io/read.h"
 
 enum { ELEMENTS_MAX = 32, PROPERTIES_MAX = 256 };
@@ -38,6 +40,10 @@ typedef struct ply {
   property properties[PROPERTIES_MAX];
   mesh_faces faces;
 } ply;
+
+static supine_status malformed(const ply *in, const char *what) {
+  return supine_error_set(in->error, SUPINE_ERROR_FORMAT, "%s: %s", in->file->path, what);
+}
 
 /* Return the index of a word in a list that ends with NULL, or the index of the NULL. */
 static int find_name(mesh_text word, const char *const *names) {
@@ -116,32 +122,25 @@ static bool read_line(ply *in, mesh_text line, bool *has_format) {
 }
 
 static supine_status read_header(ply *in) {
-  const char *path = in->file->path;
   mesh_text line;
   bool has_format = false;
   if (!supine_mesh_text_line(&in->text, &line) || !supine_mesh_text_is(line, "ply")) {
-    return supine_error_set(in->error, SUPINE_ERROR_FORMAT,
-                            "%s: does not begin with \"ply\"; give a PLY file", path);
+    return malformed(in, "does not begin with \"ply\"; give a PLY file");
   }
   for (size_t number = 2; supine_mesh_text_line(&in->text, &line); ++number) {
     mesh_text rest = line;
     mesh_text word;
     if (supine_mesh_text_word(&rest, &word) && supine_mesh_text_is(word, "end_header")) {
       return has_format ? SUPINE_OK
-                        : supine_error_set(in->error, SUPINE_ERROR_FORMAT,
-                                           "%s: the PLY header has no format line; save the mesh "
-                                           "again",
-                                           path);
+                        : malformed(in, "the PLY header has no format line; save the mesh again");
     }
     if (!read_line(in, line, &has_format)) {
       return supine_error_set(in->error, SUPINE_ERROR_FORMAT,
                               "%s: line %zu of the PLY header is malformed; save the mesh again",
-                              path, number);
+                              in->file->path, number);
     }
   }
-  return supine_error_set(
-      in->error, SUPINE_ERROR_FORMAT,
-      "%s: the PLY header has no end_header: the file is truncated; save it again", path);
+  return malformed(in, "the PLY header has no end_header: the file is truncated; save it again");
 }
 
 static supine_status check_header(const ply *in) {
@@ -158,9 +157,7 @@ static supine_status check_header(const ply *in) {
                               "%s: it has strips of triangles; save the mesh as triangles", path);
     }
   }
-  if (in->encoding == ASCII && !supine_mesh_guard_text(in->file, in->error)) {
-    return SUPINE_ERROR_FORMAT;
-  }
+  SUPINE_TRY(in->encoding == ASCII ? supine_mesh_guard_text(in->file, in->error) : SUPINE_OK);
   return (in->present & needed) == needed
              ? SUPINE_OK
              : supine_error_set(
@@ -232,16 +229,15 @@ static supine_status take_list(ply *in, const element *of, uint64_t item, const 
 
 static supine_status take_items(ply *in, const element *of) {
   double *vertices = in->faces.mesh->vertices;
-  supine_status status = SUPINE_OK;
-  for (uint64_t i = 0; status == SUPINE_OK && i < of->count; ++i) {
+  for (uint64_t i = 0; i < of->count; ++i) {
     if (in->encoding == ASCII && !supine_mesh_text_line(&in->text, &in->line)) {
       return cut_short(in, of, i);
     }
-    for (size_t p = 0; p < of->property_count && status == SUPINE_OK; ++p) {
+    for (size_t p = 0; p < of->property_count; ++p) {
       const property *item = &in->properties[of->first_property + p];
       double value = 0.0;
       if (item->count != NULL) {
-        status = take_list(in, of, i, item);
+        SUPINE_TRY(take_list(in, of, i, item));
       } else if (!take(in, item->type, &value)) {
         return cut_short(in, of, i);
       } else if (item->role <= Z) {
@@ -249,7 +245,7 @@ static supine_status take_items(ply *in, const element *of) {
       }
     }
   }
-  return status;
+  return SUPINE_OK;
 }
 
 /* Allocate the vertices that the header announces, at most as many as the file can hold. */
@@ -271,7 +267,7 @@ static supine_status make_room(const ply *in, const element *of, supine_mesh *me
   mesh->vertex_count = (size_t)count;
   mesh->vertices = malloc((size_t)count * 3 * sizeof *mesh->vertices);
   return mesh->vertices == NULL
-             ? supine_error_set(in->error, SUPINE_ERROR_MEMORY, "%s: out of memory", in->file->path)
+             ? supine_error_memory(in->error, "%zu vertices of %s", (size_t)count, in->file->path)
              : SUPINE_OK;
 }
 
@@ -281,18 +277,16 @@ supine_status supine_mesh_read_ply(mesh_file *file, supine_mesh *mesh, size_t *d
             .error = error,
             .text = {file->bytes, file->bytes + file->size},
             .faces = {.path = file->path, .mesh = mesh}};
-  supine_status status = read_header(&in);
-  status = status == SUPINE_OK ? check_header(&in) : status;
-  for (size_t e = 0; e < in.element_count && status == SUPINE_OK; ++e) {
+  SUPINE_TRY(read_header(&in));
+  SUPINE_TRY(check_header(&in));
+  for (size_t e = 0; e < in.element_count; ++e) {
     const element *of = &in.elements[e];
     if (of->kind == FACES && mesh->vertices == NULL) {
-      status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%s: its faces come before its vertices; save the mesh again",
-                                file->path);
+      return malformed(&in, "its faces come before its vertices; save the mesh again");
     }
-    status = status == SUPINE_OK && of->kind == VERTICES ? make_room(&in, of, mesh) : status;
-    status = status == SUPINE_OK ? take_items(&in, of) : status;
+    SUPINE_TRY(of->kind == VERTICES ? make_room(&in, of, mesh) : SUPINE_OK);
+    SUPINE_TRY(take_items(&in, of));
   }
   *dropped = in.faces.dropped;
-  return status;
+  return SUPINE_OK;
 }

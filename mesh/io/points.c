@@ -7,6 +7,7 @@
 
 #include <jansson.h>
 
+#include "base/arena.h"
 #include "base/csv.h"
 #include "base/text.h"
 
@@ -21,7 +22,7 @@ typedef struct reading {
 } reading;
 
 static supine_status no_memory(const reading *r) {
-  return supine_error_set(r->error, SUPINE_ERROR_MEMORY, "%s: out of memory", r->path);
+  return supine_error_memory(r->error, "%zu points of %s", r->points.count, r->path);
 }
 
 /* Append a point. Convert it from `axes` and `unit`, unless the options name others. */
@@ -61,26 +62,21 @@ static supine_status add(reading *r, const double at[3], const char *name, supin
 static supine_status read_csv(reading *r) {
   static const char *const columns[] = {"x", "y", "z", "name", "label"};
   enum { NAME = 3, LABEL, COLUMNS };
-  supine_csv csv;
-  bool more = true;
-  supine_status status = supine_csv_open(r->path, columns, COLUMNS, NAME, &csv, r->error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  while ((status = supine_csv_next(&csv, &more, r->error)) == SUPINE_OK && more) {
-    double at[3] = {0.0, 0.0, 0.0};
-    for (size_t k = 0; k < 3 && status == SUPINE_OK; ++k) {
-      status = supine_csv_number(&csv, k, columns[k], &at[k], r->error);
+  SUPINE_FREED_BY(supine_csv_close) supine_csv csv;
+  SUPINE_TRY(supine_csv_open(r->path, columns, COLUMNS, NAME, &csv, r->error));
+  for (bool more = true;;) {
+    SUPINE_TRY(supine_csv_next(&csv, &more, r->error));
+    if (!more) {
+      return SUPINE_OK;
+    }
+    double at[3];
+    for (size_t k = 0; k < 3; ++k) {
+      SUPINE_TRY(supine_csv_number(&csv, k, columns[k], &at[k], r->error));
     }
     const char *name = supine_csv_text(&csv, NAME);
     name = name != NULL ? name : supine_csv_text(&csv, LABEL);
-    status = status == SUPINE_OK ? add(r, at, name, SUPINE_AXES_LPS, 1.0) : status;
-    if (status != SUPINE_OK) {
-      break;
-    }
+    SUPINE_TRY(add(r, at, name, SUPINE_AXES_LPS, 1.0));
   }
-  supine_csv_close(&csv);
-  return status;
 }
 
 static supine_status read_markup(reading *r, const json_t *markup) {
@@ -91,8 +87,7 @@ static supine_status read_markup(reading *r, const json_t *markup) {
   double scale = 1.0;
   (void)(unit != NULL && supine_mesh_unit_find(unit, &scale));
   const json_t *list = json_object_get(markup, "controlPoints");
-  supine_status status = SUPINE_OK;
-  for (size_t i = 0; i < json_array_size(list) && status == SUPINE_OK; ++i) {
+  for (size_t i = 0; i < json_array_size(list); ++i) {
     const json_t *point = json_array_get(list, i);
     const char *placed = json_string_value(json_object_get(point, "positionStatus"));
     const json_t *position = json_object_get(point, "position");
@@ -104,30 +99,29 @@ static supine_status read_markup(reading *r, const json_t *markup) {
       const json_t *number = json_array_get(position, k);
       at[k] = json_is_number(number) ? json_number_value(number) : NAN;
     }
-    status = isfinite(at[0]) && isfinite(at[1]) && isfinite(at[2])
-                 ? add(r, at, json_string_value(json_object_get(point, "label")), axes, scale)
-                 : supine_error_set(
-                       r->error, SUPINE_ERROR_FORMAT,
-                       "%s: control point %zu has no position of three numbers: place or delete it",
-                       r->path, i + 1);
+    if (!isfinite(at[0]) || !isfinite(at[1]) || !isfinite(at[2])) {
+      return supine_error_set(
+          r->error, SUPINE_ERROR_FORMAT,
+          "%s: control point %zu has no position of three numbers: place or delete it", r->path,
+          i + 1);
+    }
+    SUPINE_TRY(add(r, at, json_string_value(json_object_get(point, "label")), axes, scale));
   }
-  return status;
+  return SUPINE_OK;
 }
 
 static supine_status read_markups(reading *r) {
   json_error_t why;
-  json_t *root = json_load_file(r->path, 0, &why);
+  json_auto_t *root = json_load_file(r->path, 0, &why);
   if (root == NULL) {
     return supine_error_set(r->error, why.line < 0 ? SUPINE_ERROR_READ : SUPINE_ERROR_FORMAT,
                             "%s:%d: %s", r->path, why.line < 0 ? 0 : why.line, why.text);
   }
   const json_t *markups = json_object_get(root, "markups");
-  supine_status status = SUPINE_OK;
-  for (size_t i = 0; i < json_array_size(markups) && status == SUPINE_OK; ++i) {
-    status = read_markup(r, json_array_get(markups, i));
+  for (size_t i = 0; i < json_array_size(markups); ++i) {
+    SUPINE_TRY(read_markup(r, json_array_get(markups, i)));
   }
-  json_decref(root);
-  return status;
+  return SUPINE_OK;
 }
 
 bool supine_mesh_points_named(const char *path) {

@@ -14,8 +14,7 @@ typedef struct supine_mesh_points {
 /** Read points from a CSV file with the columns x,y,z and optionally name (or label), or from 3D
  * Slicer's .mrk.json (placed control points, in the file's coordinate system).
  * @param options  axes and unit to use instead of the file's; NULL for the file's own
- * @param points   zero-initialised; written only on success
- * @retval SUPINE_ERROR_READ, SUPINE_ERROR_FORMAT, SUPINE_ERROR_MEMORY */
+ * @param points   zero-initialised; written only on success */
 supine_status supine_mesh_points_read(const char *path, const supine_mesh_load_options *options,
                                       supine_mesh_points *points, supine_error *error);
 void supine_mesh_points_free(supine_mesh_points *points);

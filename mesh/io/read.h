@@ -54,8 +54,8 @@ typedef struct mesh_file {
 } mesh_file;
 
 /** Refuse a text with a NUL byte, or with a CR that no LF follows: other readers would split its
- * lines differently. Return false, with SUPINE_ERROR_FORMAT set, if the text is refused. */
-bool supine_mesh_guard_text(const mesh_file *file, supine_error *error);
+ * lines differently. */
+supine_status supine_mesh_guard_text(const mesh_file *file, supine_error *error);
 
 /* ---- faces.c: add faces to a mesh that already has its vertices. ---- */
 
@@ -74,8 +74,7 @@ typedef struct mesh_faces {
 } mesh_faces;
 
 /** Cut a face into triangles, and add them. A face of more than MESH_CORNERS_MAX corners is refused
- * without reading `corners`.
- * @retval SUPINE_ERROR_FORMAT  a corner names no vertex, or there are too many corners */
+ * without reading `corners`. */
 supine_status supine_mesh_faces_add(mesh_faces *faces, const double *corners, size_t count,
                                     supine_error *error);
 

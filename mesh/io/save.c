@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Save a surface in the format of the name's ending. */
+#include "base/arena.h"
 #include "base/output.h"
 #include "base/text.h"
 
@@ -31,22 +32,12 @@ supine_status supine_mesh_save(const char *path, const supine_mesh *mesh,
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "%s: unknown ending; end the name in " SUPINE_MESH_ENDINGS, path);
   }
-  supine_output output;
-  supine_status status = supine_mesh_writer_check(path, mesh, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  status = supine_output_open(path, &output, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(supine_mesh_writer_check(path, mesh, error));
+  SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
+  SUPINE_TRY(supine_output_open(path, &output, error));
   mesh_writer writer;
   supine_mesh_writer_begin(mesh, options, &writer);
   writer.out = output.file;
-  status = function(&writer);
-  if (status != SUPINE_OK) {
-    supine_output_abandon(&output);
-    return supine_error_set(error, status, "%s: out of memory", path);
-  }
-  return supine_output_commit(&output, error);
+  return function(&writer) == SUPINE_OK ? supine_output_commit(&output, error)
+                                        : supine_error_memory(error, "writing %s", path);
 }

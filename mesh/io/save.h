@@ -35,8 +35,7 @@ void supine_mesh_writer_triangle(const mesh_writer *writer, size_t t, uint32_t c
 /** Fill a writer, except `out`, from the arguments of supine_mesh_save. */
 void supine_mesh_writer_begin(const supine_mesh *mesh, const supine_mesh_save_options *options,
                               mesh_writer *writer);
-/** Check that a surface can be saved. Return SUPINE_ERROR_ARGUMENT if its counts exceed what files
- * can hold, SUPINE_ERROR_MESH if a coordinate is not finite. */
+/** Check that files can hold a surface of this size, and that its coordinates are finite. */
 supine_status supine_mesh_writer_check(const char *path, const supine_mesh *mesh,
                                        supine_error *error);
 
@@ -44,8 +43,8 @@ supine_status supine_mesh_writer_check(const char *path, const supine_mesh *mesh
 void supine_mesh_put_f32(unsigned char **at, const float *values, size_t count);
 void supine_mesh_put_u32(unsigned char **at, const uint32_t *values, size_t count);
 
-/** Write a surface in one format. The caller checks the stream for write errors.
- * @retval SUPINE_ERROR_MEMORY */
+/** Write a surface in one format. The caller checks the stream for write errors. On failure, the
+ * memory is short. */
 typedef supine_status save_function(const mesh_writer *writer);
 #define SUPINE_MESH_SAVE(name) save_function supine_mesh_save_##name;
 SUPINE_MESH_FORMATS(SUPINE_MESH_SAVE, SUPINE_MESH_SAVE)

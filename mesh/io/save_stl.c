@@ -11,14 +11,12 @@ enum { HEADER = 80, FACET = 50 };
 
 /* Find the unit normal of a triangle; 0 if its corners are collinear. */
 static void facet_normal(float corners[3][3], float normal[3]) {
-  double side[2][3];
-  for (int k = 0; k < 2; ++k) {
-    for (int axis = 0; axis < 3; ++axis) {
-      side[k][axis] = (double)corners[k + 1][axis] - (double)corners[0][axis];
-    }
-  }
+  double p[3][3];
   double n[3];
-  supine_cross(side[0], side[1], n);
+  for (int k = 0; k < 9; ++k) {
+    p[k / 3][k % 3] = (double)corners[k / 3][k % 3];
+  }
+  supine_normal(p[0], p[1], p[2], n);
   const double length = supine_length(n);
   const double scale = length > 0.0 && isfinite(length) ? 1.0 / length : 0.0;
   for (int axis = 0; axis < 3; ++axis) {

@@ -6,6 +6,7 @@
 
 #include <libdeflate.h>
 
+#include "base/arena.h"
 #include "base/output.h"
 #include "base/parallel.h"
 
@@ -17,6 +18,8 @@ typedef struct vtp vtp;
 
 /* Write the bytes of item `i` of an array to *at, and advance *at. */
 typedef void vtp_put(const vtp *file, size_t i, unsigned char **at);
+/* Compute the numbers of item `i`. */
+typedef void vtp_numbers(const mesh_writer *writer, size_t i, float *numbers);
 
 typedef struct vtp_array {
   const char *type;
@@ -24,11 +27,14 @@ typedef struct vtp_array {
   unsigned components;
   size_t item_size; /* size of the data of one point or triangle, bytes: 1, 4 or 12 */
   size_t count;
-  bool constant; /* whether the array is equal in all frames and written once */
-  vtp_put *put;
+  bool constant;        /* whether the array is equal in all frames and written once */
+  vtp_put *put;         /* NULL for the numbers that `numbers` computes, */
+  vtp_numbers *numbers; /* without the first `skip` */
+  size_t skip;
 } vtp_array;
 
 struct vtp {
+  supine_arena arena;
   mesh_writer writer;
   vtp_array arrays[VTP_ARRAYS]; /* points, connectivity, offsets, then point data */
   size_t array_count;
@@ -52,12 +58,6 @@ static size_t room_of_block(void) {
   return libdeflate_zlib_compress_bound(NULL, BLOCK);
 }
 
-static void put_point(const vtp *file, size_t i, unsigned char **at) {
-  float position[3];
-  supine_mesh_writer_position(&file->writer, i, position);
-  supine_mesh_put_f32(at, position, 3);
-}
-
 static void put_connectivity(const vtp *file, size_t i, unsigned char **at) {
   uint32_t corner[3];
   supine_mesh_writer_triangle(&file->writer, i, corner);
@@ -70,26 +70,8 @@ static void put_offset(const vtp *file, size_t i, unsigned char **at) {
   supine_mesh_put_u32(at, &stop, 1);
 }
 
-static void put_displacement(const vtp *file, size_t i, unsigned char **at) {
-  float displacement[4];
-  supine_mesh_writer_displacement(&file->writer, i, displacement);
-  supine_mesh_put_f32(at, displacement, 3);
-}
-
-static void put_magnitude(const vtp *file, size_t i, unsigned char **at) {
-  float displacement[4];
-  supine_mesh_writer_displacement(&file->writer, i, displacement);
-  supine_mesh_put_f32(at, displacement + 3, 1);
-}
-
 static void put_expected_error(const vtp *file, size_t i, unsigned char **at) {
   supine_mesh_put_f32(at, file->writer.options.expected_error + i, 1);
-}
-
-static void put_normal(const vtp *file, size_t i, unsigned char **at) {
-  float normal[3];
-  supine_mesh_writer_normal(&file->writer, i, normal);
-  supine_mesh_put_f32(at, normal, 3);
 }
 
 static void put_lung(const vtp *file, size_t i, unsigned char **at) {
@@ -97,12 +79,7 @@ static void put_lung(const vtp *file, size_t i, unsigned char **at) {
 }
 
 static void vtp_end(vtp *file) {
-  free(file->offsets);
-  free(file->raw);
-  free(file->packed);
-  free(file->sizes);
-  file->offsets = file->sizes = NULL;
-  file->raw = file->packed = NULL;
+  supine_arena_free(&file->arena);
 }
 
 static supine_status vtp_begin(vtp *file) {
@@ -110,34 +87,35 @@ static supine_status vtp_begin(vtp *file) {
   const size_t points = writer->mesh->vertex_count;
   const size_t triangles = writer->mesh->triangle_count;
   vtp_array *to = file->arrays;
-  *to++ = (vtp_array){"Float32", "Points", 3, 12, points, false, put_point};
-  *to++ = (vtp_array){"Int32", "connectivity", 1, 12, triangles, true, put_connectivity};
-  *to++ = (vtp_array){"Int32", "offsets", 1, 4, triangles, true, put_offset};
+  *to++ =
+      (vtp_array){"Float32", "Points", 3, 12, points, false, NULL, supine_mesh_writer_position, 0};
+  *to++ = (vtp_array){"Int32", "connectivity", 1, 12, triangles, true, put_connectivity, NULL, 0};
+  *to++ = (vtp_array){"Int32", "offsets", 1, 4, triangles, true, put_offset, NULL, 0};
   if (writer->options.from != NULL) {
-    *to++ = (vtp_array){"Float32", "displacement", 3, 12, points, false, put_displacement};
-    *to++ = (vtp_array){"Float32", "displacement_magnitude", 1, 4, points, false, put_magnitude};
+    vtp_numbers *const numbers = supine_mesh_writer_displacement;
+    *to++ = (vtp_array){"Float32", "displacement", 3, 12, points, false, NULL, numbers, 0};
+    *to++ = (vtp_array){"Float32", "displacement_magnitude", 1, 4, points, false, NULL, numbers, 3};
   }
   if (writer->options.expected_error != NULL) {
-    *to++ = (vtp_array){"Float32", "expected_error_mm", 1, 4, points, false, put_expected_error};
+    *to++ = (vtp_array){"Float32", "expected_error_mm", 1,    4, points,
+                        false,     put_expected_error,  NULL, 0};
   }
   if (writer->options.normals != NULL) {
-    *to++ = (vtp_array){"Float32", "Normals", 3, 12, points, false, put_normal};
+    *to++ =
+        (vtp_array){"Float32", "Normals", 3, 12, points, false, NULL, supine_mesh_writer_normal, 0};
   }
   if (writer->options.lung != NULL) {
-    *to++ = (vtp_array){"UInt8", "lung", 1, 1, points, true, put_lung};
+    *to++ = (vtp_array){"UInt8", "lung", 1, 1, points, true, put_lung, NULL, 0};
   }
   file->array_count = (size_t)(to - file->arrays);
-  file->offsets = calloc(file->frames * file->array_count, sizeof *file->offsets);
+  file->offsets =
+      supine_arena_zeros(&file->arena, file->frames * file->array_count, sizeof *file->offsets);
   const size_t blocks = 12 * (points > triangles ? points : triangles) / BLOCK + 1;
   file->threads = supine_thread_count();
-  file->raw = malloc(file->threads * BLOCK);
-  file->packed = malloc(blocks * room_of_block());
-  file->sizes = calloc(blocks + 3, sizeof *file->sizes);
-  if (file->offsets == NULL || file->raw == NULL || file->packed == NULL || file->sizes == NULL) {
-    vtp_end(file);
-    return SUPINE_ERROR_MEMORY;
-  }
-  return SUPINE_OK;
+  file->raw = supine_arena_take(&file->arena, file->threads, BLOCK);
+  file->packed = supine_arena_take(&file->arena, blocks, room_of_block());
+  file->sizes = supine_arena_zeros(&file->arena, blocks + 3, sizeof *file->sizes);
+  return file->arena.failed ? SUPINE_ERROR_MEMORY : SUPINE_OK;
 }
 
 static void put_sizes(FILE *out, const uint64_t *sizes, size_t count) {
@@ -162,7 +140,13 @@ static void pack_blocks(void *context, size_t begin, size_t end, size_t thread) 
     const size_t items = remaining < each ? remaining : each;
     unsigned char *at = raw;
     for (size_t k = 0; k < items; ++k) {
-      array->put(file, i * each + k, &at);
+      float numbers[4];
+      if (array->put != NULL) {
+        array->put(file, i * each + k, &at);
+      } else {
+        array->numbers(&file->writer, i * each + k, numbers);
+        supine_mesh_put_f32(&at, numbers + array->skip, array->components);
+      }
     }
     struct libdeflate_compressor *compressor = libdeflate_alloc_compressor(LEVEL);
     file->sizes[3 + i] =
@@ -197,17 +181,16 @@ static supine_status put_array(vtp *file, const vtp_array *array, FILE *out) {
 
 static supine_status vtp_frame(vtp *file, FILE *out) {
   const size_t frame = file->next_frame++;
-  supine_status status = SUPINE_OK;
-  for (size_t i = 0; i < file->array_count && status == SUPINE_OK; ++i) {
+  for (size_t i = 0; i < file->array_count; ++i) {
     uint64_t *offset = &file->offsets[frame * file->array_count + i];
     if (frame > 0 && file->arrays[i].constant) {
       *offset = file->offsets[i];
     } else {
       *offset = file->bytes_written;
-      status = put_array(file, &file->arrays[i], out);
+      SUPINE_TRY(put_array(file, &file->arrays[i], out));
     }
   }
-  return status;
+  return SUPINE_OK;
 }
 
 /* Write the DataArray elements of an array, one for each frame. Offsets are padded to one length,
@@ -319,15 +302,12 @@ static void vtp_foot(FILE *out) {
 
 /* Compress the arrays into memory first, because the header of the file states their offsets. */
 supine_status supine_mesh_save_vtp(const mesh_writer *writer) {
-  vtp file = {.writer = *writer, .frames = 1};
+  SUPINE_FREED_BY(vtp_end) vtp file = {.writer = *writer, .frames = 1};
   char *bytes = NULL;
   size_t size = 0;
-  supine_status status = vtp_begin(&file);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(vtp_begin(&file));
   FILE *memory = open_memstream(&bytes, &size);
-  status = memory == NULL ? SUPINE_ERROR_MEMORY : vtp_frame(&file, memory);
+  supine_status status = memory == NULL ? SUPINE_ERROR_MEMORY : vtp_frame(&file, memory);
   if (memory != NULL && fclose(memory) != 0) {
     status = SUPINE_ERROR_MEMORY;
   }
@@ -337,7 +317,6 @@ supine_status supine_mesh_save_vtp(const mesh_writer *writer) {
     vtp_foot(writer->out);
   }
   free(bytes);
-  vtp_end(&file);
   return status;
 }
 
@@ -346,37 +325,27 @@ struct supine_mesh_series {
   vtp file;
 };
 
-static supine_status no_memory(const char *path, supine_error *error) {
-  return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
-}
-
 supine_status supine_mesh_series_open(const char *path, const supine_mesh *mesh,
                                       const supine_mesh_save_options *options, size_t frames,
                                       const double *times, supine_mesh_series **series,
                                       supine_error *error) {
   *series = NULL;
-  supine_status status = supine_mesh_writer_check(path, mesh, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(supine_mesh_writer_check(path, mesh, error));
   supine_mesh_series *made = calloc(1, sizeof *made);
   if (made == NULL) {
-    return no_memory(path, error);
+    return supine_error_memory(error, "writing %s", path);
   }
-  status = supine_output_open(path, &made->output, error);
+  supine_status status = supine_output_open(path, &made->output, error);
   if (status == SUPINE_OK && fseeko(made->output.file, 0, SEEK_SET) != 0) {
     status =
         supine_error_set(error, SUPINE_ERROR_WRITE,
                          "%s: a series cannot be written into a pipe or device: give a file", path);
   }
-  if (status == SUPINE_OK) {
-    made->file.frames = frames;
-    made->file.times = times;
-    supine_mesh_writer_begin(mesh, options, &made->file.writer);
-    status = vtp_begin(&made->file);
-    if (status != SUPINE_OK) {
-      (void)no_memory(path, error);
-    }
+  supine_mesh_writer_begin(mesh, options, &made->file.writer);
+  made->file.frames = frames;
+  made->file.times = times;
+  if (status == SUPINE_OK && vtp_begin(&made->file) != SUPINE_OK) {
+    status = supine_error_memory(error, "writing %s", path);
   }
   if (status != SUPINE_OK) {
     supine_mesh_series_close(made);
@@ -389,14 +358,10 @@ supine_status supine_mesh_series_open(const char *path, const supine_mesh *mesh,
 
 supine_status supine_mesh_series_add(supine_mesh_series *series, supine_error *error) {
   const char *path = series->output.path;
-  supine_status status = supine_mesh_writer_check(path, series->file.writer.mesh, error);
-  if (status == SUPINE_OK) {
-    status = vtp_frame(&series->file, series->output.file);
-    if (status != SUPINE_OK) {
-      (void)no_memory(path, error);
-    }
-  }
-  return status;
+  SUPINE_TRY(supine_mesh_writer_check(path, series->file.writer.mesh, error));
+  return vtp_frame(&series->file, series->output.file) == SUPINE_OK
+             ? SUPINE_OK
+             : supine_error_memory(error, "writing %s", path);
 }
 
 supine_status supine_mesh_series_commit(supine_mesh_series *series, supine_error *error) {

@@ -106,23 +106,20 @@ double supine_mesh_type_decode(const mesh_type *type, const unsigned char *bytes
                                                : (double)bits;
 }
 
-bool supine_mesh_guard_text(const mesh_file *file, supine_error *error) {
+supine_status supine_mesh_guard_text(const mesh_file *file, supine_error *error) {
   const unsigned char *end = file->bytes + file->size;
-  const unsigned char *nul = memchr(file->bytes, '\0', file->size);
-  if (nul != NULL) {
-    (void)supine_error_set(error, SUPINE_ERROR_FORMAT,
-                           "%s: the text holds a NUL byte; save it as plain ASCII or UTF-8",
-                           file->path);
-    return false;
+  if (memchr(file->bytes, '\0', file->size) != NULL) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s: the text holds a NUL byte; save it as plain ASCII or UTF-8",
+                            file->path);
   }
   for (const unsigned char *at = file->bytes; (at = memchr(at, '\r', (size_t)(end - at))) != NULL;
        ++at) {
     if (at + 1 == end || at[1] != '\n') {
-      (void)supine_error_set(error, SUPINE_ERROR_FORMAT,
-                             "%s: a line ends in CR alone; save the text with LF line ends",
-                             file->path);
-      return false;
+      return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "%s: a line ends in CR alone; save the text with LF line ends",
+                              file->path);
     }
   }
-  return true;
+  return SUPINE_OK;
 }

@@ -8,6 +8,8 @@
 
 #include <zlib.h>
 
+#include "base/arena.h"
+
 #include "mesh/io/read.h"
 
 typedef struct vtp_file {
@@ -166,13 +168,18 @@ static bool take_bytes(const vtp_file *v, const element *e, size_t wanted, unsig
       return unpack(v, (const unsigned char *)at, (size_t)(v->end - at), wanted, out);
     }
   }
-  unsigned char *decoded = malloc((size_t)(v->end - at) / 4 * 3 + 1);
-  const bool good = decoded != NULL && unpack(v, decoded, base64(at, v->end, decoded), wanted, out);
-  free(decoded);
-  return good;
+  SUPINE_ARENA arena = {0};
+  unsigned char *decoded = supine_arena_take(&arena, (size_t)(v->end - at) / 4 * 3 + 1, 1);
+  return decoded != NULL && unpack(v, decoded, base64(at, v->end, decoded), wanted, out);
 }
 
-/* Read `count` numbers of an array; a string is read as the codes of its characters. */
+/* Free an array of numbers; for SUPINE_FREED_BY. */
+static void free_numbers(double **numbers) {
+  free(*numbers);
+}
+
+/* Read `count` numbers of an array; a string is read as the codes of its characters. The caller
+ * frees the numbers, even after a failure. */
 static supine_status take_numbers(const vtp_file *v, const element *e, size_t count,
                                   double **numbers, supine_error *error) {
   char name[32] = "";
@@ -189,33 +196,26 @@ static supine_status take_numbers(const vtp_file *v, const element *e, size_t co
                      "write the file again",
                      error);
   }
+  SUPINE_ARENA arena = {0};
+  unsigned char *bytes = supine_arena_take(&arena, count, type->size);
   double *values = malloc((count + 1) * sizeof *values);
-  unsigned char *bytes = malloc(count * type->size + 1);
-  supine_status status = SUPINE_OK;
-  if (values == NULL || bytes == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", v->file->path);
-  } else {
-    const bool ascii = is_attribute(e, "format", "ascii");
-    const char *tag = memchr(e->body, '<', (size_t)(v->end - e->body));
-    mesh_text text = {(const unsigned char *)e->body,
-                      (const unsigned char *)(tag != NULL ? tag : v->end)};
-    bool good = ascii || take_bytes(v, e, count * type->size, bytes);
-    for (size_t i = 0; i < count && good && ascii; ++i) {
-      good = supine_mesh_text_number(&text, &values[i]);
-    }
-    for (size_t i = 0; i < count && good && !ascii; ++i) {
-      values[i] = supine_mesh_type_decode(type, bytes + i * type->size, false);
-    }
-    status = good ? SUPINE_OK
-                  : malformed(v, "an array is truncated or damaged; write the file again", error);
-  }
-  free(bytes);
-  if (status != SUPINE_OK) {
-    free(values);
-    return status;
-  }
   *numbers = values;
-  return SUPINE_OK;
+  if (values == NULL || arena.failed) {
+    return supine_error_memory(error, "%zu numbers of %s", count, v->file->path);
+  }
+  const bool ascii = is_attribute(e, "format", "ascii");
+  const char *tag = memchr(e->body, '<', (size_t)(v->end - e->body));
+  mesh_text text = {(const unsigned char *)e->body,
+                    (const unsigned char *)(tag != NULL ? tag : v->end)};
+  bool good = ascii || take_bytes(v, e, count * type->size, bytes);
+  for (size_t i = 0; i < count && good && ascii; ++i) {
+    good = supine_mesh_text_number(&text, &values[i]);
+  }
+  for (size_t i = 0; i < count && good && !ascii; ++i) {
+    values[i] = supine_mesh_type_decode(type, bytes + i * type->size, false);
+  }
+  return good ? SUPINE_OK
+              : malformed(v, "an array is truncated or damaged; write the file again", error);
 }
 
 /* Find an array in a piece's child element whose name is `within`. The array has the name `name`;
@@ -265,29 +265,25 @@ static supine_status take_polygons(const vtp_file *v, const element *piece, mesh
     return malformed(v, "its polygons have no offsets or connectivity; write the file again",
                      error);
   }
-  double *ends = NULL;
-  double *corners = NULL;
-  supine_status status = take_numbers(v, &offsets, count, &ends, error);
-  const double total = status == SUPINE_OK ? ends[count - 1] : 0.0;
-  if (status == SUPINE_OK) {
-    status =
-        total >= 0.0 && total <= 3.0 * MESH_TRIANGLES_MAX
-            ? take_numbers(v, &connectivity, (size_t)total, &corners, error)
-            : malformed(v, "the offsets of its polygons are invalid; write the file again", error);
+  static const char wrong[] = "the offsets of its polygons are invalid; write the file again";
+  SUPINE_FREED_BY(free_numbers) double *ends = NULL;
+  SUPINE_FREED_BY(free_numbers) double *corners = NULL;
+  SUPINE_TRY(take_numbers(v, &offsets, count, &ends, error));
+  const double total = ends[count - 1];
+  if (!(total >= 0.0 && total <= 3.0 * MESH_TRIANGLES_MAX)) {
+    return malformed(v, wrong, error);
   }
+  SUPINE_TRY(take_numbers(v, &connectivity, (size_t)total, &corners, error));
   double from = 0.0;
-  for (size_t p = 0; p < count && status == SUPINE_OK; ++p) {
+  for (size_t p = 0; p < count; ++p) {
     if (!(ends[p] >= from && ends[p] <= total)) {
-      status = malformed(v, "the offsets of its polygons are invalid; write the file again", error);
-      break;
+      return malformed(v, wrong, error);
     }
-    status =
-        supine_mesh_faces_add(faces, corners + (size_t)from, (size_t)ends[p] - (size_t)from, error);
+    SUPINE_TRY(supine_mesh_faces_add(faces, corners + (size_t)from, (size_t)ends[p] - (size_t)from,
+                                     error));
     from = ends[p];
   }
-  free(ends);
-  free(corners);
-  return status;
+  return SUPINE_OK;
 }
 
 static supine_status read_head(vtp_file *v, element *piece, supine_error *error) {
@@ -326,12 +322,12 @@ static supine_status read_head(vtp_file *v, element *piece, supine_error *error)
 static void note_space(const vtp_file *v, const element *piece, mesh_file *file) {
   enum { SIZE = 4 }; /* three letters and a NUL */
   element e;
-  double *codes = NULL;
   for (const char *at = v->bytes; find_element(at, piece->at, "Array", &e); at = e.body) {
     if (!is_attribute(&e, "Name", "SPACE")) {
       continue;
     }
     char letters[SIZE] = {'?'};
+    SUPINE_FREED_BY(free_numbers) double *codes = NULL;
     if (take_numbers(v, &e, SIZE, &codes, NULL) == SUPINE_OK && codes[3] == 0.0) {
       for (size_t i = 0; i < SIZE; ++i) {
         letters[i] = codes[i] >= 0.0 && codes[i] < 128.0 ? (char)codes[i] : '?';
@@ -339,7 +335,6 @@ static void note_space(const vtp_file *v, const element *piece, mesh_file *file)
       file->tagged = true;
       (void)supine_mesh_axes_parse(letters, &file->space);
     }
-    free(codes);
     return;
   }
 }
@@ -352,10 +347,7 @@ supine_status supine_mesh_read_vtp(mesh_file *file, supine_mesh *mesh, size_t *d
   element piece;
   element points;
   size_t count[3];
-  supine_status status = read_head(&v, &piece, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(read_head(&v, &piece, error));
   note_space(&v, &piece, file);
   if (!count_of(&piece, "NumberOfPoints", &count[0]) ||
       !count_of(&piece, "NumberOfPolys", &count[1]) ||
@@ -366,21 +358,18 @@ supine_status supine_mesh_read_vtp(mesh_file *file, supine_mesh *mesh, size_t *d
   if (count[2] > 0) {
     return malformed(&v, "it has strips of triangles; save single triangles", error);
   }
-  if (count[0] > 0 && !find_array(&v, &piece, "Points", NULL, &points)) {
-    return malformed(&v, "no array of points; write the file again", error);
-  }
   if (count[0] > 0) {
-    status = take_numbers(&v, &points, 3 * count[0], &mesh->vertices, error);
-    if (status != SUPINE_OK) {
-      return status;
+    if (!find_array(&v, &piece, "Points", NULL, &points)) {
+      return malformed(&v, "no array of points; write the file again", error);
     }
+    SUPINE_TRY(take_numbers(&v, &points, 3 * count[0], &mesh->vertices, error));
     mesh->vertex_count = count[0];
   }
   for (size_t i = 0; i < 3 * count[0]; ++i) {
     mesh->vertices[i] = (double)(float)mesh->vertices[i];
   }
   mesh_faces faces = {.path = file->path, .mesh = mesh};
-  status = take_polygons(&v, &piece, &faces, count[1], error);
+  SUPINE_TRY(take_polygons(&v, &piece, &faces, count[1], error));
   *dropped = faces.dropped;
-  return status;
+  return SUPINE_OK;
 }

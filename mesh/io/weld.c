@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* Join vertices at the same position, in linear time, by a hash of the position's bits. */
-#include <stdlib.h>
 #include <string.h>
 
 #include "mesh/io/read.h"
@@ -67,11 +66,11 @@ supine_status supine_mesh_weld(supine_mesh *mesh, supine_mesh_report *report) {
   while (slot_count < 2 * mesh->vertex_count) {
     slot_count *= 2;
   }
-  supine_status status = SUPINE_ERROR_MEMORY;
-  uint32_t *remap = malloc((mesh->vertex_count + 1) * sizeof *remap);
-  uint32_t *slots = malloc(slot_count * sizeof *slots);
-  if (remap == NULL || slots == NULL) {
-    goto cleanup;
+  SUPINE_ARENA arena = {0};
+  uint32_t *remap = supine_arena_take(&arena, mesh->vertex_count, sizeof *remap);
+  uint32_t *slots = supine_arena_take(&arena, slot_count, sizeof *slots);
+  if (arena.failed) {
+    return SUPINE_ERROR_MEMORY;
   }
   memset(slots, 0xFF, slot_count * sizeof *slots);
 
@@ -81,10 +80,5 @@ supine_status supine_mesh_weld(supine_mesh *mesh, supine_mesh_report *report) {
   report->degenerate_faces += mesh->triangle_count - kept;
   mesh->triangle_count = kept;
   report->unreferenced_vertices += supine_mesh_drop_unreferenced(mesh, remap);
-  status = SUPINE_OK;
-
-cleanup:
-  free(slots);
-  free(remap);
-  return status;
+  return SUPINE_OK;
 }

@@ -222,11 +222,8 @@ supine_status supine_labels_choose(const char *path, const supine_image *image,
   const char *name = NULL;
   char list[3][96];
   memset(side, 0, LABELS_MAX);
-  supine_status status = choose(path, image, tally, options, side, &name, error);
-  status = status == SUPINE_OK ? check(path, image, tally, side, &choice->doubted, error) : status;
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(choose(path, image, tally, options, side, &name, error));
+  SUPINE_TRY(check(path, image, tally, side, &choice->doubted, error));
   for (int value = LABELS_LEFT; value <= LABELS_EITHER; ++value) {
     list_labels(tally, side, (uint8_t)value, list[value - 1], sizeof list[0]);
   }

@@ -3,7 +3,6 @@
  * more cubes until no two cubes inside, and no two outside, meet only in an edge or a corner. The
  * surface between cubes inside and outside is then a manifold [Latecki1995]. */
 #include <math.h>
-#include <stdlib.h>
 
 #include "mesh/labels/mask.h"
 
@@ -139,59 +138,56 @@ static supine_status one_piece(labels_cubes *cubes) {
   const size_t count = supine_labels_mask_count(&inside);
   size_t pieces = 0;
   size_t changed = 0;
-  inside.at = malloc(count);
-  supine_status status = inside.at == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
-  for (size_t i = 0; status == SUPINE_OK && i < count; ++i) {
+  SUPINE_ARENA arena = {0};
+  inside.at = supine_arena_take(&arena, count, 1);
+  if (arena.failed) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  for (size_t i = 0; i < count; ++i) {
     inside.at[i] = cubes->share[i] >= half;
   }
-  status = status == SUPINE_OK ? supine_labels_keep_one(&inside, false, &pieces, &changed) : status;
-  status = status == SUPINE_OK ? supine_labels_keep_one(&inside, true, &pieces, &changed) : status;
-  for (size_t i = 0; status == SUPINE_OK && i < count; ++i) {
+  SUPINE_TRY(supine_labels_keep_one(&inside, false, &pieces, &changed));
+  SUPINE_TRY(supine_labels_keep_one(&inside, true, &pieces, &changed));
+  for (size_t i = 0; i < count; ++i) {
     const bool is = cubes->share[i] >= half;
     cubes->share[i] = is == (inside.at[i] != 0) ? cubes->share[i] : is ? 0.0F : half;
   }
-  supine_labels_mask_free(&inside);
-  return status;
-}
-
-supine_status supine_labels_cubes_create(const labels_mask *mask, double edge, bool one,
-                                         labels_cubes *cubes) {
-  const size_t *n = mask->size;
-  labels_cubes made = {.share = NULL};
-  for (int a = 0; a < 3; ++a) {
-    made.ratio[a] = edge / mask->spacing[a];
-    made.size[a] = (size_t)ceil((double)n[a] / made.ratio[a]) + (size_t)2 * LAYERS;
-    made.origin[a] = made.ratio[a] * (0.5 - LAYERS) - 0.5;
-  }
-  const size_t *m = made.size;
-  float *rows = calloc(m[0] * n[1] * n[2], sizeof *rows);
-  float *planes = calloc(m[0] * m[1] * n[2], sizeof *planes);
-  made.share = calloc(m[0] * m[1] * m[2], sizeof *made.share);
-  supine_status status = SUPINE_ERROR_MEMORY;
-  if (rows != NULL && planes != NULL && made.share != NULL) {
-    average_rows(mask, m[0], made.ratio[0], rows);
-    average(rows, n[2], n[1], m[0], m[1], made.ratio[1], planes);
-    average(planes, 1, n[2], m[0] * m[1], m[2], made.ratio[2], made.share);
-    for (size_t i = 0; i < m[0] * m[1] * m[2]; ++i) {
-      made.share[i] = rintf(levels * made.share[i]) / levels;
-    }
-    status = SUPINE_OK;
-  }
-  free(rows);
-  free(planes);
-  for (bool mended = true; mended && status == SUPINE_OK;) {
-    status = one ? one_piece(&made) : SUPINE_OK;
-    mended = status == SUPINE_OK && mend(m, made.share);
-  }
-  if (status != SUPINE_OK) {
-    supine_labels_cubes_free(&made);
-    return status;
-  }
-  *cubes = made;
   return SUPINE_OK;
 }
 
-void supine_labels_cubes_free(labels_cubes *cubes) {
-  free(cubes->share);
-  *cubes = (labels_cubes){.share = NULL};
+static supine_status average_cubes(const labels_mask *mask, labels_cubes *cubes) {
+  const size_t *n = mask->size;
+  const size_t *m = cubes->size;
+  SUPINE_ARENA arena = {0};
+  float *rows = supine_arena_take(&arena, m[0] * n[1] * n[2], sizeof *rows);
+  float *planes = supine_arena_take(&arena, m[0] * m[1] * n[2], sizeof *planes);
+  if (arena.failed) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  average_rows(mask, m[0], cubes->ratio[0], rows);
+  average(rows, n[2], n[1], m[0], m[1], cubes->ratio[1], planes);
+  average(planes, 1, n[2], m[0] * m[1], m[2], cubes->ratio[2], cubes->share);
+  for (size_t i = 0; i < m[0] * m[1] * m[2]; ++i) {
+    cubes->share[i] = rintf(levels * cubes->share[i]) / levels;
+  }
+  return SUPINE_OK;
+}
+
+supine_status supine_labels_cubes_create(const labels_mask *mask, double edge, bool one,
+                                         supine_arena *arena, labels_cubes *cubes) {
+  for (int a = 0; a < 3; ++a) {
+    cubes->ratio[a] = edge / mask->spacing[a];
+    cubes->size[a] = (size_t)ceil((double)mask->size[a] / cubes->ratio[a]) + (size_t)2 * LAYERS;
+    cubes->origin[a] = cubes->ratio[a] * (0.5 - LAYERS) - 0.5;
+  }
+  cubes->share =
+      supine_arena_take(arena, cubes->size[0] * cubes->size[1] * cubes->size[2], sizeof(float));
+  if (arena->failed) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  SUPINE_TRY(average_cubes(mask, cubes));
+  do {
+    SUPINE_TRY(one ? one_piece(cubes) : SUPINE_OK);
+  } while (mend(cubes->size, cubes->share));
+  return SUPINE_OK;
 }

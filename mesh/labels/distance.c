@@ -3,7 +3,6 @@
  * [Felzenszwalb2012]. Along the first axis, count voxels. Along each other axis, take the minimum
  * over y of (x - y)^2 + f(y), where f is the result so far: a lower envelope of parabolas. */
 #include <math.h>
-#include <stdlib.h>
 
 #include "base/parallel.h"
 #include "mesh/labels/mask.h"
@@ -96,10 +95,11 @@ supine_status supine_labels_distance(const labels_mask *mask, bool zero, float *
   enum { GRAIN = 256 };
   const size_t *size = mask->size;
   const size_t threads = supine_thread_count();
+  SUPINE_ARENA arena = {0};
   sweep s = {.mask = mask, .zero = zero, .squares = squares};
   s.length = size[1] > size[2] ? size[1] : size[2];
-  s.space = malloc(threads * 3 * (s.length + 2) * sizeof *s.space);
-  if (s.space == NULL) {
+  s.space = supine_arena_take(&arena, threads * 3 * (s.length + 2), sizeof *s.space);
+  if (arena.failed) {
     return SUPINE_ERROR_MEMORY;
   }
   supine_parallel_for(size[1] * size[2], GRAIN, threads, along_rows, &s);
@@ -107,29 +107,28 @@ supine_status supine_labels_distance(const labels_mask *mask, bool zero, float *
   supine_parallel_for(size[0] * size[2], GRAIN, threads, along_lines, &s);
   s.axis = 2;
   supine_parallel_for(size[0] * size[1], GRAIN, threads, along_lines, &s);
-  free(s.space);
   return SUPINE_OK;
 }
 
 supine_status supine_labels_close(labels_mask *mask, double radius, size_t *added) {
   const size_t count = supine_labels_mask_count(mask);
   const float reach = (float)(radius * radius);
-  float *squares = malloc(count * sizeof *squares);
+  SUPINE_ARENA arena = {0};
+  float *squares = supine_arena_take(&arena, count, sizeof *squares);
   *added = 0;
-  if (squares == NULL || supine_labels_distance(mask, false, squares) != SUPINE_OK) {
-    free(squares);
+  if (arena.failed) {
     return SUPINE_ERROR_MEMORY;
   }
+  SUPINE_TRY(supine_labels_distance(mask, false, squares));
   /* set voxels outside the mask, but within `radius` of it, to 2 */
   for (size_t i = 0; i < count; ++i) {
     mask->at[i] = mask->at[i] != 0 ? 1 : squares[i] <= reach ? 2 : 0;
   }
-  const supine_status status = supine_labels_distance(mask, true, squares);
+  SUPINE_TRY(supine_labels_distance(mask, true, squares));
   for (size_t i = 0; i < count; ++i) {
     const bool stays = mask->at[i] == 1 || (mask->at[i] == 2 && squares[i] > reach);
     *added += stays && mask->at[i] == 2;
     mask->at[i] = stays;
   }
-  free(squares);
-  return status;
+  return SUPINE_OK;
 }

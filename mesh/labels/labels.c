@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/text.h"
 #include "base/vec3.h"
 
@@ -39,18 +40,15 @@ static bool same_frame(const supine_image *a, const supine_image *b) {
   if (memcmp(a->size, b->size, sizeof a->size) != 0) {
     return false;
   }
-  for (int corner = 0; corner < 8; ++corner) {
+  for (size_t corner = 0; corner < 8; ++corner) {
+    const size_t at[3] = {(corner & 1U) * (a->size[0] - 1), (corner >> 1 & 1U) * (a->size[1] - 1),
+                          (corner >> 2) * (a->size[2] - 1)};
     double place[3];
     double voxel[3];
-    for (int k = 0; k < 3; ++k) {
-      place[k] = b->origin[k];
-      for (int x = 0; x < 3; ++x) {
-        place[k] += (corner >> x & 1) * (double)(b->size[x] - 1) * b->step[x][k];
-      }
-    }
+    supine_image_place(b, at[0] + a->size[0] * (at[1] + a->size[1] * at[2]), place);
     supine_image_locate(a, place, voxel);
     for (int x = 0; x < 3; ++x) {
-      if (fabs(voxel[x] - (corner >> x & 1) * (double)(a->size[x] - 1)) > 0.01) {
+      if (fabs(voxel[x] - (double)at[x]) > 0.01) {
         return false;
       }
     }
@@ -60,45 +58,41 @@ static bool same_frame(const supine_image *a, const supine_image *b) {
 
 static supine_status read_image(const work *w, const char *path, supine_image *image,
                                 supine_error *error) {
-  const supine_status status = supine_image_read(path, image, error);
-  supine_image_set_axes(image, status == SUPINE_OK ? w->options->axes : SUPINE_AXES_AUTO);
-  return status;
+  SUPINE_TRY(supine_image_read(path, image, error));
+  supine_image_set_axes(image, w->options->axes);
+  return SUPINE_OK;
 }
 
 /* Join masks into one map with the labels 1, 2, ... Where masks overlap, the first one counts. */
 static supine_status join_images(work *w, const char *const *paths, size_t count,
                                  supine_error *error) {
   const size_t voxels = w->image.size[0] * w->image.size[1] * w->image.size[2];
+  const supine_image first = w->image;
   uint8_t *joined = calloc(voxels, 1);
-  if (joined == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", paths[0]);
-  }
-  supine_status status = SUPINE_OK;
-  for (size_t f = 0; f < count && status == SUPINE_OK; ++f) {
-    supine_image next = {0};
-    const supine_image *image = f == 0 ? &w->image : &next;
-    status = f == 0 ? SUPINE_OK : read_image(w, paths[f], &next, error);
-    if (status == SUPINE_OK && !same_frame(&w->image, image)) {
-      status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%s: size, position or axes differ from %s: give masks of one scan",
-                                paths[f], paths[0]);
-    }
-    for (size_t i = 0; i < voxels && status == SUPINE_OK; ++i) {
-      joined[i] =
-          joined[i] == 0 && supine_image_get(image, i) != 0.0 ? (uint8_t)(f + 1) : joined[i];
-    }
-    supine_image_free(&next);
-  }
-  free(w->image.values);
+  SUPINE_FREED_BY(supine_image_free) supine_image image = first;
   w->image.values = joined;
   w->image.voxel = SUPINE_VOXEL_U8;
-  return status;
+  for (size_t f = 0; joined != NULL && f < count; ++f) {
+    if (f > 0) {
+      supine_image_free(&image);
+      SUPINE_TRY(read_image(w, paths[f], &image, error));
+    }
+    if (!same_frame(&first, &image)) {
+      return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "%s: size, position or axes differ from %s: give masks of one scan",
+                              paths[f], paths[0]);
+    }
+    for (size_t i = 0; i < voxels; ++i) {
+      joined[i] =
+          joined[i] == 0 && supine_image_get(&image, i) != 0.0 ? (uint8_t)(f + 1) : joined[i];
+    }
+  }
+  return joined != NULL ? SUPINE_OK : SUPINE_ERROR_MEMORY;
 }
 
 /* Copy the bounding box of the lungs from the label map to w->both. Its voxels become 0,
  * LABELS_LEFT, LABELS_RIGHT or LABELS_EITHER. */
-static supine_status make_mask(work *w, const labels_tally *tally, const uint8_t *side,
-                               supine_error *error) {
+static supine_status make_mask(work *w, const labels_tally *tally, const uint8_t *side) {
   size_t low[3] = {SIZE_MAX, SIZE_MAX, SIZE_MAX};
   size_t high[3] = {0, 0, 0};
   for (size_t label = 1; label < LABELS_MAX; ++label) {
@@ -107,10 +101,7 @@ static supine_status make_mask(work *w, const labels_tally *tally, const uint8_t
       high[a] = tally[label].high[a] > high[a] ? tally[label].high[a] : high[a];
     }
   }
-  if (supine_labels_mask_cut(&w->image, low, high, LABELS_MARGIN, side, &w->both) != SUPINE_OK) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", w->path);
-  }
-  return SUPINE_OK;
+  return supine_labels_mask_cut(&w->image, low, high, LABELS_MARGIN, side, &w->both);
 }
 
 /* Return whether the bounding box of a lung reaches the border of the image, which probably cuts
@@ -143,12 +134,9 @@ static void describe_axes(const double step[3][3], char *text, size_t size) {
 static supine_status read_map(work *w, const char *const *paths, size_t count,
                               supine_error *error) {
   supine_labels_report *report = w->report;
-  supine_status status = read_image(w, paths[0], &w->image, error);
-  if (status == SUPINE_OK && count > 1) {
-    status = join_images(w, paths, count, error);
-  }
-  if (status != SUPINE_OK) {
-    return status;
+  SUPINE_TRY(read_image(w, paths[0], &w->image, error));
+  if (count > 1) {
+    SUPINE_TRY(join_images(w, paths, count, error));
   }
   memcpy(report->size, w->image.size, sizeof report->size);
   for (int a = 0; a < 3; ++a) {
@@ -158,49 +146,34 @@ static supine_status read_map(work *w, const char *const *paths, size_t count,
   report->source = w->image.frame_source;
   report->frames_differ = w->image.frames_differ;
   report->coordinates = w->image.axes;
-  labels_tally *tally = malloc(LABELS_MAX * sizeof *tally);
-  uint8_t *side = malloc(LABELS_MAX);
-  if (tally == NULL || side == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", w->path);
+  SUPINE_ARENA arena = {0};
+  labels_tally *tally = supine_arena_take(&arena, LABELS_MAX, sizeof *tally);
+  uint8_t *side = supine_arena_take(&arena, LABELS_MAX, 1);
+  if (arena.failed) {
+    return SUPINE_ERROR_MEMORY;
   }
-  status = status == SUPINE_OK ? advance(w, 0.2, error) : status;
-  status = status == SUPINE_OK ? supine_labels_count(w->path, &w->image, tally, error) : status;
-  if (status == SUPINE_OK) {
-    w->choice.taken = report->taken;
-    status = supine_labels_choose(w->path, &w->image, tally, w->options, side, &w->choice, error);
-  }
-  status = status == SUPINE_OK ? advance(w, 0.3, error) : status;
-  status = status == SUPINE_OK ? make_mask(w, tally, side, error) : status;
-  supine_image_free(&w->image);
-  free(tally);
-  free(side);
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  if (memchr(w->both.at, LABELS_EITHER, supine_labels_mask_count(&w->both)) != NULL) {
-    status = supine_labels_split(w->path, &w->both, &report->neck, error);
-  }
-  return status;
+  SUPINE_TRY(advance(w, 0.2, error));
+  SUPINE_TRY(supine_labels_count(w->path, &w->image, tally, error));
+  w->choice.taken = report->taken;
+  SUPINE_TRY(supine_labels_choose(w->path, &w->image, tally, w->options, side, &w->choice, error));
+  SUPINE_TRY(advance(w, 0.3, error));
+  return make_mask(w, tally, side);
 }
 
 /* After gaps of a lung were closed, clear in its mask the voxels that belong to the other lung. */
 static void leave_other(const labels_mask *both, uint8_t value, labels_mask *mask) {
-  const long *offset = mask->from;
-  for (long k = 0; k < (long)mask->size[2]; ++k) {
-    for (long j = 0; j < (long)mask->size[1]; ++j) {
-      for (long i = 0; i < (long)mask->size[0]; ++i) {
-        const long at[3] = {i + offset[0], j + offset[1], k + offset[2]};
-        if (at[0] < 0 || at[1] < 0 || at[2] < 0 || at[0] >= (long)both->size[0] ||
-            at[1] >= (long)both->size[1] || at[2] >= (long)both->size[2]) {
-          continue;
-        }
-        const uint8_t there =
-            both->at[(size_t)at[0] +
-                     both->size[0] * ((size_t)at[1] + both->size[1] * (size_t)at[2])];
-        if (there != 0 && there != value) {
-          mask->at[(size_t)i + mask->size[0] * ((size_t)j + mask->size[1] * (size_t)k)] = 0;
-        }
-      }
+  for (size_t i = 0; i < supine_labels_mask_count(mask); ++i) {
+    size_t there = 0; /* index of the voxel in `both` */
+    bool within = true;
+    for (size_t a = 0, rest = i, stride = 1; a < 3; ++a) {
+      const long at = (long)(rest % mask->size[a]) + mask->from[a];
+      within = within && at >= 0 && at < (long)both->size[a];
+      there += stride * (size_t)at;
+      stride *= both->size[a];
+      rest /= mask->size[a];
+    }
+    if (within && both->at[there] != 0 && both->at[there] != value) {
+      mask->at[i] = 0;
     }
   }
 }
@@ -212,23 +185,18 @@ static supine_status clean(const work *w, uint8_t value, size_t margin, labels_m
                            supine_labels_lung *lung) {
   const double ml = supine_labels_voxel_ml(mask);
   size_t voxels = 0;
-  supine_status status = SUPINE_OK;
   if (w->options->close > 0.0) {
-    status = supine_labels_close(mask, w->options->close, &voxels);
+    SUPINE_TRY(supine_labels_close(mask, w->options->close, &voxels));
     leave_other(&w->both, value, mask);
     lung->closed = ml * (double)voxels;
   }
-  if (status == SUPINE_OK) {
-    status = supine_labels_keep_one(mask, false, &lung->islands, &voxels);
-    lung->dropped = ml * (double)voxels;
-  }
-  if (status == SUPINE_OK) {
-    status = supine_labels_keep_one(mask, true, &lung->cavities, &voxels);
-    lung->filled = ml * (double)voxels;
-  }
-  if (status == SUPINE_OK && lung->islands > 0) {
+  SUPINE_TRY(supine_labels_keep_one(mask, false, &lung->islands, &voxels));
+  lung->dropped = ml * (double)voxels;
+  SUPINE_TRY(supine_labels_keep_one(mask, true, &lung->cavities, &voxels));
+  lung->filled = ml * (double)voxels;
+  if (lung->islands > 0) {
     labels_mask kept;
-    status = supine_labels_mask_extract(mask, 1, margin, &kept);
+    SUPINE_TRY(supine_labels_mask_extract(mask, 1, margin, &kept));
     for (int a = 0; a < 3; ++a) {
       kept.from[a] += mask->from[a];
     }
@@ -236,57 +204,51 @@ static supine_status clean(const work *w, uint8_t value, size_t margin, labels_m
     *mask = kept;
   }
   voxels = 0;
-  for (size_t i = 0; status == SUPINE_OK && i < supine_labels_mask_count(mask); ++i) {
+  for (size_t i = 0; i < supine_labels_mask_count(mask); ++i) {
     voxels += mask->at[i];
   }
   lung->mask = ml * (double)voxels;
-  return status;
+  return SUPINE_OK;
 }
 
 /* Make the surface of one lung; do nothing if the lung has no voxels. */
 static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung, supine_mesh *mesh,
                                supine_error *error) {
-  labels_mask mask;
+  SUPINE_FREED_BY(supine_labels_mask_free) labels_mask mask;
   const char *name = value == LABELS_LEFT ? "left" : "right";
   const double least = fmin(w->both.spacing[0], fmin(w->both.spacing[1], w->both.spacing[2]));
   const size_t margin = LABELS_MARGIN + (size_t)ceil(w->options->close / least);
-  supine_status status = supine_labels_mask_extract(&w->both, value, margin, &mask);
-  if (status == SUPINE_OK && mask.at == NULL) {
+  SUPINE_TRY(supine_labels_mask_extract(&w->both, value, margin, &mask));
+  if (mask.at == NULL) {
     return SUPINE_OK;
   }
   lung->side = value == LABELS_LEFT ? 1 : -1;
-  status = status == SUPINE_OK ? clean(w, value, margin, &mask, lung) : status;
+  SUPINE_TRY(clean(w, value, margin, &mask, lung));
   lung->cut = is_cut(w, &mask, margin);
   double longest = 0.0;
   for (int a = 0; a < 3; ++a) {
     longest = fmax(longest, (double)(mask.size[a] - 2 * margin) * mask.spacing[a]);
   }
-  if (status == SUPINE_OK && !(lung->mask >= least_volume && longest <= longest_lung)) {
-    supine_labels_mask_free(&mask);
+  if (!(lung->mask >= least_volume && longest <= longest_lung)) {
     return supine_error_set(error, SUPINE_ERROR_MESH,
                             "%s: the %s lung holds %.4g mL in a box %.4g mm long, which is "
                             "impossible for a lung: check --labels and the voxel size in the "
                             "header",
                             w->path, name, lung->mask, longest);
   }
-  status = status == SUPINE_OK ? supine_labels_mask_surface(&mask, w->edge, true, mesh) : status;
+  SUPINE_TRY(supine_labels_mask_surface(&mask, w->edge, true, mesh));
   supine_labels_mask_free(&mask);
-  supine_topology topology = {0};
-  status = status == SUPINE_OK && mesh->triangle_count > 0
-               ? supine_mesh_topology_create(mesh, &topology)
-               : status;
+  if (mesh->triangle_count == 0) {
+    return supine_error_set(error, SUPINE_ERROR_MESH,
+                            "%s: the %s lung is thinner than half of --edge %g everywhere: "
+                            "give a smaller edge",
+                            w->path, name, w->edge);
+  }
+  SUPINE_FREED_BY(supine_mesh_topology_free) supine_topology topology = {0};
+  SUPINE_TRY(supine_mesh_topology_create(mesh, &topology));
   lung->tunnels = topology.genus;
   lung->surface = 1e-3 * supine_mesh_volume(mesh);
-  supine_mesh_topology_free(&topology);
-  if (status != SUPINE_OK) {
-    return supine_error_set(error, status, "%s: no memory for the surface", w->path);
-  }
-  return mesh->triangle_count > 0
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_MESH,
-                                "%s: the %s lung is thinner than half of --edge %g everywhere: "
-                                "give a smaller edge",
-                                w->path, name, w->edge);
+  return SUPINE_OK;
 }
 
 /* Refuse a header whose axes contradict labels that name the sides of the lungs: the left lung is
@@ -314,6 +276,27 @@ static supine_status check_sides(const work *w, const supine_mesh *surfaces, sup
       doubted ? "" : "; if the header is correct, add --axes with its axes");
 }
 
+static supine_status make_surfaces(work *w, const char *const *paths, size_t count,
+                                   supine_mesh *surfaces, supine_error *error) {
+  supine_labels_report *report = w->report;
+  SUPINE_TRY(read_map(w, paths, count, error));
+  supine_image_free(&w->image);
+  if (memchr(w->both.at, LABELS_EITHER, supine_labels_mask_count(&w->both)) != NULL) {
+    SUPINE_TRY(supine_labels_split(w->path, &w->both, &report->neck, error));
+  }
+  for (uint8_t value = LABELS_LEFT; value <= LABELS_RIGHT; ++value) {
+    supine_labels_lung *lung = &report->lung[report->lung_count];
+    SUPINE_TRY(advance(w, value == LABELS_LEFT ? 0.5 : 0.75, error));
+    SUPINE_TRY(make_lung(w, value, lung, &surfaces[report->lung_count], error));
+    report->lung_count += lung->side != 0;
+  }
+  supine_labels_mask_free(&w->both);
+  if (report->lung_count == 2) {
+    SUPINE_TRY(check_sides(w, surfaces, error));
+  }
+  return advance(w, 1.0, error);
+}
+
 supine_status supine_labels_surfaces(const char *const *paths, size_t count,
                                      const supine_labels_options *options, supine_mesh *surfaces,
                                      supine_labels_report *report, supine_error *error) {
@@ -328,23 +311,13 @@ supine_status supine_labels_surfaces(const char *const *paths, size_t count,
                             "images",
                             least_edge, most_edge, most_closing_radius, FILES_MAX);
   }
-  supine_status status = read_map(&w, paths, count, error);
-  for (uint8_t value = LABELS_LEFT; value <= LABELS_RIGHT && status == SUPINE_OK; ++value) {
-    status = advance(&w, value == LABELS_LEFT ? 0.5 : 0.75, error);
-    supine_labels_lung *lung = &report->lung[report->lung_count];
-    supine_mesh *mesh = &surfaces[report->lung_count];
-    status = status == SUPINE_OK ? make_lung(&w, value, lung, mesh, error) : status;
-    report->lung_count += status == SUPINE_OK && lung->side != 0;
-  }
+  const supine_status status = make_surfaces(&w, paths, count, surfaces, error);
   supine_image_free(&w.image);
   supine_labels_mask_free(&w.both);
-  status =
-      status == SUPINE_OK && report->lung_count == 2 ? check_sides(&w, surfaces, error) : status;
-  status = status == SUPINE_OK ? advance(&w, 1.0, error) : status;
-  if (status == SUPINE_OK) {
-    return status;
+  if (status != SUPINE_OK) {
+    supine_mesh_free(&surfaces[0]);
+    supine_mesh_free(&surfaces[1]);
   }
-  supine_mesh_free(&surfaces[0]);
-  supine_mesh_free(&surfaces[1]);
-  return status;
+  return status == SUPINE_ERROR_MEMORY ? supine_error_memory(error, "the labels of %s", w.path)
+                                       : status;
 }

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/vec3.h"
 
 #include "mesh/labels/mask.h"
@@ -84,40 +85,36 @@ static void count_row(const supine_image *image, size_t row, const uint16_t *lab
 
 supine_status supine_labels_count(const char *path, const supine_image *image, labels_tally *tally,
                                   supine_error *error) {
-  uint16_t *labels = malloc(image->size[0] * sizeof *labels);
-  if (labels == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
+  SUPINE_ARENA arena = {0};
+  uint16_t *labels = supine_arena_take(&arena, image->size[0], sizeof *labels);
+  if (arena.failed) {
+    return SUPINE_ERROR_MEMORY;
   }
-  for (size_t i = 0; i < LABELS_MAX; ++i) {
-    tally[i] = (labels_tally){0};
-  }
-  double bad = 0.0;
-  bool well = true;
-  for (size_t row = 0; row < image->size[1] * image->size[2] && well; ++row) {
-    well = read_row(image, row, labels, &bad);
-    if (well) {
-      count_row(image, row, labels, tally);
+  memset(tally, 0, LABELS_MAX * sizeof *tally);
+  for (size_t row = 0; row < image->size[1] * image->size[2]; ++row) {
+    double bad = 0.0;
+    if (!read_row(image, row, labels, &bad)) {
+      return supine_error_set(
+          error, SUPINE_ERROR_FORMAT,
+          bad < 0.0 ? "%s: a voxel holds %g, but labels are 0 to 65535: if this is the CT itself, "
+                      "segment it first"
+                    : "%s: a voxel holds %g, but labels are whole numbers, 0 to 65535: threshold "
+                      "probabilities into a mask first",
+          path, bad);
     }
+    count_row(image, row, labels, tally);
   }
-  free(labels);
-  if (well) {
-    return tally[0].count < image->size[0] * image->size[1] * image->size[2]
-               ? SUPINE_OK
-               : supine_error_set(error, SUPINE_ERROR_MESH,
-                                  "%s: every voxel is 0: give an image with labels", path);
-  }
-  return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                          bad < 0.0 ? "%s: a voxel holds %g, but labels are 0 to 65535: if this is "
-                                      "the CT itself, segment it first"
-                                    : "%s: a voxel holds %g, but labels are whole numbers, 0 to "
-                                      "65535: threshold probabilities into a mask first",
-                          path, bad);
+  return tally[0].count < image->size[0] * image->size[1] * image->size[2]
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_MESH,
+                                "%s: every voxel is 0: give an image with labels", path);
 }
 
 supine_status supine_labels_mask_cut(const supine_image *image, const size_t low[3],
                                      const size_t high[3], size_t margin, const uint8_t *value,
                                      labels_mask *mask) {
-  uint16_t *row = malloc(image->size[0] * sizeof *row);
+  SUPINE_ARENA arena = {0};
+  uint16_t *row = supine_arena_take(&arena, image->size[0], sizeof *row);
   *mask = (labels_mask){.at = NULL};
   for (int k = 0; k < 3; ++k) {
     mask->origin[k] = image->origin[k];
@@ -132,8 +129,7 @@ supine_status supine_labels_mask_cut(const supine_image *image, const size_t low
     memcpy(mask->step[a], image->step[a], sizeof mask->step[a]);
   }
   mask->at = calloc(supine_labels_mask_count(mask), 1);
-  if (row == NULL || mask->at == NULL) {
-    free(row);
+  if (arena.failed || mask->at == NULL) {
     supine_labels_mask_free(mask);
     return SUPINE_ERROR_MEMORY;
   }
@@ -148,7 +144,6 @@ supine_status supine_labels_mask_cut(const supine_image *image, const size_t low
       }
     }
   }
-  free(row);
   return SUPINE_OK;
 }
 

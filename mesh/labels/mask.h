@@ -5,6 +5,8 @@
 
 #include <stdint.h>
 
+#include "base/arena.h"
+
 #include "mesh/image/image.h"
 #include "mesh/labels/labels.h"
 
@@ -25,8 +27,7 @@ enum { LABELS_LEFT = 1, LABELS_RIGHT = 2, LABELS_EITHER = 3 }; /* EITHER: side n
 size_t supine_labels_mask_count(const labels_mask *mask);
 double supine_labels_voxel_ml(const labels_mask *mask);
 /** Cut out the voxels with the value `value`, as voxels with the value 1, with a layer of `margin`
- * zeros around their bounding box. If there are none, mask->at is NULL.
- * @retval SUPINE_ERROR_MEMORY */
+ * zeros around their bounding box. If there are none, mask->at is NULL. */
 supine_status supine_labels_mask_extract(const labels_mask *from, uint8_t value, size_t margin,
                                          labels_mask *mask);
 void supine_labels_mask_free(labels_mask *mask);
@@ -48,9 +49,7 @@ typedef struct labels_tally {
 } labels_tally;
 
 /** Count the voxels of each label, and find their bounding boxes.
- * @param tally  [LABELS_MAX] output
- * @retval SUPINE_ERROR_FORMAT  a voxel is not a whole number from 0 to 65535
- * @retval SUPINE_ERROR_MESH    every voxel is 0 */
+ * @param tally  [LABELS_MAX] output */
 supine_status supine_labels_count(const char *path, const supine_image *image, labels_tally *tally,
                                   supine_error *error);
 
@@ -67,7 +66,7 @@ supine_status supine_labels_choose(const char *path, const supine_image *image,
                                    uint8_t *side, labels_choice *choice, supine_error *error);
 
 /** Copy the box of voxels from voxel `low` to voxel `high` of an image that supine_labels_count has
- * checked, with a margin of `margin` zeros around it. On SUPINE_ERROR_MEMORY, mask->at is NULL.
+ * checked, with a margin of `margin` zeros around it. On failure, mask->at is NULL.
  * @param value  [largest label + 1] value in the mask for each label */
 supine_status supine_labels_mask_cut(const supine_image *image, const size_t low[3],
                                      const size_t high[3], size_t margin, const uint8_t *value,
@@ -95,8 +94,8 @@ typedef struct labels_pieces {
 } labels_pieces;
 
 /** Find the connected pieces of zero voxels if `zero` is true, else those of nonzero voxels. */
-supine_status supine_labels_pieces_find(const labels_mask *mask, bool zero, labels_pieces *pieces);
-void supine_labels_pieces_free(labels_pieces *pieces);
+supine_status supine_labels_pieces_find(const labels_mask *mask, bool zero, supine_arena *arena,
+                                        labels_pieces *pieces);
 /** If `zero` is false, set all connected pieces of nonzero voxels except the largest to 0.
  * Otherwise fill the cavities: set all connected pieces of zero voxels to 1, except the one around
  * the object.
@@ -118,8 +117,7 @@ supine_status supine_labels_close(labels_mask *mask, double radius, size_t *adde
 /* ---- split.c ---- */
 
 /** Split a mask of two lungs: replace LABELS_EITHER by LABELS_LEFT or LABELS_RIGHT.
- * @param neck  output: width of the bridge cut between the lungs, mm; 0 if they did not touch
- * @retval SUPINE_ERROR_MESH  one lung, or two that cannot be separated */
+ * @param neck  output: width of the bridge cut between the lungs, mm; 0 if they did not touch */
 supine_status supine_labels_split(const char *path, labels_mask *both, double *neck,
                                   supine_error *error);
 
@@ -136,8 +134,7 @@ typedef struct labels_cubes {
 /** Average a mask over a grid of cubes with edges of `edge` mm. If `one` is true, keep only the
  * largest connected piece of cubes inside the mask, and fill its cavities. */
 supine_status supine_labels_cubes_create(const labels_mask *mask, double edge, bool one,
-                                         labels_cubes *cubes);
-void supine_labels_cubes_free(labels_cubes *cubes);
+                                         supine_arena *arena, labels_cubes *cubes);
 
 /* ---- net.c ---- */
 

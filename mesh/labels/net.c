@@ -3,7 +3,6 @@
  * neighbouring cubes of a grid if some of the cubes are inside the mask and some outside. There is
  * a quadrilateral around the edge between the centres of two neighbouring cubes if one of them is
  * inside and the other outside. */
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/vec3.h"
@@ -138,37 +137,24 @@ static void find_quads(build *b, bool write) {
   }
 }
 
-static void net_free(surface_net *net) {
-  free(net->cell);
-  free(net->at);
-  free(net->neighbour);
-  free(net->quad);
-  *net = (surface_net){0};
-}
-
-static supine_status create(const labels_cubes *cubes, surface_net *net) {
-  surface_net made = {0};
+static supine_status create(const labels_cubes *cubes, supine_arena *arena, surface_net *net) {
   const size_t count = cubes->size[0] * cubes->size[1] * cubes->size[2];
   build b = {
-      .cubes = cubes, .stride = {1, cubes->size[0], cubes->size[0] * cubes->size[1]}, .net = &made};
+      .cubes = cubes, .stride = {1, cubes->size[0], cubes->size[0] * cubes->size[1]}, .net = net};
   find_vertices(&b, false);
   find_quads(&b, false);
-  b.vertex = malloc(count * sizeof *b.vertex);
-  made.cell = malloc((made.count + 1) * sizeof *made.cell);
-  made.at = malloc((made.count + 1) * sizeof *made.at);
-  made.neighbour = malloc((made.count + 1) * sizeof *made.neighbour);
-  made.quad = malloc((made.quad_count + 1) * sizeof *made.quad);
-  if (b.vertex == NULL || made.cell == NULL || made.at == NULL || made.neighbour == NULL ||
-      made.quad == NULL || made.count >= INT32_MAX) {
-    free(b.vertex);
-    net_free(&made);
+  SUPINE_ARENA temporary = {0};
+  b.vertex = supine_arena_take(&temporary, count, sizeof *b.vertex);
+  net->cell = supine_arena_take(arena, net->count, sizeof *net->cell);
+  net->at = supine_arena_take(arena, net->count, sizeof *net->at);
+  net->neighbour = supine_arena_take(arena, net->count, sizeof *net->neighbour);
+  net->quad = supine_arena_take(arena, net->quad_count, sizeof *net->quad);
+  if (temporary.failed || arena->failed || net->count >= INT32_MAX) {
     return SUPINE_ERROR_MEMORY;
   }
-  memset(made.neighbour, 0xFF, made.count * sizeof *made.neighbour); /* sets all to NONE */
+  memset(net->neighbour, 0xFF, net->count * sizeof *net->neighbour); /* sets all to NONE */
   find_vertices(&b, true);
   find_quads(&b, true);
-  free(b.vertex);
-  *net = made;
   return SUPINE_OK;
 }
 
@@ -203,17 +189,17 @@ static void step(const surface_net *net, double share, double (*next)[3]) {
 /* Smooth the net by alternate shrinking and inflation, a low-pass filter [Taubin1995]. Every vertex
  * stays in its cell. */
 static supine_status relax(surface_net *net) {
-  double(*next)[3] = malloc((net->count + 1) * sizeof *next);
-  if (next == NULL) {
+  SUPINE_ARENA arena = {0};
+  double(*next)[3] = supine_arena_take(&arena, net->count, sizeof *next);
+  if (arena.failed) {
     return SUPINE_ERROR_MEMORY;
   }
-  for (int turn = 0; turn < 2 * TURNS; ++turn) {
+  for (int turn = 0; turn < 2 * TURNS; ++turn) { /* an even number of exchanges */
     step(net, turn % 2 == 0 ? shrink : swell, next);
     double(*old)[3] = net->at;
     net->at = next;
     next = old;
   }
-  free(next);
   return SUPINE_OK;
 }
 
@@ -228,41 +214,32 @@ static void in_voxels(const surface_net *net, const labels_cubes *cubes, size_t 
 static supine_status make_mesh(const surface_net *net, const labels_cubes *cubes,
                                const labels_mask *mask, supine_mesh *mesh) {
   const bool turned = supine_triple(mask->step[0], mask->step[1], mask->step[2]) < 0.0;
-  supine_mesh made = {.vertex_count = net->count, .triangle_count = 2 * net->quad_count};
-  made.vertices = malloc(3 * made.vertex_count * sizeof *made.vertices);
-  made.triangles = malloc(3 * made.triangle_count * sizeof *made.triangles);
-  if (made.vertices == NULL || made.triangles == NULL) {
-    supine_mesh_free(&made);
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_mesh_allocate(net->count, 2 * net->quad_count, mesh));
   for (size_t i = 0; i < net->count; ++i) {
     double voxel[3];
     in_voxels(net, cubes, i, voxel);
-    supine_labels_mask_place(mask, voxel, made.vertices + 3 * i);
+    supine_labels_mask_place(mask, voxel, mesh->vertices + 3 * i);
   }
   for (size_t q = 0; q < net->quad_count; ++q) { /* cut along the shorter diagonal */
     uint32_t c[4];
     for (size_t k = 0; k < 4; ++k) {
       c[k] = net->quad[q][turned ? 3 - k : k];
     }
-    const bool first = supine_distance(made.vertices + 3 * c[0], made.vertices + 3 * c[2]) <=
-                       supine_distance(made.vertices + 3 * c[1], made.vertices + 3 * c[3]);
+    const bool first = supine_distance(mesh->vertices + 3 * c[0], mesh->vertices + 3 * c[2]) <=
+                       supine_distance(mesh->vertices + 3 * c[1], mesh->vertices + 3 * c[3]);
     const uint32_t corners[6] = {c[0], c[1], first ? c[2] : c[3], first ? c[0] : c[1], c[2], c[3]};
-    memcpy(made.triangles + 6 * q, corners, sizeof corners);
+    memcpy(mesh->triangles + 6 * q, corners, sizeof corners);
   }
-  *mesh = made;
   return SUPINE_OK;
 }
 
 supine_status supine_labels_mask_surface(const labels_mask *mask, double edge, bool one,
                                          supine_mesh *mesh) {
-  labels_cubes cubes = {.share = NULL};
-  surface_net net = {0};
-  supine_status status = supine_labels_cubes_create(mask, edge, one, &cubes);
-  status = status == SUPINE_OK ? create(&cubes, &net) : status;
-  status = status == SUPINE_OK ? relax(&net) : status;
-  status = status == SUPINE_OK ? make_mesh(&net, &cubes, mask, mesh) : status;
-  net_free(&net);
-  supine_labels_cubes_free(&cubes);
-  return status;
+  SUPINE_ARENA arena = {0};
+  labels_cubes cubes;
+  surface_net net;
+  SUPINE_TRY(supine_labels_cubes_create(mask, edge, one, &arena, &cubes));
+  SUPINE_TRY(create(&cubes, &arena, &net));
+  SUPINE_TRY(relax(&net));
+  return make_mesh(&net, &cubes, mask, mesh);
 }

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Find connected pieces of voxels that share faces, by joining runs of consecutive voxels in rows
  * along x. */
-#include <stdlib.h>
 #include <string.h>
 
 #include "mesh/labels/mask.h"
@@ -74,57 +73,44 @@ static void measure(const labels_mask *mask, labels_pieces *pieces) {
   }
 }
 
-supine_status supine_labels_pieces_find(const labels_mask *mask, bool zero, labels_pieces *pieces) {
+supine_status supine_labels_pieces_find(const labels_mask *mask, bool zero, supine_arena *arena,
+                                        labels_pieces *pieces) {
   const size_t rows = mask->size[1] * mask->size[2];
-  labels_pieces found = {.row = malloc((rows + 1) * sizeof(size_t))};
-  if (found.row == NULL) {
-    return SUPINE_ERROR_MEMORY;
+  size_t *first = supine_arena_zeros(arena, rows + 1, sizeof *first);
+  for (size_t row = 0; first != NULL && row < rows; ++row) {
+    first[row + 1] =
+        first[row] + runs_of_row(mask->at + row * mask->size[0], mask->size[0], zero, NULL);
   }
-  found.row[0] = 0;
-  for (size_t row = 0; row < rows; ++row) {
-    found.row[row + 1] =
-        found.row[row] + runs_of_row(mask->at + row * mask->size[0], mask->size[0], zero, NULL);
-  }
-  found.run_count = found.row[rows];
-  found.run = malloc((found.run_count + 1) * sizeof *found.run);
-  found.piece = calloc(found.run_count + 1, sizeof *found.piece);
-  if (found.run == NULL || found.piece == NULL || found.run_count >= UINT32_MAX) {
-    supine_labels_pieces_free(&found);
+  const size_t count = first != NULL ? first[rows] : 0;
+  labels_run *run = supine_arena_take(arena, count, sizeof *run);
+  *pieces = (labels_pieces){.row = first,
+                            .run = run,
+                            .run_count = count,
+                            .piece = supine_arena_zeros(arena, count + 1, sizeof *pieces->piece)};
+  if (arena->failed || count >= UINT32_MAX) {
     return SUPINE_ERROR_MEMORY;
   }
   for (size_t row = 0; row < rows; ++row) {
-    (void)runs_of_row(mask->at + row * mask->size[0], mask->size[0], zero,
-                      found.run + found.row[row]);
-    for (size_t r = found.row[row]; r < found.row[row + 1]; ++r) {
-      found.run[r].parent = (uint32_t)r;
+    (void)runs_of_row(mask->at + row * mask->size[0], mask->size[0], zero, run + first[row]);
+    for (size_t r = first[row]; r < first[row + 1]; ++r) {
+      run[r].parent = (uint32_t)r;
     }
     if (row % mask->size[1] > 0) {
-      unite_rows(found.run, found.row[row - 1], found.row[row], found.row[row], found.row[row + 1]);
+      unite_rows(run, first[row - 1], first[row], first[row], first[row + 1]);
     }
     if (row >= mask->size[1]) {
       const size_t below = row - mask->size[1];
-      unite_rows(found.run, found.row[below], found.row[below + 1], found.row[row],
-                 found.row[row + 1]);
+      unite_rows(run, first[below], first[below + 1], first[row], first[row + 1]);
     }
   }
-  measure(mask, &found);
-  *pieces = found;
+  measure(mask, pieces);
   return SUPINE_OK;
 }
 
-void supine_labels_pieces_free(labels_pieces *pieces) {
-  free(pieces->row);
-  free(pieces->run);
-  free(pieces->piece);
-  *pieces = (labels_pieces){0};
-}
-
 supine_status supine_labels_keep_one(labels_mask *mask, bool zero, size_t *others, size_t *voxels) {
-  labels_pieces pieces = {0};
-  const supine_status status = supine_labels_pieces_find(mask, zero, &pieces);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_ARENA arena = {0};
+  labels_pieces pieces;
+  SUPINE_TRY(supine_labels_pieces_find(mask, zero, &arena, &pieces));
   /* first run of the piece to keep: run 0 for voxels of value 0, as it is in the outer margin */
   uint32_t kept = 0;
   for (size_t r = 1; !zero && r < pieces.run_count; ++r) {
@@ -141,6 +127,5 @@ supine_status supine_labels_keep_one(labels_mask *mask, bool zero, size_t *other
       }
     }
   }
-  supine_labels_pieces_free(&pieces);
   return SUPINE_OK;
 }

@@ -18,18 +18,14 @@ static supine_status make_part(const supine_image *image, const labels_tally *ta
                                supine_labels_shape *part) {
   const size_t low[3] = {tally->low[0], tally->low[1], tally->low[2]};
   const size_t high[3] = {tally->high[0], tally->high[1], tally->high[2]};
-  labels_mask mask;
+  SUPINE_FREED_BY(supine_labels_mask_free) labels_mask mask;
   value[part->label] = 1;
-  supine_status status = supine_labels_mask_cut(image, low, high, LABELS_MARGIN, value, &mask);
+  SUPINE_TRY(supine_labels_mask_cut(image, low, high, LABELS_MARGIN, value, &mask));
   value[part->label] = 0;
-  if (status == SUPINE_OK) {
-    part->mask = supine_labels_voxel_ml(&mask) * (double)tally->count;
-    const double edge =
-        fmax(cbrt(1e3 * supine_labels_voxel_ml(&mask)), edge_share * cbrt(1e3 * part->mask));
-    status = supine_labels_mask_surface(&mask, edge, false, &part->surface);
-  }
-  supine_labels_mask_free(&mask);
-  return status;
+  part->mask = supine_labels_voxel_ml(&mask) * (double)tally->count;
+  const double edge =
+      fmax(cbrt(1e3 * supine_labels_voxel_ml(&mask)), edge_share * cbrt(1e3 * part->mask));
+  return supine_labels_mask_surface(&mask, edge, false, &part->surface);
 }
 
 static supine_status choose(const char *path, const labels_tally *tally, const unsigned *wanted,
@@ -58,35 +54,36 @@ static supine_status choose(const char *path, const labels_tally *tally, const u
   return SUPINE_OK;
 }
 
+static supine_status make_parts(const char *path, const unsigned *wanted, size_t wanted_count,
+                                supine_labels_shape *parts, size_t *count, supine_error *error) {
+  SUPINE_ARENA arena = {0};
+  labels_tally *tally = supine_arena_take(&arena, LABELS_MAX, sizeof *tally);
+  uint8_t *value = supine_arena_zeros(&arena, LABELS_MAX, 1);
+  SUPINE_FREED_BY(supine_image_free) supine_image image = {0};
+  if (arena.failed) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  SUPINE_TRY(supine_image_read(path, &image, error));
+  SUPINE_TRY(supine_labels_count(path, &image, tally, error));
+  SUPINE_TRY(choose(path, tally, wanted, wanted_count, parts, count, error));
+  for (size_t i = 0; i < *count; ++i) {
+    SUPINE_TRY(make_part(&image, &tally[parts[i].label], value, &parts[i]));
+  }
+  return SUPINE_OK;
+}
+
 supine_status supine_labels_shapes(const char *path, const unsigned *wanted, size_t wanted_count,
                                    supine_labels_shape **parts, size_t *count,
                                    supine_error *error) {
-  supine_image image = {0};
-  labels_tally *tally = malloc(LABELS_MAX * sizeof *tally);
-  uint8_t *value = calloc(LABELS_MAX, 1);
   supine_labels_shape *made = calloc(wanted_count > 0 ? wanted_count : PARTS_MAX, sizeof *made);
   size_t made_count = 0;
-  supine_status status =
-      tally == NULL || value == NULL || made == NULL
-          ? supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path)
-          : supine_image_read(path, &image, error);
-  status = status == SUPINE_OK ? supine_labels_count(path, &image, tally, error) : status;
-  if (status == SUPINE_OK) {
-    status = choose(path, tally, wanted, wanted_count, made, &made_count, error);
-  }
-  for (size_t i = 0; i < made_count && status == SUPINE_OK; ++i) {
-    status = make_part(&image, &tally[made[i].label], value, &made[i]);
-    if (status != SUPINE_OK) {
-      (void)supine_error_set(error, status, "%s: no memory for the surface of label %u", path,
-                             made[i].label);
-    }
-  }
-  supine_image_free(&image);
-  free(tally);
-  free(value);
+  const supine_status status =
+      made != NULL ? make_parts(path, wanted, wanted_count, made, &made_count, error)
+                   : SUPINE_ERROR_MEMORY;
   if (status != SUPINE_OK) {
     supine_labels_shapes_free(made, made_count);
-    return status;
+    return status == SUPINE_ERROR_MEMORY ? supine_error_memory(error, "the labels of %s", path)
+                                         : status;
   }
   *parts = made;
   *count = made_count;

@@ -2,7 +2,6 @@
 /* Split a mask of two lungs. Where they touch, erode the mask until it falls into two connected
  * pieces beside each other. Then assign each voxel to the nearer piece. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "mesh/labels/mask.h"
@@ -12,14 +11,10 @@ static const double least_share = 0.1;
 /* A bridge between touching lungs is cut if it is at most this wide, mm. */
 static const double widest_neck = 40.0;
 
-typedef struct pair {
-  /* index of the first run of voxels of each connected piece, left piece first */
-  uint32_t piece[2];
-} pair;
-
 /* Find the two largest connected pieces. Return false unless they lie side by side along x, and the
- * smaller one has at least `least_share` of the volume of the larger one. */
-static bool find_pair(const labels_mask *mask, const labels_pieces *pieces, pair *found) {
+ * smaller one has at least `least_share` of the volume of the larger one.
+ * @param found  written: index of the first run of voxels of each piece, left piece first */
+static bool find_pair(const labels_mask *mask, const labels_pieces *pieces, uint32_t found[2]) {
   uint32_t top[2] = {0, 0};
   for (uint32_t r = 1; r < pieces->run_count; ++r) {
     if (pieces->piece[r].count > pieces->piece[top[0]].count) {
@@ -39,14 +34,11 @@ static bool find_pair(const labels_mask *mask, const labels_pieces *pieces, pair
     const labels_piece *piece = &pieces->piece[top[p]];
     const double voxel[3] = {piece->sum[0] / counts[p], piece->sum[1] / counts[p],
                              piece->sum[2] / counts[p]};
-    found->piece[p] = top[p];
     supine_labels_mask_place(mask, voxel, centre[p]);
   }
   const double apart = centre[0][0] - centre[1][0];
-  if (apart < 0.0) {
-    found->piece[0] = top[1];
-    found->piece[1] = top[0];
-  }
+  found[0] = top[apart < 0.0];
+  found[1] = top[apart >= 0.0];
   return fabs(apart) > fabs(centre[0][1] - centre[1][1]) &&
          fabs(apart) > fabs(centre[0][2] - centre[1][2]);
 }
@@ -61,15 +53,15 @@ static void erode(const labels_mask *both, const float *squares, double depth, u
 }
 
 /* Mark the voxels of two pieces as LABELS_LEFT and LABELS_RIGHT, all others as 0. */
-static void mark_pair(const labels_mask *mask, const labels_pieces *pieces, const pair *found,
+static void mark_pair(const labels_mask *mask, const labels_pieces *pieces, const uint32_t found[2],
                       uint8_t *marks) {
   memset(marks, 0, supine_labels_mask_count(mask));
   for (size_t row = 0; row < mask->size[1] * mask->size[2]; ++row) {
     for (size_t r = pieces->row[row]; r < pieces->row[row + 1]; ++r) {
       const labels_run *run = &pieces->run[r];
-      const uint8_t mark = run->parent == found->piece[0]   ? LABELS_LEFT
-                           : run->parent == found->piece[1] ? LABELS_RIGHT
-                                                            : 0;
+      const uint8_t mark = run->parent == found[0]   ? LABELS_LEFT
+                           : run->parent == found[1] ? LABELS_RIGHT
+                                                     : 0;
       memset(marks + row * mask->size[0] + run->begin, mark, run->end - run->begin);
     }
   }
@@ -80,72 +72,59 @@ static void mark_pair(const labels_mask *mask, const labels_pieces *pieces, cons
 static supine_status share_out(labels_mask *both, uint8_t *marks, float *squares) {
   const size_t count = supine_labels_mask_count(both);
   labels_mask one = *both;
-  float *other = malloc(count * sizeof *other);
-  one.at = malloc(count);
-  supine_status status = other == NULL || one.at == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
-  for (uint8_t value = LABELS_LEFT; value <= LABELS_RIGHT && status == SUPINE_OK; ++value) {
+  SUPINE_ARENA arena = {0};
+  float *other = supine_arena_take(&arena, count, sizeof *other);
+  one.at = supine_arena_take(&arena, count, 1);
+  if (arena.failed) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  for (uint8_t value = LABELS_LEFT; value <= LABELS_RIGHT; ++value) {
     for (size_t i = 0; i < count; ++i) {
       one.at[i] = marks[i] == value;
     }
-    status = supine_labels_distance(&one, false, value == LABELS_LEFT ? squares : other);
+    SUPINE_TRY(supine_labels_distance(&one, false, value == LABELS_LEFT ? squares : other));
   }
-  for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
+  for (size_t i = 0; i < count; ++i) {
     both->at[i] = both->at[i] == 0 ? 0 : squares[i] <= other[i] ? LABELS_LEFT : LABELS_RIGHT;
   }
-  free(one.at);
-  free(other);
-  return status;
+  return SUPINE_OK;
 }
 
 supine_status supine_labels_split(const char *path, labels_mask *both, double *neck,
                                   supine_error *error) {
   const size_t count = supine_labels_mask_count(both);
   const double step = fmax(both->spacing[0], fmax(both->spacing[1], both->spacing[2]));
+  SUPINE_ARENA arena = {0};
+  float *squares = supine_arena_take(&arena, count, sizeof *squares);
   labels_mask eroded = *both;
-  float *squares = malloc(count * sizeof *squares);
-  supine_status status = SUPINE_ERROR_MEMORY;
-  bool found_pair = false;
-  eroded.at = malloc(count);
-  *neck = 0.0;
-  if (squares == NULL || eroded.at == NULL) {
-    goto cleanup;
+  eroded.at = supine_arena_take(&arena, count, 1);
+  if (arena.failed) {
+    return SUPINE_ERROR_MEMORY;
   }
-  status = SUPINE_OK;
-  bool all = false; /* whether the two pieces together hold all voxels of the mask */
-  for (double depth = 0.0; status == SUPINE_OK && !found_pair && 2.0 * depth <= widest_neck;
-       depth += step) {
-    labels_pieces pieces = {0};
-    pair found;
+  for (double depth = 0.0; 2.0 * depth <= widest_neck; depth += step) {
+    SUPINE_ARENA pass = {0};
+    labels_pieces pieces;
+    uint32_t found[2];
     if (depth == step) { /* first erosion: compute the depth of each voxel */
-      status = supine_labels_distance(both, true, squares);
+      SUPINE_TRY(supine_labels_distance(both, true, squares));
     }
     erode(both, squares, depth, eroded.at);
-    status = status == SUPINE_OK ? supine_labels_pieces_find(&eroded, false, &pieces) : status;
-    found_pair = status == SUPINE_OK && pieces.run_count > 0 && find_pair(both, &pieces, &found);
-    if (found_pair) {
-      *neck = 2.0 * depth;
-      all = depth == 0.0 && pieces.piece_count == 2;
-      mark_pair(both, &pieces, &found, eroded.at);
+    SUPINE_TRY(supine_labels_pieces_find(&eroded, false, &pass, &pieces));
+    if (pieces.run_count == 0 || !find_pair(both, &pieces, found)) {
+      continue;
     }
-    supine_labels_pieces_free(&pieces);
-  }
-  if (found_pair && all) {
+    *neck = 2.0 * depth;
+    mark_pair(both, &pieces, found, eroded.at);
+    if (depth > 0.0 || pieces.piece_count > 2) { /* not all voxels are in the two pieces */
+      supine_arena_free(&pass);
+      return share_out(both, eroded.at, squares);
+    }
     memcpy(both->at, eroded.at, count);
-  } else if (found_pair) {
-    status = share_out(both, eroded.at, squares);
+    return SUPINE_OK;
   }
-cleanup:
-  free(squares);
-  free(eroded.at);
-  if (status != SUPINE_OK) {
-    return supine_error_set(error, status, "%s: no memory for a label map of %zu voxels", path,
-                            count);
-  }
-  return found_pair
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_MESH,
-                                "%s: cannot split the mask into two lungs: erosion leaves no "
-                                "two pieces beside each other. If it is one lung, name the "
-                                "side: --labels left=LABEL or right=LABEL",
-                                path);
+  return supine_error_set(error, SUPINE_ERROR_MESH,
+                          "%s: cannot split the mask into two lungs: erosion leaves no two pieces "
+                          "beside each other. If it is one lung, name the side: --labels "
+                          "left=LABEL or right=LABEL",
+                          path);
 }

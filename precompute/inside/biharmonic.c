@@ -4,7 +4,6 @@
 #include <cblas.h>
 #include <lapacke.h>
 #include <math.h>
-#include <stdlib.h>
 
 #include "base/clones.h"
 #include "base/parallel.h"
@@ -36,8 +35,9 @@ static void frame(size_t count, const double *points, supine_inside_biharmonic *
  * distance from its nearest centre is largest. */
 SUPINE_CLONES static supine_status choose(size_t count, const double *points, size_t centre_max,
                                           supine_inside_biharmonic *fit) {
-  double *distance = malloc(count * sizeof *distance);
-  if (distance == NULL) {
+  SUPINE_ARENA arena = {0};
+  double *distance = supine_arena_take(&arena, count, sizeof *distance);
+  if (arena.failed) {
     return SUPINE_ERROR_MEMORY;
   }
   size_t farthest = 0;
@@ -67,7 +67,6 @@ SUPINE_CLONES static supine_status choose(size_t count, const double *points, si
       break;
     }
   }
-  free(distance);
   return SUPINE_OK;
 }
 
@@ -134,8 +133,8 @@ static lapack_int factorise(kernel *k) {
  *     K y = f and K Z = P,    (P^T Z) b = P^T y,    w = y - Z b
  *
  * fit->weights receives -w, then b.
- * @param p  in: P, then f, column by column, with k->size numbers in a column; out: Z, then y
- * @retval SUPINE_ERROR_NUMERICAL  K or P^T Z is singular: all centres lie in one plane */
+ * K or P^T Z is singular if all centres lie in one plane.
+ * @param p  in: P, then f, column by column, with k->size numbers in a column; out: Z, then y */
 static supine_status find_weights(supine_inside_biharmonic *fit, kernel *k, double *p) {
   static const double flat = 1e-5;
   const int n = (int)k->size;
@@ -174,60 +173,53 @@ static supine_status find_weights(supine_inside_biharmonic *fit, kernel *k, doub
 
 static supine_status solve(supine_inside_biharmonic *fit, const double *values) {
   const size_t n = fit->count;
-  kernel k = {.size = n, .matrix = malloc(n * n * sizeof *k.matrix)};
-  double *p = malloc(n * (AFFINE + fit->columns) * sizeof *p);
-  supine_status status = SUPINE_ERROR_MEMORY;
-  if (k.matrix != NULL && p != NULL) {
-    fill(fit->centres, &k);
-    for (size_t i = 0; i < n; ++i) {
-      p[i] = 1.0;
-      for (size_t axis = 0; axis < 3; ++axis) {
-        p[(1 + axis) * n + i] = fit->centres[3 * i + axis];
-      }
-      for (size_t c = 0; c < fit->columns; ++c) {
-        p[(AFFINE + c) * n + i] = values[fit->chosen[i] * fit->columns + c];
-      }
-    }
-    status = find_weights(fit, &k, p);
+  SUPINE_ARENA arena = {0};
+  kernel k = {.size = n, .matrix = supine_arena_take(&arena, n * n, sizeof *k.matrix)};
+  double *p = supine_arena_take(&arena, n * (AFFINE + fit->columns), sizeof *p);
+  if (arena.failed) {
+    return SUPINE_ERROR_MEMORY;
   }
-  free(k.matrix);
-  free(p);
-  return status;
+  fill(fit->centres, &k);
+  for (size_t i = 0; i < n; ++i) {
+    p[i] = 1.0;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      p[(1 + axis) * n + i] = fit->centres[3 * i + axis];
+    }
+    for (size_t c = 0; c < fit->columns; ++c) {
+      p[(AFFINE + c) * n + i] = values[fit->chosen[i] * fit->columns + c];
+    }
+  }
+  return find_weights(fit, &k, p);
 }
 
 supine_status supine_inside_biharmonic_fit(size_t count, const double *points, size_t columns,
                                            const double *values, size_t centre_max,
                                            supine_inside_biharmonic *fit, supine_error *error) {
-  supine_inside_biharmonic made = {.columns = columns};
   const size_t most = count < centre_max ? count : centre_max;
-  made.chosen = malloc(most * sizeof *made.chosen);
-  made.centres = malloc(3 * most * sizeof *made.centres);
-  made.weights = calloc((most + AFFINE) * columns, sizeof *made.weights);
-  supine_status status = SUPINE_ERROR_MEMORY;
-  if (made.chosen != NULL && made.centres != NULL && made.weights != NULL) {
-    frame(count, points, &made);
-    status = choose(count, points, most, &made);
-  }
-  if (status == SUPINE_OK) {
-    status = solve(&made, values);
-  }
+  supine_arena arena = {0};
+  *fit = (supine_inside_biharmonic){
+      .columns = columns,
+      .chosen = supine_arena_take(&arena, most, sizeof *fit->chosen),
+      .centres = supine_arena_take(&arena, 3 * most, sizeof *fit->centres),
+      .weights = supine_arena_zeros(&arena, (most + AFFINE) * columns, sizeof *fit->weights)};
+  fit->arena = arena;
+  frame(count, points, fit);
+  supine_status status = arena.failed ? SUPINE_ERROR_MEMORY : choose(count, points, most, fit);
+  status = status == SUPINE_OK ? solve(fit, values) : status;
   if (status != SUPINE_OK) {
-    supine_inside_biharmonic_free(&made);
-    return supine_error_set(
-        error, status,
-        status == SUPINE_ERROR_MEMORY
-            ? "no memory to interpolate from %zu points"
-            : "cannot interpolate from %zu points in one plane: give closed lungs",
-        most);
+    supine_inside_biharmonic_free(fit);
   }
-  *fit = made;
-  return SUPINE_OK;
+  return status == SUPINE_ERROR_MEMORY
+             ? supine_error_memory(error, "interpolation from %zu points", most)
+         : status != SUPINE_OK
+             ? supine_error_set(
+                   error, status,
+                   "cannot interpolate from %zu points in one plane: give closed lungs", most)
+             : SUPINE_OK;
 }
 
 void supine_inside_biharmonic_free(supine_inside_biharmonic *fit) {
-  free(fit->chosen);
-  free(fit->centres);
-  free(fit->weights);
+  supine_arena_free(&fit->arena);
   *fit = (supine_inside_biharmonic){0};
 }
 

@@ -13,12 +13,15 @@
 
 #include <supine/status.h>
 
+#include "base/arena.h"
+
 /** An interpolant of given values. Zero-initialise; release with supine_inside_biharmonic_free. */
 typedef struct supine_inside_biharmonic {
-  size_t count;    /**< number of centres: input points at which the function is exact */
-  size_t columns;  /**< number of components of the function: 3 for a vector */
-  size_t *chosen;  /**< [count] indices of the input points chosen as centres, in that order */
-  double *centres; /**< [count, 3] positions of the centres minus `middle`, divided by `unit` */
+  supine_arena arena; /**< holds the arrays */
+  size_t count;       /**< number of centres: input points at which the function is exact */
+  size_t columns;     /**< number of components of the function: 3 for a vector */
+  size_t *chosen;     /**< [count] indices of the input points chosen as centres, in that order */
+  double *centres;    /**< [count, 3] positions of the centres minus `middle`, divided by `unit` */
   double *weights; /**< [columns, count + 4] factor of each centre's distance, then of 1, x, y, z */
   double middle[3]; /**< centre of the bounding box of the input points, mm */
   double unit;      /**< half the diagonal of the bounding box of the input points, mm */
@@ -31,7 +34,6 @@ typedef struct supine_inside_biharmonic {
  * @param points  [count, 3] mm
  * @param values  [count, columns] value of each component at each point
  * @retval SUPINE_ERROR_NUMERICAL  the points lie in one plane
- * @retval SUPINE_ERROR_MEMORY
  * Cost: count x M distances to choose M centres; M^3 / 6 multiplications to factorise a matrix of
  * 8 M^2 bytes, of which half are used. */
 supine_status supine_inside_biharmonic_fit(size_t count, const double *points, size_t columns,

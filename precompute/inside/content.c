@@ -3,6 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
+
 #include "mesh/io/points.h"
 #include "precompute/inside/content.h"
 
@@ -20,7 +22,7 @@ static supine_status reserve(supine_inside_content *content, size_t points, size
     memcpy(&array, arrays[i], sizeof array);
     void *grown = realloc(array, sizes[i] + 1);
     if (grown == NULL) {
-      return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
+      return supine_error_memory(error, "%s", path);
     }
     memcpy(arrays[i], &grown, sizeof grown);
   }
@@ -41,25 +43,20 @@ static char *add_name(supine_inside_content *content, const char *name, size_t l
 supine_status supine_inside_content_points(const char *path,
                                            const supine_mesh_load_options *options,
                                            supine_inside_content *content, supine_error *error) {
-  supine_mesh_points read = {0};
+  SUPINE_FREED_BY(supine_mesh_points_free) supine_mesh_points read = {0};
   size_t length = 0;
-  supine_status status = supine_mesh_points_read(path, options, &read, error);
+  SUPINE_TRY(supine_mesh_points_read(path, options, &read, error));
   for (size_t i = 0; i < read.count; ++i) {
     length += strlen(read.names[i]) + 1;
   }
-  if (status == SUPINE_OK) {
-    status = reserve(content, read.count, 0, length, path, error);
+  SUPINE_TRY(reserve(content, read.count, 0, length, path, error));
+  char *end = content->names + strlen(content->names);
+  memcpy(content->points + 3 * content->count, read.at, 3 * read.count * sizeof *read.at);
+  for (size_t i = 0; i < read.count; ++i) {
+    content->part[content->count++] = (uint32_t)content->part_count;
+    end = add_name(content, read.names[i], strlen(read.names[i]), end);
   }
-  if (status == SUPINE_OK) {
-    char *end = content->names + strlen(content->names);
-    memcpy(content->points + 3 * content->count, read.at, 3 * read.count * sizeof *read.at);
-    for (size_t i = 0; i < read.count; ++i) {
-      content->part[content->count++] = (uint32_t)content->part_count;
-      end = add_name(content, read.names[i], strlen(read.names[i]), end);
-    }
-  }
-  supine_mesh_points_free(&read);
-  return status;
+  return SUPINE_OK;
 }
 
 /* Return where the mesh name ("airways") starts in "/scans/airways.ply", and set its length. */
@@ -72,11 +69,7 @@ static const char *part_name(const char *path, size_t *length) {
 
 static supine_status add_surface(const char *name, size_t length, const supine_mesh *mesh,
                                  supine_inside_content *content, supine_error *error) {
-  const supine_status status =
-      reserve(content, mesh->vertex_count, mesh->triangle_count, length + 1, name, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(reserve(content, mesh->vertex_count, mesh->triangle_count, length + 1, name, error));
   uint32_t *joined = content->triangles + 3 * content->triangle_count;
   for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {
     joined[i] = mesh->triangles[i] + (uint32_t)content->count;
@@ -99,22 +92,18 @@ supine_status supine_inside_content_surface(const char *name, const supine_mesh 
 
 supine_status supine_inside_content_mesh(const char *path, const supine_mesh_load_options *options,
                                          supine_inside_content *content, supine_error *error) {
-  supine_mesh mesh = {0};
-  supine_status status = supine_mesh_load(path, options, &mesh, NULL, error);
-  if (status == SUPINE_OK) {
-    size_t length = 0;
-    const char *name = part_name(path, &length);
-    status = add_surface(name, length, &mesh, content, error);
-  }
-  supine_mesh_free(&mesh);
-  return status;
+  SUPINE_FREED_BY(supine_mesh_free) supine_mesh mesh = {0};
+  size_t length = 0;
+  const char *name = part_name(path, &length);
+  SUPINE_TRY(supine_mesh_load(path, options, &mesh, NULL, error));
+  return add_surface(name, length, &mesh, content, error);
 }
 
 supine_status supine_inside_content_make_rigid(supine_inside_content *content, const char *names,
                                                supine_error *error) {
   content->rigid = calloc(content->part_count + 1, sizeof *content->rigid);
   if (content->rigid == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+    return supine_error_memory(error, "%zu parts", content->part_count);
   }
   for (const char *at = names;; ++at) {
     const size_t length = strcspn(at, ",");
@@ -150,26 +139,24 @@ static int compare_names(const void *first, const void *second) {
 
 supine_status supine_inside_content_check_names(const supine_inside_content *content,
                                                 supine_error *error) {
-  const char **names = malloc((content->part_count + 1) * sizeof *names);
-  supine_status status = SUPINE_OK;
-  if (names == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu names",
-                            content->part_count);
+  SUPINE_ARENA arena = {0};
+  const char **names = supine_arena_take(&arena, content->part_count, sizeof *names);
+  if (arena.failed) {
+    return supine_error_memory(error, "%zu names", content->part_count);
   }
   const char *name = content->names;
   for (size_t i = 0; i < content->part_count; ++i, name += strcspn(name, "\n") + 1) {
     names[i] = name;
   }
   qsort(names, content->part_count, sizeof *names, compare_names);
-  for (size_t i = 1; i < content->part_count && status == SUPINE_OK; ++i) {
+  for (size_t i = 1; i < content->part_count; ++i) {
     if (compare_names(&names[i - 1], &names[i]) == 0) {
-      status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "two parts are named '%.*s': give each a name of its own",
-                                (int)strcspn(names[i], "\n"), names[i]);
+      return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "two parts are named '%.*s': give each a name of its own",
+                              (int)strcspn(names[i], "\n"), names[i]);
     }
   }
-  free(names);
-  return status;
+  return SUPINE_OK;
 }
 
 void supine_inside_content_free(supine_inside_content *content) {

@@ -20,24 +20,21 @@ typedef struct supine_inside_content {
   supine_image grid;   /**< for a grid: numbers of nodes, position of the first node, and steps */
 } supine_inside_content;
 
-/** Append each point of a file as one part. Options and statuses as supine_mesh_points_read. */
+/** Append each point of a file as one part. Options as supine_mesh_points_read. */
 supine_status supine_inside_content_points(const char *path,
                                            const supine_mesh_load_options *options,
                                            supine_inside_content *content, supine_error *error);
 
-/** Append a mesh as one part, named after its file. Options and statuses as supine_mesh_load. */
+/** Append a mesh as one part, named after its file. Options as supine_mesh_load. */
 supine_status supine_inside_content_mesh(const char *path, const supine_mesh_load_options *options,
                                          supine_inside_content *content, supine_error *error);
 
-/** Append a surface as one part of the given name.
- * @retval SUPINE_ERROR_MEMORY */
+/** Append a surface as one part of the given name. */
 supine_status supine_inside_content_surface(const char *name, const supine_mesh *mesh,
                                             supine_inside_content *content, supine_error *error);
 
 /** Mark parts as rigid: they move, but keep their shape.
- * @param names  part names separated by commas, or "all"
- * @retval SUPINE_ERROR_ARGUMENT  no part has that name
- * @retval SUPINE_ERROR_MEMORY */
+ * @param names  part names separated by commas, or "all" */
 supine_status supine_inside_content_make_rigid(supine_inside_content *content, const char *names,
                                                supine_error *error);
 
@@ -49,17 +46,12 @@ supine_status supine_inside_content_make_rigid(supine_inside_content *content, c
  *                 is n voxels; if NULL, the axes of the grid are x, y and z
  * @param spacing  distance between nodes, mm; with `like`, rounded to a multiple of its spacing
  * @param margin   distance, mm, by which the grid extends beyond the lungs' bounding box
- * @param content  zero-initialised
- * @retval SUPINE_ERROR_ARGUMENT  a spacing that is not positive, more than 2^31 nodes
- * @retval SUPINE_ERROR_MESH      no node is inside a lung
- * @retval SUPINE_ERROR_MEMORY */
+ * @param content  zero-initialised */
 supine_status supine_inside_content_grid(const supine_inside_shells *shells,
                                          const supine_image *like, double spacing, double margin,
                                          supine_inside_content *content, supine_error *error);
 
-/** Check that every part has a name of its own.
- * @retval SUPINE_ERROR_FORMAT  two parts have the same name
- * @retval SUPINE_ERROR_MEMORY */
+/** Check that every part has a name of its own. */
 supine_status supine_inside_content_check_names(const supine_inside_content *content,
                                                 supine_error *error);
 

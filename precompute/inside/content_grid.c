@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "base/arena.h"
 #include "base/parallel.h"
 #include "base/vec3.h"
 
@@ -119,7 +120,7 @@ static supine_status take_nodes(const supine_image *grid, const unsigned char *k
   content->part = malloc(count * sizeof *content->part);
   if (content->points == NULL || content->part == NULL) {
     supine_inside_content_free(content);
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu nodes", count);
+    return supine_error_memory(error, "%zu nodes", count);
   }
   content->grid = *grid;
   for (size_t i = 0; i < nodes; ++i) {
@@ -139,21 +140,17 @@ supine_status supine_inside_content_grid(const supine_inside_shells *shells,
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "the grid's spacing is %g mm: give one above 0", spacing);
   }
-  supine_status status = make_grid(shells, like, spacing, margin, &grid, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(make_grid(shells, like, spacing, margin, &grid, error));
   double diagonal = 0.0;
   for (int k = 0; k < 3; ++k) {
     diagonal += supine_length(grid.step[k]);
   }
   const size_t nodes = grid.size[0] * grid.size[1] * grid.size[2];
-  search work = {shells, &grid, diagonal, malloc(nodes)};
-  if (work.keep == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a grid of %zu nodes", nodes);
+  SUPINE_ARENA arena = {0};
+  search work = {shells, &grid, diagonal, supine_arena_take(&arena, nodes, 1)};
+  if (arena.failed) {
+    return supine_error_memory(error, "a grid of %zu nodes", nodes);
   }
   supine_parallel_for(grid.size[1] * grid.size[2], 1, 0, search_rows, &work);
-  status = take_nodes(&grid, work.keep, content, error);
-  free(work.keep);
-  return status;
+  return take_nodes(&grid, work.keep, content, error);
 }

@@ -2,11 +2,11 @@
 /* Embed points and meshes in the lungs, and write a basis that moves them with the lungs. */
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include <supine/safetensors.h>
 
+#include "base/arena.h"
 #include "base/parallel.h"
 #include "base/vec3.h"
 #include "runtime/rigid.h"
@@ -68,11 +68,12 @@ static void gather_parts(embedding *e) {
 }
 
 /* Sort the points by lung, in stable order, and renumber the triangles. */
-static supine_status sort_points(embedding *e, supine_inside_report *report) {
+static supine_status sort_points(embedding *e, supine_inside_report *report, supine_error *error) {
   const size_t n = e->content->count;
-  uint32_t *position = malloc(n * sizeof *position);
-  if (position == NULL) {
-    return SUPINE_ERROR_MEMORY;
+  SUPINE_ARENA arena = {0};
+  uint32_t *position = supine_arena_take(&arena, n, sizeof *position);
+  if (arena.failed) {
+    return supine_error_memory(error, "%zu points", n);
   }
   size_t at = 0;
   for (size_t lung = 0; lung < e->shells->count; ++lung) {
@@ -98,7 +99,6 @@ static supine_status sort_points(embedding *e, supine_inside_report *report) {
   for (size_t i = 0; i < 3 * e->content->triangle_count; ++i) {
     e->triangles[i] = position[e->content->triangles[i]];
   }
-  free(position);
   for (size_t begin = 0, end = 0; e->content->rigid != NULL && begin < n; begin = end) {
     while (end < n && e->part[end] == e->part[begin]) {
       ++end;
@@ -238,32 +238,27 @@ static supine_status embed_lung(embedding *e, size_t lung, size_t begin, size_t 
   const supine_inside_shell *shell = &e->shells->shell[lung];
   const size_t centres =
       e->options->centres > 0 ? e->options->centres : (size_t)SUPINE_INSIDE_CENTRES;
-  double *displacement = malloc(shell->vertex_count * e->columns * sizeof *displacement);
-  double *space =
-      malloc(((size_t)6 * BLOCK + (2 * (size_t)BLOCK + 1) * e->columns) * sizeof *space);
-  supine_inside_biharmonic fit = {0};
-  supine_status status = SUPINE_ERROR_MEMORY;
-  if (displacement == NULL || space == NULL) {
-    (void)supine_error_set(error, status, "no memory for the motion of %zu vertices",
-                           shell->vertex_count);
-    goto cleanup;
+  SUPINE_ARENA arena = {0};
+  SUPINE_FREED_BY(supine_inside_biharmonic_free) supine_inside_biharmonic fit = {0};
+  double *displacement =
+      supine_arena_take(&arena, shell->vertex_count * e->columns, sizeof *displacement);
+  double *space = supine_arena_take(
+      &arena, 6 * (size_t)BLOCK + (2 * (size_t)BLOCK + 1) * e->columns, sizeof *space);
+  if (arena.failed) {
+    return supine_error_memory(error, "the motion of %zu vertices", shell->vertex_count);
   }
   supine_inside_shell_displacement(e->shells, lung, displacement);
   add_squares(e, lung, displacement);
-  status = begin == end
-               ? SUPINE_OK
-               : supine_inside_biharmonic_fit(shell->vertex_count, shell->vertices, e->columns,
-                                              displacement, centres, &fit, error);
+  SUPINE_TRY(begin == end
+                 ? SUPINE_OK
+                 : supine_inside_biharmonic_fit(shell->vertex_count, shell->vertices, e->columns,
+                                                displacement, centres, &fit, error));
   const double reach =
       e->options->field != NULL ? shell->edge : reach_spacings * (fit.spacing + shell->edge);
-  for (size_t at = begin; at < end && status == SUPINE_OK; at += BLOCK) {
+  for (size_t at = begin; at < end; at += BLOCK) {
     move_block(e, displacement, &fit, reach, at, at + BLOCK < end ? at + BLOCK : end, space);
   }
-cleanup:
-  supine_inside_biharmonic_free(&fit);
-  free(displacement);
-  free(space);
-  return status;
+  return SUPINE_OK;
 }
 
 /* Find where a rigid part lies at full inflation, so that the mode weights and gains of the scan
@@ -319,9 +314,10 @@ static supine_status write_file(const embedding *e, const char *path, supine_ten
   enum { OWN = 5 };
   size_t given = 0;
   const supine_metadata *from = supine_basis_all_metadata(e->shells->basis, &given);
-  supine_metadata *metadata = malloc((given + OWN) * sizeof *metadata);
-  if (metadata == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
+  SUPINE_ARENA arena = {0};
+  supine_metadata *metadata = supine_arena_take(&arena, given + OWN, sizeof *metadata);
+  if (arena.failed) {
+    return supine_error_memory(error, "the metadata of %s", path);
   }
   size_t count = 0;
   for (size_t i = 0; i < given; ++i) {
@@ -340,10 +336,7 @@ static supine_status write_file(const embedding *e, const char *path, supine_ten
   metadata[count++] = (supine_metadata){"outside", e->options->clamp ? "clamped" : "extrapolated"};
   metadata[count++] = (supine_metadata){
       "made_by", e->options->made_by != NULL ? e->options->made_by : "supine_inside_embed"};
-  const supine_status status =
-      supine_safetensors_write(path, tensors, tensor_count, metadata, count, error);
-  free(metadata);
-  return status;
+  return supine_safetensors_write(path, tensors, tensor_count, metadata, count, error);
 }
 
 static supine_status write_content(const embedding *e, const char *path, supine_error *error) {
@@ -403,76 +396,46 @@ static supine_status write_content(const embedding *e, const char *path, supine_
   return write_file(e, path, tensors, count, error);
 }
 
-static bool allocate(embedding *e) {
-  const size_t n = e->content->count;
-  e->place = malloc(n * sizeof *e->place);
-  e->lung = malloc(n);
-  e->order = malloc(n * sizeof *e->order);
-  e->vertices = malloc(3 * n * sizeof *e->vertices);
-  e->coefficients = malloc(n * e->columns * sizeof *e->coefficients);
-  e->depth = malloc(n * sizeof *e->depth);
-  e->part = malloc(n * sizeof *e->part);
-  e->group = malloc(n);
-  e->triangles = malloc((3 * e->content->triangle_count + 1) * sizeof *e->triangles);
-  e->rigid = malloc((2 * e->content->part_count + 1) * sizeof *e->rigid);
-  e->hilum = malloc(e->shells->count * e->columns * sizeof *e->hilum);
-  e->squares = calloc(e->shells->count * e->columns * e->columns, sizeof *e->squares);
-  return e->hilum != NULL && e->squares != NULL && e->rigid != NULL && e->place != NULL &&
-         e->lung != NULL && e->order != NULL && e->vertices != NULL && e->coefficients != NULL &&
-         e->depth != NULL && e->part != NULL && e->group != NULL && e->triangles != NULL;
-}
-
 supine_status supine_inside_embed(const supine_inside_shells *shells,
                                   const supine_inside_content *content,
                                   const supine_inside_options *options, const char *path,
                                   supine_inside_report *report, supine_error *error) {
   enum { GRAIN = 256 };
-  embedding e = {.shells = shells,
-                 .content = content,
-                 .options = options,
-                 .columns = 3 * supine_basis_get_info(shells->basis)->mode_count};
-  supine_status status = SUPINE_OK;
+  const size_t n = content->count;
+  const size_t columns = 3 * supine_basis_get_info(shells->basis)->mode_count;
   *report = (supine_inside_report){0};
-  if (content->count == 0) {
+  if (n == 0) {
     return supine_error_set(error, SUPINE_ERROR_MESH, "nothing to embed: give at least one point");
   }
-  if (!allocate(&e)) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY,
-                              "no memory for %zu points, each with %zu coefficients",
-                              content->count, e.columns);
-    goto cleanup;
+  SUPINE_ARENA arena = {0};
+  embedding e = {
+      .shells = shells,
+      .content = content,
+      .options = options,
+      .columns = columns,
+      .place = supine_arena_take(&arena, n, sizeof *e.place),
+      .lung = supine_arena_take(&arena, n, 1),
+      .order = supine_arena_take(&arena, n, sizeof *e.order),
+      .vertices = supine_arena_take(&arena, 3 * n, sizeof *e.vertices),
+      .coefficients = supine_arena_take(&arena, n * columns, sizeof *e.coefficients),
+      .depth = supine_arena_take(&arena, n, sizeof *e.depth),
+      .part = supine_arena_take(&arena, n, sizeof *e.part),
+      .group = supine_arena_take(&arena, n, 1),
+      .triangles = supine_arena_take(&arena, 3 * content->triangle_count, sizeof *e.triangles),
+      .rigid = supine_arena_take(&arena, 2 * content->part_count, sizeof *e.rigid),
+      .hilum = supine_arena_take(&arena, shells->count * columns, sizeof *e.hilum),
+      .squares = supine_arena_zeros(&arena, shells->count * columns * columns, sizeof *e.squares)};
+  if (arena.failed) {
+    return supine_error_memory(error, "%zu points, each with %zu coefficients", n, columns);
   }
-  supine_parallel_for(content->count, GRAIN, 0, find_places, &e);
+  supine_parallel_for(n, GRAIN, 0, find_places, &e);
   gather_parts(&e);
-  if (sort_points(&e, report) != SUPINE_OK) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to sort %zu points",
-                              content->count);
-    goto cleanup;
+  SUPINE_TRY(sort_points(&e, report, error));
+  for (size_t lung = 0, begin = 0; lung < shells->count; begin += report->in_lung[lung++]) {
+    SUPINE_TRY(embed_lung(&e, lung, begin, begin + report->in_lung[lung], error));
   }
-  size_t begin = 0;
-  for (size_t lung = 0; lung < shells->count && status == SUPINE_OK; ++lung) {
-    const size_t end = begin + report->in_lung[lung];
-    status = embed_lung(&e, lung, begin, end, error);
-    begin = end;
-  }
-  for (size_t i = 0; i < e.rigid_count && status == SUPINE_OK; ++i) {
+  for (size_t i = 0; i < e.rigid_count; ++i) {
     rigid_to_full(&e, e.rigid[2 * i], e.rigid[2 * i + 1]);
   }
-  if (status == SUPINE_OK) {
-    status = write_content(&e, path, error);
-  }
-cleanup:
-  free(e.place);
-  free(e.lung);
-  free(e.order);
-  free(e.vertices);
-  free(e.coefficients);
-  free(e.depth);
-  free(e.part);
-  free(e.group);
-  free(e.triangles);
-  free(e.rigid);
-  free(e.squares);
-  free(e.hilum);
-  return status;
+  return write_content(&e, path, error);
 }

@@ -63,17 +63,15 @@ typedef struct supine_inside_report {
  *     depth      F32 [N]     mm below the surface in the scan, negative outside
  *     names      U8 [bytes]  names of points and meshes, separated by newlines (not for a grid)
  *     rigid      U32 [R, 2]  vertices begin <= i < end of each rigid mesh (if there are any)
- *     lungs_box      F64 [2, 3]           corners of the box around the lungs' surface, mm
- *     lungs_squares  F64 [lungs, 3, K, K] for each lung, axis and two modes: the sum over its
- *                                         vertices of the product of their displacements by these
- *                                         modes, divided by the number of vertices of all lungs,
- * mm^2 grid       F64 [4, 3]  position of the first node, then the three steps, mm (for a grid)
+ *     grid       F64 [4, 3]  position of the first node, then the three steps, mm (for a grid)
  *     grid_size  U32 [3]     number of nodes along the three steps (for a grid)
+ *     lungs_box  F64 [2, 3]  corners of the box around the lungs' surface, mm
+ *     lungs_squares  F64 [lungs, 3, K, K]
+ *         for each lung, axis and two of K modes: the sum over its vertices of the product of their
+ *         displacements by these modes, divided by the number of vertices of all lungs, mm^2
  *
  * The tensors lungs_* give the expected errors of the points (supine/locate.h).
- * The metadata "content" is "points", "mesh" or "grid". Uses all cores; cost: see biharmonic.h.
- * @retval SUPINE_ERROR_MESH  `content` has no points
- * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY, SUPINE_ERROR_WRITE */
+ * The metadata "content" is "points", "mesh" or "grid". Uses all cores; cost: see biharmonic.h. */
 supine_status supine_inside_embed(const supine_inside_shells *shells,
                                   const supine_inside_content *content,
                                   const supine_inside_options *options, const char *path,

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/vec3.h"
 
 #include "precompute/inside/shells.h"
@@ -31,8 +32,7 @@ static supine_status create_shell(const supine_basis_info *info, const float *sc
   shell->vertices = malloc(3 * shell->vertex_count * sizeof *shell->vertices);
   shell->triangles = malloc(3 * (info->triangle_count + 1) * sizeof *shell->triangles);
   if (shell->vertices == NULL || shell->triangles == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the surface of %zu vertices",
-                            shell->vertex_count);
+    return supine_error_memory(error, "the surface of %zu vertices", shell->vertex_count);
   }
   for (size_t i = 0; i < 3 * shell->vertex_count; ++i) {
     shell->vertices[i] = (double)scanned[3 * begin + i];
@@ -61,36 +61,41 @@ static supine_status create_shell(const supine_basis_info *info, const float *sc
                                       true, &shell->surface, error);
 }
 
-supine_status supine_inside_shells_create(const supine_basis *basis, supine_inside_shells *shells,
-                                          supine_error *error) {
+static supine_status create_shells(supine_inside_shells *shells, supine_error *error) {
+  const supine_basis *basis = shells->basis;
   const supine_basis_info *info = supine_basis_get_info(basis);
-  *shells = (supine_inside_shells){.basis = basis, .count = info->lung_count};
+  const supine_state scan = supine_basis_scan(basis);
   if (supine_basis_metadata(basis, "content") != NULL) {
     return supine_error_set(
         error, SUPINE_ERROR_FORMAT,
         "the basis already holds %s inside lungs: give the basis of the lungs' surface",
         supine_basis_metadata(basis, "content"));
   }
-  float *scanned = malloc(3 * info->vertex_count * sizeof *scanned);
-  const supine_state scan = supine_basis_scan(basis);
-  supine_status status = scanned != NULL
-                             ? supine_basis_pose(basis, &scan, &shells->scan, error)
-                             : supine_error_set(error, SUPINE_ERROR_MEMORY,
-                                                "no memory for %zu vertices", info->vertex_count);
-  if (status == SUPINE_OK) {
-    (void)supine_deform(basis, &shells->scan, scanned);
+  SUPINE_ARENA arena = {0};
+  float *scanned = supine_arena_take(&arena, 3 * info->vertex_count, sizeof *scanned);
+  if (arena.failed) {
+    return supine_error_memory(error, "%zu vertices", info->vertex_count);
   }
-  for (size_t i = 0; i < 3 * info->vertex_count && status == SUPINE_OK; ++i) {
+  SUPINE_TRY(supine_basis_pose(basis, &scan, &shells->scan, error));
+  (void)supine_deform(basis, &shells->scan, scanned);
+  for (size_t i = 0; i < 3 * info->vertex_count; ++i) {
     if (!isfinite(scanned[i])) {
-      status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                                "the basis cannot reach the scan's volume: make a new basis, and "
-                                "state with --scanned how full the lungs were in the scan");
+      return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                              "the basis cannot reach the scan's volume: make a new basis, and "
+                              "state with --scanned how full the lungs were in the scan");
     }
   }
-  for (size_t lung = 0; lung < shells->count && status == SUPINE_OK; ++lung) {
-    status = create_shell(info, scanned, lung, &shells->shell[lung], error);
+  for (size_t lung = 0; lung < shells->count; ++lung) {
+    SUPINE_TRY(create_shell(info, scanned, lung, &shells->shell[lung], error));
   }
-  free(scanned);
+  return SUPINE_OK;
+}
+
+supine_status supine_inside_shells_create(const supine_basis *basis, supine_inside_shells *shells,
+                                          supine_error *error) {
+  *shells =
+      (supine_inside_shells){.basis = basis, .count = supine_basis_get_info(basis)->lung_count};
+  const supine_status status = create_shells(shells, error);
   if (status != SUPINE_OK) {
     supine_inside_shells_free(shells);
   }

@@ -29,10 +29,7 @@ typedef struct supine_inside_shells {
 
 /** Extract each lung's surface as it is in the scan.
  * @param shells  output; release with supine_inside_shells_free
- * @retval SUPINE_ERROR_MESH       a lung has no triangle, or a triangle joins two lungs
- * @retval SUPINE_ERROR_FORMAT     the basis holds structures inside lungs, not their surface
- * @retval SUPINE_ERROR_NUMERICAL  the basis cannot reach the scan's volume
- * @retval SUPINE_ERROR_MEMORY */
+ * @retval SUPINE_ERROR_NUMERICAL  the basis cannot reach the scan's volume */
 supine_status supine_inside_shells_create(const supine_basis *basis, supine_inside_shells *shells,
                                           supine_error *error);
 void supine_inside_shells_free(supine_inside_shells *shells);

@@ -30,9 +30,8 @@ typedef struct supine_lesion {
  * same gain (factor on the displacement).
  * At the same volume of the lungs, all displacements grow by one ratio, to make up for the
  * lesion.
- * @param reached  optional output: number of vertices nearer to the lesion's centre than the radius
- * @retval SUPINE_ERROR_ARGUMENT  a centre that is not finite; a radius or factor that is not
- *   positive and finite */
+ * @param reached  optional output: number of vertices nearer to the lesion's centre than the
+ *   radius */
 supine_status supine_tissue_add_lesion(const supine_lungs *lungs, const supine_lesion *lesion,
                                        double *factors, size_t *reached, supine_error *error);
 

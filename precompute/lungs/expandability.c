@@ -5,13 +5,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/csv.h"
 
 #include "precompute/lungs/expandability.h"
-
-static bool positive(double value) {
-  return value > 0.0 && isfinite(value) && isfinite(1.0 / value);
-}
 
 void supine_tissue_expandability_regional(const supine_lungs *lungs,
                                           const supine_expandability_law *law, double *a) {
@@ -45,12 +42,10 @@ static supine_status take_row(const supine_csv *csv, size_t row, size_t count, d
                             "0 for the first vertex",
                             csv->path, csv->line, number);
   }
-  const supine_status status = supine_csv_number(csv, 0, "expandability", &value, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(supine_csv_number(csv, 0, "expandability", &value, error));
+  const bool positive = value > 0.0 && isfinite(value) && isfinite(1.0 / value);
   const char *wrong = vertex >= count    ? "there is no such vertex"
-                      : !positive(value) ? "it must be positive"
+                      : !positive        ? "it must be positive"
                       : a[vertex] != 0.0 ? "the vertex was given before"
                                          : NULL;
   if (wrong != NULL) {
@@ -64,35 +59,26 @@ static supine_status take_row(const supine_csv *csv, size_t row, size_t count, d
   return SUPINE_OK;
 }
 
-static supine_status take_rows(supine_csv *csv, size_t count, double *a, supine_error *error) {
-  bool more = true;
-  supine_status status = SUPINE_OK;
-  memset(a, 0, count * sizeof *a);
-  for (size_t row = 0; status == SUPINE_OK; ++row) {
-    status = supine_csv_next(csv, &more, error);
-    if (status != SUPINE_OK || !more) {
-      break;
-    }
-    status = take_row(csv, row, count, a, error);
-  }
-  for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
-    if (a[i] == 0.0) {
-      status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%s: vertex %zu of %zu has no value: add its expandability",
-                                csv->path, i, count);
-    }
-  }
-  return status;
-}
-
 supine_status supine_tissue_expandability_load(const char *path, size_t count, double *a,
                                                supine_error *error) {
   static const char *const columns[] = {"expandability", "vertex"};
-  supine_csv csv;
-  supine_status status = supine_csv_open(path, columns, 2, 1, &csv, error);
-  if (status == SUPINE_OK) {
-    status = take_rows(&csv, count, a, error);
-    supine_csv_close(&csv);
+  SUPINE_FREED_BY(supine_csv_close) supine_csv csv;
+  SUPINE_TRY(supine_csv_open(path, columns, 2, 1, &csv, error));
+  memset(a, 0, count * sizeof *a);
+  bool more = true;
+  for (size_t row = 0;; ++row) {
+    SUPINE_TRY(supine_csv_next(&csv, &more, error));
+    if (!more) {
+      break;
+    }
+    SUPINE_TRY(take_row(&csv, row, count, a, error));
   }
-  return status;
+  for (size_t i = 0; i < count; ++i) {
+    if (a[i] == 0.0) {
+      return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "%s: vertex %zu of %zu has no value: add its expandability", path, i,
+                              count);
+    }
+  }
+  return SUPINE_OK;
 }

@@ -31,11 +31,7 @@ void supine_tissue_expandability_regional(const supine_lungs *lungs,
 
 /** Read the expandability a [count] from the column `expandability` of a CSV file. Lines are in the
  * order of the vertices, or in any order if a column `vertex` numbers the vertices from 0. Empty
- * lines, and lines that begin with #, are skipped.
- * @retval SUPINE_ERROR_READ    the file is missing or unreadable
- * @retval SUPINE_ERROR_FORMAT  a value that is missing or not positive and finite, a vertex twice
- *             or out of range: the message names line and vertex
- * @retval SUPINE_ERROR_MEMORY */
+ * lines, and lines that begin with #, are skipped. Every vertex must have one positive value. */
 supine_status supine_tissue_expandability_load(const char *path, size_t count, double *a,
                                                supine_error *error);
 

@@ -3,9 +3,9 @@
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/vec3.h"
 
 #include "mesh/anatomy.h"
@@ -41,12 +41,9 @@ static supine_status mend(supine_mesh *mesh, const char *name, supine_findings *
   supine_mesh_repair_report report;
   size_t pieces;
   size_t specks;
-  supine_status status = supine_mesh_repair(mesh, &report);
-  if (status == SUPINE_OK) {
-    status = supine_mesh_drop_specks(mesh, speck_share, &pieces, &specks);
-  }
-  if (status != SUPINE_OK) {
-    return supine_error_set(error, status, "%s: no memory to check the surface", name);
+  if (supine_mesh_repair(mesh, &report) != SUPINE_OK ||
+      supine_mesh_drop_specks(mesh, speck_share, &pieces, &specks) != SUPINE_OK) {
+    return supine_error_memory(error, "checking %s", name);
   }
   const struct {
     size_t count;
@@ -110,7 +107,7 @@ static const char to_accept[] = ". To use this size all the same, add --units mm
 static void check_size(checks *c, const supine_lungs *lungs, bool likely) {
   const supine_status refuse = c->source->units_given ? SUPINE_OK : SUPINE_ERROR_MESH;
   const char *accept = refuse == SUPINE_OK ? "" : to_accept;
-  const double ml = 1e-3 * supine_mesh_volume(&lungs->mesh);
+  const double ml = lungs->volume[0] + lungs->volume[1];
   const double most = lungs->lung_count == 2 ? 1.0 : 0.6; /* largest share of a pair's volume */
   const double height = lungs->maximum[2] - lungs->minimum[2];
   const double ratio = height / (lungs->maximum[0] - lungs->minimum[0]);
@@ -156,7 +153,7 @@ static double volume_beyond(const supine_mesh *mesh, int axis, double sign, doub
 /* Check that a lung has no long, thin tip, as of a stray vertex or a trachea, and no flat end. */
 static void check_tips(checks *c, const supine_lungs *lungs, size_t lung) {
   const supine_mesh part = supine_lungs_part(lungs, lung);
-  const double volume = supine_mesh_volume(&part);
+  const double volume = 1e3 * lungs->volume[lung];
   for (int tip = 0; tip < 6; ++tip) {
     const int axis = tip / 2;
     const double sign = tip % 2 == 0 ? -1.0 : 1.0;
@@ -188,8 +185,9 @@ static void check_overlap(checks *c, const supine_lungs *lungs) {
   const supine_mesh *mesh = &lungs->mesh;
   const uint32_t *part = lungs->topology.component;
   const size_t parts = lungs->topology.component_count;
-  uint32_t *corners = malloc(3 * mesh->triangle_count * sizeof *corners);
-  check(c, corners != NULL, SUPINE_ERROR_MEMORY, "no memory for %zu components", parts);
+  SUPINE_ARENA arena = {0};
+  uint32_t *corners = supine_arena_take(&arena, 3 * mesh->triangle_count, sizeof *corners);
+  check(c, !arena.failed, SUPINE_ERROR_MEMORY, "no memory for %zu components", parts);
   for (size_t of = 0; of < parts && parts > 1 && c->status == SUPINE_OK; ++of) {
     supine_inside_surface *surface = NULL;
     supine_inside_place deepest = {.depth = 0.0};
@@ -214,45 +212,39 @@ static void check_overlap(checks *c, const supine_lungs *lungs) {
           "both lungs in the axes of one scan, and remove surfaces inside a lung",
           deepest.depth, deepest.point[0], deepest.point[1], deepest.point[2]);
   }
-  free(corners);
 }
 
 /* Divide the triangles between two lungs along the axis on which the two overlap least. Return the
- * number of lungs, or 0 if out of memory.
- * @param parts  written; the vertices are those of `lungs`; the caller frees the triangles */
-static size_t part_lungs(const supine_lungs *lungs, supine_mesh parts[2]) {
+ * number of lungs.
+ * @param parts  written; the vertices are those of `lungs`, the triangles are in the arena */
+static size_t part_lungs(const supine_lungs *lungs, supine_arena *arena, supine_mesh parts[2]) {
   const supine_mesh *mesh = &lungs->mesh;
   const supine_topology *topology = &lungs->topology;
-  uint8_t *group = calloc(topology->component_count, sizeof *group);
+  uint8_t *group = supine_arena_take(arena, topology->component_count, sizeof *group);
   double least = SUPINE_LUNGS_MOST_OVERLAP;
   int along = -1;
-  bool failed = false;
   for (size_t g = 0; g < 2; ++g) {
-    parts[g] = (supine_mesh){.vertex_count = mesh->vertex_count, .vertices = mesh->vertices};
-    parts[g].triangles = malloc((3 * mesh->triangle_count + 1) * sizeof *parts[g].triangles);
-  }
-  if (group == NULL || parts[0].triangles == NULL || parts[1].triangles == NULL) {
-    free(group);
-    return 0;
+    parts[g] = (supine_mesh){mesh->vertex_count, mesh->vertices, 0,
+                             supine_arena_take(arena, 3 * mesh->triangle_count, sizeof(uint32_t))};
   }
   for (int axis = 0; axis < 3; ++axis) {
     const double middle = 0.5 * (lungs->minimum[axis] + lungs->maximum[axis]);
-    const double overlap = supine_lungs_sides(mesh, topology, axis, middle, group);
-    failed = failed || isnan(overlap);
+    const double overlap = supine_lungs_sides(mesh, topology, axis, middle, arena, group);
     along = overlap < least ? axis : along;
     least = fmin(least, overlap);
   }
   const double middle =
       along < 0 ? INFINITY : 0.5 * (lungs->minimum[along] + lungs->maximum[along]);
-  failed =
-      isnan(supine_lungs_sides(mesh, topology, along < 0 ? 0 : along, middle, group)) || failed;
+  (void)supine_lungs_sides(mesh, topology, along < 0 ? 0 : along, middle, arena, group);
+  if (arena->failed) {
+    return 0;
+  }
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
     const uint32_t *corner = mesh->triangles + 3 * t;
     supine_mesh *part = &parts[group[topology->component[corner[0]]]];
     memcpy(part->triangles + 3 * part->triangle_count++, corner, 3 * sizeof *corner);
   }
-  free(group);
-  return failed ? 0 : along < 0 ? 1 : 2;
+  return along < 0 ? 1 : 2;
 }
 
 /* Check the surface's unit, that it is closed, and that its shape fits the axes, its size, and the
@@ -260,7 +252,6 @@ static size_t part_lungs(const supine_lungs *lungs, supine_mesh parts[2]) {
  * and the side of a single lung: +1 left, -1 right, 0 unknown. */
 static void check_shape(checks *c, const supine_lungs *lungs, int *side, bool *axes_hold) {
   const supine_topology *t = &lungs->topology;
-  supine_mesh parts[2] = {{0}};
   supine_mesh_anatomy found = {.axes = SUPINE_AXES_LPS};
   const char *unit = NULL;
   const double length = supine_mesh_box(&lungs->mesh, (double[3]){0}, (double[3]){0});
@@ -276,11 +267,11 @@ static void check_shape(checks *c, const supine_lungs *lungs, int *side, bool *a
       "no volume: close its holes in a mesh editor, or give the label map that it was made from",
       t->boundary_edges, t->non_manifold_edges, t->inconsistent_edges);
   if (c->status == SUPINE_OK) {
-    const size_t count = part_lungs(lungs, parts);
+    SUPINE_ARENA arena = {0};
+    supine_mesh parts[2];
+    const size_t count = part_lungs(lungs, &arena, parts);
     check(c, count > 0, SUPINE_ERROR_MEMORY, "no memory for the two lungs");
     found = count > 0 ? supine_mesh_anatomy_find(parts, count) : found;
-    free(parts[0].triangles);
-    free(parts[1].triangles);
   }
   *side = found.side;
   *axes_hold = found.certain && found.axes == SUPINE_AXES_LPS;
@@ -321,46 +312,34 @@ static supine_status take_side(const supine_mesh *meshes, size_t count,
   return supine_lungs_create(meshes, count, &midline, lungs, error);
 }
 
-static void note_lungs(const supine_lungs *lungs, const char *name, supine_findings *findings) {
-  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-    if (lungs->reversed[lung]) {
-      supine_findings_add(findings,
-                          "%s: note: the triangles of the %s lung faced inwards: reversed", name,
-                          supine_lungs_name(lungs, lung));
-    }
-  }
-}
-
 supine_status supine_lungs_gate(supine_mesh *meshes, size_t count,
                                 const supine_lungs_source *source, supine_lungs *lungs,
                                 bool *axes_hold, supine_findings *findings, supine_error *error) {
-  supine_status status = SUPINE_OK;
+  supine_error inner = {0};
   int side = 0;
   *axes_hold = false;
-  for (size_t m = 0; m < count && status == SUPINE_OK; ++m) {
-    status = mend(&meshes[m], source->name, findings, error);
+  for (size_t m = 0; m < count; ++m) {
+    SUPINE_TRY(mend(&meshes[m], source->name, findings, error));
   }
-  if (status == SUPINE_OK) {
-    supine_error inner = {0};
-    status = supine_lungs_create(meshes, count, source->midline, lungs, &inner);
-    if (status != SUPINE_OK) {
-      (void)supine_error_set(error, status, "%s: %s", source->name, inner.message);
-    }
-  }
+  const supine_status status = supine_lungs_create(meshes, count, source->midline, lungs, &inner);
   if (status != SUPINE_OK) {
-    return status;
+    return supine_error_set(error, status, "%s: %s", source->name, inner.message);
   }
   checks c = {source, findings, error, SUPINE_OK};
   check_shape(&c, lungs, &side, axes_hold);
   check_overlap(&c, lungs);
-  status = c.status;
-  if (status == SUPINE_OK && lungs->lung_count == 1 && source->midline == NULL) {
-    status = take_side(meshes, count, source, side, lungs, findings, error);
+  if (c.status == SUPINE_OK && lungs->lung_count == 1 && source->midline == NULL) {
+    c.status = take_side(meshes, count, source, side, lungs, findings, error);
   }
-  if (status == SUPINE_OK) {
-    note_lungs(lungs, source->name, findings);
-  } else {
+  if (c.status != SUPINE_OK) {
     supine_lungs_free(lungs);
   }
-  return status;
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+    if (lungs->reversed[lung]) {
+      supine_findings_add(findings,
+                          "%s: note: the triangles of the %s lung faced inwards: reversed",
+                          source->name, supine_lungs_name(lungs, lung));
+    }
+  }
+  return c.status;
 }

@@ -29,10 +29,7 @@ typedef struct supine_lungs_source {
  * @param meshes     [count] changed in place
  * @param axes_hold  output: whether the shape fits the axes LPS clearly better than all other axes
  * @param findings   notes and warnings are added
- * @retval SUPINE_ERROR_MESH  a size or tip impossible for lungs, one component with both lungs, or
- *   components that overlap
- * @retval SUPINE_ERROR_OPEN_SURFACE  a surface that is not closed
- * @retval the statuses of supine_lungs_create */
+ */
 supine_status supine_lungs_gate(supine_mesh *meshes, size_t count,
                                 const supine_lungs_source *source, supine_lungs *lungs,
                                 bool *axes_hold, supine_findings *findings, supine_error *error);

@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
+
 #include "precompute/lungs/lungs.h"
 
 /* A component with less than this share of the vertices does not count as a lung. */
@@ -55,14 +57,12 @@ static supine_status join(const supine_mesh *meshes, size_t count, supine_mesh *
                             "%zu vertices are more than 32-bit indices reach: give a coarser mesh",
                             vertices);
   }
-  placed_mesh *placed = malloc(count * sizeof *placed);
-  joined->vertices = malloc(3 * vertices * sizeof *joined->vertices);
-  joined->triangles = malloc(3 * triangles * sizeof *joined->triangles);
-  if (placed == NULL || joined->vertices == NULL || joined->triangles == NULL) {
-    free(placed);
-    supine_mesh_free(joined);
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", vertices);
+  SUPINE_ARENA arena = {0};
+  placed_mesh *placed = supine_arena_take(&arena, count, sizeof *placed);
+  if (arena.failed || supine_mesh_allocate(vertices, triangles, joined) != SUPINE_OK) {
+    return supine_error_memory(error, "%zu vertices", vertices);
   }
+  joined->vertex_count = joined->triangle_count = 0;
   for (size_t m = 0; m < count; ++m) {
     placed[m] = place(&meshes[m]);
   }
@@ -78,19 +78,18 @@ static supine_status join(const supine_mesh *meshes, size_t count, supine_mesh *
     joined->vertex_count += mesh->vertex_count;
     joined->triangle_count += mesh->triangle_count;
   }
-  free(placed);
   return SUPINE_OK;
 }
 
 double supine_lungs_sides(const supine_mesh *mesh, const supine_topology *topology, int axis,
-                          double middle, uint8_t *above) {
+                          double middle, supine_arena *arena, uint8_t *above) {
   typedef struct component {
     double count, sum, low, high;
   } component;
   double range[2][2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
-  component *parts = calloc(topology->component_count, sizeof *parts);
-  if (parts == NULL) {
-    return NAN;
+  component *parts = supine_arena_zeros(arena, topology->component_count, sizeof *parts);
+  if (arena->failed) {
+    return INFINITY;
   }
   for (size_t i = 0; i < mesh->vertex_count; ++i) {
     component *part = &parts[topology->component[i]];
@@ -108,7 +107,6 @@ double supine_lungs_sides(const supine_mesh *mesh, const supine_topology *topolo
       of[1] = fmax(of[1], parts[c].high);
     }
   }
-  free(parts);
   const double narrower = fmin(range[0][1] - range[0][0], range[1][1] - range[1][0]);
   return narrower > 0.0 ? (range[0][1] - range[1][0]) / narrower : INFINITY;
 }
@@ -120,17 +118,14 @@ static supine_status group(supine_lungs *lungs, const uint8_t *left, supine_erro
   const size_t n = mesh->vertex_count;
   const size_t triangles = mesh->triangle_count;
   const uint32_t *part_of = lungs->topology.component;
-  supine_mesh sorted = {.vertex_count = n, .triangle_count = triangles};
-  uint32_t *position = calloc(n, sizeof *position);
+  supine_mesh sorted;
+  SUPINE_ARENA arena = {0};
+  uint32_t *position = supine_arena_take(&arena, n, sizeof *position);
   size_t next[2] = {0, 0};
   size_t next_triangle[2] = {0, 0};
   bool in_order = true;
-  sorted.vertices = malloc(3 * n * sizeof *sorted.vertices);
-  sorted.triangles = malloc(3 * triangles * sizeof *sorted.triangles);
-  if (position == NULL || sorted.vertices == NULL || sorted.triangles == NULL) {
-    free(position);
-    supine_mesh_free(&sorted);
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to group %zu vertices", n);
+  if (arena.failed || supine_mesh_allocate(n, triangles, &sorted) != SUPINE_OK) {
+    return supine_error_memory(error, "%zu vertices", n);
   }
   for (size_t i = 0; i < n; ++i) {
     next[1] += left[part_of[i]];
@@ -158,15 +153,16 @@ static supine_status group(supine_lungs *lungs, const uint8_t *left, supine_erro
       out[k] = position[corner[k]];
     }
   }
-  free(position);
+  supine_arena_free(&arena);
   supine_mesh_free(mesh);
   *mesh = sorted;
-  if (in_order) {
-    return SUPINE_OK;
+  if (!in_order) {
+    supine_mesh_topology_free(&lungs->topology);
+    if (supine_mesh_topology_create(mesh, &lungs->topology) != SUPINE_OK) {
+      return supine_error_memory(error, "the edges of %zu triangles", triangles);
+    }
   }
-  supine_mesh_topology_free(&lungs->topology);
-  const supine_status status = supine_mesh_topology_create(mesh, &lungs->topology);
-  return status == SUPINE_OK ? status : supine_error_set(error, status, "no memory for edges");
+  return SUPINE_OK;
 }
 
 /* Refuse a lung given twice, even at two resolutions, and a surface tiny compared with another. */
@@ -226,10 +222,19 @@ static supine_status check_midline(const supine_lungs *lungs, bool two_sided, su
   return SUPINE_OK;
 }
 
+void supine_lungs_measure(supine_lungs *lungs) {
+  supine_mesh_box(&lungs->mesh, lungs->minimum, lungs->maximum);
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+    const supine_mesh part = supine_lungs_part(lungs, lung);
+    lungs->volume[lung] = 1e-3 * supine_mesh_volume(&part);
+  }
+}
+
 static void face_outwards(supine_lungs *lungs) {
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     const supine_mesh part = supine_lungs_part(lungs, lung);
-    lungs->reversed[lung] = supine_mesh_volume(&part) < 0.0;
+    lungs->reversed[lung] = lungs->volume[lung] < 0.0;
+    lungs->volume[lung] = fabs(lungs->volume[lung]);
     if (lungs->reversed[lung]) {
       supine_mesh_reverse(&part);
     }
@@ -248,47 +253,42 @@ static supine_status measure(supine_lungs *lungs, const double *midline, supine_
                               "xyz"[k]);
     }
   }
-  supine_status status = supine_mesh_topology_create(&lungs->mesh, &lungs->topology);
-  uint8_t *left = malloc(lungs->topology.component_count + 1);
-  double overlap = NAN;
-  if (status == SUPINE_OK && left != NULL) {
-    overlap = supine_lungs_sides(&lungs->mesh, &lungs->topology, 0, 0.5 * (low + high), left);
+  const supine_status status = supine_mesh_topology_create(&lungs->mesh, &lungs->topology);
+  if (status != SUPINE_OK) {
+    return supine_error_set(error, status, "no memory for the edges of %zu triangles",
+                            lungs->mesh.triangle_count);
   }
+  SUPINE_ARENA arena = {0};
+  uint8_t *left = supine_arena_take(&arena, lungs->topology.component_count, 1);
+  const double overlap =
+      supine_lungs_sides(&lungs->mesh, &lungs->topology, 0, 0.5 * (low + high), &arena, left);
   lungs->midline = midline != NULL                       ? *midline
                    : overlap < SUPINE_LUNGS_MOST_OVERLAP ? 0.5 * (low + high)
                    : fabs(low) < fabs(high)              ? low
                                                          : high;
-  if (isnan(overlap) ||
-      isnan(supine_lungs_sides(&lungs->mesh, &lungs->topology, 0, lungs->midline, left))) {
-    status =
-        supine_error_set(error, status != SUPINE_OK ? status : SUPINE_ERROR_MEMORY,
-                         "no memory for the edges of %zu triangles", lungs->mesh.triangle_count);
-  } else {
-    status = group(lungs, left, error);
+  (void)supine_lungs_sides(&lungs->mesh, &lungs->topology, 0, lungs->midline, &arena, left);
+  if (arena.failed) {
+    return supine_error_memory(error, "%zu components", lungs->topology.component_count);
   }
-  if (status == SUPINE_OK && midline != NULL) {
-    status = check_midline(lungs, overlap < SUPINE_LUNGS_MOST_OVERLAP, error);
-  }
-  free(left);
-  return status;
+  SUPINE_TRY(group(lungs, left, error));
+  return midline != NULL ? check_midline(lungs, overlap < SUPINE_LUNGS_MOST_OVERLAP, error)
+                         : SUPINE_OK;
 }
 
 supine_status supine_lungs_create(const supine_mesh *meshes, size_t count, const double *midline,
                                   supine_lungs *lungs, supine_error *error) {
-  supine_lungs made = {0};
+  SUPINE_FREED_BY(supine_lungs_free) supine_lungs made = {0};
   if (midline != NULL && !isfinite(*midline)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "the midline must be a finite x in mm, not %g", *midline);
   }
-  supine_status status = check_surfaces(meshes, count, error);
-  status = status == SUPINE_OK ? join(meshes, count, &made.mesh, error) : status;
-  status = status == SUPINE_OK ? measure(&made, midline, error) : status;
-  if (status != SUPINE_OK) {
-    supine_lungs_free(&made);
-    return status;
-  }
+  SUPINE_TRY(check_surfaces(meshes, count, error));
+  SUPINE_TRY(join(meshes, count, &made.mesh, error));
+  SUPINE_TRY(measure(&made, midline, error));
+  supine_lungs_measure(&made);
   face_outwards(&made);
   *lungs = made;
+  made = (supine_lungs){0};
   return SUPINE_OK;
 }
 

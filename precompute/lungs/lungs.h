@@ -4,6 +4,8 @@
 #ifndef SUPINE_LUNGS_H
 #define SUPINE_LUNGS_H
 
+#include "base/arena.h"
+
 #include "mesh/mesh.h"
 
 /** One or two lungs as a single surface whose vertices and triangles are grouped by lung, within
@@ -16,6 +18,7 @@ typedef struct supine_lungs {
   size_t triangle_begin[3]; /**< lung j: triangle_begin[j] <= triangle < triangle_begin[j + 1] */
   int side[2];              /**< [lung] +1 left, -1 right */
   bool reversed[2];         /**< whether the lung's triangles faced inwards and were reversed */
+  double volume[2];         /**< [lung] volume that its surface encloses, mL */
   double minimum[3];        /**< bounding box over all lungs, mm */
   double maximum[3];
   double *scanned; /**< [vertices, 3] positions in the scan, mm, if `mesh` shows full inflation
@@ -32,13 +35,14 @@ typedef struct supine_lungs {
  * @param meshes   [count] not changed
  * @param midline  x of the plane between left and right, mm; found if NULL
  * @param lungs    written on success; release with supine_lungs_free
- * @retval SUPINE_ERROR_MESH      no surface, or one without extent; more vertices than 32-bit
- *   indices can address; one lung given twice; a surface much smaller than another; a midline that
- *   runs through a lung, or leaves both lungs on one side
- * @retval SUPINE_ERROR_ARGUMENT  a midline that is not finite
- * @retval SUPINE_ERROR_MEMORY */
+ * @retval SUPINE_ERROR_MESH      no surface, or one without extent; one lung given twice; a surface
+ *   much smaller than another; a midline that runs through a lung, or leaves both lungs on one side
+ */
 supine_status supine_lungs_create(const supine_mesh *meshes, size_t count, const double *midline,
                                   supine_lungs *lungs, supine_error *error);
+
+/** Update the bounding box and the volumes after vertices have moved. */
+void supine_lungs_measure(supine_lungs *lungs);
 
 /** Free the arrays; a zeroed struct is legal. */
 void supine_lungs_free(supine_lungs *lungs);
@@ -50,10 +54,11 @@ void supine_lungs_free(supine_lungs *lungs);
 /** Divide connected components between the two sides of `middle` along an axis, by the mean of
  * their vertices. Only components with at least 5 % of all vertices count for a side's range.
  * @param above  [components] written: whether the mean is above `middle`
+ * @param arena  for work space; if it has failed, `above` is not written
  * @return overlap of the two ranges divided by the narrower range; INFINITY if no component counts
- *   on a side, NAN if out of memory */
+ *   on a side */
 double supine_lungs_sides(const supine_mesh *mesh, const supine_topology *topology, int axis,
-                          double middle, uint8_t *above);
+                          double middle, supine_arena *arena, uint8_t *above);
 
 /** Name a lung: "left" or "right". */
 static inline const char *supine_lungs_name(const supine_lungs *lungs, size_t lung) {

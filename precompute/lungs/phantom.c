@@ -6,9 +6,10 @@
  * derived from the lung test data of Chaste (BSD-3-Clause, (c) University of Oxford and Chaste
  * authors). */
 #include <math.h>
-#include <stdlib.h>
 
 #include <supine/sh.h>
+
+#include "base/arena.h"
 
 #include "precompute/lungs/phantom.h"
 
@@ -173,15 +174,12 @@ static const double radii[2][TERMS] = {
 };
 
 /* Move the vertices of a unit sphere to one lung's surface. */
-static supine_status shape(size_t lung, size_t count, double *vertices) {
+static void shape(size_t lung, size_t count, double *vertices) {
   double y[TERMS];
   for (size_t i = 0; i < count; ++i) {
     double *p = vertices + 3 * i;
-    const supine_status status = supine_sh_evaluate(BAND, p, y);
-    if (status != SUPINE_OK) {
-      return status;
-    }
     double radius = 0.0;
+    (void)supine_sh_evaluate(BAND, p, y);
     for (size_t t = 0; t < TERMS; ++t) {
       radius += radii[lung][t] * y[t];
     }
@@ -189,7 +187,6 @@ static supine_status shape(size_t lung, size_t count, double *vertices) {
       p[k] = centre[lung][k] + radius * p[k];
     }
   }
-  return SUPINE_OK;
 }
 
 supine_status supine_phantom_create(size_t vertices, double millilitres, supine_mesh *mesh,
@@ -206,28 +203,18 @@ supine_status supine_phantom_create(size_t vertices, double millilitres, supine_
   const size_t frequency = (size_t)fmax(2.0, floor(exact + 0.5));
   const size_t count = supine_phantom_geodesic_vertex_count(frequency);
   const size_t triangles = supine_phantom_geodesic_triangle_count(frequency);
-  supine_mesh made = {.vertex_count = 2 * count, .triangle_count = 2 * triangles};
-  made.vertices = malloc(3 * made.vertex_count * sizeof *made.vertices);
-  made.triangles = malloc(3 * made.triangle_count * sizeof *made.triangles);
-  if (made.vertices == NULL || made.triangles == NULL) {
-    supine_mesh_free(&made);
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", 2 * count);
+  if (supine_mesh_allocate(2 * count, 2 * triangles, mesh) != SUPINE_OK) {
+    return supine_error_memory(error, "%zu vertices", 2 * count);
   }
   for (size_t lung = 0; lung < 2; ++lung) {
-    double *part = made.vertices + 3 * lung * count;
+    double *part = mesh->vertices + 3 * lung * count;
     supine_phantom_geodesic(frequency, (uint32_t)(lung * count), part,
-                            made.triangles + 3 * lung * triangles);
-    const supine_status status = shape(lung, count, part);
-    if (status != SUPINE_OK) {
-      supine_mesh_free(&made);
-      return supine_error_set(error, status, "cannot make the lungs: %s",
-                              supine_status_string(status));
-    }
+                            mesh->triangles + 3 * lung * triangles);
+    shape(lung, count, part);
   }
-  const double factor = cbrt(1e3 * millilitres / supine_mesh_volume(&made));
-  for (size_t i = 0; i < 3 * made.vertex_count; ++i) {
-    made.vertices[i] *= factor;
+  const double factor = cbrt(1e3 * millilitres / supine_mesh_volume(mesh));
+  for (size_t i = 0; i < 3 * mesh->vertex_count; ++i) {
+    mesh->vertices[i] *= factor;
   }
-  *mesh = made;
   return SUPINE_OK;
 }

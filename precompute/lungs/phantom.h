@@ -16,8 +16,7 @@ enum { SUPINE_PHANTOM_VERTICES_MIN = 84, SUPINE_PHANTOM_VERTICES_MAX = 20000000 
  * @param vertices     number wanted in total; rounded to that of two equal geodesic spheres
  * @param millilitres  volume of both lungs together, > 0; adults have about 6000 at full
  *                     inflation
- * @param mesh         zero-initialised; written on success
- * @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MEMORY */
+ * @param mesh         written on success */
 supine_status supine_phantom_create(size_t vertices, double millilitres, supine_mesh *mesh,
                                     supine_error *error);
 

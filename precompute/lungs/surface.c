@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Find nearest points and winding numbers with a tree of bounding boxes over triangles. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/clones.h"
 #include "base/parallel.h"
 #include "base/vec3.h"
@@ -38,6 +38,7 @@ typedef struct boxes {
 } boxes;
 
 struct supine_inside_surface {
+  supine_arena arena; /* holds this struct and its arrays */
   const double *vertices;
   const uint32_t *triangles;
   size_t triangle_count;
@@ -200,41 +201,37 @@ supine_status supine_inside_surface_create(const double *vertices, size_t count,
                                            const uint32_t *triangles, bool sides,
                                            supine_inside_surface **surface, supine_error *error) {
   const size_t leaves = 2 * count / LEAF + 1; /* upper bound: each leaf is at least half full */
-  supine_inside_surface *s = calloc(1, sizeof *s);
-  keyed *space = malloc((count + count / 2) * sizeof *space);
   *surface = NULL;
-  if (s != NULL) {
-    s->vertices = vertices;
-    s->triangles = triangles;
-    s->triangle_count = count;
-    s->order = malloc(count * sizeof *s->order);
-    s->nodes = malloc(2 * leaves * sizeof *s->nodes);
-    s->dipoles = sides ? malloc(2 * leaves * sizeof *s->dipoles) : NULL;
-    s->leaves = malloc(leaves * sizeof *s->leaves);
+  SUPINE_ARENA temporary = {0};
+  SUPINE_ARENA arena = {0};
+  keyed *space = supine_arena_take(&temporary, count + count / 2, sizeof *space);
+  supine_inside_surface *s = supine_arena_take(&arena, 1, sizeof *s);
+  const supine_inside_surface made = {
+      .vertices = vertices,
+      .triangles = triangles,
+      .triangle_count = count,
+      .order = supine_arena_take(&arena, count, sizeof *s->order),
+      .nodes = supine_arena_take(&arena, 2 * leaves, sizeof *s->nodes),
+      .dipoles = sides ? supine_arena_take(&arena, 2 * leaves, sizeof *s->dipoles) : NULL,
+      .leaves = supine_arena_take(&arena, leaves, sizeof *s->leaves)};
+  if (temporary.failed || arena.failed) {
+    return supine_error_memory(error, "a tree of %zu triangles", count);
   }
-  if (s == NULL || space == NULL || s->order == NULL || s->nodes == NULL || s->leaves == NULL ||
-      (sides && s->dipoles == NULL)) {
-    free(space);
-    supine_inside_surface_destroy(s);
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a tree of %zu triangles",
-                            count);
-  }
+  *s = made;
   for (uint32_t i = 0; i < count; ++i) {
     s->order[i] = i;
   }
   build(s, space, 0, (uint32_t)count);
-  free(space);
+  s->arena = arena;
+  arena = (supine_arena){0};
   *surface = s;
   return SUPINE_OK;
 }
 
 void supine_inside_surface_destroy(supine_inside_surface *surface) {
   if (surface != NULL) {
-    free(surface->order);
-    free(surface->nodes);
-    free(surface->dipoles);
-    free(surface->leaves);
-    free(surface);
+    supine_arena arena = surface->arena;
+    supine_arena_free(&arena);
   }
 }
 
@@ -334,23 +331,14 @@ static void search(const supine_inside_surface *s, size_t at, const double x[3],
                    supine_inside_place *place) {
   const node *n = &s->nodes[at];
   if (n->right != 0) {
-    size_t first = at + 1;
-    size_t second = n->right;
-    double near = box_square(&s->nodes[first], x);
-    double far = box_square(&s->nodes[second], x);
-    if (far < near) {
-      const size_t swap = first;
-      first = second;
-      second = swap;
-      const double square = near;
-      near = far;
-      far = square;
-    }
-    if (near < *best) {
-      search(s, first, x, best, place);
-    }
-    if (far < *best) {
-      search(s, second, x, best, place);
+    const size_t child[2] = {at + 1, n->right};
+    const double square[2] = {box_square(&s->nodes[child[0]], x),
+                              box_square(&s->nodes[child[1]], x)};
+    const int nearer = square[1] < square[0];
+    for (int k = 0; k < 2; ++k) {
+      if (square[nearer ^ k] < *best) {
+        search(s, child[nearer ^ k], x, best, place);
+      }
     }
     return;
   }

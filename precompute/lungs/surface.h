@@ -23,8 +23,7 @@ typedef struct supine_inside_place {
 /** Build a tree of bounding boxes over the triangles of a surface.
  * @param vertices   [vertices, 3] mm, must outlive the tree
  * @param triangles  [count, 3], 0 < count < 2^31, facing outwards; must outlive the tree
- * @param sides      whether to allow supine_inside_surface_find, which needs more memory
- * @retval SUPINE_ERROR_MEMORY */
+ * @param sides      whether to allow supine_inside_surface_find, which needs more memory */
 supine_status supine_inside_surface_create(const double *vertices, size_t count,
                                            const uint32_t *triangles, bool sides,
                                            supine_inside_surface **surface, supine_error *error);

@@ -2,7 +2,6 @@
 /* Find a small number of modes that approximate all normals in all postures and volumes. */
 #include <cblas.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/clones.h"
@@ -54,6 +53,7 @@ typedef struct normals_work {
   supine_normals_fans fans;
   supine_normals_states states;
   supine_normals_states held_out;
+  supine_arena memory; /* of the arrays of this struct and of `fits` */
   fit fits[SUPINE_LUNGS_MAX];
 } normals_work;
 
@@ -126,12 +126,12 @@ static supine_status find_fit(const normals_work *work, size_t lung,
   const double *phi = work->states.phi + lung * work->states.room * all;
   double coefficients[MOST * SNAPSHOTS];
   double length[STATES];
-  supine_status status = SUPINE_ERROR_MEMORY;
-  double *gram = malloc(terms * terms * sizeof *gram);
-  double *gram_phi = malloc(s * all * sizeof *gram_phi);
-  double *product = malloc(s * s * sizeof *product);
-  if (gram == NULL || gram_phi == NULL || product == NULL) {
-    goto cleanup;
+  SUPINE_ARENA arena = {0};
+  double *gram = supine_arena_take(&arena, terms * terms, sizeof *gram);
+  double *gram_phi = supine_arena_take(&arena, s * all, sizeof *gram_phi);
+  double *product = supine_arena_take(&arena, s * s, sizeof *product);
+  if (arena.failed) {
+    return SUPINE_ERROR_MEMORY;
   }
   apply_gram(rows, terms, phi, s, gram, gram_phi);
   cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)s, (int)s, (int)all, 1.0, phi, (int)all,
@@ -142,10 +142,7 @@ static supine_status find_fit(const normals_work *work, size_t lung,
   for (size_t i = 0; i < s * s; ++i) {
     product[i] /= length[i / s] * length[i % s];
   }
-  status = choose_snapshots(s, product, made, coefficients);
-  if (status != SUPINE_OK) {
-    goto cleanup;
-  }
+  SUPINE_TRY(choose_snapshots(s, product, made, coefficients));
   memset(mix, 0, MOST * all * sizeof *mix);
   for (size_t j = 0; j < made->count; ++j) {
     for (size_t r = 0; r < made->snapshot_count; ++r) {
@@ -156,45 +153,38 @@ static supine_status find_fit(const normals_work *work, size_t lung,
     }
   }
   apply_gram(rows, terms, mix, MOST, gram, made->weights);
-cleanup:
-  free(gram);
-  free(gram_phi);
-  free(product);
-  return status;
+  return SUPINE_OK;
 }
 
-static supine_status find_lung(const normals_work *work, size_t lung, fit *made) {
+/* Find the modes of one lung, and their values at held-out vertices. */
+static supine_status find_lung(normals_work *work, size_t lung, fit *made) {
   const supine_normals_surface *s = work->surface;
   const size_t stride = 1 + (s->lung_begin[lung + 1] - s->lung_begin[lung]) / ROWS;
   const size_t all = 3 * work->terms;
-  supine_normals_rows rows = {0};
-  double *mix = malloc(MOST * all * sizeof *mix);
-  double *modes = NULL;
-  made->weights = malloc(MOST * all * sizeof *made->weights);
-  supine_status status = SUPINE_ERROR_MEMORY;
-  if (mix != NULL && made->weights != NULL) {
-    status = supine_normals_rows_create(s, &work->fans, lung, 0, stride, &rows);
+  SUPINE_ARENA rows_memory = {0};
+  SUPINE_ARENA arena = {0};
+  supine_normals_rows rows;
+  double *mix = supine_arena_take(&arena, MOST * all, sizeof *mix);
+  made->weights = supine_arena_take(&work->memory, MOST * all, sizeof *made->weights);
+  if (arena.failed || work->memory.failed) {
+    return SUPINE_ERROR_MEMORY;
   }
-  status = status == SUPINE_OK ? find_fit(work, lung, &rows, mix, made) : status;
-  supine_normals_rows_free(&rows);
-  if (status == SUPINE_OK) {
-    status = supine_normals_rows_create(s, &work->fans, lung, stride / 2, stride, &made->rows);
+  SUPINE_TRY(supine_normals_rows_create(s, &work->fans, lung, 0, stride, &rows_memory, &rows));
+  SUPINE_TRY(find_fit(work, lung, &rows, mix, made));
+  supine_arena_free(&rows_memory);
+  SUPINE_TRY(supine_normals_rows_create(s, &work->fans, lung, stride / 2, stride, &work->memory,
+                                        &made->rows));
+  const size_t count = 3 * made->rows.count * MOST;
+  double *modes = supine_arena_take(&arena, count, sizeof *modes);
+  made->modes = supine_arena_take(&work->memory, count, sizeof *made->modes);
+  if (arena.failed || work->memory.failed) {
+    return SUPINE_ERROR_MEMORY;
   }
-  const size_t count = 3 * made->rows.count;
-  if (status == SUPINE_OK) {
-    modes = malloc((count * MOST + 1) * sizeof *modes);
-    made->modes = malloc((count * MOST + 1) * sizeof *made->modes);
-    status = modes == NULL || made->modes == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
+  apply_rows(made->rows.terms, made->rows.count, work->terms, mix, MOST, modes);
+  for (size_t i = 0; i < count; ++i) {
+    made->modes[i] = (float)modes[i];
   }
-  if (status == SUPINE_OK) {
-    apply_rows(made->rows.terms, made->rows.count, work->terms, mix, MOST, modes);
-    for (size_t i = 0; i < count * MOST; ++i) {
-      made->modes[i] = (float)modes[i];
-    }
-  }
-  free(mix);
-  free(modes);
-  return status;
+  return SUPINE_OK;
 }
 
 /* Round the modes [count] of one vertex along one axis as at run time, where three modes share a
@@ -306,13 +296,16 @@ static supine_status measure_all(const normals_work *work, size_t count,
                                  supine_normals_modes *made) {
   const size_t all = 3 * work->terms;
   const size_t most = 2 * ROWS + 1;
-  supine_tally *tally = calloc(1, sizeof *tally);
-  int16_t *modes = malloc(most * 3 * count * sizeof *modes);
-  double *weights = malloc(count * all * sizeof *weights);
+  SUPINE_ARENA arena = {0};
+  supine_tally *tally = supine_arena_zeros(&arena, 1, sizeof *tally);
+  int16_t *modes = supine_arena_take(&arena, most * 3 * count, sizeof *modes);
+  double *weights = supine_arena_take(&arena, count * all, sizeof *weights);
   double unit[MOST];
   double sum = 0.0;
-  const bool memory = tally != NULL && modes != NULL && weights != NULL;
-  for (size_t lung = 0; lung < work->surface->lung_count && memory; ++lung) {
+  if (arena.failed) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  for (size_t lung = 0; lung < work->surface->lung_count; ++lung) {
     const fit *of = &work->fits[lung];
     if (made->modes == NULL) {
       round_modes(of->modes, NULL, of->rows.count, MOST, count, modes, unit);
@@ -325,14 +318,9 @@ static supine_status measure_all(const normals_work *work, size_t count,
     measure(work, lung, count, modes,
             made->modes != NULL ? made->weights + lung * count * all : weights, tally, &sum);
   }
-  if (memory) {
-    made->mean = tally->count > 0 ? sum / (double)tally->count : 0.0;
-    made->p999 = supine_accuracy_tally_percentile(tally, 0.999);
-  }
-  free(tally);
-  free(modes);
-  free(weights);
-  return memory ? SUPINE_OK : SUPINE_ERROR_MEMORY;
+  made->mean = tally->count > 0 ? sum / (double)tally->count : 0.0;
+  made->p999 = supine_accuracy_tally_percentile(tally, 0.999);
+  return SUPINE_OK;
 }
 
 /* Work space of make_modes(), which computes each vertex's modes as sums over the snapshots. */
@@ -438,35 +426,37 @@ static void find_mode_factors(const planes_work *planes) {
   }
 }
 
-static supine_status make_modes(const normals_work *work, size_t count,
+static supine_status make_modes(const normals_work *work, size_t count, supine_arena *arena,
                                 supine_normals_modes *made) {
   enum { GRAIN = 1024 };
   const supine_normals_surface *s = work->surface;
   const size_t n = s->vertex_count;
   const size_t all = 3 * work->terms;
   float mode_factors[SUPINE_LUNGS_MAX][3][SUPINE_NORMALS_FIELD_MAX][LANES];
+  SUPINE_ARENA own = {0};
   planes_work planes = {.work = work,
                         .count = count,
                         .mode_factors = mode_factors,
-                        .positions = malloc(3 * n * LANES * sizeof(float)),
-                        .modes = calloc(3 * n * count, sizeof(float)),
-                        .lengths = malloc(n * sizeof(float))};
-  made->modes = malloc(3 * n * count * sizeof *made->modes);
-  made->weights = malloc(s->lung_count * count * all * sizeof *made->weights);
+                        .positions = supine_arena_take(&own, 3 * n * LANES, sizeof(float)),
+                        .modes = supine_arena_zeros(&own, 3 * n * count, sizeof(float)),
+                        .lengths = supine_arena_take(&own, n, sizeof(float))};
+  made->modes = supine_arena_take(arena, 3 * n * count, sizeof *made->modes);
+  made->weights = supine_arena_take(arena, s->lung_count * count * all, sizeof *made->weights);
   made->count = count;
+  if (own.failed || arena->failed) {
+    return SUPINE_ERROR_MEMORY;
+  }
   size_t snapshots = 0;
   for (size_t lung = 0; lung < s->lung_count; ++lung) {
     snapshots =
         work->fits[lung].snapshot_count > snapshots ? work->fits[lung].snapshot_count : snapshots;
   }
-  const bool memory = planes.positions != NULL && planes.modes != NULL && planes.lengths != NULL &&
-                      made->modes != NULL && made->weights != NULL;
-  for (; memory && planes.first <= snapshots; planes.first += LANES) {
+  for (; planes.first <= snapshots; planes.first += LANES) {
     find_mode_factors(&planes);
     supine_parallel_for(3 * n, 3 * GRAIN, 0, place_range, &planes);
     supine_parallel_for(n, GRAIN, 0, sum_range, &planes);
   }
-  for (size_t lung = 0; memory && lung < s->lung_count; ++lung) {
+  for (size_t lung = 0; lung < s->lung_count; ++lung) {
     const size_t begin = s->lung_begin[lung];
     double unit[MOST];
     round_modes(planes.modes + 3 * begin * count, planes.lengths + begin,
@@ -475,71 +465,52 @@ static supine_status make_modes(const normals_work *work, size_t count,
     scale_weights(work->fits[lung].weights, unit, count, work->terms,
                   made->weights + lung * count * all);
   }
-  free(planes.positions);
-  free(planes.modes);
-  free(planes.lengths);
-  return memory ? SUPINE_OK : SUPINE_ERROR_MEMORY;
-}
-
-supine_status supine_normals_modes_create(const supine_normals_surface *surface,
-                                          supine_normals_modes *made, supine_error *error) {
-  normals_work *work = calloc(1, sizeof *work);
-  size_t most = MOST;
-  *made = (supine_normals_modes){0};
-  if (work == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for normals");
-  }
-  if (surface->field->mode_count > SUPINE_NORMALS_FIELD_MAX || surface->triangle_count == 0) {
-    free(work);
-    return SUPINE_OK;
-  }
-  work->surface = surface;
-  work->terms = supine_normals_terms(surface->field->mode_count);
-  supine_status status = supine_normals_states_create(surface, STATES, 0.0, &work->states);
-  if (status == SUPINE_OK) {
-    status = supine_normals_states_create(surface, HELD_OUT, 0.37, &work->held_out);
-  }
-  if (status != SUPINE_OK || work->states.count == 0 || work->held_out.count == 0) {
-    goto cleanup;
-  }
-  status = supine_normals_fans_create(surface, &work->fans);
-  for (size_t lung = 0; lung < surface->lung_count && status == SUPINE_OK; ++lung) {
-    status = find_lung(work, lung, &work->fits[lung]);
-    most = work->fits[lung].count < most ? work->fits[lung].count : most;
-  }
-  size_t count = most < SUPINE_NORMALS_FEW ? most : SUPINE_NORMALS_FEW;
-  while (status == SUPINE_OK) {
-    status = measure_all(work, count, made);
-    if ((made->mean <= mean_wanted && made->p999 <= p999_wanted) || count + STEP > most) {
-      break;
-    }
-    count += STEP;
-  }
-  status = status == SUPINE_OK ? make_modes(work, count, made) : status;
-  status = status == SUPINE_OK ? measure_all(work, count, made) : status;
-  memcpy(made->range, work->states.range, sizeof made->range);
-
-cleanup:
-  for (size_t lung = 0; lung < SUPINE_LUNGS_MAX; ++lung) {
-    fit *of = &work->fits[lung];
-    supine_normals_rows_free(&of->rows);
-    free(of->weights);
-    free(of->modes);
-  }
-  supine_normals_fans_free(&work->fans);
-  supine_normals_states_free(&work->states);
-  supine_normals_states_free(&work->held_out);
-  free(work);
-  if (status != SUPINE_OK) {
-    supine_normals_modes_free(made);
-    return supine_error_set(error, status, "normals of %zu vertices: %s", surface->vertex_count,
-                            supine_status_string(status));
-  }
   return SUPINE_OK;
 }
 
-void supine_normals_modes_free(supine_normals_modes *modes) {
-  free(modes->modes);
-  free(modes->weights);
-  *modes = (supine_normals_modes){0};
+static supine_status find_modes(normals_work *work, supine_arena *arena,
+                                supine_normals_modes *made) {
+  const supine_normals_surface *s = work->surface;
+  size_t most = MOST;
+  SUPINE_TRY(supine_normals_states_create(s, STATES, 0.0, &work->memory, &work->states));
+  SUPINE_TRY(supine_normals_states_create(s, HELD_OUT, 0.37, &work->memory, &work->held_out));
+  if (work->states.count == 0 || work->held_out.count == 0) {
+    return SUPINE_OK;
+  }
+  SUPINE_TRY(supine_normals_fans_create(s, &work->memory, &work->fans));
+  for (size_t lung = 0; lung < s->lung_count; ++lung) {
+    SUPINE_TRY(find_lung(work, lung, &work->fits[lung]));
+    most = work->fits[lung].count < most ? work->fits[lung].count : most;
+  }
+  size_t count = most < SUPINE_NORMALS_FEW ? most : SUPINE_NORMALS_FEW;
+  SUPINE_TRY(measure_all(work, count, made));
+  while ((made->mean > mean_wanted || made->p999 > p999_wanted) && count + STEP <= most) {
+    count += STEP;
+    SUPINE_TRY(measure_all(work, count, made));
+  }
+  SUPINE_TRY(make_modes(work, count, arena, made));
+  memcpy(made->range, work->states.range, sizeof made->range);
+  return measure_all(work, count, made);
+}
+
+supine_status supine_normals_modes_create(const supine_normals_surface *surface,
+                                          supine_arena *arena, supine_normals_modes *made,
+                                          supine_error *error) {
+  *made = (supine_normals_modes){0};
+  if (surface->field->mode_count > SUPINE_NORMALS_FIELD_MAX || surface->triangle_count == 0) {
+    return SUPINE_OK;
+  }
+  SUPINE_ARENA own = {0};
+  normals_work *work = supine_arena_zeros(&own, 1, sizeof *work);
+  if (work == NULL) {
+    return supine_error_memory(error, "normals");
+  }
+  work->surface = surface;
+  work->terms = supine_normals_terms(surface->field->mode_count);
+  const supine_status status = find_modes(work, arena, made);
+  supine_arena_free(&work->memory);
+  return status == SUPINE_OK
+             ? status
+             : supine_error_set(error, status, "normals of %zu vertices: %s", surface->vertex_count,
+                                supine_status_string(status));
 }

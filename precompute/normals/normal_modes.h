@@ -24,6 +24,7 @@
 
 #include <supine/runtime.h>
 
+#include "base/arena.h"
 #include "precompute/projection/projection.h"
 
 /** The surface and the displacement field of a basis file. */
@@ -46,7 +47,8 @@ typedef struct supine_normals_surface {
 /** Modes from which vertex normals are computed, and the error of these normals. */
 typedef struct supine_normals_modes {
   size_t count;   /**< number of modes; may be 0 */
-  int16_t *modes; /**< [N, 3, count] scaled to integers; `weights` include the inverse scale */
+  int16_t *modes; /**< [N, 3, count] scaled to integers; `weights` include the inverse scale; NULL
+                     without modes */
   /** [lungs, count, 3, monomials] coefficients V_jc of each mode's weight (top of this file). */
   double *weights;
   /** Least and largest volume of all lungs, minus that of the reference surface, among the states
@@ -67,12 +69,9 @@ enum { SUPINE_NORMALS_FIELD_MAX = 24 }; /**< displacement fields with more modes
  * of 3, because at run time three modes share a 32-bit word. If no number suffices, the last one is
  * kept. For a displacement field with more than SUPINE_NORMALS_FIELD_MAX modes, made->count is 0.
  * Cost: the surface is deformed about 50 times. Uses all cores.
- * @param made  release with supine_normals_modes_free
- * @retval SUPINE_ERROR_NUMERICAL  an eigenvalue problem failed
- * @retval SUPINE_ERROR_MEMORY */
+ * @param arena  takes the arrays of `made` */
 supine_status supine_normals_modes_create(const supine_normals_surface *surface,
-                                          supine_normals_modes *made, supine_error *error);
-
-void supine_normals_modes_free(supine_normals_modes *modes);
+                                          supine_arena *arena, supine_normals_modes *made,
+                                          supine_error *error);
 
 #endif

@@ -2,7 +2,6 @@
 /* Express normals, the sums of triangles' area vectors, as polynomials of the weights of the
  * displacement modes and the gains, which multiply the displacement along each axis. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "precompute/normals/polynomial.h"
@@ -40,13 +39,12 @@ void supine_normals_monomials(size_t modes, const double *weights, const double 
   }
 }
 
-supine_status supine_normals_fans_create(const supine_normals_surface *surface,
+supine_status supine_normals_fans_create(const supine_normals_surface *surface, supine_arena *arena,
                                          supine_normals_fans *fans) {
   const size_t corners = 3 * surface->triangle_count;
-  fans->begin = calloc(surface->vertex_count + 2, sizeof *fans->begin);
-  fans->corner = malloc(corners * sizeof *fans->corner);
-  if (fans->begin == NULL || fans->corner == NULL) {
-    supine_normals_fans_free(fans);
+  fans->begin = supine_arena_zeros(arena, surface->vertex_count + 2, sizeof *fans->begin);
+  fans->corner = supine_arena_take(arena, corners, sizeof *fans->corner);
+  if (arena->failed) {
     return SUPINE_ERROR_MEMORY;
   }
   uint32_t *next = fans->begin + 1;
@@ -60,12 +58,6 @@ supine_status supine_normals_fans_create(const supine_normals_surface *surface,
     fans->corner[next[surface->triangles[s]]++] = (uint32_t)s;
   }
   return SUPINE_OK;
-}
-
-void supine_normals_fans_free(supine_normals_fans *fans) {
-  free(fans->begin);
-  free(fans->corner);
-  *fans = (supine_normals_fans){0};
 }
 
 /* Write vertex `to` minus vertex `from` to side [3, COLUMNS]: the difference of their positions on
@@ -112,16 +104,16 @@ static void find_row(const supine_normals_surface *s, const supine_normals_fans 
 
 supine_status supine_normals_rows_create(const supine_normals_surface *surface,
                                          const supine_normals_fans *fans, size_t lung,
-                                         size_t offset, size_t stride, supine_normals_rows *rows) {
+                                         size_t offset, size_t stride, supine_arena *arena,
+                                         supine_normals_rows *rows) {
   const size_t terms = supine_normals_terms(surface->field->mode_count);
   const size_t end = surface->lung_begin[lung + 1];
   const size_t begin = surface->lung_begin[lung];
   const size_t most = (end - begin) / stride + 1;
-  *rows = (supine_normals_rows){0};
-  rows->vertex = malloc(most * sizeof *rows->vertex);
-  rows->terms = malloc(most * 3 * terms * sizeof *rows->terms);
-  if (rows->vertex == NULL || rows->terms == NULL) {
-    supine_normals_rows_free(rows);
+  rows->count = 0;
+  rows->vertex = supine_arena_take(arena, most, sizeof *rows->vertex);
+  rows->terms = supine_arena_take(arena, most * 3 * terms, sizeof *rows->terms);
+  if (arena->failed) {
     return SUPINE_ERROR_MEMORY;
   }
   for (size_t i = begin + offset; i < end; i += stride) {
@@ -138,10 +130,4 @@ supine_status supine_normals_rows_create(const supine_normals_surface *surface,
     }
   }
   return SUPINE_OK;
-}
-
-void supine_normals_rows_free(supine_normals_rows *rows) {
-  free(rows->vertex);
-  free(rows->terms);
-  *rows = (supine_normals_rows){0};
 }

@@ -26,11 +26,9 @@ typedef struct supine_normals_fans {
   uint32_t *corner; /* [3 x triangle count] indices into the array `triangles`, grouped by vertex */
 } supine_normals_fans;
 
-/* Find the triangles around each vertex. Release them with supine_normals_fans_free.
- * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_normals_fans_create(const supine_normals_surface *surface,
+/* Find the triangles around each vertex. */
+supine_status supine_normals_fans_create(const supine_normals_surface *surface, supine_arena *arena,
                                          supine_normals_fans *fans);
-void supine_normals_fans_free(supine_normals_fans *fans);
 
 /* Find the other two corners of the triangle that contains element `corner` of `triangles`, in the
  * cyclic order of that triangle. */
@@ -51,12 +49,11 @@ typedef struct supine_normals_rows {
 
 /* Find the polynomials for the normals of every `stride`-th vertex of a lung. The first of these
  * vertices is `offset`, counted from the first vertex of the lung. Leave out vertices whose normal
- * on the reference surface is zero.
- * @retval SUPINE_ERROR_MEMORY */
+ * on the reference surface is zero. */
 supine_status supine_normals_rows_create(const supine_normals_surface *surface,
                                          const supine_normals_fans *fans, size_t lung,
-                                         size_t offset, size_t stride, supine_normals_rows *rows);
-void supine_normals_rows_free(supine_normals_rows *rows);
+                                         size_t offset, size_t stride, supine_arena *arena,
+                                         supine_normals_rows *rows);
 
 /* Sampled states (postures with a volume) of the lungs. */
 typedef struct supine_normals_states {
@@ -69,11 +66,9 @@ typedef struct supine_normals_states {
 /* Sample up to `count` states with directions of gravity all over the sphere and volumes from rest
  * (FRC) to the reference surface. If the resting volume is unknown, the displacement of the vertex
  * that moves most ranges from -15 to 60 mm; negative values reverse all displacements. States that
- * the lungs cannot reach are left out. A different `shift`, 0 to 1, gives different states. Release
- * them with supine_normals_states_free.
- * @retval SUPINE_ERROR_MEMORY */
+ * the lungs cannot reach are left out. A different `shift`, 0 to 1, gives different states. */
 supine_status supine_normals_states_create(const supine_normals_surface *surface, size_t count,
-                                           double shift, supine_normals_states *states);
-void supine_normals_states_free(supine_normals_states *states);
+                                           double shift, supine_arena *arena,
+                                           supine_normals_states *states);
 
 #endif

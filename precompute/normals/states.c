@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Sample states: gravity on a golden-angle spiral, volumes by multiples of an irrational number. */
 #include <math.h>
-#include <stdlib.h>
 
 #include "base/vec3.h"
 #include <supine/sh.h>
@@ -77,13 +76,14 @@ static bool common_gain(const supine_normals_surface *s, const double *w, double
 }
 
 supine_status supine_normals_states_create(const supine_normals_surface *surface, size_t count,
-                                           double shift, supine_normals_states *states) {
+                                           double shift, supine_arena *arena,
+                                           supine_normals_states *states) {
   static const double share_step = 0.4142135623730950488;
   const size_t terms = 3 * supine_normals_terms(surface->field->mode_count);
   double low[9];
   double w[SUPINE_MODES_MAX];
   *states = (supine_normals_states){.room = count, .range = {INFINITY, -INFINITY}};
-  states->phi = malloc(surface->lung_count * count * terms * sizeof *states->phi);
+  states->phi = supine_arena_take(arena, surface->lung_count * count * terms, sizeof *states->phi);
   if (states->phi == NULL) {
     return SUPINE_ERROR_MEMORY;
   }
@@ -108,9 +108,4 @@ supine_status supine_normals_states_create(const supine_normals_surface *surface
     }
   }
   return SUPINE_OK;
-}
-
-void supine_normals_states_free(supine_normals_states *states) {
-  free(states->phi);
-  *states = (supine_normals_states){0};
 }

@@ -7,6 +7,7 @@
 
 #include <suitesparse/cholmod.h>
 
+#include "base/arena.h"
 #include "base/library.h"
 #include "base/parallel.h"
 #include "base/vec3.h"
@@ -42,6 +43,7 @@ typedef struct part {
 } part;
 
 struct supine_equilibrium {
+  supine_arena memory; /* of the arrays */
   size_t vertex_count;
   const supine_topology *topology;
   double reach;        /* smoothing length of force, mm; 0: none, as in [Santhanam2008] */
@@ -63,11 +65,7 @@ void supine_physics_equilibrium_destroy(supine_equilibrium *equilibrium) {
       cholmod.free_factor(&p->factor, &p->common);
       cholmod.finish(&p->common);
     }
-    free(equilibrium->area);
-    free(equilibrium->edge_term);
-    free(equilibrium->lesions);
-    free(equilibrium->mass_weight);
-    free(equilibrium->load_factor);
+    supine_arena_free(&equilibrium->memory);
     free(equilibrium);
   }
 }
@@ -247,32 +245,28 @@ static supine_status create(const supine_topology *topology, size_t n, bool smoo
                             const double *lesions, supine_equilibrium **equilibrium,
                             supine_error *error) {
   *equilibrium = NULL;
-  const supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_CHOLMOD, FUNCTIONS, &cholmod, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(SUPINE_LIBRARY_LOAD(SUPINE_CHOLMOD, FUNCTIONS, &cholmod, error));
   supine_equilibrium *made = calloc(1, sizeof *made);
   if (made == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the equilibrium");
+    return supine_error_memory(error, "the equilibrium");
   }
+  supine_arena *memory = &made->memory;
   made->vertex_count = n;
   made->topology = topology;
-  made->area = smoothing ? malloc(n * sizeof *made->area) : NULL;
-  made->edge_term = malloc((topology->edge_count + 1) * sizeof *made->edge_term);
-  made->lesions = lesions != NULL ? malloc(n * sizeof *made->lesions) : NULL;
-  made->mass_weight = malloc(n * sizeof *made->mass_weight);
-  made->load_factor = malloc(n * sizeof *made->load_factor);
-  if (made->edge_term == NULL || made->mass_weight == NULL || made->load_factor == NULL ||
-      (lesions != NULL && made->lesions == NULL) || (smoothing && made->area == NULL) ||
-      !create_matrices(made)) {
+  made->area = smoothing ? supine_arena_take(memory, n, sizeof *made->area) : NULL;
+  made->edge_term = supine_arena_take(memory, topology->edge_count, sizeof *made->edge_term);
+  made->lesions = lesions != NULL ? supine_arena_take(memory, n, sizeof *lesions) : NULL;
+  made->mass_weight = supine_arena_take(memory, n, sizeof *made->mass_weight);
+  made->load_factor = supine_arena_take(memory, n, sizeof *made->load_factor);
+  if (memory->failed || !create_matrices(made)) {
     supine_physics_equilibrium_destroy(made);
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to solve %zu vertices", n);
+    return supine_error_memory(error, "the equilibrium of %zu vertices", n);
   }
   if (lesions != NULL) {
     memcpy(made->lesions, lesions, n * sizeof *lesions);
   }
   *equilibrium = made;
-  return status;
+  return SUPINE_OK;
 }
 
 supine_status supine_physics_equilibrium_create(const supine_mesh *mesh,
@@ -280,49 +274,44 @@ supine_status supine_physics_equilibrium_create(const supine_mesh *mesh,
                                                 const double *lesions,
                                                 supine_equilibrium **equilibrium,
                                                 supine_error *error) {
-  const supine_status status =
-      create(topology, mesh->vertex_count, reach > 0.0, lesions, equilibrium, error);
-  return status == SUPINE_OK
-             ? supine_physics_equilibrium_set_shape(*equilibrium, mesh, reach, NULL, error)
-             : status;
+  SUPINE_TRY(create(topology, mesh->vertex_count, reach > 0.0, lesions, equilibrium, error));
+  return supine_physics_equilibrium_set_shape(*equilibrium, mesh, reach, NULL, error);
 }
 
 supine_status
 supine_physics_equilibrium_create_weighted(const supine_topology *topology, size_t vertex_count,
                                            const double *diagonal, const double *weight,
                                            supine_equilibrium **equilibrium, supine_error *error) {
-  const supine_status status = create(topology, vertex_count, true, NULL, equilibrium, error);
-  if (status == SUPINE_OK) {
-    supine_equilibrium *eq = *equilibrium;
-    memcpy(eq->area, diagonal, vertex_count * sizeof *diagonal);
-    memcpy(eq->edge_term, weight, topology->edge_count * sizeof *weight);
-    for (size_t i = 0; i < vertex_count; ++i) {
-      eq->mass_weight[i] = eq->load_factor[i] = 1.0;
-    }
-    for (size_t k = 0; k < eq->part_count; ++k) {
-      set_values(eq, &eq->parts[k]);
-    }
+  SUPINE_TRY(create(topology, vertex_count, true, NULL, equilibrium, error));
+  supine_equilibrium *eq = *equilibrium;
+  memcpy(eq->area, diagonal, vertex_count * sizeof *diagonal);
+  memcpy(eq->edge_term, weight, topology->edge_count * sizeof *weight);
+  for (size_t i = 0; i < vertex_count; ++i) {
+    eq->mass_weight[i] = eq->load_factor[i] = 1.0;
   }
-  return status;
+  for (size_t k = 0; k < eq->part_count; ++k) {
+    set_values(eq, &eq->parts[k]);
+  }
+  return SUPINE_OK;
 }
 
 supine_status supine_physics_equilibrium_set_stiffness(supine_equilibrium *equilibrium,
                                                        const double *stiffness,
                                                        supine_error *error) {
   supine_equilibrium *eq = equilibrium;
-  const supine_status status =
-      supine_physics_stiffness_normalise(eq->vertex_count, stiffness, eq->load_factor, error);
-  for (size_t i = 0; status == SUPINE_OK && i < eq->vertex_count; ++i) {
+  SUPINE_TRY(
+      supine_physics_stiffness_normalise(eq->vertex_count, stiffness, eq->load_factor, error));
+  for (size_t i = 0; i < eq->vertex_count; ++i) {
     const double a = 1.0 / (eq->load_factor[i] * (eq->lesions != NULL ? eq->lesions[i] : 1.0));
     eq->mass_weight[i] = eq->area != NULL ? 1.0 : a;
     eq->load_factor[i] = eq->area != NULL ? eq->area[i] : 1.0;
   }
-  for (size_t k = 0; k < eq->part_count && status == SUPINE_OK; ++k) {
+  for (size_t k = 0; k < eq->part_count; ++k) {
     if (eq->area == NULL || !eq->parts[k].factorised) {
       set_values(eq, &eq->parts[k]);
     }
   }
-  return status;
+  return SUPINE_OK;
 }
 
 supine_status supine_physics_equilibrium_set_shape(supine_equilibrium *equilibrium,
@@ -433,8 +422,8 @@ supine_status supine_physics_equilibrium_solve(supine_equilibrium *equilibrium, 
   supine_parallel_for(equilibrium->part_count, 1, threads, solve_parts, &s);
   for (size_t k = 0; k < 2; ++k) {
     if (s.status[k] == SUPINE_ERROR_MEMORY) {
-      return supine_error_set(error, s.status[k], "no memory to solve %zu vertices",
-                              equilibrium->vertex_count);
+      return supine_error_memory(error, "the equilibrium of %zu vertices",
+                                 equilibrium->vertex_count);
     }
     if (s.status[k] != SUPINE_OK || !(s.residual[k] <= residual_limit)) {
       return supine_error_set(
@@ -454,9 +443,10 @@ supine_status supine_physics_equilibrium_force(supine_equilibrium *equilibrium,
   const size_t n = eq->vertex_count;
   double one[2] = {1.0, 0.0};
   double zero[2] = {0.0, 0.0};
-  double *t = malloc(n * sizeof *t);
+  SUPINE_ARENA arena = {0};
+  double *t = supine_arena_take(&arena, n, sizeof *t);
   if (t == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
+    return supine_error_memory(error, "%zu vertices", n);
   }
   for (size_t i = 0; i < n; ++i) {
     t[i] = retained[i] / (eq->mass_weight[i] * eq->mass_weight[i]);
@@ -471,7 +461,6 @@ supine_status supine_physics_equilibrium_force(supine_equilibrium *equilibrium,
   for (size_t i = 0; i < n; ++i) {
     force[i] /= eq->load_factor[i];
   }
-  free(t);
   return SUPINE_OK;
 }
 
@@ -483,13 +472,11 @@ supine_status supine_physics_transfer_column(supine_equilibrium *equilibrium, si
                             "vertex %zu is out of range: the mesh has %zu vertices, counted from 0",
                             vertex, n);
   }
-  double *force = calloc(n, sizeof *force);
+  SUPINE_ARENA arena = {0};
+  double *force = supine_arena_zeros(&arena, n, sizeof *force);
   if (force == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu forces", n);
+    return supine_error_memory(error, "%zu forces", n);
   }
   force[vertex] = 1.0;
-  const supine_status status =
-      supine_physics_equilibrium_solve(equilibrium, 1, force, column, error);
-  free(force);
-  return status;
+  return supine_physics_equilibrium_solve(equilibrium, 1, force, column, error);
 }

@@ -58,9 +58,7 @@ typedef struct supine_equilibrium supine_equilibrium;
  * @param topology  edges of the mesh; must outlive the equilibrium
  * @param reach     smoothing length R, mm; 0 for the transfer of force of [Santhanam2008]
  * @param lesions   [vertices] factors on the normalised stiffness in lesions, or NULL; copied
- * @param equilibrium  written; release with supine_physics_equilibrium_destroy
- * @retval SUPINE_ERROR_MEMORY
- * @retval SUPINE_ERROR_UNSUPPORTED  CHOLMOD is not installed */
+ * @param equilibrium  written; release with supine_physics_equilibrium_destroy */
 supine_status supine_physics_equilibrium_create(const supine_mesh *mesh,
                                                 const supine_topology *topology, double reach,
                                                 const double *lesions,
@@ -68,8 +66,7 @@ supine_status supine_physics_equilibrium_create(const supine_mesh *mesh,
                                                 supine_error *error);
 void supine_physics_equilibrium_destroy(supine_equilibrium *equilibrium);
 
-/** Assemble the equations diagonal_i F_i + sum over edges ij of weight_ij (F_i - F_j) = f_i.
- * Statuses as supine_physics_equilibrium_create. */
+/** Assemble the equations diagonal_i F_i + sum over edges ij of weight_ij (F_i - F_j) = f_i. */
 supine_status
 supine_physics_equilibrium_create_weighted(const supine_topology *topology, size_t vertex_count,
                                            const double *diagonal, const double *weight,
@@ -77,16 +74,14 @@ supine_physics_equilibrium_create_weighted(const supine_topology *topology, size
 
 /** Replace the vertex positions, the smoothing length and the stiffness of an equilibrium. This is
  * faster than creating a new equilibrium.
- * @param reach  smoothing length, mm; may be above 0 only if it was above 0 at creation
- * @return status as of supine_physics_equilibrium_set_stiffness */
+ * @param reach  smoothing length, mm; may be above 0 only if it was above 0 at creation */
 supine_status supine_physics_equilibrium_set_shape(supine_equilibrium *equilibrium,
                                                    const supine_mesh *mesh, double reach,
                                                    const double *stiffness, supine_error *error);
 
 /** Set the stiffness of the vertices. It acts only if the smoothing length (reach) is 0, and
  * changes the matrix, which the next solve factorises again.
- * @param stiffness  [vertices] above 0, scaled to a geometric mean of 1; NULL for 1 everywhere
- * @retval SUPINE_ERROR_ARGUMENT  a stiffness, named in `error`, is not positive and finite */
+ * @param stiffness  [vertices] above 0, scaled to a geometric mean of 1; NULL for 1 everywhere */
 supine_status supine_physics_equilibrium_set_stiffness(supine_equilibrium *equilibrium,
                                                        const double *stiffness,
                                                        supine_error *error);
@@ -96,23 +91,19 @@ supine_status supine_physics_equilibrium_set_stiffness(supine_equilibrium *equil
  * 40 N log2 N bytes and is kept for the next solve, but not for a lung of more than 100000
  * vertices: solve for all forces in one call.
  * @param force     [vertices, count] applied forces
- * @param retained  [vertices, count] forces that the vertices retain, written; may be `force`
- * @retval SUPINE_ERROR_MEMORY
- * @retval SUPINE_ERROR_NUMERICAL  a force that is not finite, or a relative residual above 1e-8 */
+ * @param retained  [vertices, count] forces that the vertices retain, written; may be `force` */
 supine_status supine_physics_equilibrium_solve(supine_equilibrium *equilibrium, size_t count,
                                                const double *force, double *retained,
                                                supine_error *error);
 
 /** Invert supine_physics_equilibrium_solve: find the force [vertices] to apply so that each vertex
- * retains a given force, retained [vertices] ([Santhanam2008] IV-B.3).
- * @retval SUPINE_ERROR_MEMORY */
+ * retains a given force, retained [vertices] ([Santhanam2008] IV-B.3). */
 supine_status supine_physics_equilibrium_force(supine_equilibrium *equilibrium,
                                                const double *retained, double *force,
                                                supine_error *error);
 
 /** Apply a unit force to `vertex`, and compute the part of it that remains on each vertex: a column
- * [vertices] of the transfer matrix of [Santhanam2008], equation (2).
- * @retval SUPINE_ERROR_ARGUMENT  no such vertex */
+ * [vertices] of the transfer matrix of [Santhanam2008], equation (2). */
 supine_status supine_physics_transfer_column(supine_equilibrium *equilibrium, size_t vertex,
                                              double *column, supine_error *error);
 
@@ -126,9 +117,7 @@ supine_status supine_physics_transfer_column(supine_equilibrium *equilibrium, si
  * @param force      [vertices] force applied to each vertex
  * @param masses     [vertices] force that each vertex keeps, written
  * @param progress   called at the beginning and after every N steps, with the number of steps and
- *   the sum of |Pitcher| over all nodes divided by the sum of |force|; may be NULL
- * @retval SUPINE_ERROR_ARGUMENT  a stiffness is not positive and finite
- * @retval SUPINE_ERROR_MEMORY */
+ *   the sum of |Pitcher| over all nodes divided by the sum of |force|; may be NULL */
 supine_status
 supine_physics_pitcher_catcher(const supine_mesh *mesh, const supine_topology *topology,
                                const double *stiffness, const double *force, double tolerance,
@@ -137,8 +126,7 @@ supine_physics_pitcher_catcher(const supine_mesh *mesh, const supine_topology *t
                                void *context, supine_error *error);
 
 /** Scale a stiffness [count] to a geometric mean of 1, into scaled [count]. If `stiffness` is NULL,
- * set all elements of `scaled` to 1.
- * @retval SUPINE_ERROR_ARGUMENT  a stiffness, named in `error`, is not positive and finite */
+ * set all elements of `scaled` to 1. */
 supine_status supine_physics_stiffness_normalise(size_t count, const double *stiffness,
                                                  double *scaled, supine_error *error);
 

@@ -2,9 +2,9 @@
 /* Compute the applied force and the displacements at force 1, (15)-(18) of [Santhanam2008]. */
 #include <math.h>
 #include <stddef.h>
-#include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/parallel.h"
 #include "base/vec3.h"
 
@@ -77,11 +77,11 @@ static supine_status add_shear(const supine_lungs *lungs, const supine_force_law
   double range[2];
   double forces = 0.0; /* sums of squares */
   double moved = 0.0;
-  double *force = malloc(n * sizeof *force);
+  SUPINE_ARENA arena = {0};
+  double *force = supine_arena_take(&arena, n, sizeof *force);
   if (force == NULL ||
       supine_physics_height_range(lungs, law->pair, 1, supine, range, range + 1) != SUPINE_OK) {
-    free(force);
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
+    return supine_error_memory(error, "%zu vertices", n);
   }
   const supine_gravities gravity = {1, supine, range, range + 1};
   supine_physics_force(lungs, law, &gravity, n, NULL, force);
@@ -96,7 +96,6 @@ static supine_status add_shear(const supine_lungs *lungs, const supine_force_law
     directions[3 * i + 1] -= shear * (box[2] - 0.5) * sqrt(moved / (double)n) /
                              fmax(force[i], least * sqrt(forces / (double)n));
   }
-  free(force);
   return SUPINE_OK;
 }
 

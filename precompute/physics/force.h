@@ -30,8 +30,7 @@ typedef struct supine_force_law {
 
 /** Find the smallest and the largest value of g.p over all vertices p, in mm, for each of `count`
  * directions g [count, 3], into minimum [count] and maximum [count]. Uses all cores.
- * @param pair  whether to add the mirror image of a single lung
- * @retval SUPINE_ERROR_MEMORY */
+ * @param pair  whether to add the mirror image of a single lung */
 supine_status supine_physics_height_range(const supine_lungs *lungs, bool pair, size_t count,
                                           const double *directions, double *minimum,
                                           double *maximum);
@@ -69,9 +68,7 @@ typedef struct supine_direction_law {
 } supine_direction_law;
 
 /** Compute the displacement of each vertex, mm, at a force of 1 into directions [vertices, 3].
- * @param force  law of the applied force, for the shear
- * @retval SUPINE_ERROR_ARGUMENT  a constant is not finite, or an exponent is not positive
- * @retval SUPINE_ERROR_MESH      every displacement is zero */
+ * @param force  law of the applied force, for the shear */
 supine_status supine_physics_directions(const supine_lungs *lungs, const supine_force_law *force,
                                         const supine_direction_law *law, double *directions,
                                         supine_error *error);

@@ -3,9 +3,9 @@
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
-#include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/clones.h"
 #include "base/parallel.h"
 #include "precompute/physics/force.h"
@@ -126,23 +126,21 @@ supine_status supine_physics_height_range(const supine_lungs *lungs, bool pair, 
   const size_t single = lungs->mesh.vertex_count;
   const size_t n = pair && lungs->lung_count == 1 ? 2 * single : single;
   const size_t box_count = (n + BLOCK - 1) / BLOCK;
-  block_box *boxes = malloc((box_count + 1) * sizeof *boxes);
-  double *vertices = malloc((3 * n + 1) * sizeof *vertices);
-  supine_status status = SUPINE_ERROR_MEMORY;
-  if (boxes != NULL && vertices != NULL) {
-    range_work work = {n, vertices, boxes, box_count, count, directions, minimum, maximum};
-    memcpy(vertices, lungs->mesh.vertices, 3 * single * sizeof *vertices);
-    for (size_t i = 3 * single; i < 3 * n; ++i) { /* append the mirror image of a single lung */
-      const double at = vertices[i - 3 * single];
-      vertices[i] = i % 3 == 0 ? 2.0 * lungs->midline - at : at;
-    }
-    for (size_t i = 0; i < n; i += BLOCK) {
-      boxes[i / BLOCK] = box_of(vertices + 3 * i, n - i < BLOCK ? n - i : BLOCK);
-    }
-    supine_parallel_for((count + LANES - 1) / LANES, 4, 0, height_range, &work);
-    status = SUPINE_OK;
+  SUPINE_ARENA arena = {0};
+  block_box *boxes = supine_arena_take(&arena, box_count, sizeof *boxes);
+  double *vertices = supine_arena_take(&arena, 3 * n, sizeof *vertices);
+  if (arena.failed) {
+    return SUPINE_ERROR_MEMORY;
   }
-  free(boxes);
-  free(vertices);
-  return status;
+  range_work work = {n, vertices, boxes, box_count, count, directions, minimum, maximum};
+  memcpy(vertices, lungs->mesh.vertices, 3 * single * sizeof *vertices);
+  for (size_t i = 3 * single; i < 3 * n; ++i) { /* append the mirror image of a single lung */
+    const double at = vertices[i - 3 * single];
+    vertices[i] = i % 3 == 0 ? 2.0 * lungs->midline - at : at;
+  }
+  for (size_t i = 0; i < n; i += BLOCK) {
+    boxes[i / BLOCK] = box_of(vertices + 3 * i, n - i < BLOCK ? n - i : BLOCK);
+  }
+  supine_parallel_for((count + LANES - 1) / LANES, 4, 0, height_range, &work);
+  return SUPINE_OK;
 }

@@ -12,6 +12,7 @@
 
 #include <supine/volume.h>
 
+#include "base/arena.h"
 #include "precompute/physics/reference.h"
 #include "precompute/physics/solve.h"
 #include "precompute/physics/volume_forms.h"
@@ -82,10 +83,7 @@ static supine_status find_lung_gains(const supine_volume_form *form, const doubl
     double scale = 0.0;
     supine_volume_bend(bend, sigma, ratio);
     supine_volume_form_along(form, ratio, cubic);
-    const supine_status status = supine_volume_scale(cubic, to_full, &scale, error);
-    if (status != SUPINE_OK) {
-      return status;
-    }
+    SUPINE_TRY(supine_volume_scale(cubic, to_full, &scale, error));
     double beyond[3];
     for (size_t axis = 0; axis < 3; ++axis) {
       gains[axis] = -scale * ratio[axis];
@@ -112,15 +110,14 @@ supine_status supine_reference_find_gains(const supine_lungs *scan, const double
   const supine_state *state = &reference->scan.state;
   const bool at_rest = state->volume.kind == SUPINE_VOLUME_REST && state->volume.ml == 0.0;
   supine_volume_form forms[2];
-  supine_status status = SUPINE_OK;
   supine_physics_volume_of_fields(scan, NULL, directions, amounts, 1, forms);
-  for (size_t lung = 0; lung < scan->lung_count && status == SUPINE_OK; ++lung) {
+  for (size_t lung = 0; lung < scan->lung_count; ++lung) {
     const double beyond = reference->scan_volume[lung];
-    status = find_lung_gains(&forms[lung], bend, at_rest, -beyond,
-                             reference->scan_rest[lung] - reference->full_volume[lung] - beyond,
-                             reference->scan_gains[lung], error);
+    SUPINE_TRY(find_lung_gains(&forms[lung], bend, at_rest, -beyond,
+                               reference->scan_rest[lung] - reference->full_volume[lung] - beyond,
+                               reference->scan_gains[lung], error));
   }
-  return status;
+  return SUPINE_OK;
 }
 
 /* Set a->map to the vertices of the scan minus the displacements predicted for lungs that have the
@@ -130,13 +127,11 @@ static supine_status find_map(ascent *a, supine_error *error) {
   a->rms = 0.0;
   ++a->found->solves;
   supine_mesh_box(&a->estimate.mesh, a->estimate.minimum, a->estimate.maximum);
-  supine_status status =
-      supine_physics_solve(&a->estimate, &a->model, a->found->scan.state.gravity, field, error);
-  if (status == SUPINE_OK) {
-    status = supine_reference_find_gains(&a->scan, a->model.bend, field->directions, field->catch_,
-                                         a->found, error);
-  }
-  for (size_t lung = 0; lung < a->scan.lung_count && status == SUPINE_OK; ++lung) {
+  SUPINE_TRY(
+      supine_physics_solve(&a->estimate, &a->model, a->found->scan.state.gravity, field, error));
+  SUPINE_TRY(supine_reference_find_gains(&a->scan, a->model.bend, field->directions, field->catch_,
+                                         a->found, error));
+  for (size_t lung = 0; lung < a->scan.lung_count; ++lung) {
     const double *gains = a->found->scan_gains[lung];
     for (size_t i = 3 * a->scan.lung_begin[lung]; i < 3 * a->scan.lung_begin[lung + 1]; ++i) {
       a->map[i] =
@@ -146,7 +141,7 @@ static supine_status find_map(ascent *a, supine_error *error) {
     }
   }
   a->rms = sqrt(a->rms / (double)(a->size / 3));
-  return status;
+  return SUPINE_OK;
 }
 
 static double product(const double *a, const double *b, size_t size) {
@@ -212,75 +207,54 @@ static supine_status advance(ascent *a, supine_error *error) {
 }
 
 static supine_status iterate(ascent *a, supine_error *error) {
-  supine_status status = SUPINE_OK;
-  while (status == SUPINE_OK && a->found->solves < SOLVES_MAX) {
+  while (a->found->solves < SOLVES_MAX) {
     const double before = a->rms;
-    status = find_map(a, error);
-    if (status == SUPINE_OK &&
-        (a->rms <= converged || (a->rms <= stalled && a->rms > 0.5 * before))) {
-      memcpy(a->estimate.mesh.vertices, a->map, a->size * sizeof(double));
-      return SUPINE_OK;
-    }
-    if (status == SUPINE_OK) {
-      store_differences(a);
-      status = advance(a, error);
-    } else if (status == SUPINE_ERROR_NUMERICAL && a->history > 0) {
+    const supine_status status = find_map(a, error);
+    if (status == SUPINE_ERROR_NUMERICAL && a->history > 0) {
       /* The step was too long: restart from the last value of the fixed-point map. */
       a->history = 0;
       a->stored = 0;
       memcpy(a->estimate.mesh.vertices, a->previous_map, a->size * sizeof(double));
-      status = SUPINE_OK;
+      continue;
     }
+    SUPINE_TRY(status);
+    if (a->rms <= converged || (a->rms <= stalled && a->rms > 0.5 * before)) {
+      memcpy(a->estimate.mesh.vertices, a->map, a->size * sizeof(double));
+      return SUPINE_OK;
+    }
+    store_differences(a);
+    SUPINE_TRY(advance(a, error));
   }
-  return status == SUPINE_OK
-             ? supine_error_set(
-                   error, SUPINE_ERROR_NUMERICAL,
-                   "no surface at full inflation was found: after %d steps it still "
-                   "changes by %.3g mm RMS. If the scan is fuller than --scanned says, "
-                   "change --scanned or --resting; --scanned none uses the scan as it is",
-                   SOLVES_MAX, a->rms)
-             : status;
+  return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                          "no surface at full inflation was found: after %d steps it still "
+                          "changes by %.3g mm RMS. If the scan is fuller than --scanned says, "
+                          "change --scanned or --resting; --scanned none uses the scan as it is",
+                          SOLVES_MAX, a->rms);
 }
 
 supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *model,
                                        supine_reference *found, supine_error *error) {
+  SUPINE_ARENA arena = {0};
+  const size_t size = 3 * lungs->mesh.vertex_count;
   ascent a = {.estimate = *lungs,
               .scan = *lungs,
               .model = *model,
               .found = found,
-              .size = 3 * lungs->mesh.vertex_count};
-  const size_t bytes = a.size * sizeof(double);
-  supine_status status = SUPINE_OK;
+              .size = size,
+              .map = supine_arena_take(&arena, size, sizeof(double)),
+              .previous_map = supine_arena_zeros(&arena, size, sizeof(double)),
+              .previous_residual = supine_arena_zeros(&arena, size, sizeof(double)),
+              .map_changes = supine_arena_take(&arena, DEPTH * size, sizeof(double)),
+              .residual_changes = supine_arena_take(&arena, DEPTH * size, sizeof(double))};
+  free(lungs->scanned);
+  lungs->scanned = a.scan.mesh.vertices = malloc(size * sizeof(double));
+  if (arena.failed || lungs->scanned == NULL) {
+    return supine_error_memory(error, "%zu vertices", size / 3);
+  }
   a.model.share[0] = a.model.share[1] = 1.0; /* healthy lungs; collapse is applied later */
-  a.scan.mesh.vertices = malloc(bytes);
-  a.map = malloc(bytes);
-  a.previous_map = calloc(a.size, sizeof *a.previous_map);
-  a.previous_residual = calloc(a.size, sizeof *a.previous_residual);
-  a.map_changes = malloc(DEPTH * bytes);
-  a.residual_changes = malloc(DEPTH * bytes);
-  if (a.scan.mesh.vertices == NULL || a.map == NULL || a.previous_map == NULL ||
-      a.previous_residual == NULL || a.map_changes == NULL || a.residual_changes == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", a.size / 3);
-    goto cleanup;
-  }
-  memcpy(a.scan.mesh.vertices, lungs->mesh.vertices, bytes);
-  status = iterate(&a, error);
-  if (status == SUPINE_OK) {
-    status = check_folds(&a, error);
-  }
-  supine_mesh_box(&lungs->mesh, lungs->minimum, lungs->maximum);
-  if (status == SUPINE_OK) {
-    free(lungs->scanned);
-    lungs->scanned = a.scan.mesh.vertices;
-    a.scan.mesh.vertices = NULL;
-  }
-cleanup:
+  memcpy(lungs->scanned, lungs->mesh.vertices, size * sizeof(double));
+  const supine_status status = iterate(&a, error);
   supine_physics_solution_free(&a.field);
-  free(a.scan.mesh.vertices);
-  free(a.map);
-  free(a.previous_map);
-  free(a.previous_residual);
-  free(a.map_changes);
-  free(a.residual_changes);
-  return status;
+  supine_lungs_measure(lungs);
+  return status == SUPINE_OK ? check_folds(&a, error) : status;
 }

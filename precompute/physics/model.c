@@ -2,6 +2,7 @@
 /* Return the constants of a displacement law, and set up the equilibrium of forces with them. */
 #include <math.h>
 
+#include "base/arena.h"
 #include "base/vec3.h"
 #include "precompute/physics/model.h"
 
@@ -38,10 +39,9 @@ supine_status supine_physics_model_equilibrium(const supine_lungs *lungs, const 
     return supine_physics_equilibrium_set_shape(*equilibrium, &lungs->mesh, reach, model->stiffness,
                                                 error);
   }
-  supine_status status = supine_physics_equilibrium_create(&lungs->mesh, &lungs->topology, reach,
-                                                           model->lesions, equilibrium, error);
-  if (status == SUPINE_OK && model->stiffness != NULL) {
-    status = supine_physics_equilibrium_set_stiffness(*equilibrium, model->stiffness, error);
-  }
-  return status;
+  SUPINE_TRY(supine_physics_equilibrium_create(&lungs->mesh, &lungs->topology, reach,
+                                               model->lesions, equilibrium, error));
+  return model->stiffness != NULL
+             ? supine_physics_equilibrium_set_stiffness(*equilibrium, model->stiffness, error)
+             : SUPINE_OK;
 }

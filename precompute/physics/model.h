@@ -73,10 +73,7 @@ extern const char *const supine_physics_law_names[SUPINE_LAW_COUNT + 1];
  * with its stiffness and lesions.
  * @param lungs        must outlive the equilibrium
  * @param equilibrium  in: points to NULL, or to an equilibrium of the same lungs, which is updated
- *                     for moved vertices; out: the equilibrium, which the caller destroys
- * @retval SUPINE_ERROR_ARGUMENT  softening of lower tissue, but a smoothing length of 0
- * Other statuses as supine_physics_equilibrium_create and
- * supine_physics_equilibrium_set_stiffness */
+ *                     for moved vertices; out: the equilibrium, which the caller destroys */
 supine_status supine_physics_model_equilibrium(const supine_lungs *lungs, const supine_model *model,
                                                supine_equilibrium **equilibrium,
                                                supine_error *error);

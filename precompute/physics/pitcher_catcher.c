@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Run the Pitcher/Catcher iteration as published: equations (5)-(14) of [Santhanam2008]. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "precompute/physics/equilibrium.h"
 
 /* State of the iteration. Node i < N is vertex i of a mesh of N vertices; node N + e is edge e. */
@@ -29,24 +29,24 @@ static void update(iteration *it, size_t node) {
   }
 }
 
+static iteration allocate(supine_arena *arena, size_t nodes, size_t edges) {
+  iteration it = {.node_count = nodes};
+  it.neighbours_begin = supine_arena_zeros(arena, nodes + 2, sizeof *it.neighbours_begin);
+  it.neighbours = supine_arena_take(arena, 4 * edges, sizeof *it.neighbours);
+  it.passed_share = supine_arena_take(arena, 4 * edges, sizeof *it.passed_share);
+  it.kept_share = supine_arena_take(arena, nodes, sizeof *it.kept_share);
+  it.pitcher = supine_arena_zeros(arena, nodes, sizeof *it.pitcher);
+  it.catcher = supine_arena_zeros(arena, nodes, sizeof *it.catcher);
+  it.largest = supine_arena_zeros(arena, 2 * nodes, sizeof *it.largest);
+  return it;
+}
+
 /* Find the neighbours of every node, and the shares of force that nodes pass to them by equation
- * (8) of [Santhanam2008]. Return false if out of memory. */
-static bool iteration_create(const supine_mesh *mesh, const supine_topology *topology,
-                             const double *stiffness, iteration *it) {
+ * (8) of [Santhanam2008]. */
+static void connect(const supine_mesh *mesh, const supine_topology *topology,
+                    const double *stiffness, iteration *it) {
   const size_t n = mesh->vertex_count;
-  const size_t nodes = n + topology->edge_count;
-  *it = (iteration){.node_count = nodes};
-  it->neighbours_begin = calloc(nodes + 2, sizeof *it->neighbours_begin);
-  it->neighbours = malloc((4 * topology->edge_count + 1) * sizeof *it->neighbours);
-  it->passed_share = malloc((4 * topology->edge_count + 1) * sizeof *it->passed_share);
-  it->kept_share = malloc(nodes * sizeof *it->kept_share);
-  it->pitcher = calloc(nodes, sizeof *it->pitcher);
-  it->catcher = calloc(nodes, sizeof *it->catcher);
-  it->largest = calloc(2 * nodes, sizeof *it->largest);
-  if (it->neighbours_begin == NULL || it->neighbours == NULL || it->passed_share == NULL ||
-      it->kept_share == NULL || it->pitcher == NULL || it->catcher == NULL || it->largest == NULL) {
-    return false;
-  }
+  const size_t nodes = it->node_count;
   size_t *begin = it->neighbours_begin + 1;
   for (size_t e = 0; e < topology->edge_count; ++e) {
     ++begin[topology->edges[2 * e] + 1];
@@ -80,7 +80,6 @@ static bool iteration_create(const supine_mesh *mesh, const supine_topology *top
     }
     it->kept_share[j] = s / z;
   }
-  return true;
 }
 
 /* Spread the force it->pitcher[j] over node j and its neighbours: [Santhanam2008] (5)-(7). */
@@ -104,21 +103,15 @@ supine_physics_pitcher_catcher(const supine_mesh *mesh, const supine_topology *t
                                void (*progress)(void *context, size_t steps, double remaining),
                                void *context, supine_error *error) {
   const size_t n = mesh->vertex_count;
-  iteration it = {0};
-  supine_status status = SUPINE_OK;
-  double *scaled = malloc(n * sizeof *scaled);
-  if (scaled == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu nodes", n);
+  const size_t nodes = n + topology->edge_count;
+  SUPINE_ARENA arena = {0};
+  iteration it = allocate(&arena, nodes, topology->edge_count);
+  double *scaled = supine_arena_take(&arena, n, sizeof *scaled);
+  if (arena.failed) {
+    return supine_error_memory(error, "%zu nodes", nodes);
   }
-  status = supine_physics_stiffness_normalise(n, stiffness, scaled, error);
-  if (status != SUPINE_OK) {
-    goto cleanup;
-  }
-  if (!iteration_create(mesh, topology, scaled, &it)) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu nodes",
-                              n + topology->edge_count);
-    goto cleanup;
-  }
+  SUPINE_TRY(supine_physics_stiffness_normalise(n, stiffness, scaled, error));
+  connect(mesh, topology, scaled, &it);
   double largest = 0.0;
   double sum = 0.0;
   for (size_t i = 0; i < n; ++i) {
@@ -143,14 +136,5 @@ supine_physics_pitcher_catcher(const supine_mesh *mesh, const supine_topology *t
     distribute(&it, it.largest[1]);
   }
   memcpy(masses, it.catcher, n * sizeof *masses);
-cleanup:
-  free(it.neighbours_begin);
-  free(it.neighbours);
-  free(it.passed_share);
-  free(it.kept_share);
-  free(it.pitcher);
-  free(it.catcher);
-  free(it.largest);
-  free(scaled);
-  return status;
+  return SUPINE_OK;
 }

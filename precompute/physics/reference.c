@@ -5,6 +5,7 @@
 
 #include <supine/volume.h>
 
+#include "base/arena.h"
 #include "precompute/physics/reference.h"
 
 static const double tissue_share = 0.1; /* volume of the tissue as a share of the full volume */
@@ -16,10 +17,7 @@ supine_status supine_reference_scan_parse(const char *text, supine_scan *scan,
     *scan = (supine_scan){0};
     return SUPINE_OK;
   }
-  const supine_status status = supine_state_parse(text, &read.state, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(supine_state_parse(text, &read.state, error));
   const supine_volume_kind kind = read.state.volume.kind;
   if (read.state.lung_count > 0 || (kind != SUPINE_VOLUME_REST && kind != SUPINE_VOLUME_FULL)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
@@ -145,28 +143,15 @@ supine_status supine_reference_find(supine_lungs *lungs, const supine_model *mod
   if (!scan->known) {
     return SUPINE_OK;
   }
-  double held[2] = {0.0, 0.0};
-  bool apart = false;
-  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-    const supine_mesh part = supine_lungs_part(lungs, lung);
-    held[lung] = 1e-3 * supine_mesh_volume(&part);
-  }
-  supine_status status =
-      scan->full > 0.0 ? find_rest(&found, held, error) : find_full(&found, held, error);
-  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-    apart = apart || found.scan_volume[lung] != 0.0;
-  }
-  if (status == SUPINE_OK) {
-    status = supine_reference_resting_settle(&found.resting, found.lung_count, found.side,
-                                             found.full_volume, error);
-  }
-  if (status == SUPINE_OK && apart) {
+  SUPINE_TRY(scan->full > 0.0 ? find_rest(&found, lungs->volume, error)
+                              : find_full(&found, lungs->volume, error));
+  SUPINE_TRY(supine_reference_resting_settle(&found.resting, found.lung_count, found.side,
+                                             found.full_volume, error));
+  if (found.scan_volume[0] != 0.0 || found.scan_volume[1] != 0.0) {
     (void)supine_reference_rest(&found, scan->state.gravity, found.scan_rest);
-    status = supine_reference_inflate(lungs, model, &found, error);
+    SUPINE_TRY(supine_reference_inflate(lungs, model, &found, error));
   }
-  found.known = status == SUPINE_OK;
-  if (found.known) {
-    *reference = found;
-  }
-  return status;
+  found.known = true;
+  *reference = found;
+  return SUPINE_OK;
 }

@@ -34,8 +34,7 @@ typedef struct supine_scan {
 } supine_scan;
 
 /** Parse a scan's state: "full", "supine:rest", "left:rest+300", "full-2000", or "none". The
- * default posture is supine.
- * @retval SUPINE_ERROR_ARGUMENT  anything else; `error` lists the valid forms */
+ * default posture is supine. */
 supine_status supine_reference_scan_parse(const char *text, supine_scan *scan, supine_error *error);
 
 /** Axes and unit of the input files; both are zero if the files have different axes. */
@@ -60,10 +59,7 @@ typedef struct supine_reference {
 } supine_reference;
 
 /** Find the volumes of scanned lungs at full inflation, and move the lungs to full inflation.
- * @param lungs  the vertices and the bounding box are changed, the midline is not
- * @retval SUPINE_ERROR_ARGUMENT   the scan's volume is below its tissue's or above full inflation
- * @retval SUPINE_ERROR_NUMERICAL  the surface folds, or the iteration does not converge
- * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_MESH */
+ * @param lungs  the vertices and the bounding box are changed, the midline is not */
 supine_status supine_reference_find(supine_lungs *lungs, const supine_model *model,
                                     const supine_scan *scan, const supine_resting *resting,
                                     supine_reference *reference, supine_error *error);
@@ -92,7 +88,7 @@ supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *
  * @param bend        [3] curvature of a vertex's path to rest (supine_volume_bend); 0: straight
  * @param directions  [vertices, 3] displacement of each vertex at a force of 1, mm
  * @param amounts     [vertices] force that each vertex retains after exchange with its neighbours
- * @retval SUPINE_ERROR_NUMERICAL  no gains give these volumes */
+ */
 supine_status supine_reference_find_gains(const supine_lungs *scan, const double bend[3],
                                           const double *directions, const double *amounts,
                                           supine_reference *reference, supine_error *error);

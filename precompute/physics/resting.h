@@ -55,8 +55,7 @@ supine_resting supine_reference_resting_default(void);
  * share scales the default shares of the postures that are not given, by the mean of (given share)
  * / (default share). The posture "copd" stands for the usual share in COPD, supine.
  * @param value  "0.48", a share of the full volume; "0.47/0.49", shares for the left and the right
- *   lung; "2600mL", gas and tissue of both lungs together; NULL for "copd"
- * @retval SUPINE_ERROR_ARGUMENT  no such posture, or a volume out of range */
+ *   lung; "2600mL", gas and tissue of both lungs together; NULL for "copd" */
 supine_status supine_reference_resting_set(supine_resting *resting, const char *posture,
                                            const char *value, supine_error *error);
 
@@ -72,7 +71,7 @@ bool supine_reference_resting_given(const supine_resting *resting);
  * volume), or times resting->assumed / SUPINE_REST_SHARE if none is given.
  * @param side  [count] +1: left lung, -1: right lung
  * @param full  [count] reference volume of each lung, mL; if NULL, volumes in mL are kept for later
- * @retval SUPINE_ERROR_ARGUMENT  a share is below that of the tissue alone, or above 1 */
+ */
 supine_status supine_reference_resting_settle(supine_resting *resting, size_t count,
                                               const int *side, const double *full,
                                               supine_error *error);

@@ -27,8 +27,7 @@ typedef struct supine_solution {
 /** Compute the displacements for gravity along the unit vector `g`.
  * @param solution  zero-initialised, or an earlier solution of the same lungs, whose memory is then
  *   reused; vertices may have moved. After an error it is empty. Release it with
- *   supine_physics_solution_free.
- * @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MESH, SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
+ *   supine_physics_solution_free. */
 supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model *model,
                                    const double g[3], supine_solution *solution,
                                    supine_error *error);

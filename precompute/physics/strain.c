@@ -2,8 +2,8 @@
 /* Compute displacements of tissue whose expandability varies, by least squares over edges. */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
+#include "base/arena.h"
 #include "base/vec3.h"
 
 #include "precompute/physics/strain.h"
@@ -12,6 +12,7 @@ static const double shortest = 0.5; /* smallest length of an edge, mm, against i
 static const double hold_length = 1000.0; /* mm; see `hold` */
 
 struct supine_strain {
+  supine_arena memory;
   size_t vertex_count;
   const supine_topology *topology;
   supine_equilibrium *equilibrium;
@@ -23,9 +24,7 @@ struct supine_strain {
 void supine_physics_strain_destroy(supine_strain *strain) {
   if (strain != NULL) {
     supine_physics_equilibrium_destroy(strain->equilibrium);
-    free(strain->weight);
-    free(strain->hold);
-    free(strain->expandability);
+    supine_arena_free(&strain->memory);
     free(strain);
   }
 }
@@ -35,19 +34,16 @@ supine_status supine_physics_strain_create(const supine_lungs *lungs, const doub
                                            supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   const supine_topology *topology = &lungs->topology;
-  supine_strain *made = calloc(1, sizeof *made);
-  supine_status status = SUPINE_ERROR_MEMORY;
-  *strain = NULL;
+  supine_strain *made = *strain = calloc(1, sizeof *made);
   if (made != NULL) {
-    *made = (supine_strain){.vertex_count = n,
-                            .topology = topology,
-                            .weight = malloc((topology->edge_count + 1) * sizeof(double)),
-                            .hold = calloc(n, sizeof(double)),
-                            .expandability = malloc(n * sizeof(double))};
+    made->vertex_count = n;
+    made->topology = topology;
+    made->weight = supine_arena_take(&made->memory, topology->edge_count, sizeof(double));
+    made->hold = supine_arena_zeros(&made->memory, n, sizeof(double));
+    made->expandability = supine_arena_take(&made->memory, n, sizeof(double));
   }
-  if (made == NULL || made->weight == NULL || made->hold == NULL || made->expandability == NULL) {
-    (void)supine_error_set(error, status, "no memory for the strain of %zu vertices", n);
-    goto cleanup;
+  if (made == NULL || made->memory.failed) {
+    return supine_error_memory(error, "the strain of %zu vertices", n);
   }
   for (size_t e = 0; e < topology->edge_count; ++e) {
     const uint32_t *edge = topology->edges + 2 * e;
@@ -58,32 +54,23 @@ supine_status supine_physics_strain_create(const supine_lungs *lungs, const doub
       made->hold[edge[k]] += fmax(length, shortest) / (hold_length * hold_length);
     }
   }
-  status = supine_physics_stiffness_normalise(n, stiffness, made->expandability, error);
-  for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
+  SUPINE_TRY(supine_physics_stiffness_normalise(n, stiffness, made->expandability, error));
+  for (size_t i = 0; i < n; ++i) {
     made->expandability[i] = 1.0 / (made->expandability[i] * (lesions != NULL ? lesions[i] : 1.0));
     made->hold[i] = fmax(made->hold[i], shortest / (hold_length * hold_length));
   }
-  if (status == SUPINE_OK) {
-    status = supine_physics_equilibrium_create_weighted(topology, n, made->hold, made->weight,
-                                                        &made->equilibrium, error);
-  }
-  if (status == SUPINE_OK) {
-    *strain = made;
-    made = NULL;
-  }
-cleanup:
-  supine_physics_strain_destroy(made);
-  return status;
+  return supine_physics_equilibrium_create_weighted(topology, n, made->hold, made->weight,
+                                                    &made->equilibrium, error);
 }
 
 supine_status supine_physics_strain_apply(supine_strain *strain, const double *expandability,
                                           size_t count, double *displacements,
                                           supine_error *error) {
   const double *a = expandability != NULL ? expandability : strain->expandability;
-  double *load = malloc(strain->vertex_count * count * sizeof *load);
+  SUPINE_ARENA arena = {0};
+  double *load = supine_arena_take(&arena, strain->vertex_count * count, sizeof *load);
   if (load == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu displacements",
-                            strain->vertex_count * count);
+    return supine_error_memory(error, "%zu displacements", strain->vertex_count * count);
   }
   for (size_t i = 0; i < strain->vertex_count * count; ++i) {
     load[i] = strain->hold[i / count] * displacements[i];
@@ -98,8 +85,5 @@ supine_status supine_physics_strain_apply(supine_strain *strain, const double *e
       load[j * count + c] -= part;
     }
   }
-  const supine_status status =
-      supine_physics_equilibrium_solve(strain->equilibrium, count, load, displacements, error);
-  free(load);
-  return status;
+  return supine_physics_equilibrium_solve(strain->equilibrium, count, load, displacements, error);
 }

@@ -24,10 +24,7 @@ typedef struct supine_strain supine_strain;
  * @param lungs      must outlive `strain`; its vertices may move
  * @param stiffness  [vertices] 1 / a up to a factor, or NULL for 1
  * @param lesions    [vertices] factors on the stiffness in lesions, or NULL
- * @param strain     written; release with supine_physics_strain_destroy
- * @retval SUPINE_ERROR_ARGUMENT  a stiffness, named in `error`, is not positive and finite
- * @retval SUPINE_ERROR_MEMORY
- * @retval SUPINE_ERROR_UNSUPPORTED  CHOLMOD is not installed */
+ * @param strain     written; release with supine_physics_strain_destroy, also after an error */
 supine_status supine_physics_strain_create(const supine_lungs *lungs, const double *stiffness,
                                            const double *lesions, supine_strain **strain,
                                            supine_error *error);
@@ -35,8 +32,7 @@ void supine_physics_strain_destroy(supine_strain *strain);
 
 /** Replace displacements of uniform tissue, in place.
  * @param expandability  [vertices] a, or NULL for that of supine_physics_strain_create
- * @param displacements  [vertices, count] `count` coordinates of displacements, mm
- * Statuses as supine_physics_equilibrium_solve. */
+ * @param displacements  [vertices, count] `count` coordinates of displacements, mm */
 supine_status supine_physics_strain_apply(supine_strain *strain, const double *expandability,
                                           size_t count, double *displacements, supine_error *error);
 

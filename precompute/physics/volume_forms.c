@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/clones.h"
 #include "base/parallel.h"
 #include "base/vec3.h"
@@ -223,22 +224,20 @@ supine_status supine_physics_volume_forms_create(const supine_lungs *lungs, cons
   const size_t pairs = count * (count + 1) / 2;
   const size_t size = 3 * count + 3 * count * count + pairs * count;
   const size_t room = BLOCK * (13 * count + pairs);
-  double *sums = malloc(PARTS * size * sizeof *sums);
-  double *space = malloc(supine_thread_count() * room * sizeof *space);
-  supine_status status = SUPINE_OK;
+  SUPINE_ARENA arena = {0};
+  double *sums = supine_arena_take(&arena, PARTS * size, sizeof *sums);
+  double *space = supine_arena_take(&arena, supine_thread_count() * room, sizeof *space);
   *forms = (supine_volume_forms){
       .lung_count = lungs->lung_count,
       .column_count = count,
       .linear = calloc(3 * lungs->lung_count * count, sizeof(double)),
       .quadratic = calloc(3 * lungs->lung_count * count * count, sizeof(double)),
       .cubic = calloc(lungs->lung_count * count * count * count, sizeof(double))};
-  if (sums == NULL || space == NULL || forms->linear == NULL || forms->quadratic == NULL ||
-      forms->cubic == NULL) {
+  if (arena.failed || forms->linear == NULL || forms->quadratic == NULL || forms->cubic == NULL) {
     supine_physics_volume_forms_free(forms);
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY,
-                              "no memory for volume coefficients of %zu columns", count);
+    return supine_error_memory(error, "volume coefficients of %zu columns", count);
   }
-  for (size_t lung = 0; lung < lungs->lung_count && status == SUPINE_OK; ++lung) {
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     lung_work work = begin_lung(lungs, directions, columns, count, lung);
     work.sums = sums;
     work.size = size;
@@ -247,9 +246,7 @@ supine_status supine_physics_volume_forms_create(const supine_lungs *lungs, cons
     supine_parallel_for(PARTS, 1, 0, forms_range, &work);
     forms_collect(&work, sixth_ml * (share == NULL ? 1.0 : share[lung]), forms);
   }
-  free(sums);
-  free(space);
-  return status;
+  return SUPINE_OK;
 }
 
 SUPINE_CLONES static void fields_range(void *context, size_t begin, size_t end, size_t thread) {

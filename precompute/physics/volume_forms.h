@@ -39,7 +39,7 @@ void supine_physics_volume_forms_free(supine_volume_forms *forms);
  * @param columns     [N, count] displacements by the modes as multiples of `directions`. If that is
  *                    NULL, [N, 3, count] displacement vectors, mm.
  * Uses all cores. Cost: count^3 / 2 multiplications per triangle, without directions 3 times that.
- * @retval SUPINE_ERROR_MEMORY */
+ */
 supine_status supine_physics_volume_forms_create(const supine_lungs *lungs, const double *share,
                                                  const double *directions, const double *columns,
                                                  size_t count, supine_volume_forms *forms,

@@ -3,9 +3,9 @@
  * model for held-out directions of gravity, and the share of triangles that turn over. */
 #include <cblas.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/clones.h"
 #include "base/parallel.h"
 #include "base/vec3.h"
@@ -174,17 +174,17 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
   const size_t count = truth->direction_count;
   const size_t modes = compression->mode_count;
   const size_t threads = supine_thread_count();
-  double *weights = malloc(count * (modes + 3) * sizeof *weights);
-  tally *tallies = calloc(PARTS, sizeof *tallies);
-  double *space = malloc(threads * 3 * BLOCK * (modes + 2 * count) * sizeof *space);
-  supine_status status = SUPINE_OK;
+  SUPINE_ARENA arena = {0};
+  double *weights = supine_arena_take(&arena, count * modes, sizeof *weights);
+  double *gains = supine_arena_take(&arena, 2 * count, sizeof *gains);
+  double *volumes = supine_arena_take(&arena, count, sizeof *volumes);
+  tally *tallies = supine_arena_zeros(&arena, PARTS, sizeof *tallies);
+  double *space =
+      supine_arena_take(&arena, threads * 3 * BLOCK * (modes + 2 * count), sizeof *space);
   *accuracy = (supine_accuracy){.direction_count = count};
-  if (weights == NULL || tallies == NULL || space == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to measure the error");
-    goto cleanup;
+  if (arena.failed) {
+    return supine_error_memory(error, "errors in %zu directions", count);
   }
-  double *gains = weights + count * modes;
-  double *volumes = gains + 2 * count;
   accuracy_work work = {truth, compression, directions, weights, gains, tallies, space};
   for (size_t d = 0; d < count; ++d) {
     const double *g = truth->directions + 3 * d;
@@ -193,40 +193,38 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
   }
   accuracy->volume = find_fraction(&work, forms, volumes, gains);
   if (accuracy->volume == 0.0) {
-    status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                              "the error cannot be measured: the surface folds over at less than a "
-                              "thousandth of the volume change of %g mL; check the surface and the "
-                              "constants of the displacement law",
-                              volumes[0]);
-    goto cleanup;
+    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                            "the error cannot be measured: the surface folds over at less than a "
+                            "thousandth of the volume change of %g mL; check the surface and the "
+                            "constants of the displacement law",
+                            volumes[0]);
   }
   supine_parallel_for(PARTS, 1, threads, compare_range, &work);
   conclude(&work, accuracy);
-cleanup:
-  free(weights);
-  free(tallies);
-  free(space);
-  return status;
+  return SUPINE_OK;
 }
 
 supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const double *directions,
                                           const supine_compression *compression,
                                           const supine_volume_forms *forms, const double volume[9],
-                                          double *share) {
+                                          double *share, supine_error *error) {
   enum { SAMPLES_MAX = 50000 };
   const supine_mesh *mesh = &lungs->mesh;
   const size_t n = mesh->vertex_count;
   const size_t stride = (mesh->triangle_count + SAMPLES_MAX - 1) / SAMPLES_MAX;
+  SUPINE_ARENA arena = {0};
   supine_mesh sample = {n, mesh->vertices, (mesh->triangle_count + stride - 1) / stride,
-                        malloc(3 * SAMPLES_MAX * sizeof *sample.triangles)};
-  double *moved = malloc(3 * n * sizeof *moved);
-  const bool memory = sample.triangles != NULL && moved != NULL;
-  for (size_t t = 0; t < sample.triangle_count && memory; ++t) {
+                        supine_arena_take(&arena, 3 * SAMPLES_MAX, sizeof *sample.triangles)};
+  double *moved = supine_arena_take(&arena, 3 * n, sizeof *moved);
+  *share = 0.0;
+  if (arena.failed) {
+    return supine_error_memory(error, "folds of %zu vertices", n);
+  }
+  for (size_t t = 0; t < sample.triangle_count; ++t) {
     memcpy(sample.triangles + 3 * t, mesh->triangles + 3 * t * stride,
            3 * sizeof *sample.triangles);
   }
-  *share = 0.0;
-  for (size_t posture = 0; posture < 6 && memory; ++posture) {
+  for (size_t posture = 0; posture < 6; ++posture) {
     double g[3] = {0.0, 0.0, 0.0};
     double weights[SUPINE_MODES_MADE_MAX];
     double cubic[3];
@@ -243,7 +241,5 @@ supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const doubl
     }
     *share = fmax(*share, supine_mesh_turned_over(&sample, moved));
   }
-  free(sample.triangles);
-  free(moved);
-  return memory ? SUPINE_OK : SUPINE_ERROR_MEMORY;
+  return SUPINE_OK;
 }

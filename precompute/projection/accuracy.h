@@ -7,6 +7,7 @@
 
 #include <supine/sh.h>
 
+#include "base/arena.h"
 #include "precompute/physics/model.h"
 #include "precompute/physics/volume_forms.h"
 #include "precompute/projection/projection.h"
@@ -29,6 +30,7 @@ typedef struct supine_accuracy {
 /** Solutions of the physical model for held-out directions of gravity. With direction d, the force
  * on vertex i is sum over r of columns[i, r] functions[d, r], up to the tolerance of span.c. */
 typedef struct supine_truth {
+  supine_arena memory; /**< of the arrays that are not owned by the projection */
   size_t direction_count;
   double *directions; /**< [direction_count, 3] unit vectors along gravity */
   size_t rank;
@@ -44,8 +46,7 @@ typedef struct supine_truth {
  * `projection`, which must outlive it.
  * @param directions  [N, 3] displacement of each vertex per unit force, mm; NULL if rows of the
  *   projection are coordinates of displacements
- * @param truth       release with supine_accuracy_truth_free
- * @retval SUPINE_ERROR_MEMORY */
+ * @param truth       release with supine_accuracy_truth_free, also after an error */
 supine_status supine_accuracy_truth_create(const supine_lungs *lungs, const supine_model *model,
                                            const double *directions,
                                            const supine_projection *projection, size_t count,
@@ -62,9 +63,8 @@ void supine_accuracy_held_out_directions(size_t count, double *directions);
  * @param forms       volumes as polynomials of the weights of the modes (volume_forms.h)
  * @param volume      [9] change of volume from the reference surface, mL, at which errors in mm are
  *   measured: coefficients of spherical harmonics of the direction of gravity. It is halved until
- *   the lungs can reach it in every held-out direction
- * @retval SUPINE_ERROR_NUMERICAL  the lungs cannot reach a thousandth of the change of volume
- * @retval SUPINE_ERROR_MEMORY */
+ *   the lungs can reach it in every held-out direction; SUPINE_ERROR_NUMERICAL below a thousandth
+ */
 supine_status supine_accuracy_measure(const supine_truth *truth,
                                       const supine_compression *compression,
                                       const double *directions, const supine_volume_forms *forms,
@@ -77,12 +77,11 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
  * evenly chosen triangles are examined. Above a few in a thousand, the surface looks torn.
  * @param directions  [N, 3] displacement of each vertex per unit force, mm
  * @param forms       volumes as polynomials of the weights of the modes (volume_forms.h)
- * @param volume      [9] as in supine_accuracy_measure
- * @retval SUPINE_ERROR_MEMORY */
+ * @param volume      [9] as in supine_accuracy_measure */
 supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const double *directions,
                                           const supine_compression *compression,
                                           const supine_volume_forms *forms, const double volume[9],
-                                          double *share);
+                                          double *share, supine_error *error);
 
 /** Relative RMS errors for the held-out directions of gravity, over at most 4096 evenly chosen
  * vertices. */
@@ -93,12 +92,11 @@ typedef struct supine_error_table {
   double modes[SUPINE_MODES_MADE_MAX]; /**< [k] relative RMS error with the first k + 1 modes */
 } supine_error_table;
 
-/** Tabulate the error of the displacement by number of harmonics and by number of modes.
- * @retval SUPINE_ERROR_MEMORY */
+/** Tabulate the error of the displacement by number of harmonics and by number of modes. */
 supine_status supine_accuracy_error_table_create(const supine_truth *truth,
                                                  const supine_projection *projection,
                                                  const supine_compression *compression,
                                                  const double *directions,
-                                                 supine_error_table *table);
+                                                 supine_error_table *table, supine_error *error);
 
 #endif

@@ -2,9 +2,9 @@
 /* Tabulate the relative RMS error of the displacement by number of harmonics and of modes. */
 #include <cblas.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/vec3.h"
 #include <supine/sh.h>
 
@@ -52,7 +52,7 @@ supine_status supine_accuracy_error_table_create(const supine_truth *truth,
                                                  const supine_projection *projection,
                                                  const supine_compression *compression,
                                                  const double *directions,
-                                                 supine_error_table *table) {
+                                                 supine_error_table *table, supine_error *error) {
   const size_t rank = projection->expansion.rank;
   const size_t bands = projection->expansion.band + 1;
   const size_t terms = bands * bands;
@@ -61,10 +61,11 @@ supine_status supine_accuracy_error_table_create(const supine_truth *truth,
   double y[(SUPINE_SH_BAND_MAX + 1) * (SUPINE_SH_BAND_MAX + 1)];
   double residual[SUPINE_SPAN_MAX];
   double all = 0.0;
-  double *gram = malloc(rank * rank * sizeof *gram);
+  SUPINE_ARENA arena = {0};
+  double *gram = supine_arena_take(&arena, rank * rank, sizeof *gram);
   *table = (supine_error_table){.band_count = bands, .mode_count = modes};
   if (gram == NULL) {
-    return SUPINE_ERROR_MEMORY;
+    return supine_error_memory(error, "the table of errors");
   }
   find_gram(truth, compression->row_count, directions, gram);
   for (size_t d = 0; d < truth->direction_count; ++d) {
@@ -90,6 +91,5 @@ supine_status supine_accuracy_error_table_create(const supine_truth *truth,
   for (size_t k = 0; k < modes; ++k) {
     table->modes[k] = sqrt(table->modes[k] / all);
   }
-  free(gram);
   return SUPINE_OK;
 }

@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Solve the physical model for held-out directions of gravity. */
 #include <cblas.h>
-#include <stdlib.h>
-#include <string.h>
 
+#include "base/arena.h"
 #include "base/vec3.h"
 
 #include "precompute/projection/accuracy.h"
@@ -16,9 +15,7 @@ void supine_accuracy_held_out_directions(size_t count, double *directions) {
 }
 
 void supine_accuracy_truth_free(supine_truth *truth) {
-  free(truth->directions);
-  free(truth->functions);
-  free(truth->cubic);
+  supine_arena_free(&truth->memory);
   *truth = (supine_truth){0};
 }
 
@@ -26,7 +23,8 @@ void supine_accuracy_truth_free(supine_truth *truth) {
  * gain (factor on the displacement). If truth->rank is at most FEW, use the volume as a polynomial
  * of truth->functions. Otherwise compute the forces for AT_ONCE directions at a time. */
 static supine_status find_cubics(const supine_lungs *lungs, const double *share,
-                                 const double *directions, const supine_truth *truth) {
+                                 const double *directions, const supine_truth *truth,
+                                 supine_error *error) {
   enum { FEW = 8, AT_ONCE = SUPINE_VOLUME_FIELDS };
   const size_t axes = directions == NULL ? 3 : 1;
   const size_t n = axes * lungs->mesh.vertex_count;
@@ -34,14 +32,15 @@ static supine_status find_cubics(const supine_lungs *lungs, const double *share,
   const size_t rank = truth->rank;
   supine_volume_forms columns = {0};
   supine_volume_form forms[2 * AT_ONCE];
-  double *fields = malloc((most + 1) * n * sizeof *fields);
-  if (fields == NULL ||
-      (rank <= FEW && supine_physics_volume_forms_create(lungs, share, directions, truth->columns,
-                                                         rank, &columns, NULL) != SUPINE_OK)) {
-    free(fields);
-    return SUPINE_ERROR_MEMORY;
+  SUPINE_ARENA arena = {0};
+  double *fields = supine_arena_take(&arena, (most + 1) * n, sizeof *fields);
+  if (fields == NULL) {
+    return supine_error_memory(error, "%zu displacements", n);
   }
-  memset(truth->cubic, 0, 3 * truth->direction_count * sizeof *truth->cubic);
+  if (rank <= FEW) {
+    SUPINE_TRY(supine_physics_volume_forms_create(lungs, share, directions, truth->columns, rank,
+                                                  &columns, error));
+  }
   for (size_t d = 0; d < truth->direction_count && rank <= FEW; ++d) {
     supine_physics_volume_forms_contract(&columns, truth->functions + d * rank,
                                          truth->cubic + 3 * d);
@@ -62,7 +61,6 @@ static supine_status find_cubics(const supine_lungs *lungs, const double *share,
     }
   }
   supine_physics_volume_forms_free(&columns);
-  free(fields);
   return SUPINE_OK;
 }
 
@@ -71,32 +69,23 @@ supine_status supine_accuracy_truth_create(const supine_lungs *lungs, const supi
                                            const supine_projection *projection, size_t count,
                                            supine_truth *truth, supine_error *error) {
   const size_t rank = projection->expansion.rank;
-  double *range = malloc(2 * count * sizeof *range);
-  *truth = (supine_truth){.direction_count = count,
-                          .directions = malloc(3 * count * sizeof(double)),
-                          .rank = rank,
-                          .columns = projection->expansion.columns,
-                          .functions = malloc(count * rank * sizeof(double)),
-                          .cubic = malloc(3 * count * sizeof(double))};
-  supine_status status = SUPINE_ERROR_MEMORY;
-  if (range != NULL && truth->directions != NULL && truth->functions != NULL &&
-      truth->cubic != NULL) {
-    supine_accuracy_held_out_directions(count, truth->directions);
-    status = supine_physics_height_range(lungs, model->force.pair, count, truth->directions, range,
-                                         range + count);
+  SUPINE_ARENA arena = {0};
+  double *range = supine_arena_take(&arena, 2 * count, sizeof *range);
+  *truth = (supine_truth){
+      .direction_count = count, .rank = rank, .columns = projection->expansion.columns};
+  truth->directions = supine_arena_take(&truth->memory, 3 * count, sizeof(double));
+  truth->functions = supine_arena_take(&truth->memory, count * rank, sizeof(double));
+  truth->cubic = supine_arena_zeros(&truth->memory, 3 * count, sizeof(double));
+  if (arena.failed || truth->memory.failed) {
+    return supine_error_memory(error, "%zu held-out directions", count);
   }
-  if (status == SUPINE_OK) {
-    const supine_gravities gravities = {count, truth->directions, range, range + count};
-    status = supine_projection_span_weights(lungs, &model->force, projection->span, &gravities,
-                                            truth->functions);
+  supine_accuracy_held_out_directions(count, truth->directions);
+  const supine_gravities gravities = {count, truth->directions, range, range + count};
+  if (supine_physics_height_range(lungs, model->force.pair, count, truth->directions, range,
+                                  range + count) != SUPINE_OK ||
+      supine_projection_span_weights(lungs, &model->force, projection->span, &gravities,
+                                     truth->functions) != SUPINE_OK) {
+    return supine_error_memory(error, "%zu held-out directions", count);
   }
-  free(range);
-  if (status == SUPINE_OK) {
-    status = find_cubics(lungs, model->share, directions, truth);
-  }
-  if (status != SUPINE_OK) {
-    supine_accuracy_truth_free(truth);
-    (void)supine_error_set(error, status, "no memory for %zu held-out directions", count);
-  }
-  return status;
+  return find_cubics(lungs, model->share, directions, truth, error);
 }

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "precompute/projection/projection.h"
 #include <supine/sh.h>
 
@@ -42,40 +43,21 @@ static supine_status find_heights(const supine_lungs *lungs, bool pair, const su
  * where another vertex becomes the lowest or highest, in spherical harmonics of g. Write the
  * coefficients to functions [span->rank, (band + 1)^2]. */
 static supine_status expand(const supine_lungs *lungs, const supine_force_law *law, size_t band,
-                            const supine_span *span, double *functions, supine_error *error) {
-  supine_sh_grid *grid = NULL;
-  grid_heights heights = {0};
-  double *weights = NULL;
-  supine_status status = supine_sh_expansion_grid(band, &grid);
-  if (status == SUPINE_OK) {
-    const size_t count = grid->latitudes * grid->longitudes;
-    heights = (grid_heights){malloc(3 * count * sizeof(double)), malloc(count * sizeof(double)),
-                             malloc(count * sizeof(double))};
-    weights = malloc(count * span->rank * sizeof *weights);
-    if (heights.directions == NULL || heights.minimum == NULL || heights.maximum == NULL ||
-        weights == NULL) {
-      status = SUPINE_ERROR_MEMORY;
-    }
+                            const supine_span *span, const supine_sh_grid *grid,
+                            double *functions) {
+  const size_t count = grid->latitudes * grid->longitudes;
+  SUPINE_ARENA arena = {0};
+  grid_heights heights = {supine_arena_take(&arena, 3 * count, sizeof(double)),
+                          supine_arena_take(&arena, count, sizeof(double)),
+                          supine_arena_take(&arena, count, sizeof(double))};
+  double *weights = supine_arena_take(&arena, count * span->rank, sizeof *weights);
+  if (arena.failed) {
+    return SUPINE_ERROR_MEMORY;
   }
-  if (status == SUPINE_OK) {
-    status = find_heights(lungs, law->pair, grid, &heights);
-  }
-  if (status == SUPINE_OK) {
-    const supine_gravities gravities = {grid->latitudes * grid->longitudes, heights.directions,
-                                        heights.minimum, heights.maximum};
-    status = supine_projection_span_weights(lungs, law, span, &gravities, weights);
-  }
-  if (status == SUPINE_OK) {
-    status = supine_sh_expand(band, grid, span->rank, weights, functions, NULL);
-  }
-  supine_sh_grid_destroy(grid);
-  free(heights.directions);
-  free(heights.minimum);
-  free(heights.maximum);
-  free(weights);
-  return status == SUPINE_OK ? status
-                             : supine_error_set(error, status, "projection to band %zu: %s", band,
-                                                supine_status_string(status));
+  SUPINE_TRY(find_heights(lungs, law->pair, grid, &heights));
+  const supine_gravities gravities = {count, heights.directions, heights.minimum, heights.maximum};
+  SUPINE_TRY(supine_projection_span_weights(lungs, law, span, &gravities, weights));
+  return supine_sh_expand(band, grid, span->rank, weights, functions, NULL);
 }
 
 /* Solve the physical model for each direction of gravity of made->span, into the columns. */
@@ -88,7 +70,7 @@ static supine_status solve(const supine_lungs *lungs, const supine_model *model,
   supine_equilibrium *equilibrium = NULL;
   if (supine_physics_height_range(lungs, model->force.pair, rank, made->span->directions, range,
                                   range + rank) != SUPINE_OK) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to solve %zu vertices", n);
+    return supine_error_memory(error, "%zu vertices", n);
   }
   supine_status status = supine_physics_model_equilibrium(lungs, model, &equilibrium, error);
   if (status == SUPINE_OK) {
@@ -100,38 +82,47 @@ static supine_status solve(const supine_lungs *lungs, const supine_model *model,
   return status;
 }
 
-supine_status supine_projection_create(const supine_lungs *lungs, const supine_model *model,
-                                       size_t band, supine_projection *projection,
-                                       supine_error *error) {
+static supine_status create(const supine_lungs *lungs, const supine_model *model, size_t band,
+                            supine_projection *projection, supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
-  supine_projection made = {.expansion = {.row_count = n, .band = band}};
-  supine_expansion *expansion = &made.expansion;
+  supine_expansion *expansion = &projection->expansion;
+  supine_sh_grid *grid = NULL;
+  *projection = (supine_projection){.expansion = {.row_count = n, .band = band}};
   if (band > SUPINE_SH_BAND_MAX) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "band %zu: give at most %d", band,
                             SUPINE_SH_BAND_MAX);
   }
-  made.span = malloc(sizeof *made.span);
-  supine_status status =
-      made.span == NULL ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the forces")
-                        : supine_projection_span_create(lungs, &model->force, made.span, error);
-  if (status == SUPINE_OK) {
-    expansion->rank = made.span->rank;
-    expansion->columns = malloc(n * expansion->rank * sizeof *expansion->columns);
-    expansion->functions =
-        malloc(expansion->rank * supine_sh_count(band) * sizeof *expansion->functions);
-    status =
-        expansion->columns == NULL || expansion->functions == NULL
-            ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to solve %zu vertices", n)
-            : expand(lungs, &model->force, band, made.span, expansion->functions, error);
+  projection->span = malloc(sizeof *projection->span);
+  if (projection->span == NULL) {
+    return supine_error_memory(error, "the forces");
   }
-  if (status == SUPINE_OK) {
-    status = solve(lungs, model, &made, error);
+  SUPINE_TRY(supine_projection_span_create(lungs, &model->force, projection->span, error));
+  expansion->rank = projection->span->rank;
+  expansion->columns = malloc(n * expansion->rank * sizeof *expansion->columns);
+  expansion->functions =
+      malloc(expansion->rank * supine_sh_count(band) * sizeof *expansion->functions);
+  if (expansion->columns == NULL || expansion->functions == NULL) {
+    return supine_error_memory(error, "%zu vertices", n);
   }
+  supine_status status = supine_sh_expansion_grid(band, &grid);
   if (status == SUPINE_OK) {
-    *projection = made;
-    made = (supine_projection){0};
+    status = expand(lungs, &model->force, band, projection->span, grid, expansion->functions);
+    supine_sh_grid_destroy(grid);
   }
-  supine_projection_free(&made);
+  if (status != SUPINE_OK) {
+    return supine_error_set(error, status, "projection to band %zu: %s", band,
+                            supine_status_string(status));
+  }
+  return solve(lungs, model, projection, error);
+}
+
+supine_status supine_projection_create(const supine_lungs *lungs, const supine_model *model,
+                                       size_t band, supine_projection *projection,
+                                       supine_error *error) {
+  const supine_status status = create(lungs, model, band, projection, error);
+  if (status != SUPINE_OK) {
+    supine_projection_free(projection);
+  }
   return status;
 }
 
@@ -149,16 +140,13 @@ supine_status supine_projection_volume_forms(const supine_compression *compressi
                                              supine_error *error) {
   const size_t count = compression->mode_count;
   const size_t values = compression->row_count * count;
-  double *columns = malloc(values * sizeof *columns);
+  SUPINE_ARENA arena = {0};
+  double *columns = supine_arena_take(&arena, values, sizeof *columns);
   if (columns == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY,
-                            "no memory for volume coefficients of %zu modes", count);
+    return supine_error_memory(error, "volume coefficients of %zu modes", count);
   }
   for (size_t i = 0; i < values; ++i) {
     columns[i] = (double)compression->coefficients[i];
   }
-  const supine_status status =
-      supine_physics_volume_forms_create(lungs, share, directions, columns, count, forms, error);
-  free(columns);
-  return status;
+  return supine_physics_volume_forms_create(lungs, share, directions, columns, count, forms, error);
 }

@@ -25,10 +25,7 @@ typedef struct supine_projection {
 void supine_projection_free(supine_projection *projection);
 
 /** Expand the force on each vertex in equilibrium in spherical harmonics of the direction of
- * gravity. Release the projection with supine_projection_free.
- * @retval SUPINE_ERROR_ARGUMENT  a band above SUPINE_SH_BAND_MAX; invalid stiffness;
- *   model->force.soften too large, or above 0 while model->reach is 0
- * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
+ * gravity. Release the projection with supine_projection_free. */
 supine_status supine_projection_create(const supine_lungs *lungs, const supine_model *model,
                                        size_t band, supine_projection *projection,
                                        supine_error *error);

@@ -2,9 +2,9 @@
 /* Choose a few directions of gravity whose weighted forces sum to the force for any direction. */
 #include <cblas.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/lapack.h"
 #include "base/vec3.h"
 #include "precompute/projection/span.h"
@@ -78,17 +78,15 @@ supine_status supine_projection_span_create(const supine_lungs *lungs, const sup
   size_t vertices[VERTICES];
   size_t columns[SUPINE_SPAN_MAX];
   size_t rows[SUPINE_SPAN_MAX];
-  double *force = malloc(values * sizeof *force);
-  double *residual = malloc(values * sizeof *residual);
-  supine_status status = SUPINE_OK;
+  SUPINE_ARENA arena = {0};
+  double *force = supine_arena_take(&arena, values, sizeof *force);
+  double *residual = supine_arena_take(&arena, values, sizeof *residual);
   for (size_t d = 0; d < DIRECTIONS; ++d) {
     supine_spiral((double)d, DIRECTIONS, 0.0, directions + 3 * d);
   }
-  if (force == NULL || residual == NULL ||
-      supine_physics_height_range(lungs, law->pair, DIRECTIONS, directions, range,
-                                  range + DIRECTIONS) != SUPINE_OK) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the forces");
-    goto cleanup;
+  if (arena.failed || supine_physics_height_range(lungs, law->pair, DIRECTIONS, directions, range,
+                                                  range + DIRECTIONS) != SUPINE_OK) {
+    return supine_error_memory(error, "the forces");
   }
   for (size_t k = 0; k < count; ++k) {
     vertices[k] = k * n / count;
@@ -98,10 +96,9 @@ supine_status supine_projection_span_create(const supine_lungs *lungs, const sup
   memcpy(residual, force, values * sizeof *residual);
   if (!choose(residual, count, law->soften == 0.0 ? rounding : tolerance, &span->rank, rows,
               columns)) {
-    status =
-        supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                         "--soften %g is too large for a basis file: give at most 12", law->soften);
-    goto cleanup;
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "--soften %g is too large for a basis file: give at most 12",
+                            law->soften);
   }
   for (size_t r = 0; r < span->rank; ++r) {
     memcpy(span->directions + 3 * r, directions + 3 * columns[r], 3 * sizeof *directions);
@@ -110,17 +107,13 @@ supine_status supine_projection_span_create(const supine_lungs *lungs, const sup
       span->inverse[r * span->rank + c] = force[rows[r] * DIRECTIONS + columns[c]];
     }
   }
-  status = span->rank == 0 ? SUPINE_ERROR_NUMERICAL : invert(span->inverse, span->rank);
-  if (status == SUPINE_ERROR_MEMORY) {
-    (void)supine_error_set(error, status, "no memory for the forces");
-  } else if (status != SUPINE_OK) {
-    status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                              "the force is zero everywhere: change --base or --gain");
-  }
-cleanup:
-  free(force);
-  free(residual);
-  return status;
+  const supine_status status =
+      span->rank == 0 ? SUPINE_ERROR_NUMERICAL : invert(span->inverse, span->rank);
+  return status == SUPINE_OK ? status
+         : status == SUPINE_ERROR_MEMORY
+             ? supine_error_memory(error, "the forces")
+             : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                                "the force is zero everywhere: change --base or --gain");
 }
 
 supine_status supine_projection_span_weights(const supine_lungs *lungs, const supine_force_law *law,
@@ -128,13 +121,13 @@ supine_status supine_projection_span_weights(const supine_lungs *lungs, const su
                                              const supine_gravities *gravities, double *weights) {
   const int rank = (int)span->rank;
   const int count = (int)gravities->count;
-  double *force = malloc((span->rank * gravities->count + 1) * sizeof *force);
+  SUPINE_ARENA arena = {0};
+  double *force = supine_arena_take(&arena, span->rank * gravities->count, sizeof *force);
   if (force == NULL) {
     return SUPINE_ERROR_MEMORY;
   }
   supine_physics_force(lungs, law, gravities, span->rank, span->vertices, force);
   cblas_dgemm(CblasRowMajor, CblasTrans, CblasTrans, count, rank, rank, 1.0, force, count,
               span->inverse, rank, 0.0, weights, rank);
-  free(force);
   return SUPINE_OK;
 }

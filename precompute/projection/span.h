@@ -25,15 +25,12 @@ typedef struct supine_span {
 } supine_span;
 
 /* Choose the R directions g_r of gravity whose forces are summed, and the R vertices (see above).
- * @retval SUPINE_ERROR_ARGUMENT   law->soften needs more than SUPINE_SPAN_MAX directions
- * @retval SUPINE_ERROR_NUMERICAL  the force is zero everywhere
- * @retval SUPINE_ERROR_MEMORY */
+ */
 supine_status supine_projection_span_create(const supine_lungs *lungs, const supine_force_law *law,
                                             supine_span *span, supine_error *error);
 
 /* Express the force for each direction of `gravities` as a weighted sum of the forces for
- * span->directions. Write the weights to weights [gravities->count, rank].
- * @retval SUPINE_ERROR_MEMORY */
+ * span->directions. Write the weights to weights [gravities->count, rank]. */
 supine_status supine_projection_span_weights(const supine_lungs *lungs, const supine_force_law *law,
                                              const supine_span *span,
                                              const supine_gravities *gravities, double *weights);

@@ -4,6 +4,7 @@
 #include <stdint.h>
 #include <stdlib.h>
 
+#include "base/arena.h"
 #include "base/vec3.h"
 
 #include "precompute/warp/field.h"
@@ -173,45 +174,39 @@ supine_status supine_field_create(const supine_basis *basis, const supine_pose *
   supine_field made = {.nodes = {.voxel = SUPINE_VOXEL_F32, .channels = 3}};
   const uint32_t *part = NULL;
   const float *depth = NULL;
-  supine_status status = read_grid(basis, &made.nodes, &part, &depth, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(read_grid(basis, &made.nodes, &part, &depth, error));
   const size_t count = made.nodes.size[0] * made.nodes.size[1] * made.nodes.size[2];
-  float *moved = malloc(3 * n * sizeof *moved);
-  unsigned char *known = calloc(count, 1);
+  SUPINE_ARENA arena = {0};
+  float *moved = supine_arena_take(&arena, 3 * n, sizeof *moved);
+  unsigned char *known = supine_arena_zeros(&arena, count, 1);
   float *u = calloc(3 * count, sizeof *u);
   float *below = malloc(count * sizeof *below);
   made.nodes.values = u;
   made.depth = made.nodes;
   made.depth.channels = 1;
   made.depth.values = below;
-  if (moved == NULL || known == NULL || u == NULL || below == NULL) {
-    status =
-        supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a field of %zu nodes", count);
+  if (arena.failed || u == NULL || below == NULL) {
     supine_field_free(&made);
-  } else {
-    (void)supine_displace_range(basis, pose, 0, n, moved);
-    for (size_t i = 0; i < count; ++i) {
-      below[i] = (float)-fade; /* nodes not in the basis count as `fade` mm outside the lungs */
-    }
-    /* The field gives displacements from the scan, but info->vertices are at full inflation. */
-    for (size_t i = 0; i < n; ++i) {
-      double node[3];
-      supine_image_place(&made.nodes, part[i], node);
-      for (size_t k = 0; k < 3; ++k) {
-        u[3 * (size_t)part[i] + k] =
-            (float)((double)info->vertices[3 * i + k] - node[k] + (double)moved[3 * i + k]);
-      }
-      known[part[i]] = 1;
-      below[part[i]] = depth[i];
-    }
-    fade_out(&made.nodes, known, fade);
-    *field = made;
+    return supine_error_memory(error, "a field of %zu nodes", count);
   }
-  free(moved);
-  free(known);
-  return status;
+  (void)supine_displace_range(basis, pose, 0, n, moved);
+  for (size_t i = 0; i < count; ++i) {
+    below[i] = (float)-fade; /* nodes not in the basis count as `fade` mm outside the lungs */
+  }
+  /* The field gives displacements from the scan, but info->vertices are at full inflation. */
+  for (size_t i = 0; i < n; ++i) {
+    double node[3];
+    supine_image_place(&made.nodes, part[i], node);
+    for (size_t k = 0; k < 3; ++k) {
+      u[3 * (size_t)part[i] + k] =
+          (float)((double)info->vertices[3 * i + k] - node[k] + (double)moved[3 * i + k]);
+    }
+    known[part[i]] = 1;
+    below[part[i]] = depth[i];
+  }
+  fade_out(&made.nodes, known, fade);
+  *field = made;
+  return SUPINE_OK;
 }
 
 void supine_field_free(supine_field *field) {

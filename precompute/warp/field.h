@@ -19,8 +19,7 @@ typedef struct supine_field {
 /** Compute the displacement field from the scan to a pose. It has a physical meaning only at the
  * grid nodes that 'supine embed' stored in the basis. From these it falls to 0 over `fade` mm.
  * @param field  release with supine_field_free
- * @retval SUPINE_ERROR_FORMAT  the basis has no grid, or a malformed one
- * @retval SUPINE_ERROR_MEMORY */
+ * @retval SUPINE_ERROR_FORMAT  the basis has no grid, or a malformed one */
 supine_status supine_field_create(const supine_basis *basis, const supine_pose *pose, double fade,
                                   supine_field *field, supine_error *error);
 void supine_field_free(supine_field *field);
@@ -47,8 +46,7 @@ typedef struct supine_field_residual {
 
 /** Invert a field u by Newton's method, on the same nodes: v(y) = x - y, where x + u(x) = y. A
  * resampled image takes the value of its voxel y from the place y + v(y). Cost: about ten
- * evaluations of u per node, in parallel.
- * @retval SUPINE_ERROR_MEMORY */
+ * evaluations of u per node, in parallel. */
 supine_status supine_field_invert(const supine_field *field, supine_field *inverse,
                                   supine_field_residual *residual, supine_error *error);
 
@@ -68,8 +66,7 @@ supine_status supine_field_check_hounsfield(const supine_image *image, const cha
  * @param inverse  field v, made by supine_field_invert
  * @param depth    depth of the nodes below the lungs' surface; NULL to keep densities unscaled
  * @param labels   whether to take the value of the nearest voxel instead of interpolating
- * @param moved    release with supine_image_free
- * @retval SUPINE_ERROR_MEMORY */
+ * @param moved    release with supine_image_free */
 supine_status supine_field_resample(const supine_field *inverse, const supine_image *depth,
                                     bool labels, const supine_image *image, supine_image *moved,
                                     supine_error *error);

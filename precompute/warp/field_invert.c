@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/parallel.h"
 #include "base/vec3.h"
 
@@ -147,23 +148,20 @@ supine_status supine_field_invert(const supine_field *field, supine_field *inver
   const supine_image *nodes = &field->nodes;
   const size_t count = nodes->size[0] * nodes->size[1] * nodes->size[2];
   supine_field made = {.nodes = *nodes};
+  SUPINE_ARENA arena = {0};
+  unsigned char *lost = supine_arena_take(&arena, count, 1);
   made.nodes.values = malloc(3 * count * sizeof(float));
-  unsigned char *lost = malloc(count);
-  supine_status status = SUPINE_OK;
   *residual = (supine_field_residual){0};
-  if (made.nodes.values == NULL || lost == NULL) {
-    status =
-        supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a field of %zu nodes", count);
+  if (arena.failed || made.nodes.values == NULL) {
     supine_field_free(&made);
-  } else {
-    inversion work = {field, &made, lost};
-    supine_parallel_for(nodes->size[1] * nodes->size[2], 1, 0, invert_rows, &work);
-    for (size_t i = 0; i < count; ++i) {
-      residual->lost += lost[i];
-    }
-    measure(field, &made, residual);
-    *inverse = made;
+    return supine_error_memory(error, "a field of %zu nodes", count);
   }
-  free(lost);
-  return status;
+  inversion work = {field, &made, lost};
+  supine_parallel_for(nodes->size[1] * nodes->size[2], 1, 0, invert_rows, &work);
+  for (size_t i = 0; i < count; ++i) {
+    residual->lost += lost[i];
+  }
+  measure(field, &made, residual);
+  *inverse = made;
+  return SUPINE_OK;
 }

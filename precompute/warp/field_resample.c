@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/clones.h"
 #include "base/parallel.h"
 #include "base/vec3.h"
@@ -252,8 +253,7 @@ supine_status supine_field_resample(const supine_field *inverse, const supine_im
   if (moved->values == NULL || (depth != NULL && work.kind.values == NULL)) {
     supine_image_free(moved);
     supine_image_free(&work.kind);
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for an image of %zu voxels",
-                            count);
+    return supine_error_memory(error, "an image of %zu voxels", count);
   }
   if (depth != NULL) {
     supine_parallel_for(image->size[1] * image->size[2], 1, 0, mark_rows, &work);

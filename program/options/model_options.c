@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Options that choose the lungs and the model of their mechanics. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "program/options/model_options.h"
@@ -114,7 +113,7 @@ static const char *const sexes[] = {"unknown", "female", "male", NULL};
   "; default " #constants " for " name
 #define LAW_SHEAR(id, name, base, gain, box, constants, shear, ...) "; default " #shear " for " name
 
-#define FILLS(member) SUPINE_FILLS(supine_model_options, member)
+#define FILLS(member) SUPINE_FILLS(supine_model_choice, member)
 
 const supine_option supine_command_model_options[] = {
     {.help = "Surfaces:"},
@@ -122,7 +121,7 @@ const supine_option supine_command_model_options[] = {
     {"midline", 0, "X",
      "x of the sagittal plane between the lungs, in mm and LPS; default the middle of the bounding "
      "box of two lungs, or the medial side of a single lung",
-     FILLS(source.midline), SUPINE_SAYS_GIVEN(supine_model_options, source.has_midline),
+     FILLS(source.midline), SUPINE_SAYS_GIVEN(supine_model_choice, source.has_midline),
      .wants = "a number of mm", .more = true},
     {.help = "Label maps (.nrrd, .nii, .nii.gz, .mha) instead of surfaces: one map, one mask per "
              "file, or the folder of masks that TotalSegmentator writes:"},
@@ -148,8 +147,7 @@ const supine_option supine_command_model_options[] = {
      "change of posture alone does not deform it\nPOSTURE alone: with --fields, which then do not "
      "displace the surface in this posture\nfull and rest may have +ML or -ML, for both "
      "lungs together: supine:rest+300, full-2000. Default full",
-     FILLS(choice), .read = read_scan,
-     .wants = "full or POSTURE:rest, optionally with +ML or -ML, or none"},
+     .read = read_scan, .wants = "full or POSTURE:rest, optionally with +ML or -ML, or none"},
     {"resting", 0, "LIST",
      "volume of the patient's lungs at rest (FRC), for one posture or several, separated by "
      "commas\nPOSTURE=2600mL: gas and tissue of both lungs, as measured in a CT at rest\n"
@@ -162,17 +160,17 @@ const supine_option supine_command_model_options[] = {
      "right "
      "0.629/0.486, upright 0.538/0.566, inverted as supine; with --height and --sex, mL that these "
      "predict (GLI 2021, less 0.806 L for lying, plus 0.86 L of tissue)",
-     FILLS(choice), .read = read_resting, .wants = "copd, POSTURE=2600mL or POSTURE=SHARE,..."},
+     .read = read_resting, .wants = "copd, POSTURE=2600mL or POSTURE=SHARE,..."},
     {"full", 0, "VOLUME",
      "for a scan at rest: volume of gas and tissue of the scanned lungs at full inflation, such as "
      "4200mL or 4.2L. Without it, full inflation is assumed from the usual share at rest",
-     FILLS(choice.full), .read = supine_options_read_volume},
+     FILLS(full), .read = supine_options_read_volume},
     {"height", 0, "CM",
      "height of the patient. Height and --sex give the volume expected at TLC (ECSC 1993, less 10 "
      "% for lying, plus 0.86 L of tissue), which is printed beside the volume of the scan. Without "
      "them, the range of adults is printed",
-     FILLS(choice.person.height), .range = {50.0, 250.0}, .wants = "50 to 250 cm", .more = true},
-    {"sex", 0, "SEX", "female or male", FILLS(choice.person.sex), .choices = sexes, .more = true},
+     FILLS(person.height), .range = {50.0, 250.0}, .wants = "50 to 250 cm", .more = true},
+    {"sex", 0, "SEX", "female or male", FILLS(person.sex), .choices = sexes, .more = true},
     {.help = "Law of motion. The force on a vertex is base + gain h + cx X + cy Y + cz Z. The "
              "depth h along gravity is 0 at the uppermost vertex and 1 at the lowermost. X, Y and "
              "Z are coordinates in the bounding box, from 0 to 1: X from the midline outwards, Y "
@@ -180,33 +178,33 @@ const supine_option supine_command_model_options[] = {
     {"law", 0, "LAW",
      "how gravity and volume move the surface\n" SUPINE_LAWS(
          LAW_HELP) "The options from --base to --reach change constants of the law. Default deep",
-     FILLS(choice.law), .choices = supine_physics_law_names, .more = true},
+     FILLS(law), .choices = supine_physics_law_names, .more = true},
     {"base", 0, "B", "part of the force that is equal everywhere" SUPINE_LAWS(LAW_BASE),
-     FILLS(choice.model.force.base), .more = true},
-    {"gain", 0, "G", "factor of the depth h" SUPINE_LAWS(LAW_GAIN), FILLS(choice.model.force.gain),
+     FILLS(model.force.base), .more = true},
+    {"gain", 0, "G", "factor of the depth h" SUPINE_LAWS(LAW_GAIN), FILLS(model.force.gain),
      .more = true},
     {"box-force", 0, "X,Y,Z",
      "cx, cy and cz, the parts of the force that are fixed to the body" SUPINE_LAWS(LAW_BOX),
-     FILLS(choice.model.force.box), .wants = "three numbers, CX,CY,CZ", .more = true},
+     FILLS(model.force.box), .wants = "three numbers, CX,CY,CZ", .more = true},
     {"soften", 0, "S",
      "multiply the expandability of the tissue by exp(S (h - mean h)), so that lower tissue "
      "expands more. With --law paper, --reach must be given too. Default 0",
-     FILLS(choice.model.force.soften), .more = true},
+     FILLS(model.force.soften), .more = true},
     {"constants", 0, "C1,...,C6",
      "constants of the displacement for a unit force, equations (15)-(17) of Santhanam 2008: "
      "C1 X^C2 outwards, C3 Y^C4 to the front and C5 Z^C6 to the feet, in mm. Those of deep are "
      "fitted to landmarks in ten full breaths (DIR-Lab COPDgene). Those of paper are fitted to "
      "landmarks in ten 4-D CTs (DIR-Lab), as the original ones are lost" SUPINE_LAWS(LAW_CONSTANTS),
-     FILLS(choice.model.direction.c), .wants = "six numbers, C1,C2,C3,C4,C5,C6", .more = true},
+     FILLS(model.direction.c), .wants = "six numbers, C1,C2,C3,C4,C5,C6", .more = true},
     {"shear", 0, "BETA",
      "motion from back to front that grows from apex to base as lungs fill: BETA (Z - 1/2) times "
      "the RMS displacement" SUPINE_LAWS(LAW_SHEAR),
-     FILLS(choice.model.direction.shear), .more = true},
+     FILLS(model.direction.shear), .more = true},
     {"reach", 0, "MM",
      "distance over which a force spreads along the surface: the force falls with the distance r "
      "about as exp(-r/MM). Without --reach, the paper law spreads it over a few edges of the mesh; "
      "in a finer mesh edges are shorter, and its surface may fold. Default 10 for deep",
-     FILLS(choice.model.reach), SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0", .more = true},
+     FILLS(model.reach), SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0", .more = true},
     {.help = "Tissue. Expandability is the inverse of stiffness. Only its ratios between parts of "
              "the lungs count: doubling it everywhere changes nothing."},
     {"expandability", 0, "WHAT",
@@ -216,7 +214,7 @@ const supine_option supine_command_model_options[] = {
      "expandability of every vertex: a column expandability, in the vertex order of 'supine solve' "
      "(left lung first); or the columns vertex,expandability, with vertices numbered from 0\n"
      "Default uniform",
-     FILLS(choice), .read = read_expandability, .file = SUPINE_FILE_IN,
+     .read = read_expandability, .file = SUPINE_FILE_IN,
      .wants = "uniform, linear:AXIS:FROM:TO or exp:AXIS:FROM:TO with AXIS x, y or z and both ends "
               "above 0, or a file",
      .more = true},
@@ -224,12 +222,11 @@ const supine_option supine_command_model_options[] = {
      "lesion with its centre at X,Y,Z (mm, LPS). Within half of RADIUS (mm), the stiffness is "
      "multiplied by FACTOR; from there to RADIUS the multiplier changes smoothly to 1. A FACTOR "
      "above 1 stiffens the tissue, which then strains less. May be repeated, up to 64 times",
-     FILLS(choice), .read = read_lesion,
-     .wants = "X,Y,Z,RADIUS,FACTOR, the last two above 0 (at most 64 times)"},
+     .read = read_lesion, .wants = "X,Y,Z,RADIUS,FACTOR, the last two above 0 (at most 64 times)"},
     {"lung", 0, "SIDE:SHARE",
      "collapsed lung (pneumothorax), left or right: SHARE, above 0 and at most 1, multiplies its "
      "volume in every state. The other lung takes the rest of each breath",
-     FILLS(choice), .read = read_lung, .wants = "left:SHARE or right:SHARE, above 0 and at most 1"},
+     .read = read_lung, .wants = "left:SHARE or right:SHARE, above 0 and at most 1"},
     {.name = NULL}};
 
 static void print_map(const char *path, const supine_source *source) {
@@ -260,95 +257,17 @@ static void print_map(const char *path, const supine_source *source) {
   }
 }
 
-/* Say what volume the law gives the lungs in the state that was not scanned, beside the measured
- * one. The law is not rescaled to the latter.
- * @param measured  volume of both lungs in this state when the law was fitted, mL, or 0 */
-static void tell_volume(const supine_patient_record *record, double measured,
-                        supine_findings *findings) {
-  static const double different = 1.0 / 3.0; /* ratio of volumes minus 1 from which to warn */
-  const size_t other = record->shown == 1.0 ? 0 : 1;
-  const double *lung = record->lung_volume[other];
-  const bool both = (lung[0] > 0.0 && lung[1] > 0.0) || record->patient.frame.only_side != 0;
-  char state[160];
-  char beside[64] = "";
-  (void)supine_state_describe(&record->state[other], state, sizeof state);
-  if (measured > 0.0 && both) {
-    (void)snprintf(beside, sizeof beside, "; measured: %.0f mL", measured);
-  }
-  const double off = beside[0] != '\0' ? fabs((lung[0] + lung[1]) / measured - 1.0) : 0.0;
-  supine_findings_add(findings, "%s: by the fitted law, the lungs hold %.0f mL %s%s%s",
-                      off > different ? "warning" : "note", lung[0] + lung[1], state, beside,
-                      off > different ? ". Check that the scans show the same lungs; give "
-                                        "--landmarks to 'supine fit'"
-                                      : "");
-}
-
-/* Set options->choice to the displacement law and the force that were fitted to a patient. If the
- * state of the scan is not given, use the state in the fit. */
-static supine_status take_patient(supine_model_options *options, supine_error *error) {
-  supine_patient_record *record = options->patient;
-  const supine_lungs *lungs = &options->made_from.lungs;
-  supine_model_choice *choice = &options->choice;
-  const double measured[2] = {record->volume[0], record->volume[1]};
-  supine_scan scan;
-  choice->patient_law = "the patient's own";
-  choice->model = supine_physics_model(SUPINE_LAW_DEEP);
-  options->patient_arrays = malloc(4 * lungs->mesh.vertex_count * sizeof(double));
-  const supine_status status =
-      options->patient_arrays == NULL
-          ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
-                             lungs->mesh.vertex_count)
-          : supine_patient_model(record, lungs, &choice->resting, &scan, options->patient_arrays,
-                                 &choice->model, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  tell_volume(record, measured[record->shown == 1.0 ? 0 : 1], &options->findings);
-  choice->stiffness = choice->model.stiffness;
-  if (choice->has_scan) {
-    return SUPINE_OK;
-  }
-  choice->has_scan = true;
-  choice->scan = scan;
-  supine_findings_add(&options->findings,
-                      "note: the scan is assumed to be the %s of the two that were fitted; "
-                      "--scanned changes this",
-                      record->shown == 0.0 ? "fuller" : "emptier");
-  return record->shown == 0.0 || scan.known
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                "this scan is the emptier of the two that were fitted, and how far "
-                                "it is below full inflation is unknown: give its state, such as "
-                                "--scanned supine:rest, or use the fuller scan");
-}
-
-supine_status supine_command_model_load(supine_model_options *options, const char *command,
-                                        char **paths, size_t count, bool keep,
-                                        supine_error *error) {
+supine_status supine_command_prepare(const char *command, supine_model_choice *choice, char **paths,
+                                     size_t count, supine_prepared *prepared, supine_error *error) {
   supine_progress progress = supine_options_progress_begin("label map");
-  supine_source *source = &options->made_from;
-  options->source.labels.progress = supine_options_progress_step;
-  options->source.labels.progress_context = &progress;
-  supine_status status = supine_precompute_source_load(&options->source, paths, count, source,
-                                                       &options->findings, error);
+  choice->source.labels.progress = supine_options_progress_step;
+  choice->source.labels.progress_context = &progress;
+  const supine_status status = supine_precompute_prepare(choice, paths, count, prepared, error);
   supine_options_progress_end(&progress);
-  if (status == SUPINE_OK && source->is_map) {
-    print_map(paths[0], source);
+  if (prepared->source.is_map) {
+    print_map(paths[0], &prepared->source);
   }
-  if (keep) {
-    options->choice.scan.known = false;
-    options->choice.has_scan = true;
-  }
-  if (status == SUPINE_OK && options->patient != NULL) {
-    status = take_patient(options, error);
-  }
-  if (status == SUPINE_OK) {
-    status = supine_precompute_prepare(&source->lungs, &options->choice, &options->prepared,
-                                       &options->findings, error);
-  }
-  supine_options_say_findings(command, &options->findings);
-  (void)snprintf(options->assumed, sizeof options->assumed, "%s; %s", source->summary,
-                 options->prepared.summary);
+  supine_options_say_findings(command, &prepared->source.findings);
   return status;
 }
 
@@ -359,28 +278,21 @@ supine_status supine_command_load_lungs(const char *command, const char *operand
   char *paths[FILES_MAX + 1];
   size_t count = 0;
   supine_source source = {.is_map = false};
-  supine_findings findings = {""};
-  char *names = strdup(operand);
-  char *remaining = names;
-  if (names == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  SUPINE_ARENA arena = {0};
+  char *remaining = supine_arena_take(&arena, strlen(operand) + 1, 1);
+  if (remaining == NULL) {
+    return supine_error_memory(error, "names of files");
   }
+  (void)strcpy(remaining, operand);
   while (remaining != NULL && count <= FILES_MAX) {
     paths[count++] = strsep(&remaining, ",");
   }
-  const supine_status status =
-      count > FILES_MAX
-          ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                             "'%s' names more than two surfaces: give one or two", operand)
-          : supine_precompute_source_load(options, paths, count, &source, &findings, error);
-  supine_options_say_findings(command, &findings);
+  if (count > FILES_MAX) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "'%s' names more than two surfaces: give one or two", operand);
+  }
+  const supine_status status = supine_precompute_source_load(options, paths, count, &source, error);
+  supine_options_say_findings(command, &source.findings);
   *lungs = source.lungs;
-  free(names);
   return status;
-}
-
-void supine_command_model_options_free(supine_model_options *options) {
-  free(options->patient_arrays);
-  supine_lungs_free(&options->made_from.lungs);
-  supine_precompute_prepared_free(&options->prepared);
 }

@@ -16,8 +16,7 @@ typedef struct supine_platform_file {
 
 /** Map a file into memory.
  * @param path  in UTF-8
- * @param file  written; empty on failure
- * @retval SUPINE_ERROR_READ  the file is missing, unreadable or not a regular file */
+ * @param file  written; empty on failure */
 supine_status supine_platform_map(const char *path, supine_platform_file *file,
                                   supine_error *error);
 /** Unmap a file; legal on a zeroed struct. */

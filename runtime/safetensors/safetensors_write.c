@@ -159,12 +159,8 @@ supine_status supine_safetensors_write(const char *path, const supine_tensor *te
   content c = {tensors, tensor_count, metadata, metadata_count, ""};
   supine_output output;
   supine_status status = check_tensors(&c, path, error);
-  if (status == SUPINE_OK) {
-    status = check_metadata(&c, path, error);
-  }
-  if (status == SUPINE_OK) {
-    status = supine_output_open(path, &output, error);
-  }
+  status = status != SUPINE_OK ? status : check_metadata(&c, path, error);
+  status = status != SUPINE_OK ? status : supine_output_open(path, &output, error);
   if (status != SUPINE_OK) {
     return status;
   }

@@ -12,8 +12,7 @@ assert.deepEqual(await page.evaluate(() => { const { state: s } = window.supine;
 await settled(page);
 assert.match(await page.locator('#finding').textContent(), /^Lying on the left side, the surface moves [\d.]+ mm on average from supine at rest, [\d.]+ mm at most, at the \w+ of the (left|right) lung; expected error [\d.]+ mm\.$/);
 
-/* Cards, volumes and the text on the surface have the numbers of `supine compare`. A change below its expected error is
- * not emphasised. */
+/* Cards, volumes and the text on the surface have the numbers of `supine compare`. */
 const json = JSON.parse(supine('compare', basis, '--postures', 'supine,prone,left,right,upright,supine+15', '--json').replace(/^[^{]*/, ''));
 const [rest] = json.postures;
 const cards = await page.evaluate(() => [...document.querySelectorAll('#postures small')].map((e) => e.textContent));
@@ -23,7 +22,6 @@ json.postures.forEach(({ name, displacement_mm: mm, expected_error_mm: error }, 
   assert.equal(words, mm.mean > error ? ' on average' : ', within the error', name);
   return assert.ok(Math.abs(Number(mean) - mm.mean) <= 0.051, `${name}: ${cards[i]}, not ${mm.mean}`);
 });
-assert.match(cards[5], /within the error/);
 const surface = (await page.locator('#surface-text').textContent()).match(/[\d.]+\d/g).map(Number);
 const { mean, p95, max } = json.postures[2].displacement_mm;
 [mean, 95, p95, max, json.postures[2].expected_error_mm].forEach((x, i) => assert.ok(Math.abs(surface[i] - x) < 0.06, `${surface}`));
@@ -37,10 +35,6 @@ for (const [who, text, hidden] of bars) {
   assert.equal(hidden, false);
 }
 assert.equal(await page.locator('#holds-source').textContent(), 'assumed from healthy people');
-await press(page, '6');
-await settled(page);
-assert.match(await page.locator('#finding').textContent(), /^Supine, 15 degrees head down, the surface: no change that the model can tell from supine at rest \([\d.]+ mm; expected error [\d.]+ mm\)\.$/);
-assert.equal(await page.locator('#finding em').textContent(), '');
 await press(page, '3');
 await settled(page);
 

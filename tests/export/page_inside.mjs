@@ -78,6 +78,8 @@ async function checkTable(page) {
       assert.ok(far > 0.5 && Math.abs(far - parseFloat(mm)) < WRITTEN_MM, `${name}: ${mm}, not ${far}`);
       assert.equal(words === 'no change that the model can tell', far <= parseFloat(error), `${name}: ${words} ${error}`);
     }
+    const told = await page.evaluate(() => { const { sentenceOf, movedBetween, targetOf, basis: b, state } = window.supine; const moved = movedBetween(b, state.moment, state.depth, state.from); return b.inside.names.map((_, part) => { const target = targetOf(b.inside, part, moved); return [target.mm > target.error, sentenceOf(b, moved, target, state.gravity, '').told !== '']; }); });
+    for (const [above, emphasised] of told) assert.equal(emphasised, above); // nothing is emphasised below its expected error
     const [name, mm] = rows[0];
     const finding = await page.locator('#finding').textContent();
     assert.ok(finding.includes(name) && finding.includes(mm) && finding.includes(`from ${from}`) && finding.startsWith('Prone, 500 mL above rest, '), finding);
@@ -176,6 +178,7 @@ async function checkSizes() {
     const { page, complaints } = await openLungs(files['inside.html'], { viewport: { width, height }, colorScheme, ...(touch && { hasTouch: true }) }, '#posture=left&target=4');
     assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth && [...document.querySelectorAll('#panel button, #panel input, #inside-table td')].every((e) => { const b = e.getBoundingClientRect(); return b.width === 0 || (b.left >= 0 && b.right <= innerWidth + 0.5); })), `${width} x ${height}: something is cut`);
     if (touch) {
+      await page.locator('#picture').evaluate((canvas) => canvas.scrollIntoView({ block: 'center' }));
       await page.touchscreen.tap(...await onPage(page, 'carina'));
       await page.waitForFunction(() => window.supine.basis.inside.names[window.supine.state.chosen] === 'carina');
     }

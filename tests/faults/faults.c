@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Preload this library to make one allocation of a program fail, or one call that opens, reads,
- * writes, links or renames a file. Only calls by the program's own code and by the libraries in
+ * writes or renames a file. Only calls by the program's own code and by the libraries in
  * FAULT_ALSO are counted.
  *
  *     FAULT_KIND    "memory" or "file"
@@ -383,11 +383,6 @@ int rename(const char *from, const char *to) {
 
 int renameat2(int from_folder, const char *from, int to_folder, const char *to, unsigned flags) {
   NEXT("renameat2", int, int, const char *, int, const char *, unsigned)
-  return fails(FILES, CALLER, ENOSPC) ? -1 : next(from_folder, from, to_folder, to, flags);
-}
-
-int linkat(int from_folder, const char *from, int to_folder, const char *to, int flags) {
-  NEXT("linkat", int, int, const char *, int, const char *, int)
   return fails(FILES, CALLER, ENOSPC) ? -1 : next(from_folder, from, to_folder, to, flags);
 }
 

@@ -120,6 +120,8 @@ static supine_status make_and_write(glb *g, const char *path, size_t *total, sup
                           : write_file(path, text, numbers, bytes, total, error);
     free(text);
     json_decref(root);
+  } else {
+    json_decref(roots);
   }
   free(numbers);
   return status;

@@ -78,8 +78,9 @@ function readBasis() {
   basis.froms = basis.froms.filter((from, i) => !basis.froms.slice(0, i).some((other) => same(from, other)));
   basis.lungBoxes = basis.lungNames.map((_, lung) => boundsOf(Array.from({ length: basis.lungBegin[lung + 1] - basis.lungBegin[lung] }, (_, i) => basis.surface.subarray(3 * (basis.lungBegin[lung] + i), 3 * (basis.lungBegin[lung] + i) + 3))));
   const [low, high] = ['low', 'high'].map((end, i) => [0, 1, 2].map((axis) => Math[i ? 'max' : 'min'](...basis.lungBoxes.map((box) => box[end][axis]))));
+  const box = { low: [...low], high: [...high] };
   if (basis.lungs === 1) [low[0], high[0]] = [Math.min(low[0], -high[0]), Math.max(high[0], -low[0])]; // room for the other lung
-  basis.torso = { centre: low.map((x, i) => (x + high[i]) / 2), half: low.map((x, i) => (high[i] - x) / 2) };
+  basis.torso = { ...box, centre: low.map((x, i) => (x + high[i]) / 2), half: low.map((x, i) => (high[i] - x) / 2) };
   if (basis.inside) takeInside(basis);
   return basis;
 }

@@ -41,24 +41,38 @@ function distancesOf(basis, after, before) {
   return { mean: sum / area, p95: (bin / 2000) * far[at], largest: far[at], at, rms: Math.sqrt(squares / far.length) };
 }
 
-/** Return the RMS over points of the expected error of their displacement u, mm, as the library defines it: the squared
- * error of a point is |u| constant, plus (5 d)^2 if the volume at rest is only assumed. Here d is the change of u if the
- * volumes of the states that count from rest grow by 1 % of the reference volume. `places(moment)` returns the points in
- * a state of the lungs, and `terms` is the result of movedBetween. */
-function expectedError({ now, from, constant, fuller }, places) {
+/** Return the RMS over points of the expected error of their displacement u, mm. The squared error of a point is the
+ * sum of the terms of supine/locate.h: of u itself; of u minus its part `level`, without a turn; of a volume at rest that
+ * is only assumed, by the change of u if the volumes of the states that count from rest grow by 1 % of the reference
+ * volume; beside the heart; and sideways. `places(moment)` returns the points in a state of the lungs, `reference` has
+ * their reference positions, and `terms` is the result of movedBetween. */
+function expectedError({ now, from, law, turn: turning, level, perStep, fuller, heart, sideways }, places, reference) {
   const [a, b] = [places(now), places(from)];
-  const more = fuller?.map(places);
+  const [more, flat] = [fuller?.map(places), level?.map(places)];
   let sum = 0;
   for (let i = 0; i < a.length; i += 3) {
-    let [square, slope] = [0, 0];
+    let [square, slope, turned] = [0, 0, 0];
     for (let k = i; k < i + 3; ++k) {
       const u = a[k] - b[k];
       square += u * u;
       if (more) slope += (more[0][k] - more[1][k] - u) ** 2;
+      if (flat) turned += (u - flat[0][k] + flat[1][k]) ** 2;
     }
-    sum += Math.sqrt(square) * constant + slope * (0.05 / 0.01) ** 2;
+    sum += law * Math.sqrt(square) + turning * Math.sqrt(turned) + perStep ** 2 * slope + heart(reference.subarray(i, i + 3)) ** 2 + (3 * sideways) ** 2;
   }
   return Math.sqrt(sum / (a.length / 3));
+}
+
+/** Return a function that computes, from a reference position, the error beside the heart, mm, for a change of gravity
+ * by `across` across the body. */
+function heartError({ metadata, torso: { low, high } }, across) {
+  const middle = Number(metadata.midline_mm);
+  return ([x, y, z]) => {
+    const width = x > middle ? high[0] - middle : middle - low[0];
+    const share = (v, axis) => (high[axis] > low[axis] ? (high[axis] - v) / (high[axis] - low[axis]) : 0.5);
+    const [out, back, down] = [width > 0 ? Math.abs(x - middle) / width : 0, share(y, 1), share(z, 2)];
+    return 12 * across * Math.max(0, 1 - out / 0.7) * Math.max(0, 4 * back * (1 - back)) * Math.max(0, 1 - Math.abs(down - 0.65) / 0.35);
+  };
 }
 
 /** Return how the lungs move from the state `from` to the state `now`, which has `depth` mL above rest: the statistics of
@@ -66,12 +80,21 @@ function expectedError({ now, from, constant, fuller }, places) {
 function movedBetween(basis, now, depth, from) {
   const { metadata } = basis;
   const surface = distancesOf(basis, placesOf(basis, now), placesOf(basis, from));
+  const number = (key, usual) => (Number(metadata[key]) > 0 ? Number(metadata[key]) : usual);
+  const full = Math.min(1, surface.rms / 18);
+  const law = number('expected_error_mm', 4.5) * Math.min(1, surface.rms / number('expected_error_from_mm', 18));
+  const turning = metadata.turn_fitted ? 0 : Math.max(0, 4.5 * full - law);
+  const scan = (metadata.scan_gravity ?? '0,1,0').split(',').map(Number);
+  const volume = sumOf(basis.references);
   const assumed = basis.hasResting && !metadata.resting_known && metadata.scanned !== 'rest' && !metadata.scan_state?.includes('rest');
-  const more = 0.01 * sumOf(basis.references);
-  const fuller = assumed ? [momentFor(basis, now.gravity, depth + more), from.above === null ? from : momentFor(basis, from.gravity, from.above + more)] : null;
-  const terms = { now, from, constant: Math.min(Number(metadata.expected_error_mm), surface.rms), fuller };
+  const at = (gravity, more) => [momentFor(basis, gravity ?? now.gravity, depth + more), from.above === null ? from : momentFor(basis, gravity ?? from.gravity, from.above + more)];
+  const change = unit(now.gravity).map((x, i) => x - unit(from.gravity)[i]);
+  const terms = {
+    now, from, law, turn: turning, level: turning > 0 ? at(scan, 0) : null, fuller: assumed ? at(null, 0.01 * volume) : null,
+    perStep: assumed ? (number('resting_spread', 0.17) * (volume + restFor(basis, scan))) / volume / 0.01 : 0, heart: heartError(basis, Math.hypot(change[0], change[1])), sideways: Math.abs(change[0]),
+  };
   const known = metadata.expected_error_mm && now.held;
-  return { ...surface, ...terms, known, error: known ? expectedError(terms, (moment) => placesOf(basis, moment)) : null };
+  return { ...surface, ...terms, known, error: known ? expectedError(terms, (moment) => placesOf(basis, moment), basis.surface) : null };
 }
 
 /** Return how a structure inside the lungs moves: the mean position of its vertices `at` and before, `was`, its
@@ -80,7 +103,7 @@ function targetOf(inside, part, moved) {
   const mean = (places) => [0, 1, 2].map((axis) => places.reduce((sum, p) => sum + p[axis], 0) / places.length);
   const [at, was] = [moved.now, moved.from].map((moment) => mean(insidePlaces(inside, moment, part)));
   const move = at.map((x, i) => x - was[i]);
-  return { name: inside.names[part] || '(no name)', at, was, move, mm: Math.hypot(...move), error: moved.known ? expectedError(moved, (moment) => insidePlaces(inside, moment, part).flat()) : null };
+  return { name: inside.names[part] || '(no name)', at, was, move, mm: Math.hypot(...move), error: moved.known ? expectedError(moved, (moment) => insidePlaces(inside, moment, part).flat(), Float32Array.from(inside.members[part].flatMap((v) => [...inside.reference.subarray(4 * v, 4 * v + 3)]))) : null };
 }
 
 /** Return whether a displacement exceeds its expected error. */
@@ -127,7 +150,7 @@ function sentenceOf(basis, moved, target, gravity, above) {
   if (moved.largest < 0.05) return { before: `This is ${name}, from which displacements are measured.`, told: '', after: '', error: '', meaning: '' };
   const stated = error === null ? '' : `expected error ${errorText(error)}`;
   const meaning = error === null ? '' : `Half of all points lie within ${(0.9 * error).toFixed(0)} mm of the computed place, 95 % within ${(1.8 * error).toFixed(0)} mm${near(gravity, moved.from.gravity) ? '' : '; for a change of posture the error is an extrapolation'}.`;
-  if (!isTold({ mm, error })) return { before: `${where}${who}: ${UNTOLD} from ${name} (${mm.toFixed(1)} mm; `, told: '', after: '', error: `${stated}).`, meaning };
+  if (!isTold({ mm, error })) return { before: `${where}${who}: ${UNTOLD} from ${name} (${mm.toFixed(1)} mm; `, told: '', after: '', error: `expected error ${error.toFixed(1)} mm).`, meaning };
   const [told, after] = target ? [`moves ${mm.toFixed(1)} mm`, `: ${wayWords(target.move, 2)}`] : [`moves ${mm.toFixed(1)} mm on average`, `, ${moved.largest.toFixed(1)} mm at most, ${spotWords(basis, moved.at)}`];
   return { before: where, told: `${who} ${told}`, after: ` from ${name}${after}${stated && '; '}`, error: stated && `${stated}.`, meaning };
 }

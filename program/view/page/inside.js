@@ -145,6 +145,7 @@ class TargetTable {
     for (const { part, button, row } of this.rows) {
       button.setAttribute('aria-pressed', String(this.state.chosen === part));
       row.classList.toggle('chosen', this.state.chosen === part);
+      if (this.state.chosen === part) $('inside-scroll').scrollTop = row.offsetTop - $('inside-rows').offsetTop - 32;
     }
   }
 

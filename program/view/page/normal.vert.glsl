@@ -14,10 +14,13 @@ void main() {
   vec3 at = place(uint(gl_VertexID));
   int width = textureSize(fans, 0).x;
   vec3 sum = vec3(0.0);
+  float area = 0.0;
   for (int i = int(range.x); i < int(range.y); ++i) {
     uvec2 pair = texelFetch(fans, ivec2(i % width, i / width), 0).xy;
-    sum += cross(place(pair.x) - at, place(pair.y) - at);
+    vec3 normal = cross(place(pair.x) - at, place(pair.y) - at);
+    sum += normal;
+    area += length(normal);
   }
   float size = length(sum);
-  turned = vec4(size > 0.0 ? sum / size : vec3(0.0), size);
+  turned = vec4(size > 0.0 ? sum / size : vec3(0.0), area);
 }

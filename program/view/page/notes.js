@@ -139,8 +139,8 @@ class Notes {
       this.text(target.name, Math.min(middle[0], width - 60), middle[1] + size + 12, { align: 'center', colour: '--change', font: '600 12px' });
       return;
     }
-    const ways = isTold(target) ? wayWords(target.move, 3, pane.gravity).split(', ') : [UNTOLD.slice(0, 19), UNTOLD.slice(20)];
-    const lines = [[target.name, '--change', '650 14px'], [`${target.mm.toFixed(1)} mm`, '--ink', '650 14px'], ...ways.map((way) => [way, '--ink', '12px']), [`dashed: ${from}`, '--soft', '12px'], [`halo: ${errorText(error)} error`, '--soft', '12px']].slice(0, target.error === null ? -1 : undefined);
+    const ways = isTold(target) ? wayWords(target.move, 3, pane.gravity).split(', ') : UNTOLD.split(/(?<=the) /);
+    const lines = [[target.name, '--change', '650 14px'], [`${target.mm.toFixed(1)} mm`, '--ink', isTold(target) ? '650 14px' : '12px'], ...ways.map((way) => [way, '--ink', '12px']), [`dashed: ${from}`, '--soft', '12px'], [`halo: ${errorText(error)} error`, '--soft', '12px']].slice(0, target.error === null ? -1 : undefined);
     lines.forEach(([words, colour, font], i) => this.text(words, middle[0] + size + 12, middle[1] - size + 24 + 18 * i, { colour, font }));
     taken.push([middle[0], middle[1]], [middle[0] + size, middle[1] + 40]);
   }

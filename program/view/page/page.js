@@ -307,6 +307,7 @@ function start() {
       const there = momentFor(basis, gravityOf(tilted(posture.q, posture.tilt)), depth);
       const far = there.folds ? null : movedBetween(basis, there, depth, state.from);
       answer.textContent = far ? answerOf(far, inside ? targetOf(inside, state.chosen, far) : null) : 'out of reach';
+      answer.classList.toggle('told', !/error|reach|reference/.test(answer.textContent));
     }
     redraw();
   }

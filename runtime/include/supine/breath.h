@@ -38,7 +38,10 @@
  * [Santhanam2008]  Santhanam, Imielinska, Davenport, Kupelian, Rolland, IEEE Trans. Inf. Technol.
  *                  Biomed. 12(2), 2008
  * [Salazar1964]    Salazar, Knowles, J. Appl. Physiol. 19, 1964, 97-104
- * [Venegas1998]    Venegas, Harris, Simon, J. Appl. Physiol. 84, 1998, 389-395 */
+ * [Venegas1998]    Venegas, Harris, Simon, J. Appl. Physiol. 84, 1998, 389-395
+ *
+ * Stability: growing. A minor version may change functions and structs without a replacement;
+ * CHANGELOG.md names the change. */
 #ifndef SUPINE_BREATH_H
 #define SUPINE_BREATH_H
 

@@ -3,7 +3,10 @@
  * Compare poses: distances between deformed lungs, and ventilation by height.
  *
  * Averages are weighted by area. The weight a_i of vertex i is a third of the area of its triangles
- * on the reference surface, divided by the area of all triangles. */
+ * on the reference surface, divided by the area of all triangles.
+ *
+ * Stability: growing. A minor version may change functions and structs without a replacement;
+ * CHANGELOG.md names the change. */
 #ifndef SUPINE_COMPARE_H
 #define SUPINE_COMPARE_H
 

@@ -34,7 +34,10 @@
  * Observed points correct the predicted positions by kriging, and the kriging variance replaces the
  * first three terms where it is smaller. If a rotation is fitted, or fewer than three points were
  * observed, it always replaces them. All errors are then multiplied by a factor that the points
- * decide (supine_locate). |u_i| and its RMS count as 2 mm at least. */
+ * decide (supine_locate). |u_i| and its RMS count as 2 mm at least.
+ *
+ * Stability: growing. A minor version may change functions and structs without a replacement;
+ * CHANGELOG.md names the change. */
 #ifndef SUPINE_LOCATE_H
 #define SUPINE_LOCATE_H
 

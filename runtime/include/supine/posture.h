@@ -3,7 +3,10 @@
  * Find the direction of gravity in a posture, a DICOM patient position, an orientation or a tilt.
  *
  * Gravity is a unit vector in body axes (DICOM LPS: +x left, +y posterior, +z head) that points
- * where things fall. */
+ * where things fall.
+ *
+ * Stability: stable. A change before 1.0 needs a new minor version, and CHANGELOG.md says how to
+ * move over. */
 #ifndef SUPINE_POSTURE_H
 #define SUPINE_POSTURE_H
 

@@ -24,7 +24,10 @@
  *
  * A compiled program works with newer versions of the shared library of the same name:
  * supine_basis_info only grows at its end, supine_basis_options begins with its size, and no other
- * struct changes. */
+ * struct changes.
+ *
+ * Stability: stable. A change before 1.0 needs a new minor version, and CHANGELOG.md says how to
+ * move over. */
 #ifndef SUPINE_RUNTIME_H
 #define SUPINE_RUNTIME_H
 
@@ -266,6 +269,15 @@ SUPINE_API supine_status supine_deform(const supine_basis *basis, const supine_p
  * @retval SUPINE_ERROR_ARGUMENT  the range does not lie within 0 to N */
 SUPINE_API supine_status supine_deform_range(const supine_basis *basis, const supine_pose *pose,
                                              size_t begin, size_t end, float *xyz);
+
+/** Compute supine_deform_range into a buffer whose vertices hold more than positions, such as an
+ * interleaved vertex buffer. Other bytes stay as they are.
+ * @param stride     bytes from one vertex to the next, at least 12
+ * @param positions  first position; three floats at each multiple of `stride`, written
+ * @retval SUPINE_ERROR_ARGUMENT  as supine_deform_range, or `stride` is below 12 */
+SUPINE_API supine_status supine_deform_strided(const supine_basis *basis, const supine_pose *pose,
+                                               size_t begin, size_t end, size_t stride,
+                                               void *positions);
 
 /** Compute supine_deform_range for many poses. Each vertex is read from memory only once. Statuses:
  * as supine_deform_range, for any of the poses.

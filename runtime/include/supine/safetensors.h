@@ -20,7 +20,10 @@
  *     total = sum(h(data, h(f"{dtype} [{','.join(map(str, shape))}]", h(name, 0)))
  *                 for name, dtype, shape, data in tensors)
  *     total += sum(h(value, h(key, 1)) for key, value in metadata if key != "checksum")
- *     checksum = f"xxh64:{total % 2**64:016x}" */
+ *     checksum = f"xxh64:{total % 2**64:016x}"
+ *
+ * Stability: stable. A change before 1.0 needs a new minor version, and CHANGELOG.md says how to
+ * move over. */
 #ifndef SUPINE_SAFETENSORS_H
 #define SUPINE_SAFETENSORS_H
 

@@ -8,7 +8,10 @@
  *     Y(0, 0) = 0.28209479        Y(1,-1) = 0.48860251 y
  *     Y(1, 0) = 0.48860251 z      Y(1, 1) = 0.48860251 x
  *
- * Every function is thread-safe, allocates nothing and needs only libm. */
+ * Every function is thread-safe, allocates nothing and needs only libm.
+ *
+ * Stability: stable. A change before 1.0 needs a new minor version, and CHANGELOG.md says how to
+ * move over. */
 #ifndef SUPINE_SH_H
 #define SUPINE_SH_H
 

@@ -13,7 +13,10 @@
  *     STATE    POSTURE, VOLUME or POSTURE:VOLUME
  *
  * A number alone is refused, because it does not say to which volume it is relative. Volumes are in
- * mL, of all lungs together unless they are given for each lung. */
+ * mL, of all lungs together unless they are given for each lung.
+ *
+ * Stability: stable. A change before 1.0 needs a new minor version, and CHANGELOG.md says how to
+ * move over. */
 #ifndef SUPINE_STATE_H
 #define SUPINE_STATE_H
 

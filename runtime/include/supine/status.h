@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * Status codes and error details, shared by every Supine library. */
+ * Status codes and error details, shared by every Supine library.
+ *
+ * Stability: stable. A change before 1.0 needs a new minor version, and CHANGELOG.md says how to
+ * move over. */
 #ifndef SUPINE_STATUS_H
 #define SUPINE_STATUS_H
 

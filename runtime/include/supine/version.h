@@ -1,7 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
  * The version. Before 1.0, a new minor version may change the interface; the name of the shared
- * library therefore contains the minor version. A new patch version never changes the interface. */
+ * library therefore contains the minor version. A new patch version never changes the interface.
+ *
+ * Stability: stable. A change before 1.0 needs a new minor version, and CHANGELOG.md says how to
+ * move over. */
 #ifndef SUPINE_VERSION_H
 #define SUPINE_VERSION_H
 

@@ -3,7 +3,10 @@
  * The volume of a lung, mL, as a polynomial of its gains: the factors by which the displacement
  * from the reference surface is multiplied along x, y and z.
  *
- * Every function is thread-safe and allocates nothing. */
+ * Every function is thread-safe and allocates nothing.
+ *
+ * Stability: growing. A minor version may change functions and structs without a replacement;
+ * CHANGELOG.md names the change. */
 #ifndef SUPINE_VOLUME_H
 #define SUPINE_VOLUME_H
 

@@ -26,12 +26,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _library as _c
-from . import _program
+from . import _augment, _program
+from ._augment import Deform, Sample, augment, random_states
 from ._library import (ArgumentError, Error, FormatError, MeshError, NumericalError, OpenSurfaceError,
                        OutOfMemoryError, ReadError, UnsupportedError)
 from ._program import save_fields
 
-__all__ = ["open", "precompute", "save_fields", "embed", "Basis", "Pose", "Location", "Target", "gravity", "gravity_of_quaternion", "tilt", "postures", "breath", "Gravity",
+__all__ = ["open", "precompute", "save_fields", "embed", "augment", "random_states", "Deform", "Sample", "Basis",
+           "Pose", "Location", "Target", "gravity", "gravity_of_quaternion", "tilt", "postures", "breath", "Gravity",
            "Error", "ArgumentError", "FormatError", "MeshError", "NumericalError", "OpenSurfaceError",
            "OutOfMemoryError", "ReadError", "UnsupportedError"]
 __version__: str = _c.string(_c.version())
@@ -46,8 +48,6 @@ STORAGES = ("auto", "exact", "int16", "mixed")
 COURSES = ("cosine", "ramp", "flow")
 SIMDS = ("auto", "portable", "avx2", "avx512")
 _SUPINE = (0.0, 1.0, 0.0)
-_VOXELS = {"int8": "int8", "uint8": "uint8", "int16": "int16", "uint16": "uint16", "int32": "int32", "uint32": "uint32",
-           "float32": "float", "float64": "double"}  # names of types in NRRD files
 
 
 def _three(gravity: Gravity) -> Any:
@@ -330,10 +330,8 @@ class Basis:
         since: state of the image, if it is not that of the scan
         """
         image = np.ascontiguousarray(image, image.dtype.newbyteorder("<"))
-        if image.ndim != 3 or image.dtype.name not in _VOXELS:
-            raise ValueError(f"image must be an array [z, y, x] of {', '.join(_VOXELS)}")
+        header = _augment.nrrd(image, step, origin)
         wanted = [states] if isinstance(states, str) else list(states)
-        steps = np.asarray(step, np.float64)
         with tempfile.TemporaryDirectory() as folder:
             basis, scan, table = (os.path.join(folder, name) for name in ("basis", "scan.nrrd", "states.csv"))
             source = self._owner.source
@@ -342,12 +340,8 @@ class Basis:
                     file.write(source)
             else:
                 basis = os.path.abspath(os.fsdecode(source))
-            numbers = [f"({','.join(repr(float(x)) for x in row)})"
-                       for row in [*(np.diag(steps) if steps.ndim == 1 else steps), np.asarray(origin)]]
             with io.open(scan, "wb") as file:
-                file.write(f"NRRD0004\ntype: {_VOXELS[image.dtype.name]}\ndimension: 3\nspace: left-posterior-superior\n"
-                           f"sizes: {' '.join(map(str, image.shape[::-1]))}\nspace directions: {' '.join(numbers[:3])}\n"
-                           f"space origin: {numbers[3]}\nendian: little\nencoding: raw\n\n".encode())
+                file.write(header)
                 file.write(image.data)
             with io.open(table, "w") as file:
                 file.writelines(["posture,output\n", *(f'"{state}",{i}.nrrd\n' for i, state in enumerate(wanted))])

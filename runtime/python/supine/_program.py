@@ -21,16 +21,16 @@ Progress = Callable[[float], Any]
 _EXITS: dict[int, type[_c.Error]] = {1: _c.ArgumentError, 2: _c.FormatError, 3: _c.UnsupportedError, 5: _c.NumericalError}
 
 
-def _find() -> str:
+def find() -> str:
     """Find the program beside this file, or on PATH."""
     found = shutil.which("supine", path=os.path.dirname(__file__)) or shutil.which("supine")
     if found is None:
         raise _c.UnsupportedError("the program 'supine' is neither on PATH nor beside the package: install it, as "
-                                  "precompute, embed and warp run it")
+                                  "precompute, embed, warp and augment run it")
     return found
 
 
-def _words(options: dict[str, Any]) -> list[str]:
+def words(options: dict[str, Any]) -> list[str]:
     """Convert options to arguments of the program. held_out=200 becomes --held-out 200. The value True becomes a flag,
     a tuple becomes a,b,c and a dict becomes a=b,c=d; a list repeats the option."""
     words: list[str] = []
@@ -124,6 +124,18 @@ def _listen(terminal: int, command: str, progress: Optional[Progress]) -> str:
             return said
 
 
+def fail(command: str, status: int, said: str) -> None:
+    """Raise an exception with the error message of a command."""
+    messages = re.sub(rf"^supine {command}: ", "", said, flags=re.M).splitlines()
+    what = ([""] + [m for m in messages if not re.search(r"(^|: )(warning|note): |^Try '", m)])[-1]
+    kind = _EXITS.get(status, _c.Error)
+    if status == 2 and "cannot read" in what:
+        kind = _c.ReadError
+    elif status == 2 and command == "precompute":
+        kind = _c.MeshError
+    raise kind(what or f"supine {command} ended with exit status {status}")
+
+
 def run(command: str, operands: Sequence[str], options: dict[str, Any], names: dict[str, str],
         progress: Optional[Progress]) -> str:
     """Run a command and return its standard output. Its warnings become Python warnings. Its errors become exceptions
@@ -132,7 +144,7 @@ def run(command: str, operands: Sequence[str], options: dict[str, Any], names: d
     names: dict from the path of each temporary file to the name that messages show instead"""
     import pty  # not at the top, as Windows does not have this module
 
-    arguments = [_find(), command, *_words(options), "--", *operands]
+    arguments = [find(), command, *words(options), "--", *operands]
     terminal, other_end = pty.openpty()
     with tempfile.TemporaryFile() as report, subprocess.Popen(
             arguments, stdin=subprocess.DEVNULL, stdout=report, stderr=other_end) as process:
@@ -154,13 +166,7 @@ def run(command: str, operands: Sequence[str], options: dict[str, Any], names: d
         if "warning: " in message:
             warnings.warn(message.replace("warning: ", "", 1), stacklevel=5)
     if status != 0:
-        what = ([""] + [m for m in messages if not re.search(r"(^|: )(warning|note): |^Try '", m)])[-1]
-        kind = _EXITS.get(status, _c.Error)
-        if status == 2 and "cannot read" in what:
-            kind = _c.ReadError
-        elif status == 2 and command == "precompute":
-            kind = _c.MeshError
-        raise kind(what or f"supine {command} ended with exit status {status}")
+        fail(command, status, "\n".join(messages))
     if progress is not None:
         progress(1.0)
     return text
