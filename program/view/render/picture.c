@@ -508,28 +508,22 @@ static supine_status draw_on(cairo_surface_t *surface, supine_renderer *renderer
 
 supine_status supine_render_picture_draw(supine_renderer *renderer, const supine_picture *picture,
                                          uint32_t *pixels, supine_error *error) {
-  supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error));
   cairo_surface_t *surface = cairo.image_surface_create_for_data(
       (unsigned char *)pixels, CAIRO_FORMAT_RGB24, (int)picture->width, (int)picture->height,
       (int)(4 * picture->width));
-  status = draw_on(surface, renderer, picture, error);
+  const supine_status status = draw_on(surface, renderer, picture, error);
   cairo.surface_destroy(surface);
   return status;
 }
 
 supine_status supine_render_picture_save(supine_renderer *renderer, const supine_picture *picture,
                                          const char *path, supine_error *error) {
-  supine_output output = {0};
-  supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
+  SUPINE_TRY(SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error));
   cairo_surface_t *surface =
       cairo.image_surface_create(CAIRO_FORMAT_RGB24, (int)picture->width, (int)picture->height);
-  status = draw_on(surface, renderer, picture, error);
+  supine_status status = draw_on(surface, renderer, picture, error);
   if (status == SUPINE_OK) {
     status = supine_output_open(path, &output, error);
   }
@@ -539,19 +533,15 @@ supine_status supine_render_picture_save(supine_renderer *renderer, const supine
       status = supine_output_commit(&output, error);
     }
   }
-  supine_output_abandon(&output);
   cairo.surface_destroy(surface);
   return status;
 }
 
 supine_status supine_render_png(supine_renderer *renderer, const supine_scene *scene, FILE *file,
                                 supine_error *error) {
-  supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error));
   cairo_surface_t *image = NULL;
-  status = draw_scene(renderer, scene, &image, error);
+  supine_status status = draw_scene(renderer, scene, &image, error);
   if (status == SUPINE_OK) {
     status = write_png(image, file, error);
   }
