@@ -8,6 +8,7 @@
 
 #include <supine/safetensors.h>
 
+#include "base/arena.h"
 #include "base/clock.h"
 #include "base/text.h"
 #include "mesh/mesh.h"
@@ -98,10 +99,7 @@ static supine_status complete(request *wanted, size_t *count, supine_error *erro
   }
   if (!wanted->turns) {
     supine_state state = {.lung_count = 0};
-    const supine_status status = supine_options_state(&wanted->orientation, &state, error);
-    if (status != SUPINE_OK) {
-      return status;
-    }
+    SUPINE_TRY(supine_options_state(&wanted->orientation, &state, error));
     if (state.volume.kind != SUPINE_VOLUME_DEFAULT || state.lung_count > 0) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                               "a breath starts at rest: give --posture without a volume");
@@ -136,15 +134,12 @@ typedef struct playing {
   double *compute_time; /* [frames] s */
   double *origin;       /* [N, 3] positions from which displacements are measured, mm */
   char vtp_comment[512];
+  supine_arena arena;
 } playing;
 
 static void end(playing *p) {
-  free(p->time);
+  supine_arena_free(&p->arena);
   supine_mesh_free(&p->mesh);
-  free(p->normals);
-  free(p->positions);
-  free(p->compute_time);
-  free(p->origin);
   supine_basis_close(p->basis);
 }
 
@@ -154,20 +149,19 @@ static supine_status begin_frames(playing *p, size_t count, bool series, supine_
   const size_t frame = 3 * supine_basis_get_info(p->basis)->vertex_count;
   p->frame_count = count;
   p->lung_count = supine_basis_get_info(p->basis)->lung_count;
-  p->time = malloc((5 + p->lung_count) * count * sizeof *p->time);
+  p->time = supine_arena_take(&p->arena, count, sizeof *p->time);
+  p->above = supine_arena_take(&p->arena, count, sizeof *p->above);
+  p->gravity = supine_arena_take(&p->arena, count, 3 * sizeof *p->gravity);
+  p->volumes = supine_arena_take(&p->arena, count, p->lung_count * sizeof *p->volumes);
+  p->compute_time = supine_arena_take(&p->arena, count, sizeof *p->compute_time);
+  p->origin = supine_arena_take(&p->arena, frame, sizeof *p->origin);
+  p->normals = supine_arena_take(&p->arena, frame, sizeof *p->normals);
+  SUPINE_TRY(supine_posed_mesh(p->basis, NULL, &p->mesh, error));
+  if (p->arena.failed) {
+    return supine_error_memory(error, "%zu vertices", frame / 3);
+  }
   const size_t kept = series ? 1 : 1 + count;
-  if (frame <= SIZE_MAX / sizeof(float) / kept) {
-    p->positions = malloc(kept * frame * sizeof *p->positions);
-  }
-  p->normals = malloc(frame * sizeof *p->normals);
-  p->compute_time = malloc(count * sizeof *p->compute_time);
-  if (p->time == NULL || p->normals == NULL || p->compute_time == NULL ||
-      supine_options_basis_mesh(p->basis, &p->mesh) != SUPINE_OK) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
-  }
-  p->above = p->time + count;
-  p->gravity = p->above + count;
-  p->volumes = p->gravity + 3 * count;
+  p->positions = supine_arena_take(&p->arena, kept, frame * sizeof *p->positions);
   return p->positions != NULL
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_MEMORY,
@@ -188,18 +182,18 @@ static supine_status find_volumes(playing *p, const supine_pv *pv, supine_error 
     p->time[t] = (double)t / p->wanted->fps;
     supine_breath_turn_gravity(&p->wanted->turn, p->time[t], p->gravity + 3 * t);
   }
-  supine_status status = supine_breath_evaluate(pv, &p->wanted->breath, p->frame_count, p->time,
-                                                p->above, NULL, error);
-  for (size_t t = 0; t < p->frame_count && status == SUPINE_OK; ++t) {
+  SUPINE_TRY(supine_breath_evaluate(pv, &p->wanted->breath, p->frame_count, p->time, p->above, NULL,
+                                    error));
+  for (size_t t = 0; t < p->frame_count; ++t) {
     supine_pose pose;
     supine_error cause;
-    status = find_pose(p, t, &pose, &cause);
+    const supine_status status = find_pose(p, t, &pose, &cause);
     if (status != SUPINE_OK) {
       return supine_error_set(error, status, "frame at %.3f s: %s", p->time[t], cause.message);
     }
     (void)supine_basis_volumes(p->basis, &pose, p->volumes + t * p->lung_count);
   }
-  return status;
+  return SUPINE_OK;
 }
 
 static double volume_at(const playing *p, size_t t) {
@@ -235,9 +229,9 @@ static void report(const playing *p) {
  * @param series  receives each frame; NULL to store all frames in p->positions */
 static supine_status play_frames(playing *p, supine_mesh_series *series, supine_error *error) {
   const size_t frame = 3 * p->mesh.vertex_count;
+  SUPINE_FREED_BY(supine_options_progress_end)
   supine_progress progress = supine_options_progress_begin(name);
-  supine_status status = SUPINE_OK;
-  for (size_t t = 0; t < p->frame_count && status == SUPINE_OK; ++t) {
+  for (size_t t = 0; t < p->frame_count; ++t) {
     supine_pose pose;
     const double start = supine_clock_seconds();
     (void)find_pose(p, t, &pose, NULL);
@@ -248,17 +242,19 @@ static supine_status play_frames(playing *p, supine_mesh_series *series, supine_
         p->mesh.vertices[i] = (double)p->positions[i];
       }
       supine_normals(p->basis, p->positions, p->normals);
-      status = supine_mesh_series_add(series, error);
+      SUPINE_TRY(supine_mesh_series_add(series, error));
     } else {
       memcpy(p->positions + (1 + t) * frame, p->positions, frame * sizeof *p->positions);
     }
     if (!supine_options_progress_step(&progress, (double)(t + 1) / (double)p->frame_count)) {
-      status =
-          supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
+      return supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
     }
   }
-  supine_options_progress_end(&progress);
-  return status;
+  return SUPINE_OK;
+}
+
+static void drop_series(supine_mesh_series **series) {
+  supine_mesh_series_close(*series);
 }
 
 /* Compute the frames, and write them as VTP.
@@ -269,23 +265,17 @@ static supine_status write_series(playing *p, supine_mesh_save_options save, sup
   const supine_tensor *lung = supine_basis_tensor(p->basis, "lung");
   const supine_mesh_field fields[] = {{"gravity_LPS", 3, p->gravity},
                                       {"volume_mL", p->lung_count, p->volumes}};
-  supine_mesh_series *series = NULL;
+  SUPINE_FREED_BY(drop_series) supine_mesh_series *series = NULL;
   save.from = p->origin;
   save.normals = p->normals;
   save.lung = lung == NULL ? NULL : lung->data;
   save.fields = fields;
   save.field_count = sizeof fields / sizeof *fields;
   save.rounding = rounding;
-  supine_status status = supine_mesh_series_open(p->wanted->path, &p->mesh, &save, p->frame_count,
-                                                 p->time, &series, error);
-  if (status == SUPINE_OK) {
-    status = play_frames(p, series, error);
-  }
-  if (status == SUPINE_OK) {
-    status = supine_mesh_series_commit(series, error);
-  }
-  supine_mesh_series_close(series);
-  return status;
+  SUPINE_TRY(supine_mesh_series_open(p->wanted->path, &p->mesh, &save, p->frame_count, p->time,
+                                     &series, error));
+  SUPINE_TRY(play_frames(p, series, error));
+  return supine_mesh_series_commit(series, error);
 }
 
 static supine_status write_tensors(playing *p, const char *made_by, supine_error *error) {
@@ -305,29 +295,24 @@ static supine_status write_tensors(playing *p, const char *made_by, supine_error
                                       {"units", "mm, s, mL (gas and tissue of each lung)"},
                                       {"axes", "LPS"},
                                       {"made_by", made_by}};
-  const supine_status status = play_frames(p, NULL, error);
-  return status == SUPINE_OK
-             ? supine_safetensors_write(p->wanted->path, tensors, sizeof tensors / sizeof *tensors,
-                                        metadata, sizeof metadata / sizeof *metadata, error)
-             : status;
+  SUPINE_TRY(play_frames(p, NULL, error));
+  return supine_safetensors_write(p->wanted->path, tensors, sizeof tensors / sizeof *tensors,
+                                  metadata, sizeof metadata / sizeof *metadata, error);
 }
 
 /* Check the surfaces of smallest and of largest volume with supine_options_pose_check. */
 static supine_status check_ends(const playing *p, supine_error *error) {
   size_t ends[2];
   find_ends(p, ends);
-  supine_status status = SUPINE_OK;
-  for (size_t i = 0; i < 2 && status == SUPINE_OK; ++i) {
+  for (size_t i = 0; i < 2; ++i) {
     supine_pose pose;
     const supine_state state =
         supine_breath_state(p->basis, p->gravity + 3 * ends[i], p->above[ends[i]]);
-    status = supine_basis_pose(p->basis, &state, &pose, error);
-    if (status == SUPINE_OK) {
-      status =
-          supine_options_pose_check(p->basis, name, p->wanted->allow_folds, &state, &pose, error);
-    }
+    SUPINE_TRY(supine_basis_pose(p->basis, &state, &pose, error));
+    SUPINE_TRY(
+        supine_options_pose_check(p->basis, name, p->wanted->allow_folds, &state, &pose, error));
   }
-  return status;
+  return SUPINE_OK;
 }
 
 static supine_status play(playing *p, size_t count, const char *made_by, supine_error *error) {
@@ -336,37 +321,22 @@ static supine_status play(playing *p, size_t count, const char *made_by, supine_
   supine_mesh_save_options save = {.comment = p->vtp_comment};
   supine_pv pv = *supine_breath_normal();
   supine_reference_pose from;
-  supine_status status = supine_options_basis_frame(p->basis, wanted->as_scanned, &save, error);
-  if (status == SUPINE_OK) {
-    status = begin_frames(p, count, !tensors, error);
+  SUPINE_TRY(supine_options_basis_frame(p->basis, wanted->as_scanned, &save, error));
+  SUPINE_TRY(begin_frames(p, count, !tensors, error));
+  if (wanted->pv != NULL) {
+    SUPINE_TRY(supine_breath_load(wanted->pv, &pv, error));
   }
-  if (status == SUPINE_OK && wanted->pv != NULL) {
-    status = supine_breath_load(wanted->pv, &pv, error);
-  }
-  if (status == SUPINE_OK) {
-    status = find_volumes(p, &pv, error);
-  }
-  if (status == SUPINE_OK) {
-    status = supine_options_reference(p->basis, &wanted->from, false, &from, error);
-  }
-  if (status == SUPINE_OK) {
-    status = check_ends(p, error);
-  }
-  if (status == SUPINE_OK) {
-    p->origin = supine_options_basis_positions(p->basis, &from.pose);
-    status = p->origin != NULL ? SUPINE_OK : SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(find_volumes(p, &pv, error));
+  SUPINE_TRY(supine_options_reference(p->basis, &wanted->from, false, &from, error));
+  SUPINE_TRY(check_ends(p, error));
+  SUPINE_TRY(supine_posed_positions(p->basis, &from.pose, p->origin, error));
   supine_options_signals_catch(true);
-  if (status == SUPINE_OK) {
-    (void)snprintf(p->vtp_comment, sizeof p->vtp_comment,
-                   "displacement from %s; volumes are gas and tissue of each lung; %s", from.name,
-                   made_by);
-    status = tensors ? write_tensors(p, made_by, error) : write_series(p, save, error);
-  }
-  if (status == SUPINE_OK) {
-    report(p);
-  }
-  return status;
+  (void)snprintf(p->vtp_comment, sizeof p->vtp_comment,
+                 "displacement from %s; volumes are gas and tissue of each lung; %s", from.name,
+                 made_by);
+  SUPINE_TRY(tensors ? write_tensors(p, made_by, error) : write_series(p, save, error));
+  report(p);
+  return SUPINE_OK;
 }
 
 static void begin(void *chosen) {
@@ -376,17 +346,11 @@ static void begin(void *chosen) {
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
   const char *path = given->operand[0];
-  playing p = {.wanted = wanted};
+  SUPINE_FREED_BY(end) playing p = {.wanted = wanted};
   size_t count = 1;
-  supine_status status = complete(wanted, &count, error);
-  if (status == SUPINE_OK) {
-    status = supine_options_basis_open(path, SUPINE_STORAGE_AUTO, &p.basis, error);
-  }
-  if (status == SUPINE_OK) {
-    status = play(&p, count, given->made_by, error);
-  }
-  end(&p);
-  return status;
+  SUPINE_TRY(complete(wanted, &count, error));
+  SUPINE_TRY(supine_options_basis_open(path, SUPINE_STORAGE_AUTO, &p.basis, error));
+  return play(&p, count, given->made_by, error);
 }
 
 const supine_command supine_command_breathe = {

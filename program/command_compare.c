@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/output.h"
 #include "base/vec3.h"
 
@@ -16,16 +17,10 @@ static const char name[] = "compare";
 
 static supine_status write_html(const char *path, const supine_comparison *comparison,
                                 supine_error *error) {
-  supine_output output = {0};
-  supine_status status = supine_output_open(path, &output, error);
-  if (status == SUPINE_OK) {
-    status = supine_report_html(comparison, output.file, error);
-  }
-  if (status == SUPINE_OK) {
-    status = supine_output_commit(&output, error);
-  }
-  supine_output_abandon(&output);
-  return status;
+  SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
+  SUPINE_TRY(supine_output_open(path, &output, error));
+  SUPINE_TRY(supine_report_html(comparison, output.file, error));
+  return supine_output_commit(&output, error);
 }
 
 typedef struct request {
@@ -73,83 +68,65 @@ static supine_status add_pair(const supine_basis *basis, const supine_command_na
                               supine_error *error) {
   supine_target hilum = {.name = in_hilum ? "hilum, subtracted" : "hilum", .expected = (double)NAN};
   supine_pose pose[2];
-  supine_expected expected = {0};
-  supine_target *targets = NULL;
-  supine_status status = SUPINE_OK;
-  for (size_t i = 0; i < 2 && status == SUPINE_OK; ++i) {
-    status = supine_basis_pose(basis, &item[i]->state, &pose[i], error);
+  SUPINE_FREED_BY(supine_posed_expected_free) supine_expected expected = {0};
+  SUPINE_FREED_BY(supine_command_targets_free) supine_target *targets = NULL;
+  for (size_t i = 0; i < 2; ++i) {
+    SUPINE_TRY(supine_basis_pose(basis, &item[i]->state, &pose[i], error));
   }
-  if (status == SUPINE_OK) {
-    status =
-        supine_options_expected_find(basis, &item[1]->state, &item[0]->state, &expected, error);
-  }
-  if (status == SUPINE_OK) {
-    status =
-        supine_command_targets_find(basis, names, (const supine_pose *const[2]){&pose[0], &pose[1]},
-                                    expected.sigma, false, &targets, error);
-  }
-  if (status == SUPINE_OK) {
-    status = supine_options_hilum(basis, &pose[1], &pose[0], in_hilum, hilum.move, error);
-  }
-  for (size_t i = 0; status == SUPINE_OK && i < names->count; ++i) {
+  SUPINE_TRY(supine_posed_expected(basis, &item[1]->state, &item[0]->state, &expected, error));
+  SUPINE_TRY(supine_command_targets_find(basis, names,
+                                         (const supine_pose *const[2]){&pose[0], &pose[1]},
+                                         expected.sigma, false, &targets, error));
+  SUPINE_TRY(supine_options_hilum(basis, &pose[1], &pose[0], in_hilum, hilum.move, error));
+  for (size_t i = 0; i < names->count; ++i) {
     if (in_hilum) {
       supine_command_target_shift(&targets[i], hilum.move);
     }
     add_target(item, &targets[i], list);
   }
-  if (status == SUPINE_OK && supine_length(hilum.move) > 0.0) {
+  if (supine_length(hilum.move) > 0.0) {
     hilum.moved = supine_length(hilum.move);
     hilum.volume[0] = hilum.volume[1] = targets[0].volume[0] != 0.0 ? (double)NAN : 0.0;
     add_target(item, &hilum, list);
   }
-  free(targets);
-  supine_options_expected_free(&expected);
-  return status;
+  return SUPINE_OK;
 }
 
 /* Print the displacement of each named structure between every two postures. */
 static supine_status compare_content(const supine_basis *basis, const supine_posture_list *postures,
                                      const request *wanted, supine_error *error) {
-  supine_command_names names;
-  json_t *list = json_array();
-  supine_status status = supine_command_names_open(basis, &names, error);
+  SUPINE_FREED_BY(supine_command_names_close) supine_command_names names = {0};
+  json_auto_t *list = json_array();
+  SUPINE_TRY(supine_command_names_open(basis, &names, error));
   for (size_t i = 0; i < postures->count; ++i) {
-    for (size_t j = i + 1; j < postures->count && status == SUPINE_OK; ++j) {
+    for (size_t j = i + 1; j < postures->count; ++j) {
       const supine_posture_item *const item[2] = {&postures->item[i], &postures->item[j]};
-      status = add_pair(basis, &names, item, wanted->frame == 1, list, error);
+      SUPINE_TRY(add_pair(basis, &names, item, wanted->frame == 1, list, error));
     }
   }
-  if (status == SUPINE_OK) {
-    supine_options_print(json_incref(list), wanted->json);
-  }
-  json_decref(list);
-  supine_command_names_close(&names);
-  return status;
+  supine_options_print(json_incref(list), wanted->json);
+  return SUPINE_OK;
+}
+
+static void end(supine_comparison *comparison) {
+  supine_report_free(comparison);
+  supine_command_names_close(&comparison->names);
+  supine_basis_close(comparison->inside);
 }
 
 /* Compute, print and write the comparison of the lungs. */
 static supine_status report(supine_comparison *c, const request *wanted, supine_error *error) {
-  supine_status status = SUPINE_OK;
   if (wanted->inside != NULL) {
-    status = supine_command_inside_open(c->basis, wanted->inside, &c->inside, &c->names, error);
+    SUPINE_TRY(supine_command_inside_open(c->basis, wanted->inside, &c->inside, &c->names, error));
   }
-  if (status == SUPINE_OK) {
-    status = supine_report_find(c, error);
-  }
-  if (status == SUPINE_OK) {
-    supine_report_print(c, wanted->json);
-  }
-  if (status == SUPINE_OK && wanted->html != NULL) {
-    status = write_html(wanted->html, c, error);
-  }
-  supine_report_free(c);
-  supine_command_names_close(&c->names);
-  supine_basis_close(c->inside);
-  return status;
+  SUPINE_TRY(supine_report_find(c, error));
+  supine_report_print(c, wanted->json);
+  return wanted->html != NULL ? write_html(wanted->html, c, error) : SUPINE_OK;
 }
 
 static supine_status compare(const char *path, const char *made_by, const supine_basis *basis,
                              const request *wanted, supine_error *error) {
+  SUPINE_FREED_BY(end)
   supine_comparison comparison = {.path = path,
                                   .command = name,
                                   .made_by = made_by,
@@ -165,11 +142,8 @@ static supine_status compare(const char *path, const char *made_by, const supine
   if (comparison.state.lung_count == 0 && comparison.state.volume.kind == SUPINE_VOLUME_DEFAULT) {
     comparison.state.volume = supine_basis_default_volume(basis);
   }
-  supine_status status = supine_options_posture_list_parse(wanted->postures, &comparison.state,
-                                                           &comparison.postures, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(supine_options_posture_list_parse(wanted->postures, &comparison.state,
+                                               &comparison.postures, error));
   const bool content = supine_basis_metadata(basis, "content") != NULL; /* by 'supine embed' */
   const char *refused =
       content && wanted->from.given
@@ -192,14 +166,9 @@ static supine_status compare(const char *path, const char *made_by, const supine
 }
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
-  supine_basis *basis = NULL;
-  supine_status status =
-      supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, error);
-  if (status == SUPINE_OK) {
-    status = compare(given->operand[0], given->made_by, basis, chosen, error);
-  }
-  supine_basis_close(basis);
-  return status;
+  SUPINE_FREED_BY(supine_options_basis_close) supine_basis *basis = NULL;
+  SUPINE_TRY(supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, error));
+  return compare(given->operand[0], given->made_by, basis, chosen, error);
 }
 
 const supine_command supine_command_compare = {

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/csv.h"
 #include "base/output.h"
 #include "base/text.h"
@@ -55,25 +56,6 @@ static const supine_option table[] = {
     {.table = supine_command_deform_content_options, SUPINE_FILLS(request, content)},
     {.name = NULL}};
 
-/* Compute the surface of a pose and, unless `normals` is NULL, its normals [N, 3]. */
-static supine_status deformed_mesh(const supine_basis *basis, const supine_pose *pose,
-                                   supine_mesh *mesh, float *normals) {
-  const size_t count = 3 * supine_basis_get_info(basis)->vertex_count;
-  float *xyz = malloc(count * sizeof *xyz);
-  supine_status status = xyz == NULL ? SUPINE_ERROR_MEMORY : supine_options_basis_mesh(basis, mesh);
-  if (status == SUPINE_OK) {
-    (void)supine_deform(basis, pose, xyz);
-    for (size_t i = 0; i < count; ++i) {
-      mesh->vertices[i] = (double)xyz[i];
-    }
-  }
-  if (status == SUPINE_OK && normals != NULL) {
-    supine_normals(basis, xyz, normals);
-  }
-  free(xyz);
-  return status;
-}
-
 static double largest_displacement(const supine_mesh *rest, const supine_mesh *mesh) {
   double largest = 0.0;
   for (size_t i = 0; i < mesh->vertex_count; ++i) {
@@ -104,14 +86,18 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
   double volumes[SUPINE_LUNGS_MAX];
   const supine_mesh_field fields[] = {{"gravity_LPS", 3, gravity},
                                       {"volume_mL", info->lung_count, volumes}};
-  supine_mesh from = {0};
-  supine_mesh mesh = {0};
-  float *normals = malloc(3 * info->vertex_count * sizeof *normals);
-  supine_status status =
-      normals != NULL ? deformed_mesh(basis, &moved->from.pose, &from, NULL) : SUPINE_ERROR_MEMORY;
-  if (status == SUPINE_OK) {
-    status = deformed_mesh(basis, &moved->pose, &mesh, normals);
+  SUPINE_FREED_BY(supine_mesh_free) supine_mesh from = {0};
+  SUPINE_FREED_BY(supine_mesh_free) supine_mesh mesh = {0};
+  SUPINE_ARENA arena = {0};
+  float *normals = supine_arena_take(&arena, info->vertex_count, 3 * sizeof *normals);
+  float *xyz = supine_arena_take(&arena, info->vertex_count, 3 * sizeof *xyz);
+  if (arena.failed) {
+    return supine_error_memory(error, "%zu vertices", info->vertex_count);
   }
+  SUPINE_TRY(supine_posed_mesh(basis, &moved->from.pose, &from, error));
+  SUPINE_TRY(supine_posed_mesh(basis, &moved->pose, &mesh, error));
+  (void)supine_deform(basis, &moved->pose, xyz);
+  supine_normals(basis, xyz, normals);
   for (size_t i = 0; i < 3 * mesh.vertex_count && moved->subtract_hilum; ++i) {
     mesh.vertices[i] -= moved->hilum[i % 3];
   }
@@ -122,53 +108,38 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
   save->lung = lung == NULL ? NULL : lung->data;
   save->fields = fields;
   save->field_count = sizeof fields / sizeof *fields;
-  if (status == SUPINE_OK) {
-    status = supine_mesh_save(path, &mesh, save, error);
-  }
-  if (status == SUPINE_OK) {
-    report(path, gravity, &mesh, &from, moved->from.name,
-           supine_basis_metadata(basis, "content") == NULL);
-    supine_options_expected_print(&moved->expected, stdout);
-    supine_options_hilum_print(moved->hilum, moved->subtract_hilum);
-  }
-  free(normals);
-  supine_mesh_free(&from);
-  supine_mesh_free(&mesh);
-  return status;
+  SUPINE_TRY(supine_mesh_save(path, &mesh, save, error));
+  report(path, gravity, &mesh, &from, moved->from.name,
+         supine_basis_metadata(basis, "content") == NULL);
+  supine_options_expected_print(&moved->expected, stdout);
+  supine_options_hilum_print(moved->hilum, moved->subtract_hilum);
+  return SUPINE_OK;
+}
+
+static void free_expected(supine_deformation *moved) {
+  supine_posed_expected_free(&moved->expected);
 }
 
 static supine_status deform(const supine_basis *basis, const request *wanted, supine_error *error) {
+  SUPINE_FREED_BY(free_expected)
   supine_deformation moved = {.state = wanted->volume.state,
                               .from_given = wanted->from.given,
                               .allow_folds = wanted->volume.allow_folds,
                               .subtract_hilum = wanted->frame == 1};
   char comment[192];
-  supine_status status = supine_options_reference(basis, &wanted->from, false, &moved.from, error);
-  if (status == SUPINE_OK) {
-    status = supine_options_pose(basis, name, wanted->volume.allow_folds, &moved.state, &moved.pose,
-                                 error);
-  }
-  if (status == SUPINE_OK) {
-    status = supine_options_expected_find(basis, &moved.state, &moved.from.state, &moved.expected,
-                                          error);
-  }
-  if (status == SUPINE_OK) {
-    status = supine_options_hilum(basis, &moved.pose, &moved.from.pose, wanted->frame == 1,
-                                  moved.hilum, error);
-  }
-  if (status == SUPINE_OK) {
-    (void)snprintf(comment, sizeof comment, "displacement from %s%s", moved.from.name,
-                   wanted->frame == 1 ? ", in the frame of the hilum" : "");
-    moved.save.comment = comment;
-    status = supine_options_basis_frame(basis, wanted->as_scanned, &moved.save, error);
-  }
-  if (status == SUPINE_OK) {
-    status = supine_command_deform_content_wanted(&wanted->content)
-                 ? supine_command_deform_content(&wanted->content, basis, &moved, error)
-                 : write_surface(wanted->content.path, basis, &moved, error);
-  }
-  supine_options_expected_free(&moved.expected);
-  return status;
+  SUPINE_TRY(supine_options_reference(basis, &wanted->from, false, &moved.from, error));
+  SUPINE_TRY(supine_options_pose(basis, name, wanted->volume.allow_folds, &moved.state, &moved.pose,
+                                 error));
+  SUPINE_TRY(supine_posed_expected(basis, &moved.state, &moved.from.state, &moved.expected, error));
+  SUPINE_TRY(supine_options_hilum(basis, &moved.pose, &moved.from.pose, wanted->frame == 1,
+                                  moved.hilum, error));
+  (void)snprintf(comment, sizeof comment, "displacement from %s%s", moved.from.name,
+                 wanted->frame == 1 ? ", in the frame of the hilum" : "");
+  moved.save.comment = comment;
+  SUPINE_TRY(supine_options_basis_frame(basis, wanted->as_scanned, &moved.save, error));
+  return supine_command_deform_content_wanted(&wanted->content)
+             ? supine_command_deform_content(&wanted->content, basis, &moved, error)
+             : write_surface(wanted->content.path, basis, &moved, error);
 }
 
 /* Fill a request with the state and the output file in a row of the CSV file of --states. */
@@ -215,90 +186,96 @@ static supine_status check_output(const char *basis, const request *rows, size_t
   const request *row = &rows[count - 1];
   const char *const output = row->outputs[which];
   const char *const inputs[] = {basis, row->states, row->content.image, row->content.labels};
-  supine_status status = SUPINE_OK;
-  for (size_t i = 0; i < sizeof inputs / sizeof *inputs && status == SUPINE_OK; ++i) {
+  for (size_t i = 0; i < sizeof inputs / sizeof *inputs; ++i) {
     if (inputs[i] != NULL) {
-      status = supine_options_check_output(output, inputs[i], error);
+      SUPINE_TRY(supine_options_check_output(output, inputs[i], error));
     }
   }
-  for (size_t i = 0; i < 3 * (count - 1) + which && status == SUPINE_OK; ++i) {
+  for (size_t i = 0; i < 3 * (count - 1) + which; ++i) {
     const char *const earlier = rows[i / 3].outputs[i % 3];
     if (earlier != NULL && strcmp(earlier, output) == 0) {
-      status = supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                "%s: two rows write %s: give each row its own file", row->states,
-                                output);
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "%s: two rows write %s: give each row its own file", row->states,
+                              output);
     }
   }
-  return status == SUPINE_OK ? supine_output_try(output, error) : status;
+  return supine_output_try(output, error);
+}
+
+/* What a run needs: the basis, and a request for each state. */
+typedef struct batch {
+  request *wanted;
+  supine_basis *basis;
+  request *rows;
+  size_t count;
+} batch;
+
+static void end(batch *b) {
+  for (size_t i = 0; i < 3 * b->count; ++i) {
+    free(b->rows[i / 3].outputs[i % 3]);
+  }
+  free(b->rows);
+  supine_image_free(&b->wanted->content.source);
+  supine_image_free(&b->wanted->content.label_source);
+  supine_basis_close(b->basis);
+}
+
+static supine_status add_row(batch *b, supine_error *error) {
+  request *grown = realloc(b->rows, (b->count + 1) * sizeof *grown);
+  if (grown == NULL) {
+    return supine_error_memory(error, "%zu states", b->count + 1);
+  }
+  b->rows = grown;
+  grown[b->count++] = *b->wanted;
+  return SUPINE_OK;
 }
 
 /* Make a request for each row of --states, and check all rows before any state is computed. */
-static supine_status read_rows(const char *basis, const request *wanted, request **rows,
-                               size_t *count, supine_error *error) {
+static supine_status read_rows(const char *basis, batch *b, supine_error *error) {
   static const char *const columns[] = {"posture", "output", "volume", "labels", "field"};
-  supine_csv csv;
-  bool more = true;
-  if (wanted->orientation.given) {
+  SUPINE_FREED_BY(supine_csv_close) supine_csv csv = {0};
+  if (b->wanted->orientation.given) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give a posture or --states, not both");
   }
-  supine_status status = supine_csv_open(wanted->states, columns, 5, 2, &csv, error);
-  while (status == SUPINE_OK && more) {
-    status = supine_csv_next(&csv, &more, error);
-    if (status == SUPINE_OK && more) {
-      request *grown = realloc(*rows, (*count + 1) * sizeof **rows);
-      if (grown == NULL) {
-        status = SUPINE_ERROR_MEMORY;
-        break;
-      }
-      *rows = grown;
-      grown[*count] = *wanted;
-      status = read_row(&csv, &grown[(*count)++], error);
-      for (size_t i = 0; i < 3 && status == SUPINE_OK; ++i) {
-        if (grown[*count - 1].outputs[i] != NULL) {
-          status = check_output(basis, grown, *count, i, error);
-        }
+  SUPINE_TRY(supine_csv_open(b->wanted->states, columns, 5, 2, &csv, error));
+  for (;;) {
+    bool more = false;
+    SUPINE_TRY(supine_csv_next(&csv, &more, error));
+    if (!more) {
+      break;
+    }
+    SUPINE_TRY(add_row(b, error));
+    SUPINE_TRY(read_row(&csv, &b->rows[b->count - 1], error));
+    for (size_t i = 0; i < 3; ++i) {
+      if (b->rows[b->count - 1].outputs[i] != NULL) {
+        SUPINE_TRY(check_output(basis, b->rows, b->count, i, error));
       }
     }
   }
-  supine_csv_close(&csv);
-  return status == SUPINE_OK && *count == 0
-             ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                "%s: no row follows the header: add at least one", wanted->states)
-             : status;
+  return b->count > 0 ? SUPINE_OK
+                      : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                         "%s: no row follows the header: add at least one",
+                                         b->wanted->states);
 }
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
-  const bool many = wanted->states != NULL;
-  request *rows = many ? NULL : wanted;
-  size_t count = many ? 0 : 1;
-  supine_basis *basis = NULL;
-  supine_status status = many ? read_rows(given->operand[0], wanted, &rows, &count, error)
-                              : supine_command_deform_content_check(&wanted->content, error);
-  if (status == SUPINE_OK && !many) {
-    status = supine_options_state(&wanted->orientation, &wanted->volume.state, error);
+  SUPINE_FREED_BY(end) batch b = {.wanted = wanted};
+  if (wanted->states != NULL) {
+    SUPINE_TRY(read_rows(given->operand[0], &b, error));
+  } else {
+    SUPINE_TRY(supine_command_deform_content_check(&wanted->content, error));
+    SUPINE_TRY(supine_options_state(&wanted->orientation, &wanted->volume.state, error));
+    SUPINE_TRY(add_row(&b, error));
   }
-  if (status == SUPINE_OK) {
-    status = supine_options_basis_open(given->operand[0], SUPINE_STORAGE_EXACT, &basis, error);
+  SUPINE_TRY(supine_options_basis_open(given->operand[0], SUPINE_STORAGE_EXACT, &b.basis, error));
+  SUPINE_TRY(supine_command_deform_content_read(&wanted->content, name, error));
+  for (size_t i = 0; i < b.count; ++i) {
+    b.rows[i].content.source = wanted->content.source;
+    b.rows[i].content.label_source = wanted->content.label_source;
+    SUPINE_TRY(deform(b.basis, &b.rows[i], error));
   }
-  if (status == SUPINE_OK) {
-    status = supine_command_deform_content_read(&wanted->content, name, error);
-  }
-  for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
-    rows[i].content.source = wanted->content.source;
-    rows[i].content.label_source = wanted->content.label_source;
-    status = deform(basis, &rows[i], error);
-  }
-  for (size_t i = 0; i < count; ++i) {
-    for (size_t k = 0; k < 3; ++k) {
-      free(rows[i].outputs[k]);
-    }
-  }
-  free(many ? rows : NULL);
-  supine_image_free(&wanted->content.source);
-  supine_image_free(&wanted->content.label_source);
-  supine_basis_close(basis);
-  return status;
+  return SUPINE_OK;
 }
 
 const supine_command supine_command_deform = {

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "mesh/image/image.h"
 #include "mesh/io/points.h"
 #include "mesh/labels/shapes.h"
@@ -97,15 +98,12 @@ static const supine_option table[] = {
 static supine_status read_grid(const supine_inside_shells *shells, const request *wanted,
                                const char *image_path, supine_inside_content *content,
                                supine_error *error) {
-  supine_image image = {0};
-  supine_status status =
-      image_path != NULL ? supine_image_read(image_path, &image, error) : SUPINE_OK;
-  if (status == SUPINE_OK) {
-    status = supine_inside_content_grid(shells, image_path != NULL ? &image : NULL,
-                                        wanted->grid_spacing, margin, content, error);
+  SUPINE_FREED_BY(supine_image_free) supine_image image = {0};
+  if (image_path != NULL) {
+    SUPINE_TRY(supine_image_read(image_path, &image, error));
   }
-  supine_image_free(&image);
-  return status;
+  return supine_inside_content_grid(shells, image_path != NULL ? &image : NULL,
+                                    wanted->grid_spacing, margin, content, error);
 }
 
 static supine_status read_labelled(const request *wanted, const char *path,
@@ -138,14 +136,13 @@ static supine_status read_content(const supine_inside_shells *shells, const requ
   if (count == 0 || (!wanted->labels.given && supine_image_is_named(paths[0]))) {
     return read_grid(shells, wanted, count > 0 ? paths[0] : NULL, content, error);
   }
-  supine_status status = SUPINE_OK;
-  for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
-    status = supine_image_is_named(paths[i]) ? read_labelled(wanted, paths[i], content, error)
-             : supine_mesh_points_named(paths[i])
-                 ? supine_inside_content_points(paths[i], &wanted->load, content, error)
-                 : supine_inside_content_mesh(paths[i], &wanted->load, content, error);
+  for (size_t i = 0; i < count; ++i) {
+    SUPINE_TRY(supine_image_is_named(paths[i]) ? read_labelled(wanted, paths[i], content, error)
+               : supine_mesh_points_named(paths[i])
+                   ? supine_inside_content_points(paths[i], &wanted->load, content, error)
+                   : supine_inside_content_mesh(paths[i], &wanted->load, content, error));
   }
-  return status;
+  return SUPINE_OK;
 }
 
 static void part_name(const supine_inside_content *content, size_t point, char *text, size_t size) {
@@ -219,39 +216,29 @@ static supine_status embed(const supine_basis *basis, const request *wanted,
   static supine_patient_record record; /* static, as it is too large for the stack */
   const char *law = supine_basis_metadata(basis, "patient_law");
   supine_inside_options options = {.clamp = wanted->clamp, .made_by = given->made_by};
-  supine_inside_shells shells = {0};
-  supine_inside_content content = {0};
+  SUPINE_FREED_BY(supine_inside_shells_free) supine_inside_shells shells = {0};
+  SUPINE_FREED_BY(supine_inside_content_free) supine_inside_content content = {0};
   supine_inside_report report;
-  supine_status status = supine_inside_shells_create(basis, &shells, error);
-  if (status == SUPINE_OK && law != NULL && !supine_basis_get_info(basis)->vector) {
-    status = supine_patient_decode(given->operand[0], law, &record, error);
+  SUPINE_TRY(supine_inside_shells_create(basis, &shells, error));
+  if (law != NULL && !supine_basis_get_info(basis)->vector) {
+    SUPINE_TRY(supine_patient_decode(given->operand[0], law, &record, error));
     options.context = &record;
     options.field = record.path_span[0] != 0.0 ? supine_patient_field : NULL;
   }
-  if (status == SUPINE_OK) {
-    status = read_content(&shells, wanted, given->operand + 1, given->count - 1, &content, error);
+  SUPINE_TRY(read_content(&shells, wanted, given->operand + 1, given->count - 1, &content, error));
+  SUPINE_TRY(check_content(&shells, wanted, &content, error));
+  if (wanted->rigid != NULL) {
+    SUPINE_TRY(supine_inside_content_make_rigid(&content, wanted->rigid, error));
   }
-  if (status == SUPINE_OK) {
-    status = check_content(&shells, wanted, &content, error);
-  }
-  if (status == SUPINE_OK && wanted->rigid != NULL) {
-    status = supine_inside_content_make_rigid(&content, wanted->rigid, error);
-  }
-  if (status == SUPINE_OK) {
-    status = supine_inside_embed(&shells, &content, &options, wanted->path, &report, error);
-  }
-  if (status == SUPINE_OK) {
-    print_summary(&shells, &content, &report, wanted);
-  }
-  supine_inside_content_free(&content);
-  supine_inside_shells_free(&shells);
-  return status;
+  SUPINE_TRY(supine_inside_embed(&shells, &content, &options, wanted->path, &report, error));
+  print_summary(&shells, &content, &report, wanted);
+  return SUPINE_OK;
 }
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   const request *wanted = chosen;
   const bool labels = wanted->labels.given;
-  supine_basis *basis = NULL;
+  SUPINE_FREED_BY(supine_options_basis_close) supine_basis *basis = NULL;
   bool image = false;
   for (size_t i = 1; i < given->count; ++i) {
     image = image || supine_image_is_named(given->operand[i]);
@@ -271,13 +258,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
                             "a grid or an image cannot be embedded with other content: embed it "
                             "alone, or give --labels to embed the parts of a label map");
   }
-  supine_status status =
-      supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, error);
-  if (status == SUPINE_OK) {
-    status = embed(basis, wanted, given, error);
-  }
-  supine_basis_close(basis);
-  return status;
+  SUPINE_TRY(supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, error));
+  return embed(basis, wanted, given, error);
 }
 
 const supine_command supine_command_embed = {

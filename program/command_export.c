@@ -4,6 +4,7 @@
 
 #include <export.h>
 
+#include "base/arena.h"
 #include "base/text.h"
 
 #include "program/options/basis_input.h"
@@ -54,11 +55,7 @@ static const supine_option table[] = {
 static supine_status write_glb(const export_source *source, const request *wanted,
                                supine_error *error) {
   size_t bytes = 0;
-  const supine_status status =
-      supine_export_glb_write(wanted->path, source, &wanted->glb, &bytes, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(supine_export_glb_write(wanted->path, source, &wanted->glb, &bytes, error));
   const bool small = bytes < 100000;
   (void)printf("%s: %zu lung%s with morph targets%s, %.*f %s\n", wanted->path,
                source->info->lung_count, source->info->lung_count == 1 ? "" : "s",
@@ -77,11 +74,7 @@ static supine_status find_references(const supine_basis *basis, const supine_fro
                                      supine_error *error) {
   const supine_from none = {.given = false};
   for (size_t i = 0; i < REFERENCES; ++i) {
-    const supine_status status =
-        supine_options_reference(basis, i == 0 ? from : &none, i != 1, &found[i], error);
-    if (status != SUPINE_OK) {
-      return status;
-    }
+    SUPINE_TRY(supine_options_reference(basis, i == 0 ? from : &none, i != 1, &found[i], error));
     bool again = false;
     for (size_t j = 0; j < *count; ++j) {
       again = again || strcmp(list[j].name, found[i].name) == 0;
@@ -100,18 +93,13 @@ static supine_status write_page(const export_source *source, const request *want
   export_reference from[REFERENCES];
   size_t from_count = 0;
   char title[256];
-  export_source inside = {0};
-  supine_command_names names = {0};
-  supine_status status =
-      find_references(source->basis, &wanted->from, found, from, &from_count, error);
-  if (status == SUPINE_OK && wanted->inside != NULL) {
-    status = supine_export_source_open(wanted->inside, &inside, error);
-    if (status == SUPINE_OK) {
-      status = supine_command_names_open(inside.basis, &names, error);
-    }
-    if (status == SUPINE_OK) {
-      status = supine_command_inside_check(source->basis, inside.basis, wanted->inside, error);
-    }
+  SUPINE_FREED_BY(supine_export_source_close) export_source inside = {0};
+  SUPINE_FREED_BY(supine_command_names_close) supine_command_names names = {0};
+  SUPINE_TRY(find_references(source->basis, &wanted->from, found, from, &from_count, error));
+  if (wanted->inside != NULL) {
+    SUPINE_TRY(supine_export_source_open(wanted->inside, &inside, error));
+    SUPINE_TRY(supine_command_names_open(inside.basis, &names, error));
+    SUPINE_TRY(supine_command_inside_check(source->basis, inside.basis, wanted->inside, error));
   }
   supine_options_basis_title(basis_path, title, sizeof title);
   const export_parts parts = {names.count, names.text, names.part};
@@ -121,27 +109,20 @@ static supine_status write_page(const export_source *source, const request *want
                             .title = wanted->title != NULL ? wanted->title : title,
                             .inside = wanted->inside != NULL ? &inside : NULL,
                             .parts = &parts};
-  if (status == SUPINE_OK) {
-    status = supine_export_html_write(wanted->path, source, &page, error);
+  SUPINE_TRY(supine_export_html_write(wanted->path, source, &page, error));
+  (void)printf("%s: HTML page of %zu vertices", wanted->path, source->info->vertex_count);
+  if (page.inside != NULL) {
+    (void)printf(" and %zu structure%s inside the lungs", parts.count, parts.count == 1 ? "" : "s");
   }
-  if (status == SUPINE_OK) {
-    (void)printf("%s: HTML page of %zu vertices", wanted->path, source->info->vertex_count);
-    if (page.inside != NULL) {
-      (void)printf(" and %zu structure%s inside the lungs", parts.count,
-                   parts.count == 1 ? "" : "s");
-    }
-    (void)puts("; open it in any browser");
-  }
-  supine_command_names_close(&names);
-  supine_export_source_close(&inside);
-  return status;
+  (void)puts("; open it in any browser");
+  return SUPINE_OK;
 }
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
   const char *path = given->operand[0];
   const bool page = supine_text_ends_in(wanted->path, ".html");
-  export_source source = {0};
+  SUPINE_FREED_BY(supine_export_source_close) export_source source = {0};
   if (page && wanted->glb_only) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "--plain and --animate need an output that ends in .glb");
@@ -152,20 +133,15 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
                             : wanted->inside != NULL ? "--inside"
                                                      : "--title");
   }
-  supine_status status = supine_export_source_open(path, &source, error);
-  if (status == SUPINE_OK) {
-    status = source.info->is_fields
-                 ? supine_error_set(error, SUPINE_ERROR_UNSUPPORTED,
-                                    "%s: another simulator's fields cannot be exported: use "
-                                    "'supine compare -o report.html' or 'supine render'",
-                                    path)
-                 : supine_options_basis_closed(source.basis, path, error);
+  SUPINE_TRY(supine_export_source_open(path, &source, error));
+  if (source.info->is_fields) {
+    return supine_error_set(error, SUPINE_ERROR_UNSUPPORTED,
+                            "%s: another simulator's fields cannot be exported: use "
+                            "'supine compare -o report.html' or 'supine render'",
+                            path);
   }
-  if (status == SUPINE_OK) {
-    status = page ? write_page(&source, wanted, path, error) : write_glb(&source, wanted, error);
-  }
-  supine_export_source_close(&source);
-  return status;
+  SUPINE_TRY(supine_options_basis_closed(source.basis, path, error));
+  return page ? write_page(&source, wanted, path, error) : write_glb(&source, wanted, error);
 }
 
 const supine_command supine_command_export = {

@@ -6,6 +6,7 @@
 
 #include <jansson.h>
 
+#include "base/arena.h"
 #include "base/output.h"
 #include "base/text.h"
 
@@ -144,50 +145,46 @@ static double volume_of(const supine_lungs *lungs) {
 /* Assign each landmark to the lung whose surface is nearest to it in the first scan. */
 static supine_status find_sides(const supine_lungs *lungs, supine_patient_pairs *pairs,
                                 supine_error *error) {
-  supine_inside_surface *tree = NULL;
+  SUPINE_FREED_BY(supine_inside_surface_drop) supine_inside_surface *tree = NULL;
   pairs->side = malloc(pairs->count * sizeof *pairs->side);
-  supine_status status =
-      pairs->side == NULL
-          ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu landmarks",
-                             pairs->count)
-          : supine_inside_surface_create(lungs->mesh.vertices, lungs->mesh.triangle_count,
-                                         lungs->mesh.triangles, false, &tree, error);
-  for (size_t i = 0; i < pairs->count && status == SUPINE_OK; ++i) {
+  if (pairs->side == NULL) {
+    return supine_error_memory(error, "%zu landmarks", pairs->count);
+  }
+  SUPINE_TRY(supine_inside_surface_create(lungs->mesh.vertices, lungs->mesh.triangle_count,
+                                          lungs->mesh.triangles, false, &tree, error));
+  for (size_t i = 0; i < pairs->count; ++i) {
     const supine_inside_place place =
         supine_inside_surface_nearest(tree, pairs->from + 3 * i, NULL);
     const size_t lung =
         lungs->lung_count == 2 && place.triangle >= lungs->triangle_begin[1] ? 1 : 0;
     pairs->side[i] = lungs->side[lung];
   }
-  supine_inside_surface_destroy(tree);
-  return status;
+  return SUPINE_OK;
 }
 
 static supine_status load_pairs(const request *wanted, const char *path,
                                 supine_patient_pairs *pairs, supine_error *error) {
   const bool moved = wanted->landmarks.translation || wanted->landmarks.rigid;
-  const supine_status status =
-      supine_patient_pairs_load(path, wanted->landmarks.reverse, pairs, error);
-  return status == SUPINE_OK ? supine_patient_pairs_check(pairs, moved, error) : status;
+  SUPINE_TRY(supine_patient_pairs_load(path, wanted->landmarks.reverse, pairs, error));
+  return supine_patient_pairs_check(pairs, moved, error);
 }
 
 static supine_status load_scans(const request *wanted, scan_data *data, supine_error *error) {
-  supine_status status = SUPINE_OK;
   if (wanted->landmarks.path != NULL) {
-    status = load_pairs(wanted, wanted->landmarks.path, &data->pairs, error);
+    SUPINE_TRY(load_pairs(wanted, wanted->landmarks.path, &data->pairs, error));
   }
-  if (status == SUPINE_OK && wanted->first_path != NULL) {
-    status = supine_command_load_lungs(name, wanted->first_path, &wanted->source, &data->lungs[0],
-                                       error);
+  if (wanted->first_path != NULL) {
+    SUPINE_TRY(supine_command_load_lungs(name, wanted->first_path, &wanted->source, &data->lungs[0],
+                                         error));
   }
-  if (status == SUPINE_OK && wanted->second_path != NULL) {
-    status = supine_command_load_lungs(name, wanted->second_path, &wanted->source, &data->lungs[1],
-                                       error);
+  if (wanted->second_path != NULL) {
+    SUPINE_TRY(supine_command_load_lungs(name, wanted->second_path, &wanted->source,
+                                         &data->lungs[1], error));
   }
-  if (status == SUPINE_OK && wanted->first_path != NULL && data->pairs.count > 0) {
-    status = find_sides(&data->lungs[0], &data->pairs, error);
+  if (wanted->first_path != NULL && data->pairs.count > 0) {
+    SUPINE_TRY(find_sides(&data->lungs[0], &data->pairs, error));
   }
-  return status;
+  return SUPINE_OK;
 }
 
 /* Return 1 if the options say that the second state is fuller, -1 if the first is, else 0. */
@@ -237,18 +234,16 @@ static supine_status order_states(const request *wanted, scan_data *data, supine
 static supine_status fit_landmarks(const request *wanted, const supine_patient_pairs *pairs,
                                    const supine_patient_fit_options *options,
                                    supine_patient_record *record, supine_error *error) {
-  supine_patient_row *rows = malloc(3 * pairs->count * sizeof *rows);
+  SUPINE_ARENA arena = {0};
+  supine_patient_row *rows = supine_arena_take(&arena, pairs->count, 3 * sizeof *rows);
   if (rows == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu landmarks",
-                            pairs->count);
+    return supine_error_memory(error, "%zu landmarks", pairs->count);
   }
   record->patient.frame = supine_patient_frame_of_points(
       pairs->count, pairs->from, wanted->source.has_midline ? &wanted->source.midline : NULL);
   supine_patient_rows_of_pairs(&record->patient.frame, pairs, rows);
-  const supine_status status =
-      supine_patient_fit(options, rows, 0, pairs->count, &record->patient, &record->report, error);
-  free(rows);
-  return status;
+  return supine_patient_fit(options, rows, 0, pairs->count, &record->patient, &record->report,
+                            error);
 }
 
 /* Fit one further scan, given by --state. Its landmarks pair points of the first scan with points
@@ -260,23 +255,17 @@ static supine_status fit_further(const request *wanted, const scan_data *data, s
   const bool moved = wanted->landmarks.translation || wanted->landmarks.rigid;
   const char *path = wanted->further_path[which];
   const bool landmarks = supine_text_ends_in(path, ".csv");
-  supine_patient_pairs pairs = {0};
-  supine_lungs lungs = {0};
+  SUPINE_FREED_BY(supine_patient_pairs_free) supine_patient_pairs pairs = {0};
+  SUPINE_FREED_BY(supine_lungs_free) supine_lungs lungs = {0};
   supine_patient_further *further = &record->further[record->further_count++];
   *further = (supine_patient_further){.state = wanted->further[which]};
-  supine_status status =
-      landmarks ? load_pairs(wanted, path, &pairs, error)
-                : supine_command_load_lungs(name, path, &wanted->source, &lungs, error);
-  if (status == SUPINE_OK && landmarks && data->second_is_fuller) {
+  SUPINE_TRY(landmarks ? load_pairs(wanted, path, &pairs, error)
+                       : supine_command_load_lungs(name, path, &wanted->source, &lungs, error));
+  if (landmarks && data->second_is_fuller) {
     supine_patient_points_to_fuller(&record->patient, pairs.count, pairs.from);
   }
-  if (status == SUPINE_OK) {
-    status = supine_patient_gain_fit(record, from, landmarks ? &pairs : NULL,
-                                     landmarks ? NULL : &lungs.mesh, moved, further, error);
-  }
-  supine_patient_pairs_free(&pairs);
-  supine_lungs_free(&lungs);
-  return status;
+  return supine_patient_gain_fit(record, from, landmarks ? &pairs : NULL,
+                                 landmarks ? NULL : &lungs.mesh, moved, further, error);
 }
 
 /* Fit the scans given by --state, and set the factor of the gravity-dependent force. If the fuller
@@ -284,17 +273,16 @@ static supine_status fit_further(const request *wanted, const scan_data *data, s
 static supine_status fit_gravity_factor(const request *wanted, scan_data *data,
                                         supine_patient_record *record, supine_error *error) {
   supine_lungs *from = &data->lungs[0];
-  supine_status status = SUPINE_OK;
   if (from->mesh.vertex_count == 0) {
     from = &data->lungs[1];
     supine_patient_points_to_fuller(&record->patient, from->mesh.vertex_count, from->mesh.vertices);
     supine_lungs_measure(from);
   }
-  for (size_t k = 0; k < wanted->further_count && status == SUPINE_OK; ++k) {
-    status = fit_further(wanted, data, k, from, record, error);
+  for (size_t k = 0; k < wanted->further_count; ++k) {
+    SUPINE_TRY(fit_further(wanted, data, k, from, record, error));
   }
   supine_patient_gain_set(record);
-  return status;
+  return SUPINE_OK;
 }
 
 /* If only the volumes of the scans are known, count the emptier scan as rest. Count the fuller scan
@@ -387,10 +375,7 @@ static void set_name_and_force(const request *wanted, supine_patient_record *rec
 static supine_status write_map(const char *path, const supine_lungs *lungs,
                                const supine_patient_stiffness *stiffness, supine_error *error) {
   supine_output output = {0};
-  const supine_status status = supine_output_open(path, &output, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(supine_output_open(path, &output, error));
   (void)fputs("vertex,x_mm,y_mm,z_mm,expandability,determined\n", output.file);
   for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
     const double *p = lungs->mesh.vertices + 3 * i;
@@ -408,6 +393,12 @@ static supine_status write_map(const char *path, const supine_lungs *lungs,
   return supine_output_commit(&output, error);
 }
 
+static void free_scans(scan_data *data) {
+  supine_lungs_free(&data->lungs[0]);
+  supine_lungs_free(&data->lungs[1]);
+  supine_patient_pairs_free(&data->pairs);
+}
+
 static supine_status fit(const request *wanted, supine_patient_record *record,
                          supine_error *error) {
   supine_patient_fit_options options = {
@@ -415,44 +406,31 @@ static supine_status fit(const request *wanted, supine_patient_record *record,
       .scan_motion = wanted->landmarks.rigid         ? SUPINE_PATIENT_RIGID
                      : wanted->landmarks.translation ? SUPINE_PATIENT_TRANSLATION
                                                      : SUPINE_PATIENT_STILL};
-  scan_data data = {0};
+  SUPINE_FREED_BY(free_scans) scan_data data = {0};
   double gains[2][3];
-  supine_status status = load_scans(wanted, &data, error);
-  if (status == SUPINE_OK) {
-    status = order_states(wanted, &data, error);
+  SUPINE_TRY(load_scans(wanted, &data, error));
+  SUPINE_TRY(order_states(wanted, &data, error));
+  set_states(wanted, &data, record);
+  if (wanted->second_path == NULL && !(record->volume[0] > 0.0 && record->volume[1] > 0.0)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "landmarks do not show the volume of the lungs, which decides what "
+                            "rest and full inflation are: give both volumes of gas and tissue, "
+                            "such as --rest 2600mL --other 5400mL, or both surfaces");
   }
-  if (status == SUPINE_OK) {
-    set_states(wanted, &data, record);
-    if (wanted->second_path == NULL && !(record->volume[0] > 0.0 && record->volume[1] > 0.0)) {
-      status = supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                "landmarks do not show the volume of the lungs, which decides what "
-                                "rest and full inflation are: give both volumes of gas and tissue, "
-                                "such as --rest 2600mL --other 5400mL, or both surfaces");
-    }
+  memcpy(options.gravity, record->state[1].gravity, sizeof options.gravity);
+  warn_of_rest(record);
+  supine_patient_path(record, gains);
+  for (size_t k = 0; k < 3; ++k) {
+    options.path_span[k] = gains[1][k] - gains[0][k];
   }
-  if (status == SUPINE_OK) {
-    memcpy(options.gravity, record->state[1].gravity, sizeof options.gravity);
-    warn_of_rest(record);
-    supine_patient_path(record, gains);
-    for (size_t k = 0; k < 3; ++k) {
-      options.path_span[k] = gains[1][k] - gains[0][k];
-    }
-    status = wanted->second_path != NULL
+  SUPINE_TRY(wanted->second_path != NULL
                  ? supine_patient_fit_surface(&data.lungs[0], &data.lungs[1].mesh, &data.pairs,
                                               &options, wanted->expandability, record, error)
-                 : fit_landmarks(wanted, &data.pairs, &options, record, error);
-  }
-  if (status == SUPINE_OK) {
-    set_name_and_force(wanted, record);
-    status = fit_gravity_factor(wanted, &data, record, error);
-  }
-  if (status == SUPINE_OK && wanted->map != NULL) {
-    status = write_map(wanted->map, &data.lungs[0], &record->stiffness, error);
-  }
-  supine_lungs_free(&data.lungs[0]);
-  supine_lungs_free(&data.lungs[1]);
-  supine_patient_pairs_free(&data.pairs);
-  return status;
+                 : fit_landmarks(wanted, &data.pairs, &options, record, error));
+  set_name_and_force(wanted, record);
+  SUPINE_TRY(fit_gravity_factor(wanted, &data, record, error));
+  return wanted->map != NULL ? write_map(wanted->map, &data.lungs[0], &record->stiffness, error)
+                             : SUPINE_OK;
 }
 
 /* Take the file names from the command line, and check that they fit the options. */
@@ -481,18 +459,12 @@ static supine_status check(request *wanted, const supine_arguments *given, supin
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
   static supine_patient_record record; /* static, as it is too large for the stack */
-  supine_status status = check(wanted, given, error);
-  if (status == SUPINE_OK) {
-    status = fit(wanted, &record, error);
-  }
-  if (status == SUPINE_OK) {
-    status = print(&record, given->made_by, wanted->json, error);
-  }
+  SUPINE_TRY(check(wanted, given, error));
+  SUPINE_TRY(fit(wanted, &record, error));
+  SUPINE_TRY(print(&record, given->made_by, wanted->json, error));
   /* Write the file last, so that a failure leaves no file. */
-  if (status == SUPINE_OK && wanted->path != NULL) {
-    status = supine_patient_write(wanted->path, &record, given->made_by, error);
-  }
-  return status;
+  return wanted->path != NULL ? supine_patient_write(wanted->path, &record, given->made_by, error)
+                              : SUPINE_OK;
 }
 
 const supine_command supine_command_fit = {

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/findings.h"
 
 #include <supine/compare.h>
@@ -97,7 +98,7 @@ static supine_status add_expected(json_t *root, const supine_basis *basis, supin
     supine_expected expected = {0};
     supine_expected_part parts[SUPINE_EXPECTED_TERMS];
     char text[160];
-    status = supine_options_expected_find(basis, &state, &scan, &expected, error);
+    status = supine_posed_expected(basis, &state, &scan, &expected, error);
     if (status == SUPINE_OK && expected.largest > 0.0) {
       (void)supine_state_describe(&state, text, sizeof text);
       (void)json_array_append_new(rows, json_pack("{s:s, s:f, s:f, s:b}", "state", text, "rms_mm",
@@ -112,7 +113,7 @@ static supine_status add_expected(json_t *root, const supine_basis *basis, supin
         }
       }
     }
-    supine_options_expected_free(&expected);
+    supine_posed_expected_free(&expected);
   }
   (void)json_object_set_new(root, "expected_error", rows);
   (void)json_object_set_new(root, "expected_error_terms", terms);
@@ -179,26 +180,20 @@ static const supine_option table[] = {
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   const request *wanted = chosen;
   const char *path = given->operand[0];
-  supine_basis *basis = NULL;
-  double *energy = NULL;
-  json_t *described = NULL;
   static const supine_basis_options options = {sizeof options, .without_normals = true};
-  supine_status status = supine_basis_open_with(path, &options, &basis, error);
-  if (status == SUPINE_OK) {
-    energy = calloc(supine_basis_get_info(basis)->band + 1, sizeof *energy);
-    status = energy != NULL ? band_energy(basis, energy, error) : SUPINE_ERROR_MEMORY;
+  SUPINE_FREED_BY(supine_options_basis_close) supine_basis *basis = NULL;
+  SUPINE_ARENA arena = {0};
+  json_auto_t *described = NULL;
+  SUPINE_TRY(supine_basis_open_with(path, &options, &basis, error));
+  const size_t bands = supine_basis_get_info(basis)->band + 1;
+  double *energy = supine_arena_zeros(&arena, bands, sizeof *energy);
+  if (energy == NULL) {
+    return supine_error_memory(error, "%zu bands", bands);
   }
-  if (status == SUPINE_OK) {
-    status = describe(path, basis, energy, &described, error);
-  }
-  if (status == SUPINE_OK) {
-    supine_options_print(described, wanted->json);
-  } else {
-    json_decref(described);
-  }
-  free(energy);
-  supine_basis_close(basis);
-  return status;
+  SUPINE_TRY(band_energy(basis, energy, error));
+  SUPINE_TRY(describe(path, basis, energy, &described, error));
+  supine_options_print(json_incref(described), wanted->json);
+  return SUPINE_OK;
 }
 
 const supine_command supine_command_info = {

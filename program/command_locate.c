@@ -7,6 +7,7 @@
 #include <supine/locate.h>
 #include <supine/posture.h>
 
+#include "base/arena.h"
 #include "base/output.h"
 #include "base/text.h"
 
@@ -51,7 +52,7 @@ static const supine_option table[] = {
 
 typedef struct observations {
   size_t count;
-  supine_observation *points;
+  supine_observation points[SUPINE_LOCATE_POINTS_MAX];
 } observations;
 
 /* Find the vertex of the embedded point that is called `text` in the file `path`. */
@@ -86,24 +87,20 @@ static supine_status find_vertex(const char *path, const char *text,
 static supine_status load_observed(const char *path, const request *wanted,
                                    const supine_command_names *names, observations *observed,
                                    supine_error *error) {
-  supine_mesh_points read = {0};
-  supine_status status = supine_mesh_points_read(path, &wanted->load, &read, error);
-  observed->points = calloc(read.count + 1, sizeof *observed->points);
-  if (status == SUPINE_OK && read.count > SUPINE_LOCATE_POINTS_MAX) {
-    status =
-        supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: %zu points, more than %d: leave some out",
-                         path, read.count, (int)SUPINE_LOCATE_POINTS_MAX);
-  } else if (status == SUPINE_OK && observed->points == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
+  SUPINE_FREED_BY(supine_mesh_points_free) supine_mesh_points read = {0};
+  SUPINE_TRY(supine_mesh_points_read(path, &wanted->load, &read, error));
+  if (read.count > SUPINE_LOCATE_POINTS_MAX) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s: %zu points, more than %d: leave some out", path, read.count,
+                            (int)SUPINE_LOCATE_POINTS_MAX);
   }
-  for (; observed->count < read.count && status == SUPINE_OK; ++observed->count) {
+  for (; observed->count < read.count; ++observed->count) {
     supine_observation *point = &observed->points[observed->count];
     point->noise = wanted->noise;
     memcpy(point->position, read.at + 3 * observed->count, sizeof point->position);
-    status = find_vertex(path, read.names[observed->count], names, &point->vertex, error);
+    SUPINE_TRY(find_vertex(path, read.names[observed->count], names, &point->vertex, error));
   }
-  supine_mesh_points_free(&read);
-  return status;
+  return SUPINE_OK;
 }
 
 enum { POSTURES = 6 };
@@ -122,7 +119,8 @@ typedef struct lungs_found {
   float *xyz;                        /* [N, 3] positions in the most probable posture, mm */
   float *sigma;                      /* [N] expected errors of the positions, mm */
   double volume;                     /* volume of the lungs, mL; of the surface if it is written */
-  void *space;                       /* a workspace of supine_locate for each posture */
+  double *space;                     /* a workspace of supine_locate for each posture */
+  supine_arena arena;
 } lungs_found;
 
 /* Fit the lungs in the given posture or in all six; a failed fit gets probability 0. */
@@ -140,7 +138,7 @@ static supine_status try_postures(const supine_locate_task *task, bool posture_g
       (void)supine_posture_gravity(postures[k], one.state.gravity);
     }
     const supine_status tried =
-        supine_locate(&one, located->residuals + k * n, (double *)located->space + k * space,
+        supine_locate(&one, located->residuals + k * n, located->space + k * space,
                       &located->location[k], status == SUPINE_OK ? error : NULL);
     status = tried == SUPINE_OK ? status : tried;
     located->probability[k] = tried == SUPINE_OK ? located->location[k].log_evidence : -INFINITY;
@@ -204,20 +202,19 @@ static void suggest_reading(const supine_locate_task *task, bool posture_given,
 static supine_status find_positions(const supine_basis *shown, float *xyz, float *sigma,
                                     lungs_found *located, supine_error *error) {
   const size_t n = supine_basis_get_info(shown)->vertex_count;
-  supine_status status =
-      supine_locate_positions(located->best, shown, located->xyz, located->sigma, error);
+  SUPINE_TRY(supine_locate_positions(located->best, shown, located->xyz, located->sigma, error));
   double sum = located->probability[located->best - located->location];
-  for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
+  for (size_t i = 0; i < n; ++i) {
     located->sigma[i] *= located->sigma[i] * (float)sum;
   }
-  for (size_t k = 0; k < located->count && status == SUPINE_OK; ++k) {
+  for (size_t k = 0; k < located->count; ++k) {
     const double share = located->probability[k];
     if (&located->location[k] == located->best || share < negligible) {
       continue;
     }
-    status = supine_locate_positions(&located->location[k], shown, xyz, sigma, error);
+    SUPINE_TRY(supine_locate_positions(&located->location[k], shown, xyz, sigma, error));
     sum += share;
-    for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
+    for (size_t i = 0; i < n; ++i) {
       float square = sigma[i] * sigma[i];
       for (size_t j = 3 * i; j < 3 * i + 3; ++j) {
         square += (xyz[j] - located->xyz[j]) * (xyz[j] - located->xyz[j]);
@@ -225,10 +222,10 @@ static supine_status find_positions(const supine_basis *shown, float *xyz, float
       located->sigma[i] += (float)share * square;
     }
   }
-  for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
+  for (size_t i = 0; i < n; ++i) {
     located->sigma[i] = sqrtf(located->sigma[i] / (float)sum);
   }
-  return status;
+  return SUPINE_OK;
 }
 
 /* Fit the lungs to the points, and compute the positions of the vertices of `shown`. If no posture
@@ -237,39 +234,32 @@ static supine_status find(const supine_locate_task *task, bool posture_given,
                           const supine_basis *shown, lungs_found *located, supine_error *error) {
   const size_t n = supine_basis_get_info(shown)->vertex_count;
   const size_t tries = POSTURES;
-  float *xyz = malloc(3 * n * sizeof *xyz);
-  float *sigma = malloc(n * sizeof *sigma);
-  located->residuals = malloc(tries * task->count * sizeof *located->residuals);
-  located->xyz = malloc(3 * n * sizeof *xyz);
-  located->sigma = malloc(n * sizeof *sigma);
-  located->space = malloc(tries * supine_locate_space(task->count) * sizeof(double));
-  supine_status status = SUPINE_OK;
-  if (xyz == NULL || sigma == NULL || located->residuals == NULL || located->xyz == NULL ||
-      located->sigma == NULL || located->space == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
-  } else {
-    status = try_postures(task, posture_given, located, error);
+  SUPINE_ARENA arena = {0};
+  supine_arena *kept = &located->arena;
+  float *xyz = supine_arena_take(&arena, 3 * n, sizeof *xyz);
+  float *sigma = supine_arena_take(&arena, n, sizeof *sigma);
+  located->residuals = supine_arena_take(kept, tries * task->count, sizeof *located->residuals);
+  located->xyz = supine_arena_take(kept, 3 * n, sizeof *xyz);
+  located->sigma = supine_arena_take(kept, n, sizeof *sigma);
+  located->space =
+      supine_arena_take(kept, tries * supine_locate_space(task->count), sizeof(double));
+  if (arena.failed || kept->failed) {
+    return supine_error_memory(error, "%zu vertices", n);
   }
+  const supine_status status = try_postures(task, posture_given, located, error);
   if (status == SUPINE_ERROR_NUMERICAL) {
     suggest_reading(task, posture_given, located, error);
   }
-  if (status == SUPINE_OK) {
-    located->volume = located->best->volume;
-    status = find_positions(shown, xyz, sigma, located, error);
-  }
-  free(xyz);
-  free(sigma);
-  return status;
+  SUPINE_TRY(status);
+  located->volume = located->best->volume;
+  return find_positions(shown, xyz, sigma, located, error);
 }
 
 /* Make the located surface, and set located->volume to the volume that it encloses. */
 static supine_status make_surface(const supine_basis *basis, lungs_found *located,
                                   supine_mesh *mesh, supine_error *error) {
   const size_t n = supine_basis_get_info(basis)->vertex_count;
-  const supine_status status = supine_options_basis_mesh(basis, mesh);
-  if (status != SUPINE_OK) {
-    return supine_error_set(error, status, "no memory for %zu vertices", n);
-  }
+  SUPINE_TRY(supine_posed_mesh(basis, NULL, mesh, error));
   for (size_t i = 0; i < 3 * n; ++i) {
     mesh->vertices[i] = (double)located->xyz[i];
   }
@@ -370,72 +360,55 @@ static void print(const request *wanted, const supine_command_names *names,
   supine_options_print(root, wanted->json);
 }
 
+static void free_found(lungs_found *located) {
+  supine_arena_free(&located->arena);
+}
+
 static supine_status locate(const request *wanted, const supine_basis *lungs,
                             const supine_basis *inside, const supine_command_names *names,
                             const observations *observed, supine_error *error) {
   const bool csv = supine_text_ends_in(wanted->output, ".csv");
   const supine_basis *shown = csv ? inside : lungs;
   enum { OUTLIER_POINTS = 5 }; /* supine_locate leaves out at most a fifth of the points */
-  lungs_found located = {0};
-  supine_mesh mesh = {0};
+  SUPINE_FREED_BY(free_found) lungs_found located = {0};
+  SUPINE_FREED_BY(supine_mesh_free) supine_mesh mesh = {0};
   const supine_locate_task task = {.inside = inside,
                                    .count = observed->count,
                                    .observed = observed->points,
                                    .state = wanted->state,
                                    .rigid = wanted->rigid};
-  supine_status status = find(&task, wanted->orientation.given, shown, &located, error);
+  const supine_status status = find(&task, wanted->orientation.given, shown, &located, error);
   if (status == SUPINE_ERROR_ARGUMENT && wanted->rigid) {
     /* Report a format error: the points in the file do not determine a rotation. */
-    status = error->status = SUPINE_ERROR_FORMAT;
+    return error->status = SUPINE_ERROR_FORMAT;
   }
-  if (status == SUPINE_OK && !csv) {
-    status = make_surface(lungs, &located, &mesh, error);
+  SUPINE_TRY(status);
+  if (!csv) {
+    SUPINE_TRY(make_surface(lungs, &located, &mesh, error));
   }
-  if (status == SUPINE_OK) {
-    /* Print first and write last, so that a failure leaves no file. */
-    if (observed->count < OUTLIER_POINTS) {
-      supine_options_say(name, "with fewer than %d points, a wrong one cannot be found: check them",
-                         (int)OUTLIER_POINTS);
-    }
-    print(wanted, names, observed, supine_basis_get_info(shown)->vertex_count, &located);
-    status = csv ? write_points(wanted->output, inside, names, &located, error)
-                 : write_surface(wanted->output, lungs, &mesh, &located, error);
+  /* Print first and write last, so that a failure leaves no file. */
+  if (observed->count < OUTLIER_POINTS) {
+    supine_options_say(name, "with fewer than %d points, a wrong one cannot be found: check them",
+                       (int)OUTLIER_POINTS);
   }
-  supine_mesh_free(&mesh);
-  free(located.residuals);
-  free(located.xyz);
-  free(located.sigma);
-  free(located.space);
-  return status;
+  print(wanted, names, observed, supine_basis_get_info(shown)->vertex_count, &located);
+  return csv ? write_points(wanted->output, inside, names, &located, error)
+             : write_surface(wanted->output, lungs, &mesh, &located, error);
 }
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
-  supine_basis *lungs = NULL;
-  supine_basis *inside = NULL;
-  supine_command_names names = {0};
+  SUPINE_FREED_BY(supine_options_basis_close) supine_basis *lungs = NULL;
+  SUPINE_FREED_BY(supine_options_basis_close) supine_basis *inside = NULL;
+  SUPINE_FREED_BY(supine_command_names_close) supine_command_names names = {0};
   observations observed = {0};
-  supine_status status = SUPINE_OK;
   if (wanted->orientation.given) {
-    status = supine_options_state(&wanted->orientation, &wanted->state, error);
+    SUPINE_TRY(supine_options_state(&wanted->orientation, &wanted->state, error));
   }
-  if (status == SUPINE_OK) {
-    status = supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &lungs, error);
-  }
-  if (status == SUPINE_OK) {
-    status = supine_command_inside_open(lungs, wanted->points, &inside, &names, error);
-  }
-  if (status == SUPINE_OK) {
-    status = load_observed(given->operand[1], wanted, &names, &observed, error);
-  }
-  if (status == SUPINE_OK) {
-    status = locate(wanted, lungs, inside, &names, &observed, error);
-  }
-  free(observed.points);
-  supine_command_names_close(&names);
-  supine_basis_close(inside);
-  supine_basis_close(lungs);
-  return status;
+  SUPINE_TRY(supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &lungs, error));
+  SUPINE_TRY(supine_command_inside_open(lungs, wanted->points, &inside, &names, error));
+  SUPINE_TRY(load_observed(given->operand[1], wanted, &names, &observed, error));
+  return locate(wanted, lungs, inside, &names, &observed, error);
 }
 
 const supine_command supine_command_locate = {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine phantom: make synthetic lungs. */
+#include "base/arena.h"
 #include "precompute/lungs/phantom.h"
 
 #include "program/options/command.h"
@@ -24,18 +25,13 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   const supine_mesh_save_options save = {.comment =
                                              "synthetic lungs, mm; shape after Chaste's lung test "
                                              "data (BSD-3-Clause, University of Oxford)"};
-  supine_mesh mesh = {0};
+  SUPINE_FREED_BY(supine_mesh_free) supine_mesh mesh = {0};
   (void)given;
-  supine_status status = supine_phantom_create(wanted->vertices, wanted->volume, &mesh, error);
-  if (status == SUPINE_OK) {
-    status = supine_mesh_save(wanted->path, &mesh, &save, error);
-  }
-  if (status == SUPINE_OK) {
-    (void)printf("%s: two lungs, %zu vertices, %zu triangles, %.1f mL\n", wanted->path,
-                 mesh.vertex_count, mesh.triangle_count, 1e-3 * supine_mesh_volume(&mesh));
-  }
-  supine_mesh_free(&mesh);
-  return status;
+  SUPINE_TRY(supine_phantom_create(wanted->vertices, wanted->volume, &mesh, error));
+  SUPINE_TRY(supine_mesh_save(wanted->path, &mesh, &save, error));
+  (void)printf("%s: two lungs, %zu vertices, %zu triangles, %.1f mL\n", wanted->path,
+               mesh.vertex_count, mesh.triangle_count, 1e-3 * supine_mesh_volume(&mesh));
+  return SUPINE_OK;
 }
 
 const supine_command supine_command_phantom = {

@@ -6,6 +6,7 @@
 
 #include <supine/sh.h>
 
+#include "base/arena.h"
 #include "base/vec3.h"
 #include "precompute/fields/fields.h"
 #include "precompute/precompute.h"
@@ -166,24 +167,18 @@ static supine_status compress_fields(const request *wanted, const supine_scan *s
                                   .scan_gravity = scan->known ? scan->state.gravity : NULL};
   char posture[160] = "not displaced by gravity";
   char assumed[sizeof source->summary + sizeof posture + 8];
-  supine_fields fields = {0};
+  SUPINE_FREED_BY(supine_fields_free) supine_fields fields = {0};
   supine_fit_report report;
   if (scan->known) {
     (void)supine_state_describe(&scan->state, posture, sizeof posture);
   }
   (void)snprintf(assumed, sizeof assumed, "%s; scan %s", source->summary, posture);
   options->assumed = assumed;
-  supine_status status =
-      supine_fields_load(wanted->fields, &source->lungs, &source->frame, &fields, error);
-  if (status == SUPINE_OK) {
-    status =
-        supine_fields_write(&source->lungs, &fields, &fit, options, wanted->path, &report, error);
-  }
-  if (status == SUPINE_OK) {
-    report_fit(wanted->path, assumed, &fields, &report);
-  }
-  supine_fields_free(&fields);
-  return status;
+  SUPINE_TRY(supine_fields_load(wanted->fields, &source->lungs, &source->frame, &fields, error));
+  SUPINE_TRY(
+      supine_fields_write(&source->lungs, &fields, &fit, options, wanted->path, &report, error));
+  report_fit(wanted->path, assumed, &fields, &report);
+  return SUPINE_OK;
 }
 
 static supine_status compute(const request *wanted, const supine_lungs *lungs,

@@ -6,6 +6,7 @@
 
 #include <jansson.h>
 
+#include "base/arena.h"
 #include "base/output.h"
 
 #include "program/options/command.h"
@@ -46,17 +47,14 @@ static json_t *json_limb(const supine_pv_curve *curve, const supine_pv_report *r
 static supine_status run_fit(const char *path, const request *chosen, supine_error *error) {
   supine_pv pv = {0};
   supine_pv_report reports[SUPINE_PV_LIMB_COUNT];
-  supine_status status = supine_breath_fit_file(path, chosen->confidence, &pv, reports, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(supine_breath_fit_file(path, chosen->confidence, &pv, reports, error));
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     if (reports[limb].rms_percent > 1.0) {
       supine_options_say(command, "note: the %s samples deviate from their curve by %.2g %% RMS",
                          supine_breath_limb_name((supine_pv_limb)limb), reports[limb].rms_percent);
     }
   }
-  json_t *root = json_pack("{s:f}", "confidence", chosen->confidence);
+  json_auto_t *root = json_pack("{s:f}", "confidence", chosen->confidence);
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     if (reports[limb].samples > 0) {
       (void)json_object_set_new(root, supine_breath_limb_name((supine_pv_limb)limb),
@@ -64,16 +62,13 @@ static supine_status run_fit(const char *path, const request *chosen, supine_err
     }
   }
   supine_options_print(json_incref(root), chosen->json);
-  supine_output output = {0};
-  if (chosen->output != NULL) { /* the file is written last, so that a failure leaves no file */
-    status = supine_output_open(chosen->output, &output, error);
+  if (chosen->output == NULL) {
+    return SUPINE_OK;
   }
-  if (status == SUPINE_OK && chosen->output != NULL) {
-    (void)json_dumpf(root, output.file, JSON_INDENT(2));
-    status = supine_output_commit(&output, error);
-  }
-  json_decref(root);
-  return status;
+  supine_output output; /* written last, so that a failure leaves no file */
+  SUPINE_TRY(supine_output_open(chosen->output, &output, error));
+  (void)json_dumpf(root, output.file, JSON_INDENT(2));
+  return supine_output_commit(&output, error);
 }
 
 static supine_status print_row(const supine_pv *pv, double pressure, supine_error *error) {
@@ -86,11 +81,7 @@ static supine_status print_row(const supine_pv *pv, double pressure, supine_erro
     }
     double volume = 0.0;
     double compliance = 0.0;
-    const supine_status status =
-        supine_breath_curve_evaluate(curve, 1, &pressure, &volume, &compliance, error);
-    if (status != SUPINE_OK) {
-      return status;
-    }
+    SUPINE_TRY(supine_breath_curve_evaluate(curve, 1, &pressure, &volume, &compliance, error));
     (void)printf(",%.7g,%.7g", volume, compliance);
   }
   (void)putchar('\n');
@@ -100,9 +91,8 @@ static supine_status print_row(const supine_pv *pv, double pressure, supine_erro
 static supine_status run_show(const char *path, const request *chosen, supine_error *error) {
   enum { ROWS_MAX = 1000000 };
   supine_pv pv = *supine_breath_normal();
-  supine_status status = path != NULL ? supine_breath_load(path, &pv, error) : SUPINE_OK;
-  if (status != SUPINE_OK) {
-    return status;
+  if (path != NULL) {
+    SUPINE_TRY(supine_breath_load(path, &pv, error));
   }
   const double low = fmin(pv.limb[0].pressure[0], pv.limb[1].pressure[0]);
   const double high = fmax(pv.limb[0].pressure[1], pv.limb[1].pressure[1]);
@@ -112,10 +102,10 @@ static supine_status run_show(const char *path, const request *chosen, supine_er
                             "--step gives more than %d rows: give a larger step", ROWS_MAX);
   }
   (void)puts("pressure_cmH2O,inhale_mL,inhale_mL_per_cmH2O,exhale_mL,exhale_mL_per_cmH2O");
-  for (size_t j = 0; status == SUPINE_OK && (double)j < steps * (1.0 - 1e-12); ++j) {
-    status = print_row(&pv, low + (double)j * chosen->step, error);
+  for (size_t j = 0; (double)j < steps * (1.0 - 1e-12); ++j) {
+    SUPINE_TRY(print_row(&pv, low + (double)j * chosen->step, error));
   }
-  return status == SUPINE_OK ? print_row(&pv, high, error) : status;
+  return print_row(&pv, high, error);
 }
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {

@@ -6,6 +6,7 @@
 
 #include <supine/compare.h>
 
+#include "base/arena.h"
 #include "base/output.h"
 #include "base/text.h"
 #include "base/vec3.h"
@@ -58,59 +59,49 @@ typedef struct studio {
   supine_panel panel[SUPINE_PANELS_MAX];
   double max; /* largest displacement of all panels so far, mm */
   char label[128];
+  supine_arena arena;
 } studio;
 
 static void close_studio(studio *s) {
   for (size_t i = 0; i < SUPINE_PANELS_MAX; ++i) {
     supine_command_marks_free(&s->shown[i].marks);
-    free(s->shown[i].value);
   }
   supine_command_names_close(&s->names);
   supine_basis_close(s->inside);
   supine_render_destroy(s->renderer);
   supine_compare_destroy(s->compare);
+  supine_arena_free(&s->arena);
   supine_basis_close(s->basis);
 }
 
 static supine_status open_studio(studio *s, const char *path, supine_error *error) {
-  supine_status status = supine_options_basis_open(path, SUPINE_STORAGE_AUTO, &s->basis, error);
-  if (status == SUPINE_OK) {
-    status = supine_options_reference(s->basis, &s->wanted->from, true, &s->from, error);
+  SUPINE_TRY(supine_options_basis_open(path, SUPINE_STORAGE_AUTO, &s->basis, error));
+  SUPINE_TRY(supine_options_reference(s->basis, &s->wanted->from, true, &s->from, error));
+  SUPINE_TRY(supine_compare_create(s->basis, &s->compare, error));
+  SUPINE_TRY(supine_render_create(s->basis, &s->renderer, error));
+  if (s->wanted->inside != NULL) {
+    SUPINE_TRY(
+        supine_command_inside_open(s->basis, s->wanted->inside, &s->inside, &s->names, error));
   }
-  if (status == SUPINE_OK) {
-    status = supine_compare_create(s->basis, &s->compare, error);
+  const size_t n = supine_basis_get_info(s->basis)->vertex_count;
+  for (size_t i = 0; i < s->postures.count; ++i) {
+    s->shown[i].value = supine_arena_take(&s->arena, n, sizeof *s->shown[i].value);
   }
-  if (status == SUPINE_OK) {
-    status = supine_render_create(s->basis, &s->renderer, error);
-  }
-  if (status == SUPINE_OK && s->wanted->inside != NULL) {
-    status = supine_command_inside_open(s->basis, s->wanted->inside, &s->inside, &s->names, error);
-  }
-  for (size_t i = 0; i < s->postures.count && status == SUPINE_OK; ++i) {
-    s->shown[i].value =
-        malloc(supine_basis_get_info(s->basis)->vertex_count * sizeof *s->shown[i].value);
-    if (s->shown[i].value == NULL) {
-      status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
-    }
-  }
-  return status;
+  return s->arena.failed ? supine_error_memory(error, "%zu vertices", n) : SUPINE_OK;
 }
 
 /* Fill panel i: compute the pose, the displacements and the subtitle. */
 static supine_status fill_panel(studio *s, size_t i, supine_error *error) {
   const supine_posture_item *item = &s->postures.item[i];
   drawn *shown = &s->shown[i];
-  supine_status status = supine_options_pose(s->basis, name, s->wanted->volume.allow_folds,
-                                             &item->state, &shown->pose, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(supine_options_pose(s->basis, name, s->wanted->volume.allow_folds, &item->state,
+                                 &shown->pose, error));
   supine_distance_statistics statistics;
   (void)supine_compare_distances(s->compare, &shown->pose, &s->from.pose, shown->value);
   supine_compare_statistics(s->compare, shown->value, &statistics);
   s->max = fmax(s->max, statistics.max);
   (void)snprintf(shown->subtitle, sizeof shown->subtitle, "%.0f mL, mean %.1f, max %.1f mm",
-                 supine_options_basis_volume(s->basis, &shown->pose), statistics.mean,
+                 supine_posed_volume(s->basis, &shown->pose), statistics.mean,
                  statistics.max);
   s->panel[i] = (supine_panel){.title = supine_options_posture_label(item->name),
                                .subtitle = shown->subtitle,
@@ -127,28 +118,22 @@ static supine_status mark_panel(studio *s, size_t i, supine_error *error) {
   if (s->inside == NULL) {
     return SUPINE_OK;
   }
-  supine_command_marks_free(marks);
   s->panel[i].marks = &marks->marks;
   const supine_pose *const pose[2] = {&s->from.pose, &s->shown[i].pose};
-  supine_expected expected = {0};
-  supine_status status = supine_options_expected_find(s->inside, &s->postures.item[i].state,
-                                                      &s->from.state, &expected, error);
-  if (status == SUPINE_OK) {
-    status = supine_command_marks_make(s->inside, &s->names, pose, expected.sigma, marks, error);
+  SUPINE_FREED_BY(supine_posed_expected_free) supine_expected expected = {0};
+  SUPINE_TRY(supine_posed_expected(s->inside, &s->postures.item[i].state, &s->from.state,
+                                          &expected, error));
+  SUPINE_TRY(supine_command_marks_make(s->inside, &s->names, pose, expected.sigma, marks, error));
+  const supine_target *t = &marks->first;
+  char way[96];
+  const bool still = t->moved < 0.05;
+  (void)snprintf(s->shown[i].subtitle, sizeof s->shown[i].subtitle, "%s: %s", t->name,
+                 still ? "where arrows begin" : supine_command_target_way(t, 2, way));
+  if (!still && !isnan(t->expected)) {
+    (void)snprintf(s->shown[i].note, sizeof s->shown[i].note, "expected error %.1f mm",
+                   t->expected);
   }
-  supine_options_expected_free(&expected);
-  if (status == SUPINE_OK) {
-    const supine_target *t = &marks->first;
-    char way[96];
-    const bool still = t->moved < 0.05;
-    (void)snprintf(s->shown[i].subtitle, sizeof s->shown[i].subtitle, "%s: %s", t->name,
-                   still ? "where arrows begin" : supine_command_target_way(t, 2, way));
-    if (!still && !isnan(t->expected)) {
-      (void)snprintf(s->shown[i].note, sizeof s->shown[i].note, "expected error %.1f mm",
-                     t->expected);
-    }
-  }
-  return status;
+  return SUPINE_OK;
 }
 
 static supine_picture make_picture(studio *s) {
@@ -174,19 +159,14 @@ static supine_picture make_picture(studio *s) {
 }
 
 static supine_status draw_postures(studio *s, supine_error *error) {
-  supine_status status = SUPINE_OK;
-  for (size_t i = 0; i < s->postures.count && status == SUPINE_OK; ++i) {
-    status = fill_panel(s, i, error);
-    status = status == SUPINE_OK ? mark_panel(s, i, error) : status;
+  for (size_t i = 0; i < s->postures.count; ++i) {
+    SUPINE_TRY(fill_panel(s, i, error));
+    SUPINE_TRY(mark_panel(s, i, error));
   }
   const supine_picture picture = make_picture(s);
-  if (status == SUPINE_OK) {
-    status = supine_render_picture_save(s->renderer, &picture, s->wanted->output, error);
-  }
-  if (status == SUPINE_OK) {
-    (void)printf("%s: %zu x %zu pixels\n", s->wanted->output, picture.width, picture.height);
-  }
-  return status;
+  SUPINE_TRY(supine_render_picture_save(s->renderer, &picture, s->wanted->output, error));
+  (void)printf("%s: %zu x %zu pixels\n", s->wanted->output, picture.width, picture.height);
+  return SUPINE_OK;
 }
 
 /* Compute frame `frame` of the `count` frames of an animation, and fill its only panel. */
@@ -207,24 +187,24 @@ static supine_status find_frame(studio *s, size_t frame, size_t count, supine_er
  * @param extent  for each view, the limits of x and y of the lungs over the whole turn, mm */
 static supine_status add_frames(studio *s, size_t count, const double (*extent)[4],
                                 supine_animation *animation, supine_error *error) {
+  SUPINE_FREED_BY(supine_options_progress_end)
   supine_progress progress = supine_options_progress_begin(name);
-  supine_status status = SUPINE_OK;
-  for (size_t frame = 0; frame < count && status == SUPINE_OK; ++frame) {
-    status = find_frame(s, frame, count, error);
-    status = status == SUPINE_OK ? mark_panel(s, 0, error) : status;
+  for (size_t frame = 0; frame < count; ++frame) {
+    SUPINE_TRY(find_frame(s, frame, count, error));
+    SUPINE_TRY(mark_panel(s, 0, error));
     supine_picture picture = make_picture(s);
     picture.extent = extent;
-    if (status == SUPINE_OK) {
-      status = supine_render_animation_add(animation, s->renderer, &picture,
-                                           frame + 1 < count ? 1000 / FPS : LAST_FRAME_MS, error);
-    }
+    SUPINE_TRY(supine_render_animation_add(animation, s->renderer, &picture,
+                                           frame + 1 < count ? 1000 / FPS : LAST_FRAME_MS, error));
     if (!supine_options_progress_step(&progress, (double)(frame + 1) / (double)count)) {
-      status =
-          supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
+      return supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
     }
   }
-  supine_options_progress_end(&progress);
-  return status;
+  return SUPINE_OK;
+}
+
+static void close_animation(supine_animation **animation) {
+  supine_render_animation_close(*animation);
 }
 
 /* Draw an animation of the body's turn from one posture to another. A first pass over the frames
@@ -236,9 +216,8 @@ static supine_status draw_turn(studio *s, supine_error *error) {
   const double seconds = s->wanted->turn.seconds;
   const double frames = fmax(2.0, floor(seconds * FPS * (1.0 + 1e-12)) + 1.0);
   double extent[SUPINE_VIEWS_MAX][4];
-  supine_animation *animation = NULL;
-  supine_output output = {0};
-  supine_status status = SUPINE_OK;
+  SUPINE_FREED_BY(close_animation) supine_animation *animation = NULL;
+  SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
   if (!(frames <= FRAMES_MAX)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "a turn of %g s has more than %d frames: give a shorter turn", seconds,
@@ -248,36 +227,21 @@ static supine_status draw_turn(studio *s, supine_error *error) {
   for (size_t view = 0; view < SUPINE_VIEWS_MAX; ++view) {
     memcpy(extent[view], none, sizeof none);
   }
-  for (size_t frame = 0; frame < count && status == SUPINE_OK; ++frame) {
-    status = find_frame(s, frame, count, error);
+  for (size_t frame = 0; frame < count; ++frame) {
+    SUPINE_TRY(find_frame(s, frame, count, error));
     const supine_picture picture = make_picture(s);
-    if (status == SUPINE_OK) {
-      supine_render_picture_extent(s->renderer, &picture, extent);
-    }
+    supine_render_picture_extent(s->renderer, &picture, extent);
   }
   const supine_picture picture = make_picture(s);
-  if (status == SUPINE_OK) {
-    status = supine_output_open(path, &output, error);
-  }
-  if (status == SUPINE_OK) {
-    status = supine_render_animation_open(picture.width, picture.height, &animation, error);
-  }
+  SUPINE_TRY(supine_output_open(path, &output, error));
+  SUPINE_TRY(supine_render_animation_open(picture.width, picture.height, &animation, error));
   supine_options_signals_catch(true);
-  if (status == SUPINE_OK) {
-    status = add_frames(s, count, (const double(*)[4])extent, animation, error);
-  }
-  if (status == SUPINE_OK) {
-    status = supine_render_animation_write(animation, output.file, error);
-    if (status == SUPINE_OK || ferror(output.file) != 0) {
-      status = supine_output_commit(&output, error);
-    }
-  }
-  supine_output_abandon(&output);
-  supine_render_animation_close(animation);
-  if (status == SUPINE_OK) {
-    (void)printf("%s: %zu x %zu pixels, %zu frames\n", path, picture.width, picture.height, count);
-  }
-  return status;
+  SUPINE_TRY(add_frames(s, count, (const double(*)[4])extent, animation, error));
+  const supine_status status = supine_render_animation_write(animation, output.file, error);
+  SUPINE_TRY(status == SUPINE_OK || ferror(output.file) != 0 ? supine_output_commit(&output, error)
+                                                             : status);
+  (void)printf("%s: %zu x %zu pixels, %zu frames\n", path, picture.width, picture.height, count);
+  return SUPINE_OK;
 }
 
 static supine_status read_size(const char *text, void *field, supine_error *error) {
@@ -380,15 +344,15 @@ static supine_status check(const request *wanted, supine_posture_list *postures,
         wanted->turns ? "--turn writes an animation: give -o a name that ends in .webp"
                       : "--posture writes a still picture: give -o a name that ends in .png");
   }
-  const supine_status status =
-      wanted->turns ? SUPINE_OK
-                    : supine_options_posture_list_parse(wanted->postures, &wanted->volume.state,
-                                                        postures, error);
-  return status == SUPINE_OK && postures->count > SUPINE_PANELS_MAX
+  if (!wanted->turns) {
+    SUPINE_TRY(supine_options_posture_list_parse(wanted->postures, &wanted->volume.state, postures,
+                                                 error));
+  }
+  return postures->count > SUPINE_PANELS_MAX
              ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                                 "a picture holds at most %d postures: name fewer",
                                 SUPINE_PANELS_MAX)
-             : status;
+             : SUPINE_OK;
 }
 
 static void begin(void *chosen) {
@@ -402,16 +366,10 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   if (wanted->turns && wanted->view[0] == SUPINE_VIEW_LYING) {
     wanted->view[0] = SUPINE_VIEW_ANTERIOR; /* the camera of a film stays where it is */
   }
-  studio s = {.wanted = wanted, .postures = {.count = 1}};
-  supine_status status = check(wanted, &s.postures, error);
-  if (status == SUPINE_OK) {
-    status = open_studio(&s, given->operand[0], error);
-  }
-  if (status == SUPINE_OK) {
-    status = wanted->turns ? draw_turn(&s, error) : draw_postures(&s, error);
-  }
-  close_studio(&s);
-  return status;
+  SUPINE_FREED_BY(close_studio) studio s = {.wanted = wanted, .postures = {.count = 1}};
+  SUPINE_TRY(check(wanted, &s.postures, error));
+  SUPINE_TRY(open_studio(&s, given->operand[0], error));
+  return wanted->turns ? draw_turn(&s, error) : draw_postures(&s, error);
 }
 
 const supine_command supine_command_render = {

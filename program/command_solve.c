@@ -2,6 +2,7 @@
 /* supine solve: solve the full physics for one direction of gravity. */
 #include <math.h>
 
+#include "base/arena.h"
 #include "base/output.h"
 #include "precompute/lungs/disease.h"
 #include "precompute/physics/solve.h"
@@ -252,16 +253,12 @@ static supine_status solve(const supine_prepared *prepared, const request *wante
                            supine_error *error) {
   const supine_lungs *lungs = &prepared->source.lungs;
   const double *g = wanted->state.gravity;
-  supine_solution solution = {0};
-  supine_status status = supine_physics_solve(lungs, &prepared->model, g, &solution, error);
-  if (status == SUPINE_OK && wanted->pitcher_catcher) {
-    status = iterate(lungs, &prepared->model, g, &solution, error);
+  SUPINE_FREED_BY(supine_physics_solution_free) supine_solution solution = {0};
+  SUPINE_TRY(supine_physics_solve(lungs, &prepared->model, g, &solution, error));
+  if (wanted->pitcher_catcher) {
+    SUPINE_TRY(iterate(lungs, &prepared->model, g, &solution, error));
   }
-  if (status == SUPINE_OK) {
-    status = write_solution(prepared, wanted, &solution, error);
-  }
-  supine_physics_solution_free(&solution);
-  return status;
+  return write_solution(prepared, wanted, &solution, error);
 }
 
 static void begin(void *chosen) {
@@ -270,6 +267,7 @@ static void begin(void *chosen) {
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
+  SUPINE_FREED_BY(supine_precompute_prepared_free)
   supine_prepared prepared = {.source = {.is_map = false}};
   if (wanted->has_vertex) { /* the response is that of the surface as it is */
     wanted->model.scan.known = false;
@@ -280,14 +278,10 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   } else {
     SUPINE_TRY(supine_options_state(&wanted->orientation, &wanted->state, error));
   }
-  supine_status status =
-      supine_command_prepare(name, &wanted->model, given->operand, given->count, &prepared, error);
-  if (status == SUPINE_OK) {
-    status = wanted->has_vertex ? write_column(&prepared, wanted, error)
-                                : solve(&prepared, wanted, error);
-  }
-  supine_precompute_prepared_free(&prepared);
-  return status;
+  SUPINE_TRY(
+      supine_command_prepare(name, &wanted->model, given->operand, given->count, &prepared, error));
+  return wanted->has_vertex ? write_column(&prepared, wanted, error)
+                            : solve(&prepared, wanted, error);
 }
 
 const supine_command supine_command_solve = {

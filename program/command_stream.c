@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/output.h"
 #include "base/vec3.h"
 #include "program/options/basis_input.h"
@@ -25,7 +26,7 @@ typedef struct request {
   double world_down[3], body_from_tracker[4];
   int space; /* axes of the points, as an index in `spaces` */
   supine_state volume;
-  bool has_volume;
+  bool has_volume, has_breath;
   const char *pv;
   supine_pv_breath breath;
   double smooth; /* time constant with which poses are smoothed, ms; 0 for no smoothing */
@@ -77,11 +78,12 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, volume), .read = supine_options_read_volume,
      SUPINE_SAYS_GIVEN(request, has_volume)},
     {"tidal", 0, "ML", "tidal volume; default 500", SUPINE_FILLS(request, breath.tidal),
-     SUPINE_ABOVE_ZERO},
+     SUPINE_ABOVE_ZERO, SUPINE_SAYS_GIVEN(request, has_breath)},
     {"rate", 0, "N", "breaths per minute; default 12", SUPINE_FILLS(request, breath.rate),
-     SUPINE_ABOVE_ZERO},
+     SUPINE_ABOVE_ZERO, SUPINE_SAYS_GIVEN(request, has_breath)},
     {"pv", 0, "FILE", "pressure-volume relation made by 'supine pv fit'; default a normal adult's",
-     SUPINE_FILLS(request, pv), .file = SUPINE_FILE_IN, .more = true},
+     SUPINE_FILLS(request, pv), .file = SUPINE_FILE_IN, SUPINE_SAYS_GIVEN(request, has_breath),
+     .more = true},
     {.help = "Output:"},
     {"send", 0, "WHAT",
      "what a peer receives\nweights: an NDARRAY with a weight for each mode, then three factors "
@@ -168,14 +170,12 @@ typedef struct observed_points {
 /* Open the file of --points. Each structure with a single vertex becomes a point, marked as not yet
  * observed. */
 static supine_status open_points(const supine_basis *basis, const request *wanted,
-                                 observed_points *points, supine_error *error) {
+                                 observed_points *points, supine_arena *arena,
+                                 supine_error *error) {
   const supine_command_names *names = &points->names;
   supine_stream_observed *observed = &points->observed;
-  const supine_status status =
-      supine_command_inside_open(basis, wanted->points, &points->inside, &points->names, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(
+      supine_command_inside_open(basis, wanted->points, &points->inside, &points->names, error));
   size_t count = 0;
   for (size_t part = 0; part < names->count; ++part) {
     const bool single = names->begin[part + 1] - names->begin[part] == 1;
@@ -194,34 +194,22 @@ static supine_status open_points(const supine_basis *basis, const request *wante
   observed->ras = wanted->space == 1;
   observed->inside = points->inside;
   observed->count = count;
-  observed->space = calloc(supine_locate_space(count), sizeof *observed->space);
-  return observed->space != NULL
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", wanted->points);
-}
-
-static void close_points(observed_points *points) {
-  free(points->observed.space);
-  supine_command_names_close(&points->names);
-  supine_basis_close(points->inside);
+  observed->space = supine_arena_zeros(arena, supine_locate_space(count), sizeof *observed->space);
+  return observed->space != NULL ? SUPINE_OK : supine_error_memory(error, "%s", wanted->points);
 }
 
 /* Make the page that shows the lungs of a basis file live. The caller frees *page. */
 static supine_status make_page(const char *path, const export_page *shown, char **page,
                                size_t *size, supine_error *error) {
-  export_source source = {0};
-  supine_status status = supine_export_source_open(path, &source, error);
-  if (status == SUPINE_OK) {
-    FILE *file = open_memstream(page, size);
-    status =
-        file == NULL ? SUPINE_ERROR_MEMORY : supine_export_html_print(file, &source, shown, error);
-    const bool whole = file != NULL && ferror(file) == 0;
-    if ((file != NULL && fclose(file) != 0) || !whole) {
-      status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the page");
-    }
+  SUPINE_FREED_BY(supine_export_source_close) export_source source = {0};
+  SUPINE_TRY(supine_export_source_open(path, &source, error));
+  FILE *file = open_memstream(page, size);
+  if (file == NULL) {
+    return supine_error_memory(error, "the page");
   }
-  supine_export_source_close(&source);
-  return status;
+  const supine_status status = supine_export_html_print(file, &source, shown, error);
+  const bool whole = ferror(file) == 0;
+  return fclose(file) == 0 && whole ? status : supine_error_memory(error, "the page");
 }
 
 /* If --web is given, serve the live page. The caller destroys *web, then frees *page. */
@@ -234,32 +222,24 @@ static supine_status open_page(const request *wanted, const supine_basis *basis,
   if (wanted->web == NULL) {
     return SUPINE_OK;
   }
-  supine_status status = supine_stream_address_read(wanted->web, true, &address, error);
-  if (status == SUPINE_OK) {
-    status = supine_options_reference(basis, &wanted->from, true, &from, error);
-  }
-  if (status == SUPINE_OK) {
-    const export_reference reference = {&from.pose, from.name, from.state.gravity,
-                                        supine_options_above_rest(&from.state)};
-    const export_page shown = {.breath = wanted->breath.tidal,
-                               .from = &reference,
-                               .from_count = 1,
-                               .title = "Lungs, live",
-                               .live = true};
-    status = make_page(path, &shown, page, &site.page_size, error);
-  }
-  if (status == SUPINE_OK) {
-    site.address = address.host;
-    site.port = address.port;
-    site.page = *page;
-    status = supine_stream_web_create(&site, web, error);
-  }
-  if (status == SUPINE_OK) {
-    const bool ipv6 = strchr(address.host, ':') != NULL;
-    (void)printf("page at http%s://%s%s%s:%d/\n", site.certificate != NULL ? "s" : "",
-                 ipv6 ? "[" : "", address.host, ipv6 ? "]" : "", supine_stream_web_port(*web));
-  }
-  return status;
+  SUPINE_TRY(supine_stream_address_read(wanted->web, true, &address, error));
+  SUPINE_TRY(supine_options_reference(basis, &wanted->from, true, &from, error));
+  const export_reference reference = {&from.pose, from.name, from.state.gravity,
+                                      supine_options_above_rest(&from.state)};
+  const export_page shown = {.breath = wanted->breath.tidal,
+                             .from = &reference,
+                             .from_count = 1,
+                             .title = "Lungs, live",
+                             .live = true};
+  SUPINE_TRY(make_page(path, &shown, page, &site.page_size, error));
+  site.address = address.host;
+  site.port = address.port;
+  site.page = *page;
+  SUPINE_TRY(supine_stream_web_create(&site, web, error));
+  const bool ipv6 = strchr(address.host, ':') != NULL;
+  (void)printf("page at http%s://%s%s%s:%d/\n", site.certificate != NULL ? "s" : "",
+               ipv6 ? "[" : "", address.host, ipv6 ? "]" : "", supine_stream_web_port(*web));
+  return SUPINE_OK;
 }
 
 /* Choose a breath, or a fixed volume. Fields of gravity have no breaths. */
@@ -268,6 +248,11 @@ static supine_status set_volume(const supine_basis *basis, const request *wanted
   supine_pv pv = *supine_breath_normal();
   if (supine_basis_get_info(basis)->is_fields) {
     supine_pose pose;
+    if (wanted->has_breath) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "the basis was made with --fields and has no breaths: leave out "
+                              "--tidal, --rate and --pv");
+    }
     volume->fixed = wanted->volume;
     volume->fixed.gravity[1] = 1.0;
     return supine_basis_pose(basis, &volume->fixed, &pose, error);
@@ -276,44 +261,51 @@ static supine_status set_volume(const supine_basis *basis, const request *wanted
     volume->fixed = wanted->volume;
     return SUPINE_OK;
   }
-  const supine_status status =
-      wanted->pv == NULL ? SUPINE_OK : supine_breath_load(wanted->pv, &pv, error);
-  return status == SUPINE_OK ? supine_stream_volume_breathe(volume, &pv, &wanted->breath, error)
-                             : status;
+  if (wanted->pv != NULL) {
+    SUPINE_TRY(supine_breath_load(wanted->pv, &pv, error));
+  }
+  return supine_stream_volume_breathe(volume, &pv, &wanted->breath, error);
+}
+
+/* What a run needs besides the basis. */
+typedef struct session {
+  supine_arena arena;
+  observed_points points;
+  char *page;
+  supine_stream_web *web;
+  supine_stream_server *server;
+} session;
+
+static void end(session *s) {
+  supine_stream_server_destroy(s->server);
+  supine_stream_web_destroy(s->web);
+  free(s->page);
+  supine_command_names_close(&s->points.names);
+  supine_basis_close(s->points.inside);
+  supine_arena_free(&s->arena);
 }
 
 static supine_status stream(const supine_basis *basis, const char *path, const request *wanted,
                             supine_error *error) {
   supine_stream_options options = wanted->options;
   supine_stream_volume volume = {0};
-  supine_stream_server *server = NULL;
-  char *page = NULL;
-  observed_points points = {0};
-  supine_status status = set_volume(basis, wanted, &volume, error);
+  SUPINE_FREED_BY(end) session s = {0};
+  SUPINE_TRY(set_volume(basis, wanted, &volume, error));
   options.volume = &volume;
-  if (status == SUPINE_OK && wanted->points != NULL) {
-    status = open_points(basis, wanted, &points, error);
-    options.observed = &points.observed;
+  if (wanted->points != NULL) {
+    SUPINE_TRY(open_points(basis, wanted, &s.points, &s.arena, error));
+    options.observed = &s.points.observed;
   }
-  if (status == SUPINE_OK) {
-    status = open_page(wanted, basis, path, &page, &options.web, error);
+  SUPINE_TRY(open_page(wanted, basis, path, &s.page, &s.web, error));
+  options.web = s.web;
+  SUPINE_TRY(supine_stream_server_create(basis, &options, &s.server, error));
+  if (supine_stream_server_port(s.server) != 0) {
+    (void)printf("listening on port %d\n", supine_stream_server_port(s.server));
   }
-  if (status == SUPINE_OK) {
-    status = supine_stream_server_create(basis, &options, &server, error);
-  }
-  if (status == SUPINE_OK) {
-    if (supine_stream_server_port(server) != 0) {
-      (void)printf("listening on port %d\n", supine_stream_server_port(server));
-    }
-    (void)fflush(stdout);
-    supine_options_signals_catch(true);
-    status = supine_stream_server_run(server, error);
-    report(server, wanted);
-  }
-  supine_stream_server_destroy(server);
-  supine_stream_web_destroy(options.web);
-  close_points(&points);
-  free(page);
+  (void)fflush(stdout);
+  supine_options_signals_catch(true);
+  const supine_status status = supine_stream_server_run(s.server, error);
+  report(s.server, wanted);
   return status;
 }
 
@@ -341,14 +333,9 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
                             "--world-down or --body-from-tracker is zero: give a direction, such "
                             "as 0,0,-1, and a quaternion, such as 1,0,0,0");
   }
-  supine_basis *basis = NULL;
-  supine_status status =
-      supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, error);
-  if (status == SUPINE_OK) {
-    status = stream(basis, given->operand[0], wanted, error);
-  }
-  supine_basis_close(basis);
-  return status;
+  SUPINE_FREED_BY(supine_options_basis_close) supine_basis *basis = NULL;
+  SUPINE_TRY(supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, error));
+  return stream(basis, given->operand[0], wanted, error);
 }
 
 const supine_command supine_command_stream = {

@@ -3,17 +3,21 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/text.h"
 
+#include "program/options/basis_input.h"
+#include "program/options/model_options.h"
+#include "program/options/state_options.h"
 #include "program/options/surface_options.h"
-#include "program/validation.h"
+#include "program/validation_picture.h"
 
 static const char name[] = "validate";
 
 typedef struct request {
   const char *path;
   supine_landmark_options landmarks;
-  supine_command_state from, to, state[SUPINE_COMMAND_STATES_MAX];
+  supine_validation_state from, to, state[SUPINE_VALIDATION_STATES_MAX];
   size_t count;
   supine_source_options source;
   bool json;
@@ -21,7 +25,7 @@ typedef struct request {
 
 /* Read a state, such as "prone", "prone:rest+500", "0.6:0:-0.8" or "0.6:0:-0.8:full". */
 static supine_status read_state(const char *text, void *field, supine_error *error) {
-  supine_command_state *state = field;
+  supine_validation_state *state = field;
   if (text[0] == '\0' || strlen(text) >= sizeof state->text) {
     return SUPINE_ERROR_ARGUMENT;
   }
@@ -32,10 +36,10 @@ static supine_status read_state(const char *text, void *field, supine_error *err
 /* Append a state, such as "prone.ply" or "prone:rest+500:prone.ply", to the request. */
 static supine_status append_state(const char *text, void *field, supine_error *error) {
   request *wanted = field;
-  supine_command_state *state = &wanted->state[wanted->count];
+  supine_validation_state *state = &wanted->state[wanted->count];
   const char *colon = strrchr(text, ':');
-  char posture[SUPINE_POSTURE_NAME_MAX + 32];
-  if (wanted->count == SUPINE_COMMAND_STATES_MAX) {
+  char posture[SUPINE_VALIDATION_TEXT + 32];
+  if (wanted->count == SUPINE_VALIDATION_STATES_MAX) {
     return SUPINE_ERROR_ARGUMENT;
   }
   ++wanted->count;
@@ -78,7 +82,7 @@ static const supine_option table[] = {
     {"json", 0, NULL, "print JSON instead of text", FILLS(json)},
     {.name = NULL}};
 
-static json_t *encode(const supine_command_distance of[SUPINE_PATIENT_MAP_COUNT]) {
+static json_t *encode(const supine_validation_distance of[SUPINE_PATIENT_MAP_COUNT]) {
   json_t *all = json_object();
   for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT; ++k) {
     json_t *row = json_pack("{s:f, s:f, s:f, s:f}", "mean_mm", of[k].mean, "rms_mm", of[k].rms,
@@ -86,13 +90,13 @@ static json_t *encode(const supine_command_distance of[SUPINE_PATIENT_MAP_COUNT]
     (void)json_object_set_new(row, "explained_percent",
                               isnan(of[k].explained) ? json_null()
                                                      : json_real(100.0 * of[k].explained));
-    (void)json_object_set_new(all, supine_command_map_names[k], row);
+    (void)json_object_set_new(all, supine_validation_map_names[k], row);
   }
   return all;
 }
 
-static json_t *encode_state(const supine_command_state *state,
-                            const supine_command_outcome *outcome) {
+static json_t *encode_state(const supine_validation_state *state,
+                            const supine_validation_outcome *outcome) {
   json_t *root = json_object();
   if (state->path != NULL) {
     (void)json_object_set_new(root, "file", supine_options_json_text(state->path));
@@ -105,7 +109,7 @@ static json_t *encode_state(const supine_command_state *state,
     (void)json_object_set_new(root, "surface", encode(outcome->surface));
   }
   if (outcome->has_points) {
-    const supine_command_distance *own = &outcome->points[SUPINE_PATIENT_MAP_PREDICTED];
+    const supine_validation_distance *own = &outcome->points[SUPINE_PATIENT_MAP_PREDICTED];
     (void)json_object_set_new(root, "landmarks", encode(outcome->points));
     if (own->expected > 0.0) {
       (void)json_object_update_new(
@@ -120,7 +124,7 @@ static json_t *encode_state(const supine_command_state *state,
   return root;
 }
 
-static void print(const supine_command_subject *s, bool json) {
+static void print(const supine_validation *s, bool json) {
   json_t *states = json_array();
   for (size_t i = 0; i < s->count; ++i) {
     (void)json_array_append_new(states, encode_state(&s->state[i], &s->outcome[i]));
@@ -144,7 +148,7 @@ static void set_default_posture(supine_state *state, const double gravity[3]) {
 }
 
 /* Set the states to compare. A posture or a volume that was not given is that of --to. */
-static void set_states(const request *wanted, supine_command_subject *s) {
+static void set_states(const request *wanted, supine_validation *s) {
   static const double supine[3] = {0.0, 1.0, 0.0};
   supine_state to = wanted->to.state;
   set_default_posture(&to, supine);
@@ -161,7 +165,7 @@ static void set_states(const request *wanted, supine_command_subject *s) {
   }
 }
 
-static supine_status write_errors(const request *wanted, const supine_command_subject *s,
+static supine_status write_errors(const request *wanted, const supine_validation *s,
                                   supine_error *error) {
   if (supine_text_ends_in(wanted->path, ".png")) {
     return supine_command_draw_errors(s, wanted->path, error);
@@ -172,29 +176,39 @@ static supine_status write_errors(const request *wanted, const supine_command_su
   return supine_mesh_save(wanted->path, &shown, &save, error);
 }
 
-static supine_status validate(const request *wanted, supine_command_subject *s,
-                              supine_error *error) {
+/* Compare state i with its scan, and with the landmarks if it is the first. */
+static supine_status validate_state(const request *wanted, supine_validation *s, size_t i,
+                                    supine_error *error) {
+  const char *path = s->state[i].path;
+  const char *landmarks = i == 0 ? wanted->landmarks.path : NULL;
+  SUPINE_FREED_BY(supine_lungs_free) supine_lungs lungs = {0};
+  SUPINE_FREED_BY(supine_patient_pairs_free) supine_patient_pairs pairs = {0};
+  if (path != NULL) {
+    SUPINE_TRY(supine_command_load_lungs(name, path, &wanted->source, &lungs, error));
+  }
+  if (landmarks != NULL) {
+    SUPINE_TRY(supine_patient_pairs_load(landmarks, wanted->landmarks.reverse, &pairs, error));
+  }
+  return supine_validation_compare(s, i, path != NULL ? &lungs.mesh : NULL,
+                                   landmarks != NULL ? &pairs : NULL, error);
+}
+
+static supine_status validate(const request *wanted, supine_validation *s, supine_error *error) {
+  SUPINE_FREED_BY(supine_options_progress_end)
   supine_progress progress = supine_options_progress_begin(name);
-  supine_status status = SUPINE_OK;
-  for (size_t i = 0; i < s->count && status == SUPINE_OK; ++i) {
-    status =
-        supine_command_validate_state(s, i, &wanted->source, i == 0 ? wanted->landmarks.path : NULL,
-                                      wanted->landmarks.reverse, error);
+  for (size_t i = 0; i < s->count; ++i) {
+    SUPINE_TRY(validate_state(wanted, s, i, error));
     (void)supine_options_progress_step(&progress, (double)(i + 1) / (double)s->count);
   }
-  supine_options_progress_end(&progress);
-  supine_command_find_line(s);
-  if (status == SUPINE_OK && wanted->path != NULL) {
-    status = write_errors(wanted, s, error);
-  }
-  return status;
+  supine_validation_find_line(s);
+  return wanted->path != NULL ? write_errors(wanted, s, error) : SUPINE_OK;
 }
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   const request *wanted = chosen;
   const char *path = given->operand[0];
-  supine_command_subject s = {0};
-  supine_status status = SUPINE_OK;
+  SUPINE_FREED_BY(supine_options_basis_close) supine_basis *basis = NULL;
+  SUPINE_FREED_BY(supine_validation_free) supine_validation s = {0};
   if (wanted->count == 0 && wanted->landmarks.path == NULL) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "nothing to compare with: give --state or --landmarks");
@@ -204,10 +218,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
                             "-o writes the errors of a surface: name a surface with --state");
   }
   for (size_t i = 0; i < wanted->count && wanted->path != NULL; ++i) {
-    status = supine_options_check_output(wanted->path, wanted->state[i].path, error);
-    if (status != SUPINE_OK) {
-      return status;
-    }
+    SUPINE_TRY(supine_options_check_output(wanted->path, wanted->state[i].path, error));
   }
   if (supine_text_ends_in(path, ".json")) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
@@ -219,15 +230,12 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
             : wanted->landmarks.translation ? SUPINE_PATIENT_TRANSLATION
                                             : SUPINE_PATIENT_STILL;
   set_states(wanted, &s);
-  status = supine_command_subject_open(path, &s, error);
-  if (status == SUPINE_OK) {
-    status = validate(wanted, &s, error);
-  }
-  if (status == SUPINE_OK) {
-    print(&s, wanted->json);
-  }
-  supine_command_subject_free(&s);
-  return status;
+  SUPINE_TRY(supine_options_basis_open(path, SUPINE_STORAGE_AUTO, &basis, error));
+  s.basis = basis;
+  SUPINE_TRY(supine_validation_begin(&s, error));
+  SUPINE_TRY(validate(wanted, &s, error));
+  print(&s, wanted->json);
+  return SUPINE_OK;
 }
 
 const supine_command supine_command_validate = {

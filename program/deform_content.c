@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "base/arena.h"
 #include "base/output.h"
 #include "base/text.h"
 
@@ -82,32 +83,19 @@ supine_status supine_command_deform_content_check(const supine_deform_content *w
 
 supine_status supine_command_deform_content_read(supine_deform_content *wanted, const char *command,
                                                  supine_error *error) {
-  const char *path = wanted->image;
-  const supine_image *image = &wanted->source;
-  supine_status status = SUPINE_OK;
   if (wanted->labels != NULL) {
-    status = supine_image_read(wanted->labels, &wanted->label_source, error);
+    SUPINE_TRY(supine_image_read(wanted->labels, &wanted->label_source, error));
   }
-  if (status == SUPINE_OK && path != NULL) {
-    status = supine_image_read(path, &wanted->source, error);
+  if (wanted->image == NULL) {
+    return SUPINE_OK;
   }
-  if (status != SUPINE_OK || path == NULL) {
-    return status;
-  }
+  SUPINE_TRY(supine_image_read(wanted->image, &wanted->source, error));
   if (!wanted->density) {
     supine_options_say(command, "densities are not scaled by the change of volume; for a CT, give "
                                 "--density to keep the tissue's mass");
     return SUPINE_OK;
   }
-  bool aerated = false;
-  for (size_t i = 0; i < image->size[0] * image->size[1] * image->size[2] && !aerated; ++i) {
-    aerated = supine_image_get(image, i) < supine_field_aerated;
-  }
-  return aerated ? SUPINE_OK
-                 : supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                    "%s: no voxel is below %g, so the image is not in "
-                                    "Hounsfield units: convert it, or leave --density out",
-                                    path, supine_field_aerated);
+  return supine_field_check_hounsfield(&wanted->source, wanted->image, error);
 }
 
 bool supine_command_deform_content_wanted(const supine_deform_content *wanted) {
@@ -157,33 +145,22 @@ static supine_status write_points(const char *path, const supine_basis *basis,
                                   const supine_deformation *moved, bool each, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const supine_pose *const pose[2] = {&moved->from.pose, &moved->pose};
-  supine_command_names names;
-  supine_target *rows = NULL;
-  supine_output output = {0};
-  supine_status status = supine_command_names_open(basis, &names, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_FREED_BY(supine_command_names_close) supine_command_names names = {0};
+  SUPINE_FREED_BY(supine_command_targets_free) supine_target *rows = NULL;
+  supine_output output;
+  SUPINE_TRY(supine_command_names_open(basis, &names, error));
   const size_t count = each ? info->vertex_count : names.count;
-  status =
-      supine_command_targets_find(basis, &names, pose, moved->expected.sigma, each, &rows, error);
-  if (status == SUPINE_OK) {
-    status = supine_output_open(path, &output, error);
+  SUPINE_TRY(
+      supine_command_targets_find(basis, &names, pose, moved->expected.sigma, each, &rows, error));
+  SUPINE_TRY(supine_output_open(path, &output, error));
+  for (size_t i = 0; i < count && moved->subtract_hilum; ++i) {
+    supine_command_target_shift(&rows[i], moved->hilum);
   }
-  if (status == SUPINE_OK) {
-    for (size_t i = 0; i < count && moved->subtract_hilum; ++i) {
-      supine_command_target_shift(&rows[i], moved->hilum);
-    }
-    print_rows(moved, info, rows, count, output.file);
-    status = supine_output_commit(&output, error);
-  }
-  if (status == SUPINE_OK) {
-    (void)printf("%s: %zu %s%s, displacement from %s\n", path, count, each ? "point" : "structure",
-                 count == 1 ? "" : "s", moved->from.name);
-  }
-  free(rows);
-  supine_command_names_close(&names);
-  return status;
+  print_rows(moved, info, rows, count, output.file);
+  SUPINE_TRY(supine_output_commit(&output, error));
+  (void)printf("%s: %zu %s%s, displacement from %s\n", path, count, each ? "point" : "structure",
+               count == 1 ? "" : "s", moved->from.name);
+  return SUPINE_OK;
 }
 
 static supine_status write_field(const supine_deform_content *wanted, const char *from,
@@ -197,159 +174,93 @@ static supine_status write_field(const supine_deform_content *wanted, const char
                        "+ v(y) in %s"
                      : "displacement u(x), mm, LPS: the tissue at x, in %s, goes to x + u(x)",
                  from);
-  const supine_status status = supine_image_write(wanted->field, nodes, note, error);
-  if (status == SUPINE_OK) {
-    (void)printf("%s: %s field of %zu x %zu x %zu nodes\n", wanted->field,
-                 wanted->inverse ? "inverse" : "forward", nodes->size[0], nodes->size[1],
-                 nodes->size[2]);
-  }
-  return status;
+  SUPINE_TRY(supine_image_write(wanted->field, nodes, note, error));
+  (void)printf("%s: %s field of %zu x %zu x %zu nodes\n", wanted->field,
+               wanted->inverse ? "inverse" : "forward", nodes->size[0], nodes->size[1],
+               nodes->size[2]);
+  return SUPINE_OK;
 }
 
 /* Move an image to the file `path`. Unless `depth` is NULL, scale its densities. */
 static supine_status write_image(const char *path, const supine_image *source, bool labels,
                                  const supine_image *depth, const supine_field *inverse,
                                  supine_error *error) {
-  supine_image moved;
-  supine_status status = supine_field_resample(inverse, depth, labels, source, &moved, error);
-  if (status == SUPINE_OK) {
-    status = supine_image_write(path, &moved,
+  SUPINE_FREED_BY(supine_image_free) supine_image moved = {0};
+  SUPINE_TRY(supine_field_resample(inverse, depth, labels, source, &moved, error));
+  SUPINE_TRY(supine_image_write(path, &moved,
                                 depth != NULL ? "HU + 1000 inside the lungs scaled by the local "
                                                 "change of volume: mass is kept"
                                               : NULL,
-                                error);
-    supine_image_free(&moved);
-  }
-  if (status == SUPINE_OK) {
-    const size_t *size = source->size;
-    (void)printf("%s: %zu x %zu x %zu voxels%s\n", path, size[0], size[1], size[2],
-                 depth != NULL ? ", densities scaled inside the lungs" : "");
-  }
-  return status;
+                                error));
+  const size_t *size = source->size;
+  (void)printf("%s: %zu x %zu x %zu voxels%s\n", path, size[0], size[1], size[2],
+               depth != NULL ? ", densities scaled inside the lungs" : "");
+  return SUPINE_OK;
 }
 
 static supine_status invert(const supine_field *forward, supine_field *inverse,
                             supine_error *error) {
   supine_field_residual residual = {0};
-  const supine_status status = supine_field_invert(forward, inverse, &residual, error);
-  if (status == SUPINE_OK) {
-    (void)printf(
-        "field followed by inverse: residual %.3g mm RMS, %.3g mm at most, inside the lungs",
-        residual.rms, residual.largest);
-    if (residual.lost > 0) {
-      (void)printf("; the field folds and has no inverse at %zu %s", residual.lost,
-                   residual.lost == 1 ? "node" : "nodes");
-    }
-    (void)putchar('\n');
+  SUPINE_TRY(supine_field_invert(forward, inverse, &residual, error));
+  (void)printf("field followed by inverse: residual %.3g mm RMS, %.3g mm at most, inside the lungs",
+               residual.rms, residual.largest);
+  if (residual.lost > 0) {
+    (void)printf("; the field folds and has no inverse at %zu %s", residual.lost,
+                 residual.lost == 1 ? "node" : "nodes");
   }
-  return status;
-}
-
-/* Replace `second`, the displacement from the scan to state B, by u, the displacement from state A
- * to B: u(x) = v(x) + second(x + v(x)). v is the inverse of `first`, the displacement from the scan
- * to A. Also replace each node's depth below the lungs' surface by its depth in state A. */
-static supine_status join_fields(const supine_field *first, supine_field *second,
-                                 supine_error *error) {
-  supine_field back = {0};
-  supine_field_residual residual;
-  supine_status status = supine_field_invert(first, &back, &residual, error);
-  const size_t *size = second->nodes.size;
-  float *u = malloc(3 * size[0] * size[1] * size[2] * sizeof *u);
-  if (u == NULL || status != SUPINE_OK) {
-    free(u);
-    supine_field_free(&back);
-    return status != SUPINE_OK ? status
-                               : supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
-  }
-  for (size_t i = 0; i < size[0] * size[1] * size[2]; ++i) {
-    const float *v = (const float *)back.nodes.values + 3 * i;
-    double place[3];
-    double moved[3];
-    supine_image_place(&second->nodes, i, place);
-    for (size_t k = 0; k < 3; ++k) {
-      place[k] += (double)v[k];
-    }
-    supine_field_at(second, place, moved);
-    for (size_t k = 0; k < 3; ++k) {
-      u[3 * i + k] = (float)(moved[k] + (double)v[k]);
-    }
-  }
-  free(second->nodes.values);
-  second->nodes.values = u;
-  supine_image depth;
-  status = supine_field_resample(&back, NULL, false, &second->depth, &depth, error);
-  if (status == SUPINE_OK) {
-    supine_image_free(&second->depth);
-    second->depth = depth;
-  }
-  supine_field_free(&back);
-  return status;
+  (void)putchar('\n');
+  return SUPINE_OK;
 }
 
 /* Compute the displacement field to the pose `moved`, from the scan or the state of --from, and
  * check that it does not fold. */
 static supine_status find_field(const supine_basis *basis, const supine_deformation *moved,
                                 supine_field *field, supine_error *error) {
-  supine_field first = {0};
-  supine_status status = supine_field_create(basis, &moved->pose, fade, field, error);
-  if (status == SUPINE_OK && moved->from_given) {
-    status = supine_field_create(basis, &moved->from.pose, fade, &first, error);
-  }
-  if (status == SUPINE_OK && moved->from_given) {
-    status = join_fields(&first, field, error);
-  }
-  supine_field_free(&first);
-  if (status == SUPINE_OK) {
-    const supine_plausible lungs = {
-        .command = "deform",
-        .state = &moved->state,
-        .folded = supine_field_folded(field),
-        .parts = "the field folds; cells that turn over, relative to those in the lungs",
-        .allowed = moved->allow_folds || !supine_basis_get_info(basis)->has_rest};
-    status = supine_options_plausible(&lungs, error);
-  }
-  return status;
+  SUPINE_TRY(supine_field_between(basis, moved->from_given ? &moved->from.pose : NULL, &moved->pose,
+                                  fade, field, error));
+  const supine_plausible lungs = {
+      .command = "deform",
+      .state = &moved->state,
+      .folded = supine_field_folded(field),
+      .parts = "the field folds; cells that turn over, relative to those in the lungs",
+      .allowed = moved->allow_folds || !supine_basis_get_info(basis)->has_rest};
+  return supine_options_plausible(&lungs, error);
 }
 
 static supine_status move_grid(const supine_deform_content *wanted, const supine_basis *basis,
                                const supine_deformation *moved, supine_error *error) {
   const bool image = wanted->image != NULL;
   const bool labels = wanted->labels != NULL;
-  supine_field forward = {0};
-  supine_field inverse = {0};
-  supine_status status = find_field(basis, moved, &forward, error);
-  if (status == SUPINE_OK && (image || labels || wanted->inverse)) {
-    status = invert(&forward, &inverse, error);
+  SUPINE_FREED_BY(supine_field_free) supine_field forward = {0};
+  SUPINE_FREED_BY(supine_field_free) supine_field inverse = {0};
+  SUPINE_TRY(find_field(basis, moved, &forward, error));
+  if (image || labels || wanted->inverse) {
+    SUPINE_TRY(invert(&forward, &inverse, error));
   }
-  if (status == SUPINE_OK && wanted->field != NULL) {
-    status = write_field(wanted, moved->from.name, &forward, &inverse, error);
+  if (wanted->field != NULL) {
+    SUPINE_TRY(write_field(wanted, moved->from.name, &forward, &inverse, error));
   }
-  if (status == SUPINE_OK && image) {
-    status = write_image(wanted->path, &wanted->source, false,
-                         wanted->density ? &forward.depth : NULL, &inverse, error);
+  if (image) {
+    SUPINE_TRY(write_image(wanted->path, &wanted->source, false,
+                           wanted->density ? &forward.depth : NULL, &inverse, error));
   }
-  if (status == SUPINE_OK && labels) {
-    status = write_image(image ? wanted->labels_path : wanted->path, &wanted->label_source, true,
-                         NULL, &inverse, error);
+  if (labels) {
+    SUPINE_TRY(write_image(image ? wanted->labels_path : wanted->path, &wanted->label_source, true,
+                           NULL, &inverse, error));
   }
-  supine_field_free(&forward);
-  supine_field_free(&inverse);
-  return status;
+  return SUPINE_OK;
 }
 
 supine_status supine_command_deform_content(const supine_deform_content *wanted,
                                             const supine_basis *basis,
                                             const supine_deformation *moved, supine_error *error) {
-  supine_status status = SUPINE_OK;
   if (wanted->field != NULL || wanted->image != NULL || wanted->labels != NULL) {
-    status = move_grid(wanted, basis, moved, error);
+    SUPINE_TRY(move_grid(wanted, basis, moved, error));
   }
-  if (status == SUPINE_OK && wanted->path != NULL && supine_text_ends_in(wanted->path, ".csv")) {
-    status = write_points(wanted->path, basis, moved, wanted->vertices, error);
-    if (status == SUPINE_OK) {
-      supine_options_expected_print(&moved->expected, stdout);
-      supine_options_hilum_print(moved->hilum, moved->subtract_hilum);
-    }
+  if (wanted->path != NULL && supine_text_ends_in(wanted->path, ".csv")) {
+    SUPINE_TRY(write_points(wanted->path, basis, moved, wanted->vertices, error));
+    supine_options_expected_print(&moved->expected, stdout);
+    supine_options_hilum_print(moved->hilum, moved->subtract_hilum);
   }
-  return status;
+  return SUPINE_OK;
 }

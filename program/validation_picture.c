@@ -4,7 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "program/validation.h"
+#include "base/arena.h"
+#include "program/validation_picture.h"
 
 #include "base/vec3.h"
 #include "program/view/render/render.h"
@@ -15,7 +16,7 @@ static const double end_least = 1.0;
 /* Set value[i] to the distance of predicted vertex i from the scanned surface, mm. Set *largest to
  * the maximum of these distances and its previous value. Raise *bar_end to at least the 95th
  * percentile of the distances between predicted and scanned surface. */
-static void find_values(const supine_command_subject *s, const supine_command_outcome *outcome,
+static void find_values(const supine_validation *s, const supine_validation_outcome *outcome,
                         float *value, double *largest, double *bar_end) {
   for (size_t i = 0; i < s->start.vertex_count; ++i) {
     const double off = supine_distance(outcome->predicted + 3 * i, outcome->nearest + 3 * i);
@@ -25,28 +26,33 @@ static void find_values(const supine_command_subject *s, const supine_command_ou
   *bar_end = fmax(*bar_end, outcome->surface[SUPINE_PATIENT_MAP_PREDICTED].p95);
 }
 
-supine_status supine_command_draw_errors(const supine_command_subject *subject, const char *path,
+static void destroy(supine_renderer **renderer) {
+  supine_render_destroy(*renderer);
+}
+
+supine_status supine_command_draw_errors(const supine_validation *subject, const char *path,
                                          supine_error *error) {
   static const supine_view views[2] = {SUPINE_VIEW_ANTERIOR, SUPINE_VIEW_POSTERIOR};
-  const supine_command_subject *s = subject;
+  const supine_validation *s = subject;
   const size_t n = s->start.vertex_count;
-  supine_panel panel[SUPINE_COMMAND_STATES_MAX] = {{0}};
-  char subtitle[SUPINE_COMMAND_STATES_MAX][96];
-  supine_renderer *renderer = NULL;
+  supine_panel panel[SUPINE_VALIDATION_STATES_MAX] = {{0}};
+  char subtitle[SUPINE_VALIDATION_STATES_MAX][96];
+  SUPINE_FREED_BY(destroy) supine_renderer *renderer = NULL;
   double largest = 0.0;
   double bar_end = end_least;
   size_t count = 0;
-  float *values = malloc(SUPINE_COMMAND_STATES_MAX * n * sizeof *values);
+  SUPINE_ARENA arena = {0};
+  float *values = supine_arena_take(&arena, SUPINE_VALIDATION_STATES_MAX * n, sizeof *values);
   if (values == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
+    return supine_error_memory(error, "%zu vertices", n);
   }
   for (size_t i = 0; i < s->count; ++i) {
-    const supine_command_outcome *outcome = &s->outcome[i];
+    const supine_validation_outcome *outcome = &s->outcome[i];
     if (!outcome->has_surface) {
       continue;
     }
     find_values(s, outcome, values + count * n, &largest, &bar_end);
-    const supine_command_distance *off = &outcome->surface[SUPINE_PATIENT_MAP_PREDICTED];
+    const supine_validation_distance *off = &outcome->surface[SUPINE_PATIENT_MAP_PREDICTED];
     (void)snprintf(subtitle[count], sizeof subtitle[count], "%+.0f mL, RMS %.1f, Hausdorff %.1f mm",
                    outcome->millilitres, off->rms, off->largest);
     panel[count] =
@@ -67,11 +73,6 @@ supine_status supine_command_draw_errors(const supine_command_subject *subject, 
                             .width = 20 + 440 * count,
                             .height = 120 + 480 * 2};
   picture.beyond = largest > picture.largest;
-  supine_status status = supine_render_create(s->basis, &renderer, error);
-  if (status == SUPINE_OK) {
-    status = supine_render_picture_save(renderer, &picture, path, error);
-  }
-  supine_render_destroy(renderer);
-  free(values);
-  return status;
+  SUPINE_TRY(supine_render_create(s->basis, &renderer, error));
+  return supine_render_picture_save(renderer, &picture, path, error);
 }

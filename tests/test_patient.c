@@ -12,7 +12,7 @@
 #include "precompute/lungs/surface.h"
 #include "precompute/patient/krige.h"
 #include "precompute/patient/patient_file.h"
-#include "program/validation.h"
+#include "precompute/validation/validation.h"
 #include "runtime/kriging.h"
 
 /* Fit a displacement law to pairs of points, as `supine fit` does. */
@@ -563,7 +563,7 @@ TEST(test_gain_fit_third_scan_recovers_gain) {
 
 TEST(test_compare_points_each_map_explains_its_motions) {
   supine_patient_pairs pairs = scatter(80, 21);
-  supine_command_distance distance[SUPINE_PATIENT_MAP_COUNT];
+  supine_validation_distance distance[SUPINE_PATIENT_MAP_COUNT];
   supine_error error;
   static const double turned[3][3] = {/* a rotation by 10 degrees about z, times 1.1 */
                                       {1.08329, -0.19101, 0.0},
@@ -578,7 +578,7 @@ TEST(test_compare_points_each_map_explains_its_motions) {
     }
   }
   assert_int_equal(
-      supine_command_compare_points(&pairs, pairs.to, NULL, SUPINE_PATIENT_STILL, distance, &error),
+      supine_validation_points(&pairs, pairs.to, NULL, SUPINE_PATIENT_STILL, distance, &error),
       SUPINE_OK);
   const double none = distance[SUPINE_PATIENT_MAP_NONE].rms;
   assert_true(none > 10.0);
@@ -589,7 +589,7 @@ TEST(test_compare_points_each_map_explains_its_motions) {
   for (size_t i = 0; i < pairs.count; ++i) {
     pairs.to[3 * i] += 0.2 * pairs.from[3 * i + 1]; /* a shear */
   }
-  assert_int_equal(supine_command_compare_points(&pairs, pairs.from, NULL, SUPINE_PATIENT_STILL,
+  assert_int_equal(supine_validation_points(&pairs, pairs.from, NULL, SUPINE_PATIENT_STILL,
                                                  distance, &error),
                    SUPINE_OK);
   assert_true(distance[SUPINE_PATIENT_MAP_AFFINE].largest < 1e-9 * none);
@@ -604,18 +604,18 @@ TEST(test_compare_points_each_map_explains_its_motions) {
     turned_by[3 * i + 1] = pairs.to[3 * i];
     turned_by[3 * i + 2] = pairs.to[3 * i + 2] - 7.0;
   }
-  assert_int_equal(supine_command_compare_points(&pairs, turned_by, NULL, SUPINE_PATIENT_RIGID,
+  assert_int_equal(supine_validation_points(&pairs, turned_by, NULL, SUPINE_PATIENT_RIGID,
                                                  distance, &error),
                    SUPINE_OK);
   assert_true(distance[SUPINE_PATIENT_MAP_PREDICTED].largest < 1e-9);
-  assert_int_equal(supine_command_compare_points(&pairs, turned_by, NULL,
+  assert_int_equal(supine_validation_points(&pairs, turned_by, NULL,
                                                  SUPINE_PATIENT_TRANSLATION, distance, &error),
                    SUPINE_OK);
   assert_true(distance[SUPINE_PATIENT_MAP_PREDICTED].rms > 10.0);
   assert_true(distance[SUPINE_PATIENT_MAP_TRANSLATION].explained == 0.0);
   /* Without motion, the explained fraction of the motion is undefined. */
   memcpy(pairs.to, pairs.from, 3 * pairs.count * sizeof *pairs.to);
-  assert_int_equal(supine_command_compare_points(&pairs, turned_by, NULL, SUPINE_PATIENT_STILL,
+  assert_int_equal(supine_validation_points(&pairs, turned_by, NULL, SUPINE_PATIENT_STILL,
                                                  distance, &error),
                    SUPINE_OK);
   assert_true(isnan(distance[SUPINE_PATIENT_MAP_PREDICTED].explained));
@@ -651,8 +651,8 @@ TEST(test_compare_surfaces_sampled_vertices_keep_statistics) {
     supine_inside_surface_destroy(tree);
     free(distance);
   }
-  supine_command_distance of[SUPINE_PATIENT_MAP_COUNT];
-  assert_int_equal(supine_command_compare_surfaces(&start, SUPINE_PATIENT_STILL, predicted, &end,
+  supine_validation_distance of[SUPINE_PATIENT_MAP_COUNT];
+  assert_int_equal(supine_validation_surfaces(&start, SUPINE_PATIENT_STILL, predicted, &end,
                                                    nearest, of, NULL),
                    SUPINE_OK);
   print_message("without motion: mean %.4f mm, of all vertices %.4f mm\n",

@@ -35,8 +35,7 @@ typedef struct supine_fields {
  * @retval SUPINE_ERROR_READ    the file is missing
  * @retval SUPINE_ERROR_FORMAT  malformed, or without points; a direction that is zero, repeated or
  *   not finite; a point or a displacement that is not finite
- * @retval SUPINE_ERROR_MESH    a vertex without a point of its own; two points at one vertex
- * @retval SUPINE_ERROR_MEMORY */
+ * @retval SUPINE_ERROR_MESH    a vertex without a point of its own; two points at one vertex */
 supine_status supine_fields_load(const char *path, const supine_lungs *lungs,
                                  const supine_scan_frame *frame, supine_fields *fields,
                                  supine_error *error);
@@ -67,16 +66,14 @@ typedef struct supine_fit_options {
  * @param compression  written; it has one row for each coordinate of each vertex. Release it
  *   with supine_sh_compression_free
  * @retval SUPINE_ERROR_ARGUMENT   fewer than two directions, or too few to determine options->band
- * @retval SUPINE_ERROR_NUMERICAL  all displacements are zero, or a decomposition failed
- * @retval SUPINE_ERROR_MEMORY */
+ * @retval SUPINE_ERROR_NUMERICAL  all displacements are zero, or a decomposition failed */
 supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_options *options,
                                 supine_compression *compression, supine_fit_report *report,
                                 supine_error *error);
 
 /** Fit the fields (supine_fields_fit), and write a basis file. Gain 1 (the factor on the
  * displacement) reproduces the given displacements. Of `basis`, only the number of modes and the
- * texts are used.
- * @retval SUPINE_ERROR_WRITE, and those of supine_fields_fit */
+ * texts are used. */
 supine_status supine_fields_write(const supine_lungs *lungs, const supine_fields *fields,
                                   const supine_fit_options *options,
                                   const supine_precompute_options *basis, const char *path,

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/lapack.h"
 #include "base/vec3.h"
 #include "precompute/basis_file.h"
@@ -54,50 +55,37 @@ typedef struct fitting {
   size_t rows;  /* 3 x number of vertices */
   double *gram; /* [directions, directions] scalar products of any two input fields, mm^2 */
   fit chosen;
+  supine_arena arena;
   prediction work;
 } fitting;
 
-static void fit_free(fit *f) {
-  free(f->harmonics);
-  free(f->pinv);
-  *f = (fit){0};
-}
-
-static supine_status fit_create(size_t band, size_t count, const double *directions, fit *f) {
+/* Fit harmonics up to degree `band`. The arrays of the fit are valid until `kept` is freed. */
+static supine_status fit_create(size_t band, size_t count, const double *directions,
+                                supine_arena *kept, fit *f) {
   const size_t terms = supine_sh_count(band);
   const int m = (int)count;
   const int p = (int)terms;
+  SUPINE_ARENA arena = {0};
   *f = (fit){.count = count, .terms = terms};
-  f->harmonics = calloc(count * terms, sizeof *f->harmonics);
-  f->pinv = malloc(terms * count * sizeof *f->pinv);
-  double *a = malloc(count * terms * sizeof *a);
-  double *u = malloc(count * terms * sizeof *u);
-  double *vt = malloc(terms * terms * sizeof *vt);
-  double *s = calloc(terms, sizeof *s);
-  supine_status status = SUPINE_ERROR_MEMORY;
-  if (f->harmonics != NULL && f->pinv != NULL && a != NULL && u != NULL && vt != NULL &&
-      s != NULL) {
-    status = supine_sh_evaluate_many(band, count, directions, f->harmonics);
+  f->harmonics = supine_arena_zeros(kept, count * terms, sizeof *f->harmonics);
+  f->pinv = supine_arena_take(kept, terms * count, sizeof *f->pinv);
+  double *a = supine_arena_take(&arena, count * terms, sizeof *a);
+  double *u = supine_arena_take(&arena, count * terms, sizeof *u);
+  double *vt = supine_arena_take(&arena, terms * terms, sizeof *vt);
+  double *s = supine_arena_zeros(&arena, terms, sizeof *s);
+  if (kept->failed || arena.failed) {
+    return SUPINE_ERROR_MEMORY;
   }
-  if (status == SUPINE_OK) {
-    memcpy(a, f->harmonics, count * terms * sizeof *a);
-    status =
-        supine_lapack_status(LAPACKE_dgesdd(LAPACK_ROW_MAJOR, 'S', m, p, a, p, s, u, p, vt, p));
+  SUPINE_TRY(supine_sh_evaluate_many(band, count, directions, f->harmonics));
+  memcpy(a, f->harmonics, count * terms * sizeof *a);
+  SUPINE_TRY(
+      supine_lapack_status(LAPACKE_dgesdd(LAPACK_ROW_MAJOR, 'S', m, p, a, p, s, u, p, vt, p)));
+  f->condition = s[terms - 1] > 0.0 ? s[0] / s[terms - 1] : INFINITY;
+  for (size_t t = 0; t < terms; ++t) {
+    cblas_dscal(p, 1.0 / s[t], vt + t * terms, 1);
   }
-  if (status == SUPINE_OK) {
-    f->condition = s[terms - 1] > 0.0 ? s[0] / s[terms - 1] : INFINITY;
-    for (size_t t = 0; t < terms; ++t) {
-      cblas_dscal(p, 1.0 / s[t], vt + t * terms, 1);
-    }
-    cblas_dgemm(CblasRowMajor, CblasTrans, CblasTrans, p, m, p, 1.0, vt, p, u, p, 0.0, f->pinv, m);
-  } else {
-    fit_free(f);
-  }
-  free(a);
-  free(u);
-  free(vt);
-  free(s);
-  return status;
+  cblas_dgemm(CblasRowMajor, CblasTrans, CblasTrans, p, m, p, 1.0, vt, p, u, p, 0.0, f->pinv, m);
+  return SUPINE_OK;
 }
 
 static double leverage(const fit *f, size_t d) {
@@ -112,19 +100,21 @@ static bool fit_is_determined(const fit *f) {
   return determined;
 }
 
-/* Allocate all arrays in one block. Each matrix has room for M x M numbers, where M is the number
- * of fields, because only fits with fewer than M harmonics are tried. */
+/* Each matrix has room for M x M numbers, where M is the number of fields, because only fits with
+ * fewer than M harmonics are tried. */
 static supine_status allocate(fitting *w, supine_error *error) {
   const size_t m = w->fields->direction_count;
-  const size_t square = m * m;
-  double *next = w->gram = malloc((5 * square + 4 * m) * sizeof *next);
-  if (next == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu fields", m);
+  double **const matrices[] = {&w->gram, &w->work.pinv, &w->work.pinv_gram,
+                               &w->work.coefficient_gram, &w->work.eigenvectors};
+  double **const lists[] = {&w->work.eigenvalues, &w->work.target, &w->work.residual,
+                            &w->work.gram_residual};
+  for (size_t i = 0; i < sizeof matrices / sizeof *matrices; ++i) {
+    *matrices[i] = supine_arena_take(&w->arena, m * m, sizeof(double));
   }
-  double *lists = next + 5 * square;
-  w->work = (prediction){next + square,     next + 2 * square, next + 3 * square, lists,
-                         next + 4 * square, lists + m,         lists + 2 * m,     lists + 3 * m};
-  return SUPINE_OK;
+  for (size_t i = 0; i < sizeof lists / sizeof *lists; ++i) {
+    *lists[i] = supine_arena_take(&w->arena, m, sizeof(double));
+  }
+  return w->arena.failed ? supine_error_memory(error, "%zu fields", m) : SUPINE_OK;
 }
 
 /* Predict the field for direction d of gravity from the fields for all other directions. Use the
@@ -142,7 +132,6 @@ static supine_status predict(const fitting *w, const fit *f, size_t d, size_t mo
   const int m = (int)f->count;
   const int p = (int)f->terms;
   const double *y = f->harmonics + d * f->terms;
-  supine_status status = SUPINE_OK;
   cblas_dgemv(CblasRowMajor, CblasTrans, p, m, -1.0, f->pinv, m, y, 1, 0.0, o->residual, 1);
   o->residual[d] += 1.0;
   memcpy(o->pinv, f->pinv, f->terms * f->count * sizeof *o->pinv);
@@ -154,10 +143,10 @@ static supine_status predict(const fitting *w, const fit *f, size_t d, size_t mo
                 0.0, o->pinv_gram, m);
     cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, p, p, m, 1.0, o->pinv_gram, m, o->pinv, m,
                 0.0, o->coefficient_gram, p);
-    status = supine_sh_leading_eigenpairs(f->terms, o->coefficient_gram, modes, o->eigenvalues,
-                                          o->eigenvectors);
+    SUPINE_TRY(supine_sh_leading_eigenpairs(f->terms, o->coefficient_gram, modes, o->eigenvalues,
+                                            o->eigenvectors));
     memset(o->target, 0, f->terms * sizeof *o->target);
-    for (size_t k = 0; k < modes && status == SUPINE_OK; ++k) {
+    for (size_t k = 0; k < modes; ++k) {
       const double *mode = o->eigenvectors + k * f->terms;
       cblas_daxpy(p, cblas_ddot(p, mode, 1, y, 1), mode, 1, o->target, 1);
     }
@@ -167,7 +156,7 @@ static supine_status predict(const fitting *w, const fit *f, size_t d, size_t mo
   cblas_dsymv(CblasRowMajor, CblasUpper, m, 1.0, w->gram, m, o->residual, 1, 0.0, o->gram_residual,
               1);
   *square = fmax(cblas_ddot(m, o->gram_residual, 1, o->residual, 1), 0.0);
-  return status;
+  return SUPINE_OK;
 }
 
 /* Sum the squared displacements of all fields, mm^2. */
@@ -196,13 +185,12 @@ static supine_status choose_band(fitting *w, int wanted, supine_fit_report *repo
   size_t determined_count = 0;
   for (size_t band = 0; band <= SUPINE_FIT_BAND_MAX && supine_sh_count(band) < m; ++band) {
     fit trial;
-    const supine_status status = fit_create(band, m, w->fields->directions, &trial);
+    const supine_status status = fit_create(band, m, w->fields->directions, &w->arena, &trial);
     if (status != SUPINE_OK) {
       return supine_error_set(error, status, "fit of band %zu: %s", band,
                               supine_status_string(status));
     }
     if (!fit_is_determined(&trial)) {
-      fit_free(&trial);
       break;
     }
     report->error[band] = leave_one_out(w, &trial);
@@ -210,11 +198,8 @@ static supine_status choose_band(fitting *w, int wanted, supine_fit_report *repo
     if (wanted < 0 ? report->error[band] < worthwhile * least && least > exact
                    : (size_t)wanted == band) {
       least = report->error[band];
-      fit_free(&w->chosen);
       w->chosen = trial;
       report->band = band;
-    } else {
-      fit_free(&trial);
     }
   }
   if (w->chosen.harmonics == NULL) {
@@ -238,7 +223,7 @@ static supine_status project(const fitting *w, size_t band, supine_expansion *ma
   made->columns = malloc(w->rows * m * sizeof *made->columns);
   made->functions = malloc(m * terms * sizeof *made->functions);
   if (made->columns == NULL || made->functions == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu fields", m);
+    return supine_error_memory(error, "%zu fields", m);
   }
   for (size_t d = 0; d < m; ++d) {
     for (size_t i = 0; i < w->rows; ++i) {
@@ -255,12 +240,18 @@ static supine_status cross_validate(const fitting *w, size_t modes, supine_accur
                                     supine_error *error) {
   const size_t m = w->fields->direction_count;
   const double samples = (double)m * (double)w->fields->vertex_count;
-  supine_tally *tally = calloc(1, sizeof *tally);
-  double *residual = malloc(w->rows * sizeof *residual);
-  supine_status status = tally == NULL || residual == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
-  for (size_t d = 0; d < m && status == SUPINE_OK; ++d) {
+  SUPINE_ARENA arena = {0};
+  supine_tally *tally = supine_arena_zeros(&arena, 1, sizeof *tally);
+  double *residual = supine_arena_take(&arena, w->rows, sizeof *residual);
+  if (arena.failed) {
+    return supine_error_memory(error, "%zu vertices", w->fields->vertex_count);
+  }
+  for (size_t d = 0; d < m; ++d) {
     double square;
-    status = predict(w, &w->chosen, d, modes, &square);
+    const supine_status status = predict(w, &w->chosen, d, modes, &square);
+    if (status != SUPINE_OK) {
+      return supine_error_set(error, status, "cross-validation: %s", supine_status_string(status));
+    }
     cblas_dgemv(CblasRowMajor, CblasTrans, (int)m, (int)w->rows, 1.0, w->fields->displacement,
                 (int)w->rows, w->work.residual, 1, 0.0, residual, 1);
     for (size_t i = 0; i < w->rows; i += 3) {
@@ -268,21 +259,15 @@ static supine_status cross_validate(const fitting *w, size_t modes, supine_accur
       supine_accuracy_tally_add(tally, 1, &length);
     }
   }
-  if (status == SUPINE_OK) {
-    const double size = sqrt(square_sum(w) / samples);
-    *accuracy = (supine_accuracy){.direction_count = m,
-                                  .rms_mm = sqrt(tally->square_sum / samples),
-                                  .p95_mm = supine_accuracy_tally_percentile(tally, 0.95),
-                                  .max_mm = tally->largest};
-    accuracy->relative_rms = accuracy->rms_mm / size;
-    accuracy->relative_p95 = accuracy->p95_mm / size;
-    accuracy->relative_max = accuracy->max_mm / size;
-  } else {
-    (void)supine_error_set(error, status, "cross-validation: %s", supine_status_string(status));
-  }
-  free(tally);
-  free(residual);
-  return status;
+  const double size = sqrt(square_sum(w) / samples);
+  *accuracy = (supine_accuracy){.direction_count = m,
+                                .rms_mm = sqrt(tally->square_sum / samples),
+                                .p95_mm = supine_accuracy_tally_percentile(tally, 0.95),
+                                .max_mm = tally->largest};
+  accuracy->relative_rms = accuracy->rms_mm / size;
+  accuracy->relative_p95 = accuracy->p95_mm / size;
+  accuracy->relative_max = accuracy->max_mm / size;
+  return SUPINE_OK;
 }
 
 /* Compress the chosen fit to modes, or use its harmonics. */
@@ -293,14 +278,14 @@ static supine_status compress(const supine_expansion *expansion, const supine_fi
   if (options->modes == 0) {
     return supine_sh_compress_harmonics(expansion, made, error);
   }
-  const supine_status status =
-      supine_sh_compress_modes(expansion, NULL, options->modes, made, singular, &total, error);
-  if (status == SUPINE_OK && options->fewest_modes) {
+  SUPINE_TRY(
+      supine_sh_compress_modes(expansion, NULL, options->modes, made, singular, &total, error));
+  if (options->fewest_modes) {
     supine_sh_compression_truncate(
         made, expansion->rank,
         supine_sh_modes_needed(made->mode_count, singular, total, fmax(fit_error, negligible)));
   }
-  return status;
+  return SUPINE_OK;
 }
 
 /* Subtract from each mode its weight w in the posture of the scan. The constant harmonic is
@@ -314,75 +299,58 @@ static void subtract_scan(const double scan_gravity[3], supine_compression *made
   }
 }
 
+static void free_fitting(fitting *w) {
+  supine_arena_free(&w->arena);
+}
+
 supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_options *options,
                                 supine_compression *compression, supine_fit_report *report,
                                 supine_error *error) {
   const int m = (int)fields->direction_count;
-  fitting w = {.fields = fields, .rows = 3 * fields->vertex_count};
+  SUPINE_FREED_BY(free_fitting) fitting w = {.fields = fields, .rows = 3 * fields->vertex_count};
   const int rows = (int)w.rows;
-  supine_expansion expansion = {0};
-  supine_compression made = {0};
+  SUPINE_FREED_BY(supine_sh_expansion_free) supine_expansion expansion = {0};
+  SUPINE_FREED_BY(supine_sh_compression_free) supine_compression made = {0};
   supine_fit_report found = {0};
   if (m < 2) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "too few directions of gravity (%d): give fields for at least two", m);
   }
-  supine_status status = allocate(&w, error);
-  if (status == SUPINE_OK) {
-    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, m, m, rows, 1.0, fields->displacement,
-                rows, fields->displacement, rows, 0.0, w.gram, m);
-    status =
-        square_sum(&w) > 0.0
-            ? choose_band(&w, options->band, &found, error)
-            : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                               "all displacements are zero: give fields that move the surface");
+  SUPINE_TRY(allocate(&w, error));
+  cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, m, m, rows, 1.0, fields->displacement, rows,
+              fields->displacement, rows, 0.0, w.gram, m);
+  if (!(square_sum(&w) > 0.0)) {
+    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                            "all displacements are zero: give fields that move the surface");
   }
-  if (status == SUPINE_OK) {
-    status = project(&w, found.band, &expansion, error);
+  SUPINE_TRY(choose_band(&w, options->band, &found, error));
+  SUPINE_TRY(project(&w, found.band, &expansion, error));
+  SUPINE_TRY(compress(&expansion, options, found.error[found.band], &made, error));
+  SUPINE_TRY(cross_validate(&w, options->modes == 0 ? 0 : made.mode_count, &found.accuracy, error));
+  if (options->scan_gravity != NULL) {
+    subtract_scan(options->scan_gravity, &made);
   }
-  if (status == SUPINE_OK) {
-    status = compress(&expansion, options, found.error[found.band], &made, error);
-  }
-  if (status == SUPINE_OK) {
-    status = cross_validate(&w, options->modes == 0 ? 0 : made.mode_count, &found.accuracy, error);
-  }
-  if (status == SUPINE_OK) {
-    if (options->scan_gravity != NULL) {
-      subtract_scan(options->scan_gravity, &made);
-    }
-    found.mode_count = made.mode_count;
-    *compression = made;
-    *report = found;
-  } else {
-    supine_sh_compression_free(&made);
-  }
-  supine_sh_expansion_free(&expansion);
-  free(w.gram);
-  fit_free(&w.chosen);
-  return status;
+  found.mode_count = made.mode_count;
+  *compression = made;
+  *report = found;
+  made = (supine_compression){0};
+  return SUPINE_OK;
 }
 
 supine_status supine_fields_write(const supine_lungs *lungs, const supine_fields *fields,
                                   const supine_fit_options *options,
                                   const supine_precompute_options *basis, const char *path,
                                   supine_fit_report *report, supine_error *error) {
-  supine_compression field = {0};
-  supine_volume_forms forms = {0};
-  supine_status status = supine_fields_fit(fields, options, &field, report, error);
-  if (status == SUPINE_OK) {
-    status = supine_projection_volume_forms(&field, lungs, NULL, NULL, &forms, error);
-  }
-  if (status == SUPINE_OK) {
-    const supine_basis_content content = {.lungs = lungs,
-                                          .options = basis,
-                                          .is_fields = true,
-                                          .scan_gravity = options->scan_gravity,
-                                          .compression = &field,
-                                          .forms = &forms,
-                                          .accuracy = &report->accuracy};
-    status = supine_writer_basis_write(path, &content, error);
-  }
-  supine_sh_compression_free(&field);
-  supine_physics_volume_forms_free(&forms);
-  return status;
+  SUPINE_FREED_BY(supine_sh_compression_free) supine_compression field = {0};
+  SUPINE_FREED_BY(supine_physics_volume_forms_free) supine_volume_forms forms = {0};
+  SUPINE_TRY(supine_fields_fit(fields, options, &field, report, error));
+  SUPINE_TRY(supine_projection_volume_forms(&field, lungs, NULL, NULL, &forms, error));
+  const supine_basis_content content = {.lungs = lungs,
+                                        .options = basis,
+                                        .is_fields = true,
+                                        .scan_gravity = options->scan_gravity,
+                                        .compression = &field,
+                                        .forms = &forms,
+                                        .accuracy = &report->accuracy};
+  return supine_writer_basis_write(path, &content, error);
 }

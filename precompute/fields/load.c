@@ -5,6 +5,7 @@
 
 #include <supine/safetensors.h>
 
+#include "base/arena.h"
 #include "base/text.h"
 #include "base/vec3.h"
 #include "precompute/fields/fields.h"
@@ -20,6 +21,7 @@ static const double farthest_point = 1e-4;
 /* A file being read. */
 typedef struct reading {
   const char *path;
+  supine_safetensors *file;
   const supine_lungs *lungs;
   supine_scan_frame frame;
   const supine_tensor *points, *gravity, *displacement;
@@ -28,6 +30,7 @@ typedef struct reading {
   uint32_t *corner; /* [N, 3] the number of each vertex, three times */
   supine_fields fields;
   supine_error *error;
+  supine_arena arena;
 } reading;
 
 void supine_fields_free(supine_fields *fields) {
@@ -39,16 +42,14 @@ void supine_fields_free(supine_fields *fields) {
 static supine_status allocate(reading *r) {
   const size_t m = r->fields.direction_count = r->gravity->shape[0];
   const size_t n = r->fields.vertex_count = r->lungs->mesh.vertex_count;
-  r->point_of = malloc(n * sizeof *r->point_of);
-  r->apart = malloc(n * sizeof *r->apart);
-  r->corner = malloc(3 * n * sizeof *r->corner);
+  r->point_of = supine_arena_take(&r->arena, n, sizeof *r->point_of);
+  r->apart = supine_arena_take(&r->arena, n, sizeof *r->apart);
+  r->corner = supine_arena_take(&r->arena, 3 * n, sizeof *r->corner);
   r->fields.directions = malloc(3 * m * sizeof *r->fields.directions);
   r->fields.displacement = malloc(3 * m * n * sizeof *r->fields.displacement);
-  return r->point_of != NULL && r->apart != NULL && r->corner != NULL &&
-                 r->fields.directions != NULL && r->fields.displacement != NULL
-             ? SUPINE_OK
-             : supine_error_set(r->error, SUPINE_ERROR_MEMORY,
-                                "no memory for %zu fields of %zu vertices", m, n);
+  return r->arena.failed || r->fields.directions == NULL || r->fields.displacement == NULL
+             ? supine_error_memory(r->error, "%zu fields of %zu vertices", m, n)
+             : SUPINE_OK;
 }
 
 /* Read row `row` of a tensor [..., 3], converted to LPS and times `scale`. Return whether it is
@@ -115,28 +116,27 @@ static supine_status match_points(const reading *r) {
   const supine_lungs *lungs = r->lungs;
   const size_t n = lungs->mesh.vertex_count;
   const double limit = farthest_point * supine_distance(lungs->minimum, lungs->maximum);
-  supine_inside_surface *tree = NULL;
+  SUPINE_FREED_BY(supine_inside_surface_drop) supine_inside_surface *tree = NULL;
   for (size_t i = 0; i < n; ++i) {
     r->apart[i] = INFINITY;
     r->corner[3 * i] = r->corner[3 * i + 1] = r->corner[3 * i + 2] = (uint32_t)i;
   }
-  supine_status status =
-      supine_inside_surface_create(lungs->mesh.vertices, n, r->corner, false, &tree, r->error);
-  for (size_t p = 0; p < r->points->shape[0] && status == SUPINE_OK; ++p) {
-    status = match_point(r, tree, limit, p);
+  SUPINE_TRY(
+      supine_inside_surface_create(lungs->mesh.vertices, n, r->corner, false, &tree, r->error));
+  for (size_t p = 0; p < r->points->shape[0]; ++p) {
+    SUPINE_TRY(match_point(r, tree, limit, p));
   }
-  for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
+  for (size_t i = 0; i < n; ++i) {
     const double *v = lungs->mesh.vertices + 3 * i;
     if (isinf(r->apart[i])) {
-      status = supine_error_set(
+      return supine_error_set(
           r->error, SUPINE_ERROR_MESH,
           "%s: the vertex at %.3f,%.3f,%.3f mm (LPS) has no point of its own within %.2g mm: give "
           "a point for each vertex of the surface, in the axes and unit of its file",
           r->path, v[0], v[1], v[2], limit);
     }
   }
-  supine_inside_surface_destroy(tree);
-  return status;
+  return SUPINE_OK;
 }
 
 /* Read the displacement of each vertex for one direction of gravity. */
@@ -173,45 +173,43 @@ static supine_status check_tensors(const reading *r) {
 }
 
 static supine_status take_tensors(reading *r) {
-  supine_status status = check_tensors(r);
-  status = status == SUPINE_OK ? allocate(r) : status;
-  for (size_t d = 0; d < r->fields.direction_count && status == SUPINE_OK; ++d) {
-    status = read_direction(r, d);
+  SUPINE_TRY(check_tensors(r));
+  SUPINE_TRY(allocate(r));
+  for (size_t d = 0; d < r->fields.direction_count; ++d) {
+    SUPINE_TRY(read_direction(r, d));
   }
-  status = status == SUPINE_OK ? match_points(r) : status;
-  for (size_t d = 0; d < r->fields.direction_count && status == SUPINE_OK; ++d) {
-    status = read_field(r, d);
+  SUPINE_TRY(match_points(r));
+  for (size_t d = 0; d < r->fields.direction_count; ++d) {
+    SUPINE_TRY(read_field(r, d));
   }
-  return status;
+  return SUPINE_OK;
+}
+
+static void close(reading *r) {
+  supine_safetensors_close(r->file);
+  supine_arena_free(&r->arena);
+  supine_fields_free(&r->fields);
 }
 
 supine_status supine_fields_load(const char *path, const supine_lungs *lungs,
                                  const supine_scan_frame *frame, supine_fields *fields,
                                  supine_error *error) {
+  SUPINE_FREED_BY(close)
   reading r = {.path = path, .lungs = lungs, .frame = *frame, .error = error};
   r.frame.millimetres_per_unit += r.frame.millimetres_per_unit == 0.0;
-  supine_safetensors *file = NULL;
-  supine_status status = supine_safetensors_open(path, &file, error);
+  const supine_status status = supine_safetensors_open(path, &r.file, error);
   if (status == SUPINE_ERROR_FORMAT && !supine_text_ends_in(path, ".safetensors")) {
-    (void)supine_error_set(error, status,
-                           "%s: no safetensors file: convert the results of another program, such "
-                           "as .frd or .dat of CalculiX or .xplt of FEBio, in Python with " WRITE,
-                           path);
+    return supine_error_set(error, status,
+                            "%s: no safetensors file: convert the results of another program, such "
+                            "as .frd or .dat of CalculiX or .xplt of FEBio, in Python with " WRITE,
+                            path);
   }
-  if (status == SUPINE_OK) {
-    r.points = supine_safetensors_find(file, "points");
-    r.gravity = supine_safetensors_find(file, "gravity");
-    r.displacement = supine_safetensors_find(file, "displacement");
-    status = take_tensors(&r);
-  }
-  supine_safetensors_close(file);
-  free(r.point_of);
-  free(r.apart);
-  free(r.corner);
-  if (status != SUPINE_OK) {
-    supine_fields_free(&r.fields);
-    return status;
-  }
+  SUPINE_TRY(status);
+  r.points = supine_safetensors_find(r.file, "points");
+  r.gravity = supine_safetensors_find(r.file, "gravity");
+  r.displacement = supine_safetensors_find(r.file, "displacement");
+  SUPINE_TRY(take_tensors(&r));
   *fields = r.fields;
+  r.fields = (supine_fields){0};
   return SUPINE_OK;
 }

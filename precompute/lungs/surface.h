@@ -32,6 +32,11 @@ void supine_inside_surface_refit(supine_inside_surface *surface);
 /** Free a surface; NULL is allowed. */
 void supine_inside_surface_destroy(supine_inside_surface *surface);
 
+/** Destroy *surface; for SUPINE_FREED_BY. */
+static inline void supine_inside_surface_drop(supine_inside_surface **surface) {
+  supine_inside_surface_destroy(*surface);
+}
+
 /** Find the surface point nearest to a point. The result's `depth` is the distance, without a sign
  * for the side of the surface. Thread-safe.
  * @param near  result for a nearby point, which speeds up the search, or NULL */

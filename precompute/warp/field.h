@@ -27,6 +27,12 @@ void supine_field_free(supine_field *field);
 /** Interpolate the field at a point. */
 void supine_field_at(const supine_field *field, const double point[3], double u[3]);
 
+/** Compute the displacement field from a pose (NULL: the scan) to another, as supine_field_create.
+ * Release `field` even after a failure. */
+supine_status supine_field_between(const supine_basis *basis, const supine_pose *from,
+                                   const supine_pose *to, double fade, supine_field *field,
+                                   supine_error *error);
+
 /** Count the cells that the field u turns over (det(I + du/dx) is not positive at their centre), as
  * a share of the number of cells inside the lungs. Near each of them, lung or body is lost. */
 double supine_field_folded(const supine_field *field);
@@ -47,6 +53,11 @@ supine_status supine_field_invert(const supine_field *field, supine_field *inver
 /** Density below which a voxel near the surface of the lungs belongs to them, HU. All lungs have
  * such voxels. */
 extern const double supine_field_aerated;
+
+/** Check that an image is in Hounsfield units: at least one voxel is below supine_field_aerated.
+ * @param path  names the image in the message */
+supine_status supine_field_check_hounsfield(const supine_image *image, const char *path,
+                                            supine_error *error);
 
 /** Move an image: moved(y) = image(y + v(y)) at the voxels y of the image; places outside the image
  * have the value of the nearest voxel. If `depth` is given, densities (Hounsfield units + 1000)

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Open a basis, copy its surface, and compute its expected errors. */
+/* Open a basis, and print its expected errors and the displacement of its hilum. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/text.h"
 #include "precompute/inside/shells.h"
 
@@ -24,12 +25,16 @@ supine_status supine_options_basis_closed(const supine_basis *basis, const char 
                                 path);
 }
 
+void supine_options_basis_close(supine_basis **basis) {
+  supine_basis_close(*basis);
+}
+
 supine_status supine_options_basis_open(const char *path, supine_storage storage,
                                         supine_basis **basis, supine_error *error) {
   const supine_basis_options options = {sizeof options, .storage = storage,
                                         .without_normals = true};
-  const supine_status status = supine_basis_open_with(path, &options, basis, error);
-  return status == SUPINE_OK ? supine_options_basis_closed(*basis, path, error) : status;
+  SUPINE_TRY(supine_basis_open_with(path, &options, basis, error));
+  return supine_options_basis_closed(*basis, path, error);
 }
 
 supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,
@@ -53,52 +58,6 @@ void supine_options_basis_title(const char *path, char *title, size_t size) {
   const size_t cut = supine_text_ends_in(name, ending) ? sizeof ending - 1 : 0;
   (void)snprintf(title, size, "%.*s", (int)(strlen(name) - cut), name);
   (void)supine_text_make_utf8(title);
-}
-
-double supine_options_basis_volume(const supine_basis *basis, const supine_pose *pose) {
-  double volumes[SUPINE_LUNGS_MAX] = {0.0};
-  double sum = 0.0;
-  (void)supine_basis_volumes(basis, pose, volumes);
-  for (size_t lung = 0; lung < supine_basis_get_info(basis)->lung_count; ++lung) {
-    sum += volumes[lung];
-  }
-  return sum;
-}
-
-static double *to_doubles(const supine_basis *basis, const float *xyz) {
-  const size_t count = 3 * supine_basis_get_info(basis)->vertex_count;
-  double *converted = malloc(count * sizeof *converted);
-  for (size_t i = 0; converted != NULL && i < count; ++i) {
-    converted[i] = (double)xyz[i];
-  }
-  return converted;
-}
-
-double *supine_options_basis_positions(const supine_basis *basis, const supine_pose *pose) {
-  float *xyz = malloc(3 * supine_basis_get_info(basis)->vertex_count * sizeof *xyz);
-  double *positions = NULL;
-  if (xyz != NULL) {
-    (void)supine_deform(basis, pose, xyz);
-    positions = to_doubles(basis, xyz);
-  }
-  free(xyz);
-  return positions;
-}
-
-supine_status supine_options_basis_mesh(const supine_basis *basis, supine_mesh *mesh) {
-  const supine_basis_info *info = supine_basis_get_info(basis);
-  const size_t bytes = 3 * info->triangle_count * sizeof *mesh->triangles;
-  supine_mesh made = {.vertex_count = info->vertex_count,
-                      .vertices = to_doubles(basis, supine_basis_vertices(basis)),
-                      .triangle_count = info->triangle_count,
-                      .triangles = malloc(bytes)};
-  if (made.vertices == NULL || made.triangles == NULL) {
-    supine_mesh_free(&made);
-    return SUPINE_ERROR_MEMORY;
-  }
-  memcpy(made.triangles, supine_basis_triangles(basis), bytes);
-  *mesh = made;
-  return SUPINE_OK;
 }
 
 static const char *const frames[] = {"body", "hilum", NULL};
@@ -141,40 +100,6 @@ void supine_options_hilum_print(const double shift[3], bool subtracted) {
     (void)printf("the hilum moves by %.1f, %.1f, %.1f mm (to the left, back and head)%s\n",
                  shift[0], shift[1], shift[2], subtracted ? ", subtracted from all positions" : "");
   }
-}
-
-supine_status supine_options_expected_find(const supine_basis *basis, const supine_state *state,
-                                           const supine_state *from, supine_expected *expected,
-                                           supine_error *error) {
-  const size_t n = supine_basis_get_info(basis)->vertex_count;
-  float *sigma = malloc(n * sizeof *sigma);
-  double square = 0.0;
-  double along = 0.0;
-  if (sigma == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
-  }
-  const supine_status status = supine_expected_error(basis, state, from, sigma, error);
-  if (status != SUPINE_OK) {
-    free(sigma);
-    return status == SUPINE_ERROR_UNSUPPORTED || status == SUPINE_ERROR_OPEN_SURFACE ? SUPINE_OK
-                                                                                     : status;
-  }
-  for (size_t i = 0; i < n; ++i) {
-    square += (double)sigma[i] * (double)sigma[i];
-    expected->largest = fmax(expected->largest, (double)sigma[i]);
-  }
-  for (size_t i = 0; i < 3; ++i) {
-    along += state->gravity[i] * from->gravity[i];
-  }
-  expected->sigma = sigma;
-  expected->rms = sqrt(square / (double)n);
-  expected->turned = along < 1.0 - 1e-9;
-  return SUPINE_OK;
-}
-
-void supine_options_expected_free(supine_expected *expected) {
-  free(expected->sigma);
-  *expected = (supine_expected){0};
 }
 
 void supine_options_expected_print(const supine_expected *expected, FILE *file) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Open a basis, copy its surface, and compute its expected errors. */
+/* Open a basis, and print its expected errors and the displacement of its hilum. */
 #ifndef SUPINE_BASIS_INPUT_H
 #define SUPINE_BASIS_INPUT_H
 
@@ -9,6 +9,7 @@
 #include <supine/runtime.h>
 
 #include "mesh/mesh.h"
+#include "precompute/posed/posed.h"
 
 #include "program/options/command.h"
 
@@ -17,13 +18,14 @@ extern const supine_option supine_options_as_scanned[];
 
 /* Open a basis without its stored normals, and check that its surface is closed. The caller must
  * close the basis even after a failure.
- * @retval SUPINE_ERROR_OPEN_SURFACE  the surface encloses no volume
- * @retval any status of supine_basis_open_with */
+ * @retval SUPINE_ERROR_OPEN_SURFACE  the surface encloses no volume */
 supine_status supine_options_basis_open(const char *path, supine_storage storage,
                                         supine_basis **basis, supine_error *error);
 
-/* Check that the surface of a basis encloses a volume. `path` names the file in the message.
- * @retval SUPINE_ERROR_OPEN_SURFACE */
+/* Close *basis; for SUPINE_FREED_BY. */
+void supine_options_basis_close(supine_basis **basis);
+
+/* Check that the surface of a basis encloses a volume. `path` names the file in the message. */
 supine_status supine_options_basis_closed(const supine_basis *basis, const char *path,
                                           supine_error *error);
 
@@ -35,24 +37,13 @@ supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,
 /* Write the name of a basis file without its folder and the ending .safetensors, as UTF-8. */
 void supine_options_basis_title(const char *path, char *title, size_t size);
 
-/* Return the volume of all lungs together in a pose, mL. */
-double supine_options_basis_volume(const supine_basis *basis, const supine_pose *pose);
-
-/* Return all vertices [N, 3] in a pose, mm, or NULL if out of memory. The caller frees them. */
-double *supine_options_basis_positions(const supine_basis *basis, const supine_pose *pose);
-
-/* Copy the reference surface into a mesh; release the mesh with supine_mesh_free.
- * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_options_basis_mesh(const supine_basis *basis, supine_mesh *mesh);
-
 /* Option table that holds only --frame, which sets an int: 1 to subtract the displacement of the
  * hilum, else 0. */
 extern const supine_option supine_options_hilum_frame[];
 
 /* Compute the displacement of the hilum (precompute/inside/shells.h) from one pose to another, mm;
  * 0 if the file does not determine it.
- * @retval SUPINE_ERROR_UNSUPPORTED  `needed` is true and the file does not determine it
- * @retval SUPINE_ERROR_MEMORY */
+ * @retval SUPINE_ERROR_UNSUPPORTED  `needed` is true and the file does not determine it */
 supine_status supine_options_hilum(const supine_basis *basis, const supine_pose *pose,
                                    const supine_pose *from, bool needed, double shift[3],
                                    supine_error *error);
@@ -66,22 +57,6 @@ void supine_options_hilum_print(const double shift[3], bool subtracted);
 #define SUPINE_EXPECTED_SUPPORT                                                                    \
   "The expected error was measured on breaths in one posture; for a change of posture it is an "   \
   "extrapolation. 'supine info' lists its terms."
-
-/* Expected errors of the displacements from one state to another. Initialise with zeros, and
- * release with supine_options_expected_free. */
-typedef struct supine_expected {
-  float *sigma;        /* expected error of each vertex's displacement, mm; NULL if unknown */
-  double rms, largest; /* RMS and maximum of `sigma` over the vertices, mm */
-  bool turned;         /* whether the displacements include a change of posture */
-} supine_expected;
-
-/* Compute the expected errors of the displacements from one state to another. They are unknown for
- * open surfaces and for displacements computed by another simulator; `expected` is then unchanged.
- * @retval SUPINE_ERROR_MEMORY, or any status of supine_basis_pose */
-supine_status supine_options_expected_find(const supine_basis *basis, const supine_state *state,
-                                           const supine_state *from, supine_expected *expected,
-                                           supine_error *error);
-void supine_options_expected_free(supine_expected *expected);
 
 /* Print the RMS and the largest expected error in one line; if unknown, print nothing. */
 void supine_options_expected_print(const supine_expected *expected, FILE *file);

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/vec3.h"
 
 #include "program/options/breath_turn.h"
@@ -60,11 +61,11 @@ supine_status supine_breath_turn_read(const char *text, void *turn, supine_error
                             "'%s': the time must be above 0 s, as in supine:left:5s", text);
   }
   supine_state state[2] = {{.lung_count = 0}};
-  supine_status status = supine_state_parse_posture(from, &state[0], error);
-  status = status == SUPINE_OK ? supine_state_parse_posture(to, &state[1], error) : status;
+  SUPINE_TRY(supine_state_parse_posture(from, &state[0], error));
+  SUPINE_TRY(supine_state_parse_posture(to, &state[1], error));
   memcpy(made->from, state[0].gravity, sizeof made->from);
   memcpy(made->to, state[1].gravity, sizeof made->to);
-  return status;
+  return SUPINE_OK;
 }
 
 supine_state supine_breath_state(const supine_basis *basis, const double gravity[3], double ml) {

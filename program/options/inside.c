@@ -4,19 +4,19 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/text.h"
 #include "base/vec3.h"
 
 #include "program/options/basis_input.h"
 #include "program/options/inside.h"
 
-/* Sort the vertices by structure, then in input order; return false if out of memory. */
-static bool sort_by_name(supine_command_names *names, size_t n) {
-  size_t *begin = calloc(names->count + 2, sizeof *begin);
-  names->begin = begin;
-  names->order = malloc(n * sizeof *names->order);
-  if (begin == NULL || names->order == NULL) {
-    return false;
+/* Sort the vertices by structure, then in input order. */
+static supine_status sort_by_name(supine_command_names *names, size_t n, supine_error *error) {
+  size_t *begin = names->begin = supine_arena_zeros(&names->arena, names->count + 2, sizeof *begin);
+  names->order = supine_arena_take(&names->arena, n, sizeof *names->order);
+  if (names->arena.failed) {
+    return supine_error_memory(error, "the names of %zu vertices", n);
   }
   for (size_t i = 0; i < n; ++i) {
     ++begin[names->part[i] + 2];
@@ -27,7 +27,7 @@ static bool sort_by_name(supine_command_names *names, size_t n) {
   for (size_t i = 0; i < n; ++i) {
     names->order[begin[names->part[i] + 1]++] = i;
   }
-  return true;
+  return SUPINE_OK;
 }
 
 supine_status supine_command_names_open(const supine_basis *basis, supine_command_names *names,
@@ -43,48 +43,33 @@ supine_status supine_command_names_open(const supine_basis *basis, supine_comman
         "the basis names no points: make one with 'supine embed BASIS POINTS.csv'");
   }
   const size_t length = text->shape[0];
+  char *space = supine_arena_zeros(&names->arena, length + 1, 1);
   names->part = part->data;
-  names->space = malloc(length + 1);
-  names->text = malloc((length + 1) * sizeof *names->text);
-  if (names->space == NULL || names->text == NULL) {
-    supine_command_names_close(names);
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the names of %zu vertices",
-                            n);
+  names->text = supine_arena_take(&names->arena, length + 1, sizeof *names->text);
+  if (names->arena.failed) {
+    return supine_error_memory(error, "the names of %zu vertices", n);
   }
-  memcpy(names->space, text->data, length);
-  names->space[length] = '\0';
-  names->text[names->count++] = names->space;
+  memcpy(space, text->data, length);
+  names->text[names->count++] = space;
   for (size_t i = 0; i < length; ++i) {
-    if (names->space[i] == '\n') {
-      names->space[i] = '\0';
-      names->text[names->count++] = names->space + i + 1;
+    if (space[i] == '\n') {
+      space[i] = '\0';
+      names->text[names->count++] = space + i + 1;
     }
   }
-  supine_status status = SUPINE_OK;
-  for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
+  for (size_t i = 0; i < n; ++i) {
     if (names->part[i] >= names->count) {
-      status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "point %zu of the basis has no name: make the file again with "
-                                "'supine embed BASIS POINTS.csv'",
-                                i);
+      return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "point %zu of the basis has no name: make the file again with "
+                              "'supine embed BASIS POINTS.csv'",
+                              i);
     }
   }
-  if (status == SUPINE_OK && !sort_by_name(names, n)) {
-    status =
-        supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the names of %zu vertices", n);
-  }
-  if (status != SUPINE_OK) {
-    supine_command_names_close(names);
-  }
-  return status;
+  return sort_by_name(names, n, error);
 }
 
 void supine_command_names_close(supine_command_names *names) {
-  free(names->space);
-  free(names->text);
-  free(names->order);
-  free(names->begin);
-  *names = (supine_command_names){0};
+  supine_arena_free(&names->arena);
 }
 
 size_t supine_command_lung_of(const supine_basis_info *info, size_t vertex) {
@@ -111,9 +96,9 @@ supine_status supine_command_inside_check(const supine_basis *lungs, const supin
 supine_status supine_command_inside_open(const supine_basis *lungs, const char *path,
                                          supine_basis **inside, supine_command_names *names,
                                          supine_error *error) {
-  supine_status status = supine_options_basis_open(path, SUPINE_STORAGE_AUTO, inside, error);
-  status = status == SUPINE_OK ? supine_command_names_open(*inside, names, error) : status;
-  return status == SUPINE_OK ? supine_command_inside_check(lungs, *inside, path, error) : status;
+  SUPINE_TRY(supine_options_basis_open(path, SUPINE_STORAGE_AUTO, inside, error));
+  SUPINE_TRY(supine_command_names_open(*inside, names, error));
+  return supine_command_inside_check(lungs, *inside, path, error);
 }
 
 /* Average the vertices order[begin] to order[end - 1] to a target; [N, 3] positions before and
@@ -173,31 +158,34 @@ supine_status supine_command_targets_find(const supine_basis *inside,
   const supine_basis_info *info = supine_basis_get_info(inside);
   const size_t n = info->vertex_count;
   const size_t count = each ? n : names->count;
-  float *after = malloc(3 * n * sizeof *after);
-  float *before = malloc(3 * n * sizeof *before);
+  SUPINE_ARENA arena = {0};
+  float *after = supine_arena_take(&arena, 3 * n, sizeof *after);
+  float *before = supine_arena_take(&arena, 3 * n, sizeof *before);
   *targets = calloc(count, sizeof **targets);
-  const bool enough = after != NULL && before != NULL && *targets != NULL;
-  if (enough) {
-    (void)supine_deform(inside, pose[0], before);
-    (void)supine_deform(inside, pose[1], after);
+  if (arena.failed || *targets == NULL) {
+    return supine_error_memory(error, "%zu points", n);
   }
-  for (size_t i = 0; enough && i < count; ++i) {
+  (void)supine_deform(inside, pose[0], before);
+  (void)supine_deform(inside, pose[1], after);
+  for (size_t i = 0; i < count; ++i) {
     const size_t begin = each ? i : names->begin[i];
     const size_t end = each ? i + 1 : names->begin[i + 1];
-    (*targets)[i].name = names->text[i];
-    if (end > begin) { /* a name may have no vertices */
+    if (end > begin) {
       (*targets)[i] = average(names, begin, end, after, before, sigma);
       (*targets)[i].lung = supine_command_lung_of(info, names->order[begin]);
+    } else { /* a name may have no vertices */
+      (*targets)[i].name = names->text[i];
     }
   }
-  if (enough && !each && info->triangle_count > 0) {
+  if (!each && info->triangle_count > 0) {
     find_volumes(info, names, before, 0, *targets);
     find_volumes(info, names, after, 1, *targets);
   }
-  free(after);
-  free(before);
-  return enough ? SUPINE_OK
-                : supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu points", n);
+  return SUPINE_OK;
+}
+
+void supine_command_targets_free(supine_target **targets) {
+  free(*targets);
 }
 
 const char *supine_command_target_way(const supine_target *target, size_t most, char way[96]) {
@@ -239,50 +227,41 @@ supine_status supine_command_marks_make(const supine_basis *inside,
                                         const supine_pose *const pose[2], const float *sigma,
                                         supine_command_marks *marks, supine_error *error) {
   const size_t n = supine_basis_get_info(inside)->vertex_count;
-  float *xyz = malloc(3 * n * sizeof *xyz);
-  supine_target *targets = NULL;
-  supine_command_marks made = {.mark = calloc(n + names->count, sizeof *made.mark),
-                               .label = calloc(names->count, sizeof *made.label)};
-  supine_status status = SUPINE_ERROR_MEMORY;
-  if (xyz != NULL && made.mark != NULL && made.label != NULL) {
-    status = supine_command_targets_find(inside, names, pose, sigma, false, &targets, error);
-  } else {
-    (void)supine_error_set(error, status, "no memory for %zu points", n);
+  SUPINE_ARENA arena = {0};
+  SUPINE_FREED_BY(supine_command_targets_free) supine_target *targets = NULL;
+  float *xyz = supine_arena_take(&arena, 3 * n, sizeof *xyz);
+  supine_command_marks_free(marks);
+  marks->mark = supine_arena_zeros(&marks->arena, n + names->count, sizeof *marks->mark);
+  marks->label = supine_arena_zeros(&marks->arena, names->count, sizeof *marks->label);
+  if (arena.failed || marks->arena.failed) {
+    return supine_error_memory(error, "%zu points", n);
   }
-  if (status == SUPINE_OK) {
-    (void)supine_deform(inside, pose[1], xyz);
-  }
-  for (size_t part = 0; status == SUPINE_OK && part < names->count; ++part) {
+  SUPINE_TRY(supine_command_targets_find(inside, names, pose, sigma, false, &targets, error));
+  (void)supine_deform(inside, pose[1], xyz);
+  marks->marks.mark = marks->mark;
+  marks->first = targets[0];
+  for (size_t part = 0; part < names->count; ++part) {
     const supine_target *t = &targets[part];
     const size_t count = names->begin[part + 1] - names->begin[part];
     for (size_t i = 0; count > 1 && i < count; ++i) {
-      supine_mark *mark = &made.mark[made.marks.count++];
+      supine_mark *mark = &marks->mark[marks->marks.count++];
       memcpy(mark->xyz, xyz + 3 * names->order[names->begin[part] + i], sizeof mark->xyz);
     }
-    supine_mark *middle = &made.mark[made.marks.count];
+    supine_mark *middle = &marks->mark[marks->marks.count];
     for (size_t k = 0; k < 3; ++k) {
       middle->xyz[k] = (float)t->at[k];
       middle->from[k] = (float)(t->at[k] - t->move[k]);
     }
-    (void)snprintf(made.label[part], sizeof made.label[part],
+    (void)snprintf(marks->label[part], sizeof marks->label[part],
                    t->moved <= t->expected ? "%.30s" : "%.30s %.1f mm", t->name, t->moved);
-    middle->label = made.label[part];
+    middle->label = marks->label[part];
     middle->point = count == 1;
-    made.marks.count += count > 0;
+    marks->marks.count += count > 0;
   }
-  made.marks.mark = made.mark;
-  made.first = status == SUPINE_OK ? targets[0] : made.first;
-  free(targets);
-  free(xyz);
-  if (status != SUPINE_OK) {
-    supine_command_marks_free(&made);
-  }
-  *marks = made;
-  return status;
+  return SUPINE_OK;
 }
 
 void supine_command_marks_free(supine_command_marks *marks) {
-  free(marks->mark);
-  free(marks->label);
+  supine_arena_free(&marks->arena);
   *marks = (supine_command_marks){.mark = NULL};
 }

@@ -5,6 +5,8 @@
 
 #include <jansson.h>
 
+#include "base/arena.h"
+
 #include "program/view/render/render.h"
 
 typedef struct supine_command_names {
@@ -13,10 +15,10 @@ typedef struct supine_command_names {
   const uint32_t *part; /* [N] index of each vertex's name in `text` */
   size_t *order;        /* [N] indices of the vertices, sorted by structure, then in input order */
   size_t *begin;        /* [count + 1] index of each structure's first vertex in `order` */
-  char *space;          /* memory that `text` points into */
+  supine_arena arena;
 } supine_command_names;
 
-/* Read the names of embedded structures.
+/* Read the names of embedded structures. Close `names` even after a failure.
  * @retval SUPINE_ERROR_FORMAT  the basis has no names, or malformed ones */
 supine_status supine_command_names_open(const supine_basis *basis, supine_command_names *names,
                                         supine_error *error);
@@ -50,12 +52,14 @@ typedef struct supine_target {
 /* Compute where the structures are in pose[1], and how they have moved from pose[0].
  * @param sigma    [N] expected error of each vertex, mm; NULL if unknown
  * @param each     true for a target for each vertex, false for one for each structure
- * @param targets  output: array of targets in the order of `names`, which the caller frees
- * @retval SUPINE_ERROR_MEMORY */
+ * @param targets  output: array of targets in the order of `names`, which the caller frees */
 supine_status supine_command_targets_find(const supine_basis *inside,
                                           const supine_command_names *names,
                                           const supine_pose *const pose[2], const float *sigma,
                                           bool each, supine_target **targets, supine_error *error);
+
+/* Free *targets; for SUPINE_FREED_BY. */
+void supine_command_targets_free(supine_target **targets);
 
 #define SUPINE_TARGET_UNTOLD "no change that the model can tell"
 
@@ -77,11 +81,12 @@ typedef struct supine_command_marks {
   supine_mark *mark;
   char (*label)[64];
   supine_target first; /* the first structure */
+  supine_arena arena;
 } supine_command_marks;
 
 /* Make the marks that show the structures in pose[1], with arrows from where they were in pose[0].
- * @param sigma  [N] expected error of each vertex, mm; NULL if unknown
- * @retval SUPINE_ERROR_MEMORY */
+ * Those that `marks` held before are freed.
+ * @param sigma  [N] expected error of each vertex, mm; NULL if unknown */
 supine_status supine_command_marks_make(const supine_basis *inside,
                                         const supine_command_names *names,
                                         const supine_pose *const pose[2], const float *sigma,

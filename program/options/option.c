@@ -6,6 +6,7 @@
 #include <strings.h>
 #include <sys/stat.h>
 
+#include "base/arena.h"
 #include "base/output.h"
 
 #include "program/options/command.h"
@@ -178,9 +179,7 @@ static supine_status read_options(reading *r, int argc, char **argv, supine_erro
   names[n] = (struct option){"help-all", no_argument, NULL, HELP_ALL};
   optind = 0; /* restarts getopt_long() */
   opterr = 0;
-  supine_status status = SUPINE_OK;
-  for (int got;
-       status == SUPINE_OK && (got = getopt_long(argc, argv, letters, names, NULL)) != -1;) {
+  for (int got; (got = getopt_long(argc, argv, letters, names, NULL)) != -1;) {
     size_t i = got >= FIRST_LONG ? (size_t)(got - FIRST_LONG) : 0;
     if (got == 'h' || got == HELP_ALL) {
       r->help = got;
@@ -192,9 +191,9 @@ static supine_status read_options(reading *r, int argc, char **argv, supine_erro
     while (got < FIRST_LONG && r->rows[i].option->letter != got) {
       ++i;
     }
-    status = read_given(r, &r->rows[i], optarg, error);
+    SUPINE_TRY(read_given(r, &r->rows[i], optarg, error));
   }
-  return status;
+  return SUPINE_OK;
 }
 
 /* Return whether `path` has an ending in `endings` (".ply, .obj or .stl"), in any letter case. */
@@ -290,71 +289,62 @@ supine_status supine_options_check_output(const char *output, const char *input,
 /* Check that an output is neither an input nor another output, and that it can be written. */
 static supine_status check_output(const reading *r, const row *output,
                                   const supine_arguments *given, supine_error *error) {
-  supine_status status = SUPINE_OK;
-  for (size_t i = 0; i < given->count && status == SUPINE_OK; ++i) {
-    status = supine_options_check_output(output->value, given->operand[i], error);
+  for (size_t i = 0; i < given->count; ++i) {
+    SUPINE_TRY(supine_options_check_output(output->value, given->operand[i], error));
   }
-  for (size_t i = 0; i < r->count && status == SUPINE_OK; ++i) {
+  for (size_t i = 0; i < r->count; ++i) {
     const row *other = &r->rows[i];
     if (other->given && other->option->file == SUPINE_FILE_IN) {
-      status = supine_options_check_output(output->value, other->value, error);
+      SUPINE_TRY(supine_options_check_output(output->value, other->value, error));
     } else if (other->given && other->option->file == SUPINE_FILE_OUT && other < output &&
                strcmp(output->value, other->value) == 0) {
-      status = supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                "--%s and --%s name the same file: give them different names",
-                                other->option->name, output->option->name);
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "--%s and --%s name the same file: give them different names",
+                              other->option->name, output->option->name);
     }
   }
-  return status == SUPINE_OK ? supine_output_try(output->value, error) : status;
+  return supine_output_try(output->value, error);
 }
 
 static supine_status check_outputs(const reading *r, const supine_arguments *given,
                                    supine_error *error) {
-  supine_status status = SUPINE_OK;
-  for (size_t i = 0; i < r->count && status == SUPINE_OK; ++i) {
+  for (size_t i = 0; i < r->count; ++i) {
     if (r->rows[i].given && r->rows[i].option->file == SUPINE_FILE_OUT) {
-      status = check_output(r, &r->rows[i], given, error);
+      SUPINE_TRY(check_output(r, &r->rows[i], given, error));
     }
   }
-  for (size_t i = 0; i < r->count && status == SUPINE_OK; ++i) {
+  for (size_t i = 0; i < r->count; ++i) {
     if (r->rows[i].given && r->rows[i].option->file == SUPINE_FILE_OUT &&
         supine_output_is_standard(r->rows[i].value) && !supine_output_take_standard()) {
-      status = supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                "standard output is closed: give a file instead of -");
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "standard output is closed: give a file instead of -");
     }
   }
-  return status;
+  return SUPINE_OK;
 }
 
 static supine_status read_and_run(reading *r, int argc, char **argv, supine_error *error) {
   const supine_command *command = r->command;
   char made_by[512];
-  supine_status status = SUPINE_OK;
   supine_options_describe(argc, argv, made_by, sizeof made_by);
   if (command->begin != NULL) {
     command->begin(r->request);
   }
   supine_options_visit(command->options, 0, collect, r);
-  for (size_t i = 0; i < r->count && status == SUPINE_OK; ++i) {
+  for (size_t i = 0; i < r->count; ++i) {
     if (r->rows[i].option->standard != NULL) {
-      status = read_row(&r->rows[i], r->rows[i].option->standard, error);
+      SUPINE_TRY(read_row(&r->rows[i], r->rows[i].option->standard, error));
     }
   }
-  if (status == SUPINE_OK) {
-    status = read_options(r, argc, argv, error);
-  }
-  if (status == SUPINE_OK && r->help != 0) {
+  SUPINE_TRY(read_options(r, argc, argv, error));
+  if (r->help != 0) {
     supine_options_print_help(command, r->help == HELP_ALL, stdout);
     return SUPINE_OK;
   }
   const supine_arguments given = {argv + optind, (size_t)(argc - optind), made_by};
-  if (status == SUPINE_OK) {
-    status = check_given(r, given.count, argv, error);
-  }
-  if (status == SUPINE_OK) {
-    status = check_outputs(r, &given, error);
-  }
-  return status == SUPINE_OK ? command->run(r->request, &given, error) : status;
+  SUPINE_TRY(check_given(r, given.count, argv, error));
+  SUPINE_TRY(check_outputs(r, &given, error));
+  return command->run(r->request, &given, error);
 }
 
 int supine_options_run(const supine_command *command, int argc, char **argv) {

@@ -47,8 +47,7 @@ typedef struct supine_pv_report {
  * @param samples     [count] finite
  * @param confidence  confidence level of the intervals, between 0 and 1
  * @retval SUPINE_ERROR_FORMAT     too few samples, repeated or unordered pressures, falling volumes
- * @retval SUPINE_ERROR_NUMERICAL  no minimum was found
- * @retval SUPINE_ERROR_MEMORY */
+ * @retval SUPINE_ERROR_NUMERICAL  no minimum was found */
 supine_status supine_breath_fit(const char *name, size_t count, const supine_pv_sample *samples,
                                 double confidence, supine_pv_curve *curve, supine_pv_report *report,
                                 supine_error *error);
@@ -57,13 +56,11 @@ supine_status supine_breath_fit(const char *name, size_t count, const supine_pv_
  *
  * The file is CSV with the columns pressure_cmH2O, volume_mL and, optionally, limb (inhale or
  * exhale). Without that column all samples belong to inhale.
- * @param reports  [SUPINE_PV_LIMB_COUNT]
- * @retval SUPINE_ERROR_READ, or any status of supine_breath_fit */
+ * @param reports  [SUPINE_PV_LIMB_COUNT] */
 supine_status supine_breath_fit_file(const char *path, double confidence, supine_pv *pv,
                                      supine_pv_report *reports, supine_error *error);
 
-/** Read the parameters that 'supine pv fit -o' wrote. A file with one limb sets both limbs.
- * @retval SUPINE_ERROR_READ, SUPINE_ERROR_FORMAT, SUPINE_ERROR_MEMORY */
+/** Read the parameters that 'supine pv fit -o' wrote. A file with one limb sets both limbs. */
 supine_status supine_breath_load(const char *path, supine_pv *pv, supine_error *error);
 
 #endif

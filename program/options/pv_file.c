@@ -6,6 +6,7 @@
 
 #include <jansson.h>
 
+#include "base/arena.h"
 #include "base/csv.h"
 
 #include "program/options/pv.h"
@@ -33,20 +34,13 @@ static supine_status add_sample(const supine_csv *csv, const char *const *names,
                                 supine_error *error) {
   supine_pv_limb limb = SUPINE_PV_INHALE;
   supine_pv_sample sample = {.line = csv->line};
-  supine_status status = read_limb(csv, &limb, error);
-  if (status == SUPINE_OK) {
-    status = supine_csv_number(csv, 0, names[0], &sample.pressure, error);
-  }
-  if (status == SUPINE_OK) {
-    status = supine_csv_number(csv, 1, names[1], &sample.volume, error);
-  }
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(read_limb(csv, &limb, error));
+  SUPINE_TRY(supine_csv_number(csv, 0, names[0], &sample.pressure, error));
+  SUPINE_TRY(supine_csv_number(csv, 1, names[1], &sample.volume, error));
   samples *into = &limbs[limb];
   supine_pv_sample *grown = reallocarray(into->sample, into->count + 1, sizeof *grown);
   if (grown == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+    return supine_error_memory(error, "%zu samples", into->count + 1);
   }
   into->sample = grown;
   into->sample[into->count++] = sample;
@@ -55,37 +49,41 @@ static supine_status add_sample(const supine_csv *csv, const char *const *names,
 
 static supine_status load_samples(const char *path, samples *limbs, supine_error *error) {
   static const char *const names[] = {"pressure_cmH2O", "volume_mL", "limb"};
-  supine_csv csv = {0};
-  supine_status status = supine_csv_open(path, names, 3, 2, &csv, error);
-  for (bool more = true; status == SUPINE_OK && more;) {
-    status = supine_csv_next(&csv, &more, error);
-    if (status == SUPINE_OK && more) {
-      status = add_sample(&csv, names, limbs, error);
+  SUPINE_FREED_BY(supine_csv_close) supine_csv csv = {0};
+  SUPINE_TRY(supine_csv_open(path, names, 3, 2, &csv, error));
+  for (bool more = true; more;) {
+    SUPINE_TRY(supine_csv_next(&csv, &more, error));
+    if (more) {
+      SUPINE_TRY(add_sample(&csv, names, limbs, error));
     }
   }
-  supine_csv_close(&csv);
-  return status;
+  return SUPINE_OK;
+}
+
+static void free_samples(samples (*limbs)[SUPINE_PV_LIMB_COUNT]) {
+  for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
+    free((*limbs)[limb].sample);
+  }
 }
 
 supine_status supine_breath_fit_file(const char *path, double confidence, supine_pv *pv,
                                      supine_pv_report *reports, supine_error *error) {
-  samples limbs[SUPINE_PV_LIMB_COUNT] = {{0}};
-  supine_status status = load_samples(path, limbs, error);
-  for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT && status == SUPINE_OK; ++limb) {
+  SUPINE_FREED_BY(free_samples) samples limbs[SUPINE_PV_LIMB_COUNT] = {{0}};
+  SUPINE_TRY(load_samples(path, limbs, error));
+  for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     const samples *of = &limbs[limb];
     reports[limb] = (supine_pv_report){0};
     if (of->count > 0 || limbs[1 - limb].count == 0) {
-      status = supine_breath_fit(path, of->count, of->sample, confidence, &pv->limb[limb],
-                                 &reports[limb], error);
+      SUPINE_TRY(supine_breath_fit(path, of->count, of->sample, confidence, &pv->limb[limb],
+                                   &reports[limb], error));
     }
   }
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     if (limbs[limb].count == 0) {
       pv->limb[limb] = pv->limb[1 - limb];
     }
-    free(limbs[limb].sample);
   }
-  return status;
+  return SUPINE_OK;
 }
 
 static supine_status read_curve(json_t *limb, supine_pv_curve *curve, supine_error *error) {
@@ -104,39 +102,34 @@ supine_status supine_breath_load(const char *path, supine_pv *pv, supine_error *
   json_error_t why;
   supine_pv found = {0};
   json_t *limbs[SUPINE_PV_LIMB_COUNT];
-  supine_status status = SUPINE_OK;
-  FILE *file = fopen(path, "rb");
-  json_t *root = file == NULL ? NULL : json_loadf(file, JSON_REJECT_DUPLICATES, &why);
+  SUPINE_FREED_BY(supine_file_close) FILE *file = fopen(path, "rb");
+  json_auto_t *root = file == NULL ? NULL : json_loadf(file, JSON_REJECT_DUPLICATES, &why);
   if (file == NULL || ferror(file) != 0) {
-    status =
-        supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path, strerror(errno));
-  } else if (root == NULL) {
-    status =
-        supine_error_set(error, SUPINE_ERROR_FORMAT,
-                         "%s:%d: %s: make the file with 'supine pv fit'", path, why.line, why.text);
+    return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path, strerror(errno));
   }
-  if (file != NULL) {
-    (void)fclose(file);
+  if (root == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s:%d: %s: make the file with 'supine pv fit'", path, why.line,
+                            why.text);
   }
-  for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT && status == SUPINE_OK; ++limb) {
+  for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     const char *name = supine_breath_limb_name((supine_pv_limb)limb);
     supine_error wrong;
     limbs[limb] = json_object_get(root, name);
     if (limbs[limb] != NULL && read_curve(limbs[limb], &found.limb[limb], &wrong) != SUPINE_OK) {
-      status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%s: %s: %.300s: make the file with 'supine pv fit'", path, name,
-                                wrong.message);
+      return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "%s: %s: %.300s: make the file with 'supine pv fit'", path, name,
+                              wrong.message);
     }
   }
-  if (status == SUPINE_OK && limbs[0] == NULL && limbs[1] == NULL) {
-    status = supine_error_set(
+  if (limbs[0] == NULL && limbs[1] == NULL) {
+    return supine_error_set(
         error, SUPINE_ERROR_FORMAT,
         "%s: neither the limb inhale nor exhale is given: make the file with 'supine pv fit'",
         path);
   }
-  for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT && status == SUPINE_OK; ++limb) {
+  for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     pv->limb[limb] = found.limb[limbs[limb] != NULL ? limb : 1 - limb];
   }
-  json_decref(root);
-  return status;
+  return SUPINE_OK;
 }

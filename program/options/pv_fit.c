@@ -10,6 +10,7 @@
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_multifit_nlinear.h>
 
+#include "base/arena.h"
 #include "program/options/pv.h"
 
 enum {
@@ -198,10 +199,7 @@ static supine_status fit_sorted(problem *limb, double confidence, supine_pv_curv
     limb->x[j] = ((s[j].pressure - low) - (high - s[j].pressure)) / (high - low);
     limb->v[j] = (s[j].volume - s[0].volume) / span;
   }
-  const supine_status status = check_falls(limb, span, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(check_falls(limb, span, error));
   if (minimise(limb) != SUPINE_OK) {
     return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
                             "%s: no pressure-volume curve fits: look for an outlier and remove it",
@@ -216,6 +214,11 @@ static supine_status fit_sorted(problem *limb, double confidence, supine_pv_curv
   return supine_breath_curve_check(curve, error);
 }
 
+static void free_workspace(problem *limb) {
+  gsl_multifit_nlinear_free(limb->work);
+  gsl_matrix_free(limb->covariance);
+}
+
 supine_status supine_breath_fit(const char *name, size_t count, const supine_pv_sample *samples,
                                 double confidence, supine_pv_curve *curve, supine_pv_report *report,
                                 supine_error *error) {
@@ -226,27 +229,20 @@ supine_status supine_breath_fit(const char *name, size_t count, const supine_pv_
         "%s: a limb has %zu sample%s, too few for %d unknowns: give at least %d", name, count,
         count == 1 ? "" : "s", (int)SUPINE_PV_UNKNOWNS, (int)SUPINE_PV_UNKNOWNS + 1);
   }
+  SUPINE_ARENA arena = {0};
+  SUPINE_FREED_BY(free_workspace)
   problem limb = {.name = name,
                   .count = count,
-                  .sample = malloc(count * sizeof *limb.sample),
+                  .sample = supine_arena_take(&arena, count, sizeof *limb.sample),
                   .work = gsl_multifit_nlinear_alloc(gsl_multifit_nlinear_trust, &options, count,
                                                      SUPINE_PV_UNKNOWNS),
                   .covariance = gsl_matrix_alloc(SUPINE_PV_UNKNOWNS, SUPINE_PV_UNKNOWNS),
-                  .x = malloc(3 * count * sizeof(double))};
-  supine_status status = SUPINE_ERROR_MEMORY;
-  if (limb.sample == NULL || limb.work == NULL || limb.covariance == NULL || limb.x == NULL) {
-    (void)supine_error_set(error, status, "%s: no memory for %zu samples", name, count);
-  } else {
-    limb.v = limb.x + count;
-    limb.q = limb.v + count;
-    status = sort(&limb, samples, error);
+                  .x = supine_arena_take(&arena, count, sizeof(double)),
+                  .v = supine_arena_take(&arena, count, sizeof(double)),
+                  .q = supine_arena_take(&arena, count, sizeof(double))};
+  if (arena.failed || limb.work == NULL || limb.covariance == NULL) {
+    return supine_error_memory(error, "%s: %zu samples", name, count);
   }
-  if (status == SUPINE_OK) {
-    status = fit_sorted(&limb, confidence, curve, report, error);
-  }
-  gsl_multifit_nlinear_free(limb.work);
-  gsl_matrix_free(limb.covariance);
-  free(limb.x);
-  free(limb.sample);
-  return status;
+  SUPINE_TRY(sort(&limb, samples, error));
+  return fit_sorted(&limb, confidence, curve, report, error);
 }

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "program/options/basis_input.h"
 #include "program/options/state_options.h"
 
@@ -67,9 +68,8 @@ supine_status supine_options_state(const supine_orientation *orientation, supine
 
 supine_status supine_options_posture_list_parse(const char *text, const supine_state *standard,
                                                 supine_posture_list *list, supine_error *error) {
-  supine_status status = SUPINE_OK;
   list->count = 0;
-  for (const char *at = text; status == SUPINE_OK;) {
+  for (const char *at = text;;) {
     const size_t length = strcspn(at, ",");
     if (list->count == SUPINE_POSTURE_LIST_MAX) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "more than %d postures: name fewer",
@@ -86,13 +86,12 @@ supine_status supine_options_posture_list_parse(const char *text, const supine_s
     item->name[length] = '\0';
     item->state = *standard;
     item->state.gravity[1] = 1.0; /* supine, if the state names no posture */
-    status = supine_state_parse(item->name, &item->state, error);
+    SUPINE_TRY(supine_state_parse(item->name, &item->state, error));
     if (at[length] == '\0') {
-      break;
+      return SUPINE_OK;
     }
     at += length + 1;
   }
-  return status;
 }
 
 const char *supine_options_posture_label(const char *name) {
@@ -183,15 +182,15 @@ double supine_options_above_rest(const supine_state *state) {
   return rest ? state->volume.ml : (double)NAN;
 }
 
-/* Return the fraction of the triangles that turn over in a pose, or -1 if out of memory. */
-static double turned_over(const supine_basis *basis, const supine_pose *pose) {
-  supine_mesh mesh = {0};
-  double *moved = supine_options_basis_positions(basis, pose);
-  const bool made = moved != NULL && supine_options_basis_mesh(basis, &mesh) == SUPINE_OK;
-  const double turned = made ? supine_mesh_turned_over(&mesh, moved) : -1.0;
-  supine_mesh_free(&mesh);
-  free(moved);
-  return turned;
+/* Compute the fraction of the triangles that turn over in a pose. */
+static supine_status turned_over(const supine_basis *basis, const supine_pose *pose, double *share,
+                                 supine_error *error) {
+  SUPINE_FREED_BY(supine_mesh_free) supine_mesh mesh = {0};
+  SUPINE_FREED_BY(supine_mesh_free) supine_mesh moved = {0};
+  SUPINE_TRY(supine_posed_mesh(basis, NULL, &mesh, error));
+  SUPINE_TRY(supine_posed_mesh(basis, pose, &moved, error));
+  *share = supine_mesh_turned_over(&mesh, moved.vertices);
+  return SUPINE_OK;
 }
 
 supine_status supine_options_plausible(const supine_plausible *lungs, supine_error *error) {
@@ -227,23 +226,19 @@ supine_status supine_options_pose_check(const supine_basis *basis, const char *c
   const supine_basis_info *info = supine_basis_get_info(basis);
   supine_plausible lungs = {.command = command,
                             .state = state,
-                            .volume = supine_options_basis_volume(basis, pose),
-                            .folded = turned_over(basis, pose),
+                            .volume = supine_posed_volume(basis, pose),
                             .parts = "the surface folds; triangles that turn over",
                             .allowed = allow_folds || !info->has_rest};
+  SUPINE_TRY(turned_over(basis, pose, &lungs.folded, error));
   for (size_t lung = 0; lung < info->lung_count && info->has_rest; ++lung) {
     lungs.full += info->reference_volume[lung];
   }
-  return lungs.folded < 0.0 ? supine_error_set(error, SUPINE_ERROR_MEMORY,
-                                               "no memory for %zu vertices", info->vertex_count)
-                            : supine_options_plausible(&lungs, error);
+  return supine_options_plausible(&lungs, error);
 }
 
 supine_status supine_options_pose(const supine_basis *basis, const char *command, bool allow_folds,
                                   const supine_state *state, supine_pose *pose,
                                   supine_error *error) {
-  const supine_status status = supine_basis_pose(basis, state, pose, error);
-  return status == SUPINE_OK
-             ? supine_options_pose_check(basis, command, allow_folds, state, pose, error)
-             : status;
+  SUPINE_TRY(supine_basis_pose(basis, state, pose, error));
+  return supine_options_pose_check(basis, command, allow_folds, state, pose, error);
 }

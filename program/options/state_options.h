@@ -41,8 +41,7 @@ typedef struct supine_posture_list {
   "a volume it is a state: prone:rest+500."
 
 /* Parse a list of states, such as "supine,prone:rest+500,supine+15,0.6:0:-0.8".
- * @param standard  its volume is that of states that name none
- * @retval SUPINE_ERROR_ARGUMENT */
+ * @param standard  its volume is that of states that name none */
 supine_status supine_options_posture_list_parse(const char *text, const supine_state *standard,
                                                 supine_posture_list *list, supine_error *error);
 
@@ -105,8 +104,7 @@ typedef struct supine_plausible {
 } supine_plausible;
 
 /* Check that the volume is 10 % to 120 % of full inflation, and that at most 1 % of the parts turn
- * over.
- * @retval SUPINE_ERROR_NUMERICAL */
+ * over. */
 supine_status supine_options_plausible(const supine_plausible *lungs, supine_error *error);
 
 /* Check the surface of a pose with supine_options_plausible. If the volume at rest is unknown, the

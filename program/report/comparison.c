@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/vec3.h"
 #include "program/report/comparison.h"
 
@@ -25,13 +26,10 @@ static supine_status find_breath(const supine_comparison *c, const supine_postur
   supine_error wrong;
   supine_status status = supine_basis_gains(c->basis, &state, &after, &wrong);
   if (status != SUPINE_OK) {
-    (void)supine_error_set(error, status, "%s: %s", item->name, wrong.message);
-  } else {
-    status = supine_options_pose_check(c->basis, c->command, c->allow_folds, &state, &after, error);
+    return supine_error_set(error, status, "%s: %s", item->name, wrong.message);
   }
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(
+      supine_options_pose_check(c->basis, c->command, c->allow_folds, &state, &after, error));
   (void)supine_basis_volumes(c->basis, &after, posture->gain);
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     posture->gain[lung] -= posture->volume[lung];
@@ -81,65 +79,52 @@ static supine_status find_posture(const supine_comparison *c, const supine_postu
 /* Compute the targets in each posture, with their expected errors. */
 static supine_status find_targets(supine_comparison *c, size_t i, supine_error *error) {
   const supine_pose *const pose[2] = {&c->reference.pose, &c->posture[i].pose};
-  supine_expected expected = {0};
-  supine_status status = supine_options_expected_find(c->inside, &c->postures.item[i].state,
-                                                      &c->reference.state, &expected, error);
-  if (status == SUPINE_OK) {
-    status = supine_command_targets_find(c->inside, &c->names, pose, expected.sigma, false,
-                                         &c->posture[i].targets, error);
-  }
-  supine_options_expected_free(&expected);
-  return status;
+  SUPINE_FREED_BY(supine_posed_expected_free) supine_expected expected = {0};
+  SUPINE_TRY(supine_posed_expected(c->inside, &c->postures.item[i].state, &c->reference.state,
+                                   &expected, error));
+  return supine_command_targets_find(c->inside, &c->names, pose, expected.sigma, false,
+                                     &c->posture[i].targets, error);
 }
 
 /* Compute the expected error of each posture's displacement, mm RMS; 0 if it is unknown. */
 static supine_status find_errors(supine_comparison *c, supine_error *error) {
-  supine_status status = SUPINE_OK;
-  for (size_t i = 0; i < c->postures.count && status == SUPINE_OK; ++i) {
+  for (size_t i = 0; i < c->postures.count; ++i) {
     supine_expected expected = {0};
-    status = supine_options_expected_find(c->basis, &c->postures.item[i].state, &c->reference.state,
-                                          &expected, error);
+    SUPINE_TRY(supine_posed_expected(c->basis, &c->postures.item[i].state, &c->reference.state,
+                                     &expected, error));
     c->posture[i].expected_error = expected.rms;
-    supine_options_expected_free(&expected);
-    if (status == SUPINE_OK && c->inside != NULL) {
-      status = find_targets(c, i, error);
+    supine_posed_expected_free(&expected);
+    if (c->inside != NULL) {
+      SUPINE_TRY(find_targets(c, i, error));
     }
   }
-  return status;
+  return SUPINE_OK;
 }
 
 supine_status supine_report_find(supine_comparison *c, supine_error *error) {
   const size_t n = supine_basis_get_info(c->basis)->vertex_count;
   const size_t count = c->postures.count;
-  supine_status status = SUPINE_ERROR_MEMORY;
-  float *distance = malloc(n * sizeof *distance);
-  float *xyz[2] = {malloc(3 * n * sizeof(float)), malloc(3 * n * sizeof(float))};
+  SUPINE_ARENA arena = {0};
+  float *distance = supine_arena_take(&arena, n, sizeof *distance);
+  float *xyz[2] = {supine_arena_take(&arena, 3 * n, sizeof(float)),
+                   supine_arena_take(&arena, 3 * n, sizeof(float))};
   c->posture = calloc(count, sizeof *c->posture);
-  if (distance == NULL || xyz[0] == NULL || xyz[1] == NULL || c->posture == NULL) {
-    (void)supine_error_set(error, status, "out of memory");
-    goto cleanup;
+  if (arena.failed || c->posture == NULL) {
+    return supine_error_memory(error, "%zu vertices", n);
   }
-  status = supine_options_reference(c->basis, &c->from, true, &c->reference, error);
-  if (status == SUPINE_OK) {
-    status = supine_compare_create(c->basis, &c->compare, error);
-  }
-  for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
+  SUPINE_TRY(supine_options_reference(c->basis, &c->from, true, &c->reference, error));
+  SUPINE_TRY(supine_compare_create(c->basis, &c->compare, error));
+  for (size_t i = 0; i < count; ++i) {
     supine_error wrong = {SUPINE_OK, ""};
-    status = find_posture(c, &c->postures.item[i], distance, xyz, &c->posture[i], &wrong);
+    const supine_status status =
+        find_posture(c, &c->postures.item[i], distance, xyz, &c->posture[i], &wrong);
     if (status != SUPINE_OK) {
-      (void)supine_error_set(error, status, "%s: %s", c->path,
-                             wrong.message[0] != '\0' ? wrong.message
-                                                      : supine_status_string(status));
+      return supine_error_set(error, status, "%s: %s", c->path,
+                              wrong.message[0] != '\0' ? wrong.message
+                                                       : supine_status_string(status));
     }
   }
-  if (status == SUPINE_OK) {
-    status = find_errors(c, error);
-  }
-cleanup:
-  free(distance);
-  free(xyz[0]);
-  free(xyz[1]);
-  return status;
+  return find_errors(c, error);
 }
 
 void supine_report_free(supine_comparison *c) {

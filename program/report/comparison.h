@@ -68,8 +68,7 @@ struct json_t *supine_report_held(const supine_comparison *comparison, size_t po
 void supine_report_print(const supine_comparison *comparison, bool json);
 
 /* Print the comparison as HTML. If pictures cannot be drawn, the page states the reason in their
- * place. A write error sets the error indicator of `file`.
- * @retval SUPINE_ERROR_MEMORY */
+ * place. A write error sets the error indicator of `file`. */
 supine_status supine_report_html(const supine_comparison *comparison, FILE *file,
                                  supine_error *error);
 

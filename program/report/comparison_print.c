@@ -43,7 +43,7 @@ json_t *supine_report_held(const supine_comparison *c, size_t posture, size_t lu
     supine_basis_volumes(c->basis, &pose, in_scan);
   }
   const double held = of->volume[lung];
-  const double share = named ? 1.0 : held / supine_options_basis_volume(c->basis, &of->pose);
+  const double share = named ? 1.0 : held / supine_posed_volume(c->basis, &of->pose);
   const double above = share * volume->ml; /* part of the volume that is given */
   const bool other = volume->kind == (at_rest ? SUPINE_VOLUME_FULL : SUPINE_VOLUME_REST);
   const bool measured = fabs(held - in_scan[lung]) < 0.05;

@@ -8,6 +8,7 @@
 
 #include <meshoptimizer.h>
 
+#include "base/arena.h"
 #include "base/library.h"
 #include "base/parallel.h"
 #include "program/stream/frame.h"
@@ -35,6 +36,7 @@ struct supine_stream_frames {
   size_t strips_size; /* size of `strips`, bytes */
   size_t strips_count;
   uint64_t strips_crc;
+  supine_arena arena;
   supine_stream_frame *unused; /* list of frames that can be reused */
 };
 
@@ -46,21 +48,17 @@ const char *const supine_stream_content_names[] = {"weights", "points", "surface
 static supine_status make_strips(supine_stream_frames *f, supine_error *error) {
   static const uint32_t restart = UINT32_MAX; /* separates strips in the output of stripify() */
   const size_t corners = 3 * f->info->triangle_count;
-  const supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_MESHOPT, FUNCTIONS, &meshopt, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  uint32_t *order = malloc(corners * sizeof *order);
-  f->strips = malloc((meshopt.stripifyBound(corners) + 1) * sizeof *f->strips);
+  SUPINE_TRY(SUPINE_LIBRARY_LOAD(SUPINE_MESHOPT, FUNCTIONS, &meshopt, error));
+  SUPINE_ARENA arena = {0};
+  uint32_t *order = supine_arena_take(&arena, corners, sizeof *order);
+  f->strips = supine_arena_take(&f->arena, meshopt.stripifyBound(corners) + 1, sizeof *f->strips);
   if (order == NULL || f->strips == NULL) {
-    free(order);
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+    return supine_error_memory(error, "%zu triangles", corners / 3);
   }
   meshopt.optimizeVertexCacheStrip(order, supine_basis_triangles(f->basis), corners,
                                    f->info->vertex_count);
   const size_t end =
       1 + meshopt.stripify(f->strips + 1, order, corners, f->info->vertex_count, restart);
-  free(order);
   for (size_t i = 1, head = 0; i <= end; ++i) {
     if (i == end || f->strips[i] == restart) {
       f->strips[head] = htobe32((uint32_t)(i - head - 1));
@@ -78,7 +76,7 @@ supine_status supine_stream_frames_create(const supine_basis *basis, const char 
                                           supine_stream_frames **frames, supine_error *error) {
   supine_stream_frames *f = calloc(1, sizeof *f);
   if (f == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+    return supine_error_memory(error, "frames");
   }
   f->basis = basis;
   f->info = supine_basis_get_info(basis);
@@ -106,7 +104,7 @@ void supine_stream_frames_destroy(supine_stream_frames *frames) {
     free(frame->points);
     free(frame);
   }
-  free(frames->strips);
+  supine_arena_free(&frames->arena);
   free(frames);
 }
 

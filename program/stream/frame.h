@@ -60,8 +60,7 @@ typedef struct supine_stream_frames supine_stream_frames;
 /** Create the data shared by the frames of a basis.
  * @param basis   must outlive the frames
  * @param device  device name of the messages, up to 20 characters
- * @param ras     true to send points in RAS, false to send them in LPS
- * @retval SUPINE_ERROR_MEMORY */
+ * @param ras     true to send points in RAS, false to send them in LPS */
 supine_status supine_stream_frames_create(const supine_basis *basis, const char *device, bool ras,
                                           supine_stream_frames **frames, supine_error *error);
 /** Release the shared data and all frames, which must have no users; NULL is legal. */

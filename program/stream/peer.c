@@ -9,6 +9,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "base/arena.h"
 #include "program/stream/peer.h"
 
 /* Size, bytes, above which a message body is an error. Smaller unknown bodies are skipped. */
@@ -21,7 +22,7 @@ supine_status supine_stream_peer_begin(supine_stream_peer *peer, int socket, boo
   const unsigned timeout_ms = 20000;
   unsigned char *body = malloc(SUPINE_STREAM_BODY_MAX);
   if (body == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+    return supine_error_memory(error, "a peer");
   }
   (void)setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
   (void)setsockopt(socket, SOL_SOCKET, SO_KEEPALIVE, &yes, sizeof yes);

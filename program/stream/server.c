@@ -9,6 +9,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "base/arena.h"
 #include "base/clock.h"
 #include "program/stream/peer.h"
 #include "program/stream/server.h"
@@ -30,14 +31,15 @@ struct supine_stream_server {
   int listener;      /* listening socket; -1 if none */
   int port;
   supine_stream_address target;
-  double connect_at;              /* time of the next attempt to connect; INFINITY if none */
-  double accept_at;               /* time at which to accept peers again after a failure */
-  supine_stream_peer *connected;  /* peer of --connect, connected or connecting; NULL if none */
-  supine_stream_peer *peer;       /* [options->peers] connected peers and free slots */
-  struct pollfd *polled;          /* [options->peers + 2] peers, listener, pipe of web's poses */
-  supine_stream_peer **owner;     /* [options->peers + 2] peer of each polled socket, or NULL */
-  double wait_begun;              /* time at which ppoll() was last called */
-  double woke;                    /* time at which ppoll() last returned */
+  double connect_at;             /* time of the next attempt to connect; INFINITY if none */
+  double accept_at;              /* time at which to accept peers again after a failure */
+  supine_stream_peer *connected; /* peer of --connect, connected or connecting; NULL if none */
+  supine_stream_peer *peer;      /* [options->peers] connected peers and free slots */
+  struct pollfd *polled;         /* [options->peers + 2] peers, listener, pipe of web's poses */
+  supine_stream_peer **owner;    /* [options->peers + 2] peer of each polled socket, or NULL */
+  double wait_begun;             /* time at which ppoll() was last called */
+  double woke;                   /* time at which ppoll() last returned */
+  supine_arena arena;
   supine_stream_latency *latency; /* [2] latencies of frames of weights, and of frames of points */
 };
 
@@ -320,53 +322,51 @@ supine_status supine_stream_server_run(supine_stream_server *server, supine_erro
     }
     receive_all(s, count);
     if (s->woke >= frame_due(s) && !make_frame(s)) {
-      return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+      return supine_error_memory(error, "a frame");
     }
     send_peers(s);
   }
   return SUPINE_OK;
 }
 
+static void destroy(supine_stream_server **server) {
+  supine_stream_server_destroy(*server);
+}
+
 supine_status supine_stream_server_create(const supine_basis *basis,
                                           const supine_stream_options *options,
                                           supine_stream_server **server, supine_error *error) {
-  const double now = supine_clock_seconds();
-  supine_stream_server *s = calloc(1, sizeof *s);
-  if (s != NULL) {
-    *s = (supine_stream_server){.options = options, .listener = -1};
-    s->peer = calloc(options->peers, sizeof *s->peer);
-    s->polled = calloc(options->peers + 2, sizeof *s->polled);
-    s->owner = calloc(options->peers + 2, sizeof(supine_stream_peer *));
-    s->latency = calloc(2, sizeof *s->latency);
+  SUPINE_FREED_BY(destroy) supine_stream_server *s = calloc(1, sizeof *s);
+  if (s == NULL) {
+    return supine_error_memory(error, "the server");
   }
-  if (s == NULL || s->peer == NULL || s->polled == NULL || s->owner == NULL || s->latency == NULL) {
-    supine_stream_server_destroy(s);
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  *s = (supine_stream_server){.options = options, .listener = -1, .woke = supine_clock_seconds()};
+  s->peer = supine_arena_zeros(&s->arena, options->peers, sizeof *s->peer);
+  s->polled = supine_arena_zeros(&s->arena, options->peers + 2, sizeof *s->polled);
+  s->owner = supine_arena_zeros(&s->arena, options->peers + 2, sizeof(supine_stream_peer *));
+  s->latency = supine_arena_zeros(&s->arena, 2, sizeof *s->latency);
+  if (s->arena.failed) {
+    return supine_error_memory(error, "%zu peers", options->peers);
   }
   for (size_t i = 0; i < options->peers; ++i) {
     s->peer[i].socket = -1;
   }
-  s->patient = supine_stream_patient_begin(basis, options, &s->counts, now);
-  s->connect_at = options->connect != NULL ? now : (double)INFINITY;
-  s->woke = now;
-  supine_stream_address here;
-  supine_status status =
-      supine_stream_frames_create(basis, options->name, options->ras, &s->frames, error);
-  if (status == SUPINE_OK && options->listen != NULL) {
-    status = supine_stream_address_read(options->listen, true, &here, error);
-    if (status == SUPINE_OK) {
-      s->listener = supine_stream_address_listen(&here, &s->port, error);
-      status = s->listener < 0 ? SUPINE_ERROR_WRITE : SUPINE_OK;
+  s->patient = supine_stream_patient_begin(basis, options, &s->counts, s->woke);
+  s->connect_at = options->connect != NULL ? s->woke : (double)INFINITY;
+  SUPINE_TRY(supine_stream_frames_create(basis, options->name, options->ras, &s->frames, error));
+  if (options->listen != NULL) {
+    supine_stream_address here;
+    SUPINE_TRY(supine_stream_address_read(options->listen, true, &here, error));
+    s->listener = supine_stream_address_listen(&here, &s->port, error);
+    if (s->listener < 0) {
+      return SUPINE_ERROR_WRITE;
     }
   }
-  if (status == SUPINE_OK && options->connect != NULL) {
-    status = supine_stream_address_read(options->connect, false, &s->target, error);
-  }
-  if (status != SUPINE_OK) {
-    supine_stream_server_destroy(s);
-    return status;
+  if (options->connect != NULL) {
+    SUPINE_TRY(supine_stream_address_read(options->connect, false, &s->target, error));
   }
   *server = s;
+  s = NULL;
   return SUPINE_OK;
 }
 
@@ -384,10 +384,7 @@ void supine_stream_server_destroy(supine_stream_server *server) {
   }
   supine_stream_frame_release(server->frames, server->latest);
   supine_stream_frames_destroy(server->frames);
-  free(server->latency);
-  free(server->owner);
-  free(server->polled);
-  free(server->peer);
+  supine_arena_free(&server->arena);
   free(server);
 }
 

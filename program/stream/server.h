@@ -82,8 +82,7 @@ typedef struct supine_stream_options {
 /** Create a server and open its sockets.
  * @param options  must outlive the server
  * @retval SUPINE_ERROR_ARGUMENT  an invalid address or port
- * @retval SUPINE_ERROR_WRITE     the port is taken
- * @retval SUPINE_ERROR_MEMORY */
+ * @retval SUPINE_ERROR_WRITE     the port is taken */
 supine_status supine_stream_server_create(const supine_basis *basis,
                                           const supine_stream_options *options,
                                           supine_stream_server **server, supine_error *error);
@@ -92,9 +91,8 @@ void supine_stream_server_destroy(supine_stream_server *server);
 /** Return the port on which the server listens; 0 if it does not listen. */
 int supine_stream_server_port(const supine_stream_server *server);
 
-/** Run the server until options->stop returns true or the time options->seconds is over. The options are those of supine_stream_server_create.
- * @retval SUPINE_ERROR_WRITE  the system cannot wait for the sockets
- * @retval SUPINE_ERROR_MEMORY */
+/** Run the server until options->stop returns true or the time options->seconds is over.
+ * @retval SUPINE_ERROR_WRITE  the system cannot wait for the sockets */
 supine_status supine_stream_server_run(supine_stream_server *server, supine_error *error);
 
 const supine_stream_counts *supine_stream_server_counts(const supine_stream_server *server);

@@ -6,6 +6,7 @@
 #include <string.h>
 #include <time.h>
 
+#include "base/arena.h"
 #include "program/options/basis_input.h"
 #include "program/stream/tracked_patient.h"
 
@@ -14,21 +15,17 @@ supine_status supine_stream_volume_breathe(supine_stream_volume *volume, const s
   const double start = 0.0;
   double above = 0.0;
   /* Evaluate the breath once to check the arguments. */
-  const supine_status status = supine_breath_evaluate(pv, breath, 1, &start, &above, NULL, error);
-  if (status == SUPINE_OK) {
-    *volume = (supine_stream_volume){.breathes = true, .pv = *pv, .breath = *breath};
-  }
-  return status;
+  SUPINE_TRY(supine_breath_evaluate(pv, breath, 1, &start, &above, NULL, error));
+  *volume = (supine_stream_volume){.breathes = true, .pv = *pv, .breath = *breath};
+  return SUPINE_OK;
 }
 
 supine_status supine_stream_volume_fix(supine_stream_volume *volume, const char *text,
                                        supine_error *error) {
   supine_state state = {.gravity = {0.0, 1.0, 0.0}};
-  const supine_status status = supine_state_parse_volume(text, &state, error);
-  if (status == SUPINE_OK) {
-    *volume = (supine_stream_volume){.fixed = state};
-  }
-  return status;
+  SUPINE_TRY(supine_state_parse_volume(text, &state, error));
+  *volume = (supine_stream_volume){.fixed = state};
+  return SUPINE_OK;
 }
 
 supine_state supine_stream_volume_at(const supine_stream_volume *volume, const supine_basis *basis,
@@ -221,7 +218,7 @@ static void find_gains(supine_stream_patient *patient, double now,
   const supine_state rest = supine_breath_state(basis, snapshot->gravity, 0.0);
   supine_error error;
   if (supine_basis_gains(basis, &rest, &snapshot->pose, NULL) == SUPINE_OK) {
-    snapshot->above = -supine_options_basis_volume(basis, &snapshot->pose);
+    snapshot->above = -supine_posed_volume(basis, &snapshot->pose);
   }
   if (supine_basis_gains(basis, &state, &snapshot->pose, &error) == SUPINE_OK) {
     memcpy(patient->gains, snapshot->pose.gains, sizeof patient->gains);
@@ -233,7 +230,7 @@ static void find_gains(supine_stream_patient *patient, double now,
                                error.message);
   }
   memcpy(snapshot->pose.gains, patient->gains, sizeof patient->gains);
-  snapshot->volume = supine_options_basis_volume(basis, &snapshot->pose);
+  snapshot->volume = supine_posed_volume(basis, &snapshot->pose);
   snapshot->above += snapshot->volume;
 }
 

@@ -10,6 +10,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "base/arena.h"
 #include "base/clock.h"
 #include "base/library.h"
 #include "program/stream/web.h"
@@ -217,13 +218,10 @@ static void *run(void *context) {
 
 supine_status supine_stream_web_create(const supine_stream_site *site, supine_stream_web **web,
                                        supine_error *error) {
-  const supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_WEBSOCKETS, FUNCTIONS, &lws, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(SUPINE_LIBRARY_LOAD(SUPINE_WEBSOCKETS, FUNCTIONS, &lws, error));
   supine_stream_web *w = calloc(1, sizeof *w);
   if (w == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+    return supine_error_memory(error, "the page");
   }
   w->site = *site;
   (void)pthread_mutex_init(&w->lock, NULL);

@@ -29,8 +29,7 @@ typedef struct supine_stream_site {
 
 /** Start a thread that serves a site.
  * @retval SUPINE_ERROR_UNSUPPORTED  libwebsockets is not installed
- * @retval SUPINE_ERROR_WRITE        the port is taken, or the certificate is invalid
- * @retval SUPINE_ERROR_MEMORY */
+ * @retval SUPINE_ERROR_WRITE        the port is taken, or the certificate is invalid */
 supine_status supine_stream_web_create(const supine_stream_site *site, supine_stream_web **web,
                                        supine_error *error);
 void supine_stream_web_destroy(supine_stream_web *web);

@@ -22,8 +22,7 @@ typedef struct export_source {
   size_t resting_rows; /**< number of lungs, or 1 for the sum over all lungs */
 } export_source;
 
-/** Open a basis file.
- * @retval SUPINE_ERROR_READ, SUPINE_ERROR_FORMAT, SUPINE_ERROR_MEMORY  see supine_basis_open */
+/** Open a basis file. */
 supine_status supine_export_source_open(const char *path, export_source *source,
                                         supine_error *error);
 
@@ -74,8 +73,7 @@ typedef struct export_glb_options {
  * @retval SUPINE_ERROR_MESH         the basis has no triangles
  * @retval SUPINE_ERROR_ARGUMENT     the file would exceed 4 GiB, the limit of the format
  * @retval SUPINE_ERROR_UNSUPPORTED  meshoptimizer is not installed
- * @retval SUPINE_ERROR_NUMERICAL    the surface folds before the end of the breath
- * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */
+ * @retval SUPINE_ERROR_NUMERICAL    the surface folds before the end of the breath */
 supine_status supine_export_glb_write(const char *path, const export_source *source,
                                       const export_glb_options *options, size_t *bytes,
                                       supine_error *error);
@@ -108,14 +106,11 @@ typedef struct export_page {
  * network. Vertices, displacements and triangles are compressed by meshoptimizer. In lungs up to
  * 650 mm long, positions err by at most 0.02 mm. A write error sets the error indicator of `file`.
  * @retval SUPINE_ERROR_UNSUPPORTED  there are more than EXPORT_PAGE_MODES_MAX modes, or
- *                                   meshoptimizer is not installed
- * @retval SUPINE_ERROR_MEMORY */
+ *                                   meshoptimizer is not installed */
 supine_status supine_export_html_print(FILE *file, const export_source *source,
                                        const export_page *shown, supine_error *error);
 
-/** Write the page of supine_export_html_print to a file.
- * @retval SUPINE_ERROR_UNSUPPORTED  see supine_export_html_print
- * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */
+/** Write the page of supine_export_html_print to a file. */
 supine_status supine_export_html_write(const char *path, const export_source *source,
                                        const export_page *shown, supine_error *error);
 

@@ -4,16 +4,14 @@
 
 #include <supine/sh.h>
 
+#include "base/arena.h"
 #include "program/view/export/export.h"
 
 supine_status supine_export_source_open(const char *path, export_source *source,
                                         supine_error *error) {
   export_source made = {0};
   static const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
-  const supine_status status = supine_basis_open_with(path, &exact, &made.basis, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(supine_basis_open_with(path, &exact, &made.basis, error));
   made.info = supine_basis_get_info(made.basis);
   made.terms = supine_sh_count(made.info->band);
   const supine_tensor *resting = supine_basis_tensor(made.basis, "resting_volume");

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/output.h"
 #include "program/view/export/packed.h"
 
@@ -15,29 +16,23 @@ static const double step_min_mm = 0.045;
 /* Compute the normals of vertices. */
 static supine_status prepare(glb *g, supine_error *error) {
   const size_t n = g->source->info->vertex_count;
-  g->xyz = malloc(3 * n * sizeof *g->xyz);
-  g->normals = malloc(3 * n * sizeof *g->normals);
-  g->added = malloc(3 * n * g->targets.count * sizeof *g->added);
-  supine_status status = supine_export_order_make(g->source, !g->options->plain, &g->order, error);
-  if (status == SUPINE_OK && (g->xyz == NULL || g->normals == NULL || g->added == NULL)) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  g->xyz = supine_arena_take(&g->arena, n, 3 * sizeof *g->xyz);
+  g->normals = supine_arena_take(&g->arena, n, 3 * sizeof *g->normals);
+  g->added = supine_arena_take(&g->arena, n * g->targets.count, 3 * sizeof *g->added);
+  if (g->arena.failed) {
+    return supine_error_memory(error, "%zu vertices", n);
   }
-  if (status == SUPINE_OK) {
-    status = supine_export_targets_normals(g->source, g->options->breath, &g->targets,
-                                           g->options->plain ? NULL : g->order.vertex, g->normals,
-                                           g->added, error);
-  }
-  return status;
+  SUPINE_TRY(supine_export_order_make(g->source, !g->options->plain, &g->order, error));
+  return supine_export_targets_normals(g->source, g->options->breath, &g->targets,
+                                       g->options->plain ? NULL : g->order.vertex, g->normals,
+                                       g->added, error);
 }
 
 /* Append the patient with the lungs, the animations, the table under the patient and the arrow of
  * gravity. Set `roots` to the root nodes of the scene. */
 static supine_status add_all(glb *g, json_t **roots, supine_error *error) {
   float q[4];
-  const supine_status status = prepare(g, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(prepare(g, error));
   supine_export_glb_rotation(0, q);
   json_t *children = json_array();
   (void)json_array_append_new(g->nodes, json_pack("{s:s, s:o, s:[f,f,f,f]}", "name", "patient",
@@ -91,11 +86,8 @@ static supine_status write_file(const char *path, const char *text, const char *
                             "vertices",
                             path, *total);
   }
-  supine_output output = {0};
-  supine_status status = supine_output_open(path, &output, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
+  SUPINE_TRY(supine_output_open(path, &output, error));
   const uint32_t head[] = {magic, VERSION, (uint32_t)*total, (uint32_t)(length + padding),
                            json_chunk};
   const uint32_t tail[] = {(uint32_t)bytes, binary_chunk};
@@ -104,9 +96,7 @@ static supine_status write_file(const char *path, const char *text, const char *
   (void)fwrite("   ", 1, padding, output.file);
   (void)fwrite(tail, sizeof tail, 1, output.file);
   (void)fwrite(numbers, 1, bytes, output.file);
-  status = supine_output_commit(&output, error);
-  supine_output_abandon(&output);
-  return status;
+  return supine_output_commit(&output, error);
 }
 
 /* Build both chunks in memory, then write the file. Set `total` to the size of the file, bytes. */
@@ -137,6 +127,19 @@ static supine_status make_and_write(glb *g, const char *path, size_t *total, sup
   return status;
 }
 
+static void free_glb(glb **g) {
+  if (*g != NULL) {
+    json_t *const parts[] = {(*g)->views, (*g)->accessors, (*g)->meshes,
+                             (*g)->nodes, (*g)->materials, (*g)->animations};
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; ++i) {
+      json_decref(parts[i]);
+    }
+    supine_export_order_free(&(*g)->order);
+    supine_arena_free(&(*g)->arena);
+    free(*g);
+  }
+}
+
 supine_status supine_export_glb_write(const char *path, const export_source *source,
                                       const export_glb_options *options, size_t *bytes,
                                       supine_error *error) {
@@ -144,30 +147,20 @@ supine_status supine_export_glb_write(const char *path, const export_source *sou
     return supine_error_set(error, SUPINE_ERROR_MESH,
                             "the basis has no triangles to draw: precompute it from a surface");
   }
-  supine_status status = supine_export_pack_begin(error);
-  glb *g = status == SUPINE_OK ? calloc(1, sizeof *g) : NULL;
+  SUPINE_TRY(supine_export_pack_begin(error));
+  SUPINE_FREED_BY(free_glb) glb *g = calloc(1, sizeof *g);
   if (g == NULL) {
-    return status != SUPINE_OK ? status
-                               : supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+    return supine_error_memory(error, "%s", path);
   }
-  *g = (glb){.source = source, .options = options};
-  json_t **const parts[] = {&g->views, &g->accessors, &g->meshes,
-                            &g->nodes, &g->materials, &g->animations};
-  for (size_t i = 0; i < sizeof parts / sizeof *parts; ++i) {
-    *parts[i] = json_array();
-  }
-  status = supine_export_targets_choose(source, options->breath, &g->targets, error);
+  *g = (glb){.source = source,
+             .options = options,
+             .views = json_array(),
+             .accessors = json_array(),
+             .meshes = json_array(),
+             .nodes = json_array(),
+             .materials = json_array(),
+             .animations = json_array()};
+  SUPINE_TRY(supine_export_targets_choose(source, options->breath, &g->targets, error));
   g->step = options->plain ? 1 : fmax(step_min_mm, g->targets.half_extent / (INT16_MAX / 2));
-  if (status == SUPINE_OK) {
-    status = make_and_write(g, path, bytes, error);
-  }
-  for (size_t i = 0; i < sizeof parts / sizeof *parts; ++i) {
-    json_decref(*parts[i]);
-  }
-  supine_export_order_free(&g->order);
-  free(g->xyz);
-  free(g->normals);
-  free(g->added);
-  free(g);
-  return status;
+  return make_and_write(g, path, bytes, error);
 }

@@ -6,6 +6,7 @@
 
 #include <jansson.h>
 
+#include "base/arena.h"
 #include "program/view/export/packed.h"
 #include "program/view/export/targets.h"
 
@@ -36,6 +37,7 @@ typedef struct glb {
   FILE *numbers;        /**< binary chunk of the file */
   size_t unpacked;      /**< total size of the compressed arrays after decompression, bytes */
   supine_status status; /**< SUPINE_ERROR_MEMORY if an allocation failed */
+  supine_arena arena;   /**< memory of the arrays of this struct */
 } glb;
 
 /** Append an array of `count` elements, such as positions; return the index of its accessor.

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/output.h"
 
 #include "program/view/export/base64.h"
@@ -300,6 +301,10 @@ static void write_tensors(const void *context, const char *name, FILE *file) {
   }
 }
 
+static void free_order(page *p) {
+  supine_export_order_free(&p->order);
+}
+
 supine_status supine_export_html_print(FILE *file, const export_source *source,
                                        const export_page *shown, supine_error *error) {
   const supine_basis_info *info = source->info;
@@ -309,40 +314,25 @@ supine_status supine_export_html_print(FILE *file, const export_source *source,
                             "--modes %d, or export .glb",
                             EXPORT_PAGE_MODES_MAX, info->mode_count, EXPORT_PAGE_MODES_MAX);
   }
-  supine_status status = supine_export_pack_begin(error);
-  page p = {.source = source, .shown = shown, .status = &status};
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  status = supine_export_order_make(source, true, &p.order, error);
-  if (status != SUPINE_OK) {
-    supine_export_order_free(&p.order);
-    return status;
-  }
+  SUPINE_TRY(supine_export_pack_begin(error));
+  supine_status status = SUPINE_OK;
+  SUPINE_FREED_BY(free_order) page p = {.source = source, .shown = shown, .status = &status};
+  SUPINE_TRY(supine_export_order_make(source, true, &p.order, error));
   find_steps(&p);
-  json_t *description = describe(&p);
+  json_auto_t *description = describe(&p);
   char *text = json_dumps(description, JSON_COMPACT);
-  json_t *data = json_pack("{s:O, s:s, s:b}", "title", json_object_get(description, "title"),
-                           "basis", text, "live", (int)shown->live);
+  json_auto_t *data = json_pack("{s:O, s:s, s:b}", "title", json_object_get(description, "title"),
+                                "basis", text, "live", (int)shown->live);
   const supine_template page_template = {supine_export_assets, data, write_tensors, &p};
   supine_template_fill(&page_template, "page.html", file);
   free(text);
-  json_decref(data);
-  json_decref(description);
-  supine_export_order_free(&p.order);
   return status == SUPINE_OK ? status : supine_error_set(error, status, "out of memory");
 }
 
 supine_status supine_export_html_write(const char *path, const export_source *source,
                                        const export_page *shown, supine_error *error) {
-  supine_output output = {0};
-  supine_status status = supine_output_open(path, &output, error);
-  if (status == SUPINE_OK) {
-    status = supine_export_html_print(output.file, source, shown, error);
-  }
-  if (status == SUPINE_OK) {
-    status = supine_output_commit(&output, error);
-  }
-  supine_output_abandon(&output);
-  return status;
+  SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
+  SUPINE_TRY(supine_output_open(path, &output, error));
+  SUPINE_TRY(supine_export_html_print(output.file, source, shown, error));
+  return supine_output_commit(&output, error);
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "program/view/export/packed.h"
+#include "base/arena.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -20,11 +21,9 @@
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } meshopt;
 
 supine_status supine_export_pack_begin(supine_error *error) {
-  const supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_MESHOPT, FUNCTIONS, &meshopt, error);
-  if (status == SUPINE_OK) {
-    meshopt.encodeIndexVersion(1); /* EXT_meshopt_compression requires version 1 */
-  }
-  return status;
+  SUPINE_TRY(SUPINE_LIBRARY_LOAD(SUPINE_MESHOPT, FUNCTIONS, &meshopt, error));
+  meshopt.encodeIndexVersion(1); /* EXT_meshopt_compression requires version 1 */
+  return SUPINE_OK;
 }
 
 void supine_export_pack_direction(const float direction[3], size_t size, void *numbers) {

@@ -22,13 +22,11 @@ supine_status supine_export_pack_begin(supine_error *error);
  * @param numbers  output: the integers */
 void supine_export_pack_direction(const float direction[3], size_t size, void *numbers);
 
-/** Compress `count` rows of `stride` bytes; the stride is a multiple of 4 and at most 256.
- * @retval SUPINE_ERROR_MEMORY */
+/** Compress `count` rows of `stride` bytes; the stride is a multiple of 4 and at most 256. */
 supine_status supine_export_pack_rows(const void *rows, size_t count, size_t stride,
                                       export_packed *packed);
 
-/** Compress triangles, given as `count` vertex indices below `vertices`.
- * @retval SUPINE_ERROR_MEMORY */
+/** Compress triangles, given as `count` vertex indices below `vertices`. */
 supine_status supine_export_pack_corners(const uint32_t *corners, size_t count, size_t vertices,
                                          export_packed *packed);
 
@@ -43,8 +41,7 @@ typedef struct export_order {
 /** Choose an order; free it with supine_export_order_free, also after a failure.
  * @param packed  false to keep the order of the basis. True for an order that compresses well:
  *                triangles are sorted, and vertices are in the order in which the triangles first
- *                use them; call supine_export_pack_begin first
- * @retval SUPINE_ERROR_MEMORY */
+ *                use them; call supine_export_pack_begin first */
 supine_status supine_export_order_make(const export_source *source, bool packed,
                                        export_order *order, supine_error *error);
 void supine_export_order_free(export_order *order);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "program/view/export/targets.h"
+#include "base/arena.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -56,11 +57,8 @@ static supine_status find_ranges(const export_source *source, double breath,
   for (size_t i = 0; i < PHASES * (size_t)DIRECTIONS; ++i) {
     double g[3];
     supine_spiral((double)(i / PHASES), DIRECTIONS, 0, g);
-    const supine_status status =
-        supine_export_breath_pose(source, breath, g, (double)(i % PHASES) / STEPS, &pose, error);
-    if (status != SUPINE_OK) {
-      return status;
-    }
+    SUPINE_TRY(
+        supine_export_breath_pose(source, breath, g, (double)(i % PHASES) / STEPS, &pose, error));
     for (size_t lung = 0; lung < source->info->lung_count; ++lung) {
       export_weights *w = &targets->lung[lung];
       find_amounts(source, targets->count, &pose, lung, amounts);
@@ -91,15 +89,15 @@ supine_status supine_export_targets_choose(const export_source *source, double b
   const bool bent = info->bend[0] != 0 || info->bend[1] != 0 || info->bend[2] != 0;
   targets->count = (bent ? 2 : 1) * info->mode_count;
   find_middle(source, targets);
-  const supine_status status = find_ranges(source, breath, targets, error);
-  for (size_t lung = 0; status == SUPINE_OK && lung < info->lung_count; ++lung) {
+  SUPINE_TRY(find_ranges(source, breath, targets, error));
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
     export_weights *w = &targets->lung[lung];
     for (size_t j = 0; j < targets->count; ++j) {
       w->offset[j] -= margin * w->unit[j];
       w->unit[j] = w->unit[j] > 0 ? (1 + 2 * margin) * w->unit[j] : 1;
     }
   }
-  return status;
+  return SUPINE_OK;
 }
 
 void supine_export_targets_field(const export_source *source, size_t vertex, size_t j,

@@ -58,8 +58,7 @@ void supine_export_targets_base(const export_source *source, const export_target
  * surface about the supine posture.
  * @param order  [N] order in which the file stores vertices. `added` is then rounded so that it
  *               compresses well in this order, and is 0 for a target that turns a lung's normals
- *               by less than 2.5 degrees (RMS). NULL to keep `added` exact
- * @retval SUPINE_ERROR_MEMORY */
+ *               by less than 2.5 degrees (RMS). NULL to keep `added` exact */
 supine_status supine_export_targets_normals(const export_source *source, double breath,
                                             const export_targets *targets, const uint32_t *order,
                                             float *base, float *added, supine_error *error);

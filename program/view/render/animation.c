@@ -5,6 +5,7 @@
 #include <webp/encode.h>
 #include <webp/mux.h>
 
+#include "base/arena.h"
 #include "program/view/render/render.h"
 
 /* WebP quality, 0 to 100. At 90, letters are sharp and files take a third of the lossless size. */
@@ -51,11 +52,8 @@ supine_status supine_render_animation_add(supine_animation *animation, supine_re
                                           const supine_picture *picture, int milliseconds,
                                           supine_error *error) {
   WebPPicture frame;
-  supine_status status = supine_render_picture_draw(renderer, picture, animation->pixels, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  status = SUPINE_ERROR_MEMORY;
+  SUPINE_TRY(supine_render_picture_draw(renderer, picture, animation->pixels, error));
+  supine_status status = SUPINE_ERROR_MEMORY;
   if (WebPPictureInit(&frame)) {
     frame.width = (int)animation->width;
     frame.height = (int)animation->height;

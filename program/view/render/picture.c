@@ -6,6 +6,7 @@
 
 #include <cairo.h>
 
+#include "base/arena.h"
 #include "base/library.h"
 #include "base/output.h"
 #include "program/view/render/render.h"
@@ -453,7 +454,6 @@ static supine_status compose(cairo_t *cr, supine_renderer *renderer, const supin
   const layout at = make_layout(picture);
   const bar_scale bar = {picture->largest, supine_render_bar_step(picture->largest)};
   double own[SUPINE_VIEWS_MAX][4];
-  supine_status status = SUPINE_OK;
   if (at.font < 4) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "%zu x %zu pixels are too few for %zu posture%s and %zu view%s: give "
@@ -469,16 +469,16 @@ static supine_status compose(cairo_t *cr, supine_renderer *renderer, const supin
     }
     supine_render_picture_extent(renderer, picture, own);
   }
-  for (size_t row = 0; row < picture->view_count && status == SUPINE_OK; ++row) {
-    for (size_t column = 0; column < picture->panel_count && status == SUPINE_OK; ++column) {
-      status = cell(cr, renderer, picture, &at, &bar, column, row,
-                    picture->extent != NULL ? picture->extent[row] : own[row], error);
+  for (size_t row = 0; row < picture->view_count; ++row) {
+    for (size_t column = 0; column < picture->panel_count; ++column) {
+      SUPINE_TRY(cell(cr, renderer, picture, &at, &bar, column, row,
+                      picture->extent != NULL ? picture->extent[row] : own[row], error));
     }
   }
   if (picture->transparency == 0) { /* a shell has no colours */
     colour_bar(cr, picture, &at, &bar);
   }
-  return status;
+  return SUPINE_OK;
 }
 
 static cairo_status_t to_file(void *file, const unsigned char *bytes, unsigned length) {
@@ -508,28 +508,22 @@ static supine_status draw_on(cairo_surface_t *surface, supine_renderer *renderer
 
 supine_status supine_render_picture_draw(supine_renderer *renderer, const supine_picture *picture,
                                          uint32_t *pixels, supine_error *error) {
-  supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error));
   cairo_surface_t *surface = cairo.image_surface_create_for_data(
       (unsigned char *)pixels, CAIRO_FORMAT_RGB24, (int)picture->width, (int)picture->height,
       (int)(4 * picture->width));
-  status = draw_on(surface, renderer, picture, error);
+  const supine_status status = draw_on(surface, renderer, picture, error);
   cairo.surface_destroy(surface);
   return status;
 }
 
 supine_status supine_render_picture_save(supine_renderer *renderer, const supine_picture *picture,
                                          const char *path, supine_error *error) {
-  supine_output output = {0};
-  supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
+  SUPINE_TRY(SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error));
   cairo_surface_t *surface =
       cairo.image_surface_create(CAIRO_FORMAT_RGB24, (int)picture->width, (int)picture->height);
-  status = draw_on(surface, renderer, picture, error);
+  supine_status status = draw_on(surface, renderer, picture, error);
   if (status == SUPINE_OK) {
     status = supine_output_open(path, &output, error);
   }
@@ -539,19 +533,15 @@ supine_status supine_render_picture_save(supine_renderer *renderer, const supine
       status = supine_output_commit(&output, error);
     }
   }
-  supine_output_abandon(&output);
   cairo.surface_destroy(surface);
   return status;
 }
 
 supine_status supine_render_png(supine_renderer *renderer, const supine_scene *scene, FILE *file,
                                 supine_error *error) {
-  supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error));
   cairo_surface_t *image = NULL;
-  status = draw_scene(renderer, scene, &image, error);
+  supine_status status = draw_scene(renderer, scene, &image, error);
   if (status == SUPINE_OK) {
     status = write_png(image, file, error);
   }

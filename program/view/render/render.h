@@ -52,8 +52,7 @@ void supine_render_colour(supine_colours map, double t, double rgb[3]);
 typedef struct supine_renderer supine_renderer;
 
 /** Create a renderer; supine_render_destroy frees it.
- * @param basis  must outlive the renderer
- * @retval SUPINE_ERROR_MEMORY */
+ * @param basis  must outlive the renderer */
 supine_status supine_render_create(const supine_basis *basis, supine_renderer **renderer,
                                    supine_error *error);
 /** Destroy a renderer; NULL is legal. */
@@ -84,14 +83,11 @@ void supine_render_extent(supine_renderer *renderer, const supine_scene *scene, 
 
 /** Draw a scene on a transparent background, using all cores.
  * @param pixels  [height, width] premultiplied ARGB as in cairo, top row first; output
- * @retval SUPINE_ERROR_ARGUMENT  a side of 0 or more than 16384 pixels
- * @retval SUPINE_ERROR_MEMORY */
+ * @retval SUPINE_ERROR_ARGUMENT  a side of 0 or more than 16384 pixels */
 supine_status supine_render_draw(supine_renderer *renderer, const supine_scene *scene,
                                  uint32_t *pixels, supine_error *error);
 
-/** Draw a scene and write it as PNG.
- * @retval SUPINE_ERROR_WRITE
- * @retval others as supine_render_draw */
+/** Draw a scene and write it as PNG. */
 supine_status supine_render_png(supine_renderer *renderer, const supine_scene *scene, FILE *file,
                                 supine_error *error);
 
@@ -156,14 +152,11 @@ void supine_render_picture_extent(supine_renderer *renderer, const supine_pictur
 
 /** Compose a picture.
  * @param pixels  [height, width] RGB, 0x00RRGGBB or 0xFFRRGGBB, top row first; output
- * @retval SUPINE_ERROR_ARGUMENT  the picture is too large, or too small for its panels and views
- * @retval others as supine_render_draw */
+ * @retval SUPINE_ERROR_ARGUMENT  the picture is too large, or too small for its panels and views */
 supine_status supine_render_picture_draw(supine_renderer *renderer, const supine_picture *picture,
                                          uint32_t *pixels, supine_error *error);
 
-/** Compose a picture and write it as a PNG file.
- * @retval SUPINE_ERROR_WRITE
- * @retval others as supine_render_picture_draw */
+/** Compose a picture and write it as a PNG file. */
 supine_status supine_render_picture_save(supine_renderer *renderer, const supine_picture *picture,
                                          const char *path, supine_error *error);
 
@@ -171,18 +164,14 @@ supine_status supine_render_picture_save(supine_renderer *renderer, const supine
 typedef struct supine_animation supine_animation;
 
 /** Create an animation; supine_render_animation_close frees it.
- * @retval SUPINE_ERROR_ARGUMENT  a side exceeds the 16383 pixels of WebP
- * @retval SUPINE_ERROR_MEMORY */
+ * @retval SUPINE_ERROR_ARGUMENT  a side exceeds the 16383 pixels of WebP */
 supine_status supine_render_animation_open(size_t width, size_t height,
                                            supine_animation **animation, supine_error *error);
-/** Append a picture of the animation's size, to be shown for `milliseconds`.
- * @retval SUPINE_ERROR_MEMORY
- * @retval others as supine_render_picture_draw */
+/** Append a picture of the animation's size, to be shown for `milliseconds`. */
 supine_status supine_render_animation_add(supine_animation *animation, supine_renderer *renderer,
                                           const supine_picture *picture, int milliseconds,
                                           supine_error *error);
-/** Write the animation to a file.
- * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */
+/** Write the animation to a file. */
 supine_status supine_render_animation_write(supine_animation *animation, FILE *file,
                                             supine_error *error);
 /** Free an animation; NULL is legal. */

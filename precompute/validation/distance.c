@@ -7,14 +7,14 @@
 #include <gsl/gsl_sort.h>
 #include <gsl/gsl_statistics.h>
 
-#include "program/validation.h"
+#include "precompute/validation/validation.h"
 
 #include "base/arena.h"
 #include "base/vec3.h"
 #include "precompute/lungs/surface.h"
 
-const char *const supine_command_map_names[SUPINE_PATIENT_MAP_COUNT] = {"predicted", "none",
-                                                                        "translation", "affine"};
+const char *const supine_validation_map_names[SUPINE_PATIENT_MAP_COUNT] = {"predicted", "none",
+                                                                           "translation", "affine"};
 
 /* SAMPLED_MAX: most vertices of a surface from which distances of the fitted maps are measured. */
 enum { ROUNDS = 20, FITTED_MAX = 2000, SAMPLED_MAX = 20000 };
@@ -22,7 +22,7 @@ enum { ROUNDS = 20, FITTED_MAX = 2000, SAMPLED_MAX = 20000 };
 /* A motion whose RMS is below this, mm, counts as none: scans and landmarks are less precise. */
 static const double still = 0.05;
 
-static void summarise(double *distances, size_t count, supine_command_distance *of) {
+static void summarise(double *distances, size_t count, supine_validation_distance *of) {
   gsl_sort(distances, 1, count);
   of->mean = gsl_stats_mean(distances, 1, count);
   of->rms = sqrt(gsl_stats_tss_m(distances, 1, count, 0.0) / (double)count);
@@ -31,7 +31,7 @@ static void summarise(double *distances, size_t count, supine_command_distance *
 }
 
 static void explain(supine_patient_scan_motion moved,
-                    supine_command_distance distance[SUPINE_PATIENT_MAP_COUNT]) {
+                    supine_validation_distance distance[SUPINE_PATIENT_MAP_COUNT]) {
   const double none = distance[moved == SUPINE_PATIENT_STILL ? SUPINE_PATIENT_MAP_NONE
                                                              : SUPINE_PATIENT_MAP_TRANSLATION]
                           .rms;
@@ -54,10 +54,10 @@ static supine_status undetermined(supine_error *error) {
 }
 
 supine_status
-supine_command_compare_points(const supine_patient_pairs *pairs, const double *predicted,
-                              const double *squares, supine_patient_scan_motion moved,
-                              supine_command_distance distance[SUPINE_PATIENT_MAP_COUNT],
-                              supine_error *error) {
+supine_validation_points(const supine_patient_pairs *pairs, const double *predicted,
+                         const double *squares, supine_patient_scan_motion moved,
+                         supine_validation_distance distance[SUPINE_PATIENT_MAP_COUNT],
+                         supine_error *error) {
   double *space = malloc(pairs->count * sizeof *space);
   if (space == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu points", pairs->count);
@@ -108,9 +108,9 @@ typedef struct surfaces {
 } surfaces;
 
 /* Compute statistics of the distances from the vertices of one surface to the other, both ways.
- * @param nearest  as supine_command_compare_surfaces, for all vertices; NULL to sample an equal
+ * @param nearest  as supine_validation_surfaces, for all vertices; NULL to sample an equal
  * share of the vertices of both */
-static void surface_distance(const surfaces *s, double *nearest, supine_command_distance *of) {
+static void surface_distance(const surfaces *s, double *nearest, supine_validation_distance *of) {
   const size_t total = s->state->vertex_count;
   const size_t larger = s->count > total ? s->count : total;
   const size_t most = nearest != NULL ? larger : at_most(larger, SAMPLED_MAX);
@@ -154,10 +154,10 @@ static bool fit_map(supine_patient_map kind, size_t n, const double *vertices,
 }
 
 /* Build the trees of both surfaces, fit all maps and measure their distances; see
- * supine_command_compare_surfaces. */
+ * supine_validation_surfaces. */
 static supine_status compare(surfaces *s, const supine_mesh *start,
                              supine_patient_scan_motion moved, double *predicted, double *nearest,
-                             supine_command_distance *distance, supine_error *error) {
+                             supine_validation_distance *distance, supine_error *error) {
   const supine_mesh *state = s->state;
   const size_t bytes = 3 * s->count * sizeof(double);
   memcpy(s->moved, predicted, bytes);
@@ -181,10 +181,10 @@ static supine_status compare(surfaces *s, const supine_mesh *start,
 }
 
 supine_status
-supine_command_compare_surfaces(const supine_mesh *start, supine_patient_scan_motion moved,
-                                double *predicted, const supine_mesh *state, double *nearest,
-                                supine_command_distance distance[SUPINE_PATIENT_MAP_COUNT],
-                                supine_error *error) {
+supine_validation_surfaces(const supine_mesh *start, supine_patient_scan_motion moved,
+                           double *predicted, const supine_mesh *state, double *nearest,
+                           supine_validation_distance distance[SUPINE_PATIENT_MAP_COUNT],
+                           supine_error *error) {
   SUPINE_ARENA arena = {0};
   const size_t n = start->vertex_count;
   const size_t numbers = 10 * (size_t)FITTED_MAX + 4 * (n + state->vertex_count);

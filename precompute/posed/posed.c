@@ -1,0 +1,84 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Compute volume, positions, surface and expected errors of a basis in a pose. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/arena.h"
+#include "precompute/posed/posed.h"
+
+double supine_posed_volume(const supine_basis *basis, const supine_pose *pose) {
+  double volumes[SUPINE_LUNGS_MAX] = {0.0};
+  double sum = 0.0;
+  (void)supine_basis_volumes(basis, pose, volumes);
+  for (size_t lung = 0; lung < supine_basis_get_info(basis)->lung_count; ++lung) {
+    sum += volumes[lung];
+  }
+  return sum;
+}
+
+supine_status supine_posed_positions(const supine_basis *basis, const supine_pose *pose,
+                                     double *positions, supine_error *error) {
+  const size_t n = supine_basis_get_info(basis)->vertex_count;
+  SUPINE_ARENA arena = {0};
+  float *xyz = supine_arena_take(&arena, n, 3 * sizeof *xyz);
+  if (xyz == NULL) {
+    return supine_error_memory(error, "%zu vertices", n);
+  }
+  if (pose != NULL) {
+    (void)supine_deform(basis, pose, xyz);
+  }
+  for (size_t i = 0; i < 3 * n; ++i) {
+    positions[i] = (double)(pose != NULL ? xyz : supine_basis_vertices(basis))[i];
+  }
+  return SUPINE_OK;
+}
+
+supine_status supine_posed_mesh(const supine_basis *basis, const supine_pose *pose,
+                                supine_mesh *mesh, supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const size_t corners = 3 * info->triangle_count;
+  *mesh = (supine_mesh){.vertex_count = info->vertex_count,
+                        .vertices = malloc(3 * info->vertex_count * sizeof(double)),
+                        .triangle_count = info->triangle_count,
+                        .triangles = malloc(corners * sizeof(uint32_t))};
+  if (mesh->vertices == NULL || mesh->triangles == NULL) {
+    return supine_error_memory(error, "%zu vertices", info->vertex_count);
+  }
+  memcpy(mesh->triangles, supine_basis_triangles(basis), corners * sizeof(uint32_t));
+  return supine_posed_positions(basis, pose, mesh->vertices, error);
+}
+
+supine_status supine_posed_expected(const supine_basis *basis, const supine_state *state,
+                                    const supine_state *from, supine_expected *expected,
+                                    supine_error *error) {
+  const size_t n = supine_basis_get_info(basis)->vertex_count;
+  float *sigma = malloc(n * sizeof *sigma);
+  double square = 0.0;
+  double along = 0.0;
+  if (sigma == NULL) {
+    return supine_error_memory(error, "%zu vertices", n);
+  }
+  const supine_status status = supine_expected_error(basis, state, from, sigma, error);
+  if (status != SUPINE_OK) {
+    free(sigma);
+    return status == SUPINE_ERROR_UNSUPPORTED || status == SUPINE_ERROR_OPEN_SURFACE ? SUPINE_OK
+                                                                                     : status;
+  }
+  for (size_t i = 0; i < n; ++i) {
+    square += (double)sigma[i] * (double)sigma[i];
+    expected->largest = fmax(expected->largest, (double)sigma[i]);
+  }
+  for (size_t i = 0; i < 3; ++i) {
+    along += state->gravity[i] * from->gravity[i];
+  }
+  expected->sigma = sigma;
+  expected->rms = sqrt(square / (double)n);
+  expected->turned = along < 1.0 - 1e-9;
+  return SUPINE_OK;
+}
+
+void supine_posed_expected_free(supine_expected *expected) {
+  free(expected->sigma);
+  *expected = (supine_expected){0};
+}

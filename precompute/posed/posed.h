@@ -1,0 +1,39 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Compute volume, positions, surface and expected errors of a basis in a pose. */
+#ifndef SUPINE_POSED_H
+#define SUPINE_POSED_H
+
+#include <supine/locate.h>
+#include <supine/runtime.h>
+
+#include "mesh/mesh.h"
+
+/* Return the volume of all lungs together in a pose, mL. */
+double supine_posed_volume(const supine_basis *basis, const supine_pose *pose);
+
+/* Compute all vertices [N, 3] in a pose or, if `pose` is NULL, of the reference surface, mm. */
+supine_status supine_posed_positions(const supine_basis *basis, const supine_pose *pose,
+                                     double *positions, supine_error *error);
+
+/* Copy the surface in a pose or, if `pose` is NULL, the reference surface into a mesh. Release the
+ * mesh with supine_mesh_free, even after a failure. */
+supine_status supine_posed_mesh(const supine_basis *basis, const supine_pose *pose,
+                                supine_mesh *mesh, supine_error *error);
+
+/* Expected errors of the displacements from one state to another. Initialise with zeros, and
+ * release with supine_posed_expected_free. */
+typedef struct supine_expected {
+  float *sigma;        /* expected error of each vertex's displacement, mm; NULL if unknown */
+  double rms, largest; /* RMS and maximum of `sigma` over the vertices, mm */
+  bool turned;         /* whether the displacements include a change of posture */
+} supine_expected;
+
+/* Compute the expected errors of the displacements from one state to another. They are unknown for
+ * open surfaces and for displacements computed by another simulator; `expected` is then unchanged.
+ * @retval SUPINE_ERROR_MEMORY, or any status of supine_basis_pose */
+supine_status supine_posed_expected(const supine_basis *basis, const supine_state *state,
+                                    const supine_state *from, supine_expected *expected,
+                                    supine_error *error);
+void supine_posed_expected_free(supine_expected *expected);
+
+#endif
