@@ -23,10 +23,11 @@
  *     V       volume of all lungs, mL
  *     s_V     0.17, or metadata "resting_spread", of the volume that was assumed: at rest, that is
  *             0.08 of full inflation. The error is common to all postures: two states at rest
- * differ by |d(u_i)/dV| s_V Dg      change of the unit vector of gravity b_i     max(0, 1 - X /
- * 0.7) 4 Y (1 - Y) max(0, 1 - |Z - 0.65| / 0.35), with X from the midline outwards, Y from the back
- * and Z from the apex, 0 to 1 in the box around the lungs. The heart moves by up to 19 mm (Chino &
- * Marks 2008, n 16), but not in the model
+ *             differ by |d(u_i)/dV| s_V
+ *     Dg      change of the unit vector of gravity
+ *     b_i     max(0, 1 - X / 0.7) 4 Y (1 - Y) max(0, 1 - |Z - 0.65| / 0.35), with X from the
+ *             midline outwards, Y from the back and Z from the apex, 0 to 1 in the box around the
+ *             lungs. The heart moves by up to 19 mm (Chino & Marks 2008, n 16), but not here
  *
  * For a change of posture, all terms are extrapolations: nobody was scanned in two postures. Half
  * of all points lie within 0.9 sigma of the truth, 95 % within 1.8 sigma.
