@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Compute the force on the lungs from a measured displacement. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include <cblas.h>
@@ -9,6 +8,7 @@
 
 #include "precompute/patient/matching.h"
 
+#include "base/arena.h"
 #include "base/vec3.h"
 
 enum { COLUMNS = SUPINE_PATIENT_COLUMNS, HEIGHT = COLUMNS, FORCE, ALL };
@@ -101,30 +101,23 @@ supine_status supine_patient_applied_find(supine_patient_matching *matching,
                                           supine_patient_applied *applied, supine_error *error) {
   const size_t n = matching->fuller->mesh.vertex_count;
   double products[ALL * ALL];
-  double *spread = malloc(2 * n * sizeof *spread);
-  double *means = malloc((ALL + 1) * n * sizeof *means);
-  supine_status status =
-      spread == NULL || means == NULL
-          ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n)
-          : SUPINE_OK;
-  if (status == SUPINE_OK) {
-    supine_patient_matching_choose(matching, n);
-    find_smoothed_force(matching, patient, spread);
-    status = supine_physics_equilibrium_force(matching->equilibrium, spread, spread + n, error);
+  SUPINE_ARENA arena = {0};
+  double *spread = supine_arena_take(&arena, 2 * n, sizeof *spread);
+  double *means = supine_arena_take(&arena, (ALL + 1) * n, sizeof *means);
+  if (arena.failed) {
+    return supine_error_memory(error, "%zu vertices", n);
   }
-  if (status == SUPINE_OK) {
-    const size_t blocks = supine_patient_rows_block(&matching->frame, matching->rows, n, 1);
-    applied->blocks = (double)blocks;
-    supine_mesh_vertex_area(&matching->fuller->mesh, spread);
-    sum_products(matching, spread + n, gravity, spread, blocks, means, products);
-    if (!fit_force(products, applied)) {
-      status = supine_error_set(
-          error, SUPINE_ERROR_NUMERICAL,
-          "the displacement between the two surfaces does not determine the applied force: check "
-          "that both surfaces show the same lungs, and that neither surface is cut off");
-    }
-  }
-  free(spread);
-  free(means);
-  return status;
+  supine_patient_matching_choose(matching, n);
+  find_smoothed_force(matching, patient, spread);
+  SUPINE_TRY(supine_physics_equilibrium_force(matching->equilibrium, spread, spread + n, error));
+  const size_t blocks = supine_patient_rows_block(&matching->frame, matching->rows, n, 1);
+  applied->blocks = (double)blocks;
+  supine_mesh_vertex_area(&matching->fuller->mesh, spread);
+  sum_products(matching, spread + n, gravity, spread, blocks, means, products);
+  return fit_force(products, applied)
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                                "the displacement between the two surfaces does not determine the "
+                                "applied force: check that both surfaces show the same lungs, and "
+                                "that neither surface is cut off");
 }

@@ -2,7 +2,6 @@
 /* Fit the expandability (1 / relative stiffness) of each region of the lungs, and test the result
  * on held-out vertices. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include <cblas.h>
@@ -10,6 +9,7 @@
 
 #include "precompute/patient/matching.h"
 
+#include "base/arena.h"
 #include "base/vec3.h"
 
 /* Largest distance from a vertex to the nearest centre of a region, mm. */
@@ -135,34 +135,34 @@ static void find_uniform(const supine_patient_matching *m, const supine_patient_
   }
 }
 
+static void free_strain(supine_strain **strain) {
+  supine_physics_strain_destroy(*strain);
+}
+
 supine_status supine_patient_matching_set_tissue(supine_patient_matching *matching,
                                                  const supine_patient_power *law,
                                                  const supine_patient_stiffness *stiffness,
                                                  supine_error *error) {
   const size_t n = matching->fuller->mesh.vertex_count;
-  supine_strain *strain = NULL;
-  double *e = malloc(4 * n * sizeof *e);
-  free(matching->tissue);
-  matching->tissue = stiffness->count > 0 ? malloc(3 * n * sizeof(double)) : NULL;
-  supine_status status =
-      e == NULL || (stiffness->count > 0 && matching->tissue == NULL)
-          ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n)
-          : SUPINE_OK;
-  if (status == SUPINE_OK && stiffness->count > 0) {
-    supine_patient_stiffness_of(stiffness, matching->fuller, e);
-    find_uniform(matching, law, matching->tissue);
-    memcpy(e + n, matching->tissue, 3 * n * sizeof *e);
-    status = supine_physics_strain_create(matching->fuller, e, NULL, &strain, error);
-    if (status == SUPINE_OK) {
-      status = supine_physics_strain_apply(strain, NULL, 3, matching->tissue, error);
-    }
-    for (size_t i = 0; i < 3 * n && status == SUPINE_OK; ++i) {
-      matching->tissue[i] -= e[n + i];
-    }
+  SUPINE_FREED_BY(free_strain) supine_strain *strain = NULL;
+  SUPINE_ARENA arena = {0};
+  matching->tissue = NULL;
+  if (stiffness->count == 0) {
+    return SUPINE_OK;
   }
-  supine_physics_strain_destroy(strain);
-  free(e);
-  return status;
+  double *e = supine_arena_take(&arena, 4 * n, sizeof *e);
+  double *tissue = supine_arena_take(&matching->arena, 3 * n, sizeof *tissue);
+  if (arena.failed || matching->arena.failed) {
+    return supine_error_memory(error, "%zu vertices", n);
+  }
+  supine_patient_stiffness_of(stiffness, matching->fuller, e);
+  find_uniform(matching, law, tissue);
+  memcpy(e + n, tissue, 3 * n * sizeof *e);
+  SUPINE_TRY(supine_physics_strain_create(matching->fuller, e, NULL, &strain, error));
+  SUPINE_TRY(supine_physics_strain_apply(strain, NULL, 3, tissue, error));
+  cblas_daxpy((int)(3 * n), -1.0, e + n, 1, tissue, 1);
+  matching->tissue = tissue;
+  return SUPINE_OK;
 }
 
 /* Compute w->response: one solve for each region. */
@@ -170,36 +170,30 @@ static supine_status find_responses(work *w, const supine_patient_power *law, su
   const supine_patient_matching *m = w->m;
   const size_t n = m->fuller->mesh.vertex_count;
   const size_t regions = w->stiffness->count;
-  supine_strain *strain = NULL;
-  double *shares = malloc((regions + 1) * n * sizeof *shares);
-  double *u = malloc(6 * n * sizeof *u);
-  supine_status status =
-      shares == NULL || u == NULL
-          ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n)
-          : supine_physics_strain_create(m->fuller, NULL, NULL, &strain, error);
-  for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
-    double of[SUPINE_PATIENT_REGIONS_MAX + 1] = {0.0};
+  SUPINE_FREED_BY(free_strain) supine_strain *strain = NULL;
+  SUPINE_ARENA arena = {0};
+  double *shares = supine_arena_zeros(&arena, (regions + 1) * n, sizeof *shares);
+  double *u = supine_arena_take(&arena, 6 * n, sizeof *u);
+  if (arena.failed) {
+    return supine_error_memory(error, "%zu vertices", n);
+  }
+  SUPINE_TRY(supine_physics_strain_create(m->fuller, NULL, NULL, &strain, error));
+  for (size_t i = 0; i < n; ++i) {
+    double of[SUPINE_PATIENT_REGIONS_MAX];
     supine_patient_stiffness_shares(w->stiffness, m->fuller, i, of);
-    for (size_t k = 0; k <= regions; ++k) {
-      shares[k * n + i] = k < regions ? of[k] : 0.0;
-    }
+    cblas_dcopy((int)regions, of, 1, shares + i, (int)n);
   }
-  if (status == SUPINE_OK) {
-    find_uniform(m, law, u + 3 * n);
-  }
-  for (size_t k = regions + 1; k-- > 0 && status == SUPINE_OK;) {
+  find_uniform(m, law, u + 3 * n);
+  for (size_t k = regions + 1; k-- > 0;) {
     memcpy(u, u + 3 * n, 3 * n * sizeof *u);
-    status = supine_physics_strain_apply(strain, shares + k * n, AXES, u, error);
-    for (size_t i = 0; i < m->count * AXES && status == SUPINE_OK; ++i) {
+    SUPINE_TRY(supine_physics_strain_apply(strain, shares + k * n, AXES, u, error));
+    for (size_t i = 0; i < m->count * AXES; ++i) {
       double *row = w->response + i / AXES * (regions + 1) * AXES + i % AXES;
       row[k * AXES] =
           u[3 * m->match[i / AXES].vertex + i % AXES] - (k < regions ? row[regions * AXES] : 0.0);
     }
   }
-  supine_physics_strain_destroy(strain);
-  free(shares);
-  free(u);
-  return status;
+  return SUPINE_OK;
 }
 
 /* Compute the displacement u of matched vertex i, mm. Write its derivatives with respect to the
@@ -333,13 +327,11 @@ static supine_status undetermined(supine_error *error) {
 /* Fit and match the surfaces in turn, without robust weights. */
 static supine_status iterate(work *w, double *noise, supine_error *error) {
   supine_patient_matching *m = w->m;
-  supine_status status = SUPINE_OK;
-  for (size_t round = 0; round < ROUNDS && status == SUPINE_OK; ++round) {
-    status = supine_patient_matching_weigh(m, INFINITY, error);
+  for (size_t round = 0; round < ROUNDS; ++round) {
+    SUPINE_TRY(supine_patient_matching_weigh(m, INFINITY, error));
     *noise = sqrt(vertices_per_error) * fmax(noise_least, residual(w, FOLDS, NULL));
-    if (status == SUPINE_OK &&
-        !(step(w, round == 0, *noise, FOLDS) && step(w, false, *noise, FOLDS))) {
-      status = undetermined(error);
+    if (!step(w, round == 0, *noise, FOLDS) || !step(w, false, *noise, FOLDS)) {
+      return undetermined(error);
     }
     for (size_t i = 0; i < m->count; ++i) {
       double u[3];
@@ -350,7 +342,7 @@ static supine_status iterate(work *w, double *noise, supine_error *error) {
     }
     supine_patient_matching_find(m);
   }
-  return status;
+  return SUPINE_OK;
 }
 
 /* Set the regions and the displacement law to the solution. After the last step, w->matrix holds
@@ -386,39 +378,33 @@ supine_status supine_patient_expand(supine_patient_matching *matching,
   *report = (supine_patient_expand_report){.tried = true};
   place_regions(matching->fuller, stiffness);
   const size_t n = stiffness->count;
+  SUPINE_ARENA arena = {0};
   work w = {.m = matching,
             .stiffness = stiffness,
             .motion = (size_t)options->scan_motion,
             .ridge = ridges[0],
-            .response = malloc(matching->count * (n + 1) * AXES * sizeof(double)),
-            .precision = malloc((n * n + 1) * sizeof(double)),
-            .matrix = malloc((size_t)UNKNOWNS_MAX * UNKNOWNS_MAX * sizeof(double))};
-  supine_status status =
-      w.response == NULL || w.precision == NULL || w.matrix == NULL ||
-              supine_patient_rows_block(&matching->frame, matching->rows, matching->count, 1) == 0
-          ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu regions", n)
-          : find_responses(&w, &law, error);
-  if (status == SUPINE_OK) {
-    find_prior_precision(stiffness, w.precision);
-    for (size_t t = 0; t < n + AXES; ++t) {
-      w.x[t] = 1.0;
-    }
-    status = iterate(&w, &noise, error);
+            .response = supine_arena_take(&arena, matching->count * (n + 1) * AXES, sizeof(double)),
+            .precision = supine_arena_take(&arena, n * n, sizeof(double)),
+            .matrix =
+                supine_arena_take(&arena, (size_t)UNKNOWNS_MAX * UNKNOWNS_MAX, sizeof(double))};
+  if (arena.failed ||
+      supine_patient_rows_block(&matching->frame, matching->rows, matching->count, 1) == 0) {
+    return supine_error_memory(error, "%zu regions", n);
   }
-  if (status == SUPINE_OK && !choose_ridge(&w, noise, report)) {
-    status = undetermined(error);
+  SUPINE_TRY(find_responses(&w, &law, error));
+  find_prior_precision(stiffness, w.precision);
+  for (size_t t = 0; t < n + AXES; ++t) {
+    w.x[t] = 1.0;
   }
-  status = status == SUPINE_OK ? iterate(&w, &noise, error) : status;
-  if (status == SUPINE_OK) {
-    report->fitted[1] = residual(&w, FOLDS, NULL);
-    conclude(&w, &law, stiffness, report);
-    report->kept = report->held_out[1] < kept_ratio * report->held_out[0];
-    stiffness->count = report->kept ? n : 0;
-    patient->power = report->kept ? law : patient->power;
-    status = supine_patient_matching_set_tissue(matching, &law, stiffness, error);
+  SUPINE_TRY(iterate(&w, &noise, error));
+  if (!choose_ridge(&w, noise, report)) {
+    return undetermined(error);
   }
-  free(w.response);
-  free(w.precision);
-  free(w.matrix);
-  return status;
+  SUPINE_TRY(iterate(&w, &noise, error));
+  report->fitted[1] = residual(&w, FOLDS, NULL);
+  conclude(&w, &law, stiffness, report);
+  report->kept = report->held_out[1] < kept_ratio * report->held_out[0];
+  stiffness->count = report->kept ? n : 0;
+  patient->power = report->kept ? law : patient->power;
+  return supine_patient_matching_set_tissue(matching, &law, stiffness, error);
 }

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Fit a displacement law with its kriging correction, and measure the error on held-out points. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include <cblas.h>
@@ -91,23 +90,24 @@ static double affine_residual(const double map[AFFINE], const supine_patient_row
 static size_t assign_folds(const supine_patient_frame *frame, supine_patient_row *rows,
                            size_t count, unsigned long seed, size_t *fold) {
   const size_t blocks = supine_patient_rows_block(frame, rows, count, seed + 1);
-  size_t *fold_of = malloc((blocks + 1) * sizeof *fold_of);
+  SUPINE_ARENA arena = {0};
+  size_t *fold_of = supine_arena_take(&arena, blocks, sizeof *fold_of);
   gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
-  const bool able = fold_of != NULL && random != NULL;
-  if (able) {
-    gsl_rng_set(random, 1000 + seed);
-    for (size_t b = 0; b < blocks; ++b) {
-      const size_t other = gsl_rng_uniform_int(random, b + 1);
-      fold_of[b] = fold_of[other];
-      fold_of[other] = b % FOLDS;
-    }
-    for (size_t i = 0; i < count; ++i) {
-      fold[i] = fold_of[rows[i].block];
-    }
+  if (arena.failed || random == NULL) {
+    gsl_rng_free(random);
+    return 0;
+  }
+  gsl_rng_set(random, 1000 + seed);
+  for (size_t b = 0; b < blocks; ++b) {
+    const size_t other = gsl_rng_uniform_int(random, b + 1);
+    fold_of[b] = fold_of[other];
+    fold_of[other] = b % FOLDS;
   }
   gsl_rng_free(random);
-  free(fold_of);
-  return able ? blocks : 0;
+  for (size_t i = 0; i < count && blocks > 0; ++i) {
+    fold[i] = fold_of[rows[i].block];
+  }
+  return blocks;
 }
 
 /* Predict the displacement u of a point, mm, without the motion of the body. */
@@ -158,29 +158,28 @@ static void add_residuals(const study *s, const supine_patient_row *rows, size_t
 static supine_status hold_out(const study *s, const size_t *fold, size_t which, squares *sums,
                               double *ratio) {
   const size_t n = s->row_count;
+  SUPINE_ARENA arena = {0};
   /* First the measurements to which the law is fitted, then the held-out ones. */
-  supine_patient_row *rows = malloc(n * sizeof *rows);
-  supine_patient_krige krige = {0};
-  supine_status status = rows == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
+  supine_patient_row *rows = supine_arena_take(&arena, n, sizeof *rows);
+  SUPINE_FREED_BY(supine_patient_krige_free) supine_patient_krige krige = {0};
   size_t fitted_count = 0;
   size_t count = 0;
-  for (int held_out = 0; held_out < 2 && status == SUPINE_OK; ++held_out) {
+  if (arena.failed) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  for (int held_out = 0; held_out < 2; ++held_out) {
+    fitted_count = count;
     for (size_t i = 0; i < n; ++i) {
       if ((fold[i] == which) == (held_out == 1)) {
         rows[count++] = s->rows[i];
       }
     }
-    fitted_count = held_out ? fitted_count : count;
   }
-  if (status == SUPINE_OK && fitted_count < n) {
-    status = supine_patient_krige_fit(&s->options, rows, fitted_count, &krige, NULL);
-    if (status == SUPINE_OK) {
-      add_residuals(s, rows + fitted_count, n - fitted_count, &krige, sums, ratio);
-    }
+  if (fitted_count < n) {
+    SUPINE_TRY(supine_patient_krige_fit(&s->options, rows, fitted_count, &krige, NULL));
+    add_residuals(s, rows + fitted_count, n - fitted_count, &krige, sums, ratio);
   }
-  supine_patient_krige_free(&krige);
-  free(rows);
-  return status;
+  return SUPINE_OK;
 }
 
 static void hold_out_range(void *context, size_t begin, size_t end, size_t thread) {
@@ -261,25 +260,19 @@ static supine_status run(study *s, supine_patient *patient, supine_patient_fit_r
                          supine_error *error) {
   squares fitted = {.weight = 0.0};
   squares held_out = {.weight = 0.0};
-  supine_patient_krige krige = {0};
-  supine_status status =
-      supine_patient_krige_fit(&s->options, s->rows, s->row_count, &krige, error);
-  if (status == SUPINE_OK) {
-    add_residuals(s, s->rows, s->row_count, &krige, &fitted, NULL);
-    s->options.sill = krige.sill;
-    s->options.uncorrected = krige.sill == 0.0;
-    supine_patient_krige_errors(&krige, report->error);
-    supine_patient_krige_copy_law(&krige, patient);
-    status = hold_all_out(s, &held_out, error);
-  }
-  if (status == SUPINE_OK) {
-    (void)find_rms(s, &fitted, report->fitted);
-    report->explained = find_rms(s, &held_out, report->held_out);
-    report->baseline = report->held_out[baseline_of(s)];
-    set_expected(s, &krige, report);
-  }
-  supine_patient_krige_free(&krige);
-  return status;
+  SUPINE_FREED_BY(supine_patient_krige_free) supine_patient_krige krige = {0};
+  SUPINE_TRY(supine_patient_krige_fit(&s->options, s->rows, s->row_count, &krige, error));
+  add_residuals(s, s->rows, s->row_count, &krige, &fitted, NULL);
+  s->options.sill = krige.sill;
+  s->options.uncorrected = krige.sill == 0.0;
+  supine_patient_krige_errors(&krige, report->error);
+  supine_patient_krige_copy_law(&krige, patient);
+  SUPINE_TRY(hold_all_out(s, &held_out, error));
+  (void)find_rms(s, &fitted, report->fitted);
+  report->explained = find_rms(s, &held_out, report->held_out);
+  report->baseline = report->held_out[baseline_of(s)];
+  set_expected(s, &krige, report);
+  return SUPINE_OK;
 }
 
 supine_status supine_patient_fit(const supine_patient_fit_options *options,
@@ -288,35 +281,28 @@ supine_status supine_patient_fit(const supine_patient_fit_options *options,
                                  supine_error *error) {
   const size_t count = single + 3 * triples;
   const size_t needed = (options->law == SUPINE_PATIENT_PAPER ? 9 : 1) + options->scan_motion;
+  SUPINE_ARENA arena = {0};
   study s = {.options = *options,
              .rows = rows,
              .row_count = count,
              .triples = triples,
-             .ratio = calloc(SEEDS * triples + 1, sizeof(double)),
-             .fold = malloc(SEEDS * count * sizeof(size_t))};
-  supine_status status = SUPINE_OK;
+             .ratio = supine_arena_zeros(&arena, SEEDS * triples, sizeof(double)),
+             .fold = supine_arena_take(&arena, SEEDS * count, sizeof(size_t))};
   *report = (supine_patient_fit_report){.points = (double)(triples > 0 ? triples : count)};
   patient->law = options->law;
   if (single + triples < needed) {
-    status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "points: %zu, fewer than the %zu unknowns of the %s law: give more "
-                              "points, or use --law deep",
-                              single + triples, needed, supine_patient_law_names[options->law]);
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "points: %zu, fewer than the %zu unknowns of the %s law: give more "
+                            "points, or use --law deep",
+                            single + triples, needed, supine_patient_law_names[options->law]);
   }
-  for (size_t seed = 0; seed < SEEDS && status == SUPINE_OK; ++seed) {
+  for (size_t seed = 0; seed < SEEDS; ++seed) {
     const size_t blocks =
-        s.fold == NULL || s.ratio == NULL
-            ? 0
-            : assign_folds(&patient->frame, rows, count, seed, s.fold + seed * count);
+        arena.failed ? 0 : assign_folds(&patient->frame, rows, count, seed, s.fold + seed * count);
     report->blocks = (double)blocks;
     if (blocks == 0) {
-      status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu values", count);
+      return supine_error_memory(error, "%zu values", count);
     }
   }
-  if (status == SUPINE_OK) {
-    status = run(&s, patient, report, error);
-  }
-  free(s.fold);
-  free(s.ratio);
-  return status;
+  return run(&s, patient, report, error);
 }

@@ -2,7 +2,6 @@
 /* Fit the gain, the increase of the force from the top to the bottom of the lungs, to scans in
  * other postures. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include <cblas.h>
@@ -105,25 +104,23 @@ static double depth_at(const supine_patient_frame *frame, const supine_patient_p
 static supine_status make_rows(work *w, const supine_lungs *lungs,
                                const supine_patient_pairs *pairs, const supine_mesh *surface,
                                supine_error *error) {
-  supine_status status = SUPINE_OK;
-  if (pairs != NULL) {
-    w->matching.count = 3 * pairs->count;
-    w->matching.rows = malloc(w->matching.count * sizeof *w->matching.rows);
+  supine_patient_matching *m = &w->matching;
+  if (pairs == NULL) {
+    SUPINE_TRY(supine_patient_matching_create(lungs, surface, VERTICES_MAX, 0, m, error));
+    SUPINE_TRY(supine_patient_matching_set_tissue(m, &w->record->patient.power,
+                                                  &w->record->stiffness, error));
   } else {
-    status = supine_patient_matching_create(lungs, surface, VERTICES_MAX, 0, &w->matching, error);
-    if (status == SUPINE_OK) {
-      status = supine_patient_matching_set_tissue(&w->matching, &w->record->patient.power,
-                                                  &w->record->stiffness, error);
-    }
+    m->count = 3 * pairs->count;
+    m->rows = supine_arena_take(&m->arena, m->count, sizeof *m->rows);
   }
-  w->motion = malloc(w->matching.count * sizeof *w->motion);
-  if (status == SUPINE_OK && (w->matching.rows == NULL || w->motion == NULL)) {
-    status =
-        supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the fit to a further state");
-  } else if (status == SUPINE_OK && pairs != NULL) {
-    supine_patient_rows_of_pairs(&w->record->patient.frame, pairs, w->matching.rows);
+  w->motion = supine_arena_take(&m->arena, m->count, sizeof *w->motion);
+  if (m->arena.failed) {
+    return supine_error_memory(error, "the fit to a further state");
   }
-  return status;
+  if (pairs != NULL) {
+    supine_patient_rows_of_pairs(&w->record->patient.frame, pairs, m->rows);
+  }
+  return SUPINE_OK;
 }
 
 /* Compute w->motion, the displacement and change of force of each measured point. Assign the points
@@ -172,19 +169,17 @@ static supine_status match_surface(work *w, supine_error *error) {
 /* Match the surfaces and fit w->x (factors, translation and gain) in turn until w->x converges.
  * Then estimate the gain's standard error by the jackknife over 8 blocks of measurements. */
 static supine_status iterate(work *w, supine_patient_further *further, supine_error *error) {
-  supine_status status = SUPINE_OK;
   double change = INFINITY;
   double sum = 0.0;
   double square = 0.0;
-  for (size_t round = 0; round < ROUNDS && status == SUPINE_OK && change >= converged; ++round) {
+  for (size_t round = 0; round < ROUNDS && change >= converged; ++round) {
     const double before[UNKNOWNS] = {w->x[0], w->x[1], [GAIN] = w->x[GAIN]};
-    status = w->matching.state == NULL ? SUPINE_OK : match_surface(w, error);
+    if (w->matching.state != NULL) {
+      SUPINE_TRY(match_surface(w, error));
+    }
     further->residual = fit(w, further->fits_gain, BLOCKS);
     change =
         fabs(w->x[0] - before[0]) + fabs(w->x[1] - before[1]) + fabs(w->x[GAIN] - before[GAIN]);
-  }
-  if (status != SUPINE_OK) {
-    return status;
   }
   if (change >= not_converged) {
     return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
@@ -221,7 +216,6 @@ supine_status supine_patient_gain_fit(const supine_patient_record *record,
     status = iterate(&w, further, error);
   }
   supine_patient_matching_free(&w.matching);
-  free(w.motion);
   return status;
 }
 

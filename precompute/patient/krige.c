@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Fit a displacement law and, by kriging, a correction of its residual. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include <cblas.h>
@@ -256,30 +255,24 @@ static supine_status krige_create(supine_patient_krige *k,
                                   const supine_patient_fit_options *options,
                                   const supine_patient_row *rows, size_t count,
                                   supine_error *error) {
-  const bool corrected = !options->uncorrected && !options->size_only;
+  supine_arena *a = &k->arena;
   *k = (supine_patient_krige){.rows = rows,
                               .count = count,
                               .options = *options,
-                              .mean = supine_patient_deep(options->gravity, options->path_span),
-                              .centre = malloc(count * sizeof *k->centre),
-                              .cholesky = corrected ? malloc(count * count * sizeof(double)) : NULL,
-                              .design = malloc((TERMS + 1) * count * sizeof *k->design),
-                              .normal_matrix = malloc(2 * TERMS * TERMS * sizeof *k->normal_matrix),
-                              .kernel_weight = malloc(count * sizeof *k->kernel_weight),
-                              .scratch = malloc(count * sizeof *k->scratch)};
-  return k->centre == NULL || (corrected && k->cholesky == NULL) || k->design == NULL ||
-                 k->normal_matrix == NULL || k->kernel_weight == NULL || k->scratch == NULL
-             ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu values", count)
-             : SUPINE_OK;
+                              .mean = supine_patient_deep(options->gravity, options->path_span)};
+  k->centre = supine_arena_take(a, count, sizeof *k->centre);
+  k->design = supine_arena_take(a, (TERMS + 1) * count, sizeof *k->design);
+  k->normal_matrix = supine_arena_take(a, (size_t)2 * TERMS * TERMS, sizeof *k->normal_matrix);
+  k->kernel_weight = supine_arena_take(a, count, sizeof *k->kernel_weight);
+  k->scratch = supine_arena_take(a, count, sizeof *k->scratch);
+  if (!options->uncorrected && !options->size_only) {
+    k->cholesky = supine_arena_take(a, count * count, sizeof *k->cholesky);
+  }
+  return a->failed ? supine_error_memory(error, "%zu values", count) : SUPINE_OK;
 }
 
 void supine_patient_krige_free(supine_patient_krige *krige) {
-  free(krige->centre);
-  free(krige->cholesky);
-  free(krige->design);
-  free(krige->normal_matrix);
-  free(krige->kernel_weight);
-  free(krige->scratch);
+  supine_arena_free(&krige->arena);
 }
 
 static supine_status undetermined(supine_error *error) {
@@ -293,17 +286,13 @@ supine_status supine_patient_krige_fit(const supine_patient_fit_options *options
                                        supine_patient_krige *krige, supine_error *error) {
   supine_patient_krige *k = krige;
   const int n = (int)count;
-  const supine_status status = krige_create(k, options, rows, count, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(krige_create(k, options, rows, count, error));
   bool determined = fit_uncorrected(k, true);
   k->mean = k->law;
   if (options->size_only) {
     return determined ? SUPINE_OK : undetermined(error);
   }
-  determined = determined && (k->options.law == SUPINE_PATIENT_DEEP || fit_uncorrected(k, false));
-  if (!determined) {
+  if (!determined || (k->options.law != SUPINE_PATIENT_DEEP && !fit_uncorrected(k, false))) {
     return undetermined(error);
   }
   k->law = k->mean;

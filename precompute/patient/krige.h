@@ -14,8 +14,7 @@
 #ifndef SUPINE_PATIENT_KRIGE_H
 #define SUPINE_PATIENT_KRIGE_H
 
-#include <supine/status.h>
-
+#include "base/arena.h"
 #include "precompute/patient/pairs.h"
 #include "precompute/patient/patient.h"
 
@@ -86,6 +85,7 @@ typedef struct supine_patient_krige {
   double *scratch;       /* [count] temporary values, one for each measurement */
   double *normal_matrix; /* [2, terms, terms] normal matrix, after the fit its Cholesky factor; then
                             work space */
+  supine_arena arena;    /* holds the arrays above */
   double objective;      /* squared whitened residuals plus squared deviations from the prior */
   double right_side[SUPINE_PATIENT_TERMS];
 } supine_patient_krige;
@@ -97,8 +97,7 @@ typedef struct supine_patient_krige {
  *   factor `sill` on the correction's covariance is at least 1, the law is only scaled again.
  * @param rows   [count] measurements; those of weight 0 do not count; must outlive the fit
  * @param krige  release with supine_patient_krige_free, also after a failure
- * @retval SUPINE_ERROR_NUMERICAL  the measurements do not determine the displacement law
- * @retval SUPINE_ERROR_MEMORY */
+ * @retval SUPINE_ERROR_NUMERICAL  the measurements do not determine the displacement law */
 supine_status supine_patient_krige_fit(const supine_patient_fit_options *options,
                                        const supine_patient_row *rows, size_t count,
                                        supine_patient_krige *krige, supine_error *error);
@@ -149,8 +148,7 @@ typedef struct supine_patient_fit_report {
  * @param single   number of vertices, each with one measurement; these measurements come first
  * @param triples  number of landmarks, each with three measurements
  * @param patient  in: `frame`, the bounding box of the lungs; out: the law and its correction
- * @retval SUPINE_ERROR_FORMAT     fewer points than the law has unknowns
- * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
+ * @retval SUPINE_ERROR_FORMAT     fewer points than the law has unknowns */
 supine_status supine_patient_fit(const supine_patient_fit_options *options,
                                  supine_patient_row *rows, size_t single, size_t triples,
                                  supine_patient *patient, supine_patient_fit_report *report,

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Match vertices to the nearest points of another surface. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include <gsl/gsl_sort.h>
@@ -145,46 +144,35 @@ supine_status supine_patient_matching_create(const supine_lungs *fuller, const s
   supine_patient_matching *m = matching;
   *m = (supine_patient_matching){.fuller = fuller, .state = state};
   m->frame = supine_patient_frame_of_lungs(fuller);
-  m->smoothed_force = malloc(SUPINE_PATIENT_COLUMNS * n * sizeof(double));
-  m->fuller_normals = malloc(3 * n * sizeof(double));
-  m->state_normals = malloc(3 * state->vertex_count * sizeof(double));
-  m->match = malloc(n * sizeof *m->match);
-  m->rows = malloc((n + 3 * landmarks) * sizeof *m->rows);
-  m->space = malloc(n * sizeof(double));
-  if (m->smoothed_force == NULL || m->fuller_normals == NULL || m->state_normals == NULL ||
-      m->match == NULL || m->rows == NULL || m->space == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
+  supine_arena *a = &m->arena;
+  m->smoothed_force = supine_arena_take(a, SUPINE_PATIENT_COLUMNS * n, sizeof(double));
+  m->fuller_normals = supine_arena_take(a, 3 * n, sizeof(double));
+  m->state_normals = supine_arena_take(a, 3 * state->vertex_count, sizeof(double));
+  m->match = supine_arena_take(a, n, sizeof *m->match);
+  m->rows = supine_arena_take(a, n + 3 * landmarks, sizeof *m->rows);
+  m->space = supine_arena_take(a, n, sizeof(double));
+  if (a->failed) {
+    return supine_error_memory(error, "%zu vertices", n);
   }
   supine_mesh_vertex_normals(&fuller->mesh, m->fuller_normals);
   supine_mesh_vertex_normals(state, m->state_normals);
   const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
-  supine_status status = supine_physics_model_equilibrium(fuller, &model, &m->equilibrium, error);
+  SUPINE_TRY(supine_physics_model_equilibrium(fuller, &model, &m->equilibrium, error));
   for (size_t i = 0; i < n; ++i) {
     const supine_patient_place place = supine_patient_find_vertex(fuller, i);
     memcpy(m->smoothed_force + SUPINE_PATIENT_COLUMNS * i, place.force, sizeof place.force);
   }
-  if (status == SUPINE_OK) {
-    status = supine_physics_equilibrium_solve(m->equilibrium, SUPINE_PATIENT_COLUMNS,
-                                              m->smoothed_force, m->smoothed_force, error);
-  }
-  if (status == SUPINE_OK) {
-    supine_patient_matching_choose(m, limit);
-    status = supine_inside_surface_create(state->vertices, state->triangle_count, state->triangles,
-                                          false, &m->tree, error);
-  }
-  return status;
+  SUPINE_TRY(supine_physics_equilibrium_solve(m->equilibrium, SUPINE_PATIENT_COLUMNS,
+                                              m->smoothed_force, m->smoothed_force, error));
+  supine_patient_matching_choose(m, limit);
+  return supine_inside_surface_create(state->vertices, state->triangle_count, state->triangles,
+                                      false, &m->tree, error);
 }
 
 void supine_patient_matching_free(supine_patient_matching *matching) {
   supine_inside_surface_destroy(matching->tree);
   supine_physics_equilibrium_destroy(matching->equilibrium);
-  free(matching->smoothed_force);
-  free(matching->tissue);
-  free(matching->fuller_normals);
-  free(matching->state_normals);
-  free(matching->match);
-  free(matching->rows);
-  free(matching->space);
+  supine_arena_free(&matching->arena);
 }
 
 static void place_range(void *context, size_t begin, size_t end, size_t thread) {

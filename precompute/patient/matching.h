@@ -31,6 +31,7 @@ typedef struct supine_patient_matching {
   supine_patient_match *match; /* [count] these vertices and their matches */
   supine_patient_row *rows;    /* [count + landmark_row_count] measurements */
   double *space;               /* [count] temporary values, one for each match */
+  supine_arena arena;          /* holds the arrays above */
   double matched; /* share of vertices whose normal is like that at match->nearest, 0 to 1 */
   double rms;     /* weighted RMS of match->distance, mm */
   const supine_patient *patient; /* displacement law that last displaced the vertices */
@@ -39,8 +40,7 @@ typedef struct supine_patient_matching {
 
 /* Prepare the matching of surface `fuller` to surface `state`: compute smoothed_force, and choose
  * at most `limit` vertices to match. Allocate one measurement per vertex and three per landmark.
- * Call supine_patient_matching_free also after a failure.
- * @retval SUPINE_ERROR_MEMORY, those of supine_physics_equilibrium_solve */
+ * Call supine_patient_matching_free also after a failure. */
 supine_status supine_patient_matching_create(const supine_lungs *fuller, const supine_mesh *state,
                                              size_t limit, size_t landmarks,
                                              supine_patient_matching *matching,
@@ -51,8 +51,7 @@ void supine_patient_matching_free(supine_patient_matching *matching);
  * measurements. Measurements of landmarks are dropped. */
 void supine_patient_matching_choose(supine_patient_matching *matching, size_t limit);
 
-/* Compute matching->tissue for displacements of uniform tissue by `law`.
- * @retval SUPINE_ERROR_MEMORY, those of strain.h */
+/* Compute matching->tissue for displacements of uniform tissue by `law`. */
 supine_status supine_patient_matching_set_tissue(supine_patient_matching *matching,
                                                  const supine_patient_power *law,
                                                  const supine_patient_stiffness *stiffness,
@@ -100,8 +99,7 @@ void supine_patient_stiffness_of(const supine_patient_stiffness *stiffness,
  * @param matching   without landmarks, matched by the law of uniform tissue; its `tissue` is set
  * @param patient    in: `frame`, the bounding box of the lungs; out: the fitted displacement law if
  *   the result is kept
- * @param stiffness  written; uniform (no regions) if the fitted regions do not reduce the error
- * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
+ * @param stiffness  written; uniform (no regions) if the fitted regions do not reduce the error */
 supine_status supine_patient_expand(supine_patient_matching *matching,
                                     const supine_patient_fit_options *options,
                                     supine_patient *patient, supine_patient_stiffness *stiffness,
@@ -113,8 +111,7 @@ supine_status supine_patient_expand(supine_patient_matching *matching,
  * @param matching  on return all vertices are matched
  * @param patient   displacement law fitted to these surfaces; its kriging correction is not used
  * @param gravity   unit vector in the emptier state
- * @retval SUPINE_ERROR_NUMERICAL  the means do not determine the linear function
- * @retval SUPINE_ERROR_MEMORY */
+ * @retval SUPINE_ERROR_NUMERICAL  the means do not determine the linear function */
 supine_status supine_patient_applied_find(supine_patient_matching *matching,
                                           const supine_patient *patient, const double gravity[3],
                                           supine_patient_applied *applied, supine_error *error);

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Make a physical model from a patient's displacement law, and find the state that a scan shows. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "precompute/patient/matching.h"
 
+#include "base/arena.h"
 #include "base/parallel.h"
 #include "precompute/physics/solve.h"
 #include "precompute/physics/volume_forms.h"
@@ -116,24 +116,21 @@ static void move(work *w) {
 static supine_status find_ratio(const work *w, supine_error *error) {
   const supine_patient_record *record = w->record;
   supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
-  supine_solution solution = {0};
+  SUPINE_FREED_BY(supine_physics_solution_free) supine_solution solution = {0};
   model.force = record->force;
-  const supine_status status =
-      supine_physics_solve(&w->lungs, &model, record->state[1].gravity, &solution, error);
-  for (size_t i = 0; i < w->lungs.mesh.vertex_count && status == SUPINE_OK; ++i) {
+  SUPINE_TRY(supine_physics_solve(&w->lungs, &model, record->state[1].gravity, &solution, error));
+  for (size_t i = 0; i < w->lungs.mesh.vertex_count; ++i) {
     const supine_patient_place place = supine_patient_find_vertex(&w->lungs, i);
     w->smoothing_ratio[i] =
         solution.catch_[i] /
         fmax(force_least, supine_patient_force_at(&record->patient.power, &place));
   }
-  supine_physics_solution_free(&solution);
-  return status;
+  return SUPINE_OK;
 }
 
 /* Compute w->displacement and, if `scan` [vertices, 3] shows the emptier state, the vertices of
  * w->lungs in the fuller state. Set the last [vertices] of w->smoothing_ratio to 1. */
 static supine_status displace(work *w, const double *scan, supine_error *error) {
-  supine_status status = SUPINE_OK;
   w->scan = scan;
   for (size_t i = 0; i < 2 * w->lungs.mesh.vertex_count; ++i) {
     w->smoothing_ratio[i] = 1.0;
@@ -141,11 +138,11 @@ static supine_status displace(work *w, const double *scan, supine_error *error) 
   if (scan != NULL) {
     move(w);
   }
-  for (int pass = 0; pass < (scan != NULL ? 2 : 1) && status == SUPINE_OK; ++pass) {
-    status = find_ratio(w, error);
+  for (int pass = 0; pass < (scan != NULL ? 2 : 1); ++pass) {
+    SUPINE_TRY(find_ratio(w, error));
     move(w);
   }
-  return status;
+  return SUPINE_OK;
 }
 
 /* Extrapolate the displacement between the two scanned states to full inflation (end 0) or to rest
@@ -312,22 +309,20 @@ supine_status supine_patient_model(supine_patient_record *record, const supine_l
   const size_t n = lungs->mesh.vertex_count;
   double *directions = arrays;
   double *stiffness = arrays + 3 * n;
+  SUPINE_ARENA arena = {0};
   work w = {.record = record,
             .lungs = *lungs,
-            .smoothing_ratio = malloc(2 * n * sizeof(double)),
+            .smoothing_ratio = supine_arena_take(&arena, 2 * n, sizeof(double)),
             .displacement = directions};
   double *path_span = record->path_span;
   supine_volume_form forms[2] = {{{0.0}}};
-  supine_status status = find_state(record, lungs, error);
-  w.lungs.mesh.vertices = malloc(3 * n * sizeof(double));
-  if (status == SUPINE_OK && (w.smoothing_ratio == NULL || w.lungs.mesh.vertices == NULL)) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
-  }
-  if (status != SUPINE_OK) {
-    goto cleanup;
+  SUPINE_TRY(find_state(record, lungs, error));
+  w.lungs.mesh.vertices = supine_arena_take(&arena, 3 * n, sizeof(double));
+  if (arena.failed) {
+    return supine_error_memory(error, "%zu vertices", n);
   }
   memcpy(w.lungs.mesh.vertices, lungs->mesh.vertices, 3 * n * sizeof(double));
-  status = displace(&w, record->shown == 1.0 ? lungs->mesh.vertices : NULL, error);
+  SUPINE_TRY(displace(&w, record->shown == 1.0 ? lungs->mesh.vertices : NULL, error));
   supine_physics_volume_of_fields(&w.lungs, NULL, w.displacement, w.smoothing_ratio + n, 1, forms);
   set_volumes(record, &w.lungs, forms);
   supine_patient_resting(record, resting);
@@ -355,10 +350,7 @@ supine_status supine_patient_model(supine_patient_record *record, const supine_l
     model->direction.c[2 * k] = -record->patient.power.c[2 * k] / path_span[k];
     model->direction.c[2 * k + 1] = record->patient.power.c[2 * k + 1];
   }
-cleanup:
-  free(w.smoothing_ratio);
-  free(w.lungs.mesh.vertices);
-  return status;
+  return SUPINE_OK;
 }
 
 void supine_patient_field(const void *record, const double point[3], double side, double u[3]) {

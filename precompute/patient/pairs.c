@@ -8,6 +8,7 @@
 
 #include "precompute/patient/pairs.h"
 
+#include "base/arena.h"
 #include "base/csv.h"
 #include "base/vec3.h"
 #include "runtime/rigid.h"
@@ -51,10 +52,13 @@ static supine_status read_rows(supine_csv *csv, bool reverse, supine_patient_pai
                                supine_error *error) {
   size_t capacity = 0;
   size_t column[COORDINATES];
-  supine_status status = find_columns(csv, reverse, column, error);
-  bool more = status == SUPINE_OK;
-  while (more && status == SUPINE_OK &&
-         (status = supine_csv_next(csv, &more, error)) == SUPINE_OK && more) {
+  bool more = true;
+  SUPINE_TRY(find_columns(csv, reverse, column, error));
+  for (;;) {
+    SUPINE_TRY(supine_csv_next(csv, &more, error));
+    if (!more) {
+      break;
+    }
     if (pairs->count == capacity) {
       capacity = capacity == 0 ? 512 : 2 * capacity;
       double *from = realloc(pairs->from, 3 * capacity * sizeof *from);
@@ -62,29 +66,27 @@ static supine_status read_rows(supine_csv *csv, bool reverse, supine_patient_pai
       double *to = realloc(pairs->to, 3 * capacity * sizeof *to);
       pairs->to = to != NULL ? to : pairs->to;
       if (from == NULL || to == NULL) {
-        return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu points", capacity);
+        return supine_error_memory(error, "%zu points", capacity);
       }
     }
-    for (size_t k = 0; k < COORDINATES && status == SUPINE_OK; ++k) {
+    for (size_t k = 0; k < COORDINATES; ++k) {
       double *point = (k < 3 ? pairs->from : pairs->to) + 3 * pairs->count;
-      status = supine_csv_number(csv, column[k], columns[column[k]], &point[k % 3], error);
+      SUPINE_TRY(supine_csv_number(csv, column[k], columns[column[k]], &point[k % 3], error));
     }
     ++pairs->count;
   }
-  return status == SUPINE_OK && pairs->count == 0
-             ? supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%s: no pairs of points: give one pair in each line", csv->path)
-             : status;
+  return pairs->count > 0
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_FORMAT,
+                                "%s: no pairs of points: give one pair in each line", csv->path);
 }
 
 supine_status supine_patient_pairs_load(const char *path, bool reverse, supine_patient_pairs *pairs,
                                         supine_error *error) {
   supine_csv csv;
-  supine_status status = supine_csv_open(path, columns, COLUMNS, 0, &csv, error);
-  if (status == SUPINE_OK) {
-    status = read_rows(&csv, reverse, pairs, error);
-    supine_csv_close(&csv);
-  }
+  SUPINE_TRY(supine_csv_open(path, columns, COLUMNS, 0, &csv, error));
+  const supine_status status = read_rows(&csv, reverse, pairs, error);
+  supine_csv_close(&csv);
   if (status != SUPINE_OK) {
     supine_patient_pairs_free(pairs);
   }

@@ -110,8 +110,7 @@ typedef struct supine_patient_record {
 } supine_patient_record;
 
 /** Write the record to a JSON file. A failure leaves no incomplete file.
- * @param made_by  command line, or NULL
- * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */
+ * @param made_by  command line, or NULL */
 supine_status supine_patient_write(const char *path, const supine_patient_record *record,
                                    const char *made_by, supine_error *error);
 
@@ -152,8 +151,7 @@ supine_status supine_patient_read(const char *path, supine_patient_record *recor
  *   inflation is unknown
  * @param arrays   [4 N], written: the directions [N, 3], mm, then the relative stiffness [N]; must
  *   outlive the model
- * @retval SUPINE_ERROR_MESH  the surface is too far from both states, or is the other lung
- * @retval SUPINE_ERROR_MEMORY, those of supine_physics_solve */
+ * @retval SUPINE_ERROR_MESH  the surface is too far from both states, or is the other lung */
 supine_status supine_patient_model(supine_patient_record *record, const supine_lungs *lungs,
                                    supine_resting *resting, supine_scan *scan, double *arrays,
                                    supine_model *model, supine_error *error);
@@ -192,8 +190,7 @@ supine_scan supine_patient_scan(const supine_patient_record *record, size_t stat
  * @param expandability  also fit the stiffness of lung regions (supine_patient_expand), with
  *   SUPINE_PATIENT_PAPER and without a kriging correction
  * @retval SUPINE_ERROR_MESH  no overlap (frames, units or sides differ), equal surfaces, or too few
- *   matches
- * @retval those of supine_patient_fit */
+ *   matches */
 supine_status supine_patient_fit_surface(const supine_lungs *fuller, const supine_mesh *emptier,
                                          const supine_patient_pairs *landmarks,
                                          const supine_patient_fit_options *options,
@@ -215,8 +212,7 @@ supine_status supine_patient_fit_surface(const supine_lungs *fuller, const supin
  * @param pairs    points in the fuller and in the third scan; NULL if `surface` is given
  * @param scans_moved  whether to fit t; otherwise it is 0
  * @param further  in: the state of the third scan; out: the fit
- * @retval SUPINE_ERROR_MESH    too few matches
- * @retval SUPINE_ERROR_MEMORY, those of supine_physics_equilibrium_solve */
+ * @retval SUPINE_ERROR_MESH    too few matches */
 supine_status supine_patient_gain_fit(const supine_patient_record *record,
                                       const supine_lungs *fuller, const supine_patient_pairs *pairs,
                                       const supine_mesh *surface, bool scans_moved,

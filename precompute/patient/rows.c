@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Make measurements from landmarks, group measurements by position, and predict their values. */
 #include <math.h>
-#include <stdlib.h>
 
 #include <gsl/gsl_rng.h>
 
@@ -36,17 +35,20 @@ size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patie
   size_t blocks = 0;
   double origin[3] = {0.0};
   /* [cube] index of the cube in the list of cubes with measurements, plus 1; else 0 */
-  size_t *number = calloc((size_t)CELLS * CELLS * CELLS, sizeof *number);
+  SUPINE_ARENA arena = {0};
+  size_t *number = supine_arena_zeros(&arena, (size_t)CELLS * CELLS * CELLS, sizeof *number);
   gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
-  const bool able = number != NULL && random != NULL;
-  if (able) {
-    gsl_rng_set(random, seed);
+  if (arena.failed || random == NULL) {
+    gsl_rng_free(random);
+    return 0;
   }
-  for (int k = 0; k < 3 && able; ++k) {
+  gsl_rng_set(random, seed);
+  for (int k = 0; k < 3; ++k) {
     const double half = 0.5 * (frame->maximum[k] - frame->minimum[k]);
     origin[k] = -half - block_side * gsl_rng_uniform(random);
   }
-  for (size_t i = 0; i < count && able; ++i) {
+  gsl_rng_free(random);
+  for (size_t i = 0; i < count; ++i) {
     size_t cell = 0;
     for (int k = 0; k < 3; ++k) {
       const double at = floor((rows[i].place.offset[k] - origin[k]) / block_side);
@@ -55,8 +57,6 @@ size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patie
     number[cell] = number[cell] == 0 ? ++blocks : number[cell];
     rows[i].block = number[cell] - 1;
   }
-  gsl_rng_free(random);
-  free(number);
   return blocks;
 }
 

@@ -40,20 +40,17 @@ static void start_rows(supine_patient_matching *m) {
 static supine_status refit(const supine_patient_matching *m, bool shaped,
                            supine_patient_fit_options *options, supine_patient *patient,
                            supine_error *error) {
-  supine_patient_krige krige = {0};
+  SUPINE_FREED_BY(supine_patient_krige_free) supine_patient_krige krige = {0};
   options->size_only = !shaped;
-  const supine_status status =
-      supine_patient_krige_fit(options, m->rows, m->count + m->landmark_row_count, &krige, error);
-  if (status == SUPINE_OK) {
-    supine_patient_krige_copy_law(&krige, patient);
-  }
-  if (status == SUPINE_OK && shaped) {
+  SUPINE_TRY(
+      supine_patient_krige_fit(options, m->rows, m->count + m->landmark_row_count, &krige, error));
+  supine_patient_krige_copy_law(&krige, patient);
+  if (shaped) {
     options->sill = krige.sill;
     options->uncorrected = krige.sill == 0.0;
     options->noise = krige.noise;
   }
-  supine_patient_krige_free(&krige);
-  return status;
+  return SUPINE_OK;
 }
 
 /* Fit the displacement law and match the surfaces in turn. In the first rounds, fit only a factor
@@ -63,23 +60,19 @@ static supine_status iterate(supine_patient_matching *m, const supine_patient_fi
                              supine_patient *patient, supine_patient_surface_report *report,
                              supine_error *error) {
   supine_patient_fit_options options = *wanted;
-  supine_status status = SUPINE_OK;
   double change = INFINITY;
   bool shaped = false;
   start_rows(m);
-  for (size_t round = 0;
-       status == SUPINE_OK && round < ROUNDS_MAX && !(shaped && change < converged); ++round) {
+  for (size_t round = 0; round < ROUNDS_MAX && !(shaped && change < converged); ++round) {
     shaped = shaped || change < size_converged;
-    status = refit(m, shaped, &options, patient, error);
-    if (status == SUPINE_OK) {
-      change = supine_patient_matching_place(m, patient);
-      supine_patient_matching_find(m);
-      status = supine_patient_matching_weigh(m, scale_least, error);
-    }
+    SUPINE_TRY(refit(m, shaped, &options, patient, error));
+    change = supine_patient_matching_place(m, patient);
+    supine_patient_matching_find(m);
+    SUPINE_TRY(supine_patient_matching_weigh(m, scale_least, error));
   }
   report->matched = m->matched;
   report->after = m->rms;
-  return status;
+  return SUPINE_OK;
 }
 
 static supine_status check_apart(supine_patient_matching *m, supine_patient_surface_report *report,
@@ -101,33 +94,29 @@ static supine_status measure(supine_patient_matching *m, const supine_patient_fi
                              supine_patient_record *record, supine_error *error) {
   supine_patient_fit_report *report = &record->report;
   const supine_patient_power expanding = record->patient.power;
-  supine_status status = supine_patient_fit(wanted, m->rows, m->count, m->landmark_row_count / 3,
-                                            &record->patient, report, error);
-  if (status == SUPINE_OK && record->expand.kept) {
+  SUPINE_TRY(supine_patient_fit(wanted, m->rows, m->count, m->landmark_row_count / 3,
+                                &record->patient, report, error));
+  if (record->expand.kept) {
     record->patient.power = expanding;
     record->patient.law = SUPINE_PATIENT_DEEP;
     memset(report->error, 0, sizeof report->error);
     report->held_out[SUPINE_PATIENT_SCORE_CORRECTED] = record->expand.held_out[1];
     report->explained = 100.0 * (1.0 - pow(record->expand.held_out[1] / report->baseline, 2.0));
   }
-  return status == SUPINE_OK ? supine_patient_applied_find(m, &record->patient, wanted->gravity,
-                                                           &record->applied, error)
-                             : status;
+  return supine_patient_applied_find(m, &record->patient, wanted->gravity, &record->applied, error);
 }
 
 static supine_status run(supine_patient_matching *m, const supine_patient_fit_options *wanted,
                          bool expandability, supine_patient_record *record, supine_error *error) {
   record->patient = (supine_patient){.law = wanted->law, .frame = m->frame};
-  supine_status status = check_apart(m, &record->surface, error);
-  if (status == SUPINE_OK) {
-    status = iterate(m, wanted, &record->patient, &record->surface, error);
-  }
-  if (status == SUPINE_OK && expandability) {
-    status = supine_patient_expand(m, wanted, &record->patient, &record->stiffness, &record->expand,
-                                   error);
+  SUPINE_TRY(check_apart(m, &record->surface, error));
+  SUPINE_TRY(iterate(m, wanted, &record->patient, &record->surface, error));
+  if (expandability) {
+    SUPINE_TRY(supine_patient_expand(m, wanted, &record->patient, &record->stiffness,
+                                     &record->expand, error));
     record->surface.after = record->expand.kept ? record->expand.fitted[1] : record->surface.after;
   }
-  return status == SUPINE_OK ? measure(m, wanted, record, error) : status;
+  return measure(m, wanted, record, error);
 }
 
 supine_status supine_patient_fit_surface(const supine_lungs *fuller, const supine_mesh *emptier,
@@ -136,29 +125,23 @@ supine_status supine_patient_fit_surface(const supine_lungs *fuller, const supin
                                          bool expandability, supine_patient_record *record,
                                          supine_error *error) {
   const size_t landmark_count = expandability ? 0 : landmarks->count;
-  supine_patient_matching m = {0};
+  SUPINE_FREED_BY(supine_patient_matching_free) supine_patient_matching m = {0};
   supine_patient_fit_options wanted = *options;
   if (expandability) { /* fit the stiffness of regions instead of a kriging correction */
     wanted.law = SUPINE_PATIENT_PAPER;
     wanted.uncorrected = true;
   }
   record->stiffness.count = 0;
-  supine_status status = supine_patient_check_boxes(&fuller->mesh, emptier, error);
-  if (status == SUPINE_OK) {
-    status = supine_patient_matching_create(
-        fuller, emptier, expandability ? REGIONAL_MAX : VERTICES_MAX, landmark_count, &m, error);
-  }
-  if (status == SUPINE_OK && landmark_count > 0) {
+  SUPINE_TRY(supine_patient_check_boxes(&fuller->mesh, emptier, error));
+  SUPINE_TRY(supine_patient_matching_create(
+      fuller, emptier, expandability ? REGIONAL_MAX : VERTICES_MAX, landmark_count, &m, error));
+  if (landmark_count > 0) {
     supine_patient_rows_of_pairs(&m.frame, landmarks, m.rows + m.count);
-    m.landmark_row_count = 3 * landmark_count;
-    /* Give all landmarks together the same weight as all matched vertices. */
-    for (size_t i = 0; i < m.landmark_row_count; ++i) {
-      m.rows[m.count + i].weight = (double)m.count / (double)m.landmark_row_count;
-    }
   }
-  if (status == SUPINE_OK) {
-    status = run(&m, &wanted, expandability, record, error);
+  m.landmark_row_count = 3 * landmark_count;
+  /* Give all landmarks together the same weight as all matched vertices. */
+  for (size_t i = 0; i < m.landmark_row_count; ++i) {
+    m.rows[m.count + i].weight = (double)m.count / (double)m.landmark_row_count;
   }
-  supine_patient_matching_free(&m);
-  return status;
+  return run(&m, &wanted, expandability, record, error);
 }
