@@ -33,7 +33,7 @@ bool supine_output_take_standard(void) {
   return atomic_load(&standard_output) >= 0 && dup2(STDERR_FILENO, STDOUT_FILENO) >= 0;
 }
 
-/* Names of existing temporary files; NULL in free entries. */
+/* Names of temporary files that exist or are about to; NULL in free entries. */
 static char *_Atomic temporary_names[NAMES_MAX];
 
 /* Replace one entry of `temporary_names` that equals `from` by `to`. */
@@ -102,11 +102,12 @@ static int open_temporary(supine_output *output) {
   for (int i = 0; output->temporary != NULL && i < TRIES; ++i) {
     (void)snprintf(output->temporary, size, "%s.part-%ld-%u", output->target, (long)getpid(),
                    atomic_fetch_add(&counter, 1));
+    replace_name(NULL, output->temporary); /* before the file exists: a signal may come at once */
     const int descriptor = open(output->temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     if (descriptor >= 0) {
-      replace_name(NULL, output->temporary);
       return descriptor;
     }
+    replace_name(output->temporary, NULL);
     if (errno != EEXIST) {
       break;
     }
