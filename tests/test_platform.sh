@@ -19,7 +19,7 @@ aarch64)
   ;;
 windows)
   compiler=x86_64-w64-mingw32-gcc runner=$(command -v wine64 || command -v wine || echo wine) exe=.exe libm=''
-  options="--toolchain $source/cmake/windows.cmake" shared=libsupine_runtime.dll
+  shared=libsupine_runtime.dll
   ;;
 *)
   echo "usage: test_platform.sh gcc|clang|musl|aarch64|windows CMAKE SOURCE_FOLDER LIBRARY CC PROGRAM"
@@ -33,11 +33,13 @@ work=$(mktemp -d)
 # Wine's server outlives the programs, and writes files when it ends.
 trap '{ [ "$platform" != windows ] || { wineserver -k; wineserver -w; }; } >/dev/null 2>&1 || true; rm -rf "$work"' EXIT
 export WINEPREFIX="$work/wine" WINEDEBUG=-all WINEDLLOVERRIDES=mscoree,mshtml=
-if [ "$platform" != windows ]; then
-  options="$options -DCMAKE_C_COMPILER=$compiler"
+if [ "$platform" = windows ]; then
+  set -- "-DCMAKE_TOOLCHAIN_FILE=$source/cmake/windows.cmake"
+else
+  set -- "-DCMAKE_C_COMPILER=$compiler"
 fi
 # shellcheck disable=SC2086
-"$cmake" -S "$source" -B "$work/build" -G Ninja $options -DSUPINE_RUNTIME_ONLY=ON -DSUPINE_WERROR=ON -DBUILD_TESTING=OFF \
+"$cmake" -S "$source" -B "$work/build" -G Ninja "$@" $options -DSUPINE_RUNTIME_ONLY=ON -DSUPINE_WERROR=ON -DBUILD_TESTING=OFF \
   -DSUPINE_XXHASH_HEADER=/usr/include/xxhash.h >"$work/log"
 "$cmake" --build "$work/build" >>"$work/log" || { cat "$work/log"; exit 1; }
 built=$work/build/runtime
