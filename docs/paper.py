@@ -132,7 +132,7 @@ def percent(basis):
 
 
 steps, left = re.findall(r"(\d+) steps, (\S+) of the force not yet balanced", iterated)[-1]
-pitcher = f"{steps} steps leave {left} of the force; {re.search(r'largest difference.*?[0-9.e-]+', iterated)[0]} (184 vertices)"
+pitcher = f"{steps} steps leave {left} of the force; {re.search(r'largest difference from the direct solution [0-9.e-]+', iterated)[0]} (184 vertices)"
 
 
 def operations(basis):
