@@ -313,7 +313,3 @@ void supine_stream_web_send(supine_stream_web *web, const supine_stream_snapshot
     lws.cancel_service(web->context);
   }
 }
-
-size_t supine_stream_web_viewers(supine_stream_web *web) {
-  return atomic_load(&web->viewers);
-}

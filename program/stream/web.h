@@ -47,6 +47,4 @@ bool supine_stream_web_take(supine_stream_web *web, double gravity[3], double *r
 /** Send a state to each viewer as soon as the viewer is ready, unless a newer state replaces it. */
 void supine_stream_web_send(supine_stream_web *web, const supine_stream_snapshot *snapshot);
 
-size_t supine_stream_web_viewers(supine_stream_web *web);
-
 #endif
