@@ -28,8 +28,8 @@ typedef struct pipeline {
   const supine_lungs *given;
   const supine_lungs *lungs; /* lungs in use: `given`, or `anchored` after anchor() */
   const supine_precompute_options *options;
-  supine_arena memory;   /* of the corrected vertices */
-  supine_arena lengths;  /* of `directions` and `weight` */
+  supine_arena memory;   /* holds the vertices of `anchored` */
+  supine_arena lengths;  /* holds the arrays `directions` and `weight` */
   supine_lungs anchored; /* copy of `given` whose vertices anchor() has corrected, or all zero */
   supine_reference reference;
   double *directions; /* [N, 3] displacement of each vertex per unit force, mm, or NULL */
