@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine stream: receive the poses of a tracked patient, and send the lungs in each pose. */
+#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -198,25 +199,13 @@ static supine_status open_points(const supine_basis *basis, const request *wante
   return observed->space != NULL ? SUPINE_OK : supine_error_memory(error, "%s", wanted->points);
 }
 
-/* Make the page that shows the lungs of a basis file live. The caller frees *page. */
-static supine_status make_page(const char *path, const export_page *shown, char **page,
-                               size_t *size, supine_error *error) {
-  SUPINE_FREED_BY(supine_export_source_close) export_source source = {0};
-  SUPINE_TRY(supine_export_source_open(path, &source, error));
-  FILE *file = open_memstream(page, size);
-  if (file == NULL) {
-    return supine_error_memory(error, "the page");
-  }
-  const supine_status status = supine_export_html_print(file, &source, shown, error);
-  const bool whole = ferror(file) == 0;
-  return fclose(file) == 0 && whole ? status : supine_error_memory(error, "the page");
-}
-
-/* If --web is given, serve the live page. The caller destroys *web, then frees *page. */
+/* If --web is given, serve the page that shows the lungs of the basis file `path` live, from a
+ * temporary file. The caller destroys *web, then closes *page. */
 static supine_status open_page(const request *wanted, const supine_basis *basis, const char *path,
-                               char **page, supine_stream_web **web, supine_error *error) {
+                               FILE **page, supine_stream_web **web, supine_error *error) {
   supine_stream_address address;
   supine_reference_pose from;
+  SUPINE_FREED_BY(supine_export_source_close) export_source source = {0};
   supine_stream_site site = {
       .certificate = wanted->certificate, .key = wanted->key, .viewers = wanted->options.peers};
   if (wanted->web == NULL) {
@@ -231,10 +220,19 @@ static supine_status open_page(const request *wanted, const supine_basis *basis,
                              .from_count = 1,
                              .title = "Lungs, live",
                              .live = true};
-  SUPINE_TRY(make_page(path, &shown, page, &site.page_size, error));
+  SUPINE_TRY(supine_export_source_open(path, &source, error));
+  *page = tmpfile();
+  if (*page == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_WRITE, "no temporary file for the page: %s",
+                            strerror(errno));
+  }
+  SUPINE_TRY(supine_export_html_print(*page, &source, &shown, error));
+  if (fflush(*page) != 0) {
+    return supine_error_set(error, SUPINE_ERROR_WRITE, "the page: %s", strerror(errno));
+  }
   site.address = address.host;
   site.port = address.port;
-  site.page = *page;
+  (void)snprintf(site.page, sizeof site.page, "/proc/self/fd/%d", fileno(*page));
   SUPINE_TRY(supine_stream_web_create(&site, web, error));
   const bool ipv6 = strchr(address.host, ':') != NULL;
   (void)printf("page at http%s://%s%s%s:%d/\n", site.certificate != NULL ? "s" : "",
@@ -271,7 +269,7 @@ static supine_status set_volume(const supine_basis *basis, const request *wanted
 typedef struct session {
   supine_arena arena;
   observed_points points;
-  char *page;
+  FILE *page;
   supine_stream_web *web;
   supine_stream_server *server;
 } session;
@@ -279,7 +277,7 @@ typedef struct session {
 static void end(session *s) {
   supine_stream_server_destroy(s->server);
   supine_stream_web_destroy(s->web);
-  free(s->page);
+  supine_file_close(&s->page);
   supine_command_names_close(&s->points.names);
   supine_basis_close(s->points.inside);
   supine_arena_free(&s->arena);
