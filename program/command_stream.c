@@ -100,8 +100,6 @@ static const supine_option table[] = {
      .standard = "SUPINE", .more = true},
     {"fps", 0, "N", "largest number of frames per second", SUPINE_FILLS(request, options.rate),
      .range = {1.0, 1000.0}, .standard = "200", .more = true},
-    {"peers", 0, "N", "largest number of peers, and of viewers of the page",
-     SUPINE_FILLS(request, options.peers), .range = {1.0, 1000.0}, .standard = "64", .more = true},
     {.help = "A live page:"},
     {"web", 0, "[ADDRESS:]PORT",
      "serve a page that shows the lungs live. A phone on which the page is open can send its own "
@@ -128,8 +126,8 @@ static bool stop(void *context) {
   return supine_options_interrupted();
 }
 
-static void report(const supine_stream_server *server, const request *wanted) {
-  const supine_stream_counts *n = supine_stream_server_counts(server);
+static void report(const supine_stream_results *results, const request *wanted) {
+  const supine_stream_counts *n = &results->counts;
   if (wanted->points != NULL) {
     (void)printf("received positions of observed points: %llu\n", (unsigned long long)n->positions);
   }
@@ -145,8 +143,7 @@ static void report(const supine_stream_server *server, const request *wanted) {
                  (unsigned long long)n->unreachable);
   }
   for (int surfaces = 0; surfaces < 2; ++surfaces) {
-    const supine_stream_latency *latency = supine_stream_server_latency(
-        server, surfaces != 0 ? SUPINE_STREAM_SURFACE : SUPINE_STREAM_WEIGHTS);
+    const supine_stream_latency *latency = &results->latency[surfaces];
     if (latency->count > 0) {
       (void)printf(
           "pose received to %s sent: median %.3f ms, 99 %% within %.3f ms, worst %.3f ms; allowed: "
@@ -206,8 +203,7 @@ static supine_status open_page(const request *wanted, const supine_basis *basis,
   supine_stream_address address;
   supine_reference_pose from;
   SUPINE_FREED_BY(supine_export_source_close) export_source source = {0};
-  supine_stream_site site = {
-      .certificate = wanted->certificate, .key = wanted->key, .viewers = wanted->options.peers};
+  supine_stream_site site = {.certificate = wanted->certificate, .key = wanted->key};
   if (wanted->web == NULL) {
     return SUPINE_OK;
   }
@@ -297,13 +293,14 @@ static supine_status stream(const supine_basis *basis, const char *path, const r
   SUPINE_TRY(open_page(wanted, basis, path, &s.page, &s.web, error));
   options.web = s.web;
   SUPINE_TRY(supine_stream_server_create(basis, &options, &s.server, error));
-  if (supine_stream_server_port(s.server) != 0) {
-    (void)printf("listening on port %d\n", supine_stream_server_port(s.server));
+  const supine_stream_results *results = supine_stream_server_results(s.server);
+  if (results->port != 0) {
+    (void)printf("listening on port %d\n", results->port);
   }
   (void)fflush(stdout);
   supine_options_signals_catch(true);
   const supine_status status = supine_stream_server_run(s.server, error);
-  report(s.server, wanted);
+  report(results, wanted);
   return status;
 }
 

@@ -126,7 +126,7 @@ static int view(struct lws *wsi, enum lws_callback_reasons reason, void *user, v
   case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:
     return is_ours(wsi) ? 0 : -1;
   case LWS_CALLBACK_ESTABLISHED:
-    if (atomic_load(&web->viewers) >= web->site.viewers) {
+    if (atomic_load(&web->viewers) >= SUPINE_STREAM_VIEWERS_MAX) {
       return -1;
     }
     s->counted_in_viewers = true;
@@ -198,8 +198,7 @@ supine_status supine_stream_web_create(const supine_stream_site *site, supine_st
   if (strchr(info.iface, ':') == NULL) {
     info.options |= LWS_SERVER_OPTION_DISABLE_IPV6;
   }
-  info.fd_limit_per_thread =
-      (unsigned)site->viewers + 64; /* 64 more connections may load the page */
+  info.fd_limit_per_thread = SUPINE_STREAM_VIEWERS_MAX + 64; /* 64 more may load the page */
   if (site->certificate != NULL) {
     info.options |= LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT;
     info.ssl_cert_filepath = site->certificate;

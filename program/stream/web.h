@@ -17,13 +17,14 @@
 
 typedef struct supine_stream_web supine_stream_web;
 
+enum { SUPINE_STREAM_VIEWERS_MAX = 64 };
+
 /** Address and content of the web server. There is no access control. */
 typedef struct supine_stream_site {
   const char *address;           /**< numeric address to listen on */
   int port;                      /**< 0 to choose a free port */
   const char *certificate, *key; /**< paths of PEM files; NULL for no encryption */
   char page[32];                 /**< path of the HTML file, which is read for each request */
-  size_t viewers; /**< maximum number of viewers */
 } supine_stream_site;
 
 /** Start a thread that serves a site.

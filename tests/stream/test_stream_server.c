@@ -83,7 +83,6 @@ static stage *stage_create(void) {
                                        .setup = supine_stream_setup_default(),
                                        .volume = &s->volume,
                                        .rate = 1000.0,
-                                       .peers = 64,
                                        .seconds = 60.0, /* ends a test that hangs */
                                        .warn = count_warning,
                                        .stop = is_ending,
@@ -97,7 +96,7 @@ static int stage_run(stage *s) {
                    SUPINE_OK);
   assert_int_equal(pthread_create(&s->thread, NULL, run, s), 0);
   s->running = true;
-  return supine_stream_server_port(s->server);
+  return supine_stream_server_results(s->server)->port;
 }
 
 /* Stop the server's thread, after which its counts may be read, and return the counts. */
@@ -106,7 +105,7 @@ static supine_stream_counts stage_end(stage *s) {
   assert_int_equal(pthread_join(s->thread, NULL), 0);
   s->running = false;
   assert_int_equal(s->status, SUPINE_OK);
-  return *supine_stream_server_counts(s->server);
+  return supine_stream_server_results(s->server)->counts;
 }
 
 static void stage_destroy(stage *s) {
@@ -320,8 +319,7 @@ TEST(test_server_each_pose_answered_by_weights) {
   const supine_stream_counts counts = stage_end(s);
   assert_int_equal(counts.poses, 42);
   assert_int_equal(counts.refused + counts.malformed + counts.lost, 0);
-  const supine_stream_latency *latency =
-      supine_stream_server_latency(s->server, SUPINE_STREAM_WEIGHTS);
+  const supine_stream_latency *latency = &supine_stream_server_results(s->server)->latency[0];
   assert_true(latency->count >= 43);
   assert_true(latency->worst > 0.0 && latency->worst < 1.0);
   stage_destroy(s);
@@ -475,10 +473,9 @@ TEST(test_server_stuck_or_vanished_peers_delay_nobody) {
   stage_destroy(s);
 }
 
-TEST(test_server_fifty_peers_one_more_refused) {
-  enum { MANY = 50 };
+TEST(test_server_full_of_peers_one_more_refused) {
+  enum { MANY = SUPINE_STREAM_PEERS_MAX };
   stage *s = stage_create();
-  s->options.peers = MANY;
   const int port = stage_run(s);
   int peer[MANY];
   supine_stream_header header;
