@@ -52,7 +52,7 @@ static const supine_option table[] = {
      "opposite postures, the body turns through left (supine to prone) or through supine (upright "
      "to inverted, left to right). The volume at rest changes with the posture",
      SUPINE_FILLS(request, turn), .read = supine_breath_turn_read, .wants = "FROM:TO:SECONDS",
-     SUPINE_SAYS_GIVEN(request, turns)},
+     SUPINE_SAYS_GIVEN(request, turns), .rivals = "gravity"},
     {.help = "The breath:"},
     {"tidal", 0, "ML",
      "tidal volume of both lungs, in mL, above rest in the posture, or above the scan if rest is "
@@ -93,9 +93,6 @@ static supine_status complete(request *wanted, size_t *count, supine_error *erro
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "--as-scanned is for VTP files only: leave it out, as safetensors "
                             "files are always in LPS and mm");
-  }
-  if (wanted->turns && wanted->orientation.given) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give --turn or one posture, not both");
   }
   if (!wanted->turns) {
     supine_state state = {.lung_count = 0};
