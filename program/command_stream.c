@@ -30,7 +30,6 @@ typedef struct request {
   bool has_volume, has_breath;
   const char *pv;
   supine_pv_breath breath;
-  double smooth; /* time constant with which poses are smoothed, ms; 0 for no smoothing */
   const char *web, *certificate, *key;
   supine_from from;
   const char *points;
@@ -57,11 +56,6 @@ static const supine_option table[] = {
      "rotation from the marker's axes to the body's (left, back, head), as a quaternion; 0,0,0,1 "
      "if the marker's axes are right, front, head",
      SUPINE_FILLS(request, body_from_tracker), .standard = "1,0,0,0", .more = true},
-    {"smooth", 0, "MS",
-     "time constant of smoothing, in ms, for a noisy tracker; it delays a turn by this time; "
-     "default 0",
-     SUPINE_FILLS(request, smooth), .range = {0.0, 10000.0}, .wants = "0 to 10000 ms",
-     .more = true},
     {.help = "Observed points inside the lungs, as in 'supine locate':"},
     {"points", 0, "FILE",
      "positions of the points in the scan, made by 'supine embed BASIS'. Their observed positions "
@@ -151,10 +145,6 @@ static void report(const supine_stream_results *results, const request *wanted) 
           surfaces != 0 ? "surface" : "weights", 1e3 * supine_stream_latency_quantile(latency, 0.5),
           1e3 * supine_stream_latency_quantile(latency, 0.99), 1e3 * latency->worst, 1e3 * budget);
     }
-  }
-  if (wanted->smooth > 0.0) {
-    (void)printf("--smooth adds a delay of %.0f ms during a turn at constant speed\n",
-                 wanted->smooth);
   }
 }
 
@@ -314,15 +304,16 @@ static void begin(void *chosen) {
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
   supine_stream_options *options = &wanted->options;
+  double unit[3];
   options->ras = wanted->space == 1;
-  options->smooth = 1e-3 * wanted->smooth;
   if (options->listen == NULL && options->connect == NULL) {
     options->listen = "18944";
   }
   if ((wanted->certificate == NULL) != (wanted->key == NULL)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give --certificate and --key together");
   }
-  if (!supine_stream_rotation(wanted->body_from_tracker, options->setup.body) ||
+  supine_stream_rotation(wanted->body_from_tracker, options->setup.body); /* 0 if it is zero */
+  if (!supine_normalise(options->setup.body, unit) ||
       !supine_normalise(wanted->world_down, options->setup.down)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "--world-down or --body-from-tracker is zero: give a direction, such "

@@ -158,7 +158,7 @@ static double frame_due(const supine_stream_server *s) {
   if (s->patient.pending || s->latest == NULL) {
     return soonest;
   }
-  if (!s->options->volume->breathes && !s->patient.turning) {
+  if (!s->options->volume->breathes) {
     return (double)INFINITY;
   }
   /* Each message triggers a frame. After a recent message, wait two frame intervals for the next

@@ -73,7 +73,6 @@ typedef struct supine_stream_options {
   supine_stream_content content;    /**< content sent to peers that have not asked for any */
   bool ras;                         /**< send points in RAS */
   double rate;                      /**< maximum number of frames a second */
-  double smooth;                    /**< time constant for smoothing gravity, s; 0 to turn off */
   double seconds;                   /**< duration, s; 0 to run until `stop` returns true */
   supine_stream_web *web;           /**< live page; NULL if none */
   void (*warn)(void *context, const char *text);
