@@ -20,6 +20,9 @@ static const double send_interval = 20e-3;  /* time between checks of the peers 
 static const double connect_interval = 1.0; /* time between attempts to connect to a peer, s */
 static const double stop_interval = 0.1;    /* time between calls of options->stop, s */
 
+/* Indices of sockets that are polled; those of peers come first. */
+enum { LISTENER = SUPINE_STREAM_PEERS_MAX, WEB, POLLED };
+
 /* All times are in seconds by supine_clock_seconds. */
 struct supine_stream_server {
   const supine_stream_options *options;
@@ -33,11 +36,11 @@ struct supine_stream_server {
   double connect_at;             /* time of the next attempt to connect; INFINITY if none */
   double accept_at;              /* time at which to accept peers again after a failure */
   supine_stream_peer *connected; /* peer of --connect, connected or connecting; NULL if none */
-  supine_stream_peer peer[SUPINE_STREAM_PEERS_MAX];       /* connected peers and free slots */
-  struct pollfd polled[SUPINE_STREAM_PEERS_MAX + 2];      /* peers, listener, pipe of web's poses */
-  supine_stream_peer *owner[SUPINE_STREAM_PEERS_MAX + 2]; /* peer of each polled socket, or NULL */
-  double wait_begun; /* time at which ppoll() was last called */
-  double woke;       /* time at which ppoll() last returned */
+  supine_stream_peer peer[SUPINE_STREAM_PEERS_MAX]; /* connected peers and free slots */
+  unsigned char body[SUPINE_STREAM_PEERS_MAX][SUPINE_STREAM_BODY_MAX]; /* received by each peer */
+  struct pollfd polled[POLLED]; /* sockets of `peer`, listener, pipe of web's poses; -1 if none */
+  double wait_begun;            /* time at which ppoll() was last called */
+  double woke;                  /* time at which ppoll() last returned */
 };
 
 /* Return whether a peer wants frames, is sent none at the moment, and lacks the newest frame. */
@@ -57,11 +60,10 @@ static void end_peer(supine_stream_server *s, supine_stream_peer *peer) {
 
 /* Initialise a peer in a free slot. If no slot is free, close the socket and return NULL. */
 static supine_stream_peer *begin_peer(supine_stream_server *s, int socket, bool connecting) {
-  supine_error error;
   for (size_t i = 0; i < SUPINE_STREAM_PEERS_MAX; ++i) {
     supine_stream_peer *peer = &s->peer[i];
-    if (peer->socket < 0 && supine_stream_peer_begin(peer, socket, connecting, s->options->content,
-                                                     s->woke, &error) == SUPINE_OK) {
+    if (peer->socket < 0) {
+      supine_stream_peer_begin(peer, socket, connecting, s->options->content, s->woke, s->body[i]);
       s->results.counts.peers += connecting ? 0 : 1;
       return peer;
     }
@@ -249,42 +251,33 @@ static struct timespec find_timeout(const supine_stream_server *s, double end) {
   return (struct timespec){0, (long)(1e9 * left)};
 }
 
-/* List the sockets for ppoll() to watch, and return their number. */
-static nfds_t gather(supine_stream_server *s) {
-  nfds_t count = 0;
+/* Choose the sockets for ppoll() to watch. */
+static void gather(supine_stream_server *s) {
   for (size_t i = 0; i < SUPINE_STREAM_PEERS_MAX; ++i) {
-    supine_stream_peer *peer = &s->peer[i];
-    if (peer->socket >= 0) {
-      const bool writes = peer->connecting || peer->frame != NULL;
-      s->owner[count] = peer;
-      s->polled[count++] =
-          (struct pollfd){peer->socket, (short)(POLLIN | (writes ? POLLOUT : 0)), 0};
-    }
+    const supine_stream_peer *peer = &s->peer[i];
+    const bool writes = peer->connecting || peer->frame != NULL;
+    s->polled[i] = (struct pollfd){peer->socket, (short)(POLLIN | (writes ? POLLOUT : 0)), 0};
   }
-  const bool accepts = s->listener >= 0 && s->woke >= s->accept_at;
-  s->owner[count] = NULL;
-  s->polled[count++] = (struct pollfd){accepts ? s->listener : -1, POLLIN, 0};
-  const int web = s->options->web != NULL ? supine_stream_web_descriptor(s->options->web) : -1;
-  s->owner[count] = NULL;
-  s->polled[count++] = (struct pollfd){web, POLLIN, 0};
-  return count;
+  s->polled[LISTENER] = (struct pollfd){s->woke >= s->accept_at ? s->listener : -1, POLLIN, 0};
+  s->polled[WEB] = (struct pollfd){
+      s->options->web != NULL ? supine_stream_web_descriptor(s->options->web) : -1, POLLIN, 0};
 }
 
 /* Read from all sockets that ppoll() reported. */
-static void receive_all(supine_stream_server *s, nfds_t count) {
-  for (nfds_t i = 0; i + 2 < count; ++i) {
+static void receive_all(supine_stream_server *s) {
+  for (size_t i = 0; i < SUPINE_STREAM_PEERS_MAX; ++i) {
     if (s->polled[i].revents != 0) {
-      if (s->owner[i]->connecting) {
-        connection_made(s, s->owner[i]);
+      if (s->peer[i].connecting) {
+        connection_made(s, &s->peer[i]);
       } else if ((s->polled[i].revents & (POLLIN | POLLHUP | POLLERR)) != 0) {
-        read_peer(s, s->owner[i]);
+        read_peer(s, &s->peer[i]);
       }
     }
   }
-  if (s->polled[count - 2].revents != 0) {
+  if (s->polled[LISTENER].revents != 0) {
     accept_peers(s);
   }
-  if (s->polled[count - 1].revents != 0) {
+  if (s->polled[WEB].revents != 0) {
     double gravity[3];
     double received = 0.0;
     if (supine_stream_web_take(s->options->web, gravity, &received)) {
@@ -300,10 +293,10 @@ supine_status supine_stream_server_run(supine_stream_server *server, supine_erro
   const double end = options->seconds > 0.0 ? s->woke + options->seconds : (double)INFINITY;
   double asked = s->woke;
   while (s->woke < end) {
-    const nfds_t count = gather(s);
+    gather(s);
     const struct timespec timeout = find_timeout(s, end);
     s->wait_begun = supine_clock_seconds();
-    if (ppoll(s->polled, count, &timeout, NULL) < 0 && errno != EINTR) {
+    if (ppoll(s->polled, POLLED, &timeout, NULL) < 0 && errno != EINTR) {
       return supine_error_set(error, SUPINE_ERROR_WRITE, "cannot wait for the sockets: %s",
                               strerror(errno));
     }
@@ -317,7 +310,7 @@ supine_status supine_stream_server_run(supine_stream_server *server, supine_erro
     if (s->woke >= s->connect_at) {
       connect_peer(s);
     }
-    receive_all(s, count);
+    receive_all(s);
     if (s->woke >= frame_due(s) && !make_frame(s)) {
       return supine_error_memory(error, "a frame");
     }
