@@ -74,13 +74,11 @@ static void note_message(supine_stream_patient *p, double received) {
   p->received = received;
 }
 
-static void store_pose(supine_stream_patient *p, const double gravity[3], double received,
-                       uint64_t stamp) {
-  memcpy(p->gravity, gravity, sizeof p->gravity);
+/* Note a message with a pose or an observed point. */
+static void note_pose(supine_stream_patient *p, double received, uint64_t stamp) {
   note_message(p, received);
   p->pose_received = received;
   p->stamp = stamp;
-  ++p->counts->poses;
 }
 
 /* Store a pose unless `verdict` refuses it. Warn if the pose is refused or repaired. */
@@ -95,7 +93,9 @@ static void accept_pose(supine_stream_patient *p, supine_stream_verdict verdict,
     ++p->counts->repaired;
     supine_stream_patient_warn(p, received, "a pose is repaired: %s; send a rotation", why);
   }
-  store_pose(p, gravity, received, stamp);
+  memcpy(p->gravity, gravity, sizeof p->gravity);
+  note_pose(p, received, stamp);
+  ++p->counts->poses;
 }
 
 /* Store the position of an observed point; a not-a-number position means that the point is not
@@ -113,9 +113,7 @@ static bool store_position(supine_stream_patient *p, const char *name, const dou
   for (size_t i = 0; i < 3; ++i) {
     observed->last[at].position[i] = observed->ras && i < 2 ? -position[i] : position[i];
   }
-  note_message(p, received);
-  p->pose_received = received;
-  p->stamp = stamp;
+  note_pose(p, received, stamp);
   ++p->counts->positions;
   return true;
 }
