@@ -32,8 +32,9 @@
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } lws;
 
 enum {
-  TEXT = 256,    /* size of the buffer for a state as JSON, bytes */
-  RECEIVED = 512 /* size of the buffer for received bytes */
+  CONNECTIONS_MAX = 128, /* viewers, and browsers that load the page */
+  TEXT = 256,            /* size of the buffer for a state as JSON, bytes */
+  RECEIVED = 512         /* size of the buffer for received bytes */
 };
 
 struct supine_stream_web {
@@ -44,7 +45,6 @@ struct supine_stream_web {
   pthread_t thread;
   bool running;
   atomic_bool ending;
-  atomic_size_t viewers;
   pthread_mutex_t lock; /* protects the following fields of this struct */
   uint64_t number;      /* serial number of the state in `text`: 1, 2, ... */
   char text[TEXT];      /* newest state as JSON; send_state() appends the age of the pose and "}" */
@@ -60,7 +60,6 @@ typedef struct web_pose {
 /* State of a connection to a viewer. */
 typedef struct session {
   uint64_t number; /* serial number of the last state sent */
-  bool counted_in_viewers;
 } session;
 
 static supine_stream_web *web_of(struct lws *wsi) {
@@ -126,17 +125,7 @@ static int view(struct lws *wsi, enum lws_callback_reasons reason, void *user, v
   case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:
     return is_ours(wsi) ? 0 : -1;
   case LWS_CALLBACK_ESTABLISHED:
-    if (atomic_load(&web->viewers) >= SUPINE_STREAM_VIEWERS_MAX) {
-      return -1;
-    }
-    s->counted_in_viewers = true;
-    (void)atomic_fetch_add(&web->viewers, 1);
     (void)lws.callback_on_writable(wsi);
-    return 0;
-  case LWS_CALLBACK_CLOSED:
-    if (s->counted_in_viewers) {
-      (void)atomic_fetch_sub(&web->viewers, 1);
-    }
     return 0;
   case LWS_CALLBACK_EVENT_WAIT_CANCELLED: /* supine_stream_web_send has stored a new state */
     (void)lws.callback_on_writable_all_protocol(web->context, lws.get_protocol(wsi));
@@ -198,7 +187,7 @@ supine_status supine_stream_web_create(const supine_stream_site *site, supine_st
   if (strchr(info.iface, ':') == NULL) {
     info.options |= LWS_SERVER_OPTION_DISABLE_IPV6;
   }
-  info.fd_limit_per_thread = SUPINE_STREAM_VIEWERS_MAX + 64; /* 64 more may load the page */
+  info.fd_limit_per_thread = CONNECTIONS_MAX;
   if (site->certificate != NULL) {
     info.options |= LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT;
     info.ssl_cert_filepath = site->certificate;
@@ -267,7 +256,5 @@ void supine_stream_web_send(supine_stream_web *web, const supine_stream_snapshot
   web->pose_received = snapshot->pose_received;
   ++web->number;
   (void)pthread_mutex_unlock(&web->lock);
-  if (atomic_load(&web->viewers) > 0) {
-    lws.cancel_service(web->context);
-  }
+  lws.cancel_service(web->context);
 }

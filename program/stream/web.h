@@ -17,8 +17,6 @@
 
 typedef struct supine_stream_web supine_stream_web;
 
-enum { SUPINE_STREAM_VIEWERS_MAX = 64 };
-
 /** Address and content of the web server. There is no access control. */
 typedef struct supine_stream_site {
   const char *address;           /**< numeric address to listen on */
