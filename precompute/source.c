@@ -31,8 +31,10 @@ static void load_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const reading *r = context;
   for (size_t i = begin; i < end; ++i) {
-    r->errors[i].status = supine_mesh_load(r->paths[i], &r->options->load, &r->meshes[i],
-                                           &r->reports[i], &r->errors[i]);
+    supine_mesh_load_options load = r->options->load;
+    load.arrays = r->options->surfaces != NULL ? &r->options->surfaces[i] : NULL;
+    r->errors[i].status =
+        supine_mesh_load(r->paths[i], &load, &r->meshes[i], &r->reports[i], &r->errors[i]);
   }
 }
 
@@ -203,7 +205,7 @@ static supine_status check_kinds(const supine_source_options *options, char **pa
                                  bool *is_map, supine_error *error) {
   const supine_labels_options *labels = &options->labels;
   size_t images = 0;
-  for (size_t i = 0; i < count; ++i) {
+  for (size_t i = 0; i < count && options->surfaces == NULL; ++i) {
     images += supine_image_is_named(paths[i]) || (count == 1 && is_folder(paths[i]));
   }
   *is_map = images == count;
