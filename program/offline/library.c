@@ -104,28 +104,29 @@ static supine_status make(job *j, const char *path, supine_error *error) {
 
 supine_status supine_precompute_basis(const supine_precompute_input *input,
                                       supine_precompute_result *result, supine_error *error) {
-  const char *folder = getenv("TMPDIR"); /* NOLINT(concurrency-mt-unsafe) */
-  char path[512];
+  const char *temporary = getenv("TMPDIR"); /* NOLINT(concurrency-mt-unsafe) */
+  char folder[512];
+  char path[sizeof folder + 32];
   job j = {.input = input, .result = result};
   *result = (supine_precompute_result){.bytes = NULL};
   if (input->path_count > 0 && input->surface_count > 0) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give files or arrays, not both");
   }
-  (void)snprintf(path, sizeof path, "%s/supine-XXXXXX", folder != NULL ? folder : "/tmp");
-  const int descriptor = input->output == NULL ? mkstemp(path) : -1;
-  if (descriptor < 0 && input->output == NULL) {
+  (void)snprintf(folder, sizeof folder, "%s/supine-XXXXXX", temporary != NULL ? temporary : "/tmp");
+  if (input->output == NULL && mkdtemp(folder) == NULL) {
     return supine_error_set(error, SUPINE_ERROR_WRITE,
-                            "%s: cannot write: set TMPDIR to another folder", path);
+                            "%s: cannot write: set TMPDIR to another folder", folder);
   }
+  (void)snprintf(path, sizeof path, "%s/basis.safetensors", folder);
   gsl_error_handler_t *handler = gsl_set_error_handler_off();
   const int threads = openblas_get_num_threads();
   openblas_set_num_threads(1);
   const supine_status status = make(&j, input->output != NULL ? input->output : path, error);
   openblas_set_num_threads(threads);
   (void)gsl_set_error_handler(handler);
-  if (descriptor >= 0) {
-    (void)close(descriptor);
+  if (input->output == NULL) {
     (void)unlink(path);
+    (void)rmdir(folder);
   }
   return status;
 }
