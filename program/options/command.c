@@ -106,6 +106,17 @@ bool supine_options_parse_count(const char *text, size_t *value) {
   return true;
 }
 
+bool supine_options_next_item(const char **list, char *item, size_t size) {
+  const char *at = *list;
+  if (at == NULL) {
+    return false;
+  }
+  (void)snprintf(item, size, "%.*s", (int)strcspn(at, ","), at);
+  at = strchr(at, ',');
+  *list = at != NULL ? at + 1 : NULL;
+  return true;
+}
+
 const char *supine_options_suggest(const char *text, const char *const *candidates, size_t count) {
   const char *best = NULL;
   size_t fewest = 1 + strlen(text) / 2; /* candidates that need more edits are not suggested */

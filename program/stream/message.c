@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/clones.h"
+#include "program/stream/gravity.h"
 #include "program/stream/message.h"
 
 static uint64_t number(const unsigned char *bytes, int size) {
@@ -128,13 +129,14 @@ static double real64(cursor *c) {
   return value;
 }
 
-/* Read a quaternion, which is sent as x, y, z, w, into m->number as w, x, y, z. */
+/* Read a quaternion, which is sent as x, y, z, w, as a matrix. */
 static void quaternion(cursor *c, supine_stream_message *m) {
-  m->kind = SUPINE_STREAM_QUATERNION;
-  for (int i = 1; i < 4; ++i) {
-    m->number[i] = real32(c);
+  double q[4];
+  m->kind = SUPINE_STREAM_ROTATION;
+  for (int i = 0; i < 4; ++i) {
+    q[(i + 1) % 4] = real32(c);
   }
-  m->number[0] = real32(c);
+  supine_stream_rotation(q, m->number);
 }
 
 static void transform(cursor *c, const char *device, int ours, supine_stream_message *m) {

@@ -43,11 +43,10 @@ void supine_stream_header_write(const supine_stream_header *header,
 /** Kinds of received messages. Each comment says what a supine_stream_message then contains. */
 typedef enum supine_stream_kind {
   SUPINE_STREAM_NOTHING = 0, /**< message that is ignored because of its type or device */
-  SUPINE_STREAM_ROTATION,    /**< number[0..8]: matrix from tracker to world axes, row by row;
-                                  number[9..11]: position, mm; text: name of the device */
+  SUPINE_STREAM_ROTATION,    /**< number[0..8]: matrix from tracker to world axes, row by row. If
+                                  text is the name of the device, number[9..11]: position, mm */
   SUPINE_STREAM_POSITION,   /**< number[9..11]: position of an observed point, mm; text: its name */
   SUPINE_STREAM_POINT_LIST, /**< points: supine_stream_message_point reads one of them */
-  SUPINE_STREAM_QUATERNION, /**< number[0..3]: w, x, y, z of the tracker-to-world rotation */
   SUPINE_STREAM_DOWN,       /**< number[0..2]: direction of gravity in tracker axes */
   SUPINE_STREAM_VOLUME,     /**< number[0]: volume above rest in the posture, mL */
   SUPINE_STREAM_VOLUME_TEXT, /**< text: a volume such as rest+500 or 2600mL */

@@ -4,38 +4,29 @@
 #include <linux/sockios.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
-#include <stdlib.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "base/arena.h"
 #include "program/stream/peer.h"
 
 /* Size, bytes, above which a message body is an error. Smaller unknown bodies are skipped. */
 static const uint64_t skipped_max = 256u << 20;
 
-supine_status supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connecting,
-                                       supine_stream_content content, double now,
-                                       supine_error *error) {
+void supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connecting,
+                              supine_stream_content content, double now, unsigned char *body) {
   const int yes = 1;
   const unsigned timeout_ms = 20000;
-  unsigned char *body = malloc(SUPINE_STREAM_BODY_MAX);
-  if (body == NULL) {
-    return supine_error_memory(error, "a peer");
-  }
   (void)setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
   (void)setsockopt(socket, SOL_SOCKET, SO_KEEPALIVE, &yes, sizeof yes);
   (void)setsockopt(socket, IPPROTO_TCP, TCP_USER_TIMEOUT, &timeout_ms, sizeof timeout_ms);
   *peer = (supine_stream_peer){
       .socket = socket, .connecting = connecting, .emptied = now, .body = body, .content = content};
-  return SUPINE_OK;
 }
 
 void supine_stream_peer_end(supine_stream_peer *peer, supine_stream_frames *frames) {
   (void)close(peer->socket);
   supine_stream_frame_release(frames, peer->frame);
-  free(peer->body);
   *peer = (supine_stream_peer){.socket = -1};
 }
 

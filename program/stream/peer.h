@@ -57,12 +57,11 @@ typedef enum supine_stream_outcome {
 
 /** Initialise a peer, which then owns the socket. The kernel closes the connection if sent data
  * stays unacknowledged for 20 s.
- * @param now  current time, s by supine_clock_seconds
- * @retval SUPINE_ERROR_MEMORY  the caller still owns the socket */
-supine_status supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connecting,
-                                       supine_stream_content content, double now,
-                                       supine_error *error);
-/** Close the socket, release the frame that was being sent, and free the buffer `peer->body`. */
+ * @param now   current time, s by supine_clock_seconds
+ * @param body  [SUPINE_STREAM_BODY_MAX] buffer for received messages */
+void supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connecting,
+                              supine_stream_content content, double now, unsigned char *body);
+/** Close the socket, and release the frame that was being sent. */
 void supine_stream_peer_end(supine_stream_peer *peer, supine_stream_frames *frames);
 
 /** Function that is called for each message of a known type; the body is in `peer->body`. */

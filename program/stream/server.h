@@ -38,11 +38,14 @@ typedef struct supine_stream_counts {
   uint64_t sent;        /**< frames sent, summed over peers */
   uint64_t peers;       /**< peers accepted */
   uint64_t lost;        /**< peers disconnected because of invalid messages */
-  uint64_t turned_away; /**< connections refused, as there were too many peers */
+  uint64_t turned_away; /**< connections refused, as there were SUPINE_STREAM_PEERS_MAX peers */
 } supine_stream_counts;
 
-/** Number of bins of a latency histogram, 1 us each; the last bin also counts longer latencies. */
-enum { SUPINE_STREAM_LATENCY_BINS = 65536 };
+enum {
+  SUPINE_STREAM_PEERS_MAX = 64,
+  /* Number of bins of a latency histogram, 1 us each; the last bin also counts longer latencies. */
+  SUPINE_STREAM_LATENCY_BINS = 65536
+};
 
 typedef struct supine_stream_latency {
   uint64_t count;
@@ -66,14 +69,12 @@ typedef struct supine_stream_options {
   const char *name;    /**< device name in sent messages */
   supine_stream_setup setup;
   supine_stream_volume *volume; /**< fixed volume or breath at the start; messages may change it */
-  supine_stream_observed *observed;  /**< points whose positions come in messages; NULL if none */
-  supine_stream_content content;     /**< content sent to peers that have not asked for any */
-  bool ras;                          /**< send points in RAS */
-  double rate;                       /**< maximum number of frames a second */
-  size_t peers;                      /**< maximum number of peers, 1 to 1000 */
-  double smooth;                     /**< time constant for smoothing gravity, s; 0 to turn off */
-  double seconds;                    /**< duration, s; 0 to run until `stop` returns true */
-  supine_stream_web *web;            /**< live page; NULL if none */
+  supine_stream_observed *observed; /**< points whose positions come in messages; NULL if none */
+  supine_stream_content content;    /**< content sent to peers that have not asked for any */
+  bool ras;                         /**< send points in RAS */
+  double rate;                      /**< maximum number of frames a second */
+  double seconds;                   /**< duration, s; 0 to run until `stop` returns true */
+  supine_stream_web *web;           /**< live page; NULL if none */
   void (*warn)(void *context, const char *text);
   bool (*stop)(void *context); /**< called every 100 ms or so; true ends the run */
   void *context;
@@ -88,20 +89,19 @@ supine_status supine_stream_server_create(const supine_basis *basis,
                                           supine_stream_server **server, supine_error *error);
 void supine_stream_server_destroy(supine_stream_server *server);
 
-/** Return the port on which the server listens; 0 if it does not listen. */
-int supine_stream_server_port(const supine_stream_server *server);
-
 /** Run the server until options->stop returns true or the time options->seconds is over.
  * @retval SUPINE_ERROR_WRITE  the system cannot wait for the sockets */
 supine_status supine_stream_server_run(supine_stream_server *server, supine_error *error);
 
-const supine_stream_counts *supine_stream_server_counts(const supine_stream_server *server);
-
-/** Return the latencies of sent frames: of frames of weights if `content` is SUPINE_STREAM_WEIGHTS,
- * otherwise of frames of points. A latency is the time from receiving the newest message to passing
- * the frame to the kernel. Frames without a new message do not count. If a message may have waited
- * in the peer's socket, its latency is an upper bound: the time since the socket was last empty. */
-const supine_stream_latency *supine_stream_server_latency(const supine_stream_server *server,
-                                                          supine_stream_content content);
+/** What the server has done so far. A latency is the time from receiving the newest message to
+ * passing the frame to the kernel. Frames without a new message do not count. If a message may have
+ * waited in the peer's socket, its latency is an upper bound: the time since the socket was last
+ * empty. */
+typedef struct supine_stream_results {
+  int port; /**< port on which the server listens; 0 if it does not listen */
+  supine_stream_counts counts;
+  supine_stream_latency latency[2]; /**< of frames of weights, and of frames of points */
+} supine_stream_results;
+const supine_stream_results *supine_stream_server_results(const supine_stream_server *server);
 
 #endif

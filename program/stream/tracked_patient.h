@@ -39,9 +39,6 @@ typedef struct supine_stream_patient {
   bool pending;         /* true until a frame shows the newest message */
   uint64_t stamp;       /* time stamp of the newest pose or point, 2^-32 s since 1970; 0 if none */
   double gravity[3];    /* direction of gravity in the newest pose */
-  double smoothed_gravity[3]; /* direction of gravity that frames show */
-  double smoothed_at;
-  bool turning; /* true until `smoothed_gravity` reaches `gravity` */
   double warned_at;
   double gains[SUPINE_LUNGS_MAX][3]; /* factors of the displacement of each lung along x, y
                                         and z, at the last volume that could be reached */

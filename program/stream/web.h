@@ -22,9 +22,7 @@ typedef struct supine_stream_site {
   const char *address;           /**< numeric address to listen on */
   int port;                      /**< 0 to choose a free port */
   const char *certificate, *key; /**< paths of PEM files; NULL for no encryption */
-  const void *page;              /**< HTML; must outlive the server */
-  size_t page_size;
-  size_t viewers; /**< maximum number of viewers */
+  char page[32];                 /**< path of the HTML file, which is read for each request */
 } supine_stream_site;
 
 /** Start a thread that serves a site.
