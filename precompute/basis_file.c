@@ -165,8 +165,7 @@ static void add_lungs(entries *list, const supine_lungs *lungs, const double sha
   }
   double volume[2];
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-    const supine_mesh part = supine_lungs_part(lungs, lung);
-    volume[lung] = 1e-3 * share[lung] * supine_mesh_volume(&part);
+    volume[lung] = share[lung] * lungs->volume[lung];
   }
   add_by_lung(list, "reference_volume_ml", lungs->lung_count, volume);
   if (share[0] != 1.0 || share[1] != 1.0) {

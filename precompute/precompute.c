@@ -149,6 +149,7 @@ static supine_status anchor(pipeline *p, supine_error *error) {
     const size_t lung = lungs->lung_count == 2 && i >= 3 * lungs->lung_begin[1];
     p->anchored.mesh.vertices[i] -= p->reference.scan_gains[lung][i % 3] * u[i];
   }
+  supine_lungs_measure_volumes(&p->anchored);
   p->lungs = &p->anchored;
   return status;
 }
