@@ -174,7 +174,9 @@ supine_progress supine_options_progress_begin(const char *label) {
 bool supine_options_progress_step(void *progress, double fraction) {
   supine_progress *state = progress;
   const double time = supine_clock_seconds();
-  if (state->stderr_is_terminal && time - state->shown_at > 0.1) {
+  if (fraction >= 1.0) {
+    supine_options_progress_end(state);
+  } else if (state->stderr_is_terminal && time - state->shown_at > 0.1) {
     state->shown_at = time;
     const double spent = time - state->start;
     (void)fprintf(stderr, "\r%s: %3.0f %%", state->label, 100.0 * fraction);
