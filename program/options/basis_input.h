@@ -48,17 +48,11 @@ supine_status supine_options_hilum(const supine_basis *basis, const supine_pose 
                                    const supine_pose *from, bool needed, double shift[3],
                                    supine_error *error);
 
-/* Print the displacement of the hilum in one line, and whether it was subtracted. */
-void supine_options_hilum_print(const double shift[3], bool subtracted);
-
 #define SUPINE_EXPECTED_MEANING                                                                    \
   "3-D RMS; half of all points lie within 0.9 times this distance of their true position, 95 % "   \
   "within 1.8 times"
 #define SUPINE_EXPECTED_SUPPORT                                                                    \
   "The expected error was measured on breaths in one posture; for a change of posture it is an "   \
   "extrapolation. 'supine info' lists its terms."
-
-/* Print the RMS and the largest expected error in one line; if unknown, print nothing. */
-void supine_options_expected_print(const supine_expected *expected, FILE *file);
 
 #endif
