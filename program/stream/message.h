@@ -84,8 +84,7 @@ int supine_stream_message_is_known(const supine_stream_header *header);
  *     "VOLUME"     STRING        volume such as rest+500
  *     "SEND"       STRING        name of the content that the peer asks for
  *
- * @param device  device that gives the patient's pose; NULL if every device does
- * @retval SUPINE_ERROR_FORMAT  the checksum is wrong, or lengths contradict each other */
+ * @param device  device that gives the patient's pose; NULL if every device does */
 supine_status supine_stream_message_read(const supine_stream_header *header,
                                          const unsigned char *body, const char *device,
                                          supine_stream_message *message, supine_error *error);

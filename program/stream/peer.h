@@ -19,8 +19,7 @@ typedef struct supine_stream_address {
 } supine_stream_address;
 
 /** Parse "PORT" (on 127.0.0.1), "HOST:PORT" or "[HOST]:PORT".
- * @param numeric  true to refuse host names
- * @retval SUPINE_ERROR_ARGUMENT  the text is not an address, or the host is unknown */
+ * @param numeric  true to refuse host names */
 supine_status supine_stream_address_read(const char *text, bool numeric,
                                          supine_stream_address *address, supine_error *error);
 

@@ -81,16 +81,13 @@ typedef struct supine_stream_options {
 } supine_stream_options;
 
 /** Create a server and open its sockets.
- * @param options  must outlive the server
- * @retval SUPINE_ERROR_ARGUMENT  an invalid address or port
- * @retval SUPINE_ERROR_WRITE     the port is taken */
+ * @param options  must outlive the server */
 supine_status supine_stream_server_create(const supine_basis *basis,
                                           const supine_stream_options *options,
                                           supine_stream_server **server, supine_error *error);
 void supine_stream_server_destroy(supine_stream_server *server);
 
-/** Run the server until options->stop returns true or the time options->seconds is over.
- * @retval SUPINE_ERROR_WRITE  the system cannot wait for the sockets */
+/** Run the server until options->stop returns true or the time options->seconds is over. */
 supine_status supine_stream_server_run(supine_stream_server *server, supine_error *error);
 
 /** What the server has done so far. A latency is the time from receiving the newest message to
