@@ -222,7 +222,7 @@ static supine_status open_page(const request *wanted, const supine_basis *basis,
   SUPINE_TRY(supine_stream_web_create(&site, web, error));
   const bool ipv6 = strchr(address.host, ':') != NULL;
   (void)printf("page at http%s://%s%s%s:%d/\n", site.certificate != NULL ? "s" : "",
-               ipv6 ? "[" : "", address.host, ipv6 ? "]" : "", supine_stream_web_port(*web));
+               ipv6 ? "[" : "", address.host, ipv6 ? "]" : "", site.port);
   return SUPINE_OK;
 }
 
