@@ -130,7 +130,7 @@ static void report(const supine_stream_results *results, const request *wanted) 
       (unsigned long long)n->poses, (unsigned long long)n->repaired, (unsigned long long)n->refused,
       (unsigned long long)n->frames, (unsigned long long)n->sent, (unsigned long long)n->peers);
   if (n->malformed + n->skipped + n->lost + n->turned_away + n->unreachable > 0) {
-    (void)printf("malformed messages: %llu; messages not read: %llu; peers disconnected: %llu; "
+    (void)printf("malformed messages: %llu; messages not used: %llu; peers disconnected: %llu; "
                  "peers refused: %llu; frames whose volume is out of reach: %llu\n",
                  (unsigned long long)n->malformed, (unsigned long long)n->skipped,
                  (unsigned long long)n->lost, (unsigned long long)n->turned_away,

@@ -66,9 +66,6 @@ typedef struct supine_stream_message {
 void supine_stream_message_point(const supine_stream_message *message, size_t point, char name[65],
                                  double position[3]);
 
-/** Return whether supine_stream_message_read decodes messages of the header's type. */
-int supine_stream_message_is_known(const supine_stream_header *header);
-
 /** Decode the body of a message. Its numbers may be infinite or not-a-number. These messages are
  * used, depending on the device name in the header. A QTDATA has the poses of several instruments:
  *

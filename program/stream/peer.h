@@ -63,11 +63,11 @@ void supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connect
 /** Close the socket, and release the frame that was being sent. */
 void supine_stream_peer_end(supine_stream_peer *peer, supine_stream_frames *frames);
 
-/** Function that is called for each message of a known type; the body is in `peer->body`. */
+/** Function that is called for each message; the body is in `peer->body`. */
 typedef void supine_stream_receive(void *context, supine_stream_peer *peer);
 
-/** Read up to 64 KiB of received bytes, and call `receive` for each complete message. Messages of
- * unknown types, or with larger bodies than SUPINE_STREAM_BODY_MAX, are skipped.
+/** Read up to 64 KiB of received bytes, and call `receive` for each complete message. Messages
+ * with larger bodies than SUPINE_STREAM_BODY_MAX are skipped.
  * @param skipped  incremented for each skipped message
  * @param error    set if the peer sent an invalid header or a body above 256 MiB, else unchanged */
 supine_stream_outcome supine_stream_peer_read(supine_stream_peer *peer, double now,

@@ -32,7 +32,7 @@ typedef struct supine_stream_counts {
   uint64_t repaired;    /**< poses used although they were not exact rotations */
   uint64_t refused;     /**< poses that were not used, such as matrices with a reflection */
   uint64_t malformed;   /**< messages with a wrong checksum or inconsistent lengths */
-  uint64_t skipped;     /**< messages of unknown types, or too large */
+  uint64_t skipped;     /**< messages without use, and too large ones */
   uint64_t unreachable; /**< frames without the wanted volume, because it was unreachable */
   uint64_t frames;
   uint64_t sent;        /**< frames sent, summed over peers */
