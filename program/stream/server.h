@@ -41,22 +41,16 @@ typedef struct supine_stream_counts {
   uint64_t turned_away; /**< connections refused, as there were SUPINE_STREAM_PEERS_MAX peers */
 } supine_stream_counts;
 
-enum {
-  SUPINE_STREAM_PEERS_MAX = 64,
-  /* Number of bins of a latency histogram, 1 us each; the last bin also counts longer latencies. */
-  SUPINE_STREAM_LATENCY_BINS = 65536
-};
+enum { SUPINE_STREAM_PEERS_MAX = 64 };
+
+/** Time allowed from receiving a message to sending its frame, s. */
+#define SUPINE_STREAM_BUDGET 15e-3
 
 typedef struct supine_stream_latency {
   uint64_t count;
-  double worst; /**< largest latency, s */
-  uint32_t bin[SUPINE_STREAM_LATENCY_BINS];
+  uint64_t late; /**< number of latencies above SUPINE_STREAM_BUDGET */
+  double worst;  /**< largest latency, s */
 } supine_stream_latency;
-
-/** Return a quantile of the latencies, s, rounded up to a microsecond; the worst latency if the
- * quantile is in the last bin; 0 if there are no latencies.
- * @param share  0 to 1: 0.5 for the median */
-double supine_stream_latency_quantile(const supine_stream_latency *latency, double share);
 
 typedef struct supine_stream_server supine_stream_server;
 typedef struct supine_stream_volume supine_stream_volume; /* defined in tracked_patient.h */
