@@ -12,7 +12,7 @@
 
 #include "program/stream/peer.h"
 
-/* Size, bytes, above which a message body is an error. Smaller unknown bodies are skipped. */
+/* Size, bytes, above which a message body is an error. Smaller ones are skipped or read. */
 static const uint64_t skipped_max = 256u << 20;
 
 void supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connecting,
@@ -55,7 +55,7 @@ static bool begin_body(supine_stream_peer *peer, uint64_t *skipped, supine_error
     return false;
   }
   peer->received = 0;
-  peer->in_body = supine_stream_message_is_known(&peer->header) && size <= SUPINE_STREAM_BODY_MAX;
+  peer->in_body = size <= SUPINE_STREAM_BODY_MAX;
   if (!peer->in_body) {
     peer->to_skip = size;
     ++*skipped;

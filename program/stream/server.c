@@ -187,22 +187,9 @@ static bool make_frame(supine_stream_server *s) {
 }
 
 static void add_latency(supine_stream_latency *latency, double seconds) {
-  const double last = SUPINE_STREAM_LATENCY_BINS - 1;
-  ++latency->bin[(size_t)fmin(last, fmax(0.0, 1e6 * seconds))];
   ++latency->count;
+  latency->late += seconds > SUPINE_STREAM_BUDGET;
   latency->worst = fmax(latency->worst, seconds);
-}
-
-double supine_stream_latency_quantile(const supine_stream_latency *latency, double share) {
-  const double wanted = ceil(share * (double)latency->count);
-  double passed = 0.0;
-  for (size_t i = 0; i + 1 < SUPINE_STREAM_LATENCY_BINS; ++i) {
-    passed += (double)latency->bin[i];
-    if (passed >= wanted && passed > 0.0) {
-      return fmin(latency->worst, 1e-6 * (double)(i + 1));
-    }
-  }
-  return latency->worst;
 }
 
 /* Send the unsent rest of a frame to a peer. If there is none, send the newest frame. */
