@@ -265,7 +265,7 @@ static supine_status find_turned_over(pipeline *p, supine_error *error) {
                                      &p->turned_over, error);
 }
 
-static supine_status write_file(const pipeline *p, const char *path, supine_error *error) {
+static supine_status write_file(pipeline *p, const char *path, supine_error *error) {
   for (size_t i = 0; i < 3 * p->lungs->mesh.vertex_count && p->directions == NULL; ++i) {
     const size_t lung = p->lungs->lung_count == 2 && i >= 3 * p->lungs->lung_begin[1];
     cblas_sscal((int)p->compression.mode_count, (float)cbrt(p->options->model.share[lung]),
