@@ -464,23 +464,6 @@ static supine_status prepare(const check *c, supine_basis *basis,
   return SUPINE_OK;
 }
 
-/* Copy the caller's options. Members that the struct of an older program lacks become 0. */
-static supine_status take_options(const check *c, const supine_basis_options *options,
-                                  supine_basis_options *taken) {
-  const size_t oldest = offsetof(supine_basis_options, simd) + sizeof options->simd;
-  *taken = (supine_basis_options){.size = sizeof *taken};
-  if (options == NULL) {
-    return SUPINE_OK;
-  }
-  if (options->size < oldest) {
-    return supine_error_set(
-        c->error, SUPINE_ERROR_ARGUMENT,
-        "the size of the options is %zu: set it to sizeof(supine_basis_options)", options->size);
-  }
-  memcpy(taken, options, options->size < sizeof *taken ? options->size : sizeof *taken);
-  return SUPINE_OK;
-}
-
 /* Check the optional tensor 'rigid'. Each row must be a range of vertices of one lung. */
 static supine_status check_rigid(const check *c, supine_basis *basis) {
   const supine_tensor *rigid = supine_safetensors_find(c->file, "rigid");
@@ -522,29 +505,53 @@ static supine_status check_expected(const check *c, supine_basis *basis) {
   return read_numbers(c, "midline_mm", 1, &basis->midline);
 }
 
-/* Make a basis from an open file. The basis then owns the file. On failure, close the file. */
-static supine_status open_file(supine_safetensors *file, const char *name,
+/* Copy the caller's options. Members that the struct of an older program lacks become 0. */
+static supine_status take_options(const supine_basis_options *options, supine_basis_options *taken,
+                                  supine_error *error) {
+  const size_t oldest = offsetof(supine_basis_options, simd) + sizeof options->simd;
+  *taken = (supine_basis_options){.size = sizeof *taken};
+  if (options != NULL && options->size < oldest) {
+    return supine_error_set(
+        error, SUPINE_ERROR_ARGUMENT,
+        "the size of the options is %zu: set it to sizeof(supine_basis_options)", options->size);
+  }
+  if (options != NULL) {
+    memcpy(taken, options, options->size < sizeof *taken ? options->size : sizeof *taken);
+  }
+  return (taken->allocator.allocate == NULL) == (taken->allocator.release == NULL)
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                "the allocator has only one function: set both or neither");
+}
+
+/* Open the `size` bytes of a file, or the file `name` if `bytes` is NULL. */
+static supine_status open_file(const char *name, const void *bytes, size_t size,
                                const supine_basis_options *options, supine_basis **result,
                                supine_error *error) {
   supine_basis_options taken;
-  const check c = {file, name, error};
-  supine_status status = SUPINE_ERROR_MEMORY;
-  supine_basis *basis = calloc(1, sizeof *basis);
+  supine_safetensors *file = NULL;
   *result = NULL;
+  supine_status status = take_options(options, &taken, error);
+  if (status == SUPINE_OK) {
+    status = supine_safetensors_open_with(name, bytes, size, &taken.allocator, &file, error);
+  }
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  supine_basis *basis = supine_safetensors_allocate(file, sizeof *basis);
   if (basis == NULL) {
     supine_safetensors_close(file);
-    return supine_error_set(error, status, "%s: out of memory", name);
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", name);
   }
+  memset(basis, 0, sizeof *basis);
   basis->file = file;
+  const check c = {file, name, error};
   status = check_metadata(&c, &basis->info);
   static supine_status (*const steps[])(const check *, supine_basis *) = {
       check_surface, check_field, check_modes,   check_lungs, check_volume,   check_reference,
       check_rest,    check_scan,  check_normals, check_rigid, check_expected, identify};
   for (size_t i = 0; status == SUPINE_OK && i < sizeof steps / sizeof *steps; ++i) {
     status = steps[i](&c, basis);
-  }
-  if (status == SUPINE_OK) {
-    status = take_options(&c, options, &taken);
   }
   if (status == SUPINE_OK) {
     status = prepare(&c, basis, &taken);
@@ -559,20 +566,13 @@ static supine_status open_file(supine_safetensors *file, const char *name,
 
 supine_status supine_basis_open_with(const char *path, const supine_basis_options *options,
                                      supine_basis **basis, supine_error *error) {
-  supine_safetensors *file = NULL;
-  *basis = NULL;
-  const supine_status status = supine_safetensors_open(path, &file, error);
-  return status != SUPINE_OK ? status : open_file(file, path, options, basis, error);
+  return open_file(path, NULL, 0, options, basis, error);
 }
 
 supine_status supine_basis_open_memory_with(const void *bytes, size_t size,
                                             const supine_basis_options *options,
                                             supine_basis **basis, supine_error *error) {
-  static const char name[] = "basis in memory";
-  supine_safetensors *file = NULL;
-  *basis = NULL;
-  const supine_status status = supine_safetensors_open_memory(bytes, size, name, &file, error);
-  return status != SUPINE_OK ? status : open_file(file, name, options, basis, error);
+  return open_file("basis in memory", bytes != NULL ? bytes : "", size, options, basis, error);
 }
 
 supine_status supine_basis_open(const char *path, supine_basis **basis, supine_error *error) {
@@ -588,10 +588,11 @@ void supine_basis_close(supine_basis *basis) {
   if (basis == NULL) {
     return;
   }
-  supine_safetensors_close(basis->file);
-  supine_platform_free(basis->tiles.bytes);
-  supine_platform_free(basis->lit.bytes);
-  free(basis);
+  supine_safetensors *file = basis->file; /* its allocator frees the rest */
+  supine_safetensors_release(file, basis->tiles.bytes);
+  supine_safetensors_release(file, basis->lit.bytes);
+  supine_safetensors_release(file, basis);
+  supine_safetensors_close(file);
 }
 
 const supine_basis_info *supine_basis_get_info(const supine_basis *basis) {
