@@ -238,7 +238,7 @@ TEST(test_open_with_allocator_uses_only_it) {
       assert_says(error.message, s.path);
     } else {
       float *xyz = s.xyz + 300;
-      assert_int_equal(p.blocks, p.requests - 1); /* one is freed when the basis is packed */
+      assert_in_range(p.blocks, 5, p.requests - 1); /* work space is freed */
       assert_int_equal(supine_basis_open(s.path, &usual, NULL), SUPINE_OK);
       const supine_pose pose = {.weights = {0.3, -0.2, 0.1}, .gains = {{1, 1, 1}, {1, 1, 1}}};
       supine_deform(basis, &pose, s.xyz);

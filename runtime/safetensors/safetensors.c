@@ -45,21 +45,6 @@ uint64_t supine_safetensors_checksum(const supine_tensor *tensors, size_t tensor
   return sum;
 }
 
-void *supine_safetensors_allocate(const supine_safetensors *file, size_t bytes) {
-  const supine_allocator *with = &file->allocator;
-  return with->allocate != NULL ? with->allocate(with->user, bytes)
-                                : supine_platform_allocate(bytes);
-}
-
-void supine_safetensors_release(const supine_safetensors *file, void *memory) {
-  const supine_allocator *with = &file->allocator;
-  if (with->release == NULL) {
-    supine_platform_free(memory);
-  } else if (memory != NULL) {
-    with->release(with->user, memory);
-  }
-}
-
 supine_status supine_safetensors_open_with(const char *name, const void *bytes, size_t size,
                                            const supine_allocator *allocator,
                                            supine_safetensors **result, supine_error *error) {

@@ -30,9 +30,21 @@ struct supine_safetensors {
 };
 
 /** Allocate memory for a file, aligned to 64 bytes and not zeroed; return NULL if there is none. */
-void *supine_safetensors_allocate(const supine_safetensors *file, size_t bytes);
+static inline void *supine_safetensors_allocate(const supine_safetensors *file, size_t bytes) {
+  const supine_allocator *with = &file->allocator;
+  return with->allocate != NULL ? with->allocate(with->user, bytes)
+                                : supine_platform_allocate(bytes);
+}
+
 /** Free memory of supine_safetensors_allocate; NULL is legal. */
-void supine_safetensors_release(const supine_safetensors *file, void *memory);
+static inline void supine_safetensors_release(const supine_safetensors *file, void *memory) {
+  const supine_allocator *with = &file->allocator;
+  if (with->release == NULL) {
+    supine_platform_free(memory);
+  } else if (memory != NULL) {
+    with->release(with->user, memory);
+  }
+}
 
 /** Open the `size` bytes of a file, or map the file `name` if `bytes` is NULL. */
 supine_status supine_safetensors_open_with(const char *name, const void *bytes, size_t size,
