@@ -5,7 +5,7 @@
 #include "base/clones.h"
 #include "runtime/internal.h"
 #include "runtime/kernels/compact.h"
-#include "runtime/safetensors/platform.h"
+#include "runtime/safetensors/safetensors_file.h"
 
 /* Pack supine_basis_info.normals of 16 vertices. rows[v] points to the numbers of vertex v. */
 SUPINE_CLONES static void pack_tile(const supine_tiles *tiles, const int16_t *const rows[TILE],
@@ -32,7 +32,7 @@ supine_status supine_basis_pack_normals(supine_basis *basis) {
   supine_tiles *tiles = &basis->lit;
   const size_t last = basis->info.vertex_count - 1;
   supine_tiles_layout_lit(tiles, basis->info.normal_count, last / TILE + 1);
-  tiles->bytes = supine_platform_allocate(tiles->count * tiles->stride);
+  tiles->bytes = supine_safetensors_allocate(basis->file, tiles->count * tiles->stride);
   if (tiles->bytes == NULL) {
     return SUPINE_ERROR_MEMORY;
   }

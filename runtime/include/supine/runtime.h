@@ -75,6 +75,9 @@ typedef struct supine_basis_options {
   supine_storage storage;
   supine_simd simd;
   bool without_normals; /**< do not load normals, which saves memory */
+  /** Functions that allocate and free all memory of the basis but the mapped file, called only
+   * while it is opened or closed. Both are NULL, or neither. */
+  supine_allocator allocator;
 } supine_basis_options;
 
 /** The content of an open basis. The basis owns the struct and all arrays. */
@@ -148,7 +151,8 @@ typedef struct supine_pose {
  * @param basis    written; NULL on failure
  * @retval SUPINE_ERROR_READ         the file is missing or unreadable
  * @retval SUPINE_ERROR_FORMAT       the file is truncated, corrupted or not a basis file
- * @retval SUPINE_ERROR_ARGUMENT     an option is out of range, or options->size is not set
+ * @retval SUPINE_ERROR_ARGUMENT     an option is out of range, options->size is not set, or only
+ * one function of the allocator is set
  * @retval SUPINE_ERROR_UNSUPPORTED  the processor or the library lacks the instruction set
  * @retval SUPINE_ERROR_MEMORY       an allocation failed */
 SUPINE_API supine_status supine_basis_open_with(const char *path,
