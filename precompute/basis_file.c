@@ -347,7 +347,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
        {table->band_count},
        table == &no_table ? NULL : table->harmonics},
       {"error_modes", SUPINE_F64, 1, {table->mode_count}, table == &no_table ? NULL : table->modes},
-      {"normals", SUPINE_I16, 3, {n, 3, q}, normals.modes},
+      {"normals", SUPINE_I8, 3, {n, 3, q + 1}, normals.modes},
       {"normal_weights", SUPINE_F64, 4, {g, q, 3, 1 + 2 * k + k * (k + 1) / 2}, normals.weights}};
   supine_tensor given[sizeof all / sizeof *all];
   size_t count = 0;
