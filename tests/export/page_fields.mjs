@@ -1,30 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A page and a glTF file of another simulator's fields, with more coefficients per vertex than vertex attributes hold:
-// positions are those of the library, there is no breath, and the error of the basis is stated.
+// A page of another simulator's fields, with more coefficients per vertex than vertex attributes hold: positions are
+// those of the library, there is no breath, and the error of the basis is stated.
 import assert from 'node:assert/strict';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { close, evaluateFor, openLungs, press, settled } from './browser.mjs';
-import { folder, largestDistance, randomDirections, supine } from './support.mjs';
+import { fieldsBasis, folder, largestDistance, randomDirections, supine } from './support.mjs';
 
 const TOLERANCE_MM = 0.06;
-const [mesh, fields, basis, html, glb, points, inside, rows] = ['lungs.obj', 'fields.safetensors', 'basis.safetensors', 'fields.html', 'fields.glb', 'points.csv', 'inside.safetensors', 'moved.csv'].map((name) => join(folder, name));
+const [basis, html, points, inside, rows] = ['basis.safetensors', 'fields.html', 'points.csv', 'inside.safetensors', 'moved.csv'].map((name) => join(folder, name));
 
-/** Write a safetensors file of float64 tensors, {name: [shape, numbers]}. */
-function writeTensors(path, tensors) {
-  let at = 0;
-  const header = JSON.stringify(Object.fromEntries(Object.entries(tensors).map(([name, [shape, numbers]]) => [name, { dtype: 'F64', shape, data_offsets: [at, at += 8 * numbers.length] }])));
-  const size = Buffer.alloc(8);
-  size.writeBigUInt64LE(BigInt(header.length));
-  writeFileSync(path, Buffer.concat([size, Buffer.from(header), ...Object.values(tensors).map(([, numbers]) => Buffer.from(Float64Array.from(numbers).buffer))]));
-}
-
-supine('phantom', '--vertices', '3000', '-o', mesh);
-const places = readFileSync(mesh, 'utf8').split('\n').filter((line) => line.startsWith('v ')).map((line) => line.split(' ').slice(1, 4).map(Number));
-const gravity = supine('precompute', '--directions', '100').trim().split('\n').slice(1).map((line) => line.split(',').map(Number));
-const wave = ([gx, gy, gz], [x, y, z]) => [6 * Math.sin(gx * (2 + x / 60)), 8 * gy + 3 * Math.cos(2 * gz + (gx * y) / 40), 5 * gz + 4 * Math.sin(gx + (gy * z) / 50)];
-writeTensors(fields, { points: [[places.length, 3], places.flat()], gravity: [[gravity.length, 3], gravity.flat()], displacement: [[gravity.length, places.length, 3], gravity.flatMap((g) => places.flatMap((p) => wave(g, p)))] });
-supine('precompute', mesh, '--fields', fields, '--modes', '30', '--scanned', 'supine', '-o', basis);
+fieldsBasis(basis, 3000);
 writeFileSync(points, 'name,x,y,z\nnodule,-80,-120,-90\n');
 supine('embed', basis, points, '-o', inside);
 supine('export', basis, '--inside', inside, '-o', html);
@@ -61,8 +47,3 @@ assert.match(await page.locator('#surface-text').textContent(), / mm on average 
 assert.deepEqual(complaints, []);
 await page.screenshot({ path: process.env.SCREENSHOT ?? join(folder, 'fields.png') });
 await close(page);
-
-supine('export', basis, '-o', glb);
-for (const option of [['--breath', '700', '-o', html], ['--animate', '-o', glb]]) {
-  assert.throws(() => supine('export', basis, ...option), /no breaths: leave --breath and --animate out/);
-}
