@@ -15,6 +15,7 @@
 #include "precompute/basis_file.h"
 #include "precompute/lungs/disease.h"
 #include "precompute/normals/normal_modes.h"
+#include "runtime/safetensors/safetensors_file.h"
 
 enum { ENTRIES_MAX = 64 };
 
@@ -264,6 +265,30 @@ static void add_all(entries *list, const supine_basis_content *content, const do
   add(list, "made_by", "%s", choice->made_by != NULL ? choice->made_by : "supine_precompute");
 }
 
+/* Add the error of storage to content->accuracy. Open the tensors as a basis in memory for that. */
+static supine_status measure_storage(const supine_basis_content *content,
+                                     const supine_tensor *tensors, size_t count,
+                                     const entries *list, supine_error *error) {
+  const supine_basis_options options = {
+      .size = sizeof options, .simd = SUPINE_SIMD_PORTABLE, .without_normals = true};
+  supine_basis *basis = NULL;
+  char *bytes = NULL;
+  size_t size = 0;
+  FILE *memory = open_memstream(&bytes, &size);
+  if (memory != NULL) {
+    supine_safetensors_print(memory, tensors, count, list->metadata, list->count);
+  }
+  supine_status status = memory == NULL || fclose(memory) != 0
+                             ? supine_error_memory(error, "a basis in memory")
+                             : supine_basis_open_memory_with(bytes, size, &options, &basis, error);
+  if (status == SUPINE_OK) {
+    status = supine_accuracy_add_storage(basis, content->accuracy);
+  }
+  supine_basis_close(basis);
+  free(bytes);
+  return status;
+}
+
 /* This function has more than 60 lines: it lists all tensors in the file's order. */
 supine_status supine_writer_basis_write(const char *path, const supine_basis_content *content,
                                         supine_error *error) {
@@ -322,7 +347,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
        {table->band_count},
        table == &no_table ? NULL : table->harmonics},
       {"error_modes", SUPINE_F64, 1, {table->mode_count}, table == &no_table ? NULL : table->modes},
-      {"normals", SUPINE_I16, 3, {n, 3, q}, normals.modes},
+      {"normals", SUPINE_I8, 3, {n, 3, q + 1}, normals.modes},
       {"normal_weights", SUPINE_F64, 4, {g, q, 3, 1 + 2 * k + k * (k + 1) / 2}, normals.weights}};
   supine_tensor given[sizeof all / sizeof *all];
   size_t count = 0;
@@ -330,6 +355,12 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
     if (all[i].data != NULL) {
       given[count++] = all[i];
     }
+  }
+  SUPINE_TRY(measure_storage(content, given, count, &list, error));
+  list.count = 0;
+  add_all(&list, content, share, &normals);
+  if (arena.failed) {
+    return supine_error_memory(error, "metadata of %s", path);
   }
   return supine_safetensors_write(path, given, count, list.metadata, list.count, error);
 }

@@ -299,8 +299,8 @@ static const supine_option table[] = {
     {"view", 0, "LIST",
      "views to draw, one below another, separated by commas: anterior, posterior, left (or "
      "lateral), right, head, feet, oblique (from the front, left and above), lying (gravity down, "
-     "head left); default lying, or anterior with --turn",
-     .read = read_views},
+     "head left). With --turn, lying is anterior",
+     .read = read_views, .standard = "lying"},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {"largest", 0, "MM",
      "end of the colour bar. If values exceed it, the bar has a pointed end. Default the "
@@ -341,12 +341,6 @@ static supine_status check(const request *wanted, supine_posture_list *postures,
              : SUPINE_OK;
 }
 
-static void begin(void *chosen) {
-  request *wanted = chosen;
-  wanted->view[0] = SUPINE_VIEW_LYING;
-  wanted->view_count = 1;
-}
-
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
   if (wanted->turns && wanted->view[0] == SUPINE_VIEW_LYING) {
@@ -378,5 +372,4 @@ const supine_command supine_command_render = {
     "      --view anterior,lateral,posterior -o prone.png",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),
-    .begin = begin,
     .run = run};

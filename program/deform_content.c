@@ -307,7 +307,15 @@ supine_status supine_command_deform_content(const supine_deform_content *wanted,
   SUPINE_TRY(supine_text_ends_in(wanted->path, ".csv")
                  ? write_points(wanted->path, basis, moved, wanted->vertices, error)
                  : write_surface(wanted->path, basis, moved, error));
-  supine_options_expected_print(&moved->expected, stdout);
-  supine_options_hilum_print(moved->hilum, moved->subtract_hilum);
+  if (moved->expected.sigma != NULL) {
+    (void)printf("expected error %.1f mm (RMS over the points), %.1f mm at most%s\n",
+                 moved->expected.rms, moved->expected.largest,
+                 moved->expected.turned ? "; an extrapolation, as the posture changes" : "");
+  }
+  if (supine_length(moved->hilum) != 0.0) {
+    (void)printf("the hilum moves by %.1f, %.1f, %.1f mm (to the left, back and head)%s\n",
+                 moved->hilum[0], moved->hilum[1], moved->hilum[2],
+                 moved->subtract_hilum ? ", subtracted from all positions" : "");
+  }
   return SUPINE_OK;
 }

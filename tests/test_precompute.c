@@ -181,7 +181,7 @@ static sample_mean mean_of(size_t count, const double *values) {
   return (sample_mean){mean, sqrt((square / (double)count - mean * mean) / (double)(count - 1))};
 }
 
-enum { CHECKED = 300 };
+enum { CHECKED = 600 };
 
 /* Compare the displacements of a basis with those of supine_physics_solve, in `count` directions of
  * gravity. For each direction, set three means over the vertices, mm^2:
@@ -545,7 +545,7 @@ TEST(test_turned_over_one_posture_emptied_finds_more_reversed) {
   for (size_t p = 0; p < sizeof postures / sizeof *postures; ++p) {
     const int g = postures[p];
     static const size_t term[3] = {3, 1, 2}; /* index of the band-1 harmonic along x, y, z */
-    const double part = -0.76 * full;
+    const double part = -0.72 * full;
     const double sign = g < 3 ? 1.0 : -1.0;
     /* Expand the volume at rest in harmonics: `part` mL in one posture, 0 mL in the opposite one.
      * The divisors are the values of the harmonics of degrees 0 and 1 along that axis. */
@@ -567,7 +567,7 @@ TEST(test_turned_over_one_posture_emptied_finds_more_reversed) {
         SUPINE_OK);
     free(dense.mesh.triangles);
     assert_close(sampled, share, 1e-12);
-    assert_true(share > least + 0.02); /* 0.12 to 0.16 of the triangles turn, against 0.08 */
+    assert_true(share > least + 0.02); /* 0.12 to 0.15 of the triangles turn, against 0.08 */
   }
   supine_physics_volume_forms_free(&forms);
   supine_sh_compression_free(&field);

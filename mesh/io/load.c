@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/stat.h>
 
 #include "base/arena.h"
@@ -64,12 +65,12 @@ static void find_space(mesh_file *file) {
   char letters[4] = "";
   (void)snprintf(head, sizeof head, "%s", (const char *)file->bytes);
   const char *tag = head;
-  while ((tag = strcasestr(tag, "SPACE=")) != NULL && tag > head &&
-         isalnum((unsigned char)tag[-1])) {
+  while (*tag != '\0' &&
+         (strncasecmp(tag, "SPACE=", 6) != 0 || (tag > head && isalnum((unsigned char)tag[-1])))) {
     ++tag;
   }
-  file->tagged = tag != NULL;
-  if (tag != NULL && !isalnum((unsigned char)tag[strnlen(tag, 9)])) {
+  file->tagged = *tag != '\0';
+  if (file->tagged && !isalnum((unsigned char)tag[strnlen(tag, 9)])) {
     for (size_t k = 0; k < 3; ++k) {
       letters[k] = (char)toupper((unsigned char)tag[strnlen(tag, 6 + k)]);
     }

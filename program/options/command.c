@@ -73,7 +73,7 @@ int supine_options_finish(const char *command) {
 void supine_options_describe(int argc, char **argv, char *text, size_t size) {
   size_t used = (size_t)snprintf(text, size, "supine " SUPINE_VERSION);
   for (int i = 0; i < argc && used < size; ++i) {
-    used += (size_t)snprintf(text + used, size - used, " %s", basename(argv[i]));
+    used += (size_t)snprintf(text + used, size - used, " %s", supine_text_file_name(argv[i]));
   }
   (void)supine_text_make_utf8(text);
 }

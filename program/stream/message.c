@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Read messages from untrusted bytes. Write headers, floats, and the first fields of a body. */
+#include <arpa/inet.h>
 #include <ctype.h>
-#include <endian.h>
+#include <stdbool.h>
 #include <string.h>
 
 #include "base/clones.h"
@@ -86,7 +87,7 @@ SUPINE_CLONES void supine_stream_encode_floats(size_t count, float *values) {
   for (size_t i = 0; i < count; ++i) {
     uint32_t word;
     memcpy(&word, values + i, sizeof word);
-    word = htobe32(word);
+    word = htonl(word);
     memcpy(values + i, &word, sizeof word);
   }
 }
@@ -218,20 +219,8 @@ static void string(cursor *c, supine_stream_message *m, supine_stream_kind kind)
   }
 }
 
-enum { TRANSFORM, QTDATA, POSITION, POINT, NDARRAY, STRING, TYPES };
-static const char *const types[TYPES] = {"TRANSFORM", "QTDATA",  "POSITION",
-                                         "POINT",     "NDARRAY", "STRING"};
-
-static int type_of(const supine_stream_header *header) {
-  int type = 0;
-  while (type < TYPES && strcmp(header->type, types[type]) != 0) {
-    ++type;
-  }
-  return type;
-}
-
-int supine_stream_message_is_known(const supine_stream_header *header) {
-  return type_of(header) != TYPES;
+static bool is(const supine_stream_header *header, const char *type) {
+  return strcmp(header->type, type) == 0;
 }
 
 /* Skip the extended header of a body and cut off its metadata; return 0 if a size is invalid. */
@@ -264,25 +253,24 @@ supine_status supine_stream_message_read(const supine_stream_header *header,
         "%s: the sizes of extension and metadata exceed the body: correct the sender",
         header->type);
   }
-  const int type = type_of(header);
   const int ours = device == NULL || strcmp(header->device, device) == 0;
   if (strcmp(header->device, "VOLUME") == 0 || strcmp(header->device, "SEND") == 0) {
     const int volume = header->device[0] == 'V';
-    if (type == STRING) {
+    if (is(header, "STRING")) {
       string(&c, message, volume ? SUPINE_STREAM_VOLUME_TEXT : SUPINE_STREAM_REQUEST);
-    } else if (type == NDARRAY && volume) {
+    } else if (is(header, "NDARRAY") && volume) {
       array(&c, message, SUPINE_STREAM_VOLUME, 1);
     }
-  } else if (type == QTDATA) {
+  } else if (is(header, "QTDATA")) {
     instruments(&c, device, header, message);
-  } else if (type == TRANSFORM) {
+  } else if (is(header, "TRANSFORM")) {
     transform(&c, header->device, ours, message);
-  } else if (type == POINT) {
+  } else if (is(header, "POINT")) {
     points(&c, message);
-  } else if (type == POSITION && ours && size > 12) { /* a shorter body has no quaternion */
+  } else if (is(header, "POSITION") && ours && size > 12) { /* a shorter one has no quaternion */
     (void)pass(&c, 12);
     quaternion(&c, message);
-  } else if (type == NDARRAY && ours) {
+  } else if (is(header, "NDARRAY") && ours) {
     array(&c, message, SUPINE_STREAM_DOWN, 3);
   }
   if (c.overrun != 0) {

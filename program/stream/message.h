@@ -66,9 +66,6 @@ typedef struct supine_stream_message {
 void supine_stream_message_point(const supine_stream_message *message, size_t point, char name[65],
                                  double position[3]);
 
-/** Return whether supine_stream_message_read decodes messages of the header's type. */
-int supine_stream_message_is_known(const supine_stream_header *header);
-
 /** Decode the body of a message. Its numbers may be infinite or not-a-number. These messages are
  * used, depending on the device name in the header. A QTDATA has the poses of several instruments:
  *
@@ -84,8 +81,7 @@ int supine_stream_message_is_known(const supine_stream_header *header);
  *     "VOLUME"     STRING        volume such as rest+500
  *     "SEND"       STRING        name of the content that the peer asks for
  *
- * @param device  device that gives the patient's pose; NULL if every device does
- * @retval SUPINE_ERROR_FORMAT  the checksum is wrong, or lengths contradict each other */
+ * @param device  device that gives the patient's pose; NULL if every device does */
 supine_status supine_stream_message_read(const supine_stream_header *header,
                                          const unsigned char *body, const char *device,
                                          supine_stream_message *message, supine_error *error);

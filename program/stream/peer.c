@@ -1,25 +1,29 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Read and write the socket of a peer without blocking. */
 #include <errno.h>
-#include <linux/sockios.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <unistd.h>
+#ifdef __linux__
+#include <linux/sockios.h>
+#endif
 
 #include "program/stream/peer.h"
 
-/* Size, bytes, above which a message body is an error. Smaller unknown bodies are skipped. */
+/* Size, bytes, above which a message body is an error. Smaller ones are skipped or read. */
 static const uint64_t skipped_max = 256u << 20;
 
 void supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connecting,
                               supine_stream_content content, double now, unsigned char *body) {
   const int yes = 1;
-  const unsigned timeout_ms = 20000;
   (void)setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
   (void)setsockopt(socket, SOL_SOCKET, SO_KEEPALIVE, &yes, sizeof yes);
+#ifdef TCP_USER_TIMEOUT /* Linux; elsewhere, the system decides when a silent peer is gone */
+  const unsigned timeout_ms = 20000;
   (void)setsockopt(socket, IPPROTO_TCP, TCP_USER_TIMEOUT, &timeout_ms, sizeof timeout_ms);
+#endif
   *peer = (supine_stream_peer){
       .socket = socket, .connecting = connecting, .emptied = now, .body = body, .content = content};
 }
@@ -51,7 +55,7 @@ static bool begin_body(supine_stream_peer *peer, uint64_t *skipped, supine_error
     return false;
   }
   peer->received = 0;
-  peer->in_body = supine_stream_message_is_known(&peer->header) && size <= SUPINE_STREAM_BODY_MAX;
+  peer->in_body = size <= SUPINE_STREAM_BODY_MAX;
   if (!peer->in_body) {
     peer->to_skip = size;
     ++*skipped;
@@ -105,7 +109,13 @@ supine_stream_outcome supine_stream_peer_read(supine_stream_peer *peer, double n
 
 bool supine_stream_peer_ready(const supine_stream_peer *peer) {
   int queued = 0;
+#ifdef SO_NWRITE /* macOS counts what is sent but not yet acknowledged, too */
+  return getsockopt(peer->socket, SOL_SOCKET, SO_NWRITE, &queued, &(socklen_t){sizeof queued}) ==
+             0 &&
+         queued == 0;
+#else
   return ioctl(peer->socket, SIOCOUTQNSD, &queued) == 0 && queued == 0;
+#endif
 }
 
 void supine_stream_peer_give(supine_stream_peer *peer, supine_stream_frames *frames,

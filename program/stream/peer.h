@@ -19,10 +19,12 @@ typedef struct supine_stream_address {
 } supine_stream_address;
 
 /** Parse "PORT" (on 127.0.0.1), "HOST:PORT" or "[HOST]:PORT".
- * @param numeric  true to refuse host names
- * @retval SUPINE_ERROR_ARGUMENT  the text is not an address, or the host is unknown */
+ * @param numeric  true to refuse host names */
 supine_status supine_stream_address_read(const char *text, bool numeric,
                                          supine_stream_address *address, supine_error *error);
+
+/** Make a socket or pipe non-blocking, and close it in programs that this one starts. Return it. */
+int supine_stream_nonblocking(int descriptor);
 
 /** Open a non-blocking socket that listens at the address; on failure return -1 and set the error.
  * @param port  set to the port on which the socket listens */
@@ -64,11 +66,11 @@ void supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connect
 /** Close the socket, and release the frame that was being sent. */
 void supine_stream_peer_end(supine_stream_peer *peer, supine_stream_frames *frames);
 
-/** Function that is called for each message of a known type; the body is in `peer->body`. */
+/** Function that is called for each message; the body is in `peer->body`. */
 typedef void supine_stream_receive(void *context, supine_stream_peer *peer);
 
-/** Read up to 64 KiB of received bytes, and call `receive` for each complete message. Messages of
- * unknown types, or with larger bodies than SUPINE_STREAM_BODY_MAX, are skipped.
+/** Read up to 64 KiB of received bytes, and call `receive` for each complete message. Messages
+ * with larger bodies than SUPINE_STREAM_BODY_MAX are skipped.
  * @param skipped  incremented for each skipped message
  * @param error    set if the peer sent an invalid header or a body above 256 MiB, else unchanged */
 supine_stream_outcome supine_stream_peer_read(supine_stream_peer *peer, double now,

@@ -32,7 +32,7 @@ typedef struct supine_stream_counts {
   uint64_t repaired;    /**< poses used although they were not exact rotations */
   uint64_t refused;     /**< poses that were not used, such as matrices with a reflection */
   uint64_t malformed;   /**< messages with a wrong checksum or inconsistent lengths */
-  uint64_t skipped;     /**< messages of unknown types, or too large */
+  uint64_t skipped;     /**< messages without use, and too large ones */
   uint64_t unreachable; /**< frames without the wanted volume, because it was unreachable */
   uint64_t frames;
   uint64_t sent;        /**< frames sent, summed over peers */
@@ -41,22 +41,16 @@ typedef struct supine_stream_counts {
   uint64_t turned_away; /**< connections refused, as there were SUPINE_STREAM_PEERS_MAX peers */
 } supine_stream_counts;
 
-enum {
-  SUPINE_STREAM_PEERS_MAX = 64,
-  /* Number of bins of a latency histogram, 1 us each; the last bin also counts longer latencies. */
-  SUPINE_STREAM_LATENCY_BINS = 65536
-};
+enum { SUPINE_STREAM_PEERS_MAX = 64 };
+
+/** Time allowed from receiving a message to sending its frame, s. */
+#define SUPINE_STREAM_BUDGET 15e-3
 
 typedef struct supine_stream_latency {
   uint64_t count;
-  double worst; /**< largest latency, s */
-  uint32_t bin[SUPINE_STREAM_LATENCY_BINS];
+  uint64_t late; /**< number of latencies above SUPINE_STREAM_BUDGET */
+  double worst;  /**< largest latency, s */
 } supine_stream_latency;
-
-/** Return a quantile of the latencies, s, rounded up to a microsecond; the worst latency if the
- * quantile is in the last bin; 0 if there are no latencies.
- * @param share  0 to 1: 0.5 for the median */
-double supine_stream_latency_quantile(const supine_stream_latency *latency, double share);
 
 typedef struct supine_stream_server supine_stream_server;
 typedef struct supine_stream_volume supine_stream_volume; /* defined in tracked_patient.h */
@@ -81,16 +75,13 @@ typedef struct supine_stream_options {
 } supine_stream_options;
 
 /** Create a server and open its sockets.
- * @param options  must outlive the server
- * @retval SUPINE_ERROR_ARGUMENT  an invalid address or port
- * @retval SUPINE_ERROR_WRITE     the port is taken */
+ * @param options  must outlive the server */
 supine_status supine_stream_server_create(const supine_basis *basis,
                                           const supine_stream_options *options,
                                           supine_stream_server **server, supine_error *error);
 void supine_stream_server_destroy(supine_stream_server *server);
 
-/** Run the server until options->stop returns true or the time options->seconds is over.
- * @retval SUPINE_ERROR_WRITE  the system cannot wait for the sockets */
+/** Run the server until options->stop returns true or the time options->seconds is over. */
 supine_status supine_stream_server_run(supine_stream_server *server, supine_error *error);
 
 /** What the server has done so far. A latency is the time from receiving the newest message to

@@ -19,8 +19,7 @@ struct supine_stream_volume {
 supine_status supine_stream_volume_breathe(supine_stream_volume *volume, const supine_pv *pv,
                                            const supine_pv_breath *breath, supine_error *error);
 
-/** Set a fixed volume from a text such as rest+500, full-300 or 2600mL.
- * @retval SUPINE_ERROR_ARGUMENT  the text is not a volume; `volume` is unchanged */
+/** Set a fixed volume from a text such as rest+500; leave it unchanged if the text is wrong. */
 supine_status supine_stream_volume_fix(supine_stream_volume *volume, const char *text,
                                        supine_error *error);
 

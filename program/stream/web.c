@@ -13,6 +13,7 @@
 #include "base/arena.h"
 #include "base/clock.h"
 #include "base/library.h"
+#include "program/stream/peer.h"
 #include "program/stream/web.h"
 
 /* clang-format off */
@@ -40,7 +41,6 @@ enum {
 struct supine_stream_web {
   supine_stream_site site;
   struct lws_context *context;
-  int port;
   int poses[2]; /* pipe that carries received poses to the server's thread */
   pthread_t thread;
   bool running;
@@ -164,7 +164,7 @@ static void *run(void *context) {
   return NULL;
 }
 
-supine_status supine_stream_web_create(const supine_stream_site *site, supine_stream_web **web,
+supine_status supine_stream_web_create(supine_stream_site *site, supine_stream_web **web,
                                        supine_error *error) {
   SUPINE_TRY(SUPINE_LIBRARY_LOAD(SUPINE_WEBSOCKETS, FUNCTIONS, &lws, error));
   supine_stream_web *w = calloc(1, sizeof *w);
@@ -173,7 +173,8 @@ supine_status supine_stream_web_create(const supine_stream_site *site, supine_st
   }
   w->site = *site;
   (void)pthread_mutex_init(&w->lock, NULL);
-  const bool piped = pipe2(w->poses, O_NONBLOCK | O_CLOEXEC) == 0;
+  const bool piped = pipe(w->poses) == 0 && supine_stream_nonblocking(w->poses[0]) > 0 &&
+                     supine_stream_nonblocking(w->poses[1]) > 0;
   lws.set_log_level(0, NULL);
   struct lws_context_creation_info info = {0};
   info.port = site->port;
@@ -196,8 +197,8 @@ supine_status supine_stream_web_create(const supine_stream_site *site, supine_st
   }
   w->context = piped ? lws.create_context(&info) : NULL;
   struct lws_vhost *host = w->context == NULL ? NULL : lws.get_vhost_by_name(w->context, "default");
-  w->port = host == NULL ? 0 : lws.get_vhost_listen_port(host);
-  w->running = w->port > 0 && pthread_create(&w->thread, NULL, run, w) == 0;
+  const int port = host == NULL ? 0 : lws.get_vhost_listen_port(host);
+  w->running = port > 0 && pthread_create(&w->thread, NULL, run, w) == 0;
   if (!w->running) {
     supine_stream_web_destroy(w);
     return supine_error_set(error, SUPINE_ERROR_WRITE,
@@ -205,6 +206,7 @@ supine_status supine_stream_web_create(const supine_stream_site *site, supine_st
                             "--web, and check --certificate and --key",
                             info.iface, site->port);
   }
+  site->port = port;
   *web = w;
   return SUPINE_OK;
 }
@@ -226,10 +228,6 @@ void supine_stream_web_destroy(supine_stream_web *web) {
   }
   (void)pthread_mutex_destroy(&web->lock);
   free(web);
-}
-
-int supine_stream_web_port(const supine_stream_web *web) {
-  return web->port;
 }
 
 int supine_stream_web_descriptor(const supine_stream_web *web) {

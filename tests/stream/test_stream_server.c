@@ -322,6 +322,7 @@ TEST(test_server_each_pose_answered_by_weights) {
   const supine_stream_latency *latency = &supine_stream_server_results(s->server)->latency[0];
   assert_true(latency->count >= 43);
   assert_true(latency->worst > 0.0 && latency->worst < 1.0);
+  assert_int_equal(latency->late > 0, latency->worst > SUPINE_STREAM_BUDGET);
   stage_destroy(s);
 }
 

@@ -111,7 +111,7 @@ class Info(ctypes.Structure):
                 ("direction", c_void_p), ("coefficients", c_void_p), ("modes", c_void_p),
                 ("volume_linear", c_void_p), ("volume_quadratic", c_void_p), ("volume_cubic", c_void_p),
                 ("packed", c_void_p), ("normal_count", c_size_t), ("normals", c_void_p),
-                ("normal_weights", c_void_p), ("reference_volume", c_void_p), ("has_rest", c_bool),
+                ("normal_bytes", c_void_p), ("normal_weights", c_void_p), ("reference_volume", c_void_p), ("has_rest", c_bool),
                 ("has_full", c_bool), ("is_fields", c_bool), ("volume_axes", c_size_t), ("bend", c_double * 3),
                 ("identity", c_uint64)]
 
@@ -122,7 +122,7 @@ class Tensor(ctypes.Structure):
 
 
 # Element types in the order of supine_dtype.
-DTYPES = (ctypes.c_uint8, c_uint32, c_float, c_double, c_int16)
+DTYPES = (ctypes.c_uint8, c_uint32, c_float, c_double, c_int16, ctypes.c_int8)
 
 
 class Metadata(ctypes.Structure):
