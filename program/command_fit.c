@@ -366,7 +366,7 @@ static void set_name_and_force(const request *wanted, supine_patient_record *rec
   const supine_model deep = supine_physics_model(SUPINE_LAW_DEEP);
   const char *path = wanted->landmarks.path != NULL ? wanted->landmarks.path : wanted->second_path;
   (void)snprintf(record->name, sizeof record->name, "%s",
-                 wanted->name != NULL ? wanted->name : basename(path));
+                 wanted->name != NULL ? wanted->name : supine_text_file_name(path));
   record->force =
       supine_patient_force(&record->patient.power, deep.force.gain, record->state[1].gravity);
 }

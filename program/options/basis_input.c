@@ -54,7 +54,7 @@ supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,
 
 void supine_options_basis_title(const char *path, char *title, size_t size) {
   static const char ending[] = ".safetensors";
-  const char *name = basename(path);
+  const char *name = supine_text_file_name(path);
   const size_t cut = supine_text_ends_in(name, ending) ? sizeof ending - 1 : 0;
   (void)snprintf(title, size, "%.*s", (int)(strlen(name) - cut), name);
   (void)supine_text_make_utf8(title);

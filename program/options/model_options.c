@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/text.h"
 #include "program/options/model_options.h"
 #include "program/options/state_options.h"
 #include "program/options/surface_options.h"
@@ -24,7 +25,8 @@ static supine_status read_resting(const char *text, void *field, supine_error *e
   char copy[256];
   (void)snprintf(copy, sizeof copy, "%s", text);
   supine_status status = SUPINE_OK;
-  for (char *rest = copy, *piece; status == SUPINE_OK && (piece = strsep(&rest, ",")) != NULL;) {
+  for (char *rest = copy; status == SUPINE_OK && rest != NULL;) {
+    const char *piece = supine_text_item(&rest);
     char *value = strchr(piece, '=');
     if (value != NULL) {
       *value++ = '\0';
@@ -277,7 +279,7 @@ supine_status supine_command_load_lungs(const char *command, const char *operand
   }
   (void)strcpy(remaining, operand);
   while (remaining != NULL && count <= FILES_MAX) {
-    paths[count++] = strsep(&remaining, ",");
+    paths[count++] = supine_text_item(&remaining);
   }
   if (count > FILES_MAX) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,

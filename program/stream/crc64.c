@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Compute CRC-64 with tables, 16 bytes at a time. */
-#include <endian.h>
 #include <pthread.h>
 #include <string.h>
 
@@ -54,8 +53,8 @@ uint64_t supine_stream_crc64(uint64_t crc, const void *bytes, size_t size) {
   for (; size >= 16; at += 16, size -= 16) {
     uint64_t word[2];
     memcpy(word, at, sizeof word);
-    word[0] = be64toh(word[0]) ^ crc;
-    word[1] = be64toh(word[1]);
+    word[0] = __builtin_bswap64(word[0]) ^ crc; /* hosts are little-endian */
+    word[1] = __builtin_bswap64(word[1]);
     crc = 0;
     for (int k = 0; k < 8; ++k) {
       crc ^= table[8 + k][word[0] >> 8 * k & 255] ^ table[k][word[1] >> 8 * k & 255];

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Compute the positions of a frame, and build its messages. */
-#include <endian.h>
+#define _DEFAULT_SOURCE /* declares madvise */ // NOLINT(bugprone-reserved-identifier)
+#include <arpa/inet.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -59,11 +60,11 @@ static supine_status make_strips(supine_stream_frames *f, supine_error *error) {
       1 + meshopt.stripify(f->strips + 1, order, corners, f->info->vertex_count, restart);
   for (size_t i = 1, head = 0; i <= end; ++i) {
     if (i == end || f->strips[i] == restart) {
-      f->strips[head] = htobe32((uint32_t)(i - head - 1));
+      f->strips[head] = htonl((uint32_t)(i - head - 1));
       head = i;
       ++f->strips_count;
     } else {
-      f->strips[i] = htobe32(f->strips[i]);
+      f->strips[i] = htonl(f->strips[i]);
     }
   }
   f->strips_size = end * sizeof *f->strips;

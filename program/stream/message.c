@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Read messages from untrusted bytes. Write headers, floats, and the first fields of a body. */
+#include <arpa/inet.h>
 #include <ctype.h>
-#include <endian.h>
 #include <stdbool.h>
 #include <string.h>
 
@@ -80,7 +80,7 @@ SUPINE_CLONES void supine_stream_encode_floats(size_t count, float *values) {
   for (size_t i = 0; i < count; ++i) {
     uint32_t word;
     memcpy(&word, values + i, sizeof word);
-    word = htobe32(word);
+    word = htonl(word);
     memcpy(values + i, &word, sizeof word);
   }
 }

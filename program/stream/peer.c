@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Read and write the socket of a peer without blocking. */
 #include <errno.h>
-#include <linux/sockios.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <unistd.h>
+#ifdef __linux__
+#include <linux/sockios.h>
+#endif
 
 #include "program/stream/peer.h"
 
@@ -16,10 +18,12 @@ static const uint64_t skipped_max = 256u << 20;
 void supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connecting,
                               supine_stream_content content, double now, unsigned char *message) {
   const int yes = 1;
-  const unsigned timeout_ms = 20000;
   (void)setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
   (void)setsockopt(socket, SOL_SOCKET, SO_KEEPALIVE, &yes, sizeof yes);
+#ifdef TCP_USER_TIMEOUT /* Linux; elsewhere, the system decides when a silent peer is gone */
+  const unsigned timeout_ms = 20000;
   (void)setsockopt(socket, IPPROTO_TCP, TCP_USER_TIMEOUT, &timeout_ms, sizeof timeout_ms);
+#endif
   *peer = (supine_stream_peer){.socket = socket,
                                .connecting = connecting,
                                .message = message,
@@ -96,7 +100,13 @@ supine_stream_outcome supine_stream_peer_read(supine_stream_peer *peer, double n
 
 bool supine_stream_peer_ready(const supine_stream_peer *peer) {
   int queued = 0;
+#ifdef SO_NWRITE /* macOS counts what is sent but not yet acknowledged, too */
+  return getsockopt(peer->socket, SOL_SOCKET, SO_NWRITE, &queued, &(socklen_t){sizeof queued}) ==
+             0 &&
+         queued == 0;
+#else
   return ioctl(peer->socket, SIOCOUTQNSD, &queued) == 0 && queued == 0;
+#endif
 }
 
 void supine_stream_peer_give(supine_stream_peer *peer, supine_stream_frames *frames,

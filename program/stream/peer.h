@@ -23,6 +23,9 @@ typedef struct supine_stream_address {
 supine_status supine_stream_address_read(const char *text, bool numeric,
                                          supine_stream_address *address, supine_error *error);
 
+/** Make a socket or pipe non-blocking, and close it in programs that this one starts. Return it. */
+int supine_stream_nonblocking(int descriptor);
+
 /** Open a non-blocking socket that listens at the address; on failure return -1 and set the error.
  * @param port  set to the port on which the socket listens */
 int supine_stream_address_listen(const supine_stream_address *address, int *port,

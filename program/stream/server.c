@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Run the main loop: read messages, compute a frame for the newest pose, send the frame. */
+#define _GNU_SOURCE /* declares ppoll, part of POSIX since 2024 */ // NOLINT(bugprone-reserved-identifier)
 #include <errno.h>
 #include <math.h>
 #include <poll.h>
@@ -80,7 +81,7 @@ static supine_stream_peer *begin_peer(supine_stream_server *s, int socket, bool 
 
 static void accept_peers(supine_stream_server *s) {
   for (size_t i = 0; i < SUPINE_STREAM_PEERS_MAX; ++i) {
-    const int socket = accept4(s->listener, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
+    const int socket = supine_stream_nonblocking(accept(s->listener, NULL, NULL));
     if (socket < 0) {
       if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR && errno != ECONNABORTED) {
         s->accept_at = s->woke + connect_interval;
@@ -228,16 +229,24 @@ static void send_peers(supine_stream_server *s) {
   }
 }
 
-/* Compute how long ppoll() may wait in a run that ends at the time `end`. */
-static struct timespec find_timeout(const supine_stream_server *s, double end) {
+/* Compute how many seconds to wait for sockets in a run that ends at the time `end`. */
+static double find_timeout(const supine_stream_server *s, double end) {
   double next = fmin(fmin(s->woke + stop_interval, end), fmin(s->connect_at, frame_due(s)));
   for (size_t i = 0; i < SUPINE_STREAM_PEERS_MAX; ++i) {
     if (needs_frame(s, &s->peer[i])) {
       next = fmin(next, s->woke + send_interval);
     }
   }
-  const double left = fmax(0.0, next - supine_clock_seconds());
-  return (struct timespec){0, (long)(1e9 * left)};
+  return fmax(0.0, next - supine_clock_seconds());
+}
+
+/* Wait for sockets at most some seconds, less than 1. */
+static int wait_for_sockets(struct pollfd *polled, nfds_t count, double seconds) {
+#ifdef __APPLE__
+  return poll(polled, count, (int)ceil(1e3 * seconds));
+#else
+  return ppoll(polled, count, &(struct timespec){0, (long)(1e9 * seconds)}, NULL);
+#endif
 }
 
 /* Choose the sockets for ppoll() to watch. */
@@ -283,9 +292,9 @@ supine_status supine_stream_server_run(supine_stream_server *server, supine_erro
   double asked = s->woke;
   while (s->woke < end) {
     gather(s);
-    const struct timespec timeout = find_timeout(s, end);
+    const double timeout = find_timeout(s, end);
     s->wait_begun = supine_clock_seconds();
-    if (ppoll(s->polled, POLLED, &timeout, NULL) < 0 && errno != EINTR) {
+    if (wait_for_sockets(s->polled, POLLED, timeout) < 0 && errno != EINTR) {
       return supine_error_set(error, SUPINE_ERROR_WRITE, "cannot wait for the sockets: %s",
                               strerror(errno));
     }

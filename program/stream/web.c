@@ -13,6 +13,7 @@
 #include "base/arena.h"
 #include "base/clock.h"
 #include "base/library.h"
+#include "program/stream/peer.h"
 #include "program/stream/web.h"
 
 /* clang-format off */
@@ -172,7 +173,8 @@ supine_status supine_stream_web_create(supine_stream_site *site, supine_stream_w
   }
   w->site = *site;
   (void)pthread_mutex_init(&w->lock, NULL);
-  const bool piped = pipe2(w->poses, O_NONBLOCK | O_CLOEXEC) == 0;
+  const bool piped = pipe(w->poses) == 0 && supine_stream_nonblocking(w->poses[0]) > 0 &&
+                     supine_stream_nonblocking(w->poses[1]) > 0;
   lws.set_log_level(0, NULL);
   struct lws_context_creation_info info = {0};
   info.port = site->port;
