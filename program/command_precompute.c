@@ -255,7 +255,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
       .band = wanted->band,
       .modes = wanted->modes,
       .held_out = wanted->held_out,
-      .expected_error = record.report.expected_constant,
+      .expected_error = prepared.patient != NULL ? supine_patient_expected(prepared.patient) : 0.0,
       .expected_from = record.report.expected_from,
       .turn_fitted = record.gain_error > 0.0,
       .frame = prepared.source.frame,
