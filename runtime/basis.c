@@ -378,15 +378,18 @@ static supine_status check_normals(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
   const size_t terms = supine_basis_normal_terms(basis);
   size_t shape[] = {info->vertex_count, 3, ANY};
-  if (supine_safetensors_find(c->file, "normals") == NULL &&
-      supine_safetensors_find(c->file, "normal_weights") == NULL) {
+  const supine_tensor *tensor = supine_safetensors_find(c->file, "normals");
+  if (tensor == NULL && supine_safetensors_find(c->file, "normal_weights") == NULL) {
     return SUPINE_OK;
   }
-  info->normals = require(c, "normals", SUPINE_I16, 3, shape);
-  if (info->normals == NULL) {
+  const bool bytes = tensor != NULL && tensor->dtype == SUPINE_I8;
+  const void *vectors = require(c, "normals", bytes ? SUPINE_I8 : SUPINE_I16, 3, shape);
+  if (vectors == NULL) {
     return SUPINE_ERROR_FORMAT;
   }
-  info->normal_count = shape[2];
+  info->normals = bytes ? NULL : vectors;
+  info->normal_bytes = bytes ? vectors : NULL;
+  info->normal_count = shape[2] - (bytes && shape[2] > 0);
   if (info->normal_count < 1 || info->normal_count > SUPINE_NORMAL_MODES_MAX) {
     return refuse(c, "the basis of vertex normals has %zu modes, not 1 to %d", info->normal_count,
                   SUPINE_NORMAL_MODES_MAX);
@@ -444,6 +447,7 @@ static supine_status prepare(const check *c, supine_basis *basis,
   if (options->without_normals) {
     basis->info.normal_count = 0;
     basis->info.normals = NULL;
+    basis->info.normal_bytes = NULL;
     basis->info.normal_weights = NULL;
   }
   if (basis->info.normal_count > 0) {

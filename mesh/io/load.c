@@ -4,6 +4,7 @@
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 #include <sys/stat.h>
@@ -104,6 +105,26 @@ static supine_status read_file(mesh_file *file, supine_arena *arena, mesh_reader
                                             file->path);
 }
 
+/* Copy a surface as a reader copies that of a file. */
+static supine_status copy_arrays(const char *name, const supine_mesh *given, supine_mesh *mesh,
+                                 supine_error *error) {
+  mesh_faces faces = {.path = name, .mesh = mesh};
+  mesh->vertices = malloc((3 * given->vertex_count + 1) * sizeof *mesh->vertices);
+  if (mesh->vertices == NULL) {
+    return supine_error_memory(error, "%zu vertices of %s", given->vertex_count, name);
+  }
+  mesh->vertex_count = given->vertex_count;
+  for (size_t i = 0; i < 3 * given->vertex_count; ++i) {
+    mesh->vertices[i] = (double)((float)given->vertices[i] + 0.0F); /* + 0 makes -0 to 0 */
+  }
+  for (size_t t = 0; t < given->triangle_count; ++t) {
+    const uint32_t *corner = given->triangles + 3 * t;
+    const double corners[3] = {corner[0], corner[1], corner[2]};
+    SUPINE_TRY(supine_mesh_faces_add(&faces, corners, 3, error));
+  }
+  return SUPINE_OK;
+}
+
 static supine_status choose_axes(const mesh_file *file, supine_axes asked,
                                  supine_mesh_report *report, supine_error *error) {
   if (asked != SUPINE_AXES_AUTO) {
@@ -164,8 +185,12 @@ supine_status supine_mesh_load(const char *path, const supine_mesh_load_options 
   supine_mesh_report found = {0};
   mesh_file file = {.path = path};
   mesh_reader *reader = NULL;
-  SUPINE_TRY(read_file(&file, &arena, &reader, error));
-  SUPINE_TRY(reader(&file, &loaded, &found.degenerate_faces, error));
+  if (chosen.arrays != NULL) {
+    SUPINE_TRY(copy_arrays(path, chosen.arrays, &loaded, error));
+  } else {
+    SUPINE_TRY(read_file(&file, &arena, &reader, error));
+    SUPINE_TRY(reader(&file, &loaded, &found.degenerate_faces, error));
+  }
   SUPINE_TRY(choose_axes(&file, chosen.axes, &found, error));
   SUPINE_TRY(convert(path, scale, found.axes, &loaded, error));
   if (supine_mesh_weld(&loaded, &found) != SUPINE_OK) {

@@ -94,18 +94,3 @@ supine_status supine_options_hilum(const supine_basis *basis, const supine_pose 
                                              "--frame hilum: the file does not say how the hilum "
                                              "moves: make it again with 'supine embed'");
 }
-
-void supine_options_hilum_print(const double shift[3], bool subtracted) {
-  if (shift[0] != 0.0 || shift[1] != 0.0 || shift[2] != 0.0) {
-    (void)printf("the hilum moves by %.1f, %.1f, %.1f mm (to the left, back and head)%s\n",
-                 shift[0], shift[1], shift[2], subtracted ? ", subtracted from all positions" : "");
-  }
-}
-
-void supine_options_expected_print(const supine_expected *expected, FILE *file) {
-  if (expected->sigma != NULL) {
-    (void)fprintf(file, "expected error %.1f mm (RMS over the points), %.1f mm at most%s\n",
-                  expected->rms, expected->largest,
-                  expected->turned ? "; an extrapolation, as the posture changes" : "");
-  }
-}

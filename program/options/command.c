@@ -106,6 +106,17 @@ bool supine_options_parse_count(const char *text, size_t *value) {
   return true;
 }
 
+bool supine_options_next_item(const char **list, char *item, size_t size) {
+  const char *at = *list;
+  if (at == NULL) {
+    return false;
+  }
+  (void)snprintf(item, size, "%.*s", (int)strcspn(at, ","), at);
+  at = strchr(at, ',');
+  *list = at != NULL ? at + 1 : NULL;
+  return true;
+}
+
 const char *supine_options_suggest(const char *text, const char *const *candidates, size_t count) {
   const char *best = NULL;
   size_t fewest = 1 + strlen(text) / 2; /* candidates that need more edits are not suggested */
@@ -163,7 +174,9 @@ supine_progress supine_options_progress_begin(const char *label) {
 bool supine_options_progress_step(void *progress, double fraction) {
   supine_progress *state = progress;
   const double time = supine_clock_seconds();
-  if (state->stderr_is_terminal && time - state->shown_at > 0.1) {
+  if (fraction >= 1.0) {
+    supine_options_progress_end(state);
+  } else if (state->stderr_is_terminal && time - state->shown_at > 0.1) {
     state->shown_at = time;
     const double spent = time - state->start;
     (void)fprintf(stderr, "\r%s: %3.0f %%", state->label, 100.0 * fraction);

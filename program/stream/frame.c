@@ -5,7 +5,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
 
 #include <meshoptimizer.h>
 
@@ -23,8 +22,7 @@ static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } meshopt;
 enum {
   BATCH = 2048,       /* number of vertices computed together, so that they stay in the L1 cache */
   GRAIN = 32 * BATCH, /* smallest number of vertices for which a thread is worth starting */
-  THREADS_MAX = 256,
-  HUGE_PAGE = 1 << 21 /* bytes */
+  THREADS_MAX = 256
 };
 
 struct supine_stream_frames {
@@ -99,12 +97,6 @@ void supine_stream_frames_destroy(supine_stream_frames *frames) {
   if (frames == NULL) {
     return;
   }
-  while (frames->unused != NULL) {
-    supine_stream_frame *frame = frames->unused;
-    frames->unused = frame->next;
-    free(frame->points);
-    free(frame);
-  }
   supine_arena_free(&frames->arena);
   free(frames);
 }
@@ -116,21 +108,11 @@ supine_stream_frame *supine_stream_frame_acquire(supine_stream_frames *frames,
     frames->unused = frame->next;
   } else {
     const size_t count = frames->info->vertex_count;
-    const size_t size = 12 * count + SUPINE_STREAM_ATTRIBUTE + 4 * count;
-    const size_t page = size < 2 * (size_t)HUGE_PAGE ? 64 : HUGE_PAGE;
-    const size_t whole = (size + page - 1) / page * page;
-    frame = calloc(1, sizeof *frame);
-    float *points = aligned_alloc(page, whole);
+    frame = supine_arena_zeros(&frames->arena, 1, sizeof *frame);
+    float *points = supine_arena_take(&frames->arena, 16 * count + SUPINE_STREAM_ATTRIBUTE, 1);
     if (frame == NULL || points == NULL) {
-      free(frame);
-      free(points);
       return NULL;
     }
-#ifdef MADV_HUGEPAGE
-    if (page == HUGE_PAGE) {
-      (void)madvise(points, whole, MADV_HUGEPAGE);
-    }
-#endif
     frame->points = points;
     frame->errors = (unsigned char *)(points + 3 * count);
   }

@@ -3,7 +3,6 @@
 #include <errno.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
-#include <stdlib.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -11,20 +10,14 @@
 #include <linux/sockios.h>
 #endif
 
-#include "base/arena.h"
 #include "program/stream/peer.h"
 
-/* Size, bytes, above which a message body is an error. Smaller unknown bodies are skipped. */
+/* Size, bytes, above which a message body is an error. Smaller ones are skipped or read. */
 static const uint64_t skipped_max = 256u << 20;
 
-supine_status supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connecting,
-                                       supine_stream_content content, double now,
-                                       supine_error *error) {
+void supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connecting,
+                              supine_stream_content content, double now, unsigned char *body) {
   const int yes = 1;
-  unsigned char *body = malloc(SUPINE_STREAM_BODY_MAX);
-  if (body == NULL) {
-    return supine_error_memory(error, "a peer");
-  }
   (void)setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
   (void)setsockopt(socket, SOL_SOCKET, SO_KEEPALIVE, &yes, sizeof yes);
 #ifdef TCP_USER_TIMEOUT /* Linux; elsewhere, the system decides when a silent peer is gone */
@@ -33,13 +26,11 @@ supine_status supine_stream_peer_begin(supine_stream_peer *peer, int socket, boo
 #endif
   *peer = (supine_stream_peer){
       .socket = socket, .connecting = connecting, .emptied = now, .body = body, .content = content};
-  return SUPINE_OK;
 }
 
 void supine_stream_peer_end(supine_stream_peer *peer, supine_stream_frames *frames) {
   (void)close(peer->socket);
   supine_stream_frame_release(frames, peer->frame);
-  free(peer->body);
   *peer = (supine_stream_peer){.socket = -1};
 }
 
@@ -64,7 +55,7 @@ static bool begin_body(supine_stream_peer *peer, uint64_t *skipped, supine_error
     return false;
   }
   peer->received = 0;
-  peer->in_body = supine_stream_message_is_known(&peer->header) && size <= SUPINE_STREAM_BODY_MAX;
+  peer->in_body = size <= SUPINE_STREAM_BODY_MAX;
   if (!peer->in_body) {
     peer->to_skip = size;
     ++*skipped;

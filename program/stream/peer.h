@@ -19,8 +19,7 @@ typedef struct supine_stream_address {
 } supine_stream_address;
 
 /** Parse "PORT" (on 127.0.0.1), "HOST:PORT" or "[HOST]:PORT".
- * @param numeric  true to refuse host names
- * @retval SUPINE_ERROR_ARGUMENT  the text is not an address, or the host is unknown */
+ * @param numeric  true to refuse host names */
 supine_status supine_stream_address_read(const char *text, bool numeric,
                                          supine_stream_address *address, supine_error *error);
 
@@ -60,19 +59,18 @@ typedef enum supine_stream_outcome {
 
 /** Initialise a peer, which then owns the socket. The kernel closes the connection if sent data
  * stays unacknowledged for 20 s.
- * @param now  current time, s by supine_clock_seconds
- * @retval SUPINE_ERROR_MEMORY  the caller still owns the socket */
-supine_status supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connecting,
-                                       supine_stream_content content, double now,
-                                       supine_error *error);
-/** Close the socket, release the frame that was being sent, and free the buffer `peer->body`. */
+ * @param now   current time, s by supine_clock_seconds
+ * @param body  [SUPINE_STREAM_BODY_MAX] buffer for received messages */
+void supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connecting,
+                              supine_stream_content content, double now, unsigned char *body);
+/** Close the socket, and release the frame that was being sent. */
 void supine_stream_peer_end(supine_stream_peer *peer, supine_stream_frames *frames);
 
-/** Function that is called for each message of a known type; the body is in `peer->body`. */
+/** Function that is called for each message; the body is in `peer->body`. */
 typedef void supine_stream_receive(void *context, supine_stream_peer *peer);
 
-/** Read up to 64 KiB of received bytes, and call `receive` for each complete message. Messages of
- * unknown types, or with larger bodies than SUPINE_STREAM_BODY_MAX, are skipped.
+/** Read up to 64 KiB of received bytes, and call `receive` for each complete message. Messages
+ * with larger bodies than SUPINE_STREAM_BODY_MAX are skipped.
  * @param skipped  incremented for each skipped message
  * @param error    set if the peer sent an invalid header or a body above 256 MiB, else unchanged */
 supine_stream_outcome supine_stream_peer_read(supine_stream_peer *peer, double now,

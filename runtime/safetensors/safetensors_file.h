@@ -6,6 +6,7 @@
 
 #include <inttypes.h>
 #include <stdbool.h>
+#include <stdio.h>
 
 #include <supine/safetensors.h>
 
@@ -61,6 +62,11 @@ bool supine_safetensors_tensor_size(const supine_tensor *tensor, size_t *size);
 
 /** Parse and check the header of file->bytes, and point the tensors to their data. */
 supine_status supine_safetensors_parse(supine_safetensors *file, supine_error *error);
+
+/** Print a file like supine_safetensors_write, but without its checks. Errors are left in `file`.
+ */
+void supine_safetensors_print(FILE *file, const supine_tensor *tensors, size_t tensor_count,
+                              const supine_metadata *metadata, size_t metadata_count);
 
 /** Compute the checksum that supine/safetensors.h describes. */
 uint64_t supine_safetensors_checksum(const supine_tensor *tensors, size_t tensor_count,

@@ -116,8 +116,12 @@ typedef struct supine_basis_info {
    * memory traffic, as the layout changes between versions. */
   const void *packed;
   size_t normal_count; /**< vectors per vertex whose weighted sum is the normal; 0 if none */
-  /** [vertex_count, 3, normal_count] vectors whose weighted and normalised sum is the normal. */
+  /** [vertex_count, 3, normal_count] vectors whose weighted and normalised sum is the normal; NULL
+   * if `normal_bytes` has them. */
   const int16_t *normals;
+  /** [vertex_count, 3, normal_count + 1] bytes: vector j is 256 times byte j, and vector 0 has the
+   * last byte added; NULL if `normals` has the vectors, as in files of versions 1 and 2. */
+  const int8_t *normal_bytes;
   /** Coefficients of the polynomials that supine_basis_normal_weights evaluates. With K =
    * mode_count, the shape is [lung_count, normal_count, 3, 1 + 2 K + K (K + 1) / 2], or
    * [lung_count, normal_count, (K + 1) (K + 2) / 2] in files of versions 1 and 2. */
