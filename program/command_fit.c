@@ -189,7 +189,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
       wanted->landmarks.path != NULL ? wanted->landmarks.path : wanted->scan_path[1];
   SUPINE_FREED_BY(supine_patient_scans_free) supine_patient_scans scans = {0};
   (void)snprintf(record.name, sizeof record.name, "%s",
-                 wanted->name != NULL ? wanted->name : basename(named_for));
+                 wanted->name != NULL ? wanted->name : supine_text_file_name(named_for));
   SUPINE_TRY(load_scans(wanted, &scans, error));
   SUPINE_TRY(supine_patient_scans_order(&scans, &record, error));
   for (size_t k = 0; k < SUPINE_PATIENT_NOTES && scans.note[k][0] != '\0'; ++k) {

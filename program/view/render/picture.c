@@ -80,15 +80,15 @@ static void text(cairo_t *cr, double x, double y, double align, const char *word
   cairo.show_text(cr, words);
 }
 
-/* Draw text with its left end at x, reduced in size if it is wider than `room`, pixels. */
-static void fitted_text(cairo_t *cr, double x, double y, double size, bool bold, double room,
-                        const char *words) {
+/* Draw text with its left end at x, reduced in size if it is wider than `room`, pixels. Return the
+ * size. */
+static double fitted_text(cairo_t *cr, double x, double y, double size, bool bold, double room,
+                          const char *words) {
   font(cr, size, bold);
-  const double width = text_width(cr, words);
-  if (width > room) {
-    font(cr, size * room / width, bold);
-  }
+  const double fitted = size * fmin(1, room / text_width(cr, words));
+  font(cr, fitted, bold);
   text(cr, x, y, 0, words);
+  return fitted;
 }
 
 static void rounded(cairo_t *cr, double x, double y, double width, double height, double radius) {
@@ -219,23 +219,17 @@ static void trace(cairo_t *cr, const double from[2], const double to[2], double 
   cairo.fill(cr);
 }
 
-/* Draw a label, and a line from it to its mark at `at`. `box` is as in place_name. */
-static void name(cairo_t *cr, const supine_mark *mark, const double at[2], double (*box)[3],
-                 size_t placed, double size, const supine_scene *scene) {
-  double *own = box[placed];
-  font(cr, size * 0.75, false);
-  own[2] = text_width(cr, mark->label);
-  const bool right = at[0] + 2.2 * size + own[2] < (double)scene->width;
-  own[0] = right ? at[0] + 2.2 * size : fmax(0, at[0] - 2.2 * size - own[2]);
-  own[1] = at[1] - size * 0.6;
-  place_name(box, placed, size);
+/* Draw a label at `box`, which is as in place_name, and a line from it to its mark at `at`. */
+static void name(cairo_t *cr, const char *label, const double at[2], const double box[3],
+                 double size) {
+  const bool right = box[0] > at[0];
   colour(cr, faint);
   cairo.set_line_width(cr, size * 0.06);
   cairo.move_to(cr, at[0] + (right ? 0.5 : -0.5) * size, at[1]);
-  cairo.line_to(cr, own[0] + (right ? -0.2 * size : own[2] + 0.2 * size), own[1] - 0.25 * size);
+  cairo.line_to(cr, box[0] + (right ? -0.2 * size : box[2] + 0.2 * size), box[1] - 0.25 * size);
   cairo.stroke(cr);
-  cairo.move_to(cr, own[0], own[1]);
-  cairo.text_path(cr, mark->label);
+  cairo.move_to(cr, box[0], box[1]);
+  cairo.text_path(cr, label);
   cairo.set_source_rgba(cr, card[0], card[1], card[2], 0.85);
   cairo.set_line_width(cr, size * 0.25);
   cairo.stroke_preserve(cr);
@@ -243,13 +237,40 @@ static void name(cairo_t *cr, const supine_mark *mark, const double at[2], doubl
   cairo.fill(cr);
 }
 
-/* Draw discs and dots at the marks, then arrows, then labels. The origin of the picture is the
- * upper left corner of the scene; `size` is the size of the font, pixels. */
+/* Draw labels on the outer side of their marks at `pixel`, so that lines to them do not cross. */
+static void draw_names(cairo_t *cr, const supine_marks *marks, double (*pixel)[2], double (*box)[3],
+                       double size, double width) {
+  const double margin = 0.5 * size; /* part of that between the scene and the edge of its card */
+  double sum = 0.0;
+  size_t count = 0;
+  for (size_t i = 0; i < marks->count; ++i) {
+    sum += marks->mark[i].label != NULL ? pixel[i][0] : 0.0;
+    count += marks->mark[i].label != NULL;
+  }
+  font(cr, size * 0.68, false);
+  for (size_t i = 0, placed = 0; placed < count; ++i) {
+    if (marks->mark[i].label != NULL) {
+      double *own = box[placed];
+      own[2] = text_width(cr, marks->mark[i].label);
+      const double right = pixel[i][0] + 1.3 * size;
+      const double left = pixel[i][0] - 1.3 * size - own[2];
+      const bool outer_right = pixel[i][0] * (double)count >= sum * (1.0 - 1e-12);
+      own[0] = right + own[2] < width + margin && (outer_right || left < -margin)
+                   ? right
+                   : fmax(-margin, left);
+      own[1] = pixel[i][1] - size * 0.6;
+      place_name(box, placed++, size);
+      name(cr, marks->mark[i].label, pixel[i], own, size);
+    }
+  }
+}
+
+/* Draw triangles, discs and dots at the marks, then arrows, then labels. The origin of the picture
+ * is the upper left corner of the scene; `size` is the size of the font, pixels. */
 static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const supine_scene *scene,
                                 const supine_marks *marks, double size) {
   double(*pixel)[2] = malloc(2 * (marks->count + 1) * sizeof *pixel);
   double(*box)[3] = malloc((marks->count + 1) * sizeof *box);
-  size_t placed = 0;
   if (pixel == NULL || box == NULL) {
     free(pixel);
     free(box);
@@ -258,12 +279,22 @@ static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const su
   double(*from)[2] = pixel + marks->count;
   supine_render_project(renderer, scene, marks, false, pixel);
   supine_render_project(renderer, scene, marks, true, from);
+  cairo.new_path(cr);
+  colour(cr, mark_colour);
+  cairo.set_line_width(cr, 1.0); /* closes the seams between triangles */
+  for (size_t t = 0; t < marks->triangle_count; ++t) {
+    for (size_t k = 0; k < 3; ++k) {
+      const double *at = pixel[marks->triangles[3 * t + k]];
+      cairo.line_to(cr, at[0], at[1]);
+    }
+    cairo.close_path(cr);
+    cairo.fill_preserve(cr);
+    cairo.stroke(cr);
+  }
   for (size_t i = 0; i < marks->count; ++i) {
     const supine_mark *mark = &marks->mark[i];
     if (mark->point || mark->label == NULL) {
-      cairo.new_path(cr);
       cairo.arc(cr, pixel[i][0], pixel[i][1], size * (mark->point ? 0.32 : 0.1), 0, 2 * pi);
-      colour(cr, mark_colour);
       cairo.fill(cr);
     }
   }
@@ -272,11 +303,7 @@ static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const su
       trace(cr, from[i], pixel[i], size);
     }
   }
-  for (size_t i = 0; i < marks->count; ++i) {
-    if (marks->mark[i].label != NULL) {
-      name(cr, &marks->mark[i], pixel[i], box, placed++, size, scene);
-    }
-  }
+  draw_names(cr, marks, pixel, box, size, (double)scene->width);
   free(pixel);
   free(box);
   return SUPINE_OK;
@@ -360,13 +387,13 @@ static supine_status cell(cairo_t *cr, supine_renderer *renderer, const supine_p
   ball(cr, x + radius + at->font * 0.7, y + at->heading_height / 2 + at->font * 0.2, radius, view,
        panel->gravity);
   colour(cr, ink);
-  fitted_text(cr, words, y + at->heading_height / 2 - at->font * 0.25, at->font * 1.3, true, room,
-              panel->title);
+  (void)fitted_text(cr, words, y + at->heading_height / 2 - at->font * 0.25, at->font * 1.3, true,
+                    room, panel->title);
   colour(cr, faint);
-  fitted_text(cr, words, y + at->heading_height / 2 + at->font * 0.95, at->font * 0.82, false, room,
-              panel->subtitle);
-  fitted_text(cr, words, y + at->heading_height / 2 + at->font * 2.0, at->font * 0.82, false, room,
-              view == SUPINE_VIEW_LYING ? panel->note : supine_render_view_name(view));
+  const double size = fitted_text(cr, words, y + at->heading_height / 2 + at->font * 0.95,
+                                  at->font * 0.82, false, room, panel->subtitle);
+  (void)fitted_text(cr, words, y + at->heading_height / 2 + at->font * 2.0, size, false, room,
+                    view == SUPINE_VIEW_LYING ? panel->note : supine_render_view_name(view));
   double below = at->font * 0.5; /* height of the space below the lungs */
   if (view == SUPINE_VIEW_LYING && fabs(panel->gravity[2]) < 0.8) { /* the table */
     cairo.rectangle(cr, x + at->font, y + at->cell_height - 2 * at->font,
