@@ -96,8 +96,7 @@ typedef struct supine_patient_krige {
  *   prior. With SUPINE_PATIENT_DEEP, their prior standard deviations are about 30 %; but if the
  *   factor `sill` on the correction's covariance is at least 1, the law is only scaled again.
  * @param rows   [count] measurements; those of weight 0 do not count; must outlive the fit
- * @param krige  release with supine_patient_krige_free, also after a failure
- * @retval SUPINE_ERROR_NUMERICAL  the measurements do not determine the displacement law */
+ * @param krige  release with supine_patient_krige_free, also after a failure */
 supine_status supine_patient_krige_fit(const supine_patient_fit_options *options,
                                        const supine_patient_row *rows, size_t count,
                                        supine_patient_krige *krige, supine_error *error);
@@ -147,8 +146,7 @@ typedef struct supine_patient_fit_report {
  * @param rows     [single + 3 triples] measurements; the index of their cube, `block`, is written
  * @param single   number of vertices, each with one measurement; these measurements come first
  * @param triples  number of landmarks, each with three measurements
- * @param patient  in: `frame`, the bounding box of the lungs; out: the law and its correction
- * @retval SUPINE_ERROR_FORMAT     fewer points than the law has unknowns */
+ * @param patient  in: `frame`, the bounding box of the lungs; out: the law and its correction */
 supine_status supine_patient_fit(const supine_patient_fit_options *options,
                                  supine_patient_row *rows, size_t single, size_t triples,
                                  supine_patient *patient, supine_patient_fit_report *report,

@@ -70,8 +70,7 @@ void supine_patient_matching_find(supine_patient_matching *matching);
 /* Multiply the weights of the vertices' measurements by Tukey's biweight of match->distance, which
  * is 0 beyond 4.7 times a robust scale (standard deviation) of all distances. Compute
  * matching->matched and matching->rms.
- * @param scale  lower bound on the robust scale, mm; INFINITY keeps the weights as they are
- * @retval SUPINE_ERROR_MESH  less than 30 % of the vertices match */
+ * @param scale  lower bound on the robust scale, mm; INFINITY keeps the weights as they are */
 supine_status supine_patient_matching_weigh(supine_patient_matching *matching, double scale,
                                             supine_error *error);
 
@@ -110,8 +109,7 @@ supine_status supine_patient_expand(supine_patient_matching *matching,
  * box to the means.
  * @param matching  on return all vertices are matched
  * @param patient   displacement law fitted to these surfaces; its kriging correction is not used
- * @param gravity   unit vector in the emptier state
- * @retval SUPINE_ERROR_NUMERICAL  the means do not determine the linear function */
+ * @param gravity   unit vector in the emptier state */
 supine_status supine_patient_applied_find(supine_patient_matching *matching,
                                           const supine_patient *patient, const double gravity[3],
                                           supine_patient_applied *applied, supine_error *error);
