@@ -48,6 +48,7 @@ typedef struct supine_mesh {
 typedef struct supine_mesh_load_options {
   supine_axes axes;
   double millimetres_per_unit; /**< length of the unit of coordinates, mm; 0 means 1 */
+  const supine_mesh *arrays;   /**< surface to copy instead of reading the file; NULL: none */
 } supine_mesh_load_options;
 
 typedef struct supine_mesh_report {

@@ -52,7 +52,7 @@ static const supine_option table[] = {
      "opposite postures, the body turns through left (supine to prone) or through supine (upright "
      "to inverted, left to right). The volume at rest changes with the posture",
      SUPINE_FILLS(request, turn), .read = supine_breath_turn_read, .wants = "FROM:TO:SECONDS",
-     SUPINE_SAYS_GIVEN(request, turns)},
+     SUPINE_SAYS_GIVEN(request, turns), .rivals = "gravity"},
     {.help = "The breath:"},
     {"tidal", 0, "ML",
      "tidal volume of both lungs, in mL, above rest in the posture, or above the scan if rest is "
@@ -94,9 +94,6 @@ static supine_status complete(request *wanted, size_t *count, supine_error *erro
                             "--as-scanned is for VTP files only: leave it out, as safetensors "
                             "files are always in LPS and mm");
   }
-  if (wanted->turns && wanted->orientation.given) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give --turn or one posture, not both");
-  }
   if (!wanted->turns) {
     supine_state state = {.lung_count = 0};
     SUPINE_TRY(supine_options_state(&wanted->orientation, &state, error));
@@ -128,6 +125,7 @@ typedef struct playing {
   double *above;    /* [frames] volume minus that at rest (in the scan if rest is unknown), mL */
   double *gravity;  /* [frames, 3] unit vectors */
   double *volumes;  /* [frames, lungs] volume of gas and tissue, mL */
+  double *total;    /* [frames] sum of `volumes` over the lungs, mL */
   supine_mesh mesh; /* triangles; for VTP output, also the positions of the current frame */
   float *normals;   /* [N, 3] normals of the current frame, for VTP output */
   float *positions; /* [N, 3] current frame, mm; followed by all frames unless the output is VTP */
@@ -153,22 +151,17 @@ static supine_status begin_frames(playing *p, size_t count, bool series, supine_
   p->above = supine_arena_take(&p->arena, count, sizeof *p->above);
   p->gravity = supine_arena_take(&p->arena, count, 3 * sizeof *p->gravity);
   p->volumes = supine_arena_take(&p->arena, count, p->lung_count * sizeof *p->volumes);
+  p->total = supine_arena_take(&p->arena, count, sizeof *p->total);
   p->compute_time = supine_arena_take(&p->arena, count, sizeof *p->compute_time);
   p->origin = supine_arena_take(&p->arena, frame, sizeof *p->origin);
   p->normals = supine_arena_take(&p->arena, frame, sizeof *p->normals);
-  SUPINE_TRY(supine_posed_mesh(p->basis, NULL, &p->mesh, error));
-  if (p->arena.failed) {
-    return supine_error_memory(error, "%zu vertices", frame / 3);
-  }
-  const size_t kept = series ? 1 : 1 + count;
-  p->positions = supine_arena_take(&p->arena, kept, frame * sizeof *p->positions);
-  return p->positions != NULL
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_MEMORY,
-                                "%s: no memory for %zu frames of %zu vertices (%.1f GB): lower "
-                                "--seconds or --fps, or write a .vtp file",
-                                p->wanted->path, count, frame / 3,
-                                4e-9 * (double)frame * (double)kept);
+  p->positions = supine_arena_take(&p->arena, series ? 1 : 1 + count, frame * sizeof *p->positions);
+  return p->arena.failed
+             ? supine_error_memory(error,
+                                   "%zu frames of %zu vertices: lower --seconds or --fps, or write "
+                                   "a .vtp file",
+                                   count, frame / 3)
+             : supine_posed_mesh(p->basis, NULL, &p->mesh, error);
 }
 
 static supine_status find_pose(const playing *p, size_t t, supine_pose *pose, supine_error *error) {
@@ -192,34 +185,18 @@ static supine_status find_volumes(playing *p, const supine_pv *pv, supine_error 
       return supine_error_set(error, status, "frame at %.3f s: %s", p->time[t], cause.message);
     }
     (void)supine_basis_volumes(p->basis, &pose, p->volumes + t * p->lung_count);
+    p->total[t] = supine_posed_volume(p->basis, &pose);
   }
   return SUPINE_OK;
 }
 
-static double volume_at(const playing *p, size_t t) {
-  double sum = 0.0;
-  for (size_t lung = 0; lung < p->lung_count; ++lung) {
-    sum += p->volumes[t * p->lung_count + lung];
-  }
-  return sum;
-}
-
-/* Set ends[0] to the frame with the smallest total volume, and ends[1] to that with the largest. */
-static void find_ends(const playing *p, size_t ends[2]) {
-  ends[0] = ends[1] = 0;
-  for (size_t t = 1; t < p->frame_count; ++t) {
-    ends[0] = volume_at(p, t) < volume_at(p, ends[0]) ? t : ends[0];
-    ends[1] = volume_at(p, t) > volume_at(p, ends[1]) ? t : ends[1];
-  }
-}
-
 static void report(const playing *p) {
-  size_t ends[2];
-  find_ends(p, ends);
+  double least;
+  double largest;
+  gsl_stats_minmax(&least, &largest, p->total, 1, p->frame_count);
   (void)printf("%s: %zu frame%s, %.2f s at %.4g a second; volumes of %.2f to %.2f mL\n",
                p->wanted->path, p->frame_count, p->frame_count == 1 ? "" : "s",
-               p->time[p->frame_count - 1], p->wanted->fps, volume_at(p, ends[0]),
-               volume_at(p, ends[1]));
+               p->time[p->frame_count - 1], p->wanted->fps, least, largest);
   (void)printf("compute time per frame: median %.3f ms, longest %.3f ms, allowed %.0f ms\n",
                1e3 * gsl_stats_median(p->compute_time, 1, p->frame_count),
                1e3 * gsl_stats_max(p->compute_time, 1, p->frame_count), 1e3 * budget);
@@ -303,7 +280,7 @@ static supine_status write_tensors(playing *p, const char *made_by, supine_error
 /* Check the surfaces of smallest and of largest volume with supine_options_pose_check. */
 static supine_status check_ends(const playing *p, supine_error *error) {
   size_t ends[2];
-  find_ends(p, ends);
+  gsl_stats_minmax_index(&ends[0], &ends[1], p->total, 1, p->frame_count);
   for (size_t i = 0; i < 2; ++i) {
     supine_pose pose;
     const supine_state state =

@@ -101,8 +101,7 @@ static supine_status fill_panel(studio *s, size_t i, supine_error *error) {
   supine_compare_statistics(s->compare, shown->value, &statistics);
   s->max = fmax(s->max, statistics.max);
   (void)snprintf(shown->subtitle, sizeof shown->subtitle, "%.0f mL, mean %.1f, max %.1f mm",
-                 supine_posed_volume(s->basis, &shown->pose), statistics.mean,
-                 statistics.max);
+                 supine_posed_volume(s->basis, &shown->pose), statistics.mean, statistics.max);
   s->panel[i] = (supine_panel){.title = supine_options_posture_label(item->name),
                                .subtitle = shown->subtitle,
                                .note = shown->note,
@@ -121,8 +120,8 @@ static supine_status mark_panel(studio *s, size_t i, supine_error *error) {
   s->panel[i].marks = &marks->marks;
   const supine_pose *const pose[2] = {&s->from.pose, &s->shown[i].pose};
   SUPINE_FREED_BY(supine_posed_expected_free) supine_expected expected = {0};
-  SUPINE_TRY(supine_posed_expected(s->inside, &s->postures.item[i].state, &s->from.state,
-                                          &expected, error));
+  SUPINE_TRY(supine_posed_expected(s->inside, &s->postures.item[i].state, &s->from.state, &expected,
+                                   error));
   SUPINE_TRY(supine_command_marks_make(s->inside, &s->names, pose, expected.sigma, marks, error));
   const supine_target *t = &marks->first;
   char way[96];
@@ -246,33 +245,23 @@ static supine_status draw_turn(studio *s, supine_error *error) {
 
 static supine_status read_size(const char *text, void *field, supine_error *error) {
   request *wanted = field;
+  char rest;
   (void)error;
-  char width[16];
-  const size_t length = strcspn(text, "x");
-  if (length < sizeof width && text[length] == 'x') {
-    memcpy(width, text, length);
-    width[length] = '\0';
-    if (supine_options_parse_count(width, &wanted->width) &&
-        supine_options_parse_count(text + length + 1, &wanted->height) && wanted->width > 0 &&
-        wanted->height > 0 && wanted->width <= 16384 && wanted->height <= 16384) {
-      return SUPINE_OK;
-    }
-  }
-  return SUPINE_ERROR_ARGUMENT;
+  return supine_options_fits(
+      sscanf(text, "%5zux%5zu%c", &wanted->width, &wanted->height, &rest) == 2 &&
+      wanted->width > 0 && wanted->height > 0 && wanted->width <= 16384 && wanted->height <= 16384);
 }
 
 static supine_status read_views(const char *text, void *field, supine_error *error) {
   request *wanted = field;
+  const char *names[SUPINE_VIEW_COUNT + 1] = {[SUPINE_VIEW_COUNT] = "lateral"};
+  char word[32];
   wanted->view_count = 0;
-  for (const char *at = text;;) {
-    char word[32];
-    const char *names[SUPINE_VIEW_COUNT + 1] = {[SUPINE_VIEW_COUNT] = "lateral"};
-    const size_t length = strcspn(at, ",");
+  for (supine_view i = 0; i < SUPINE_VIEW_COUNT; ++i) {
+    names[i] = supine_render_view_name(i);
+  }
+  for (const char *at = text; supine_options_next_item(&at, word, sizeof word);) {
     size_t view = 0;
-    (void)snprintf(word, sizeof word, "%.*s", (int)(length < 31 ? length : 31), at);
-    for (supine_view i = 0; i < SUPINE_VIEW_COUNT; ++i) {
-      names[i] = supine_render_view_name(i);
-    }
     while (view <= SUPINE_VIEW_COUNT && strcmp(word, names[view]) != 0) {
       ++view;
     }
@@ -287,20 +276,18 @@ static supine_status read_views(const char *text, void *field, supine_error *err
     }
     wanted->view[wanted->view_count++] =
         view == SUPINE_VIEW_COUNT ? SUPINE_VIEW_LEFT : (supine_view)view;
-    if (at[length] == '\0') {
-      return SUPINE_OK;
-    }
-    at += length + 1;
   }
+  return SUPINE_OK;
 }
 
 static const supine_option table[] = {
-    {"posture", 0, "LIST", "comma-separated postures, up to 8", SUPINE_FILLS(request, postures)},
+    {"posture", 0, "LIST", "comma-separated postures, up to 8", SUPINE_FILLS(request, postures),
+     .rivals = "gravity"},
     {"turn", 0, "FROM:TO:SECONDS",
      "draw an animation instead: gravity turns from one posture to another at constant speed, "
      "pauses for a second, and starts again. For example, supine:left:5s turns for 5 s",
      SUPINE_FILLS(request, turn), .read = supine_breath_turn_read, .wants = "FROM:TO:SECONDS",
-     SUPINE_SAYS_GIVEN(request, turns)},
+     SUPINE_SAYS_GIVEN(request, turns), .rivals = "gravity"},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {"output", 'o', "FILE", ".png for --posture; .webp for --turn, an animation that browsers play",
      SUPINE_FILLS(request, output), .required = true, .file = SUPINE_FILE_OUT,
@@ -312,8 +299,8 @@ static const supine_option table[] = {
     {"view", 0, "LIST",
      "views to draw, one below another, separated by commas: anterior, posterior, left (or "
      "lateral), right, head, feet, oblique (from the front, left and above), lying (gravity down, "
-     "head left); default lying, or anterior with --turn",
-     .read = read_views},
+     "head left). With --turn, lying is anterior",
+     .read = read_views, .standard = "lying"},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {"largest", 0, "MM",
      "end of the colour bar. If values exceed it, the bar has a pointed end. Default the "
@@ -333,10 +320,9 @@ static const supine_option table[] = {
 static supine_status check(const request *wanted, supine_posture_list *postures,
                            supine_error *error) {
   const bool animation = supine_text_ends_in(wanted->output, ".webp");
-  if (wanted->turns ? wanted->postures != NULL : wanted->postures == NULL) {
+  if (!wanted->turns && wanted->postures == NULL) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            wanted->turns ? "give --posture or --turn, not both"
-                                          : "the posture is missing: give --posture or --turn");
+                            "the posture is missing: give --posture or --turn");
   }
   if (wanted->turns != animation) {
     return supine_error_set(
@@ -353,12 +339,6 @@ static supine_status check(const request *wanted, supine_posture_list *postures,
                                 "a picture holds at most %d postures: name fewer",
                                 SUPINE_PANELS_MAX)
              : SUPINE_OK;
-}
-
-static void begin(void *chosen) {
-  request *wanted = chosen;
-  wanted->view[0] = SUPINE_VIEW_LYING;
-  wanted->view_count = 1;
 }
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
@@ -392,5 +372,4 @@ const supine_command supine_command_render = {
     "      --view anterior,lateral,posterior -o prone.png",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),
-    .begin = begin,
     .run = run};

@@ -59,15 +59,15 @@ static double reach;
 
 static supine_precompute_report make_basis(const supine_lungs *lungs, size_t band, size_t modes,
                                            double soften, size_t held_out) {
-  supine_precompute_options options = {.model = supine_physics_model(SUPINE_LAW_PAPER),
-                                       .band = band,
-                                       .modes = modes,
-                                       .held_out = held_out};
-  options.model.force.soften = soften;
-  options.model.reach = soften != 0.0 ? 10.0 : reach;
+  supine_prepared prepared = {.source = {.lungs = *lungs},
+                              .model = supine_physics_model(SUPINE_LAW_PAPER)};
+  const supine_basis_choice choice = {
+      .path = path, .band = band, .modes = modes, .held_out = held_out};
+  prepared.model.force.soften = soften;
+  prepared.model.reach = soften != 0.0 ? 10.0 : reach;
   supine_precompute_report report;
   supine_error error;
-  if (supine_precompute(lungs, &options, path, &report, &error) != SUPINE_OK) {
+  if (supine_precompute(&prepared, &choice, &report, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
   return report;
@@ -578,19 +578,20 @@ TEST(test_turned_over_one_posture_emptied_finds_more_reversed) {
 
 TEST(test_precompute_turned_over_share_equals_run_time) {
   supine_lungs lungs = phantom(3000);
-  supine_precompute_options options = {
-      .model = supine_physics_model(SUPINE_LAW_PAPER), .band = 7, .modes = 4, .held_out = 20};
+  supine_prepared prepared = {.source = {.lungs = lungs},
+                              .model = supine_physics_model(SUPINE_LAW_PAPER)};
+  const supine_basis_choice choice = {.path = path, .band = 7, .modes = 4, .held_out = 20};
   double *stiffness = malloc(lungs.mesh.vertex_count * sizeof *stiffness);
   uint64_t seed = 3;
   for (size_t i = 0; i < lungs.mesh.vertex_count; ++i) {
     stiffness[i] = exp(8.0 * helper_random(&seed));
   }
   supine_precompute_report report;
-  assert_int_equal(supine_precompute(&lungs, &options, path, &report, NULL), SUPINE_OK);
+  assert_int_equal(supine_precompute(&prepared, &choice, &report, NULL), SUPINE_OK);
   assert_true(report.turned_over < 0.001);
   assert_close(report.turned_over, turned_over_at_run_time(report.accuracy.volume), 1e-4);
-  options.model.stiffness = stiffness; /* irregular stiffness reverses triangles */
-  assert_int_equal(supine_precompute(&lungs, &options, path, &report, NULL), SUPINE_OK);
+  prepared.model.stiffness = stiffness; /* irregular stiffness reverses triangles */
+  assert_int_equal(supine_precompute(&prepared, &choice, &report, NULL), SUPINE_OK);
   assert_true(report.turned_over > 0.01);
   assert_close(report.turned_over, turned_over_at_run_time(report.accuracy.volume), 1e-3);
   free(stiffness);
@@ -612,19 +613,20 @@ TEST(test_precompute_real_lungs_with_reach_few_reversed) {
 
 TEST(test_precompute_bad_options_refused) {
   supine_lungs lungs = phantom(500);
-  supine_precompute_options options = {
-      .model = supine_physics_model(SUPINE_LAW_PAPER), .band = 65, .modes = 16};
+  supine_prepared prepared = {.source = {.lungs = lungs},
+                              .model = supine_physics_model(SUPINE_LAW_PAPER)};
+  supine_basis_choice choice = {.path = path, .band = 65, .modes = 16};
   supine_error error;
-  assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error), SUPINE_ERROR_ARGUMENT);
-  options.band = 8;
-  options.modes = 0; /* all 81 harmonics: too many */
-  assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error), SUPINE_ERROR_ARGUMENT);
-  options.modes = 65;
-  assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error), SUPINE_ERROR_ARGUMENT);
-  options.modes = 16;
+  assert_int_equal(supine_precompute(&prepared, &choice, NULL, &error), SUPINE_ERROR_ARGUMENT);
+  choice.band = 8;
+  choice.modes = 0; /* all 81 harmonics: too many */
+  assert_int_equal(supine_precompute(&prepared, &choice, NULL, &error), SUPINE_ERROR_ARGUMENT);
+  choice.modes = 65;
+  assert_int_equal(supine_precompute(&prepared, &choice, NULL, &error), SUPINE_ERROR_ARGUMENT);
+  choice.modes = 16;
   /* Softening of lower tissue (`soften`) requires a smoothing distance of forces (`reach`) > 0. */
-  options.model.force.soften = 1.0;
-  assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error), SUPINE_ERROR_ARGUMENT);
+  prepared.model.force.soften = 1.0;
+  assert_int_equal(supine_precompute(&prepared, &choice, NULL, &error), SUPINE_ERROR_ARGUMENT);
   supine_lungs_free(&lungs);
 }
 

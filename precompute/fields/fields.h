@@ -72,11 +72,10 @@ supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_op
                                 supine_error *error);
 
 /** Fit the fields (supine_fields_fit), and write a basis file. Gain 1 (the factor on the
- * displacement) reproduces the given displacements. Of `basis`, only the number of modes and the
- * texts are used. */
-supine_status supine_fields_write(const supine_lungs *lungs, const supine_fields *fields,
+ * displacement) reproduces the given displacements. Of `prepared`, the model is not used. */
+supine_status supine_fields_write(const supine_prepared *prepared, const supine_fields *fields,
                                   const supine_fit_options *options,
-                                  const supine_precompute_options *basis, const char *path,
-                                  supine_fit_report *report, supine_error *error);
+                                  const supine_basis_choice *basis, supine_fit_report *report,
+                                  supine_error *error);
 
 #endif

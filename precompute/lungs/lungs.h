@@ -19,7 +19,9 @@ typedef struct supine_lungs {
   int side[2];              /**< [lung] +1 left, -1 right */
   bool reversed[2];         /**< whether the lung's triangles faced inwards and were reversed */
   double volume[2];         /**< [lung] volume that its surface encloses, mL */
-  double minimum[3];        /**< bounding box over all lungs, mm */
+  double low[2][3];         /**< [lung] bounding box, mm */
+  double high[2][3];
+  double minimum[3]; /**< bounding box over all lungs, mm */
   double maximum[3];
   double *scanned; /**< [vertices, 3] positions in the scan, mm, if `mesh` shows full inflation
                       instead of the scan; otherwise NULL */
@@ -41,8 +43,9 @@ typedef struct supine_lungs {
 supine_status supine_lungs_create(const supine_mesh *meshes, size_t count, const double *midline,
                                   supine_lungs *lungs, supine_error *error);
 
-/** Update the bounding box and the volumes after vertices have moved. */
+/** Update the bounding boxes and the volumes, or only the volumes, after vertices have moved. */
 void supine_lungs_measure(supine_lungs *lungs);
+void supine_lungs_measure_volumes(supine_lungs *lungs);
 
 /** Free the arrays; a zeroed struct is legal. */
 void supine_lungs_free(supine_lungs *lungs);

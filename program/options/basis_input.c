@@ -54,7 +54,7 @@ supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,
 
 void supine_options_basis_title(const char *path, char *title, size_t size) {
   static const char ending[] = ".safetensors";
-  const char *name = basename(path);
+  const char *name = supine_text_file_name(path);
   const size_t cut = supine_text_ends_in(name, ending) ? sizeof ending - 1 : 0;
   (void)snprintf(title, size, "%.*s", (int)(strlen(name) - cut), name);
   (void)supine_text_make_utf8(title);
@@ -93,19 +93,4 @@ supine_status supine_options_hilum(const supine_basis *basis, const supine_pose 
                           : supine_error_set(error, SUPINE_ERROR_UNSUPPORTED,
                                              "--frame hilum: the file does not say how the hilum "
                                              "moves: make it again with 'supine embed'");
-}
-
-void supine_options_hilum_print(const double shift[3], bool subtracted) {
-  if (shift[0] != 0.0 || shift[1] != 0.0 || shift[2] != 0.0) {
-    (void)printf("the hilum moves by %.1f, %.1f, %.1f mm (to the left, back and head)%s\n",
-                 shift[0], shift[1], shift[2], subtracted ? ", subtracted from all positions" : "");
-  }
-}
-
-void supine_options_expected_print(const supine_expected *expected, FILE *file) {
-  if (expected->sigma != NULL) {
-    (void)fprintf(file, "expected error %.1f mm (RMS over the points), %.1f mm at most%s\n",
-                  expected->rms, expected->largest,
-                  expected->turned ? "; an extrapolation, as the posture changes" : "");
-  }
 }

@@ -73,7 +73,7 @@ int supine_options_finish(const char *command) {
 void supine_options_describe(int argc, char **argv, char *text, size_t size) {
   size_t used = (size_t)snprintf(text, size, "supine " SUPINE_VERSION);
   for (int i = 0; i < argc && used < size; ++i) {
-    used += (size_t)snprintf(text + used, size - used, " %s", basename(argv[i]));
+    used += (size_t)snprintf(text + used, size - used, " %s", supine_text_file_name(argv[i]));
   }
   (void)supine_text_make_utf8(text);
 }
@@ -103,6 +103,17 @@ bool supine_options_parse_count(const char *text, size_t *value) {
     return false;
   }
   *value = (size_t)number;
+  return true;
+}
+
+bool supine_options_next_item(const char **list, char *item, size_t size) {
+  const char *at = *list;
+  if (at == NULL) {
+    return false;
+  }
+  (void)snprintf(item, size, "%.*s", (int)strcspn(at, ","), at);
+  at = strchr(at, ',');
+  *list = at != NULL ? at + 1 : NULL;
   return true;
 }
 
@@ -163,7 +174,9 @@ supine_progress supine_options_progress_begin(const char *label) {
 bool supine_options_progress_step(void *progress, double fraction) {
   supine_progress *state = progress;
   const double time = supine_clock_seconds();
-  if (state->stderr_is_terminal && time - state->shown_at > 0.1) {
+  if (fraction >= 1.0) {
+    supine_options_progress_end(state);
+  } else if (state->stderr_is_terminal && time - state->shown_at > 0.1) {
     state->shown_at = time;
     const double spent = time - state->start;
     (void)fprintf(stderr, "\r%s: %3.0f %%", state->label, 100.0 * fraction);

@@ -9,6 +9,7 @@
 #include <supine/compare.h>
 #include <supine/sh.h>
 
+#include "base/arena.h"
 #include "base/vec3.h"
 #include "runtime/internal.h"
 
@@ -86,12 +87,9 @@ static void find_gram(supine_compare *compare, size_t lung, size_t axis) {
   double *gram = compare->gram + (3 * lung + axis) * count * count;
   for (size_t i = basis->lung_begin[lung]; i < basis->lung_begin[lung + 1]; ++i) {
     const double share = (double)compare->share[i];
-    if (basis->info.vector) {
-      add_row(basis->info.coefficients + (3 * i + axis) * count, share, count, gram);
-    } else {
-      const double d = (double)basis->info.direction[3 * i + axis];
-      add_row(basis->info.coefficients + i * count, share * d * d, count, gram);
-    }
+    const double d = basis->info.vector ? 1 : (double)basis->info.direction[3 * i + axis];
+    const size_t row = basis->info.vector ? 3 * i + axis : i;
+    add_row(basis->info.coefficients + row * count, share * d * d, count, gram);
   }
   for (size_t k = 0; k < count; ++k) {
     for (size_t l = 0; l < k; ++l) {
@@ -107,40 +105,30 @@ supine_status supine_compare_create(const supine_basis *basis, supine_compare **
                                     supine_error *error) {
   const supine_basis_info *info = &basis->info;
   const size_t square = info->mode_count * info->mode_count;
-  supine_status status = SUPINE_ERROR_MEMORY;
-  supine_compare *made = calloc(1, sizeof *made);
+  const size_t numbers = (3 * info->lung_count + 1) * square;
+  supine_compare *made = calloc(1, sizeof *made + numbers * sizeof *made->gram +
+                                       info->vertex_count * sizeof *made->share);
   if (made == NULL) {
-    return supine_error_set(error, status, "out of memory");
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
   }
   made->basis = basis;
-  made->share = calloc(info->vertex_count, sizeof *made->share);
-  made->gram = calloc(3 * info->lung_count * square, sizeof *made->gram);
-  made->sum = calloc(square, sizeof *made->sum);
-  if (made->share == NULL || made->gram == NULL || made->sum == NULL) {
-    (void)supine_error_set(error, status, "out of memory");
-    goto cleanup;
-  }
-  status = share_area(made, error);
+  made->sum = (double *)(made + 1);
+  made->gram = made->sum + square;
+  made->share = (float *)(made->sum + numbers);
+  const supine_status status = share_area(made, error);
   if (status != SUPINE_OK) {
-    goto cleanup;
+    supine_compare_destroy(made);
+    return status;
   }
   for (size_t i = 0; i < 3 * info->lung_count; ++i) {
     find_gram(made, i / 3, i % 3);
   }
   *compare = made;
-  made = NULL;
-cleanup:
-  supine_compare_destroy(made);
-  return status;
+  return SUPINE_OK;
 }
 
 void supine_compare_destroy(supine_compare *compare) {
-  if (compare != NULL) {
-    free(compare->share);
-    free(compare->gram);
-    free(compare->sum);
-    free(compare);
-  }
+  free(compare);
 }
 
 double supine_compare_area(const supine_compare *compare) {
@@ -217,15 +205,10 @@ static double dot(const double *weights, const float *coefficients, size_t count
 static double displacement(const supine_basis *basis, const double *q, size_t i) {
   const size_t count = basis->info.mode_count;
   double u[3];
-  if (basis->info.vector) {
-    for (size_t axis = 0; axis < 3; ++axis) {
-      u[axis] = dot(q + axis * count, basis->info.coefficients + (3 * i + axis) * count, count);
-    }
-    return supine_length(u);
-  }
   for (size_t axis = 0; axis < 3; ++axis) {
-    u[axis] = dot(q + axis * count, basis->info.coefficients + i * count, count) *
-              (double)basis->info.direction[3 * i + axis];
+    const size_t row = basis->info.vector ? 3 * i + axis : i;
+    u[axis] = dot(q + axis * count, basis->info.coefficients + row * count, count) *
+              (basis->info.vector ? 1 : (double)basis->info.direction[3 * i + axis]);
   }
   return supine_length(u);
 }
