@@ -114,11 +114,12 @@ static const supine_option table[] = {
      "regions about 45 mm wide, relative to the deep law with one factor for each axis. The result "
      "is used only if it lowers the held-out residual by 5 % or more",
      FILLS(expandability), .more = true},
-    {"map", 0, "FILE.csv",
+    {"map", 0, "FILE",
      "with --expandability: write the expandability of every vertex of the fuller scan, and how "
-     "far "
-     "the surfaces determine it, 0 to 1. 'supine precompute --expandability' reads this file",
-     FILLS(map), .file = SUPINE_FILE_OUT, .more = true},
+     "far the surfaces determine it, 0 (not at all) to 1. 'supine precompute --expandability' "
+     "reads "
+     "the .csv; a .vtp or .ply has both as colours of the surface",
+     FILLS(map), .file = SUPINE_FILE_OUT, .endings = ".csv, .vtp or .ply", .more = true},
     {"json", 0, NULL, "print JSON instead of text", FILLS(json)},
     {.name = NULL}};
 
@@ -371,24 +372,38 @@ static void set_name_and_force(const request *wanted, supine_patient_record *rec
       supine_patient_force(&record->patient.power, deep.force.gain, record->state[1].gravity);
 }
 
-/* Write the expandability of every vertex to a CSV file. */
+/* Write the expandability of every vertex, and how far it is determined, to a CSV file or as
+ * scalars of the surface. */
 static supine_status write_map(const char *path, const supine_lungs *lungs,
                                const supine_patient_stiffness *stiffness, supine_error *error) {
+  const size_t n = lungs->mesh.vertex_count;
   supine_output output = {0};
+  SUPINE_ARENA arena = {0};
+  float *a = supine_arena_take(&arena, n, sizeof *a);
+  float *determined = supine_arena_zeros(&arena, n, sizeof *determined);
+  if (arena.failed) {
+    return supine_error_memory(error, "%zu vertices", n);
+  }
+  for (size_t i = 0; i < n; ++i) {
+    double shares[SUPINE_PATIENT_REGIONS_MAX];
+    supine_patient_stiffness_shares(stiffness, lungs, i, shares);
+    a[i] = stiffness->count == 0 ? 1.0F : 0.0F;
+    for (size_t k = 0; k < stiffness->count; ++k) {
+      a[i] += (float)(shares[k] * stiffness->region[k].expandability);
+      determined[i] += (float)(shares[k] * stiffness->region[k].determined);
+    }
+  }
+  if (!supine_text_ends_in(path, ".csv")) {
+    const supine_mesh_save_options save = {
+        .scalars = {{"expandability", a}, {"determined", determined}}};
+    return supine_mesh_save(path, &lungs->mesh, &save, error);
+  }
   SUPINE_TRY(supine_output_open(path, &output, error));
   (void)fputs("vertex,x_mm,y_mm,z_mm,expandability,determined\n", output.file);
-  for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
+  for (size_t i = 0; i < n; ++i) {
     const double *p = lungs->mesh.vertices + 3 * i;
-    double shares[SUPINE_PATIENT_REGIONS_MAX];
-    double a = stiffness->count == 0 ? 1.0 : 0.0;
-    double determined = 0.0;
-    supine_patient_stiffness_shares(stiffness, lungs, i, shares);
-    for (size_t k = 0; k < stiffness->count; ++k) {
-      a += shares[k] * stiffness->region[k].expandability;
-      determined += shares[k] * stiffness->region[k].determined;
-    }
-    (void)fprintf(output.file, "%zu,%.6g,%.6g,%.6g,%.5g,%.3g\n", i, p[0], p[1], p[2], a,
-                  determined);
+    (void)fprintf(output.file, "%zu,%.6g,%.6g,%.6g,%.5g,%.3g\n", i, p[0], p[1], p[2], (double)a[i],
+                  (double)determined[i]);
   }
   return supine_output_commit(&output, error);
 }

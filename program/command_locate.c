@@ -274,7 +274,7 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
   const supine_mesh_field fields[] = {{"gravity_LPS", 3, located->best->state.gravity},
                                       {"volume_mL", 1, &located->volume}};
   const supine_mesh_save_options save = {.comment = "in the frame of the observations",
-                                         .expected_error = located->sigma,
+                                         .scalars = {{"expected_error_mm", located->sigma}},
                                          .lung = lung == NULL ? NULL : lung->data,
                                          .fields = fields,
                                          .field_count = 2};
