@@ -5,7 +5,7 @@
 #include "base/clones.h"
 #include "runtime/internal.h"
 #include "runtime/kernels/compact.h"
-#include "runtime/safetensors/platform.h"
+#include "runtime/safetensors/safetensors_file.h"
 
 /* Pack the vectors of 16 vertices (supine_basis_info.normals or normal_bytes), from vertex `begin`
  * on. After the last vertex, repeat it. */
@@ -40,7 +40,7 @@ supine_status supine_basis_pack_normals(supine_basis *basis) {
   supine_tiles *tiles = &basis->lit;
   supine_tiles_layout_lit(tiles, basis->info.normal_count,
                           (basis->info.vertex_count - 1) / TILE + 1);
-  tiles->bytes = supine_platform_allocate(tiles->count * tiles->stride);
+  tiles->bytes = supine_safetensors_allocate(basis->file, tiles->count * tiles->stride);
   if (tiles->bytes == NULL) {
     return SUPINE_ERROR_MEMORY;
   }

@@ -5,6 +5,7 @@
 #ifndef SUPINE_ACCURACY_H
 #define SUPINE_ACCURACY_H
 
+#include <supine/runtime.h>
 #include <supine/sh.h>
 
 #include "base/arena.h"
@@ -70,6 +71,17 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
                                       const double *directions, const supine_volume_forms *forms,
                                       const double volume[9], supine_accuracy *accuracy,
                                       supine_error *error);
+
+/** Add to `accuracy` the error of storage, which is independent of the other errors: add squares of
+ * the RMS error and of the percentile, and add the maximum. The error of storage is the difference
+ * between the positions that the run time computes and the same sum of modes in double precision,
+ * in 16 directions of gravity, at the default volume (supine_basis_default_volume). Directions in
+ * which the surface cannot have this volume are left out.
+ * @param basis       opened with the default storage
+ * @param directions  [N, 3] displacement of each vertex per unit force, mm, or NULL */
+supine_status supine_accuracy_add_storage(const supine_basis *basis,
+                                          const supine_compression *compression,
+                                          const double *directions, supine_accuracy *accuracy);
 
 /** Find the share of triangles, 0 to 1, whose normals turn by more than 90 degrees from the
  * reference surface to a given volume. It is the largest share in the six postures with gravity

@@ -153,10 +153,18 @@ static void put_file(const content *c, FILE *file) {
   }
 }
 
+void supine_safetensors_print(FILE *file, const supine_tensor *tensors, size_t tensor_count,
+                              const supine_metadata *metadata, size_t metadata_count) {
+  content c = {tensors, tensor_count, metadata, metadata_count, ""};
+  (void)snprintf(c.checksum, sizeof c.checksum, CHECKSUM_FORMAT,
+                 supine_safetensors_checksum(tensors, tensor_count, metadata, metadata_count));
+  put_file(&c, file);
+}
+
 supine_status supine_safetensors_write(const char *path, const supine_tensor *tensors,
                                        size_t tensor_count, const supine_metadata *metadata,
                                        size_t metadata_count, supine_error *error) {
-  content c = {tensors, tensor_count, metadata, metadata_count, ""};
+  const content c = {tensors, tensor_count, metadata, metadata_count, ""};
   supine_output output;
   supine_status status = check_tensors(&c, path, error);
   status = status != SUPINE_OK ? status : check_metadata(&c, path, error);
@@ -164,8 +172,6 @@ supine_status supine_safetensors_write(const char *path, const supine_tensor *te
   if (status != SUPINE_OK) {
     return status;
   }
-  (void)snprintf(c.checksum, sizeof c.checksum, CHECKSUM_FORMAT,
-                 supine_safetensors_checksum(tensors, tensor_count, metadata, metadata_count));
-  put_file(&c, output.file);
+  supine_safetensors_print(output.file, tensors, tensor_count, metadata, metadata_count);
   return supine_output_commit(&output, error);
 }
