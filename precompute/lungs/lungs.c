@@ -20,26 +20,6 @@ static const double least_side_share = 0.05;
  * is refused if the ratio is larger. Lungs do reach across the midline behind the breastbone. */
 static const double most_beyond_share = 0.5;
 
-/* A surface, and the mean x of its vertices, mm. Surfaces are joined in order of falling mean x. */
-typedef struct placed_mesh {
-  const supine_mesh *mesh;
-  double mean_x;
-} placed_mesh;
-
-static int compare_placed(const void *a, const void *b) {
-  const placed_mesh *first = a;
-  const placed_mesh *second = b;
-  return (first->mean_x < second->mean_x) - (first->mean_x > second->mean_x);
-}
-
-static placed_mesh place(const supine_mesh *mesh) {
-  double sum = 0.0;
-  for (size_t i = 0; i < mesh->vertex_count; ++i) {
-    sum += mesh->vertices[3 * i];
-  }
-  return (placed_mesh){mesh, mesh->vertex_count == 0 ? 0.0 : sum / (double)mesh->vertex_count};
-}
-
 static supine_status join(const supine_mesh *meshes, size_t count, supine_mesh *joined,
                           supine_error *error) {
   size_t vertices = 0;
@@ -57,18 +37,12 @@ static supine_status join(const supine_mesh *meshes, size_t count, supine_mesh *
                             "%zu vertices are more than 32-bit indices reach: give a coarser mesh",
                             vertices);
   }
-  SUPINE_ARENA arena = {0};
-  placed_mesh *placed = supine_arena_take(&arena, count, sizeof *placed);
-  if (arena.failed || supine_mesh_allocate(vertices, triangles, joined) != SUPINE_OK) {
+  if (supine_mesh_allocate(vertices, triangles, joined) != SUPINE_OK) {
     return supine_error_memory(error, "%zu vertices", vertices);
   }
   joined->vertex_count = joined->triangle_count = 0;
   for (size_t m = 0; m < count; ++m) {
-    placed[m] = place(&meshes[m]);
-  }
-  qsort(placed, count, sizeof *placed, compare_placed);
-  for (size_t m = 0; m < count; ++m) {
-    const supine_mesh *mesh = placed[m].mesh;
+    const supine_mesh *mesh = &meshes[m];
     uint32_t *out = joined->triangles + 3 * joined->triangle_count;
     for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {
       out[i] = (uint32_t)(mesh->triangles[i] + joined->vertex_count);

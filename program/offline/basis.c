@@ -74,6 +74,16 @@ static void print_assumed(FILE *out, const char *options, const char *assumed) {
   }
 }
 
+static void print_errors(FILE *out, const supine_accuracy *accuracy, const char *at,
+                         const char *state) {
+  (void)fprintf(out,
+                "  %.3g %% RMS, %.3g %% 95th percentile, %.3g %% largest, of the RMS displacement\n"
+                "  %.3g mm RMS, %.3g mm 95th percentile, %.3g mm largest%s%s\n",
+                100.0 * accuracy->relative_rms, 100.0 * accuracy->relative_p95,
+                100.0 * accuracy->relative_max, accuracy->rms_mm, accuracy->p95_mm,
+                accuracy->max_mm, at, state);
+}
+
 static void report_result(FILE *out, const supine_basis_choice *choice,
                           const supine_prepared *prepared, const supine_precompute_report *report) {
   const supine_lungs *lungs = &prepared->source.lungs;
@@ -92,16 +102,9 @@ static void report_result(FILE *out, const supine_basis_choice *choice,
                 choice->band, report->mode_count, choice->modes == 0 ? "harmonic" : "mode",
                 plural(report->mode_count));
   print_assumed(out, "--axes, --units, --scanned, --law and --resting", prepared->assumed);
-  (void)fprintf(
-      out,
-      "error against the full solve, on %zu held-out direction%s:\n  %.3g %% RMS, %.3g %% "
-      "95th percentile, %.3g %% largest, of the RMS displacement\n",
-      accuracy->direction_count, plural(accuracy->direction_count), 100.0 * accuracy->relative_rms,
-      100.0 * accuracy->relative_p95, 100.0 * accuracy->relative_max);
-  if (accuracy->volume > 0.0) {
-    (void)fprintf(out, "  %.3g mm RMS, %.3g mm 95th percentile, %.3g mm largest, at %s\n",
-                  accuracy->rms_mm, accuracy->p95_mm, accuracy->max_mm, state);
-  }
+  (void)fprintf(out, "error against the full solve, on %zu held-out direction%s:\n",
+                accuracy->direction_count, plural(accuracy->direction_count));
+  print_errors(out, accuracy, ", at ", state);
   if (report->turned_over > turned_over_limit) {
     (void)fprintf(
         out,
@@ -136,13 +139,8 @@ static void report_fit(FILE *out, const char *path, const char *assumed,
                   "missing: about\n%zu evenly spread directions would determine band %zu\n",
                   highest, 2 * (highest + 2) * (highest + 2), highest + 1);
   }
-  (void)fprintf(out,
-                "error of the basis, each direction predicted from the others:\n"
-                "  %.3g %% RMS, %.3g %% 95th percentile, %.3g %% largest, of the RMS displacement\n"
-                "  %.3g mm RMS, %.3g mm 95th percentile, %.3g mm largest\n",
-                100.0 * fit->accuracy.relative_rms, 100.0 * fit->accuracy.relative_p95,
-                100.0 * fit->accuracy.relative_max, fit->accuracy.rms_mm, fit->accuracy.p95_mm,
-                fit->accuracy.max_mm);
+  (void)fprintf(out, "error of the basis, each direction predicted from the others:\n");
+  print_errors(out, &fit->accuracy, "", "");
 }
 
 /* Compress the fields, and write a basis of them. */
