@@ -139,7 +139,7 @@ static void add_expected_error(entries *list, const supine_basis_content *conten
   const bool fitted = record != NULL && record->report.expected_constant > 0.0;
   if (!content->is_fields) {
     add(list, "expected_error_mm", "%g",
-        fitted ? record->report.expected_constant : SUPINE_EXPECTED_ERROR_MM);
+        fitted ? supine_patient_expected(record) : SUPINE_EXPECTED_ERROR_MM);
   }
   if (fitted) {
     add(list, "expected_error_from_mm", "%g", record->report.expected_from);

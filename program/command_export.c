@@ -17,6 +17,7 @@ typedef struct request {
   const char *title;
   supine_from from;
   bool glb_only; /* whether an option was given that applies to .glb files only */
+  bool breathes; /* whether --breath was given */
   const char *inside;
   export_glb_options glb;
 } request;
@@ -24,7 +25,7 @@ typedef struct request {
 static const supine_option table[] = {
     {"output", 'o', "FILE",
      ".html: a page to explore the lungs in a browser, in one file that needs no network. The "
-     "basis may have up to 16 modes\n.glb: glTF 2.0 morph targets, with which any engine deforms "
+     "basis may have up to 128 modes\n.glb: glTF 2.0 morph targets, with which any engine deforms "
      "the lungs",
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT,
      .endings = ".html or .glb"},
@@ -32,7 +33,7 @@ static const supine_option table[] = {
      "tidal volume of the breath shown. Up to this volume, the weights of morph targets stay "
      "between 0 and 1",
      SUPINE_FILLS(request, glb.breath), .standard = "500", SUPINE_ABOVE_ZERO,
-     .wants = "millilitres above 0"},
+     SUPINE_SAYS_GIVEN(request, breathes), .wants = "millilitres above 0"},
     {.help = "For a page:"},
     {"inside", 0, "FILE",
      "structures made by 'supine embed' from the same basis, shown inside transparent lungs; the "
@@ -134,10 +135,10 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
                                                      : "--title");
   }
   SUPINE_TRY(supine_export_source_open(path, &source, error));
-  if (source.info->is_fields) {
-    return supine_error_set(error, SUPINE_ERROR_UNSUPPORTED,
-                            "%s: another simulator's fields cannot be exported: use "
-                            "'supine compare -o report.html' or 'supine render'",
+  if (source.info->is_fields && (wanted->breathes || wanted->glb.animate)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "%s holds another simulator's fields of gravity, which have no "
+                            "breaths: leave --breath and --animate out",
                             path);
   }
   SUPINE_TRY(supine_options_basis_closed(source.basis, path, error));

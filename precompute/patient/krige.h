@@ -123,7 +123,8 @@ typedef enum supine_patient_score {
 } supine_patient_score;
 
 /** Result of a fit; errors are RMS distances, in mm. If there are landmarks, they are those of
- * landmarks; otherwise, of vertices along the normals of the other surface. */
+ * landmarks; otherwise, of vertices along the normals of the other surface. Scores predict the
+ * emptier scan. */
 typedef struct supine_patient_fit_report {
   double points; /**< number of landmarks or, without landmarks, of matched vertices */
   double blocks; /**< number of cubes of 40 mm with points */
@@ -135,8 +136,11 @@ typedef struct supine_patient_fit_report {
   double band; /**< share of the held-out landmarks with an error below its 95 % bound, %, or 0 */
   double explained; /**< percentage by which the law with its kriging correction reduces the squared
                        `baseline` */
-  double expected_point;    /**< expected error of the predicted position of a point, mm */
-  double expected_constant; /**< expected squared error, mm^2, per mm of displacement */
+  /** Errors are larger in the fuller scan by this factor, about the cube root of the ratio of the
+   * volumes: where the emptier scan is predicted, tissue and errors are compressed. */
+  double stretch;
+  double expected_point;    /**< expected error of a point predicted in the fuller scan, mm */
+  double expected_constant; /**< expected squared error there, mm^2, per mm of displacement */
   double expected_from; /**< RMS displacement, mm, below which this constant falls in proportion */
   double error[SUPINE_PATIENT_CONSTANTS]; /**< standard errors of c1 to c9 (patient.h) */
 } supine_patient_fit_report;

@@ -82,6 +82,11 @@ void supine_patient_stiffness_shares(const supine_patient_stiffness *stiffness,
 void supine_patient_stiffness_of(const supine_patient_stiffness *stiffness,
                                  const supine_lungs *lungs, double *e);
 
+/** Write the expandability of every vertex, and how far surfaces determine it, to a CSV file. */
+supine_status supine_patient_stiffness_write(const char *path,
+                                             const supine_patient_stiffness *stiffness,
+                                             const supine_lungs *lungs, supine_error *error);
+
 /** Find the expandability a (1 / stiffness) of each lung region from the displacement between the
  * surfaces of two states ([Santhanam2008] VI).
  *

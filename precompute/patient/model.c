@@ -351,6 +351,12 @@ supine_status supine_patient_model(supine_patient_record *record, const supine_l
   return SUPINE_OK;
 }
 
+double supine_patient_expected(const supine_patient_record *record) {
+  const supine_patient_fit_report *report = &record->report;
+  const bool forwards = record->shown == 0.0 && report->stretch > 0.0;
+  return report->expected_constant / (forwards ? report->stretch * report->stretch : 1.0);
+}
+
 void supine_patient_field(const void *record, const double point[3], double side, double u[3]) {
   const supine_patient_record *of = record;
   double at[3] = {point[0], point[1], point[2]};

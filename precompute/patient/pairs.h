@@ -60,8 +60,7 @@ bool supine_patient_map_fit(supine_patient_map kind, size_t count, const double 
 void supine_patient_map_apply(const supine_patient_affinity *map, const double from[3],
                               double to[3]);
 
-/** Check that two surfaces can be two states of the same lungs: along each axis, their bounding
- * boxes overlap by at least half of the larger box. */
+/** Check by the overlap of bounding boxes that two surfaces can be two states of the same lungs. */
 supine_status supine_patient_check_boxes(const supine_mesh *first, const supine_mesh *second,
                                          supine_error *error);
 

@@ -153,6 +153,10 @@ supine_status supine_patient_model(supine_patient_record *record, const supine_l
                                    supine_resting *resting, supine_scan *scan, double *arrays,
                                    supine_model *model, supine_error *error);
 
+/** Return the constant c of the expected error (supine/locate.h), mm, for a basis of the scan that
+ * supine_patient_model has found: smaller for the fuller scan, as it predicts the emptier state. */
+double supine_patient_expected(const supine_patient_record *record);
+
 /** Compute gains [state][axis]: the displacement from full inflation to the fuller [0] and to the
  * emptier [1] scanned state, divided by the displacement to rest. The default displacement law
  * gives the path of the vertices to rest; the cube root of a state's volume gives the position on

@@ -192,15 +192,17 @@ static size_t put_weights(const supine_stream_frames *f, const supine_stream_sna
                           unsigned char *bytes) {
   const size_t modes = f->info->mode_count;
   const size_t count = modes + 3 * f->info->lung_count;
-  const size_t head = supine_stream_ndarray_head(count, bytes);
+  /* Type 10 (32-bit floats), one dimension, and its size in two bytes. */
+  const unsigned char head[4] = {10, 1, (unsigned char)(count >> 8), (unsigned char)count};
   float values[SUPINE_MODES_MAX + 3 * SUPINE_LUNGS_MAX];
   for (size_t i = 0; i < count; ++i) {
     values[i] = (float)(i < modes ? snapshot->pose.weights[i]
                                   : snapshot->pose.gains[(i - modes) / 3][(i - modes) % 3]);
   }
   supine_stream_encode_floats(count, values);
-  memcpy(bytes + head, values, 4 * count);
-  return head + 4 * count;
+  memcpy(bytes, head, sizeof head);
+  memcpy(bytes + sizeof head, values, 4 * count);
+  return sizeof head + 4 * count;
 }
 
 static void add_piece(supine_stream_packet *packet, void *bytes, size_t size) {

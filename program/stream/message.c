@@ -55,13 +55,6 @@ void supine_stream_header_write(const supine_stream_header *header,
   put(bytes + 50, 8, header->crc);
 }
 
-size_t supine_stream_ndarray_head(size_t count, unsigned char *bytes) {
-  bytes[0] = 10; /* type 10: 32-bit floats */
-  bytes[1] = 1;  /* number of dimensions */
-  put(bytes + 2, 2, count);
-  return 4;
-}
-
 size_t supine_stream_polydata_head(size_t points, size_t strips, size_t size, size_t attributes,
                                    unsigned char *bytes) {
   memset(bytes, 0, 40); /* zeros: no vertices, lines or polygons */

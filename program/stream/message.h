@@ -86,9 +86,6 @@ supine_status supine_stream_message_read(const supine_stream_header *header,
                                          const unsigned char *body, const char *device,
                                          supine_stream_message *message, supine_error *error);
 
-/** Write the first 4 bytes of an NDARRAY, which precede its `count` 32-bit floats; return 4. */
-size_t supine_stream_ndarray_head(size_t count, unsigned char *bytes);
-
 /** Write the first 40 bytes of a POLYDATA, which precede its points; return 40.
  * @param points, strips  numbers of points and of triangle strips
  * @param size            size of the triangle strips, bytes

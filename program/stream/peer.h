@@ -34,15 +34,16 @@ int supine_stream_address_listen(const supine_stream_address *address, int *port
 /** Open a non-blocking socket and begin to connect it to the address; return -1 on failure. */
 int supine_stream_address_connect(const supine_stream_address *address);
 
+enum { SUPINE_STREAM_MESSAGE_MAX = SUPINE_STREAM_HEADER + SUPINE_STREAM_BODY_MAX };
+
 typedef struct supine_stream_peer {
   int socket; /**< -1 if there is no peer */
   bool connecting;
-  unsigned char header_bytes[SUPINE_STREAM_HEADER];
-  size_t received; /**< bytes received of the body if `in_body` is true, else of the header */
-  bool in_body;
+  unsigned char *message; /**< [SUPINE_STREAM_MESSAGE_MAX] header and body being received */
+  uint64_t received;      /**< bytes received of the message */
+  uint64_t size;          /**< size of the message, bytes; until it is known, of its header */
+  bool in_body;           /**< true if `header` is known */
   supine_stream_header header;
-  uint64_t to_skip;    /**< bytes of a skipped body that are still to be received */
-  unsigned char *body; /**< [SUPINE_STREAM_BODY_MAX] body of the message being received */
   double emptied; /**< time when no received data was left to read, s by supine_clock_seconds */
   supine_stream_content content; /**< kind of content that the peer is sent */
   bool knows_triangles; /**< true if the peer has received the triangles with a frame of points */
@@ -59,14 +60,14 @@ typedef enum supine_stream_outcome {
 
 /** Initialise a peer, which then owns the socket. The kernel closes the connection if sent data
  * stays unacknowledged for 20 s.
- * @param now   current time, s by supine_clock_seconds
- * @param body  [SUPINE_STREAM_BODY_MAX] buffer for received messages */
+ * @param now      current time, s by supine_clock_seconds
+ * @param message  [SUPINE_STREAM_MESSAGE_MAX] buffer for received messages */
 void supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connecting,
-                              supine_stream_content content, double now, unsigned char *body);
+                              supine_stream_content content, double now, unsigned char *message);
 /** Close the socket, and release the frame that was being sent. */
 void supine_stream_peer_end(supine_stream_peer *peer, supine_stream_frames *frames);
 
-/** Function that is called for each message; the body is in `peer->body`. */
+/** Function that is called for each message; it is in `peer->message`. */
 typedef void supine_stream_receive(void *context, supine_stream_peer *peer);
 
 /** Read up to 64 KiB of received bytes, and call `receive` for each complete message. Messages

@@ -38,7 +38,8 @@ struct supine_stream_server {
   double accept_at;              /* time at which to accept peers again after a failure */
   supine_stream_peer *connected; /* peer of --connect, connected or connecting; NULL if none */
   supine_stream_peer peer[SUPINE_STREAM_PEERS_MAX]; /* connected peers and free slots */
-  unsigned char body[SUPINE_STREAM_PEERS_MAX][SUPINE_STREAM_BODY_MAX]; /* received by each peer */
+  unsigned char message[SUPINE_STREAM_PEERS_MAX]
+                       [SUPINE_STREAM_MESSAGE_MAX]; /* received by each peer */
   struct pollfd polled[POLLED]; /* sockets of `peer`, listener, pipe of web's poses; -1 if none */
   double wait_begun;            /* time at which ppoll() was last called */
   double woke;                  /* time at which ppoll() last returned */
@@ -64,7 +65,8 @@ static supine_stream_peer *begin_peer(supine_stream_server *s, int socket, bool 
   for (size_t i = 0; i < SUPINE_STREAM_PEERS_MAX; ++i) {
     supine_stream_peer *peer = &s->peer[i];
     if (peer->socket < 0) {
-      supine_stream_peer_begin(peer, socket, connecting, s->options->content, s->woke, s->body[i]);
+      supine_stream_peer_begin(peer, socket, connecting, s->options->content, s->woke,
+                               s->message[i]);
       s->results.counts.peers += connecting ? 0 : 1;
       return peer;
     }
@@ -126,8 +128,8 @@ static void receive(void *context, supine_stream_peer *peer) {
   supine_stream_server *s = context;
   supine_stream_message message;
   supine_error error;
-  if (supine_stream_message_read(&peer->header, peer->body, s->options->device, &message, &error) !=
-      SUPINE_OK) {
+  if (supine_stream_message_read(&peer->header, peer->message + SUPINE_STREAM_HEADER,
+                                 s->options->device, &message, &error) != SUPINE_OK) {
     ++s->results.counts.malformed;
     supine_stream_patient_warn(&s->patient, s->woke, "a message is dropped: %s", error.message);
     return;

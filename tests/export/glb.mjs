@@ -5,7 +5,7 @@ import assert from 'node:assert/strict';
 import { readFileSync, statSync } from 'node:fs';
 import { join } from 'node:path';
 import {
-  evaluate, folder, inOrder, largestDistance, load, loadCommon, matchPoints, randomDirections, randomSource, supine,
+  evaluate, fieldsBasis, folder, inOrder, largestDistance, load, loadCommon, matchPoints, randomDirections, randomSource, supine,
 } from './support.mjs';
 import { harmonics } from './harmonics.mjs';
 
@@ -16,6 +16,7 @@ const { MeshoptDecoder } = await load('three/examples/jsm/libs/meshopt_decoder.m
 
 const PLAIN_MM = 0.001;
 const COUNTS_MM = 0.1; // tolerance: positions and targets are each rounded to 0.045 mm
+const FIELDS_MM = 0.2; // tolerance of fields, whose more than 20 targets are each rounded
 const BREATH = 1000; // largest volume above rest, mL
 
 /** Assert that the validator finds neither errors nor warnings. */
@@ -144,6 +145,7 @@ async function check(basis, words, tolerance) {
   await validate(path);
   const { lungs, meshes, extras } = await open(path);
   assert.deepEqual(meshes.map((m) => m.material.name), ['left lung', 'right lung', 'table', 'gravity']);
+  assert.equal(extras.basis.lungs, 'left,right');
   lungs.forEach((lung) => assert.deepEqual(Object.keys(lung.morphTargetDictionary), lung.userData.targetNames));
   const random = randomSource(77);
   const pairs = randomDirections(10, 20241).map((g, i) => [g, i % 2 ? BREATH * random() : BREATH]);
@@ -167,6 +169,26 @@ async function check(basis, words, tolerance) {
   assert.ok(worst < tolerance, `${words.join(' ')}: ${worst} mm off`);
   const mostMean = words.includes('--plain') ? 1 : 1.25; // limit of the mean error of normals, degrees
   assert.ok(mean(angles) < mostMean && at95(angles) < 3, 'normals are off');
+}
+
+/** Check positions of another simulator's fields, whose gain is 1, and that breaths are refused. */
+async function checkFields(basis) {
+  const path = join(folder, 'fields.glb');
+  supine('export', basis, '-o', path);
+  await validate(path);
+  const { lungs, extras } = await open(path);
+  assert.match(extras.gains, /^s = 1 and t = 0/);
+  assert.ok(extras.modes.length > 20 && extras.breathVolume === undefined && extras.volume === undefined);
+  const gravities = [[0, 1, 0], [0, -1, 0], ...randomDirections(5, 8)];
+  const truth = evaluate(basis, gravities.map((g) => [g, 0]));
+  const order = matchPoints(together(lungs, extras), truth[0].xyz, COUNTS_MM);
+  gravities.forEach((g, i) => {
+    const v = extras.modes.map((row) => extras.modeUnit * dot(row, harmonics(extras.band, g)));
+    setWeights(lungs, lungs.map(({ userData: { supine: { offset, unit } } }) => v.map((x, k) => (x - offset[k]) / unit[k])));
+    const off = largestDistance(together(lungs, extras), inOrder(truth[i].xyz, order));
+    assert.ok(off < FIELDS_MM, `fields along ${g}: ${off} mm off`);
+  });
+  for (const option of [['--breath', '700'], ['--animate']]) assert.throws(() => supine('export', basis, ...option, '-o', path), /no breaths: leave --breath and --animate out/);
 }
 
 /** Check that each clip turns gravity downwards, keeps the lungs above the table, and gives the
@@ -214,6 +236,9 @@ for (const basis of [modes, paper, many]) {
   await check(basis, ['--plain'], PLAIN_MM);
 }
 await checkAnimations(modes);
+const fields = join(folder, 'vectors.safetensors');
+fieldsBasis(fields, 600);
+await checkFields(fields);
 await checkColours(modes);
 
 /* The animated file of the default phantom, which demonstrations use, has at most 500 kB. */

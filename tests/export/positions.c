@@ -16,7 +16,10 @@ static bool write_positions(const supine_basis *basis, const double g[3], double
                             float *xyz) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const supine_volume_kind from = info->has_rest ? SUPINE_VOLUME_REST : SUPINE_VOLUME_SCAN;
-  const supine_state state = {.gravity = {g[0], g[1], g[2]}, .volume = {from, depth}};
+  supine_state state = {.gravity = {g[0], g[1], g[2]}};
+  if (!info->is_fields) {
+    state.volume = (supine_volume){from, depth};
+  }
   supine_pose pose;
   supine_pose_fill(&pose, depth);
   if (info->has_volume ? supine_basis_pose(basis, &state, &pose, NULL) != SUPINE_OK

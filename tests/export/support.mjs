@@ -4,7 +4,7 @@
 // skipped.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
-import { existsSync, mkdtempSync, rmSync } from 'node:fs';
+import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
@@ -39,6 +39,27 @@ export function supine(...words) {
 /** Temporary folder, removed when the test ends. */
 export const folder = mkdtempSync(join(tmpdir(), 'supine-export-'));
 process.on('exit', () => rmSync(folder, { recursive: true, force: true }));
+
+/** Write a safetensors file of float64 tensors, {name: [shape, numbers]}. */
+function writeTensors(path, tensors) {
+  let at = 0;
+  const header = JSON.stringify(Object.fromEntries(Object.entries(tensors).map(([name, [shape, numbers]]) => [name, { dtype: 'F64', shape, data_offsets: [at, at += 8 * numbers.length] }])));
+  const size = Buffer.alloc(8);
+  size.writeBigUInt64LE(BigInt(header.length));
+  writeFileSync(path, Buffer.concat([size, Buffer.from(header), ...Object.values(tensors).map(([, numbers]) => Buffer.from(Float64Array.from(numbers).buffer))]));
+}
+
+/** Write a basis of smooth fields, as another simulator may compute them, of a phantom with about `vertices` vertices. It
+ * has more than 20 vector modes. */
+export function fieldsBasis(path, vertices) {
+  const [mesh, fields] = ['fields.obj', 'fields.safetensors'].map((name) => join(folder, name));
+  supine('phantom', '--vertices', String(vertices), '-o', mesh);
+  const points = readFileSync(mesh, 'utf8').split('\n').filter((line) => line.startsWith('v ')).map((line) => line.split(' ').slice(1, 4).map(Number));
+  const gravity = supine('precompute', '--directions', '100').trim().split('\n').slice(1).map((line) => line.split(',').map(Number));
+  const wave = ([gx, gy, gz], [x, y, z]) => [6 * Math.sin(gx * (2 + x / 60)), 8 * gy + 3 * Math.cos(2 * gz + (gx * y) / 40), 5 * gz + 4 * Math.sin(gx + (gy * z) / 50)];
+  writeTensors(fields, { points: [[points.length, 3], points.flat()], gravity: [[gravity.length, 3], gravity.flat()], displacement: [[gravity.length, points.length, 3], gravity.flatMap((g) => points.flatMap((p) => wave(g, p)))] });
+  supine('precompute', mesh, '--fields', fields, '--modes', '30', '--scanned', 'supine', '-o', path);
+}
 
 /** Return a generator of uniform random numbers in [0, 1) (mulberry32). */
 export function randomSource(seed) {

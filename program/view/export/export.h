@@ -37,7 +37,8 @@ void supine_export_box(const export_source *source, double low[3], double high[3
 void supine_export_field(const export_source *source, size_t vertex, size_t mode, double u[3]);
 
 /** Compute the pose during a breath of `breath` mL, with gravity along the unit vector `g`. The
- * `fraction` is 0 at rest (in the scan if rest is unknown) and 1 at the end of inspiration. */
+ * `fraction` is 0 at rest (in the scan if rest is unknown) and 1 at the end of inspiration; another
+ * simulator's fields have no breath. */
 supine_status supine_export_breath_pose(const export_source *source, double breath,
                                         const double g[3], double fraction, supine_pose *pose,
                                         supine_error *error);
@@ -73,9 +74,8 @@ supine_status supine_export_glb_write(const char *path, const export_source *sou
                                       const export_glb_options *options, size_t *bytes,
                                       supine_error *error);
 
-/** Largest number of modes on an HTML page: 12 vertex attributes hold the coefficients of a vector
- * basis, four each. */
-enum { EXPORT_PAGE_MODES_MAX = 16 };
+/** Largest number of modes on an HTML page: meshoptimizer compresses rows of up to 256 bytes. */
+enum { EXPORT_PAGE_MODES_MAX = 128 };
 
 /** A state from which displacements are measured. */
 typedef struct export_reference {

@@ -49,6 +49,9 @@ supine_status supine_export_breath_pose(const export_source *source, double brea
                                         const double g[3], double fraction, supine_pose *pose,
                                         supine_error *error) {
   const supine_volume_kind from = source->info->has_rest ? SUPINE_VOLUME_REST : SUPINE_VOLUME_SCAN;
-  const supine_state state = {.gravity = {g[0], g[1], g[2]}, .volume = {from, fraction * breath}};
+  supine_state state = {.gravity = {g[0], g[1], g[2]}};
+  if (!source->info->is_fields) {
+    state.volume = (supine_volume){from, fraction * breath};
+  }
   return supine_basis_pose(source->basis, &state, pose, error);
 }

@@ -9,6 +9,11 @@
 /* With more morph targets, the extras omit the volume formula: it has too many constants then. */
 enum { VOLUME_TARGETS_MAX = 32 };
 
+/* Return whether the extras have the volume formula. */
+static bool has_volume(const glb *g) {
+  return g->targets.count <= VOLUME_TARGETS_MAX && !g->source->info->is_fields;
+}
+
 static const char frame_text[] =
     "Vertices of a lung's mesh are in the patient's axes, LPS (x left, y back, z head), from "
     "'middle', mm: position = middle + millimetresPerUnit * vertex. The mesh's node converts "
@@ -20,6 +25,8 @@ static const char weights_text[] =
     "(supine 0,1,0). Y: real orthonormal spherical harmonics, index l*l+l+m, sine terms at m < "
     "0, no Condon-Shortley phase: Y[0] = 0.28209479, Y[1..3] = 0.48860251 * (y, z, x). The gain "
     "along axis a is A[a] = s + t * bend[a]; s = t = 0 is the reference surface.";
+static const char fields_text[] =
+    "s = 1 and t = 0: another simulator's fields of gravity, without volumes and breaths";
 static const char volume_text[] =
     "volume of a lung minus its referenceVolume, mL: sum over axes a of L[a] A[a], plus Q[0] "
     "A[1] A[2] + Q[1] A[0] A[2] + Q[2] A[0] A[1] + C A[0] A[1] A[2], where L[a] = sum "
@@ -73,13 +80,15 @@ json_t *supine_export_glb_extras(const glb *g) {
     }
     (void)json_array_append_new(modes, row);
   }
-  json_t *supine =
-      json_pack("{s:s, s:s, s:i, s:o, s:f, s:o, s:o, s:f, s:f, s:f, s:o}", "frame", frame_text,
-                "weights", weights_text, "band", (int)s->info->band, "modes", modes, "modeUnit",
-                unit, "bend", supine_template_numbers(s->info->bend, 3), "middle",
-                supine_template_numbers(g->targets.middle, 3), "millimetresPerUnit", g->step,
-                "breathVolume", g->options->breath, "basis", origin(s));
-  if (g->targets.count <= VOLUME_TARGETS_MAX) {
+  json_t *supine = json_pack("{s:s, s:s, s:i, s:o, s:f, s:o, s:o, s:f, s:o}", "frame", frame_text,
+                             "weights", weights_text, "band", (int)s->info->band, "modes", modes,
+                             "modeUnit", unit, "bend", supine_template_numbers(s->info->bend, 3),
+                             "middle", supine_template_numbers(g->targets.middle, 3),
+                             "millimetresPerUnit", g->step, "basis", origin(s));
+  (void)(s->info->is_fields
+             ? json_object_set_new(supine, "gains", json_string(fields_text))
+             : json_object_set_new(supine, "breathVolume", json_real(g->options->breath)));
+  if (has_volume(g)) {
     (void)json_object_set_new(supine, "volume", json_string(volume_text));
   }
   if (s->info->has_rest) {
@@ -104,7 +113,7 @@ json_t *supine_export_glb_lung_extras(const glb *g, size_t lung) {
     (void)json_object_set_new(supine, "resting",
                               supine_template_numbers(resting, EXPORT_RESTING_TERMS));
   }
-  if (g->targets.count <= VOLUME_TARGETS_MAX) {
+  if (has_volume(g)) {
     (void)json_object_update_new(
         supine,
         json_pack(

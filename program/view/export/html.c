@@ -53,19 +53,22 @@ static double length_of(const float v[3]) {
   return hypot(hypot((double)v[0], (double)v[1]), (double)v[2]);
 }
 
-static void place_row(const page *p, const export_source *s, size_t vertex, int16_t *row) {
-  for (size_t axis = 0; axis < 3; ++axis) {
+static void place_row(const page *p, const export_source *s, size_t vertex, size_t axis,
+                      int16_t *row) {
+  for (; axis < 3; ++axis) {
     row[axis] =
         quantise((double)s->info->vertices[3 * vertex + axis] - p->middle[axis], p->position_step);
   }
 }
 
-static void direction_row(const page *p, const export_source *s, size_t vertex, int16_t *row) {
+static void direction_row(const page *p, const export_source *s, size_t vertex, size_t axis,
+                          int16_t *row) {
   static const float none[3] = {0, 0, 1};
   const float *d = s->info->direction + 3 * vertex;
   const float length = (float)length_of(d);
   const float unit[3] = {d[0] / length, d[1] / length, d[2] / length};
   (void)p;
+  (void)axis;
   supine_export_pack_direction(length > 0 ? unit : none, 4 * sizeof *row, row);
 }
 
@@ -74,36 +77,38 @@ static double reach_of(const export_source *s, size_t vertex) {
   return s->info->vector ? 1 : length_of(s->info->direction + 3 * vertex);
 }
 
-/* Return the number of coefficients of a vertex. */
-static size_t columns_of(const export_source *s) {
-  return (s->info->vector ? 3 : 1) * s->info->mode_count;
+/* Return the number of coefficients of a vertex for each mode. */
+static size_t axes_of(const export_source *s) {
+  return s->info->vector ? 3 : 1;
 }
 
-static void coefficient_row(const page *p, const export_source *s, size_t vertex, int16_t *row) {
-  const size_t columns = columns_of(s);
+static void coefficient_row(const page *p, const export_source *s, size_t vertex, size_t axis,
+                            int16_t *row) {
+  const size_t k = s->info->mode_count;
+  const float *from = s->info->coefficients + (vertex * axes_of(s) + axis) * k;
   const double step = s == p->source ? p->coefficient_step : p->inside_step;
-  for (size_t i = 0; i < columns; ++i) {
-    row[i] =
-        quantise((double)s->info->coefficients[vertex * columns + i] * reach_of(s, vertex), step);
+  for (size_t i = 0; i < k; ++i) {
+    row[i] = quantise((double)from[i] * reach_of(s, vertex), step);
   }
 }
 
-typedef void fill_row(const page *p, const export_source *s, size_t vertex, int16_t *row);
+typedef void fill_row(const page *p, const export_source *s, size_t vertex, size_t axis,
+                      int16_t *row);
 
-/* Compress and write `columns` integers for each vertex of a basis, padded to an even number of
- * columns. `fill` computes the integers of a vertex. */
+/* Compress and write integers of all vertices of a basis, [axes, vertices, columns]. `fill`
+ * computes the columns of a vertex on an axis; they are padded to an even number. */
 static void write_rows(const page *p, FILE *file, const char *name, const export_source *s,
-                       size_t columns, fill_row *fill) {
+                       size_t axes, size_t columns, fill_row *fill) {
   const size_t n = s->info->vertex_count;
   const size_t stride = (columns + 1) / 2 * 2;
   export_packed packed = {0};
   supine_status status = SUPINE_ERROR_MEMORY;
-  int16_t *rows = calloc(n * stride, sizeof *rows);
+  int16_t *rows = calloc(axes * n * stride, sizeof *rows);
   if (rows != NULL) {
-    for (size_t i = 0; i < n; ++i) {
-      fill(p, s, s == p->source ? p->order.vertex[i] : i, rows + i * stride);
+    for (size_t i = 0; i < axes * n; ++i) {
+      fill(p, s, s == p->source ? p->order.vertex[i % n] : i % n, i / n, rows + i * stride);
     }
-    status = supine_export_pack_rows(rows, n, stride * sizeof *rows, &packed);
+    status = supine_export_pack_rows(rows, axes * n, stride * sizeof *rows, &packed);
   }
   write_packed(p, file, name, status, packed);
   free(rows);
@@ -119,7 +124,7 @@ static void write_corners(const page *p, FILE *file, const char *name, const exp
 
 /* Return the largest displacement of a vertex along an axis by one mode, mm. */
 static double largest_coefficient(const export_source *s) {
-  const size_t columns = columns_of(s);
+  const size_t columns = axes_of(s) * s->info->mode_count;
   double largest = 0;
   for (size_t i = 0; i < s->info->vertex_count * columns; ++i) {
     largest = fmax(largest, fabs((double)s->info->coefficients[i]) * reach_of(s, i / columns));
@@ -284,17 +289,18 @@ static void write_tensors(const void *context, const char *name, FILE *file) {
   if (strcmp(name, "tensors") != 0) {
     return;
   }
-  write_rows(p, file, "vertices", s, 3, place_row);
+  write_rows(p, file, "vertices", s, 1, 3, place_row);
   if (!s->info->vector) {
-    write_rows(p, file, "direction", s, 4, direction_row);
+    write_rows(p, file, "direction", s, 1, 4, direction_row);
   }
-  write_rows(p, file, "coefficients", s, columns_of(s), coefficient_row);
+  write_rows(p, file, "coefficients", s, axes_of(s), s->info->mode_count, coefficient_row);
   write_corners(p, file, "triangles", s, p->order.corners);
   write_doubles(file, s->basis);
   if (p->shown->inside != NULL) {
     const export_source *inside = p->shown->inside;
-    write_rows(p, file, "inside-vertices", inside, 3, place_row);
-    write_rows(p, file, "inside-coefficients", inside, columns_of(inside), coefficient_row);
+    write_rows(p, file, "inside-vertices", inside, 1, 3, place_row);
+    write_rows(p, file, "inside-coefficients", inside, 3, inside->info->mode_count,
+               coefficient_row);
     write_corners(p, file, "inside-triangles", inside, inside->info->triangles);
     write_tensor(file, "inside-parts", p->shown->parts->of,
                  inside->info->vertex_count * sizeof *p->shown->parts->of);

@@ -4,6 +4,7 @@
 #ifndef SUPINE_EXPORT_PACKED_H
 #define SUPINE_EXPORT_PACKED_H
 
+#include "base/arena.h"
 #include "program/view/export/export.h"
 
 /** Compressed bytes; free `bytes` with free(). */
@@ -35,6 +36,7 @@ typedef struct export_order {
   uint32_t *corners; /**< [triangles, 3] vertices of each triangle, as indices into `vertex` */
   size_t corner_begin[SUPINE_LUNGS_MAX + 1]; /**< for each lung, the index in `corners` of its first
                                                 corner; then the total number of corners */
+  supine_arena arena;
 } export_order;
 
 /** Choose an order; free it with supine_export_order_free, also after a failure.

@@ -63,7 +63,8 @@ function readBasis() {
   basis.surface = takeRows('vertices', n, 3, basis.placeUnit, basis.middle);
   const directions = basis.vector ? [] : takeCounts('direction', n, 4, 'OCTAHEDRAL');
   basis.direction = Float32Array.from({ length: directions.length / 4 * 3 }, (_, i) => directions[4 * Math.floor(i / 3) + (i % 3)] / 32767);
-  basis.coefficients = takeRows('coefficients', n, (basis.vector ? 3 : 1) * basis.modes, basis.unit);
+  basis.fields = basis.metadata.route === 'fields'; // made from another simulator's fields, which have no volumes and no breaths
+  basis.coefficients = takeRows('coefficients', (basis.vector ? 3 : 1) * n, basis.modes, basis.unit);
   basis.corners = takeTriangles('triangles', basis.triangles);
   basis.mixes = takeTensor('modes', Float64Array);
   basis.linear = takeTensor('volume_linear', Float64Array);
@@ -277,12 +278,13 @@ function gainsFor(basis, forms, volumes, total) {
 
 /** Return a moment: {gravity, weights, gains, held, folds}, the state of the lungs for a direction of gravity and a
  * volume `depth` mL above rest. `weights` are those of the modes, `gains` the factors of the displacement of each lung
- * along x, y, z, and `held` the volume (gas and tissue) of each lung, mL. `folds`: whether the surface folds before. */
+ * along x, y, z, and `held` the volume (gas and tissue) of each lung, mL. `folds`: whether the surface folds before.
+ * Another simulator's fields are not scaled to a volume. */
 function momentFor(basis, gravity, depth) {
   const weights = weightsFor(basis, gravity);
   const forms = basis.references.map((_, lung) => lungForm(basis, lung, weights));
   const volumes = volumesFor(basis, gravity);
-  const gains = gainsFor(basis, forms, volumes, sumOf(volumes.rest) + depth);
+  const gains = basis.fields ? forms.map(() => [1, 1, 1]) : gainsFor(basis, forms, volumes, sumOf(volumes.rest) + depth);
   const held = gains.map((gain, lung) => basis.references[lung] + formAt(forms[lung], gain));
   return { gravity, weights, gains: Float64Array.from(gains.flat()), held, folds: !gains.flat().every(Number.isFinite) };
 }
@@ -295,14 +297,14 @@ function lungOf({ lungBegin }, vertex) {
 
 /** Write the displacement of a vertex of the surface by the modes at their weights, mm, before the gains multiply it,
  * to `out`. */
-function fieldOf({ coefficients, direction, modes, vector }, weights, vertex, out) {
+function fieldOf({ coefficients, direction, modes, vector, vertices }, weights, vertex, out) {
   for (let axis = 0; axis < 3; ++axis) {
     if (axis > 0 && !vector) {
       out[axis] = out[0];
       continue;
     }
     out[axis] = 0;
-    for (let k = 0, at = (vector ? 3 * vertex + axis : vertex) * modes; k < modes; ++k) out[axis] += weights[k] * coefficients[at + k];
+    for (let k = 0, at = (axis * vertices + vertex) * modes; k < modes; ++k) out[axis] += weights[k] * coefficients[at + k];
   }
   if (!vector) for (let axis = 0; axis < 3; ++axis) out[axis] *= direction[3 * vertex + axis];
 }

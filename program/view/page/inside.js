@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Read and show the structures inside the lungs: named parts, which are points or meshes. A vertex is displaced along
-// an axis by the sum over the modes of weight times fields[vertex][axis][mode], times a factor of its lung ("gain").
+// an axis by the sum over the modes of weight times fields[axis][vertex][mode], times a factor of its lung ("gain").
 
 const BALL_RADIUS = 4; // radius of the ball drawn at a point, mm
 
@@ -8,7 +8,7 @@ const BALL_RADIUS = 4; // radius of the ball drawn at a point, mm
 function takeInside({ inside, modes: k, placeUnit, middle }) {
   const { vertices: n } = inside;
   inside.modes = k;
-  const [places, fields, of, corners] = [takeRows('inside-vertices', n, 3, placeUnit, middle), takeRows('inside-coefficients', n, 3 * k, inside.unit),
+  const [places, fields, of, corners] = [takeRows('inside-vertices', n, 3, placeUnit, middle), takeRows('inside-coefficients', 3 * n, k, inside.unit),
     takeTensor('inside-parts', Uint32Array), takeTriangles('inside-triangles', inside.triangles)];
   const meshed = new Uint8Array(n);
   for (const corner of corners) meshed[corner] = 1;
@@ -23,7 +23,7 @@ function takeInside({ inside, modes: k, placeUnit, middle }) {
   inside.members = inside.names.map(() => []); // vertices of each part
   order.forEach((from, to) => {
     inside.reference.set([...places.subarray(3 * from, 3 * from + 3), lungOf(inside, from)], 4 * to);
-    inside.fields.set(fields.subarray(3 * k * from, 3 * k * (from + 1)), 3 * k * to);
+    for (let first = 0; first < 3 * n; first += n) inside.fields.set(fields.subarray(k * (first + from), k * (first + from + 1)), k * (first + to));
     inside.part[to] = of[from];
     inside.members[of[from]].push(to);
   });
@@ -48,10 +48,10 @@ function normalsOf({ reference, vertices, corners }) {
 }
 
 /** Return the position, mm, of a vertex displaced by the modes, even if its part is rigid. */
-function fieldPlace({ reference, fields, modes: k }, { weights, gains }, vertex) {
+function fieldPlace({ reference, fields, vertices, modes: k }, { weights, gains }, vertex) {
   return [0, 1, 2].map((axis) => {
     let sum = 0;
-    for (let m = 0, at = (3 * vertex + axis) * k; m < k; ++m) sum += weights[m] * fields[at + m];
+    for (let m = 0, at = (axis * vertices + vertex) * k; m < k; ++m) sum += weights[m] * fields[at + m];
     return reference[4 * vertex + axis] + gains[3 * reference[4 * vertex + 3] + axis] * sum;
   });
 }

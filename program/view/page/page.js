@@ -586,6 +586,7 @@ function start() {
   });
   $('posture-name').addEventListener('blur', () => { last.posture = null; redraw(); }); // replaces a typed text that may be invalid
   const play = () => {
+    if (basis.fields) return;
     state.playing = !state.playing;
     remeasure();
     const part = Math.min(1, state.depth / state.tidal);
@@ -711,6 +712,7 @@ function start() {
     else if (VIEWS[event.key.toUpperCase()] && event.key.length === 1) lookFrom(event.key.toUpperCase());
   });
 
+  if (basis.fields) for (const part of document.querySelectorAll('.breath, section[aria-labelledby=breath-title]')) part.hidden = true;
   for (const id of ['depth', 'tidal']) for (const end of [id, `${id}-number`]) $(end).max = state.depthMax;
   for (const end of ['tidal', 'tidal-number']) $(end).min = $(end).step = state.tidal / 50;
   for (const end of ['depth', 'depth-number']) $(end).step = state.tidal / 100;
@@ -718,7 +720,7 @@ function start() {
   document.querySelector('[name=kind][value=expansion]').disabled = basis.words === 0;
   write('depth-name', `Above ${restOrScan}`);
   write('ghost-name', 'Ghost of the reference');
-  write('state', `at ${basis.resting ? 'rest, after a quiet expiration' : 'the volume of the scan'}; ${/scan at [^;()]*/.exec(basis.metadata.assumed)?.[0].replace('scan at', 'scan assumed at').trim() ?? ''}`.replace(/; $/, ''));
+  write('state', basis.fields ? `another simulator\u2019s fields of gravity, compressed: error ${errorOf(basis)}` : `at ${basis.resting ? 'rest, after a quiet expiration' : 'the volume of the scan'}; ${/scan at [^;()]*/.exec(basis.metadata.assumed)?.[0].replace('scan at', 'scan assumed at').trim() ?? ''}`.replace(/; $/, ''));
   $('credit').hidden = !basis.metadata.attribution;
   write('credit', `Lungs: ${basis.metadata.attribution}`);
   $('inside').disabled = !inside;
@@ -775,12 +777,15 @@ function pictureOn(canvas, basis) {
   }
 }
 
+/** Return the error of the displacement by the modes, in words. */
+const errorOf = ({ metadata, fields }) => metadata.error_rms_percent && `${Number(metadata.error_rms_percent).toPrecision(2)} % RMS${fields ? `, ${Number(metadata.error_max_mm).toPrecision(2)} mm at most, each direction from the others` : ' from the full solve, on held-out directions'}`;
+
 function showFacts(basis) {
   const { metadata } = basis;
   const facts = [
     ['surface', `${basis.lungNames.join(' and ')}, ${basis.vertices.toLocaleString('en')} vertices`],
     ['field', `${basis.modes} ${metadata.modes === 'harmonics' ? 'harmonics' : 'modes'} of band ${basis.band}`],
-    ['error', metadata.error_rms_percent && `${Number(metadata.error_rms_percent).toPrecision(2)} % RMS from the full solve, on held-out directions`],
+    ['error', errorOf(basis)],
     ['law', metadata.law], ['scan', metadata.scanned], ['force', metadata.force], ['stiffness', metadata.stiffness],
     ['made by', metadata.made_by], ['credit', metadata.attribution],
   ];

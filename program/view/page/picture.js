@@ -7,7 +7,7 @@ const source = (id) => document.getElementById(id).textContent;
 
 const NO_CUT = [0, 0, 0, 1e10];
 const ARROWS_SHOWN = 500;
-const WIDTH = 1024; // width of the textures that hold lists, texels
+const WIDTH = 2048; // width of the textures that hold lists, texels
 
 /** Outline of the patient's body: height of the section's centre above the centre of the lungs, and its half widths to
  * the sides and to front and back, as multiples of half the lungs' extent along each axis. */
@@ -27,7 +27,6 @@ class Picture {
     this.gl = gl;
     this.canvas = canvas;
     this.basis = basis;
-    this.moving = this.program(basis.vector ? 'inside.vert.glsl' : 'vertex.vert.glsl', null, ['moved'], basis.vector ? this.vectorLibrary() : [...this.sized(), source('vertex.vert.glsl')].join('\n'));
     this.turning = this.program('normal.vert.glsl', null, ['turned']);
     this.surface = this.program('surface.vert.glsl', 'surface.frag.glsl');
     this.picker = this.program('surface.vert.glsl', 'pick.frag.glsl');
@@ -46,20 +45,18 @@ class Picture {
     this.gpuTime = NaN;
   }
 
-  /** Return supine.glsl preceded by lines that define the sizes of this basis. */
-  sized() {
-    const { basis } = this;
-    return [`#define SUPINE_LUNGS ${basis.lungs}`, `#define SUPINE_VECTORS ${Math.ceil(basis.modes / 4)}`, source('supine.glsl')];
-  }
-
-  /** Return the shader that deforms vertices of a vector basis. Each attribute from location 1 on has the coefficients
-   * for one axis and four modes. */
-  vectorLibrary() {
-    const vectors = Math.ceil(this.basis.modes / 4);
-    const all = [0, 1, 2].flatMap((axis) => Array.from({ length: vectors }, (_, j) => ({ axis, j, name: `c${axis}_${j}` })));
-    const sum = (axis) => all.filter((c) => c.axis === axis).map(({ j, name }) => `dot(supine_weights[${j}], ${name})`).join(' + ');
-    return [...this.sized(), source('inside.vert.glsl'), ...all.map(({ name }, i) => `layout(location = ${1 + i}) in vec4 ${name};`),
-      `float amount(int axis) { return axis == 0 ? ${sum(0)} : axis == 1 ? ${sum(1)} : ${sum(2)}; }`].join('\n');
+  /** Return what capture() needs to deform vertices: the shader program, a texture of their coefficients, [axes, vertices,
+   * modes], which are multiples of `unit`, mm, and `array`, the vertex array. */
+  deformed(coefficients, vertices, axes, unit, array) {
+    const { gl, basis: { modes, lungs } } = this;
+    const vectors = Math.ceil(modes / 4);
+    const rows = axes * vertices;
+    const height = Math.ceil((rows * vectors) / WIDTH) || 1;
+    const counts = new Int16Array(4 * WIDTH * height);
+    for (let i = 0; i < rows; ++i) for (let k = 0; k < modes; ++k) counts[4 * vectors * i + k] = Math.round(coefficients[modes * i + k] / unit);
+    const text = [`#define SUPINE_LUNGS ${lungs}`, `#define SUPINE_VECTORS ${vectors}`, `#define AXES ${axes}`, source('supine.glsl'), source('vertex.vert.glsl')];
+    return { ...this.program('vertex.vert.glsl', null, ['moved'], text.join('\n')), array, count: vertices, vertices, every: 1, unit,
+      coefficients: this.texture(gl.RGBA16I, gl.RGBA_INTEGER, gl.SHORT, WIDTH, height, counts) };
   }
 
   program(vertex, fragment, outputs, text = source(vertex)) {
@@ -110,36 +107,18 @@ class Picture {
     return made;
   }
 
-  /** Return the attributes of the coefficients of a vector basis, four modes each: those of x, y, then z. */
-  vectorAttributes(fields) {
-    const { modes: k } = this.basis;
-    const buffer = this.buffer(fields);
-    const attributes = [];
-    for (let axis = 0; axis < 3; ++axis) for (let first = 0; first < k; first += 4) attributes.push([buffer, Math.min(4, k - first), 12 * k, 4 * (axis * k + first)]);
-    return attributes;
-  }
-
-  /** Make the inputs of the shader that deforms the surface, for all vertices and for the few vertices that have arrows:
-   * reference position and lung, and the coefficients. If there are fewer coefficients than places, the shader reads the
-   * others as (0, 0, 0, 1), but their weights are 0. */
+  /** Make the inputs of the shader that deforms the surface, for all vertices and for the few vertices that have
+   * arrows. */
   makeInputs() {
     const { basis } = this;
-    const k = basis.modes;
-    const inputs = (reference, direction, coefficients) => {
-      const attributes = [[this.buffer(reference), 4, 16, 0]];
-      if (basis.vector) return this.array([...attributes, ...this.vectorAttributes(coefficients)]);
-      const buffer = this.buffer(coefficients);
-      attributes.push([this.buffer(direction), 3, 12, 0]);
-      for (let first = 0; first < 16; first += 4) attributes.push(first < k ? [buffer, Math.min(4, k - first), 4 * k, 4 * first] : null);
-      return this.array(attributes);
-    };
+    const inputs = (reference, direction) => this.array([[this.buffer(reference), 4, 16, 0], basis.vector ? null : [this.buffer(direction), 3, 12, 0]]);
     const reference = new Float32Array(4 * basis.vertices);
     for (let i = 0; i < basis.vertices; ++i) reference.set([...basis.surface.subarray(3 * i, 3 * i + 3), lungOf(basis, i)], 4 * i);
     const every = Math.max(1, Math.floor(basis.vertices / ARROWS_SHOWN));
     this.fewCount = Math.ceil(basis.vertices / every);
-    const few = (values, size) => values.constructor.from({ length: size ? this.fewCount * size : 0 }, (_, i) => values[Math.floor(i / size) * every * size + (i % size)]);
-    this.inputs = inputs(reference, basis.direction, basis.coefficients);
-    this.fewInputs = inputs(few(reference, 4), few(basis.direction, basis.vector ? 0 : 3), few(basis.coefficients, (basis.vector ? 3 : 1) * k));
+    const few = (values, size) => Float32Array.from({ length: this.fewCount * size }, (_, i) => values[Math.floor(i / size) * every * size + (i % size)]);
+    this.inputs = this.deformed(basis.coefficients, basis.vertices, basis.vector ? 3 : 1, basis.unit, inputs(reference, basis.direction));
+    this.fewInputs = { ...this.inputs, array: inputs(few(reference, 4), few(basis.direction, 3)), count: this.fewCount, every };
     this.makeFans();
   }
 
@@ -159,17 +138,16 @@ class Picture {
     this.fans = this.texture(gl.RG32UI, gl.RG_INTEGER, gl.UNSIGNED_INT, WIDTH, rows, pairs);
     this.places = this.texture(gl.RGBA32F, gl.RGBA, gl.FLOAT, WIDTH, Math.ceil(vertices / WIDTH), null);
     const ranges = new Float32Array(2 * vertices).map((_, i) => begin[Math.floor(i / 2) + (i % 2)]);
-    this.fanInputs = this.array([[this.buffer(ranges), 2, 8, 0]]);
+    this.fanInputs = { ...this.turning, array: this.array([[this.buffer(ranges), 2, 8, 0]]), count: vertices };
   }
 
   /** Make the shader programs for structures inside the lungs, and buffers for the vertices of the structures and of
    * the ball that marks a point. */
   makeInside() {
     const { gl, basis: { inside } } = this;
-    this.insideMoving = this.program('inside.vert.glsl', null, ['moved'], this.vectorLibrary());
     this.content = this.program('content.vert.glsl', 'surface.frag.glsl');
     this.contentPicker = this.program('content.vert.glsl', 'content_pick.frag.glsl');
-    this.insideInputs = this.array([[this.buffer(inside.reference), 4, 16, 0], ...this.vectorAttributes(inside.fields)]);
+    this.insideInputs = this.deformed(inside.fields, inside.vertices, 3, inside.unit, this.array([[this.buffer(inside.reference), 4, 16, 0]]));
     this.insideParts = this.buffer(inside.part);
     this.insideNormals = this.buffer(inside.normals);
     this.insideIndices = this.buffer(inside.corners, gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER);
@@ -325,27 +303,34 @@ class Picture {
       indices: this.buffer(new Uint32Array(indices), gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER), count: indices.length };
   }
 
-  /** Run the shader program `moving` on the `count` vertices of the vertex array `array`, for the state `moment` of the
-   * lungs, and store its outputs in the buffers `targets`. */
-  capture(moment, array, targets, count, moving = this.moving) {
+  /** Run the shader program of `inputs` on their vertices, and store its output in the buffer `target`. `moment` is the
+   * state of the lungs if the inputs are those of deformed(), otherwise null. */
+  capture(moment, { program, at, array, count, coefficients, vertices, every, unit }, target) {
     const { gl } = this;
-    gl.useProgram(moving.program);
+    gl.useProgram(program);
     if (moment) {
       const weights = new Float32Array(4 * Math.ceil(this.basis.modes / 4));
       weights.set(moment.weights);
-      gl.uniform4fv(moving.at.supine_weights, weights);
-      gl.uniform3fv(moving.at.supine_gains, moment.gains);
+      gl.uniform4fv(at.supine_weights, weights);
+      gl.uniform3fv(at.supine_gains, moment.gains);
+      gl.uniform1i(at.vertices, vertices);
+      gl.uniform1i(at.every, every);
+      gl.uniform1f(at.unit, unit);
+      gl.uniform1i(at.coefficients, 2);
+      gl.activeTexture(gl.TEXTURE2);
+      gl.bindTexture(gl.TEXTURE_2D, coefficients);
+      gl.activeTexture(gl.TEXTURE0);
     }
     gl.bindBuffer(gl.ARRAY_BUFFER, null); // WebGL refuses to write a buffer that is bound elsewhere
     gl.bindVertexArray(array);
     gl.bindTransformFeedback(gl.TRANSFORM_FEEDBACK, this.feedback);
-    targets.forEach((target, i) => gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, i, target));
+    gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, 0, target);
     gl.enable(gl.RASTERIZER_DISCARD);
     gl.beginTransformFeedback(gl.POINTS);
     gl.drawArrays(gl.POINTS, 0, count);
     gl.endTransformFeedback();
     gl.disable(gl.RASTERIZER_DISCARD);
-    targets.forEach((_, i) => gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, i, null));
+    gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, 0, null);
     gl.bindTransformFeedback(gl.TRANSFORM_FEEDBACK, null);
     gl.bindVertexArray(null);
   }
@@ -355,14 +340,14 @@ class Picture {
   deform(name, moment) {
     const { moved, turned, few, inside } = this.state(name);
     this.captureSurface(moment, moved, turned);
-    this.capture(moment, this.fewInputs, [few], this.fewCount);
+    this.capture(moment, this.fewInputs, few);
     if (inside) this.captureInside(moment, inside);
   }
 
   /** Compute the positions of the surface's vertices, then their normals, which a shader sums over the triangles. */
   captureSurface(moment, moved, turned) {
     const { gl, basis: { vertices } } = this;
-    this.capture(moment, this.inputs, [moved], vertices);
+    this.capture(moment, this.inputs, moved);
     gl.bindTexture(gl.TEXTURE_2D, this.places);
     gl.bindBuffer(gl.PIXEL_UNPACK_BUFFER, moved);
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, WIDTH, Math.ceil(vertices / WIDTH), gl.RGBA, gl.FLOAT, 0);
@@ -372,14 +357,14 @@ class Picture {
     gl.activeTexture(gl.TEXTURE1);
     gl.bindTexture(gl.TEXTURE_2D, this.fans);
     gl.activeTexture(gl.TEXTURE0);
-    this.capture(null, this.fanInputs, [turned], vertices, this.turning);
+    this.capture(null, this.fanInputs, turned);
   }
 
   /** Deform the structures inside the lungs by the modes in the shader. In a rigid structure, the motion of a vertex
    * depends on all the others: compute the vertices of these structures here, and overwrite those of the shader. */
   captureInside(moment, target) {
     const { gl, basis: { inside } } = this;
-    this.capture(moment, this.insideInputs, [target], inside.vertices, this.insideMoving);
+    this.capture(moment, this.insideInputs, target);
     gl.bindBuffer(gl.ARRAY_BUFFER, target);
     for (const part of inside.rigid) gl.bufferSubData(gl.ARRAY_BUFFER, 16 * inside.members[part][0], new Float32Array(insidePlaces(inside, moment, part).flatMap((p) => [...p, 1])));
     gl.bindBuffer(gl.ARRAY_BUFFER, null);

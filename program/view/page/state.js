@@ -147,6 +147,7 @@ class State {
   /** Compute the lungs' state for the current gravity and volume. If the surface would fold, keep the previous state
    * and return false. */
   compute() {
+    if (this.basis.fields) this.depth = 0;
     const moment = momentFor(this.basis, this.gravity, this.depth);
     if (moment.folds) return false;
     this.moment = moment;

@@ -1,16 +1,28 @@
 // SPDX-License-Identifier: MIT
-// Compute the position of each vertex of the surface, for transform feedback.
+// Compute the position of each vertex of the surface, or of the structures inside the lungs, for transform feedback.
+// AXES is 1 if the displacement has one coefficient for each mode, along `direction`, and 3 if it has one along x, y, z.
 layout(location = 0) in vec4 reference; // reference position, mm; w: lung
 layout(location = 1) in vec3 direction;
-layout(location = 2) in vec4 c0;
-layout(location = 3) in vec4 c1;
-layout(location = 4) in vec4 c2;
-layout(location = 5) in vec4 c3;
+uniform highp isampler2D coefficients; // in steps of `unit`, four modes in each texel, [AXES, vertices, modes]
+uniform int vertices; // number of vertices in `coefficients`
+uniform int every;    // the vertices 0, every, 2 every ... are drawn
+uniform float unit;   // mm
 out vec4 moved;
 
+float amount(int axis) {
+  int width = textureSize(coefficients, 0).x;
+  int at = (axis * vertices + gl_VertexID * every) * SUPINE_VECTORS;
+  float sum = 0.0;
+  for (int i = at; i < at + SUPINE_VECTORS; ++i) {
+    sum += dot(supine_weights[i - at], vec4(texelFetch(coefficients, ivec2(i % width, i / width), 0)));
+  }
+  return unit * sum;
+}
+
 void main() {
-  vec4 c[4] = vec4[4](c0, c1, c2, c3);
-  float amount = 0.0;
-  for (int i = 0; i < SUPINE_VECTORS; ++i) amount += dot(supine_weights[i], c[i]);
-  moved = vec4(supine_place(reference, direction, amount), 1.0);
+#if AXES == 3
+  moved = vec4(supine_place(reference, vec3(amount(0), amount(1), amount(2)), 1.0), 1.0);
+#else
+  moved = vec4(supine_place(reference, direction, amount(0)), 1.0);
+#endif
 }

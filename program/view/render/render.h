@@ -101,6 +101,8 @@ typedef struct supine_mark {
 typedef struct supine_marks {
   size_t count;
   const supine_mark *mark;
+  size_t triangle_count;
+  const uint32_t *triangles; /**< [triangle_count, 3] indices of marks: meshes, which are filled */
 } supine_marks;
 
 /** Compute the positions of marks in the drawing of a scene, or those of supine_mark.from.
