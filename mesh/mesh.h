@@ -139,6 +139,14 @@ typedef struct supine_mesh_field {
   const double *values; /**< [frames, count] values; only a series has more than one frame */
 } supine_mesh_field;
 
+/** A number at each vertex: point data of VTP and PLY files. */
+typedef struct supine_mesh_scalar {
+  const char *name;
+  const float *values; /**< [vertex_count]; NULL if there is no number */
+} supine_mesh_scalar;
+
+enum { SUPINE_MESH_SCALARS = 2 };
+
 /** How to write a file, and its optional contents. */
 typedef struct supine_mesh_save_options {
   supine_axes axes;    /**< axes of the file and of its SPACE tag; AUTO means LPS */
@@ -146,8 +154,7 @@ typedef struct supine_mesh_save_options {
                           PLY files then hold displacements and their magnitudes */
   const char *comment; /**< optional note of one line */
   double millimetres_per_unit; /**< unit of positions and displacements; 0 means 1 */
-  const float *expected_error; /**< optional [vertex_count], always in mm: point data
-                                  "expected_error_mm" of VTP and PLY */
+  supine_mesh_scalar scalars[SUPINE_MESH_SCALARS]; /**< optional */
   /** @{ For VTP only, all optional. */
   const float *normals;            /**< [vertex_count, 3] written as point data "Normals" */
   const unsigned char *lung;       /**< [vertex_count] index of the lung, as point data "lung" */
