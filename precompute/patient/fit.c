@@ -124,11 +124,16 @@ static size_t assign_folds(const supine_patient_frame *frame, supine_patient_row
   return blocks;
 }
 
-/* Return the length of the displacement of a point by the displacement law, mm. */
-static double displacement_of(const supine_patient_krige *krige, const supine_patient_row *row) {
+/* Predict the length of a point's displacement without the motion of the body, mm. */
+static double displacement_of(supine_patient_krige *krige, const supine_patient_row *row) {
+  supine_patient_row along = *row;
   double u[3];
-  supine_patient_direction(&krige->law, &row->place,
-                           supine_patient_force_at(&krige->law, &row->place), u);
+  supine_patient_motion(&krige->law, &row->place, u);
+  for (size_t a = 0; a < 3; ++a) {
+    memset(along.axis, 0, sizeof along.axis);
+    along.axis[a] = 1.0;
+    u[a] = supine_patient_krige_predict(krige, &along) - u[a];
+  }
   return supine_length(u);
 }
 
@@ -220,7 +225,7 @@ static supine_status hold_all_out(study *s, squares *held_out, supine_error *err
  * share of the held-out landmarks that err by less than 1.8 times as much. With c, the sum of the
  * squared errors that are expected of the held-out landmarks is the sum of those that they have,
  * if they are predicted in the fuller scan from their positions in the emptier one. */
-static void set_expected(const study *s, const squares *held_out, const supine_patient_krige *krige,
+static void set_expected(const study *s, const squares *held_out, supine_patient_krige *krige,
                          supine_patient_fit_report *report) {
   const size_t count = SEEDS * s->triples;
   const double growth = report->stretch * report->stretch;

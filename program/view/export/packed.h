@@ -13,8 +13,7 @@ typedef struct export_packed {
   size_t size;
 } export_packed;
 
-/** Load meshoptimizer; call this before the functions below.
- * @retval SUPINE_ERROR_UNSUPPORTED  meshoptimizer is not installed */
+/** Load meshoptimizer; call this before the functions below. */
 supine_status supine_export_pack_begin(supine_error *error);
 
 /** Encode a unit vector for the filter OCTAHEDRAL of EXT_meshopt_compression, as 4 signed integers,
