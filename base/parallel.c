@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* Split independent work over POSIX threads. */
+#define _GNU_SOURCE /* declares sched_getaffinity */ // NOLINT(bugprone-reserved-identifier)
 #include <pthread.h>
 #include <sched.h>
 #include <stdbool.h>
 #include <stdlib.h>
+#include <unistd.h>
 
 #include "base/parallel.h"
 
@@ -41,11 +43,13 @@ size_t supine_thread_count(void) {
   if (requested > 0) {
     return (size_t)requested;
   }
+  long count = sysconf(_SC_NPROCESSORS_ONLN);
+#ifdef CPU_COUNT /* Linux: a container or a scheduler may allow only some of the processors */
   cpu_set_t allowed;
-  if (sched_getaffinity(0, sizeof allowed, &allowed) != 0) {
-    return 1;
+  if (sched_getaffinity(0, sizeof allowed, &allowed) == 0) {
+    count = CPU_COUNT(&allowed);
   }
-  const int count = CPU_COUNT(&allowed);
+#endif
   return count < 1 ? 1 : count > THREADS_MAX ? THREADS_MAX : (size_t)count;
 }
 

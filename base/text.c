@@ -16,6 +16,21 @@ void supine_text_add(char *text, size_t size, const char *format, ...) {
   va_end(arguments);
 }
 
+const char *supine_text_file_name(const char *path) {
+  const char *slash = strrchr(path, '/');
+  return slash != NULL ? slash + 1 : path;
+}
+
+char *supine_text_item(char **rest) {
+  char *item = *rest;
+  char *comma = strchr(item, ',');
+  *rest = comma != NULL ? comma + 1 : NULL;
+  if (comma != NULL) {
+    *comma = '\0';
+  }
+  return item;
+}
+
 bool supine_text_ends_in(const char *name, const char *ending) {
   const size_t length = strlen(name);
   const size_t tail = strlen(ending);

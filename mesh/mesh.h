@@ -48,6 +48,7 @@ typedef struct supine_mesh {
 typedef struct supine_mesh_load_options {
   supine_axes axes;
   double millimetres_per_unit; /**< length of the unit of coordinates, mm; 0 means 1 */
+  const supine_mesh *arrays;   /**< surface to copy instead of reading the file; NULL: none */
 } supine_mesh_load_options;
 
 typedef struct supine_mesh_report {
@@ -104,9 +105,7 @@ typedef struct supine_topology {
 } supine_topology;
 
 /** Find edges and components in linear time, except for sorting the edges of each vertex.
- * @param topology  zero-initialised; written only on success
- * @retval SUPINE_ERROR_ARGUMENT  a triangle names a vertex twice or out of range, or there are more
- *             than 2^31 - 1 vertices */
+ * @param topology  zero-initialised; written only on success */
 supine_status supine_mesh_topology_create(const supine_mesh *mesh, supine_topology *topology);
 void supine_mesh_topology_free(supine_topology *topology);
 

@@ -135,17 +135,17 @@ static void add_reference(entries *list, const supine_reference *reference, cons
 
 /* Add the constants of the expected position error (supine/locate.h). */
 static void add_expected_error(entries *list, const supine_basis_content *content) {
-  const supine_precompute_options *options = content->options;
-  const bool fitted = !content->is_fields && options->expected_error > 0.0;
+  const supine_patient_record *record = content->prepared->patient;
+  const bool fitted = record != NULL && record->report.expected_constant > 0.0;
   if (!content->is_fields) {
     add(list, "expected_error_mm", "%g",
-        fitted ? options->expected_error : SUPINE_EXPECTED_ERROR_MM);
+        fitted ? supine_patient_expected(record) : SUPINE_EXPECTED_ERROR_MM);
   }
   if (fitted) {
-    add(list, "expected_error_from_mm", "%g", options->expected_from);
-    add(list, "expected_error_source", "%s", options->patient_summary);
+    add(list, "expected_error_from_mm", "%g", record->report.expected_from);
+    add(list, "expected_error_source", "%s", content->prepared->fit);
   }
-  if (fitted && options->turn_fitted) {
+  if (fitted && record->gain_error > 0.0) {
     add(list, "turn_fitted", "yes");
   }
 }
@@ -166,8 +166,7 @@ static void add_lungs(entries *list, const supine_lungs *lungs, const double sha
   }
   double volume[2];
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-    const supine_mesh part = supine_lungs_part(lungs, lung);
-    volume[lung] = 1e-3 * share[lung] * supine_mesh_volume(&part);
+    volume[lung] = share[lung] * lungs->volume[lung];
   }
   add_by_lung(list, "reference_volume_ml", lungs->lung_count, volume);
   if (share[0] != 1.0 || share[1] != 1.0) {
@@ -186,7 +185,7 @@ static supine_status find_normals(const supine_basis_content *content, const flo
                                   const float *directions, supine_arena *arena,
                                   supine_normals_modes *normals, supine_error *error) {
   static const double straight[3] = {0.0, 0.0, 0.0};
-  const double *bend = content->reference != NULL ? content->options->model.bend : straight;
+  const double *bend = content->reference != NULL ? content->prepared->model.bend : straight;
   const supine_lungs *lungs = content->lungs;
   const supine_normals_surface surface = {.vertex_count = lungs->mesh.vertex_count,
                                           .triangle_count = lungs->mesh.triangle_count,
@@ -211,40 +210,44 @@ static void add_normals(entries *list, const supine_normals_modes *normals, bool
   }
 }
 
-static void add_texts(entries *list, const supine_precompute_options *options) {
-  if (options->patient != NULL) {
-    add(list, "patient_law", "%s", options->patient);
-    add(list, "patient", "%s", options->patient_summary);
+static void add_texts(entries *list, const supine_prepared *prepared) {
+  const char *findings = prepared->source.findings.text;
+  if (prepared->patient != NULL) {
+    char *law = supine_patient_text(prepared->patient, NULL);
+    list->memory->failed |= law == NULL;
+    add(list, "patient_law", "%s", law != NULL ? law : "");
+    add(list, "patient", "%s", prepared->fit);
+    free(law);
   }
-  if (options->assumed != NULL) {
-    add(list, "assumed", "%s", options->assumed);
+  if (prepared->assumed[0] != '\0') {
+    add(list, "assumed", "%s", prepared->assumed);
   }
-  if (options->findings != NULL && options->findings[0] != '\0') {
-    add(list, "warnings", "%.*s", (int)strlen(options->findings) - 1, options->findings);
+  if (findings[0] != '\0') {
+    add(list, "warnings", "%.*s", (int)strlen(findings) - 1, findings);
   }
-  if (options->frame.millimetres_per_unit > 0.0) {
+  if (prepared->source.frame.millimetres_per_unit > 0.0) {
     char letters[4];
-    supine_mesh_axes_letters(options->frame.axes, letters);
+    supine_mesh_axes_letters(prepared->source.frame.axes, letters);
     add(list, "scan_axes", "%s", letters);
-    add(list, "scan_unit_mm", "%.17g", options->frame.millimetres_per_unit);
+    add(list, "scan_unit_mm", "%.17g", prepared->source.frame.millimetres_per_unit);
   }
 }
 
 /* Add all metadata in the file's order. */
 static void add_all(entries *list, const supine_basis_content *content, const double share[2],
                     const supine_normals_modes *normals) {
-  const supine_precompute_options *options = content->options;
+  const supine_basis_choice *choice = content->choice;
   add(list, "format", "supine-basis");
   add(list, "version", "3");
   add(list, "kind", "%s", content->directions == NULL ? "vector" : "scalar");
   add(list, "band", "%zu", content->compression->band);
-  add(list, "modes", "%s", options->modes == 0 ? "harmonics" : "best");
+  add(list, "modes", "%s", choice->modes == 0 ? "harmonics" : "best");
   add(list, "mode_count", "%zu", content->compression->mode_count);
   add(list, "units", "mm");
   add(list, "axes", "LPS");
   add_lungs(list, content->lungs, share);
   if (!content->is_fields) {
-    add_model(list, content->lungs, &options->model, content->reference != NULL);
+    add_model(list, content->lungs, &content->prepared->model, content->reference != NULL);
   }
   if (content->reference != NULL) {
     add_reference(list, content->reference, share);
@@ -257,9 +260,9 @@ static void add_all(entries *list, const supine_basis_content *content, const do
   if (content->turned_over != NULL) {
     add(list, "turned_over_percent", "%.3g", 100.0 * *content->turned_over);
   }
-  add_texts(list, options);
+  add_texts(list, content->prepared);
   add_normals(list, normals, content->resting != NULL);
-  add(list, "made_by", "%s", options->made_by != NULL ? options->made_by : "supine_precompute");
+  add(list, "made_by", "%s", choice->made_by != NULL ? choice->made_by : "supine_precompute");
 }
 
 /* Add the error of storage to content->accuracy. Open the tensors as a basis in memory for that.
@@ -294,7 +297,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   static const double healthy[2] = {1.0, 1.0};
   static const supine_error_table no_table;
   const supine_lungs *lungs = content->lungs;
-  const double *share = content->is_fields ? healthy : content->options->model.share;
+  const double *share = content->is_fields ? healthy : content->prepared->model.share;
   const supine_compression *field = content->compression;
   const supine_volume_forms *forms = content->forms;
   const supine_error_table *table = content->table != NULL ? content->table : &no_table;
@@ -346,7 +349,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
        {table->band_count},
        table == &no_table ? NULL : table->harmonics},
       {"error_modes", SUPINE_F64, 1, {table->mode_count}, table == &no_table ? NULL : table->modes},
-      {"normals", SUPINE_I16, 3, {n, 3, q}, normals.modes},
+      {"normals", SUPINE_I8, 3, {n, 3, q + 1}, normals.modes},
       {"normal_weights", SUPINE_F64, 4, {g, q, 3, 1 + 2 * k + k * (k + 1) / 2}, normals.weights}};
   supine_tensor given[sizeof all / sizeof *all];
   size_t count = 0;

@@ -10,7 +10,8 @@
 /** Content of a basis file with N vertices. */
 typedef struct supine_basis_content {
   const supine_lungs *lungs;
-  const supine_precompute_options *options; /**< options->model is unused if `is_fields` */
+  const supine_prepared *prepared; /**< texts and model; the model is unused if `is_fields` */
+  const supine_basis_choice *choice;
   bool is_fields;             /**< whether another simulator computed the displacements; if so: */
   const double *scan_gravity; /**< [3] gravity in the scan, or NULL if it is unknown */
   const double *directions;   /**< [N, 3] displacement of each vertex per unit force, mm; NULL if

@@ -25,12 +25,13 @@ static const double breath_volume = 500.0;
 static const double sqrt_4pi = 3.5449077018110321;
 
 typedef struct pipeline {
-  const supine_lungs *given;
-  const supine_lungs *lungs; /* lungs in use: `given`, or `anchored` after anchor() */
-  const supine_precompute_options *options;
-  supine_arena memory;   /* holds the vertices of `anchored` */
-  supine_arena lengths;  /* holds the arrays `directions` and `weight` */
-  supine_lungs anchored; /* copy of `given` whose vertices anchor() has corrected, or all zero */
+  const supine_prepared *given;
+  const supine_model *model;
+  const supine_basis_choice *choice;
+  const supine_lungs *lungs; /* lungs in use: the given ones, or `anchored` after anchor() */
+  supine_arena memory;       /* holds the vertices of `anchored` */
+  supine_arena lengths;      /* holds the arrays `directions` and `weight` */
+  supine_lungs anchored; /* copy of the lungs whose vertices anchor() has corrected, or all zero */
   supine_reference reference;
   double *directions; /* [N, 3] displacement of each vertex per unit force, mm, or NULL */
   /* [N] squared length of the vector in `directions`. With these weights, the modes minimise the
@@ -69,8 +70,8 @@ static supine_status find_directions(pipeline *p, supine_error *error) {
   if (p->lengths.failed) {
     return supine_error_memory(error, "%zu vertices", n);
   }
-  SUPINE_TRY(supine_physics_directions(p->lungs, &p->options->model.force,
-                                       &p->options->model.direction, p->directions, error));
+  SUPINE_TRY(supine_physics_directions(p->lungs, &p->model->force, &p->model->direction,
+                                       p->directions, error));
   for (size_t i = 0; i < n; ++i) {
     const double *d = p->directions + 3 * i;
     p->weight[i] = supine_dot(d, d);
@@ -79,8 +80,7 @@ static supine_status find_directions(pipeline *p, supine_error *error) {
 }
 
 static supine_status project(pipeline *p, supine_error *error) {
-  const supine_precompute_options *options = p->options;
-  return supine_projection_create(p->lungs, &options->model, options->band, &p->projection, error);
+  return supine_projection_create(p->lungs, p->model, p->choice->band, &p->projection, error);
 }
 
 /* If expandability varies, replace the forces of the projection by displacements, mm. */
@@ -88,7 +88,7 @@ static supine_status find_strain(pipeline *p, supine_error *error) {
   supine_expansion *expansion = &p->projection.expansion;
   const size_t rank = expansion->rank;
   const size_t rows = 3 * expansion->row_count;
-  if (p->options->model.strain == NULL) {
+  if (p->model->strain == NULL) {
     return SUPINE_OK;
   }
   double *columns = malloc(rows * rank * sizeof *columns);
@@ -103,13 +103,13 @@ static supine_status find_strain(pipeline *p, supine_error *error) {
   p->directions = p->weight = NULL;
   expansion->columns = columns;
   expansion->row_count = rows;
-  return supine_physics_strain_apply(p->options->model.strain, NULL, 3 * rank, columns, error);
+  return supine_physics_strain_apply(p->model->strain, NULL, 3 * rank, columns, error);
 }
 
 static supine_status compress(pipeline *p, supine_error *error) {
-  return p->options->modes == 0
+  return p->choice->modes == 0
              ? supine_sh_compress_harmonics(&p->projection.expansion, &p->compression, error)
-             : supine_sh_compress_modes(&p->projection.expansion, p->weight, p->options->modes,
+             : supine_sh_compress_modes(&p->projection.expansion, p->weight, p->choice->modes,
                                         &p->compression, p->singular, &p->square_sum, error);
 }
 
@@ -121,7 +121,7 @@ static supine_status compress(pipeline *p, supine_error *error) {
  * A_j is the gain (factor on the displacement) at which its lung has the volume of the scan, and u
  * is the displacement computed from the modes. */
 static supine_status anchor(pipeline *p, supine_error *error) {
-  const supine_lungs *lungs = p->given;
+  const supine_lungs *lungs = &p->given->source.lungs;
   const supine_compression *field = &p->compression;
   const size_t n = lungs->mesh.vertex_count;
   double weights[SUPINE_MODES_MADE_MAX];
@@ -143,19 +143,20 @@ static supine_status anchor(pipeline *p, supine_error *error) {
     u[i] = 1.0;
   }
   memcpy(p->anchored.mesh.vertices, lungs->scanned, 3 * n * sizeof(double));
-  const supine_status status = supine_reference_find_gains(&p->anchored, p->options->model.bend, u,
-                                                           u + 3 * n, &p->reference, error);
+  const supine_status status =
+      supine_reference_find_gains(&p->anchored, p->model->bend, u, u + 3 * n, &p->reference, error);
   for (size_t i = 0; i < 3 * n; ++i) {
     const size_t lung = lungs->lung_count == 2 && i >= 3 * lungs->lung_begin[1];
     p->anchored.mesh.vertices[i] -= p->reference.scan_gains[lung][i % 3] * u[i];
   }
+  supine_lungs_measure_volumes(&p->anchored);
   p->lungs = &p->anchored;
   return status;
 }
 
 static supine_status find_forms(pipeline *p, supine_error *error) {
-  return supine_projection_volume_forms(&p->compression, p->lungs, p->options->model.share,
-                                        p->directions, &p->forms, error);
+  return supine_projection_volume_forms(&p->compression, p->lungs, p->model->share, p->directions,
+                                        &p->forms, error);
 }
 
 /* Check that each lung can reach its resting volume (FRC) with gravity along the unit vector g.
@@ -210,13 +211,12 @@ static supine_status rest_harmonics(const supine_reference *reference, const dou
 
 /* Find the resting volumes (FRC) if known, and the volume at which errors in mm are measured. */
 static supine_status find_rest(pipeline *p, supine_error *error) {
-  const supine_precompute_options *options = p->options;
   p->volume[0] = breath_volume * sqrt_4pi;
   if (!p->reference.known) {
     return SUPINE_OK;
   }
-  SUPINE_TRY(rest_harmonics(&p->reference, options->model.share, &p->compression, &p->forms,
-                            p->resting, error));
+  SUPINE_TRY(rest_harmonics(&p->reference, p->model->share, &p->compression, &p->forms, p->resting,
+                            error));
   for (size_t t = 0; t < 9; ++t) {
     p->volume[t] = p->resting[0][t] + p->resting[1][t];
   }
@@ -229,9 +229,9 @@ static size_t held_out_default(const pipeline *p) {
 }
 
 static supine_status hold_out(pipeline *p, supine_error *error) {
-  const size_t count = p->options->held_out > 0 ? p->options->held_out : held_out_default(p);
-  return supine_accuracy_truth_create(p->lungs, &p->options->model, p->directions, &p->projection,
-                                      count, &p->truth, error);
+  const size_t count = p->choice->held_out > 0 ? p->choice->held_out : held_out_default(p);
+  return supine_accuracy_truth_create(p->lungs, p->model, p->directions, &p->projection, count,
+                                      &p->truth, error);
 }
 
 static supine_status measure(pipeline *p, supine_error *error) {
@@ -249,7 +249,7 @@ static supine_status tabulate(pipeline *p, supine_error *error) {
 static supine_status drop_modes(pipeline *p, supine_error *error) {
   const size_t needed = supine_sh_modes_needed(p->compression.mode_count, p->singular,
                                                p->square_sum, p->accuracy.relative_rms);
-  if (p->options->modes == 0 || needed == p->compression.mode_count) {
+  if (p->choice->modes == 0 || needed == p->compression.mode_count) {
     return SUPINE_OK;
   }
   supine_sh_compression_truncate(&p->compression, p->projection.expansion.rank, needed);
@@ -265,14 +265,15 @@ static supine_status find_turned_over(pipeline *p, supine_error *error) {
                                      &p->turned_over, error);
 }
 
-static supine_status write_file(pipeline *p, const char *path, supine_error *error) {
+static supine_status write_file(pipeline *p, supine_error *error) {
   for (size_t i = 0; i < 3 * p->lungs->mesh.vertex_count && p->directions == NULL; ++i) {
     const size_t lung = p->lungs->lung_count == 2 && i >= 3 * p->lungs->lung_begin[1];
-    cblas_sscal((int)p->compression.mode_count, (float)cbrt(p->options->model.share[lung]),
+    cblas_sscal((int)p->compression.mode_count, (float)cbrt(p->model->share[lung]),
                 p->compression.coefficients + i * p->compression.mode_count, 1);
   }
   const supine_basis_content content = {.lungs = p->lungs,
-                                        .options = p->options,
+                                        .prepared = p->given,
+                                        .choice = p->choice,
                                         .directions = p->directions,
                                         .compression = &p->compression,
                                         .forms = &p->forms,
@@ -281,31 +282,38 @@ static supine_status write_file(pipeline *p, const char *path, supine_error *err
                                         .table = &p->table,
                                         .reference = p->reference.known ? &p->reference : NULL,
                                         .resting = p->reference.known ? p->resting[0] : NULL};
-  return supine_writer_basis_write(path, &content, error);
+  return supine_writer_basis_write(p->choice->path, &content, error);
 }
 
-supine_status supine_precompute(const supine_lungs *lungs, const supine_precompute_options *options,
-                                const char *path, supine_precompute_report *report,
-                                supine_error *error) {
-  pipeline p = {.given = lungs, .lungs = lungs, .options = options};
-  if (options->reference != NULL) {
-    p.reference = *options->reference;
+static supine_status tell_progress(const supine_basis_choice *choice, double fraction,
+                                   supine_error *error) {
+  return choice->progress == NULL || choice->progress(choice->progress_context, fraction)
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_INTERRUPTED,
+                                "interrupted: nothing was written");
+}
+
+supine_status supine_precompute(const supine_prepared *prepared, const supine_basis_choice *choice,
+                                supine_precompute_report *report, supine_error *error) {
+  static supine_status (*const steps[])(pipeline *, supine_error *) = {
+      project,  find_directions, find_strain, compress,   anchor,           find_forms, find_rest,
+      hold_out, measure,         tabulate,    drop_modes, find_turned_over, write_file};
+  enum { STEPS = sizeof steps / sizeof *steps };
+  SUPINE_FREED_BY(pipeline_free)
+  pipeline p = {.given = prepared,
+                .model = &prepared->model,
+                .choice = choice,
+                .lungs = &prepared->source.lungs,
+                .reference = prepared->reference};
+  for (size_t i = 0; i < STEPS; ++i) {
+    SUPINE_TRY(tell_progress(choice, (double)i / STEPS, error));
+    SUPINE_TRY(steps[i](&p, error));
   }
-  supine_status (*const steps[])(pipeline *, supine_error *) = {
-      project,   find_directions, find_strain, compress, anchor,     find_forms,
-      find_rest, hold_out,        measure,     tabulate, drop_modes, find_turned_over};
-  supine_status status = SUPINE_OK;
-  for (size_t i = 0; i < sizeof steps / sizeof *steps && status == SUPINE_OK; ++i) {
-    status = steps[i](&p, error);
-  }
-  if (status == SUPINE_OK) {
-    status = write_file(&p, path, error);
-  }
-  if (status == SUPINE_OK && report != NULL) {
+  SUPINE_TRY(tell_progress(choice, 1.0, error));
+  if (report != NULL) {
     *report = (supine_precompute_report){.mode_count = p.compression.mode_count,
                                          .accuracy = p.accuracy,
                                          .turned_over = p.turned_over};
   }
-  pipeline_free(&p);
-  return status;
+  return SUPINE_OK;
 }

@@ -73,6 +73,17 @@ static void tell_volume(const supine_patient_record *record, double measured,
                                       : "");
 }
 
+static void describe_fit(const supine_patient_record *record, char *text, size_t size) {
+  const supine_patient_fit_report *report = &record->report;
+  (void)snprintf(text, size,
+                 "%s: %s law%s from %.0f points; held-out residual %.1f of %.1f mm RMS, %.0f %% "
+                 "explained; expected error %.1f mm RMS",
+                 record->name, supine_patient_law_names[record->patient.law],
+                 record->patient.centre_count > 0 ? " and kriging" : "", report->points,
+                 report->held_out[SUPINE_PATIENT_SCORE_CORRECTED], report->baseline,
+                 report->explained, report->expected_point);
+}
+
 /* Use the displacement law and the force that were fitted to a patient. If the state of the scan is
  * not given, use the state in the fit. */
 static supine_status take_patient(const supine_patient_record *fitted, supine_prepared *p,
@@ -86,6 +97,7 @@ static supine_status take_patient(const supine_patient_record *fitted, supine_pr
   }
   *record = *fitted;
   p->patient = record;
+  describe_fit(record, p->fit, sizeof p->fit);
   p->model = supine_physics_model(SUPINE_LAW_DEEP);
   SUPINE_TRY(supine_patient_model(record, &p->source.lungs, &means->resting, &scan, arrays,
                                   &p->model, error));

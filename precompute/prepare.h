@@ -39,6 +39,7 @@ typedef struct supine_prepared {
   supine_model model;
   const supine_patient_record *patient; /**< the patient's, with what these lungs add, or NULL */
   supine_reference reference;
+  char fit[256];       /**< for the user: of which data `patient` was made, and its errors */
   char assumed[800];   /**< for the user: axes, unit, displacement law, state and volumes */
   supine_arena memory; /**< of the arrays of the model */
 } supine_prepared;

@@ -23,16 +23,17 @@ typedef struct reading {
   supine_mesh_report *reports;
   supine_error *errors; /* error of each file; status SUPINE_OK if the file was loaded */
   supine_axes axes;     /* axes of the files, or of a label map's header */
-  bool has_midline;
-  double midline;
+  int side;             /* side of a single lung in a label map; else 0 */
 } reading;
 
 static void load_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const reading *r = context;
   for (size_t i = begin; i < end; ++i) {
-    r->errors[i].status = supine_mesh_load(r->paths[i], &r->options->load, &r->meshes[i],
-                                           &r->reports[i], &r->errors[i]);
+    supine_mesh_load_options load = r->options->load;
+    load.arrays = r->options->surfaces != NULL ? &r->options->surfaces[i] : NULL;
+    r->errors[i].status =
+        supine_mesh_load(r->paths[i], &load, &r->meshes[i], &r->reports[i], &r->errors[i]);
   }
 }
 
@@ -122,8 +123,6 @@ static supine_status find_lobes(const char *folder, lobe_files *found, supine_er
                                 folder);
 }
 
-/* Load label maps. If they show a single lung and no midline was given, use the medial face of the
- * lung's bounding box as midline. */
 static supine_status load_maps(reading *r, supine_source *source, supine_error *error) {
   supine_labels_options wanted = r->options->labels;
   const bool folder = r->count == 1 && is_folder(r->paths[0]);
@@ -148,13 +147,7 @@ static supine_status load_maps(reading *r, supine_source *source, supine_error *
   for (size_t i = 0; i < r->count; ++i) {
     r->reports[i] = (supine_mesh_report){.axes = SUPINE_AXES_LPS, .axes_from_tag = true};
   }
-  if (r->count == 1 && !r->has_midline) {
-    double low[3];
-    double high[3];
-    supine_mesh_box(&r->meshes[0], low, high);
-    r->midline = source->report.lung[0].side > 0 ? low[0] : high[0];
-    r->has_midline = true;
-  }
+  r->side = source->report.lung[0].side;
   note_map(r->paths[0], &source->report, &source->findings);
   return SUPINE_OK;
 }
@@ -185,14 +178,8 @@ static void summarize(const reading *r, supine_source *source) {
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     supine_text_add(source->summary, size, "; %s lung in", supine_lungs_name(lungs, lung));
     for (size_t axis = 0; axis < 3; ++axis) {
-      double low = INFINITY;
-      double high = -INFINITY;
-      for (size_t i = lungs->lung_begin[lung]; i < lungs->lung_begin[lung + 1]; ++i) {
-        low = fmin(low, lungs->mesh.vertices[3 * i + axis]);
-        high = fmax(high, lungs->mesh.vertices[3 * i + axis]);
-      }
       supine_text_add(source->summary, size, "%s %c %.0f to %.0f", axis == 0 ? "" : ",",
-                      "xyz"[axis], low, high);
+                      "xyz"[axis], lungs -> low[lung][axis], lungs -> high[lung][axis]);
     }
     supine_text_add(source->summary, size, " mm");
   }
@@ -203,7 +190,7 @@ static supine_status check_kinds(const supine_source_options *options, char **pa
                                  bool *is_map, supine_error *error) {
   const supine_labels_options *labels = &options->labels;
   size_t images = 0;
-  for (size_t i = 0; i < count; ++i) {
+  for (size_t i = 0; i < count && options->surfaces == NULL; ++i) {
     images += supine_image_is_named(paths[i]) || (count == 1 && is_folder(paths[i]));
   }
   *is_map = images == count;
@@ -227,7 +214,9 @@ static supine_status read_files(reading *r, supine_source *source, supine_error 
   const supine_lungs_source given = {.name = r->paths[0],
                                      .axes = r->axes,
                                      .units_given = r->options->load.millimetres_per_unit != 0.0,
-                                     .midline = r->has_midline ? &r->midline : NULL};
+                                     .midline =
+                                         r->options->has_midline ? &r->options->midline : NULL,
+                                     .side = r->side};
   SUPINE_TRY(supine_lungs_gate(r->meshes, r->count, &given, &source->lungs, &source->axes_hold,
                                &source->findings, error));
   if (r->options->surfaces_out != NULL) {
@@ -249,9 +238,7 @@ supine_status supine_precompute_source_load(const supine_source_options *options
                .count = count,
                .meshes = supine_arena_zeros(&arena, most, sizeof *r.meshes),
                .reports = supine_arena_zeros(&arena, most, sizeof *r.reports),
-               .errors = supine_arena_zeros(&arena, most, sizeof *r.errors),
-               .has_midline = options->has_midline,
-               .midline = options->midline};
+               .errors = supine_arena_zeros(&arena, most, sizeof *r.errors)};
   if (arena.failed) {
     return supine_error_memory(error, "%zu files", count);
   }

@@ -12,6 +12,7 @@
 
 typedef struct supine_source_options {
   supine_mesh_load_options load;
+  const supine_mesh *surfaces;  /**< a surface for each path, which is then only a name; or NULL */
   supine_labels_options labels; /**< options for label maps; load.axes replaces labels.axes */
   const char *surfaces_out;     /**< path to save the surfaces of a label map to, or NULL */
   bool has_midline;

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine deform: write the surface of a basis for a posture and a volume. */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -8,8 +7,6 @@
 #include "base/csv.h"
 #include "base/output.h"
 #include "base/text.h"
-#include "base/vec3.h"
-#include "mesh/mesh.h"
 #include <supine/runtime.h>
 
 #include "program/deform_content.h"
@@ -37,8 +34,7 @@ static const supine_option table[] = {
      "file to write: " SUPINE_MESH_ENDINGS
      "; PLY and VTP files include displacements and expected errors. Embedded points can also be "
      "written as .csv, and moved images as .nrrd, .nii, .nii.gz or .mha",
-     SUPINE_FILLS(request, content.path), .file = SUPINE_FILE_OUT, .endings = ENDINGS,
-     .rivals = "output"},
+     SUPINE_FILLS(request, content.path), .file = SUPINE_FILE_OUT, .endings = ENDINGS},
     {"states", 0, "LIST",
      "CSV file with a state in each row, in the columns posture, volume and output; the basis and "
      "the images are read once for all states. An output is a surface, points, or "
@@ -46,8 +42,8 @@ static const supine_option table[] = {
      "With --image and --labels, the column labels has the file of the moved labels; the column "
      "field has that of the field. Each state's field is computed once. Paths are relative to the "
      "folder of LIST",
-     SUPINE_FILLS(request, states), .file = SUPINE_FILE_IN, .wants = "a CSV file",
-     .rivals = "output"},
+     SUPINE_FILLS(request, states), .file = SUPINE_FILE_IN,
+     .partners = "volume allow-folds from as-scanned frame vertices inverse image density labels"},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {.table = supine_options_from_scan, SUPINE_FILLS(request, from)},
     {.table = supine_options_as_scanned, SUPINE_FILLS(request, as_scanned)},
@@ -55,66 +51,6 @@ static const supine_option table[] = {
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.table = supine_command_deform_content_options, SUPINE_FILLS(request, content)},
     {.name = NULL}};
-
-static double largest_displacement(const supine_mesh *rest, const supine_mesh *mesh) {
-  double largest = 0.0;
-  for (size_t i = 0; i < mesh->vertex_count; ++i) {
-    const double *a = rest->vertices + 3 * i;
-    const double *b = mesh->vertices + 3 * i;
-    largest = fmax(largest, supine_distance(b, a));
-  }
-  return largest;
-}
-
-static void report(const char *path, const double gravity[3], const supine_mesh *mesh,
-                   const supine_mesh *from, const char *reference, bool volumes) {
-  (void)printf("%s: gravity %.4g,%.4g,%.4g, largest displacement %.3f mm from %s", path, gravity[0],
-               gravity[1], gravity[2], largest_displacement(from, mesh), reference);
-  if (volumes) {
-    const double held = 1e-3 * supine_mesh_volume(mesh);
-    (void)printf(", %.2f mL (%+.2f mL)", held, held - 1e-3 * supine_mesh_volume(from));
-  }
-  (void)putchar('\n');
-}
-
-static supine_status write_surface(const char *path, const supine_basis *basis,
-                                   supine_deformation *moved, supine_error *error) {
-  const supine_basis_info *info = supine_basis_get_info(basis);
-  const supine_tensor *lung = supine_basis_tensor(basis, "lung");
-  const double *gravity = moved->state.gravity;
-  supine_mesh_save_options *save = &moved->save;
-  double volumes[SUPINE_LUNGS_MAX];
-  const supine_mesh_field fields[] = {{"gravity_LPS", 3, gravity},
-                                      {"volume_mL", info->lung_count, volumes}};
-  SUPINE_FREED_BY(supine_mesh_free) supine_mesh from = {0};
-  SUPINE_FREED_BY(supine_mesh_free) supine_mesh mesh = {0};
-  SUPINE_ARENA arena = {0};
-  float *normals = supine_arena_take(&arena, info->vertex_count, 3 * sizeof *normals);
-  float *xyz = supine_arena_take(&arena, info->vertex_count, 3 * sizeof *xyz);
-  if (arena.failed) {
-    return supine_error_memory(error, "%zu vertices", info->vertex_count);
-  }
-  SUPINE_TRY(supine_posed_mesh(basis, &moved->from.pose, &from, error));
-  SUPINE_TRY(supine_posed_mesh(basis, &moved->pose, &mesh, error));
-  (void)supine_deform(basis, &moved->pose, xyz);
-  supine_normals(basis, xyz, normals);
-  for (size_t i = 0; i < 3 * mesh.vertex_count && moved->subtract_hilum; ++i) {
-    mesh.vertices[i] -= moved->hilum[i % 3];
-  }
-  (void)supine_basis_volumes(basis, &moved->pose, volumes);
-  save->from = from.vertices;
-  save->normals = mesh.triangle_count > 0 ? normals : NULL;
-  save->scalars[0] = (supine_mesh_scalar){"expected_error_mm", moved->expected.sigma};
-  save->lung = lung == NULL ? NULL : lung->data;
-  save->fields = fields;
-  save->field_count = sizeof fields / sizeof *fields;
-  SUPINE_TRY(supine_mesh_save(path, &mesh, save, error));
-  report(path, gravity, &mesh, &from, moved->from.name,
-         supine_basis_metadata(basis, "content") == NULL);
-  supine_options_expected_print(&moved->expected, stdout);
-  supine_options_hilum_print(moved->hilum, moved->subtract_hilum);
-  return SUPINE_OK;
-}
 
 static void free_expected(supine_deformation *moved) {
   supine_posed_expected_free(&moved->expected);
@@ -137,15 +73,13 @@ static supine_status deform(const supine_basis *basis, const request *wanted, su
                  wanted->frame == 1 ? ", in the frame of the hilum" : "");
   moved.save.comment = comment;
   SUPINE_TRY(supine_options_basis_frame(basis, wanted->as_scanned, &moved.save, error));
-  return supine_command_deform_content_wanted(&wanted->content)
-             ? supine_command_deform_content(&wanted->content, basis, &moved, error)
-             : write_surface(wanted->content.path, basis, &moved, error);
+  return supine_command_deform_content(&wanted->content, basis, &moved, error);
 }
 
 /* Fill a request with the state and the output file in a row of the CSV file of --states. */
 static supine_status read_row(const supine_csv *csv, request *row, supine_error *error) {
   const char *const output = supine_csv_text(csv, 1);
-  const char *const volume = supine_csv_text(csv, 2);
+  const char *const volume = supine_csv_text(csv, 4);
   supine_state *state = &row->volume.state;
   supine_error reason;
   state->gravity[1] = 1.0; /* the default posture is supine */
@@ -162,8 +96,8 @@ static supine_status read_row(const supine_csv *csv, request *row, supine_error 
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%s:%zu: %s: the name must end in %s",
                             csv->path, csv->line, output, ENDINGS);
   }
-  for (size_t i = 0; i < 3; ++i) { /* the columns output, labels and field are 1, 3 and 4 */
-    const char *const named = i == 0 ? output : supine_csv_text(csv, i + 2);
+  for (size_t i = 0; i < 3; ++i) { /* the columns output, labels and field */
+    const char *const named = supine_csv_text(csv, 1 + i);
     if (named != NULL && named[0] != '\0') {
       row->outputs[i] = supine_path_beside(csv->path, named);
       if (row->outputs[i] == NULL) {
@@ -171,10 +105,8 @@ static supine_status read_row(const supine_csv *csv, request *row, supine_error 
       }
     }
   }
-  if (row->outputs[2] != NULL) {
-    row->content.field = row->outputs[2];
-  }
   row->content.labels_path = row->outputs[1];
+  row->content.field = row->outputs[2];
   *(voxels && !image ? &row->content.field : &row->content.path) = row->outputs[0];
   return supine_command_deform_content_check(&row->content, error);
 }
@@ -232,11 +164,8 @@ static supine_status add_row(batch *b, supine_error *error) {
 
 /* Make a request for each row of --states, and check all rows before any state is computed. */
 static supine_status read_rows(const char *basis, batch *b, supine_error *error) {
-  static const char *const columns[] = {"posture", "output", "volume", "labels", "field"};
+  static const char *const columns[] = {"posture", "output", "labels", "field", "volume"};
   SUPINE_FREED_BY(supine_csv_close) supine_csv csv = {0};
-  if (b->wanted->orientation.given) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give a posture or --states, not both");
-  }
   SUPINE_TRY(supine_csv_open(b->wanted->states, columns, 5, 2, &csv, error));
   for (;;) {
     bool more = false;

@@ -20,14 +20,14 @@ static const char name[] = "embed";
 /* A grid extends this far beyond the lungs, mm. Displacements fall to 0 over this distance. */
 static const double margin = 60.0;
 
-enum { LABELS_MOST = 64 };
+enum { LABELS_MOST = 64, NAME_MOST = 31 };
 
 /* Labels given by --labels, and a name for each. */
 typedef struct label_list {
   bool given;
   size_t count; /* number of labels; 0: all labels of the label map */
   unsigned label[LABELS_MOST];
-  char name[LABELS_MOST][32];
+  char name[LABELS_MOST][NAME_MOST + 7];
 } label_list;
 
 typedef struct request {
@@ -44,25 +44,22 @@ typedef struct request {
 static supine_status read_labels(const char *text, void *field, supine_error *error) {
   label_list *list = field;
   (void)error;
+  char item[40];
   list->given = true;
   list->count = 0;
-  for (const char *at = text; strcmp(text, "all") != 0;) {
-    const size_t length = strcspn(at, ",");
-    const size_t digits = strspn(at, "0123456789");
-    const bool named = digits < length && at[digits] == '=';
-    if (list->count == LABELS_MOST || digits == 0 || digits > 5 || (digits != length && !named) ||
-        length - digits > sizeof list->name[0] || (named && length == digits + 1)) {
+  if (strcmp(text, "all") == 0) {
+    return SUPINE_OK;
+  }
+  for (const char *at = text; supine_options_next_item(&at, item, sizeof item);) {
+    const size_t digits = strspn(item, "0123456789");
+    const bool named = item[digits] == '=' && item[digits + 1] != '\0';
+    if (list->count == LABELS_MOST || digits == 0 || digits > 5 ||
+        strlen(item + digits) > 1 + NAME_MOST || (item[digits] != '\0' && !named)) {
       return SUPINE_ERROR_ARGUMENT;
     }
-    char *called = list->name[list->count];
-    list->label[list->count] = (unsigned)strtoul(at, NULL, 10);
-    (void)snprintf(called, sizeof list->name[0], "%s%.*s", named ? "" : "label ",
-                   (int)(named ? length - digits - 1 : digits), named ? at + digits + 1 : at);
-    ++list->count;
-    at += length;
-    if (*at++ == '\0') {
-      break;
-    }
+    list->label[list->count] = (unsigned)strtoul(item, NULL, 10);
+    (void)snprintf(list->name[list->count++], sizeof list->name[0], "%s%.31s",
+                   named ? "" : "label ", named ? item + digits + 1 : item);
   }
   return SUPINE_OK;
 }

@@ -80,29 +80,23 @@ static supine_status write_column(const supine_prepared *prepared, const request
 static supine_status find_volumes(const supine_reference *reference, const supine_state *state,
                                   double *ml, supine_error *error) {
   const double *g = state->gravity;
-  const double full = reference->full_volume[0] + reference->full_volume[1];
+  const double *full = reference->full_volume;
+  const double *scan = reference->scan_volume;
+  const supine_volume_kind kind = state->volume.kind;
   double part[2];
-  double total = state->volume.ml;
-  switch (state->volume.kind) {
-  case SUPINE_VOLUME_ABSOLUTE:
-    break;
-  case SUPINE_VOLUME_SCAN:
-    total += full + reference->scan_volume[0] + reference->scan_volume[1];
-    break;
-  case SUPINE_VOLUME_FULL:
-    total += supine_reference_full(reference, g, part);
-    break;
-  default:
-    total += supine_reference_rest(reference, g, part);
-  }
   if (state->lung_count > 0) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "--volume: 'supine solve' takes one volume of all lungs together, not "
                             "a volume for each lung");
   }
+  const double total =
+      state->volume.ml + (kind == SUPINE_VOLUME_ABSOLUTE ? 0.0
+                          : kind == SUPINE_VOLUME_SCAN   ? full[0] + full[1] + scan[0] + scan[1]
+                          : kind == SUPINE_VOLUME_FULL   ? supine_reference_full(reference, g, part)
+                                                       : supine_reference_rest(reference, g, part));
   supine_reference_share_out(reference, g, total, ml);
   for (size_t lung = 0; lung < reference->lung_count; ++lung) {
-    ml[lung] -= reference->full_volume[lung];
+    ml[lung] -= full[lung];
   }
   return SUPINE_OK;
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine stream: receive the poses of a tracked patient, and send the lungs in each pose. */
+#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -19,8 +20,6 @@
 
 static const char name[] = "stream";
 
-static const double budget = 15e-3; /* time allowed from receiving a pose to sending its frame, s */
-
 typedef struct request {
   supine_stream_options options;
   double world_down[3], body_from_tracker[4];
@@ -29,7 +28,6 @@ typedef struct request {
   bool has_volume, has_breath;
   const char *pv;
   supine_pv_breath breath;
-  double smooth; /* time constant with which poses are smoothed, ms; 0 for no smoothing */
   const char *web, *certificate, *key;
   supine_from from;
   const char *points;
@@ -56,11 +54,6 @@ static const supine_option table[] = {
      "rotation from the marker's axes to the body's (left, back, head), as a quaternion; 0,0,0,1 "
      "if the marker's axes are right, front, head",
      SUPINE_FILLS(request, body_from_tracker), .standard = "1,0,0,0", .more = true},
-    {"smooth", 0, "MS",
-     "time constant of smoothing, in ms, for a noisy tracker; it delays a turn by this time; "
-     "default 0",
-     SUPINE_FILLS(request, smooth), .range = {0.0, 10000.0}, .wants = "0 to 10000 ms",
-     .more = true},
     {.help = "Observed points inside the lungs, as in 'supine locate':"},
     {"points", 0, "FILE",
      "positions of the points in the scan, made by 'supine embed BASIS'. Their observed positions "
@@ -99,8 +92,6 @@ static const supine_option table[] = {
      .standard = "SUPINE", .more = true},
     {"fps", 0, "N", "largest number of frames per second", SUPINE_FILLS(request, options.rate),
      .range = {1.0, 1000.0}, .standard = "200", .more = true},
-    {"peers", 0, "N", "largest number of peers, and of viewers of the page",
-     SUPINE_FILLS(request, options.peers), .range = {1.0, 1000.0}, .standard = "64", .more = true},
     {.help = "A live page:"},
     {"web", 0, "[ADDRESS:]PORT",
      "serve a page that shows the lungs live. A phone on which the page is open can send its own "
@@ -127,8 +118,8 @@ static bool stop(void *context) {
   return supine_options_interrupted();
 }
 
-static void report(const supine_stream_server *server, const request *wanted) {
-  const supine_stream_counts *n = supine_stream_server_counts(server);
+static void report(const supine_stream_results *results, const request *wanted) {
+  const supine_stream_counts *n = &results->counts;
   if (wanted->points != NULL) {
     (void)printf("received positions of observed points: %llu\n", (unsigned long long)n->positions);
   }
@@ -137,26 +128,21 @@ static void report(const supine_stream_server *server, const request *wanted) {
       (unsigned long long)n->poses, (unsigned long long)n->repaired, (unsigned long long)n->refused,
       (unsigned long long)n->frames, (unsigned long long)n->sent, (unsigned long long)n->peers);
   if (n->malformed + n->skipped + n->lost + n->turned_away + n->unreachable > 0) {
-    (void)printf("malformed messages: %llu; messages not read: %llu; peers disconnected: %llu; "
+    (void)printf("malformed messages: %llu; messages not used: %llu; peers disconnected: %llu; "
                  "peers refused: %llu; frames whose volume is out of reach: %llu\n",
                  (unsigned long long)n->malformed, (unsigned long long)n->skipped,
                  (unsigned long long)n->lost, (unsigned long long)n->turned_away,
                  (unsigned long long)n->unreachable);
   }
   for (int surfaces = 0; surfaces < 2; ++surfaces) {
-    const supine_stream_latency *latency = supine_stream_server_latency(
-        server, surfaces != 0 ? SUPINE_STREAM_SURFACE : SUPINE_STREAM_WEIGHTS);
+    const supine_stream_latency *latency = &results->latency[surfaces];
     if (latency->count > 0) {
-      (void)printf(
-          "pose received to %s sent: median %.3f ms, 99 %% within %.3f ms, worst %.3f ms; allowed: "
-          "%.0f ms\n",
-          surfaces != 0 ? "surface" : "weights", 1e3 * supine_stream_latency_quantile(latency, 0.5),
-          1e3 * supine_stream_latency_quantile(latency, 0.99), 1e3 * latency->worst, 1e3 * budget);
+      (void)printf("pose received to %s sent: %llu of %llu frames within %.0f ms, worst %.3f ms\n",
+                   surfaces != 0 ? "surface" : "weights",
+                   (unsigned long long)(latency->count - latency->late),
+                   (unsigned long long)latency->count, 1e3 * SUPINE_STREAM_BUDGET,
+                   1e3 * latency->worst);
     }
-  }
-  if (wanted->smooth > 0.0) {
-    (void)printf("--smooth adds a delay of %.0f ms during a turn at constant speed\n",
-                 wanted->smooth);
   }
 }
 
@@ -198,27 +184,17 @@ static supine_status open_points(const supine_basis *basis, const request *wante
   return observed->space != NULL ? SUPINE_OK : supine_error_memory(error, "%s", wanted->points);
 }
 
-/* Make the page that shows the lungs of a basis file live. The caller frees *page. */
-static supine_status make_page(const char *path, const export_page *shown, char **page,
-                               size_t *size, supine_error *error) {
-  SUPINE_FREED_BY(supine_export_source_close) export_source source = {0};
-  SUPINE_TRY(supine_export_source_open(path, &source, error));
-  FILE *file = open_memstream(page, size);
-  if (file == NULL) {
-    return supine_error_memory(error, "the page");
-  }
-  const supine_status status = supine_export_html_print(file, &source, shown, error);
-  const bool whole = ferror(file) == 0;
-  return fclose(file) == 0 && whole ? status : supine_error_memory(error, "the page");
-}
+#define PAGE P_tmpdir "/supine-page-XXXXXX" /* template of the name of a temporary file */
 
-/* If --web is given, serve the live page. The caller destroys *web, then frees *page. */
+/* If --web is given, serve the page that shows the lungs of the basis file `path` live, from a
+ * temporary file. The caller destroys *web, then removes the file `page`. */
 static supine_status open_page(const request *wanted, const supine_basis *basis, const char *path,
-                               char **page, supine_stream_web **web, supine_error *error) {
+                               char *page, supine_stream_web **web, supine_error *error) {
   supine_stream_address address;
   supine_reference_pose from;
-  supine_stream_site site = {
-      .certificate = wanted->certificate, .key = wanted->key, .viewers = wanted->options.peers};
+  SUPINE_FREED_BY(supine_export_source_close) export_source source = {0};
+  SUPINE_FREED_BY(supine_file_close) FILE *file = NULL;
+  supine_stream_site site = {.certificate = wanted->certificate, .key = wanted->key};
   if (wanted->web == NULL) {
     return SUPINE_OK;
   }
@@ -231,14 +207,23 @@ static supine_status open_page(const request *wanted, const supine_basis *basis,
                              .from_count = 1,
                              .title = "Lungs, live",
                              .live = true};
-  SUPINE_TRY(make_page(path, &shown, page, &site.page_size, error));
+  SUPINE_TRY(supine_export_source_open(path, &source, error));
+  (void)strcpy(page, PAGE);
+  const int descriptor = mkstemp(page);
+  file = descriptor < 0 ? NULL : fdopen(descriptor, "w");
+  if (file != NULL) {
+    SUPINE_TRY(supine_export_html_print(file, &source, &shown, error));
+  }
+  if (file == NULL || fflush(file) != 0) {
+    return supine_error_set(error, SUPINE_ERROR_WRITE, "%s: %s", page, strerror(errno));
+  }
   site.address = address.host;
   site.port = address.port;
-  site.page = *page;
+  site.page = page;
   SUPINE_TRY(supine_stream_web_create(&site, web, error));
   const bool ipv6 = strchr(address.host, ':') != NULL;
   (void)printf("page at http%s://%s%s%s:%d/\n", site.certificate != NULL ? "s" : "",
-               ipv6 ? "[" : "", address.host, ipv6 ? "]" : "", supine_stream_web_port(*web));
+               ipv6 ? "[" : "", address.host, ipv6 ? "]" : "", site.port);
   return SUPINE_OK;
 }
 
@@ -271,7 +256,7 @@ static supine_status set_volume(const supine_basis *basis, const request *wanted
 typedef struct session {
   supine_arena arena;
   observed_points points;
-  char *page;
+  char page[sizeof PAGE];
   supine_stream_web *web;
   supine_stream_server *server;
 } session;
@@ -279,7 +264,7 @@ typedef struct session {
 static void end(session *s) {
   supine_stream_server_destroy(s->server);
   supine_stream_web_destroy(s->web);
-  free(s->page);
+  (void)remove(s->page); /* has no effect if there is no page */
   supine_command_names_close(&s->points.names);
   supine_basis_close(s->points.inside);
   supine_arena_free(&s->arena);
@@ -296,16 +281,17 @@ static supine_status stream(const supine_basis *basis, const char *path, const r
     SUPINE_TRY(open_points(basis, wanted, &s.points, &s.arena, error));
     options.observed = &s.points.observed;
   }
-  SUPINE_TRY(open_page(wanted, basis, path, &s.page, &s.web, error));
+  SUPINE_TRY(open_page(wanted, basis, path, s.page, &s.web, error));
   options.web = s.web;
   SUPINE_TRY(supine_stream_server_create(basis, &options, &s.server, error));
-  if (supine_stream_server_port(s.server) != 0) {
-    (void)printf("listening on port %d\n", supine_stream_server_port(s.server));
+  const supine_stream_results *results = supine_stream_server_results(s.server);
+  if (results->port != 0) {
+    (void)printf("listening on port %d\n", results->port);
   }
   (void)fflush(stdout);
   supine_options_signals_catch(true);
   const supine_status status = supine_stream_server_run(s.server, error);
-  report(s.server, wanted);
+  report(results, wanted);
   return status;
 }
 
@@ -319,15 +305,16 @@ static void begin(void *chosen) {
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
   supine_stream_options *options = &wanted->options;
+  double unit[3];
   options->ras = wanted->space == 1;
-  options->smooth = 1e-3 * wanted->smooth;
   if (options->listen == NULL && options->connect == NULL) {
     options->listen = "18944";
   }
   if ((wanted->certificate == NULL) != (wanted->key == NULL)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give --certificate and --key together");
   }
-  if (!supine_stream_rotation(wanted->body_from_tracker, options->setup.body) ||
+  supine_stream_rotation(wanted->body_from_tracker, options->setup.body); /* 0 if it is zero */
+  if (!supine_normalise(options->setup.body, unit) ||
       !supine_normalise(wanted->world_down, options->setup.down)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "--world-down or --body-from-tracker is zero: give a direction, such "
@@ -346,9 +333,8 @@ const supine_command supine_command_stream = {
              "and sends the lungs in that pose to every connected peer. A pose is a TRANSFORM, "
              "QTDATA or POSITION message, or an NDARRAY of three numbers, the direction of gravity "
              "in the marker's axes, as a tilt sensor measures it. Only the newest pose counts: a "
-             "slow peer misses frames "
-             "without delaying the others. At the end the command prints the time from receiving a "
-             "pose to sending its frame.",
+             "slow peer misses frames without delaying the others. At the end the command prints "
+             "how many frames were sent within 15 ms of receiving their pose.",
     .options = table,
     .notes =
         "Examples:\n"

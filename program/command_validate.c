@@ -85,12 +85,11 @@ static const supine_option table[] = {
 static json_t *encode(const supine_validation_distance of[SUPINE_PATIENT_MAP_COUNT]) {
   json_t *all = json_object();
   for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT; ++k) {
-    json_t *row = json_pack("{s:f, s:f, s:f, s:f}", "mean_mm", of[k].mean, "rms_mm", of[k].rms,
-                            "p95_mm", of[k].p95, "largest_mm", of[k].largest);
-    (void)json_object_set_new(row, "explained_percent",
-                              isnan(of[k].explained) ? json_null()
-                                                     : json_real(100.0 * of[k].explained));
-    (void)json_object_set_new(all, supine_validation_map_names[k], row);
+    json_t *explained = isnan(of[k].explained) ? json_null() : json_real(100.0 * of[k].explained);
+    (void)json_object_set_new(all, supine_validation_map_names[k],
+                              json_pack("{s:f, s:f, s:f, s:f, s:o}", "mean_mm", of[k].mean,
+                                        "rms_mm", of[k].rms, "p95_mm", of[k].p95, "largest_mm",
+                                        of[k].largest, "explained_percent", explained));
   }
   return all;
 }
@@ -101,10 +100,10 @@ static json_t *encode_state(const supine_validation_state *state,
   if (state->path != NULL) {
     (void)json_object_set_new(root, "file", supine_options_json_text(state->path));
   }
-  (void)json_object_update_new(root, json_pack("{s:[f, f, f], s:f, s:f}", "gravity",
-                                               state->state.gravity[0], state->state.gravity[1],
-                                               state->state.gravity[2], "scale", outcome->scale,
-                                               "volume_ml", outcome->millilitres));
+  (void)json_object_update_new(root, json_pack("{s:o, s:f, s:f}", "gravity",
+                                               supine_options_json_numbers(3, state->state.gravity),
+                                               "scale", outcome->scale, "volume_ml",
+                                               outcome->millilitres));
   if (outcome->has_surface) {
     (void)json_object_set_new(root, "surface", encode(outcome->surface));
   }

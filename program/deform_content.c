@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Write displacement fields, images moved by a field, and a CSV file of moved points. */
+/* Write deformed surfaces, displacement fields, moved images, and a CSV file of moved points. */
 #include <math.h>
 #include <stdlib.h>
 
 #include "base/arena.h"
 #include "base/output.h"
 #include "base/text.h"
+#include "base/vec3.h"
 
 #include "mesh/mesh.h"
 #include "precompute/warp/field.h"
@@ -96,11 +97,6 @@ supine_status supine_command_deform_content_read(supine_deform_content *wanted, 
     return SUPINE_OK;
   }
   return supine_field_check_hounsfield(&wanted->source, wanted->image, error);
-}
-
-bool supine_command_deform_content_wanted(const supine_deform_content *wanted) {
-  return wanted->field != NULL || wanted->image != NULL || wanted->labels != NULL ||
-         supine_text_ends_in(wanted->path, ".csv");
 }
 
 /* Convert a vector from LPS and mm to other axes and another unit. */
@@ -251,16 +247,75 @@ static supine_status move_grid(const supine_deform_content *wanted, const supine
   return SUPINE_OK;
 }
 
+/* Write a surface, and print its largest displacement and its volume. */
+static supine_status write_surface(const char *path, const supine_basis *basis,
+                                   supine_deformation *moved, supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const supine_tensor *lung = supine_basis_tensor(basis, "lung");
+  const double *gravity = moved->state.gravity;
+  supine_mesh_save_options *save = &moved->save;
+  double volumes[SUPINE_LUNGS_MAX];
+  const supine_mesh_field fields[] = {{"gravity_LPS", 3, gravity},
+                                      {"volume_mL", info->lung_count, volumes}};
+  SUPINE_FREED_BY(supine_mesh_free) supine_mesh from = {0};
+  SUPINE_FREED_BY(supine_mesh_free) supine_mesh mesh = {0};
+  SUPINE_ARENA arena = {0};
+  float *normals = supine_arena_take(&arena, info->vertex_count, 3 * sizeof *normals);
+  float *xyz = supine_arena_take(&arena, info->vertex_count, 3 * sizeof *xyz);
+  if (arena.failed) {
+    return supine_error_memory(error, "%zu vertices", info->vertex_count);
+  }
+  SUPINE_TRY(supine_posed_mesh(basis, &moved->from.pose, &from, error));
+  SUPINE_TRY(supine_posed_mesh(basis, &moved->pose, &mesh, error));
+  (void)supine_deform(basis, &moved->pose, xyz);
+  supine_normals(basis, xyz, normals);
+  for (size_t i = 0; i < 3 * mesh.vertex_count && moved->subtract_hilum; ++i) {
+    mesh.vertices[i] -= moved->hilum[i % 3];
+  }
+  (void)supine_basis_volumes(basis, &moved->pose, volumes);
+  save->from = from.vertices;
+  save->normals = mesh.triangle_count > 0 ? normals : NULL;
+  save->scalars[0] = (supine_mesh_scalar){"expected_error_mm", moved->expected.sigma};
+  save->lung = lung == NULL ? NULL : lung->data;
+  save->fields = fields;
+  save->field_count = sizeof fields / sizeof *fields;
+  SUPINE_TRY(supine_mesh_save(path, &mesh, save, error));
+  double largest = 0.0;
+  for (size_t i = 0; i < mesh.vertex_count; ++i) {
+    largest = fmax(largest, supine_distance(mesh.vertices + 3 * i, from.vertices + 3 * i));
+  }
+  (void)printf("%s: gravity %.4g,%.4g,%.4g, largest displacement %.3f mm from %s", path, gravity[0],
+               gravity[1], gravity[2], largest, moved->from.name);
+  if (supine_basis_metadata(basis, "content") == NULL) {
+    const double held = 1e-3 * supine_mesh_volume(&mesh);
+    (void)printf(", %.2f mL (%+.2f mL)", held, held - 1e-3 * supine_mesh_volume(&from));
+  }
+  (void)putchar('\n');
+  return SUPINE_OK;
+}
+
 supine_status supine_command_deform_content(const supine_deform_content *wanted,
-                                            const supine_basis *basis,
-                                            const supine_deformation *moved, supine_error *error) {
-  if (wanted->field != NULL || wanted->image != NULL || wanted->labels != NULL) {
+                                            const supine_basis *basis, supine_deformation *moved,
+                                            supine_error *error) {
+  const bool image = wanted->image != NULL || wanted->labels != NULL;
+  if (image || wanted->field != NULL) {
     SUPINE_TRY(move_grid(wanted, basis, moved, error));
   }
-  if (wanted->path != NULL && supine_text_ends_in(wanted->path, ".csv")) {
-    SUPINE_TRY(write_points(wanted->path, basis, moved, wanted->vertices, error));
-    supine_options_expected_print(&moved->expected, stdout);
-    supine_options_hilum_print(moved->hilum, moved->subtract_hilum);
+  if (image || wanted->path == NULL) {
+    return SUPINE_OK;
+  }
+  SUPINE_TRY(supine_text_ends_in(wanted->path, ".csv")
+                 ? write_points(wanted->path, basis, moved, wanted->vertices, error)
+                 : write_surface(wanted->path, basis, moved, error));
+  if (moved->expected.sigma != NULL) {
+    (void)printf("expected error %.1f mm (RMS over the points), %.1f mm at most%s\n",
+                 moved->expected.rms, moved->expected.largest,
+                 moved->expected.turned ? "; an extrapolation, as the posture changes" : "");
+  }
+  if (supine_length(moved->hilum) != 0.0) {
+    (void)printf("the hilum moves by %.1f, %.1f, %.1f mm (to the left, back and head)%s\n",
+                 moved->hilum[0], moved->hilum[1], moved->hilum[2],
+                 moved->subtract_hilum ? ", subtracted from all positions" : "");
   }
   return SUPINE_OK;
 }

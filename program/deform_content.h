@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Write the points, fields and images of 'supine deform', for structures made by 'supine embed'. */
+/* Write the surfaces, points, fields and images of 'supine deform'. */
 #ifndef SUPINE_DEFORM_CONTENT_H
 #define SUPINE_DEFORM_CONTENT_H
 
@@ -43,12 +43,9 @@ supine_status supine_command_deform_content_check(const supine_deform_content *w
 supine_status supine_command_deform_content_read(supine_deform_content *wanted, const char *command,
                                                  supine_error *error);
 
-/* Return whether points, a field or an image are to be written instead of a surface. */
-bool supine_command_deform_content_wanted(const supine_deform_content *wanted);
-
-/* Write the points, the field or the image, and print what was written. */
+/* Write the surface, the points, the field and the images, and print what was written. */
 supine_status supine_command_deform_content(const supine_deform_content *wanted,
-                                            const supine_basis *basis,
-                                            const supine_deformation *moved, supine_error *error);
+                                            const supine_basis *basis, supine_deformation *moved,
+                                            supine_error *error);
 
 #endif

@@ -37,20 +37,16 @@ static void print_help(void) {
              "4 failed output, 5 numerical failure.");
 }
 
+/* Return the command of a name; if there is none, suggest another and return NULL. */
 static const supine_command *find_command(const char *name) {
-  size_t i = 0;
-  while (supine_command_list[i] != NULL && strcmp(name, supine_command_list[i]->name) != 0) {
-    ++i;
-  }
-  return supine_command_list[i];
-}
-
-static int unknown_command(const char *name) {
   enum { NAMES_MAX = 64 };
   const char *names[NAMES_MAX];
   size_t count = 0;
   for (; count < NAMES_MAX && supine_command_list[count] != NULL; ++count) {
     names[count] = supine_command_list[count]->name;
+    if (strcmp(name, names[count]) == 0) {
+      return supine_command_list[count];
+    }
   }
   const char *nearest = supine_options_suggest(name, names, count);
   if (nearest != NULL) {
@@ -58,7 +54,7 @@ static int unknown_command(const char *name) {
   } else {
     (void)fprintf(stderr, "supine: no command '%s'; 'supine --help' lists the commands\n", name);
   }
-  return SUPINE_EXIT_USAGE;
+  return NULL;
 }
 
 /* Remove unfinished output files and end the program, because jansson or GSL is out of memory.
@@ -108,7 +104,7 @@ int main(int argc, char **argv) {
   }
   const supine_command *command = find_command(name);
   if (command == NULL) {
-    return unknown_command(name);
+    return SUPINE_EXIT_USAGE;
   }
   if (!supine_thread_count_is_valid()) {
     supine_options_say(name, "SUPINE_THREADS is '%s': set a number from 1 to 256, or unset it",

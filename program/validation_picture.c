@@ -10,36 +10,19 @@
 #include "base/vec3.h"
 #include "program/view/render/render.h"
 
-/* The upper end of the colour bar is at least this, mm. */
-static const double end_least = 1.0;
-
-/* Set value[i] to the distance of predicted vertex i from the scanned surface, mm. Set *largest to
- * the maximum of these distances and its previous value. Raise *bar_end to at least the 95th
- * percentile of the distances between predicted and scanned surface. */
-static void find_values(const supine_validation *s, const supine_validation_outcome *outcome,
-                        float *value, double *largest, double *bar_end) {
-  for (size_t i = 0; i < s->start.vertex_count; ++i) {
-    const double off = supine_distance(outcome->predicted + 3 * i, outcome->nearest + 3 * i);
-    value[i] = (float)off;
-    *largest = fmax(*largest, off);
-  }
-  *bar_end = fmax(*bar_end, outcome->surface[SUPINE_PATIENT_MAP_PREDICTED].p95);
-}
-
 static void destroy(supine_renderer **renderer) {
   supine_render_destroy(*renderer);
 }
 
-supine_status supine_command_draw_errors(const supine_validation *subject, const char *path,
+supine_status supine_command_draw_errors(const supine_validation *s, const char *path,
                                          supine_error *error) {
   static const supine_view views[2] = {SUPINE_VIEW_ANTERIOR, SUPINE_VIEW_POSTERIOR};
-  const supine_validation *s = subject;
   const size_t n = s->start.vertex_count;
   supine_panel panel[SUPINE_VALIDATION_STATES_MAX] = {{0}};
   char subtitle[SUPINE_VALIDATION_STATES_MAX][96];
   SUPINE_FREED_BY(destroy) supine_renderer *renderer = NULL;
   double largest = 0.0;
-  double bar_end = end_least;
+  double bar_end = 1.0; /* the least upper end of the colour bar, mm */
   size_t count = 0;
   SUPINE_ARENA arena = {0};
   float *values = supine_arena_take(&arena, SUPINE_VALIDATION_STATES_MAX * n, sizeof *values);
@@ -51,15 +34,21 @@ supine_status supine_command_draw_errors(const supine_validation *subject, const
     if (!outcome->has_surface) {
       continue;
     }
-    find_values(s, outcome, values + count * n, &largest, &bar_end);
+    float *value = values + count * n; /* distance of each vertex from the scanned surface, mm */
+    for (size_t k = 0; k < n; ++k) {
+      const double off = supine_distance(outcome->predicted + 3 * k, outcome->nearest + 3 * k);
+      value[k] = (float)off;
+      largest = fmax(largest, off);
+    }
     const supine_validation_distance *off = &outcome->surface[SUPINE_PATIENT_MAP_PREDICTED];
+    bar_end = fmax(bar_end, off->p95);
     (void)snprintf(subtitle[count], sizeof subtitle[count], "%+.0f mL, RMS %.1f, Hausdorff %.1f mm",
                    outcome->millilitres, off->rms, off->largest);
     panel[count] =
         (supine_panel){.title = s->state[i].text[0] != '\0' ? s->state[i].text : s->state[i].path,
                        .subtitle = subtitle[count],
                        .pose = &outcome->pose,
-                       .value = values + count * n};
+                       .value = value};
     memcpy(panel[count].gravity, s->state[i].state.gravity, sizeof panel[count].gravity);
     ++count;
   }

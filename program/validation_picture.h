@@ -6,7 +6,7 @@
 #include "precompute/validation/validation.h"
 
 /* Draw one panel for each state that has a scanned surface. */
-supine_status supine_command_draw_errors(const supine_validation *subject, const char *path,
+supine_status supine_command_draw_errors(const supine_validation *s, const char *path,
                                          supine_error *error);
 
 #endif

@@ -8,6 +8,7 @@
 
 #include <supine/sh.h>
 
+#include "base/arena.h"
 #include "runtime/internal.h"
 #include "runtime/safetensors/safetensors_file.h"
 
@@ -131,15 +132,14 @@ static supine_status check_surface(const check *c, supine_basis *basis) {
 static supine_status check_field(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
   const size_t n = info->vertex_count;
-  size_t scalar[] = {n, ANY};
-  size_t vector[] = {n, 3, ANY};
+  const size_t rank = info->vector ? 3 : 2;
+  size_t shape[] = {n, info->vector ? 3 : ANY, ANY};
   size_t direction[] = {n, 3};
-  info->coefficients = info->vector ? require(c, "coefficients", SUPINE_F32, 3, vector)
-                                    : require(c, "coefficients", SUPINE_F32, 2, scalar);
+  info->coefficients = require(c, "coefficients", SUPINE_F32, rank, shape);
   if (info->coefficients == NULL) {
     return SUPINE_ERROR_FORMAT;
   }
-  info->mode_count = info->vector ? vector[2] : scalar[1];
+  info->mode_count = shape[rank - 1];
   if (info->mode_count < 1 || info->mode_count > SUPINE_MODES_MAX) {
     return refuse(c, "the number of modes is %zu, not 1 to %d", info->mode_count, SUPINE_MODES_MAX);
   }
@@ -367,8 +367,8 @@ static supine_status check_rest(const check *c, supine_basis *basis) {
   }
   size_t shape[2] = {basis->info.lung_count, RESTING_TERMS};
   basis->rest_by_lung = tensor->rank == 2;
-  basis->resting = basis->rest_by_lung ? require(c, "resting_volume", SUPINE_F64, 2, shape)
-                                       : require(c, "resting_volume", SUPINE_F64, 1, shape + 1);
+  const size_t rank = basis->rest_by_lung ? 2 : 1;
+  basis->resting = require(c, "resting_volume", SUPINE_F64, rank, shape + 2 - rank);
   basis->info.has_rest = basis->resting != NULL;
   return basis->resting != NULL ? SUPINE_OK : SUPINE_ERROR_FORMAT;
 }
@@ -378,24 +378,25 @@ static supine_status check_normals(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
   const size_t terms = supine_basis_normal_terms(basis);
   size_t shape[] = {info->vertex_count, 3, ANY};
-  if (supine_safetensors_find(c->file, "normals") == NULL &&
-      supine_safetensors_find(c->file, "normal_weights") == NULL) {
+  const supine_tensor *tensor = supine_safetensors_find(c->file, "normals");
+  if (tensor == NULL && supine_safetensors_find(c->file, "normal_weights") == NULL) {
     return SUPINE_OK;
   }
-  info->normals = require(c, "normals", SUPINE_I16, 3, shape);
-  if (info->normals == NULL) {
+  const bool bytes = tensor != NULL && tensor->dtype == SUPINE_I8;
+  const void *vectors = require(c, "normals", bytes ? SUPINE_I8 : SUPINE_I16, 3, shape);
+  if (vectors == NULL) {
     return SUPINE_ERROR_FORMAT;
   }
-  info->normal_count = shape[2];
+  info->normals = bytes ? NULL : vectors;
+  info->normal_bytes = bytes ? vectors : NULL;
+  info->normal_count = shape[2] - (bytes && shape[2] > 0);
   if (info->normal_count < 1 || info->normal_count > SUPINE_NORMAL_MODES_MAX) {
     return refuse(c, "the basis of vertex normals has %zu modes, not 1 to %d", info->normal_count,
                   SUPINE_NORMAL_MODES_MAX);
   }
-  size_t one[] = {info->lung_count, info->normal_count, terms};
-  size_t by_axis[] = {info->lung_count, info->normal_count, 3, terms};
-  info->normal_weights = info->volume_axes == 3
-                             ? require(c, "normal_weights", SUPINE_F64, 4, by_axis)
-                             : require(c, "normal_weights", SUPINE_F64, 3, one);
+  const bool by_axis = info->volume_axes == 3;
+  size_t weights[] = {info->lung_count, info->normal_count, by_axis ? 3 : terms, terms};
+  info->normal_weights = require(c, "normal_weights", SUPINE_F64, by_axis ? 4 : 3, weights);
   return info->normal_weights != NULL ? SUPINE_OK : SUPINE_ERROR_FORMAT;
 }
 
@@ -435,12 +436,8 @@ static supine_status prepare(const check *c, supine_basis *basis,
     const bool thirds = supine_tiles_thirds(SUPINE_STORAGE_MIXED, basis->info.mode_count) > 0;
     storage = thirds ? SUPINE_STORAGE_MIXED : SUPINE_STORAGE_INT16;
   }
-  supine_status status = SUPINE_OK;
   for (;;) {
-    status = supine_basis_pack(basis, storage);
-    if (status != SUPINE_OK) {
-      break;
-    }
+    SUPINE_TRY(supine_basis_pack(basis, storage));
     basis->info.storage_error = supine_basis_storage_error(basis);
     if (!choose || storage == SUPINE_STORAGE_EXACT || basis->info.storage_error <= error_limit_mm) {
       break;
@@ -450,34 +447,15 @@ static supine_status prepare(const check *c, supine_basis *basis,
   if (options->without_normals) {
     basis->info.normal_count = 0;
     basis->info.normals = NULL;
+    basis->info.normal_bytes = NULL;
     basis->info.normal_weights = NULL;
   }
-  if (status == SUPINE_OK && basis->info.normal_count > 0) {
-    status = supine_basis_pack_normals(basis);
-  }
-  if (status != SUPINE_OK) {
-    return supine_error_set(c->error, status, "%s: out of memory", c->name);
+  if (basis->info.normal_count > 0) {
+    SUPINE_TRY(supine_basis_pack_normals(basis));
   }
   const double bytes = basis->info.bytes_per_vertex + 3 * sizeof(float);
   basis->stream = (double)basis->info.vertex_count * bytes > STREAM_BYTES;
   basis->prefetch = basis->stream ? supine_kernels_prefetch_choose() : SUPINE_PREFETCH_NONE;
-  return SUPINE_OK;
-}
-
-/* Copy the caller's options. Members that the struct of an older program lacks become 0. */
-static supine_status take_options(const check *c, const supine_basis_options *options,
-                                  supine_basis_options *taken) {
-  const size_t oldest = offsetof(supine_basis_options, simd) + sizeof options->simd;
-  *taken = (supine_basis_options){.size = sizeof *taken};
-  if (options == NULL) {
-    return SUPINE_OK;
-  }
-  if (options->size < oldest) {
-    return supine_error_set(
-        c->error, SUPINE_ERROR_ARGUMENT,
-        "the size of the options is %zu: set it to sizeof(supine_basis_options)", options->size);
-  }
-  memcpy(taken, options, options->size < sizeof *taken ? options->size : sizeof *taken);
   return SUPINE_OK;
 }
 
@@ -522,57 +500,73 @@ static supine_status check_expected(const check *c, supine_basis *basis) {
   return read_numbers(c, "midline_mm", 1, &basis->midline);
 }
 
-/* Make a basis from an open file. The basis then owns the file. On failure, close the file. */
-static supine_status open_file(supine_safetensors *file, const char *name,
+/* Copy the caller's options. Members that the struct of an older program lacks become 0. */
+static supine_status take_options(const supine_basis_options *options, supine_basis_options *taken,
+                                  supine_error *error) {
+  const size_t oldest = offsetof(supine_basis_options, simd) + sizeof options->simd;
+  *taken = (supine_basis_options){.size = sizeof *taken};
+  if (options != NULL && options->size < oldest) {
+    return supine_error_set(
+        error, SUPINE_ERROR_ARGUMENT,
+        "the size of the options is %zu: set it to sizeof(supine_basis_options)", options->size);
+  }
+  if (options != NULL) {
+    memcpy(taken, options, options->size < sizeof *taken ? options->size : sizeof *taken);
+  }
+  return (taken->allocator.allocate == NULL) == (taken->allocator.release == NULL)
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                "the allocator has only one function: set both or neither");
+}
+
+/* Close a basis; for SUPINE_FREED_BY. */
+static void close_basis(supine_basis **basis) {
+  supine_basis_close(*basis);
+}
+
+/* Open the `size` bytes of a file, or the file `name` if `bytes` is NULL. */
+static supine_status open_file(const char *name, const void *bytes, size_t size,
                                const supine_basis_options *options, supine_basis **result,
                                supine_error *error) {
   supine_basis_options taken;
-  const check c = {file, name, error};
-  supine_status status = SUPINE_ERROR_MEMORY;
-  supine_basis *basis = calloc(1, sizeof *basis);
+  supine_safetensors *file = NULL;
   *result = NULL;
+  SUPINE_TRY(take_options(options, &taken, error));
+  SUPINE_TRY(supine_safetensors_open_with(name, bytes, size, &taken.allocator, &file, error));
+  SUPINE_FREED_BY(close_basis)
+  supine_basis *basis = supine_safetensors_allocate(file, sizeof *basis);
   if (basis == NULL) {
     supine_safetensors_close(file);
-    return supine_error_set(error, status, "%s: out of memory", name);
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", name);
   }
+  memset(basis, 0, sizeof *basis);
   basis->file = file;
-  status = check_metadata(&c, &basis->info);
+  const check c = {file, name, error};
+  SUPINE_TRY(check_metadata(&c, &basis->info));
   static supine_status (*const steps[])(const check *, supine_basis *) = {
       check_surface, check_field, check_modes,   check_lungs, check_volume,   check_reference,
       check_rest,    check_scan,  check_normals, check_rigid, check_expected, identify};
-  for (size_t i = 0; status == SUPINE_OK && i < sizeof steps / sizeof *steps; ++i) {
-    status = steps[i](&c, basis);
+  for (size_t i = 0; i < sizeof steps / sizeof *steps; ++i) {
+    SUPINE_TRY(steps[i](&c, basis));
   }
+  const supine_status status = prepare(&c, basis, &taken);
   if (status == SUPINE_OK) {
-    status = take_options(&c, options, &taken);
+    *result = basis;
+    basis = NULL;
   }
-  if (status == SUPINE_OK) {
-    status = prepare(&c, basis, &taken);
-  }
-  if (status != SUPINE_OK) {
-    supine_basis_close(basis);
-    return status;
-  }
-  *result = basis;
-  return SUPINE_OK;
+  return status == SUPINE_ERROR_MEMORY ? supine_error_set(error, status, "%s: out of memory", name)
+                                       : status;
 }
 
 supine_status supine_basis_open_with(const char *path, const supine_basis_options *options,
                                      supine_basis **basis, supine_error *error) {
-  supine_safetensors *file = NULL;
-  *basis = NULL;
-  const supine_status status = supine_safetensors_open(path, &file, error);
-  return status != SUPINE_OK ? status : open_file(file, path, options, basis, error);
+  return open_file(path, NULL, 0, options, basis, error);
 }
 
 supine_status supine_basis_open_memory_with(const void *bytes, size_t size,
                                             const supine_basis_options *options,
                                             supine_basis **basis, supine_error *error) {
-  static const char name[] = "basis in memory";
-  supine_safetensors *file = NULL;
-  *basis = NULL;
-  const supine_status status = supine_safetensors_open_memory(bytes, size, name, &file, error);
-  return status != SUPINE_OK ? status : open_file(file, name, options, basis, error);
+  return open_file("basis in memory", bytes != NULL ? bytes : "", size, options, basis, error);
 }
 
 supine_status supine_basis_open(const char *path, supine_basis **basis, supine_error *error) {
@@ -588,10 +582,11 @@ void supine_basis_close(supine_basis *basis) {
   if (basis == NULL) {
     return;
   }
-  supine_safetensors_close(basis->file);
-  supine_platform_free(basis->tiles.bytes);
-  supine_platform_free(basis->lit.bytes);
-  free(basis);
+  supine_safetensors *file = basis->file; /* its allocator frees the rest */
+  supine_safetensors_release(file, basis->tiles.bytes);
+  supine_safetensors_release(file, basis->lit.bytes);
+  supine_safetensors_release(file, basis);
+  supine_safetensors_close(file);
 }
 
 const supine_basis_info *supine_basis_get_info(const supine_basis *basis) {

@@ -5,6 +5,8 @@
 
 #include <supine/breath.h>
 
+#include "base/arena.h"
+
 /* Number of equal intervals of pressure for the integration of a pressure-volume limb. Over one
  * interval, the compliance changes by a factor of at most e^16, so that a Gauss-Legendre rule of 16
  * points is accurate to 1e-15. */
@@ -237,10 +239,7 @@ static supine_status limb_holds(const supine_pv *pv, const char *what, double pr
                                 supine_error *error) {
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     const supine_pv_curve *curve = &pv->limb[limb];
-    const supine_status status = supine_breath_curve_check(curve, error);
-    if (status != SUPINE_OK) {
-      return status;
-    }
+    SUPINE_TRY(supine_breath_curve_check(curve, error));
     if (!(pressure >= curve->pressure[0] && pressure <= curve->pressure[1])) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                               "%s pressure %g cmH2O is outside the %s limb's range, %g to %g cmH2O",
@@ -255,10 +254,7 @@ static supine_status loop_begin(const supine_pv *pv, const supine_pv_breath *bre
                                 supine_error *error) {
   const supine_pv_curve *inhale = &pv->limb[SUPINE_PV_INHALE];
   cycle->rest = breath->rest_pressure;
-  supine_status status = limb_holds(pv, "rest", cycle->rest, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(limb_holds(pv, "rest", cycle->rest, error));
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     limb_begin(&pv->limb[limb], &cycle->limbs[limb]);
     cycle->volume[limb] = limb_volume(&cycle->limbs[limb], cycle->rest, NULL);
@@ -271,23 +267,22 @@ static supine_status loop_begin(const supine_pv *pv, const supine_pv_breath *bre
                             "gains above %g cmH2O: give a smaller volume",
                             breath->tidal, inhale->volume[1] - rest, cycle->rest);
   }
-  status = limb_pressure(&cycle->limbs[SUPINE_PV_INHALE], full, &cycle->peak);
-  if (status != SUPINE_OK) {
+  if (limb_pressure(&cycle->limbs[SUPINE_PV_INHALE], full, &cycle->peak) != SUPINE_OK) {
     return supine_error_set(
-        error, status,
+        error, SUPINE_ERROR_NUMERICAL,
         "no pressure found at which the inhale limb gives %g mL: check the inhale limb", full);
   }
-  status = limb_holds(pv, "peak", cycle->peak, error);
-  for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT && status == SUPINE_OK; ++limb) {
+  SUPINE_TRY(limb_holds(pv, "peak", cycle->peak, error));
+  for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     cycle->gain[limb] = limb_volume(&cycle->limbs[limb], cycle->peak, NULL) - cycle->volume[limb];
     if (!(cycle->gain[limb] > 0.0)) {
-      status = supine_error_set(
+      return supine_error_set(
           error, SUPINE_ERROR_NUMERICAL,
           "the %s limb is too flat between %g and %g cmH2O: check the pressure-volume relation",
           supine_breath_limb_name((supine_pv_limb)limb), cycle->rest, cycle->peak);
     }
   }
-  return status;
+  return SUPINE_OK;
 }
 
 static double between(double value, double low, double high) {
@@ -326,15 +321,15 @@ static supine_status follow(const supine_pv_breath *breath, const loop *cycle, d
 supine_status supine_breath_evaluate(const supine_pv *pv, const supine_pv_breath *breath,
                                      size_t count, const double *times, double *volumes,
                                      double *pressures, supine_error *error) {
-  supine_status status = breath_check(breath, error);
-  for (size_t j = 0; j < count && status == SUPINE_OK; ++j) {
+  SUPINE_TRY(breath_check(breath, error));
+  for (size_t j = 0; j < count; ++j) {
     if (!isfinite(times[j])) {
-      status = supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                "times[%zu] is not finite: give a time in s", j);
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "times[%zu] is not finite: give a time in s", j);
     }
   }
-  if (status != SUPINE_OK || count == 0) {
-    return status;
+  if (count == 0) {
+    return SUPINE_OK;
   }
   if (breath->course == SUPINE_PV_CONSTANT_FLOW && pressures == NULL) {
     for (size_t j = 0; j < count && volumes != NULL; ++j) {
@@ -348,11 +343,11 @@ supine_status supine_breath_evaluate(const supine_pv *pv, const supine_pv_breath
                             "this breath needs a pressure-volume relation: pass pv");
   }
   loop cycle;
-  status = loop_begin(pv, breath, &cycle, error);
-  for (size_t j = 0; j < count && status == SUPINE_OK; ++j) {
+  SUPINE_TRY(loop_begin(pv, breath, &cycle, error));
+  for (size_t j = 0; j < count; ++j) {
     double volume = 0.0;
     double pressure = 0.0;
-    status = follow(breath, &cycle, times[j], &volume, &pressure, error);
+    SUPINE_TRY(follow(breath, &cycle, times[j], &volume, &pressure, error));
     if (volumes != NULL) {
       volumes[j] = volume;
     }
@@ -360,5 +355,5 @@ supine_status supine_breath_evaluate(const supine_pv *pv, const supine_pv_breath
       pressures[j] = pressure;
     }
   }
-  return status;
+  return SUPINE_OK;
 }

@@ -5,11 +5,13 @@
 #include "base/clones.h"
 #include "runtime/internal.h"
 #include "runtime/kernels/compact.h"
-#include "runtime/safetensors/platform.h"
+#include "runtime/safetensors/safetensors_file.h"
 
-/* Pack supine_basis_info.normals of 16 vertices. rows[v] points to the numbers of vertex v. */
-SUPINE_CLONES static void pack_tile(const supine_tiles *tiles, const int16_t *const rows[TILE],
-                                    unsigned char *to) {
+/* Pack the vectors of 16 vertices (supine_basis_info.normals or normal_bytes), from vertex `begin`
+ * on. After the last vertex, repeat it. */
+SUPINE_CLONES static void pack_tile(const supine_basis_info *info, const supine_tiles *tiles,
+                                    size_t begin, unsigned char *to) {
+  const size_t last = info->vertex_count - 1;
   const size_t words = supine_tiles_normal_words(tiles->modes);
   for (size_t at = 0; at < 3 * words; ++at, to += TILE * sizeof(uint32_t)) {
     const size_t word = at % words;
@@ -17,8 +19,14 @@ SUPINE_CLONES static void pack_tile(const supine_tiles *tiles, const int16_t *co
     double three[3][TILE] = {{0}};
     uint32_t packed[TILE];
     for (size_t which = 0; which < 3 && word + which * words < tiles->modes; ++which) {
+      const size_t k = word + which * words;
       for (size_t v = 0; v < TILE; ++v) {
-        three[which][v] = rows[v][axis * tiles->modes + word + which * words] * (1 / normal_unit());
+        const size_t row = 3 * (begin + v < last ? begin + v : last) + axis;
+        const int number =
+            info->normals != NULL
+                ? info->normals[row * tiles->modes + k]
+                : normal_from_bytes(info->normal_bytes + row * (tiles->modes + 1), tiles->modes, k);
+        three[which][v] = number * (1 / normal_unit());
       }
     }
     for (size_t v = 0; v < TILE; ++v) {
@@ -30,19 +38,14 @@ SUPINE_CLONES static void pack_tile(const supine_tiles *tiles, const int16_t *co
 
 supine_status supine_basis_pack_normals(supine_basis *basis) {
   supine_tiles *tiles = &basis->lit;
-  const size_t last = basis->info.vertex_count - 1;
-  supine_tiles_layout_lit(tiles, basis->info.normal_count, last / TILE + 1);
-  tiles->bytes = supine_platform_allocate(tiles->count * tiles->stride);
+  supine_tiles_layout_lit(tiles, basis->info.normal_count,
+                          (basis->info.vertex_count - 1) / TILE + 1);
+  tiles->bytes = supine_safetensors_allocate(basis->file, tiles->count * tiles->stride);
   if (tiles->bytes == NULL) {
     return SUPINE_ERROR_MEMORY;
   }
   for (size_t t = 0; t < tiles->count; ++t) {
-    const int16_t *rows[TILE];
-    for (size_t v = 0; v < TILE; ++v) {
-      const size_t i = t * TILE + v < last ? t * TILE + v : last;
-      rows[v] = basis->info.normals + 3 * tiles->modes * i;
-    }
-    pack_tile(tiles, rows, tiles->bytes + t * tiles->stride);
+    pack_tile(&basis->info, tiles, t * TILE, tiles->bytes + t * tiles->stride);
   }
   return SUPINE_OK;
 }

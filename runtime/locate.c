@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/vec3.h"
 #include "runtime/expected.h"
 #include "runtime/rigid.h"
 
@@ -207,51 +208,35 @@ static double angle_of(const double r[9], double vector[3]) {
 
 /* Set the rotation to the one that moves the predicted positions closest to the observed ones. */
 static void rotate_roughly(workspace *s) {
-  double h[3][3] = {{0}};
-  find_residuals(s);
-  const double *c = s->fit->origin; /* mean observed position - mean predicted position, mm */
-  double mean[3] = {0};
-  const size_t n = s->task->count;
-  for (size_t j = 0; j < 3 * n; ++j) {
-    mean[j % 3] += s->law[j] / (double)n;
-  }
-  for (size_t j = 0; j < n; ++j) {
-    for (size_t a = 0; a < 3; ++a) {
-      for (size_t b = 0; b < 3; ++b) {
-        h[a][b] +=
-            (s->law[3 * j + a] - mean[a]) * (s->task->observed[j].position[b] - c[b] - mean[b]);
-      }
+  supine_rigid_motion motion = {0};
+  double vector[3];
+  for (size_t j = 0; j < s->task->count; ++j) {
+    float law[3];
+    float observed[3];
+    for (size_t i = 0; i < 3; ++i) {
+      law[i] = (float)s->law[3 * j + i];
+      observed[i] = (float)s->task->observed[j].position[i];
     }
+    supine_rigid_add(&motion, law, observed, 1);
   }
-  supine_rigid_rotation((const double(*)[3])h, s->found->rotation);
+  supine_rigid_finish(&motion);
+  memcpy(s->found->rotation, motion.rotation, sizeof motion.rotation);
   s->fit->options.rotation_deviation =
-      angle_of(s->found->rotation, mean) > other_frame ? 0 : rotation_spread;
+      angle_of(s->found->rotation, vector) > other_frame ? 0 : rotation_spread;
 }
 
-/* Replace the rotation R by R exp(r) for a rotation vector r in rad, by Rodrigues' formula. */
+/* Replace the rotation R by the one nearest to R (1 + [r]), where [r] x = r x x, r in rad. */
 static void rotate_further(double rotation[9], const double r[3]) {
-  const double angle = sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
-  if (angle == 0) {
-    return;
-  }
-  const double c = cos(angle);
-  const double sine = sin(angle) / angle;
-  const double rest = (1 - c) / (angle * angle);
-  double step[9];
+  double transposed[3][3]; /* of R (1 + [r]) */
   for (size_t a = 0; a < 3; ++a) {
+    const double *row = rotation + 3 * a;
+    double turned[3]; /* row [r] = row x r */
+    supine_cross(row, r, turned);
     for (size_t b = 0; b < 3; ++b) {
-      const double cross = a == b ? 0 : (b == (a + 1) % 3 ? -1 : 1) * r[3 - a - b];
-      step[3 * a + b] = (a == b ? c : 0) + sine * cross + rest * r[a] * r[b];
+      transposed[b][a] = row[b] + turned[b];
     }
   }
-  double product[9];
-  for (size_t a = 0; a < 3; ++a) {
-    for (size_t b = 0; b < 3; ++b) {
-      product[3 * a + b] = rotation[3 * a] * step[b] + rotation[3 * a + 1] * step[3 + b] +
-                           rotation[3 * a + 2] * step[6 + b];
-    }
-  }
-  memcpy(rotation, product, sizeof product);
+  supine_rigid_rotation((const double(*)[3])transposed, rotation);
 }
 
 /* Change the volume by `ml` mL, but by at most half of the prior standard deviation of the volume.

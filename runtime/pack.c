@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* Pack a basis into tiles of 16 vertices, and bound the quantisation errors. */
 #include <math.h>
-#include <stdlib.h>
+#include <string.h>
 
 #include "base/clones.h"
 #include "runtime/internal.h"
 #include "runtime/kernels/compact.h"
-#include "runtime/safetensors/platform.h"
+#include "runtime/safetensors/safetensors_file.h"
 
 enum {
   FIXED_TOP = INT32_MAX / 4096 * 4096, /* integer that means 1; fixed_narrow() does not clip it */
@@ -211,15 +211,16 @@ SUPINE_CLONES __attribute__((flatten)) static void pack(const supine_basis *basi
 
 supine_status supine_basis_pack(supine_basis *basis, supine_storage storage) {
   supine_tiles *tiles = &basis->tiles;
-  work *w = calloc(1, sizeof *w);
-  supine_platform_free(tiles->bytes);
+  work *w = supine_safetensors_allocate(basis->file, sizeof *w);
+  supine_safetensors_release(basis->file, tiles->bytes);
   supine_tiles_layout(tiles, storage, basis->info.mode_count, basis->info.vector,
                       (basis->info.vertex_count + TILE - 1) / TILE);
-  tiles->bytes = supine_platform_allocate(tiles->count * tiles->stride);
+  tiles->bytes = supine_safetensors_allocate(basis->file, tiles->count * tiles->stride);
   if (w == NULL || tiles->bytes == NULL) {
-    free(w);
+    supine_safetensors_release(basis->file, w);
     return SUPINE_ERROR_MEMORY;
   }
+  memset(w, 0, sizeof *w);
   choose_steps(basis, w);
   pack(basis, w);
   for (size_t k = 0; k < tiles->modes; ++k) {
@@ -229,6 +230,6 @@ supine_status supine_basis_pack(supine_basis *basis, supine_storage storage) {
   basis->info.storage = storage;
   basis->info.packed = tiles->bytes;
   basis->info.bytes_per_vertex = (double)tiles->stride / TILE;
-  free(w);
+  supine_safetensors_release(basis->file, w);
   return SUPINE_OK;
 }

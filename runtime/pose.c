@@ -6,6 +6,7 @@
 #include <supine/sh.h>
 #include <supine/volume.h>
 
+#include "base/arena.h"
 #include "base/vec3.h"
 #include "runtime/internal.h"
 
@@ -15,10 +16,7 @@ supine_status supine_basis_weights(const supine_basis *basis, const double gravi
                                    double *weights) {
   double y[(SUPINE_SH_BAND_MAX + 1) * (SUPINE_SH_BAND_MAX + 1)];
   const size_t count = supine_sh_count(basis->info.band);
-  const supine_status status = supine_sh_evaluate(basis->info.band, gravity, y);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(supine_sh_evaluate(basis->info.band, gravity, y));
   for (size_t k = 0; k < basis->info.mode_count; ++k) {
     double sum = 0;
     for (size_t i = 0; i < count; ++i) {
@@ -140,14 +138,6 @@ static void share_out(const supine_basis *basis, const volumes *v, double total,
   }
 }
 
-/* Find the gains (factors of the displacement) at which one lung holds `ml` mL more than its
- * reference surface. */
-static supine_status lung_gains(const supine_basis *basis, const volumes *v, size_t lung, double ml,
-                                supine_pose *pose, supine_error *error) {
-  return supine_volume_form_gains(&v->form[lung], basis->info.bend, v->rest[lung], ml,
-                                  pose->gains[lung], error);
-}
-
 /* Find the gain (factor of the displacement), equal for all lungs and axes, at which the lungs
  * together hold `total` mL more than the reference surface. */
 static supine_status common_gains(const volumes *v, double total, supine_pose *pose,
@@ -175,12 +165,12 @@ static supine_status total_gains(const supine_basis *basis, const volumes *v, do
     return common_gains(v, total, pose, error);
   }
   double lung_ml[SUPINE_LUNGS_MAX];
-  supine_status status = SUPINE_OK;
   share_out(basis, v, total, lung_ml);
-  for (size_t lung = 0; lung < v->lung_count && status == SUPINE_OK; ++lung) {
-    status = lung_gains(basis, v, lung, lung_ml[lung], pose, error);
+  for (size_t lung = 0; lung < v->lung_count; ++lung) {
+    SUPINE_TRY(supine_volume_form_gains(&v->form[lung], basis->info.bend, v->rest[lung],
+                                        lung_ml[lung], pose->gains[lung], error));
   }
-  return status;
+  return SUPINE_OK;
 }
 
 /* Find the gains (factors of the displacement) for a state that names each lung with a volume. A
@@ -213,19 +203,12 @@ static supine_status named_gains(const supine_basis *basis, const volumes *v,
     if (volume->kind != SUPINE_VOLUME_ABSOLUTE) {
       double total = 0;
       supine_pose together;
-      supine_status status = total_of(basis, v, &(supine_volume){volume->kind, 0}, &total, error);
-      if (status == SUPINE_OK) {
-        status = total_gains(basis, v, total, &together, error);
-      }
-      if (status != SUPINE_OK) {
-        return status;
-      }
+      SUPINE_TRY(total_of(basis, v, &(supine_volume){volume->kind, 0}, &total, error));
+      SUPINE_TRY(total_gains(basis, v, total, &together, error));
       ml = supine_volume_form_at(&v->form[lung], together.gains[lung]) + volume->ml;
     }
-    const supine_status status = lung_gains(basis, v, lung, ml, pose, error);
-    if (status != SUPINE_OK) {
-      return status;
-    }
+    SUPINE_TRY(supine_volume_form_gains(&v->form[lung], basis->info.bend, v->rest[lung], ml,
+                                        pose->gains[lung], error));
   }
   return SUPINE_OK;
 }
@@ -280,14 +263,12 @@ supine_status supine_basis_gains(const supine_basis *basis, const supine_state *
   }
   volumes v;
   double total = 0;
-  supine_status status = find_volumes(basis, asked.gravity, pose->weights, &v, error);
-  if (status == SUPINE_OK && asked.lung_count > 0) {
+  SUPINE_TRY(find_volumes(basis, asked.gravity, pose->weights, &v, error));
+  if (asked.lung_count > 0) {
     return named_gains(basis, &v, &asked, pose, error);
   }
-  if (status == SUPINE_OK) {
-    status = total_of(basis, &v, &asked.volume, &total, error);
-  }
-  return status == SUPINE_OK ? total_gains(basis, &v, total, pose, error) : status;
+  SUPINE_TRY(total_of(basis, &v, &asked.volume, &total, error));
+  return total_gains(basis, &v, total, pose, error);
 }
 
 supine_status supine_basis_pose(const supine_basis *basis, const supine_state *state,

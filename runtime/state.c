@@ -9,6 +9,7 @@
 
 #include <supine/state.h>
 
+#include "base/arena.h"
 #include "base/vec3.h"
 #include "runtime/words.h"
 
@@ -100,10 +101,7 @@ static supine_status read_lungs(const char *text, supine_state *state, supine_er
     (void)snprintf(piece, sizeof piece, "%.*s", (int)size, value);
     (void)snprintf(read.lungs[read.lung_count].name, SUPINE_STATE_NAME_SIZE, "%.*s", (int)length,
                    at);
-    const supine_status status = read_volume(piece, &read.lungs[read.lung_count].volume, error);
-    if (status != SUPINE_OK) {
-      return status;
-    }
+    SUPINE_TRY(read_volume(piece, &read.lungs[read.lung_count].volume, error));
     ++read.lung_count;
     if (value[size] == '\0') {
       *state = read;
@@ -119,12 +117,10 @@ supine_status supine_state_parse_volume(const char *text, supine_state *state,
     return read_lungs(text, state, error);
   }
   supine_volume volume;
-  const supine_status status = read_volume(text, &volume, error);
-  if (status == SUPINE_OK) {
-    state->volume = volume;
-    state->lung_count = 0;
-  }
-  return status;
+  SUPINE_TRY(read_volume(text, &volume, error));
+  state->volume = volume;
+  state->lung_count = 0;
+  return SUPINE_OK;
 }
 
 /* Read gravity as "X:Y:Z", a vector of any length but 0, and normalise it. */
@@ -177,7 +173,6 @@ supine_status supine_state_parse(const char *text, supine_state *state, supine_e
   supine_state read = *state;
   supine_error volume_error = {0};
   const char *colon = strrchr(text, ':');
-  supine_status status = SUPINE_OK;
   if (supine_state_parse_volume(text, &read, &volume_error) == SUPINE_OK ||
       supine_state_parse_posture(text, &read, NULL) == SUPINE_OK) {
     *state = read;
@@ -201,14 +196,10 @@ supine_status supine_state_parse(const char *text, supine_state *state, supine_e
                             "no posture '%.64s...': give a posture such as supine", text);
   }
   (void)snprintf(posture, sizeof posture, "%.*s", (int)(colon - text), text);
-  status = supine_state_parse_posture(posture, &read, error);
-  if (status == SUPINE_OK) {
-    status = supine_state_parse_volume(colon + 1, &read, error);
-  }
-  if (status == SUPINE_OK) {
-    *state = read;
-  }
-  return status;
+  SUPINE_TRY(supine_state_parse_posture(posture, &read, error));
+  SUPINE_TRY(supine_state_parse_volume(colon + 1, &read, error));
+  *state = read;
+  return SUPINE_OK;
 }
 
 /* A text being written, cut off at `size` bytes. `length` is the length of the whole text. */
@@ -230,13 +221,13 @@ static void add(writer *out, const char *format, ...) {
 }
 
 static void add_posture(writer *out, const double gravity[3], bool described) {
-  static const char *const names[] = {"supine", "prone", "left", "right", "upright", "inverted"};
+  enum { PLAIN = 6 }; /* supine, prone, left, right, upright and inverted come first */
   const double *g = gravity;
-  for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
+  for (size_t i = 0; i < PLAIN; ++i) {
     double named[3];
-    (void)supine_posture_gravity(names[i], named);
+    (void)supine_posture_gravity(supine_posture_name(i), named);
     if (g[0] * named[0] + g[1] * named[1] + g[2] * named[2] > 1 - 1e-14) {
-      add(out, "%s%s", names[i], described && named[0] != 0 ? " side" : "");
+      add(out, "%s%s", supine_posture_name(i), described && named[0] != 0 ? " side" : "");
       return;
     }
   }
@@ -248,55 +239,42 @@ static void add_posture(writer *out, const double gravity[3], bool described) {
   add(out, described ? "gravity %.3g:%.3g:%.3g" : "%.9g:%.9g:%.9g", g[0], g[1], g[2]);
 }
 
-static void add_volume(writer *out, const supine_volume *volume) {
-  if (volume->kind == SUPINE_VOLUME_ABSOLUTE) {
-    add(out, "%.9gmL", volume->ml);
-  } else if (volume->ml == 0) {
-    add(out, "%s", kinds[volume->kind]);
-  } else {
-    add(out, "%s%+.9g", kinds[volume->kind], volume->ml);
-  }
-}
-
-size_t supine_state_print(const supine_state *state, char *text, size_t size) {
-  writer out = {text, size, 0};
-  add_posture(&out, state->gravity, false);
-  if (state->lung_count == 0 && state->volume.kind != SUPINE_VOLUME_DEFAULT) {
-    add(&out, ":");
-    add_volume(&out, &state->volume);
-  }
-  for (size_t i = 0; i < state->lung_count; ++i) {
-    add(&out, "%s%s=", i == 0 ? ":" : ",", state->lungs[i].name);
-    add_volume(&out, &state->lungs[i].volume);
-  }
-  return out.length;
-}
-
-static void describe_volume(writer *out, const supine_volume *volume) {
+static void add_volume(writer *out, const supine_volume *volume, bool described) {
   static const char *const phrases[] = {[SUPINE_VOLUME_DEFAULT] = "",
                                         [SUPINE_VOLUME_REST] = "at rest",
                                         [SUPINE_VOLUME_FULL] = "at full inflation",
                                         [SUPINE_VOLUME_SCAN] = "at the scan's volume"};
   if (volume->kind == SUPINE_VOLUME_ABSOLUTE) {
-    add(out, "at %.0f mL", volume->ml);
+    add(out, described ? "at %.0f mL" : "%.9gmL", volume->ml);
     return;
   }
-  add(out, "%s", phrases[volume->kind]);
-  if (volume->ml != 0) {
+  add(out, "%s", (described ? phrases : kinds)[volume->kind]);
+  if (volume->ml != 0 && described) {
     add(out, " %c %.9g mL", volume->ml < 0 ? '-' : '+', fabs(volume->ml));
+  } else if (volume->ml != 0) {
+    add(out, "%+.9g", volume->ml);
   }
 }
 
-size_t supine_state_describe(const supine_state *state, char *text, size_t size) {
+/* Write a state as text to parse, or as a description. */
+static size_t add_state(const supine_state *state, bool described, char *text, size_t size) {
   writer out = {text, size, 0};
-  add_posture(&out, state->gravity, true);
+  add_posture(&out, state->gravity, described);
   if (state->lung_count == 0 && state->volume.kind != SUPINE_VOLUME_DEFAULT) {
-    add(&out, " ");
-    describe_volume(&out, &state->volume);
+    add(&out, described ? " " : ":");
+    add_volume(&out, &state->volume, described);
   }
   for (size_t i = 0; i < state->lung_count; ++i) {
-    add(&out, ", %s lung ", state->lungs[i].name);
-    describe_volume(&out, &state->lungs[i].volume);
+    add(&out, described ? ", %s lung " : i == 0 ? ":%s=" : ",%s=", state->lungs[i].name);
+    add_volume(&out, &state->lungs[i].volume, described);
   }
   return out.length;
+}
+
+size_t supine_state_print(const supine_state *state, char *text, size_t size) {
+  return add_state(state, false, text, size);
+}
+
+size_t supine_state_describe(const supine_state *state, char *text, size_t size) {
+  return add_state(state, true, text, size);
 }

@@ -28,11 +28,4 @@ void supine_sh_expansion_free(supine_expansion *expansion);
  * `band`, at least 32, and twice as many longitudes. Statuses: as supine_sh_grid_create. */
 supine_status supine_sh_expansion_grid(size_t band, supine_sh_grid **grid);
 
-/** Compute the harmonic coefficients of functions from their values on a grid.
- * @param values     [latitudes, longitudes, rank] value of each function at each direction
- * @param functions  [rank, (band + 1)^2] output
- * Statuses: as supine_sh_transform_create. */
-supine_status supine_sh_expand(size_t band, const supine_sh_grid *grid, size_t rank,
-                               const double *values, double *functions, supine_error *error);
-
 #endif

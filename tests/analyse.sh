@@ -11,7 +11,7 @@ mkdir -p build
 if [ "$what" = all ] || [ "$what" = cppcheck ]; then
   cppcheck --std=c11 --enable=warning,performance,portability --inline-suppr --quiet --error-exitcode=1 \
     --suppress=missingIncludeSystem --suppressions-list=tests/cppcheck.supp \
-    -I . -I runtime/include -D_GNU_SOURCE sh mesh precompute runtime program packaging
+    -I . -I runtime/include -D_XOPEN_SOURCE=700 sh mesh precompute runtime program packaging
 fi
 if [ "$what" = all ] || [ "$what" = clang ] || [ "$what" = clang-tidy ]; then
   cmake -S . -B build/clang -G Ninja -DCMAKE_C_COMPILER=clang -DCMAKE_BUILD_TYPE=Debug \

@@ -39,7 +39,8 @@ endif()
 # Test the Python package with Debian's python.
 if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
   add_test(NAME python COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/test_python.py
-    ${PROJECT_SOURCE_DIR} $<TARGET_FILE:supine_runtime_shared> $<TARGET_FILE:supine> ${CMAKE_C_COMPILER})
+    ${PROJECT_SOURCE_DIR} $<TARGET_FILE:supine_runtime_shared> $<TARGET_FILE:supine_precompute_shared>
+    $<TARGET_FILE:supine> ${CMAKE_C_COMPILER})
   set_tests_properties(python PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
 endif()
 

@@ -176,6 +176,7 @@ void fixture_destroy(fixture *f) {
   free(f->quadratic);
   free(f->cubic);
   free(f->normal);
+  free(f->normal_byte);
   free(f->normal_weight);
   free(f);
 }
@@ -192,6 +193,20 @@ void fixture_add_normals(fixture *f, size_t modes, uint64_t seed) {
   }
   for (size_t i = 0; i < f->lungs * modes * terms; ++i) {
     f->normal_weight[i] = 1e-5 * fixture_random(&state);
+  }
+}
+
+void fixture_round_normals(fixture *f) {
+  const size_t modes = f->normals;
+  f->normal_byte = fixture_allocate(3 * f->vertices * (modes + 1), 1);
+  for (size_t i = 0; i < 3 * f->vertices; ++i) {
+    int8_t *bytes = f->normal_byte + i * (modes + 1);
+    int16_t *row = f->normal + i * modes;
+    for (size_t j = 0; j < modes; ++j) {
+      bytes[j] = (int8_t)(row[j] / 256);
+      bytes[modes] = j == 0 ? (int8_t)(row[0] % 256 / 2) : bytes[modes];
+      row[j] = (int16_t)(256 * bytes[j] + (j == 0 ? bytes[modes] : 0));
+    }
   }
 }
 
@@ -221,7 +236,10 @@ void fixture_write(const fixture *f, const char *path) {
     tensors[count++] = (supine_tensor){"resting_volume", SUPINE_F64, 1, {9}, f->resting};
   }
   if (f->normals > 0) {
-    tensors[count++] = (supine_tensor){"normals", SUPINE_I16, 3, {n, 3, f->normals}, f->normal};
+    tensors[count++] =
+        f->normal_byte != NULL
+            ? (supine_tensor){"normals", SUPINE_I8, 3, {n, 3, f->normals + 1}, f->normal_byte}
+            : (supine_tensor){"normals", SUPINE_I16, 3, {n, 3, f->normals}, f->normal};
     tensors[count++] = (supine_tensor){
         "normal_weights", SUPINE_F64, 3, {g, f->normals, (k + 1) * (k + 2) / 2}, f->normal_weight};
   }

@@ -25,6 +25,7 @@ typedef struct fixture {
   bool fields;     /* whether the metadata says that another simulator computed the displacements */
   size_t normals;  /* number of modes from which normals are computed, set by fixture_add_normals */
   int16_t *normal; /* [vertices, 3, normals] coefficients of vertex normals, as integers */
+  int8_t *normal_byte;   /* `normal` as supine_basis_info.normal_bytes, or NULL */
   double *normal_weight; /* [lungs, normals, terms] coefficients of the weight of each normal mode:
                             a quadratic polynomial in the weights of the displacement modes */
 } fixture;
@@ -51,6 +52,9 @@ void fixture_add_forms(fixture *f);
 
 /* Add `modes` modes of vertex normals, with random vectors. */
 void fixture_add_normals(fixture *f, size_t modes, uint64_t seed);
+
+/* Round the vectors of the normals so that the file stores them in bytes. */
+void fixture_round_normals(fixture *f);
 
 /* Write the basis file, and assert that this succeeds. */
 void fixture_write(const fixture *f, const char *path);

@@ -21,11 +21,11 @@ static char text[16384]; /* output of the last command on stdout and stderr toge
 
 /* Write a basis of the lungs with the left lung collapsed to `left_share` of its volume. */
 static supine_status make_basis(const supine_lungs *lungs, double left_share, const char *path) {
-  supine_precompute_options options = {
-      .model = supine_physics_model(SUPINE_LAW_PAPER), .band = 5, .modes = 16, .held_out = 5};
-  options.model.share[0] = left_share;
-  supine_precompute_report report;
-  return supine_precompute(lungs, &options, path, &report, NULL);
+  supine_prepared prepared = {.source = {.lungs = *lungs},
+                              .model = supine_physics_model(SUPINE_LAW_PAPER)};
+  const supine_basis_choice choice = {.path = path, .band = 5, .modes = 16, .held_out = 5};
+  prepared.model.share[0] = left_share;
+  return supine_precompute(&prepared, &choice, NULL, NULL);
 }
 
 static int setup(void **state) {

@@ -32,9 +32,10 @@ TEST(test_deform_real_lung_every_path_within_stated_error) {
   char path[] = "/tmp/supine-deform-XXXXXX";
   const int file = mkstemp(path);
   assert_true(file >= 0 && close(file) == 0);
-  const supine_precompute_options options = {
-      .model = supine_physics_model(SUPINE_LAW_PAPER), .band = 3, .held_out = 5};
-  assert_int_equal(supine_precompute(&lungs, &options, path, NULL, NULL), SUPINE_OK);
+  const supine_prepared prepared = {.source = {.lungs = lungs},
+                                    .model = supine_physics_model(SUPINE_LAW_PAPER)};
+  const supine_basis_choice choice = {.path = path, .band = 3, .held_out = 5};
+  assert_int_equal(supine_precompute(&prepared, &choice, NULL, NULL), SUPINE_OK);
   supine_basis *bases[SUPINE_STORAGE_COUNT * SUPINE_SIMD_COUNT] = {NULL};
   for (int i = 0; i < SUPINE_STORAGE_COUNT * SUPINE_SIMD_COUNT; ++i) {
     const supine_basis_options how = {sizeof how,

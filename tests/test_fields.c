@@ -163,11 +163,12 @@ TEST(test_fit_leave_one_out_error_equals_refits) {
 static void check_stated_error(const supine_lungs *of, supine_fields fields, supine_fields others,
                                const char *what) {
   const supine_fit_options options = {.band = -1, .modes = 16};
-  const supine_precompute_options file = {.modes = 16};
   const char *path = in_folder("basis.safetensors");
+  const supine_prepared prepared = {.source = {.lungs = *of}};
+  const supine_basis_choice file = {.path = path, .modes = 16};
   supine_fit_report report;
   supine_error error;
-  if (supine_fields_write(of, &fields, &options, &file, path, &report, &error) != SUPINE_OK) {
+  if (supine_fields_write(&prepared, &fields, &options, &file, &report, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
   supine_basis *basis = NULL;
@@ -279,10 +280,11 @@ TEST(test_fit_band_reducing_error_by_half_a_percent_not_chosen) {
 TEST(test_fit_vector_volumes_exact) {
   supine_fields fields = physics_fields(&lungs, 30, 21, 1.0);
   const supine_fit_options options = {.band = -1, .modes = 8};
-  const supine_precompute_options file = {.modes = 8};
   const char *path = in_folder("volume.safetensors");
+  const supine_prepared prepared = {.source = {.lungs = lungs}};
+  const supine_basis_choice file = {.path = path, .modes = 8};
   supine_fit_report report;
-  assert_int_equal(supine_fields_write(&lungs, &fields, &options, &file, path, &report, NULL),
+  assert_int_equal(supine_fields_write(&prepared, &fields, &options, &file, &report, NULL),
                    SUPINE_OK);
   const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
   supine_basis *basis = NULL;

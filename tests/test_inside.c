@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Test points, meshes and grids inside the lungs: location, motion and files. */
 #include "folder.h"
+
 #include "inside_helpers.h"
+#include <supine/locate.h>
 
 #include "base/vec3.h"
 #include "precompute/inside/biharmonic.h"
@@ -494,6 +496,35 @@ TEST(test_embed_points_in_one_lung_file_has_both_lungs) {
     supine_basis_close(inside);
     assert_true(farthest_from(&content, 0) < 4.0 * 0x1p-24 * 256.0);
   }
+  supine_inside_content_free(&content);
+}
+
+/* The expected error of a point depends on the lungs, not on which other points are in its file. */
+TEST(test_embed_point_alone_has_the_expected_error_that_it_has_among_others) {
+  const supine_state prone = {.gravity = {0.0, -1.0, 0.0}, .volume = {SUPINE_VOLUME_SCAN, 150.0}};
+  supine_inside_content content = made_points(40, 0.2, 0.9, 3);
+  float among[40];
+  float alone = 0.0F;
+  for (int pass = 0; pass < 2; ++pass) {
+    (void)embed(&content, false, 0);
+    supine_basis *inside = helper_open(inside_path);
+    float *sigma = pass == 0 ? among : &alone;
+    assert_int_equal(supine_expected_error(inside, &prone, NULL, sigma, NULL), SUPINE_OK);
+    for (uint32_t i = 0; pass == 0 && i < 40; ++i) { /* find the first point in the file's order */
+      alone =
+          ((const uint32_t *)supine_basis_tensor(inside, "part")->data)[i] == 0 ? among[i] : alone;
+    }
+    if (pass == 0) {
+      among[0] = alone;
+    }
+    supine_basis_close(inside);
+    content.count = 1;
+    content.names[2] = '\0'; /* the name of the first point alone */
+  }
+  printf("expected error of a point among others %.4f mm, alone %.4f mm\n", (double)among[0],
+         (double)alone);
+  assert_true(alone > 0.5F);
+  assert_true(fabsf(alone / among[0] - 1.0F) < 1e-4F);
   supine_inside_content_free(&content);
 }
 

@@ -1,11 +1,12 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Install the run-time library to an empty folder, and build the example with it by CMake and by pkg-config. Check
-# the dependencies and the exported names of the library.
+# Install the libraries to an empty folder, and build the examples with them by CMake and by pkg-config. Check the
+# dependencies and the exported names of the libraries.
 #
 #     test_install.sh CMAKE BUILD_FOLDER EXAMPLE_FOLDER MAKE_BASIS CC CXX
 set -eu
 cmake=$1 build=$2 example=$3 make_basis=$4 cc=$5 cxx=$6
+unset SUPINE_THREADS
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 prefix=$work/prefix
@@ -77,3 +78,35 @@ if grep -v '^supine_' "$work/names"; then exit 1; fi
 # The static library uses no functions of FFTW, GSL, assimp, threads or BLAS.
 nm --undefined-only "$lib/libsupine_runtime.a" | awk '{print $2}' | sort -u >"$work/undefined"
 if grep -Ei 'fftw|gsl_|assimp|^ai[A-Z]|pthread|cblas' "$work/undefined"; then exit 1; fi
+
+# The offline library makes a basis from arrays. CMake finds it once it is installed, and refuses it as a component before.
+"$cmake" -S "$example" -B "$work/missing" -G Ninja -DCMAKE_PREFIX_PATH="$prefix" -DNEEDED=precompute >"$work/out" 2>&1 && exit 1
+grep -q 'precompute' "$work/out"
+"$cmake" --install "$build" --prefix "$prefix" --component precompute >>"$work/log"
+CC=$cc CXX=$cxx "$cmake" -S "$example" -B "$work/offline" -G Ninja -DCMAKE_PREFIX_PATH="$prefix" -DNEEDED=precompute >>"$work/log"
+"$cmake" --build "$work/offline" >>"$work/log"
+"$build/supine" phantom --vertices 1000 -o "$work/lungs.ply" >>"$work/log"
+/usr/bin/python3 - "$work/lungs.ply" >"$work/lungs.txt" <<'EOF'
+import re, struct, sys
+data = open(sys.argv[1], "rb").read()
+at = data.index(b"end_header\n") + len("end_header\n")
+n, m = (int(x) for x in re.findall(rb"element \w+ (\d+)", data[:at]))
+width = 4 if re.search(rb"property float x", data[:at]) else 8
+print(n, m)
+print(*struct.unpack_from(f"<{3 * n}{'f' if width == 4 else 'd'}", data, at))
+for t in range(m):
+    print(*struct.unpack_from("<3I", data, at + 3 * width * n + 13 * t + 1))
+EOF
+# shellcheck disable=SC2046
+"$cc" -std=c17 -Wall -Wextra -Werror "$example/offline.c" $(pkg-config --cflags --libs supine-precompute) -o "$work/by_flags"
+for program in offline/offline_static offline/offline_shared by_flags; do
+  LD_LIBRARY_PATH=$lib "$work/$program" "$work/lungs.txt" >"$work/out" || { cat "$work/out"; echo "failed: $program"; exit 1; }
+  grep -q ' vertices, [1-8] modes$' "$work/out" || { cat "$work/out"; exit 1; }
+done
+nm -D --defined-only "$lib/libsupine_precompute.so" | awk '$2 == "T" {print $3}' | sed 's/@@.*//' | sort >"$work/shown"
+"$cc" -std=c17 -E -P -I"$prefix/include" -include supine/precompute.h -x c /dev/null |
+  grep -o 'supine_precompute_[a-z0-9_]*(' | tr -d '(' | sort -u | diff - "$work/shown"
+for header in "-x c -std=c17" "-x c++"; do
+  # shellcheck disable=SC2086
+  "$cxx" -Wall -Wextra -Wpedantic -Werror -fsyntax-only -I"$prefix/include" -include supine/precompute.h $header /dev/null
+done

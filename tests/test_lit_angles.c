@@ -32,25 +32,24 @@ static supine_basis *make_basis(supine_lungs *lungs, double soften, size_t modes
   static const supine_scan full = {.known = true,
                                    .state = {.gravity = {0, 1, 0}, .volume = {SUPINE_VOLUME_FULL}}};
   const supine_resting resting = supine_reference_resting_default();
-  supine_precompute_options options = {
-      .model = supine_physics_model(SUPINE_LAW_DEEP), .band = 15, .modes = modes, .held_out = 20};
-  supine_reference reference;
-  supine_precompute_report report;
+  supine_prepared prepared = {.model = supine_physics_model(SUPINE_LAW_DEEP)};
   supine_error error = {0};
   supine_basis *basis = NULL;
   char path[] = "/tmp/supine-angles-XXXXXX";
   const int file = mkstemp(path);
   assert_true(file >= 0 && close(file) == 0);
-  options.model.force.soften = soften;
-  options.reference = &reference;
+  const supine_basis_choice choice = {.path = path, .band = 15, .modes = modes, .held_out = 20};
+  prepared.model.force.soften = soften;
+  prepared.source.lungs = *lungs;
   /* Use exact storage: rounded positions would change the normals of small triangles. */
   const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
-  if (supine_reference_find(lungs, &options.model, &full, &resting, &reference, &error) !=
-          SUPINE_OK ||
-      supine_precompute(lungs, &options, path, &report, &error) != SUPINE_OK ||
+  if (supine_reference_find(&prepared.source.lungs, &prepared.model, &full, &resting,
+                            &prepared.reference, &error) != SUPINE_OK ||
+      supine_precompute(&prepared, &choice, NULL, &error) != SUPINE_OK ||
       supine_basis_open_with(path, &exact, &basis, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
+  *lungs = prepared.source.lungs;
   assert_int_equal(unlink(path), 0);
   return basis;
 }

@@ -124,6 +124,7 @@ TEST(test_fit_public_landmarks_err_less_than_quadratic_law) {
                {"097", {6.75, 8.03}}};
   double mean[2] = {0.0};
   double band = 0.0;
+  double stated = 0.0;
   for (size_t c = 0; c < 10; ++c) {
     const bool exhaled = c % 2 == 1;
     char path[512];
@@ -153,6 +154,13 @@ TEST(test_fit_public_landmarks_err_less_than_quadratic_law) {
     assert_true(kept < held[SUPINE_PATIENT_SCORE_LAW] && kept < held[SUPINE_PATIENT_SCORE_AFFINE]);
     assert_true(kept > report.fitted[SUPINE_PATIENT_SCORE_CORRECTED]);
     assert_true(report.band > 87.0 && report.band < 99.0);
+    /* The error stated in the fuller scan is that found on held-out blocks, where tissue is longer
+     * by `stretch`. */
+    assert_true(exhaled ? report.stretch == 1.0 : report.stretch > 1.03 && report.stretch < 1.35);
+    assert_true(fabs(report.expected_point / (report.stretch * kept) - 1.0) < 0.1);
+    /* The fit from the exhaled scan finds the error that the fit from the inhaled scan stated. */
+    assert_true(!exhaled || fabs(stated / kept - 1.0) < 0.1);
+    stated = report.expected_point;
     mean[exhaled] += kept / 5.0;
     band += report.band / 10.0;
     supine_patient_pairs_free(&pairs);
@@ -160,6 +168,29 @@ TEST(test_fit_public_landmarks_err_less_than_quadratic_law) {
   printf("mean error: %.2f and %.2f mm, %.1f %% within the band\n", mean[0], mean[1], band);
   assert_true(mean[0] <= 5.25 && mean[1] <= 5.95);
   assert_true(band > 92.0 && band < 98.0);
+}
+
+TEST(test_validation_points_states_expected_error_and_share_in_band) {
+  enum { N = 4 };
+  double from[3 * N] = {0.0, 0.0, 0.0, 50.0, 0.0, 0.0, 0.0, 60.0, 0.0, 0.0, 0.0, 70.0};
+  double to[3 * N];
+  double predicted[3 * N];
+  const double squares[N] = {1.0, 2.25, 1.0, 4.0}; /* expected errors 1, 1.5, 1 and 2 mm */
+  supine_patient_pairs pairs = {N, from, to, NULL};
+  supine_validation_distance distance[SUPINE_PATIENT_MAP_COUNT];
+  for (size_t i = 0; i < 3 * N; ++i) {
+    to[i] = from[i] + 5.0;
+    predicted[i] = to[i] + (i % 3 == 0 ? 1.0 + (double)(i / 3) : 0.0); /* 1, 2, 3 and 4 mm off */
+  }
+  assert_int_equal(
+      supine_validation_points(&pairs, predicted, squares, SUPINE_PATIENT_STILL, distance, NULL),
+      SUPINE_OK);
+  const supine_validation_distance *of = &distance[SUPINE_PATIENT_MAP_PREDICTED];
+  assert_true(fabs(of->rms - sqrt(7.5)) < 1e-12);
+  assert_true(fabs(of->expected - sqrt(8.25 / 4.0)) < 1e-12);
+  /* 1 < 1.8 x 1 and 2 < 1.8 x 1.5, but 3 > 1.8 x 1 and 4 > 1.8 x 2. */
+  assert_true(fabs(of->within - 0.5) < 1e-12);
+  assert_true(distance[SUPINE_PATIENT_MAP_AFFINE].expected == 0.0);
 }
 
 /* The error at the fitted points, after correction by kriging, equals the reported error. */
@@ -589,9 +620,9 @@ TEST(test_compare_points_each_map_explains_its_motions) {
   for (size_t i = 0; i < pairs.count; ++i) {
     pairs.to[3 * i] += 0.2 * pairs.from[3 * i + 1]; /* a shear */
   }
-  assert_int_equal(supine_validation_points(&pairs, pairs.from, NULL, SUPINE_PATIENT_STILL,
-                                                 distance, &error),
-                   SUPINE_OK);
+  assert_int_equal(
+      supine_validation_points(&pairs, pairs.from, NULL, SUPINE_PATIENT_STILL, distance, &error),
+      SUPINE_OK);
   assert_true(distance[SUPINE_PATIENT_MAP_AFFINE].largest < 1e-9 * none);
   /* If the predicted displacement is 0, the error equals that without a prediction. */
   assert_true(distance[SUPINE_PATIENT_MAP_PREDICTED].rms == distance[SUPINE_PATIENT_MAP_NONE].rms);
@@ -604,20 +635,20 @@ TEST(test_compare_points_each_map_explains_its_motions) {
     turned_by[3 * i + 1] = pairs.to[3 * i];
     turned_by[3 * i + 2] = pairs.to[3 * i + 2] - 7.0;
   }
-  assert_int_equal(supine_validation_points(&pairs, turned_by, NULL, SUPINE_PATIENT_RIGID,
-                                                 distance, &error),
-                   SUPINE_OK);
+  assert_int_equal(
+      supine_validation_points(&pairs, turned_by, NULL, SUPINE_PATIENT_RIGID, distance, &error),
+      SUPINE_OK);
   assert_true(distance[SUPINE_PATIENT_MAP_PREDICTED].largest < 1e-9);
-  assert_int_equal(supine_validation_points(&pairs, turned_by, NULL,
-                                                 SUPINE_PATIENT_TRANSLATION, distance, &error),
+  assert_int_equal(supine_validation_points(&pairs, turned_by, NULL, SUPINE_PATIENT_TRANSLATION,
+                                            distance, &error),
                    SUPINE_OK);
   assert_true(distance[SUPINE_PATIENT_MAP_PREDICTED].rms > 10.0);
   assert_true(distance[SUPINE_PATIENT_MAP_TRANSLATION].explained == 0.0);
   /* Without motion, the explained fraction of the motion is undefined. */
   memcpy(pairs.to, pairs.from, 3 * pairs.count * sizeof *pairs.to);
-  assert_int_equal(supine_validation_points(&pairs, turned_by, NULL, SUPINE_PATIENT_STILL,
-                                                 distance, &error),
-                   SUPINE_OK);
+  assert_int_equal(
+      supine_validation_points(&pairs, turned_by, NULL, SUPINE_PATIENT_STILL, distance, &error),
+      SUPINE_OK);
   assert_true(isnan(distance[SUPINE_PATIENT_MAP_PREDICTED].explained));
   free(turned_by);
   supine_patient_pairs_free(&pairs);
@@ -652,9 +683,9 @@ TEST(test_compare_surfaces_sampled_vertices_keep_statistics) {
     free(distance);
   }
   supine_validation_distance of[SUPINE_PATIENT_MAP_COUNT];
-  assert_int_equal(supine_validation_surfaces(&start, SUPINE_PATIENT_STILL, predicted, &end,
-                                                   nearest, of, NULL),
-                   SUPINE_OK);
+  assert_int_equal(
+      supine_validation_surfaces(&start, SUPINE_PATIENT_STILL, predicted, &end, nearest, of, NULL),
+      SUPINE_OK);
   print_message("without motion: mean %.4f mm, of all vertices %.4f mm\n",
                 of[SUPINE_PATIENT_MAP_NONE].mean, mean);
   assert_true(of[SUPINE_PATIENT_MAP_PREDICTED].largest < 1e-6);

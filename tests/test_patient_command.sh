@@ -27,12 +27,12 @@ near() {
 vertices() {
   awk '/^v / { print $2 "," $3 "," $4 }' "$1"
 }
-# pairs FROM TO NAME: write NAME.csv with every 25th vertex of two OBJ files as landmarks.
+# pairs FROM TO NAME: write NAME.csv with every tenth vertex of two OBJ files as landmarks.
 pairs() {
   {
     echo x,y,z,to_x,to_y,to_z
     vertices "$1.obj" >from.csv
-    vertices "$2.obj" | paste -d, from.csv - | awk 'NR % 25 == 1'
+    vertices "$2.obj" | paste -d, from.csv - | awk 'NR % 10 == 1'
   } >"$3.csv"
 }
 # surfaces FILE: print the RMS distance, mm, between the predicted and the scanned surface of the first state in FILE,
@@ -79,8 +79,8 @@ turns forwards s_supine_rest.ply s_supine_full.ply --other supine:full \
   --state prone:rest:s_prone_rest.ply
 turns backwards s_supine_full.ply s_supine_rest.ply --rest supine:full --other supine:rest \
   --state prone:rest:s_prone_rest.ply
-turns points --landmarks full.csv --rest 2884mL --other 6000mL --state prone:rest:prone.CSV
-turns reversed --landmarks empty.csv --rest 6000mL --other 2884mL \
+turns points --landmarks full.csv --rest 2885mL --other 6000mL --state prone:rest:prone.CSV
+turns reversed --landmarks empty.csv --rest 6000mL --other 2885mL \
   --state prone:rest:down.csv
 grep -q 'state *supine:full' fit.txt || fail "the states are not stated: $(cat fit.txt)"
 "$supine" info points.safetensors | grep -q 'patient *somebody: deep law.* held-out residual' ||
@@ -128,13 +128,13 @@ grep -q 'the volume at rest is 56 % of full inflation' note || fail "no warning:
 
 # Two absolute volumes are rest and full inflation; a scan is recognised by its volume. The patient's full inflation is
 # kept if the state of the scan is given.
-"$supine" fit s_supine_rest.ply q_supine_full.ply --rest 2884mL --other 6000mL -o known.json >fit.txt 2>note ||
+"$supine" fit s_supine_rest.ply q_supine_full.ply --rest 2885mL --other 6000mL -o known.json >fit.txt 2>note ||
   fail "fit volumes alone"
-grep -q '2884 mL counts as rest, that of 6000 mL as full inflation' note || fail "volumes alone: $(cat note)"
+grep -q '2885 mL counts as rest, that of 6000 mL as full inflation' note || fail "volumes alone: $(cat note)"
 "$supine" precompute s_supine_rest.ply --scanned supine:rest --patient known.json -o known.safetensors >out 2>&1 ||
   fail "precompute volumes alone: $(cat out)"
 grep -q 'full inflation 6[0-9]* mL (from rest' out || fail "full inflation is lost: $(cat out)"
-"$supine" fit --landmarks full.csv --rest 2884mL --other 3300mL -o x.json >out 2>&1 &&
+"$supine" fit --landmarks full.csv --rest 2885mL --other 3300mL -o x.json >out 2>&1 &&
   grep -q 'as a breath above it' out || fail "a breath: $(cat out)"
 "$supine" fit --landmarks full.csv --rest supine:rest --other supine:full -o x.json >out 2>&1 &&
   fail "landmarks without volumes"
@@ -145,7 +145,7 @@ near "$(surfaces valid.json)" 0 2 || fail "volumes alone: $(surfaces valid.json)
 
 # A third state that is called prone, but has the positions of a supine scan, does not determine the gain
 # (the coefficient of height in the force).
-"$supine" fit --landmarks full.csv --rest 2884mL --other 6000mL --state prone:rest:full.csv -o x.json \
+"$supine" fit --landmarks full.csv --rest 2885mL --other 6000mL --state prone:rest:full.csv -o x.json \
   --json >fit.json 2>&1 || fail "fit a state that did not turn"
 "$supine" fit s_supine_rest.ply s_supine_full.ply --other supine:full \
   --state prone:rest:s_supine_rest.ply --law paper >fit.txt || fail "fit a scan that did not turn"
@@ -293,7 +293,7 @@ echo '{}' >fit.csv
 refused 2 'not a patient' precompute rest.ply --patient fit.csv -o x.safetensors
 awk -F, 'NR == 1 { print; next } { printf "%s,%s,%s,%s,%s,%s\n", $1+900, $2, $3, $4+900, $5, $6 }' \
   full.csv >far.csv
-"$supine" fit --landmarks far.csv --rest 2884mL --other 6000mL -o far.json >/dev/null || fail "fit far away"
+"$supine" fit --landmarks far.csv --rest 2885mL --other 6000mL -o far.json >/dev/null || fail "fit far away"
 refused 2 'check that it has the same coordinate frame and unit' precompute s.ply --patient far.json -o x.safetensors
 refused 2 'check their frame, unit and patient' validate points.safetensors --to supine:full --landmarks far.csv
 [ ! -e x.safetensors ] || fail "a refused command left a file"

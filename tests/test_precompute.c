@@ -59,15 +59,15 @@ static double reach;
 
 static supine_precompute_report make_basis(const supine_lungs *lungs, size_t band, size_t modes,
                                            double soften, size_t held_out) {
-  supine_precompute_options options = {.model = supine_physics_model(SUPINE_LAW_PAPER),
-                                       .band = band,
-                                       .modes = modes,
-                                       .held_out = held_out};
-  options.model.force.soften = soften;
-  options.model.reach = soften != 0.0 ? 10.0 : reach;
+  supine_prepared prepared = {.source = {.lungs = *lungs},
+                              .model = supine_physics_model(SUPINE_LAW_PAPER)};
+  const supine_basis_choice choice = {
+      .path = path, .band = band, .modes = modes, .held_out = held_out};
+  prepared.model.force.soften = soften;
+  prepared.model.reach = soften != 0.0 ? 10.0 : reach;
   supine_precompute_report report;
   supine_error error;
-  if (supine_precompute(lungs, &options, path, &report, &error) != SUPINE_OK) {
+  if (supine_precompute(&prepared, &choice, &report, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
   return report;
@@ -181,7 +181,7 @@ static sample_mean mean_of(size_t count, const double *values) {
   return (sample_mean){mean, sqrt((square / (double)count - mean * mean) / (double)(count - 1))};
 }
 
-enum { CHECKED = 300 };
+enum { CHECKED = 600 };
 
 /* Compare the displacements of a basis with those of supine_physics_solve, in `count` directions of
  * gravity. For each direction, set three means over the vertices, mm^2:
@@ -545,7 +545,7 @@ TEST(test_turned_over_one_posture_emptied_finds_more_reversed) {
   for (size_t p = 0; p < sizeof postures / sizeof *postures; ++p) {
     const int g = postures[p];
     static const size_t term[3] = {3, 1, 2}; /* index of the band-1 harmonic along x, y, z */
-    const double part = -0.76 * full;
+    const double part = -0.72 * full;
     const double sign = g < 3 ? 1.0 : -1.0;
     /* Expand the volume at rest in harmonics: `part` mL in one posture, 0 mL in the opposite one.
      * The divisors are the values of the harmonics of degrees 0 and 1 along that axis. */
@@ -567,7 +567,7 @@ TEST(test_turned_over_one_posture_emptied_finds_more_reversed) {
         SUPINE_OK);
     free(dense.mesh.triangles);
     assert_close(sampled, share, 1e-12);
-    assert_true(share > least + 0.02); /* 0.12 to 0.16 of the triangles turn, against 0.08 */
+    assert_true(share > least + 0.02); /* 0.12 to 0.15 of the triangles turn, against 0.08 */
   }
   supine_physics_volume_forms_free(&forms);
   supine_sh_compression_free(&field);
@@ -578,19 +578,20 @@ TEST(test_turned_over_one_posture_emptied_finds_more_reversed) {
 
 TEST(test_precompute_turned_over_share_equals_run_time) {
   supine_lungs lungs = phantom(3000);
-  supine_precompute_options options = {
-      .model = supine_physics_model(SUPINE_LAW_PAPER), .band = 7, .modes = 4, .held_out = 20};
+  supine_prepared prepared = {.source = {.lungs = lungs},
+                              .model = supine_physics_model(SUPINE_LAW_PAPER)};
+  const supine_basis_choice choice = {.path = path, .band = 7, .modes = 4, .held_out = 20};
   double *stiffness = malloc(lungs.mesh.vertex_count * sizeof *stiffness);
   uint64_t seed = 3;
   for (size_t i = 0; i < lungs.mesh.vertex_count; ++i) {
     stiffness[i] = exp(8.0 * helper_random(&seed));
   }
   supine_precompute_report report;
-  assert_int_equal(supine_precompute(&lungs, &options, path, &report, NULL), SUPINE_OK);
+  assert_int_equal(supine_precompute(&prepared, &choice, &report, NULL), SUPINE_OK);
   assert_true(report.turned_over < 0.001);
   assert_close(report.turned_over, turned_over_at_run_time(report.accuracy.volume), 1e-4);
-  options.model.stiffness = stiffness; /* irregular stiffness reverses triangles */
-  assert_int_equal(supine_precompute(&lungs, &options, path, &report, NULL), SUPINE_OK);
+  prepared.model.stiffness = stiffness; /* irregular stiffness reverses triangles */
+  assert_int_equal(supine_precompute(&prepared, &choice, &report, NULL), SUPINE_OK);
   assert_true(report.turned_over > 0.01);
   assert_close(report.turned_over, turned_over_at_run_time(report.accuracy.volume), 1e-3);
   free(stiffness);
@@ -612,19 +613,20 @@ TEST(test_precompute_real_lungs_with_reach_few_reversed) {
 
 TEST(test_precompute_bad_options_refused) {
   supine_lungs lungs = phantom(500);
-  supine_precompute_options options = {
-      .model = supine_physics_model(SUPINE_LAW_PAPER), .band = 65, .modes = 16};
+  supine_prepared prepared = {.source = {.lungs = lungs},
+                              .model = supine_physics_model(SUPINE_LAW_PAPER)};
+  supine_basis_choice choice = {.path = path, .band = 65, .modes = 16};
   supine_error error;
-  assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error), SUPINE_ERROR_ARGUMENT);
-  options.band = 8;
-  options.modes = 0; /* all 81 harmonics: too many */
-  assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error), SUPINE_ERROR_ARGUMENT);
-  options.modes = 65;
-  assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error), SUPINE_ERROR_ARGUMENT);
-  options.modes = 16;
+  assert_int_equal(supine_precompute(&prepared, &choice, NULL, &error), SUPINE_ERROR_ARGUMENT);
+  choice.band = 8;
+  choice.modes = 0; /* all 81 harmonics: too many */
+  assert_int_equal(supine_precompute(&prepared, &choice, NULL, &error), SUPINE_ERROR_ARGUMENT);
+  choice.modes = 65;
+  assert_int_equal(supine_precompute(&prepared, &choice, NULL, &error), SUPINE_ERROR_ARGUMENT);
+  choice.modes = 16;
   /* Softening of lower tissue (`soften`) requires a smoothing distance of forces (`reach`) > 0. */
-  options.model.force.soften = 1.0;
-  assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error), SUPINE_ERROR_ARGUMENT);
+  prepared.model.force.soften = 1.0;
+  assert_int_equal(supine_precompute(&prepared, &choice, NULL, &error), SUPINE_ERROR_ARGUMENT);
   supine_lungs_free(&lungs);
 }
 

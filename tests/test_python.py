@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Build the wheel of the Python package, install it without network access into a clean environment, and test it.
 
-    test_python.py SOURCE_FOLDER LIBRARY SUPINE CC"""
+    test_python.py SOURCE_FOLDER LIBRARY OFFLINE_LIBRARY SUPINE CC"""
 import importlib.util
 import os
 import re
@@ -11,7 +11,7 @@ import sys
 import tempfile
 import zipfile
 
-source, library, supine, cc = sys.argv[1:5]
+source, library, offline, supine, cc = sys.argv[1:6]
 for wanted in ("pip", "setuptools", "wheel", "numpy"):
     if importlib.util.find_spec(wanted) is None:
         print(f"skipped: this python has no {wanted}")
@@ -62,7 +62,12 @@ with tempfile.TemporaryDirectory() as folder:
     run(supine, "precompute", "lungs.ply", "-o", "lungs.safetensors", "--band", "3")
     run(supine, "precompute", "lungs.ply", "-o", "other.safetensors", "--band", "2")
     run(supine, "embed", "lungs.safetensors", "--grid", "12", "-o", "grid.safetensors")
-    print(wheel, run(python, f"{source}/tests/python/inside.py", "./reference", "lungs.safetensors"))
+    print(wheel, run(python, f"{source}/tests/python/inside.py", "./reference", "lungs.safetensors", "program"))
+    # With the offline library beside the package, the same results are made in process.
+    package = os.path.dirname(run(python, "-c", "import supine; print(supine.__file__)"))
+    os.remove(os.path.join(package, "supine"))
+    shutil.copy(offline, os.path.join(package, "libsupine_precompute.so"))
+    print("offline library:", run(python, f"{source}/tests/python/inside.py", "./reference", "lungs.safetensors", "library"))
 
     # Run the examples of runtime/python/README.md; the one with VTK needs VTK.
     with open(f"{source}/runtime/python/README.md", encoding="utf-8") as readme:

@@ -420,19 +420,19 @@ TEST(test_reference_real_scans_reach_full_inflation) {
 /* Make a basis of lungs scanned in a state, and write its RMS error, mm, to `rms_mm`. */
 static supine_basis *basis_of(supine_lungs *lungs, const supine_scan *scan, double *rms_mm) {
   const supine_resting resting = supine_reference_resting_default();
-  supine_precompute_options options = {
-      .model = supine_physics_model(SUPINE_LAW_DEEP), .band = 15, .modes = 16, .held_out = 20};
-  supine_reference reference;
+  supine_prepared prepared = {.source = {.lungs = *lungs},
+                              .model = supine_physics_model(SUPINE_LAW_DEEP)};
+  const supine_basis_choice choice = {.path = path, .band = 15, .modes = 16, .held_out = 20};
   supine_precompute_report report;
   supine_basis *basis = NULL;
   supine_error error = {0};
-  options.reference = &reference;
-  if (supine_reference_find(lungs, &options.model, scan, &resting, &reference, &error) !=
-          SUPINE_OK ||
-      supine_precompute(lungs, &options, path, &report, &error) != SUPINE_OK ||
+  if (supine_reference_find(&prepared.source.lungs, &prepared.model, scan, &resting,
+                            &prepared.reference, &error) != SUPINE_OK ||
+      supine_precompute(&prepared, &choice, &report, &error) != SUPINE_OK ||
       supine_basis_open(path, &basis, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
+  *lungs = prepared.source.lungs;
   assert_true(report.accuracy.volume == 1.0 && report.accuracy.rms_mm < 0.1);
   *rms_mm = report.accuracy.rms_mm;
   return basis;

@@ -219,7 +219,7 @@ TEST(test_project_outer_vertices_match_drawing) {
   for (size_t i = 0; i < info->vertex_count; ++i) {
     memcpy(mark[i].xyz, info->vertices + 3 * i, sizeof mark[i].xyz);
   }
-  const supine_marks marks = {info->vertex_count, mark};
+  const supine_marks marks = {.count = info->vertex_count, .mark = mark};
   for (supine_view view = 0; view < SUPINE_VIEW_COUNT; ++view) {
     const supine_scene scene = {.pose = POSED(m.basis, weights, scales),
                                 .view = view,

@@ -195,6 +195,75 @@ TEST(test_evaluate_open_basis_no_system_calls) {
   setting_close(&s);
 }
 
+/* Memory of an allocator that the test passes to the library. */
+typedef struct pool {
+  size_t blocks, requests, refused; /* refused: number of the request to refuse, from 1; 0: none */
+} pool;
+
+static void *pool_allocate(void *user, size_t bytes) {
+  pool *p = user;
+  void *block =
+      ++p->requests == p->refused ? NULL : __real_aligned_alloc(64, (bytes + 63) / 64 * 64);
+  p->blocks += block != NULL;
+  if (block != NULL) {
+    memset(block, 0xA5, bytes);
+  }
+  return block;
+}
+
+static void pool_release(void *user, void *memory) {
+  pool *p = user;
+  assert_non_null(memory);
+  --p->blocks;
+  __real_free(memory);
+}
+
+TEST(test_open_with_allocator_uses_only_it) {
+  setting s = setting_open();
+  pool p = {0};
+  supine_status status = SUPINE_ERROR_MEMORY;
+  const supine_basis_options options = {.size = sizeof options,
+                                        .allocator = {pool_allocate, pool_release, &p}};
+  for (p.refused = 1; status != SUPINE_OK && p.refused < 1000; ++p.refused) {
+    supine_basis *basis = NULL;
+    supine_basis *usual = NULL;
+    supine_error error = {0};
+    attempts = p.requests = 0;
+    counting = true;
+    status = supine_basis_open_with(s.path, &options, &basis, &error);
+    counting = false;
+    assert_int_equal(attempts, 0); /* nothing is allocated by the C library */
+    if (status != SUPINE_OK) {
+      assert_int_equal(status, SUPINE_ERROR_MEMORY);
+      assert_says(error.message, s.path);
+    } else {
+      float *xyz = s.xyz + 300;
+      assert_in_range(p.blocks, 5, p.requests - 1); /* work space is freed */
+      assert_int_equal(supine_basis_open(s.path, &usual, NULL), SUPINE_OK);
+      const supine_pose pose = {.weights = {0.3, -0.2, 0.1}, .gains = {{1, 1, 1}, {1, 1, 1}}};
+      supine_deform(basis, &pose, s.xyz);
+      supine_deform(usual, &pose, xyz);
+      assert_memory_equal(s.xyz, xyz, 300 * sizeof *xyz);
+    }
+    supine_basis_close(basis);
+    supine_basis_close(usual);
+    assert_int_equal(p.blocks, 0);
+  }
+  assert_int_equal(status, SUPINE_OK);
+  assert_true(p.refused > 5);
+  setting_close(&s);
+}
+
+TEST(test_open_with_half_an_allocator_refused) {
+  setting s = setting_open();
+  supine_basis *basis = NULL;
+  const supine_basis_options options = {.size = sizeof options,
+                                        .allocator = {.release = pool_release}};
+  assert_int_equal(supine_basis_open_with(s.path, &options, &basis, NULL), SUPINE_ERROR_ARGUMENT);
+  assert_null(basis);
+  setting_close(&s);
+}
+
 TEST(test_open_each_allocation_failing_reports_memory_error) {
   setting s = setting_open();
   supine_status status = SUPINE_ERROR_MEMORY;

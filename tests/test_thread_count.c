@@ -16,13 +16,13 @@ static supine_lungs phantom(void) {
 }
 
 /* Return the bytes (malloc) and the size of a basis file computed with `threads` threads. */
-static unsigned char *bytes_of(const supine_lungs *lungs, const supine_precompute_options *options,
-                               const char *threads, size_t *size) {
+static unsigned char *bytes_of(const supine_prepared *prepared, const char *threads, size_t *size) {
   char path[] = "/tmp/supine-threads-XXXXXX";
+  const supine_basis_choice choice = {.path = path, .band = 3, .modes = 8, .held_out = 20};
   supine_error error;
   (void)close(mkstemp(path));
   assert_int_equal(setenv("SUPINE_THREADS", threads, 1), 0);
-  if (supine_precompute(lungs, options, path, NULL, &error) != SUPINE_OK) {
+  if (supine_precompute(prepared, &choice, NULL, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
   unsigned char *bytes = test_read(path, size);
@@ -33,15 +33,15 @@ static unsigned char *bytes_of(const supine_lungs *lungs, const supine_precomput
 static void check(double soften, double reach) {
   static const char *const threads[] = {"2", "3", "7"};
   supine_lungs lungs = phantom();
-  supine_precompute_options options = {
-      .model = supine_physics_model(SUPINE_LAW_PAPER), .band = 3, .modes = 8, .held_out = 20};
-  options.model.force.soften = soften;
-  options.model.reach = reach;
+  supine_prepared prepared = {.source = {.lungs = lungs},
+                              .model = supine_physics_model(SUPINE_LAW_PAPER)};
+  prepared.model.force.soften = soften;
+  prepared.model.reach = reach;
   size_t size;
-  unsigned char *one = bytes_of(&lungs, &options, "1", &size);
+  unsigned char *one = bytes_of(&prepared, "1", &size);
   for (size_t t = 0; t < sizeof threads / sizeof *threads; ++t) {
     size_t other_size;
-    unsigned char *other = bytes_of(&lungs, &options, threads[t], &other_size);
+    unsigned char *other = bytes_of(&prepared, threads[t], &other_size);
     assert_int_equal(other_size, size);
     for (size_t i = 0; i < size; ++i) {
       if (one[i] != other[i]) {

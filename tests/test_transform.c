@@ -36,17 +36,10 @@ static double *make(size_t count, uint64_t seed) {
   return numbers;
 }
 
-/* Compute coefficients [fields, count] of values [points, fields], adding latitudes from last to
- * first. */
+/* Compute coefficients [fields, count] of values [points, fields]. */
 static void forward(const setup *s, size_t fields, const double *values, double *coefficients) {
-  const size_t latitudes = s->grid->latitudes;
-  supine_sh_transform *plan = NULL;
-  assert_int_equal(supine_sh_transform_create(s->band, s->grid, fields, &plan, NULL), SUPINE_OK);
-  memset(coefficients, 0, s->count * fields * sizeof *coefficients);
-  for (size_t j = latitudes; j-- > 0;) {
-    supine_sh_transform_ring(plan, j, values + j * s->longitudes * fields, coefficients);
-  }
-  supine_sh_transform_destroy(plan);
+  assert_int_equal(supine_sh_transform(s->band, s->grid, fields, values, coefficients, NULL),
+                   SUPINE_OK);
 }
 
 static double largest_difference(const double *a, const double *b, size_t count) {
@@ -155,20 +148,17 @@ TEST(test_forward_any_values_equal_direct_quadrature) {
   tear_down(&s);
 }
 
-TEST(test_create_small_grid_or_high_band_refused) {
+TEST(test_transform_small_grid_or_high_band_refused) {
   static const size_t sizes[][3] = {
       {3, 3, 8}, {3, 4, 6}, {SUPINE_SH_BAND_MAX + 1, 200, 400}, {SIZE_MAX, 200, 400}};
   for (size_t i = 0; i < sizeof sizes / sizeof *sizes; ++i) {
     supine_sh_grid *grid = NULL;
-    supine_sh_transform *plan = NULL;
     supine_error error = {0};
     assert_int_equal(supine_sh_grid_create(sizes[i][1], sizes[i][2], &grid), SUPINE_OK);
-    assert_int_equal(supine_sh_transform_create(sizes[i][0], grid, 1, &plan, &error),
+    assert_int_equal(supine_sh_transform(sizes[i][0], grid, 1, NULL, NULL, &error),
                      SUPINE_ERROR_ARGUMENT);
-    assert_null(plan);
     assert_int_equal(error.status, SUPINE_ERROR_ARGUMENT);
     assert_says(error.message, "directions cannot represent band");
     supine_sh_grid_destroy(grid);
   }
-  supine_sh_transform_destroy(NULL);
 }

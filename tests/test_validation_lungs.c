@@ -29,10 +29,10 @@ TEST(test_deform_one_orientation_linear_in_volume) {
   const int file = mkstemp(path);
   assert_true(file >= 0);
   (void)close(file);
-  const supine_precompute_options options = {
-      .model = supine_physics_model(SUPINE_LAW_PAPER), .band = 7, .modes = 16, .held_out = 5};
-  supine_precompute_report report;
-  assert_int_equal(supine_precompute(&lungs, &options, path, &report, NULL), SUPINE_OK);
+  const supine_prepared prepared = {.source = {.lungs = lungs},
+                                    .model = supine_physics_model(SUPINE_LAW_PAPER)};
+  const supine_basis_choice choice = {.path = path, .band = 7, .modes = 16, .held_out = 5};
+  assert_int_equal(supine_precompute(&prepared, &choice, NULL, NULL), SUPINE_OK);
   supine_basis *basis = NULL;
   assert_int_equal(supine_basis_open(path, &basis, NULL), SUPINE_OK);
   const size_t n = supine_basis_get_info(basis)->vertex_count;

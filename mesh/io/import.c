@@ -6,7 +6,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -150,7 +149,8 @@ static void confine(size_t bytes) {
 }
 
 static _Noreturn void be_child(const mesh_file *file, const char *kind, size_t bytes,
-                               FILE *stream) {
+                               int pipe_end) {
+  FILE *stream = fdopen(pipe_end, "wb");
   outcome result = {.error = {SUPINE_OK, ""}};
   gathering out = {.error = &result.error};
   out.faces = (mesh_faces){.path = file->path, .mesh = &out.mesh};
@@ -168,6 +168,9 @@ static _Noreturn void be_child(const mesh_file *file, const char *kind, size_t b
   result.dropped = out.faces.dropped;
   result.vertex_count = out.mesh.vertex_count;
   result.triangle_count = out.mesh.triangle_count;
+  if (stream == NULL) {
+    _exit(1);
+  }
   (void)fwrite(&result, sizeof result, 1, stream);
   (void)fwrite(out.mesh.vertices, 3 * sizeof(double), result.vertex_count, stream);
   (void)fwrite(out.mesh.triangles, 3 * sizeof(uint32_t), result.triangle_count, stream);
@@ -179,7 +182,6 @@ static _Noreturn void be_child(const mesh_file *file, const char *kind, size_t b
 static supine_status take_outcome(const char *path, FILE *stream, supine_mesh *mesh,
                                   size_t *dropped, supine_error *error) {
   outcome result;
-  rewind(stream);
   if (fread(&result, sizeof result, 1, stream) == 1) {
     if (result.error.status != SUPINE_OK) {
       return supine_error_set(error, result.error.status, "%s", result.error.message);
@@ -204,21 +206,24 @@ static supine_status take_outcome(const char *path, FILE *stream, supine_mesh *m
 static supine_status import_file(const mesh_file *file, const char *kind, supine_mesh *mesh,
                                  size_t *dropped, supine_error *error) {
   struct stat about = {0};
-  const int descriptor = memfd_create("mesh", MFD_CLOEXEC);
-  SUPINE_FREED_BY(supine_file_close)
-  FILE *stream = descriptor < 0 ? NULL : fdopen(descriptor, "w+b");
+  int ends[2] = {-1, -1};
+  FILE *stream = pipe(ends) == 0 ? fdopen(ends[0], "rb") : NULL;
   if (stream == NULL) {
-    (void)close(descriptor);
+    (void)close(ends[0]);
+    (void)close(ends[1]);
     return supine_error_memory(error, "%s", file->path);
   }
   (void)stat(file->path, &about);
   const pid_t child = fork();
   if (child == 0) {
-    be_child(file, kind, (size_t)about.st_size, stream);
+    be_child(file, kind, (size_t)about.st_size, ends[1]);
   }
+  (void)close(ends[1]);
+  const supine_status status = take_outcome(file->path, stream, mesh, dropped, error);
+  (void)fclose(stream); /* before the wait: a child that still writes ends */
   while (child > 0 && waitpid(child, NULL, 0) < 0 && errno == EINTR) {
   }
-  return take_outcome(file->path, stream, mesh, dropped, error);
+  return status;
 }
 
 supine_status supine_mesh_import(mesh_file *file, supine_mesh *mesh, size_t *dropped,

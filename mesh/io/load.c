@@ -4,7 +4,9 @@
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/stat.h>
 
 #include "base/arena.h"
@@ -63,12 +65,12 @@ static void find_space(mesh_file *file) {
   char letters[4] = "";
   (void)snprintf(head, sizeof head, "%s", (const char *)file->bytes);
   const char *tag = head;
-  while ((tag = strcasestr(tag, "SPACE=")) != NULL && tag > head &&
-         isalnum((unsigned char)tag[-1])) {
+  while (*tag != '\0' &&
+         (strncasecmp(tag, "SPACE=", 6) != 0 || (tag > head && isalnum((unsigned char)tag[-1])))) {
     ++tag;
   }
-  file->tagged = tag != NULL;
-  if (tag != NULL && !isalnum((unsigned char)tag[strnlen(tag, 9)])) {
+  file->tagged = *tag != '\0';
+  if (file->tagged && !isalnum((unsigned char)tag[strnlen(tag, 9)])) {
     for (size_t k = 0; k < 3; ++k) {
       letters[k] = (char)toupper((unsigned char)tag[strnlen(tag, 6 + k)]);
     }
@@ -101,6 +103,26 @@ static supine_status read_file(mesh_file *file, supine_arena *arena, mesh_reader
                                             "%s: no importer for this ending; give the mesh "
                                             "as .ply, .obj, .stl or .vtp",
                                             file->path);
+}
+
+/* Copy a surface as a reader copies that of a file. */
+static supine_status copy_arrays(const char *name, const supine_mesh *given, supine_mesh *mesh,
+                                 supine_error *error) {
+  mesh_faces faces = {.path = name, .mesh = mesh};
+  mesh->vertices = malloc((3 * given->vertex_count + 1) * sizeof *mesh->vertices);
+  if (mesh->vertices == NULL) {
+    return supine_error_memory(error, "%zu vertices of %s", given->vertex_count, name);
+  }
+  mesh->vertex_count = given->vertex_count;
+  for (size_t i = 0; i < 3 * given->vertex_count; ++i) {
+    mesh->vertices[i] = (double)((float)given->vertices[i] + 0.0F); /* + 0 makes -0 to 0 */
+  }
+  for (size_t t = 0; t < given->triangle_count; ++t) {
+    const uint32_t *corner = given->triangles + 3 * t;
+    const double corners[3] = {corner[0], corner[1], corner[2]};
+    SUPINE_TRY(supine_mesh_faces_add(&faces, corners, 3, error));
+  }
+  return SUPINE_OK;
 }
 
 static supine_status choose_axes(const mesh_file *file, supine_axes asked,
@@ -163,8 +185,12 @@ supine_status supine_mesh_load(const char *path, const supine_mesh_load_options 
   supine_mesh_report found = {0};
   mesh_file file = {.path = path};
   mesh_reader *reader = NULL;
-  SUPINE_TRY(read_file(&file, &arena, &reader, error));
-  SUPINE_TRY(reader(&file, &loaded, &found.degenerate_faces, error));
+  if (chosen.arrays != NULL) {
+    SUPINE_TRY(copy_arrays(path, chosen.arrays, &loaded, error));
+  } else {
+    SUPINE_TRY(read_file(&file, &arena, &reader, error));
+    SUPINE_TRY(reader(&file, &loaded, &found.degenerate_faces, error));
+  }
   SUPINE_TRY(choose_axes(&file, chosen.axes, &found, error));
   SUPINE_TRY(convert(path, scale, found.axes, &loaded, error));
   if (supine_mesh_weld(&loaded, &found) != SUPINE_OK) {

@@ -39,7 +39,7 @@ void supine_mesh_writer_begin(const supine_mesh *mesh, const supine_mesh_save_op
 supine_status supine_mesh_writer_check(const char *path, const supine_mesh *mesh,
                                        supine_error *error);
 
-/** Write `count` values as little-endian bytes at *at, and advance *at. */
+/** Copy `count` values to *at, and advance *at. */
 void supine_mesh_put_f32(unsigned char **at, const float *values, size_t count);
 void supine_mesh_put_u32(unsigned char **at, const uint32_t *values, size_t count);
 

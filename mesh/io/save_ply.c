@@ -38,18 +38,13 @@ supine_status supine_mesh_save_ply(const mesh_writer *writer) {
         row[count++] = writer->options.scalars[k].values[i];
       }
     }
-    unsigned char bytes[sizeof row];
-    unsigned char *at = bytes;
-    supine_mesh_put_f32(&at, row, count);
-    (void)fwrite(bytes, 1, (size_t)(at - bytes), writer->out);
+    (void)fwrite(row, sizeof *row, count, writer->out);
   }
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
-    unsigned char bytes[13] = {3};
-    unsigned char *at = bytes + 1;
     uint32_t corner[3];
     supine_mesh_writer_triangle(writer, t, corner);
-    supine_mesh_put_u32(&at, corner, 3);
-    (void)fwrite(bytes, 1, sizeof bytes, writer->out);
+    (void)fputc(3, writer->out);
+    (void)fwrite(corner, sizeof corner, 1, writer->out);
   }
   return SUPINE_OK;
 }

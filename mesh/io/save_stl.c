@@ -7,10 +7,10 @@
 
 #include "mesh/io/save.h"
 
-enum { HEADER = 80, FACET = 50 };
+enum { HEADER = 80 };
 
 /* Find the unit normal of a triangle; 0 if its corners are collinear. */
-static void facet_normal(float corners[3][3], float normal[3]) {
+static void facet_normal(float (*corners)[3], float normal[3]) {
   double p[3][3];
   double n[3];
   for (int k = 0; k < 9; ++k) {
@@ -29,28 +29,21 @@ supine_status supine_mesh_save_stl(const mesh_writer *writer) {
   /* The header must not begin with "solid", which marks STL text. */
   char text[HEADER + 1 + sizeof writer->comment];
   (void)snprintf(text, sizeof text, "SPACE=%s %s %s", writer->space, writer->unit, writer->comment);
-  unsigned char header[HEADER + 4] = {0};
-  memcpy(header, text, strnlen(text, HEADER));
-  unsigned char *at = header + HEADER;
   const uint32_t count = (uint32_t)mesh->triangle_count;
-  supine_mesh_put_u32(&at, &count, 1);
-  (void)fwrite(header, 1, sizeof header, writer->out);
+  memset(text + strlen(text), 0, sizeof text - strlen(text));
+  (void)fwrite(text, 1, HEADER, writer->out);
+  (void)fwrite(&count, sizeof count, 1, writer->out);
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
-    float corners[3][3];
-    float normal[3];
+    static const uint16_t attributes = 0;
+    float facet[4][3]; /* normal, then the corners */
     uint32_t corner[3];
     supine_mesh_writer_triangle(writer, t, corner);
     for (size_t k = 0; k < 3; ++k) {
-      supine_mesh_writer_position(writer, corner[k], corners[k]);
+      supine_mesh_writer_position(writer, corner[k], facet[1 + k]);
     }
-    facet_normal(corners, normal);
-    unsigned char bytes[FACET] = {0};
-    at = bytes;
-    supine_mesh_put_f32(&at, normal, 3);
-    for (size_t k = 0; k < 3; ++k) {
-      supine_mesh_put_f32(&at, corners[k], 3);
-    }
-    (void)fwrite(bytes, 1, sizeof bytes, writer->out);
+    facet_normal(facet + 1, facet[0]);
+    (void)fwrite(facet, sizeof facet, 1, writer->out);
+    (void)fwrite(&attributes, sizeof attributes, 1, writer->out);
   }
   return SUPINE_OK;
 }

@@ -108,17 +108,11 @@ void supine_mesh_writer_triangle(const mesh_writer *writer, size_t t, uint32_t c
 }
 
 void supine_mesh_put_f32(unsigned char **at, const float *values, size_t count) {
-  for (size_t i = 0; i < count; ++i) {
-    uint32_t bits = 0;
-    memcpy(&bits, &values[i], sizeof bits);
-    supine_mesh_put_u32(at, &bits, 1);
-  }
+  memcpy(*at, values, count * sizeof *values);
+  *at += count * sizeof *values;
 }
 
 void supine_mesh_put_u32(unsigned char **at, const uint32_t *values, size_t count) {
-  for (size_t i = 0; i < count; ++i) {
-    for (unsigned byte = 0; byte < 4; ++byte) {
-      *(*at)++ = (unsigned char)(values[i] >> (8 * byte));
-    }
-  }
+  memcpy(*at, values, count * sizeof *values);
+  *at += count * sizeof *values;
 }

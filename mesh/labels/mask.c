@@ -34,7 +34,10 @@ static bool box_of(const labels_mask *mask, uint8_t value, size_t low[3], size_t
     if (first == NULL) {
       continue;
     }
-    const uint8_t *last = memrchr(at, value, mask->size[0]);
+    const uint8_t *last = at + mask->size[0] - 1;
+    while (*last != value) {
+      --last;
+    }
     const size_t from[3] = {(size_t)(first - at), row % mask->size[1], row / mask->size[1]};
     const size_t to[3] = {(size_t)(last - at), from[1], from[2]};
     for (int a = 0; a < 3; ++a) {

@@ -326,20 +326,22 @@ supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_op
   return SUPINE_OK;
 }
 
-supine_status supine_fields_write(const supine_lungs *lungs, const supine_fields *fields,
+supine_status supine_fields_write(const supine_prepared *prepared, const supine_fields *fields,
                                   const supine_fit_options *options,
-                                  const supine_precompute_options *basis, const char *path,
-                                  supine_fit_report *report, supine_error *error) {
+                                  const supine_basis_choice *basis, supine_fit_report *report,
+                                  supine_error *error) {
+  const supine_lungs *lungs = &prepared->source.lungs;
   SUPINE_FREED_BY(supine_sh_compression_free) supine_compression field = {0};
   SUPINE_FREED_BY(supine_physics_volume_forms_free) supine_volume_forms forms = {0};
   SUPINE_TRY(supine_fields_fit(fields, options, &field, report, error));
   SUPINE_TRY(supine_projection_volume_forms(&field, lungs, NULL, NULL, &forms, error));
   const supine_basis_content content = {.lungs = lungs,
-                                        .options = basis,
+                                        .prepared = prepared,
+                                        .choice = basis,
                                         .is_fields = true,
                                         .scan_gravity = options->scan_gravity,
                                         .compression = &field,
                                         .forms = &forms,
                                         .accuracy = &report->accuracy};
-  return supine_writer_basis_write(path, &content, error);
+  return supine_writer_basis_write(basis->path, &content, error);
 }

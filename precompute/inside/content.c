@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/text.h"
 
 #include "mesh/io/points.h"
 #include "precompute/inside/content.h"
@@ -61,7 +62,7 @@ supine_status supine_inside_content_points(const char *path,
 
 /* Return where the mesh name ("airways") starts in "/scans/airways.ply", and set its length. */
 static const char *part_name(const char *path, size_t *length) {
-  const char *name = basename(path);
+  const char *name = supine_text_file_name(path);
   const char *dot = strrchr(name, '.');
   *length = dot != NULL && dot > name ? (size_t)(dot - name) : strlen(name);
   return name;

@@ -254,7 +254,9 @@ static void check_shape(checks *c, const supine_lungs *lungs, int *side, bool *a
   const supine_topology *t = &lungs->topology;
   supine_mesh_anatomy found = {.axes = SUPINE_AXES_LPS};
   const char *unit = NULL;
-  const double length = supine_mesh_box(&lungs->mesh, (double[3]){0}, (double[3]){0});
+  const double *low = lungs->minimum;
+  const double *high = lungs->maximum;
+  const double length = fmax(high[0] - low[0], fmax(high[1] - low[1], high[2] - low[2]));
   const bool likely = supine_mesh_unit_is_likely(length, &unit);
   const bool given = c->source->units_given;
   char letters[4];
@@ -286,28 +288,31 @@ static void check_shape(checks *c, const supine_lungs *lungs, int *side, bool *a
   for (size_t lung = 0; lung < lungs->lung_count && c->status == SUPINE_OK; ++lung) {
     check_tips(c, lungs, lung);
   }
-  check(c, !found.joined || c->source->midline != NULL, SUPINE_ERROR_MESH,
+  check(c, !found.joined || c->source->midline != NULL || c->source->side != 0, SUPINE_ERROR_MESH,
         "this surface looks like both lungs in one piece: separate them (for a label map by "
         "--labels one). If it is a single lung, give --midline");
   check_size(c, lungs, likely);
 }
 
-/* Choose the side of a single lung by its shape or, if that is unclear, by its position. */
+/* Choose the side of a single lung as stated, or by its shape or, if that is unclear, by its
+ * position. */
 static supine_status take_side(const supine_mesh *meshes, size_t count,
                                const supine_lungs_source *source, int side, supine_lungs *lungs,
                                supine_findings *findings, supine_error *error) {
   const double low = lungs->minimum[0];
   const double high = lungs->maximum[0];
-  const int taken = side != 0 ? side : lungs->side[0];
-  supine_findings_add(findings,
-                      "%s: note: one lung, taken for the %s lung by its %s; --midline %.0f would "
-                      "make it the %s lung",
-                      source->name, taken > 0 ? "left" : "right", side != 0 ? "shape" : "place",
-                      taken > 0 ? ceil(high) : floor(low), taken > 0 ? "right" : "left");
-  if (taken == lungs->side[0] && lungs->midline == (taken > 0 ? low : high)) {
+  const int taken = source->side != 0 ? source->side : side != 0 ? side : lungs->side[0];
+  const double midline = taken > 0 ? low : high;
+  if (source->side == 0) {
+    supine_findings_add(findings,
+                        "%s: note: one lung, taken for the %s lung by its %s; --midline %.0f would "
+                        "make it the %s lung",
+                        source->name, taken > 0 ? "left" : "right", side != 0 ? "shape" : "place",
+                        taken > 0 ? ceil(high) : floor(low), taken > 0 ? "right" : "left");
+  }
+  if (taken == lungs->side[0] && lungs->midline == midline) {
     return SUPINE_OK;
   }
-  const double midline = taken > 0 ? low : high;
   supine_lungs_free(lungs);
   return supine_lungs_create(meshes, count, &midline, lungs, error);
 }

@@ -14,6 +14,7 @@ typedef struct supine_lungs_source {
   supine_axes axes; /**< axes of all files; SUPINE_AXES_AUTO if files differ in their axes */
   bool units_given;
   const double *midline; /**< x of the midline, mm; NULL to find it from the lungs */
+  int side;              /**< side of a single lung: +1 left, -1 right; 0 to find it */
 } supine_lungs_source;
 
 /** Repair and check surfaces, and join them into lungs.

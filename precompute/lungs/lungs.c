@@ -20,26 +20,6 @@ static const double least_side_share = 0.05;
  * is refused if the ratio is larger. Lungs do reach across the midline behind the breastbone. */
 static const double most_beyond_share = 0.5;
 
-/* A surface, and the mean x of its vertices, mm. Surfaces are joined in order of falling mean x. */
-typedef struct placed_mesh {
-  const supine_mesh *mesh;
-  double mean_x;
-} placed_mesh;
-
-static int compare_placed(const void *a, const void *b) {
-  const placed_mesh *first = a;
-  const placed_mesh *second = b;
-  return (first->mean_x < second->mean_x) - (first->mean_x > second->mean_x);
-}
-
-static placed_mesh place(const supine_mesh *mesh) {
-  double sum = 0.0;
-  for (size_t i = 0; i < mesh->vertex_count; ++i) {
-    sum += mesh->vertices[3 * i];
-  }
-  return (placed_mesh){mesh, mesh->vertex_count == 0 ? 0.0 : sum / (double)mesh->vertex_count};
-}
-
 static supine_status join(const supine_mesh *meshes, size_t count, supine_mesh *joined,
                           supine_error *error) {
   size_t vertices = 0;
@@ -57,18 +37,12 @@ static supine_status join(const supine_mesh *meshes, size_t count, supine_mesh *
                             "%zu vertices are more than 32-bit indices reach: give a coarser mesh",
                             vertices);
   }
-  SUPINE_ARENA arena = {0};
-  placed_mesh *placed = supine_arena_take(&arena, count, sizeof *placed);
-  if (arena.failed || supine_mesh_allocate(vertices, triangles, joined) != SUPINE_OK) {
+  if (supine_mesh_allocate(vertices, triangles, joined) != SUPINE_OK) {
     return supine_error_memory(error, "%zu vertices", vertices);
   }
   joined->vertex_count = joined->triangle_count = 0;
   for (size_t m = 0; m < count; ++m) {
-    placed[m] = place(&meshes[m]);
-  }
-  qsort(placed, count, sizeof *placed, compare_placed);
-  for (size_t m = 0; m < count; ++m) {
-    const supine_mesh *mesh = placed[m].mesh;
+    const supine_mesh *mesh = &meshes[m];
     uint32_t *out = joined->triangles + 3 * joined->triangle_count;
     for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {
       out[i] = (uint32_t)(mesh->triangles[i] + joined->vertex_count);
@@ -205,28 +179,39 @@ static supine_status check_midline(const supine_lungs *lungs, bool two_sided, su
                             0.5 * (lungs->minimum[0] + lungs->maximum[0]));
   }
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-    double inner = INFINITY; /* least x of a vertex, mm; 0 at midline, > 0 on the lung's side */
-    double outer = -INFINITY;
-    for (size_t i = lungs->lung_begin[lung]; i < lungs->lung_begin[lung + 1]; ++i) {
-      const double x = lungs->side[lung] * (lungs->mesh.vertices[3 * i] - lungs->midline);
-      inner = fmin(inner, x);
-      outer = fmax(outer, x);
-    }
-    if (-inner > most_beyond_share * outer) {
+    const bool left = lungs->side[lung] > 0;
+    const double ends[2] = {lungs->midline - lungs->low[lung][0],
+                            lungs->high[lung][0] - lungs->midline};
+    if (ends[!left] > most_beyond_share * ends[left]) {
       return supine_error_set(error, SUPINE_ERROR_MESH,
                               "the midline x = %g mm runs through the %s lung, which reaches "
                               "%.3g mm beyond it; give one between the lungs, or none",
-                              lungs->midline, supine_lungs_name(lungs, lung), -inner);
+                              lungs->midline, supine_lungs_name(lungs, lung), ends[!left]);
     }
   }
   return SUPINE_OK;
 }
 
-void supine_lungs_measure(supine_lungs *lungs) {
-  supine_mesh_box(&lungs->mesh, lungs->minimum, lungs->maximum);
+void supine_lungs_measure_volumes(supine_lungs *lungs) {
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     const supine_mesh part = supine_lungs_part(lungs, lung);
     lungs->volume[lung] = 1e-3 * supine_mesh_volume(&part);
+  }
+}
+
+void supine_lungs_measure(supine_lungs *lungs) {
+  supine_lungs_measure_volumes(lungs);
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+    const size_t begin = lungs->lung_begin[lung];
+    const supine_mesh own = {lungs->lung_begin[lung + 1] - begin, lungs->mesh.vertices + 3 * begin,
+                             0, NULL};
+    supine_mesh_box(&own, lungs->low[lung], lungs->high[lung]);
+    for (size_t k = 0; k < 3; ++k) {
+      const double *low = lungs->low[lung];
+      const double *high = lungs->high[lung];
+      lungs->minimum[k] = lung == 0 ? low[k] : fmin(lungs->minimum[k], low[k]);
+      lungs->maximum[k] = lung == 0 ? high[k] : fmax(lungs->maximum[k], high[k]);
+    }
   }
 }
 
@@ -271,6 +256,7 @@ static supine_status measure(supine_lungs *lungs, const double *midline, supine_
     return supine_error_memory(error, "%zu components", lungs->topology.component_count);
   }
   SUPINE_TRY(group(lungs, left, error));
+  supine_lungs_measure(lungs);
   return midline != NULL ? check_midline(lungs, overlap < SUPINE_LUNGS_MOST_OVERLAP, error)
                          : SUPINE_OK;
 }
@@ -285,7 +271,6 @@ supine_status supine_lungs_create(const supine_mesh *meshes, size_t count, const
   SUPINE_TRY(check_surfaces(meshes, count, error));
   SUPINE_TRY(join(meshes, count, &made.mesh, error));
   SUPINE_TRY(measure(&made, midline, error));
-  supine_lungs_measure(&made);
   face_outwards(&made);
   *lungs = made;
   made = (supine_lungs){0};

@@ -19,7 +19,9 @@ typedef struct supine_lungs {
   int side[2];              /**< [lung] +1 left, -1 right */
   bool reversed[2];         /**< whether the lung's triangles faced inwards and were reversed */
   double volume[2];         /**< [lung] volume that its surface encloses, mL */
-  double minimum[3];        /**< bounding box over all lungs, mm */
+  double low[2][3];         /**< [lung] bounding box, mm */
+  double high[2][3];
+  double minimum[3]; /**< bounding box over all lungs, mm */
   double maximum[3];
   double *scanned; /**< [vertices, 3] positions in the scan, mm, if `mesh` shows full inflation
                       instead of the scan; otherwise NULL */
@@ -34,15 +36,13 @@ typedef struct supine_lungs {
  * box nearest x = 0 for one. If the triangles of a lung face inwards, they are reversed.
  * @param meshes   [count] not changed
  * @param midline  x of the plane between left and right, mm; found if NULL
- * @param lungs    written on success; release with supine_lungs_free
- * @retval SUPINE_ERROR_MESH      no surface, or one without extent; one lung given twice; a surface
- *   much smaller than another; a midline that runs through a lung, or leaves both lungs on one side
- */
+ * @param lungs    written on success; release with supine_lungs_free */
 supine_status supine_lungs_create(const supine_mesh *meshes, size_t count, const double *midline,
                                   supine_lungs *lungs, supine_error *error);
 
-/** Update the bounding box and the volumes after vertices have moved. */
+/** Update the bounding boxes and the volumes, or only the volumes, after vertices have moved. */
 void supine_lungs_measure(supine_lungs *lungs);
+void supine_lungs_measure_volumes(supine_lungs *lungs);
 
 /** Free the arrays; a zeroed struct is legal. */
 void supine_lungs_free(supine_lungs *lungs);

@@ -11,8 +11,8 @@ enum { SUPINE_PHANTOM_VERTICES_MIN = 84, SUPINE_PHANTOM_VERTICES_MAX = 20000000 
 
 /** Make two closed lungs, left first, of a given total volume.
  *
- * Each is a geodesic sphere (10 f^2 + 2 vertices at frequency f) whose radius is a sum of
- * spherical harmonics to band 12; the pair is scaled about the origin to the volume.
+ * Each is a geodesic sphere (10 f^2 + 2 vertices at frequency f), mapped to a lung by spherical
+ * harmonics of each coordinate to band 4; the pair is scaled about the origin to the volume.
  * @param vertices     number wanted in total; rounded to that of two equal geodesic spheres
  * @param millilitres  volume of both lungs together, > 0; adults have about 6000 at full
  *                     inflation

@@ -187,14 +187,14 @@ static supine_status find_lung(normals_work *work, size_t lung, fit *made) {
   return SUPINE_OK;
 }
 
-/* Round the modes [count] of one vertex along one axis as at run time, where three modes share a
- * 32-bit word with 13, 10 and 9 bits. */
-static void pack(const int16_t *modes, size_t count, double *packed) {
+/* Round the modes [count + 1] of one vertex along one axis as at run time, where three modes share
+ * a 32-bit word with 13, 10 and 9 bits. */
+static void pack(const int8_t *modes, size_t count, double *packed) {
   const size_t words = supine_tiles_normal_words(count);
   for (size_t j = 0; j < words; ++j) {
     double three[3] = {0.0, 0.0, 0.0};
     for (size_t k = j, which = 0; k < count; k += words, ++which) {
-      three[which] = modes[k] / normal_unit();
+      three[which] = normal_from_bytes(modes, count, k) / normal_unit();
     }
     const uint32_t word = normal_narrow(three[0], three[1], three[2]);
     for (size_t k = j, which = 0; k < count; k += words, ++which) {
@@ -203,12 +203,13 @@ static void pack(const int16_t *modes, size_t count, double *packed) {
   }
 }
 
-/* Round the first `count` modes of n vertices to multiples of unit[mode], the quantisation step.
+/* Round the first `count` modes of n vertices to bytes (supine_basis_info.normal_bytes), in
+ * multiples of unit[mode].
  * @param values   [n, 3, stride] modes, first divided in place by `lengths`, unless NULL; x / 0 = 0
  * @param lengths  [n] length of each normal on the reference surface, or NULL
- * @param rounded  [n, 3, count] written: modes divided by `unit` */
+ * @param bytes    [n, 3, count + 1] written: modes divided by `unit` */
 static void round_modes(float *values, const float *lengths, size_t n, size_t stride, size_t count,
-                        int16_t *rounded, double *unit) {
+                        int8_t *bytes, double *unit) {
   float top[MOST] = {0.0f};
   for (size_t i = 0; i < 3 * n; ++i) {
     const float factor = lengths == NULL         ? 1.0f
@@ -220,13 +221,15 @@ static void round_modes(float *values, const float *lengths, size_t n, size_t st
     }
   }
   for (size_t j = 0; j < count; ++j) {
-    unit[j] = top[j] > 0 ? (double)top[j] / INT16_MAX : 1.0;
+    unit[j] = top[j] > 0 ? (double)top[j] / (256 * INT8_MAX) : 1.0;
     top[j] = (float)(1.0 / unit[j]);
   }
   for (size_t i = 0; i < 3 * n; ++i) {
+    int8_t *row = bytes + i * (count + 1);
     for (size_t j = 0; j < count; ++j) {
-      rounded[i * count + j] = (int16_t)lrintf(values[i * stride + j] * top[j]);
+      row[j] = (int8_t)lrintf(values[i * stride + j] * top[j] / 256);
     }
+    row[count] = (int8_t)lrintf(fminf(values[i * stride] * top[0] - 256.0f * row[0], INT8_MAX));
   }
 }
 
@@ -257,8 +260,8 @@ SUPINE_CLONES static void find_angles(size_t count, const double *a, const doubl
 
 /* Measure the angles between exact and approximate normals at the held-out vertices of a lung, in
  * all held-out states. Add them to the histogram `tally`, and their sum to `sum`. The rounded
- * modes [vertices, 3, count] and weights [count, 3, terms] are those of the basis file. */
-static void measure(const normals_work *work, size_t lung, size_t count, const int16_t *modes,
+ * modes [vertices, 3, count + 1] and weights [count, 3, terms] are those of the basis file. */
+static void measure(const normals_work *work, size_t lung, size_t count, const int8_t *modes,
                     const double *weights, supine_tally *tally, double *sum) {
   enum { BLOCK = 16 }; /* vertices whose exact normals are computed at a time */
   const fit *made = &work->fits[lung];
@@ -278,7 +281,7 @@ static void measure(const normals_work *work, size_t lung, size_t count, const i
       apply_rows(made->rows.terms + r * all, rows, work->terms, phi, states, exact);
     }
     for (size_t axis = 0; axis < 3; ++axis) {
-      pack(modes + (3 * r + axis) * count, count, packed[axis]);
+      pack(modes + (3 * r + axis) * (count + 1), count, packed[axis]);
     }
     cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, 3, (int)states, (int)count, 1.0, packed[0],
                 MOST, v, (int)count, 0.0, normals, (int)states);
@@ -296,9 +299,10 @@ static supine_status measure_all(const normals_work *work, size_t count,
                                  supine_normals_modes *made) {
   const size_t all = 3 * work->terms;
   const size_t most = 2 * ROWS + 1;
+  const size_t row = 3 * (count + 1); /* bytes of a vertex */
   SUPINE_ARENA arena = {0};
   supine_tally *tally = supine_arena_zeros(&arena, 1, sizeof *tally);
-  int16_t *modes = supine_arena_take(&arena, most * 3 * count, sizeof *modes);
+  int8_t *modes = supine_arena_take(&arena, most, row);
   double *weights = supine_arena_take(&arena, count * all, sizeof *weights);
   double unit[MOST];
   double sum = 0.0;
@@ -312,8 +316,7 @@ static supine_status measure_all(const normals_work *work, size_t count,
       scale_weights(of->weights, unit, count, work->terms, weights);
     }
     for (size_t r = 0; r < of->rows.count && made->modes != NULL; ++r) {
-      memcpy(modes + 3 * r * count, made->modes + 3 * of->rows.vertex[r] * count,
-             3 * count * sizeof *modes);
+      memcpy(modes + r * row, made->modes + of->rows.vertex[r] * row, row);
     }
     measure(work, lung, count, modes,
             made->modes != NULL ? made->weights + lung * count * all : weights, tally, &sum);
@@ -440,7 +443,7 @@ static supine_status make_modes(const normals_work *work, size_t count, supine_a
                         .positions = supine_arena_take(&own, 3 * n * LANES, sizeof(float)),
                         .modes = supine_arena_zeros(&own, 3 * n * count, sizeof(float)),
                         .lengths = supine_arena_take(&own, n, sizeof(float))};
-  made->modes = supine_arena_take(arena, 3 * n * count, sizeof *made->modes);
+  made->modes = supine_arena_take(arena, 3 * n * (count + 1), sizeof *made->modes);
   made->weights = supine_arena_take(arena, s->lung_count * count * all, sizeof *made->weights);
   made->count = count;
   if (own.failed || arena->failed) {
@@ -460,8 +463,8 @@ static supine_status make_modes(const normals_work *work, size_t count, supine_a
     const size_t begin = s->lung_begin[lung];
     double unit[MOST];
     round_modes(planes.modes + 3 * begin * count, planes.lengths + begin,
-                s->lung_begin[lung + 1] - begin, count, count, made->modes + 3 * begin * count,
-                unit);
+                s->lung_begin[lung + 1] - begin, count, count,
+                made->modes + 3 * begin * (count + 1), unit);
     scale_weights(work->fits[lung].weights, unit, count, work->terms,
                   made->weights + lung * count * all);
   }

@@ -46,9 +46,9 @@ typedef struct supine_normals_surface {
 
 /** Modes from which vertex normals are computed, and the error of these normals. */
 typedef struct supine_normals_modes {
-  size_t count;   /**< number of modes; may be 0 */
-  int16_t *modes; /**< [N, 3, count] scaled to integers; `weights` include the inverse scale; NULL
-                     without modes */
+  size_t count;  /**< number of modes; may be 0 */
+  int8_t *modes; /**< [N, 3, count + 1] scaled to integers (supine_basis_info.normal_bytes);
+                    `weights` include the inverse scale; NULL without modes */
   /** [lungs, count, 3, monomials] coefficients V_jc of each mode's weight (top of this file). */
   double *weights;
   /** Least and largest volume of all lungs, minus that of the reference surface, among the states

@@ -40,7 +40,9 @@ static const double neighbour_distance_ratio = 1.7;
 /* Regions are kept if the held-out error with regions / that without is less than this. */
 static const double kept_ratio = 0.95;
 
-static const double expandability_least = 0.02;
+/* Smallest expandability of a region, where 1 is the prior mean (assumed): surfaces do not show
+ * whether tissue that hardly expands is 4 or 50 times as stiff. */
+static const double expandability_least = 0.25;
 
 /* Factors on the precision of the prior, of which cross-validation chooses one. */
 static const double ridges[] = {1.0, 0.3, 0.1, 0.03};
@@ -359,7 +361,7 @@ static void conclude(work *w, supine_patient_power *law, supine_patient_stiffnes
     }
     (void)LAPACKE_dpotrs(LAPACK_COL_MAJOR, 'U', (lapack_int)size, 1, w->matrix, (lapack_int)size, x,
                          (lapack_int)size);
-    stiffness->region[k].expandability = exp(w->x[k]);
+    stiffness->region[k].expandability = w->x[k];
     stiffness->region[k].determined = 1.0 - x[k];
     report->undetermined += stiffness->region[k].determined < SUPINE_PATIENT_DETERMINED ? 1.0 : 0.0;
   }

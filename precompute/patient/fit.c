@@ -28,11 +28,13 @@ enum {
 static const double constant_of_surfaces = 5.3, constant_of_landmarks = 1.0, prior_points = 10.0;
 static const double displacement_least = 2.0; /* shorter displacements count as this, mm */
 static const double bound = 1.8; /* 95 % of all points err by less than 1.8 expected errors */
+static const double stretch_most = 1.8; /* largest report->stretch: 6 times the volume */
 static const double full_breath = 18.0; /* largest report->expected_from, mm (supine/locate.h) */
 
 typedef struct squares {
   double residual[SCORES]; /* [predictor] weighted sum of squared residuals, mm^2 */
   double weight;
+  double path; /* weighted sum of the predicted displacements of landmarks, mm */
 } squares;
 
 typedef struct study {
@@ -79,6 +81,18 @@ static void affine_fit(const supine_patient_row *rows, size_t count, bool transl
   }
 }
 
+/* Return by how much an error of a position is larger in the fuller scan than in the emptier one:
+ * the cube root of the ratio of the volumes, by an affine map of the measurements. */
+static double find_stretch(const supine_patient_row *rows, size_t count) {
+  double map[AFFINE];
+  double moved[9];
+  affine_fit(rows, count, false, map);
+  for (size_t i = 0; i < 9; ++i) {
+    moved[i] = 0.01 * map[3 + i] + (i % 4 == 0 ? 1.0 : 0.0);
+  }
+  return fmin(stretch_most, fmax(1.0, pow(supine_triple(moved, moved + 3, moved + 6), -1.0 / 3.0)));
+}
+
 static double affine_residual(const double map[AFFINE], const supine_patient_row *row) {
   double x[AFFINE];
   affine_design(row, x);
@@ -110,17 +124,17 @@ static size_t assign_folds(const supine_patient_frame *frame, supine_patient_row
   return blocks;
 }
 
-/* Predict the displacement u of a point, mm, without the motion of the body. */
-static void predict(supine_patient_krige *krige, const supine_patient_row *row, double u[3]) {
+/* Predict the length of a point's displacement without the motion of the body, mm. */
+static double displacement_of(supine_patient_krige *krige, const supine_patient_row *row) {
   supine_patient_row along = *row;
-  double motion[3];
-  supine_patient_motion(&krige->law, &row->place, motion);
+  double u[3];
+  supine_patient_motion(&krige->law, &row->place, u);
   for (size_t a = 0; a < 3; ++a) {
-    for (size_t b = 0; b < 3; ++b) {
-      along.axis[b] = a == b ? 1.0 : 0.0;
-    }
-    u[a] = supine_patient_krige_predict(krige, &along) - motion[a];
+    memset(along.axis, 0, sizeof along.axis);
+    along.axis[a] = 1.0;
+    u[a] = supine_patient_krige_predict(krige, &along) - u[a];
   }
+  return supine_length(u);
 }
 
 /* Fit each predictor of supine_patient_score (no displacement, translation, affine map,
@@ -134,7 +148,6 @@ static void add_residuals(const study *s, const supine_patient_row *rows, size_t
   for (size_t i = 0; i < count; ++i) {
     const supine_patient_row *row = &rows[i];
     double x[SUPINE_PATIENT_TERMS];
-    double u[3];
     if (s->triples > 0 && row->landmark == 0) {
       continue;
     }
@@ -147,10 +160,9 @@ static void add_residuals(const study *s, const supine_patient_row *rows, size_t
     }
     sums->weight += row->weight;
     if (ratio != NULL && row->landmark > 0) { /* the three measurements of a landmark add up */
-      predict(krige, row, u);
-      ratio[row->landmark - 1] += residual[SUPINE_PATIENT_SCORE_CORRECTED] *
-                                  residual[SUPINE_PATIENT_SCORE_CORRECTED] /
-                                  fmax(displacement_least, supine_length(u));
+      const double size = fmax(displacement_least, displacement_of(krige, row));
+      sums->path += row->weight * size;
+      ratio[row->landmark - 1] += pow(residual[SUPINE_PATIENT_SCORE_CORRECTED], 2.0) / size;
     }
   }
 }
@@ -210,31 +222,34 @@ static supine_status hold_all_out(study *s, squares *held_out, supine_error *err
 
 /* Set the constant c of the expected error, from the held-out landmarks or, without landmarks, to
  * that of other patients; the RMS displacement to which it applies; the expected error; and the
- * share of the held-out landmarks that err by less than 1.8 times as much. */
-static void set_expected(const study *s, supine_patient_krige *krige,
+ * share of the held-out landmarks that err by less than 1.8 times as much. With c, the sum of the
+ * squared errors that are expected of the held-out landmarks is the sum of those that they have,
+ * if they are predicted in the fuller scan from their positions in the emptier one. */
+static void set_expected(const study *s, const squares *held_out, supine_patient_krige *krige,
                          supine_patient_fit_report *report) {
   const size_t count = SEEDS * s->triples;
-  double sum = prior_points * constant_of_landmarks;
+  const double growth = report->stretch * report->stretch;
   double mean = 0.0;
   double square = 0.0;
   double points = 0.0;
   double within = 0.0;
   for (size_t i = 0; i < s->row_count; ++i) {
-    double u[3];
     if (s->triples == 0 || s->rows[i].landmark > 0) {
-      predict(krige, &s->rows[i], u);
-      mean += supine_length(u);
-      square += supine_dot(u, u);
+      const double size = displacement_of(krige, &s->rows[i]);
+      mean += size;
+      square += size * size;
       points += 1.0;
     }
   }
-  for (size_t i = 0; i < count; ++i) {
-    sum += s->ratio[i] / SEEDS;
+  report->expected_constant = constant_of_surfaces;
+  if (count > 0) {
+    const double own =
+        3.0 * growth * held_out->residual[SUPINE_PATIENT_SCORE_CORRECTED] / held_out->path;
+    report->expected_constant = (prior_points * constant_of_landmarks + (double)s->triples * own) /
+                                (prior_points + (double)s->triples);
   }
-  report->expected_constant =
-      count > 0 ? sum / (prior_points + (double)s->triples) : constant_of_surfaces;
   for (size_t i = 0; i < count; ++i) {
-    within += s->ratio[i] <= bound * bound * report->expected_constant ? 1.0 : 0.0;
+    within += growth * s->ratio[i] <= bound * bound * report->expected_constant ? 1.0 : 0.0;
   }
   report->band = count > 0 ? 100.0 * within / (double)count : 0.0;
   report->expected_from = fmin(full_breath, sqrt(square / points));
@@ -271,7 +286,8 @@ static supine_status run(study *s, supine_patient *patient, supine_patient_fit_r
   (void)find_rms(s, &fitted, report->fitted);
   report->explained = find_rms(s, &held_out, report->held_out);
   report->baseline = report->held_out[baseline_of(s)];
-  set_expected(s, &krige, report);
+  report->stretch = find_stretch(s->rows, s->row_count);
+  set_expected(s, &held_out, &krige, report);
   return SUPINE_OK;
 }
 

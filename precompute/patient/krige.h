@@ -96,8 +96,7 @@ typedef struct supine_patient_krige {
  *   prior. With SUPINE_PATIENT_DEEP, their prior standard deviations are about 30 %; but if the
  *   factor `sill` on the correction's covariance is at least 1, the law is only scaled again.
  * @param rows   [count] measurements; those of weight 0 do not count; must outlive the fit
- * @param krige  release with supine_patient_krige_free, also after a failure
- * @retval SUPINE_ERROR_NUMERICAL  the measurements do not determine the displacement law */
+ * @param krige  release with supine_patient_krige_free, also after a failure */
 supine_status supine_patient_krige_fit(const supine_patient_fit_options *options,
                                        const supine_patient_row *rows, size_t count,
                                        supine_patient_krige *krige, supine_error *error);
@@ -124,7 +123,8 @@ typedef enum supine_patient_score {
 } supine_patient_score;
 
 /** Result of a fit; errors are RMS distances, in mm. If there are landmarks, they are those of
- * landmarks; otherwise, of vertices along the normals of the other surface. */
+ * landmarks; otherwise, of vertices along the normals of the other surface. Scores predict the
+ * emptier scan. */
 typedef struct supine_patient_fit_report {
   double points; /**< number of landmarks or, without landmarks, of matched vertices */
   double blocks; /**< number of cubes of 40 mm with points */
@@ -136,8 +136,11 @@ typedef struct supine_patient_fit_report {
   double band; /**< share of the held-out landmarks with an error below its 95 % bound, %, or 0 */
   double explained; /**< percentage by which the law with its kriging correction reduces the squared
                        `baseline` */
-  double expected_point;    /**< expected error of the predicted position of a point, mm */
-  double expected_constant; /**< expected squared error, mm^2, per mm of displacement */
+  /** Errors are larger in the fuller scan by this factor, about the cube root of the ratio of the
+   * volumes: where the emptier scan is predicted, tissue and errors are compressed. */
+  double stretch;
+  double expected_point;    /**< expected error of a point predicted in the fuller scan, mm */
+  double expected_constant; /**< expected squared error there, mm^2, per mm of displacement */
   double expected_from; /**< RMS displacement, mm, below which this constant falls in proportion */
   double error[SUPINE_PATIENT_CONSTANTS]; /**< standard errors of c1 to c9 (patient.h) */
 } supine_patient_fit_report;
@@ -147,8 +150,7 @@ typedef struct supine_patient_fit_report {
  * @param rows     [single + 3 triples] measurements; the index of their cube, `block`, is written
  * @param single   number of vertices, each with one measurement; these measurements come first
  * @param triples  number of landmarks, each with three measurements
- * @param patient  in: `frame`, the bounding box of the lungs; out: the law and its correction
- * @retval SUPINE_ERROR_FORMAT     fewer points than the law has unknowns */
+ * @param patient  in: `frame`, the bounding box of the lungs; out: the law and its correction */
 supine_status supine_patient_fit(const supine_patient_fit_options *options,
                                  supine_patient_row *rows, size_t single, size_t triples,
                                  supine_patient *patient, supine_patient_fit_report *report,

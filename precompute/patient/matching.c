@@ -85,41 +85,6 @@ supine_status supine_patient_matching_weigh(supine_patient_matching *matching, d
   return SUPINE_OK;
 }
 
-void supine_patient_stiffness_shares(const supine_patient_stiffness *stiffness,
-                                     const supine_lungs *lungs, size_t vertex, double *shares) {
-  const double *point = lungs->mesh.vertices + 3 * vertex;
-  const int side = supine_patient_side_of(lungs, vertex);
-  double sum = 0.0;
-  double least = INFINITY;
-  size_t nearest = 0;
-  for (size_t k = 0; k < stiffness->count; ++k) {
-    const supine_patient_region *region = &stiffness->region[k];
-    const double distance =
-        region->side == side ? supine_distance(region->centre, point) : INFINITY;
-    const double q = fmin(1.0, fmax(0.0, 2.0 - 2.0 * distance / region->radius));
-    shares[k] = q * q * (3.0 - 2.0 * q);
-    sum += shares[k];
-    nearest = distance < least ? k : nearest;
-    least = fmin(least, distance);
-  }
-  for (size_t k = 0; k < stiffness->count; ++k) {
-    shares[k] = sum > 0.0 ? shares[k] / sum : (double)(k == nearest);
-  }
-}
-
-void supine_patient_stiffness_of(const supine_patient_stiffness *stiffness,
-                                 const supine_lungs *lungs, double *e) {
-  double shares[SUPINE_PATIENT_REGIONS_MAX];
-  for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
-    double a = stiffness->count == 0 ? 1.0 : 0.0;
-    supine_patient_stiffness_shares(stiffness, lungs, i, shares);
-    for (size_t k = 0; k < stiffness->count; ++k) {
-      a += stiffness->region[k].expandability * shares[k];
-    }
-    e[i] = 1.0 / a;
-  }
-}
-
 void supine_patient_matching_choose(supine_patient_matching *matching, size_t limit) {
   supine_patient_matching *m = matching;
   const size_t n = m->fuller->mesh.vertex_count;

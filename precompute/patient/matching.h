@@ -70,8 +70,7 @@ void supine_patient_matching_find(supine_patient_matching *matching);
 /* Multiply the weights of the vertices' measurements by Tukey's biweight of match->distance, which
  * is 0 beyond 4.7 times a robust scale (standard deviation) of all distances. Compute
  * matching->matched and matching->rms.
- * @param scale  lower bound on the robust scale, mm; INFINITY keeps the weights as they are
- * @retval SUPINE_ERROR_MESH  less than 30 % of the vertices match */
+ * @param scale  lower bound on the robust scale, mm; INFINITY keeps the weights as they are */
 supine_status supine_patient_matching_weigh(supine_patient_matching *matching, double scale,
                                             supine_error *error);
 
@@ -82,6 +81,12 @@ void supine_patient_stiffness_shares(const supine_patient_stiffness *stiffness,
 /** Write the relative stiffness of the tissue at every vertex into e [vertices]. */
 void supine_patient_stiffness_of(const supine_patient_stiffness *stiffness,
                                  const supine_lungs *lungs, double *e);
+
+/** Write the expandability of every vertex, and how far surfaces determine it, to a
+ * CSV file or as point data of a surface file. */
+supine_status supine_patient_stiffness_write(const char *path,
+                                             const supine_patient_stiffness *stiffness,
+                                             const supine_lungs *lungs, supine_error *error);
 
 /** Find the expandability a (1 / stiffness) of each lung region from the displacement between the
  * surfaces of two states ([Santhanam2008] VI).
@@ -110,8 +115,7 @@ supine_status supine_patient_expand(supine_patient_matching *matching,
  * box to the means.
  * @param matching  on return all vertices are matched
  * @param patient   displacement law fitted to these surfaces; its kriging correction is not used
- * @param gravity   unit vector in the emptier state
- * @retval SUPINE_ERROR_NUMERICAL  the means do not determine the linear function */
+ * @param gravity   unit vector in the emptier state */
 supine_status supine_patient_applied_find(supine_patient_matching *matching,
                                           const supine_patient *patient, const double gravity[3],
                                           supine_patient_applied *applied, supine_error *error);

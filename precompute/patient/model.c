@@ -109,7 +109,7 @@ static void move_range(void *context, size_t begin, size_t end, size_t thread) {
 
 static void move(work *w) {
   supine_parallel_for(w->lungs.mesh.vertex_count, GRAIN, 0, move_range, w);
-  supine_mesh_box(&w->lungs.mesh, w->lungs.minimum, w->lungs.maximum);
+  supine_lungs_measure(&w->lungs);
 }
 
 /* Compute w->smoothing_ratio of each vertex, for the posture of the two scans. */
@@ -167,7 +167,7 @@ static void find_path_span(const work *w, const supine_resting *resting,
   enum { ROUNDS = 30 };
   static const double step = 1e-4;
   const supine_patient_record *record = w->record;
-  const double lung_volume = 1e-3 * supine_mesh_volume(&w->lungs.mesh);
+  const double lung_volume = w->lungs.volume[0] + w->lungs.volume[1];
   const double full = either_full_volume(record, resting);
   const double volume[2] = {
       full, full * supine_reference_resting_total(resting, record->state[1].gravity)};
@@ -223,7 +223,7 @@ static supine_status find_state(supine_patient_record *record, const supine_lung
   }
   const size_t state =
       record->volume[0] > 0.0 && record->volume[1] > 0.0 && only_side == frame->only_side
-          ? 1e-3 * supine_mesh_volume(&lungs->mesh) < sqrt(record->volume[0] * record->volume[1])
+          ? lungs->volume[0] + lungs->volume[1] < sqrt(record->volume[0] * record->volume[1])
           : sum[1] < sum[0];
   const size_t k = axis[state];
   record->shown = (double)state;
@@ -289,11 +289,9 @@ static void set_volumes(supine_patient_record *record, const supine_lungs *fulle
   double sum[2] = {0.0, 0.0};
   memset(record->lung_volume, 0, sizeof record->lung_volume);
   for (size_t lung = 0; lung < fuller->lung_count; ++lung) {
-    const supine_mesh part = supine_lungs_part(fuller, lung);
     const size_t side = fuller->side[lung] > 0 ? 0 : 1;
-    const double volume = 1e-3 * supine_mesh_volume(&part);
-    record->lung_volume[0][side] = volume;
-    record->lung_volume[1][side] = volume + supine_volume_form_at(&forms[lung], ones);
+    record->lung_volume[0][side] = fuller->volume[lung];
+    record->lung_volume[1][side] = fuller->volume[lung] + supine_volume_form_at(&forms[lung], ones);
     sum[0] += record->lung_volume[0][side];
     sum[1] += record->lung_volume[1][side];
   }
@@ -326,8 +324,8 @@ supine_status supine_patient_model(supine_patient_record *record, const supine_l
   supine_physics_volume_of_fields(&w.lungs, NULL, w.displacement, w.smoothing_ratio + n, 1, forms);
   set_volumes(record, &w.lungs, forms);
   supine_patient_resting(record, resting);
-  *scan = supine_patient_scan(record, (size_t)record->shown,
-                              1e-3 * supine_mesh_volume(&lungs->mesh), resting);
+  *scan = supine_patient_scan(record, (size_t)record->shown, lungs->volume[0] + lungs->volume[1],
+                              resting);
   for (size_t i = 0; i < sizeof forms[0].of / sizeof *forms[0].of; ++i) {
     forms[0].of[i] += forms[1].of[i];
   }
@@ -351,6 +349,12 @@ supine_status supine_patient_model(supine_patient_record *record, const supine_l
     model->direction.c[2 * k + 1] = record->patient.power.c[2 * k + 1];
   }
   return SUPINE_OK;
+}
+
+double supine_patient_expected(const supine_patient_record *record) {
+  const supine_patient_fit_report *report = &record->report;
+  const bool forwards = record->shown == 0.0 && report->stretch > 0.0;
+  return report->expected_constant / (forwards ? report->stretch * report->stretch : 1.0);
 }
 
 void supine_patient_field(const void *record, const double point[3], double side, double u[3]) {

@@ -21,10 +21,7 @@ typedef struct supine_patient_pairs {
  * state) or im1_x,im1_y,im1_z,im2_x,im2_y,im2_z (image 1 is the second state, usually inhaled;
  * image 2 is the first).
  * @param reverse  exchange the two states
- * @param pairs    initialised to zero; empty after a failure
- * @retval SUPINE_ERROR_READ    the file is missing or unreadable
- * @retval SUPINE_ERROR_FORMAT  a column is missing, a number is not finite, or there are no pairs
- * @retval SUPINE_ERROR_MEMORY */
+ * @param pairs    initialised to zero; empty after a failure */
 supine_status supine_patient_pairs_load(const char *path, bool reverse, supine_patient_pairs *pairs,
                                         supine_error *error);
 void supine_patient_pairs_free(supine_patient_pairs *pairs);
@@ -34,10 +31,9 @@ void supine_patient_pairs_free(supine_patient_pairs *pairs);
  * @return 1 if the points do not determine a map, or if the map is a reflection */
 double supine_patient_pairs_growth(const supine_patient_pairs *pairs);
 
-/** Check that the pairs of points can be positions in two states of one chest.
- * @param scans_moved  the body may have moved between the scans
- * @retval SUPINE_ERROR_FORMAT  fewer than 12 pairs, points in one plane, units other than mm,
- *   exchanged sides or axes, frames that do not overlap (unless scans_moved), or no displacement */
+/** Check that at least 12 pairs of points can be positions in two states of one chest. Refuse other
+ * units than mm, exchanged sides or axes, and frames that do not overlap (unless scans_moved).
+ * @param scans_moved  the body may have moved between the scans */
 supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool scans_moved,
                                          supine_error *error);
 
@@ -64,8 +60,7 @@ bool supine_patient_map_fit(supine_patient_map kind, size_t count, const double 
 void supine_patient_map_apply(const supine_patient_affinity *map, const double from[3],
                               double to[3]);
 
-/** Check by the overlap of bounding boxes that two surfaces can be two states of the same lungs.
- * @retval SUPINE_ERROR_MESH  along an axis, they overlap by less than half of the larger box */
+/** Check by the overlap of bounding boxes that two surfaces can be two states of the same lungs. */
 supine_status supine_patient_check_boxes(const supine_mesh *first, const supine_mesh *second,
                                          supine_error *error);
 

@@ -43,6 +43,7 @@ static const numbers table[] = {
     SCORE("corrected", CORRECTED),
     {"held_out_rms_mm", "baseline", 1, AT(report.baseline), false},
     {NULL, "explained_percent", 1, AT(report.explained), false},
+    {NULL, "error_in_fuller_scan", 1, AT(report.stretch), true},
     {NULL, "expected_rms_mm", 1, AT(report.expected_point), false},
     {NULL, "expected_constant_mm", 1, AT(report.expected_constant), false},
     {NULL, "expected_from_mm", 1, AT(report.expected_from), false},

@@ -129,9 +129,7 @@ void supine_patient_field(const void *record, const double point[3], double side
 supine_status supine_patient_decode(const char *name, const char *text,
                                     supine_patient_record *record, supine_error *error);
 
-/** Read the record of a patient's displacement law from a JSON file.
- * @retval SUPINE_ERROR_READ    the file cannot be opened
- * @retval SUPINE_ERROR_FORMAT  a key is missing or invalid */
+/** Read the record of a patient's displacement law from a JSON file. */
 supine_status supine_patient_read(const char *path, supine_patient_record *record,
                                   supine_error *error);
 
@@ -150,11 +148,14 @@ supine_status supine_patient_read(const char *path, supine_patient_record *recor
  * @param scan     written: the state of the scan; `known` is false if its volume relative to full
  *   inflation is unknown
  * @param arrays   [4 N], written: the directions [N, 3], mm, then the relative stiffness [N]; must
- *   outlive the model
- * @retval SUPINE_ERROR_MESH  the surface is too far from both states, or is the other lung */
+ *   outlive the model */
 supine_status supine_patient_model(supine_patient_record *record, const supine_lungs *lungs,
                                    supine_resting *resting, supine_scan *scan, double *arrays,
                                    supine_model *model, supine_error *error);
+
+/** Return the constant c of the expected error (supine/locate.h), mm, for a basis of the scan that
+ * supine_patient_model has found: smaller for the fuller scan, as it predicts the emptier state. */
+double supine_patient_expected(const supine_patient_record *record);
 
 /** Compute gains [state][axis]: the displacement from full inflation to the fuller [0] and to the
  * emptier [1] scanned state, divided by the displacement to rest. The default displacement law
@@ -188,9 +189,7 @@ supine_scan supine_patient_scan(const supine_patient_record *record, size_t stat
  * @param emptier        surface of the same lungs with less air, mm, in the same coordinate frame
  * @param landmarks      pairs to fit as well; ignored if `expandability` is true
  * @param expandability  also fit the stiffness of lung regions (supine_patient_expand), with
- *   SUPINE_PATIENT_PAPER and without a kriging correction
- * @retval SUPINE_ERROR_MESH  no overlap (frames, units or sides differ), equal surfaces, or too few
- *   matches */
+ *   SUPINE_PATIENT_PAPER and without a kriging correction */
 supine_status supine_patient_fit_surface(const supine_lungs *fuller, const supine_mesh *emptier,
                                          const supine_patient_pairs *landmarks,
                                          const supine_patient_fit_options *options,
@@ -211,8 +210,7 @@ supine_status supine_patient_fit_surface(const supine_lungs *fuller, const supin
  * @param fuller   surface in the fuller of the two scans; NULL if `surface` is NULL
  * @param pairs    points in the fuller and in the third scan; NULL if `surface` is given
  * @param scans_moved  whether to fit t; otherwise it is 0
- * @param further  in: the state of the third scan; out: the fit
- * @retval SUPINE_ERROR_MESH    too few matches */
+ * @param further  in: the state of the third scan; out: the fit */
 supine_status supine_patient_gain_fit(const supine_patient_record *record,
                                       const supine_lungs *fuller, const supine_patient_pairs *pairs,
                                       const supine_mesh *surface, bool scans_moved,

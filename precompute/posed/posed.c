@@ -38,11 +38,7 @@ supine_status supine_posed_mesh(const supine_basis *basis, const supine_pose *po
                                 supine_mesh *mesh, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const size_t corners = 3 * info->triangle_count;
-  *mesh = (supine_mesh){.vertex_count = info->vertex_count,
-                        .vertices = malloc(3 * info->vertex_count * sizeof(double)),
-                        .triangle_count = info->triangle_count,
-                        .triangles = malloc(corners * sizeof(uint32_t))};
-  if (mesh->vertices == NULL || mesh->triangles == NULL) {
+  if (supine_mesh_allocate(info->vertex_count, info->triangle_count, mesh) != SUPINE_OK) {
     return supine_error_memory(error, "%zu vertices", info->vertex_count);
   }
   memcpy(mesh->triangles, supine_basis_triangles(basis), corners * sizeof(uint32_t));

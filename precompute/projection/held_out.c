@@ -1,7 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Solve the physical model for held-out directions of gravity. */
-#include <cblas.h>
-
 #include "base/arena.h"
 #include "base/vec3.h"
 
@@ -20,45 +18,16 @@ void supine_accuracy_truth_free(supine_truth *truth) {
 }
 
 /* Find the change of volume for each held-out direction of gravity as a cubic polynomial of the
- * gain (factor on the displacement). If truth->rank is at most FEW, use the volume as a polynomial
- * of truth->functions. Otherwise compute the forces for AT_ONCE directions at a time. */
+ * gain (factor on the displacement). */
 static supine_status find_cubics(const supine_lungs *lungs, const double *share,
                                  const double *directions, const supine_truth *truth,
                                  supine_error *error) {
-  enum { FEW = 8, AT_ONCE = SUPINE_VOLUME_FIELDS };
-  const size_t axes = directions == NULL ? 3 : 1;
-  const size_t n = axes * lungs->mesh.vertex_count;
-  const size_t most = axes == 3 ? 1 : AT_ONCE;
-  const size_t rank = truth->rank;
   supine_volume_forms columns = {0};
-  supine_volume_form forms[2 * AT_ONCE];
-  SUPINE_ARENA arena = {0};
-  double *fields = supine_arena_take(&arena, (most + 1) * n, sizeof *fields);
-  if (fields == NULL) {
-    return supine_error_memory(error, "%zu displacements", n);
-  }
-  if (rank <= FEW) {
-    SUPINE_TRY(supine_physics_volume_forms_create(lungs, share, directions, truth->columns, rank,
-                                                  &columns, error));
-  }
-  for (size_t d = 0; d < truth->direction_count && rank <= FEW; ++d) {
-    supine_physics_volume_forms_contract(&columns, truth->functions + d * rank,
+  SUPINE_TRY(supine_physics_volume_forms_create(lungs, share, directions, truth->columns,
+                                                truth->rank, &columns, error));
+  for (size_t d = 0; d < truth->direction_count; ++d) {
+    supine_physics_volume_forms_contract(&columns, truth->functions + d * truth->rank,
                                          truth->cubic + 3 * d);
-  }
-  for (size_t first = 0; first < truth->direction_count && rank > FEW; first += most) {
-    const size_t left = truth->direction_count - first;
-    const size_t count = left < most ? left : most;
-    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)n, (int)count, (int)rank, 1.0,
-                truth->columns, (int)rank, truth->functions + first * rank, (int)rank, 0.0, fields,
-                (int)count);
-    for (size_t i = 0; i < n; ++i) {
-      fields[most * n + i] = 1.0;
-    }
-    supine_physics_volume_of_fields(lungs, share, axes == 3 ? fields : directions,
-                                    axes == 3 ? fields + n : fields, count, forms);
-    for (size_t i = 0; i < lungs->lung_count * count; ++i) {
-      supine_physics_volume_form_add(&forms[i], truth->cubic + 3 * (first + i % count));
-    }
   }
   supine_physics_volume_forms_free(&columns);
   return SUPINE_OK;

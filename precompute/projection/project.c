@@ -6,6 +6,7 @@
 
 #include "base/arena.h"
 #include "precompute/projection/projection.h"
+#include "sh/transform.h"
 #include <supine/sh.h>
 
 void supine_projection_free(supine_projection *projection) {
@@ -57,7 +58,7 @@ static supine_status expand(const supine_lungs *lungs, const supine_force_law *l
   SUPINE_TRY(find_heights(lungs, law->pair, grid, &heights));
   const supine_gravities gravities = {count, heights.directions, heights.minimum, heights.maximum};
   SUPINE_TRY(supine_projection_span_weights(lungs, law, span, &gravities, weights));
-  return supine_sh_expand(band, grid, span->rank, weights, functions, NULL);
+  return supine_sh_transform(band, grid, span->rank, weights, functions, NULL);
 }
 
 /* Solve the physical model for each direction of gravity of made->span, into the columns. */

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/vec3.h"
 #include "precompute/inside/biharmonic.h"
 #include "precompute/lungs/surface.h"
 #include "precompute/validation/validation.h"
@@ -20,14 +21,6 @@ static const double same_posture = 1e-9; /* gravity directions that differ by le
 void supine_validation_free(supine_validation *subject) {
   supine_mesh_free(&subject->start);
   supine_arena_free(&subject->arena);
-}
-
-static bool same_direction(const double a[3], const double b[3]) {
-  double off = 0.0;
-  for (int k = 0; k < 3; ++k) {
-    off = fmax(off, fabs(a[k] - b[k]));
-  }
-  return off < same_posture;
 }
 
 supine_status supine_validation_begin(supine_validation *subject, supine_error *error) {
@@ -159,7 +152,8 @@ void supine_validation_find_line(supine_validation *subject) {
   for (int pass = 0; pass < 2; ++pass) {
     for (size_t i = 0; i < s->count; ++i) {
       const supine_validation_outcome *of = &s->outcome[i];
-      if (!of->has_best || !same_direction(s->state[i].state.gravity, s->state[0].state.gravity)) {
+      if (!of->has_best ||
+          supine_distance(s->state[i].state.gravity, s->state[0].state.gravity) >= same_posture) {
         continue;
       }
       const double scale = of->best_scale - s->from_scale;

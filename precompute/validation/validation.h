@@ -87,8 +87,7 @@ void supine_validation_find_line(supine_validation *subject);
  * supine_validation_map_names: `predicted`, and maps fitted to the pairs.
  * @param moved      body motion between the scans to fit to `predicted` and remove before comparing
  * @param predicted  [count, 3] positions predicted from the first points of the pairs, mm
- * @param squares    [count] their squared expected errors, mm^2, 0 if unknown; or NULL
- * @retval SUPINE_ERROR_NUMERICAL  the points lie in one plane */
+ * @param squares    [count] their squared expected errors, mm^2, 0 if unknown; or NULL */
 supine_status
 supine_validation_points(const supine_patient_pairs *pairs, const double *predicted,
                          const double *squares, supine_patient_scan_motion moved,
@@ -104,7 +103,7 @@ supine_validation_points(const supine_patient_pairs *pairs, const double *predic
  * @param moved      body motion between the scans to fit to `predicted` and remove before comparing
  * @param predicted  [N, 3] positions predicted by the basis, mm; on return, after the fitted motion
  * @param nearest    [N, 3] point of `state` nearest to each predicted vertex, mm; output, or NULL
- * @retval SUPINE_ERROR_MESH  as supine_patient_check_boxes */
+ */
 supine_status
 supine_validation_surfaces(const supine_mesh *start, supine_patient_scan_motion moved,
                            double *predicted, const supine_mesh *state, double *nearest,

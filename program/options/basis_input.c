@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Open a basis, and print its expected errors and the displacement of its hilum. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/arena.h"
@@ -54,7 +53,7 @@ supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,
 
 void supine_options_basis_title(const char *path, char *title, size_t size) {
   static const char ending[] = ".safetensors";
-  const char *name = basename(path);
+  const char *name = supine_text_file_name(path);
   const size_t cut = supine_text_ends_in(name, ending) ? sizeof ending - 1 : 0;
   (void)snprintf(title, size, "%.*s", (int)(strlen(name) - cut), name);
   (void)supine_text_make_utf8(title);
@@ -75,10 +74,11 @@ supine_status supine_options_hilum(const supine_basis *basis, const supine_pose 
                                    supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const size_t modes = info->mode_count;
-  double *mean = malloc(info->lung_count * 3 * modes * sizeof *mean);
+  SUPINE_ARENA arena = {0};
+  double *mean = supine_arena_take(&arena, info->lung_count * 3 * modes, sizeof *mean);
   memset(shift, 0, 3 * sizeof *shift);
   if (mean == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+    return supine_error_memory(error, "%zu modes", modes);
   }
   const bool known = supine_inside_hilum(basis, mean);
   for (size_t i = 0; i < info->lung_count * 3 * modes && known; ++i) {
@@ -88,24 +88,8 @@ supine_status supine_options_hilum(const supine_basis *basis, const supine_pose 
                    (pose->gains[lung][axis] * pose->weights[i % modes] -
                     from->gains[lung][axis] * from->weights[i % modes]);
   }
-  free(mean);
   return known || !needed ? SUPINE_OK
                           : supine_error_set(error, SUPINE_ERROR_UNSUPPORTED,
                                              "--frame hilum: the file does not say how the hilum "
                                              "moves: make it again with 'supine embed'");
-}
-
-void supine_options_hilum_print(const double shift[3], bool subtracted) {
-  if (shift[0] != 0.0 || shift[1] != 0.0 || shift[2] != 0.0) {
-    (void)printf("the hilum moves by %.1f, %.1f, %.1f mm (to the left, back and head)%s\n",
-                 shift[0], shift[1], shift[2], subtracted ? ", subtracted from all positions" : "");
-  }
-}
-
-void supine_options_expected_print(const supine_expected *expected, FILE *file) {
-  if (expected->sigma != NULL) {
-    (void)fprintf(file, "expected error %.1f mm (RMS over the points), %.1f mm at most%s\n",
-                  expected->rms, expected->largest,
-                  expected->turned ? "; an extrapolation, as the posture changes" : "");
-  }
 }

@@ -17,8 +17,7 @@
 extern const supine_option supine_options_as_scanned[];
 
 /* Open a basis without its stored normals, and check that its surface is closed. The caller must
- * close the basis even after a failure.
- * @retval SUPINE_ERROR_OPEN_SURFACE  the surface encloses no volume */
+ * close the basis even after a failure. */
 supine_status supine_options_basis_open(const char *path, supine_storage storage,
                                         supine_basis **basis, supine_error *error);
 
@@ -29,8 +28,7 @@ void supine_options_basis_close(supine_basis **basis);
 supine_status supine_options_basis_closed(const supine_basis *basis, const char *path,
                                           supine_error *error);
 
-/* If `wanted` is true, set the axes and the unit of `save` to those of the scan.
- * @retval SUPINE_ERROR_FORMAT  the basis does not state the axes and the unit of its scan */
+/* If `wanted` is true, set the axes and the unit of `save` to those of the scan. */
 supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,
                                          supine_mesh_save_options *save, supine_error *error);
 
@@ -42,14 +40,10 @@ void supine_options_basis_title(const char *path, char *title, size_t size);
 extern const supine_option supine_options_hilum_frame[];
 
 /* Compute the displacement of the hilum (precompute/inside/shells.h) from one pose to another, mm;
- * 0 if the file does not determine it.
- * @retval SUPINE_ERROR_UNSUPPORTED  `needed` is true and the file does not determine it */
+ * 0 if the file does not determine it, which is an error if `needed`. */
 supine_status supine_options_hilum(const supine_basis *basis, const supine_pose *pose,
                                    const supine_pose *from, bool needed, double shift[3],
                                    supine_error *error);
-
-/* Print the displacement of the hilum in one line, and whether it was subtracted. */
-void supine_options_hilum_print(const double shift[3], bool subtracted);
 
 #define SUPINE_EXPECTED_MEANING                                                                    \
   "3-D RMS; half of all points lie within 0.9 times this distance of their true position, 95 % "   \
@@ -57,8 +51,5 @@ void supine_options_hilum_print(const double shift[3], bool subtracted);
 #define SUPINE_EXPECTED_SUPPORT                                                                    \
   "The expected error was measured on breaths in one posture; for a change of posture it is an "   \
   "extrapolation. 'supine info' lists its terms."
-
-/* Print the RMS and the largest expected error in one line; if unknown, print nothing. */
-void supine_options_expected_print(const supine_expected *expected, FILE *file);
 
 #endif

@@ -17,17 +17,12 @@ static void find_quarter(const breath_turn *turn, double quarter[3]) {
   const double *from = turn->from;
   double axis[3];
   supine_cross(from, turn->to, axis);
-  const double sine = supine_length(axis);
-  if (sine < 1e-9) { /* opposite directions do not determine the axis of the turn */
-    const double *over = fabs(from[2]) > 0.5 ? back : left;
-    supine_cross(from, over, axis);
-    if (supine_dot(axis, axis) < 1e-9) { /* `from` is parallel to `left` */
-      supine_cross(from, back, axis);
-    }
+  if (supine_length(axis) < 1e-9) { /* opposite directions do not determine the axis of the turn */
+    const bool over_back = fabs(from[2]) > 0.5 || fabs(from[0]) > 1.0 - 1e-9;
+    supine_cross(from, over_back ? back : left, axis);
   }
-  const double length = supine_length(axis);
-  const double unit[3] = {axis[0] / length, axis[1] / length, axis[2] / length};
-  supine_cross(unit, from, quarter);
+  (void)supine_normalise(axis, axis);
+  supine_cross(axis, from, quarter);
 }
 
 void supine_breath_turn_gravity(const breath_turn *turn, double time, double gravity[3]) {

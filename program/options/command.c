@@ -20,27 +20,16 @@
 #include "runtime/words.h"
 
 static int exit_code(supine_status status) {
-  switch (status) {
-  case SUPINE_OK:
-    return SUPINE_EXIT_OK;
-  case SUPINE_ERROR_ARGUMENT:
-    return SUPINE_EXIT_USAGE;
-  case SUPINE_ERROR_READ:
-  case SUPINE_ERROR_FORMAT:
-  case SUPINE_ERROR_MESH:
-  case SUPINE_ERROR_OPEN_SURFACE:
-    return SUPINE_EXIT_INPUT;
-  case SUPINE_ERROR_UNSUPPORTED:
-    return SUPINE_EXIT_UNSUPPORTED;
-  case SUPINE_ERROR_WRITE:
-  case SUPINE_ERROR_INTERRUPTED:
-    return SUPINE_EXIT_OUTPUT;
-  case SUPINE_ERROR_MEMORY:
-  case SUPINE_ERROR_NUMERICAL:
-  case SUPINE_STATUS_COUNT:
-    break;
-  }
-  return SUPINE_EXIT_NUMERICAL;
+  static const int codes[SUPINE_STATUS_COUNT] = {
+      [SUPINE_ERROR_ARGUMENT] = SUPINE_EXIT_USAGE,
+      [SUPINE_ERROR_READ] = SUPINE_EXIT_INPUT,
+      [SUPINE_ERROR_FORMAT] = SUPINE_EXIT_INPUT,
+      [SUPINE_ERROR_MESH] = SUPINE_EXIT_INPUT,
+      [SUPINE_ERROR_OPEN_SURFACE] = SUPINE_EXIT_INPUT,
+      [SUPINE_ERROR_UNSUPPORTED] = SUPINE_EXIT_UNSUPPORTED,
+      [SUPINE_ERROR_WRITE] = SUPINE_EXIT_OUTPUT,
+      [SUPINE_ERROR_INTERRUPTED] = SUPINE_EXIT_OUTPUT}; /* 0: the rest, which are numerical */
+  return codes[status] != 0 ? codes[status] : SUPINE_EXIT_NUMERICAL;
 }
 
 void supine_options_say(const char *command, const char *format, ...) {
@@ -73,7 +62,7 @@ int supine_options_finish(const char *command) {
 void supine_options_describe(int argc, char **argv, char *text, size_t size) {
   size_t used = (size_t)snprintf(text, size, "supine " SUPINE_VERSION);
   for (int i = 0; i < argc && used < size; ++i) {
-    used += (size_t)snprintf(text + used, size - used, " %s", basename(argv[i]));
+    used += (size_t)snprintf(text + used, size - used, " %s", supine_text_file_name(argv[i]));
   }
   (void)supine_text_make_utf8(text);
 }
@@ -103,6 +92,17 @@ bool supine_options_parse_count(const char *text, size_t *value) {
     return false;
   }
   *value = (size_t)number;
+  return true;
+}
+
+bool supine_options_next_item(const char **list, char *item, size_t size) {
+  const char *at = *list;
+  if (at == NULL) {
+    return false;
+  }
+  (void)snprintf(item, size, "%.*s", (int)strcspn(at, ","), at);
+  at = strchr(at, ',');
+  *list = at != NULL ? at + 1 : NULL;
   return true;
 }
 
@@ -163,7 +163,9 @@ supine_progress supine_options_progress_begin(const char *label) {
 bool supine_options_progress_step(void *progress, double fraction) {
   supine_progress *state = progress;
   const double time = supine_clock_seconds();
-  if (state->stderr_is_terminal && time - state->shown_at > 0.1) {
+  if (fraction >= 1.0) {
+    supine_options_progress_end(state);
+  } else if (state->stderr_is_terminal && time - state->shown_at > 0.1) {
     state->shown_at = time;
     const double spent = time - state->start;
     (void)fprintf(stderr, "\r%s: %3.0f %%", state->label, 100.0 * fraction);

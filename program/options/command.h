@@ -61,6 +61,10 @@ bool supine_options_parse_count(const char *text, size_t *value);
 /* Read `count` finite numbers separated by commas; return false for any other text. */
 bool supine_options_parse_numbers(const char *text, size_t count, double *values);
 
+/* Copy the first item of a list separated by commas to `item` [size], cut off if it is longer, and
+ * advance *list. Return false at the end of the list. */
+bool supine_options_next_item(const char **list, char *item, size_t size);
+
 /* Return the candidate nearest to `text` by edit distance, or NULL if all differ too much. */
 const char *supine_options_suggest(const char *text, const char *const *candidates, size_t count);
 
@@ -73,7 +77,7 @@ typedef struct supine_progress {
 } supine_progress;
 
 supine_progress supine_options_progress_begin(const char *label);
-/* Show the fraction of the work done, 0 to 1; return false if the user has interrupted the work. */
+/* Show the fraction of the work done, 0 to 1, and nothing at 1; return false if the user has interrupted the work. */
 bool supine_options_progress_step(void *progress, double fraction);
 void supine_options_progress_end(supine_progress *progress);
 

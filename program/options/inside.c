@@ -226,7 +226,8 @@ supine_status supine_command_marks_make(const supine_basis *inside,
                                         const supine_command_names *names,
                                         const supine_pose *const pose[2], const float *sigma,
                                         supine_command_marks *marks, supine_error *error) {
-  const size_t n = supine_basis_get_info(inside)->vertex_count;
+  const supine_basis_info *info = supine_basis_get_info(inside);
+  const size_t n = info->vertex_count;
   SUPINE_ARENA arena = {0};
   SUPINE_FREED_BY(supine_command_targets_free) supine_target *targets = NULL;
   float *xyz = supine_arena_take(&arena, 3 * n, sizeof *xyz);
@@ -238,15 +239,14 @@ supine_status supine_command_marks_make(const supine_basis *inside,
   }
   SUPINE_TRY(supine_command_targets_find(inside, names, pose, sigma, false, &targets, error));
   (void)supine_deform(inside, pose[1], xyz);
-  marks->marks.mark = marks->mark;
+  marks->marks = (supine_marks){n, marks->mark, info->triangle_count, info->triangles};
   marks->first = targets[0];
+  for (size_t i = 0; i < n; ++i) {
+    memcpy(marks->mark[i].xyz, xyz + 3 * i, sizeof marks->mark[i].xyz);
+  }
   for (size_t part = 0; part < names->count; ++part) {
     const supine_target *t = &targets[part];
     const size_t count = names->begin[part + 1] - names->begin[part];
-    for (size_t i = 0; count > 1 && i < count; ++i) {
-      supine_mark *mark = &marks->mark[marks->marks.count++];
-      memcpy(mark->xyz, xyz + 3 * names->order[names->begin[part] + i], sizeof mark->xyz);
-    }
     supine_mark *middle = &marks->mark[marks->marks.count];
     for (size_t k = 0; k < 3; ++k) {
       middle->xyz[k] = (float)t->at[k];

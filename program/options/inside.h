@@ -18,8 +18,7 @@ typedef struct supine_command_names {
   supine_arena arena;
 } supine_command_names;
 
-/* Read the names of embedded structures. Close `names` even after a failure.
- * @retval SUPINE_ERROR_FORMAT  the basis has no names, or malformed ones */
+/* Read the names of embedded structures. Close `names` even after a failure. */
 supine_status supine_command_names_open(const supine_basis *basis, supine_command_names *names,
                                         supine_error *error);
 void supine_command_names_close(supine_command_names *names);

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/text.h"
 #include "program/options/model_options.h"
 #include "program/options/state_options.h"
 #include "program/options/surface_options.h"
@@ -24,7 +25,8 @@ static supine_status read_resting(const char *text, void *field, supine_error *e
   char copy[256];
   (void)snprintf(copy, sizeof copy, "%s", text);
   supine_status status = SUPINE_OK;
-  for (char *rest = copy, *piece; status == SUPINE_OK && (piece = strsep(&rest, ",")) != NULL;) {
+  for (char *rest = copy; status == SUPINE_OK && rest != NULL;) {
+    const char *piece = supine_text_item(&rest);
     char *value = strchr(piece, '=');
     if (value != NULL) {
       *value++ = '\0';
@@ -40,36 +42,29 @@ static supine_status read_resting(const char *text, void *field, supine_error *e
  * ends of an axis x, y or z; any other text names a file. */
 static supine_status read_expandability(const char *text, void *field, supine_error *error) {
   supine_model_choice *choice = field;
+  supine_expandability_law *law = &choice->expandability_law;
+  const bool linear = strncmp(text, "linear:", strlen("linear:")) == 0;
+  char axis;
+  char from[32];
+  char to[32];
   (void)error;
   choice->expandability = NULL;
-  choice->expandability_law = (supine_expandability_law){0};
+  *law = (supine_expandability_law){0};
   if (strcmp(text, "uniform") == 0) {
     return SUPINE_OK;
   }
-  if (strncmp(text, "linear:", strlen("linear:")) == 0) {
-    choice->expandability_law.shape = SUPINE_EXPANDABILITY_LINEAR;
-  } else if (strncmp(text, "exp:", strlen("exp:")) == 0) {
-    choice->expandability_law.shape = SUPINE_EXPANDABILITY_EXPONENTIAL;
-  } else {
+  if (!linear && strncmp(text, "exp:", strlen("exp:")) != 0) {
     choice->expandability = text;
     return SUPINE_OK;
   }
-  const char *at = strchr(text, ':') + 1;
-  if (at[0] < 'x' || at[0] > 'z' || at[1] != ':') {
+  if (sscanf(text, "%*[a-z]:%c:%31[^:]:%31s", &axis, from, to) != 3 || axis < 'x' || axis > 'z') {
     return SUPINE_ERROR_ARGUMENT;
   }
-  choice->expandability_law.axis = at[0] - 'x';
-  char numbers[128];
-  (void)snprintf(numbers, sizeof numbers, "%s", at + 2);
-  char *colon = strchr(numbers, ':');
-  if (colon == NULL) {
-    return SUPINE_ERROR_ARGUMENT;
-  }
-  *colon = '\0';
-  return supine_options_fits(
-      supine_options_parse_number(numbers, &choice->expandability_law.from) &&
-      supine_options_parse_number(colon + 1, &choice->expandability_law.to) &&
-      choice->expandability_law.from > 0.0 && choice->expandability_law.to > 0.0);
+  law->shape = linear ? SUPINE_EXPANDABILITY_LINEAR : SUPINE_EXPANDABILITY_EXPONENTIAL;
+  law->axis = axis - 'x';
+  return supine_options_fits(supine_options_parse_number(from, &law->from) &&
+                             supine_options_parse_number(to, &law->to) && law->from > 0.0 &&
+                             law->to > 0.0);
 }
 
 static supine_status read_lesion(const char *text, void *field, supine_error *error) {
@@ -88,11 +83,10 @@ static supine_status read_lesion(const char *text, void *field, supine_error *er
 static supine_status read_lung(const char *text, void *field, supine_error *error) {
   supine_model_choice *choice = field;
   (void)error;
-  const char *colon = strchr(text, ':');
-  const bool left = colon == text + 4 && strncmp(text, "left", 4) == 0;
-  const bool right = colon == text + 5 && strncmp(text, "right", 5) == 0;
+  const bool left = strncmp(text, "left:", strlen("left:")) == 0;
   double share;
-  if (!(left || right) || !supine_options_parse_number(colon + 1, &share) ||
+  if (!(left || strncmp(text, "right:", strlen("right:")) == 0) ||
+      !supine_options_parse_number(strchr(text, ':') + 1, &share) ||
       !(share > 0.0 && share <= 1.0)) {
     return SUPINE_ERROR_ARGUMENT;
   }
@@ -285,7 +279,7 @@ supine_status supine_command_load_lungs(const char *command, const char *operand
   }
   (void)strcpy(remaining, operand);
   while (remaining != NULL && count <= FILES_MAX) {
-    paths[count++] = strsep(&remaining, ",");
+    paths[count++] = supine_text_item(&remaining);
   }
   if (count > FILES_MAX) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,

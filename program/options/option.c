@@ -323,7 +323,8 @@ static supine_status check_outputs(const reading *r, const supine_arguments *giv
   return SUPINE_OK;
 }
 
-static supine_status read_and_run(reading *r, int argc, char **argv, supine_error *error) {
+static supine_status read_and_run(reading *r, int argc, char **argv, const void *context,
+                                  supine_error *error) {
   const supine_command *command = r->command;
   char made_by[512];
   supine_options_describe(argc, argv, made_by, sizeof made_by);
@@ -341,18 +342,24 @@ static supine_status read_and_run(reading *r, int argc, char **argv, supine_erro
     supine_options_print_help(command, r->help == HELP_ALL, stdout);
     return SUPINE_OK;
   }
-  const supine_arguments given = {argv + optind, (size_t)(argc - optind), made_by};
+  const supine_arguments given = {argv + optind, (size_t)(argc - optind), made_by, context};
   SUPINE_TRY(check_given(r, given.count, argv, error));
   SUPINE_TRY(check_outputs(r, &given, error));
   return command->run(r->request, &given, error);
 }
 
-int supine_options_run(const supine_command *command, int argc, char **argv) {
+supine_status supine_options_run_words(const supine_command *command, int argc, char **argv,
+                                       const void *context, supine_error *error) {
   reading r = {.command = command, .request = calloc(1, command->request_size)};
-  supine_error error = {.message = ""};
   const supine_status status =
-      r.request != NULL ? read_and_run(&r, argc, argv, &error) : SUPINE_ERROR_MEMORY;
+      r.request != NULL ? read_and_run(&r, argc, argv, context, error) : SUPINE_ERROR_MEMORY;
   free(r.request);
+  return status;
+}
+
+int supine_options_run(const supine_command *command, int argc, char **argv) {
+  supine_error error = {.message = ""};
+  const supine_status status = supine_options_run_words(command, argc, argv, NULL, &error);
   return status == SUPINE_OK ? supine_options_finish(command->name)
                              : supine_options_fail(command->name, status, &error);
 }

@@ -93,6 +93,7 @@ static const struct {
               {NULL, "error", "compression error"},
               {"error", "volume_ml", "errors in mm at volume, mL"},
               {NULL, "error_harmonics", "error by highest band, share"},
+              {NULL, "error_in_fuller_scan", "error in the fuller / in the emptier scan"},
               {NULL, "error_modes", "error by number of modes, share"},
               {NULL, "expected_constant_mm", "expected error^2 / displacement, mm"},
               {NULL, "expected_error", "expected error of a displacement from the scan"},

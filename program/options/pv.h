@@ -45,9 +45,7 @@ typedef struct supine_pv_report {
  * @param name        the samples' file, for messages
  * @param count       at least SUPINE_PV_UNKNOWNS + 1
  * @param samples     [count] finite
- * @param confidence  confidence level of the intervals, between 0 and 1
- * @retval SUPINE_ERROR_FORMAT     too few samples, repeated or unordered pressures, falling volumes
- * @retval SUPINE_ERROR_NUMERICAL  no minimum was found */
+ * @param confidence  confidence level of the intervals, between 0 and 1 */
 supine_status supine_breath_fit(const char *name, size_t count, const supine_pv_sample *samples,
                                 double confidence, supine_pv_curve *curve, supine_pv_report *report,
                                 supine_error *error);

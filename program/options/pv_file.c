@@ -38,7 +38,7 @@ static supine_status add_sample(const supine_csv *csv, const char *const *names,
   SUPINE_TRY(supine_csv_number(csv, 0, names[0], &sample.pressure, error));
   SUPINE_TRY(supine_csv_number(csv, 1, names[1], &sample.volume, error));
   samples *into = &limbs[limb];
-  supine_pv_sample *grown = reallocarray(into->sample, into->count + 1, sizeof *grown);
+  supine_pv_sample *grown = realloc(into->sample, (into->count + 1) * sizeof *grown);
   if (grown == NULL) {
     return supine_error_memory(error, "%zu samples", into->count + 1);
   }

@@ -13,7 +13,7 @@ static const double least_of_full = 0.1;
 static const double most_of_full = 1.2;
 static const double folded_limit = 0.01; /* largest plausible share of triangles turned over */
 
-static supine_status read_posture(const char *text, void *field, supine_error *error) {
+static supine_status read_state(const char *text, void *field, supine_error *error) {
   *(supine_state *)field = (supine_state){.gravity = {0.0}}; /* zero if the text has no posture */
   return supine_state_parse(text, field, error);
 }
@@ -22,13 +22,10 @@ static supine_status read_posture(const char *text, void *field, supine_error *e
 static supine_status read_gravity(const char *text, void *field, supine_error *error) {
   char posture[128];
   double numbers[3];
-  if (!supine_options_parse_numbers(text, 3, numbers) || strlen(text) >= sizeof posture) {
+  if (!supine_options_parse_numbers(text, 3, numbers)) {
     return SUPINE_ERROR_ARGUMENT;
   }
-  (void)snprintf(posture, sizeof posture, "%s", text);
-  for (char *comma = posture; (comma = strchr(comma, ',')) != NULL;) {
-    *comma = ':';
-  }
+  (void)snprintf(posture, sizeof posture, "%.17g:%.17g:%.17g", numbers[0], numbers[1], numbers[2]);
   return supine_state_parse_posture(posture, field, error);
 }
 
@@ -46,7 +43,7 @@ const supine_option supine_options_orientation[] = {
      "about the left-right axis, from the back towards the head, and -DEGREES the other way: "
      "supine+15 and prone-15 lower the head (Trendelenburg). With a volume, it is a state: "
      "prone:rest+500",
-     GRAVITY, .read = read_posture, .choices = postures},
+     GRAVITY, .read = read_state, .choices = postures},
     {"gravity", 0, "X,Y,Z",
      "direction of gravity in body axes, instead of a posture: x to the left, y to the back, z to "
      "the head; 0,1,0 is supine",
@@ -68,30 +65,26 @@ supine_status supine_options_state(const supine_orientation *orientation, supine
 
 supine_status supine_options_posture_list_parse(const char *text, const supine_state *standard,
                                                 supine_posture_list *list, supine_error *error) {
+  char name[2 * SUPINE_POSTURE_NAME_MAX];
   list->count = 0;
-  for (const char *at = text;;) {
-    const size_t length = strcspn(at, ",");
+  for (const char *at = text; supine_options_next_item(&at, name, sizeof name);) {
     if (list->count == SUPINE_POSTURE_LIST_MAX) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "more than %d postures: name fewer",
                               SUPINE_POSTURE_LIST_MAX);
     }
     supine_posture_item *item = &list->item[list->count++];
-    if (length == 0 || length >= sizeof item->name) {
+    if (name[0] == '\0' || strlen(name) >= sizeof item->name) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "no posture '%.*s': give supine, prone, left, right, upright or "
+                              "no posture '%s': give supine, prone, left, right, upright or "
                               "inverted, or a gravity X:Y:Z",
-                              (int)length, at);
+                              name);
     }
-    memcpy(item->name, at, length);
-    item->name[length] = '\0';
+    (void)strcpy(item->name, name);
     item->state = *standard;
     item->state.gravity[1] = 1.0; /* supine, if the state names no posture */
     SUPINE_TRY(supine_state_parse(item->name, &item->state, error));
-    if (at[length] == '\0') {
-      return SUPINE_OK;
-    }
-    at += length + 1;
   }
+  return SUPINE_OK;
 }
 
 const char *supine_options_posture_label(const char *name) {
@@ -100,12 +93,6 @@ const char *supine_options_posture_label(const char *name) {
 
 supine_status supine_options_read_volume(const char *text, void *field, supine_error *error) {
   return supine_state_parse_volume(text, field, error);
-}
-
-static supine_status read_from(const char *text, void *field, supine_error *error) {
-  supine_state *state = field;
-  *state = (supine_state){.gravity = {0.0}}; /* stays zero if the text names no posture */
-  return supine_state_parse(text, state, error);
 }
 
 const supine_option supine_options_folds[] = {
@@ -133,7 +120,8 @@ const supine_option supine_options_volume[] = {
         "state that displacements are measured from: POSTURE, VOLUME or POSTURE:VOLUME. "          \
         "POSTURE is a name such as prone; VOLUME is rest (FRC), full (TLC) or scan, each alone "   \
         "or with +ML or -ML, or an absolute volume such as 2600mL; default " standard,             \
-        SUPINE_FILLS(supine_from, state), SUPINE_SAYS_GIVEN(supine_from, given), .read = read_from \
+        SUPINE_FILLS(supine_from, state), SUPINE_SAYS_GIVEN(supine_from, given),                   \
+        .read = read_state                                                                         \
   }
 const supine_option supine_options_from[] = {FROM("supine:rest, or the scan if rest is unknown"),
                                              {.name = NULL}};

@@ -16,8 +16,7 @@ typedef struct supine_orientation {
 } supine_orientation;
 
 /* Copy the direction of gravity that --posture or --gravity has set, and the volume if --posture
- * names one. Other volumes stay in `state`.
- * @retval SUPINE_ERROR_ARGUMENT  neither option gave a posture */
+ * names one. Other volumes stay in `state`. */
 supine_status supine_options_state(const supine_orientation *orientation, supine_state *state,
                                    supine_error *error);
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Parse addresses and open sockets. */
 #include <errno.h>
+#include <fcntl.h>
 #include <netdb.h>
 #include <netinet/in.h>
 #include <stdlib.h>
@@ -49,10 +50,18 @@ supine_status supine_stream_address_read(const char *text, bool numeric,
   return SUPINE_OK;
 }
 
+int supine_stream_nonblocking(int descriptor) {
+  if (descriptor >= 0) {
+    (void)fcntl(descriptor, F_SETFD, FD_CLOEXEC);
+    (void)fcntl(descriptor, F_SETFL, O_NONBLOCK);
+  }
+  return descriptor;
+}
+
 int supine_stream_address_listen(const supine_stream_address *address, int *port,
                                  supine_error *error) {
   const int yes = 1;
-  const int s = socket(address->where.ss_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  const int s = supine_stream_nonblocking(socket(address->where.ss_family, SOCK_STREAM, 0));
   struct sockaddr_storage given;
   socklen_t size = sizeof given;
   if (s < 0 || setsockopt(s, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes) != 0 ||
@@ -72,7 +81,7 @@ int supine_stream_address_listen(const supine_stream_address *address, int *port
 }
 
 int supine_stream_address_connect(const supine_stream_address *address) {
-  const int s = socket(address->where.ss_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  const int s = supine_stream_nonblocking(socket(address->where.ss_family, SOCK_STREAM, 0));
   if (s >= 0 && connect(s, (const struct sockaddr *)&address->where, address->size) != 0 &&
       errno != EINPROGRESS) {
     (void)close(s);

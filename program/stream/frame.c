@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Compute the positions of a frame, and build its messages. */
-#include <endian.h>
+#define _DEFAULT_SOURCE /* declares madvise */ // NOLINT(bugprone-reserved-identifier)
+#include <arpa/inet.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
 
 #include <meshoptimizer.h>
 
@@ -22,8 +22,7 @@ static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } meshopt;
 enum {
   BATCH = 2048,       /* number of vertices computed together, so that they stay in the L1 cache */
   GRAIN = 32 * BATCH, /* smallest number of vertices for which a thread is worth starting */
-  THREADS_MAX = 256,
-  HUGE_PAGE = 1 << 21 /* bytes */
+  THREADS_MAX = 256
 };
 
 struct supine_stream_frames {
@@ -61,11 +60,11 @@ static supine_status make_strips(supine_stream_frames *f, supine_error *error) {
       1 + meshopt.stripify(f->strips + 1, order, corners, f->info->vertex_count, restart);
   for (size_t i = 1, head = 0; i <= end; ++i) {
     if (i == end || f->strips[i] == restart) {
-      f->strips[head] = htobe32((uint32_t)(i - head - 1));
+      f->strips[head] = htonl((uint32_t)(i - head - 1));
       head = i;
       ++f->strips_count;
     } else {
-      f->strips[i] = htobe32(f->strips[i]);
+      f->strips[i] = htonl(f->strips[i]);
     }
   }
   f->strips_size = end * sizeof *f->strips;
@@ -98,12 +97,6 @@ void supine_stream_frames_destroy(supine_stream_frames *frames) {
   if (frames == NULL) {
     return;
   }
-  while (frames->unused != NULL) {
-    supine_stream_frame *frame = frames->unused;
-    frames->unused = frame->next;
-    free(frame->points);
-    free(frame);
-  }
   supine_arena_free(&frames->arena);
   free(frames);
 }
@@ -115,18 +108,10 @@ supine_stream_frame *supine_stream_frame_acquire(supine_stream_frames *frames,
     frames->unused = frame->next;
   } else {
     const size_t count = frames->info->vertex_count;
-    const size_t size = 12 * count + SUPINE_STREAM_ATTRIBUTE + 4 * count;
-    const size_t page = size < 2 * (size_t)HUGE_PAGE ? 64 : HUGE_PAGE;
-    const size_t whole = (size + page - 1) / page * page;
-    frame = calloc(1, sizeof *frame);
-    float *points = aligned_alloc(page, whole);
+    frame = supine_arena_zeros(&frames->arena, 1, sizeof *frame);
+    float *points = supine_arena_take(&frames->arena, 16 * count + SUPINE_STREAM_ATTRIBUTE, 1);
     if (frame == NULL || points == NULL) {
-      free(frame);
-      free(points);
       return NULL;
-    }
-    if (page == HUGE_PAGE) {
-      (void)madvise(points, whole, MADV_HUGEPAGE);
     }
     frame->points = points;
     frame->errors = (unsigned char *)(points + 3 * count);
@@ -207,15 +192,17 @@ static size_t put_weights(const supine_stream_frames *f, const supine_stream_sna
                           unsigned char *bytes) {
   const size_t modes = f->info->mode_count;
   const size_t count = modes + 3 * f->info->lung_count;
-  const size_t head = supine_stream_ndarray_head(count, bytes);
+  /* Type 10 (32-bit floats), one dimension, and its size in two bytes. */
+  const unsigned char head[4] = {10, 1, (unsigned char)(count >> 8), (unsigned char)count};
   float values[SUPINE_MODES_MAX + 3 * SUPINE_LUNGS_MAX];
   for (size_t i = 0; i < count; ++i) {
     values[i] = (float)(i < modes ? snapshot->pose.weights[i]
                                   : snapshot->pose.gains[(i - modes) / 3][(i - modes) % 3]);
   }
   supine_stream_encode_floats(count, values);
-  memcpy(bytes + head, values, 4 * count);
-  return head + 4 * count;
+  memcpy(bytes, head, sizeof head);
+  memcpy(bytes + sizeof head, values, 4 * count);
+  return sizeof head + 4 * count;
 }
 
 static void add_piece(supine_stream_packet *packet, void *bytes, size_t size) {

@@ -44,7 +44,7 @@ typedef struct supine_stream_snapshot {
 
 /** A state of the lungs, which is encoded once and sent to several peers. */
 typedef struct supine_stream_frame {
-  size_t users; /**< peers that it is being sent to, plus 1 for the newest frame */
+  size_t users;    /**< peers that it is being sent to, plus 1 for the newest frame */
   uint64_t number; /**< serial number: 1, 2, ... */
   supine_stream_snapshot snapshot;
   bool has_points; /**< true if `points` and `points_crc` are computed */

@@ -5,7 +5,6 @@
 
 #include "base/vec3.h"
 
-#include "program/options/breath_turn.h"
 #include "program/stream/gravity.h"
 
 /* A matrix that deviates from a rotation by at most this counts as exact. Rounding to 32-bit floats
@@ -17,19 +16,16 @@ supine_stream_setup supine_stream_setup_default(void) {
   return (supine_stream_setup){.down = {0, 0, -1}, .body = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
 }
 
-bool supine_stream_rotation(const double q[4], double r[9]) {
-  const double w = q[0];
-  const double x = q[1];
-  const double y = q[2];
-  const double z = q[3];
-  const double square = w * w + x * x + y * y + z * z;
-  const double s = 2.0 / square;
+void supine_stream_rotation(const double quaternion[4], double matrix[9]) {
+  const double w = quaternion[0];
+  const double x = quaternion[1];
+  const double y = quaternion[2];
+  const double z = quaternion[3];
   const double rows[9] = {
-      1 - s * (y * y + z * z), s * (x * y - w * z),     s * (x * z + w * y),
-      s * (x * y + w * z),     1 - s * (x * x + z * z), s * (y * z - w * x),
-      s * (x * z - w * y),     s * (y * z + w * x),     1 - s * (x * x + y * y)};
-  memcpy(r, rows, sizeof rows);
-  return isfinite(square) && square > 1e-12;
+      w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z),         2.0 * (x * z + w * y),
+      2.0 * (x * y + w * z),         w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x),
+      2.0 * (x * z - w * y),         2.0 * (y * z + w * x),         w * w - x * x - y * y + z * z};
+  memcpy(matrix, rows, sizeof rows);
 }
 
 /* Compute out = M^T v, for M stored row by row. */
@@ -76,27 +72,6 @@ supine_stream_verdict supine_stream_gravity_rotation(const supine_stream_setup *
   return SUPINE_STREAM_REPAIRED;
 }
 
-supine_stream_verdict supine_stream_gravity_quaternion(const supine_stream_setup *setup,
-                                                       const double quaternion[4],
-                                                       double gravity[3], const char **why) {
-  double rotation[9];
-  double squared_length = 0.0;
-  for (int i = 0; i < 4; ++i) {
-    squared_length += quaternion[i] * quaternion[i];
-  }
-  *why = "its quaternion is zero or not finite; send a rotation";
-  if (!supine_stream_rotation(quaternion, rotation)) {
-    return SUPINE_STREAM_REFUSED;
-  }
-  const supine_stream_verdict verdict =
-      supine_stream_gravity_rotation(setup, rotation, gravity, why);
-  if (verdict != SUPINE_STREAM_EXACT || fabs(sqrt(squared_length) - 1.0) <= exact_max) {
-    return verdict;
-  }
-  *why = "the length of its quaternion is not 1";
-  return SUPINE_STREAM_REPAIRED;
-}
-
 supine_stream_verdict supine_stream_gravity_down(const supine_stream_setup *setup,
                                                  const double down[3], double gravity[3],
                                                  const char **why) {
@@ -112,14 +87,4 @@ supine_stream_verdict supine_stream_gravity_down(const supine_stream_setup *setu
   (void)supine_normalise(turned, gravity); /* removes rounding errors of the length */
   *why = NULL;
   return SUPINE_STREAM_EXACT;
-}
-
-double supine_stream_gravity_smooth(const double gravity[3], double step, double seconds,
-                                    double smooth[3]) {
-  const double share = seconds > 0.0 ? -expm1(-step / seconds) : 1.0;
-  breath_turn turn = {.seconds = 1.0};
-  memcpy(turn.from, smooth, sizeof turn.from);
-  memcpy(turn.to, gravity, sizeof turn.to);
-  supine_breath_turn_gravity(&turn, share, smooth);
-  return (1.0 - share) * acos(fmax(-1.0, fmin(1.0, supine_dot(turn.from, turn.to))));
 }

@@ -15,15 +15,15 @@
 /** How the tracker's axes relate to gravity and to the body. */
 typedef struct supine_stream_setup {
   double down[3]; /**< unit vector, direction of gravity in world axes */
-  double body[9]; /**< rotation B from tracker axes to body axes, row by row */
+  double body[9]; /**< rotation B from tracker axes to body axes, at any scale, row by row */
 } supine_stream_setup;
 
 /** Return the default setup: the world's z axis points up, and tracker axes equal body axes. */
 supine_stream_setup supine_stream_setup_default(void);
 
-/** Convert a quaternion (w, x, y, z) of any length to a rotation matrix, row by row; return false
- * if the quaternion is zero or not finite. */
-bool supine_stream_rotation(const double quaternion[4], double rotation[9]);
+/** Convert a quaternion (w, x, y, z) to a matrix, row by row: a rotation, scaled by the square of
+ * the quaternion's length. */
+void supine_stream_rotation(const double quaternion[4], double matrix[9]);
 
 /** Quality of a received pose. */
 typedef enum supine_stream_verdict {
@@ -42,23 +42,9 @@ supine_stream_verdict supine_stream_gravity_rotation(const supine_stream_setup *
                                                      const double rotation[9], double gravity[3],
                                                      const char **why);
 
-/** Compute the direction of gravity from a quaternion (w, x, y, z), normalised first. It is refused
- * if it is zero or not finite, and counts as repaired if its length is not 1 within 0.001. */
-supine_stream_verdict supine_stream_gravity_quaternion(const supine_stream_setup *setup,
-                                                       const double quaternion[4],
-                                                       double gravity[3], const char **why);
-
 /** Convert a direction of gravity, of any length but 0, from tracker axes to body axes. */
 supine_stream_verdict supine_stream_gravity_down(const supine_stream_setup *setup,
                                                  const double down[3], double gravity[3],
                                                  const char **why);
-
-/** Rotate `smooth` towards `gravity` by the fraction 1 - exp(-step / seconds) of the angle between
- * them. This first-order low-pass filter follows a steady rotation with a delay of `seconds`.
- * @param step     time since the last call, s
- * @param seconds  time constant, s; if it is 0, `smooth` becomes `gravity`
- * @return the angle that remains between `smooth` and `gravity`, radians */
-double supine_stream_gravity_smooth(const double gravity[3], double step, double seconds,
-                                    double smooth[3]);
 
 #endif

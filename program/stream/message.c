@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Read messages from untrusted bytes. Write headers, floats, and the first fields of a body. */
+#include <arpa/inet.h>
 #include <ctype.h>
-#include <endian.h>
+#include <stdbool.h>
 #include <string.h>
 
 #include "base/clones.h"
+#include "program/stream/gravity.h"
 #include "program/stream/message.h"
 
 static uint64_t number(const unsigned char *bytes, int size) {
@@ -53,13 +55,6 @@ void supine_stream_header_write(const supine_stream_header *header,
   put(bytes + 50, 8, header->crc);
 }
 
-size_t supine_stream_ndarray_head(size_t count, unsigned char *bytes) {
-  bytes[0] = 10; /* type 10: 32-bit floats */
-  bytes[1] = 1;  /* number of dimensions */
-  put(bytes + 2, 2, count);
-  return 4;
-}
-
 size_t supine_stream_polydata_head(size_t points, size_t strips, size_t size, size_t attributes,
                                    unsigned char *bytes) {
   memset(bytes, 0, 40); /* zeros: no vertices, lines or polygons */
@@ -85,7 +80,7 @@ SUPINE_CLONES void supine_stream_encode_floats(size_t count, float *values) {
   for (size_t i = 0; i < count; ++i) {
     uint32_t word;
     memcpy(&word, values + i, sizeof word);
-    word = htobe32(word);
+    word = htonl(word);
     memcpy(values + i, &word, sizeof word);
   }
 }
@@ -128,13 +123,14 @@ static double real64(cursor *c) {
   return value;
 }
 
-/* Read a quaternion, which is sent as x, y, z, w, into m->number as w, x, y, z. */
+/* Read a quaternion, which is sent as x, y, z, w, as a matrix. */
 static void quaternion(cursor *c, supine_stream_message *m) {
-  m->kind = SUPINE_STREAM_QUATERNION;
-  for (int i = 1; i < 4; ++i) {
-    m->number[i] = real32(c);
+  double q[4];
+  m->kind = SUPINE_STREAM_ROTATION;
+  for (int i = 0; i < 4; ++i) {
+    q[(i + 1) % 4] = real32(c);
   }
-  m->number[0] = real32(c);
+  supine_stream_rotation(q, m->number);
 }
 
 static void transform(cursor *c, const char *device, int ours, supine_stream_message *m) {
@@ -216,20 +212,8 @@ static void string(cursor *c, supine_stream_message *m, supine_stream_kind kind)
   }
 }
 
-enum { TRANSFORM, QTDATA, POSITION, POINT, NDARRAY, STRING, TYPES };
-static const char *const types[TYPES] = {"TRANSFORM", "QTDATA",  "POSITION",
-                                         "POINT",     "NDARRAY", "STRING"};
-
-static int type_of(const supine_stream_header *header) {
-  int type = 0;
-  while (type < TYPES && strcmp(header->type, types[type]) != 0) {
-    ++type;
-  }
-  return type;
-}
-
-int supine_stream_message_is_known(const supine_stream_header *header) {
-  return type_of(header) != TYPES;
+static bool is(const supine_stream_header *header, const char *type) {
+  return strcmp(header->type, type) == 0;
 }
 
 /* Skip the extended header of a body and cut off its metadata; return 0 if a size is invalid. */
@@ -262,25 +246,24 @@ supine_status supine_stream_message_read(const supine_stream_header *header,
         "%s: the sizes of extension and metadata exceed the body: correct the sender",
         header->type);
   }
-  const int type = type_of(header);
   const int ours = device == NULL || strcmp(header->device, device) == 0;
   if (strcmp(header->device, "VOLUME") == 0 || strcmp(header->device, "SEND") == 0) {
     const int volume = header->device[0] == 'V';
-    if (type == STRING) {
+    if (is(header, "STRING")) {
       string(&c, message, volume ? SUPINE_STREAM_VOLUME_TEXT : SUPINE_STREAM_REQUEST);
-    } else if (type == NDARRAY && volume) {
+    } else if (is(header, "NDARRAY") && volume) {
       array(&c, message, SUPINE_STREAM_VOLUME, 1);
     }
-  } else if (type == QTDATA) {
+  } else if (is(header, "QTDATA")) {
     instruments(&c, device, header, message);
-  } else if (type == TRANSFORM) {
+  } else if (is(header, "TRANSFORM")) {
     transform(&c, header->device, ours, message);
-  } else if (type == POINT) {
+  } else if (is(header, "POINT")) {
     points(&c, message);
-  } else if (type == POSITION && ours && size > 12) { /* a shorter body has no quaternion */
+  } else if (is(header, "POSITION") && ours && size > 12) { /* a shorter one has no quaternion */
     (void)pass(&c, 12);
     quaternion(&c, message);
-  } else if (type == NDARRAY && ours) {
+  } else if (is(header, "NDARRAY") && ours) {
     array(&c, message, SUPINE_STREAM_DOWN, 3);
   }
   if (c.overrun != 0) {

@@ -43,11 +43,10 @@ void supine_stream_header_write(const supine_stream_header *header,
 /** Kinds of received messages. Each comment says what a supine_stream_message then contains. */
 typedef enum supine_stream_kind {
   SUPINE_STREAM_NOTHING = 0, /**< message that is ignored because of its type or device */
-  SUPINE_STREAM_ROTATION,    /**< number[0..8]: matrix from tracker to world axes, row by row;
-                                  number[9..11]: position, mm; text: name of the device */
+  SUPINE_STREAM_ROTATION,    /**< number[0..8]: matrix from tracker to world axes, row by row. If
+                                  text is the name of the device, number[9..11]: position, mm */
   SUPINE_STREAM_POSITION,   /**< number[9..11]: position of an observed point, mm; text: its name */
   SUPINE_STREAM_POINT_LIST, /**< points: supine_stream_message_point reads one of them */
-  SUPINE_STREAM_QUATERNION, /**< number[0..3]: w, x, y, z of the tracker-to-world rotation */
   SUPINE_STREAM_DOWN,       /**< number[0..2]: direction of gravity in tracker axes */
   SUPINE_STREAM_VOLUME,     /**< number[0]: volume above rest in the posture, mL */
   SUPINE_STREAM_VOLUME_TEXT, /**< text: a volume such as rest+500 or 2600mL */
@@ -67,9 +66,6 @@ typedef struct supine_stream_message {
 void supine_stream_message_point(const supine_stream_message *message, size_t point, char name[65],
                                  double position[3]);
 
-/** Return whether supine_stream_message_read decodes messages of the header's type. */
-int supine_stream_message_is_known(const supine_stream_header *header);
-
 /** Decode the body of a message. Its numbers may be infinite or not-a-number. These messages are
  * used, depending on the device name in the header. A QTDATA has the poses of several instruments:
  *
@@ -85,14 +81,10 @@ int supine_stream_message_is_known(const supine_stream_header *header);
  *     "VOLUME"     STRING        volume such as rest+500
  *     "SEND"       STRING        name of the content that the peer asks for
  *
- * @param device  device that gives the patient's pose; NULL if every device does
- * @retval SUPINE_ERROR_FORMAT  the checksum is wrong, or lengths contradict each other */
+ * @param device  device that gives the patient's pose; NULL if every device does */
 supine_status supine_stream_message_read(const supine_stream_header *header,
                                          const unsigned char *body, const char *device,
                                          supine_stream_message *message, supine_error *error);
-
-/** Write the first 4 bytes of an NDARRAY, which precede its `count` 32-bit floats; return 4. */
-size_t supine_stream_ndarray_head(size_t count, unsigned char *bytes);
 
 /** Write the first 40 bytes of a POLYDATA, which precede its points; return 40.
  * @param points, strips  numbers of points and of triangle strips

@@ -1,41 +1,40 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Read and write the socket of a peer without blocking. */
 #include <errno.h>
-#include <linux/sockios.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
-#include <stdlib.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <unistd.h>
+#ifdef __linux__
+#include <linux/sockios.h>
+#endif
 
-#include "base/arena.h"
 #include "program/stream/peer.h"
 
-/* Size, bytes, above which a message body is an error. Smaller unknown bodies are skipped. */
+/* Size, bytes, above which a message body is an error. Smaller ones are skipped or read. */
 static const uint64_t skipped_max = 256u << 20;
 
-supine_status supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connecting,
-                                       supine_stream_content content, double now,
-                                       supine_error *error) {
+void supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connecting,
+                              supine_stream_content content, double now, unsigned char *message) {
   const int yes = 1;
-  const unsigned timeout_ms = 20000;
-  unsigned char *body = malloc(SUPINE_STREAM_BODY_MAX);
-  if (body == NULL) {
-    return supine_error_memory(error, "a peer");
-  }
   (void)setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
   (void)setsockopt(socket, SOL_SOCKET, SO_KEEPALIVE, &yes, sizeof yes);
+#ifdef TCP_USER_TIMEOUT /* Linux; elsewhere, the system decides when a silent peer is gone */
+  const unsigned timeout_ms = 20000;
   (void)setsockopt(socket, IPPROTO_TCP, TCP_USER_TIMEOUT, &timeout_ms, sizeof timeout_ms);
-  *peer = (supine_stream_peer){
-      .socket = socket, .connecting = connecting, .emptied = now, .body = body, .content = content};
-  return SUPINE_OK;
+#endif
+  *peer = (supine_stream_peer){.socket = socket,
+                               .connecting = connecting,
+                               .message = message,
+                               .size = SUPINE_STREAM_HEADER,
+                               .emptied = now,
+                               .content = content};
 }
 
 void supine_stream_peer_end(supine_stream_peer *peer, supine_stream_frames *frames) {
   (void)close(peer->socket);
   supine_stream_frame_release(frames, peer->frame);
-  free(peer->body);
   *peer = (supine_stream_peer){.socket = -1};
 }
 
@@ -47,9 +46,9 @@ static ssize_t receive_bytes(int socket, void *bytes, size_t size) {
                                                                                   : -1;
 }
 
-/* Parse a complete header and decide whether to skip the body; return false if it is invalid. */
+/* Parse a complete header; return false if it is invalid. */
 static bool begin_body(supine_stream_peer *peer, uint64_t *skipped, supine_error *error) {
-  if (supine_stream_header_read(peer->header_bytes, &peer->header, error) != SUPINE_OK) {
+  if (supine_stream_header_read(peer->message, &peer->header, error) != SUPINE_OK) {
     return false;
   }
   const uint64_t size = peer->header.size;
@@ -59,12 +58,9 @@ static bool begin_body(supine_stream_peer *peer, uint64_t *skipped, supine_error
                            (unsigned long long)size);
     return false;
   }
-  peer->received = 0;
-  peer->in_body = supine_stream_message_is_known(&peer->header) && size <= SUPINE_STREAM_BODY_MAX;
-  if (!peer->in_body) {
-    peer->to_skip = size;
-    ++*skipped;
-  }
+  peer->in_body = true;
+  peer->size += size;
+  *skipped += size > SUPINE_STREAM_BODY_MAX;
   return true;
 }
 
@@ -73,40 +69,30 @@ supine_stream_outcome supine_stream_peer_read(supine_stream_peer *peer, double n
                                               uint64_t *skipped, supine_error *error) {
   size_t allowed = SUPINE_STREAM_BODY_MAX;
   while (allowed > 0) {
-    unsigned char *into =
-        peer->in_body ? peer->body + peer->received : peer->header_bytes + peer->received;
-    size_t size =
-        (peer->in_body ? (size_t)peer->header.size : SUPINE_STREAM_HEADER) - peer->received;
-    if (peer->to_skip > 0) {
-      into = peer->body;
-      size = (size_t)peer->to_skip;
+    const bool skips = peer->size > SUPINE_STREAM_MESSAGE_MAX; /* overwrite the start of the body */
+    const uint64_t left = peer->size - peer->received;
+    const ssize_t got =
+        receive_bytes(peer->socket, peer->message + (skips ? SUPINE_STREAM_HEADER : peer->received),
+                      left < allowed ? (size_t)left : allowed);
+    if (got < 0) {
+      return SUPINE_STREAM_LOST;
     }
-    ssize_t got = 0;
-    if (size > 0) {
-      got = receive_bytes(peer->socket, into, size < allowed ? size : allowed);
-      if (got < 0) {
-        return SUPINE_STREAM_LOST;
+    if (got == 0) {
+      peer->emptied = now;
+      return SUPINE_STREAM_DONE;
+    }
+    allowed -= (size_t)got;
+    peer->received += (uint64_t)got;
+    if (peer->received == peer->size && !peer->in_body && !begin_body(peer, skipped, error)) {
+      return SUPINE_STREAM_LOST;
+    }
+    if (peer->received == peer->size) {
+      if (!skips) {
+        receive(context, peer);
       }
-      if (got == 0) {
-        peer->emptied = now;
-        return SUPINE_STREAM_DONE;
-      }
-      allowed -= (size_t)got;
-    }
-    if (peer->to_skip > 0) {
-      peer->to_skip -= (uint64_t)got;
-      continue;
-    }
-    peer->received += (size_t)got;
-    if ((size_t)got < size) {
-      continue;
-    }
-    if (peer->in_body) {
       peer->in_body = false;
       peer->received = 0;
-      receive(context, peer);
-    } else if (!begin_body(peer, skipped, error)) {
-      return SUPINE_STREAM_LOST;
+      peer->size = SUPINE_STREAM_HEADER;
     }
   }
   return SUPINE_STREAM_MORE;
@@ -114,7 +100,13 @@ supine_stream_outcome supine_stream_peer_read(supine_stream_peer *peer, double n
 
 bool supine_stream_peer_ready(const supine_stream_peer *peer) {
   int queued = 0;
+#ifdef SO_NWRITE /* macOS counts what is sent but not yet acknowledged, too */
+  return getsockopt(peer->socket, SOL_SOCKET, SO_NWRITE, &queued, &(socklen_t){sizeof queued}) ==
+             0 &&
+         queued == 0;
+#else
   return ioctl(peer->socket, SIOCOUTQNSD, &queued) == 0 && queued == 0;
+#endif
 }
 
 void supine_stream_peer_give(supine_stream_peer *peer, supine_stream_frames *frames,

@@ -19,10 +19,12 @@ typedef struct supine_stream_address {
 } supine_stream_address;
 
 /** Parse "PORT" (on 127.0.0.1), "HOST:PORT" or "[HOST]:PORT".
- * @param numeric  true to refuse host names
- * @retval SUPINE_ERROR_ARGUMENT  the text is not an address, or the host is unknown */
+ * @param numeric  true to refuse host names */
 supine_status supine_stream_address_read(const char *text, bool numeric,
                                          supine_stream_address *address, supine_error *error);
+
+/** Make a socket or pipe non-blocking, and close it in programs that this one starts. Return it. */
+int supine_stream_nonblocking(int descriptor);
 
 /** Open a non-blocking socket that listens at the address; on failure return -1 and set the error.
  * @param port  set to the port on which the socket listens */
@@ -32,15 +34,16 @@ int supine_stream_address_listen(const supine_stream_address *address, int *port
 /** Open a non-blocking socket and begin to connect it to the address; return -1 on failure. */
 int supine_stream_address_connect(const supine_stream_address *address);
 
+enum { SUPINE_STREAM_MESSAGE_MAX = SUPINE_STREAM_HEADER + SUPINE_STREAM_BODY_MAX };
+
 typedef struct supine_stream_peer {
   int socket; /**< -1 if there is no peer */
   bool connecting;
-  unsigned char header_bytes[SUPINE_STREAM_HEADER];
-  size_t received; /**< bytes received of the body if `in_body` is true, else of the header */
-  bool in_body;
+  unsigned char *message; /**< [SUPINE_STREAM_MESSAGE_MAX] header and body being received */
+  uint64_t received;      /**< bytes received of the message */
+  uint64_t size;          /**< size of the message, bytes; until it is known, of its header */
+  bool in_body;           /**< true if `header` is known */
   supine_stream_header header;
-  uint64_t to_skip;    /**< bytes of a skipped body that are still to be received */
-  unsigned char *body; /**< [SUPINE_STREAM_BODY_MAX] body of the message being received */
   double emptied; /**< time when no received data was left to read, s by supine_clock_seconds */
   supine_stream_content content; /**< kind of content that the peer is sent */
   bool knows_triangles; /**< true if the peer has received the triangles with a frame of points */
@@ -57,19 +60,18 @@ typedef enum supine_stream_outcome {
 
 /** Initialise a peer, which then owns the socket. The kernel closes the connection if sent data
  * stays unacknowledged for 20 s.
- * @param now  current time, s by supine_clock_seconds
- * @retval SUPINE_ERROR_MEMORY  the caller still owns the socket */
-supine_status supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connecting,
-                                       supine_stream_content content, double now,
-                                       supine_error *error);
-/** Close the socket, release the frame that was being sent, and free the buffer `peer->body`. */
+ * @param now      current time, s by supine_clock_seconds
+ * @param message  [SUPINE_STREAM_MESSAGE_MAX] buffer for received messages */
+void supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connecting,
+                              supine_stream_content content, double now, unsigned char *message);
+/** Close the socket, and release the frame that was being sent. */
 void supine_stream_peer_end(supine_stream_peer *peer, supine_stream_frames *frames);
 
-/** Function that is called for each message of a known type; the body is in `peer->body`. */
+/** Function that is called for each message; it is in `peer->message`. */
 typedef void supine_stream_receive(void *context, supine_stream_peer *peer);
 
-/** Read up to 64 KiB of received bytes, and call `receive` for each complete message. Messages of
- * unknown types, or with larger bodies than SUPINE_STREAM_BODY_MAX, are skipped.
+/** Read up to 64 KiB of received bytes, and call `receive` for each complete message. Messages
+ * with larger bodies than SUPINE_STREAM_BODY_MAX are skipped.
  * @param skipped  incremented for each skipped message
  * @param error    set if the peer sent an invalid header or a body above 256 MiB, else unchanged */
 supine_stream_outcome supine_stream_peer_read(supine_stream_peer *peer, double now,

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Run the main loop: read messages, compute a frame for the newest pose, send the frame. */
+#define _GNU_SOURCE /* declares ppoll, part of POSIX since 2024 */ // NOLINT(bugprone-reserved-identifier)
 #include <errno.h>
 #include <math.h>
 #include <poll.h>
@@ -20,27 +21,28 @@ static const double send_interval = 20e-3;  /* time between checks of the peers 
 static const double connect_interval = 1.0; /* time between attempts to connect to a peer, s */
 static const double stop_interval = 0.1;    /* time between calls of options->stop, s */
 
+/* Indices of sockets that are polled; those of peers come first. */
+enum { LISTENER = SUPINE_STREAM_PEERS_MAX, WEB, POLLED };
+
 /* All times are in seconds by supine_clock_seconds. */
 struct supine_stream_server {
   const supine_stream_options *options;
-  supine_stream_counts counts;
+  supine_stream_results results;
   supine_stream_patient patient;
   supine_stream_frames *frames;
   supine_stream_frame *latest;
   double frame_time; /* time at which the newest frame, `latest`, was made */
   int listener;      /* listening socket; -1 if none */
-  int port;
   supine_stream_address target;
   double connect_at;             /* time of the next attempt to connect; INFINITY if none */
   double accept_at;              /* time at which to accept peers again after a failure */
   supine_stream_peer *connected; /* peer of --connect, connected or connecting; NULL if none */
-  supine_stream_peer *peer;      /* [options->peers] connected peers and free slots */
-  struct pollfd *polled;         /* [options->peers + 2] peers, listener, pipe of web's poses */
-  supine_stream_peer **owner;    /* [options->peers + 2] peer of each polled socket, or NULL */
-  double wait_begun;             /* time at which ppoll() was last called */
-  double woke;                   /* time at which ppoll() last returned */
-  supine_arena arena;
-  supine_stream_latency *latency; /* [2] latencies of frames of weights, and of frames of points */
+  supine_stream_peer peer[SUPINE_STREAM_PEERS_MAX]; /* connected peers and free slots */
+  unsigned char message[SUPINE_STREAM_PEERS_MAX]
+                       [SUPINE_STREAM_MESSAGE_MAX]; /* received by each peer */
+  struct pollfd polled[POLLED]; /* sockets of `peer`, listener, pipe of web's poses; -1 if none */
+  double wait_begun;            /* time at which ppoll() was last called */
+  double woke;                  /* time at which ppoll() last returned */
 };
 
 /* Return whether a peer wants frames, is sent none at the moment, and lacks the newest frame. */
@@ -60,26 +62,26 @@ static void end_peer(supine_stream_server *s, supine_stream_peer *peer) {
 
 /* Initialise a peer in a free slot. If no slot is free, close the socket and return NULL. */
 static supine_stream_peer *begin_peer(supine_stream_server *s, int socket, bool connecting) {
-  supine_error error;
-  for (size_t i = 0; i < s->options->peers; ++i) {
+  for (size_t i = 0; i < SUPINE_STREAM_PEERS_MAX; ++i) {
     supine_stream_peer *peer = &s->peer[i];
-    if (peer->socket < 0 && supine_stream_peer_begin(peer, socket, connecting, s->options->content,
-                                                     s->woke, &error) == SUPINE_OK) {
-      s->counts.peers += connecting ? 0 : 1;
+    if (peer->socket < 0) {
+      supine_stream_peer_begin(peer, socket, connecting, s->options->content, s->woke,
+                               s->message[i]);
+      s->results.counts.peers += connecting ? 0 : 1;
       return peer;
     }
   }
   (void)close(socket);
-  ++s->counts.turned_away;
-  supine_stream_patient_warn(
-      &s->patient, s->woke,
-      "a peer is refused: the number of peers is limited to %zu; raise --peers", s->options->peers);
+  ++s->results.counts.turned_away;
+  supine_stream_patient_warn(&s->patient, s->woke,
+                             "a peer is refused: at most %d can be connected; close another",
+                             (int)SUPINE_STREAM_PEERS_MAX);
   return NULL;
 }
 
 static void accept_peers(supine_stream_server *s) {
-  for (size_t i = 0; i < s->options->peers; ++i) {
-    const int socket = accept4(s->listener, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
+  for (size_t i = 0; i < SUPINE_STREAM_PEERS_MAX; ++i) {
+    const int socket = supine_stream_nonblocking(accept(s->listener, NULL, NULL));
     if (socket < 0) {
       if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR && errno != ECONNABORTED) {
         s->accept_at = s->woke + connect_interval;
@@ -105,7 +107,7 @@ static void connection_made(supine_stream_server *s, supine_stream_peer *peer) {
     return;
   }
   peer->connecting = false;
-  ++s->counts.peers;
+  ++s->results.counts.peers;
 }
 
 static void take_request(supine_stream_server *s, supine_stream_peer *peer, const char *text) {
@@ -126,9 +128,9 @@ static void receive(void *context, supine_stream_peer *peer) {
   supine_stream_server *s = context;
   supine_stream_message message;
   supine_error error;
-  if (supine_stream_message_read(&peer->header, peer->body, s->options->device, &message, &error) !=
-      SUPINE_OK) {
-    ++s->counts.malformed;
+  if (supine_stream_message_read(&peer->header, peer->message + SUPINE_STREAM_HEADER,
+                                 s->options->device, &message, &error) != SUPINE_OK) {
+    ++s->results.counts.malformed;
     supine_stream_patient_warn(&s->patient, s->woke, "a message is dropped: %s", error.message);
     return;
   }
@@ -145,10 +147,10 @@ static void receive(void *context, supine_stream_peer *peer) {
 
 static void read_peer(supine_stream_server *s, supine_stream_peer *peer) {
   supine_error error = {.status = SUPINE_OK};
-  if (supine_stream_peer_read(peer, s->woke, receive, s, &s->counts.skipped, &error) ==
+  if (supine_stream_peer_read(peer, s->woke, receive, s, &s->results.counts.skipped, &error) ==
       SUPINE_STREAM_LOST) {
     if (error.status != SUPINE_OK) {
-      ++s->counts.lost;
+      ++s->results.counts.lost;
       supine_stream_patient_warn(&s->patient, s->woke, "a peer is disconnected: %s", error.message);
     }
     end_peer(s, peer);
@@ -161,7 +163,7 @@ static double frame_due(const supine_stream_server *s) {
   if (s->patient.pending || s->latest == NULL) {
     return soonest;
   }
-  if (!s->options->volume->breathes && !s->patient.turning) {
+  if (!s->options->volume->breathes) {
     return (double)INFINITY;
   }
   /* Each message triggers a frame. After a recent message, wait two frame intervals for the next
@@ -179,7 +181,7 @@ static bool make_frame(supine_stream_server *s) {
     return false;
   }
   s->frame_time = s->woke;
-  ++s->counts.frames;
+  ++s->results.counts.frames;
   if (s->options->web != NULL) {
     supine_stream_web_send(s->options->web, &snapshot);
   }
@@ -187,22 +189,9 @@ static bool make_frame(supine_stream_server *s) {
 }
 
 static void add_latency(supine_stream_latency *latency, double seconds) {
-  const double last = SUPINE_STREAM_LATENCY_BINS - 1;
-  ++latency->bin[(size_t)fmin(last, fmax(0.0, 1e6 * seconds))];
   ++latency->count;
+  latency->late += seconds > SUPINE_STREAM_BUDGET;
   latency->worst = fmax(latency->worst, seconds);
-}
-
-double supine_stream_latency_quantile(const supine_stream_latency *latency, double share) {
-  const double wanted = ceil(share * (double)latency->count);
-  double passed = 0.0;
-  for (size_t i = 0; i + 1 < SUPINE_STREAM_LATENCY_BINS; ++i) {
-    passed += (double)latency->bin[i];
-    if (passed >= wanted && passed > 0.0) {
-      return fmin(latency->worst, 1e-6 * (double)(i + 1));
-    }
-  }
-  return latency->worst;
 }
 
 /* Send the unsent rest of a frame to a peer. If there is none, send the newest frame. */
@@ -219,10 +208,10 @@ static void send_peer(supine_stream_server *s, supine_stream_peer *peer) {
   } else if (outcome == SUPINE_STREAM_DONE) {
     const double received = peer->frame->snapshot.received;
     if (received >= 0.0) {
-      add_latency(&s->latency[peer->content != SUPINE_STREAM_WEIGHTS],
+      add_latency(&s->results.latency[peer->content != SUPINE_STREAM_WEIGHTS],
                   supine_clock_seconds() - received);
     }
-    ++s->counts.sent;
+    ++s->results.counts.sent;
     supine_stream_frame_release(s->frames, peer->frame);
     peer->frame = NULL;
   }
@@ -230,7 +219,7 @@ static void send_peer(supine_stream_server *s, supine_stream_peer *peer) {
 
 static void send_peers(supine_stream_server *s) {
   for (int surfaces = 0; surfaces < 2; ++surfaces) {
-    for (size_t i = 0; i < s->options->peers; ++i) {
+    for (size_t i = 0; i < SUPINE_STREAM_PEERS_MAX; ++i) {
       supine_stream_peer *peer = &s->peer[i];
       const bool surface = peer->content != SUPINE_STREAM_WEIGHTS;
       if (peer->socket >= 0 && surface == (surfaces == 1)) {
@@ -240,54 +229,53 @@ static void send_peers(supine_stream_server *s) {
   }
 }
 
-/* Compute how long ppoll() may wait in a run that ends at the time `end`. */
-static struct timespec find_timeout(const supine_stream_server *s, double end) {
+/* Compute how many seconds to wait for sockets in a run that ends at the time `end`. */
+static double find_timeout(const supine_stream_server *s, double end) {
   double next = fmin(fmin(s->woke + stop_interval, end), fmin(s->connect_at, frame_due(s)));
-  for (size_t i = 0; i < s->options->peers; ++i) {
+  for (size_t i = 0; i < SUPINE_STREAM_PEERS_MAX; ++i) {
     if (needs_frame(s, &s->peer[i])) {
       next = fmin(next, s->woke + send_interval);
     }
   }
-  const double left = fmax(0.0, next - supine_clock_seconds());
-  return (struct timespec){0, (long)(1e9 * left)};
+  return fmax(0.0, next - supine_clock_seconds());
 }
 
-/* List the sockets for ppoll() to watch, and return their number. */
-static nfds_t gather(supine_stream_server *s) {
-  nfds_t count = 0;
-  for (size_t i = 0; i < s->options->peers; ++i) {
-    supine_stream_peer *peer = &s->peer[i];
-    if (peer->socket >= 0) {
-      const bool writes = peer->connecting || peer->frame != NULL;
-      s->owner[count] = peer;
-      s->polled[count++] =
-          (struct pollfd){peer->socket, (short)(POLLIN | (writes ? POLLOUT : 0)), 0};
-    }
+/* Wait for sockets at most some seconds, less than 1. */
+static int wait_for_sockets(struct pollfd *polled, nfds_t count, double seconds) {
+#ifdef __APPLE__
+  return poll(polled, count, (int)ceil(1e3 * seconds));
+#else
+  return ppoll(polled, count, &(struct timespec){0, (long)(1e9 * seconds)}, NULL);
+#endif
+}
+
+/* Choose the sockets for ppoll() to watch. */
+static void gather(supine_stream_server *s) {
+  for (size_t i = 0; i < SUPINE_STREAM_PEERS_MAX; ++i) {
+    const supine_stream_peer *peer = &s->peer[i];
+    const bool writes = peer->connecting || peer->frame != NULL;
+    s->polled[i] = (struct pollfd){peer->socket, (short)(POLLIN | (writes ? POLLOUT : 0)), 0};
   }
-  const bool accepts = s->listener >= 0 && s->woke >= s->accept_at;
-  s->owner[count] = NULL;
-  s->polled[count++] = (struct pollfd){accepts ? s->listener : -1, POLLIN, 0};
-  const int web = s->options->web != NULL ? supine_stream_web_descriptor(s->options->web) : -1;
-  s->owner[count] = NULL;
-  s->polled[count++] = (struct pollfd){web, POLLIN, 0};
-  return count;
+  s->polled[LISTENER] = (struct pollfd){s->woke >= s->accept_at ? s->listener : -1, POLLIN, 0};
+  s->polled[WEB] = (struct pollfd){
+      s->options->web != NULL ? supine_stream_web_descriptor(s->options->web) : -1, POLLIN, 0};
 }
 
 /* Read from all sockets that ppoll() reported. */
-static void receive_all(supine_stream_server *s, nfds_t count) {
-  for (nfds_t i = 0; i + 2 < count; ++i) {
+static void receive_all(supine_stream_server *s) {
+  for (size_t i = 0; i < SUPINE_STREAM_PEERS_MAX; ++i) {
     if (s->polled[i].revents != 0) {
-      if (s->owner[i]->connecting) {
-        connection_made(s, s->owner[i]);
+      if (s->peer[i].connecting) {
+        connection_made(s, &s->peer[i]);
       } else if ((s->polled[i].revents & (POLLIN | POLLHUP | POLLERR)) != 0) {
-        read_peer(s, s->owner[i]);
+        read_peer(s, &s->peer[i]);
       }
     }
   }
-  if (s->polled[count - 2].revents != 0) {
+  if (s->polled[LISTENER].revents != 0) {
     accept_peers(s);
   }
-  if (s->polled[count - 1].revents != 0) {
+  if (s->polled[WEB].revents != 0) {
     double gravity[3];
     double received = 0.0;
     if (supine_stream_web_take(s->options->web, gravity, &received)) {
@@ -303,10 +291,10 @@ supine_status supine_stream_server_run(supine_stream_server *server, supine_erro
   const double end = options->seconds > 0.0 ? s->woke + options->seconds : (double)INFINITY;
   double asked = s->woke;
   while (s->woke < end) {
-    const nfds_t count = gather(s);
-    const struct timespec timeout = find_timeout(s, end);
+    gather(s);
+    const double timeout = find_timeout(s, end);
     s->wait_begun = supine_clock_seconds();
-    if (ppoll(s->polled, count, &timeout, NULL) < 0 && errno != EINTR) {
+    if (wait_for_sockets(s->polled, POLLED, timeout) < 0 && errno != EINTR) {
       return supine_error_set(error, SUPINE_ERROR_WRITE, "cannot wait for the sockets: %s",
                               strerror(errno));
     }
@@ -320,7 +308,7 @@ supine_status supine_stream_server_run(supine_stream_server *server, supine_erro
     if (s->woke >= s->connect_at) {
       connect_peer(s);
     }
-    receive_all(s, count);
+    receive_all(s);
     if (s->woke >= frame_due(s) && !make_frame(s)) {
       return supine_error_memory(error, "a frame");
     }
@@ -340,24 +328,19 @@ supine_status supine_stream_server_create(const supine_basis *basis,
   if (s == NULL) {
     return supine_error_memory(error, "the server");
   }
-  *s = (supine_stream_server){.options = options, .listener = -1, .woke = supine_clock_seconds()};
-  s->peer = supine_arena_zeros(&s->arena, options->peers, sizeof *s->peer);
-  s->polled = supine_arena_zeros(&s->arena, options->peers + 2, sizeof *s->polled);
-  s->owner = supine_arena_zeros(&s->arena, options->peers + 2, sizeof(supine_stream_peer *));
-  s->latency = supine_arena_zeros(&s->arena, 2, sizeof *s->latency);
-  if (s->arena.failed) {
-    return supine_error_memory(error, "%zu peers", options->peers);
-  }
-  for (size_t i = 0; i < options->peers; ++i) {
+  s->options = options;
+  s->listener = -1;
+  s->woke = supine_clock_seconds();
+  for (size_t i = 0; i < SUPINE_STREAM_PEERS_MAX; ++i) {
     s->peer[i].socket = -1;
   }
-  s->patient = supine_stream_patient_begin(basis, options, &s->counts, s->woke);
+  s->patient = supine_stream_patient_begin(basis, options, &s->results.counts, s->woke);
   s->connect_at = options->connect != NULL ? s->woke : (double)INFINITY;
   SUPINE_TRY(supine_stream_frames_create(basis, options->name, options->ras, &s->frames, error));
   if (options->listen != NULL) {
     supine_stream_address here;
     SUPINE_TRY(supine_stream_address_read(options->listen, true, &here, error));
-    s->listener = supine_stream_address_listen(&here, &s->port, error);
+    s->listener = supine_stream_address_listen(&here, &s->results.port, error);
     if (s->listener < 0) {
       return SUPINE_ERROR_WRITE;
     }
@@ -374,7 +357,7 @@ void supine_stream_server_destroy(supine_stream_server *server) {
   if (server == NULL) {
     return;
   }
-  for (size_t i = 0; server->frames != NULL && i < server->options->peers; ++i) {
+  for (size_t i = 0; server->frames != NULL && i < SUPINE_STREAM_PEERS_MAX; ++i) {
     if (server->peer[i].socket >= 0) {
       supine_stream_peer_end(&server->peer[i], server->frames);
     }
@@ -384,19 +367,9 @@ void supine_stream_server_destroy(supine_stream_server *server) {
   }
   supine_stream_frame_release(server->frames, server->latest);
   supine_stream_frames_destroy(server->frames);
-  supine_arena_free(&server->arena);
   free(server);
 }
 
-int supine_stream_server_port(const supine_stream_server *server) {
-  return server->port;
-}
-
-const supine_stream_counts *supine_stream_server_counts(const supine_stream_server *server) {
-  return &server->counts;
-}
-
-const supine_stream_latency *supine_stream_server_latency(const supine_stream_server *server,
-                                                          supine_stream_content content) {
-  return &server->latency[content != SUPINE_STREAM_WEIGHTS];
+const supine_stream_results *supine_stream_server_results(const supine_stream_server *server) {
+  return &server->results;
 }

@@ -32,28 +32,25 @@ typedef struct supine_stream_counts {
   uint64_t repaired;    /**< poses used although they were not exact rotations */
   uint64_t refused;     /**< poses that were not used, such as matrices with a reflection */
   uint64_t malformed;   /**< messages with a wrong checksum or inconsistent lengths */
-  uint64_t skipped;     /**< messages of unknown types, or too large */
+  uint64_t skipped;     /**< messages without use, and too large ones */
   uint64_t unreachable; /**< frames without the wanted volume, because it was unreachable */
   uint64_t frames;
   uint64_t sent;        /**< frames sent, summed over peers */
   uint64_t peers;       /**< peers accepted */
   uint64_t lost;        /**< peers disconnected because of invalid messages */
-  uint64_t turned_away; /**< connections refused, as there were too many peers */
+  uint64_t turned_away; /**< connections refused, as there were SUPINE_STREAM_PEERS_MAX peers */
 } supine_stream_counts;
 
-/** Number of bins of a latency histogram, 1 us each; the last bin also counts longer latencies. */
-enum { SUPINE_STREAM_LATENCY_BINS = 65536 };
+enum { SUPINE_STREAM_PEERS_MAX = 64 };
+
+/** Time allowed from receiving a message to sending its frame, s. */
+#define SUPINE_STREAM_BUDGET 15e-3
 
 typedef struct supine_stream_latency {
   uint64_t count;
-  double worst; /**< largest latency, s */
-  uint32_t bin[SUPINE_STREAM_LATENCY_BINS];
+  uint64_t late; /**< number of latencies above SUPINE_STREAM_BUDGET */
+  double worst;  /**< largest latency, s */
 } supine_stream_latency;
-
-/** Return a quantile of the latencies, s, rounded up to a microsecond; the worst latency if the
- * quantile is in the last bin; 0 if there are no latencies.
- * @param share  0 to 1: 0.5 for the median */
-double supine_stream_latency_quantile(const supine_stream_latency *latency, double share);
 
 typedef struct supine_stream_server supine_stream_server;
 typedef struct supine_stream_volume supine_stream_volume; /* defined in tracked_patient.h */
@@ -66,42 +63,36 @@ typedef struct supine_stream_options {
   const char *name;    /**< device name in sent messages */
   supine_stream_setup setup;
   supine_stream_volume *volume; /**< fixed volume or breath at the start; messages may change it */
-  supine_stream_observed *observed;  /**< points whose positions come in messages; NULL if none */
-  supine_stream_content content;     /**< content sent to peers that have not asked for any */
-  bool ras;                          /**< send points in RAS */
-  double rate;                       /**< maximum number of frames a second */
-  size_t peers;                      /**< maximum number of peers, 1 to 1000 */
-  double smooth;                     /**< time constant for smoothing gravity, s; 0 to turn off */
-  double seconds;                    /**< duration, s; 0 to run until `stop` returns true */
-  supine_stream_web *web;            /**< live page; NULL if none */
+  supine_stream_observed *observed; /**< points whose positions come in messages; NULL if none */
+  supine_stream_content content;    /**< content sent to peers that have not asked for any */
+  bool ras;                         /**< send points in RAS */
+  double rate;                      /**< maximum number of frames a second */
+  double seconds;                   /**< duration, s; 0 to run until `stop` returns true */
+  supine_stream_web *web;           /**< live page; NULL if none */
   void (*warn)(void *context, const char *text);
   bool (*stop)(void *context); /**< called every 100 ms or so; true ends the run */
   void *context;
 } supine_stream_options;
 
 /** Create a server and open its sockets.
- * @param options  must outlive the server
- * @retval SUPINE_ERROR_ARGUMENT  an invalid address or port
- * @retval SUPINE_ERROR_WRITE     the port is taken */
+ * @param options  must outlive the server */
 supine_status supine_stream_server_create(const supine_basis *basis,
                                           const supine_stream_options *options,
                                           supine_stream_server **server, supine_error *error);
 void supine_stream_server_destroy(supine_stream_server *server);
 
-/** Return the port on which the server listens; 0 if it does not listen. */
-int supine_stream_server_port(const supine_stream_server *server);
-
-/** Run the server until options->stop returns true or the time options->seconds is over.
- * @retval SUPINE_ERROR_WRITE  the system cannot wait for the sockets */
+/** Run the server until options->stop returns true or the time options->seconds is over. */
 supine_status supine_stream_server_run(supine_stream_server *server, supine_error *error);
 
-const supine_stream_counts *supine_stream_server_counts(const supine_stream_server *server);
-
-/** Return the latencies of sent frames: of frames of weights if `content` is SUPINE_STREAM_WEIGHTS,
- * otherwise of frames of points. A latency is the time from receiving the newest message to passing
- * the frame to the kernel. Frames without a new message do not count. If a message may have waited
- * in the peer's socket, its latency is an upper bound: the time since the socket was last empty. */
-const supine_stream_latency *supine_stream_server_latency(const supine_stream_server *server,
-                                                          supine_stream_content content);
+/** What the server has done so far. A latency is the time from receiving the newest message to
+ * passing the frame to the kernel. Frames without a new message do not count. If a message may have
+ * waited in the peer's socket, its latency is an upper bound: the time since the socket was last
+ * empty. */
+typedef struct supine_stream_results {
+  int port; /**< port on which the server listens; 0 if it does not listen */
+  supine_stream_counts counts;
+  supine_stream_latency latency[2]; /**< of frames of weights, and of frames of points */
+} supine_stream_results;
+const supine_stream_results *supine_stream_server_results(const supine_stream_server *server);
 
 #endif

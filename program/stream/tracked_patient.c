@@ -49,8 +49,6 @@ supine_stream_patient supine_stream_patient_begin(const supine_basis *basis,
                                  .counts = counts,
                                  .breath_begun = now,
                                  .gravity = {0, 1, 0},
-                                 .smoothed_gravity = {0, 1, 0},
-                                 .smoothed_at = now,
                                  .pose_received = -1.0,
                                  .received = -1.0,
                                  .warned_at = now - 1.0};
@@ -76,17 +74,11 @@ static void note_message(supine_stream_patient *p, double received) {
   p->received = received;
 }
 
-static void store_pose(supine_stream_patient *p, const double gravity[3], double received,
-                       uint64_t stamp) {
-  memcpy(p->gravity, gravity, sizeof p->gravity);
-  if (p->counts->poses == 0) { /* the first pose is not smoothed */
-    memcpy(p->smoothed_gravity, gravity, sizeof p->smoothed_gravity);
-    p->smoothed_at = received;
-  }
+/* Note a message with a pose or an observed point. */
+static void note_pose(supine_stream_patient *p, double received, uint64_t stamp) {
   note_message(p, received);
   p->pose_received = received;
   p->stamp = stamp;
-  ++p->counts->poses;
 }
 
 /* Store a pose unless `verdict` refuses it. Warn if the pose is refused or repaired. */
@@ -101,7 +93,9 @@ static void accept_pose(supine_stream_patient *p, supine_stream_verdict verdict,
     ++p->counts->repaired;
     supine_stream_patient_warn(p, received, "a pose is repaired: %s; send a rotation", why);
   }
-  store_pose(p, gravity, received, stamp);
+  memcpy(p->gravity, gravity, sizeof p->gravity);
+  note_pose(p, received, stamp);
+  ++p->counts->poses;
 }
 
 /* Store the position of an observed point; a not-a-number position means that the point is not
@@ -119,9 +113,7 @@ static bool store_position(supine_stream_patient *p, const char *name, const dou
   for (size_t i = 0; i < 3; ++i) {
     observed->last[at].position[i] = observed->ras && i < 2 ? -position[i] : position[i];
   }
-  note_message(p, received);
-  p->pose_received = received;
-  p->stamp = stamp;
+  note_pose(p, received, stamp);
   ++p->counts->positions;
   return true;
 }
@@ -162,10 +154,6 @@ void supine_stream_patient_receive(supine_stream_patient *patient,
     verdict = supine_stream_gravity_rotation(setup, message->number, gravity, &why);
     accept_pose(patient, verdict, why, gravity, received, stamp);
     break;
-  case SUPINE_STREAM_QUATERNION:
-    verdict = supine_stream_gravity_quaternion(setup, message->number, gravity, &why);
-    accept_pose(patient, verdict, why, gravity, received, stamp);
-    break;
   case SUPINE_STREAM_DOWN:
     verdict = supine_stream_gravity_down(setup, message->number, gravity, &why);
     accept_pose(patient, verdict, why, gravity, received, stamp);
@@ -189,6 +177,7 @@ void supine_stream_patient_receive(supine_stream_patient *patient,
     break;
   case SUPINE_STREAM_NOTHING:
   case SUPINE_STREAM_REQUEST:
+    ++patient->counts->skipped;
     break;
   }
 }
@@ -275,13 +264,8 @@ static void find_location(supine_stream_patient *patient, double now,
 
 void supine_stream_patient_snapshot(supine_stream_patient *patient, double now,
                                     supine_stream_snapshot *snapshot) {
-  const double angle =
-      supine_stream_gravity_smooth(patient->gravity, fmax(0.0, now - patient->smoothed_at),
-                                   patient->options->smooth, patient->smoothed_gravity);
   *snapshot = (supine_stream_snapshot){0};
-  patient->smoothed_at = now;
-  patient->turning = angle > 1e-6; /* a smaller rotation moves points by less than 1 um */
-  memcpy(snapshot->gravity, patient->smoothed_gravity, sizeof snapshot->gravity);
+  memcpy(snapshot->gravity, patient->gravity, sizeof snapshot->gravity);
   snapshot->received = patient->pending ? patient->received : -1.0;
   snapshot->pose_received = patient->pose_received;
   snapshot->stamp = patient->stamp != 0 ? patient->stamp : stamp_now();

@@ -19,8 +19,7 @@ struct supine_stream_volume {
 supine_status supine_stream_volume_breathe(supine_stream_volume *volume, const supine_pv *pv,
                                            const supine_pv_breath *breath, supine_error *error);
 
-/** Set a fixed volume from a text such as rest+500, full-300 or 2600mL.
- * @retval SUPINE_ERROR_ARGUMENT  the text is not a volume; `volume` is unchanged */
+/** Set a fixed volume from a text such as rest+500; leave it unchanged if the text is wrong. */
 supine_status supine_stream_volume_fix(supine_stream_volume *volume, const char *text,
                                        supine_error *error);
 
@@ -39,9 +38,6 @@ typedef struct supine_stream_patient {
   bool pending;         /* true until a frame shows the newest message */
   uint64_t stamp;       /* time stamp of the newest pose or point, 2^-32 s since 1970; 0 if none */
   double gravity[3];    /* direction of gravity in the newest pose */
-  double smoothed_gravity[3]; /* direction of gravity that frames show */
-  double smoothed_at;
-  bool turning; /* true until `smoothed_gravity` reaches `gravity` */
   double warned_at;
   double gains[SUPINE_LUNGS_MAX][3]; /* factors of the displacement of each lung along x, y
                                         and z, at the last volume that could be reached */

@@ -13,18 +13,19 @@
 #include "base/arena.h"
 #include "base/clock.h"
 #include "base/library.h"
+#include "program/stream/peer.h"
 #include "program/stream/web.h"
 
 /* clang-format off */
 #define FUNCTIONS(EACH)                                                                            \
-  EACH(lws_, add_http_common_headers) EACH(lws_, callback_http_dummy)                              \
-  EACH(lws_, callback_on_writable) EACH(lws_, callback_on_writable_all_protocol)                   \
-  EACH(lws_, cancel_service) EACH(lws_, context_destroy) EACH(lws_, context_user)                  \
-  EACH(lws_, create_context) EACH(lws_, finalize_write_http_header) EACH(lws_, get_context)        \
-  EACH(lws_, get_protocol) EACH(lws_, get_vhost_by_name) EACH(lws_, get_vhost_listen_port)         \
-  EACH(lws_, hdr_copy) EACH(lws_, hdr_total_length) EACH(lws_, http_transaction_completed)         \
-  EACH(lws_, is_final_fragment) EACH(lws_, is_first_fragment) EACH(lws_, return_http_status)       \
-  EACH(lws_, service) EACH(lws_, set_log_level) EACH(lws_, write)
+  EACH(lws_, callback_http_dummy) EACH(lws_, callback_on_writable)                                 \
+  EACH(lws_, callback_on_writable_all_protocol) EACH(lws_, cancel_service)                         \
+  EACH(lws_, context_destroy) EACH(lws_, context_user) EACH(lws_, create_context)                  \
+  EACH(lws_, get_context) EACH(lws_, get_protocol) EACH(lws_, get_vhost_by_name)                   \
+  EACH(lws_, get_vhost_listen_port) EACH(lws_, hdr_copy) EACH(lws_, hdr_total_length)              \
+  EACH(lws_, http_transaction_completed) EACH(lws_, is_final_fragment)                             \
+  EACH(lws_, is_first_fragment) EACH(lws_, serve_http_file) EACH(lws_, service)                    \
+  EACH(lws_, set_log_level) EACH(lws_, write)
 /* clang-format on */
 
 /* Functions of libwebsockets. The library is loaded at run time: linking it would also require
@@ -32,20 +33,18 @@
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } lws;
 
 enum {
-  TEXT = 256,     /* size of the buffer for a state as JSON, bytes */
-  RECEIVED = 512, /* size of the buffer for received bytes */
-  CHUNK = 65536   /* size of the pieces in which the page is sent, bytes */
+  CONNECTIONS_MAX = 128, /* viewers, and browsers that load the page */
+  TEXT = 256,            /* size of the buffer for a state as JSON, bytes */
+  RECEIVED = 512         /* size of the buffer for received bytes */
 };
 
 struct supine_stream_web {
   supine_stream_site site;
   struct lws_context *context;
-  int port;
   int poses[2]; /* pipe that carries received poses to the server's thread */
   pthread_t thread;
   bool running;
   atomic_bool ending;
-  atomic_size_t viewers;
   pthread_mutex_t lock; /* protects the following fields of this struct */
   uint64_t number;      /* serial number of the state in `text`: 1, 2, ... */
   char text[TEXT];      /* newest state as JSON; send_state() appends the age of the pose and "}" */
@@ -58,11 +57,9 @@ typedef struct web_pose {
   double received; /* time of receipt, s by supine_clock_seconds */
 } web_pose;
 
-/* State of a connection to a viewer, or to a browser that loads the page. */
+/* State of a connection to a viewer. */
 typedef struct session {
-  size_t sent;     /* bytes of the page sent so far */
   uint64_t number; /* serial number of the last state sent */
-  bool counted_in_viewers;
 } session;
 
 static supine_stream_web *web_of(struct lws *wsi) {
@@ -128,17 +125,7 @@ static int view(struct lws *wsi, enum lws_callback_reasons reason, void *user, v
   case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:
     return is_ours(wsi) ? 0 : -1;
   case LWS_CALLBACK_ESTABLISHED:
-    if (atomic_load(&web->viewers) >= web->site.viewers) {
-      return -1;
-    }
-    s->counted_in_viewers = true;
-    (void)atomic_fetch_add(&web->viewers, 1);
     (void)lws.callback_on_writable(wsi);
-    return 0;
-  case LWS_CALLBACK_CLOSED:
-    if (s->counted_in_viewers) {
-      (void)atomic_fetch_sub(&web->viewers, 1);
-    }
     return 0;
   case LWS_CALLBACK_EVENT_WAIT_CANCELLED: /* supine_stream_web_send has stored a new state */
     (void)lws.callback_on_writable_all_protocol(web->context, lws.get_protocol(wsi));
@@ -155,57 +142,18 @@ static int view(struct lws *wsi, enum lws_callback_reasons reason, void *user, v
   }
 }
 
-static int begin_page(supine_stream_web *web, struct lws *wsi, const char *path, session *s) {
-  unsigned char bytes[LWS_PRE + 1024];
-  unsigned char *at = bytes + LWS_PRE;
-  unsigned char *end = bytes + sizeof bytes - 1;
-  if (strcmp(path, "/") != 0) {
-    return lws.return_http_status(wsi, HTTP_STATUS_NOT_FOUND, NULL) != 0 ||
-                   lws.http_transaction_completed(wsi) != 0
-               ? -1
-               : 0;
-  }
-  s->sent = 0;
-  if (lws.add_http_common_headers(wsi, HTTP_STATUS_OK, "text/html; charset=utf-8",
-                                  web->site.page_size, &at, end) != 0 ||
-      lws.finalize_write_http_header(wsi, bytes + LWS_PRE, &at, end) != 0) {
-    return -1;
-  }
-  (void)lws.callback_on_writable(wsi);
-  return 0;
-}
-
-static int continue_page(supine_stream_web *web, struct lws *wsi, session *s) {
-  unsigned char bytes[LWS_PRE + CHUNK];
-  const size_t left = web->site.page_size - s->sent;
-  const size_t size = left < CHUNK ? left : CHUNK;
-  memcpy(bytes + LWS_PRE, (const unsigned char *)web->site.page + s->sent, size);
-  s->sent += size;
-  const bool last = size == left;
-  if (lws.write(wsi, bytes + LWS_PRE, size, last ? LWS_WRITE_HTTP_FINAL : LWS_WRITE_HTTP) < 0) {
-    return -1;
-  }
-  if (last) {
-    return lws.http_transaction_completed(wsi) != 0 ? -1 : 0;
-  }
-  (void)lws.callback_on_writable(wsi);
-  return 0;
-}
-
 static int serve(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in,
                  size_t size) {
-  switch (reason) {
-  case LWS_CALLBACK_HTTP:
-    return begin_page(web_of(wsi), wsi, in, user);
-  case LWS_CALLBACK_HTTP_WRITEABLE:
-    return continue_page(web_of(wsi), wsi, user);
-  default:
-    return lws.callback_http_dummy(wsi, reason, user, in, size);
+  if (reason != LWS_CALLBACK_HTTP || strcmp(in, "/") != 0) {
+    return lws.callback_http_dummy(wsi, reason, user, in, size); /* refuses other pages */
   }
+  const int done =
+      lws.serve_http_file(wsi, web_of(wsi)->site.page, "text/html; charset=utf-8", NULL, 0);
+  return done < 0 || (done > 0 && lws.http_transaction_completed(wsi) != 0) ? -1 : 0;
 }
 
 static const struct lws_protocols protocols[] = {
-    {"http", serve, sizeof(session), 0, 0, NULL, 0},
+    {"http", serve, 0, 0, 0, NULL, 0},
     {"supine", view, sizeof(session), RECEIVED, 0, NULL, 0},
     {NULL, NULL, 0, 0, 0, NULL, 0}};
 
@@ -216,7 +164,7 @@ static void *run(void *context) {
   return NULL;
 }
 
-supine_status supine_stream_web_create(const supine_stream_site *site, supine_stream_web **web,
+supine_status supine_stream_web_create(supine_stream_site *site, supine_stream_web **web,
                                        supine_error *error) {
   SUPINE_TRY(SUPINE_LIBRARY_LOAD(SUPINE_WEBSOCKETS, FUNCTIONS, &lws, error));
   supine_stream_web *w = calloc(1, sizeof *w);
@@ -225,7 +173,8 @@ supine_status supine_stream_web_create(const supine_stream_site *site, supine_st
   }
   w->site = *site;
   (void)pthread_mutex_init(&w->lock, NULL);
-  const bool piped = pipe2(w->poses, O_NONBLOCK | O_CLOEXEC) == 0;
+  const bool piped = pipe(w->poses) == 0 && supine_stream_nonblocking(w->poses[0]) > 0 &&
+                     supine_stream_nonblocking(w->poses[1]) > 0;
   lws.set_log_level(0, NULL);
   struct lws_context_creation_info info = {0};
   info.port = site->port;
@@ -239,8 +188,7 @@ supine_status supine_stream_web_create(const supine_stream_site *site, supine_st
   if (strchr(info.iface, ':') == NULL) {
     info.options |= LWS_SERVER_OPTION_DISABLE_IPV6;
   }
-  info.fd_limit_per_thread =
-      (unsigned)site->viewers + 64; /* 64 more connections may load the page */
+  info.fd_limit_per_thread = CONNECTIONS_MAX;
   if (site->certificate != NULL) {
     info.options |= LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT;
     info.ssl_cert_filepath = site->certificate;
@@ -249,8 +197,8 @@ supine_status supine_stream_web_create(const supine_stream_site *site, supine_st
   }
   w->context = piped ? lws.create_context(&info) : NULL;
   struct lws_vhost *host = w->context == NULL ? NULL : lws.get_vhost_by_name(w->context, "default");
-  w->port = host == NULL ? 0 : lws.get_vhost_listen_port(host);
-  w->running = w->port > 0 && pthread_create(&w->thread, NULL, run, w) == 0;
+  const int port = host == NULL ? 0 : lws.get_vhost_listen_port(host);
+  w->running = port > 0 && pthread_create(&w->thread, NULL, run, w) == 0;
   if (!w->running) {
     supine_stream_web_destroy(w);
     return supine_error_set(error, SUPINE_ERROR_WRITE,
@@ -258,6 +206,7 @@ supine_status supine_stream_web_create(const supine_stream_site *site, supine_st
                             "--web, and check --certificate and --key",
                             info.iface, site->port);
   }
+  site->port = port;
   *web = w;
   return SUPINE_OK;
 }
@@ -279,10 +228,6 @@ void supine_stream_web_destroy(supine_stream_web *web) {
   }
   (void)pthread_mutex_destroy(&web->lock);
   free(web);
-}
-
-int supine_stream_web_port(const supine_stream_web *web) {
-  return web->port;
 }
 
 int supine_stream_web_descriptor(const supine_stream_web *web) {
@@ -309,7 +254,5 @@ void supine_stream_web_send(supine_stream_web *web, const supine_stream_snapshot
   web->pose_received = snapshot->pose_received;
   ++web->number;
   (void)pthread_mutex_unlock(&web->lock);
-  if (atomic_load(&web->viewers) > 0) {
-    lws.cancel_service(web->context);
-  }
+  lws.cancel_service(web->context);
 }

@@ -20,21 +20,15 @@ typedef struct supine_stream_web supine_stream_web;
 /** Address and content of the web server. There is no access control. */
 typedef struct supine_stream_site {
   const char *address;           /**< numeric address to listen on */
-  int port;                      /**< 0 to choose a free port */
+  int port;                      /**< 0 to choose a free port; set to the port in use */
   const char *certificate, *key; /**< paths of PEM files; NULL for no encryption */
-  const void *page;              /**< HTML; must outlive the server */
-  size_t page_size;
-  size_t viewers; /**< maximum number of viewers */
+  const char *page;              /**< path of the HTML file, which is read for each request */
 } supine_stream_site;
 
-/** Start a thread that serves a site.
- * @retval SUPINE_ERROR_UNSUPPORTED  libwebsockets is not installed
- * @retval SUPINE_ERROR_WRITE        the port is taken, or the certificate is invalid */
-supine_status supine_stream_web_create(const supine_stream_site *site, supine_stream_web **web,
+/** Start a thread that serves a site. */
+supine_status supine_stream_web_create(supine_stream_site *site, supine_stream_web **web,
                                        supine_error *error);
 void supine_stream_web_destroy(supine_stream_web *web);
-
-int supine_stream_web_port(const supine_stream_web *web);
 
 /** Return a descriptor that is readable when a viewer has sent a pose. */
 int supine_stream_web_descriptor(const supine_stream_web *web);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Compare poses by the distances of vertices, and compute the energy of each band of harmonics. RMS
- * distances and energies come from Gram matrices, without a pass over the vertices. */
+/* Compare poses by the distances of vertices, and compute the energy of each band of harmonics from
+ * a Gram matrix, without a pass over the vertices. */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -9,6 +9,7 @@
 #include <supine/compare.h>
 #include <supine/sh.h>
 
+#include "base/arena.h"
 #include "base/vec3.h"
 #include "runtime/internal.h"
 
@@ -16,8 +17,7 @@ struct supine_compare {
   const supine_basis *basis;
   double area;  /* area of the reference surface, mm^2 */
   float *share; /* [N] fraction of the area that belongs to each vertex */
-  double *gram; /* [lungs, 3, modes, modes] Gram matrix of the modes for each lung and axis, mm^2 */
-  double *sum;  /* [modes, modes] sum of `gram` over lungs and axes, mm^2 */
+  double *gram; /* [modes, modes] Gram matrix of the modes, mm^2 */
 };
 
 static const double four_pi = 12.566370614359172954;
@@ -39,8 +39,7 @@ static double twice_area(const supine_basis *basis, const uint32_t *corner) {
 
 static supine_status share_area(supine_compare *compare, supine_error *error) {
   const supine_basis *basis = compare->basis;
-  const size_t n = basis->info.vertex_count;
-  double *area = calloc(n, sizeof *area);
+  double *area = calloc(basis->info.vertex_count, sizeof *area);
   if (area == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
   }
@@ -54,7 +53,7 @@ static supine_status share_area(supine_compare *compare, supine_error *error) {
     total += 3 * piece;
   }
   compare->area = total;
-  for (size_t i = 0; i < n && total > 0; ++i) {
+  for (size_t i = 0; i < basis->info.vertex_count && total > 0; ++i) {
     compare->share[i] = (float)(area[i] / total);
   }
   free(area);
@@ -80,26 +79,22 @@ static void add_row(const float *c, double weight, size_t count, double *gram) {
   }
 }
 
-static void find_gram(supine_compare *compare, size_t lung, size_t axis) {
+/* Add the part of one lung and axis to the Gram matrix.
+ * @param part  [modes, modes] work space */
+static void add_gram(supine_compare *compare, size_t lung, size_t axis, double *part) {
   const supine_basis *basis = compare->basis;
   const size_t count = basis->info.mode_count;
-  double *gram = compare->gram + (3 * lung + axis) * count * count;
+  memset(part, 0, count * count * sizeof *part);
   for (size_t i = basis->lung_begin[lung]; i < basis->lung_begin[lung + 1]; ++i) {
     const double share = (double)compare->share[i];
-    if (basis->info.vector) {
-      add_row(basis->info.coefficients + (3 * i + axis) * count, share, count, gram);
-    } else {
-      const double d = (double)basis->info.direction[3 * i + axis];
-      add_row(basis->info.coefficients + i * count, share * d * d, count, gram);
-    }
+    const double d = basis->info.vector ? 1 : (double)basis->info.direction[3 * i + axis];
+    const size_t row = basis->info.vector ? 3 * i + axis : i;
+    add_row(basis->info.coefficients + row * count, share * d * d, count, part);
   }
   for (size_t k = 0; k < count; ++k) {
-    for (size_t l = 0; l < k; ++l) {
-      gram[k * count + l] = gram[l * count + k];
+    for (size_t l = 0; l < count; ++l) {
+      compare->gram[k * count + l] += part[k < l ? k * count + l : l * count + k];
     }
-  }
-  for (size_t k = 0; k < count * count; ++k) {
-    compare->sum[k] += gram[k];
   }
 }
 
@@ -107,53 +102,42 @@ supine_status supine_compare_create(const supine_basis *basis, supine_compare **
                                     supine_error *error) {
   const supine_basis_info *info = &basis->info;
   const size_t square = info->mode_count * info->mode_count;
-  supine_status status = SUPINE_ERROR_MEMORY;
-  supine_compare *made = calloc(1, sizeof *made);
+  const size_t numbers = 2 * square; /* the Gram matrix and work space */
+  supine_compare *made = calloc(1, sizeof *made + numbers * sizeof *made->gram +
+                                       info->vertex_count * sizeof *made->share);
   if (made == NULL) {
-    return supine_error_set(error, status, "out of memory");
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
   }
   made->basis = basis;
-  made->share = calloc(info->vertex_count, sizeof *made->share);
-  made->gram = calloc(3 * info->lung_count * square, sizeof *made->gram);
-  made->sum = calloc(square, sizeof *made->sum);
-  if (made->share == NULL || made->gram == NULL || made->sum == NULL) {
-    (void)supine_error_set(error, status, "out of memory");
-    goto cleanup;
-  }
-  status = share_area(made, error);
+  made->gram = (double *)(made + 1);
+  made->share = (float *)(made->gram + numbers);
+  const supine_status status = share_area(made, error);
   if (status != SUPINE_OK) {
-    goto cleanup;
+    supine_compare_destroy(made);
+    return status;
   }
   for (size_t i = 0; i < 3 * info->lung_count; ++i) {
-    find_gram(made, i / 3, i % 3);
+    add_gram(made, i / 3, i % 3, made->gram + square);
   }
   *compare = made;
-  made = NULL;
-cleanup:
-  supine_compare_destroy(made);
-  return status;
+  return SUPINE_OK;
 }
 
 void supine_compare_destroy(supine_compare *compare) {
-  if (compare != NULL) {
-    free(compare->share);
-    free(compare->gram);
-    free(compare->sum);
-    free(compare);
-  }
+  free(compare);
 }
 
 double supine_compare_area(const supine_compare *compare) {
   return compare->area;
 }
 
-/* Return q^T G p for the matrix G = `gram` [count, count]. */
-static double product(const double *gram, const double *q, const double *p, size_t count) {
+/* Return q^T G q for the matrix G = `gram` [count, count]. */
+static double product(const double *gram, const double *q, size_t count) {
   double sum = 0;
   for (size_t k = 0; k < count; ++k) {
     double row = 0;
     for (size_t l = 0; l < count; ++l) {
-      row += gram[k * count + l] * p[l];
+      row += gram[k * count + l] * q[l];
     }
     sum += q[k] * row;
   }
@@ -174,20 +158,6 @@ static bool products_of(const supine_compare *compare, const supine_pose *pose,
   return supine_basis_has_pose(compare->basis, pose) && supine_basis_has_pose(compare->basis, from);
 }
 
-double supine_compare_rms(const supine_compare *compare, const supine_pose *pose,
-                          const supine_pose *from) {
-  const size_t count = compare->basis->info.mode_count;
-  double q[3 * SUPINE_LUNGS_MAX * SUPINE_MODES_MAX];
-  double square = 0;
-  if (!products_of(compare, pose, from, q)) {
-    return INFINITY;
-  }
-  for (size_t i = 0; i < 3 * compare->basis->info.lung_count; ++i) {
-    square += product(compare->gram + i * count * count, q + i * count, q + i * count, count);
-  }
-  return sqrt(fmax(square, 0));
-}
-
 void supine_compare_energy(const supine_compare *compare, double *energy) {
   const size_t count = compare->basis->info.mode_count;
   const size_t terms = supine_sh_count(compare->basis->info.band);
@@ -199,7 +169,7 @@ void supine_compare_energy(const supine_compare *compare, double *energy) {
       for (size_t k = 0; k < count; ++k) {
         column[k] = compare->basis->info.modes[k * terms + term];
       }
-      energy[l] += product(compare->sum, column, column, count) / four_pi;
+      energy[l] += product(compare->gram, column, count) / four_pi;
     }
   }
 }
@@ -217,15 +187,10 @@ static double dot(const double *weights, const float *coefficients, size_t count
 static double displacement(const supine_basis *basis, const double *q, size_t i) {
   const size_t count = basis->info.mode_count;
   double u[3];
-  if (basis->info.vector) {
-    for (size_t axis = 0; axis < 3; ++axis) {
-      u[axis] = dot(q + axis * count, basis->info.coefficients + (3 * i + axis) * count, count);
-    }
-    return supine_length(u);
-  }
   for (size_t axis = 0; axis < 3; ++axis) {
-    u[axis] = dot(q + axis * count, basis->info.coefficients + i * count, count) *
-              (double)basis->info.direction[3 * i + axis];
+    const size_t row = basis->info.vector ? 3 * i + axis : i;
+    u[axis] = dot(q + axis * count, basis->info.coefficients + row * count, count) *
+              (basis->info.vector ? 1 : (double)basis->info.direction[3 * i + axis]);
   }
   return supine_length(u);
 }

@@ -64,6 +64,12 @@ static inline double normal_unit(void) {
   return INT16_MAX / (255 * 0x1p23);
 }
 
+/** Return number k of `count` numbers of 16 bits that a file stores in count + 1 bytes
+ * (supine_basis_info.normal_bytes). */
+static inline int normal_from_bytes(const int8_t *bytes, size_t count, size_t k) {
+  return 256 * bytes[k] + (k == 0 ? bytes[count] : 0);
+}
+
 /** Return number 0, 1 or 2 of the three numbers that normal_narrow packed into `word`. */
 static inline float normal_number(uint32_t word, size_t number) {
   return (float)word_integer(word << (number == 0 ? 0 : number == 1 ? 13 : 23));

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Open safetensors files, and check them against their checksum. */
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #define XXH_INLINE_ALL
@@ -46,22 +45,27 @@ uint64_t supine_safetensors_checksum(const supine_tensor *tensors, size_t tensor
   return sum;
 }
 
-/* Open the bytes of a file. The open file then owns `mapping`. On failure, unmap `mapping`. */
-static supine_status open_bytes(const void *bytes, size_t size, supine_platform_file mapping,
-                                const char *name, supine_safetensors **result,
-                                supine_error *error) {
-  supine_safetensors *file = calloc(1, sizeof *file + strlen(name) + 1);
-  supine_status status = SUPINE_ERROR_MEMORY;
+supine_status supine_safetensors_open_with(const char *name, const void *bytes, size_t size,
+                                           const supine_allocator *allocator,
+                                           supine_safetensors **result, supine_error *error) {
+  supine_safetensors made = {.bytes = bytes, .size = size, .allocator = *allocator};
   *result = NULL;
-  if (file == NULL) {
-    supine_platform_unmap(&mapping);
-    return supine_error_set(error, status, "%s: out of memory", name);
+  if (bytes == NULL) {
+    const supine_status status = supine_platform_map(name, &made.mapping, error);
+    if (status != SUPINE_OK) {
+      return status;
+    }
+    made.bytes = made.mapping.bytes;
+    made.size = made.mapping.size;
   }
+  supine_safetensors *file = supine_safetensors_allocate(&made, sizeof made + strlen(name) + 1);
+  if (file == NULL) {
+    supine_platform_unmap(&made.mapping);
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", name);
+  }
+  *file = made;
   strcpy(file->name, name);
-  file->bytes = bytes;
-  file->size = size;
-  file->mapping = mapping;
-  status = supine_safetensors_parse(file, error);
+  const supine_status status = supine_safetensors_parse(file, error);
   if (status == SUPINE_OK) {
     *result = file;
   } else {
@@ -72,16 +76,13 @@ static supine_status open_bytes(const void *bytes, size_t size, supine_platform_
 
 supine_status supine_safetensors_open_memory(const void *bytes, size_t size, const char *name,
                                              supine_safetensors **file, supine_error *error) {
-  return open_bytes(bytes, size, (supine_platform_file){NULL, 0}, name, file, error);
+  return supine_safetensors_open_with(name, bytes != NULL ? bytes : "", size,
+                                      &(supine_allocator){0}, file, error);
 }
 
 supine_status supine_safetensors_open(const char *path, supine_safetensors **file,
                                       supine_error *error) {
-  supine_platform_file mapping;
-  *file = NULL;
-  const supine_status status = supine_platform_map(path, &mapping, error);
-  return status != SUPINE_OK ? status
-                             : open_bytes(mapping.bytes, mapping.size, mapping, path, file, error);
+  return supine_safetensors_open_with(path, NULL, 0, &(supine_allocator){0}, file, error);
 }
 
 void supine_safetensors_close(supine_safetensors *file) {
@@ -89,14 +90,9 @@ void supine_safetensors_close(supine_safetensors *file) {
     return;
   }
   supine_platform_unmap(&file->mapping);
-  for (size_t i = 0; i < file->tensor_count; ++i) {
-    free(file->copies[i]);
-  }
-  free(file->copies);
-  free(file->tensors);
-  free(file->metadata);
-  free(file->header);
-  free(file);
+  supine_safetensors_release(file, file->copies);
+  supine_safetensors_release(file, file->tensors); /* with the metadata and the header */
+  supine_safetensors_release(file, file);
 }
 
 supine_status supine_safetensors_verify(const supine_safetensors *file, supine_error *error) {

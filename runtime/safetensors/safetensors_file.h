@@ -20,14 +20,37 @@ struct supine_safetensors {
   const unsigned char *bytes;
   size_t size;
   supine_platform_file mapping; /**< mapping that contains `bytes`; zero if the caller owns them */
-  char *header;                 /**< a copy of the header, in which strings are decoded */
-  supine_tensor *tensors;       /**< tensors, sorted by the position of their data */
-  void **copies;                /**< [tensor_count] aligned copy; NULL if data are aligned */
+  supine_allocator allocator;
+  supine_tensor *tensors; /**< tensors, sorted by the position of their data */
+  char *header;           /**< a copy of the header, in which strings are decoded */
+  unsigned char *copies;  /**< copies of the tensors that are misaligned in the file; or NULL */
   size_t tensor_count;
   supine_metadata *metadata;
   size_t metadata_count;
   char name[]; /**< name of the file in messages */
 };
+
+/** Allocate memory for a file, aligned to 64 bytes and not zeroed; return NULL if there is none. */
+static inline void *supine_safetensors_allocate(const supine_safetensors *file, size_t bytes) {
+  const supine_allocator *with = &file->allocator;
+  return with->allocate != NULL ? with->allocate(with->user, bytes)
+                                : supine_platform_allocate(bytes);
+}
+
+/** Free memory of supine_safetensors_allocate; NULL is legal. */
+static inline void supine_safetensors_release(const supine_safetensors *file, void *memory) {
+  const supine_allocator *with = &file->allocator;
+  if (with->release == NULL) {
+    supine_platform_free(memory);
+  } else if (memory != NULL) {
+    with->release(with->user, memory);
+  }
+}
+
+/** Open the `size` bytes of a file, or map the file `name` if `bytes` is NULL. */
+supine_status supine_safetensors_open_with(const char *name, const void *bytes, size_t size,
+                                           const supine_allocator *allocator,
+                                           supine_safetensors **result, supine_error *error);
 
 /** Return the name of an element type in the header, such as "F32". `dtype` must be in range. */
 const char *supine_safetensors_dtype_name(supine_dtype dtype);

@@ -20,7 +20,7 @@ static const struct {
   size_t size;
 } dtypes[SUPINE_DTYPE_COUNT] = {
     [SUPINE_U8] = {"U8", 1},   [SUPINE_U32] = {"U32", 4}, [SUPINE_F32] = {"F32", 4},
-    [SUPINE_F64] = {"F64", 8}, [SUPINE_I16] = {"I16", 2},
+    [SUPINE_F64] = {"F64", 8}, [SUPINE_I16] = {"I16", 2}, [SUPINE_I8] = {"I8", 1},
 };
 
 const char *supine_safetensors_dtype_name(supine_dtype dtype) {
@@ -205,7 +205,7 @@ static supine_dtype take_dtype(parser *p, const char *tensor) {
     ++dtype;
   }
   if (dtype == SUPINE_DTYPE_COUNT) {
-    fail(p, "tensor '%.64s': dtype '%.16s' is none of U8, I16, U32, F32, F64", tensor, name);
+    fail(p, "tensor '%.64s': dtype '%.16s' is none of U8, I8, I16, U32, F32, F64", tensor, name);
   }
   return (supine_dtype)dtype;
 }
@@ -298,6 +298,15 @@ static int compare_places(const void *left, const void *right) {
   return (places[0][key] > places[1][key]) - (places[0][key] < places[1][key]);
 }
 
+static bool is_aligned(const supine_tensor *tensor) {
+  return (uintptr_t)tensor->data % supine_safetensors_dtype_size(tensor->dtype) == 0;
+}
+
+/* Return the size of a tensor in bytes, rounded up to a multiple of 8. */
+static size_t padded_size(const supine_tensor *tensor) {
+  return (size_of(tensor) + 7) / 8 * 8;
+}
+
 /* Check that the tensors fill the data of the file without gaps or overlaps. Point each tensor to
  * its data or to an aligned copy of its data. */
 static supine_status place_tensors(parser *p, size_t data_begin) {
@@ -319,16 +328,22 @@ static supine_status place_tensors(parser *p, size_t data_begin) {
          at > data_size ? "truncated" : "trailing bytes", at, data_size);
     return p->status;
   }
+  size_t copied = 0;
   for (size_t i = 0; i < file->tensor_count; ++i) {
     supine_tensor *tensor = &file->tensors[i];
-    const size_t size = size_of(tensor);
     tensor->data = file->bytes + data_begin + (uintptr_t)tensor->data;
-    if ((uintptr_t)tensor->data % supine_safetensors_dtype_size(tensor->dtype) != 0) {
-      file->copies[i] = malloc(size + 1);
-      if (file->copies[i] == NULL) {
-        return supine_error_set(p->error, SUPINE_ERROR_MEMORY, "%s: out of memory", file->name);
-      }
-      tensor->data = memcpy(file->copies[i], tensor->data, size);
+    copied += is_aligned(tensor) ? 0 : padded_size(tensor);
+  }
+  file->copies = copied > 0 ? supine_safetensors_allocate(file, copied) : NULL;
+  if (copied > 0 && file->copies == NULL) {
+    return supine_error_set(p->error, SUPINE_ERROR_MEMORY, "%s: out of memory", file->name);
+  }
+  unsigned char *copy = file->copies;
+  for (size_t i = 0; i < file->tensor_count; ++i) {
+    supine_tensor *tensor = &file->tensors[i];
+    if (!is_aligned(tensor)) {
+      tensor->data = memcpy(copy, tensor->data, size_of(tensor));
+      copy += padded_size(tensor);
     }
   }
   return SUPINE_OK;
@@ -357,14 +372,15 @@ supine_status supine_safetensors_parse(supine_safetensors *file, supine_error *e
   for (size_t i = 0; i < length; ++i) {
     members += file->bytes[PREFIX + i] == ':';
   }
-  file->header = malloc((size_t)length + 1);
-  file->tensors = calloc(members < TENSORS_MAX ? members : TENSORS_MAX, sizeof *file->tensors);
-  file->copies = calloc(members < TENSORS_MAX ? members : TENSORS_MAX, sizeof *file->copies);
-  file->metadata = calloc(members < METADATA_MAX ? members : METADATA_MAX, sizeof *file->metadata);
-  if (file->header == NULL || file->tensors == NULL || file->copies == NULL ||
-      file->metadata == NULL) {
+  const size_t tensors = members < TENSORS_MAX ? members : TENSORS_MAX;
+  const size_t strings = members < METADATA_MAX ? members : METADATA_MAX;
+  file->tensors = supine_safetensors_allocate(
+      file, tensors * sizeof *file->tensors + strings * sizeof *file->metadata + length + 1);
+  if (file->tensors == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", file->name);
   }
+  file->metadata = (supine_metadata *)(file->tensors + tensors);
+  file->header = (char *)(file->metadata + strings);
   memcpy(file->header, file->bytes + PREFIX, (size_t)length);
   file->header[length] = '\0';
   p.at = file->header;

@@ -69,17 +69,17 @@ static double run_ours(pair *files, const char *out, double times[STAGES], size_
   static const supine_scan full = {.known = true,
                                    .state = {.gravity = {0, 1, 0}, .volume = {SUPINE_VOLUME_FULL}}};
   const supine_resting resting = supine_reference_resting_default();
-  const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
-  supine_reference reference;
+  supine_prepared prepared = {.source = {.lungs = lungs},
+                              .model = supine_physics_model(SUPINE_LAW_DEEP)};
   if (status == SUPINE_OK) {
-    status = supine_reference_find(&lungs, &model, &full, &resting, &reference, &error);
+    status = supine_reference_find(&prepared.source.lungs, &prepared.model, &full, &resting,
+                                   &prepared.reference, &error);
   }
   if (status == SUPINE_OK) {
-    const supine_precompute_options options = {
-        .model = model, .reference = &reference, .band = 23, .modes = 16};
-    status = supine_precompute(&lungs, &options, out, NULL, &error);
+    const supine_basis_choice choice = {.path = out, .band = 23, .modes = 16};
+    status = supine_precompute(&prepared, &choice, NULL, &error);
   }
-  supine_lungs_free(&lungs);
+  supine_precompute_prepared_free(&prepared);
   const double end = supine_clock_seconds();
   if (status != SUPINE_OK) {
     (void)fprintf(stderr, "%s\n", error.message);

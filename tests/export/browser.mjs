@@ -55,11 +55,12 @@ export async function close(page) {
   unused.set(page.kind, [...(unused.get(page.kind) ?? []), page]);
 }
 
-/** Open the page of a basis, wait until it is drawn, and show all controls. By default the patient is supine and
+/** Open the page of a basis, wait until it is drawn and its texts, which move the picture, are written, and show all
+ * controls. By default the patient is supine and
  * does not breathe, as tests point at fixed places in the picture. */
 export async function openLungs(path, options, hash = '#posture=supine&depth=500&show=contours&room=0') {
   const opened = await open(path, options, hash);
-  await opened.page.waitForFunction(() => window.supine?.panes().length > 0);
+  await opened.page.waitForFunction(() => window.supine?.panes().length > 0 && document.getElementById('finding').textContent);
   await opened.page.evaluate(() => { document.getElementById('more').open = true; });
   return opened;
 }

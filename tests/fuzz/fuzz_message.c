@@ -26,8 +26,7 @@ static void read_message(const uint8_t *bytes, size_t size, bool mend) {
     header.size = left;
     header.crc = supine_stream_crc64(0, bytes + SUPINE_STREAM_HEADER, left);
   }
-  if (header.size > left || header.size > SUPINE_STREAM_BODY_MAX ||
-      !supine_stream_message_is_known(&header)) {
+  if (header.size > left || header.size > SUPINE_STREAM_BODY_MAX) {
     return;
   }
   const supine_status status =

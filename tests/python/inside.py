@@ -16,7 +16,7 @@ import numpy as np
 
 import supine
 
-reference, path = sys.argv[1:3]
+reference, path, maker = sys.argv[1:4]  # maker: "program" or "library", which makes bases
 
 
 def refused(kind, text, call, *arguments, **keywords):
@@ -37,7 +37,7 @@ assert lungs.has_volume and lungs.has_normals and list(lungs.lungs) == ["left", 
 for array, shape, dtype in ((lungs.vertices, (n, 3), np.float32), (lungs.triangles, (lungs.triangle_count, 3), np.uint32),
                             (lungs.coefficients, (n, k), np.float32), (lungs.direction, (n, 3), np.float32),
                             (lungs.modes, (k, (lungs.band + 1) ** 2), np.float64), (lungs.bounds, (2, 2, 3), np.float32),
-                            (lungs.tensor("lung"), (n,), np.uint8), (lungs.tensor("normals"), lungs.tensor("normals").shape, np.int16)):
+                            (lungs.tensor("lung"), (n,), np.uint8), (lungs.tensor("normals"), lungs.tensor("normals").shape, np.int8)):
     assert array.shape == shape and array.dtype == dtype and not array.flags.owndata
     assert not array.flags.writeable and array.flags.c_contiguous
 assert lungs.tensor("vertices").ctypes.data == lungs.vertices.ctypes.data
@@ -216,6 +216,7 @@ for name in ("vertices", "triangles", "coefficients", "modes", "volume_cubic"):
 assert parts and parts == sorted(parts) and 0 <= parts[0] and parts[-1] == 1
 assert "error against the full solve" in made.report and lungs.report == ""
 left, right = (slice(part.start, part.stop) for part in lungs.lungs.values())
+assert supine.precompute(lungs.vertices, lungs.triangles, band=3)._owner.source == made._owner.source
 halves = [lungs.triangles[(lungs.triangles >= part.start).all(1) & (lungs.triangles < part.stop).all(1)] - part.start
           for part in (left, right)]
 apart = supine.precompute((lungs.vertices[right], halves[1]), (lungs.vertices[left].tolist(), halves[0]), band=3,
@@ -291,7 +292,11 @@ assert supine.embed(made, grid=40, clamp=True).vertex_count > 100
 refused(supine.ArgumentError, "nothing to embed", supine.embed, made)
 refused(ValueError, "points must be", supine.embed, made, [(1, 2)])
 program, os.environ["PATH"] = shutil.which("supine"), ""
-refused(supine.UnsupportedError, "neither on PATH nor beside", supine.precompute, lungs.vertices, lungs.triangles)
+refused(supine.UnsupportedError, "neither on PATH nor beside", supine.embed, made, place)
+if maker == "program":
+    refused(supine.UnsupportedError, "neither on PATH nor beside", supine.precompute, lungs.vertices, lungs.triangles)
+else:
+    assert supine.precompute(lungs.vertices, lungs.triangles, band=2, modes=2).mode_count == 2
 os.symlink(program, os.path.join(os.path.dirname(supine.__file__), "supine"))
 assert supine.embed(made, place).vertex_count == 1
 print("results equal those in C")

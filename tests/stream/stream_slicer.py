@@ -78,3 +78,48 @@ else:
     assert model.mesh.GetNumberOfPoints() == len(points) // 3
     assert model.mesh.GetNumberOfPolys() == len(surface.triangles) // 3
     assert max(abs(a - b) for a, b in zip(model.mesh.GetPoint(7), points[21:24])) < 1e-6
+
+# The scripted module, with stand-ins for Slicer's modules: it starts, follows a transform, stops, and reports a dead server.
+import os  # noqa: E402
+import types  # noqa: E402
+from unittest import mock  # noqa: E402
+
+
+class Base:
+    def __init__(self, parent=None):
+        self.layout = mock.MagicMock()
+
+    def setup(self):
+        pass
+
+
+class VtkMatrix:
+    def GetElement(self, row, column):
+        return float(row == column)
+
+
+loadable = types.ModuleType("slicer.ScriptedLoadableModule")
+loadable.ScriptedLoadableModule = loadable.ScriptedLoadableModuleWidget = Base
+slicer, qt = mock.MagicMock(), mock.MagicMock()
+qt.QLineEdit = lambda text: types.SimpleNamespace(text=text)
+sys.modules.update({"slicer": slicer, "slicer.ScriptedLoadableModule": loadable, "qt": qt,
+                    "vtk": types.SimpleNamespace(vtkMatrix4x4=VtkMatrix)})
+sys.path.insert(0, os.path.join(sys.argv[1], "slicer"))
+import SupineLung  # noqa: E402
+
+listed = mock.MagicMock()
+SupineLung.SupineLung(listed)
+assert listed.title == "Supine Lung"
+widget = SupineLung.SupineLungWidget()
+widget.setup()
+widget.host.text, widget.port.text = "127.0.0.1", str(port)
+widget.toggled(True)
+node = widget.node.currentNode()
+assert widget.follow is not None and node.AddObserver.called and not slicer.util.errorDisplay.called
+_, posed = settle(lambda: weights.newest(0.05))
+assert max(abs(a - b) for a, b in zip(posed, seen["supine"])) < 1e-5  # the identity is a patient on the back
+widget.cleanup()
+assert widget.follow is None and node.RemoveObserver.called
+widget.port.text = "1"
+widget.toggled(True)
+assert widget.follow is None and slicer.util.errorDisplay.called and widget.button.checked is False

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Test directions of gravity from trackers' matrices and quaternions, refused poses, smoothing. */
+/* Test directions of gravity from trackers' matrices and quaternions, refused poses. */
 #include "program/stream/gravity.h"
 #include "tests/test.h"
 #include <supine/posture.h>
@@ -95,17 +95,16 @@ TEST(test_gravity_tracker_quaternions_give_postures) {
       {"inverted", {0, 1, 0, 0}},
       {"supine", {0.5, -0.5, -0.5, 0.5}}, /* about x by -90 degrees, then about z by 90 degrees */
   };
-  const supine_stream_setup setup = supine_stream_setup_default();
   for (size_t i = 0; i < sizeof turns / sizeof *turns; ++i) {
     for (int sign = -1; sign < 2; sign += 2) {
       double q[4];
+      double r[9];
       double gravity[3];
-      const char *why = NULL;
       for (int k = 0; k < 4; ++k) {
         q[k] = sign * turns[i].q[k];
       }
-      assert_int_equal(supine_stream_gravity_quaternion(&setup, q, gravity, &why),
-                       SUPINE_STREAM_EXACT);
+      supine_stream_rotation(q, r);
+      assert_int_equal(take(r, gravity), SUPINE_STREAM_EXACT);
       expect_gravity(gravity, turns[i].posture);
     }
   }
@@ -177,43 +176,17 @@ TEST(test_gravity_invalid_quaternions_and_vectors_refused) {
   const supine_stream_setup setup = supine_stream_setup_default();
   const double good[4] = {3, -3, 0, 0};
   const double bad[3][4] = {{0, 0, 0, 0}, {NAN, 0, 0, 0}, {1, INFINITY, 0, 0}};
+  double r[9];
   double gravity[3] = {7, 7, 7};
   const char *why = NULL;
   for (int i = 0; i < 3; ++i) {
-    assert_int_equal(supine_stream_gravity_quaternion(&setup, bad[i], gravity, &why),
-                     SUPINE_STREAM_REFUSED);
-    assert_non_null(why);
+    supine_stream_rotation(bad[i], r);
+    assert_int_equal(take(r, gravity), SUPINE_STREAM_REFUSED);
     assert_int_equal(supine_stream_gravity_down(&setup, bad[i], gravity, &why),
                      SUPINE_STREAM_REFUSED);
   }
   assert_true(gravity[0] == 7.0);
-  assert_int_equal(supine_stream_gravity_quaternion(&setup, good, gravity, &why),
-                   SUPINE_STREAM_REPAIRED);
+  supine_stream_rotation(good, r);
+  assert_int_equal(take(r, gravity), SUPINE_STREAM_REPAIRED);
   expect_gravity(gravity, "supine");
-}
-
-/* The smoothed direction lags behind a steady turn of gravity by `seconds`. */
-TEST(test_gravity_smooth_steady_turn_has_stated_lag) {
-  const double seconds = 0.2;
-  const double step = 1e-3;
-  const double speed = 0.5; /* rad/s */
-  double smooth[3] = {0, 1, 0};
-  for (int i = 1; i <= 2000; ++i) { /* for 2 s, ten times the lag of 0.2 s */
-    const double angle = speed * step * i;
-    const double gravity[3] = {sin(angle), cos(angle), 0};
-    const double left = supine_stream_gravity_smooth(gravity, step, seconds, smooth);
-    if (i == 2000) { /* now the lag of the smoothed direction is `seconds`, within one time step */
-      assert_true(fabs(left - speed * seconds) < speed * step);
-      assert_true(fabs(atan2(smooth[0], smooth[1]) - (angle - left)) < 1e-12);
-    }
-  }
-  const double still[3] = {0, 0, -1};
-  double none[3] = {0, 1, 0};
-  assert_true(supine_stream_gravity_smooth(still, step, 0.0, none) == 0.0);
-  assert_memory_equal(none, still, sizeof still);
-  /* After gravity reverses, half of the turn takes `seconds` times ln 2. */
-  double opposite[3] = {0, 0, 1};
-  assert_true(fabs(supine_stream_gravity_smooth(still, seconds * log(2.0), seconds, opposite) -
-                   M_PI / 2.0) < 1e-9);
-  assert_true(fabs(opposite[2]) < 1e-9);
 }

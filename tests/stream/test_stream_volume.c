@@ -1,27 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Test volumes given as text, and the histogram of latencies. */
+/* Test volumes given as text, and volumes of a breath. */
 #include "program/stream/tracked_patient.h"
 #include "tests/runtime_fixture.h"
 #include "tests/test.h"
-
-TEST(test_latency_known_values_give_percentiles) {
-  supine_stream_latency *latency = fixture_allocate(1, sizeof *latency);
-  assert_true(supine_stream_latency_quantile(latency, 0.5) == 0.0);
-  for (int i = 1; i <= 1000; ++i) { /* latencies of 10.5, 20.5, ... us */
-    ++latency->bin[10 * i];
-  }
-  latency->count = 1000;
-  latency->worst = 10000.5e-6;
-  assert_true(fabs(supine_stream_latency_quantile(latency, 0.5) - 5001e-6) < 1e-12);
-  assert_true(fabs(supine_stream_latency_quantile(latency, 0.99) - 9901e-6) < 1e-12);
-  assert_true(supine_stream_latency_quantile(latency, 1.0) == latency->worst);
-  ++latency->count;
-  ++latency->bin[SUPINE_STREAM_LATENCY_BINS - 1];
-  latency->worst = 3.0;
-  assert_true(supine_stream_latency_quantile(latency, 1.0) == 3.0);
-  assert_true(supine_stream_latency_quantile(latency, 0.99) < 0.01);
-  free(latency);
-}
 
 static void expect_volume(const supine_stream_volume *volume, const supine_basis *basis,
                           const double gravity[3], double time, supine_volume wanted) {

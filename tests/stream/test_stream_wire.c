@@ -12,6 +12,7 @@
 #include <igtl_transform.h>
 #include <igtl_util.h>
 
+#include "base/vec3.h"
 #include "program/stream/frame.h"
 #include "tests/runtime_fixture.h"
 
@@ -154,12 +155,24 @@ TEST(test_read_transform_of_version_2_gives_rotation) {
   }
 }
 
+/* The matrix of a unit quaternion: R v = v + 2 u x (u x v + w v), where u = (x, y, z). */
 static void expect_quaternion(const supine_stream_message *m, double w, double x, double y,
                               double z) {
-  const double wanted[4] = {w, x, y, z};
-  assert_int_equal(m->kind, SUPINE_STREAM_QUATERNION);
-  for (int i = 0; i < 4; ++i) {
-    assert_true(fabs(m->number[i] - wanted[i]) < 1e-7); /* precision of 32-bit floats */
+  const double u[3] = {x, y, z};
+  assert_int_equal(m->kind, SUPINE_STREAM_ROTATION);
+  assert_string_equal(m->text, "");
+  for (int i = 0; i < 3; ++i) {
+    double v[3] = {i == 0, i == 1, i == 2};
+    double inner[3];
+    double outer[3];
+    supine_cross(u, v, inner);
+    for (int k = 0; k < 3; ++k) {
+      inner[k] += w * v[k];
+    }
+    supine_cross(u, inner, outer);
+    for (int k = 0; k < 3; ++k) { /* within the precision of 32-bit floats */
+      assert_true(fabs(m->number[3 * k + i] - (v[k] + 2.0 * outer[k])) < 5e-7);
+    }
   }
 }
 

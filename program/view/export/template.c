@@ -30,9 +30,9 @@ typedef struct tag {
 
 static tag next_tag(const char *at, const char *end) {
   tag found = {0};
-  const char *open = memmem(at, (size_t)(end - at), "{{", 2);
-  const char *close = open == NULL ? NULL : memmem(open, (size_t)(end - open), "}}", 2);
-  if (close != NULL) {
+  const char *open = strstr(at, "{{"); /* a NUL follows every asset */
+  const char *close = open == NULL ? NULL : strstr(open, "}}");
+  if (close != NULL && close + 2 <= end) {
     found.begin = open;
     found.end = close + 2;
     found.name = open + 2;

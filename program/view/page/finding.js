@@ -3,7 +3,7 @@
 
 /** Published changes, %, of the volume that each lung has at rest, relative to the supine posture: mean (standard
  * deviation), by posture. */
-const PUBLISHED = { left: 'left lung 0 (44), right lung +25 (11) (Little 2021, n 10)' };
+const PUBLISHED = { left: 'left 0 (44), right +25 (11) (Little 2021, n 10)' };
 
 /** Return the volume (gas plus tissue) of each lung, mL. */
 const heldBy = (basis, { weights, gains }) => basis.references.map((ml, lung) => ml + formAt(lungForm(basis, lung, weights), gains.slice(3 * lung, 3 * lung + 3)));
@@ -149,10 +149,10 @@ function sentenceOf(basis, moved, target, gravity, above) {
   const { mm, error } = target ?? { mm: moved.mean, error: moved.error };
   if (moved.largest < 0.05) return { before: `This is ${name}, from which displacements are measured.`, told: '', after: '', error: '', meaning: '' };
   const stated = error === null ? '' : `expected error ${errorText(error)}`;
-  const meaning = error === null ? '' : `Half of all points lie within ${(0.9 * error).toFixed(0)} mm of the computed place, 95 % within ${(1.8 * error).toFixed(0)} mm${near(gravity, moved.from.gravity) ? '' : '; for a change of posture the error is an extrapolation'}.`;
-  if (!isTold({ mm, error })) return { before: `${where}${who}: ${UNTOLD} from ${name} (${mm.toFixed(1)} mm; `, told: '', after: '', error: `expected error ${error.toFixed(1)} mm).`, meaning };
+  const half = error === null ? '' : `Half of all points lie within ${(0.9 * error).toFixed(0)} mm of the computed place, 95 % within ${(1.8 * error).toFixed(0)} mm${near(gravity, moved.from.gravity) ? '' : '; for a change of posture the error is an extrapolation'}.`;
+  if (!isTold({ mm, error })) return { before: `${where}${who}: ${UNTOLD} from ${name}.`, told: '', after: '', error: '', meaning: `Computed: ${mm.toFixed(1)} mm, with an expected error of ${error.toFixed(1)} mm. ${half}` };
   const [told, after] = target ? [`moves ${mm.toFixed(1)} mm`, `: ${wayWords(target.move, 2)}`] : [`moves ${mm.toFixed(1)} mm on average`, `, ${moved.largest.toFixed(1)} mm at most, ${spotWords(basis, moved.at)}`];
-  return { before: where, told: `${who} ${told}`, after: ` from ${name}${after}${stated && '; '}`, error: stated && `${stated}.`, meaning };
+  return { before: where, told: `${who} ${told}`, after: ` from ${name}${after}${stated && '; '}`, error: stated && `${stated}.`, meaning: half };
 }
 
 const errorText = (mm) => `${mm < 3 ? mm.toFixed(1) : mm.toFixed(0)} mm`;
@@ -175,7 +175,7 @@ function answerOf(moved, target) {
   const told = target ?? { mm: moved.mean, error: moved.error };
   if (moved.largest < 0.05) return 'reference';
   if (!isTold(told)) return `${told.mm.toFixed(1)} mm, within the error`;
-  return `${told.mm.toFixed(1)} mm${target ? `, ${wayWords(target.move, 1)}` : ' on average'}`;
+  return `${told.mm.toFixed(1)} mm${!target ? ' on average' : told.mm < 1 ? '' : `, ${wayWords(target.move, 1)}`}`;
 }
 
 /** Bars with the lungs' volumes: a tick for the earlier volume, a dot for that now, and a band for its range. */

@@ -34,18 +34,12 @@ function drawTrace(context, was, at, radius, halo) {
     context.beginPath();
     context.arc(x, y, r, 0, 2 * Math.PI);
   };
-  if (halo > 0) {
-    const shade = context.createRadialGradient(...at, radius, ...at, radius + halo);
-    shade.addColorStop(0, `${css('--change')}66`);
-    shade.addColorStop(1, `${css('--change')}00`);
-    context.fillStyle = shade;
-    circle(at, radius + halo);
+  context.fillStyle = css('--change');
+  for (const [alpha, r] of [[0.25, radius + halo], [0.85, radius]]) {
+    context.globalAlpha = alpha;
+    circle(at, r);
     context.fill();
   }
-  context.fillStyle = css('--change');
-  context.globalAlpha = 0.85;
-  circle(at, radius);
-  context.fill();
   context.globalAlpha = 1;
   context.strokeStyle = context.fillStyle = css('--ink');
   context.lineWidth = 1.2;
@@ -57,7 +51,7 @@ function drawTrace(context, was, at, radius, halo) {
   if (Math.hypot(at[0] - was[0], at[1] - was[1]) > 4) drawArrow(context, was, at, Math.min(radius > 20 ? 13 : 7, 0.6 * Math.hypot(at[0] - was[0], at[1] - was[1])));
 }
 
-/** The canvas with the notes. `avoid` returns the boxes, CSS pixels, that names may not cover. */
+/** The canvas with the notes. `taken` has the boxes [left, top, right, bottom], CSS pixels, that names may not cover. */
 class Notes {
   constructor(canvas) {
     this.canvas = canvas;
@@ -84,14 +78,16 @@ class Notes {
     this.text(word, x, y + from, { align: 'center', font: '12px' });
   }
 
-  /** Draw a target's name, and a line from it to the target. If names overlap, the lower one moves down. */
+  /** Draw a target's name, and a line from it to the target. A name that would cover a taken box moves down. */
   name(target, at, lines, width) {
     const { context, taken } = this;
     context.font = '600 13px system-ui, sans-serif';
-    const side = at[0] + 70 + Math.max(...lines.map((line) => context.measureText(line).width)) < width ? 1 : -1;
+    const wide = Math.max(...lines.map((line) => context.measureText(line).width));
+    const side = at[0] + 70 + wide < width ? 1 : -1;
     const place = [at[0] + side * 60, at[1] + 4];
-    while (taken.some(([x, y]) => Math.abs(y - place[1]) < 34 && Math.abs(x - place[0]) < 200)) place[1] += 8;
-    taken.push(place);
+    const box = () => [place[0] - (side < 0 ? wide : 0), place[1] - 9, place[0] + (side > 0 ? wide : 0), place[1] + 16 * lines.length - 7];
+    while (taken.some(([left, top, right, bottom]) => left < box()[2] && right > box()[0] && top < box()[3] && bottom > box()[1])) place[1] += 8;
+    taken.push(box());
     context.strokeStyle = css('--soft');
     context.lineWidth = 1;
     context.beginPath();
@@ -101,15 +97,16 @@ class Notes {
     lines.forEach((line, i) => this.text(line, place[0], place[1] + 16 * i, { align: side > 0 ? 'left' : 'right', font: i ? '12px' : '600 13px' }));
   }
 
-  /** Draw the chosen target's trace, and enlarged in a circle at the upper right, with its numbers beside or below. */
+  /** Draw the chosen target's trace, and enlarged in a circle at the upper right, with its numbers beside it or, if the
+   * picture is narrow, its name below. */
   lens(pane, target, radius, from, ratio, { width, height }) {
     const { context, taken } = this;
     const [was, at] = [target.was, target.at].map((p) => project(pane, p, ratio));
     if (!was || !at) return;
     const scale = (1 / pane.pixel); // CSS pixels for each mm
-    const small = width < 520;
-    const size = small ? 54 : Math.min(92, height * 0.2);
-    const middle = [width - (small ? size + 10 : size + 172), size + (small ? 8 : 16)];
+    const narrow = width < 720;
+    const size = Math.min(92, height * 0.2, width * 0.15);
+    const middle = [width - size - (narrow ? 10 : 172), size + 12];
     const error = target.error ?? 0;
     const grown = (0.92 * size) / Math.max(radius + error + 0.5 * target.mm, 10); // pixels for each mm in the lens
     drawTrace(context, was, at, Math.max(4, radius * scale), 0);
@@ -135,14 +132,14 @@ class Notes {
     const [old, now] = [was, at].map((p) => p.map((x, k) => middle[k] + ((x - centre[k]) / scale) * grown));
     drawTrace(context, old, now, radius * grown, error * grown);
     context.restore();
-    if (small) {
-      this.text(target.name, Math.min(middle[0], width - 60), middle[1] + size + 12, { align: 'center', colour: '--change', font: '600 12px' });
+    taken.push([middle[0] - size, 0, width, middle[1] + size + (narrow ? 22 : 6)]);
+    if (narrow) {
+      this.text(target.name, width - 10, middle[1] + size + 12, { align: 'right', colour: '--change', font: '600 12px' });
       return;
     }
     const ways = isTold(target) ? wayWords(target.move, 3, pane.gravity).split(', ') : UNTOLD.split(/(?<=the) /);
     const lines = [[target.name, '--change', '650 14px'], [`${target.mm.toFixed(1)} mm`, '--ink', isTold(target) ? '650 14px' : '12px'], ...ways.map((way) => [way, '--ink', '12px']), [`dashed: ${from}`, '--soft', '12px'], [`halo: ${errorText(error)} error`, '--soft', '12px']].slice(0, target.error === null ? -1 : undefined);
     lines.forEach(([words, colour, font], i) => this.text(words, middle[0] + size + 12, middle[1] - size + 24 + 18 * i, { colour, font }));
-    taken.push([middle[0], middle[1]], [middle[0] + size, middle[1] + 40]);
   }
 }
 

@@ -160,6 +160,6 @@ class Outlines {
     context.fillStyle = css('--ink');
     context.fillRect(0, height - 29, 40 * scale, 1.5);
     text('4 cm', 40 * scale + 6, height - 28, 'left');
-    text(`${PLANES[axis].name}, seen ${from}`, 0, height - 9, 'left');
+    text(`${PLANES[axis].name}, ${from}`, 0, height - 9, 'left');
   }
 }

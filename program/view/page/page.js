@@ -237,7 +237,7 @@ function start() {
           notes.context.strokeStyle = notes.context.fillStyle = css('--ink');
           notes.context.lineWidth = 1.5;
           if (Math.hypot(at[0] - was[0], at[1] - was[1]) > 6) drawArrow(notes.context, was, at, 6);
-          notes.name(target, at, [target.name, ...(small ? [] : [`${target.mm.toFixed(1)} mm${isTold(target) ? '' : `: ${UNTOLD}`}`])], width);
+          notes.name(target, at, [target.name, ...(small ? [] : [`${target.mm.toFixed(1)} mm`]), ...(small || isTold(target) ? [] : [UNTOLD])], width);
         }
       }
     }
@@ -318,7 +318,7 @@ function start() {
     const measured = told.depth === 0 && from.name === 'supine at rest' ? PUBLISHED[postureText(state.gravity)] : undefined;
     holds.show(basis, moment.held, told.depth, heldBy(basis, from), lungHeights(state.gravity));
     write('holds-source', basis.metadata.resting_spread ? 'assumed from healthy people' : '');
-    write('holds-text', `Dashed tick: ${from.name}. Dot: now.${basis.metadata.resting_spread ? ' Band: one SD.' : ''} Full bar: the reference.${measured ? ` Published change, %, mean (SD): ${measured}.` : ''}`);
+    write('holds-text', `Tick: ${from.name}. Dot: now.${basis.metadata.resting_spread ? ' Band: one SD.' : ''}${measured ? ` Published change, % (SD): ${measured}.` : ''}`);
   }
 
   const volumeWords = () => `${amount(state.tidal)}, ${state.rate} a minute${Math.round(state.depth) ? `; now ${restOrScan} + ${amount(state.depth)}` : ''}`;
@@ -615,7 +615,7 @@ function start() {
     basis.froms.forEach((from, i) => {
       const [label, input, words] = ['label', 'input', 'span'].map((tag) => document.createElement(tag));
       Object.assign(input, { type: 'radio', name: 'since', value: i });
-      words.textContent = `since ${from.name.replace('scan', 'CT')}`;
+      words.textContent = `from ${from.name}`;
       input.addEventListener('change', () => measureFrom(from));
       label.append(input, words);
       group.prepend(label);
@@ -720,7 +720,7 @@ function start() {
   document.querySelector('[name=kind][value=expansion]').disabled = basis.words === 0;
   write('depth-name', `Above ${restOrScan}`);
   write('ghost-name', 'Ghost of the reference');
-  write('state', basis.fields ? `another simulator\u2019s fields of gravity, compressed: error ${errorOf(basis)}` : `at ${basis.resting ? 'rest, after a quiet expiration' : 'the volume of the scan'}; ${/scan at [^;()]*/.exec(basis.metadata.assumed)?.[0].replace('scan at', 'CT assumed at').trim() ?? ''}`.replace(/; $/, ''));
+  write('state', basis.fields ? `another simulator\u2019s fields of gravity, compressed: error ${errorOf(basis)}` : `at ${basis.resting ? 'rest, after a quiet expiration' : 'the volume of the scan'}; ${/scan at [^;()]*/.exec(basis.metadata.assumed)?.[0].replace('scan at', 'scan assumed at').trim() ?? ''}`.replace(/; $/, ''));
   $('credit').hidden = !basis.metadata.attribution;
   write('credit', `Lungs: ${basis.metadata.attribution}`);
   $('inside').disabled = !inside;

@@ -80,15 +80,15 @@ static void text(cairo_t *cr, double x, double y, double align, const char *word
   cairo.show_text(cr, words);
 }
 
-/* Draw text with its left end at x, reduced in size if it is wider than `room`, pixels. */
-static void fitted_text(cairo_t *cr, double x, double y, double size, bool bold, double room,
-                        const char *words) {
+/* Draw text with its left end at x, reduced in size if it is wider than `room`, pixels. Return the
+ * size. */
+static double fitted_text(cairo_t *cr, double x, double y, double size, bool bold, double room,
+                          const char *words) {
   font(cr, size, bold);
-  const double width = text_width(cr, words);
-  if (width > room) {
-    font(cr, size * room / width, bold);
-  }
+  const double fitted = size * fmin(1, room / text_width(cr, words));
+  font(cr, fitted, bold);
   text(cr, x, y, 0, words);
+  return fitted;
 }
 
 static void rounded(cairo_t *cr, double x, double y, double width, double height, double radius) {
@@ -107,6 +107,22 @@ static void ground(cairo_t *cr, const supine_picture *picture) {
   cairo.set_source(cr, fade);
   cairo.paint(cr);
   cairo.pattern_destroy(fade);
+}
+
+/* Draw an arrow from `from` to `to`. Its head and its line have the sizes `head` and `line`. */
+static void arrow(cairo_t *cr, const double from[2], const double to[2], double head, double line) {
+  const double length = hypot(to[0] - from[0], to[1] - from[1]);
+  const double dx = (to[0] - from[0]) / length;
+  const double dy = (to[1] - from[1]) / length;
+  cairo.set_line_width(cr, line);
+  cairo.move_to(cr, from[0], from[1]);
+  cairo.line_to(cr, to[0] - 0.8 * head * dx, to[1] - 0.8 * head * dy);
+  cairo.stroke(cr);
+  cairo.move_to(cr, to[0], to[1]);
+  cairo.line_to(cr, to[0] - head * dx - 0.5 * head * dy, to[1] - head * dy + 0.5 * head * dx);
+  cairo.line_to(cr, to[0] - head * dx + 0.5 * head * dy, to[1] - head * dy - 0.5 * head * dx);
+  cairo.close_path(cr);
+  cairo.fill(cr);
 }
 
 /* Draw gravity on the ball that shows the body's axes: as a circle with a dot if it points nearly
@@ -134,19 +150,10 @@ static void gravity_arrow(cairo_t *cr, double x, double y, double radius, const 
     cairo.stroke(cr);
     return;
   }
-  const double dx = seen[0] / flat;
-  const double dy = -seen[1] / flat;
-  const double length = radius * fmax(flat, 0.55);
-  const double head = radius * 0.42;
-  const double neck = length - head;
-  cairo.move_to(cr, x - 0.25 * length * dx, y - 0.25 * length * dy);
-  cairo.line_to(cr, x + (neck + head * 0.2) * dx, y + (neck + head * 0.2) * dy);
-  cairo.stroke(cr);
-  cairo.move_to(cr, x + length * dx, y + length * dy);
-  cairo.line_to(cr, x + neck * dx - 0.5 * head * dy, y + neck * dy + 0.5 * head * dx);
-  cairo.line_to(cr, x + neck * dx + 0.5 * head * dy, y + neck * dy - 0.5 * head * dx);
-  cairo.close_path(cr);
-  cairo.fill(cr);
+  const double length = radius * fmax(flat, 0.55) / flat;
+  const double from[2] = {x - 0.25 * length * seen[0], y + 0.25 * length * seen[1]};
+  const double to[2] = {x + length * seen[0], y - length * seen[1]};
+  arrow(cr, from, to, radius * 0.42, radius * 0.13);
 }
 
 /* Draw the ball that shows the body's axes and gravity. */
@@ -198,44 +205,17 @@ static void place_name(double (*box)[3], size_t count, double line) {
   }
 }
 
-/* Draw an arrow that shows how a mark has moved. */
-static void trace(cairo_t *cr, const double from[2], const double to[2], double size) {
-  const double length = hypot(to[0] - from[0], to[1] - from[1]);
-  const double head = fmin(size * 0.55, 0.6 * length);
-  if (length < 0.3 * size) {
-    return;
-  }
-  const double dx = (to[0] - from[0]) / length;
-  const double dy = (to[1] - from[1]) / length;
-  colour(cr, ink);
-  cairo.set_line_width(cr, size * 0.12);
-  cairo.move_to(cr, from[0], from[1]);
-  cairo.line_to(cr, to[0] - head * dx, to[1] - head * dy);
-  cairo.stroke(cr);
-  cairo.move_to(cr, to[0], to[1]);
-  cairo.line_to(cr, to[0] - head * dx - 0.45 * head * dy, to[1] - head * dy + 0.45 * head * dx);
-  cairo.line_to(cr, to[0] - head * dx + 0.45 * head * dy, to[1] - head * dy - 0.45 * head * dx);
-  cairo.close_path(cr);
-  cairo.fill(cr);
-}
-
-/* Draw a label, and a line from it to its mark at `at`. `box` is as in place_name. */
-static void name(cairo_t *cr, const supine_mark *mark, const double at[2], double (*box)[3],
-                 size_t placed, double size, const supine_scene *scene) {
-  double *own = box[placed];
-  font(cr, size * 0.75, false);
-  own[2] = text_width(cr, mark->label);
-  const bool right = at[0] + 2.2 * size + own[2] < (double)scene->width;
-  own[0] = right ? at[0] + 2.2 * size : fmax(0, at[0] - 2.2 * size - own[2]);
-  own[1] = at[1] - size * 0.6;
-  place_name(box, placed, size);
+/* Draw a label at `box`, which is as in place_name, and a line from it to its mark at `at`. */
+static void name(cairo_t *cr, const char *label, const double at[2], const double box[3],
+                 double size) {
+  const bool right = box[0] > at[0];
   colour(cr, faint);
   cairo.set_line_width(cr, size * 0.06);
   cairo.move_to(cr, at[0] + (right ? 0.5 : -0.5) * size, at[1]);
-  cairo.line_to(cr, own[0] + (right ? -0.2 * size : own[2] + 0.2 * size), own[1] - 0.25 * size);
+  cairo.line_to(cr, box[0] + (right ? -0.2 * size : box[2] + 0.2 * size), box[1] - 0.25 * size);
   cairo.stroke(cr);
-  cairo.move_to(cr, own[0], own[1]);
-  cairo.text_path(cr, mark->label);
+  cairo.move_to(cr, box[0], box[1]);
+  cairo.text_path(cr, label);
   cairo.set_source_rgba(cr, card[0], card[1], card[2], 0.85);
   cairo.set_line_width(cr, size * 0.25);
   cairo.stroke_preserve(cr);
@@ -243,43 +223,79 @@ static void name(cairo_t *cr, const supine_mark *mark, const double at[2], doubl
   cairo.fill(cr);
 }
 
-/* Draw discs and dots at the marks, then arrows, then labels. The origin of the picture is the
- * upper left corner of the scene; `size` is the size of the font, pixels. */
+/* Draw labels on the outer side of their marks at `pixel`, so that lines to them do not cross. */
+static void draw_names(cairo_t *cr, const supine_marks *marks, double (*pixel)[2], double (*box)[3],
+                       double size, double width) {
+  const double margin = 0.5 * size; /* part of that between the scene and the edge of its card */
+  double sum = 0.0;
+  size_t count = 0;
+  for (size_t i = 0; i < marks->count; ++i) {
+    sum += marks->mark[i].label != NULL ? pixel[i][0] : 0.0;
+    count += marks->mark[i].label != NULL;
+  }
+  font(cr, size * 0.68, false);
+  for (size_t i = 0, placed = 0; placed < count; ++i) {
+    if (marks->mark[i].label != NULL) {
+      double *own = box[placed];
+      own[2] = text_width(cr, marks->mark[i].label);
+      const double right = pixel[i][0] + 1.3 * size;
+      const double left = pixel[i][0] - 1.3 * size - own[2];
+      const bool outer_right = pixel[i][0] * (double)count >= sum * (1.0 - 1e-12);
+      own[0] = right + own[2] < width + margin && (outer_right || left < -margin)
+                   ? right
+                   : fmax(-margin, left);
+      own[1] = pixel[i][1] - size * 0.6;
+      place_name(box, placed++, size);
+      name(cr, marks->mark[i].label, pixel[i], own, size);
+    }
+  }
+}
+
+/* Draw triangles, discs and dots at the marks, then arrows, then labels. The origin of the picture
+ * is the upper left corner of the scene; `size` is the size of the font, pixels. */
 static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const supine_scene *scene,
                                 const supine_marks *marks, double size) {
-  double(*pixel)[2] = malloc(2 * (marks->count + 1) * sizeof *pixel);
-  double(*box)[3] = malloc((marks->count + 1) * sizeof *box);
-  size_t placed = 0;
-  if (pixel == NULL || box == NULL) {
-    free(pixel);
-    free(box);
+  SUPINE_ARENA arena = {0};
+  double(*pixel)[2] = supine_arena_take(&arena, marks->count, 2 * sizeof *pixel);
+  double(*box)[3] = supine_arena_take(&arena, marks->count, sizeof *box);
+  if (arena.failed) {
     return SUPINE_ERROR_MEMORY;
   }
   double(*from)[2] = pixel + marks->count;
   supine_render_project(renderer, scene, marks, false, pixel);
   supine_render_project(renderer, scene, marks, true, from);
+  cairo.new_path(cr);
+  colour(cr, mark_colour);
+  cairo.set_line_width(cr, 1.0); /* closes the seams between triangles */
+  for (size_t t = 0; t < marks->triangle_count; ++t) {
+    for (size_t k = 0; k < 3; ++k) {
+      const double *at = pixel[marks->triangles[3 * t + k]];
+      cairo.line_to(cr, at[0], at[1]);
+    }
+    cairo.close_path(cr);
+    cairo.fill_preserve(cr);
+    cairo.stroke(cr);
+  }
   for (size_t i = 0; i < marks->count; ++i) {
     const supine_mark *mark = &marks->mark[i];
     if (mark->point || mark->label == NULL) {
-      cairo.new_path(cr);
       cairo.arc(cr, pixel[i][0], pixel[i][1], size * (mark->point ? 0.32 : 0.1), 0, 2 * pi);
-      colour(cr, mark_colour);
       cairo.fill(cr);
     }
   }
+  colour(cr, ink);
   for (size_t i = 0; i < marks->count; ++i) {
-    if (marks->mark[i].label != NULL) {
-      trace(cr, from[i], pixel[i], size);
+    const double moved = hypot(pixel[i][0] - from[i][0], pixel[i][1] - from[i][1]);
+    if (marks->mark[i].label != NULL && moved > 0.3 * size) {
+      arrow(cr, from[i], pixel[i], fmin(size * 0.55, 0.6 * moved), size * 0.12);
     }
   }
-  for (size_t i = 0; i < marks->count; ++i) {
-    if (marks->mark[i].label != NULL) {
-      name(cr, &marks->mark[i], pixel[i], box, placed++, size, scene);
-    }
-  }
-  free(pixel);
-  free(box);
+  draw_names(cr, marks, pixel, box, size, (double)scene->width);
   return SUPINE_OK;
+}
+
+static void free_surface(cairo_surface_t **surface) {
+  cairo.surface_destroy(*surface);
 }
 
 /* Draw a scene on a new cairo surface, which the caller must destroy, even after a failure. */
@@ -322,20 +338,17 @@ static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_
                               .width = (size_t)width,
                               .height = (size_t)height,
                               .extent = shown};
-  cairo_surface_t *image = NULL;
-  supine_status status = draw_scene(renderer, &scene, &image, error);
-  if (status == SUPINE_OK) {
-    cairo.set_source_surface(cr, image, floor(x), floor(y));
-    cairo.paint_with_alpha(cr, picture->transparency > 0 ? fmin(1, 2 * (1 - picture->transparency))
-                                                         : 1);
-    if (panel->marks != NULL) {
-      cairo.translate(cr, floor(x), floor(y));
-      status = draw_marks(cr, renderer, &scene, panel->marks, size);
-      cairo.translate(cr, -floor(x), -floor(y));
-    }
+  SUPINE_FREED_BY(free_surface) cairo_surface_t *image = NULL;
+  SUPINE_TRY(draw_scene(renderer, &scene, &image, error));
+  cairo.set_source_surface(cr, image, floor(x), floor(y));
+  cairo.paint_with_alpha(cr,
+                         picture->transparency > 0 ? fmin(1, 2 * (1 - picture->transparency)) : 1);
+  if (panel->marks != NULL) {
+    cairo.translate(cr, floor(x), floor(y));
+    SUPINE_TRY(draw_marks(cr, renderer, &scene, panel->marks, size));
+    cairo.translate(cr, -floor(x), -floor(y));
   }
-  cairo.surface_destroy(image);
-  return status;
+  return SUPINE_OK;
 }
 
 /* Draw the cell of the picture that shows the posture `column` from the view `row`. A struct for
@@ -360,13 +373,13 @@ static supine_status cell(cairo_t *cr, supine_renderer *renderer, const supine_p
   ball(cr, x + radius + at->font * 0.7, y + at->heading_height / 2 + at->font * 0.2, radius, view,
        panel->gravity);
   colour(cr, ink);
-  fitted_text(cr, words, y + at->heading_height / 2 - at->font * 0.25, at->font * 1.3, true, room,
-              panel->title);
+  (void)fitted_text(cr, words, y + at->heading_height / 2 - at->font * 0.25, at->font * 1.3, true,
+                    room, panel->title);
   colour(cr, faint);
-  fitted_text(cr, words, y + at->heading_height / 2 + at->font * 0.95, at->font * 0.82, false, room,
-              panel->subtitle);
-  fitted_text(cr, words, y + at->heading_height / 2 + at->font * 2.0, at->font * 0.82, false, room,
-              view == SUPINE_VIEW_LYING ? panel->note : supine_render_view_name(view));
+  const double size = fitted_text(cr, words, y + at->heading_height / 2 + at->font * 0.95,
+                                  at->font * 0.82, false, room, panel->subtitle);
+  (void)fitted_text(cr, words, y + at->heading_height / 2 + at->font * 2.0, size, false, room,
+                    view == SUPINE_VIEW_LYING ? panel->note : supine_render_view_name(view));
   double below = at->font * 0.5; /* height of the space below the lungs */
   if (view == SUPINE_VIEW_LYING && fabs(panel->gravity[2]) < 0.8) { /* the table */
     cairo.rectangle(cr, x + at->font, y + at->cell_height - 2 * at->font,
@@ -509,42 +522,31 @@ static supine_status draw_on(cairo_surface_t *surface, supine_renderer *renderer
 supine_status supine_render_picture_draw(supine_renderer *renderer, const supine_picture *picture,
                                          uint32_t *pixels, supine_error *error) {
   SUPINE_TRY(SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error));
+  SUPINE_FREED_BY(free_surface)
   cairo_surface_t *surface = cairo.image_surface_create_for_data(
       (unsigned char *)pixels, CAIRO_FORMAT_RGB24, (int)picture->width, (int)picture->height,
       (int)(4 * picture->width));
-  const supine_status status = draw_on(surface, renderer, picture, error);
-  cairo.surface_destroy(surface);
-  return status;
+  return draw_on(surface, renderer, picture, error);
 }
 
 supine_status supine_render_picture_save(supine_renderer *renderer, const supine_picture *picture,
                                          const char *path, supine_error *error) {
   SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
   SUPINE_TRY(SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error));
+  SUPINE_FREED_BY(free_surface)
   cairo_surface_t *surface =
       cairo.image_surface_create(CAIRO_FORMAT_RGB24, (int)picture->width, (int)picture->height);
-  supine_status status = draw_on(surface, renderer, picture, error);
-  if (status == SUPINE_OK) {
-    status = supine_output_open(path, &output, error);
-  }
-  if (status == SUPINE_OK) {
-    status = write_png(surface, output.file, error);
-    if (status == SUPINE_OK || ferror(output.file) != 0) {
-      status = supine_output_commit(&output, error);
-    }
-  }
-  cairo.surface_destroy(surface);
-  return status;
+  SUPINE_TRY(draw_on(surface, renderer, picture, error));
+  SUPINE_TRY(supine_output_open(path, &output, error));
+  const supine_status status = write_png(surface, output.file, error);
+  return status == SUPINE_OK || ferror(output.file) != 0 ? supine_output_commit(&output, error)
+                                                         : status;
 }
 
 supine_status supine_render_png(supine_renderer *renderer, const supine_scene *scene, FILE *file,
                                 supine_error *error) {
   SUPINE_TRY(SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error));
-  cairo_surface_t *image = NULL;
-  supine_status status = draw_scene(renderer, scene, &image, error);
-  if (status == SUPINE_OK) {
-    status = write_png(image, file, error);
-  }
-  cairo.surface_destroy(image);
-  return status;
+  SUPINE_FREED_BY(free_surface) cairo_surface_t *image = NULL;
+  SUPINE_TRY(draw_scene(renderer, scene, &image, error));
+  return write_png(image, file, error);
 }

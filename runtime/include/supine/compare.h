@@ -23,9 +23,9 @@ extern "C" {
 typedef struct supine_compare supine_compare;
 
 /** Compute the constants for comparing poses: the share a_i of each vertex i in the area of the
- * reference surface (top of this file), and a Gram matrix of the modes for each lung and axis j:
+ * reference surface (top of this file), and the Gram matrix of the modes:
  *
- *     G_j[k, l] = sum over the vertices i of the lung of a_i d_ij^2 c_ik c_il
+ *     G[k, l] = sum over vertices i and axes j of a_i d_ij^2 c_ik c_il
  *
  * Mode k moves vertex i along the vector d_i, in proportion to c_ik; d_ij is coordinate j of d_i.
  * If supine_basis_info.vector is true, coefficients c_ijk replace d_ij c_ik. Cost: 3 N K^2 / 2
@@ -41,19 +41,6 @@ SUPINE_API void supine_compare_destroy(supine_compare *compare);
 
 /** Return the area of the reference surface, mm^2. */
 SUPINE_API double supine_compare_area(const supine_compare *compare);
-
-/** Compute the RMS distance D between the vertices in two poses, mm, from Gram matrices of the
- * modes, without a pass over the vertices:
- *
- *     D^2 = sum over all lungs and axes of q^T G q,     q = A w - A' w'
- *
- * G is the Gram matrix of a lung and an axis (supine_compare_create). A is the gain of `pose` for
- * this lung and axis, and w are the weights of `pose`. A' and w' are the gain and the weights of
- * `from`. Cost: 3 K^2 multiplications for each lung and K modes.
- * @param from  NULL for the reference surface
- * @return D, or infinity if a pose is of another basis */
-SUPINE_API double supine_compare_rms(const supine_compare *compare, const supine_pose *pose,
-                                     const supine_pose *from);
 
 /** Compute the distance between the positions of every vertex in two poses. Cost: one pass over the
  * vertices, with 3 K + 6 multiplications per vertex for K modes.
@@ -82,9 +69,9 @@ SUPINE_API void supine_compare_statistics(const supine_compare *compare, const f
  *
  *     energy[l] = 1 / (4 pi) * sum over m of  M_lm^T G M_lm
  *
- * M_lm is the column of supine_basis_info.modes for the harmonic Y_lm, and G is the sum of the
- * Gram matrices of all lungs and axes (supine_compare_create). Reversed gravity reverses the
- * displacements of odd bands, but not those of even bands.
+ * M_lm is the column of supine_basis_info.modes for the harmonic Y_lm, and G is the Gram matrix of
+ * supine_compare_create. Reversed gravity reverses the displacements of odd bands, but not those of
+ * even bands.
  * @param energy  [supine_basis_info.band + 1] mm^2, written */
 SUPINE_API void supine_compare_energy(const supine_compare *compare, double *energy);
 

@@ -75,6 +75,9 @@ typedef struct supine_basis_options {
   supine_storage storage;
   supine_simd simd;
   bool without_normals; /**< do not load normals, which saves memory */
+  /** Functions that allocate and free all memory of the basis but the mapped file, called only
+   * while it is opened or closed. Both are NULL, or neither. */
+  supine_allocator allocator;
 } supine_basis_options;
 
 /** The content of an open basis. The basis owns the struct and all arrays. */
@@ -113,8 +116,12 @@ typedef struct supine_basis_info {
    * memory traffic, as the layout changes between versions. */
   const void *packed;
   size_t normal_count; /**< vectors per vertex whose weighted sum is the normal; 0 if none */
-  /** [vertex_count, 3, normal_count] vectors whose weighted and normalised sum is the normal. */
+  /** [vertex_count, 3, normal_count] vectors whose weighted and normalised sum is the normal; NULL
+   * if `normal_bytes` has them. */
   const int16_t *normals;
+  /** [vertex_count, 3, normal_count + 1] bytes: vector j is 256 times byte j, and vector 0 has the
+   * last byte added; NULL if `normals` has the vectors, as in files of versions 1 and 2. */
+  const int8_t *normal_bytes;
   /** Coefficients of the polynomials that supine_basis_normal_weights evaluates. With K =
    * mode_count, the shape is [lung_count, normal_count, 3, 1 + 2 K + K (K + 1) / 2], or
    * [lung_count, normal_count, (K + 1) (K + 2) / 2] in files of versions 1 and 2. */
@@ -148,7 +155,8 @@ typedef struct supine_pose {
  * @param basis    written; NULL on failure
  * @retval SUPINE_ERROR_READ         the file is missing or unreadable
  * @retval SUPINE_ERROR_FORMAT       the file is truncated, corrupted or not a basis file
- * @retval SUPINE_ERROR_ARGUMENT     an option is out of range, or options->size is not set
+ * @retval SUPINE_ERROR_ARGUMENT     an option is out of range, options->size is not set, or only
+ * one function of the allocator is set
  * @retval SUPINE_ERROR_UNSUPPORTED  the processor or the library lacks the instruction set
  * @retval SUPINE_ERROR_MEMORY       an allocation failed */
 SUPINE_API supine_status supine_basis_open_with(const char *path,

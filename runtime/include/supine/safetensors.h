@@ -43,6 +43,7 @@ typedef enum supine_dtype {
   SUPINE_F32,
   SUPINE_F64,
   SUPINE_I16,
+  SUPINE_I8,
   SUPINE_DTYPE_COUNT
 } supine_dtype;
 
@@ -65,6 +66,14 @@ typedef struct supine_metadata {
 } supine_metadata;
 
 typedef struct supine_safetensors supine_safetensors;
+
+/** Functions that allocate memory. A zeroed struct stands for those of the C library. */
+typedef struct supine_allocator {
+  /** Return memory aligned to 64 bytes, not necessarily zeroed; NULL if there is none. */
+  void *(*allocate)(void *user, size_t bytes);
+  void (*release)(void *user, void *memory); /**< free memory of `allocate`, never NULL */
+  void *user;                                /**< first argument of both functions */
+} supine_allocator;
 
 /** Map a file, and check its header and the layout of its tensors, but not its checksum
  * (supine_safetensors_verify). The file must not change while it is open.

@@ -470,7 +470,8 @@ def open(source: Source, *, storage: str = "auto", simd: str = "auto", normals: 
 
 
 def precompute(*surfaces: Any, progress: Optional[_program.Progress] = None, **options: Any) -> Basis:
-    """Make a basis from lung surfaces with the program `supine`, beside this package or on PATH. Examples:
+    """Make a basis from lung surfaces. Use the offline library (GPL) if it is installed, else the program `supine`, beside
+    this package or on PATH. Examples:
 
         precompute(vertices, faces, scanned="supine:rest")      # vertices [N, 3], faces [M, 3] of one lung or both
         precompute((vertices, faces), (vertices, faces))        # one surface for each lung
@@ -480,13 +481,13 @@ def precompute(*surfaces: Any, progress: Optional[_program.Progress] = None, **o
     The basis has the vertices of the left lung first, and the vertices of each lung in the given order. Options are
     those of `supine precompute --help`: held_out=200 becomes --held-out 200. The value True becomes a flag, a tuple
     becomes a,b,c and a dict becomes a=b,c=d; a list repeats the option. Without `output`, the basis is only in
-    memory. Warnings of the program become Python warnings.
+    memory. Warnings become Python warnings.
 
-    progress: function that is called with the fraction done, 0 to 1. If it raises an exception, the program stops.
+    progress: function that is called with the fraction done, 0 to 1. If it raises an exception, the work stops.
     """
     if len(surfaces) == 2 and not isinstance(surfaces[0], (str, tuple, os.PathLike)):
         surfaces = (surfaces,)
-    return _made("precompute", None, surfaces, options, progress)
+    return _open(*_program.precompute(surfaces, options, progress))
 
 
 def embed(lungs: Basis, *content: Any, progress: Optional[_program.Progress] = None, **options: Any) -> Basis:
@@ -497,12 +498,10 @@ def embed(lungs: Basis, *content: Any, progress: Optional[_program.Progress] = N
         embed(lungs, "labels.nii.gz", labels="7=nodule")        # an image of labels
 
     Options are those of `supine embed --help`, given as in `precompute`, with the same `output` and `progress`."""
-    return _made("embed", lungs._owner.source, content, options, progress)
+    return _open(*_program.make("embed", lungs._owner.source, content, options, progress))
 
 
-def _made(command: str, lungs: Any, content: Sequence[Any], options: dict[str, Any],
-          progress: Optional[_program.Progress]) -> Basis:
-    source, report = _program.make(command, lungs, content, options, progress)
+def _open(source: Source, report: str) -> Basis:
     basis = Basis(source)
     basis.report = report
     return basis

@@ -11,13 +11,13 @@ from typing import Any, Optional
 MODES_MAX, LUNGS_MAX = 256, 16
 
 
-def _load() -> ctypes.CDLL:
-    """Load the library from this folder, where wheels have it, or else from the system."""
-    beside = os.path.join(os.path.dirname(__file__), "libsupine_runtime.so")
-    return ctypes.CDLL(beside if os.path.exists(beside) else ctypes.util.find_library("supine_runtime"))
+def _path(name: str) -> Optional[str]:
+    """Find a library in this folder, where wheels have it, or else in the system."""
+    beside = os.path.join(os.path.dirname(__file__), f"lib{name}.so")
+    return beside if os.path.exists(beside) else ctypes.util.find_library(name)
 
 
-_c = _load()
+_c = ctypes.CDLL(_path("supine_runtime"))
 
 
 class Error(Exception):
@@ -111,7 +111,7 @@ class Info(ctypes.Structure):
                 ("direction", c_void_p), ("coefficients", c_void_p), ("modes", c_void_p),
                 ("volume_linear", c_void_p), ("volume_quadratic", c_void_p), ("volume_cubic", c_void_p),
                 ("packed", c_void_p), ("normal_count", c_size_t), ("normals", c_void_p),
-                ("normal_weights", c_void_p), ("reference_volume", c_void_p), ("has_rest", c_bool),
+                ("normal_bytes", c_void_p), ("normal_weights", c_void_p), ("reference_volume", c_void_p), ("has_rest", c_bool),
                 ("has_full", c_bool), ("is_fields", c_bool), ("volume_axes", c_size_t), ("bend", c_double * 3),
                 ("identity", c_uint64)]
 
@@ -122,7 +122,7 @@ class Tensor(ctypes.Structure):
 
 
 # Element types in the order of supine_dtype.
-DTYPES = (ctypes.c_uint8, c_uint32, c_float, c_double, c_int16)
+DTYPES = (ctypes.c_uint8, c_uint32, c_float, c_double, c_int16, ctypes.c_int8)
 
 
 class Metadata(ctypes.Structure):
@@ -152,6 +152,27 @@ class Location(ctypes.Structure):
     _fields_ = [("state", State), ("volume", c_double), ("volume_error", c_double), ("volume_prior_error", c_double),
                 ("rotation", c_double * 9), ("translation", c_double * 3), ("residual_rms", c_double),
                 ("log_evidence", c_double), ("outlier_count", c_size_t), ("fit", c_void_p)]
+
+
+class Surface(ctypes.Structure):
+    """The C struct supine_precompute_surface."""
+    _fields_ = [("vertex_count", c_size_t), ("vertices", c_void_p), ("triangle_count", c_size_t), ("triangles", c_void_p)]
+
+
+ProgressFunction = ctypes.CFUNCTYPE(c_int, c_void_p, c_double)
+
+
+class Input(ctypes.Structure):
+    """The C struct supine_precompute_input."""
+    _fields_ = [("paths", POINTER(c_char_p)), ("path_count", c_size_t), ("surfaces", POINTER(Surface)),
+                ("surface_count", c_size_t), ("options", POINTER(c_char_p)), ("option_count", c_size_t),
+                ("output", c_char_p), ("progress", ProgressFunction), ("context", c_void_p)]
+
+
+class Result(ctypes.Structure):
+    """The C struct supine_precompute_result."""
+    _fields_ = [("bytes", c_void_p), ("size", c_size_t), ("report", c_char * 2048), ("assumed", c_char * 800),
+                ("findings", c_char * 4096)]
 
 
 class Residual(ctypes.Structure):
@@ -233,3 +254,15 @@ normals = _declare("normals", None, c_void_p, c_void_p, c_void_p)
 def string(text: Optional[bytes]) -> str:
     """Decode UTF-8; return "" for None."""
     return (text or b"").decode(errors="replace")
+
+
+def offline() -> Optional[ctypes.CDLL]:
+    """Load the offline library (GPL), or return None if it is not installed."""
+    path = _path("supine_precompute")
+    if path is None:
+        return None
+    library = ctypes.CDLL(path)
+    library.supine_precompute_basis.argtypes = POINTER(Input), POINTER(Result), POINTER(CError)
+    library.supine_precompute_result_free.argtypes = POINTER(Result),
+    library.supine_precompute_result_free.restype = None
+    return library

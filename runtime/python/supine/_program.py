@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""Run the program `supine` for tasks that are not in the library: making bases and moving images."""
+"""Make bases and move images, by the offline library where it is installed, or by the program `supine`."""
 from __future__ import annotations
 
 import csv
+import ctypes
 import json
 import os
 import re
 import shutil
 import subprocess
+import sys
 import tempfile
 import warnings
 from typing import Any, Callable, Mapping, Optional, Sequence, Union
@@ -48,8 +50,8 @@ def words(options: dict[str, Any]) -> list[str]:
     return words
 
 
-def _write_mesh(path: str, vertices: ArrayLike, faces: ArrayLike) -> None:
-    """Write a surface as PLY: vertices [N, 3]; faces [M, 3], or an array 3, a, b, c, 3, ... like `Basis.faces`."""
+def _mesh(vertices: ArrayLike, faces: ArrayLike) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
+    """Check a surface: vertices [N, 3]; faces [M, 3], or an array 3, a, b, c, 3, ... like `Basis.faces`."""
     points, corners = np.asarray(vertices, "<f8"), np.asarray(faces)
     if corners.ndim == 1 and corners.size % 4 == 0 and (corners[::4] == 3).all():
         corners = corners.reshape(-1, 4)[:, 1:]
@@ -57,9 +59,13 @@ def _write_mesh(path: str, vertices: ArrayLike, faces: ArrayLike) -> None:
         raise ValueError(f"vertices must be [N, 3], not {list(points.shape)}")
     if corners.ndim != 2 or corners.shape[1] != 3 or corners.dtype.kind not in "iu":
         raise ValueError(f"faces must be integers [M, 3], not {corners.dtype} {list(corners.shape)}")
+    return points, np.clip(corners, -1, 2**31 - 1)  # out-of-range indices stay so: they are reported
+
+
+def _write_mesh(path: str, points: np.ndarray[Any, Any], corners: np.ndarray[Any, Any]) -> None:
     records = np.empty(len(corners), [("count", "u1"), ("corner", "<i4", 3)])
     records["count"] = 3
-    records["corner"] = np.clip(corners, -1, 2**31 - 1)  # out-of-range indices stay so: the program reports them
+    records["corner"] = corners
     with open(path, "wb") as file:
         file.write(b"ply\nformat binary_little_endian 1.0\n"
                    b"element vertex %d\nproperty double x\nproperty double y\nproperty double z\n"
@@ -136,6 +142,16 @@ def fail(command: str, status: int, said: str) -> None:
     raise kind(what or f"supine {command} ended with exit status {status}")
 
 
+def _warn(messages: Sequence[str]) -> None:
+    """Turn the warnings among messages into Python warnings at the line that called the package."""
+    level = 1
+    while sys._getframe(level).f_globals.get("__package__") == __package__:  # pylint: disable=protected-access
+        level += 1
+    for message in messages:
+        if "warning: " in message:
+            warnings.warn(message.replace("warning: ", "", 1), stacklevel=level + 1)
+
+
 def run(command: str, operands: Sequence[str], options: dict[str, Any], names: dict[str, str],
         progress: Optional[Progress]) -> str:
     """Run a command and return its standard output. Its warnings become Python warnings. Its errors become exceptions
@@ -162,9 +178,7 @@ def run(command: str, operands: Sequence[str], options: dict[str, Any], names: d
     for path, name in names.items():
         said, text = said.replace(path, name), text.replace(path, name)
     messages = re.sub(rf"^supine {command}: ", "", said, flags=re.M).splitlines()
-    for message in messages:
-        if "warning: " in message:
-            warnings.warn(message.replace("warning: ", "", 1), stacklevel=5)
+    _warn(messages)
     if status != 0:
         fail(command, status, "\n".join(messages))
     if progress is not None:
@@ -196,7 +210,8 @@ def make(command: str, lungs: Any, content: Sequence[Any], options: dict[str, An
             if isinstance(item, (str, os.PathLike)):
                 operands.append(os.fspath(item))
             elif isinstance(item, tuple) and len(item) == 2:
-                _write_mesh(new_file(f"surface {number}", ".ply"), *item)
+                mesh = _mesh(*item)
+                _write_mesh(new_file(f"surface {number}", ".ply"), *mesh)
             else:
                 _write_points(new_file(f"points {number}", ".csv"), item)
         if isinstance(options.get("fields"), tuple):
@@ -211,3 +226,51 @@ def make(command: str, lungs: Any, content: Sequence[Any], options: dict[str, An
             return made, report
         with open(made, "rb") as file:
             return file.read(), report
+
+
+def _texts(texts: Sequence[str]) -> Any:
+    return (ctypes.c_char_p * len(texts))(*(os.fsencode(text) for text in texts))
+
+
+def precompute(surfaces: Sequence[Any], options: dict[str, Any], progress: Optional[Progress]) -> tuple[Any, str]:
+    """Make a basis; return it, as bytes or as the path `output`, and the text of the program.
+
+    Use the offline library if it is installed and the surfaces are all files or all arrays; else run the program."""
+    meshes = [item for item in surfaces if not isinstance(item, (str, os.PathLike))]
+    library = _c.offline()
+    if library is None or 0 < len(meshes) < len(surfaces):
+        return make("precompute", None, surfaces, options, progress)
+    stopped: list[BaseException] = []
+
+    def tell(_: Any, fraction: float) -> int:
+        try:
+            if progress is not None:
+                progress(fraction)
+        except BaseException as exception:  # pylint: disable=broad-exception-caught  # raised again below
+            stopped.append(exception)
+        return len(stopped)
+
+    with tempfile.TemporaryDirectory(prefix="supine-") as folder:
+        fields = os.path.join(folder, "fields")
+        if isinstance(options.get("fields"), tuple):
+            save_fields(fields, *options["fields"])
+            options["fields"] = fields
+        kept = options.pop("output", None)
+        given, paths = words(options), [] if meshes else [os.fspath(path) for path in surfaces]
+        arrays = [(np.ascontiguousarray(points), np.ascontiguousarray(corners, "<u4"))
+                  for points, corners in (_mesh(*item) for item in meshes)]
+        parts = (_c.Surface * len(arrays))(*((len(points), points.ctypes.data, len(corners), corners.ctypes.data)
+                                             for points, corners in arrays))
+        result, error = _c.Result(), _c.CError()
+        status = library.supine_precompute_basis(
+            _c.Input(_texts(paths), len(paths), parts, len(parts), _texts(given), len(given),
+                     None if kept is None else os.fsencode(kept), _c.ProgressFunction(tell), None), result, error)
+    made = os.fspath(kept) if kept is not None else ctypes.string_at(result.bytes, result.size) if result.bytes else None
+    findings, report = _c.string(result.findings), _c.string(result.report)
+    library.supine_precompute_result_free(result)
+    if stopped:
+        raise stopped[0]
+    _warn(findings.splitlines())
+    if status != 0:  # the same kinds of exceptions as from the program, which calls any wrong input a mesh
+        _c.fail(5 if status in (4, 6) else status, error.message.replace(fields.encode(), b"fields"))
+    return made, report

@@ -1,0 +1,238 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Order two scans by volume, complete their states, and fit a displacement law to them. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "precompute/patient/scans.h"
+
+#include "base/arena.h"
+#include "precompute/lungs/surface.h"
+
+void supine_patient_scans_free(supine_patient_scans *scans) {
+  supine_lungs_free(&scans->lungs[0]);
+  supine_lungs_free(&scans->lungs[1]);
+  supine_patient_pairs_free(&scans->pairs);
+}
+
+static double volume_of(const supine_lungs *lungs) {
+  return lungs->volume[0] + lungs->volume[1];
+}
+
+/* Assign each landmark to the lung whose surface is nearest to it in the first scan. */
+static supine_status find_sides(const supine_lungs *lungs, supine_patient_pairs *pairs,
+                                supine_error *error) {
+  SUPINE_FREED_BY(supine_inside_surface_drop) supine_inside_surface *tree = NULL;
+  pairs->side = malloc(pairs->count * sizeof *pairs->side);
+  if (pairs->side == NULL) {
+    return supine_error_memory(error, "%zu landmarks", pairs->count);
+  }
+  SUPINE_TRY(supine_inside_surface_create(lungs->mesh.vertices, lungs->mesh.triangle_count,
+                                          lungs->mesh.triangles, false, &tree, error));
+  for (size_t i = 0; i < pairs->count; ++i) {
+    const supine_inside_place place =
+        supine_inside_surface_nearest(tree, pairs->from + 3 * i, NULL);
+    const size_t lung =
+        lungs->lung_count == 2 && place.triangle >= lungs->triangle_begin[1] ? 1 : 0;
+    pairs->side[i] = lungs->side[lung];
+  }
+  return SUPINE_OK;
+}
+
+/* Return 1 if the states say that the second is fuller, -1 if the first is, else 0. */
+static int named_order(const supine_state state[2]) {
+  const supine_volume *a = &state[0].volume;
+  const supine_volume *b = &state[1].volume;
+  const bool turned = memcmp(state[0].gravity, state[1].gravity, sizeof state[0].gravity) != 0;
+  double more = 0.0;
+  if (a->kind != b->kind) {
+    more = a->kind == SUPINE_VOLUME_REST && b->kind == SUPINE_VOLUME_FULL   ? 1.0
+           : a->kind == SUPINE_VOLUME_FULL && b->kind == SUPINE_VOLUME_REST ? -1.0
+                                                                            : 0.0;
+  } else if (a->kind != SUPINE_VOLUME_DEFAULT && !(a->kind == SUPINE_VOLUME_REST && turned)) {
+    more = b->ml - a->ml;
+  }
+  return (more > 0.0) - (more < 0.0);
+}
+
+/* Set the volume of scan k (0 or 1), if it was not given, to that of its surface. If the volume of
+ * the other scan is relative to full inflation, or to rest in the same posture, make this one
+ * relative too; otherwise absolute. */
+static void complete_state(supine_patient_record *record, size_t k) {
+  supine_volume *of = &record->state[k].volume;
+  const supine_state *other = &record->state[1 - k];
+  const bool same = memcmp(record->state[k].gravity, other->gravity, sizeof other->gravity) == 0;
+  if (of->kind == SUPINE_VOLUME_DEFAULT && record->volume[k] > 0.0) {
+    const bool relative =
+        record->volume[1 - k] > 0.0 && (other->volume.kind == SUPINE_VOLUME_FULL ||
+                                        (other->volume.kind == SUPINE_VOLUME_REST && same));
+    *of = relative ? (supine_volume){other->volume.kind,
+                                     other->volume.ml + record->volume[k] - record->volume[1 - k]}
+                   : (supine_volume){SUPINE_VOLUME_ABSOLUTE, record->volume[k]};
+  }
+}
+
+static char *next_note(supine_patient_scans *scans) {
+  return scans->note[scans->note[0][0] != '\0' ? 1 : 0];
+}
+
+/* If only the volumes of the scans are known, count the emptier scan as rest. Count the fuller scan
+ * as full inflation, unless the other holds more of it than lungs at rest do. */
+static void name_volumes(supine_patient_scans *scans, supine_patient_record *record) {
+  static const double rest_most = 0.81; /* largest share at rest of ten patients with COPD */
+  const double *v = record->volume;
+  const bool breath = v[1] > rest_most * v[0];
+  if (record->state[0].volume.kind == SUPINE_VOLUME_ABSOLUTE &&
+      record->state[1].volume.kind == SUPINE_VOLUME_ABSOLUTE) {
+    record->state[1].volume = (supine_volume){SUPINE_VOLUME_REST, 0.0};
+    record->state[0].volume = breath ? (supine_volume){SUPINE_VOLUME_REST, v[0] - v[1]}
+                                     : (supine_volume){SUPINE_VOLUME_FULL, 0.0};
+    (void)snprintf(next_note(scans), sizeof scans->note[0],
+                   "note: the scan of %.0f mL counts as rest, that of %.0f mL as %s", v[1], v[0],
+                   breath ? "a breath above it" : "full inflation");
+  }
+}
+
+/* Warn if the volume at rest in the scans differs from the volume at rest of healthy people. */
+static void warn_of_rest(supine_patient_scans *scans, const supine_patient_record *record) {
+  const supine_resting usual = supine_reference_resting_default();
+  const double *g = record->state[1].gravity;
+  supine_resting shown = usual;
+  supine_patient_resting(record, &shown);
+  const double share[2] = {supine_reference_resting_total(&usual, g),
+                           supine_reference_resting_total(&shown, g)};
+  if (fabs(share[1] - share[0]) > SUPINE_REST_SPREAD) {
+    (void)snprintf(next_note(scans), sizeof scans->note[0],
+                   "warning: the volume at rest is %.0f %% of full inflation in the two scans, but "
+                   "%.0f %% in healthy people: check --rest. 'supine precompute --patient' uses "
+                   "the volume in the scans",
+                   100.0 * share[1], 100.0 * share[0]);
+  }
+}
+
+static void set_states(supine_patient_scans *scans, supine_patient_record *record) {
+  const supine_lungs *emptier = &scans->lungs[1];
+  const supine_patient_frame frame =
+      supine_patient_frame_of_points(scans->pairs.count, scans->pairs.to, NULL);
+  for (size_t k = 0; k < 2; ++k) {
+    const supine_volume *volume = &scans->state[k].volume;
+    record->state[k] = scans->state[k];
+    record->volume[k] = volume_of(&scans->lungs[k]);
+    if (record->volume[k] == 0.0 && volume->kind == SUPINE_VOLUME_ABSOLUTE) {
+      record->volume[k] = volume->ml;
+    }
+  }
+  complete_state(record, 0);
+  complete_state(record, 1);
+  name_volumes(scans, record);
+  warn_of_rest(scans, record);
+  memcpy(record->emptier[0], record->from_surface ? emptier->minimum : frame.minimum,
+         sizeof record->emptier[0]);
+  memcpy(record->emptier[1], record->from_surface ? emptier->maximum : frame.maximum,
+         sizeof record->emptier[1]);
+}
+
+static void exchange(supine_patient_scans *scans) {
+  const supine_lungs lungs = scans->lungs[0];
+  const supine_state state = scans->state[0];
+  double *from = scans->pairs.from;
+  scans->lungs[0] = scans->lungs[1];
+  scans->lungs[1] = lungs;
+  scans->state[0] = scans->state[1];
+  scans->state[1] = state;
+  scans->pairs.from = scans->pairs.to;
+  scans->pairs.to = from;
+  scans->reordered = true;
+}
+
+supine_status supine_patient_scans_order(supine_patient_scans *scans, supine_patient_record *record,
+                                         supine_error *error) {
+  /* The measured volumes contradict the states only if they differ by more than this fraction. */
+  static const double volume_error = 0.02;
+  const double volume[2] = {volume_of(&scans->lungs[0]), volume_of(&scans->lungs[1])};
+  const int named = named_order(scans->state);
+  record->from_surface = volume[0] > 0.0 && volume[1] > 0.0;
+  const double growth = record->from_surface     ? volume[1] / volume[0]
+                        : scans->pairs.count > 0 ? supine_patient_pairs_growth(&scans->pairs)
+                                                 : 1.0;
+  if ((named > 0 && growth < 1.0 - volume_error) || (named < 0 && growth > 1.0 + volume_error)) {
+    return supine_error_set(
+        error, SUPINE_ERROR_FORMAT,
+        "the scan given as the fuller one has only %.0f %% of the volume of the "
+        "other scan: exchange --rest and --other, or give --reverse",
+        100.0 * (named > 0 ? growth : 1.0 / growth));
+  }
+  if (volume[0] > 0.0 && scans->pairs.count > 0) {
+    SUPINE_TRY(find_sides(&scans->lungs[0], &scans->pairs, error));
+  }
+  if (named > 0 || (named == 0 && growth > 1.0)) {
+    exchange(scans);
+  }
+  set_states(scans, record);
+  return record->from_surface || (record->volume[0] > 0.0 && record->volume[1] > 0.0)
+             ? SUPINE_OK
+             : supine_error_set(
+                   error, SUPINE_ERROR_ARGUMENT,
+                   "landmarks do not show the volume of the lungs, which decides what rest and "
+                   "full inflation are: give both volumes of gas and tissue, such as --rest 2600mL "
+                   "--other 5400mL, or both surfaces");
+}
+
+static supine_status fit_landmarks(const supine_patient_scans *scans,
+                                   const supine_patient_fit_options *options,
+                                   supine_patient_record *record, supine_error *error) {
+  const supine_patient_pairs *pairs = &scans->pairs;
+  SUPINE_ARENA arena = {0};
+  supine_patient_row *rows = supine_arena_take(&arena, pairs->count, 3 * sizeof *rows);
+  if (rows == NULL) {
+    return supine_error_memory(error, "%zu landmarks", pairs->count);
+  }
+  record->patient.frame = supine_patient_frame_of_points(pairs->count, pairs->from, scans->midline);
+  supine_patient_rows_of_pairs(&record->patient.frame, pairs, rows);
+  return supine_patient_fit(options, rows, 0, pairs->count, &record->patient, &record->report,
+                            error);
+}
+
+supine_status supine_patient_scans_fit(const supine_patient_scans *scans,
+                                       const supine_patient_fit_options *options,
+                                       bool expandability, supine_patient_record *record,
+                                       supine_error *error) {
+  const supine_model deep = supine_physics_model(SUPINE_LAW_DEEP);
+  const double *gravity = record->state[1].gravity;
+  supine_patient_fit_options wanted = *options;
+  double gains[2][3];
+  supine_patient_path(record, gains);
+  for (size_t k = 0; k < 3; ++k) {
+    wanted.gravity[k] = gravity[k];
+    wanted.path_span[k] = gains[1][k] - gains[0][k];
+  }
+  SUPINE_TRY(record->from_surface
+                 ? supine_patient_fit_surface(&scans->lungs[0], &scans->lungs[1].mesh,
+                                              &scans->pairs, &wanted, expandability, record, error)
+                 : fit_landmarks(scans, &wanted, record, error));
+  record->force = supine_patient_force(&record->patient.power, deep.force.gain, gravity);
+  return SUPINE_OK;
+}
+
+supine_status supine_patient_scans_fit_further(supine_patient_scans *scans,
+                                               const supine_state *state, bool scans_moved,
+                                               supine_patient_pairs *pairs,
+                                               const supine_mesh *surface,
+                                               supine_patient_record *record, supine_error *error) {
+  const supine_patient *patient = &record->patient;
+  supine_lungs *from = &scans->lungs[0];
+  supine_patient_further *further = &record->further[record->further_count++];
+  *further = (supine_patient_further){.state = *state};
+  if (from->mesh.vertex_count == 0 && surface != NULL) {
+    /* The fuller scan has no surface: move that of the emptier one to the fuller state. */
+    *from = scans->lungs[1];
+    scans->lungs[1] = (supine_lungs){0};
+    supine_patient_points_to_fuller(patient, from->mesh.vertex_count, from->mesh.vertices);
+    supine_lungs_measure(from);
+  }
+  if (surface == NULL && scans->reordered) {
+    supine_patient_points_to_fuller(patient, pairs->count, pairs->from);
+  }
+  return supine_patient_gain_fit(record, from, surface == NULL ? pairs : NULL, surface, scans_moved,
+                                 further, error);
+}

@@ -1,0 +1,50 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file
+ * Fit a patient's displacement law to two scans in any order, and its gain to further ones. */
+#ifndef SUPINE_PATIENT_SCANS_H
+#define SUPINE_PATIENT_SCANS_H
+
+#include "precompute/patient/patient_file.h"
+
+enum { SUPINE_PATIENT_NOTES = 2 };
+
+/** What is known of two scans of one person: surfaces, landmarks, and states. Initialise to zero,
+ * and release with supine_patient_scans_free. */
+typedef struct supine_patient_scans {
+  supine_lungs lungs[2];      /**< empty if a scan has no surface */
+  supine_patient_pairs pairs; /**< landmarks in both scans; may be empty */
+  supine_state state[2]; /**< a missing volume (SUPINE_VOLUME_DEFAULT) is found from surfaces */
+  const double *midline; /**< x of the plane between the lungs, mm; NULL for the middle */
+  bool reordered;        /**< set by supine_patient_scans_order: they were exchanged */
+  char note[SUPINE_PATIENT_NOTES][256]; /**< set by supine_patient_scans_order, for the user */
+} supine_patient_scans;
+
+void supine_patient_scans_free(supine_patient_scans *scans);
+
+/** Put the fuller scan first, and write both states, their volumes and the bounding box of the
+ * emptier one into the record. If the states do not tell which scan is fuller, compare the volumes
+ * of the surfaces or, without two surfaces, use the volume change of an affine map of the
+ * landmarks. */
+supine_status supine_patient_scans_order(supine_patient_scans *scans, supine_patient_record *record,
+                                         supine_error *error);
+
+/** Fit the displacement law to ordered scans.
+ * @param options        `gravity` and `path_span` are taken from the record
+ * @param expandability  as supine_patient_fit_surface */
+supine_status supine_patient_scans_fit(const supine_patient_scans *scans,
+                                       const supine_patient_fit_options *options,
+                                       bool expandability, supine_patient_record *record,
+                                       supine_error *error);
+
+/** Append the fit to a further scan (supine_patient_gain_fit) to the record, after
+ * supine_patient_scans_fit.
+ * @param pairs    points in the first of the two scans as given, and in the further scan; they may
+ *   be moved. Empty if `surface` is not NULL
+ * @param surface  surface in the further scan, or NULL */
+supine_status supine_patient_scans_fit_further(supine_patient_scans *scans,
+                                               const supine_state *state, bool scans_moved,
+                                               supine_patient_pairs *pairs,
+                                               const supine_mesh *surface,
+                                               supine_patient_record *record, supine_error *error);
+
+#endif
