@@ -128,7 +128,7 @@ static void fit(const supine_lungs *rest, const supine_lungs *other, const supin
 }
 
 static void expect_lesion(const supine_lungs *rest, const supine_lungs *other,
-                          const supine_lesion *lesion, double least, double least_times) {
+                          const supine_lesion *lesion, double least) {
   static supine_patient_record found;
   fit(rest, other, lesion, &found);
   const double times = contrast(rest, &found.stiffness, lesion);
