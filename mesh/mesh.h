@@ -105,9 +105,7 @@ typedef struct supine_topology {
 } supine_topology;
 
 /** Find edges and components in linear time, except for sorting the edges of each vertex.
- * @param topology  zero-initialised; written only on success
- * @retval SUPINE_ERROR_ARGUMENT  a triangle names a vertex twice or out of range, or there are more
- *             than 2^31 - 1 vertices */
+ * @param topology  zero-initialised; written only on success */
 supine_status supine_mesh_topology_create(const supine_mesh *mesh, supine_topology *topology);
 void supine_mesh_topology_free(supine_topology *topology);
 
@@ -141,6 +139,14 @@ typedef struct supine_mesh_field {
   const double *values; /**< [frames, count] values; only a series has more than one frame */
 } supine_mesh_field;
 
+/** A number at each vertex: point data of VTP and PLY files. */
+typedef struct supine_mesh_scalar {
+  const char *name;
+  const float *values; /**< [vertex_count]; NULL if there is no number */
+} supine_mesh_scalar;
+
+enum { SUPINE_MESH_SCALARS = 2 };
+
 /** How to write a file, and its optional contents. */
 typedef struct supine_mesh_save_options {
   supine_axes axes;    /**< axes of the file and of its SPACE tag; AUTO means LPS */
@@ -148,8 +154,7 @@ typedef struct supine_mesh_save_options {
                           PLY files then hold displacements and their magnitudes */
   const char *comment; /**< optional note of one line */
   double millimetres_per_unit; /**< unit of positions and displacements; 0 means 1 */
-  const float *expected_error; /**< optional [vertex_count], always in mm: point data
-                                  "expected_error_mm" of VTP and PLY */
+  supine_mesh_scalar scalars[SUPINE_MESH_SCALARS]; /**< optional */
   /** @{ For VTP only, all optional. */
   const float *normals;            /**< [vertex_count, 3] written as point data "Normals" */
   const unsigned char *lung;       /**< [vertex_count] index of the lung, as point data "lung" */

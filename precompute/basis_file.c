@@ -265,8 +265,9 @@ static void add_all(entries *list, const supine_basis_content *content, const do
   add(list, "made_by", "%s", choice->made_by != NULL ? choice->made_by : "supine_precompute");
 }
 
-/* Add the error of storage to content->accuracy. Open the tensors as a basis in memory for that. */
-static supine_status measure_storage(const supine_basis_content *content,
+/* Add the error of storage to content->accuracy. Open the tensors as a basis in memory for that.
+ * @param directions  those of the file, [N, 3], or NULL */
+static supine_status measure_storage(const supine_basis_content *content, const double *directions,
                                      const supine_tensor *tensors, size_t count,
                                      const entries *list, supine_error *error) {
   const supine_basis_options options = {
@@ -282,7 +283,8 @@ static supine_status measure_storage(const supine_basis_content *content,
                              ? supine_error_memory(error, "a basis in memory")
                              : supine_basis_open_memory_with(bytes, size, &options, &basis, error);
   if (status == SUPINE_OK) {
-    status = supine_accuracy_add_storage(basis, content->accuracy);
+    status =
+        supine_accuracy_add_storage(basis, content->compression, directions, content->accuracy);
   }
   supine_basis_close(basis);
   free(bytes);
@@ -356,7 +358,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
       given[count++] = all[i];
     }
   }
-  SUPINE_TRY(measure_storage(content, given, count, &list, error));
+  SUPINE_TRY(measure_storage(content, vector ? NULL : collapsed, given, count, &list, error));
   list.count = 0;
   add_all(&list, content, share, &normals);
   if (arena.failed) {

@@ -27,8 +27,7 @@ typedef struct supine_precompute_report {
 } supine_precompute_report;
 
 /** Make a basis from lungs and their model, measure its error, and write the file atomically.
- * @param report  optional
- * @retval SUPINE_ERROR_INTERRUPTED  choice->progress returned false */
+ * @param report  optional */
 supine_status supine_precompute(const supine_prepared *prepared, const supine_basis_choice *choice,
                                 supine_precompute_report *report, supine_error *error);
 

@@ -105,10 +105,8 @@ static supine_status read_row(const supine_csv *csv, request *row, supine_error 
       }
     }
   }
-  if (row->outputs[2] != NULL) {
-    row->content.field = row->outputs[2];
-  }
   row->content.labels_path = row->outputs[1];
+  row->content.field = row->outputs[2];
   *(voxels && !image ? &row->content.field : &row->content.path) = row->outputs[0];
   return supine_command_deform_content_check(&row->content, error);
 }

@@ -96,11 +96,12 @@ static const supine_option table[] = {
      "regions about 45 mm wide, relative to the deep law with one factor for each axis. The result "
      "is used only if it lowers the held-out residual by 5 % or more",
      FILLS(expandability), .more = true},
-    {"map", 0, "FILE.csv",
+    {"map", 0, "FILE",
      "with --expandability: write the expandability of every vertex of the fuller scan, and how "
-     "far "
-     "the surfaces determine it, 0 to 1. 'supine precompute --expandability' reads this file",
-     FILLS(map), .file = SUPINE_FILE_OUT, .more = true},
+     "far the surfaces determine it, 0 (not at all) to 1. 'supine precompute --expandability' "
+     "reads "
+     "the .csv; a .vtp or .ply has both as colours of the surface",
+     FILLS(map), .file = SUPINE_FILE_OUT, .endings = ".csv, .vtp or .ply", .more = true},
     {"json", 0, NULL, "print JSON instead of text", FILLS(json)},
     {.name = NULL}};
 

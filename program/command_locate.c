@@ -181,7 +181,7 @@ static supine_status finish_surface(const request *wanted, const supine_basis *l
   const supine_mesh_field fields[] = {{"gravity_LPS", 3, located->best->state.gravity},
                                       {"volume_mL", 1, &volume}};
   const supine_mesh_save_options save = {.comment = "in the frame of the observations",
-                                         .expected_error = located->sigma,
+                                         .scalars = {{"expected_error_mm", located->sigma}},
                                          .lung = lung == NULL ? NULL : lung->data,
                                          .fields = fields,
                                          .field_count = 2};

@@ -48,17 +48,15 @@ static supine_status run_fit(const char *path, const request *chosen, supine_err
   supine_pv pv = {0};
   supine_pv_report reports[SUPINE_PV_LIMB_COUNT];
   SUPINE_TRY(supine_breath_fit_file(path, chosen->confidence, &pv, reports, error));
-  for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
-    if (reports[limb].rms_percent > 1.0) {
-      supine_options_say(command, "note: the %s samples deviate from their curve by %.2g %% RMS",
-                         supine_breath_limb_name((supine_pv_limb)limb), reports[limb].rms_percent);
-    }
-  }
   json_auto_t *root = json_pack("{s:f}", "confidence", chosen->confidence);
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
+    const char *name = supine_breath_limb_name((supine_pv_limb)limb);
+    if (reports[limb].rms_percent > 1.0) {
+      supine_options_say(command, "note: the %s samples deviate from their curve by %.2g %% RMS",
+                         name, reports[limb].rms_percent);
+    }
     if (reports[limb].samples > 0) {
-      (void)json_object_set_new(root, supine_breath_limb_name((supine_pv_limb)limb),
-                                json_limb(&pv.limb[limb], &reports[limb]));
+      (void)json_object_set_new(root, name, json_limb(&pv.limb[limb], &reports[limb]));
     }
   }
   supine_options_print(json_incref(root), chosen->json);

@@ -184,13 +184,16 @@ static supine_status open_points(const supine_basis *basis, const request *wante
   return observed->space != NULL ? SUPINE_OK : supine_error_memory(error, "%s", wanted->points);
 }
 
+#define PAGE P_tmpdir "/supine-page-XXXXXX" /* template of the name of a temporary file */
+
 /* If --web is given, serve the page that shows the lungs of the basis file `path` live, from a
- * temporary file. The caller destroys *web, then closes *page. */
+ * temporary file. The caller destroys *web, then removes the file `page`. */
 static supine_status open_page(const request *wanted, const supine_basis *basis, const char *path,
-                               FILE **page, supine_stream_web **web, supine_error *error) {
+                               char *page, supine_stream_web **web, supine_error *error) {
   supine_stream_address address;
   supine_reference_pose from;
   SUPINE_FREED_BY(supine_export_source_close) export_source source = {0};
+  SUPINE_FREED_BY(supine_file_close) FILE *file = NULL;
   supine_stream_site site = {.certificate = wanted->certificate, .key = wanted->key};
   if (wanted->web == NULL) {
     return SUPINE_OK;
@@ -205,18 +208,18 @@ static supine_status open_page(const request *wanted, const supine_basis *basis,
                              .title = "Lungs, live",
                              .live = true};
   SUPINE_TRY(supine_export_source_open(path, &source, error));
-  *page = tmpfile();
-  if (*page == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_WRITE, "no temporary file for the page: %s",
-                            strerror(errno));
+  (void)strcpy(page, PAGE);
+  const int descriptor = mkstemp(page);
+  file = descriptor < 0 ? NULL : fdopen(descriptor, "w");
+  if (file != NULL) {
+    SUPINE_TRY(supine_export_html_print(file, &source, &shown, error));
   }
-  SUPINE_TRY(supine_export_html_print(*page, &source, &shown, error));
-  if (fflush(*page) != 0) {
-    return supine_error_set(error, SUPINE_ERROR_WRITE, "the page: %s", strerror(errno));
+  if (file == NULL || fflush(file) != 0) {
+    return supine_error_set(error, SUPINE_ERROR_WRITE, "%s: %s", page, strerror(errno));
   }
   site.address = address.host;
   site.port = address.port;
-  (void)snprintf(site.page, sizeof site.page, "/proc/self/fd/%d", fileno(*page));
+  site.page = page;
   SUPINE_TRY(supine_stream_web_create(&site, web, error));
   const bool ipv6 = strchr(address.host, ':') != NULL;
   (void)printf("page at http%s://%s%s%s:%d/\n", site.certificate != NULL ? "s" : "",
@@ -253,7 +256,7 @@ static supine_status set_volume(const supine_basis *basis, const request *wanted
 typedef struct session {
   supine_arena arena;
   observed_points points;
-  FILE *page;
+  char page[sizeof PAGE];
   supine_stream_web *web;
   supine_stream_server *server;
 } session;
@@ -261,7 +264,7 @@ typedef struct session {
 static void end(session *s) {
   supine_stream_server_destroy(s->server);
   supine_stream_web_destroy(s->web);
-  supine_file_close(&s->page);
+  (void)remove(s->page); /* has no effect if there is no page */
   supine_command_names_close(&s->points.names);
   supine_basis_close(s->points.inside);
   supine_arena_free(&s->arena);
@@ -278,7 +281,7 @@ static supine_status stream(const supine_basis *basis, const char *path, const r
     SUPINE_TRY(open_points(basis, wanted, &s.points, &s.arena, error));
     options.observed = &s.points.observed;
   }
-  SUPINE_TRY(open_page(wanted, basis, path, &s.page, &s.web, error));
+  SUPINE_TRY(open_page(wanted, basis, path, s.page, &s.web, error));
   options.web = s.web;
   SUPINE_TRY(supine_stream_server_create(basis, &options, &s.server, error));
   const supine_stream_results *results = supine_stream_server_results(s.server);

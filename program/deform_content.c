@@ -275,7 +275,7 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
   (void)supine_basis_volumes(basis, &moved->pose, volumes);
   save->from = from.vertices;
   save->normals = mesh.triangle_count > 0 ? normals : NULL;
-  save->expected_error = moved->expected.sigma;
+  save->scalars[0] = (supine_mesh_scalar){"expected_error_mm", moved->expected.sigma};
   save->lung = lung == NULL ? NULL : lung->data;
   save->fields = fields;
   save->field_count = sizeof fields / sizeof *fields;

@@ -54,16 +54,13 @@ double supine_basis_storage_error(const supine_basis *basis) {
     if (supine_basis_weights(basis, state.gravity, pose.weights) != SUPINE_OK) {
       continue; /* the zero vector has no direction */
     }
-    if (basis->info.is_fields) {
-      supine_pose_fill(&pose, 1);
-    } else if (basis->info.has_volume) {
-      if (supine_basis_add_volume(basis, volume, &pose) != SUPINE_OK) {
-        continue; /* the lungs cannot hold this volume in this posture */
-      }
-    } else {
-      supine_pose_fill(&pose, 1);
+    supine_pose_fill(&pose, 1);
+    if (!basis->info.has_volume && !basis->info.is_fields) {
       const double largest = largest_displacement(basis, &pose);
       supine_pose_fill(&pose, largest > 0 ? distance / largest : 0);
+    } else if (!basis->info.is_fields &&
+               supine_basis_add_volume(basis, volume, &pose) != SUPINE_OK) {
+      continue; /* the lungs cannot hold this volume in this posture */
     }
     const double error = supine_basis_error(basis, &pose);
     worst = isnan(error) ? INFINITY : fmax(worst, error); /* NaN means that floats overflowed */

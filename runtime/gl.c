@@ -5,25 +5,29 @@
 #include "runtime/kernels/compact.h"
 
 static bool fits(const supine_basis *basis) {
-  return !basis->info.vector && basis->info.mode_count <= SUPINE_GL_MODES;
+  return basis->info.mode_count <= SUPINE_GL_MODES;
 }
 
 supine_status supine_gl_pack(const supine_basis *basis, size_t begin, size_t end,
                              float *attributes) {
-  const size_t modes = basis->info.mode_count;
+  const bool vector = basis->info.vector;
+  const size_t head = vector ? SUPINE_GL_VECTOR_FLOATS : SUPINE_GL_FLOATS;
+  const size_t count = (vector ? 3 : 1) * basis->info.mode_count;
   size_t lung = 0;
   if (!fits(basis)) {
     return SUPINE_ERROR_UNSUPPORTED;
   }
   for (size_t i = begin; i < end; ++i) {
-    float *to = attributes + (i - begin) * (SUPINE_GL_FLOATS + modes);
+    float *to = attributes + (i - begin) * (head + count);
     while (i >= basis->lung_begin[lung + 1]) {
       ++lung;
     }
     memcpy(to, basis->info.vertices + 3 * i, 3 * sizeof *to);
     to[3] = (float)lung;
-    memcpy(to + 4, basis->info.direction + 3 * i, 3 * sizeof *to);
-    memcpy(to + SUPINE_GL_FLOATS, basis->info.coefficients + i * modes, modes * sizeof *to);
+    if (!vector) {
+      memcpy(to + 4, basis->info.direction + 3 * i, 3 * sizeof *to);
+    }
+    memcpy(to + head, basis->info.coefficients + i * count, count * sizeof *to);
   }
   return SUPINE_OK;
 }

@@ -71,12 +71,10 @@ static inline bool supine_basis_has_range(const supine_basis *basis, const supin
 }
 
 /** Pack the coefficients, directions and reference positions of the vertices into tiles of 16
- * vertices, in the number format `storage`, which is not AUTO. Free the previous tiles.
- * @retval SUPINE_ERROR_MEMORY  an allocation failed */
+ * vertices, in the number format `storage`, which is not AUTO. Free the previous tiles. */
 supine_status supine_basis_pack(supine_basis *basis, supine_storage storage);
 
-/** Pack the vectors supine_basis_info.normals into tiles of 16 vertices.
- * @retval SUPINE_ERROR_MEMORY  an allocation failed */
+/** Pack the vectors supine_basis_info.normals into tiles of 16 vertices. */
 supine_status supine_basis_pack_normals(supine_basis *basis);
 
 /** Return the number of terms that supine_basis_normal_weights adds for each vector and axis: 1
@@ -101,8 +99,7 @@ double supine_basis_storage_error(const supine_basis *basis);
 
 /** Set all gains of a pose (factors of the displacement) to the same number, so that all lungs
  * together hold `volume` mL more than the reference surface.
- * @param pose  its weights are read, its gains written
- * @retval SUPINE_ERROR_NUMERICAL  the lungs cannot hold this volume */
+ * @param pose  its weights are read, its gains written */
 supine_status supine_basis_add_volume(const supine_basis *basis, double volume, supine_pose *pose);
 
 #endif

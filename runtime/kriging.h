@@ -105,11 +105,7 @@ size_t supine_kriging_space(size_t count);
  * residuals of points.
  * @param count   1 to SUPINE_KRIGING_POINTS_MAX
  * @param points  [count]; keep them as long as the fit is used
- * @param space   [supine_kriging_space(count)]; keep it as long as the fit is used
- * @retval SUPINE_ERROR_ARGUMENT   a rotation without a prior is to be fitted, but the points lie on
- *                                 one line
- * @retval SUPINE_ERROR_NUMERICAL  the covariance of the points is not positive definite: a number
- *                                 is not finite, or points at one position have a noise of 0 */
+ * @param space   [supine_kriging_space(count)]; keep it as long as the fit is used */
 supine_status supine_kriging_fit(const supine_kriging_options *options, size_t count,
                                  const supine_kriging_point *points, double *space,
                                  supine_kriging *fit, supine_error *error);

@@ -138,14 +138,6 @@ static void share_out(const supine_basis *basis, const volumes *v, double total,
   }
 }
 
-/* Find the gains (factors of the displacement) at which one lung holds `ml` mL more than its
- * reference surface. */
-static supine_status lung_gains(const supine_basis *basis, const volumes *v, size_t lung, double ml,
-                                supine_pose *pose, supine_error *error) {
-  return supine_volume_form_gains(&v->form[lung], basis->info.bend, v->rest[lung], ml,
-                                  pose->gains[lung], error);
-}
-
 /* Find the gain (factor of the displacement), equal for all lungs and axes, at which the lungs
  * together hold `total` mL more than the reference surface. */
 static supine_status common_gains(const volumes *v, double total, supine_pose *pose,
@@ -175,7 +167,8 @@ static supine_status total_gains(const supine_basis *basis, const volumes *v, do
   double lung_ml[SUPINE_LUNGS_MAX];
   share_out(basis, v, total, lung_ml);
   for (size_t lung = 0; lung < v->lung_count; ++lung) {
-    SUPINE_TRY(lung_gains(basis, v, lung, lung_ml[lung], pose, error));
+    SUPINE_TRY(supine_volume_form_gains(&v->form[lung], basis->info.bend, v->rest[lung],
+                                        lung_ml[lung], pose->gains[lung], error));
   }
   return SUPINE_OK;
 }
@@ -214,7 +207,8 @@ static supine_status named_gains(const supine_basis *basis, const volumes *v,
       SUPINE_TRY(total_gains(basis, v, total, &together, error));
       ml = supine_volume_form_at(&v->form[lung], together.gains[lung]) + volume->ml;
     }
-    SUPINE_TRY(lung_gains(basis, v, lung, ml, pose, error));
+    SUPINE_TRY(supine_volume_form_gains(&v->form[lung], basis->info.bend, v->rest[lung], ml,
+                                        pose->gains[lung], error));
   }
   return SUPINE_OK;
 }

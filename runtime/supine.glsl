@@ -3,13 +3,14 @@
 // Put this text after the #version line (and, for ES, after "precision highp float;").
 //
 //     x = reference + gain (w . c) direction    w, c: weight of each of K modes, and its coefficient at the vertex
+//     x = reference + gain (w . cx, w . cy, w . cz)  if a mode has a coefficient for each axis
 //     normal = sum over j of v_j m_j            v_j, m_j: weight of each of Q vectors, and the vector at the vertex
 //
 // `direction` is the vector along which the vertex moves. `gain` multiplies the displacement of a lung along x, y and z.
 // Attributes (reference, direction, c, m) come from supine_gl_pack and supine_gl_pack_normals, the uniforms from
 // supine_gl_weights and supine_gl_normal_weights (supine/runtime.h). reference.w is the index of the lung and selects
-// its gains, so that one draw call draws all lungs. A vertex costs K + 6 multiplications and K + 2 additions; its normal
-// costs 3 Q multiplications and 3 Q additions.
+// its gains, so that one draw call draws all lungs. A vertex costs K + 6 multiplications and K + 2 additions, or 3 K + 3
+// and 3 K; its normal costs 3 Q multiplications and 3 Q additions.
 
 #ifndef SUPINE_LUNGS
 #define SUPINE_LUNGS 2
@@ -29,29 +30,51 @@ vec3 supine_place(vec4 reference, vec3 direction, float amount) {
   return reference.xyz + supine_gains[int(reference.w)] * amount * direction;
 }
 
+// Sum weight times coefficient over the modes, and displace a vertex by the sum along `direction`.
+float supine_amount(vec4 c0) {
+  return dot(supine_weights[0], c0);
+}
+
 vec3 supine_displace(vec4 reference, vec3 direction, vec4 c0) {
-  return supine_place(reference, direction, dot(supine_weights[0], c0));
+  return supine_place(reference, direction, supine_amount(c0));
 }
 
 #if SUPINE_VECTORS > 1
+float supine_amount(vec4 c0, vec4 c1) {
+  return dot(supine_weights[0], c0) + dot(supine_weights[1], c1);
+}
+
 vec3 supine_displace(vec4 reference, vec3 direction, vec4 c0, vec4 c1) {
-  return supine_place(reference, direction, dot(supine_weights[0], c0) + dot(supine_weights[1], c1));
+  return supine_place(reference, direction, supine_amount(c0, c1));
 }
 #endif
 
 #if SUPINE_VECTORS > 2
+float supine_amount(vec4 c0, vec4 c1, vec4 c2) {
+  return dot(supine_weights[0], c0) + dot(supine_weights[1], c1) + dot(supine_weights[2], c2);
+}
+
 vec3 supine_displace(vec4 reference, vec3 direction, vec4 c0, vec4 c1, vec4 c2) {
-  return supine_place(reference, direction, dot(supine_weights[0], c0) + dot(supine_weights[1], c1) +
-                                        dot(supine_weights[2], c2));
+  return supine_place(reference, direction, supine_amount(c0, c1, c2));
 }
 #endif
 
 #if SUPINE_VECTORS > 3
+float supine_amount(vec4 c0, vec4 c1, vec4 c2, vec4 c3) {
+  return dot(supine_weights[0], c0) + dot(supine_weights[1], c1) +
+         (dot(supine_weights[2], c2) + dot(supine_weights[3], c3));
+}
+
 vec3 supine_displace(vec4 reference, vec3 direction, vec4 c0, vec4 c1, vec4 c2, vec4 c3) {
-  return supine_place(reference, direction, dot(supine_weights[0], c0) + dot(supine_weights[1], c1) +
-                                        (dot(supine_weights[2], c2) + dot(supine_weights[3], c3)));
+  return supine_place(reference, direction, supine_amount(c0, c1, c2, c3));
 }
 #endif
+
+// Displace a vertex of a basis with coefficients along x, y and z (supine_basis_info.vector). `amounts` has the sum of
+// each axis, such as vec3(supine_amount(x0, x1), supine_amount(y0, y1), supine_amount(z0, z1)) with 5 to 8 modes.
+vec3 supine_displace(vec4 reference, vec3 amounts) {
+  return supine_place(reference, amounts, 1.0);
+}
 
 // Compute the part of a vertex normal that one vertex attribute holds; the normal is the sum over all `part`s, before
 // normalisation. `words` is the attribute packed by supine_gl_pack_normals: each word has one coordinate of three

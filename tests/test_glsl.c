@@ -16,6 +16,7 @@
 #include "tests/poses.h"
 
 enum { VERTICES = 1003, LUNGS = 2, NORMALS = 8, WORDS = 3 };
+enum { DIRECTION_AT = 5, NORMALS_AT = 13 }; /* locations of attributes */
 
 /* Type and name of each OpenGL function that is loaded at run time. */
 #define GL_FUNCTIONS(F)                                                                            \
@@ -118,37 +119,52 @@ static GLuint make_shader(const gl_api *gl, GLenum kind, const char *version, co
   return shader;
 }
 
-/* Link an OpenGL program that displaces vertices by coefficients in `vectors` vec4s. */
+/* Link an OpenGL program that displaces vertices by coefficients in `vectors` vec4s along the
+ * vertex's direction or, if `axes` is 3, along each axis. */
 static GLuint make_program(const gl_api *gl, const char *version, const char *library,
-                           size_t vectors) {
-  static const char *const arguments[] = {"c0", "c0, c1", "c0, c1, c2", "c0, c1, c2, c3"};
+                           size_t vectors, size_t axes) {
+  static const char *const arguments[][4] = {
+      {"direction, c0", "direction, c0, c1", "direction, c0, c1, c2", "direction, c0, c1, c2, c3"},
+      {"vec3(supine_amount(c0), supine_amount(y0), supine_amount(z0))",
+       "vec3(supine_amount(c0, c1), supine_amount(y0, y1), supine_amount(z0, z1))",
+       "vec3(supine_amount(c0, c1, c2), supine_amount(y0, y1, y2), supine_amount(z0, z1, z2))",
+       "vec3(supine_amount(c0, c1, c2, c3), supine_amount(y0, y1, y2, y3),\n"
+       "     supine_amount(z0, z1, z2, z3))"}};
   static const char fragment[] = "out vec4 colour; void main() { colour = vec4(1.0); }\n";
-  static const char *const names[] = {"rest", "direction", "c0", "c1", "c2",
-                                      "c3",   "n0",        "n1", "n2"};
+  /* Attributes by location. OpenGL has at least 16. */
+  static const char *const scalar[] = {"rest", "c0", "c1", "c2", "c3", "direction", "",   "",
+                                       "",     "",   "",   "",   "",   "n0",        "n1", "n2"};
+  static const char *const vector[] = {"rest", "c0", "c1", "c2", "c3", "y0", "y1", "y2",
+                                       "y3",   "z0", "z1", "z2", "z3", "n0", "n1", "n2"};
+  const char *const *names = axes == 3 ? vector : scalar;
   static const char *const varyings[] = {"position", "normal"};
-  char vertex[1024];
+  char vertex[2048];
   char defines[256];
   (void)snprintf(defines, sizeof defines,
                  "#define SUPINE_LUNGS %d\n#define SUPINE_VECTORS %zu\n#define SUPINE_WORDS %d\n",
                  LUNGS, vectors, WORDS);
-  (void)snprintf(
-      vertex, sizeof vertex,
-      "in vec4 rest; in vec3 direction; in vec4 c0; in vec4 c1; in vec4 c2; in vec4 c3;\n"
-      "in uvec3 n0; in uvec3 n1; in uvec3 n2;\n"
-      "out vec3 position;\n"
-      "out vec3 normal;\n"
-      "void main() {\n"
-      "  position = supine_displace(rest, direction, %s);\n"
-      "  normal = normalize(supine_normal(rest, 0, n0) + supine_normal(rest, 1, n1) +\n"
-      "                     supine_normal(rest, 2, n2));\n"
-      "  gl_Position = vec4(position, 1.0);\n"
-      "}\n",
-      arguments[vectors - 1]);
+  (void)snprintf(vertex, sizeof vertex,
+                 "in vec4 rest; in vec4 c0; in vec4 c1; in vec4 c2; in vec4 c3; %s\n"
+                 "in uvec3 n0; in uvec3 n1; in uvec3 n2;\n"
+                 "out vec3 position;\n"
+                 "out vec3 normal;\n"
+                 "void main() {\n"
+                 "  position = supine_displace(rest, %s);\n"
+                 "  normal = normalize(supine_normal(rest, 0, n0) + supine_normal(rest, 1, n1) +\n"
+                 "                     supine_normal(rest, 2, n2));\n"
+                 "  gl_Position = vec4(position, 1.0);\n"
+                 "}\n",
+                 axes == 3 ? "in vec4 y0; in vec4 y1; in vec4 y2; in vec4 y3;\n"
+                             "in vec4 z0; in vec4 z1; in vec4 z2; in vec4 z3;"
+                           : "in vec3 direction;",
+                 arguments[axes / 2][vectors - 1]);
   const GLuint program = gl->CreateProgram();
   gl->AttachShader(program, make_shader(gl, GL_VERTEX_SHADER, version, defines, library, vertex));
   gl->AttachShader(program, make_shader(gl, GL_FRAGMENT_SHADER, version, "", "", fragment));
-  for (GLuint i = 0; i < sizeof names / sizeof *names; ++i) {
-    gl->BindAttribLocation(program, i, names[i]);
+  for (GLuint i = 0; i < NORMALS_AT + WORDS; ++i) {
+    if (names[i][0] != '\0') {
+      gl->BindAttribLocation(program, i, names[i]);
+    }
   }
   gl->TransformFeedbackVaryings(program, 2, varyings, GL_INTERLEAVED_ATTRIBS);
   gl->LinkProgram(program);
@@ -177,9 +193,10 @@ static void make_framebuffer(const gl_api *gl) {
 /* Inputs of the vertex shader. */
 typedef struct model {
   size_t modes;
-  float
-      *attributes; /* [VERTICES, SUPINE_GL_FLOATS + modes] vertex attributes from supine_gl_pack */
-  uint32_t *words; /* [VERTICES, WORDS, 3] packed normals from supine_gl_pack_normals */
+  size_t axes;       /* 3 for a basis with three coefficients for each mode, otherwise 1 */
+  size_t head;       /* floats of a vertex before its coefficients */
+  float *attributes; /* [VERTICES, head + axes * modes] vertex attributes from supine_gl_pack */
+  uint32_t *words;   /* [VERTICES, WORDS, 3] packed normals from supine_gl_pack_normals */
   float weights[SUPINE_GL_MODES];
   float gains[3 * LUNGS];
   float normal_weights[LUNGS * WORDS * 3];
@@ -187,7 +204,7 @@ typedef struct model {
 
 /* Create the vertex arrays of the model. */
 static void load_model(const gl_api *gl, const model *m) {
-  const size_t floats = SUPINE_GL_FLOATS + m->modes;
+  const size_t floats = m->head + m->axes * m->modes;
   const GLsizei stride = (GLsizei)(floats * sizeof(float));
   GLuint array = 0;
   GLuint buffers[2] = {0, 0};
@@ -198,20 +215,27 @@ static void load_model(const gl_api *gl, const model *m) {
   gl->BufferData(GL_ARRAY_BUFFER, (GLsizeiptr)VERTICES * stride, m->attributes, GL_STATIC_DRAW);
   gl->EnableVertexAttribArray(0);
   gl->VertexAttribPointer(0, 4, GL_FLOAT, GL_FALSE, stride, NULL);
-  gl->EnableVertexAttribArray(1);
-  gl->VertexAttribPointer(1, 3, GL_FLOAT, GL_FALSE, stride, (const void *)(4 * sizeof(float)));
-  for (size_t k = 0; k < m->modes; k += 4) {
-    const uintptr_t offset = (SUPINE_GL_FLOATS + k) * sizeof(float);
-    gl->EnableVertexAttribArray((GLuint)(2 + k / 4));
-    gl->VertexAttribPointer((GLuint)(2 + k / 4), m->modes - k < 4 ? (GLint)(m->modes - k) : 4,
-                            GL_FLOAT, GL_FALSE, stride, (const void *)offset);
+  if (m->axes == 1) {
+    gl->EnableVertexAttribArray(DIRECTION_AT);
+    gl->VertexAttribPointer(DIRECTION_AT, 3, GL_FLOAT, GL_FALSE, stride,
+                            (const void *)(4 * sizeof(float)));
+  }
+  for (size_t axis = 0; axis < m->axes; ++axis) {
+    for (size_t k = 0; k < m->modes; k += 4) {
+      const uintptr_t offset = (m->head + axis * m->modes + k) * sizeof(float);
+      const GLuint location = (GLuint)(1 + 4 * axis + k / 4);
+      gl->EnableVertexAttribArray(location);
+      gl->VertexAttribPointer(location, m->modes - k < 4 ? (GLint)(m->modes - k) : 4, GL_FLOAT,
+                              GL_FALSE, stride, (const void *)offset);
+    }
   }
   gl->BindBuffer(GL_ARRAY_BUFFER, buffers[1]);
   gl->BufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(VERTICES * WORDS * 3 * sizeof *m->words), m->words,
                  GL_STATIC_DRAW);
   for (GLuint j = 0; j < WORDS; ++j) {
-    gl->EnableVertexAttribArray(6 + j);
-    gl->VertexAttribIPointer(6 + j, 3, GL_UNSIGNED_INT, (GLsizei)(WORDS * 3 * sizeof *m->words),
+    gl->EnableVertexAttribArray(NORMALS_AT + j);
+    gl->VertexAttribIPointer(NORMALS_AT + j, 3, GL_UNSIGNED_INT,
+                             (GLsizei)(WORDS * 3 * sizeof *m->words),
                              (const void *)((uintptr_t)j * 3 * sizeof *m->words));
   }
 }
@@ -246,17 +270,20 @@ static void run_shader(const gl_api *gl, GLuint program, const model *m, float *
  * differently. The random modes nearly cancel in some sums, which loses a digit. */
 static const double normal_rounding = 1e-4;
 
-static void check_modes(const gl_api *gl, const char *version, const char *library, size_t modes) {
-  const GLuint program = make_program(gl, version, library, (modes + 3) / 4);
-  fixture *f = fixture_create(VERTICES, modes, 3, LUNGS, false, false, 9, 21);
+static void check_modes(const gl_api *gl, const char *version, const char *library, size_t modes,
+                        bool vector) {
+  model m = {.modes = modes,
+             .axes = vector ? 3 : 1,
+             .head = vector ? SUPINE_GL_VECTOR_FLOATS : SUPINE_GL_FLOATS};
+  const GLuint program = make_program(gl, version, library, (modes + 3) / 4, m.axes);
+  fixture *f = fixture_create(VERTICES, modes, 3, LUNGS, vector, false, 9, 21);
   fixture_add_normals(f, NORMALS, 5);
   size_t size = 0;
   unsigned char *bytes = fixture_bytes(f, &size);
   const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
   supine_basis *basis = NULL;
   assert_int_equal(supine_basis_open_memory_with(bytes, size, &exact, &basis, NULL), SUPINE_OK);
-  model m = {.modes = modes};
-  m.attributes = fixture_allocate(VERTICES * (SUPINE_GL_FLOATS + modes), sizeof *m.attributes);
+  m.attributes = fixture_allocate(VERTICES * (m.head + m.axes * modes), sizeof *m.attributes);
   m.words = fixture_allocate((size_t)VERTICES * WORDS * 3, sizeof *m.words);
   float *gpu = fixture_allocate(6 * VERTICES, sizeof *gpu);
   float *cpu = fixture_allocate(6 * VERTICES, sizeof *cpu);
@@ -311,7 +338,8 @@ static void check_glsl(EGLenum api, const char *version) {
   unsigned char *library = test_read(SUPINE_GLSL, &length);
   static const size_t modes[] = {1, 4, 6, 11, 16};
   for (size_t i = 0; i < sizeof modes / sizeof *modes; ++i) {
-    check_modes(&gl, version, (const char *)library, modes[i]);
+    check_modes(&gl, version, (const char *)library, modes[i], false);
+    check_modes(&gl, version, (const char *)library, modes[i], true);
   }
   free(library);
   (void)eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);

@@ -152,7 +152,7 @@ TEST(test_save_expected_error_stays_in_millimetres) {
     const size_t row = moved ? 32 : 16;
     const supine_mesh_save_options options = {.from = moved ? mesh.vertices : NULL,
                                               .millimetres_per_unit = 10.0,
-                                              .expected_error = errors};
+                                              .scalars = {{"expected_error_mm", errors}}};
     char path[256];
     size_t size = 0;
     save(sample_path(state, "a.ply", path), &mesh, &options);

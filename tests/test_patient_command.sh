@@ -159,6 +159,17 @@ grep -q 'source of the gain.*scans of --state do not' fit.txt || fail "a gain at
 "$supine" fit rest.ply stiff.ply --rest 6000mL --other 5000mL --expandability -o stiff.json \
   --map stiff.csv >fit.txt || fail "fit a lesion"
 [ "$(wc -l <stiff.csv)" -gt 300 ] || fail "rows of the map: $(wc -l <stiff.csv)"
+"$supine" fit rest.ply stiff.ply --rest 6000mL --other 5000mL --expandability --map map.ply >/dev/null ||
+  fail "colour a surface by expandability"
+for scalar in expandability determined; do
+  head -c 400 map.ply | grep -qa "^property float $scalar$" || fail "$scalar of the map's surface"
+done
+# The numbers of the first vertex, 20 bytes after the header, are those of the first row.
+at=$(head -c 600 map.ply | grep -abo 'end_header' | cut -d: -f1)
+near "$(od -An -tf4 -N4 -j$((at + 11 + 12)) map.ply | tr -d ' ')" "$(sed -n 2p stiff.csv | cut -d, -f5)" 0.001 ||
+  fail "colour of the first vertex: $(sed -n 2p stiff.csv)"
+near "$(od -An -tf4 -N4 -j$((at + 11 + 16)) map.ply | tr -d ' ')" "$(sed -n 2p stiff.csv | cut -d, -f6)" 0.001 ||
+  fail "colour of the first vertex: $(sed -n 2p stiff.csv)"
 "$supine" precompute rest.ply --expandability stiff.csv --held-out 10 -o map.safetensors >/dev/null 2>&1 ||
   fail "precompute with the map"
 grep -q 'kept *yes' fit.txt || fail "no expandability kept"

@@ -17,22 +17,26 @@ supine_status supine_mesh_save_ply(const mesh_writer *writer) {
                 "property float displacement_z\nproperty float displacement_magnitude\n",
                 writer->out);
   }
-  if (writer->options.expected_error != NULL) {
-    (void)fputs("property float expected_error_mm\n", writer->out);
+  for (size_t k = 0; k < SUPINE_MESH_SCALARS; ++k) {
+    if (writer->options.scalars[k].values != NULL) {
+      (void)fprintf(writer->out, "property float %s\n", writer->options.scalars[k].name);
+    }
   }
   (void)fprintf(writer->out,
                 "element face %zu\nproperty list uchar int vertex_indices\nend_header\n",
                 mesh->triangle_count);
   for (size_t i = 0; i < mesh->vertex_count; ++i) {
-    float row[8];
+    float row[7 + SUPINE_MESH_SCALARS];
     size_t count = 3;
     supine_mesh_writer_position(writer, i, row);
     if (writer->options.from != NULL) {
       supine_mesh_writer_displacement(writer, i, row + 3);
       count = 7;
     }
-    if (writer->options.expected_error != NULL) {
-      row[count++] = writer->options.expected_error[i];
+    for (size_t k = 0; k < SUPINE_MESH_SCALARS; ++k) {
+      if (writer->options.scalars[k].values != NULL) {
+        row[count++] = writer->options.scalars[k].values[i];
+      }
     }
     (void)fwrite(row, sizeof *row, count, writer->out);
   }

@@ -12,7 +12,7 @@
 
 #include "mesh/io/save.h"
 
-enum { VTP_ARRAYS = 8, VTP_FIRST_OF_POINTS = 3 };
+enum { VTP_ARRAYS = 9, VTP_FIRST_OF_POINTS = 3 };
 
 typedef struct vtp vtp;
 
@@ -30,7 +30,7 @@ typedef struct vtp_array {
   bool constant;        /* whether the array is equal in all frames and written once */
   vtp_put *put;         /* NULL for the numbers that `numbers` computes, */
   vtp_numbers *numbers; /* without the first `skip` */
-  size_t skip;
+  size_t skip;          /* for put_scalar, the index of the scalar */
 } vtp_array;
 
 struct vtp {
@@ -70,8 +70,8 @@ static void put_offset(const vtp *file, size_t i, unsigned char **at) {
   supine_mesh_put_u32(at, &stop, 1);
 }
 
-static void put_expected_error(const vtp *file, size_t i, unsigned char **at) {
-  supine_mesh_put_f32(at, file->writer.options.expected_error + i, 1);
+static void put_scalar(const vtp *file, size_t i, unsigned char **at) {
+  supine_mesh_put_f32(at, file->writer.options.scalars[file->packing->skip].values + i, 1);
 }
 
 static void put_lung(const vtp *file, size_t i, unsigned char **at) {
@@ -96,9 +96,11 @@ static supine_status vtp_begin(vtp *file) {
     *to++ = (vtp_array){"Float32", "displacement", 3, 12, points, false, NULL, numbers, 0};
     *to++ = (vtp_array){"Float32", "displacement_magnitude", 1, 4, points, false, NULL, numbers, 3};
   }
-  if (writer->options.expected_error != NULL) {
-    *to++ = (vtp_array){"Float32", "expected_error_mm", 1,    4, points,
-                        false,     put_expected_error,  NULL, 0};
+  for (size_t k = 0; k < SUPINE_MESH_SCALARS; ++k) {
+    const supine_mesh_scalar *scalar = &writer->options.scalars[k];
+    if (scalar->values != NULL) {
+      *to++ = (vtp_array){"Float32", scalar->name, 1, 4, points, false, put_scalar, NULL, k};
+    }
   }
   if (writer->options.normals != NULL) {
     *to++ =

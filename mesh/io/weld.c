@@ -48,14 +48,10 @@ static size_t join(supine_mesh *mesh, uint32_t *remap, uint32_t *slots, size_t s
 static size_t drop_degenerate(supine_mesh *mesh, const uint32_t *remap) {
   size_t kept = 0;
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
-    const uint32_t a = remap[mesh->triangles[3 * t]];
-    const uint32_t b = remap[mesh->triangles[3 * t + 1]];
-    const uint32_t c = remap[mesh->triangles[3 * t + 2]];
-    if (a != b && b != c && c != a) {
-      mesh->triangles[3 * kept] = a;
-      mesh->triangles[3 * kept + 1] = b;
-      mesh->triangles[3 * kept + 2] = c;
-      ++kept;
+    const uint32_t *old = mesh->triangles + 3 * t;
+    const uint32_t corner[3] = {remap[old[0]], remap[old[1]], remap[old[2]]};
+    if (corner[0] != corner[1] && corner[1] != corner[2] && corner[2] != corner[0]) {
+      memcpy(mesh->triangles + 3 * kept++, corner, sizeof corner);
     }
   }
   return kept;

@@ -68,11 +68,8 @@ typedef struct supine_labels_report {
  * manifold. It is smoothed without shrinking [Taubin1995]; no vertex moves by more than a cube.
  *
  * @param surfaces  [2] zero-initialised; surface i is that of report->lung[i] and faces outwards
- * @retval SUPINE_ERROR_MESH  a lung has no voxels, or is too small or too large; it is unclear
- * which labels are lungs; the left lung does not lie left of the right lung; or labels name the
- * sides, the header's axes were not given, and the lungs' shape is mirrored Memory: the image and 1
- * byte per voxel. For each voxel of the lungs' bounding box, splitting lungs takes 10 bytes more
- * and closing gaps takes 4 bytes more. */
+ * Memory: the image and 1 byte per voxel. For each voxel of the lungs' bounding box, splitting lungs
+ * takes 10 bytes more and closing gaps takes 4 bytes more. */
 supine_status supine_labels_surfaces(const char *const *paths, size_t count,
                                      const supine_labels_options *options, supine_mesh *surfaces,
                                      supine_labels_report *report, supine_error *error);

@@ -16,9 +16,7 @@ typedef struct supine_labels_shape {
  * vertices is about one voxel or, if that is larger, 1/50 of the cube root of the label's volume.
  * @param wanted  [wanted_count] labels, 1 to 65535; all labels present if the count is 0
  * @param parts   [*count] output in the order of `wanted`, or by ascending label; release with
- *             supine_labels_shapes_free
- * @retval SUPINE_ERROR_MESH  a label has no voxels, all voxels are 0, or more than 256 labels are
- *             present but none is named */
+ *             supine_labels_shapes_free */
 supine_status supine_labels_shapes(const char *path, const unsigned *wanted, size_t wanted_count,
                                    supine_labels_shape **parts, size_t *count, supine_error *error);
 void supine_labels_shapes_free(supine_labels_shape *parts, size_t count);

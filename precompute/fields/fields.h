@@ -31,11 +31,7 @@ typedef struct supine_fields {
  * @param lungs   the reference surface
  * @param frame   axes and unit of the file, which are those of the files of the lungs; a frame of
  *   zeros stands for LPS and mm
- * @param fields  release with supine_fields_free
- * @retval SUPINE_ERROR_READ    the file is missing
- * @retval SUPINE_ERROR_FORMAT  malformed, or without points; a direction that is zero, repeated or
- *   not finite; a point or a displacement that is not finite
- * @retval SUPINE_ERROR_MESH    a vertex without a point of its own; two points at one vertex */
+ * @param fields  release with supine_fields_free */
 supine_status supine_fields_load(const char *path, const supine_lungs *lungs,
                                  const supine_scan_frame *frame, supine_fields *fields,
                                  supine_error *error);
@@ -64,9 +60,7 @@ typedef struct supine_fit_options {
 
 /** Fit harmonics to the fields, compress the fit, and measure its leave-one-out error.
  * @param compression  written; it has one row for each coordinate of each vertex. Release it
- *   with supine_sh_compression_free
- * @retval SUPINE_ERROR_ARGUMENT   fewer than two directions, or too few to determine options->band
- * @retval SUPINE_ERROR_NUMERICAL  all displacements are zero, or a decomposition failed */
+ *   with supine_sh_compression_free */
 supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_options *options,
                                 supine_compression *compression, supine_fit_report *report,
                                 supine_error *error);

@@ -33,7 +33,6 @@ typedef struct supine_inside_biharmonic {
  *
  * @param points  [count, 3] mm
  * @param values  [count, columns] value of each component at each point
- * @retval SUPINE_ERROR_NUMERICAL  the points lie in one plane
  * Cost: count x M distances to choose M centres; M^3 / 6 multiplications to factorise a matrix of
  * 8 M^2 bytes, of which half are used. */
 supine_status supine_inside_biharmonic_fit(size_t count, const double *points, size_t columns,

@@ -28,8 +28,7 @@ typedef struct supine_inside_shells {
 } supine_inside_shells;
 
 /** Extract each lung's surface as it is in the scan.
- * @param shells  output; release with supine_inside_shells_free
- * @retval SUPINE_ERROR_NUMERICAL  the basis cannot reach the scan's volume */
+ * @param shells  output; release with supine_inside_shells_free */
 supine_status supine_inside_shells_create(const supine_basis *basis, supine_inside_shells *shells,
                                           supine_error *error);
 void supine_inside_shells_free(supine_inside_shells *shells);

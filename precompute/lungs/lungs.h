@@ -36,10 +36,7 @@ typedef struct supine_lungs {
  * box nearest x = 0 for one. If the triangles of a lung face inwards, they are reversed.
  * @param meshes   [count] not changed
  * @param midline  x of the plane between left and right, mm; found if NULL
- * @param lungs    written on success; release with supine_lungs_free
- * @retval SUPINE_ERROR_MESH      no surface, or one without extent; one lung given twice; a surface
- *   much smaller than another; a midline that runs through a lung, or leaves both lungs on one side
- */
+ * @param lungs    written on success; release with supine_lungs_free */
 supine_status supine_lungs_create(const supine_mesh *meshes, size_t count, const double *midline,
                                   supine_lungs *lungs, supine_error *error);
 

@@ -21,6 +21,13 @@ static const unsigned char faces[FACES][3] = {
     {3, 8, 9},   {4, 9, 5},  {2, 4, 11}, {6, 2, 10}, {8, 6, 7},   {9, 8, 1},
 };
 
+/* The two corners of each edge, lower first, in the order in which `faces` has them. */
+static const unsigned char edges[EDGES][2] = {
+    {0, 11}, {0, 5}, {0, 1},  {1, 7},  {0, 7}, {7, 10}, {0, 10}, {10, 11}, {1, 5}, {5, 9},
+    {5, 11}, {4, 5}, {2, 11}, {6, 10}, {1, 8}, {3, 9},  {3, 4},  {2, 3},   {2, 6}, {3, 6},
+    {6, 8},  {3, 8}, {8, 9},  {4, 9},  {2, 4}, {4, 11}, {2, 10}, {6, 7},   {7, 8}, {1, 9},
+};
+
 size_t supine_phantom_geodesic_vertex_count(size_t frequency) {
   return 10 * frequency * frequency + 2;
 }
@@ -38,25 +45,6 @@ static void corner(size_t index, double p[3]) {
   p[axis % 3] = one;
   p[(axis + 1) % 3] = far;
   p[(axis + 2) % 3] = 0.0;
-}
-
-/* Find the index of the edge between two corners of the icosahedron. Edges are numbered in the
- * order in which `faces` names them with the lower corner first. */
-static size_t edge_index(unsigned a, unsigned b) {
-  size_t count = 0;
-  for (size_t f = 0; f < FACES; ++f) {
-    for (size_t k = 0; k < 3; ++k) {
-      const unsigned p = faces[f][k];
-      const unsigned q = faces[f][(k + 1) % 3];
-      if (p < q) {
-        if ((p == a && q == b) || (p == b && q == a)) {
-          return count;
-        }
-        ++count;
-      }
-    }
-  }
-  return count;
 }
 
 /* Return the index of a vertex of the geodesic sphere. It lies at the barycentric coordinates (f -
@@ -78,7 +66,11 @@ static size_t vertex_index(size_t face, size_t f, size_t i, size_t j) {
         const unsigned b = faces[face][next];
         /* vertices are numbered along the edge from its corner with the lower index */
         const size_t along = a < b ? step[next] : step[k];
-        return CORNERS + edge_index(a, b) * (f - 1) + along - 1;
+        size_t edge = 0;
+        while (edges[edge][0] != (a < b ? a : b) || edges[edge][1] != (a < b ? b : a)) {
+          ++edge;
+        }
+        return CORNERS + edge * (f - 1) + along - 1;
       }
     }
   }

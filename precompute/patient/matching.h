@@ -82,7 +82,8 @@ void supine_patient_stiffness_shares(const supine_patient_stiffness *stiffness,
 void supine_patient_stiffness_of(const supine_patient_stiffness *stiffness,
                                  const supine_lungs *lungs, double *e);
 
-/** Write the expandability of every vertex, and how far surfaces determine it, to a CSV file. */
+/** Write the expandability of every vertex, and how far surfaces determine it, to a
+ * CSV file or as point data of a surface file. */
 supine_status supine_patient_stiffness_write(const char *path,
                                              const supine_patient_stiffness *stiffness,
                                              const supine_lungs *lungs, supine_error *error);

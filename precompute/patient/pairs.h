@@ -31,10 +31,9 @@ void supine_patient_pairs_free(supine_patient_pairs *pairs);
  * @return 1 if the points do not determine a map, or if the map is a reflection */
 double supine_patient_pairs_growth(const supine_patient_pairs *pairs);
 
-/** Check that the pairs of points can be positions in two states of one chest.
- * @param scans_moved  the body may have moved between the scans
- * @retval SUPINE_ERROR_FORMAT  fewer than 12 pairs, points in one plane, units other than mm,
- *   exchanged sides or axes, frames that do not overlap (unless scans_moved), or no displacement */
+/** Check that at least 12 pairs of points can be positions in two states of one chest. Refuse other
+ * units than mm, exchanged sides or axes, and frames that do not overlap (unless scans_moved).
+ * @param scans_moved  the body may have moved between the scans */
 supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool scans_moved,
                                          supine_error *error);
 

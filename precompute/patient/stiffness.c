@@ -4,7 +4,9 @@
 
 #include "precompute/patient/matching.h"
 
+#include "base/arena.h"
 #include "base/output.h"
+#include "base/text.h"
 #include "base/vec3.h"
 
 void supine_patient_stiffness_shares(const supine_patient_stiffness *stiffness,
@@ -45,21 +47,34 @@ void supine_patient_stiffness_of(const supine_patient_stiffness *stiffness,
 supine_status supine_patient_stiffness_write(const char *path,
                                              const supine_patient_stiffness *stiffness,
                                              const supine_lungs *lungs, supine_error *error) {
+  const size_t n = lungs->mesh.vertex_count;
   supine_output output = {0};
+  SUPINE_ARENA arena = {0};
+  float *a = supine_arena_take(&arena, n, sizeof *a);
+  float *determined = supine_arena_zeros(&arena, n, sizeof *determined);
+  if (arena.failed) {
+    return supine_error_memory(error, "%zu vertices", n);
+  }
+  for (size_t i = 0; i < n; ++i) {
+    double shares[SUPINE_PATIENT_REGIONS_MAX];
+    supine_patient_stiffness_shares(stiffness, lungs, i, shares);
+    a[i] = stiffness->count == 0 ? 1.0F : 0.0F;
+    for (size_t k = 0; k < stiffness->count; ++k) {
+      a[i] += (float)(shares[k] * stiffness->region[k].expandability);
+      determined[i] += (float)(shares[k] * stiffness->region[k].determined);
+    }
+  }
+  if (!supine_text_ends_in(path, ".csv")) {
+    const supine_mesh_save_options save = {
+        .scalars = {{"expandability", a}, {"determined", determined}}};
+    return supine_mesh_save(path, &lungs->mesh, &save, error);
+  }
   SUPINE_TRY(supine_output_open(path, &output, error));
   (void)fputs("vertex,x_mm,y_mm,z_mm,expandability,determined\n", output.file);
-  for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
+  for (size_t i = 0; i < n; ++i) {
     const double *p = lungs->mesh.vertices + 3 * i;
-    double shares[SUPINE_PATIENT_REGIONS_MAX];
-    double a = stiffness->count == 0 ? 1.0 : 0.0;
-    double determined = 0.0;
-    supine_patient_stiffness_shares(stiffness, lungs, i, shares);
-    for (size_t k = 0; k < stiffness->count; ++k) {
-      a += shares[k] * stiffness->region[k].expandability;
-      determined += shares[k] * stiffness->region[k].determined;
-    }
-    (void)fprintf(output.file, "%zu,%.6g,%.6g,%.6g,%.5g,%.3g\n", i, p[0], p[1], p[2], a,
-                  determined);
+    (void)fprintf(output.file, "%zu,%.6g,%.6g,%.6g,%.5g,%.3g\n", i, p[0], p[1], p[2], (double)a[i],
+                  (double)determined[i]);
   }
   return supine_output_commit(&output, error);
 }

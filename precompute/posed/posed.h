@@ -30,7 +30,7 @@ typedef struct supine_expected {
 
 /* Compute the expected errors of the displacements from one state to another. They are unknown for
  * open surfaces and for displacements computed by another simulator; `expected` is then unchanged.
- * @retval SUPINE_ERROR_MEMORY, or any status of supine_basis_pose */
+ */
 supine_status supine_posed_expected(const supine_basis *basis, const supine_state *state,
                                     const supine_state *from, supine_expected *expected,
                                     supine_error *error);

@@ -77,8 +77,11 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
  * between the positions that the run time computes and the same sum of modes in double precision,
  * in 16 directions of gravity, at the default volume (supine_basis_default_volume). Directions in
  * which the surface cannot have this volume are left out.
- * @param basis  opened with the default storage */
-supine_status supine_accuracy_add_storage(const supine_basis *basis, supine_accuracy *accuracy);
+ * @param basis       opened with the default storage
+ * @param directions  [N, 3] displacement of each vertex per unit force, mm, or NULL */
+supine_status supine_accuracy_add_storage(const supine_basis *basis,
+                                          const supine_compression *compression,
+                                          const double *directions, supine_accuracy *accuracy);
 
 /** Find the share of triangles, 0 to 1, whose normals turn by more than 90 degrees from the
  * reference surface to a given volume. It is the largest share in the six postures with gravity

@@ -18,8 +18,7 @@ typedef struct supine_field {
 
 /** Compute the displacement field from the scan to a pose. It has a physical meaning only at the
  * grid nodes that 'supine embed' stored in the basis. From these it falls to 0 over `fade` mm.
- * @param field  release with supine_field_free
- * @retval SUPINE_ERROR_FORMAT  the basis has no grid, or a malformed one */
+ * @param field  release with supine_field_free */
 supine_status supine_field_create(const supine_basis *basis, const supine_pose *pose, double fade,
                                   supine_field *field, supine_error *error);
 void supine_field_free(supine_field *field);

@@ -63,26 +63,23 @@ INLINE void find_cells(const supine_image *image, double (*at)[RUN], cells *foun
   }
 }
 
-/* Find the nodes around RUN voxels of a row of `from`. The operations and their order are those of
- * supine_image_place and supine_field_find_cell, so that both give the same bits. */
+/* Find the nodes around RUN voxels of a row of `from`, which are evenly spaced. */
 INLINE void find_nodes(const supine_image *from, size_t row, size_t begin,
                        const supine_image *nodes, cells *found) {
-  const double line[2] = {(double)(row % from->size[1]), (double)(row / from->size[1])};
-  const supine_image frame = *nodes;
-  const supine_image voxels = *from;
   double at[3][RUN];
-  double across[3];
-  supine_cross(frame.step[1], frame.step[2], across);
-  const double whole = supine_dot(frame.step[0], across);
-  for (size_t i = 0; i < RUN; ++i) { /* Cramer's rule */
-    double apart[3];
-    for (size_t k = 0; k < 3; ++k) {
-      apart[k] = voxels.origin[k] + (double)(begin + i) * voxels.step[0][k] +
-                 line[0] * voxels.step[1][k] + line[1] * voxels.step[2][k] - frame.origin[k];
+  double point[3];
+  double start[3];
+  double next[3];
+  supine_image_place(from, row * from->size[0] + begin, point);
+  supine_image_locate(nodes, point, start);
+  for (size_t k = 0; k < 3; ++k) {
+    point[k] += from->step[0][k];
+  }
+  supine_image_locate(nodes, point, next);
+  for (size_t a = 0; a < 3; ++a) {
+    for (size_t i = 0; i < RUN; ++i) {
+      at[a][i] = start[a] + (double)i * (next[a] - start[a]);
     }
-    at[0][i] = supine_dot(apart, across) / whole;
-    at[1][i] = supine_triple(frame.step[0], apart, frame.step[2]) / whole;
-    at[2][i] = supine_triple(frame.step[0], frame.step[1], apart) / whole;
   }
   find_cells(nodes, at, found);
 }
@@ -107,28 +104,32 @@ INLINE void weigh_corners(const supine_image *image, const cells *in, double (*w
   }
 }
 
-/* Interpolate the displacements, mm. The operations and their order are those of
- * supine_field_interpolate, so that both give the same bits. */
-INLINE void displace(const supine_image *nodes, const cells *in, double (*shift)[RUN]) {
+/* Interpolate the displacements, mm. Return whether a voxel moves. */
+INLINE bool displace(const supine_image *nodes, const cells *in, double (*shift)[RUN]) {
   double weight[8][RUN];
   size_t offset[8];
   vector corners[8] = {{0.0}};
+  bool moves = false; /* whether a corner of the cell moves */
+  bool any = false;
   weigh_corners(nodes, in, weight, offset);
   for (size_t i = 0; i < RUN; ++i) {
     if (i == 0 || in->first[i] != in->first[i - 1]) {
       for (size_t corner = 0; corner < 8; ++corner) {
         const float *u = (const float *)nodes->values + in->first[i] + offset[corner];
         corners[corner] = (vector){(double)u[0], (double)u[1], (double)u[2], 0.0};
+        moves = (corner > 0 && moves) || u[0] != 0.0F || u[1] != 0.0F || u[2] != 0.0F;
       }
     }
     vector u = {0.0, 0.0, 0.0, 0.0};
-    for (size_t corner = 0; corner < 8; ++corner) {
+    for (size_t corner = 0; corner < 8 && moves; ++corner) {
       u += weight[corner][i] * corners[corner];
     }
     for (size_t k = 0; k < 3; ++k) {
       shift[k][i] = u[k];
     }
+    any |= moves;
   }
+  return any;
 }
 
 /* Interpolate an image of one channel at points. */
@@ -248,24 +249,20 @@ SUPINE_CLONES static void resample_run(const resampling *work, size_t row, size_
   double at[3][RUN];
   double shift[3][RUN];
   double values[RUN];
-  bool still = true;
   cells nodes;
   cells in;
   find_nodes(from, row, begin, &work->inverse->nodes, &nodes);
-  displace(&work->inverse->nodes, &nodes, shift);
-  for (size_t i = 0; i < RUN; ++i) {
-    const double u[3] = {shift[0][i], shift[1][i], shift[2][i]};
-    still &= u[0] == 0.0 && u[1] == 0.0 && u[2] == 0.0;
-    for (size_t a = 0; a < 3; ++a) {
-      at[a][i] = (a == 0 ? (double)(begin + i) : line[a - 1]) + u[0] * work->axes[0][a] +
-                 u[1] * work->axes[1][a] + u[2] * work->axes[2][a];
-    }
-  }
-  if (still) {
+  if (!displace(&work->inverse->nodes, &nodes, shift)) {
     const size_t size = supine_image_voxel_size(from->voxel);
     memcpy((char *)work->to->values + first * size, (const char *)from->values + first * size,
            count * size);
     return;
+  }
+  for (size_t a = 0; a < 3; ++a) {
+    for (size_t i = 0; i < RUN; ++i) {
+      at[a][i] = (a == 0 ? (double)(begin + i) : line[a - 1]) + shift[0][i] * work->axes[0][a] +
+                 shift[1][i] * work->axes[1][a] + shift[2][i] * work->axes[2][a];
+    }
   }
   find_cells(from, at, &in);
   if (work->labels) {

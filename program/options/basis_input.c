@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Open a basis, and print its expected errors and the displacement of its hilum. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/arena.h"
@@ -75,10 +74,11 @@ supine_status supine_options_hilum(const supine_basis *basis, const supine_pose 
                                    supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const size_t modes = info->mode_count;
-  double *mean = malloc(info->lung_count * 3 * modes * sizeof *mean);
+  SUPINE_ARENA arena = {0};
+  double *mean = supine_arena_take(&arena, info->lung_count * 3 * modes, sizeof *mean);
   memset(shift, 0, 3 * sizeof *shift);
   if (mean == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+    return supine_error_memory(error, "%zu modes", modes);
   }
   const bool known = supine_inside_hilum(basis, mean);
   for (size_t i = 0; i < info->lung_count * 3 * modes && known; ++i) {
@@ -88,7 +88,6 @@ supine_status supine_options_hilum(const supine_basis *basis, const supine_pose 
                    (pose->gains[lung][axis] * pose->weights[i % modes] -
                     from->gains[lung][axis] * from->weights[i % modes]);
   }
-  free(mean);
   return known || !needed ? SUPINE_OK
                           : supine_error_set(error, SUPINE_ERROR_UNSUPPORTED,
                                              "--frame hilum: the file does not say how the hilum "

@@ -20,27 +20,16 @@
 #include "runtime/words.h"
 
 static int exit_code(supine_status status) {
-  switch (status) {
-  case SUPINE_OK:
-    return SUPINE_EXIT_OK;
-  case SUPINE_ERROR_ARGUMENT:
-    return SUPINE_EXIT_USAGE;
-  case SUPINE_ERROR_READ:
-  case SUPINE_ERROR_FORMAT:
-  case SUPINE_ERROR_MESH:
-  case SUPINE_ERROR_OPEN_SURFACE:
-    return SUPINE_EXIT_INPUT;
-  case SUPINE_ERROR_UNSUPPORTED:
-    return SUPINE_EXIT_UNSUPPORTED;
-  case SUPINE_ERROR_WRITE:
-  case SUPINE_ERROR_INTERRUPTED:
-    return SUPINE_EXIT_OUTPUT;
-  case SUPINE_ERROR_MEMORY:
-  case SUPINE_ERROR_NUMERICAL:
-  case SUPINE_STATUS_COUNT:
-    break;
-  }
-  return SUPINE_EXIT_NUMERICAL;
+  static const int codes[SUPINE_STATUS_COUNT] = {
+      [SUPINE_ERROR_ARGUMENT] = SUPINE_EXIT_USAGE,
+      [SUPINE_ERROR_READ] = SUPINE_EXIT_INPUT,
+      [SUPINE_ERROR_FORMAT] = SUPINE_EXIT_INPUT,
+      [SUPINE_ERROR_MESH] = SUPINE_EXIT_INPUT,
+      [SUPINE_ERROR_OPEN_SURFACE] = SUPINE_EXIT_INPUT,
+      [SUPINE_ERROR_UNSUPPORTED] = SUPINE_EXIT_UNSUPPORTED,
+      [SUPINE_ERROR_WRITE] = SUPINE_EXIT_OUTPUT,
+      [SUPINE_ERROR_INTERRUPTED] = SUPINE_EXIT_OUTPUT}; /* 0: the rest, which are numerical */
+  return codes[status] != 0 ? codes[status] : SUPINE_EXIT_NUMERICAL;
 }
 
 void supine_options_say(const char *command, const char *format, ...) {

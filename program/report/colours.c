@@ -3,7 +3,8 @@
 #include "program/report/comparison_parts.h"
 #include "program/view/render/render.h"
 
-json_t *supine_report_hex(supine_colours map, double t) {
+/* Return the colour of a map at 0 <= t <= 1 as a string "#rrggbb". */
+static json_t *hex(supine_colours map, double t) {
   double rgb[3];
   supine_render_colour(map, t, rgb);
   return json_sprintf("#%02x%02x%02x", (unsigned)(255.0 * rgb[0] + 0.5) & 255U,
@@ -24,7 +25,7 @@ json_t *supine_report_bar(supine_colours map, double largest, const char *words)
   json_t *stops = json_array();
   json_t *ticks = json_array();
   for (int i = 0; i <= STOPS; ++i) {
-    (void)json_array_append_new(stops, supine_report_hex(map, i / (double)STOPS));
+    (void)json_array_append_new(stops, hex(map, i / (double)STOPS));
   }
   for (int i = 0; largest > 0.0 && i * step <= largest * (1.0 + 1e-9); ++i) {
     (void)json_array_append_new(ticks, json_pack("{s:o, s:o}", "at",

@@ -57,6 +57,6 @@ json_t *supine_report_profile(const supine_comparison *c) {
                          supine_options_posture_label(c->postures.item[i].name), "dashed",
                          (int)(i >= 7), "dots", dots));
   }
-  return json_pack("{s:s, s:o, s:o, s:o}", "axis", "regional expansion, %", "title",
-                   supine_report_profile_finding(c), "ticks", ticks, "lines", lines);
+  return json_pack("{s:s, s:o, s:o}", "axis", "regional expansion, %", "ticks", ticks, "lines",
+                   lines);
 }

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Build the first sentences and the first table of the report, and the titles of its charts, whose
- * vertical axis is height. */
+/* Build the first sentences and the first tables of the report. */
 #include <ctype.h>
 #include <math.h>
 #include <stdlib.h>
@@ -13,13 +12,12 @@ static const struct {
   const char *posture, *percent, *ratio;
 } published[] = {{"supine", "", "1.75"}, {"left", "0 (44), +25 (11)", ""}};
 
-/* Compute the change of each lung's volume between the reference pose and a posture, % and mL. */
-static void find_changes(const supine_comparison *c, size_t posture, double *percent, double *ml) {
+/* Compute the change of each lung's volume between the reference pose and a posture, %. */
+static void find_changes(const supine_comparison *c, size_t posture, double *percent) {
   double held[SUPINE_LUNGS_MAX];
   (void)supine_basis_volumes(c->basis, &c->reference.pose, held);
   for (size_t lung = 0; lung < supine_basis_get_info(c->basis)->lung_count; ++lung) {
-    ml[lung] = c->posture[posture].volume[lung] - held[lung];
-    percent[lung] = 100 * ml[lung] / held[lung];
+    percent[lung] = 100 * (c->posture[posture].volume[lung] / held[lung] - 1);
   }
 }
 
@@ -74,15 +72,14 @@ static void print_finding(const supine_comparison *c, size_t posture, FILE *to) 
   (void)fputs(moved <= error ? ")." : ".", to);
 }
 
-static json_t *printed(const supine_comparison *c, size_t posture,
-                       void (*print)(const supine_comparison *c, size_t posture, FILE *to)) {
+static json_t *finding(const supine_comparison *c, size_t posture) {
   char *text = NULL;
   size_t size = 0;
   FILE *to = open_memstream(&text, &size);
   if (to == NULL) {
     return json_null();
   }
-  print(c, posture, to);
+  print_finding(c, posture, to);
   json_t *made = fclose(to) == 0 ? json_string(text) : json_null();
   free(text);
   return made;
@@ -93,23 +90,10 @@ json_t *supine_report_findings(const supine_comparison *c) {
   json_t *list = json_array();
   for (size_t i = 0; i < c->postures.count && json_array_size(list) < SENTENCES; ++i) {
     if (c->posture[i].displacement.max >= 0.05) { /* this posture is not the reference */
-      (void)json_array_append_new(list, printed(c, i, print_finding));
+      (void)json_array_append_new(list, finding(c, i));
     }
   }
   return list;
-}
-
-static void print_profile(const supine_comparison *c, size_t last, FILE *to) {
-  (void)fputs("Expansion, lowest third of the height divided by uppermost third:", to);
-  for (size_t i = 0; i <= last; ++i) {
-    (void)fprintf(to, "%s %s %.2f", i > 0 ? "," : "",
-                  supine_options_posture_label(c->postures.item[i].name),
-                  lowest_over_uppermost(c, i));
-  }
-}
-
-json_t *supine_report_profile_finding(const supine_comparison *c) {
-  return printed(c, (c->postures.count < 4 ? c->postures.count : 4) - 1, print_profile);
 }
 
 json_t *supine_report_targets(const supine_comparison *c) {
@@ -141,10 +125,9 @@ json_t *supine_report_postures(const supine_comparison *c) {
   for (size_t i = 0; i < c->postures.count; ++i) {
     json_t *lungs = json_array();
     double percent[SUPINE_LUNGS_MAX] = {0};
-    double ml[SUPINE_LUNGS_MAX] = {0};
     const char *words[2] = {"", ""};
     const double ratio = lowest_over_uppermost(c, i); /* NaN if no breath is computed */
-    find_changes(c, i, percent, ml);
+    find_changes(c, i, percent);
     for (size_t lung = 0; lung < info->lung_count; ++lung) {
       (void)json_array_append_new(
           lungs, json_pack("{s:o, s:o, s:o}", "range", supine_report_held(c, i, lung, true), "ml",

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "base/arena.h"
 #include "program/report/comparison_parts.h"
 
 /* A slice, seen from the feet or from the front: the patient's left is on the right. */
@@ -115,9 +116,10 @@ json_t *supine_report_outlines(const supine_comparison *c) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);
   double low[3] = {INFINITY, INFINITY, INFINITY};
   double high[3] = {-INFINITY, -INFINITY, -INFINITY};
-  float *xyz = malloc(3 * info->vertex_count * sizeof *xyz);
+  SUPINE_ARENA arena = {0};
+  float *xyz = supine_arena_take(&arena, info->vertex_count, 3 * sizeof *xyz);
   json_t *list = json_array();
-  if (xyz == NULL) {
+  if (arena.failed) {
     return list;
   }
   for (size_t i = 0; i < c->postures.count; ++i) {
@@ -130,6 +132,5 @@ json_t *supine_report_outlines(const supine_comparison *c) {
   for (size_t i = 0; i < sizeof slices / sizeof *slices; ++i) {
     (void)json_array_append_new(list, chart(c, &slices[i], low, high, xyz));
   }
-  free(xyz);
   return list;
 }

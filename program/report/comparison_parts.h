@@ -8,9 +8,6 @@
 #include "program/report/comparison.h"
 #include "program/view/render/render.h"
 
-/* Return the colour of a map at 0 <= t <= 1 as a string "#rrggbb". */
-json_t *supine_report_hex(supine_colours map, double t);
-
 /* Return the colour of a posture's line in charts. */
 const char *supine_report_line(size_t posture);
 
@@ -28,10 +25,6 @@ json_t *supine_report_targets(const supine_comparison *comparison);
 /* Return the value of the tag {{postures}}: for each posture a table row of lung volumes, their
  * changes, displacements, and values from publications. */
 json_t *supine_report_postures(const supine_comparison *comparison);
-
-/* Return the title of the chart of ventilation by height: for the first four postures, the ratio of
- * the expansions of the lowest and the uppermost third of the height. */
-json_t *supine_report_profile_finding(const supine_comparison *comparison);
 
 /* Return the value of the tag {{profile}}: a chart of the regional expansion by height along
  * gravity.

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "base/arena.h"
 #include "program/report/comparison_parts.h"
 #include "program/view/export/base64.h"
 #include "program/view/render/render.h"
@@ -80,19 +81,24 @@ static json_t *picture(const supine_comparison *c, supine_renderer *renderer, si
   return made;
 }
 
+static void free_renderer(supine_renderer **renderer) {
+  supine_render_destroy(*renderer);
+}
+
 json_t *supine_report_pictures(const supine_comparison *c, supine_error *error) {
   enum { PER_ROW = 6 }; /* pictures side by side on a printed page */
   const size_t count = c->postures.count;
   const size_t rows = (count + PER_ROW - 1) / PER_ROW;
   double extent[4] = SUPINE_EXTENT_NONE;
   double most = 0.0;
-  supine_renderer *renderer = NULL;
-  json_t *cells = json_array();
-  json_t *pictures = NULL;
-  float *value = malloc(supine_basis_get_info(c->basis)->vertex_count * sizeof *value);
+  SUPINE_ARENA arena = {0};
+  SUPINE_FREED_BY(free_renderer) supine_renderer *renderer = NULL;
+  json_auto_t *cells = json_array();
+  float *value =
+      supine_arena_take(&arena, supine_basis_get_info(c->basis)->vertex_count, sizeof *value);
   *error = (supine_error){SUPINE_ERROR_MEMORY, "out of memory"};
-  if (value == NULL || supine_render_create(c->basis, &renderer, error) != SUPINE_OK) {
-    goto cleanup;
+  if (arena.failed || supine_render_create(c->basis, &renderer, error) != SUPINE_OK) {
+    return NULL;
   }
   for (size_t i = 0; i < count; ++i) {
     const supine_scene scene = make_scene(c, i, NULL);
@@ -102,21 +108,17 @@ json_t *supine_report_pictures(const supine_comparison *c, supine_error *error) 
   const double largest = supine_render_bar_end(most);
   for (size_t i = 0; i < count; ++i) {
     if (json_array_append_new(cells, picture(c, renderer, i, largest, extent, value, error)) != 0) {
-      goto cleanup;
+      return NULL;
     }
   }
   char words[224];
   (void)snprintf(words, sizeof words,
                  "displacement from %s, mm; contour lines at the ticks of the bar",
                  c->reference.name);
-  pictures = supine_report_bar(SUPINE_COLOURS_DISPLACEMENT, largest, words);
+  json_t *pictures = supine_report_bar(SUPINE_COLOURS_DISPLACEMENT, largest, words);
   (void)json_object_set(pictures, "cells", cells);
   (void)json_object_set_new(pictures, "widest", json_integer(WIDTH));
   (void)json_object_set_new(pictures, "columns",
                             json_integer((json_int_t)((count + rows - 1) / rows)));
-cleanup:
-  json_decref(cells);
-  supine_render_destroy(renderer);
-  free(value);
   return pictures;
 }

@@ -22,7 +22,7 @@ typedef struct supine_stream_site {
   const char *address;           /**< numeric address to listen on */
   int port;                      /**< 0 to choose a free port; set to the port in use */
   const char *certificate, *key; /**< paths of PEM files; NULL for no encryption */
-  char page[32];                 /**< path of the HTML file, which is read for each request */
+  const char *page;              /**< path of the HTML file, which is read for each request */
 } supine_stream_site;
 
 /** Start a thread that serves a site. */

@@ -39,8 +39,7 @@ static double twice_area(const supine_basis *basis, const uint32_t *corner) {
 
 static supine_status share_area(supine_compare *compare, supine_error *error) {
   const supine_basis *basis = compare->basis;
-  const size_t n = basis->info.vertex_count;
-  double *area = calloc(n, sizeof *area);
+  double *area = calloc(basis->info.vertex_count, sizeof *area);
   if (area == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
   }
@@ -54,7 +53,7 @@ static supine_status share_area(supine_compare *compare, supine_error *error) {
     total += 3 * piece;
   }
   compare->area = total;
-  for (size_t i = 0; i < n && total > 0; ++i) {
+  for (size_t i = 0; i < basis->info.vertex_count && total > 0; ++i) {
     compare->share[i] = (float)(area[i] / total);
   }
   free(area);

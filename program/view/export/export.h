@@ -38,8 +38,7 @@ void supine_export_field(const export_source *source, size_t vertex, size_t mode
 
 /** Compute the pose during a breath of `breath` mL, with gravity along the unit vector `g`. The
  * `fraction` is 0 at rest (in the scan if rest is unknown) and 1 at the end of inspiration; another
- * simulator's fields have no breath.
- * @retval SUPINE_ERROR_NUMERICAL  the surface folds before it reaches the volume of the pose */
+ * simulator's fields have no breath. */
 supine_status supine_export_breath_pose(const export_source *source, double breath,
                                         const double g[3], double fraction, supine_pose *pose,
                                         supine_error *error);
@@ -70,11 +69,7 @@ typedef struct export_glb_options {
  * file and of each lung's mesh say how to compute the weights from gravity and volume. Targets also
  * change normals. The node "patient" lies on a table
  * and rotates about the centre of the lungs; an arrow shows gravity. Units are metres, y points up.
- * @param bytes  output: size of the file
- * @retval SUPINE_ERROR_MESH         the basis has no triangles
- * @retval SUPINE_ERROR_ARGUMENT     the file would exceed 4 GiB, the limit of the format
- * @retval SUPINE_ERROR_UNSUPPORTED  meshoptimizer is not installed
- * @retval SUPINE_ERROR_NUMERICAL    the surface folds before the end of the breath */
+ * @param bytes  output: size of the file */
 supine_status supine_export_glb_write(const char *path, const export_source *source,
                                       const export_glb_options *options, size_t *bytes,
                                       supine_error *error);
@@ -105,8 +100,7 @@ typedef struct export_page {
 /** Print one self-contained HTML page that shows the lungs in a browser (WebGL 2) without a
  * network. Vertices, displacements and triangles are compressed by meshoptimizer. In lungs up to
  * 650 mm long, positions err by at most 0.02 mm. A write error sets the error indicator of `file`.
- * @retval SUPINE_ERROR_UNSUPPORTED  there are more than EXPORT_PAGE_MODES_MAX modes, or
- *                                   meshoptimizer is not installed */
+ */
 supine_status supine_export_html_print(FILE *file, const export_source *source,
                                        const export_page *shown, supine_error *error);
 

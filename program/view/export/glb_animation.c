@@ -50,12 +50,13 @@ static void add(glb *g, const char *name, double roll, size_t seconds) {
   const size_t count = g->source->info->lung_count;
   const size_t frames = RATE * seconds + 1;
   const size_t targets = g->targets.count;
-  float *times = malloc(frames * sizeof *times);
-  float *rotations = malloc(4 * frames * sizeof *rotations);
-  float *weights = malloc(count * frames * targets * sizeof *weights);
-  if (times == NULL || rotations == NULL || weights == NULL) {
+  SUPINE_ARENA arena = {0};
+  float *times = supine_arena_take(&arena, frames, sizeof *times);
+  float *rotations = supine_arena_take(&arena, frames, 4 * sizeof *rotations);
+  float *weights = supine_arena_take(&arena, count * frames * targets, sizeof *weights);
+  if (arena.failed) {
     g->status = SUPINE_ERROR_MEMORY;
-    goto cleanup;
+    return;
   }
   for (size_t i = 0; i < frames; ++i) {
     const double at = (double)i / RATE;
@@ -80,10 +81,6 @@ static void add(glb *g, const char *name, double roll, size_t seconds) {
   }
   (void)json_array_append_new(g->animations, json_pack("{s:s, s:o, s:o}", "name", name, "samplers",
                                                        samplers, "channels", channels));
-cleanup:
-  free(times);
-  free(rotations);
-  free(weights);
 }
 
 void supine_export_glb_animate(glb *g) {

@@ -90,17 +90,16 @@ static void number_vertices(const export_source *source, size_t lung, uint32_t *
 supine_status supine_export_order_make(const export_source *source, bool packed,
                                        export_order *order, supine_error *error) {
   const supine_basis_info *info = source->info;
-  uint32_t *place = malloc(info->vertex_count * sizeof *place);
-  uint32_t *from = malloc(3 * info->triangle_count * sizeof *from + 1);
-  float *level = calloc(3 * info->vertex_count, sizeof *level);
+  SUPINE_ARENA arena = {0};
+  uint32_t *place = supine_arena_take(&arena, info->vertex_count, sizeof *place);
+  uint32_t *from = supine_arena_take(&arena, info->triangle_count, 3 * sizeof *from);
+  float *level = supine_arena_zeros(&arena, info->vertex_count, 3 * sizeof *level);
   size_t at = 0;
-  order->vertex = malloc(info->vertex_count * sizeof *order->vertex);
-  order->corners = malloc(3 * info->triangle_count * sizeof *order->corners + 1);
-  supine_status status = SUPINE_OK;
-  if (place == NULL || from == NULL || level == NULL || order->vertex == NULL ||
-      order->corners == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
-    goto cleanup;
+  order->vertex = supine_arena_take(&order->arena, info->vertex_count, sizeof *order->vertex);
+  order->corners =
+      supine_arena_take(&order->arena, info->triangle_count, 3 * sizeof *order->corners);
+  if (arena.failed || order->arena.failed) {
+    return supine_error_memory(error, "%zu vertices", info->vertex_count);
   }
   for (size_t v = 0; v < info->vertex_count; ++v) {
     order->vertex[v] = (uint32_t)v;
@@ -122,15 +121,9 @@ supine_status supine_export_order_make(const export_source *source, bool packed,
       number_vertices(source, lung, place, order);
     }
   }
-cleanup:
-  free(place);
-  free(from);
-  free(level);
-  return status;
+  return SUPINE_OK;
 }
 
 void supine_export_order_free(export_order *order) {
-  free(order->vertex);
-  free(order->corners);
-  *order = (export_order){0};
+  supine_arena_free(&order->arena);
 }

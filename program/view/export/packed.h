@@ -4,6 +4,7 @@
 #ifndef SUPINE_EXPORT_PACKED_H
 #define SUPINE_EXPORT_PACKED_H
 
+#include "base/arena.h"
 #include "program/view/export/export.h"
 
 /** Compressed bytes; free `bytes` with free(). */
@@ -12,8 +13,7 @@ typedef struct export_packed {
   size_t size;
 } export_packed;
 
-/** Load meshoptimizer; call this before the functions below.
- * @retval SUPINE_ERROR_UNSUPPORTED  meshoptimizer is not installed */
+/** Load meshoptimizer; call this before the functions below. */
 supine_status supine_export_pack_begin(supine_error *error);
 
 /** Encode a unit vector for the filter OCTAHEDRAL of EXT_meshopt_compression, as 4 signed integers,
@@ -36,6 +36,7 @@ typedef struct export_order {
   uint32_t *corners; /**< [triangles, 3] vertices of each triangle, as indices into `vertex` */
   size_t corner_begin[SUPINE_LUNGS_MAX + 1]; /**< for each lung, the index in `corners` of its first
                                                 corner; then the total number of corners */
+  supine_arena arena;
 } export_order;
 
 /** Choose an order; free it with supine_export_order_free, also after a failure.

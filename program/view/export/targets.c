@@ -214,18 +214,15 @@ supine_status supine_export_targets_normals(const export_source *source, double 
   static const double least = 0.035;
   const size_t n = source->info->vertex_count;
   supine_pose pose;
-  double(*weights)[EXPORT_TARGETS_MAX] = malloc(source->info->lung_count * sizeof *weights);
-  float *xyz = malloc(3 * n * sizeof *xyz);
-  float *below = malloc(3 * n * sizeof *below);
-  supine_status status = SUPINE_ERROR_MEMORY;
-  if (weights == NULL || xyz == NULL || below == NULL) {
-    (void)supine_error_set(error, status, "out of memory");
-    goto cleanup;
+  SUPINE_ARENA arena = {0};
+  double(*weights)[EXPORT_TARGETS_MAX] =
+      supine_arena_take(&arena, source->info->lung_count, sizeof *weights);
+  float *xyz = supine_arena_take(&arena, 3 * n, sizeof *xyz);
+  float *below = supine_arena_take(&arena, 3 * n, sizeof *below);
+  if (arena.failed) {
+    return supine_error_memory(error, "%zu vertices", n);
   }
-  status = supine_export_breath_pose(source, breath, supine, 0, &pose, error);
-  if (status != SUPINE_OK) {
-    goto cleanup;
-  }
+  SUPINE_TRY(supine_export_breath_pose(source, breath, supine, 0, &pose, error));
   for (size_t lung = 0; lung < source->info->lung_count; ++lung) {
     supine_export_targets_weights(source, targets, &pose, lung, weights[lung]);
   }
@@ -253,9 +250,5 @@ supine_status supine_export_targets_normals(const export_source *source, double 
   if (order != NULL) {
     round_changes(source, targets, weights, order, base, added);
   }
-cleanup:
-  free(weights);
-  free(xyz);
-  free(below);
-  return status;
+  return SUPINE_OK;
 }

@@ -37,8 +37,7 @@ typedef struct export_targets {
   export_weights lung[SUPINE_LUNGS_MAX];
 } export_targets;
 
-/** Choose the morph targets of every lung for a breath of `breath` mL.
- * @retval SUPINE_ERROR_NUMERICAL  the surface folds before the end of the breath */
+/** Choose the morph targets of every lung for a breath of `breath` mL. */
 supine_status supine_export_targets_choose(const export_source *source, double breath,
                                            export_targets *targets, supine_error *error);
 

@@ -21,7 +21,7 @@ float amount(int axis) {
 
 void main() {
 #if AXES == 3
-  moved = vec4(supine_place(reference, vec3(amount(0), amount(1), amount(2)), 1.0), 1.0);
+  moved = vec4(supine_displace(reference, vec3(amount(0), amount(1), amount(2))), 1.0);
 #else
   moved = vec4(supine_place(reference, direction, amount(0)), 1.0);
 #endif

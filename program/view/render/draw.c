@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/parallel.h"
 #include "base/vec3.h"
 #include "program/view/render/render.h"
@@ -67,6 +68,7 @@ struct supine_renderer {
   const supine_basis_info *info;
   float *scratch;  /* [2, N, 3] positions, mm, then unit normals */
   corner *corners; /* [N] the projected vertices */
+  supine_arena arena;
 };
 
 supine_status supine_render_create(const supine_basis *basis, supine_renderer **renderer,
@@ -75,12 +77,12 @@ supine_status supine_render_create(const supine_basis *basis, supine_renderer **
   if (r != NULL) {
     r->basis = basis;
     r->info = supine_basis_get_info(basis);
-    r->scratch = malloc(6 * r->info->vertex_count * sizeof *r->scratch);
-    r->corners = malloc(r->info->vertex_count * sizeof *r->corners);
+    r->scratch = supine_arena_take(&r->arena, r->info->vertex_count, 6 * sizeof *r->scratch);
+    r->corners = supine_arena_take(&r->arena, r->info->vertex_count, sizeof *r->corners);
   }
-  if (r == NULL || r->scratch == NULL || r->corners == NULL) {
+  if (r == NULL || r->arena.failed) {
     supine_render_destroy(r);
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+    return supine_error_memory(error, "the picture");
   }
   *renderer = r;
   return SUPINE_OK;
@@ -88,8 +90,7 @@ supine_status supine_render_create(const supine_basis *basis, supine_renderer **
 
 void supine_render_destroy(supine_renderer *renderer) {
   if (renderer != NULL) {
-    free(renderer->scratch);
-    free(renderer->corners);
+    supine_arena_free(&renderer->arena);
     free(renderer);
   }
 }
@@ -436,24 +437,21 @@ supine_status supine_render_draw(supine_renderer *r, const supine_scene *scene, 
                             "%zu x %zu pixels cannot be drawn: give sides of 1 to %d pixels",
                             scene->width, scene->height, SIDE_MAX);
   }
+  SUPINE_ARENA arena = {0};
   const size_t count = OVERSAMPLE * OVERSAMPLE * scene->width * scene->height;
   canvas c = {.renderer = r,
               .scene = scene,
               .width = OVERSAMPLE * scene->width,
               .height = OVERSAMPLE * scene->height,
-              .nearest = malloc(count * sizeof *c.nearest),
-              .nearness = calloc(count, sizeof *c.nearness),
+              .nearest = supine_arena_take(&arena, count, sizeof *c.nearest),
+              .nearness = supine_arena_zeros(&arena, count, sizeof *c.nearness),
               .pixels = pixels};
-  supine_status status = SUPINE_OK;
-  if (c.nearest == NULL || c.nearness == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
-  } else {
-    memset(c.nearest, 0xFF, count * sizeof *c.nearest);
-    find_colours(&c);
-    find_corners(&c);
-    supine_parallel_for(scene->height, ROWS_PER_JOB, 0, draw_rows, &c);
+  if (arena.failed) {
+    return supine_error_memory(error, "%zu samples", count);
   }
-  free(c.nearest);
-  free(c.nearness);
-  return status;
+  memset(c.nearest, 0xFF, count * sizeof *c.nearest);
+  find_colours(&c);
+  find_corners(&c);
+  supine_parallel_for(scene->height, ROWS_PER_JOB, 0, draw_rows, &c);
+  return SUPINE_OK;
 }

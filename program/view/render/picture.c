@@ -109,6 +109,22 @@ static void ground(cairo_t *cr, const supine_picture *picture) {
   cairo.pattern_destroy(fade);
 }
 
+/* Draw an arrow from `from` to `to`. Its head and its line have the sizes `head` and `line`. */
+static void arrow(cairo_t *cr, const double from[2], const double to[2], double head, double line) {
+  const double length = hypot(to[0] - from[0], to[1] - from[1]);
+  const double dx = (to[0] - from[0]) / length;
+  const double dy = (to[1] - from[1]) / length;
+  cairo.set_line_width(cr, line);
+  cairo.move_to(cr, from[0], from[1]);
+  cairo.line_to(cr, to[0] - 0.8 * head * dx, to[1] - 0.8 * head * dy);
+  cairo.stroke(cr);
+  cairo.move_to(cr, to[0], to[1]);
+  cairo.line_to(cr, to[0] - head * dx - 0.5 * head * dy, to[1] - head * dy + 0.5 * head * dx);
+  cairo.line_to(cr, to[0] - head * dx + 0.5 * head * dy, to[1] - head * dy - 0.5 * head * dx);
+  cairo.close_path(cr);
+  cairo.fill(cr);
+}
+
 /* Draw gravity on the ball that shows the body's axes: as a circle with a dot if it points nearly
  * towards the viewer, as a circle with a cross if it points nearly away, else as an arrow. `seen`
  * is gravity's unit vector in the viewer's axes. */
@@ -134,19 +150,10 @@ static void gravity_arrow(cairo_t *cr, double x, double y, double radius, const 
     cairo.stroke(cr);
     return;
   }
-  const double dx = seen[0] / flat;
-  const double dy = -seen[1] / flat;
-  const double length = radius * fmax(flat, 0.55);
-  const double head = radius * 0.42;
-  const double neck = length - head;
-  cairo.move_to(cr, x - 0.25 * length * dx, y - 0.25 * length * dy);
-  cairo.line_to(cr, x + (neck + head * 0.2) * dx, y + (neck + head * 0.2) * dy);
-  cairo.stroke(cr);
-  cairo.move_to(cr, x + length * dx, y + length * dy);
-  cairo.line_to(cr, x + neck * dx - 0.5 * head * dy, y + neck * dy + 0.5 * head * dx);
-  cairo.line_to(cr, x + neck * dx + 0.5 * head * dy, y + neck * dy - 0.5 * head * dx);
-  cairo.close_path(cr);
-  cairo.fill(cr);
+  const double length = radius * fmax(flat, 0.55) / flat;
+  const double from[2] = {x - 0.25 * length * seen[0], y + 0.25 * length * seen[1]};
+  const double to[2] = {x + length * seen[0], y - length * seen[1]};
+  arrow(cr, from, to, radius * 0.42, radius * 0.13);
 }
 
 /* Draw the ball that shows the body's axes and gravity. */
@@ -196,27 +203,6 @@ static void place_name(double (*box)[3], size_t count, double line) {
       i = SIZE_MAX; /* the loop starts again with the first name */
     }
   }
-}
-
-/* Draw an arrow that shows how a mark has moved. */
-static void trace(cairo_t *cr, const double from[2], const double to[2], double size) {
-  const double length = hypot(to[0] - from[0], to[1] - from[1]);
-  const double head = fmin(size * 0.55, 0.6 * length);
-  if (length < 0.3 * size) {
-    return;
-  }
-  const double dx = (to[0] - from[0]) / length;
-  const double dy = (to[1] - from[1]) / length;
-  colour(cr, ink);
-  cairo.set_line_width(cr, size * 0.12);
-  cairo.move_to(cr, from[0], from[1]);
-  cairo.line_to(cr, to[0] - head * dx, to[1] - head * dy);
-  cairo.stroke(cr);
-  cairo.move_to(cr, to[0], to[1]);
-  cairo.line_to(cr, to[0] - head * dx - 0.45 * head * dy, to[1] - head * dy + 0.45 * head * dx);
-  cairo.line_to(cr, to[0] - head * dx + 0.45 * head * dy, to[1] - head * dy - 0.45 * head * dx);
-  cairo.close_path(cr);
-  cairo.fill(cr);
 }
 
 /* Draw a label at `box`, which is as in place_name, and a line from it to its mark at `at`. */
@@ -269,11 +255,10 @@ static void draw_names(cairo_t *cr, const supine_marks *marks, double (*pixel)[2
  * is the upper left corner of the scene; `size` is the size of the font, pixels. */
 static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const supine_scene *scene,
                                 const supine_marks *marks, double size) {
-  double(*pixel)[2] = malloc(2 * (marks->count + 1) * sizeof *pixel);
-  double(*box)[3] = malloc((marks->count + 1) * sizeof *box);
-  if (pixel == NULL || box == NULL) {
-    free(pixel);
-    free(box);
+  SUPINE_ARENA arena = {0};
+  double(*pixel)[2] = supine_arena_take(&arena, marks->count, 2 * sizeof *pixel);
+  double(*box)[3] = supine_arena_take(&arena, marks->count, sizeof *box);
+  if (arena.failed) {
     return SUPINE_ERROR_MEMORY;
   }
   double(*from)[2] = pixel + marks->count;
@@ -298,15 +283,19 @@ static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const su
       cairo.fill(cr);
     }
   }
+  colour(cr, ink);
   for (size_t i = 0; i < marks->count; ++i) {
-    if (marks->mark[i].label != NULL) {
-      trace(cr, from[i], pixel[i], size);
+    const double moved = hypot(pixel[i][0] - from[i][0], pixel[i][1] - from[i][1]);
+    if (marks->mark[i].label != NULL && moved > 0.3 * size) {
+      arrow(cr, from[i], pixel[i], fmin(size * 0.55, 0.6 * moved), size * 0.12);
     }
   }
   draw_names(cr, marks, pixel, box, size, (double)scene->width);
-  free(pixel);
-  free(box);
   return SUPINE_OK;
+}
+
+static void free_surface(cairo_surface_t **surface) {
+  cairo.surface_destroy(*surface);
 }
 
 /* Draw a scene on a new cairo surface, which the caller must destroy, even after a failure. */
@@ -349,20 +338,17 @@ static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_
                               .width = (size_t)width,
                               .height = (size_t)height,
                               .extent = shown};
-  cairo_surface_t *image = NULL;
-  supine_status status = draw_scene(renderer, &scene, &image, error);
-  if (status == SUPINE_OK) {
-    cairo.set_source_surface(cr, image, floor(x), floor(y));
-    cairo.paint_with_alpha(cr, picture->transparency > 0 ? fmin(1, 2 * (1 - picture->transparency))
-                                                         : 1);
-    if (panel->marks != NULL) {
-      cairo.translate(cr, floor(x), floor(y));
-      status = draw_marks(cr, renderer, &scene, panel->marks, size);
-      cairo.translate(cr, -floor(x), -floor(y));
-    }
+  SUPINE_FREED_BY(free_surface) cairo_surface_t *image = NULL;
+  SUPINE_TRY(draw_scene(renderer, &scene, &image, error));
+  cairo.set_source_surface(cr, image, floor(x), floor(y));
+  cairo.paint_with_alpha(cr,
+                         picture->transparency > 0 ? fmin(1, 2 * (1 - picture->transparency)) : 1);
+  if (panel->marks != NULL) {
+    cairo.translate(cr, floor(x), floor(y));
+    SUPINE_TRY(draw_marks(cr, renderer, &scene, panel->marks, size));
+    cairo.translate(cr, -floor(x), -floor(y));
   }
-  cairo.surface_destroy(image);
-  return status;
+  return SUPINE_OK;
 }
 
 /* Draw the cell of the picture that shows the posture `column` from the view `row`. A struct for
@@ -536,42 +522,31 @@ static supine_status draw_on(cairo_surface_t *surface, supine_renderer *renderer
 supine_status supine_render_picture_draw(supine_renderer *renderer, const supine_picture *picture,
                                          uint32_t *pixels, supine_error *error) {
   SUPINE_TRY(SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error));
+  SUPINE_FREED_BY(free_surface)
   cairo_surface_t *surface = cairo.image_surface_create_for_data(
       (unsigned char *)pixels, CAIRO_FORMAT_RGB24, (int)picture->width, (int)picture->height,
       (int)(4 * picture->width));
-  const supine_status status = draw_on(surface, renderer, picture, error);
-  cairo.surface_destroy(surface);
-  return status;
+  return draw_on(surface, renderer, picture, error);
 }
 
 supine_status supine_render_picture_save(supine_renderer *renderer, const supine_picture *picture,
                                          const char *path, supine_error *error) {
   SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
   SUPINE_TRY(SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error));
+  SUPINE_FREED_BY(free_surface)
   cairo_surface_t *surface =
       cairo.image_surface_create(CAIRO_FORMAT_RGB24, (int)picture->width, (int)picture->height);
-  supine_status status = draw_on(surface, renderer, picture, error);
-  if (status == SUPINE_OK) {
-    status = supine_output_open(path, &output, error);
-  }
-  if (status == SUPINE_OK) {
-    status = write_png(surface, output.file, error);
-    if (status == SUPINE_OK || ferror(output.file) != 0) {
-      status = supine_output_commit(&output, error);
-    }
-  }
-  cairo.surface_destroy(surface);
-  return status;
+  SUPINE_TRY(draw_on(surface, renderer, picture, error));
+  SUPINE_TRY(supine_output_open(path, &output, error));
+  const supine_status status = write_png(surface, output.file, error);
+  return status == SUPINE_OK || ferror(output.file) != 0 ? supine_output_commit(&output, error)
+                                                         : status;
 }
 
 supine_status supine_render_png(supine_renderer *renderer, const supine_scene *scene, FILE *file,
                                 supine_error *error) {
   SUPINE_TRY(SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error));
-  cairo_surface_t *image = NULL;
-  supine_status status = draw_scene(renderer, scene, &image, error);
-  if (status == SUPINE_OK) {
-    status = write_png(image, file, error);
-  }
-  cairo.surface_destroy(image);
-  return status;
+  SUPINE_FREED_BY(free_surface) cairo_surface_t *image = NULL;
+  SUPINE_TRY(draw_scene(renderer, scene, &image, error));
+  return write_png(image, file, error);
 }

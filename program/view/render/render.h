@@ -82,8 +82,7 @@ typedef struct supine_scene {
 void supine_render_extent(supine_renderer *renderer, const supine_scene *scene, double extent[4]);
 
 /** Draw a scene on a transparent background, using all cores.
- * @param pixels  [height, width] premultiplied ARGB as in cairo, top row first; output
- * @retval SUPINE_ERROR_ARGUMENT  a side of 0 or more than 16384 pixels */
+ * @param pixels  [height, width] premultiplied ARGB as in cairo, top row first; output */
 supine_status supine_render_draw(supine_renderer *renderer, const supine_scene *scene,
                                  uint32_t *pixels, supine_error *error);
 
@@ -153,8 +152,7 @@ void supine_render_picture_extent(supine_renderer *renderer, const supine_pictur
                                   double (*extent)[4]);
 
 /** Compose a picture.
- * @param pixels  [height, width] RGB, 0x00RRGGBB or 0xFFRRGGBB, top row first; output
- * @retval SUPINE_ERROR_ARGUMENT  the picture is too large, or too small for its panels and views */
+ * @param pixels  [height, width] RGB, 0x00RRGGBB or 0xFFRRGGBB, top row first; output */
 supine_status supine_render_picture_draw(supine_renderer *renderer, const supine_picture *picture,
                                          uint32_t *pixels, supine_error *error);
 
@@ -165,8 +163,7 @@ supine_status supine_render_picture_save(supine_renderer *renderer, const supine
 /** A WebP animation that repeats forever. */
 typedef struct supine_animation supine_animation;
 
-/** Create an animation; supine_render_animation_close frees it.
- * @retval SUPINE_ERROR_ARGUMENT  a side exceeds the 16383 pixels of WebP */
+/** Create an animation; supine_render_animation_close frees it. */
 supine_status supine_render_animation_open(size_t width, size_t height,
                                            supine_animation **animation, supine_error *error);
 /** Append a picture of the animation's size, to be shown for `milliseconds`. */

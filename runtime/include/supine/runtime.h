@@ -364,17 +364,20 @@ SUPINE_API supine_status supine_deform_lit_range(const supine_basis *basis, cons
 SUPINE_API void supine_normals(const supine_basis *basis, const float *xyz, float *normals);
 
 /** Limits of supine.glsl: the largest number of modes, and the number of floats of a vertex before
- * its coefficients. */
-enum { SUPINE_GL_MODES = 16, SUPINE_GL_FLOATS = 7 };
+ * its coefficients, for a basis whose supine_basis_info.vector is false or true. */
+enum { SUPINE_GL_MODES = 16, SUPINE_GL_FLOATS = 7, SUPINE_GL_VECTOR_FLOATS = 4 };
 
 /** Fill a vertex buffer for supine.glsl with vertices begin <= i < end. With K modes, a vertex has
  *
  *     reference     vec4 at byte 0: reference position, mm, and the index of the lung as w
- *     direction     vec3 at byte 16, mm
- *     coefficients  ceil(K / 4) vec4s from byte 28; the last may have fewer than four numbers
- * @param attributes  [end - begin, SUPINE_GL_FLOATS + K], written; 44 bytes per vertex if K is 4
- * @retval SUPINE_ERROR_UNSUPPORTED  the basis has more than SUPINE_GL_MODES modes or is a vector
- *                                   field */
+ *     direction     vec3 at byte 16, mm; absent if supine_basis_info.vector is true
+ *     coefficients  ceil(K / 4) vec4s from byte 28; the last may have fewer than four numbers. If
+ *                   `vector` is true, K numbers each along x, y and z from byte 16, so that 16
+ * modes need 12 vec4s
+ * @param attributes  [end - begin, SUPINE_GL_FLOATS + K], or, if `vector` is true,
+ *                    [end - begin, SUPINE_GL_VECTOR_FLOATS + 3 K], written; 44 or 64 bytes per
+ *                    vertex if K is 4
+ * @retval SUPINE_ERROR_UNSUPPORTED  the basis has more than SUPINE_GL_MODES modes */
 SUPINE_API supine_status supine_gl_pack(const supine_basis *basis, size_t begin, size_t end,
                                         float *attributes);
 

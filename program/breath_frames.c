@@ -1,0 +1,218 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Compute a breath frame by frame, and write the frames. */
+#include <gsl/gsl_statistics.h>
+#include <string.h>
+
+#include <supine/safetensors.h>
+
+#include "base/arena.h"
+#include "base/clock.h"
+#include "base/text.h"
+#include "mesh/mesh.h"
+
+#include "program/breath_frames.h"
+#include "program/options/basis_input.h"
+
+static const char name[] = "breathe";
+
+static const double budget = 15e-3; /* longest compute time allowed for one frame, s */
+
+/* A breath, and the memory for its frames. */
+typedef struct playing {
+  const supine_breath_frames *wanted;
+  const supine_basis *basis;
+  size_t lung_count;
+  double *time;     /* [frames] time since the start, s */
+  double *above;    /* [frames] volume minus that at rest (in the scan if rest is unknown), mL */
+  double *gravity;  /* [frames, 3] unit vectors */
+  double *volumes;  /* [frames, lungs] volume of gas and tissue, mL */
+  double *total;    /* [frames] sum of `volumes` over the lungs, mL */
+  supine_mesh mesh; /* triangles; for VTP output, also the positions of the current frame */
+  float *normals;   /* [N, 3] normals of the current frame, for VTP output */
+  float *positions; /* [N, 3] current frame, mm; followed by all frames unless the output is VTP */
+  double *compute_time; /* [frames] s */
+  double *origin;       /* [N, 3] positions from which displacements are measured, mm */
+  char vtp_comment[512];
+  supine_arena arena;
+} playing;
+
+static void end(playing *p) {
+  supine_arena_free(&p->arena);
+  supine_mesh_free(&p->mesh);
+}
+
+/* Allocate memory for the frames. If `series` is true, keep the positions of one frame only, as
+ * each is written before the next is computed. */
+static supine_status begin_frames(playing *p, bool series, supine_error *error) {
+  const size_t count = p->wanted->count;
+  const size_t frame = 3 * supine_basis_get_info(p->basis)->vertex_count;
+  p->lung_count = supine_basis_get_info(p->basis)->lung_count;
+  p->time = supine_arena_take(&p->arena, count, sizeof *p->time);
+  p->above = supine_arena_take(&p->arena, count, sizeof *p->above);
+  p->gravity = supine_arena_take(&p->arena, count, 3 * sizeof *p->gravity);
+  p->volumes = supine_arena_take(&p->arena, count, p->lung_count * sizeof *p->volumes);
+  p->total = supine_arena_take(&p->arena, count, sizeof *p->total);
+  p->compute_time = supine_arena_take(&p->arena, count, sizeof *p->compute_time);
+  p->origin = supine_arena_take(&p->arena, frame, sizeof *p->origin);
+  p->normals = supine_arena_take(&p->arena, frame, sizeof *p->normals);
+  p->positions = supine_arena_take(&p->arena, series ? 1 : 1 + count, frame * sizeof *p->positions);
+  return p->arena.failed
+             ? supine_error_memory(error,
+                                   "%zu frames of %zu vertices: lower --seconds or --fps, or write "
+                                   "a .vtp file",
+                                   count, frame / 3)
+             : supine_posed_mesh(p->basis, NULL, &p->mesh, error);
+}
+
+static supine_status find_pose(const playing *p, size_t t, supine_pose *pose, supine_error *error) {
+  const supine_state state = supine_breath_state(p->basis, p->gravity + 3 * t, p->above[t]);
+  return supine_basis_pose(p->basis, &state, pose, error);
+}
+
+/* Compute the time, the direction of gravity and the volumes of each frame. */
+static supine_status find_volumes(playing *p, const supine_pv *pv, supine_error *error) {
+  for (size_t t = 0; t < p->wanted->count; ++t) {
+    p->time[t] = (double)t / p->wanted->fps;
+    supine_breath_turn_gravity(&p->wanted->turn, p->time[t], p->gravity + 3 * t);
+  }
+  SUPINE_TRY(supine_breath_evaluate(pv, &p->wanted->breath, p->wanted->count, p->time, p->above,
+                                    NULL, error));
+  for (size_t t = 0; t < p->wanted->count; ++t) {
+    supine_pose pose;
+    supine_error cause;
+    const supine_status status = find_pose(p, t, &pose, &cause);
+    if (status != SUPINE_OK) {
+      return supine_error_set(error, status, "frame at %.3f s: %s", p->time[t], cause.message);
+    }
+    (void)supine_basis_volumes(p->basis, &pose, p->volumes + t * p->lung_count);
+    p->total[t] = supine_posed_volume(p->basis, &pose);
+  }
+  return SUPINE_OK;
+}
+
+static void report(const playing *p) {
+  double least;
+  double largest;
+  gsl_stats_minmax(&least, &largest, p->total, 1, p->wanted->count);
+  (void)printf("%s: %zu frame%s, %.2f s at %.4g a second; volumes of %.2f to %.2f mL\n",
+               p->wanted->path, p->wanted->count, p->wanted->count == 1 ? "" : "s",
+               p->time[p->wanted->count - 1], p->wanted->fps, least, largest);
+  (void)printf("compute time per frame: median %.3f ms, longest %.3f ms, allowed %.0f ms\n",
+               1e3 * gsl_stats_median(p->compute_time, 1, p->wanted->count),
+               1e3 * gsl_stats_max(p->compute_time, 1, p->wanted->count), 1e3 * budget);
+}
+
+/* Compute all frames. Call find_volumes first: it checks that each frame has a valid pose.
+ * @param series  receives each frame; NULL to store all frames in p->positions */
+static supine_status play_frames(playing *p, supine_mesh_series *series, supine_error *error) {
+  const size_t frame = 3 * p->mesh.vertex_count;
+  SUPINE_FREED_BY(supine_options_progress_end)
+  supine_progress progress = supine_options_progress_begin(name);
+  for (size_t t = 0; t < p->wanted->count; ++t) {
+    supine_pose pose;
+    const double start = supine_clock_seconds();
+    (void)find_pose(p, t, &pose, NULL);
+    (void)supine_deform(p->basis, &pose, p->positions);
+    p->compute_time[t] = supine_clock_seconds() - start;
+    if (series != NULL) {
+      for (size_t i = 0; i < frame; ++i) {
+        p->mesh.vertices[i] = (double)p->positions[i];
+      }
+      supine_normals(p->basis, p->positions, p->normals);
+      SUPINE_TRY(supine_mesh_series_add(series, error));
+    } else {
+      memcpy(p->positions + (1 + t) * frame, p->positions, frame * sizeof *p->positions);
+    }
+    if (!supine_options_progress_step(&progress, (double)(t + 1) / (double)p->wanted->count)) {
+      return supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
+    }
+  }
+  return SUPINE_OK;
+}
+
+static void drop_series(supine_mesh_series **series) {
+  supine_mesh_series_close(*series);
+}
+
+/* Compute the frames, and write them as VTP.
+ * @param save  axes, unit and comment of the output; the other options are set here */
+static supine_status write_series(playing *p, supine_mesh_save_options save, supine_error *error) {
+  /* Positions are rounded to multiples of this length, mm. */
+  static const double rounding = 1.0 / 256.0;
+  const supine_tensor *lung = supine_basis_tensor(p->basis, "lung");
+  const supine_mesh_field fields[] = {{"gravity_LPS", 3, p->gravity},
+                                      {"volume_mL", p->lung_count, p->volumes}};
+  SUPINE_FREED_BY(drop_series) supine_mesh_series *series = NULL;
+  save.from = p->origin;
+  save.normals = p->normals;
+  save.lung = lung == NULL ? NULL : lung->data;
+  save.fields = fields;
+  save.field_count = sizeof fields / sizeof *fields;
+  save.rounding = rounding;
+  SUPINE_TRY(supine_mesh_series_open(p->wanted->path, &p->mesh, &save, p->wanted->count, p->time,
+                                     &series, error));
+  SUPINE_TRY(play_frames(p, series, error));
+  return supine_mesh_series_commit(series, error);
+}
+
+static supine_status write_tensors(playing *p, supine_error *error) {
+  const size_t t = p->wanted->count;
+  const supine_tensor tensors[] = {
+      {"positions",
+       SUPINE_F32,
+       3,
+       {t, p->mesh.vertex_count, 3},
+       p->positions + 3 * p->mesh.vertex_count},
+      {"triangles", SUPINE_U32, 2, {p->mesh.triangle_count, 3}, p->mesh.triangles},
+      {"time", SUPINE_F64, 1, {t}, p->time},
+      {"volume", SUPINE_F64, 2, {t, p->lung_count}, p->volumes},
+      {"gravity", SUPINE_F64, 2, {t, 3}, p->gravity}};
+  const supine_metadata metadata[] = {{"format", "supine-breath"},
+                                      {"version", "1"},
+                                      {"units", "mm, s, mL (gas and tissue of each lung)"},
+                                      {"axes", "LPS"},
+                                      {"made_by", p->wanted->made_by}};
+  SUPINE_TRY(play_frames(p, NULL, error));
+  return supine_safetensors_write(p->wanted->path, tensors, sizeof tensors / sizeof *tensors,
+                                  metadata, sizeof metadata / sizeof *metadata, error);
+}
+
+/* Check the surfaces of smallest and of largest volume with supine_options_pose_check. */
+static supine_status check_ends(const playing *p, supine_error *error) {
+  size_t ends[2];
+  gsl_stats_minmax_index(&ends[0], &ends[1], p->total, 1, p->wanted->count);
+  for (size_t i = 0; i < 2; ++i) {
+    supine_pose pose;
+    const supine_state state =
+        supine_breath_state(p->basis, p->gravity + 3 * ends[i], p->above[ends[i]]);
+    SUPINE_TRY(supine_basis_pose(p->basis, &state, &pose, error));
+    SUPINE_TRY(
+        supine_options_pose_check(p->basis, name, p->wanted->allow_folds, &state, &pose, error));
+  }
+  return SUPINE_OK;
+}
+
+supine_status supine_command_breath_write(const supine_breath_frames *wanted,
+                                          const supine_basis *basis, supine_error *error) {
+  SUPINE_FREED_BY(end) playing p = {.wanted = wanted, .basis = basis};
+  const bool tensors = supine_text_ends_in(wanted->path, ".safetensors");
+  supine_mesh_save_options save = {.comment = p.vtp_comment};
+  supine_pv pv = *supine_breath_normal();
+  supine_reference_pose from;
+  SUPINE_TRY(supine_options_basis_frame(basis, wanted->as_scanned, &save, error));
+  SUPINE_TRY(begin_frames(&p, !tensors, error));
+  if (wanted->pv != NULL) {
+    SUPINE_TRY(supine_breath_load(wanted->pv, &pv, error));
+  }
+  SUPINE_TRY(find_volumes(&p, &pv, error));
+  SUPINE_TRY(supine_options_reference(basis, &wanted->from, false, &from, error));
+  SUPINE_TRY(check_ends(&p, error));
+  SUPINE_TRY(supine_posed_positions(basis, &from.pose, p.origin, error));
+  supine_options_signals_catch(true);
+  (void)snprintf(p.vtp_comment, sizeof p.vtp_comment,
+                 "displacement from %s; volumes are gas and tissue of each lung; %s", from.name,
+                 wanted->made_by);
+  SUPINE_TRY(tensors ? write_tensors(&p, error) : write_series(&p, save, error));
+  report(&p);
+  return SUPINE_OK;
+}

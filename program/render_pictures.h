@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Draw the lungs in several postures as a picture, or during a turn as an animation. */
+#ifndef SUPINE_RENDER_PICTURES_H
+#define SUPINE_RENDER_PICTURES_H
+
+#include "program/options/breath_turn.h"
+#include "program/options/state_options.h"
+#include "program/view/render/render.h"
+
+typedef struct supine_pictures {
+  const char *output;           /* .png for postures, .webp for a turn */
+  supine_posture_list postures; /* up to SUPINE_PANELS_MAX, side by side; not used for a turn */
+  bool turns;
+  breath_turn turn;
+  supine_volume_options volume;
+  supine_from from;     /* state from which displacements are measured */
+  const char *inside;   /* file of structures inside the lungs; NULL if not given */
+  double largest;       /* value at the end of the colour bar, mm; 0 if automatic */
+  double opacity;       /* opacity of the lungs, 0 to 1; 0 if not given */
+  size_t width, height; /* size of the picture, pixels; 0 if automatic */
+  supine_view view[SUPINE_VIEWS_MAX];
+  size_t view_count;
+} supine_pictures;
+
+/* Draw and write the pictures of the lungs of the basis file `path`. */
+supine_status supine_command_pictures_draw(const supine_pictures *wanted, const char *path,
+                                           supine_error *error);
+
+#endif
