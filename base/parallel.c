@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Split independent work over POSIX threads. */
-#define _GNU_SOURCE /* declares sched_getaffinity */ // NOLINT(bugprone-reserved-identifier)
+#define _GNU_SOURCE /* declares sched_getaffinity */ // NOLINT(*-reserved-identifier,cert-*)
 #include <pthread.h>
 #include <sched.h>
 #include <stdbool.h>

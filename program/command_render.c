@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine render: draw the lungs in one or several postures, or during a turn. */
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/arena.h"

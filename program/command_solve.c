@@ -1,15 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine solve: solve the full physics for one direction of gravity. */
-#include <math.h>
-
 #include "base/arena.h"
 #include "base/output.h"
 #include "precompute/lungs/disease.h"
 #include "precompute/physics/solve.h"
-#include <supine/volume.h>
 
 #include "program/options/model_options.h"
 #include "program/options/state_options.h"
+#include "program/solve_iterate.h"
 
 static const char name[] = "solve";
 
@@ -146,51 +144,6 @@ static supine_status find_gains(const supine_prepared *prepared, const request *
   return SUPINE_OK;
 }
 
-/* The Pitcher/Catcher iteration of [Santhanam2008] stops when the force that remains on each vertex
- * is at most this fraction of the largest applied force. */
-static const double pitcher_tolerance = 1e-6;
-
-/* Print the unbalanced fraction of the force each time the number of iteration steps per vertex has
- * doubled. */
-static void report_remaining(void *context, size_t steps, double remaining) {
-  const size_t per_vertex = steps / *(const size_t *)context;
-  if ((per_vertex & (per_vertex - 1)) == 0) {
-    (void)printf("Pitcher/Catcher: %8zu steps, %.3g of the force not yet balanced\n", steps,
-                 remaining);
-  }
-}
-
-/* Replace the solved forces by those of Santhanam's iteration, and print the largest difference. */
-static supine_status iterate(const supine_lungs *lungs, const supine_model *model,
-                             const double g[3], supine_solution *solution, supine_error *error) {
-  size_t n = lungs->mesh.vertex_count;
-  double range[2];
-  double difference = 0.0;
-  SUPINE_ARENA arena = {0};
-  double *force = supine_arena_take(&arena, n, sizeof *force);
-  double *caught = supine_arena_take(&arena, n, sizeof *caught);
-  if (model->reach > 0.0 || model->lesions != NULL) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--pitcher-catcher needs --law paper, and cannot be combined with "
-                            "--reach or --lesion");
-  }
-  if (arena.failed ||
-      supine_physics_height_range(lungs, model->force.pair, 1, g, range, range + 1) != SUPINE_OK) {
-    return supine_error_memory(error, "%zu vertices", n);
-  }
-  const supine_gravities gravity = {1, g, range, range + 1};
-  supine_physics_force(lungs, &model->force, &gravity, n, NULL, force);
-  SUPINE_TRY(supine_physics_pitcher_catcher(&lungs->mesh, &lungs->topology, model->stiffness, force,
-                                            pitcher_tolerance, caught, report_remaining, &n,
-                                            error));
-  for (size_t i = 0; i < n; ++i) {
-    difference = fmax(difference, fabs(caught[i] - solution->catch_[i]));
-    solution->catch_[i] = caught[i];
-  }
-  (void)printf("Pitcher/Catcher: largest difference from the direct solution %.2g\n", difference);
-  return SUPINE_OK;
-}
-
 static void print_gains(const supine_lungs *lungs, double gains[2][3]) {
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     const double *gain = gains[lung];
@@ -250,7 +203,7 @@ static supine_status solve(const supine_prepared *prepared, const request *wante
   SUPINE_FREED_BY(supine_physics_solution_free) supine_solution solution = {0};
   SUPINE_TRY(supine_physics_solve(lungs, &prepared->model, g, &solution, error));
   if (wanted->pitcher_catcher) {
-    SUPINE_TRY(iterate(lungs, &prepared->model, g, &solution, error));
+    SUPINE_TRY(supine_command_iterate(lungs, &prepared->model, g, &solution, error));
   }
   return write_solution(prepared, wanted, &solution, error);
 }

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine validate: compare a basis with other states of the same person. */
-#include <math.h>
 #include <string.h>
 
 #include "base/arena.h"
@@ -10,7 +9,7 @@
 #include "program/options/model_options.h"
 #include "program/options/state_options.h"
 #include "program/options/surface_options.h"
-#include "program/validation_picture.h"
+#include "program/validation_report.h"
 
 static const char name[] = "validate";
 
@@ -81,63 +80,6 @@ static const supine_option table[] = {
      FILLS(path), .file = SUPINE_FILE_OUT, .endings = ".png, .ply or .vtp"},
     {"json", 0, NULL, "print JSON instead of text", FILLS(json)},
     {.name = NULL}};
-
-static json_t *encode(const supine_validation_distance of[SUPINE_PATIENT_MAP_COUNT]) {
-  json_t *all = json_object();
-  for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT; ++k) {
-    json_t *explained = isnan(of[k].explained) ? json_null() : json_real(100.0 * of[k].explained);
-    (void)json_object_set_new(all, supine_validation_map_names[k],
-                              json_pack("{s:f, s:f, s:f, s:f, s:o}", "mean_mm", of[k].mean,
-                                        "rms_mm", of[k].rms, "p95_mm", of[k].p95, "largest_mm",
-                                        of[k].largest, "explained_percent", explained));
-  }
-  return all;
-}
-
-static json_t *encode_state(const supine_validation_state *state,
-                            const supine_validation_outcome *outcome) {
-  json_t *root = json_object();
-  if (state->path != NULL) {
-    (void)json_object_set_new(root, "file", supine_options_json_text(state->path));
-  }
-  (void)json_object_update_new(root, json_pack("{s:o, s:f, s:f}", "gravity",
-                                               supine_options_json_numbers(3, state->state.gravity),
-                                               "scale", outcome->scale, "volume_ml",
-                                               outcome->millilitres));
-  if (outcome->has_surface) {
-    (void)json_object_set_new(root, "surface", encode(outcome->surface));
-  }
-  if (outcome->has_points) {
-    const supine_validation_distance *own = &outcome->points[SUPINE_PATIENT_MAP_PREDICTED];
-    (void)json_object_set_new(root, "landmarks", encode(outcome->points));
-    if (own->expected > 0.0) {
-      (void)json_object_update_new(
-          root, json_pack("{s:f, s:f, s:f}", "expected_rms_mm", own->expected, "expected_over_true",
-                          own->expected / own->rms, "within_band_percent", 100.0 * own->within));
-    }
-  }
-  if (outcome->has_best) {
-    (void)json_object_update_new(root, json_pack("{s:f, s:f}", "nearest_scale", outcome->best_scale,
-                                                 "nearest_rms", outcome->best_rms));
-  }
-  return root;
-}
-
-static void print(const supine_validation *s, bool json) {
-  json_t *states = json_array();
-  for (size_t i = 0; i < s->count; ++i) {
-    (void)json_array_append_new(states, encode_state(&s->state[i], &s->outcome[i]));
-  }
-  json_t *root = json_pack("{s:f, s:{s:f, s:f}, s:o}", "from_scale", s->from_scale, "paper",
-                           "surface_mm", 2.0, "constants_percent", 1.0, "states", states);
-  if (s->line_count > 1) {
-    (void)json_object_set_new(root, "linearity",
-                              json_pack("{s:i, s:f, s:f}", "states", (int)s->line_count,
-                                        "scale_per_litre", 1e3 * s->line_slope, "off_percent",
-                                        100.0 * s->line_off));
-  }
-  supine_options_print(root, json);
-}
 
 static void set_default_posture(supine_state *state, const double gravity[3]) {
   const double *g = state->gravity;
@@ -233,7 +175,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   s.basis = basis;
   SUPINE_TRY(supine_validation_begin(&s, error));
   SUPINE_TRY(validate(wanted, &s, error));
-  print(&s, wanted->json);
+  supine_command_print_validation(&s, wanted->json);
   return SUPINE_OK;
 }
 

@@ -12,7 +12,8 @@
 #ifndef SUPINE_EXPANSION_H
 #define SUPINE_EXPANSION_H
 
-#include "sh/grid.h"
+#include <stddef.h>
+#include <stdlib.h>
 
 typedef struct supine_expansion {
   size_t row_count;  /**< N */
@@ -22,10 +23,10 @@ typedef struct supine_expansion {
   double *functions; /**< [rank, (band + 1)^2] Q: harmonic coefficients of each function */
 } supine_expansion;
 
-void supine_sh_expansion_free(supine_expansion *expansion);
-
-/** Create a grid that is fine enough for functions with kinks: 8 latitudes for each degree up to
- * `band`, at least 32, and twice as many longitudes. Statuses: as supine_sh_grid_create. */
-supine_status supine_sh_expansion_grid(size_t band, supine_sh_grid **grid);
+static inline void supine_sh_expansion_free(supine_expansion *expansion) {
+  free(expansion->columns);
+  free(expansion->functions);
+  *expansion = (supine_expansion){0};
+}
 
 #endif

@@ -9,6 +9,10 @@
 #include "base/arena.h"
 #include "sh/grid.h"
 
+/* Functions with kinks have harmonics of every degree. With 8 latitudes for each degree, those
+ * above the band hardly alias. */
+enum { LATITUDES_PER_BAND = 8, LATITUDES_MIN = 32 };
+
 /* Refine the n nodes z and the weights w to rounding error by one Newton step on the Legendre
  * polynomial P_n. GSL tabulates some rules, and computes the others with errors up to about 1e-11.
  * One step squares such an error.
@@ -60,6 +64,12 @@ supine_status supine_sh_grid_create(size_t latitudes, size_t longitudes, supine_
   }
   *grid = made;
   return made != NULL ? SUPINE_OK : SUPINE_ERROR_MEMORY;
+}
+
+supine_status supine_sh_grid_for_kinks(size_t band, supine_sh_grid **grid) {
+  const size_t least = LATITUDES_PER_BAND * (band + 1);
+  const size_t latitudes = least < LATITUDES_MIN ? LATITUDES_MIN : least;
+  return supine_sh_grid_create(latitudes, 2 * latitudes, grid);
 }
 
 void supine_sh_grid_destroy(supine_sh_grid *grid) {

@@ -25,6 +25,10 @@ typedef struct supine_sh_grid {
  * @param grid  written, NULL on failure; free it with supine_sh_grid_destroy */
 supine_status supine_sh_grid_create(size_t latitudes, size_t longitudes, supine_sh_grid **grid);
 
+/** Create a rule that is fine enough for functions with kinks: 8 latitudes for each degree up to
+ * `band`, at least 32, and twice as many longitudes. */
+supine_status supine_sh_grid_for_kinks(size_t band, supine_sh_grid **grid);
+
 /** Free a quadrature rule. NULL is allowed. */
 void supine_sh_grid_destroy(supine_sh_grid *grid);
 

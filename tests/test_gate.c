@@ -432,7 +432,7 @@ TEST(test_gate_flat_end_and_thin_tip_warned_of) {
     (void)supine_mesh_box(&mesh, low, high);
     for (size_t i = 0; i < mesh.vertex_count; ++i) {
       double *z = &mesh.vertices[3 * i + 2];
-      *z = tube == 0 ? fmax(*z, low[2] + 70.0) : *z > high[2] - 1.5 ? *z + 30.0 : *z;
+      *z = tube == 0 ? fmax(*z, low[2] + 60.0) : *z > high[2] - 1.5 ? *z + 30.0 : *z;
     }
     outcome out = pass(&mesh, NULL);
     assert_int_equal(out.status, SUPINE_OK);

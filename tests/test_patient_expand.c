@@ -128,7 +128,7 @@ static void fit(const supine_lungs *rest, const supine_lungs *other, const supin
 }
 
 static void expect_lesion(const supine_lungs *rest, const supine_lungs *other,
-                          const supine_lesion *lesion, double least, double least_times) {
+                          const supine_lesion *lesion, double least) {
   static supine_patient_record found;
   fit(rest, other, lesion, &found);
   const double times = contrast(rest, &found.stiffness, lesion);
@@ -136,7 +136,7 @@ static void expect_lesion(const supine_lungs *rest, const supine_lungs *other,
   assert_true(agreement(rest, &found.stiffness, stiffness_of(rest, lesion), &slope) > least);
   printf("lesion found %.2f times as stiff, true value %.0f\n", times, lesion->factor);
   /* Regions are wider than the edge of the lesion. */
-  assert_true(times > least_times && times < 1.2 * lesion->factor);
+  assert_true(times > 1.9 && times < 1.2 * lesion->factor);
   assert_true(found.expand.kept);
   assert_true(found.expand.held_out[1] < 0.9 * found.expand.held_out[0]);
   /* The reported held-out error is that of the final fit, in which regions differ in stiffness. */
@@ -150,7 +150,7 @@ TEST(test_fit_real_lung_with_lesion_recovers_stiffness) {
     skip();
   }
   const supine_lesion lesion = {{110.0, -200.0, -230.0}, 60.0, 3.0};
-  expect_lesion(&rest, &other, &lesion, 0.85, 1.9);
+  expect_lesion(&rest, &other, &lesion, 0.85);
   supine_lungs_free(&rest);
   supine_lungs_free(&other);
 }
@@ -170,7 +170,7 @@ TEST(test_fit_synthetic_lungs_with_lesion_recovers_stiffness) {
   supine_lungs other = {0};
   make_lungs(1600, &rest);
   make_lungs(6000, &other);
-  expect_lesion(&rest, &other, &lesion, 0.55, 2.0);
+  expect_lesion(&rest, &other, &lesion, 0.65);
   supine_lungs_free(&rest);
   supine_lungs_free(&other);
 }
@@ -206,7 +206,7 @@ TEST(test_fit_synthetic_lungs_with_gradient_recovers_stiffness) {
   supine_lungs other = {0};
   make_lungs(1600, &rest);
   make_lungs(6000, &other);
-  check_gradient(&rest, &other, 0.75);
+  check_gradient(&rest, &other, 0.85);
   supine_lungs_free(&rest);
   supine_lungs_free(&other);
 }

@@ -38,25 +38,13 @@ typedef struct fit {
   double condition;  /* condition number of `harmonics` */
 } fit;
 
-/* Work space of predict(), which predicts the field of a held-out direction from all others. */
-typedef struct prediction {
-  double *pinv;      /* [harmonics, directions] fit.pinv of a fit without the held-out direction */
-  double *pinv_gram; /* [harmonics, directions] product of `pinv` and fitting.gram */
-  double *coefficient_gram; /* [harmonics, harmonics] scalar products of coefficients, mm^2 */
-  double *eigenvalues;
-  double *eigenvectors;
-  double *target;   /* [harmonics] values at the held-out direction, or their projection on modes */
-  double *residual; /* [directions] weight of each input field in the prediction error */
-  double *gram_residual; /* [directions] product of fitting.gram and `residual` */
-} prediction;
-
 typedef struct fitting {
   const supine_fields *fields;
   size_t rows;  /* 3 x number of vertices */
   double *gram; /* [directions, directions] scalar products of any two input fields, mm^2 */
   fit chosen;
+  double *residual; /* [directions] weight of each input field in the error of predict() */
   supine_arena arena;
-  prediction work;
 } fitting;
 
 /* Fit harmonics up to degree `band`. The arrays of the fit are valid until `kept` is freed. */
@@ -100,27 +88,10 @@ static bool fit_is_determined(const fit *f) {
   return determined;
 }
 
-/* Each matrix has room for M x M numbers, where M is the number of fields, because only fits with
- * fewer than M harmonics are tried. */
-static supine_status allocate(fitting *w, supine_error *error) {
-  const size_t m = w->fields->direction_count;
-  double **const matrices[] = {&w->gram, &w->work.pinv, &w->work.pinv_gram,
-                               &w->work.coefficient_gram, &w->work.eigenvectors};
-  double **const lists[] = {&w->work.eigenvalues, &w->work.target, &w->work.residual,
-                            &w->work.gram_residual};
-  for (size_t i = 0; i < sizeof matrices / sizeof *matrices; ++i) {
-    *matrices[i] = supine_arena_take(&w->arena, m * m, sizeof(double));
-  }
-  for (size_t i = 0; i < sizeof lists / sizeof *lists; ++i) {
-    *lists[i] = supine_arena_take(&w->arena, m, sizeof(double));
-  }
-  return w->arena.failed ? supine_error_memory(error, "%zu fields", m) : SUPINE_OK;
-}
-
 /* Predict the field for direction d of gravity from the fields for all other directions. Use the
  * harmonics if `modes` is 0, otherwise that number of principal modes of the fitted field. The
  * error, true minus predicted, is a weighted sum of all input fields. Write the weights to
- * w->work.residual, and the squared norm of the error, mm^2, to `square`.
+ * w->residual, and the squared norm of the error, mm^2, to `square`.
  *
  * Let A be f->pinv, h row d of f->harmonics x A, and e_d a vector that is 1 at d and 0 elsewhere.
  * The pseudo-inverse without direction d is
@@ -128,34 +99,44 @@ static supine_status allocate(fitting *w, supine_error *error) {
  *     A_d = A - A e_d (e_d - h)^T / (1 - h_d) */
 static supine_status predict(const fitting *w, const fit *f, size_t d, size_t modes,
                              double *square) {
-  const prediction *o = &w->work;
   const int m = (int)f->count;
   const int p = (int)f->terms;
   const double *y = f->harmonics + d * f->terms;
-  cblas_dgemv(CblasRowMajor, CblasTrans, p, m, -1.0, f->pinv, m, y, 1, 0.0, o->residual, 1);
-  o->residual[d] += 1.0;
-  memcpy(o->pinv, f->pinv, f->terms * f->count * sizeof *o->pinv);
-  cblas_dger(CblasRowMajor, p, m, -1.0 / o->residual[d], f->pinv + d, m, o->residual, 1, o->pinv,
-             m);
-  memcpy(o->target, y, f->terms * sizeof *o->target);
+  double *residual = w->residual;
+  SUPINE_ARENA arena = {0};
+  double *pinv = supine_arena_take(&arena, f->terms * f->count, sizeof *pinv);
+  double *pinv_gram = supine_arena_take(&arena, f->terms * f->count, sizeof *pinv_gram);
+  double *coefficient_gram =
+      supine_arena_take(&arena, f->terms * f->terms, sizeof(double)); /* mm^2 */
+  double *eigenvalues = supine_arena_take(&arena, f->terms, sizeof *eigenvalues);
+  double *eigenvectors = supine_arena_take(&arena, f->terms * f->terms, sizeof *eigenvectors);
+  double *target = supine_arena_take(&arena, f->terms, sizeof *target); /* y, or y on the modes */
+  double *gram_residual = supine_arena_take(&arena, f->count, sizeof *gram_residual);
+  if (arena.failed) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  cblas_dgemv(CblasRowMajor, CblasTrans, p, m, -1.0, f->pinv, m, y, 1, 0.0, residual, 1);
+  residual[d] += 1.0;
+  memcpy(pinv, f->pinv, f->terms * f->count * sizeof *pinv);
+  cblas_dger(CblasRowMajor, p, m, -1.0 / residual[d], f->pinv + d, m, residual, 1, pinv, m);
+  memcpy(target, y, f->terms * sizeof *target);
   if (modes > 0) {
-    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, p, m, m, 1.0, o->pinv, m, w->gram, m,
-                0.0, o->pinv_gram, m);
-    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, p, p, m, 1.0, o->pinv_gram, m, o->pinv, m,
-                0.0, o->coefficient_gram, p);
-    SUPINE_TRY(supine_sh_leading_eigenpairs(f->terms, o->coefficient_gram, modes, o->eigenvalues,
-                                            o->eigenvectors));
-    memset(o->target, 0, f->terms * sizeof *o->target);
+    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, p, m, m, 1.0, pinv, m, w->gram, m, 0.0,
+                pinv_gram, m);
+    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, p, p, m, 1.0, pinv_gram, m, pinv, m, 0.0,
+                coefficient_gram, p);
+    SUPINE_TRY(
+        supine_sh_leading_eigenpairs(f->terms, coefficient_gram, modes, eigenvalues, eigenvectors));
+    memset(target, 0, f->terms * sizeof *target);
     for (size_t k = 0; k < modes; ++k) {
-      const double *mode = o->eigenvectors + k * f->terms;
-      cblas_daxpy(p, cblas_ddot(p, mode, 1, y, 1), mode, 1, o->target, 1);
+      const double *mode = eigenvectors + k * f->terms;
+      cblas_daxpy(p, cblas_ddot(p, mode, 1, y, 1), mode, 1, target, 1);
     }
   }
-  cblas_dgemv(CblasRowMajor, CblasTrans, p, m, -1.0, o->pinv, m, o->target, 1, 0.0, o->residual, 1);
-  o->residual[d] += 1.0;
-  cblas_dsymv(CblasRowMajor, CblasUpper, m, 1.0, w->gram, m, o->residual, 1, 0.0, o->gram_residual,
-              1);
-  *square = fmax(cblas_ddot(m, o->gram_residual, 1, o->residual, 1), 0.0);
+  cblas_dgemv(CblasRowMajor, CblasTrans, p, m, -1.0, pinv, m, target, 1, 0.0, residual, 1);
+  residual[d] += 1.0;
+  cblas_dsymv(CblasRowMajor, CblasUpper, m, 1.0, w->gram, m, residual, 1, 0.0, gram_residual, 1);
+  *square = fmax(cblas_ddot(m, gram_residual, 1, residual, 1), 0.0);
   return SUPINE_OK;
 }
 
@@ -166,14 +147,15 @@ static double square_sum(const fitting *w) {
 }
 
 /* Compute the relative RMS leave-one-out error of a fit before its compression to modes. */
-static double leave_one_out(const fitting *w, const fit *f) {
+static supine_status leave_one_out(const fitting *w, const fit *f, double *error) {
   double sum = 0.0;
   for (size_t d = 0; d < f->count; ++d) {
     double square;
-    (void)predict(w, f, d, 0, &square);
+    SUPINE_TRY(predict(w, f, d, 0, &square));
     sum += square;
   }
-  return sqrt(sum / square_sum(w));
+  *error = sqrt(sum / square_sum(w));
+  return SUPINE_OK;
 }
 
 /* Fit harmonics up to each degree (band) that the directions determine. Choose band `wanted`. If it
@@ -185,15 +167,18 @@ static supine_status choose_band(fitting *w, int wanted, supine_fit_report *repo
   size_t determined_count = 0;
   for (size_t band = 0; band <= SUPINE_FIT_BAND_MAX && supine_sh_count(band) < m; ++band) {
     fit trial;
-    const supine_status status = fit_create(band, m, w->fields->directions, &w->arena, &trial);
+    supine_status status = fit_create(band, m, w->fields->directions, &w->arena, &trial);
+    const bool determined = status == SUPINE_OK && fit_is_determined(&trial);
+    if (determined) {
+      status = leave_one_out(w, &trial, &report->error[band]);
+    }
     if (status != SUPINE_OK) {
       return supine_error_set(error, status, "fit of band %zu: %s", band,
                               supine_status_string(status));
     }
-    if (!fit_is_determined(&trial)) {
+    if (!determined) {
       break;
     }
-    report->error[band] = leave_one_out(w, &trial);
     determined_count = band + 1;
     if (wanted < 0 ? report->error[band] < worthwhile * least && least > exact
                    : (size_t)wanted == band) {
@@ -253,7 +238,7 @@ static supine_status cross_validate(const fitting *w, size_t modes, supine_accur
       return supine_error_set(error, status, "cross-validation: %s", supine_status_string(status));
     }
     cblas_dgemv(CblasRowMajor, CblasTrans, (int)m, (int)w->rows, 1.0, w->fields->displacement,
-                (int)w->rows, w->work.residual, 1, 0.0, residual, 1);
+                (int)w->rows, w->residual, 1, 0.0, residual, 1);
     for (size_t i = 0; i < w->rows; i += 3) {
       const double length = supine_length(residual + i);
       supine_accuracy_tally_add(tally, 1, &length);
@@ -316,7 +301,11 @@ supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_op
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "too few directions of gravity (%d): give fields for at least two", m);
   }
-  SUPINE_TRY(allocate(&w, error));
+  w.gram = supine_arena_take(&w.arena, (size_t)m * (size_t)m, sizeof *w.gram);
+  w.residual = supine_arena_take(&w.arena, (size_t)m, sizeof *w.residual);
+  if (w.arena.failed) {
+    return supine_error_memory(error, "%d fields", m);
+  }
   cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, m, m, rows, 1.0, fields->displacement, rows,
               fields->displacement, rows, 0.0, w.gram, m);
   if (!(square_sum(&w) > 0.0)) {

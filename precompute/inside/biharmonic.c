@@ -11,9 +11,9 @@
 
 #include "precompute/inside/biharmonic.h"
 
-/* AFFINE: number of affine terms (1, x, y, z). COLUMNS: number of matrix columns eliminated
- * together. POINTS, CENTRES: numbers of points and centres evaluated together. */
-enum { AFFINE = 4, COLUMNS = 128, POINTS = 32, CENTRES = 64 };
+/* AFFINE: number of affine terms (1, x, y, z). POINTS, CENTRES: numbers of points and centres
+ * evaluated together. */
+enum { AFFINE = 4, POINTS = 32, CENTRES = 64 };
 
 /* Set fit->middle to the centre of the points' bounding box, and fit->unit to half its diagonal. */
 static void frame(size_t count, const double *points, supine_inside_biharmonic *fit) {
@@ -70,60 +70,19 @@ SUPINE_CLONES static supine_status choose(size_t count, const double *points, si
   return SUPINE_OK;
 }
 
-/* The interpolation matrix K of the centres p_i, which is positive definite because |p_i| <= 1:
+/* Fill the lower triangle of the interpolation matrix K [n, n] of the centres p_i, column by
+ * column. It is positive definite because |p_i| <= 1:
  *
  *     K_ij = alpha - |p_i - p_j|,    alpha > 2
  *
  * It may replace the matrix of -|p_i - p_j|, because alpha cancels for weights whose sum is 0. */
-typedef struct kernel {
-  size_t size;    /* number of centres */
-  double *matrix; /* [size, size] stored column by column; only the lower triangle is used */
-  size_t done;    /* number of columns eliminated */
-} kernel;
-
-SUPINE_CLONES static void fill(const double *c, const kernel *k) {
+SUPINE_CLONES static void fill(size_t n, const double *c, double *matrix) {
   static const double alpha = 3.0;
-  for (size_t j = 0; j < k->size; ++j) {
-    for (size_t i = j; i < k->size; ++i) {
-      k->matrix[j * k->size + i] = alpha - supine_distance(c + 3 * i, c + 3 * j);
+  for (size_t j = 0; j < n; ++j) {
+    for (size_t i = j; i < n; ++i) {
+      matrix[j * n + i] = alpha - supine_distance(c + 3 * i, c + 3 * j);
     }
   }
-}
-
-/* Do a Cholesky step: subtract the products of the last COLUMNS eliminated columns from all later
- * columns. Blocks of long columns alternate with blocks of short ones to balance the threads. */
-static void update_blocks(void *context, size_t begin, size_t end, size_t thread) {
-  (void)thread;
-  const kernel *k = context;
-  const size_t n = k->size;
-  const size_t blocks = (n - k->done + COLUMNS - 1) / COLUMNS;
-  const double *last = k->matrix + (k->done - COLUMNS) * n;
-  for (size_t i = begin; i < end; ++i) {
-    const size_t j = k->done + COLUMNS * (i % 2 == 0 ? i / 2 : blocks - 1 - i / 2);
-    const size_t width = n - j < COLUMNS ? n - j : COLUMNS;
-    cblas_dgemm(CblasColMajor, CblasNoTrans, CblasTrans, (int)(n - j), (int)width, COLUMNS, -1.0,
-                last + j, (int)n, last + j, (int)n, 1.0, k->matrix + j * n + j, (int)n);
-  }
-}
-
-/* Compute the Cholesky factor of the interpolation matrix, in place. The result does not depend on
- * the number of threads. Return 0, or LAPACK's code if the matrix is not positive definite. */
-static lapack_int factorise(kernel *k) {
-  const size_t n = k->size;
-  lapack_int failed = 0;
-  for (size_t j = 0; j < n && failed == 0; j += COLUMNS) {
-    double *corner = k->matrix + j * n + j;
-    const size_t width = n - j < COLUMNS ? n - j : COLUMNS;
-    const size_t below = n - j - width;
-    failed = LAPACKE_dpotrf(LAPACK_COL_MAJOR, 'L', (lapack_int)width, corner, (lapack_int)n);
-    if (below > 0 && failed == 0) {
-      cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasTrans, CblasNonUnit, (int)below,
-                  (int)width, 1.0, corner, (int)n, corner + width, (int)n);
-      k->done = j + width;
-      supine_parallel_for((below + COLUMNS - 1) / COLUMNS, 2, 0, update_blocks, k);
-    }
-  }
-  return failed;
 }
 
 /* Find the vectors w and b of the function u(x) = -sum over j of w_j |x - p_j| + (1, x) b. Let K be
@@ -134,22 +93,24 @@ static lapack_int factorise(kernel *k) {
  *
  * fit->weights receives -w, then b.
  * K or P^T Z is singular if all centres lie in one plane.
- * @param p  in: P, then f, column by column, with k->size numbers in a column; out: Z, then y */
-static supine_status find_weights(supine_inside_biharmonic *fit, kernel *k, double *p) {
+ * @param matrix  K; overwritten
+ * @param p  in: P, then f, column by column, with one number for each centre; out: Z, then y */
+static supine_status find_weights(supine_inside_biharmonic *fit, double *matrix, double *p) {
   static const double flat = 1e-5;
-  const int n = (int)k->size;
+  const int n = (int)fit->count;
   const int columns = (int)fit->columns;
   const double *centre = fit->centres;
   double affine[AFFINE * AFFINE] = {0.0};
-  if (factorise(k) != 0 ||
-      LAPACKE_dpotrs(LAPACK_COL_MAJOR, 'L', n, AFFINE + columns, k->matrix, n, p, n) != 0) {
+  if (LAPACKE_dpotrf(LAPACK_COL_MAJOR, 'L', n, matrix, n) != 0 ||
+      LAPACKE_dpotrs(LAPACK_COL_MAJOR, 'L', n, AFFINE + columns, matrix, n, p, n) != 0) {
     return SUPINE_ERROR_NUMERICAL;
   }
   for (int r = 0; r < AFFINE + columns; ++r) {
-    double *to = r < AFFINE ? affine + AFFINE * r
-                            : fit->weights + (size_t)(r - AFFINE) * (k->size + AFFINE) + k->size;
-    for (size_t i = 0; i < k->size; ++i) {
-      const double z = p[(size_t)r * k->size + i];
+    double *to = r < AFFINE
+                     ? affine + AFFINE * r
+                     : fit->weights + (size_t)(r - AFFINE) * (fit->count + AFFINE) + fit->count;
+    for (size_t i = 0; i < fit->count; ++i) {
+      const double z = p[(size_t)r * fit->count + i];
       to[0] += z;
       for (size_t axis = 0; axis < 3; ++axis) {
         to[1 + axis] += centre[3 * i + axis] * z;
@@ -164,9 +125,9 @@ static supine_status find_weights(supine_inside_biharmonic *fit, kernel *k, doub
   (void)LAPACKE_dpotrs(LAPACK_COL_MAJOR, 'L', AFFINE, columns, affine, AFFINE, fit->weights + n,
                        n + AFFINE);
   for (size_t r = 0; r < fit->columns; ++r) {
-    double *w = fit->weights + r * (k->size + AFFINE);
+    double *w = fit->weights + r * (fit->count + AFFINE);
     cblas_dgemv(CblasColMajor, CblasNoTrans, n, AFFINE, 1.0, p, n, w + n, 1, 0.0, w, 1);
-    cblas_daxpy(n, -1.0, p + (AFFINE + r) * k->size, 1, w, 1);
+    cblas_daxpy(n, -1.0, p + (AFFINE + r) * fit->count, 1, w, 1);
   }
   return SUPINE_OK;
 }
@@ -174,12 +135,12 @@ static supine_status find_weights(supine_inside_biharmonic *fit, kernel *k, doub
 static supine_status solve(supine_inside_biharmonic *fit, const double *values) {
   const size_t n = fit->count;
   SUPINE_ARENA arena = {0};
-  kernel k = {.size = n, .matrix = supine_arena_take(&arena, n * n, sizeof *k.matrix)};
+  double *matrix = supine_arena_take(&arena, n * n, sizeof *matrix);
   double *p = supine_arena_take(&arena, n * (AFFINE + fit->columns), sizeof *p);
   if (arena.failed) {
     return SUPINE_ERROR_MEMORY;
   }
-  fill(fit->centres, &k);
+  fill(n, fit->centres, matrix);
   for (size_t i = 0; i < n; ++i) {
     p[i] = 1.0;
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -189,7 +150,7 @@ static supine_status solve(supine_inside_biharmonic *fit, const double *values) 
       p[(AFFINE + c) * n + i] = values[fit->chosen[i] * fit->columns + c];
     }
   }
-  return find_weights(fit, &k, p);
+  return find_weights(fit, matrix, p);
 }
 
 supine_status supine_inside_biharmonic_fit(size_t count, const double *points, size_t columns,

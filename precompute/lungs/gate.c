@@ -135,6 +135,9 @@ static double volume_beyond(const supine_mesh *mesh, int axis, double sign, doub
       p[k] = mesh->vertices + 3 * (size_t)mesh->triangles[3 * t + k];
       h[k] = sign * (p[k][axis] - from);
     }
+    if (h[0] <= 0.0 && h[1] <= 0.0 && h[2] <= 0.0) {
+      continue;
+    }
     double mean = fmax(0.0, (h[0] + h[1] + h[2]) / 3.0); /* of max(0, h) over the triangle */
     for (int k = 0; k < 3; ++k) { /* if corner k lies on the other side than the other two */
       const double a = h[(k + 1) % 3];

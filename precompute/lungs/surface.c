@@ -61,24 +61,30 @@ typedef struct keyed {
   uint32_t triangle;
 } keyed;
 
-/* Sort by key with a stable merge sort, which needs no function call for a comparison.
- * @param space  [count / 2] work space */
-static void sort(keyed *item, size_t count, keyed *space) {
-  const size_t half = count / 2;
-  if (half == 0) {
-    return;
-  }
-  sort(item, half, space);
-  sort(item + half, count - half, space);
-  if (item[half - 1].key <= item[half].key) {
-    return;
-  }
-  memcpy(space, item, half * sizeof *item);
-  for (size_t i = 0, j = half, to = 0; i < half; ++to) {
-    const bool second = j < count && item[j].key < space[i].key;
-    item[to] = second ? item[j] : space[i];
-    j += second;
-    i += !second;
+/* Move the `half` items with the least keys to the front (quickselect by Hoare). */
+static void select_least(keyed *item, ptrdiff_t count, ptrdiff_t half) {
+  ptrdiff_t low = 0;
+  ptrdiff_t high = count - 1;
+  while (low < high) {
+    const double pivot = item[low + (high - low) / 2].key;
+    ptrdiff_t up = low;
+    ptrdiff_t down = high;
+    while (up <= down) {
+      while (item[up].key < pivot) {
+        ++up;
+      }
+      while (item[down].key > pivot) {
+        --down;
+      }
+      if (up <= down) {
+        const keyed other = item[up];
+        item[up++] = item[down];
+        item[down--] = other;
+      }
+    }
+    /* Item `half` lies at or before `down`, at or after `up`, or between them in its place. */
+    low = down < half ? up : low;
+    high = up > half ? down : high;
   }
 }
 
@@ -184,11 +190,11 @@ static void build(supine_inside_surface *s, keyed *space, uint32_t begin, uint32
     corners(s, s->order[i], p);
     space[i] = (keyed){p[0][axis] + p[1][axis] + p[2][axis], s->order[i]};
   }
-  sort(space + begin, end - begin, space + s->triangle_count);
+  const uint32_t middle = begin + (end - begin) / 2;
+  select_least(space + begin, end - begin, middle - begin);
   for (size_t i = begin; i < end; ++i) {
     s->order[i] = space[i].triangle;
   }
-  const uint32_t middle = begin + (end - begin) / 2;
   build(s, space, begin, middle);
   n->right = s->node_count;
   build(s, space, middle, end);
@@ -215,7 +221,7 @@ supine_status supine_inside_surface_create(const double *vertices, size_t count,
   *surface = NULL;
   SUPINE_ARENA temporary = {0};
   SUPINE_ARENA arena = {0};
-  keyed *space = supine_arena_take(&temporary, count + count / 2, sizeof *space);
+  keyed *space = supine_arena_take(&temporary, count, sizeof *space);
   supine_inside_surface *s = supine_arena_take(&arena, 1, sizeof *s);
   const supine_inside_surface made = {
       .vertices = vertices,

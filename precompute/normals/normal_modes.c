@@ -44,7 +44,6 @@ typedef struct fit {
   float snapshot_weights[1 + SNAPSHOTS][MOST];
   double *weights; /* [mode, 3, monomials] coefficients V (normal_modes.h) of each mode's weight */
   supine_normals_rows rows; /* polynomials that give the normals of held-out vertices */
-  float *modes;             /* [rows.count, 3, MOST] modes at the held-out vertices */
 } fit;
 
 typedef struct normals_work {
@@ -156,7 +155,7 @@ static supine_status find_fit(const normals_work *work, size_t lung,
   return SUPINE_OK;
 }
 
-/* Find the modes of one lung, and their values at held-out vertices. */
+/* Find the modes of one lung, and the polynomials of its held-out vertices. */
 static supine_status find_lung(normals_work *work, size_t lung, fit *made) {
   const supine_normals_surface *s = work->surface;
   const size_t stride = 1 + (s->lung_begin[lung + 1] - s->lung_begin[lung]) / ROWS;
@@ -172,19 +171,8 @@ static supine_status find_lung(normals_work *work, size_t lung, fit *made) {
   SUPINE_TRY(supine_normals_rows_create(s, &work->fans, lung, 0, stride, &rows_memory, &rows));
   SUPINE_TRY(find_fit(work, lung, &rows, mix, made));
   supine_arena_free(&rows_memory);
-  SUPINE_TRY(supine_normals_rows_create(s, &work->fans, lung, stride / 2, stride, &work->memory,
-                                        &made->rows));
-  const size_t count = 3 * made->rows.count * MOST;
-  double *modes = supine_arena_take(&arena, count, sizeof *modes);
-  made->modes = supine_arena_take(&work->memory, count, sizeof *made->modes);
-  if (arena.failed || work->memory.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
-  apply_rows(made->rows.terms, made->rows.count, work->terms, mix, MOST, modes);
-  for (size_t i = 0; i < count; ++i) {
-    made->modes[i] = (float)modes[i];
-  }
-  return SUPINE_OK;
+  return supine_normals_rows_create(s, &work->fans, lung, stride / 2, stride, &work->memory,
+                                    &made->rows);
 }
 
 /* Round the modes [count + 1] of one vertex along one axis as at run time, where three modes share
@@ -203,20 +191,18 @@ static void pack(const int8_t *modes, size_t count, double *packed) {
   }
 }
 
-/* Round the first `count` modes of n vertices to bytes (supine_basis_info.normal_bytes), in
- * multiples of unit[mode].
- * @param values   [n, 3, stride] modes, first divided in place by `lengths`, unless NULL; x / 0 = 0
- * @param lengths  [n] length of each normal on the reference surface, or NULL
+/* Round the modes of n vertices to bytes (supine_basis_info.normal_bytes), in multiples of
+ * unit[mode].
+ * @param values   [n, 3, count] modes, first divided in place by `lengths`; x / 0 = 0
+ * @param lengths  [n] length of each normal on the reference surface
  * @param bytes    [n, 3, count + 1] written: modes divided by `unit` */
-static void round_modes(float *values, const float *lengths, size_t n, size_t stride, size_t count,
-                        int8_t *bytes, double *unit) {
+static void round_modes(float *values, const float *lengths, size_t n, size_t count, int8_t *bytes,
+                        double *unit) {
   float top[MOST] = {0.0f};
   for (size_t i = 0; i < 3 * n; ++i) {
-    const float factor = lengths == NULL         ? 1.0f
-                         : lengths[i / 3] > 0.0f ? 1.0f / lengths[i / 3]
-                                                 : 0.0f;
+    const float factor = lengths[i / 3] > 0.0f ? 1.0f / lengths[i / 3] : 0.0f;
     for (size_t j = 0; j < count; ++j) {
-      const float size = fabsf(values[i * stride + j] *= factor);
+      const float size = fabsf(values[i * count + j] *= factor);
       top[j] = size > top[j] ? size : top[j];
     }
   }
@@ -225,11 +211,12 @@ static void round_modes(float *values, const float *lengths, size_t n, size_t st
     top[j] = (float)(1.0 / unit[j]);
   }
   for (size_t i = 0; i < 3 * n; ++i) {
+    const float *from = values + i * count;
     int8_t *row = bytes + i * (count + 1);
     for (size_t j = 0; j < count; ++j) {
-      row[j] = (int8_t)lrintf(values[i * stride + j] * top[j] / 256);
+      row[j] = (int8_t)lrintf(from[j] * top[j] / 256);
     }
-    row[count] = (int8_t)lrintf(fminf(values[i * stride] * top[0] - 256.0f * row[0], INT8_MAX));
+    row[count] = (int8_t)lrintf(fminf(from[0] * top[0] - 256.0f * row[0], INT8_MAX));
   }
 }
 
@@ -259,14 +246,15 @@ SUPINE_CLONES static void find_angles(size_t count, const double *a, const doubl
 }
 
 /* Measure the angles between exact and approximate normals at the held-out vertices of a lung, in
- * all held-out states. Add them to the histogram `tally`, and their sum to `sum`. The rounded
- * modes [vertices, 3, count + 1] and weights [count, 3, terms] are those of the basis file. */
-static void measure(const normals_work *work, size_t lung, size_t count, const int8_t *modes,
-                    const double *weights, supine_tally *tally, double *sum) {
+ * all held-out states. Add them to the histogram `tally`, and their sum to `sum`. */
+static void measure(const normals_work *work, size_t lung, const supine_normals_modes *found,
+                    supine_tally *tally, double *sum) {
   enum { BLOCK = 16 }; /* vertices whose exact normals are computed at a time */
   const fit *made = &work->fits[lung];
   const size_t all = 3 * work->terms;
   const size_t states = work->held_out.count;
+  const size_t count = found->count;
+  const double *weights = found->weights + lung * count * all;
   const double *phi = work->held_out.phi + lung * work->held_out.room * all;
   double v[HELD_OUT * MOST];
   double exact[BLOCK * 3 * HELD_OUT]; /* [BLOCK, 3, states] exact normals */
@@ -281,7 +269,7 @@ static void measure(const normals_work *work, size_t lung, size_t count, const i
       apply_rows(made->rows.terms + r * all, rows, work->terms, phi, states, exact);
     }
     for (size_t axis = 0; axis < 3; ++axis) {
-      pack(modes + (3 * r + axis) * (count + 1), count, packed[axis]);
+      pack(found->modes + (3 * made->rows.vertex[r] + axis) * (count + 1), count, packed[axis]);
     }
     cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, 3, (int)states, (int)count, 1.0, packed[0],
                 MOST, v, (int)count, 0.0, normals, (int)states);
@@ -293,33 +281,16 @@ static void measure(const normals_work *work, size_t lung, size_t count, const i
   }
 }
 
-/* Measure the angular error of `count` modes, and set made->mean and made->p999. Measure the modes
- * in `made` if it has any; otherwise measure the modes in work->fits after rounding. */
-static supine_status measure_all(const normals_work *work, size_t count,
-                                 supine_normals_modes *made) {
-  const size_t all = 3 * work->terms;
-  const size_t most = 2 * ROWS + 1;
-  const size_t row = 3 * (count + 1); /* bytes of a vertex */
+/* Measure the angular error of modes, and set made->mean and made->p999. */
+static supine_status measure_all(const normals_work *work, supine_normals_modes *made) {
   SUPINE_ARENA arena = {0};
   supine_tally *tally = supine_arena_zeros(&arena, 1, sizeof *tally);
-  int8_t *modes = supine_arena_take(&arena, most, row);
-  double *weights = supine_arena_take(&arena, count * all, sizeof *weights);
-  double unit[MOST];
   double sum = 0.0;
-  if (arena.failed) {
+  if (tally == NULL) {
     return SUPINE_ERROR_MEMORY;
   }
   for (size_t lung = 0; lung < work->surface->lung_count; ++lung) {
-    const fit *of = &work->fits[lung];
-    if (made->modes == NULL) {
-      round_modes(of->modes, NULL, of->rows.count, MOST, count, modes, unit);
-      scale_weights(of->weights, unit, count, work->terms, weights);
-    }
-    for (size_t r = 0; r < of->rows.count && made->modes != NULL; ++r) {
-      memcpy(modes + r * row, made->modes + of->rows.vertex[r] * row, row);
-    }
-    measure(work, lung, count, modes,
-            made->modes != NULL ? made->weights + lung * count * all : weights, tally, &sum);
+    measure(work, lung, made, tally, &sum);
   }
   made->mean = tally->count > 0 ? sum / (double)tally->count : 0.0;
   made->p999 = supine_accuracy_tally_percentile(tally, 0.999);
@@ -429,6 +400,7 @@ static void find_mode_factors(const planes_work *planes) {
   }
 }
 
+/* Compute `count` modes of all vertices, and measure their error. */
 static supine_status make_modes(const normals_work *work, size_t count, supine_arena *arena,
                                 supine_normals_modes *made) {
   enum { GRAIN = 1024 };
@@ -463,12 +435,12 @@ static supine_status make_modes(const normals_work *work, size_t count, supine_a
     const size_t begin = s->lung_begin[lung];
     double unit[MOST];
     round_modes(planes.modes + 3 * begin * count, planes.lengths + begin,
-                s->lung_begin[lung + 1] - begin, count, count,
-                made->modes + 3 * begin * (count + 1), unit);
+                s->lung_begin[lung + 1] - begin, count, made->modes + 3 * begin * (count + 1),
+                unit);
     scale_weights(work->fits[lung].weights, unit, count, work->terms,
                   made->weights + lung * count * all);
   }
-  return SUPINE_OK;
+  return measure_all(work, made);
 }
 
 static supine_status find_modes(normals_work *work, supine_arena *arena,
@@ -486,14 +458,13 @@ static supine_status find_modes(normals_work *work, supine_arena *arena,
     most = work->fits[lung].count < most ? work->fits[lung].count : most;
   }
   size_t count = most < SUPINE_NORMALS_FEW ? most : SUPINE_NORMALS_FEW;
-  SUPINE_TRY(measure_all(work, count, made));
+  SUPINE_TRY(make_modes(work, count, arena, made));
   while ((made->mean > mean_wanted || made->p999 > p999_wanted) && count + STEP <= most) {
     count += STEP;
-    SUPINE_TRY(measure_all(work, count, made));
+    SUPINE_TRY(make_modes(work, count, arena, made));
   }
-  SUPINE_TRY(make_modes(work, count, arena, made));
   memcpy(made->range, work->states.range, sizeof made->range);
-  return measure_all(work, count, made);
+  return SUPINE_OK;
 }
 
 supine_status supine_normals_modes_create(const supine_normals_surface *surface,

@@ -109,7 +109,7 @@ supine_status supine_reference_find_gains(const supine_lungs *scan, const double
   const supine_state *state = &reference->scan.state;
   const bool at_rest = state->volume.kind == SUPINE_VOLUME_REST && state->volume.ml == 0.0;
   supine_volume_form forms[2];
-  supine_physics_volume_of_fields(scan, NULL, directions, amounts, 1, forms);
+  supine_physics_volume_of_field(scan, NULL, directions, amounts, forms);
   for (size_t lung = 0; lung < scan->lung_count; ++lung) {
     const double beyond = reference->scan_volume[lung];
     SUPINE_TRY(find_lung_gains(&forms[lung], bend, at_rest, -beyond,

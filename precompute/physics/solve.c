@@ -45,8 +45,7 @@ static supine_status solve(const supine_lungs *lungs, const supine_model *model,
       made->catch_[i] = 1.0;
     }
   }
-  supine_physics_volume_of_fields(lungs, model->share, made->directions, made->catch_, 1,
-                                  made->form);
+  supine_physics_volume_of_field(lungs, model->share, made->directions, made->catch_, made->form);
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     supine_physics_volume_form_add(&made->form[lung], made->cubic);
   }

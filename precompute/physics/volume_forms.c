@@ -13,7 +13,7 @@
 /* The triangles of each lung are split into PARTS ranges, which are summed separately, BLOCK
  * triangles at a time. The number of ranges is fixed, so that the sums do not depend on the number
  * of threads. FORM: number of terms of a supine_volume_form. */
-enum { PARTS = 16, BLOCK = 128, FIELDS = SUPINE_VOLUME_FIELDS, FORM = 7 };
+enum { PARTS = 16, BLOCK = 128, FORM = 7 };
 
 static const double sixth_ml = 1e-3 / 6.0; /* volume of a tetrahedron, mL / its determinant, mm^3 */
 
@@ -249,66 +249,46 @@ supine_status supine_physics_volume_forms_create(const supine_lungs *lungs, cons
   return SUPINE_OK;
 }
 
-SUPINE_CLONES static void fields_range(void *context, size_t begin, size_t end, size_t thread) {
+SUPINE_CLONES static void field_range(void *context, size_t begin, size_t end, size_t thread) {
   const lung_work *work = context;
-  const size_t count = work->count;
   (void)thread;
   for (size_t part = begin; part < end; ++part) {
-    double sums[FORM][FIELDS] = {{0.0}};
+    double sums[FORM] = {0.0};
     for (size_t t = part_begin(work, part); t < part_begin(work, part + 1); ++t) {
       double p[3][3];
-      const double *d[3];
-      const double *f[3];
-      double first[3][3];
-      double second[3][3];
+      double u[3][3]; /* displacement of each corner */
+      double first[3];
+      double second[3];
       const uint32_t *corner = read_corners(work, t, p);
-      for (size_t v = 0; v < 3; ++v) {
-        d[v] = work->directions + 3 * (size_t)corner[v];
-        f[v] = work->columns + count * corner[v];
+      for (size_t k = 0; k < 9; ++k) {
+        const size_t vertex = corner[k / 3];
+        u[k / 3][k % 3] = work->columns[vertex] * work->directions[3 * vertex + k % 3];
       }
       for (size_t v = 0; v < 3; ++v) {
-        supine_cross(p[(v + 1) % 3], p[(v + 2) % 3], first[v]);
-        supine_cross(d[(v + 1) % 3], d[(v + 2) % 3], second[v]);
-      }
-      const double third = supine_dot(d[0], second[0]);
-      for (size_t v = 0; v < 3; ++v) {
+        supine_cross(p[(v + 1) % 3], p[(v + 2) % 3], first);
+        supine_cross(u[(v + 1) % 3], u[(v + 2) % 3], second);
         for (size_t axis = 0; axis < 3; ++axis) {
-          first[v][axis] *= d[v][axis];
-          second[v][axis] *= p[v][axis];
+          sums[axis] += first[axis] * u[v][axis];
+          sums[3 + axis] += second[axis] * p[v][axis];
         }
       }
-      for (size_t l = 0; l < count; ++l) {
-        const double a = f[0][l];
-        const double b = f[1][l];
-        const double c = f[2][l];
-        for (size_t axis = 0; axis < 3; ++axis) {
-          sums[axis][l] += first[0][axis] * a + first[1][axis] * b + first[2][axis] * c;
-          sums[3 + axis][l] +=
-              second[0][axis] * b * c + second[1][axis] * c * a + second[2][axis] * a * b;
-        }
-        sums[6][l] += third * a * b * c;
-      }
+      sums[6] += supine_triple(u[0], u[1], u[2]);
     }
-    memcpy(work->sums + part * work->size, sums, sizeof sums);
+    memcpy(work->sums + part * FORM, sums, sizeof sums);
   }
 }
 
-void supine_physics_volume_of_fields(const supine_lungs *lungs, const double *share,
-                                     const double *directions, const double *fields, size_t count,
-                                     supine_volume_form *forms) {
-  double sums[PARTS * FORM * FIELDS];
-  for (size_t lung = 0; lung < lungs->lung_count; ++lung, forms += count) {
-    lung_work work = begin_lung(lungs, directions, fields, count, lung);
+void supine_physics_volume_of_field(const supine_lungs *lungs, const double *share,
+                                    const double *directions, const double *amounts,
+                                    supine_volume_form *forms) {
+  double sums[PARTS * FORM];
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+    lung_work work = begin_lung(lungs, directions, amounts, 1, lung);
     work.sums = sums;
-    work.size = FORM * FIELDS;
-    memset(forms, 0, count * sizeof *forms);
-    supine_parallel_for(PARTS, 1, 0, fields_range, &work);
-    for (size_t i = 0; i < PARTS * FORM * count; ++i) {
-      const size_t l = i % count;
-      const size_t term = i / count % FORM;
-      const size_t part = i / count / FORM;
-      forms[l].of[term] +=
-          sixth_ml * (share == NULL ? 1.0 : share[lung]) * sums[(part * FORM + term) * FIELDS + l];
+    forms[lung] = (supine_volume_form){{0.0}};
+    supine_parallel_for(PARTS, 1, 0, field_range, &work);
+    for (size_t i = 0; i < PARTS * FORM; ++i) {
+      forms[lung].of[i % FORM] += sixth_ml * (share == NULL ? 1.0 : share[lung]) * sums[i];
     }
   }
 }

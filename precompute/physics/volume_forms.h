@@ -45,18 +45,14 @@ supine_status supine_physics_volume_forms_create(const supine_lungs *lungs, cons
                                                  size_t count, supine_volume_forms *forms,
                                                  supine_error *error);
 
-/** Largest number of fields in one call of supine_physics_volume_of_fields. */
-enum { SUPINE_VOLUME_FIELDS = 16 };
-
-/** Compute the volume that each of `count` displacement fields adds to each closed lung, as a
- * polynomial of the lung's gains (factors of its displacement along x, y and z).
+/** Compute the volume that a displacement adds to each closed lung, as a polynomial of the lung's
+ * gains (factors of its displacement along x, y and z).
  * @param share, directions  as in supine_physics_volume_forms_create; directions are not NULL
- * @param count   at most SUPINE_VOLUME_FIELDS
- * @param fields  [N, count] displacement of each vertex, as a multiple of `directions`
- * @param forms   [lungs, count] output */
-void supine_physics_volume_of_fields(const supine_lungs *lungs, const double *share,
-                                     const double *directions, const double *fields, size_t count,
-                                     supine_volume_form *forms);
+ * @param amounts  [N] displacement of each vertex, as a multiple of `directions`
+ * @param forms    [lungs] output */
+void supine_physics_volume_of_field(const supine_lungs *lungs, const double *share,
+                                    const double *directions, const double *amounts,
+                                    supine_volume_form *forms);
 
 /** Compute one lung's change of volume at given mode weights, as a polynomial of its gains
  * (factors of its displacement along x, y and z). */

@@ -105,7 +105,7 @@ static supine_status create(const supine_lungs *lungs, const supine_model *model
   if (expansion->columns == NULL || expansion->functions == NULL) {
     return supine_error_memory(error, "%zu vertices", n);
   }
-  supine_status status = supine_sh_expansion_grid(band, &grid);
+  supine_status status = supine_sh_grid_for_kinks(band, &grid);
   if (status == SUPINE_OK) {
     status = expand(lungs, &model->force, band, projection->span, grid, expansion->functions);
     supine_sh_grid_destroy(grid);

@@ -77,7 +77,8 @@ typedef struct supine_progress {
 } supine_progress;
 
 supine_progress supine_options_progress_begin(const char *label);
-/* Show the fraction of the work done, 0 to 1, and nothing at 1; return false if the user has interrupted the work. */
+/* Show the fraction of the work done, 0 to 1, and nothing at 1; return false if the user has
+ * interrupted the work. */
 bool supine_options_progress_step(void *progress, double fraction);
 void supine_options_progress_end(supine_progress *progress);
 

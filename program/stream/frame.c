@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Compute the positions of a frame, and build its messages. */
-#define _DEFAULT_SOURCE /* declares madvise */ // NOLINT(bugprone-reserved-identifier)
+#define _DEFAULT_SOURCE /* declares madvise */ // NOLINT(*-reserved-identifier,cert-*)
 #include <arpa/inet.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Run the main loop: read messages, compute a frame for the newest pose, send the frame. */
-#define _GNU_SOURCE /* declares ppoll, part of POSIX since 2024 */ // NOLINT(bugprone-reserved-identifier)
+#define _GNU_SOURCE /* declares ppoll, part of POSIX since 2024 */ // NOLINT(*-reserved-identifier,cert-*)
 #include <errno.h>
 #include <math.h>
 #include <poll.h>

@@ -110,7 +110,7 @@ supine_status supine_compare_create(const supine_basis *basis, supine_compare **
   }
   made->basis = basis;
   made->gram = (double *)(made + 1);
-  made->share = (float *)(made->gram + numbers);
+  made->share = (float *)(void *)(made->gram + numbers);
   const supine_status status = share_area(made, error);
   if (status != SUPINE_OK) {
     supine_compare_destroy(made);

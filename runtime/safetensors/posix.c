@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Map files and allocate large memory on POSIX systems. */
-#define _DEFAULT_SOURCE /* declares madvise */ // NOLINT(bugprone-reserved-identifier)
+#define _DEFAULT_SOURCE /* declares madvise */ // NOLINT(*-reserved-identifier,cert-*)
 #include <errno.h>
 #include <fcntl.h>
 #include <stdlib.h>

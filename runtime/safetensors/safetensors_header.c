@@ -339,7 +339,7 @@ static supine_status place_tensors(parser *p, size_t data_begin) {
     return supine_error_set(p->error, SUPINE_ERROR_MEMORY, "%s: out of memory", file->name);
   }
   unsigned char *copy = file->copies;
-  for (size_t i = 0; i < file->tensor_count; ++i) {
+  for (size_t i = 0; copy != NULL && i < file->tensor_count; ++i) {
     supine_tensor *tensor = &file->tensors[i];
     if (!is_aligned(tensor)) {
       tensor->data = memcpy(copy, tensor->data, size_of(tensor));

@@ -113,7 +113,7 @@ class Deck:
 
 
 def measure(supine, law, points, faces, directions, others):
-    """Print a row for each number of modes; return (error, stated error) by modes, and seconds of each program."""
+    """Print a row for each number of modes; return (error, stated error) by modes, seconds of each program, and the last basis."""
     deck = Deck(points, faces, law)
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
         solved = list(pool.map(deck.solve, range(len(directions) + len(others)), np.vstack([directions, others])))
@@ -134,7 +134,18 @@ def measure(supine, law, points, faces, directions, others):
     begun = time.process_time()
     for _ in range(count):
         basis.deform(pose, out)
-    return errors, seconds, (time.process_time() - begun) / count
+    return errors, seconds, (time.process_time() - begun) / count, basis
+
+
+def compare_law(supine, basis, points, faces):
+    """Print how the default law and the simulator displace the lung from supine to the other postures."""
+    law = supine.precompute(points, faces)
+    moves = []
+    for posture, down in (("prone", (0, -1, 0)), ("left", (1, 0, 0)), ("right", (-1, 0, 0))):
+        own, other = (lungs.deform(lungs.pose(posture)) - lungs.deform(lungs.pose("supine")) for lungs in (law, basis))
+        correlation = np.corrcoef(own.ravel(), other.ravel())[0, 1]
+        moves.append(f"{posture}: correlation {correlation:.2f}, mean along gravity {(own @ down).mean():.1f} mm and {(other @ down).mean():.1f} mm")
+    print("\ndefault law at rest beside neo-Hookean, supine to " + "; ".join(moves))
 
 
 def follow_guide(supine, points, faces):
@@ -167,8 +178,9 @@ def main():
         directions, others = (np.array([row.split(",") for row in rows], float) for rows in listed)
         print(f"{len(points)} vertices, {DIRECTIONS} directions, {HELD_OUT} held out\n")
         print("| tissue | modes | error found | error stated | RMS | largest |\n|---|--:|--:|--:|--:|--:|")
-        linear, _, _ = measure(supine, "linear", points, faces, directions, others)
-        errors, seconds, fast = measure(supine, "neo-Hookean", points, faces, directions, others)
+        linear, _, _, _ = measure(supine, "linear", points, faces, directions, others)
+        errors, seconds, fast, basis = measure(supine, "neo-Hookean", points, faces, directions, others)
+        compare_law(supine, basis, points, faces)
         follow_guide(supine, points, faces)
         os.chdir("/")
     print(f"\nneo-Hookean: {seconds:.2g} s of processor time in CalculiX, {1e6 * fast:.2g} us in supine_deform: "

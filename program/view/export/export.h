@@ -6,6 +6,8 @@
 
 #include <stdio.h>
 
+#include <jansson.h>
+
 #include <supine/runtime.h>
 
 enum { EXPORT_RESTING_TERMS = 9 }; /* number of spherical harmonics of bands 0 to 2 */
@@ -35,6 +37,9 @@ void supine_export_box(const export_source *source, double low[3], double high[3
 /** Compute the displacement `u`, mm, of a vertex in one mode, at weight 1 and at gain 1. Gains are
  * the factors that multiply the displacement along each axis. */
 void supine_export_field(const export_source *source, size_t vertex, size_t mode, double u[3]);
+
+/** Return the metadata of the basis as a JSON object. */
+json_t *supine_export_metadata(const export_source *source);
 
 /** Compute the pose during a breath of `breath` mL, with gravity along the unit vector `g`. The
  * `fraction` is 0 at rest (in the scan if rest is unknown) and 1 at the end of inspiration; another

@@ -55,3 +55,13 @@ supine_status supine_export_breath_pose(const export_source *source, double brea
   }
   return supine_basis_pose(source->basis, &state, pose, error);
 }
+
+json_t *supine_export_metadata(const export_source *source) {
+  size_t count = 0;
+  const supine_metadata *all = supine_basis_all_metadata(source->basis, &count);
+  json_t *metadata = json_object();
+  for (size_t i = 0; i < count; ++i) {
+    (void)json_object_set_new(metadata, all[i].key, json_string(all[i].value));
+  }
+  return metadata;
+}

@@ -52,21 +52,6 @@ static json_t *target_names(const glb *g) {
   return names;
 }
 
-/* Return the metadata that describe how the basis was made, as JSON. */
-static json_t *origin(const export_source *source) {
-  static const char *const keys[] = {
-      "lungs",       "made_by",          "force", "direction", "direction_constants", "stiffness",
-      "attribution", "error_rms_percent"};
-  json_t *object = json_object();
-  for (size_t i = 0; i < sizeof keys / sizeof *keys; ++i) {
-    const char *value = supine_basis_metadata(source->basis, keys[i]);
-    if (value != NULL) {
-      (void)json_object_set_new(object, keys[i], json_string(value));
-    }
-  }
-  return object;
-}
-
 json_t *supine_export_glb_extras(const glb *g) {
   const export_source *s = g->source;
   const char *full = supine_basis_metadata(s->basis, "full_upright_gain");
@@ -84,7 +69,7 @@ json_t *supine_export_glb_extras(const glb *g) {
                              "weights", weights_text, "band", (int)s->info->band, "modes", modes,
                              "modeUnit", unit, "bend", supine_template_numbers(s->info->bend, 3),
                              "middle", supine_template_numbers(g->targets.middle, 3),
-                             "millimetresPerUnit", g->step, "basis", origin(s));
+                             "millimetresPerUnit", g->step, "basis", supine_export_metadata(s));
   (void)(s->info->is_fields
              ? json_object_set_new(supine, "gains", json_string(fields_text))
              : json_object_set_new(supine, "breathVolume", json_real(g->options->breath)));

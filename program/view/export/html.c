@@ -259,12 +259,6 @@ static json_t *describe_froms(const page *p) {
 
 static json_t *describe(const page *p) {
   const supine_basis_info *info = p->source->info;
-  size_t count = 0;
-  const supine_metadata *all = supine_basis_all_metadata(p->source->basis, &count);
-  json_t *metadata = json_object();
-  for (size_t i = 0; i < count; ++i) {
-    (void)json_object_set_new(metadata, all[i].key, json_string(all[i].value));
-  }
   json_t *title = json_string(p->shown->title);
   return json_pack(
       "{s:I, s:I, s:I, s:I, s:b, s:o, s:o, s:b, s:o, s:f, s:o, s:o, s:o, s:f, s:f, "
@@ -273,10 +267,10 @@ static json_t *describe(const page *p) {
       "modes", (json_int_t)info->mode_count, "band", (json_int_t)info->band, "vector",
       (int)info->vector, "lungBegin", begins(p->source, info->lung_begin), "cornerBegin",
       begins(p->source, p->order.corner_begin), "hasResting", (int)(p->source->info->has_rest),
-      "colours", colours(), "breathVolume", p->shown->breath, "metadata", metadata, "title",
-      title != NULL ? title : json_string("lungs"), "middle", supine_template_numbers(p->middle, 3),
-      "placeUnit", p->position_step, "unit", p->coefficient_step, "inside", describe_inside(p),
-      "froms", describe_froms(p), "references",
+      "colours", colours(), "breathVolume", p->shown->breath, "metadata",
+      supine_export_metadata(p->source), "title", title != NULL ? title : json_string("lungs"),
+      "middle", supine_template_numbers(p->middle, 3), "placeUnit", p->position_step, "unit",
+      p->coefficient_step, "inside", describe_inside(p), "froms", describe_froms(p), "references",
       supine_template_numbers(info->reference_volume, info->lung_count), "scanVolume",
       scan_volume(p->source), "volumeAxes", (json_int_t)info->volume_axes, "bend",
       supine_template_numbers(info->bend, 3));

@@ -1,9 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Draw the lungs, coloured by the distance between predicted and scanned surface. */
-#ifndef SUPINE_VALIDATION_PICTURE_H
-#define SUPINE_VALIDATION_PICTURE_H
+/* Print the distances that a validation found, and draw those of the surface. */
+#ifndef SUPINE_VALIDATION_REPORT_H
+#define SUPINE_VALIDATION_REPORT_H
 
 #include "precompute/validation/validation.h"
+
+/* Print the results to standard output, as text or JSON. */
+void supine_command_print_validation(const supine_validation *s, bool json);
 
 /* Draw one panel for each state that has a scanned surface. */
 supine_status supine_command_draw_errors(const supine_validation *s, const char *path,

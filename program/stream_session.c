@@ -1,0 +1,206 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Run a server that follows a tracked patient, and report what it did. */
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/arena.h"
+#include "program/options/basis_input.h"
+#include "program/options/inside.h"
+#include "program/stream/peer.h"
+#include "program/stream_session.h"
+#include "program/view/export/export.h"
+
+static const char name[] = "stream";
+
+static void warn(void *context, const char *text) {
+  (void)context;
+  supine_options_say(name, "%s", text);
+}
+
+static bool stop(void *context) {
+  (void)context;
+  return supine_options_interrupted();
+}
+
+static void report(const supine_stream_results *results, const supine_stream_session *wanted) {
+  const supine_stream_counts *n = &results->counts;
+  if (wanted->points != NULL) {
+    (void)printf("received positions of observed points: %llu\n", (unsigned long long)n->positions);
+  }
+  (void)printf(
+      "poses: %llu (repaired: %llu; refused: %llu); frames: %llu (sent: %llu); peers: %llu\n",
+      (unsigned long long)n->poses, (unsigned long long)n->repaired, (unsigned long long)n->refused,
+      (unsigned long long)n->frames, (unsigned long long)n->sent, (unsigned long long)n->peers);
+  if (n->malformed + n->skipped + n->lost + n->turned_away + n->unreachable > 0) {
+    (void)printf("malformed messages: %llu; messages not used: %llu; peers disconnected: %llu; "
+                 "peers refused: %llu; frames whose volume is out of reach: %llu\n",
+                 (unsigned long long)n->malformed, (unsigned long long)n->skipped,
+                 (unsigned long long)n->lost, (unsigned long long)n->turned_away,
+                 (unsigned long long)n->unreachable);
+  }
+  for (int surfaces = 0; surfaces < 2; ++surfaces) {
+    const supine_stream_latency *latency = &results->latency[surfaces];
+    if (latency->count > 0) {
+      (void)printf("pose received to %s sent: %llu of %llu frames within %.0f ms, worst %.3f ms\n",
+                   surfaces != 0 ? "surface" : "weights",
+                   (unsigned long long)(latency->count - latency->late),
+                   (unsigned long long)latency->count, 1e3 * SUPINE_STREAM_BUDGET,
+                   1e3 * latency->worst);
+    }
+  }
+}
+
+/* The observed points, and the file made by 'supine embed' that names them. */
+typedef struct observed_points {
+  supine_basis *inside;
+  supine_command_names names;
+  supine_stream_observed observed;
+} observed_points;
+
+/* Open the file of --points. Each structure with a single vertex becomes a point, marked as not yet
+ * observed. */
+static supine_status open_points(const supine_basis *basis, const supine_stream_session *wanted,
+                                 observed_points *points, supine_arena *arena,
+                                 supine_error *error) {
+  const supine_command_names *names = &points->names;
+  supine_stream_observed *observed = &points->observed;
+  SUPINE_TRY(
+      supine_command_inside_open(basis, wanted->points, &points->inside, &points->names, error));
+  size_t count = 0;
+  for (size_t part = 0; part < names->count; ++part) {
+    const bool single = names->begin[part + 1] - names->begin[part] == 1;
+    if (single && count++ < SUPINE_LOCATE_POINTS_MAX) {
+      observed->name[count - 1] = names->text[part];
+      observed->last[count - 1] = (supine_observation){.vertex = names->order[names->begin[part]],
+                                                       .position = {(double)NAN},
+                                                       .noise = wanted->noise};
+    }
+  }
+  if (count == 0 || count > SUPINE_LOCATE_POINTS_MAX) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s holds %zu points: give a file with 1 to %d", wanted->points, count,
+                            (int)SUPINE_LOCATE_POINTS_MAX);
+  }
+  observed->ras = wanted->options.ras;
+  observed->inside = points->inside;
+  observed->count = count;
+  observed->space = supine_arena_zeros(arena, supine_locate_space(count), sizeof *observed->space);
+  return observed->space != NULL ? SUPINE_OK : supine_error_memory(error, "%s", wanted->points);
+}
+
+#define PAGE P_tmpdir "/supine-page-XXXXXX" /* template of the name of a temporary file */
+
+/* If --web is given, serve the page that shows the lungs of the basis file `path` live, from a
+ * temporary file. The caller destroys *web, then removes the file `page`. */
+static supine_status open_page(const supine_stream_session *wanted, const supine_basis *basis,
+                               const char *path, char *page, supine_stream_web **web,
+                               supine_error *error) {
+  supine_stream_address address;
+  supine_reference_pose from;
+  SUPINE_FREED_BY(supine_export_source_close) export_source source = {0};
+  SUPINE_FREED_BY(supine_file_close) FILE *file = NULL;
+  supine_stream_site site = {.certificate = wanted->certificate, .key = wanted->key};
+  if (wanted->web == NULL) {
+    return SUPINE_OK;
+  }
+  SUPINE_TRY(supine_stream_address_read(wanted->web, true, &address, error));
+  SUPINE_TRY(supine_options_reference(basis, &wanted->from, true, &from, error));
+  const export_reference reference = {&from.pose, from.name, from.state.gravity,
+                                      supine_options_above_rest(&from.state)};
+  const export_page shown = {.breath = wanted->breath.tidal,
+                             .from = &reference,
+                             .from_count = 1,
+                             .title = "Lungs, live",
+                             .live = true};
+  SUPINE_TRY(supine_export_source_open(path, &source, error));
+  (void)strcpy(page, PAGE);
+  const int descriptor = mkstemp(page);
+  file = descriptor < 0 ? NULL : fdopen(descriptor, "w");
+  if (file != NULL) {
+    SUPINE_TRY(supine_export_html_print(file, &source, &shown, error));
+  }
+  if (file == NULL || fflush(file) != 0) {
+    return supine_error_set(error, SUPINE_ERROR_WRITE, "%s: %s", page, strerror(errno));
+  }
+  site.address = address.host;
+  site.port = address.port;
+  site.page = page;
+  SUPINE_TRY(supine_stream_web_create(&site, web, error));
+  const bool ipv6 = strchr(address.host, ':') != NULL;
+  (void)printf("page at http%s://%s%s%s:%d/\n", site.certificate != NULL ? "s" : "",
+               ipv6 ? "[" : "", address.host, ipv6 ? "]" : "", site.port);
+  return SUPINE_OK;
+}
+
+/* Choose a breath, or a fixed volume. Fields of gravity have no breaths. */
+static supine_status set_volume(const supine_basis *basis, const supine_stream_session *wanted,
+                                supine_stream_volume *volume, supine_error *error) {
+  supine_pv pv = *supine_breath_normal();
+  if (supine_basis_get_info(basis)->is_fields) {
+    supine_pose pose;
+    if (wanted->has_breath) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "the basis was made with --fields and has no breaths: leave out "
+                              "--tidal, --rate and --pv");
+    }
+    volume->fixed = wanted->volume;
+    volume->fixed.gravity[1] = 1.0;
+    return supine_basis_pose(basis, &volume->fixed, &pose, error);
+  }
+  if (wanted->has_volume) {
+    volume->fixed = wanted->volume;
+    return SUPINE_OK;
+  }
+  if (wanted->pv != NULL) {
+    SUPINE_TRY(supine_breath_load(wanted->pv, &pv, error));
+  }
+  return supine_stream_volume_breathe(volume, &pv, &wanted->breath, error);
+}
+
+/* What a run needs besides the basis. */
+typedef struct running {
+  supine_arena arena;
+  observed_points points;
+  char page[sizeof PAGE];
+  supine_stream_web *web;
+  supine_stream_server *server;
+} running;
+
+static void end(running *s) {
+  supine_stream_server_destroy(s->server);
+  supine_stream_web_destroy(s->web);
+  (void)remove(s->page); /* has no effect if there is no page */
+  supine_command_names_close(&s->points.names);
+  supine_basis_close(s->points.inside);
+  supine_arena_free(&s->arena);
+}
+
+supine_status supine_command_stream_run(const supine_stream_session *wanted,
+                                        const supine_basis *basis, const char *path,
+                                        supine_error *error) {
+  supine_stream_options options = wanted->options;
+  supine_stream_volume volume = {0};
+  SUPINE_FREED_BY(end) running s = {0};
+  SUPINE_TRY(set_volume(basis, wanted, &volume, error));
+  options.volume = &volume;
+  options.warn = warn;
+  options.stop = stop;
+  if (wanted->points != NULL) {
+    SUPINE_TRY(open_points(basis, wanted, &s.points, &s.arena, error));
+    options.observed = &s.points.observed;
+  }
+  SUPINE_TRY(open_page(wanted, basis, path, s.page, &s.web, error));
+  options.web = s.web;
+  SUPINE_TRY(supine_stream_server_create(basis, &options, &s.server, error));
+  const supine_stream_results *results = supine_stream_server_results(s.server);
+  if (results->port != 0) {
+    (void)printf("listening on port %d\n", results->port);
+  }
+  (void)fflush(stdout);
+  supine_options_signals_catch(true);
+  const supine_status status = supine_stream_server_run(s.server, error);
+  report(results, wanted);
+  return status;
+}
