@@ -209,15 +209,26 @@ static supine_status invert(const supine_field *forward, supine_field *inverse,
 }
 
 /* Compute the displacement field to the pose `moved`, from the scan or the state of --from, and
- * check that it does not fold. */
+ * check that it does not fold in the lungs, and hardly in the body around them. There, where the
+ * field fades out, five pairs of real lungs at rest had folds of up to 3 % of the lungs' cells. */
 static supine_status find_field(const supine_basis *basis, const supine_deformation *moved,
                                 supine_field *field, supine_error *error) {
+  static const double told = 0.01;
+  static const double allowed = 0.1;
   SUPINE_TRY(supine_field_between(basis, moved->from_given ? &moved->from.pose : NULL, &moved->pose,
                                   fade, field, error));
+  const double around = supine_field_folded(field, false);
+  if (around > told && (around <= allowed || moved->allow_folds)) {
+    supine_options_say("deform",
+                       "warning: the field folds in the body around the lungs, in %.2g %% as many "
+                       "cells as the lungs have: voxels of the body and of the rim of the lungs "
+                       "are wrong there",
+                       100.0 * around);
+  }
   const supine_plausible lungs = {
       .command = "deform",
       .state = &moved->state,
-      .folded = supine_field_folded(field),
+      .folded = around > allowed ? around : supine_field_folded(field, true),
       .parts = "the field folds; cells that turn over, relative to those in the lungs",
       .allowed = moved->allow_folds || !supine_basis_get_info(basis)->has_rest};
   return supine_options_plausible(&lungs, error);

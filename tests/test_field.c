@@ -77,6 +77,28 @@ static double size_of(const double v[3]) {
   return hypot(hypot(v[0], v[1]), v[2]);
 }
 
+/* Turn over the cells in the lungs alone, by u = -2 x there, and then those of the body alone. */
+TEST(test_field_folded_counts_cells_in_lungs_and_around) {
+  supine_field field = made_field();
+  const float *depth = field.depth.values;
+  assert_true(supine_field_folded(&field, true) == 0.0);
+  for (int part = 0; part < 2; ++part) {
+    const size_t *size = field.nodes.size;
+    for (size_t i = 0; i < size[0] * size[1] * size[2]; ++i) {
+      const double index[3] = {(double)(i % size[0]), (double)(i / size[0] % size[1]),
+                               (double)(i / size[0] / size[1])};
+      double u[3] = {0.0, 0.0, 0.0};
+      for (size_t k = 0; k < 9 && (depth[i] > 0.0F) == (part == 0); ++k) {
+        u[k % 3] -= 2.0 * field.nodes.step[k / 3][k % 3] * index[k / 3];
+      }
+      supine_image_put(&field.nodes, 3 * i, 3, u);
+    }
+    assert_true(supine_field_folded(&field, part == 0) > 0.5);
+    assert_true(supine_field_folded(&field, part == 0) > supine_field_folded(&field, part != 0));
+  }
+  supine_field_free(&field);
+}
+
 /* At grid nodes the field equals the displacement computed by the basis. Between nodes it is
  * trilinear. Far outside the lungs it is 0. */
 TEST(test_field_at_nodes_and_cells_interpolates_basis) {

@@ -249,7 +249,7 @@ double supine_field_stretch(const supine_image *nodes, const supine_field_cell *
          supine_triple(nodes->step[0], nodes->step[1], nodes->step[2]);
 }
 
-double supine_field_folded(const supine_field *field) {
+double supine_field_folded(const supine_field *field, bool in_lungs) {
   const size_t *size = field->nodes.size;
   size_t inside = 0;
   size_t folded = 0;
@@ -258,8 +258,9 @@ double supine_field_folded(const supine_field *field) {
                                     {0.5, 0.5, 0.5}};
     if (cell.corner[0] + 1 < size[0] && cell.corner[1] + 1 < size[1] &&
         cell.corner[2] + 1 < size[2]) {
-      inside += ((const float *)field->depth.values)[i] > 0.0F ? 1 : 0;
-      folded += supine_field_stretch(&field->nodes, &cell) > 0.0 ? 0 : 1;
+      const bool lung = ((const float *)field->depth.values)[i] > 0.0F;
+      inside += lung ? 1 : 0;
+      folded += lung == in_lungs && !(supine_field_stretch(&field->nodes, &cell) > 0.0) ? 1 : 0;
     }
   }
   return (double)folded / fmax((double)inside, 1.0);

@@ -33,8 +33,10 @@ supine_status supine_field_between(const supine_basis *basis, const supine_pose 
                                    supine_error *error);
 
 /** Count the cells that the field u turns over (det(I + du/dx) is not positive at their centre), as
- * a share of the number of cells inside the lungs. Near each of them, lung or body is lost. */
-double supine_field_folded(const supine_field *field);
+ * a share of the number of cells in the lungs. Near each of them, voxels are lost.
+ * @param in_lungs  count cells in the lungs; false counts those in the body around them, where the
+ *                  field fades out */
+double supine_field_folded(const supine_field *field, bool in_lungs);
 
 /** Residual u(x) + v(x + u(x)) of a field u and its inverse v. */
 typedef struct supine_field_residual {
