@@ -25,6 +25,7 @@ typedef struct playing {
   double *time;     /* [frames] time since the start, s */
   double *above;    /* [frames] volume minus that at rest (in the scan if rest is unknown), mL */
   double *gravity;  /* [frames, 3] unit vectors */
+  double *expected; /* [frames] expected error of the displacements, RMS over the vertices, mm */
   double *volumes;  /* [frames, lungs] volume of gas and tissue, mL */
   double *total;    /* [frames] sum of `volumes` over the lungs, mL */
   supine_mesh mesh; /* triangles; for VTP output, also the positions of the current frame */
@@ -52,6 +53,7 @@ static supine_status begin_frames(playing *p, bool series, supine_error *error) 
   p->gravity = supine_arena_take(&p->arena, count, 3 * sizeof *p->gravity);
   p->volumes = supine_arena_take(&p->arena, count, p->lung_count * sizeof *p->volumes);
   p->total = supine_arena_take(&p->arena, count, sizeof *p->total);
+  p->expected = supine_arena_take(&p->arena, count, sizeof *p->expected);
   p->compute_time = supine_arena_take(&p->arena, count, sizeof *p->compute_time);
   p->origin = supine_arena_take(&p->arena, frame, sizeof *p->origin);
   p->normals = supine_arena_take(&p->arena, frame, sizeof *p->normals);
@@ -130,24 +132,43 @@ static supine_status play_frames(playing *p, supine_mesh_series *series, supine_
   return SUPINE_OK;
 }
 
+/* Compute the expected error of the displacements of each frame from the state `from`. Set `known`
+ * to false for a basis without expected errors. */
+static supine_status find_expected(const playing *p, const supine_state *from, bool *known,
+                                   supine_error *error) {
+  *known = true;
+  for (size_t t = 0; t < p->wanted->count && *known; ++t) {
+    SUPINE_FREED_BY(supine_posed_expected_free) supine_expected expected = {0};
+    const supine_state state = supine_breath_state(p->basis, p->gravity + 3 * t, p->above[t]);
+    SUPINE_TRY(supine_posed_expected(p->basis, &state, from, &expected, error));
+    *known = expected.sigma != NULL;
+    p->expected[t] = expected.rms;
+  }
+  return SUPINE_OK;
+}
+
 static void drop_series(supine_mesh_series **series) {
   supine_mesh_series_close(*series);
 }
 
 /* Compute the frames, and write them as VTP.
  * @param save  axes, unit and comment of the output; the other options are set here */
-static supine_status write_series(playing *p, supine_mesh_save_options save, supine_error *error) {
+static supine_status write_series(playing *p, const supine_state *from,
+                                  supine_mesh_save_options save, supine_error *error) {
   /* Positions are rounded to multiples of this length, mm. */
   static const double rounding = 1.0 / 256.0;
   const supine_tensor *lung = supine_basis_tensor(p->basis, "lung");
   const supine_mesh_field fields[] = {{"gravity_LPS", 3, p->gravity},
-                                      {"volume_mL", p->lung_count, p->volumes}};
+                                      {"volume_mL", p->lung_count, p->volumes},
+                                      {"expected_error_RMS_mm", 1, p->expected}};
+  bool known;
+  SUPINE_TRY(find_expected(p, from, &known, error));
   SUPINE_FREED_BY(drop_series) supine_mesh_series *series = NULL;
   save.from = p->origin;
   save.normals = p->normals;
   save.lung = lung == NULL ? NULL : lung->data;
   save.fields = fields;
-  save.field_count = sizeof fields / sizeof *fields;
+  save.field_count = known ? 3 : 2;
   save.rounding = rounding;
   SUPINE_TRY(supine_mesh_series_open(p->wanted->path, &p->mesh, &save, p->wanted->count, p->time,
                                      &series, error));
@@ -212,7 +233,7 @@ supine_status supine_command_breath_write(const supine_breath_frames *wanted,
   (void)snprintf(p.vtp_comment, sizeof p.vtp_comment,
                  "displacement from %s; volumes are gas and tissue of each lung; %s", from.name,
                  wanted->made_by);
-  SUPINE_TRY(tensors ? write_tensors(&p, error) : write_series(&p, save, error));
+  SUPINE_TRY(tensors ? write_tensors(&p, error) : write_series(&p, &from.state, save, error));
   report(&p);
   return SUPINE_OK;
 }
