@@ -3,7 +3,7 @@
 
 /** Published changes, %, of the volume that each lung has at rest, relative to the supine posture: mean (standard
  * deviation), by posture. */
-const PUBLISHED = { left: 'left 0 (44), right +25 (11) (Little 2021, n 10)' };
+const PUBLISHED = { left: 'left 0 % (SD 44), right +25 % (SD 11); Little 2021, n\u00a010' };
 
 /** Return the volume (gas plus tissue) of each lung, mL. */
 const heldBy = (basis, { weights, gains }) => basis.references.map((ml, lung) => ml + formAt(lungForm(basis, lung, weights), gains.slice(3 * lung, 3 * lung + 3)));

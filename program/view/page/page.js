@@ -318,7 +318,7 @@ function start() {
     const measured = told.depth === 0 && from.name === 'supine at rest' ? PUBLISHED[postureText(state.gravity)] : undefined;
     holds.show(basis, moment.held, told.depth, heldBy(basis, from), lungHeights(state.gravity));
     write('holds-source', basis.metadata.resting_spread ? 'assumed from healthy people' : '');
-    write('holds-text', `Tick: ${from.name}. Dot: now.${basis.metadata.resting_spread ? ' Band: one SD.' : ''}${measured ? ` Published change, % (SD): ${measured}.` : ''}`);
+    write('holds-text', `Tick: ${from.name}. Dot: now.${basis.metadata.resting_spread ? ' Band: one SD between people.' : ''}${measured ? ` Published change: ${measured}.` : ''}`);
   }
 
   const volumeWords = () => `${amount(state.tidal)}, ${state.rate} a minute${Math.round(state.depth) ? `; now ${restOrScan} + ${amount(state.depth)}` : ''}`;
