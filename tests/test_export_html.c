@@ -172,7 +172,7 @@ TEST(test_page_tensors_equal_basis) {
   char *page = read_page();
   export_source s = {0};
   assert_int_equal(supine_export_source_open(basis, &s, NULL), SUPINE_OK);
-  export_order order;
+  export_order order = {0};
   assert_int_equal(supine_export_order_make(&s, true, &order, NULL), SUPINE_OK);
   check_motion(page, &s, order.vertex);
   check_corners(page, order.corners, 3 * s.info->triangle_count);
@@ -206,7 +206,7 @@ TEST(test_page_of_vector_basis_coefficients_equal_basis) {
   assert_int_equal(EXPORT_RUN(text, vector, "-o", out), 0);
   char *page = read_page();
   export_source s = {0};
-  export_order order;
+  export_order order = {0};
   assert_int_equal(supine_export_source_open(vector, &s, NULL), SUPINE_OK);
   assert_int_equal(supine_export_order_make(&s, true, &order, NULL), SUPINE_OK);
   const size_t n = s.info->vertex_count;

@@ -172,8 +172,12 @@ static _Noreturn void be_child(const mesh_file *file, const char *kind, size_t b
     _exit(1);
   }
   (void)fwrite(&result, sizeof result, 1, stream);
-  (void)fwrite(out.mesh.vertices, 3 * sizeof(double), result.vertex_count, stream);
-  (void)fwrite(out.mesh.triangles, 3 * sizeof(uint32_t), result.triangle_count, stream);
+  if (out.mesh.vertices != NULL) {
+    (void)fwrite(out.mesh.vertices, 3 * sizeof(double), result.vertex_count, stream);
+  }
+  if (out.mesh.triangles != NULL) {
+    (void)fwrite(out.mesh.triangles, 3 * sizeof(uint32_t), result.triangle_count, stream);
+  }
   (void)fflush(stream);
   _exit(0); /* the end of the process frees the scene */
 }
