@@ -93,26 +93,28 @@ static supine_status fill_panel(studio *s, size_t i, supine_error *error) {
   return SUPINE_OK;
 }
 
-/* Add marks of the structures inside the lungs, if any, to panel i. Call this after fill_panel. */
+/* Add the expected error to panel i, and marks of the structures inside the lungs, if any. Call
+ * this after fill_panel. */
 static supine_status mark_panel(studio *s, size_t i, supine_error *error) {
-  supine_command_marks *marks = &s->shown[i].marks;
-  if (s->inside == NULL) {
-    return SUPINE_OK;
-  }
-  s->panel[i].marks = &marks->marks;
-  const supine_pose *const pose[2] = {&s->from.pose, &s->shown[i].pose};
+  drawn *shown = &s->shown[i];
+  const supine_pose *const pose[2] = {&s->from.pose, &shown->pose};
   SUPINE_FREED_BY(supine_posed_expected_free) supine_expected expected = {0};
-  SUPINE_TRY(supine_posed_expected(s->inside, &s->postures.item[i].state, &s->from.state, &expected,
-                                   error));
-  SUPINE_TRY(supine_command_marks_make(s->inside, &s->names, pose, expected.sigma, marks, error));
-  const supine_target *t = &marks->first;
-  char way[96];
-  const bool still = t->moved < 0.05;
-  (void)snprintf(s->shown[i].subtitle, sizeof s->shown[i].subtitle, "%s: %s", t->name,
-                 still ? "where arrows begin" : supine_command_target_way(t, 2, way));
-  if (!still && !isnan(t->expected)) {
-    (void)snprintf(s->shown[i].note, sizeof s->shown[i].note, "expected error %.1f mm",
-                   t->expected);
+  SUPINE_TRY(supine_posed_expected(s->inside != NULL ? s->inside : s->basis,
+                                   &s->postures.item[i].state, &s->from.state, &expected, error));
+  double sigma = expected.sigma != NULL && expected.rms >= 0.05 ? expected.rms : NAN;
+  if (s->inside != NULL) {
+    s->panel[i].marks = &shown->marks.marks;
+    SUPINE_TRY(supine_command_marks_make(s->inside, &s->names, pose, expected.sigma, &shown->marks,
+                                         error));
+    const supine_target *t = &shown->marks.first;
+    char way[96];
+    const bool still = t->moved < 0.05;
+    (void)snprintf(shown->subtitle, sizeof shown->subtitle, "%s: %s", t->name,
+                   still ? "where arrows begin" : supine_command_target_way(t, 2, way));
+    sigma = still ? NAN : t->expected;
+  }
+  if (!isnan(sigma)) {
+    (void)snprintf(shown->note, sizeof shown->note, "expected error %.1f mm", sigma);
   }
   return SUPINE_OK;
 }

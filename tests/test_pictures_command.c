@@ -281,6 +281,32 @@ TEST(test_render_same_as_golden_picture) {
   assert_true(other > 2 * tolerance);
 }
 
+/* Return the number of dark pixels in the line of text below the subtitle of panel 0 or 1, in a
+ * picture of two panels and the default size. */
+static int dark_pixels(const char *path, int panel) {
+  cairo_surface_t *image = cairo_image_surface_create_from_png(path);
+  assert_int_equal(cairo_surface_status(image), CAIRO_STATUS_SUCCESS);
+  int count = 0;
+  for (int y = 112; y < 134; ++y) {
+    const unsigned char *row =
+        cairo_image_surface_get_data(image) + (ptrdiff_t)y * cairo_image_surface_get_stride(image);
+    for (int x = 440 * panel + 160; x < 440 * panel + 400; ++x) {
+      count += row[4 * x] < 160;
+    }
+  }
+  cairo_surface_destroy(image);
+  return count;
+}
+
+/* No error is expected where nothing moves. */
+TEST(test_render_moved_lungs_state_expected_error) {
+  if (!render("lungs.safetensors --posture supine,prone -o stated.png")) {
+    skip();
+  }
+  assert_int_equal(dark_pixels(in_folder("stated.png"), 0), 0);
+  assert_true(dark_pixels(in_folder("stated.png"), 1) > 100);
+}
+
 /* Find the arrow of gravity on the ball in the upper left of a picture: set `place` to the mean
  * position of its orange pixels relative to the centre of the ball, in pixels. */
 static void find_arrow(const char *path, double place[2]) {
