@@ -217,7 +217,9 @@ static supine_status find_field(const supine_basis *basis, const supine_deformat
   static const double allowed = 0.1;
   SUPINE_TRY(supine_field_between(basis, moved->from_given ? &moved->from.pose : NULL, &moved->pose,
                                   fade, field, error));
-  const double around = supine_field_folded(field, false);
+  double folded[2];
+  supine_field_folded(field, folded);
+  const double around = folded[1];
   if (around > told && (around <= allowed || moved->allow_folds)) {
     supine_options_say("deform",
                        "warning: the field folds in the body around the lungs, in %.2g %% as many "
@@ -228,7 +230,7 @@ static supine_status find_field(const supine_basis *basis, const supine_deformat
   const supine_plausible lungs = {
       .command = "deform",
       .state = &moved->state,
-      .folded = around > allowed ? around : supine_field_folded(field, true),
+      .folded = around > allowed ? around : folded[0],
       .parts = "the field folds; cells that turn over, relative to those in the lungs",
       .allowed = moved->allow_folds || !supine_basis_get_info(basis)->has_rest};
   return supine_options_plausible(&lungs, error);

@@ -249,10 +249,10 @@ double supine_field_stretch(const supine_image *nodes, const supine_field_cell *
          supine_triple(nodes->step[0], nodes->step[1], nodes->step[2]);
 }
 
-double supine_field_folded(const supine_field *field, bool in_lungs) {
+void supine_field_folded(const supine_field *field, double share[2]) {
   const size_t *size = field->nodes.size;
   size_t inside = 0;
-  size_t folded = 0;
+  size_t folded[2] = {0, 0};
   for (size_t i = 0; i < size[0] * size[1] * size[2]; ++i) {
     const supine_field_cell cell = {{i % size[0], i / size[0] % size[1], i / size[0] / size[1]},
                                     {0.5, 0.5, 0.5}};
@@ -260,8 +260,10 @@ double supine_field_folded(const supine_field *field, bool in_lungs) {
         cell.corner[2] + 1 < size[2]) {
       const bool lung = ((const float *)field->depth.values)[i] > 0.0F;
       inside += lung ? 1 : 0;
-      folded += lung == in_lungs && !(supine_field_stretch(&field->nodes, &cell) > 0.0) ? 1 : 0;
+      folded[lung ? 0 : 1] += supine_field_stretch(&field->nodes, &cell) > 0.0 ? 0 : 1;
     }
   }
-  return (double)folded / fmax((double)inside, 1.0);
+  for (size_t k = 0; k < 2; ++k) {
+    share[k] = (double)folded[k] / fmax((double)inside, 1.0);
+  }
 }

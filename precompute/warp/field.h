@@ -32,11 +32,10 @@ supine_status supine_field_between(const supine_basis *basis, const supine_pose 
                                    const supine_pose *to, double fade, supine_field *field,
                                    supine_error *error);
 
-/** Count the cells that the field u turns over (det(I + du/dx) is not positive at their centre), as
- * a share of the number of cells in the lungs. Near each of them, voxels are lost.
- * @param in_lungs  count cells in the lungs; false counts those in the body around them, where the
- *                  field fades out */
-double supine_field_folded(const supine_field *field, bool in_lungs);
+/** Count the cells that the field u turns over (det(I + du/dx) is not positive at their centre):
+ * share[0] in the lungs, share[1] in the body around them, where the field fades out. Both are
+ * shares of the number of cells in the lungs. Near each of these cells, voxels are lost. */
+void supine_field_folded(const supine_field *field, double share[2]);
 
 /** Residual u(x) + v(x + u(x)) of a field u and its inverse v. */
 typedef struct supine_field_residual {
