@@ -43,7 +43,8 @@ typedef struct fitting {
   size_t rows;  /* 3 x number of vertices */
   double *gram; /* [directions, directions] scalar products of any two input fields, mm^2 */
   fit chosen;
-  double *residual; /* [directions] weight of each input field in the error of predict() */
+  double
+      *residual; /* [directions] the prediction error is the sum of these times the input fields */
   supine_arena arena;
 } fitting;
 

@@ -36,8 +36,8 @@ supine_status supine_patient_scans_fit(const supine_patient_scans *scans,
                                        bool expandability, supine_patient_record *record,
                                        supine_error *error);
 
-/** Append the fit to a further scan (supine_patient_gain_fit) to the record, after
- * supine_patient_scans_fit.
+/** Fit a further scan by supine_patient_gain_fit, and append the result to the record. Call
+ * supine_patient_scans_fit first.
  * @param pairs    points in the first of the two scans as given, and in the further scan; they may
  *   be moved. Empty if `surface` is not NULL
  * @param surface  surface in the further scan, or NULL */
