@@ -5,6 +5,7 @@
 #include <export.h>
 
 #include "base/arena.h"
+#include "base/output.h"
 #include "base/text.h"
 
 #include "program/options/basis_input.h"
@@ -53,67 +54,60 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, glb.animate), SUPINE_SAYS_GIVEN(request, glb_only)},
     {.name = NULL}};
 
-static supine_status write_glb(const export_source *source, const request *wanted,
+static supine_status write_glb(const supine_basis *basis, const request *wanted,
                                supine_error *error) {
   size_t bytes = 0;
-  SUPINE_TRY(supine_export_glb_write(wanted->path, source, &wanted->glb, &bytes, error));
+  SUPINE_TRY(supine_export_glb_write(wanted->path, basis, &wanted->glb, &bytes, error));
+  const size_t lungs = supine_basis_get_info(basis)->lung_count;
   const bool small = bytes < 100000;
-  (void)printf("%s: %zu lung%s with morph targets%s, %.*f %s\n", wanted->path,
-               source->info->lung_count, source->info->lung_count == 1 ? "" : "s",
-               wanted->glb.animate ? " and animations" : "", small ? 0 : 2,
+  (void)printf("%s: %zu lung%s with morph targets%s, %.*f %s\n", wanted->path, lungs,
+               lungs == 1 ? "" : "s", wanted->glb.animate ? " and animations" : "", small ? 0 : 2,
                (small ? 1e-3 : 1e-6) * (double)bytes, small ? "kB" : "MB");
   return SUPINE_OK;
 }
 
-enum { REFERENCES = 3 };
-
 /* Find the states from which the page measures displacements: that of --from or its default, the
  * scan, and supine at rest, each once. */
 static supine_status find_references(const supine_basis *basis, const supine_from *from,
-                                     supine_reference_pose found[REFERENCES],
-                                     export_reference list[REFERENCES], size_t *count,
+                                     supine_reference_pose found[3], size_t *count,
                                      supine_error *error) {
   const supine_from none = {.given = false};
-  for (size_t i = 0; i < REFERENCES; ++i) {
-    SUPINE_TRY(supine_options_reference(basis, i == 0 ? from : &none, i != 1, &found[i], error));
+  for (size_t i = 0; i < 3; ++i) {
+    SUPINE_TRY(
+        supine_options_reference(basis, i == 0 ? from : &none, i != 1, &found[*count], error));
     bool again = false;
     for (size_t j = 0; j < *count; ++j) {
-      again = again || strcmp(list[j].name, found[i].name) == 0;
+      again = again || strcmp(found[j].name, found[*count].name) == 0;
     }
-    if (!again) {
-      list[(*count)++] = (export_reference){&found[i].pose, found[i].name, found[i].state.gravity,
-                                            supine_options_above_rest(&found[i].state)};
-    }
+    *count += !again;
   }
   return SUPINE_OK;
 }
 
-static supine_status write_page(const export_source *source, const request *wanted,
+static supine_status write_page(const supine_basis *basis, const request *wanted,
                                 const char *basis_path, supine_error *error) {
-  supine_reference_pose found[REFERENCES];
-  export_reference from[REFERENCES];
-  size_t from_count = 0;
+  supine_reference_pose from[3];
   char title[256];
-  SUPINE_FREED_BY(supine_export_source_close) export_source inside = {0};
+  SUPINE_FREED_BY(supine_options_basis_close) supine_basis *inside = NULL;
   SUPINE_FREED_BY(supine_command_names_close) supine_command_names names = {0};
-  SUPINE_TRY(find_references(source->basis, &wanted->from, found, from, &from_count, error));
-  if (wanted->inside != NULL) {
-    SUPINE_TRY(supine_export_source_open(wanted->inside, &inside, error));
-    SUPINE_TRY(supine_command_names_open(inside.basis, &names, error));
-    SUPINE_TRY(supine_command_inside_check(source->basis, inside.basis, wanted->inside, error));
-  }
+  SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
   supine_options_basis_title(basis_path, title, sizeof title);
-  const export_parts parts = {names.count, names.text, names.part};
-  const export_page page = {.breath = wanted->glb.breath,
-                            .from = from,
-                            .from_count = from_count,
-                            .title = wanted->title != NULL ? wanted->title : title,
-                            .inside = wanted->inside != NULL ? &inside : NULL,
-                            .parts = &parts};
-  SUPINE_TRY(supine_export_html_write(wanted->path, source, &page, error));
-  (void)printf("%s: HTML page of %zu vertices", wanted->path, source->info->vertex_count);
-  if (page.inside != NULL) {
-    (void)printf(" and %zu structure%s inside the lungs", parts.count, parts.count == 1 ? "" : "s");
+  export_page page = {.breath = wanted->glb.breath,
+                      .from = from,
+                      .title = wanted->title != NULL ? wanted->title : title,
+                      .names = &names};
+  SUPINE_TRY(find_references(basis, &wanted->from, from, &page.from_count, error));
+  if (wanted->inside != NULL) {
+    SUPINE_TRY(supine_command_inside_open(basis, wanted->inside, &inside, &names, error));
+    page.inside = inside;
+  }
+  SUPINE_TRY(supine_output_open(wanted->path, &output, error));
+  SUPINE_TRY(supine_export_html_print(output.file, basis, &page, error));
+  SUPINE_TRY(supine_output_commit(&output, error));
+  (void)printf("%s: HTML page of %zu vertices", wanted->path,
+               supine_basis_get_info(basis)->vertex_count);
+  if (inside != NULL) {
+    (void)printf(" and %zu structure%s inside the lungs", names.count, names.count == 1 ? "" : "s");
   }
   (void)puts("; open it in any browser");
   return SUPINE_OK;
@@ -123,7 +117,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   request *wanted = chosen;
   const char *path = given->operand[0];
   const bool page = supine_text_ends_in(wanted->path, ".html");
-  SUPINE_FREED_BY(supine_export_source_close) export_source source = {0};
+  SUPINE_FREED_BY(supine_options_basis_close) supine_basis *basis = NULL;
   if (page && wanted->glb_only) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "--plain and --animate need an output that ends in .glb");
@@ -134,15 +128,14 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
                             : wanted->inside != NULL ? "--inside"
                                                      : "--title");
   }
-  SUPINE_TRY(supine_export_source_open(path, &source, error));
-  if (source.info->is_fields && (wanted->breathes || wanted->glb.animate)) {
+  SUPINE_TRY(supine_options_basis_open(path, SUPINE_STORAGE_EXACT, &basis, error));
+  if (supine_basis_get_info(basis)->is_fields && (wanted->breathes || wanted->glb.animate)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "%s holds another simulator's fields of gravity, which have no "
                             "breaths: leave --breath and --animate out",
                             path);
   }
-  SUPINE_TRY(supine_options_basis_closed(source.basis, path, error));
-  return page ? write_page(&source, wanted, path, error) : write_glb(&source, wanted, error);
+  return page ? write_page(basis, wanted, path, error) : write_glb(basis, wanted, error);
 }
 
 const supine_command supine_command_export = {

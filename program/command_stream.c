@@ -113,7 +113,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   }
   SUPINE_FREED_BY(supine_options_basis_close) supine_basis *basis = NULL;
   SUPINE_TRY(supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, error));
-  return supine_command_stream_run(session, basis, given->operand[0], error);
+  return supine_command_stream_run(session, basis, error);
 }
 
 const supine_command supine_command_stream = {

@@ -92,14 +92,12 @@ static supine_status open_points(const supine_basis *basis, const supine_stream_
 
 #define PAGE P_tmpdir "/supine-page-XXXXXX" /* template of the name of a temporary file */
 
-/* If --web is given, serve the page that shows the lungs of the basis file `path` live, from a
- * temporary file. The caller destroys *web, then removes the file `page`. */
+/* If --web is given, serve the page that shows the lungs of the basis live, from a temporary file.
+ * The caller destroys *web, then removes the file `page`. */
 static supine_status open_page(const supine_stream_session *wanted, const supine_basis *basis,
-                               const char *path, char *page, supine_stream_web **web,
-                               supine_error *error) {
+                               char *page, supine_stream_web **web, supine_error *error) {
   supine_stream_address address;
   supine_reference_pose from;
-  SUPINE_FREED_BY(supine_export_source_close) export_source source = {0};
   SUPINE_FREED_BY(supine_file_close) FILE *file = NULL;
   supine_stream_site site = {.certificate = wanted->certificate, .key = wanted->key};
   if (wanted->web == NULL) {
@@ -107,19 +105,16 @@ static supine_status open_page(const supine_stream_session *wanted, const supine
   }
   SUPINE_TRY(supine_stream_address_read(wanted->web, true, &address, error));
   SUPINE_TRY(supine_options_reference(basis, &wanted->from, true, &from, error));
-  const export_reference reference = {&from.pose, from.name, from.state.gravity,
-                                      supine_options_above_rest(&from.state)};
   const export_page shown = {.breath = wanted->breath.tidal,
-                             .from = &reference,
+                             .from = &from,
                              .from_count = 1,
                              .title = "Lungs, live",
                              .live = true};
-  SUPINE_TRY(supine_export_source_open(path, &source, error));
   (void)strcpy(page, PAGE);
   const int descriptor = mkstemp(page);
   file = descriptor < 0 ? NULL : fdopen(descriptor, "w");
   if (file != NULL) {
-    SUPINE_TRY(supine_export_html_print(file, &source, &shown, error));
+    SUPINE_TRY(supine_export_html_print(file, basis, &shown, error));
   }
   if (file == NULL || fflush(file) != 0) {
     return supine_error_set(error, SUPINE_ERROR_WRITE, "%s: %s", page, strerror(errno));
@@ -178,8 +173,7 @@ static void end(running *s) {
 }
 
 supine_status supine_command_stream_run(const supine_stream_session *wanted,
-                                        const supine_basis *basis, const char *path,
-                                        supine_error *error) {
+                                        const supine_basis *basis, supine_error *error) {
   supine_stream_options options = wanted->options;
   supine_stream_volume volume = {0};
   SUPINE_FREED_BY(end) running s = {0};
@@ -191,7 +185,7 @@ supine_status supine_command_stream_run(const supine_stream_session *wanted,
     SUPINE_TRY(open_points(basis, wanted, &s.points, &s.arena, error));
     options.observed = &s.points.observed;
   }
-  SUPINE_TRY(open_page(wanted, basis, path, s.page, &s.web, error));
+  SUPINE_TRY(open_page(wanted, basis, s.page, &s.web, error));
   options.web = s.web;
   SUPINE_TRY(supine_stream_server_create(basis, &options, &s.server, error));
   const supine_stream_results *results = supine_stream_server_results(s.server);

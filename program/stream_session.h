@@ -19,9 +19,8 @@ typedef struct supine_stream_session {
   double noise;       /* standard deviation of an observed coordinate, mm */
 } supine_stream_session;
 
-/* Follow the patient until interrupted, with the lungs of the basis file `path`. */
+/* Follow the patient until interrupted. */
 supine_status supine_command_stream_run(const supine_stream_session *wanted,
-                                        const supine_basis *basis, const char *path,
-                                        supine_error *error);
+                                        const supine_basis *basis, supine_error *error);
 
 #endif

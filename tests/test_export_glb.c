@@ -107,16 +107,18 @@ static void check_pose(const supine_pose *given, const double s[2], const double
   const unsigned char *numbers = NULL;
   json_t *root = read_glb(&bytes, &numbers);
   const json_t *all = json_object_get(json_object_get(root, "extras"), "supine");
-  export_source source = {0};
-  assert_int_equal(supine_export_source_open(basis, &source, NULL), SUPINE_OK);
+  const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
+  supine_basis *source = NULL;
+  assert_int_equal(supine_basis_open_with(basis, &exact, &source, NULL), SUPINE_OK);
+  const supine_basis_info *info = supine_basis_get_info(source);
   double y[(SUPINE_SH_BAND_MAX + 1) * (SUPINE_SH_BAND_MAX + 1)];
-  float *xyz = fixture_allocate(3 * source.info->vertex_count, sizeof *xyz);
-  supine_deform(source.basis, given, xyz);
-  assert_int_equal(supine_sh_evaluate(source.info->band, pose_gravity, y), SUPINE_OK);
-  const size_t k = source.info->mode_count;
-  for (size_t i = 0; i < 3 * source.info->vertex_count; ++i) {
-    const size_t lung = i / 3 >= source.info->lung_begin[1];
-    const size_t vertex = i / 3 - source.info->lung_begin[lung];
+  float *xyz = fixture_allocate(3 * info->vertex_count, sizeof *xyz);
+  supine_deform(source, given, xyz);
+  assert_int_equal(supine_sh_evaluate(info->band, pose_gravity, y), SUPINE_OK);
+  const size_t k = info->mode_count;
+  for (size_t i = 0; i < 3 * info->vertex_count; ++i) {
+    const size_t lung = i / 3 >= info->lung_begin[1];
+    const size_t vertex = i / 3 - info->lung_begin[lung];
     const json_t *mesh = child(root, "meshes", lung);
     const json_t *primitive = child(mesh, "primitives", 0);
     const json_t *own = json_object_get(json_object_get(mesh, "extras"), "supine");
@@ -124,7 +126,7 @@ static void check_pose(const supine_pose *given, const double s[2], const double
     double x = real(all, "middle", i % 3) + component(root, numbers, base, vertex, i % 3);
     for (size_t j = 0; j < json_array_size(json_object_get(primitive, "targets")); ++j) {
       double v = 0;
-      for (size_t term = 0; term < source.terms; ++term) {
+      for (size_t term = 0; term < supine_sh_count(info->band); ++term) {
         v += json_number_value(json_array_get(child(all, "modes", j % k), term)) * y[term] *
              json_number_value(json_object_get(all, "modeUnit"));
       }
@@ -135,7 +137,7 @@ static void check_pose(const supine_pose *given, const double s[2], const double
     }
     assert_true(fabs(x - (double)xyz[i]) < 1e-4);
   }
-  supine_export_source_close(&source);
+  supine_basis_close(source);
   json_decref(root);
   free(bytes);
   free(xyz);
@@ -143,32 +145,33 @@ static void check_pose(const supine_pose *given, const double s[2], const double
 
 TEST(test_glb_bent_basis_morphs_to_positions_of_library) {
   assert_int_equal(EXPORT_RUN(text, basis, "-o", out, "--plain"), 0);
-  export_source source = {0};
+  supine_basis *source = NULL;
   supine_pose pose;
-  assert_int_equal(supine_export_source_open(basis, &source, NULL), SUPINE_OK);
-  assert_int_equal(supine_export_breath_pose(&source, 600, pose_gravity, 0.7, &pose, NULL),
+  assert_int_equal(supine_basis_open(basis, &source, NULL), SUPINE_OK);
+  assert_int_equal(supine_export_breath_pose(source, 600, pose_gravity, 0.7, &pose, NULL),
                    SUPINE_OK);
+  const supine_basis_info *info = supine_basis_get_info(source);
   double s[2];
   double t[2];
   for (size_t lung = 0; lung < 2; ++lung) {
     const double *gain = pose.gains[lung];
-    assert_true(source.info->bend[0] == 0 && fabs(gain[2] - gain[0]) > 0.01 * fabs(gain[0]));
+    assert_true(info->bend[0] == 0 && fabs(gain[2] - gain[0]) > 0.01 * fabs(gain[0]));
     s[lung] = gain[0];
-    t[lung] = (gain[2] - gain[0]) / source.info->bend[2];
+    t[lung] = (gain[2] - gain[0]) / info->bend[2];
   }
   assert_true(fabs(s[0] - s[1]) > 0.01 * fabs(s[0]));
   check_pose(&pose, s, t);
-  supine_export_source_close(&source);
+  supine_basis_close(source);
 }
 
 /* Find the range of each morph weight of the first lung, in `tried` directions of gravity and at
  * `phases` equal steps from the start to the end of a breath. */
 static void find_weight_range(double breath, size_t tried, size_t phases, double low[TARGETS],
                               double high[TARGETS]) {
-  export_source source = {0};
+  supine_basis *source = NULL;
   export_targets *targets = fixture_allocate(1, sizeof *targets);
-  assert_int_equal(supine_export_source_open(basis, &source, NULL), SUPINE_OK);
-  assert_int_equal(supine_export_targets_choose(&source, breath, targets, NULL), SUPINE_OK);
+  assert_int_equal(supine_basis_open(basis, &source, NULL), SUPINE_OK);
+  assert_int_equal(supine_export_targets_choose(source, breath, targets, NULL), SUPINE_OK);
   assert_int_equal(targets->count, TARGETS);
   for (size_t j = 0; j < TARGETS; ++j) {
     low[j] = INFINITY;
@@ -179,18 +182,18 @@ static void find_weight_range(double breath, size_t tried, size_t phases, double
     double weights[EXPORT_TARGETS_MAX];
     supine_pose pose;
     supine_spiral((double)(i / phases), (double)tried, 0, g);
-    assert_int_equal(supine_export_breath_pose(&source, breath, g,
+    assert_int_equal(supine_export_breath_pose(source, breath, g,
                                                (double)(i % phases) / (double)(phases - 1), &pose,
                                                NULL),
                      SUPINE_OK);
-    supine_export_targets_weights(&source, targets, &pose, 0, weights);
+    supine_export_targets_weights(supine_basis_get_info(source), targets, &pose, 0, weights);
     for (size_t j = 0; j < TARGETS; ++j) {
       low[j] = fmin(low[j], weights[j]);
       high[j] = fmax(high[j], weights[j]);
     }
   }
   free(targets);
-  supine_export_source_close(&source);
+  supine_basis_close(source);
 }
 
 /* Morph weights are between 0 and 1 for any direction of gravity. They are scaled by the range of

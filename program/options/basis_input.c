@@ -14,16 +14,6 @@ const supine_option supine_options_as_scanned[] = {
      .kind = SUPINE_OPTION_FLAG, .size = sizeof(bool)},
     {.name = NULL}};
 
-supine_status supine_options_basis_closed(const supine_basis *basis, const char *path,
-                                          supine_error *error) {
-  return supine_basis_get_info(basis)->has_volume
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
-                                "%s: the surface is open and encloses no volume: close the mesh "
-                                "before 'supine precompute'",
-                                path);
-}
-
 void supine_options_basis_close(supine_basis **basis) {
   supine_basis_close(*basis);
 }
@@ -33,7 +23,22 @@ supine_status supine_options_basis_open(const char *path, supine_storage storage
   const supine_basis_options options = {sizeof options, .storage = storage,
                                         .without_normals = true};
   SUPINE_TRY(supine_basis_open_with(path, &options, basis, error));
-  return supine_options_basis_closed(*basis, path, error);
+  return supine_basis_get_info(*basis)->has_volume
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
+                                "%s: the surface is open and encloses no volume: close the mesh "
+                                "before 'supine precompute'",
+                                path);
+}
+
+json_t *supine_options_json_metadata(const supine_basis *basis) {
+  size_t count = 0;
+  const supine_metadata *all = supine_basis_all_metadata(basis, &count);
+  json_t *metadata = json_object();
+  for (size_t i = 0; i < count; ++i) {
+    (void)json_object_set_new(metadata, all[i].key, json_string(all[i].value));
+  }
+  return metadata;
 }
 
 supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,

@@ -24,10 +24,6 @@ supine_status supine_options_basis_open(const char *path, supine_storage storage
 /* Close *basis; for SUPINE_FREED_BY. */
 void supine_options_basis_close(supine_basis **basis);
 
-/* Check that the surface of a basis encloses a volume. `path` names the file in the message. */
-supine_status supine_options_basis_closed(const supine_basis *basis, const char *path,
-                                          supine_error *error);
-
 /* If `wanted` is true, set the axes and the unit of `save` to those of the scan. */
 supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,
                                          supine_mesh_save_options *save, supine_error *error);
@@ -44,6 +40,9 @@ extern const supine_option supine_options_hilum_frame[];
 supine_status supine_options_hilum(const supine_basis *basis, const supine_pose *pose,
                                    const supine_pose *from, bool needed, double shift[3],
                                    supine_error *error);
+
+/* Return the metadata of a basis as a JSON object. */
+json_t *supine_options_json_metadata(const supine_basis *basis);
 
 #define SUPINE_EXPECTED_MEANING                                                                    \
   "3-D RMS; half of all points lie within 0.9 times this distance of their true position, 95 % "   \

@@ -80,25 +80,19 @@ size_t supine_command_lung_of(const supine_basis_info *info, size_t vertex) {
   return lung;
 }
 
-supine_status supine_command_inside_check(const supine_basis *lungs, const supine_basis *inside,
-                                          const char *path, supine_error *error) {
-  const supine_basis_info *a = supine_basis_get_info(lungs);
-  const supine_basis_info *b = supine_basis_get_info(inside);
-  return b->vector && a->identity == b->identity
+supine_status supine_command_inside_open(const supine_basis *lungs, const char *path,
+                                         supine_basis **inside, supine_command_names *names,
+                                         supine_error *error) {
+  SUPINE_TRY(supine_options_basis_open(path, SUPINE_STORAGE_AUTO, inside, error));
+  SUPINE_TRY(supine_command_names_open(*inside, names, error));
+  const supine_basis_info *info = supine_basis_get_info(*inside);
+  return info->vector && info->identity == supine_basis_get_info(lungs)->identity
              ? SUPINE_OK
              : supine_error_set(
                    error, SUPINE_ERROR_FORMAT,
                    "%s belongs to another basis: make it again with 'supine embed' from "
                    "the given basis",
                    path);
-}
-
-supine_status supine_command_inside_open(const supine_basis *lungs, const char *path,
-                                         supine_basis **inside, supine_command_names *names,
-                                         supine_error *error) {
-  SUPINE_TRY(supine_options_basis_open(path, SUPINE_STORAGE_AUTO, inside, error));
-  SUPINE_TRY(supine_command_names_open(*inside, names, error));
-  return supine_command_inside_check(lungs, *inside, path, error);
 }
 
 /* Average the vertices order[begin] to order[end - 1] to a target; [N, 3] positions before and

@@ -26,10 +26,6 @@ void supine_command_names_close(supine_command_names *names);
 /* Return the index of the lung that a vertex belongs to. */
 size_t supine_command_lung_of(const supine_basis_info *info, size_t vertex);
 
-/* Check that the structures `inside` were embedded in `lungs`; else return SUPINE_ERROR_FORMAT. */
-supine_status supine_command_inside_check(const supine_basis *lungs, const supine_basis *inside,
-                                          const char *path, supine_error *error);
-
 /* Open the basis file of embedded structures, read their names, and check that they were embedded
  * in `lungs`. Initialise *inside and *names to zero before the call; close both after it, even if
  * it fails. */

@@ -109,8 +109,7 @@ supine_status supine_report_html(const supine_comparison *c, FILE *file, supine_
   } else {
     (void)json_object_set_new(data, "trouble", json_string(error->message));
   }
-  const supine_template report = {.assets = supine_report_assets, .data = data};
-  supine_template_fill(&report, "report.html", file);
+  supine_template_fill(supine_report_assets, data, "report.html", file);
   json_decref(data);
   return SUPINE_OK;
 }

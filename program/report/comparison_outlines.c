@@ -124,10 +124,7 @@ json_t *supine_report_outlines(const supine_comparison *c) {
   }
   for (size_t i = 0; i < c->postures.count; ++i) {
     (void)supine_deform(c->basis, &c->posture[i].pose, xyz);
-    for (size_t j = 0; j < 3 * info->vertex_count; ++j) {
-      low[j % 3] = fmin(low[j % 3], (double)xyz[j]);
-      high[j % 3] = fmax(high[j % 3], (double)xyz[j]);
-    }
+    supine_render_box(xyz, info->vertex_count, low, high);
   }
   for (size_t i = 0; i < sizeof slices / sizeof *slices; ++i) {
     (void)json_array_append_new(list, chart(c, &slices[i], low, high, xyz));

@@ -21,21 +21,15 @@ static supine_scene make_scene(const supine_comparison *c, size_t posture, const
 
 /* Draw a scene and return it as PNG in base64, or NULL on failure. */
 static json_t *draw(supine_renderer *renderer, const supine_scene *scene, supine_error *error) {
-  char *bytes[2] = {NULL, NULL}; /* [0] PNG; [1] the same PNG as base64 */
-  size_t size[2] = {0, 0};
-  FILE *file[2] = {open_memstream(&bytes[0], &size[0]), open_memstream(&bytes[1], &size[1])};
+  char *bytes = NULL;
+  size_t size = 0;
+  FILE *file = open_memstream(&bytes, &size);
+  const bool drawn = file != NULL && supine_render_png(renderer, scene, file, error) == SUPINE_OK;
   json_t *made = NULL;
-  bool drawn = file[0] != NULL && file[1] != NULL &&
-               supine_render_png(renderer, scene, file[0], error) == SUPINE_OK;
-  drawn = (file[0] == NULL || fclose(file[0]) == 0) && drawn;
-  if (drawn) {
-    supine_export_base64_write(bytes[0], size[0], file[1]);
+  if (file != NULL && fclose(file) == 0 && drawn) {
+    made = supine_export_base64(bytes, size);
   }
-  if (file[1] != NULL && fclose(file[1]) == 0 && drawn) {
-    made = json_stringn_nocheck(bytes[1], size[1]);
-  }
-  free(bytes[0]);
-  free(bytes[1]);
+  free(bytes);
   return made;
 }
 

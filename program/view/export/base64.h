@@ -5,9 +5,10 @@
 #define SUPINE_EXPORT_BASE64_H
 
 #include <stddef.h>
-#include <stdio.h>
 
-/** Write `size` bytes as base64 with padding. A write error sets the error indicator of `file`. */
-void supine_export_base64_write(const void *bytes, size_t size, FILE *file);
+#include <jansson.h>
+
+/** Return bytes as base64 with padding, or NULL if out of memory. */
+json_t *supine_export_base64(const void *bytes, size_t size);
 
 #endif

@@ -15,15 +15,15 @@ static const double step_min_mm = 0.045;
 
 /* Compute the normals of vertices. */
 static supine_status prepare(glb *g, supine_error *error) {
-  const size_t n = g->source->info->vertex_count;
+  const size_t n = g->info->vertex_count;
   g->xyz = supine_arena_take(&g->arena, n, 3 * sizeof *g->xyz);
   g->normals = supine_arena_take(&g->arena, n, 3 * sizeof *g->normals);
   g->added = supine_arena_take(&g->arena, n * g->targets.count, 3 * sizeof *g->added);
   if (g->arena.failed) {
     return supine_error_memory(error, "%zu vertices", n);
   }
-  SUPINE_TRY(supine_export_order_make(g->source, !g->options->plain, &g->order, error));
-  return supine_export_targets_normals(g->source, g->options->breath, &g->targets,
+  SUPINE_TRY(supine_export_order_make(g->info, !g->options->plain, &g->arena, &g->order, error));
+  return supine_export_targets_normals(g->basis, g->options->breath, &g->targets,
                                        g->options->plain ? NULL : g->order.vertex, g->normals,
                                        g->added, error);
 }
@@ -38,7 +38,7 @@ static supine_status add_all(glb *g, json_t **roots, supine_error *error) {
   (void)json_array_append_new(g->nodes, json_pack("{s:s, s:o, s:[f,f,f,f]}", "name", "patient",
                                                   "children", children, "rotation", (double)q[0],
                                                   (double)q[1], (double)q[2], (double)q[3]));
-  for (size_t lung = 0; lung < g->source->info->lung_count; ++lung) {
+  for (size_t lung = 0; lung < g->info->lung_count; ++lung) {
     (void)json_array_append_new(children, json_integer(supine_export_glb_add(g, lung)));
   }
   if (g->options->animate) {
@@ -134,16 +134,16 @@ static void free_glb(glb **g) {
     for (size_t i = 0; i < sizeof parts / sizeof *parts; ++i) {
       json_decref(parts[i]);
     }
-    supine_export_order_free(&(*g)->order);
     supine_arena_free(&(*g)->arena);
     free(*g);
   }
 }
 
-supine_status supine_export_glb_write(const char *path, const export_source *source,
+supine_status supine_export_glb_write(const char *path, const supine_basis *basis,
                                       const export_glb_options *options, size_t *bytes,
                                       supine_error *error) {
-  if (source->info->triangle_count == 0) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  if (info->triangle_count == 0) {
     return supine_error_set(error, SUPINE_ERROR_MESH,
                             "the basis has no triangles to draw: precompute it from a surface");
   }
@@ -152,7 +152,8 @@ supine_status supine_export_glb_write(const char *path, const export_source *sou
   if (g == NULL) {
     return supine_error_memory(error, "%s", path);
   }
-  *g = (glb){.source = source,
+  *g = (glb){.basis = basis,
+             .info = info,
              .options = options,
              .views = json_array(),
              .accessors = json_array(),
@@ -160,7 +161,7 @@ supine_status supine_export_glb_write(const char *path, const export_source *sou
              .nodes = json_array(),
              .materials = json_array(),
              .animations = json_array()};
-  SUPINE_TRY(supine_export_targets_choose(source, options->breath, &g->targets, error));
+  SUPINE_TRY(supine_export_targets_choose(basis, options->breath, &g->targets, error));
   g->step = options->plain ? 1 : fmax(step_min_mm, g->targets.half_extent / (INT16_MAX / 2));
   return make_and_write(g, path, bytes, error);
 }

@@ -7,6 +7,7 @@
 #include <jansson.h>
 
 #include "base/arena.h"
+#include "program/view/export/export.h"
 #include "program/view/export/packed.h"
 #include "program/view/export/targets.h"
 
@@ -25,7 +26,8 @@ typedef enum glb_kind {
 
 /** State of a file while it is built. */
 typedef struct glb {
-  const export_source *source;
+  const supine_basis *basis;
+  const supine_basis_info *info;
   const export_glb_options *options;
   export_targets targets;
   export_order order;

@@ -36,9 +36,9 @@ static void make_frame(glb *g, double roll, double seconds, float *rows, size_t 
   double weights[EXPORT_TARGETS_MAX];
   supine_pose pose;
   /* No failure is expected, because supine_export_targets_choose has checked this breath. */
-  (void)supine_export_breath_pose(g->source, g->options->breath, gravity, fraction, &pose, NULL);
-  for (size_t i = 0; i < g->source->info->lung_count; ++i) {
-    supine_export_targets_weights(g->source, &g->targets, &pose, i, weights);
+  (void)supine_export_breath_pose(g->basis, g->options->breath, gravity, fraction, &pose, NULL);
+  for (size_t i = 0; i < g->info->lung_count; ++i) {
+    supine_export_targets_weights(g->info, &g->targets, &pose, i, weights);
     for (size_t j = 0; j < g->targets.count; ++j) {
       rows[i * frames * g->targets.count + j] = (float)weights[j];
     }
@@ -47,7 +47,7 @@ static void make_frame(glb *g, double roll, double seconds, float *rows, size_t 
 
 /* Append an animation of breathing at `roll` radians, or during one full turn if `roll` is NAN. */
 static void add(glb *g, const char *name, double roll, size_t seconds) {
-  const size_t count = g->source->info->lung_count;
+  const size_t count = g->info->lung_count;
   const size_t frames = RATE * seconds + 1;
   const size_t targets = g->targets.count;
   SUPINE_ARENA arena = {0};

@@ -6,7 +6,6 @@
 
 #include "program/view/export/glb.h"
 #include "program/view/export/packed.h"
-#include "program/view/export/template.h"
 
 /* Format in which the file stores a kind of array. */
 typedef struct layout {
@@ -118,8 +117,8 @@ static void set_bounds(json_t *accessor, const layout *l, const unsigned char *e
     low[axis] = fmin(low[axis], x);
     high[axis] = fmax(high[axis], x);
   }
-  (void)json_object_set_new(accessor, "min", supine_template_numbers(low, l->columns));
-  (void)json_object_set_new(accessor, "max", supine_template_numbers(high, l->columns));
+  (void)json_object_set_new(accessor, "min", supine_options_json_numbers(l->columns, low));
+  (void)json_object_set_new(accessor, "max", supine_options_json_numbers(l->columns, high));
 }
 
 json_int_t supine_export_glb_put_zeros(glb *g, glb_kind kind, size_t count) {

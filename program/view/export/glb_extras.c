@@ -3,15 +3,24 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include <supine/sh.h>
+
 #include "program/view/export/glb.h"
-#include "program/view/export/template.h"
 
 /* With more morph targets, the extras omit the volume formula: it has too many constants then. */
 enum { VOLUME_TARGETS_MAX = 32 };
 
+enum { RESTING_TERMS = 9 }; /* number of spherical harmonics of bands 0 to 2 */
+
 /* Return whether the extras have the volume formula. */
 static bool has_volume(const glb *g) {
-  return g->targets.count <= VOLUME_TARGETS_MAX && !g->source->info->is_fields;
+  return g->targets.count <= VOLUME_TARGETS_MAX && !g->info->is_fields;
+}
+
+/* Return whether the basis has the volume at rest of each lung, and not only of all together. */
+static bool by_lung(const glb *g) {
+  const supine_tensor *resting = supine_basis_tensor(g->basis, "resting_volume");
+  return resting->rank == 2 && resting->shape[0] > 1;
 }
 
 static const char frame_text[] =
@@ -44,7 +53,7 @@ static const char resting_text[] =
 
 /* Return the names of the morph targets, such as "mode_3" and "bend_3". */
 static json_t *target_names(const glb *g) {
-  const size_t k = g->source->info->mode_count;
+  const size_t k = g->info->mode_count;
   json_t *names = json_array();
   for (size_t j = 0; j < g->targets.count; ++j) {
     (void)json_array_append_new(names, json_sprintf("%s_%zu", j < k ? "mode" : "bend", j % k));
@@ -53,59 +62,63 @@ static json_t *target_names(const glb *g) {
 }
 
 json_t *supine_export_glb_extras(const glb *g) {
-  const export_source *s = g->source;
-  const char *full = supine_basis_metadata(s->basis, "full_upright_gain");
+  const supine_basis_info *info = g->info;
+  const size_t terms = supine_sh_count(info->band);
+  const char *full = supine_basis_metadata(g->basis, "full_upright_gain");
   const double unit = 1e-8; /* value of one integer step in `modes` */
   json_t *modes = json_array();
-  for (size_t k = 0; k < s->info->mode_count; ++k) {
+  for (size_t k = 0; k < info->mode_count; ++k) {
     json_t *row = json_array();
-    for (size_t i = 0; i < s->terms; ++i) {
-      (void)json_array_append_new(row,
-                                  json_integer(llround(s->info->modes[k * s->terms + i] / unit)));
+    for (size_t i = 0; i < terms; ++i) {
+      (void)json_array_append_new(row, json_integer(llround(info->modes[k * terms + i] / unit)));
     }
     (void)json_array_append_new(modes, row);
   }
-  json_t *supine = json_pack("{s:s, s:s, s:i, s:o, s:f, s:o, s:o, s:f, s:o}", "frame", frame_text,
-                             "weights", weights_text, "band", (int)s->info->band, "modes", modes,
-                             "modeUnit", unit, "bend", supine_template_numbers(s->info->bend, 3),
-                             "middle", supine_template_numbers(g->targets.middle, 3),
-                             "millimetresPerUnit", g->step, "basis", supine_export_metadata(s));
-  (void)(s->info->is_fields
+  json_t *supine =
+      json_pack("{s:s, s:s, s:i, s:o, s:f, s:o, s:o, s:f, s:o}", "frame", frame_text, "weights",
+                weights_text, "band", (int)info->band, "modes", modes, "modeUnit", unit, "bend",
+                supine_options_json_numbers(3, info->bend), "middle",
+                supine_options_json_numbers(3, g->targets.middle), "millimetresPerUnit", g->step,
+                "basis", supine_options_json_metadata(g->basis));
+  (void)(info->is_fields
              ? json_object_set_new(supine, "gains", json_string(fields_text))
              : json_object_set_new(supine, "breathVolume", json_real(g->options->breath)));
   if (has_volume(g)) {
     (void)json_object_set_new(supine, "volume", json_string(volume_text));
   }
-  if (s->info->has_rest) {
+  if (info->has_rest) {
     (void)json_object_update_new(supine, json_pack("{s:s, s:b, s:f}", "rest", resting_text,
-                                                   "byLung", s->resting_rows > 1, "fullUprightGain",
+                                                   "byLung", by_lung(g), "fullUprightGain",
                                                    full != NULL ? strtod(full, NULL) : 0));
   }
   return json_pack("{s:o}", "supine", supine);
 }
 
 json_t *supine_export_glb_lung_extras(const glb *g, size_t lung) {
-  const supine_basis_info *info = g->source->info;
+  const supine_basis_info *info = g->info;
   const size_t k = info->mode_count;
   const size_t axes = info->volume_axes;
   json_t *supine =
       json_pack("{s:I, s:o, s:o}", "lung", (json_int_t)lung, "offset",
-                supine_template_numbers(g->targets.lung[lung].offset, g->targets.count), "unit",
-                supine_template_numbers(g->targets.lung[lung].unit, g->targets.count));
+                supine_options_json_numbers(g->targets.count, g->targets.lung[lung].offset), "unit",
+                supine_options_json_numbers(g->targets.count, g->targets.lung[lung].unit));
   if (info->has_rest) {
-    const double *resting =
-        g->source->resting + (g->source->resting_rows > 1 ? lung * EXPORT_RESTING_TERMS : 0);
-    (void)json_object_set_new(supine, "resting",
-                              supine_template_numbers(resting, EXPORT_RESTING_TERMS));
+    const double *resting = supine_basis_tensor(g->basis, "resting_volume")->data;
+    (void)json_object_set_new(
+        supine, "resting",
+        supine_options_json_numbers(RESTING_TERMS,
+                                    resting + (by_lung(g) ? lung * RESTING_TERMS : 0)));
   }
   if (has_volume(g)) {
     (void)json_object_update_new(
         supine,
         json_pack(
             "{s:f, s:o, s:o, s:o}", "referenceVolume", info->reference_volume[lung], "linear",
-            supine_template_numbers(info->volume_linear + lung * axes * k, axes * k), "quadratic",
-            supine_template_numbers(info->volume_quadratic + lung * axes * k * k, axes * k * k),
-            "cubic", supine_template_numbers(info->volume_cubic + lung * k * k * k, k * k * k)));
+            supine_options_json_numbers(axes * k, info->volume_linear + lung * axes * k),
+            "quadratic",
+            supine_options_json_numbers(axes * k * k, info->volume_quadratic + lung * axes * k * k),
+            "cubic",
+            supine_options_json_numbers(k * k * k, info->volume_cubic + lung * k * k * k)));
   }
   return json_pack("{s:o, s:o}", "targetNames", target_names(g), "supine", supine);
 }

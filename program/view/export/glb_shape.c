@@ -28,7 +28,7 @@ json_int_t supine_export_glb_material(glb *g, const char *name, const double rgb
 
 /* Compute the displacement of a vertex by morph target `j` at weight 1, in units of glb.step. */
 static void place_target(const glb *g, size_t lung, size_t j, size_t vertex, double xyz[3]) {
-  supine_export_targets_field(g->source, vertex, j, xyz);
+  supine_export_targets_field(g->info, vertex, j, xyz);
   for (size_t axis = 0; axis < 3; ++axis) {
     xyz[axis] *= g->targets.lung[lung].unit[j] / g->step;
   }
@@ -38,7 +38,7 @@ static void place_target(const glb *g, size_t lung, size_t j, size_t vertex, dou
  * targets, correct the position so that the deformed vertex is exact at the weights `rest`. */
 static void place_base(const glb *g, size_t lung, const double *rest, size_t vertex,
                        double xyz[3]) {
-  supine_export_targets_base(g->source, &g->targets, lung, vertex, xyz);
+  supine_export_targets_base(g->info, &g->targets, lung, vertex, xyz);
   for (size_t axis = 0; axis < 3; ++axis) {
     xyz[axis] /= g->step;
   }
@@ -53,14 +53,14 @@ static void place_base(const glb *g, size_t lung, const double *rest, size_t ver
 
 /* Append one lung's part of an array over all vertices; return the index of the accessor. */
 static json_int_t put(glb *g, size_t lung, glb_kind kind, const void *rows) {
-  const size_t *begin = g->source->info->lung_begin + lung;
+  const size_t *begin = g->info->lung_begin + lung;
   return supine_export_glb_put(g, kind, rows, g->order.vertex + begin[0], begin[1] - begin[0]);
 }
 
 /* Append a lung's displacements by morph target `j`, or the positions of its base mesh if `j` is
  * the number of targets. */
 static json_int_t put_places(glb *g, size_t lung, size_t j, const double *rest) {
-  const size_t *begin = g->source->info->lung_begin + lung;
+  const size_t *begin = g->info->lung_begin + lung;
   for (size_t i = begin[0]; i < begin[1]; ++i) {
     double at[3];
     if (j < g->targets.count) {
@@ -77,7 +77,7 @@ static json_int_t put_places(glb *g, size_t lung, size_t j, const double *rest) 
 
 /* Append the vectors that morph target `j` adds to the normals of a lung. */
 static json_int_t put_changes(glb *g, size_t lung, size_t j) {
-  const supine_basis_info *info = g->source->info;
+  const supine_basis_info *info = g->info;
   const size_t *begin = info->lung_begin + lung;
   const float *added = g->added + 3 * j * info->vertex_count;
   for (size_t i = 3 * begin[0]; i < 3 * begin[1]; ++i) {
@@ -93,7 +93,7 @@ static json_int_t put_corners(glb *g, size_t lung) {
   const size_t *begin = g->order.corner_begin + lung;
   uint32_t *corners = g->order.corners + begin[0];
   for (size_t i = 0; i < begin[1] - begin[0]; ++i) {
-    corners[i] -= (uint32_t)g->source->info->lung_begin[lung];
+    corners[i] -= (uint32_t)g->info->lung_begin[lung];
   }
   return supine_export_glb_put(g, GLB_CORNERS, corners, NULL, begin[1] - begin[0]);
 }
@@ -106,9 +106,9 @@ json_int_t supine_export_glb_add(glb *g, size_t lung) {
   double rest[EXPORT_TARGETS_MAX];
   char name[64];
   supine_pose pose;
-  (void)snprintf(name, sizeof name, "%s lung", g->source->info->lung_names[lung]);
-  (void)supine_export_breath_pose(g->source, g->options->breath, supine, 0, &pose, NULL);
-  supine_export_targets_weights(g->source, &g->targets, &pose, lung, rest);
+  (void)snprintf(name, sizeof name, "%s lung", g->info->lung_names[lung]);
+  (void)supine_export_breath_pose(g->basis, g->options->breath, supine, 0, &pose, NULL);
+  supine_export_targets_weights(g->info, &g->targets, &pose, lung, rest);
   for (size_t j = 0; j < g->targets.count; ++j) {
     (void)json_array_append_new(targets,
                                 json_pack("{s:I, s:I}", "POSITION", put_places(g, lung, j, rest),

@@ -65,9 +65,9 @@ static void sort_triangles(uint32_t *corners, size_t count, const float *level, 
 
 /* Renumber the vertices of a lung in the order in which its triangles first use them, with unused
  * vertices last. `place` [N] is workspace. */
-static void number_vertices(const export_source *source, size_t lung, uint32_t *place,
+static void number_vertices(const supine_basis_info *info, size_t lung, uint32_t *place,
                             export_order *order) {
-  const size_t *begin = source->info->lung_begin + lung;
+  const size_t *begin = info->lung_begin + lung;
   uint32_t next = (uint32_t)begin[0];
   for (size_t v = begin[0]; v < begin[1]; ++v) {
     place[v] = UINT32_MAX;
@@ -87,29 +87,28 @@ static void number_vertices(const export_source *source, size_t lung, uint32_t *
   }
 }
 
-supine_status supine_export_order_make(const export_source *source, bool packed,
-                                       export_order *order, supine_error *error) {
-  const supine_basis_info *info = source->info;
-  SUPINE_ARENA arena = {0};
-  uint32_t *place = supine_arena_take(&arena, info->vertex_count, sizeof *place);
-  uint32_t *from = supine_arena_take(&arena, info->triangle_count, 3 * sizeof *from);
-  float *level = supine_arena_zeros(&arena, info->vertex_count, 3 * sizeof *level);
+supine_status supine_export_order_make(const supine_basis_info *info, bool packed,
+                                       supine_arena *arena, export_order *order,
+                                       supine_error *error) {
+  SUPINE_ARENA own = {0};
+  uint32_t *place = supine_arena_take(&own, info->vertex_count, sizeof *place);
+  uint32_t *from = supine_arena_take(&own, info->triangle_count, 3 * sizeof *from);
+  float *level = supine_arena_zeros(&own, info->vertex_count, 3 * sizeof *level);
   size_t at = 0;
-  order->vertex = supine_arena_take(&order->arena, info->vertex_count, sizeof *order->vertex);
-  order->corners =
-      supine_arena_take(&order->arena, info->triangle_count, 3 * sizeof *order->corners);
-  if (arena.failed || order->arena.failed) {
+  order->vertex = supine_arena_take(arena, info->vertex_count, sizeof *order->vertex);
+  order->corners = supine_arena_take(arena, info->triangle_count, 3 * sizeof *order->corners);
+  if (own.failed || arena->failed) {
     return supine_error_memory(error, "%zu vertices", info->vertex_count);
   }
   for (size_t v = 0; v < info->vertex_count; ++v) {
     order->vertex[v] = (uint32_t)v;
-    level[3 * v] = source->info->vertices[3 * v + 2];
+    level[3 * v] = info->vertices[3 * v + 2];
   }
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     uint32_t *corners = order->corners + at;
     order->corner_begin[lung] = at;
     for (size_t t = 0; t < info->triangle_count; ++t) {
-      const uint32_t *corner = source->info->triangles + 3 * t;
+      const uint32_t *corner = info->triangles + 3 * t;
       if (corner[0] >= info->lung_begin[lung] && corner[0] < info->lung_begin[lung + 1]) {
         memcpy(order->corners + at, corner, 3 * sizeof *corner);
         at += 3;
@@ -118,12 +117,8 @@ supine_status supine_export_order_make(const export_source *source, bool packed,
     order->corner_begin[lung + 1] = at;
     if (packed) {
       sort_triangles(corners, at - order->corner_begin[lung], level, info->vertex_count, from);
-      number_vertices(source, lung, place, order);
+      number_vertices(info, lung, place, order);
     }
   }
   return SUPINE_OK;
-}
-
-void supine_export_order_free(export_order *order) {
-  supine_arena_free(&order->arena);
 }

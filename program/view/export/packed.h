@@ -5,7 +5,8 @@
 #define SUPINE_EXPORT_PACKED_H
 
 #include "base/arena.h"
-#include "program/view/export/export.h"
+
+#include <supine/runtime.h>
 
 /** Compressed bytes; free `bytes` with free(). */
 typedef struct export_packed {
@@ -36,15 +37,14 @@ typedef struct export_order {
   uint32_t *corners; /**< [triangles, 3] vertices of each triangle, as indices into `vertex` */
   size_t corner_begin[SUPINE_LUNGS_MAX + 1]; /**< for each lung, the index in `corners` of its first
                                                 corner; then the total number of corners */
-  supine_arena arena;
 } export_order;
 
-/** Choose an order; free it with supine_export_order_free, also after a failure.
+/** Choose an order; its arrays are valid until the arena is freed.
  * @param packed  false to keep the order of the basis. True for an order that compresses well:
  *                triangles are sorted, and vertices are in the order in which the triangles first
  *                use them; call supine_export_pack_begin first */
-supine_status supine_export_order_make(const export_source *source, bool packed,
-                                       export_order *order, supine_error *error);
-void supine_export_order_free(export_order *order);
+supine_status supine_export_order_make(const supine_basis_info *info, bool packed,
+                                       supine_arena *arena, export_order *order,
+                                       supine_error *error);
 
 #endif

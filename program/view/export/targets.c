@@ -6,6 +6,8 @@
 #include <stdlib.h>
 
 #include "base/vec3.h"
+#include "program/options/breath_turn.h"
+#include "program/view/render/render.h"
 
 enum { DIRECTIONS = 4096 }; /* number of sampled directions of gravity */
 /* The range of each weight in the sampled directions is extended by this fraction at both ends. */
@@ -26,20 +28,26 @@ static void split_gains(const double bend[3], const double gains[3], double spli
 }
 
 /* Compute the factor that multiplies each displacement field of a lung in a pose. */
-static void find_amounts(const export_source *source, size_t count, const supine_pose *pose,
+static void find_amounts(const supine_basis_info *info, size_t count, const supine_pose *pose,
                          size_t lung, double *amounts) {
-  const size_t k = source->info->mode_count;
+  const size_t k = info->mode_count;
   double gain[2];
-  split_gains(source->info->bend, pose->gains[lung], gain);
+  split_gains(info->bend, pose->gains[lung], gain);
   for (size_t j = 0; j < count; ++j) {
     amounts[j] = gain[j / k] * pose->weights[j % k];
   }
 }
 
-void supine_export_targets_weights(const export_source *source, const export_targets *targets,
+supine_status supine_export_breath_pose(const supine_basis *basis, double breath, const double g[3],
+                                        double fraction, supine_pose *pose, supine_error *error) {
+  const supine_state state = supine_breath_state(basis, g, fraction * breath);
+  return supine_basis_pose(basis, &state, pose, error);
+}
+
+void supine_export_targets_weights(const supine_basis_info *info, const export_targets *targets,
                                    const supine_pose *pose, size_t lung, double *weights) {
   const export_weights *w = &targets->lung[lung];
-  find_amounts(source, targets->count, pose, lung, weights);
+  find_amounts(info, targets->count, pose, lung, weights);
   for (size_t j = 0; j < targets->count; ++j) {
     weights[j] = (weights[j] - w->offset[j]) / w->unit[j];
   }
@@ -49,19 +57,20 @@ void supine_export_targets_weights(const export_source *source, const export_tar
  * gravity and phase of the breath. Within a large breath, some factors pass an extremum; 10 steps
  * miss it by less than `margin`. Set `offset` to the smallest factor, at which the morph target has
  * weight 0, and `unit` to the difference from the largest, at which it has weight 1. */
-static supine_status find_ranges(const export_source *source, double breath,
-                                 export_targets *targets, supine_error *error) {
+static supine_status find_ranges(const supine_basis *basis, double breath, export_targets *targets,
+                                 supine_error *error) {
   enum { STEPS = 10, PHASES = STEPS + 1 };
+  const supine_basis_info *info = supine_basis_get_info(basis);
   double amounts[EXPORT_TARGETS_MAX];
   supine_pose pose;
   for (size_t i = 0; i < PHASES * (size_t)DIRECTIONS; ++i) {
     double g[3];
     supine_spiral((double)(i / PHASES), DIRECTIONS, 0, g);
     SUPINE_TRY(
-        supine_export_breath_pose(source, breath, g, (double)(i % PHASES) / STEPS, &pose, error));
-    for (size_t lung = 0; lung < source->info->lung_count; ++lung) {
+        supine_export_breath_pose(basis, breath, g, (double)(i % PHASES) / STEPS, &pose, error));
+    for (size_t lung = 0; lung < info->lung_count; ++lung) {
       export_weights *w = &targets->lung[lung];
-      find_amounts(source, targets->count, &pose, lung, amounts);
+      find_amounts(info, targets->count, &pose, lung, amounts);
       for (size_t j = 0; j < targets->count; ++j) {
         const double high = i == 0 ? amounts[j] : fmax(amounts[j], w->offset[j] + w->unit[j]);
         w->offset[j] = i == 0 ? amounts[j] : fmin(amounts[j], w->offset[j]);
@@ -72,10 +81,10 @@ static supine_status find_ranges(const export_source *source, double breath,
   return SUPINE_OK;
 }
 
-static void find_middle(const export_source *source, export_targets *targets) {
+static void find_middle(const supine_basis_info *info, export_targets *targets) {
   double low[3] = {INFINITY, INFINITY, INFINITY};
   double high[3] = {-INFINITY, -INFINITY, -INFINITY};
-  supine_export_box(source, low, high);
+  supine_render_box(info->vertices, info->vertex_count, low, high);
   targets->half_extent = 0;
   for (size_t axis = 0; axis < 3; ++axis) {
     targets->middle[axis] = (low[axis] + high[axis]) / 2;
@@ -83,13 +92,13 @@ static void find_middle(const export_source *source, export_targets *targets) {
   }
 }
 
-supine_status supine_export_targets_choose(const export_source *source, double breath,
+supine_status supine_export_targets_choose(const supine_basis *basis, double breath,
                                            export_targets *targets, supine_error *error) {
-  const supine_basis_info *info = source->info;
+  const supine_basis_info *info = supine_basis_get_info(basis);
   const bool bent = info->bend[0] != 0 || info->bend[1] != 0 || info->bend[2] != 0;
   targets->count = (bent ? 2 : 1) * info->mode_count;
-  find_middle(source, targets);
-  SUPINE_TRY(find_ranges(source, breath, targets, error));
+  find_middle(info, targets);
+  SUPINE_TRY(find_ranges(basis, breath, targets, error));
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     export_weights *w = &targets->lung[lung];
     for (size_t j = 0; j < targets->count; ++j) {
@@ -100,41 +109,43 @@ supine_status supine_export_targets_choose(const export_source *source, double b
   return SUPINE_OK;
 }
 
-void supine_export_targets_field(const export_source *source, size_t vertex, size_t j,
+void supine_export_targets_field(const supine_basis_info *info, size_t vertex, size_t j,
                                  double u[3]) {
-  const size_t k = source->info->mode_count;
-  supine_export_field(source, vertex, j % k, u);
-  for (size_t axis = 0; axis < 3 && j >= k; ++axis) {
-    u[axis] *= source->info->bend[axis];
+  const size_t k = info->mode_count;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    u[axis] = info->vector ? (double)info->coefficients[(3 * vertex + axis) * k + j % k]
+                           : (double)info->coefficients[vertex * k + j % k] *
+                                 (double)info->direction[3 * vertex + axis];
+    u[axis] *= j < k ? 1 : info->bend[axis];
   }
 }
 
 /* Add the displacement fields at a vertex, times `amount` [count], to the position `xyz`, mm. */
-static void add_fields(const export_source *source, size_t count, const double *amount,
+static void add_fields(const supine_basis_info *info, size_t count, const double *amount,
                        size_t vertex, double xyz[3]) {
   for (size_t j = 0; j < count; ++j) {
     double u[3];
-    supine_export_targets_field(source, vertex, j, u);
+    supine_export_targets_field(info, vertex, j, u);
     for (size_t axis = 0; axis < 3; ++axis) {
       xyz[axis] += amount[j] * u[axis];
     }
   }
 }
 
-void supine_export_targets_base(const export_source *source, const export_targets *targets,
+void supine_export_targets_base(const supine_basis_info *info, const export_targets *targets,
                                 size_t lung, size_t vertex, double xyz[3]) {
   for (size_t axis = 0; axis < 3; ++axis) {
-    xyz[axis] = (double)source->info->vertices[3 * vertex + axis] - targets->middle[axis];
+    xyz[axis] = (double)info->vertices[3 * vertex + axis] - targets->middle[axis];
   }
-  add_fields(source, targets->count, targets->lung[lung].offset, vertex, xyz);
+  add_fields(info, targets->count, targets->lung[lung].offset, vertex, xyz);
 }
 
 /* Compute the normals [N, 3] of the surface at the morph targets' `weights` in each lung. First add
  * `step` to the weight of target `j` in every lung. `xyz` [N, 3] is workspace. */
-static void find_normals(const export_source *source, const export_targets *targets,
+static void find_normals(const supine_basis *basis, const export_targets *targets,
                          double (*weights)[EXPORT_TARGETS_MAX], size_t j, double step, float *xyz,
                          float *normals) {
-  const supine_basis_info *info = source->info;
+  const supine_basis_info *info = supine_basis_get_info(basis);
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     double amount[EXPORT_TARGETS_MAX];
     for (size_t i = 0; i < targets->count; ++i) {
@@ -142,22 +153,22 @@ static void find_normals(const export_source *source, const export_targets *targ
     }
     for (size_t i = info->lung_begin[lung]; i < info->lung_begin[lung + 1]; ++i) {
       double at[3];
-      supine_export_targets_base(source, targets, lung, i, at);
-      add_fields(source, targets->count, amount, i, at);
+      supine_export_targets_base(info, targets, lung, i, at);
+      add_fields(info, targets->count, amount, i, at);
       for (size_t axis = 0; axis < 3; ++axis) {
         xyz[3 * i + axis] = (float)at[axis];
       }
     }
   }
-  supine_normals(source->basis, xyz, normals);
+  supine_normals(basis, xyz, normals);
 }
 
 /* Divide each base normal by its length, because glTF requires unit normals. Divide the changes of
  * this normal by morph targets by the same length: viewers normalise the sum. */
-static void make_unit(const export_source *source, const export_targets *targets, float *base,
+static void make_unit(const supine_basis_info *info, const export_targets *targets, float *base,
                       float *added) {
   static const double least = 0.2; /* smallest divisor of the changes */
-  const size_t n = source->info->vertex_count;
+  const size_t n = info->vertex_count;
   for (size_t i = 0; i < n; ++i) {
     float *b = base + 3 * i;
     const double length = hypot(hypot((double)b[0], (double)b[1]), (double)b[2]);
@@ -178,12 +189,11 @@ static void make_unit(const export_source *source, const export_targets *targets
  * of 1 / INT8_MAX, or to the value of the previous vertex in `order` if that is close. The normal
  * at the targets' `weights` is `base` plus the sum of weight times change. Correct `base`, so that
  * this normal stays as it was. */
-static void round_changes(const export_source *source, const export_targets *targets,
+static void round_changes(const supine_basis_info *info, const export_targets *targets,
                           double (*weights)[EXPORT_TARGETS_MAX], const uint32_t *order, float *base,
                           float *added) {
   /* A component that differs by at most this from that of the previous vertex becomes equal. */
   static const float near = 2.5F / INT8_MAX;
-  const supine_basis_info *info = source->info;
   for (size_t i = 0, lung = 0; i < info->vertex_count; ++i) {
     lung += i == info->lung_begin[lung + 1];
     float *b = base + 3 * (size_t)order[i];
@@ -205,35 +215,36 @@ static void round_changes(const export_source *source, const export_targets *tar
   }
 }
 
-supine_status supine_export_targets_normals(const export_source *source, double breath,
+supine_status supine_export_targets_normals(const supine_basis *basis, double breath,
                                             const export_targets *targets, const uint32_t *order,
                                             float *base, float *added, supine_error *error) {
   static const double supine[3] = {0, 1, 0};
   static const double step = 0.2; /* change of a weight for central differences */
   /* Changes of a lung's normals by a morph target are set to 0 if their RMS is less, radians. */
   static const double least = 0.035;
-  const size_t n = source->info->vertex_count;
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const size_t n = info->vertex_count;
   supine_pose pose;
   SUPINE_ARENA arena = {0};
   double(*weights)[EXPORT_TARGETS_MAX] =
-      supine_arena_take(&arena, source->info->lung_count, sizeof *weights);
+      supine_arena_take(&arena, info->lung_count, sizeof *weights);
   float *xyz = supine_arena_take(&arena, 3 * n, sizeof *xyz);
   float *below = supine_arena_take(&arena, 3 * n, sizeof *below);
   if (arena.failed) {
     return supine_error_memory(error, "%zu vertices", n);
   }
-  SUPINE_TRY(supine_export_breath_pose(source, breath, supine, 0, &pose, error));
-  for (size_t lung = 0; lung < source->info->lung_count; ++lung) {
-    supine_export_targets_weights(source, targets, &pose, lung, weights[lung]);
+  SUPINE_TRY(supine_export_breath_pose(basis, breath, supine, 0, &pose, error));
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    supine_export_targets_weights(info, targets, &pose, lung, weights[lung]);
   }
-  find_normals(source, targets, weights, 0, 0, xyz, base);
+  find_normals(basis, targets, weights, 0, 0, xyz, base);
   for (size_t j = 0; j < targets->count; ++j) {
     float *d = added + 3 * j * n;
-    find_normals(source, targets, weights, j, step, xyz, d);
-    find_normals(source, targets, weights, j, -step, xyz, below);
-    for (size_t lung = 0; lung < source->info->lung_count; ++lung) {
-      const size_t begin = 3 * source->info->lung_begin[lung];
-      const size_t end = 3 * source->info->lung_begin[lung + 1];
+    find_normals(basis, targets, weights, j, step, xyz, d);
+    find_normals(basis, targets, weights, j, -step, xyz, below);
+    for (size_t lung = 0; lung < info->lung_count; ++lung) {
+      const size_t begin = 3 * info->lung_begin[lung];
+      const size_t end = 3 * info->lung_begin[lung + 1];
       double sum = 0;
       for (size_t i = begin; i < end; ++i) {
         d[i] = (d[i] - below[i]) / (float)(2 * step);
@@ -246,9 +257,9 @@ supine_status supine_export_targets_normals(const export_source *source, double 
       }
     }
   }
-  make_unit(source, targets, base, added);
+  make_unit(info, targets, base, added);
   if (order != NULL) {
-    round_changes(source, targets, weights, order, base, added);
+    round_changes(info, targets, weights, order, base, added);
   }
   return SUPINE_OK;
 }

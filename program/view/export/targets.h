@@ -4,7 +4,7 @@
 #ifndef SUPINE_EXPORT_TARGETS_H
 #define SUPINE_EXPORT_TARGETS_H
 
-#include "program/view/export/export.h"
+#include <supine/runtime.h>
 
 enum { EXPORT_TARGETS_MAX = 2 * SUPINE_MODES_MAX };
 
@@ -38,18 +38,25 @@ typedef struct export_targets {
 } export_targets;
 
 /** Choose the morph targets of every lung for a breath of `breath` mL. */
-supine_status supine_export_targets_choose(const export_source *source, double breath,
+supine_status supine_export_targets_choose(const supine_basis *basis, double breath,
                                            export_targets *targets, supine_error *error);
 
+/** Compute the pose during a breath of `breath` mL, with gravity along the unit vector `g`. The
+ * `fraction` is 0 at rest (in the scan if rest is unknown) and 1 at the end of inspiration; another
+ * simulator's fields have no breath. */
+supine_status supine_export_breath_pose(const supine_basis *basis, double breath, const double g[3],
+                                        double fraction, supine_pose *pose, supine_error *error);
+
 /** Compute the weights [targets->count] at which the morph targets of a lung show a pose. */
-void supine_export_targets_weights(const export_source *source, const export_targets *targets,
+void supine_export_targets_weights(const supine_basis_info *info, const export_targets *targets,
                                    const supine_pose *pose, size_t lung, double *weights);
 
 /** Compute the displacement `u`, mm, of a vertex by field j of export_weights. */
-void supine_export_targets_field(const export_source *source, size_t vertex, size_t j, double u[3]);
+void supine_export_targets_field(const supine_basis_info *info, size_t vertex, size_t j,
+                                 double u[3]);
 
 /** Compute the position of a vertex in a lung's base mesh, mm, relative to `targets->middle`. */
-void supine_export_targets_base(const export_source *source, const export_targets *targets,
+void supine_export_targets_base(const supine_basis_info *info, const export_targets *targets,
                                 size_t lung, size_t vertex, double xyz[3]);
 
 /** Compute the normals `base` [N, 3] of the base mesh, and the change of the normals by each morph
@@ -58,7 +65,7 @@ void supine_export_targets_base(const export_source *source, const export_target
  * @param order  [N] order in which the file stores vertices. `added` is then rounded so that it
  *               compresses well in this order, and is 0 for a target that turns a lung's normals
  *               by less than 2.5 degrees (RMS). NULL to keep `added` exact */
-supine_status supine_export_targets_normals(const export_source *source, double breath,
+supine_status supine_export_targets_normals(const supine_basis *basis, double breath,
                                             const export_targets *targets, const uint32_t *order,
                                             float *base, float *added, supine_error *error);
 

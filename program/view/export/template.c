@@ -58,14 +58,16 @@ static const json_t *look_up(const scope *from, const char *name, size_t length)
 
 /* Write text with HTML's reserved characters & < > " replaced by entities. */
 static void escape(const char *text, FILE *file) {
-  static const char *const replaced[] = {
-      ['&'] = "&amp;", ['<'] = "&lt;", ['>'] = "&gt;", ['"'] = "&quot;"};
-  for (const unsigned char *c = (const unsigned char *)text; *c != '\0'; ++c) {
-    if (*c < sizeof replaced / sizeof *replaced && replaced[*c] != NULL) {
-      (void)fputs(replaced[*c], file);
-    } else {
-      (void)fputc(*c, file);
+  static const char reserved[] = "&<>\"";
+  static const char *const entities[] = {"&amp;", "&lt;", "&gt;", "&quot;"};
+  for (;;) {
+    const size_t plain = strcspn(text, reserved);
+    (void)fwrite(text, 1, plain, file);
+    if (text[plain] == '\0') {
+      return;
     }
+    (void)fputs(entities[strchr(reserved, text[plain]) - reserved], file);
+    text += plain + 1;
   }
 }
 
@@ -79,25 +81,21 @@ static void write_value(const json_t *value, FILE *file) {
   }
 }
 
-static void fill(const supine_template *t, const char *at, const char *end, const scope *around,
+static void fill(const supine_asset *assets, const char *at, const char *end, const scope *around,
                  FILE *file);
 
-static void write_named(const supine_template *t, const tag *named, const scope *around,
+static void write_named(const supine_asset *assets, const tag *named, const scope *around,
                         FILE *file) {
   const json_t *value = look_up(around, named->name, named->length);
-  const supine_asset *asset = find_asset(t->assets, named->name, named->length);
+  const supine_asset *asset = find_asset(assets, named->name, named->length);
   if (value != NULL) {
     write_value(value, file);
   } else if (asset != NULL && strstr(asset->name, ".html") != NULL) {
     /* Omit the last newline of the asset, because the template has a newline after the tag. */
     const size_t size = asset->size - (asset->bytes[asset->size - 1] == '\n');
-    fill(t, asset->bytes, asset->bytes + size, around, file);
+    fill(assets, asset->bytes, asset->bytes + size, around, file);
   } else if (asset != NULL) {
     (void)fwrite(asset->bytes, 1, asset->size, file);
-  } else if (t->write != NULL) {
-    char name[32];
-    (void)snprintf(name, sizeof name, "%.*s", (int)named->length, named->name);
-    t->write(t->context, name, file);
   }
 }
 
@@ -116,48 +114,41 @@ static tag find_end(const char *at, const char *end) {
   return found;
 }
 
-static void fill_section(const supine_template *t, const tag *open, const char *end,
+static void fill_section(const supine_asset *assets, const tag *open, const char *end,
                          const scope *around, FILE *file) {
   const json_t *value = look_up(around, open->name, open->length);
   const scope inner = {value, around};
   if (json_is_object(value) || json_is_string(value) || json_is_number(value) ||
       json_is_true(value)) {
-    fill(t, open->end, end, &inner, file);
+    fill(assets, open->end, end, &inner, file);
   }
   for (size_t i = 0; i < json_array_size(value); ++i) {
     const scope element = {json_array_get(value, i), around};
-    fill(t, open->end, end, &element, file);
+    fill(assets, open->end, end, &element, file);
   }
 }
 
-static void fill(const supine_template *t, const char *at, const char *end, const scope *around,
+static void fill(const supine_asset *assets, const char *at, const char *end, const scope *around,
                  FILE *file) {
   for (tag open = next_tag(at, end); open.end != NULL; open = next_tag(at, end)) {
     (void)fwrite(at, 1, (size_t)(open.begin - at), file);
     at = open.end;
     if (open.kind == 0) {
-      write_named(t, &open, around, file);
+      write_named(assets, &open, around, file);
     } else {
       const tag close = find_end(at, end);
-      fill_section(t, &open, close.end != NULL ? close.begin : end, around, file);
+      fill_section(assets, &open, close.end != NULL ? close.begin : end, around, file);
       at = close.end != NULL ? close.end : end;
     }
   }
   (void)fwrite(at, 1, (size_t)(end - at), file);
 }
 
-void supine_template_fill(const supine_template *filling, const char *name, FILE *file) {
-  const supine_asset *asset = find_asset(filling->assets, name, strlen(name));
-  const scope data = {filling->data, NULL};
+void supine_template_fill(const supine_asset *assets, const json_t *data, const char *name,
+                          FILE *file) {
+  const supine_asset *asset = find_asset(assets, name, strlen(name));
+  const scope outermost = {data, NULL};
   if (asset != NULL) {
-    fill(filling, asset->bytes, asset->bytes + asset->size, &data, file);
+    fill(assets, asset->bytes, asset->bytes + asset->size, &outermost, file);
   }
-}
-
-json_t *supine_template_numbers(const double *values, size_t count) {
-  json_t *list = json_array();
-  for (size_t i = 0; i < count; ++i) {
-    (void)json_array_append_new(list, json_real(values[i]));
-  }
-  return list;
 }

@@ -26,19 +26,10 @@ typedef struct supine_asset {
   size_t size;
 } supine_asset;
 
-/** Assets and data to fill a template with. */
-typedef struct supine_template {
-  const supine_asset *assets;
-  const json_t *data;
-  /** Write the text of a tag that names neither data nor an asset; if NULL, nothing is written. */
-  void (*write)(const void *context, const char *name, FILE *file);
-  const void *context;
-} supine_template;
-
-/** Write the asset `name` with its tags filled. Tags with unknown names write nothing; supine_embed
- * refuses such tags when the program is built. A write error sets the error indicator of `file`. */
-void supine_template_fill(const supine_template *filling, const char *name, FILE *file);
-
-json_t *supine_template_numbers(const double *values, size_t count);
+/** Write the asset `name` with its tags filled from `data` and the other assets. Tags with unknown
+ * names write nothing; supine_embed refuses such tags when the program is built. A write error sets
+ * the error indicator of `file`. */
+void supine_template_fill(const supine_asset *assets, const json_t *data, const char *name,
+                          FILE *file);
 
 #endif

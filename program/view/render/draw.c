@@ -95,6 +95,13 @@ void supine_render_destroy(supine_renderer *renderer) {
   }
 }
 
+void supine_render_box(const float *xyz, size_t count, double low[3], double high[3]) {
+  for (size_t i = 0; i < 3 * count; ++i) {
+    low[i % 3] = fmin(low[i % 3], (double)xyz[i]);
+    high[i % 3] = fmax(high[i % 3], (double)xyz[i]);
+  }
+}
+
 /* A viewer, who looks at the centre of the reference surface in every state. */
 typedef struct camera {
   double axes[3][3];
@@ -108,10 +115,7 @@ static camera find_camera(const supine_renderer *r, const supine_scene *scene) {
   double low[3] = {INFINITY, INFINITY, INFINITY};
   double high[3] = {-INFINITY, -INFINITY, -INFINITY};
   supine_render_view_axes(scene->view, scene->gravity, c.axes);
-  for (size_t i = 0; i < 3 * r->info->vertex_count; ++i) {
-    low[i % 3] = fmin(low[i % 3], (double)r->info->vertices[i]);
-    high[i % 3] = fmax(high[i % 3], (double)r->info->vertices[i]);
-  }
+  supine_render_box(r->info->vertices, r->info->vertex_count, low, high);
   for (int axis = 0; axis < 3; ++axis) {
     c.centre[axis] = (low[axis] + high[axis]) / 2;
     c.radius = hypot(c.radius, (high[axis] - low[axis]) / 2);

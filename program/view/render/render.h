@@ -72,6 +72,9 @@ typedef struct supine_scene {
   const double *extent; /**< [4] smallest and largest x, then y, mm; NULL: those of this scene */
 } supine_scene;
 
+/** Enlarge a box, with the corners `low` and `high`, to contain the vertices `xyz` [count, 3]. */
+void supine_render_box(const float *xyz, size_t count, double low[3], double high[3]);
+
 /** Empty extent, to be enlarged by supine_render_extent. */
 #define SUPINE_EXTENT_NONE                                                                         \
   { INFINITY, -INFINITY, INFINITY, -INFINITY }
