@@ -7,22 +7,16 @@
 
 #include "program/render_pictures.h"
 
-typedef struct request {
-  const char *postures;
-  supine_pictures pictures;
-} request;
-
 static supine_status read_size(const char *text, void *field, supine_error *error) {
-  supine_pictures *wanted = &((request *)field)->pictures;
+  size_t *size = field;
   char rest;
   (void)error;
-  return supine_options_fits(
-      sscanf(text, "%5zux%5zu%c", &wanted->width, &wanted->height, &rest) == 2 &&
-      wanted->width > 0 && wanted->height > 0 && wanted->width <= 16384 && wanted->height <= 16384);
+  return supine_options_fits(sscanf(text, "%5zux%5zu%c", &size[0], &size[1], &rest) == 2 &&
+                             size[0] > 0 && size[1] > 0 && size[0] <= 16384 && size[1] <= 16384);
 }
 
 static supine_status read_views(const char *text, void *field, supine_error *error) {
-  supine_pictures *wanted = &((request *)field)->pictures;
+  supine_pictures *wanted = field;
   const char *names[SUPINE_VIEW_COUNT + 1] = {[SUPINE_VIEW_COUNT] = "lateral"};
   char word[32];
   wanted->view_count = 0;
@@ -49,68 +43,58 @@ static supine_status read_views(const char *text, void *field, supine_error *err
   return SUPINE_OK;
 }
 
+#define FILLS(member) SUPINE_FILLS(supine_pictures, member)
+
 static const supine_option table[] = {
-    {"posture", 0, "LIST", "comma-separated postures, up to 8", SUPINE_FILLS(request, postures),
+    {"posture", 0, "LIST", "comma-separated postures, up to 8", FILLS(postures),
      .rivals = "gravity"},
     {"turn", 0, "FROM:TO:SECONDS",
      "draw an animation instead: gravity turns from one posture to another at constant speed, "
      "pauses for a second, and starts again. For example, supine:left:5s turns for 5 s",
-     SUPINE_FILLS(request, pictures.turn), .read = supine_breath_turn_read,
-     .wants = "FROM:TO:SECONDS", SUPINE_SAYS_GIVEN(request, pictures.turns), .rivals = "gravity"},
-    {.table = supine_options_volume, SUPINE_FILLS(request, pictures.volume)},
+     FILLS(turn), .read = supine_breath_turn_read, .wants = "FROM:TO:SECONDS",
+     SUPINE_SAYS_GIVEN(supine_pictures, turns), .rivals = "gravity"},
+    {.table = supine_options_volume, FILLS(volume)},
     {"output", 'o', "FILE", ".png for --posture; .webp for --turn, an animation that browsers play",
-     SUPINE_FILLS(request, pictures.output), .required = true, .file = SUPINE_FILE_OUT,
-     .endings = ".png or .webp"},
+     FILLS(output), .required = true, .file = SUPINE_FILE_OUT, .endings = ".png or .webp"},
     {"size", 0, "WxH",
      "size of the whole picture, in pixels; default 440 x 480 for each posture and view, plus "
      "margins",
-     .read = read_size, .wants = "WIDTHxHEIGHT, up to 16384 each"},
+     FILLS(size), .read = read_size, .wants = "WIDTHxHEIGHT, up to 16384 each"},
     {"view", 0, "LIST",
      "views to draw, one below another, separated by commas: anterior, posterior, left (or "
      "lateral), right, head, feet, oblique (from the front, left and above), lying (gravity down, "
      "head left). With --turn, lying is anterior",
      .read = read_views, .standard = "lying"},
-    {.table = supine_options_from, SUPINE_FILLS(request, pictures.from)},
+    {.table = supine_options_from, FILLS(from)},
     {"largest", 0, "MM",
      "end of the colour bar. If values exceed it, the bar has a pointed end. Default the "
      "largest displacement, rounded up",
-     SUPINE_FILLS(request, pictures.largest), SUPINE_ABOVE_ZERO, .wants = "millimetres above 0",
-     .more = true},
+     FILLS(largest), SUPINE_ABOVE_ZERO, .wants = "millimetres above 0", .more = true},
     {"inside", 0, "FILE",
      "structures made by 'supine embed' from the same basis, shown inside transparent lungs with "
      "their names and displacements",
-     SUPINE_FILLS(request, pictures.inside), .file = SUPINE_FILE_IN},
+     FILLS(inside), .file = SUPINE_FILE_IN},
     {"opacity", 0, "SHARE",
-     "opacity of the lungs, 0.05 to 1 (opaque); default 1, or 0.35 with --inside",
-     SUPINE_FILLS(request, pictures.opacity), .range = {0.05, 1.0},
-     .wants = "a share from 0.05 to 1", .more = true},
+     "opacity of the lungs, 0.05 to 1 (opaque); default 1, or 0.35 with --inside", FILLS(opacity),
+     .range = {0.05, 1.0}, .wants = "a share from 0.05 to 1", .more = true},
     {.name = NULL}};
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
-  const request *wanted = chosen;
-  supine_pictures *pictures = &((request *)chosen)->pictures;
-  const bool animation = supine_text_ends_in(pictures->output, ".webp");
-  if (!pictures->turns && wanted->postures == NULL) {
+  supine_pictures *wanted = chosen;
+  if (!wanted->turns && wanted->postures == NULL) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "the posture is missing: give --posture or --turn");
   }
-  if (pictures->turns != animation) {
+  if (wanted->turns != supine_text_ends_in(wanted->output, ".webp")) {
     return supine_error_set(
         error, SUPINE_ERROR_ARGUMENT,
-        pictures->turns ? "--turn writes an animation: give -o a name that ends in .webp"
-                        : "--posture writes a still picture: give -o a name that ends in .png");
+        wanted->turns ? "--turn writes an animation: give -o a name that ends in .webp"
+                      : "--posture writes a still picture: give -o a name that ends in .png");
   }
-  if (!pictures->turns) {
-    SUPINE_TRY(supine_options_posture_list_parse(wanted->postures, &pictures->volume.state,
-                                                 &pictures->postures, error));
-  } else if (pictures->view[0] == SUPINE_VIEW_LYING) {
-    pictures->view[0] = SUPINE_VIEW_ANTERIOR; /* the camera of a film stays where it is */
+  if (wanted->turns && wanted->view[0] == SUPINE_VIEW_LYING) {
+    wanted->view[0] = SUPINE_VIEW_ANTERIOR; /* the camera of a film stays where it is */
   }
-  return pictures->postures.count > SUPINE_PANELS_MAX
-             ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                "a picture holds at most %d postures: name fewer",
-                                SUPINE_PANELS_MAX)
-             : supine_command_pictures_draw(pictures, given->operand[0], error);
+  return supine_command_pictures_draw(wanted, given->operand[0], error);
 }
 
 const supine_command supine_command_render = {
@@ -132,5 +116,5 @@ const supine_command supine_command_render = {
     "  supine render lungs.safetensors --posture prone --from supine:rest \\\n"
     "      --view anterior,lateral,posterior -o prone.png",
     SUPINE_ONE_BASIS,
-    .request_size = sizeof(request),
+    .request_size = sizeof(supine_pictures),
     .run = run};

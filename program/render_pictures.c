@@ -136,9 +136,9 @@ static supine_picture make_picture(studio *s) {
                           .largest = largest,
                           .beyond = s->max > largest,
                           .transparency = 1.0 - opacity,
-                          .width = wanted->width != 0 ? wanted->width : 20 + 440 * count,
-                          .height = wanted->height != 0 ? wanted->height
-                                                        : 120 + 480 * wanted->view_count};
+                          .width = wanted->size[0] != 0 ? wanted->size[0] : 20 + 440 * count,
+                          .height = wanted->size[1] != 0 ? wanted->size[1]
+                                                         : 120 + 480 * wanted->view_count};
 }
 
 static supine_status draw_postures(studio *s, supine_error *error) {
@@ -229,8 +229,15 @@ static supine_status draw_turn(studio *s, supine_error *error) {
 
 supine_status supine_command_pictures_draw(const supine_pictures *wanted, const char *path,
                                            supine_error *error) {
-  SUPINE_FREED_BY(close_studio) studio s = {.wanted = wanted, .postures = wanted->postures};
-  s.postures.count = wanted->turns ? 1 : wanted->postures.count;
+  SUPINE_FREED_BY(close_studio) studio s = {.wanted = wanted, .postures.count = 1};
+  if (!wanted->turns) {
+    SUPINE_TRY(supine_options_posture_list_parse(wanted->postures, &wanted->volume.state,
+                                                 &s.postures, error));
+  }
+  if (s.postures.count > SUPINE_PANELS_MAX) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "a picture holds at most %d postures: name fewer", SUPINE_PANELS_MAX);
+  }
   SUPINE_TRY(open_studio(&s, path, error));
   return wanted->turns ? draw_turn(&s, error) : draw_postures(&s, error);
 }

@@ -63,7 +63,6 @@ static json_t *picture(const supine_comparison *c, supine_renderer *renderer, si
   (void)supine_compare_distances(c->compare, &shown->pose, &c->reference.pose, value);
   scene.value = value;
   scene.largest = largest;
-  scene.line_step = supine_render_bar_step(largest);
   json_t *png = draw(renderer, &scene, error);
   if (png == NULL) {
     return NULL;

@@ -203,6 +203,7 @@ typedef struct canvas {
   float *nearness;                  /* [height, width] 1 / (depth of the nearest triangle), 1/mm */
   float colours[SHADES + 1][3];     /* colour map, linear RGB, 0 to 1 */
   unsigned char encode[SHADES + 1]; /* [i] byte that encodes the linear light i / SHADES */
+  float line_step;                  /* difference of the value between contour lines, mm */
   uint32_t *pixels;
 } canvas;
 
@@ -362,11 +363,10 @@ static void shade(const canvas *c, size_t triangle, float x, float y, unsigned c
     half[k] += eye[k];
   }
   const float value = value_at(&f, x, y);
-  const float spacing = (float)scene->line_step;
   const float facing = fmaxf(0.0F, dot(n, eye));
   float light = 0.46F + 0.14F * n[1] + 0.58F * lambert(n, key) + 0.16F * lambert(n, fill);
   light *= 0.72F + 0.28F * smoothstep(0.0F, 0.45F, facing); /* darken the outline */
-  light *= spacing > 0.0F ? 1.0F - 0.275F * contour(&f, x, y, value, spacing) : 1.0F;
+  light *= 1.0F - 0.275F * contour(&f, x, y, value, c->line_step);
   if (scene->shell) {
     const float cover = 0.12F + 0.7F * powf(1.0F - facing, 2.5F);
     rgba[3] = (unsigned char)lrintf(255.0F * cover);
@@ -449,6 +449,7 @@ supine_status supine_render_draw(supine_renderer *r, const supine_scene *scene, 
               .height = OVERSAMPLE * scene->height,
               .nearest = supine_arena_take(&arena, count, sizeof *c.nearest),
               .nearness = supine_arena_zeros(&arena, count, sizeof *c.nearness),
+              .line_step = (float)supine_render_bar_step(scene->largest),
               .pixels = pixels};
   if (arena.failed) {
     return supine_error_memory(error, "%zu samples", count);

@@ -53,10 +53,13 @@ typedef struct layout {
   double footer_height; /* height of the area below the cells, which holds the colour bar */
 } layout;
 
-typedef struct bar_scale {
-  double largest;
-  double step;
-} bar_scale;
+/* What draws a picture. */
+typedef struct painter {
+  cairo_t *cr;
+  supine_renderer *renderer;
+  const supine_picture *picture;
+  layout at;
+} painter;
 
 static void colour(cairo_t *cr, const double rgb[3]) {
   cairo.set_source_rgb(cr, rgb[0], rgb[1], rgb[2]);
@@ -313,51 +316,46 @@ static supine_status draw_scene(supine_renderer *renderer, const supine_scene *s
   return status;
 }
 
-/* Draw the lungs and the marks of a panel in a box whose upper left corner is (x, y); `size` is the
- * size of the font; all in pixels. A struct for the 13 parameters would have no other use. */
-static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
-                           const supine_panel *panel, supine_view view, const bar_scale *bar,
-                           double x, double y, double width, double height, double size,
-                           const double *extent, supine_error *error) {
+/* Draw the lungs and the marks of a panel in a box {x, y, width, height}, pixels. */
+static supine_status lungs(const painter *by, const supine_panel *panel, supine_view view,
+                           const double box[4], const double extent[4], supine_error *error) {
+  const double transparency = by->picture->transparency;
   double shown[4] = {extent[0], extent[1], extent[2], extent[3]};
   double own[4] = SUPINE_EXTENT_NONE;
+  supine_scene scene = {.pose = panel->pose,
+                        .value = panel->value,
+                        .largest = by->picture->largest,
+                        .colours = by->picture->colours,
+                        .view = view,
+                        .gravity = panel->gravity,
+                        .shell = transparency > 0,
+                        .width = (size_t)box[2],
+                        .height = (size_t)box[3],
+                        .extent = shown};
   if (view == SUPINE_VIEW_LYING) { /* put the lungs of every posture on the table */
-    const supine_scene alone = {.pose = panel->pose, .view = view, .gravity = panel->gravity};
-    supine_render_extent(renderer, &alone, own);
+    supine_render_extent(by->renderer, &scene, own);
     shown[2] = own[2];
     shown[3] += own[2] - extent[2];
   }
-  const supine_scene scene = {.pose = panel->pose,
-                              .value = panel->value,
-                              .largest = bar->largest,
-                              .line_step = bar->step,
-                              .colours = picture->colours,
-                              .view = view,
-                              .gravity = panel->gravity,
-                              .shell = picture->transparency > 0,
-                              .width = (size_t)width,
-                              .height = (size_t)height,
-                              .extent = shown};
   SUPINE_FREED_BY(free_surface) cairo_surface_t *image = NULL;
-  SUPINE_TRY(draw_scene(renderer, &scene, &image, error));
-  cairo.set_source_surface(cr, image, floor(x), floor(y));
-  cairo.paint_with_alpha(cr,
-                         picture->transparency > 0 ? fmin(1, 2 * (1 - picture->transparency)) : 1);
+  SUPINE_TRY(draw_scene(by->renderer, &scene, &image, error));
+  cairo.set_source_surface(by->cr, image, floor(box[0]), floor(box[1]));
+  cairo.paint_with_alpha(by->cr, transparency > 0 ? fmin(1, 2 * (1 - transparency)) : 1);
   if (panel->marks != NULL) {
-    cairo.translate(cr, floor(x), floor(y));
-    SUPINE_TRY(draw_marks(cr, renderer, &scene, panel->marks, size));
-    cairo.translate(cr, -floor(x), -floor(y));
+    cairo.translate(by->cr, floor(box[0]), floor(box[1]));
+    SUPINE_TRY(draw_marks(by->cr, by->renderer, &scene, panel->marks, by->at.font));
+    cairo.translate(by->cr, -floor(box[0]), -floor(box[1]));
   }
   return SUPINE_OK;
 }
 
-/* Draw the cell of the picture that shows the posture `column` from the view `row`. A struct for
- * the nine parameters would have no other use. */
-static supine_status cell(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
-                          const layout *at, const bar_scale *bar, size_t column, size_t row,
-                          const double extent[4], supine_error *error) {
-  const supine_panel *panel = &picture->panel[column];
-  const supine_view view = picture->view[row];
+/* Draw the cell of the picture that shows the posture `column` from the view `row`. */
+static supine_status cell(const painter *by, size_t column, size_t row, const double extent[4],
+                          supine_error *error) {
+  cairo_t *cr = by->cr;
+  const layout *at = &by->at;
+  const supine_panel *panel = &by->picture->panel[column];
+  const supine_view view = by->picture->view[row];
   const double gap = at->margin / 2;
   const double x = at->margin + (double)column * (at->cell_width + gap);
   const double y = at->margin + (double)row * (at->cell_height + gap);
@@ -388,14 +386,17 @@ static supine_status cell(cairo_t *cr, supine_renderer *renderer, const supine_p
     cairo.fill(cr);
     below = at->font * 3;
   }
-  return lungs(cr, renderer, picture, panel, view, bar, x + at->font * 0.5, y + at->heading_height,
-               at->cell_width - at->font, at->cell_height - at->heading_height - below, at->font,
-               extent, error);
+  const double box[4] = {x + at->font * 0.5, y + at->heading_height, at->cell_width - at->font,
+                         at->cell_height - at->heading_height - below};
+  return lungs(by, panel, view, box, extent, error);
 }
 
-static void colour_bar(cairo_t *cr, const supine_picture *picture, const layout *at,
-                       const bar_scale *bar) {
+static void colour_bar(const painter *by) {
   enum { STOPS = 64 };
+  cairo_t *cr = by->cr;
+  const supine_picture *picture = by->picture;
+  const layout *at = &by->at;
+  const double step = supine_render_bar_step(picture->largest);
   const double width = fmin((double)picture->width - 2 * at->margin, 34 * at->font);
   const double x = ((double)picture->width - width) / 2;
   const double y = (double)picture->height - at->footer_height + at->font * 1.65;
@@ -420,10 +421,10 @@ static void colour_bar(cairo_t *cr, const supine_picture *picture, const layout 
   text(cr, x + width / 2, y - at->font * 0.5, 0.5, picture->bar_label);
   colour(cr, faint);
   cairo.set_line_width(cr, 1);
-  for (int i = 0; i * bar->step <= bar->largest * (1 + 1e-9); ++i) {
+  for (int i = 0; i * step <= picture->largest * (1 + 1e-9); ++i) {
     char number[32];
-    const double tick = x + width * i * bar->step / bar->largest;
-    (void)snprintf(number, sizeof number, "%g", i * bar->step);
+    const double tick = x + width * i * step / picture->largest;
+    (void)snprintf(number, sizeof number, "%g", i * step);
     cairo.move_to(cr, tick, y + height + at->font * 0.15);
     cairo.line_to(cr, tick, y + height + at->font * 0.4);
     cairo.stroke(cr);
@@ -462,12 +463,11 @@ void supine_render_picture_extent(supine_renderer *renderer, const supine_pictur
   }
 }
 
-static supine_status compose(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
-                             supine_error *error) {
-  const layout at = make_layout(picture);
-  const bar_scale bar = {picture->largest, supine_render_bar_step(picture->largest)};
-  double own[SUPINE_VIEWS_MAX][4];
-  if (at.font < 4) {
+static supine_status compose(const painter *by, supine_error *error) {
+  static const double none[4] = SUPINE_EXTENT_NONE;
+  const supine_picture *picture = by->picture;
+  double extent[SUPINE_VIEWS_MAX][4];
+  if (by->at.font < 4) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "%zu x %zu pixels are too few for %zu posture%s and %zu view%s: give "
                             "a larger --size",
@@ -475,21 +475,19 @@ static supine_status compose(cairo_t *cr, supine_renderer *renderer, const supin
                             picture->panel_count == 1 ? "" : "s", picture->view_count,
                             picture->view_count == 1 ? "" : "s");
   }
-  ground(cr, picture);
-  if (picture->extent == NULL) {
-    for (size_t row = 0; row < picture->view_count; ++row) {
-      memcpy(own[row], (const double[])SUPINE_EXTENT_NONE, sizeof own[row]);
-    }
-    supine_render_picture_extent(renderer, picture, own);
-  }
+  ground(by->cr, picture);
   for (size_t row = 0; row < picture->view_count; ++row) {
-    for (size_t column = 0; column < picture->panel_count; ++column) {
-      SUPINE_TRY(cell(cr, renderer, picture, &at, &bar, column, row,
-                      picture->extent != NULL ? picture->extent[row] : own[row], error));
-    }
+    memcpy(extent[row], picture->extent != NULL ? picture->extent[row] : none, sizeof none);
+  }
+  if (picture->extent == NULL) {
+    supine_render_picture_extent(by->renderer, picture, extent);
+  }
+  for (size_t i = 0; i < picture->view_count * picture->panel_count; ++i) {
+    const size_t row = i / picture->panel_count;
+    SUPINE_TRY(cell(by, i % picture->panel_count, row, extent[row], error));
   }
   if (picture->transparency == 0) { /* a shell has no colours */
-    colour_bar(cr, picture, &at, &bar);
+    colour_bar(by);
   }
   return SUPINE_OK;
 }
@@ -508,14 +506,14 @@ static supine_status write_png(cairo_surface_t *surface, FILE *file, supine_erro
 static supine_status draw_on(cairo_surface_t *surface, supine_renderer *renderer,
                              const supine_picture *picture, supine_error *error) {
   supine_status status = SUPINE_ERROR_MEMORY;
-  cairo_t *cr = cairo.create(surface);
-  if (cairo.status(cr) == CAIRO_STATUS_SUCCESS) {
-    status = compose(cr, renderer, picture, error);
+  const painter by = {cairo.create(surface), renderer, picture, make_layout(picture)};
+  if (cairo.status(by.cr) == CAIRO_STATUS_SUCCESS) {
+    status = compose(&by, error);
     cairo.surface_flush(surface);
   } else {
     (void)supine_error_set(error, status, "out of memory");
   }
-  cairo.destroy(cr);
+  cairo.destroy(by.cr);
   return status;
 }
 

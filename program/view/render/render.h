@@ -62,8 +62,8 @@ void supine_render_destroy(supine_renderer *renderer);
 typedef struct supine_scene {
   const supine_pose *pose;
   const float *value; /**< [N] value that the colour of each vertex shows, mm */
-  double largest;     /**< value that the last colour shows, mm; above 0 */
-  double line_step;   /**< difference of the value between contour lines, mm; 0 for no lines */
+  double largest;     /**< value that the last colour shows, mm; above 0. Contour lines are at the
+                           ticks of its colour bar (supine_render_bar_step) */
   supine_colours colours;
   supine_view view;
   const double *gravity; /**< [3] unit vector; needed if `view` is SUPINE_VIEW_LYING */
