@@ -5,6 +5,13 @@
 #include "program/report/comparison_parts.h"
 #include "program/view/render/render.h"
 
+/* These colours can be told apart with any colour vision (M. Okabe and K. Ito, 2008). */
+const char *supine_report_line(size_t posture) {
+  static const char *const lines[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
+                                      "#56b4e9", "#e69f00", "#8c8c8c"};
+  return lines[posture % (sizeof lines / sizeof *lines)];
+}
+
 /* Return the regional expansion of a slab, %. */
 static double percent(const supine_comparison *c, size_t posture, size_t slab) {
   return 100.0 * c->posture[posture].expansion[slab];

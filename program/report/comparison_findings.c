@@ -2,9 +2,9 @@
 /* Build the first sentences and the first tables of the report. */
 #include <ctype.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
+#include "base/text.h"
 #include "program/report/comparison_parts.h"
 
 /* Published values, mean (SD), for the postures' table rows; report.html names the sources. */
@@ -38,51 +38,39 @@ static double lowest_over_uppermost(const supine_comparison *c, size_t posture) 
   return gain[1] / volume[1] / (gain[0] / volume[0]);
 }
 
-static void print_where(const char *name, FILE *to) {
-  const char *label = supine_options_posture_label(name);
-  if (label != name) {
-    (void)fprintf(to, "Lying on the %s,", label);
-  } else if (isalpha((unsigned char)name[0])) {
-    (void)fprintf(to, "%c%s,", toupper((unsigned char)name[0]), name + 1);
-  } else {
-    (void)fprintf(to, "With gravity along %s,", name);
-  }
-}
-
-/* Print a sentence on a posture: how far the first target or, without targets, the surface moves. A
- * displacement below its expected error is no change that the model can tell. */
-static void print_finding(const supine_comparison *c, size_t posture, FILE *to) {
+/* Return a sentence on a posture: how far the first target or, without targets, the surface moves.
+ * A displacement below its expected error is no change that the model can tell. */
+static json_t *finding(const supine_comparison *c, size_t posture) {
   const supine_compared_posture *p = &c->posture[posture];
   const supine_target *t = p->targets;
   const double moved = t != NULL ? t->moved : p->displacement.mean;
   const double error = t != NULL ? t->expected : p->expected_error;
+  const char *name = c->postures.item[posture].name;
+  const char *label = supine_options_posture_label(name);
   char way[96];
-  print_where(c->postures.item[posture].name, to);
-  (void)fprintf(to, " %s", t != NULL ? t->name : "the surface");
-  if (moved <= error) {
-    (void)fprintf(to, ": " SUPINE_TARGET_UNTOLD " (%.1f mm", moved);
-  } else if (t != NULL) {
-    (void)fprintf(to, " moves %.1f mm: %s", moved, supine_command_target_way(t, 2, way));
+  char text[512] = "";
+  if (label != name) {
+    supine_text_add(text, sizeof text, "Lying on the %s,", label);
+  } else if (isalpha((unsigned char)name[0])) {
+    supine_text_add(text, sizeof text, "%c%s,", toupper((unsigned char)name[0]), name + 1);
   } else {
-    (void)fprintf(to, " moves %.1f mm on average, %.1f mm at most", moved, p->displacement.max);
+    supine_text_add(text, sizeof text, "With gravity along %s,", name);
+  }
+  supine_text_add(text, sizeof text, " %s", t != NULL ? t->name : "the surface");
+  if (moved <= error) {
+    supine_text_add(text, sizeof text, ": " SUPINE_TARGET_UNTOLD " (%.1f mm", moved);
+  } else if (t != NULL) {
+    supine_text_add(text, sizeof text, " moves %.1f mm: %s", moved,
+                    supine_command_target_way(t, 2, way));
+  } else {
+    supine_text_add(text, sizeof text, " moves %.1f mm on average, %.1f mm at most", moved,
+                    p->displacement.max);
   }
   if (error > 0) {
-    (void)fprintf(to, "; expected error %.1f mm", error);
+    supine_text_add(text, sizeof text, "; expected error %.1f mm", error);
   }
-  (void)fputs(moved <= error ? ")." : ".", to);
-}
-
-static json_t *finding(const supine_comparison *c, size_t posture) {
-  char *text = NULL;
-  size_t size = 0;
-  FILE *to = open_memstream(&text, &size);
-  if (to == NULL) {
-    return json_null();
-  }
-  print_finding(c, posture, to);
-  json_t *made = fclose(to) == 0 ? json_string(text) : json_null();
-  free(text);
-  return made;
+  supine_text_add(text, sizeof text, moved <= error ? ")." : ".");
+  return supine_options_json_text(text);
 }
 
 json_t *supine_report_findings(const supine_comparison *c) {

@@ -6,13 +6,9 @@
 #include <jansson.h>
 
 #include "program/report/comparison.h"
-#include "program/view/render/render.h"
 
 /* Return the colour of a posture's line in charts. */
 const char *supine_report_line(size_t posture);
-
-/* Return the data of bar.html, a colour bar from 0 to `largest` with the caption `words`. */
-json_t *supine_report_bar(supine_colours map, double largest, const char *words);
 
 /* Return the value of the tag {{findings}}: a sentence on each of the first three postures that
  * differ from the reference pose. */

@@ -179,11 +179,7 @@ static json_t *colours(void) {
   for (supine_colours map = 0; map < SUPINE_COLOURS_COUNT; ++map) {
     char text[6 * COLOURS + 1];
     for (int i = 0; i < COLOURS; ++i) {
-      double rgb[3];
-      supine_render_colour(map, i / (double)(COLOURS - 1), rgb);
-      for (int k = 0; k < 3; ++k) {
-        (void)snprintf(text + 6 * i + 2 * k, 3, "%02x", (unsigned)(255 * rgb[k] + 0.5) & 255U);
-      }
+      supine_render_hex(map, i / (double)(COLOURS - 1), text + 6 * i);
     }
     (void)json_object_set_new(maps, names[map], json_string(text));
   }

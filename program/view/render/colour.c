@@ -34,6 +34,14 @@ void supine_render_colour(supine_colours map, double t, double rgb[3]) {
   }
 }
 
+void supine_render_hex(supine_colours map, double t, char text[7]) {
+  double rgb[3];
+  supine_render_colour(map, t, rgb);
+  for (int k = 0; k < 3; ++k) {
+    (void)snprintf(text + 2 * k, 3, "%02x", (unsigned)(255 * rgb[k] + 0.5) & 255U);
+  }
+}
+
 double supine_render_bar_step(double value) {
   if (!(value > 0)) {
     return 0.2;

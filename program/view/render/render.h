@@ -48,6 +48,9 @@ typedef enum supine_colours {
  * Pictures, the report and the page use the same maps. */
 void supine_render_colour(supine_colours map, double t, double rgb[3]);
 
+/** Write the colour of a map at t as the six hexadecimal digits of HTML. */
+void supine_render_hex(supine_colours map, double t, char text[7]);
+
 /** Buffers for drawings of one basis. Only one thread at a time may use a renderer. */
 typedef struct supine_renderer supine_renderer;
 
