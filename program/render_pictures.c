@@ -33,7 +33,6 @@ typedef struct studio {
   supine_basis *basis;
   supine_reference_pose from;
   supine_compare *compare;
-  supine_renderer *renderer;
   supine_basis *inside; /* NULL if there are no structures inside the lungs */
   supine_command_names names;
   supine_posture_list postures; /* posture of each panel */
@@ -50,7 +49,6 @@ static void close_studio(studio *s) {
   }
   supine_command_names_close(&s->names);
   supine_basis_close(s->inside);
-  supine_render_destroy(s->renderer);
   supine_compare_destroy(s->compare);
   supine_arena_free(&s->arena);
   supine_basis_close(s->basis);
@@ -60,7 +58,6 @@ static supine_status open_studio(studio *s, const char *path, supine_error *erro
   SUPINE_TRY(supine_options_basis_open(path, SUPINE_STORAGE_AUTO, &s->basis, error));
   SUPINE_TRY(supine_options_reference(s->basis, &s->wanted->from, true, &s->from, error));
   SUPINE_TRY(supine_compare_create(s->basis, &s->compare, error));
-  SUPINE_TRY(supine_render_create(s->basis, &s->renderer, error));
   if (s->wanted->inside != NULL) {
     SUPINE_TRY(
         supine_command_inside_open(s->basis, s->wanted->inside, &s->inside, &s->names, error));
@@ -147,7 +144,7 @@ static supine_status draw_postures(studio *s, supine_error *error) {
     SUPINE_TRY(mark_panel(s, i, error));
   }
   const supine_picture picture = make_picture(s);
-  SUPINE_TRY(supine_render_picture_save(s->renderer, &picture, s->wanted->output, error));
+  SUPINE_TRY(supine_render_picture_save(s->basis, &picture, s->wanted->output, error));
   (void)printf("%s: %zu x %zu pixels\n", s->wanted->output, picture.width, picture.height);
   return SUPINE_OK;
 }
@@ -177,7 +174,7 @@ static supine_status add_frames(studio *s, size_t count, const double (*extent)[
     SUPINE_TRY(mark_panel(s, 0, error));
     supine_picture picture = make_picture(s);
     picture.extent = extent;
-    SUPINE_TRY(supine_render_animation_add(animation, s->renderer, &picture,
+    SUPINE_TRY(supine_render_animation_add(animation, s->basis, &picture,
                                            frame + 1 < count ? 1000 / FPS : LAST_FRAME_MS, error));
     if (!supine_options_progress_step(&progress, (double)(frame + 1) / (double)count)) {
       return supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
@@ -213,7 +210,7 @@ static supine_status draw_turn(studio *s, supine_error *error) {
   for (size_t frame = 0; frame < count; ++frame) {
     SUPINE_TRY(find_frame(s, frame, count, error));
     const supine_picture picture = make_picture(s);
-    supine_render_picture_extent(s->renderer, &picture, extent);
+    supine_render_picture_extent(s->basis, &picture, extent);
   }
   const supine_picture picture = make_picture(s);
   SUPINE_TRY(supine_output_open(path, &output, error));

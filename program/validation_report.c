@@ -68,17 +68,12 @@ void supine_command_print_validation(const supine_validation *s, bool json) {
   supine_options_print(root, json);
 }
 
-static void destroy(supine_renderer **renderer) {
-  supine_render_destroy(*renderer);
-}
-
 supine_status supine_command_draw_errors(const supine_validation *s, const char *path,
                                          supine_error *error) {
   static const supine_view views[2] = {SUPINE_VIEW_ANTERIOR, SUPINE_VIEW_POSTERIOR};
   const size_t n = s->start.vertex_count;
   supine_panel panel[SUPINE_VALIDATION_STATES_MAX] = {{0}};
   char subtitle[SUPINE_VALIDATION_STATES_MAX][96];
-  SUPINE_FREED_BY(destroy) supine_renderer *renderer = NULL;
   double largest = 0.0;
   double bar_end = 1.0; /* the least upper end of the colour bar, mm */
   size_t count = 0;
@@ -120,6 +115,5 @@ supine_status supine_command_draw_errors(const supine_validation *s, const char 
                             .width = 20 + 440 * count,
                             .height = 120 + 480 * 2};
   picture.beyond = largest > picture.largest;
-  SUPINE_TRY(supine_render_create(s->basis, &renderer, error));
-  return supine_render_picture_save(renderer, &picture, path, error);
+  return supine_render_picture_save(s->basis, &picture, path, error);
 }

@@ -111,19 +111,17 @@ TEST(test_bar_any_range_ends_at_round_tick) {
   }
 }
 
-/* A synthetic basis, its renderer, and a value for each vertex. */
+/* A synthetic basis, and a value for each vertex. */
 typedef struct drawing {
   fixture *f;
   unsigned char *bytes;
   supine_basis *basis;
-  supine_renderer *renderer;
   float *value;
 } drawing;
 
 enum { WIDTH = 120, HEIGHT = 100, PIXELS = WIDTH * HEIGHT };
 
 static void drawing_destroy(drawing *m) {
-  supine_render_destroy(m->renderer);
   supine_basis_close(m->basis);
   free(m->bytes);
   free(m->value);
@@ -133,7 +131,6 @@ static void drawing_destroy(drawing *m) {
 static drawing drawing_create(fixture *f) {
   drawing m = {.f = f};
   size_t size = 0;
-  supine_error error;
   m.bytes = fixture_bytes(f, &size);
   assert_int_equal(supine_basis_open_memory(m.bytes, size, &m.basis, NULL), SUPINE_OK);
   m.value = malloc(f->vertices * sizeof *m.value);
@@ -141,7 +138,6 @@ static drawing drawing_create(fixture *f) {
   for (size_t i = 0; i < f->vertices; ++i) {
     m.value[i] = f->vertex[3 * i + 2] * 0.05F + 5;
   }
-  assert_int_equal(supine_render_create(m.basis, &m.renderer, &error), SUPINE_OK);
   return m;
 }
 
@@ -156,7 +152,7 @@ static void draw(const drawing *m, supine_view view, const double *weights, doub
                               .width = WIDTH,
                               .height = HEIGHT};
   supine_error error;
-  if (supine_render_draw(m->renderer, &scene, pixels, &error) != SUPINE_OK) {
+  if (supine_render_draw(m->basis, &scene, pixels, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
 }
@@ -229,7 +225,7 @@ TEST(test_project_outer_vertices_match_drawing) {
     double projected[4] = {INFINITY, -INFINITY, INFINITY, -INFINITY};
     double drawn[4] = {INFINITY, -INFINITY, INFINITY, -INFINITY};
     draw(&m, view, weights, 1, pixels);
-    supine_render_project(m.renderer, &scene, &marks, false, at);
+    supine_render_project(m.basis, &scene, &marks, false, at);
     for (size_t i = 0; i < info->vertex_count; ++i) {
       for (int side = 0; side < 2; ++side) {
         projected[2 * side] = fmin(projected[2 * side], at[i][side]);
@@ -261,8 +257,8 @@ TEST(test_draw_impossible_size_refused) {
   supine_scene scene = {
       .pose = POSED(m.basis, weights, scales), .value = m.value, .largest = 1, .height = 10};
   supine_error error;
-  assert_int_equal(supine_render_draw(m.renderer, &scene, &pixel, &error), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_render_draw(m.basis, &scene, &pixel, &error), SUPINE_ERROR_ARGUMENT);
   scene.width = (size_t)1 << 30;
-  assert_int_equal(supine_render_draw(m.renderer, &scene, &pixel, &error), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_render_draw(m.basis, &scene, &pixel, &error), SUPINE_ERROR_ARGUMENT);
   drawing_destroy(&m);
 }

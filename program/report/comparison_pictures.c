@@ -20,11 +20,11 @@ static supine_scene make_scene(const supine_comparison *c, size_t posture, const
 }
 
 /* Draw a scene and return it as PNG in base64, or NULL on failure. */
-static json_t *draw(supine_renderer *renderer, const supine_scene *scene, supine_error *error) {
+static json_t *draw(const supine_basis *basis, const supine_scene *scene, supine_error *error) {
   char *bytes = NULL;
   size_t size = 0;
   FILE *file = open_memstream(&bytes, &size);
-  const bool drawn = file != NULL && supine_render_png(renderer, scene, file, error) == SUPINE_OK;
+  const bool drawn = file != NULL && supine_render_png(basis, scene, file, error) == SUPINE_OK;
   json_t *made = NULL;
   if (file != NULL && fclose(file) == 0 && drawn) {
     made = supine_export_base64(bytes, size);
@@ -56,14 +56,14 @@ static void set_gravity(const double g[3], json_t *shot) {
   }
 }
 
-static json_t *picture(const supine_comparison *c, supine_renderer *renderer, size_t posture,
-                       double largest, const double extent[4], float *value, supine_error *error) {
+static json_t *picture(const supine_comparison *c, size_t posture, double largest,
+                       const double extent[4], float *value, supine_error *error) {
   const supine_compared_posture *shown = &c->posture[posture];
   supine_scene scene = make_scene(c, posture, extent);
   (void)supine_compare_distances(c->compare, &shown->pose, &c->reference.pose, value);
   scene.value = value;
   scene.largest = largest;
-  json_t *png = draw(renderer, &scene, error);
+  json_t *png = draw(c->basis, &scene, error);
   if (png == NULL) {
     return NULL;
   }
@@ -93,10 +93,6 @@ static json_t *make_bar(double largest, const char *words) {
   return json_pack("{s:o, s:o, s:s}", "stops", stops, "ticks", ticks, "words", words);
 }
 
-static void free_renderer(supine_renderer **renderer) {
-  supine_render_destroy(*renderer);
-}
-
 json_t *supine_report_pictures(const supine_comparison *c, supine_error *error) {
   enum { PER_ROW = 6 }; /* pictures side by side on a printed page */
   const size_t count = c->postures.count;
@@ -104,22 +100,21 @@ json_t *supine_report_pictures(const supine_comparison *c, supine_error *error) 
   double extent[4] = SUPINE_EXTENT_NONE;
   double most = 0.0;
   SUPINE_ARENA arena = {0};
-  SUPINE_FREED_BY(free_renderer) supine_renderer *renderer = NULL;
   json_auto_t *cells = json_array();
   float *value =
       supine_arena_take(&arena, supine_basis_get_info(c->basis)->vertex_count, sizeof *value);
   *error = (supine_error){SUPINE_ERROR_MEMORY, "out of memory"};
-  if (arena.failed || supine_render_create(c->basis, &renderer, error) != SUPINE_OK) {
+  if (arena.failed) {
     return NULL;
   }
   for (size_t i = 0; i < count; ++i) {
     const supine_scene scene = make_scene(c, i, NULL);
-    supine_render_extent(renderer, &scene, extent);
+    supine_render_extent(c->basis, &scene, extent);
     most = fmax(most, c->posture[i].displacement.max);
   }
   const double largest = supine_render_bar_end(most);
   for (size_t i = 0; i < count; ++i) {
-    if (json_array_append_new(cells, picture(c, renderer, i, largest, extent, value, error)) != 0) {
+    if (json_array_append_new(cells, picture(c, i, largest, extent, value, error)) != 0) {
       return NULL;
     }
   }

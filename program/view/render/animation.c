@@ -48,11 +48,11 @@ supine_status supine_render_animation_open(size_t width, size_t height,
   return SUPINE_OK;
 }
 
-supine_status supine_render_animation_add(supine_animation *animation, supine_renderer *renderer,
+supine_status supine_render_animation_add(supine_animation *animation, const supine_basis *basis,
                                           const supine_picture *picture, int milliseconds,
                                           supine_error *error) {
   WebPPicture frame;
-  SUPINE_TRY(supine_render_picture_draw(renderer, picture, animation->pixels, error));
+  SUPINE_TRY(supine_render_picture_draw(basis, picture, animation->pixels, error));
   supine_status status = SUPINE_ERROR_MEMORY;
   if (WebPPictureInit(&frame)) {
     frame.width = (int)animation->width;

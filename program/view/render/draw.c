@@ -63,38 +63,6 @@ typedef struct corner {
   float value;
 } corner;
 
-struct supine_renderer {
-  const supine_basis *basis;
-  const supine_basis_info *info;
-  float *scratch;  /* [2, N, 3] positions, mm, then unit normals */
-  corner *corners; /* [N] the projected vertices */
-  supine_arena arena;
-};
-
-supine_status supine_render_create(const supine_basis *basis, supine_renderer **renderer,
-                                   supine_error *error) {
-  supine_renderer *r = calloc(1, sizeof *r);
-  if (r != NULL) {
-    r->basis = basis;
-    r->info = supine_basis_get_info(basis);
-    r->scratch = supine_arena_take(&r->arena, r->info->vertex_count, 6 * sizeof *r->scratch);
-    r->corners = supine_arena_take(&r->arena, r->info->vertex_count, sizeof *r->corners);
-  }
-  if (r == NULL || r->arena.failed) {
-    supine_render_destroy(r);
-    return supine_error_memory(error, "the picture");
-  }
-  *renderer = r;
-  return SUPINE_OK;
-}
-
-void supine_render_destroy(supine_renderer *renderer) {
-  if (renderer != NULL) {
-    supine_arena_free(&renderer->arena);
-    free(renderer);
-  }
-}
-
 void supine_render_box(const float *xyz, size_t count, double low[3], double high[3]) {
   for (size_t i = 0; i < 3 * count; ++i) {
     low[i % 3] = fmin(low[i % 3], (double)xyz[i]);
@@ -110,12 +78,12 @@ typedef struct camera {
   double away;   /* distance from the viewer to the centre, mm */
 } camera;
 
-static camera find_camera(const supine_renderer *r, const supine_scene *scene) {
+static camera find_camera(const supine_basis_info *info, const supine_scene *scene) {
   camera c = {.radius = 1e-3};
   double low[3] = {INFINITY, INFINITY, INFINITY};
   double high[3] = {-INFINITY, -INFINITY, -INFINITY};
   supine_render_view_axes(scene->view, scene->gravity, c.axes);
-  supine_render_box(r->info->vertices, r->info->vertex_count, low, high);
+  supine_render_box(info->vertices, info->vertex_count, low, high);
   for (int axis = 0; axis < 3; ++axis) {
     c.centre[axis] = (low[axis] + high[axis]) / 2;
     c.radius = hypot(c.radius, (high[axis] - low[axis]) / 2);
@@ -138,13 +106,19 @@ static void place(const camera *c, const float xyz[3], double seen[3]) {
   turn(c, from, seen);
 }
 
-void supine_render_extent(supine_renderer *r, const supine_scene *scene, double extent[4]) {
-  const camera c = find_camera(r, scene);
+void supine_render_extent(const supine_basis *basis, const supine_scene *scene, double extent[4]) {
+  enum { CHUNK = 512 };
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const camera c = find_camera(info, scene);
   const double closest = c.away - 0.98 * drawn_depth * c.radius;
-  (void)supine_deform(r->basis, scene->pose, r->scratch);
-  for (size_t i = 0; i < r->info->vertex_count; ++i) {
+  float xyz[3 * CHUNK];
+  for (size_t i = 0; i < info->vertex_count; ++i) {
     double p[3];
-    place(&c, r->scratch + 3 * i, p);
+    if (i % CHUNK == 0) {
+      const size_t end = i + CHUNK < info->vertex_count ? i + CHUNK : info->vertex_count;
+      (void)supine_deform_range(basis, scene->pose, i, end, xyz);
+    }
+    place(&c, xyz + 3 * (i % CHUNK), p);
     for (int side = 0; side < 2; ++side) {
       const double at = p[side] * c.away / fmax(closest, c.away - p[2]);
       extent[2 * side] = fmin(extent[2 * side], at);
@@ -155,12 +129,12 @@ void supine_render_extent(supine_renderer *r, const supine_scene *scene, double 
 
 /* Fit the lungs into the picture. Set frame[0] and frame[1] to the centre of their extent, mm, and
  * frame[2] and frame[3] to the scales, in half widths and half heights of the picture per mm. */
-static void find_frame(supine_renderer *r, const supine_scene *scene, double frame[4]) {
+static void find_frame(const supine_basis *basis, const supine_scene *scene, double frame[4]) {
   double extent[4] = SUPINE_EXTENT_NONE;
   if (scene->extent != NULL) {
     memcpy(extent, scene->extent, sizeof extent);
   } else {
-    supine_render_extent(r, scene, extent);
+    supine_render_extent(basis, scene, extent);
   }
   const double aspect = (double)scene->width / (double)scene->height;
   const double wide = fmax(1e-3, margin * (extent[1] - extent[0]) / 2);
@@ -182,12 +156,12 @@ static void project(const camera *c, const double frame[4], const double p[3], c
   }
 }
 
-void supine_render_project(supine_renderer *r, const supine_scene *scene, const supine_marks *marks,
-                           bool from, double (*pixel)[2]) {
-  const camera c = find_camera(r, scene);
+void supine_render_project(const supine_basis *basis, const supine_scene *scene,
+                           const supine_marks *marks, bool from, double (*pixel)[2]) {
+  const camera c = find_camera(supine_basis_get_info(basis), scene);
   const double size[2] = {(double)scene->width, (double)scene->height};
   double frame[4];
-  find_frame(r, scene, frame);
+  find_frame(basis, scene, frame);
   for (size_t i = 0; i < marks->count; ++i) {
     double p[3];
     place(&c, from ? marks->mark[i].from : marks->mark[i].xyz, p);
@@ -196,8 +170,9 @@ void supine_render_project(supine_renderer *r, const supine_scene *scene, const 
 }
 
 typedef struct canvas {
-  supine_renderer *renderer;
+  const supine_basis_info *info;
   const supine_scene *scene;
+  corner *corners;                  /* [N] the projected vertices */
   size_t width, height;             /* size of the picture, samples */
   uint32_t *nearest;                /* [height, width] nearest triangle, or NO_TRIANGLE */
   float *nearness;                  /* [height, width] 1 / (depth of the nearest triangle), 1/mm */
@@ -207,33 +182,40 @@ typedef struct canvas {
   uint32_t *pixels;
 } canvas;
 
-static void find_corners(const canvas *c) {
-  supine_renderer *r = c->renderer;
-  const camera cam = find_camera(r, c->scene);
+/* Project the vertices of the deformed surface. */
+static supine_status find_corners(const canvas *c, const supine_basis *basis, supine_error *error) {
+  const size_t n = c->info->vertex_count;
+  const camera cam = find_camera(c->info, c->scene);
   const double size[2] = {(double)c->width, (double)c->height};
   const double near = cam.away - drawn_depth * cam.radius;
   double frame[4];
-  find_frame(r, c->scene, frame);
-  (void)supine_deform(r->basis, c->scene->pose, r->scratch);
-  const float *normals = r->scratch + 3 * r->info->vertex_count;
-  supine_normals(r->basis, r->scratch, r->scratch + 3 * r->info->vertex_count);
-  for (size_t i = 0; i < r->info->vertex_count; ++i) {
-    const double n[3] = {(double)normals[3 * i], (double)normals[3 * i + 1],
-                         (double)normals[3 * i + 2]};
+  SUPINE_ARENA arena = {0};
+  float *xyz = supine_arena_take(&arena, 3 * n, sizeof *xyz);
+  float *normals = supine_arena_take(&arena, 3 * n, sizeof *normals);
+  if (arena.failed) {
+    return supine_error_memory(error, "%zu vertices", n);
+  }
+  find_frame(basis, c->scene, frame);
+  (void)supine_deform(basis, c->scene->pose, xyz);
+  supine_normals(basis, xyz, normals);
+  for (size_t i = 0; i < n; ++i) {
+    const double normal[3] = {(double)normals[3 * i], (double)normals[3 * i + 1],
+                              (double)normals[3 * i + 2]};
     double p[3];
     double seen[3];
     double at[2];
-    place(&cam, r->scratch + 3 * i, p);
-    turn(&cam, n, seen);
+    place(&cam, xyz + 3 * i, p);
+    turn(&cam, normal, seen);
     project(&cam, frame, p, size, at);
     const double away = cam.away - p[2];
-    r->corners[i] = (corner){.x = (float)at[0],
+    c->corners[i] = (corner){.x = (float)at[0],
                              .y = (float)at[1],
                              .nearness = away > near ? (float)(1.0 / away) : 0.0F,
                              .normal = {(float)seen[0], (float)seen[1], (float)seen[2]},
                              .eye = {(float)-p[0], (float)-p[1], (float)away},
                              .value = c->scene->value[i]};
   }
+  return SUPINE_OK;
 }
 
 typedef struct face {
@@ -242,8 +224,8 @@ typedef struct face {
 } face;
 
 static face face_of(const canvas *c, size_t triangle) {
-  const uint32_t *v = c->renderer->info->triangles + 3 * triangle;
-  const corner *all = c->renderer->corners;
+  const uint32_t *v = c->info->triangles + 3 * triangle;
+  const corner *all = c->corners;
   face f = {{&all[v[0]], &all[v[1]], &all[v[2]]}, 0.0F};
   f.area = (f.at[2]->x - f.at[0]->x) * (f.at[1]->y - f.at[0]->y) -
            (f.at[1]->x - f.at[0]->x) * (f.at[2]->y - f.at[0]->y);
@@ -404,8 +386,8 @@ static uint32_t mean_of(const canvas *c, size_t x, size_t y) {
 
 static void draw_rows(void *context, size_t begin, size_t end, size_t thread) {
   const canvas *c = context;
-  const supine_basis_info *info = c->renderer->info;
-  const corner *corners = c->renderer->corners;
+  const supine_basis_info *info = c->info;
+  const corner *corners = c->corners;
   (void)thread;
   for (size_t t = 0; t < info->triangle_count; ++t) {
     const uint32_t *v = info->triangles + 3 * t;
@@ -433,8 +415,8 @@ static void find_colours(canvas *c) {
   }
 }
 
-supine_status supine_render_draw(supine_renderer *r, const supine_scene *scene, uint32_t *pixels,
-                                 supine_error *error) {
+supine_status supine_render_draw(const supine_basis *basis, const supine_scene *scene,
+                                 uint32_t *pixels, supine_error *error) {
   if (scene->width == 0 || scene->height == 0 || scene->width > SIDE_MAX ||
       scene->height > SIDE_MAX) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
@@ -443,7 +425,9 @@ supine_status supine_render_draw(supine_renderer *r, const supine_scene *scene, 
   }
   SUPINE_ARENA arena = {0};
   const size_t count = OVERSAMPLE * OVERSAMPLE * scene->width * scene->height;
-  canvas c = {.renderer = r,
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  canvas c = {.info = info,
+              .corners = supine_arena_take(&arena, info->vertex_count, sizeof *c.corners),
               .scene = scene,
               .width = OVERSAMPLE * scene->width,
               .height = OVERSAMPLE * scene->height,
@@ -456,7 +440,7 @@ supine_status supine_render_draw(supine_renderer *r, const supine_scene *scene, 
   }
   memset(c.nearest, 0xFF, count * sizeof *c.nearest);
   find_colours(&c);
-  find_corners(&c);
+  SUPINE_TRY(find_corners(&c, basis, error));
   supine_parallel_for(scene->height, ROWS_PER_JOB, 0, draw_rows, &c);
   return SUPINE_OK;
 }

@@ -56,7 +56,7 @@ typedef struct layout {
 /* What draws a picture. */
 typedef struct painter {
   cairo_t *cr;
-  supine_renderer *renderer;
+  const supine_basis *basis;
   const supine_picture *picture;
   layout at;
 } painter;
@@ -256,7 +256,7 @@ static void draw_names(cairo_t *cr, const supine_marks *marks, double (*pixel)[2
 
 /* Draw triangles, discs and dots at the marks, then arrows, then labels. The origin of the picture
  * is the upper left corner of the scene; `size` is the size of the font, pixels. */
-static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const supine_scene *scene,
+static supine_status draw_marks(cairo_t *cr, const supine_basis *basis, const supine_scene *scene,
                                 const supine_marks *marks, double size) {
   SUPINE_ARENA arena = {0};
   double(*pixel)[2] = supine_arena_take(&arena, marks->count, 2 * sizeof *pixel);
@@ -265,8 +265,8 @@ static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const su
     return SUPINE_ERROR_MEMORY;
   }
   double(*from)[2] = pixel + marks->count;
-  supine_render_project(renderer, scene, marks, false, pixel);
-  supine_render_project(renderer, scene, marks, true, from);
+  supine_render_project(basis, scene, marks, false, pixel);
+  supine_render_project(basis, scene, marks, true, from);
   cairo.new_path(cr);
   colour(cr, mark_colour);
   cairo.set_line_width(cr, 1.0); /* closes the seams between triangles */
@@ -302,7 +302,7 @@ static void free_surface(cairo_surface_t **surface) {
 }
 
 /* Draw a scene on a new cairo surface, which the caller must destroy, even after a failure. */
-static supine_status draw_scene(supine_renderer *renderer, const supine_scene *scene,
+static supine_status draw_scene(const supine_basis *basis, const supine_scene *scene,
                                 cairo_surface_t **image, supine_error *error) {
   *image = cairo.image_surface_create(CAIRO_FORMAT_ARGB32, (int)scene->width, (int)scene->height);
   if (cairo.surface_status(*image) != CAIRO_STATUS_SUCCESS ||
@@ -311,7 +311,7 @@ static supine_status draw_scene(supine_renderer *renderer, const supine_scene *s
   }
   cairo.surface_flush(*image);
   const supine_status status = supine_render_draw(
-      renderer, scene, (uint32_t *)(void *)cairo.image_surface_get_data(*image), error);
+      basis, scene, (uint32_t *)(void *)cairo.image_surface_get_data(*image), error);
   cairo.surface_mark_dirty(*image);
   return status;
 }
@@ -333,17 +333,17 @@ static supine_status lungs(const painter *by, const supine_panel *panel, supine_
                         .height = (size_t)box[3],
                         .extent = shown};
   if (view == SUPINE_VIEW_LYING) { /* put the lungs of every posture on the table */
-    supine_render_extent(by->renderer, &scene, own);
+    supine_render_extent(by->basis, &scene, own);
     shown[2] = own[2];
     shown[3] += own[2] - extent[2];
   }
   SUPINE_FREED_BY(free_surface) cairo_surface_t *image = NULL;
-  SUPINE_TRY(draw_scene(by->renderer, &scene, &image, error));
+  SUPINE_TRY(draw_scene(by->basis, &scene, &image, error));
   cairo.set_source_surface(by->cr, image, floor(box[0]), floor(box[1]));
   cairo.paint_with_alpha(by->cr, transparency > 0 ? fmin(1, 2 * (1 - transparency)) : 1);
   if (panel->marks != NULL) {
     cairo.translate(by->cr, floor(box[0]), floor(box[1]));
-    SUPINE_TRY(draw_marks(by->cr, by->renderer, &scene, panel->marks, by->at.font));
+    SUPINE_TRY(draw_marks(by->cr, by->basis, &scene, panel->marks, by->at.font));
     cairo.translate(by->cr, -floor(box[0]), -floor(box[1]));
   }
   return SUPINE_OK;
@@ -451,14 +451,14 @@ static layout make_layout(const supine_picture *picture) {
   return at;
 }
 
-void supine_render_picture_extent(supine_renderer *renderer, const supine_picture *picture,
+void supine_render_picture_extent(const supine_basis *basis, const supine_picture *picture,
                                   double (*extent)[4]) {
   for (size_t row = 0; row < picture->view_count; ++row) {
     for (size_t column = 0; column < picture->panel_count; ++column) {
       const supine_scene scene = {.pose = picture->panel[column].pose,
                                   .view = picture->view[row],
                                   .gravity = picture->panel[column].gravity};
-      supine_render_extent(renderer, &scene, extent[row]);
+      supine_render_extent(basis, &scene, extent[row]);
     }
   }
 }
@@ -480,7 +480,7 @@ static supine_status compose(const painter *by, supine_error *error) {
     memcpy(extent[row], picture->extent != NULL ? picture->extent[row] : none, sizeof none);
   }
   if (picture->extent == NULL) {
-    supine_render_picture_extent(by->renderer, picture, extent);
+    supine_render_picture_extent(by->basis, picture, extent);
   }
   for (size_t i = 0; i < picture->view_count * picture->panel_count; ++i) {
     const size_t row = i / picture->panel_count;
@@ -503,10 +503,10 @@ static supine_status write_png(cairo_surface_t *surface, FILE *file, supine_erro
                                                             cairo.status_to_string(written));
 }
 
-static supine_status draw_on(cairo_surface_t *surface, supine_renderer *renderer,
+static supine_status draw_on(cairo_surface_t *surface, const supine_basis *basis,
                              const supine_picture *picture, supine_error *error) {
   supine_status status = SUPINE_ERROR_MEMORY;
-  const painter by = {cairo.create(surface), renderer, picture, make_layout(picture)};
+  const painter by = {cairo.create(surface), basis, picture, make_layout(picture)};
   if (cairo.status(by.cr) == CAIRO_STATUS_SUCCESS) {
     status = compose(&by, error);
     cairo.surface_flush(surface);
@@ -517,34 +517,34 @@ static supine_status draw_on(cairo_surface_t *surface, supine_renderer *renderer
   return status;
 }
 
-supine_status supine_render_picture_draw(supine_renderer *renderer, const supine_picture *picture,
+supine_status supine_render_picture_draw(const supine_basis *basis, const supine_picture *picture,
                                          uint32_t *pixels, supine_error *error) {
   SUPINE_TRY(SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error));
   SUPINE_FREED_BY(free_surface)
   cairo_surface_t *surface = cairo.image_surface_create_for_data(
       (unsigned char *)pixels, CAIRO_FORMAT_RGB24, (int)picture->width, (int)picture->height,
       (int)(4 * picture->width));
-  return draw_on(surface, renderer, picture, error);
+  return draw_on(surface, basis, picture, error);
 }
 
-supine_status supine_render_picture_save(supine_renderer *renderer, const supine_picture *picture,
+supine_status supine_render_picture_save(const supine_basis *basis, const supine_picture *picture,
                                          const char *path, supine_error *error) {
   SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
   SUPINE_TRY(SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error));
   SUPINE_FREED_BY(free_surface)
   cairo_surface_t *surface =
       cairo.image_surface_create(CAIRO_FORMAT_RGB24, (int)picture->width, (int)picture->height);
-  SUPINE_TRY(draw_on(surface, renderer, picture, error));
+  SUPINE_TRY(draw_on(surface, basis, picture, error));
   SUPINE_TRY(supine_output_open(path, &output, error));
   const supine_status status = write_png(surface, output.file, error);
   return status == SUPINE_OK || ferror(output.file) != 0 ? supine_output_commit(&output, error)
                                                          : status;
 }
 
-supine_status supine_render_png(supine_renderer *renderer, const supine_scene *scene, FILE *file,
+supine_status supine_render_png(const supine_basis *basis, const supine_scene *scene, FILE *file,
                                 supine_error *error) {
   SUPINE_TRY(SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error));
   SUPINE_FREED_BY(free_surface) cairo_surface_t *image = NULL;
-  SUPINE_TRY(draw_scene(renderer, scene, &image, error));
+  SUPINE_TRY(draw_scene(basis, scene, &image, error));
   return write_png(image, file, error);
 }

@@ -51,16 +51,6 @@ void supine_render_colour(supine_colours map, double t, double rgb[3]);
 /** Write the colour of a map at t as the six hexadecimal digits of HTML. */
 void supine_render_hex(supine_colours map, double t, char text[7]);
 
-/** Buffers for drawings of one basis. Only one thread at a time may use a renderer. */
-typedef struct supine_renderer supine_renderer;
-
-/** Create a renderer; supine_render_destroy frees it.
- * @param basis  must outlive the renderer */
-supine_status supine_render_create(const supine_basis *basis, supine_renderer **renderer,
-                                   supine_error *error);
-/** Destroy a renderer; NULL is legal. */
-void supine_render_destroy(supine_renderer *renderer);
-
 /** One drawing: the lungs in one state from one side. */
 typedef struct supine_scene {
   const supine_pose *pose;
@@ -85,15 +75,15 @@ void supine_render_box(const float *xyz, size_t count, double low[3], double hig
 /** Enlarge an extent to contain a scene, so that several states can be drawn at one scale. An
  * extent is the smallest x, the largest x, the smallest y and the largest y, mm, on the plane
  * through the lungs' centre that the viewer faces. All scenes must have the same view. */
-void supine_render_extent(supine_renderer *renderer, const supine_scene *scene, double extent[4]);
+void supine_render_extent(const supine_basis *basis, const supine_scene *scene, double extent[4]);
 
 /** Draw a scene on a transparent background, using all cores.
  * @param pixels  [height, width] premultiplied ARGB as in cairo, top row first; output */
-supine_status supine_render_draw(supine_renderer *renderer, const supine_scene *scene,
+supine_status supine_render_draw(const supine_basis *basis, const supine_scene *scene,
                                  uint32_t *pixels, supine_error *error);
 
 /** Draw a scene and write it as PNG. */
-supine_status supine_render_png(supine_renderer *renderer, const supine_scene *scene, FILE *file,
+supine_status supine_render_png(const supine_basis *basis, const supine_scene *scene, FILE *file,
                                 supine_error *error);
 
 /** A point, or a vertex of a mesh, inside the lungs. */
@@ -113,7 +103,7 @@ typedef struct supine_marks {
 
 /** Compute the positions of marks in the drawing of a scene, or those of supine_mark.from.
  * @param pixel  [count, 2] pixels from the left and upper edges; output */
-void supine_render_project(supine_renderer *renderer, const supine_scene *scene,
+void supine_render_project(const supine_basis *basis, const supine_scene *scene,
                            const supine_marks *marks, bool from, double (*pixel)[2]);
 
 /** A column of a picture: the lungs in one posture. */
@@ -154,16 +144,16 @@ double supine_render_bar_end(double value);
 /** Enlarge the extents of all views (see supine_render_extent) so that they contain a picture.
  * Several pictures can then be drawn at one scale.
  * @param extent  [view_count, 4] smallest and largest x, then y, of each view, mm */
-void supine_render_picture_extent(supine_renderer *renderer, const supine_picture *picture,
+void supine_render_picture_extent(const supine_basis *basis, const supine_picture *picture,
                                   double (*extent)[4]);
 
 /** Compose a picture.
  * @param pixels  [height, width] RGB, 0x00RRGGBB or 0xFFRRGGBB, top row first; output */
-supine_status supine_render_picture_draw(supine_renderer *renderer, const supine_picture *picture,
+supine_status supine_render_picture_draw(const supine_basis *basis, const supine_picture *picture,
                                          uint32_t *pixels, supine_error *error);
 
 /** Compose a picture and write it as a PNG file. */
-supine_status supine_render_picture_save(supine_renderer *renderer, const supine_picture *picture,
+supine_status supine_render_picture_save(const supine_basis *basis, const supine_picture *picture,
                                          const char *path, supine_error *error);
 
 /** A WebP animation that repeats forever. */
@@ -173,7 +163,7 @@ typedef struct supine_animation supine_animation;
 supine_status supine_render_animation_open(size_t width, size_t height,
                                            supine_animation **animation, supine_error *error);
 /** Append a picture of the animation's size, to be shown for `milliseconds`. */
-supine_status supine_render_animation_add(supine_animation *animation, supine_renderer *renderer,
+supine_status supine_render_animation_add(supine_animation *animation, const supine_basis *basis,
                                           const supine_picture *picture, int milliseconds,
                                           supine_error *error);
 /** Write the animation to a file. */
