@@ -21,16 +21,6 @@ const char *supine_text_file_name(const char *path) {
   return slash != NULL ? slash + 1 : path;
 }
 
-char *supine_text_item(char **rest) {
-  char *item = *rest;
-  char *comma = strchr(item, ',');
-  *rest = comma != NULL ? comma + 1 : NULL;
-  if (comma != NULL) {
-    *comma = '\0';
-  }
-  return item;
-}
-
 bool supine_text_ends_in(const char *name, const char *ending) {
   const size_t length = strlen(name);
   const size_t tail = strlen(ending);

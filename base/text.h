@@ -19,10 +19,6 @@ char *supine_text_make_utf8(char *text);
 /** Return the part of a path after the last '/'. */
 const char *supine_text_file_name(const char *path);
 
-/** Return the text up to the next comma, which becomes a NUL, and set `rest` to the text after it,
- * or to NULL at the end. */
-char *supine_text_item(char **rest);
-
 /** Return whether a name ends in `ending` (".csv"), ignoring case, after at least one character. */
 bool supine_text_ends_in(const char *name, const char *ending);
 

@@ -10,27 +10,11 @@
 #include <time.h>
 #include <unistd.h>
 
-#include <supine/version.h>
-
 #include "base/clock.h"
 #include "base/output.h"
-#include "base/text.h"
 
 #include "program/options/command.h"
 #include "runtime/words.h"
-
-static int exit_code(supine_status status) {
-  static const int codes[SUPINE_STATUS_COUNT] = {
-      [SUPINE_ERROR_ARGUMENT] = SUPINE_EXIT_USAGE,
-      [SUPINE_ERROR_READ] = SUPINE_EXIT_INPUT,
-      [SUPINE_ERROR_FORMAT] = SUPINE_EXIT_INPUT,
-      [SUPINE_ERROR_MESH] = SUPINE_EXIT_INPUT,
-      [SUPINE_ERROR_OPEN_SURFACE] = SUPINE_EXIT_INPUT,
-      [SUPINE_ERROR_UNSUPPORTED] = SUPINE_EXIT_UNSUPPORTED,
-      [SUPINE_ERROR_WRITE] = SUPINE_EXIT_OUTPUT,
-      [SUPINE_ERROR_INTERRUPTED] = SUPINE_EXIT_OUTPUT}; /* 0: the rest, which are numerical */
-  return codes[status] != 0 ? codes[status] : SUPINE_EXIT_NUMERICAL;
-}
 
 void supine_options_say(const char *command, const char *format, ...) {
   va_list arguments;
@@ -41,15 +25,6 @@ void supine_options_say(const char *command, const char *format, ...) {
   va_end(arguments);
 }
 
-int supine_options_fail(const char *command, supine_status status, const supine_error *error) {
-  supine_options_say(command, "%s",
-                     error->message[0] != '\0' ? error->message : supine_status_string(status));
-  if (status == SUPINE_ERROR_ARGUMENT) {
-    (void)fprintf(stderr, "Try 'supine %s --help'.\n", command);
-  }
-  return exit_code(status);
-}
-
 int supine_options_finish(const char *command) {
   errno = 0;
   if (ferror(stdout) != 0 || fflush(stdout) != 0) {
@@ -57,14 +32,6 @@ int supine_options_finish(const char *command) {
     return SUPINE_EXIT_OUTPUT;
   }
   return SUPINE_EXIT_OK;
-}
-
-void supine_options_describe(int argc, char **argv, char *text, size_t size) {
-  size_t used = (size_t)snprintf(text, size, "supine " SUPINE_VERSION);
-  for (int i = 0; i < argc && used < size; ++i) {
-    used += (size_t)snprintf(text + used, size - used, " %s", supine_text_file_name(argv[i]));
-  }
-  (void)supine_text_make_utf8(text);
 }
 
 bool supine_options_parse_number(const char *text, double *value) {

@@ -33,9 +33,6 @@ extern const supine_command *const supine_command_list[];
 /* Print "supine COMMAND: MESSAGE" to stderr. */
 void supine_options_say(const char *command, const char *format, ...) SUPINE_PRINTF(2, 3);
 
-/* Print the message of `error` or, if that is empty, the name of `status`; return the exit code. */
-int supine_options_fail(const char *command, supine_status status, const supine_error *error);
-
 /* Flush standard output; return SUPINE_EXIT_OUTPUT if the disk is full or the pipe is closed. */
 int supine_options_finish(const char *command);
 
@@ -49,9 +46,6 @@ json_t *supine_options_json_text(const char *text);
 
 /* Return numbers as a JSON array; numbers that are not finite become null. */
 json_t *supine_options_json_numbers(size_t count, const double *numbers);
-
-/* Write the command line into `text` [size]; shorten paths to the part after the last slash. */
-void supine_options_describe(int argc, char **argv, char *text, size_t size);
 
 /* Read a finite number; return false for any other text. */
 bool supine_options_parse_number(const char *text, double *value);

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "base/text.h"
+#include "base/arena.h"
 #include "program/options/model_options.h"
 #include "program/options/state_options.h"
 #include "program/options/surface_options.h"
@@ -22,20 +22,17 @@ static supine_status read_scan(const char *text, void *field, supine_error *erro
 /* Read volumes at rest, such as "supine=0.48,prone=2600mL" or "copd". */
 static supine_status read_resting(const char *text, void *field, supine_error *error) {
   supine_model_choice *choice = field;
-  char copy[256];
-  (void)snprintf(copy, sizeof copy, "%s", text);
-  supine_status status = SUPINE_OK;
-  for (char *rest = copy; status == SUPINE_OK && rest != NULL;) {
-    const char *piece = supine_text_item(&rest);
+  char piece[64];
+  for (const char *at = text; supine_options_next_item(&at, piece, sizeof piece);) {
     char *value = strchr(piece, '=');
     if (value != NULL) {
       *value++ = '\0';
     } else if (strcmp(piece, "copd") != 0) {
       return SUPINE_ERROR_ARGUMENT;
     }
-    status = supine_reference_resting_set(&choice->resting, piece, value, error);
+    SUPINE_TRY(supine_reference_resting_set(&choice->resting, piece, value, error));
   }
-  return status;
+  return SUPINE_OK;
 }
 
 /* Read "uniform", or "linear:AXIS:FROM:TO" or "exp:AXIS:FROM:TO" with the expandability at both
@@ -268,24 +265,17 @@ supine_status supine_command_prepare(const char *command, supine_model_choice *c
 supine_status supine_command_load_lungs(const char *command, const char *operand,
                                         const supine_source_options *options, supine_lungs *lungs,
                                         supine_error *error) {
-  enum { FILES_MAX = 2 };
-  char *paths[FILES_MAX + 1];
-  size_t count = 0;
+  char first[4096];
+  const char *second = operand;
   supine_source source = {.is_map = false};
-  SUPINE_ARENA arena = {0};
-  char *remaining = supine_arena_take(&arena, strlen(operand) + 1, 1);
-  if (remaining == NULL) {
-    return supine_error_memory(error, "names of files");
-  }
-  (void)strcpy(remaining, operand);
-  while (remaining != NULL && count <= FILES_MAX) {
-    paths[count++] = supine_text_item(&remaining);
-  }
-  if (count > FILES_MAX) {
+  (void)supine_options_next_item(&second, first, sizeof first);
+  if (second != NULL && strchr(second, ',') != NULL) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "'%s' names more than two surfaces: give one or two", operand);
   }
-  const supine_status status = supine_precompute_source_load(options, paths, count, &source, error);
+  char *paths[] = {first, (char *)second};
+  const supine_status status =
+      supine_precompute_source_load(options, paths, second != NULL ? 2 : 1, &source, error);
   supine_options_say_findings(command, &source.findings);
   *lungs = source.lungs;
   return status;

@@ -6,8 +6,11 @@
 #include <strings.h>
 #include <sys/stat.h>
 
+#include <supine/version.h>
+
 #include "base/arena.h"
 #include "base/output.h"
+#include "base/text.h"
 
 #include "program/options/command.h"
 
@@ -323,11 +326,20 @@ static supine_status check_outputs(const reading *r, const supine_arguments *giv
   return SUPINE_OK;
 }
 
+/* Write the command line into `text` [size]; shorten paths to the part after the last slash. */
+static void describe_command(int argc, char **argv, char *text, size_t size) {
+  size_t used = (size_t)snprintf(text, size, "supine " SUPINE_VERSION);
+  for (int i = 0; i < argc && used < size; ++i) {
+    used += (size_t)snprintf(text + used, size - used, " %s", supine_text_file_name(argv[i]));
+  }
+  (void)supine_text_make_utf8(text);
+}
+
 static supine_status read_and_run(reading *r, int argc, char **argv, const void *context,
                                   supine_error *error) {
   const supine_command *command = r->command;
   char made_by[512];
-  supine_options_describe(argc, argv, made_by, sizeof made_by);
+  describe_command(argc, argv, made_by, sizeof made_by);
   if (command->begin != NULL) {
     command->begin(r->request);
   }
@@ -357,9 +369,29 @@ supine_status supine_options_run_words(const supine_command *command, int argc, 
   return status;
 }
 
+static int exit_code(supine_status status) {
+  static const int codes[SUPINE_STATUS_COUNT] = {
+      [SUPINE_ERROR_ARGUMENT] = SUPINE_EXIT_USAGE,
+      [SUPINE_ERROR_READ] = SUPINE_EXIT_INPUT,
+      [SUPINE_ERROR_FORMAT] = SUPINE_EXIT_INPUT,
+      [SUPINE_ERROR_MESH] = SUPINE_EXIT_INPUT,
+      [SUPINE_ERROR_OPEN_SURFACE] = SUPINE_EXIT_INPUT,
+      [SUPINE_ERROR_UNSUPPORTED] = SUPINE_EXIT_UNSUPPORTED,
+      [SUPINE_ERROR_WRITE] = SUPINE_EXIT_OUTPUT,
+      [SUPINE_ERROR_INTERRUPTED] = SUPINE_EXIT_OUTPUT}; /* 0: the rest, which are numerical */
+  return codes[status] != 0 ? codes[status] : SUPINE_EXIT_NUMERICAL;
+}
+
 int supine_options_run(const supine_command *command, int argc, char **argv) {
   supine_error error = {.message = ""};
   const supine_status status = supine_options_run_words(command, argc, argv, NULL, &error);
-  return status == SUPINE_OK ? supine_options_finish(command->name)
-                             : supine_options_fail(command->name, status, &error);
+  if (status == SUPINE_OK) {
+    return supine_options_finish(command->name);
+  }
+  supine_options_say(command->name, "%s",
+                     error.message[0] != '\0' ? error.message : supine_status_string(status));
+  if (status == SUPINE_ERROR_ARGUMENT) {
+    (void)fprintf(stderr, "Try 'supine %s --help'.\n", command->name);
+  }
+  return exit_code(status);
 }

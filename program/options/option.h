@@ -1,24 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Declare a command and the table of its options. Parsing, --help, suggestions, manual pages and
- * completions all use the table. A complete command:
- *
- *     typedef struct request { const char *output; size_t vertices; } request;
- *
- *     static const supine_option table[] = {
- *         {"output", 'o', "FILE", "where to write", SUPINE_FILLS(request, output),
- *          .file = SUPINE_FILE_OUT, .required = true},
- *         {"vertices", 0, "N", "about so many", SUPINE_FILLS(request, vertices),
- *          .standard = "20000"},
- *         {.name = NULL}};
- *
- *     static supine_status run(void *request_, const supine_arguments *given, supine_error *error)
- *
- *     const supine_command supine_command_phantom = {
- *         "phantom", "make a pair of lungs", .usage = "-o FILE [OPTIONS]", .about = "Makes ...",
- *         .options = table, .notes = "Example:\n  supine phantom -o lungs.ply\n",
- *         .request_size = sizeof(request), .run = run};
- *
- * Then declare it in command.h and list it in list.c. */
+ * completions all use the table. command_phantom.c is a short example. A new command is declared in
+ * command.h and listed in list.c. */
 #ifndef SUPINE_OPTION_H
 #define SUPINE_OPTION_H
 

@@ -164,12 +164,6 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
   return SUPINE_OK;
 }
 
-double supine_options_above_rest(const supine_state *state) {
-  const bool rest = state->lung_count == 0 && (state->volume.kind == SUPINE_VOLUME_REST ||
-                                               state->volume.kind == SUPINE_VOLUME_DEFAULT);
-  return rest ? state->volume.ml : (double)NAN;
-}
-
 /* Compute the fraction of the triangles that turn over in a pose. */
 static supine_status turned_over(const supine_basis *basis, const supine_pose *pose, double *share,
                                  supine_error *error) {

@@ -89,9 +89,6 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
                                        bool compares, supine_reference_pose *reference,
                                        supine_error *error);
 
-/* Return the volume of a state, mL above rest; NAN if the state does not count from rest. */
-double supine_options_above_rest(const supine_state *state);
-
 /* What decides whether the lungs in a state are plausible. */
 typedef struct supine_plausible {
   const char *command;

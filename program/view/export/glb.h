@@ -50,16 +50,8 @@ json_int_t supine_export_glb_put(glb *g, glb_kind kind, const void *elements, co
 /** Append an accessor of `count` elements that are 0 without storing them; return its index. */
 json_int_t supine_export_glb_put_zeros(glb *g, glb_kind kind, size_t count);
 
-/** Append a mesh and a node that refers to it, and return the index of the node. Positions in the
- * mesh are in LPS axes, relative to the centre of the lungs, in units of glb.step. The node
- * converts them to metres with y up.
- * @param mesh  JSON of the mesh, which `g` then owns */
-json_int_t supine_export_glb_show(glb *g, const char *name, json_t *mesh);
-
 /** Append the mesh of a lung, with morph targets; return the index of its node. */
 json_int_t supine_export_glb_add(glb *g, size_t lung);
-
-json_int_t supine_export_glb_material(glb *g, const char *name, const double rgb[3]);
 
 /** Return the `extras` of the file, which say how to compute weights from gravity and volume. */
 json_t *supine_export_glb_extras(const glb *g);

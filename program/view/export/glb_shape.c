@@ -1,11 +1,15 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Append meshes with morph targets, nodes and materials to a glTF file. */
+/* Append meshes to a glTF file: lungs with morph targets, a table under the patient, and an arrow
+ * that shows gravity. */
 #include <math.h>
 #include <stdio.h>
 
 #include "program/view/export/glb.h"
 
-json_int_t supine_export_glb_show(glb *g, const char *name, json_t *mesh) {
+/* Append a mesh and a node that refers to it, and return the index of the node. Positions in the
+ * mesh are in LPS axes, relative to the centre of the lungs, in units of glb.step. The node
+ * converts them to metres with y up. `g` owns `mesh` then. */
+static json_int_t show(glb *g, const char *name, json_t *mesh) {
   const double half = sqrt(0.5);
   const double metres = 1e-3 * g->step;
   (void)json_object_set_new(mesh, "name", json_string(name));
@@ -17,7 +21,7 @@ json_int_t supine_export_glb_show(glb *g, const char *name, json_t *mesh) {
   return (json_int_t)json_array_size(g->nodes) - 1;
 }
 
-json_int_t supine_export_glb_material(glb *g, const char *name, const double rgb[3]) {
+static json_int_t add_material(glb *g, const char *name, const double rgb[3]) {
   (void)json_array_append_new(g->materials,
                               json_pack("{s:s, s:{s:[f,f,f,f], s:f, s:f}, s:b}", "name", name,
                                         "pbrMetallicRoughness", "baseColorFactor", rgb[0], rgb[1],
@@ -118,10 +122,66 @@ json_int_t supine_export_glb_add(glb *g, size_t lung) {
   const json_int_t places = put_places(g, lung, g->targets.count, rest);
   const json_int_t normals = put(g, lung, GLB_NORMALS, g->normals);
   const json_int_t corners = put_corners(g, lung);
-  return supine_export_glb_show(
-      g, name,
-      json_pack("{s:[{s:{s:I, s:I}, s:I, s:I, s:o}], s:o, s:o}", "primitives", "attributes",
-                "POSITION", places, "NORMAL", normals, "indices", corners, "material",
-                supine_export_glb_material(g, name, tissue), "targets", targets, "weights", weights,
-                "extras", supine_export_glb_lung_extras(g, lung)));
+  return show(g, name,
+              json_pack("{s:[{s:{s:I, s:I}, s:I, s:I, s:o}], s:o, s:o}", "primitives", "attributes",
+                        "POSITION", places, "NORMAL", normals, "indices", corners, "material",
+                        add_material(g, name, tissue), "targets", targets, "weights", weights,
+                        "extras", supine_export_glb_lung_extras(g, lung)));
+}
+
+enum { SIDES = 16, RINGS = 5 };
+
+/* Append a solid of revolution about the vertical axis and return its node. `profile` has the
+ * radius and the height of each ring, mm. The mesh has no normals, so that facets look flat. */
+static json_int_t sweep(glb *g, const char *name, const double profile[RINGS][2], size_t sides,
+                        const double rgb[3]) {
+  float places[RINGS * SIDES][3];
+  uint32_t corners[(RINGS - 1) * SIDES * 6];
+  size_t at = 0;
+  for (size_t ring = 0; ring < RINGS; ++ring) {
+    for (size_t i = 0; i < sides; ++i) {
+      const double angle = 6.28318530717958648 * ((double)i + 0.5) / (double)sides;
+      float *place = places[ring * sides + i];
+      place[0] = (float)(profile[ring][0] * cos(angle) / g->step);
+      place[1] = (float)(profile[ring][0] * sin(angle) / g->step);
+      place[2] = (float)(profile[ring][1] / g->step);
+    }
+  }
+  for (size_t ring = 0; ring + 1 < RINGS; ++ring) {
+    for (size_t i = 0; i < sides; ++i) {
+      const uint32_t a = (uint32_t)(ring * sides + i);
+      const uint32_t b = (uint32_t)(ring * sides + (i + 1) % sides);
+      const uint32_t up = (uint32_t)sides;
+      const uint32_t quad[] = {a, b, b + up, a, b + up, a + up};
+      for (size_t c = 0; c < 6; ++c) {
+        corners[at++] = quad[c];
+      }
+    }
+  }
+  const json_int_t material = add_material(g, name, rgb);
+  const json_int_t indices = supine_export_glb_put(g, GLB_CORNERS, corners, NULL, at);
+  return show(g, name,
+              json_pack("{s:[{s:{s:I}, s:I, s:I}]}", "primitives", "attributes", "POSITION",
+                        supine_export_glb_put(g, GLB_POSITIONS, places, NULL, RINGS * sides),
+                        "indices", indices, "material", material));
+}
+
+json_t *supine_export_glb_room(glb *g) {
+  static const double grey[3] = {0.45, 0.52, 0.62};
+  static const double red[3] = {0.80, 0.25, 0.05};
+  const double r = g->targets.half_extent;
+  const double top = -1.15 * r;
+  const double table[RINGS][2] = {
+      {0, top - 0.06 * r}, {1.5 * r, top - 0.06 * r}, {1.5 * r, top}, {0, top}, {0, top}};
+  const double low = top + 0.02 * r;
+  const double arrow[RINGS][2] = {{0, low},
+                                  {0.08 * r, low + 0.16 * r},
+                                  {0.03 * r, low + 0.16 * r},
+                                  {0.03 * r, low + 0.45 * r},
+                                  {0, low + 0.45 * r}};
+  const json_int_t under = sweep(g, "table", table, 4, grey);
+  const json_int_t down = sweep(g, "gravity", arrow, SIDES, red);
+  (void)json_object_set_new(json_array_get(g->nodes, (size_t)down), "translation",
+                            json_pack("[f,f,f]", 1.25e-3 * r, 0.0, 0.0));
+  return json_pack("[i, I, I]", 0, under, down);
 }

@@ -241,12 +241,14 @@ static json_t *describe_froms(const page *p) {
   json_t *list = json_array();
   for (size_t i = 0; i < p->shown->from_count; ++i) {
     const supine_reference_pose *from = &p->shown->from[i];
-    const double above = supine_options_above_rest(&from->state);
+    const supine_volume volume = from->state.volume;
+    const bool rest = from->state.lung_count == 0 &&
+                      (volume.kind == SUPINE_VOLUME_REST || volume.kind == SUPINE_VOLUME_DEFAULT);
     (void)json_array_append_new(
         list,
         json_pack("{s:s, s:o, s:o, s:o, s:o}", "name", from->name, "gravity",
                   supine_options_json_numbers(3, from->state.gravity), "above",
-                  isnan(above) ? json_null() : json_real(above), "weights",
+                  rest ? json_real(volume.ml) : json_null(), "weights",
                   supine_options_json_numbers(p->info->mode_count, from->pose.weights), "gains",
                   supine_options_json_numbers(3 * p->info->lung_count, from->pose.gains[0])));
   }
