@@ -13,8 +13,6 @@
 #include "program/options/state_options.h"
 #include "program/report/comparison.h"
 
-static const char name[] = "compare";
-
 static supine_status write_html(const char *path, const supine_comparison *comparison,
                                 supine_error *error) {
   SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
@@ -24,14 +22,12 @@ static supine_status write_html(const char *path, const supine_comparison *compa
 }
 
 typedef struct request {
+  supine_comparison comparison;
   const char *postures;
   const char *html;
   const char *inside;
   bool json;
-  supine_volume_options volume;
-  supine_from from;
-  int frame;     /* 1 if the hilum stays in place, 0 if the body does */
-  double breath; /* tidal volume, mL */
+  int frame; /* 1 if the hilum stays in place, 0 if the body does */
   bool has_breath;
 } request;
 
@@ -39,12 +35,12 @@ static const supine_option table[] = {
     {"postures", 0, "LIST",
      "states to compare, separated by commas, such as supine:rest,prone:rest+500",
      SUPINE_FILLS(request, postures), .standard = "supine,prone,left,right"},
-    {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
-    {.table = supine_options_from, SUPINE_FILLS(request, from)},
+    {.table = supine_options_volume, SUPINE_FILLS(request, comparison.volume)},
+    {.table = supine_options_from, SUPINE_FILLS(request, comparison.from)},
     {.table = supine_options_hilum_frame, SUPINE_FILLS(request, frame)},
     {"breath", 0, "ML", "tidal volume of the breath whose ventilation by height is computed",
-     SUPINE_FILLS(request, breath), SUPINE_SAYS_GIVEN(request, has_breath), .standard = "500",
-     SUPINE_ABOVE_ZERO},
+     SUPINE_FILLS(request, comparison.breath), SUPINE_SAYS_GIVEN(request, has_breath),
+     .standard = "500", SUPINE_ABOVE_ZERO},
     {"inside", 0, "FILE",
      "structures made by 'supine embed' from the same basis: the report has the displacement of "
      "each, with its expected error",
@@ -93,25 +89,26 @@ static supine_status add_pair(const supine_basis *basis, const supine_command_na
 }
 
 /* Print the displacement of each named structure between every two postures. */
-static supine_status compare_content(const supine_basis *basis, const supine_posture_list *postures,
-                                     const request *wanted, supine_error *error) {
-  SUPINE_FREED_BY(supine_command_names_close) supine_command_names names = {0};
+static supine_status compare_content(supine_comparison *c, const request *wanted,
+                                     supine_error *error) {
   json_auto_t *list = json_array();
-  SUPINE_TRY(supine_command_names_open(basis, &names, error));
-  for (size_t i = 0; i < postures->count; ++i) {
-    for (size_t j = i + 1; j < postures->count; ++j) {
-      const supine_posture_item *const item[2] = {&postures->item[i], &postures->item[j]};
-      SUPINE_TRY(add_pair(basis, &names, item, wanted->frame == 1, list, error));
+  SUPINE_TRY(supine_command_names_open(c->basis, &c->names, error));
+  for (size_t i = 0; i < c->postures.count; ++i) {
+    for (size_t j = i + 1; j < c->postures.count; ++j) {
+      const supine_posture_item *const item[2] = {&c->postures.item[i], &c->postures.item[j]};
+      SUPINE_TRY(add_pair(c->basis, &c->names, item, wanted->frame == 1, list, error));
     }
   }
   supine_options_print(json_incref(list), wanted->json);
   return SUPINE_OK;
 }
 
-static void end(supine_comparison *comparison) {
-  supine_report_free(comparison);
-  supine_command_names_close(&comparison->names);
-  supine_basis_close(comparison->inside);
+static void end(request **wanted) {
+  supine_comparison *c = &(*wanted)->comparison;
+  supine_report_free(c);
+  supine_command_names_close(&c->names);
+  supine_basis_close(c->inside);
+  supine_basis_close(c->basis);
 }
 
 /* Compute, print and write the comparison of the lungs. */
@@ -124,29 +121,24 @@ static supine_status report(supine_comparison *c, const request *wanted, supine_
   return wanted->html != NULL ? write_html(wanted->html, c, error) : SUPINE_OK;
 }
 
-static supine_status compare(const char *path, const char *made_by, const supine_basis *basis,
-                             const request *wanted, supine_error *error) {
-  SUPINE_FREED_BY(end)
-  supine_comparison comparison = {.path = path,
-                                  .command = name,
-                                  .made_by = made_by,
-                                  .allow_folds = wanted->volume.allow_folds,
-                                  .basis = basis,
-                                  .state = wanted->volume.state,
-                                  .from = wanted->from,
-                                  .breath = wanted->breath};
-  comparison.state.gravity[1] = 1.0;
-  if (supine_basis_get_info(basis)->is_fields && !wanted->has_breath) {
-    comparison.breath = 0.0; /* fields of gravity have no volumes and no breaths */
+static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
+  SUPINE_FREED_BY(end) request *wanted = chosen;
+  supine_comparison *c = &wanted->comparison;
+  supine_state *state = &c->volume.state;
+  c->path = given->operand[0];
+  c->made_by = given->made_by;
+  SUPINE_TRY(supine_options_basis_open(c->path, SUPINE_STORAGE_AUTO, &c->basis, error));
+  state->gravity[1] = 1.0;
+  if (supine_basis_get_info(c->basis)->is_fields && !wanted->has_breath) {
+    c->breath = 0.0; /* fields of gravity have no volumes and no breaths */
   }
-  if (comparison.state.lung_count == 0 && comparison.state.volume.kind == SUPINE_VOLUME_DEFAULT) {
-    comparison.state.volume = supine_basis_default_volume(basis);
+  if (state->lung_count == 0 && state->volume.kind == SUPINE_VOLUME_DEFAULT) {
+    state->volume = supine_basis_default_volume(c->basis);
   }
-  SUPINE_TRY(supine_options_posture_list_parse(wanted->postures, &comparison.state,
-                                               &comparison.postures, error));
-  const bool content = supine_basis_metadata(basis, "content") != NULL; /* by 'supine embed' */
+  SUPINE_TRY(supine_options_posture_list_parse(wanted->postures, state, &c->postures, error));
+  const bool content = supine_basis_metadata(c->basis, "content") != NULL; /* by 'supine embed' */
   const char *refused =
-      content && wanted->from.given
+      content && c->from.given
           ? "%s holds structures inside the lungs, which are compared between every two postures: "
             "leave --from out, or use 'supine deform --from'"
       : content && wanted->html != NULL
@@ -157,22 +149,13 @@ static supine_status compare(const char *path, const char *made_by, const supine
                                          "by 'supine embed', or use 'supine deform --frame hilum'"
                                        : NULL;
   if (refused != NULL) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, refused, path);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, refused, c->path);
   }
-  if (content) {
-    return compare_content(basis, &comparison.postures, wanted, error);
-  }
-  return report(&comparison, wanted, error);
-}
-
-static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
-  SUPINE_FREED_BY(supine_options_basis_close) supine_basis *basis = NULL;
-  SUPINE_TRY(supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, error));
-  return compare(given->operand[0], given->made_by, basis, chosen, error);
+  return content ? compare_content(c, wanted, error) : report(c, wanted, error);
 }
 
 const supine_command supine_command_compare = {
-    name,
+    "compare",
     "compare postures: displacement, and ventilation by height",
     .usage = "BASIS [--postures LIST] [--volume VOLUME] [-o report.html] [OPTIONS]",
     .about = "For each posture, reports the displacement from supine at rest or from the state of "

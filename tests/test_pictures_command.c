@@ -54,7 +54,6 @@ static double length_of(const json_t *direction) {
 
 static void check_posture(const json_t *posture) {
   double gain = 0;
-  double share = 0;
   double volume = 0;
   const json_t *slabs = json_object_get(posture, "slabs");
   check_statistics(posture, "displacement_mm");
@@ -65,11 +64,9 @@ static void check_posture(const json_t *posture) {
   for (size_t s = 0; s < 10; ++s) {
     const json_t *slab = json_array_get(slabs, s);
     gain += json_number_value(json_object_get(slab, "gain_ml"));
-    share += json_number_value(json_object_get(slab, "share"));
     volume += json_number_value(json_object_get(slab, "volume_ml"));
   }
   assert_true(fabs(gain - 400) < 0.05); /* tolerance in mL, for positions rounded to float */
-  assert_true(fabs(share - 1) < 1e-4);
   /* The volumes of the ten slabs add up to the volume of both lungs. */
   const json_t *held = json_object_get(posture, "volume_ml");
   const double left = number(held, "left", "value");

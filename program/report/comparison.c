@@ -9,11 +9,13 @@
 #include "base/vec3.h"
 #include "program/report/comparison.h"
 
+static const char command[] = "compare";
+
 /* Compute the volume that each lung and each of ten horizontal slabs gains in a breath. The breath
  * begins at the lung volumes in the posture. `xyz` [2][N, 3] is workspace. */
-static supine_status find_breath(const supine_comparison *c, const supine_posture_item *item,
-                                 float *xyz[2], supine_compared_posture *posture,
-                                 supine_error *error) {
+static supine_status find_breath(const supine_comparison *c, float *xyz[2],
+                                 supine_compared_posture *posture, supine_error *error) {
+  const supine_posture_item *item = posture->item;
   const supine_basis_info *info = supine_basis_get_info(c->basis);
   supine_slab slabs[SUPINE_LUNGS_MAX * SUPINE_COMPARISON_SLABS];
   supine_pose after = posture->pose;
@@ -29,7 +31,7 @@ static supine_status find_breath(const supine_comparison *c, const supine_postur
     return supine_error_set(error, status, "%s: %s", item->name, wrong.message);
   }
   SUPINE_TRY(
-      supine_options_pose_check(c->basis, c->command, c->allow_folds, &state, &after, error));
+      supine_options_pose_check(c->basis, command, c->volume.allow_folds, &state, &after, error));
   (void)supine_basis_volumes(c->basis, &after, posture->gain);
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     posture->gain[lung] -= posture->volume[lung];
@@ -45,14 +47,13 @@ static supine_status find_breath(const supine_comparison *c, const supine_postur
   for (size_t i = 0; i < SUPINE_COMPARISON_SLABS; ++i) {
     const supine_slab *slab = &posture->slab[i];
     posture->expansion[i] = slab->volume > 0.0 ? slab->gain / slab->volume : 0.0;
-    posture->share[i] = slab->gain / c->breath;
   }
   return status;
 }
 
-static supine_status find_posture(const supine_comparison *c, const supine_posture_item *item,
-                                  float *distance, float *xyz[2], supine_compared_posture *posture,
-                                  supine_error *error) {
+static supine_status find_posture(const supine_comparison *c, float *distance, float *xyz[2],
+                                  supine_compared_posture *posture, supine_error *error) {
+  const supine_posture_item *item = posture->item;
   supine_error wrong;
   supine_status status = supine_basis_pose(c->basis, &item->state, &posture->pose, &wrong);
   if (status != SUPINE_OK) {
@@ -63,13 +64,13 @@ static supine_status find_posture(const supine_comparison *c, const supine_postu
   (void)supine_basis_volumes(c->basis, &posture->pose, posture->volume);
   (void)supine_options_hilum(c->basis, &posture->pose, &c->reference.pose, false, posture->hilum,
                              NULL);
-  status = supine_options_pose_check(c->basis, c->command, c->allow_folds, &item->state,
+  status = supine_options_pose_check(c->basis, command, c->volume.allow_folds, &item->state,
                                      &posture->pose, error);
   if (status == SUPINE_OK && c->breath > 0.0) {
-    status = find_breath(c, item, xyz, posture, error);
+    status = find_breath(c, xyz, posture, error);
     posture->has_breath = status == SUPINE_OK;
     if (status == SUPINE_ERROR_NUMERICAL) { /* the lungs cannot hold that much more */
-      supine_options_say(c->command, "note: without a breath: %s", error->message);
+      supine_options_say(command, "note: without a breath: %s", error->message);
       return SUPINE_OK;
     }
   }
@@ -77,25 +78,27 @@ static supine_status find_posture(const supine_comparison *c, const supine_postu
 }
 
 /* Compute the targets in each posture, with their expected errors. */
-static supine_status find_targets(supine_comparison *c, size_t i, supine_error *error) {
-  const supine_pose *const pose[2] = {&c->reference.pose, &c->posture[i].pose};
+static supine_status find_targets(const supine_comparison *c, supine_compared_posture *posture,
+                                  supine_error *error) {
+  const supine_pose *const pose[2] = {&c->reference.pose, &posture->pose};
   SUPINE_FREED_BY(supine_posed_expected_free) supine_expected expected = {0};
-  SUPINE_TRY(supine_posed_expected(c->inside, &c->postures.item[i].state, &c->reference.state,
-                                   &expected, error));
+  SUPINE_TRY(supine_posed_expected(c->inside, &posture->item->state, &c->reference.state, &expected,
+                                   error));
   return supine_command_targets_find(c->inside, &c->names, pose, expected.sigma, false,
-                                     &c->posture[i].targets, error);
+                                     &posture->targets, error);
 }
 
 /* Compute the expected error of each posture's displacement, mm RMS; 0 if it is unknown. */
 static supine_status find_errors(supine_comparison *c, supine_error *error) {
   for (size_t i = 0; i < c->postures.count; ++i) {
+    supine_compared_posture *posture = &c->posture[i];
     supine_expected expected = {0};
-    SUPINE_TRY(supine_posed_expected(c->basis, &c->postures.item[i].state, &c->reference.state,
+    SUPINE_TRY(supine_posed_expected(c->basis, &posture->item->state, &c->reference.state,
                                      &expected, error));
-    c->posture[i].expected_error = expected.rms;
+    posture->expected_error = expected.rms;
     supine_posed_expected_free(&expected);
     if (c->inside != NULL) {
-      SUPINE_TRY(find_targets(c, i, error));
+      SUPINE_TRY(find_targets(c, posture, error));
     }
   }
   return SUPINE_OK;
@@ -116,8 +119,9 @@ supine_status supine_report_find(supine_comparison *c, supine_error *error) {
   SUPINE_TRY(supine_compare_create(c->basis, &c->compare, error));
   for (size_t i = 0; i < count; ++i) {
     supine_error wrong = {SUPINE_OK, ""};
-    const supine_status status =
-        find_posture(c, &c->postures.item[i], distance, xyz, &c->posture[i], &wrong);
+    c->posture[i].item = &c->postures.item[i];
+    c->posture[i].label = supine_options_posture_label(c->postures.item[i].name);
+    const supine_status status = find_posture(c, distance, xyz, &c->posture[i], &wrong);
     if (status != SUPINE_OK) {
       return supine_error_set(error, status, "%s: %s", c->path,
                               wrong.message[0] != '\0' ? wrong.message
@@ -137,14 +141,15 @@ void supine_report_free(supine_comparison *c) {
 
 void supine_report_volume(const supine_comparison *c, char *text, size_t size) {
   char whole[160];
+  const supine_volume *volume = &c->volume.state.volume;
   for (size_t i = 0; i < c->postures.count; ++i) {
-    const supine_state *state = &c->postures.item[i].state;
-    if (state->volume.kind != c->state.volume.kind || state->volume.ml != c->state.volume.ml) {
+    const supine_volume *own = &c->postures.item[i].state.volume;
+    if (own->kind != volume->kind || own->ml != volume->ml) {
       (void)snprintf(text, size, "of each state");
       return;
     }
   }
-  (void)supine_state_describe(&c->state, whole, sizeof whole);
+  (void)supine_state_describe(&c->volume.state, whole, sizeof whole);
   const char *space = strchr(whole, ' '); /* end of the posture's name */
   (void)snprintf(text, size, "%s", space == NULL ? "as given" : space + 1);
 }

@@ -15,6 +15,8 @@ enum { SUPINE_COMPARISON_SLABS = 10 };
 
 /* Results for one posture. */
 typedef struct supine_compared_posture {
+  const supine_posture_item *item; /* name and state */
+  const char *label;               /* name for texts, such as "left side" */
   supine_pose pose;
   supine_distance_statistics displacement; /* displacement from the reference pose, mm */
   double expected_error;                   /* expected RMS error, mm; 0 if unknown */
@@ -26,20 +28,17 @@ typedef struct supine_compared_posture {
   double gain[SUPINE_LUNGS_MAX];             /* volume that each lung gains in the breath, mL */
   supine_slab slab[SUPINE_COMPARISON_SLABS]; /* horizontal slabs, uppermost first */
   double expansion[SUPINE_COMPARISON_SLABS]; /* volume that each slab gains / its volume before */
-  double share[SUPINE_COMPARISON_SLABS];     /* volume that each slab gains / gain of all lungs */
 } supine_compared_posture;
 
 typedef struct supine_comparison {
-  const char *path;    /* path of the basis file */
-  const char *command; /* name of the command, for messages */
-  const char *made_by; /* command line, which the report prints */
-  bool allow_folds;
-  const supine_basis *basis;
-  supine_basis *inside;       /* structures inside the lungs; NULL if there are none */
-  supine_command_names names; /* their names */
-  supine_state state;         /* supine, at the volume of all postures that name none */
+  const char *path;             /* path of the basis file */
+  const char *made_by;          /* command line, which the report prints */
+  supine_volume_options volume; /* its state is supine, at the volume of postures that name none */
   supine_from from;
   double breath; /* volume that a breath adds, mL; 0 if no breath is computed */
+  supine_basis *basis;
+  supine_basis *inside;       /* structures inside the lungs; NULL if there are none */
+  supine_command_names names; /* their names */
   supine_posture_list postures;
   supine_reference_pose reference; /* pose from which displacements are measured */
   supine_compare *compare;
@@ -52,7 +51,7 @@ supine_status supine_report_find(supine_comparison *comparison, supine_error *er
 
 void supine_report_free(supine_comparison *comparison);
 
-/* Write the volume of `comparison->state` to `text`, for example "at rest + 300 mL". */
+/* Write the volume of `comparison->volume` to `text`, for example "at rest + 300 mL". */
 void supine_report_volume(const supine_comparison *comparison, char *text, size_t size);
 
 /* Return whether the expected error of any posture is known. */

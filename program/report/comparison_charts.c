@@ -59,10 +59,9 @@ json_t *supine_report_profile(const supine_comparison *c) {
                           "y", json_sprintf("%.1f", down(95.0 - 10.0 * (double)s)), "value",
                           json_sprintf("%.2f", value)));
     }
-    (void)json_array_append_new(
-        lines, json_pack("{s:s, s:s, s:b, s:o}", "line", supine_report_line(i), "name",
-                         supine_options_posture_label(c->postures.item[i].name), "dashed",
-                         (int)(i >= 7), "dots", dots));
+    (void)json_array_append_new(lines, json_pack("{s:s, s:s, s:b, s:o}", "line",
+                                                 supine_report_line(i), "name", c->posture[i].label,
+                                                 "dashed", (int)(i >= 7), "dots", dots));
   }
   return json_pack("{s:s, s:o, s:o}", "axis", "regional expansion, %", "ticks", ticks, "lines",
                    lines);

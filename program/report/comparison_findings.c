@@ -45,12 +45,11 @@ static json_t *finding(const supine_comparison *c, size_t posture) {
   const supine_target *t = p->targets;
   const double moved = t != NULL ? t->moved : p->displacement.mean;
   const double error = t != NULL ? t->expected : p->expected_error;
-  const char *name = c->postures.item[posture].name;
-  const char *label = supine_options_posture_label(name);
+  const char *name = p->item->name;
   char way[96];
   char text[512] = "";
-  if (label != name) {
-    supine_text_add(text, sizeof text, "Lying on the %s,", label);
+  if (p->label != name) {
+    supine_text_add(text, sizeof text, "Lying on the %s,", p->label);
   } else if (isalpha((unsigned char)name[0])) {
     supine_text_add(text, sizeof text, "%c%s,", toupper((unsigned char)name[0]), name + 1);
   } else {
@@ -95,9 +94,8 @@ json_t *supine_report_targets(const supine_comparison *c) {
         continue;
       }
       (void)json_array_append_new(
-          list, json_pack("{s:s, s:s, s:o, s:s, s:o}", "name", name, "posture",
-                          supine_options_posture_label(c->postures.item[i].name), "moved",
-                          json_sprintf("%.1f", t->moved), "way",
+          list, json_pack("{s:s, s:s, s:o, s:s, s:o}", "name", name, "posture", c->posture[i].label,
+                          "moved", json_sprintf("%.1f", t->moved), "way",
                           supine_command_target_way(t, 3, way), "error",
                           isnan(t->expected) ? json_string("unknown")
                                              : json_sprintf("%.1f", t->expected)));
@@ -111,6 +109,7 @@ json_t *supine_report_postures(const supine_comparison *c) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);
   json_t *list = json_array();
   for (size_t i = 0; i < c->postures.count; ++i) {
+    const supine_compared_posture *p = &c->posture[i];
     json_t *lungs = json_array();
     double percent[SUPINE_LUNGS_MAX] = {0};
     const char *words[2] = {"", ""};
@@ -119,23 +118,21 @@ json_t *supine_report_postures(const supine_comparison *c) {
     for (size_t lung = 0; lung < info->lung_count; ++lung) {
       (void)json_array_append_new(
           lungs, json_pack("{s:o, s:o, s:o}", "range", supine_report_held(c, i, lung, true), "ml",
-                           json_sprintf("%.0f", c->posture[i].volume[lung]), "percent",
+                           json_sprintf("%.0f", p->volume[lung]), "percent",
                            json_sprintf(fabs(percent[lung]) < 0.5 ? "0" : "%+.0f", percent[lung])));
     }
     for (size_t j = 0; j < sizeof published / sizeof *published; ++j) {
-      if (strcmp(published[j].posture, c->postures.item[i].name) == 0) {
+      if (strcmp(published[j].posture, p->item->name) == 0) {
         words[0] = published[j].percent;
         words[1] = published[j].ratio;
       }
     }
-    const double error = c->posture[i].expected_error;
     (void)json_array_append_new(
-        list, json_pack("{s:s, s:s, s:o, s:o, s:o, s:o, s:s, s:s, s:o}", "name",
-                        supine_options_posture_label(c->postures.item[i].name), "line",
+        list, json_pack("{s:s, s:s, s:o, s:o, s:o, s:o, s:s, s:s, s:o}", "name", p->label, "line",
                         supine_report_line(i), "held", lungs, "mean",
-                        json_sprintf("%.1f", c->posture[i].displacement.mean), "max",
-                        json_sprintf("%.1f", c->posture[i].displacement.max), "error",
-                        error > 0 ? json_sprintf("%.1f", error) : json_string(""),
+                        json_sprintf("%.1f", p->displacement.mean), "max",
+                        json_sprintf("%.1f", p->displacement.max), "error",
+                        json_sprintf(p->expected_error > 0 ? "%.1f" : "", p->expected_error),
                         "published_percent", words[0], "published_ratio", words[1], "ratio",
                         json_sprintf(isnan(ratio) ? "" : "%.2f", ratio)));
   }

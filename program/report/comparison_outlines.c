@@ -86,7 +86,7 @@ static json_t *chart(const supine_comparison *c, const slice *s, const double lo
   json_t *lines = json_array();
   json_t *title = json_sprintf("%s: area", s->name);
   for (size_t i = 0; i < c->postures.count; ++i) {
-    const char *name = supine_options_posture_label(c->postures.item[i].name);
+    const char *name = c->posture[i].label;
     double area = 0;
     json_t *own = outline(c, s, at, &c->posture[i].pose, xyz, &area);
     if (c->posture[i].displacement.max < 0.05) { /* this posture is the reference */

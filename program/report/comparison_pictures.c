@@ -67,10 +67,8 @@ static json_t *picture(const supine_comparison *c, size_t posture, double larges
   if (png == NULL) {
     return NULL;
   }
-  json_t *made =
-      json_pack("{s:s, s:o}", "name", supine_options_posture_label(c->postures.item[posture].name),
-                "png", png);
-  set_gravity(c->postures.item[posture].state.gravity, made);
+  json_t *made = json_pack("{s:s, s:o}", "name", shown->label, "png", png);
+  set_gravity(shown->item->state.gravity, made);
   return made;
 }
 

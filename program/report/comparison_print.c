@@ -11,10 +11,6 @@ static json_t *statistics(const supine_distance_statistics *d) {
                    d->max);
 }
 
-static json_t *direction(const double g[3]) {
-  return json_pack("[f, f, f]", g[0], g[1], g[2]);
-}
-
 static json_t *by_lung(const supine_comparison *c, const double *values) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);
   json_t *list = json_object();
@@ -28,7 +24,7 @@ static json_t *by_lung(const supine_comparison *c, const double *values) {
  * deviation to either side, is longer upwards. */
 json_t *supine_report_held(const supine_comparison *c, size_t posture, size_t lung, bool as_text) {
   const supine_compared_posture *of = &c->posture[posture];
-  const supine_state *state = &c->postures.item[posture].state;
+  const supine_state *state = &of->item->state;
   const char *name = supine_basis_get_info(c->basis)->lung_names[lung];
   const bool named = state->lung_count > 0;
   const supine_volume *volume =
@@ -69,50 +65,40 @@ static json_t *volumes(const supine_comparison *c, size_t posture, bool as_text)
   return list;
 }
 
-static json_t *encode_slab(const supine_compared_posture *posture, size_t s) {
-  const supine_slab *slab = &posture->slab[s];
+static json_t *encode_slabs(const supine_compared_posture *p) {
   const double thickness = 1.0 / SUPINE_COMPARISON_SLABS;
-  return json_pack("{s:[f, f], s:f, s:f, s:f, s:f}", "height", 1.0 - thickness * (double)(s + 1),
-                   1.0 - thickness * (double)s, "volume_ml", slab->volume, "gain_ml", slab->gain,
-                   "expansion", posture->expansion[s], "share", posture->share[s]);
+  json_t *slabs = json_array();
+  for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
+    (void)json_array_append_new(
+        slabs, json_pack("{s:[f, f], s:f, s:f, s:f}", "height", 1.0 - thickness * (double)(s + 1),
+                         1.0 - thickness * (double)s, "volume_ml", p->slab[s].volume, "gain_ml",
+                         p->slab[s].gain, "expansion", p->expansion[s]));
+  }
+  return slabs;
 }
 
-static json_t *encode_targets(const supine_comparison *c, size_t posture) {
-  json_t *list = json_array();
-  for (size_t i = 0; i < c->names.count; ++i) {
-    (void)json_array_append_new(list, supine_command_target_json(&c->posture[posture].targets[i]));
+static json_t *encode_posture(const supine_comparison *c, size_t i) {
+  const supine_compared_posture *p = &c->posture[i];
+  json_t *posture =
+      json_pack("{s:s, s:o, s:o, s:o}", "name", p->item->name, "gravity",
+                supine_options_json_numbers(3, p->item->state.gravity), "displacement_mm",
+                statistics(&p->displacement), "hilum_mm", supine_options_json_numbers(3, p->hilum));
+  if (supine_report_has_errors(c)) {
+    (void)json_object_set_new(posture, "expected_error_mm", json_real(p->expected_error));
   }
-  return list;
-}
-
-static json_t *encode_postures(const supine_comparison *c) {
-  json_t *list = json_array();
-  for (size_t i = 0; i < c->postures.count; ++i) {
-    const supine_posture_item *item = &c->postures.item[i];
-    json_t *posture =
-        json_pack("{s:s, s:o, s:o}", "name", item->name, "gravity", direction(item->state.gravity),
-                  "displacement_mm", statistics(&c->posture[i].displacement));
-    (void)json_object_set_new(posture, "hilum_mm",
-                              supine_options_json_numbers(3, c->posture[i].hilum));
-    if (supine_report_has_errors(c)) {
-      (void)json_object_set_new(posture, "expected_error_mm",
-                                json_real(c->posture[i].expected_error));
-    }
-    (void)json_object_set_new(posture, "volume_ml", volumes(c, i, false));
-    if (c->posture[i].has_breath) {
-      json_t *slabs = json_array();
-      for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
-        (void)json_array_append_new(slabs, encode_slab(&c->posture[i], s));
-      }
-      (void)json_object_set_new(posture, "gain_ml", by_lung(c, c->posture[i].gain));
-      (void)json_object_set_new(posture, "slabs", slabs);
-    }
-    if (c->inside != NULL) {
-      (void)json_object_set_new(posture, "targets", encode_targets(c, i));
-    }
-    (void)json_array_append_new(list, posture);
+  (void)json_object_set_new(posture, "volume_ml", volumes(c, i, false));
+  if (p->has_breath) {
+    (void)json_object_set_new(posture, "gain_ml", by_lung(c, p->gain));
+    (void)json_object_set_new(posture, "slabs", encode_slabs(p));
   }
-  return list;
+  if (c->inside != NULL) {
+    json_t *targets = json_array();
+    for (size_t k = 0; k < c->names.count; ++k) {
+      (void)json_array_append_new(targets, supine_command_target_json(&p->targets[k]));
+    }
+    (void)json_object_set_new(posture, "targets", targets);
+  }
+  return posture;
 }
 
 /* Append a row to the table named `heading`: `value` in the column `name`, then `columns`,
@@ -133,38 +119,33 @@ static void add_tables(const supine_comparison *c, json_t *text) {
   (void)snprintf(gained, sizeof gained, "volume (mL) that each lung gains in a breath of %.4g mL",
                  c->breath);
   for (size_t i = 0; i < c->postures.count; ++i) {
-    const char *name = supine_options_posture_label(c->postures.item[i].name);
-    json_t *moved = statistics(&c->posture[i].displacement);
-    (void)json_object_set_new(moved, "hilum x, y, z",
-                              supine_options_json_numbers(3, c->posture[i].hilum));
+    const supine_compared_posture *p = &c->posture[i];
+    json_t *moved = statistics(&p->displacement);
+    (void)json_object_set_new(moved, "hilum x, y, z", supine_options_json_numbers(3, p->hilum));
     if (supine_report_has_errors(c)) {
-      (void)json_object_set_new(moved, "expected error", json_real(c->posture[i].expected_error));
+      (void)json_object_set_new(moved, "expected error", json_real(p->expected_error));
     }
-    add_row(text, "displacement, mm", "posture", name, moved);
+    add_row(text, "displacement, mm", "posture", p->label, moved);
     for (size_t k = 0; c->inside != NULL && k < c->names.count; ++k) {
-      add_row(text, "targets", "posture", name,
-              supine_command_target_json(&c->posture[i].targets[k]));
+      add_row(text, "targets", "posture", p->label, supine_command_target_json(&p->targets[k]));
     }
-    add_row(text, "volume of each lung, mL", "posture", name, volumes(c, i, true));
-    if (c->posture[i].has_breath) {
-      add_row(text, gained, "posture", name, by_lung(c, c->posture[i].gain));
+    add_row(text, "volume of each lung, mL", "posture", p->label, volumes(c, i, true));
+    if (p->has_breath) {
+      add_row(text, gained, "posture", p->label, by_lung(c, p->gain));
     }
   }
   for (size_t s = 0; c->breath > 0.0 && s < SUPINE_COMPARISON_SLABS; ++s) {
-    json_t *values[2] = {json_object(), json_object()};
+    json_t *values = json_object();
     char height[16];
     (void)snprintf(height, sizeof height, "%zu-%zu", 100 - 10 * (s + 1), 100 - 10 * s);
     for (size_t i = 0; i < c->postures.count; ++i) {
-      const char *name = supine_options_posture_label(c->postures.item[i].name);
-      if (!c->posture[i].has_breath) {
-        continue;
+      if (c->posture[i].has_breath) {
+        (void)json_object_set_new(values, c->posture[i].label,
+                                  json_real(100.0 * c->posture[i].expansion[s]));
       }
-      (void)json_object_set_new(values[0], name, json_real(100.0 * c->posture[i].expansion[s]));
-      (void)json_object_set_new(values[1], name, json_real(100.0 * c->posture[i].share[s]));
     }
     add_row(text, "regional expansion by height along gravity, % of the volume before the breath",
-            "height, %", height, values[0]);
-    add_row(text, "share of the breath by height along gravity, %", "height, %", height, values[1]);
+            "height, %", height, values);
   }
 }
 
@@ -176,13 +157,17 @@ void supine_report_print(const supine_comparison *c, bool json) {
                            (json_int_t)supine_basis_get_info(c->basis)->vertex_count, "area_mm2",
                            supine_compare_area(c->compare));
   if (json) {
-    (void)json_object_set_new(root, "postures", encode_postures(c));
+    json_t *postures = json_array();
+    for (size_t i = 0; i < c->postures.count; ++i) {
+      (void)json_array_append_new(postures, encode_posture(c, i));
+    }
+    (void)json_object_set_new(root, "postures", postures);
   } else {
     add_tables(c, root);
-  }
-  if (!json && supine_report_has_errors(c)) {
-    (void)json_object_set_new(root, "expected error",
-                              json_string(SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT));
+    if (supine_report_has_errors(c)) {
+      (void)json_object_set_new(root, "expected error",
+                                json_string(SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT));
+    }
   }
   supine_options_print(root, json);
 }
