@@ -99,12 +99,6 @@ static supine_status find_volumes(const supine_reference *reference, const supin
   return SUPINE_OK;
 }
 
-static void fill(double gains[2][3], double gain) {
-  for (size_t i = 0; i < 6; ++i) {
-    gains[i / 3][i % 3] = gain;
-  }
-}
-
 /* Find the gains (factors on each lung's displacement along x, y and z) that give each lung its
  * volume. If the volume at rest is unknown, all gains are equal, and 1 if --volume is missing. */
 static supine_status find_gains(const supine_prepared *prepared, const request *wanted,
@@ -113,22 +107,22 @@ static supine_status find_gains(const supine_prepared *prepared, const request *
   const supine_lungs *lungs = &prepared->source.lungs;
   const supine_reference *reference = &prepared->reference;
   const supine_volume *volume = &wanted->state.volume;
-  fill(gains, 1.0);
-  if (volume->kind == SUPINE_VOLUME_DEFAULT && !reference->known) {
-    return SUPINE_OK;
-  }
-  if (!reference->known) {
+  double scale = 1.0;
+  if (!reference->known && volume->kind != SUPINE_VOLUME_DEFAULT) {
+    if (volume->kind != SUPINE_VOLUME_SCAN && volume->kind != SUPINE_VOLUME_ABSOLUTE) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "rest and full are unknown with --scanned none: give scan+ML or an "
+                              "absolute volume, such as 2600mL");
+    }
     const double held =
         volume->kind == SUPINE_VOLUME_ABSOLUTE ? lungs->volume[0] + lungs->volume[1] : 0.0;
-    double scale = 0.0;
-    const supine_status status =
-        volume->kind == SUPINE_VOLUME_SCAN || volume->kind == SUPINE_VOLUME_ABSOLUTE
-            ? supine_volume_scale(solution->cubic, volume->ml - held, &scale, error)
-            : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                               "rest and full are unknown with --scanned none: give scan+ML or an "
-                               "absolute volume, such as 2600mL");
-    fill(gains, scale);
-    return status;
+    SUPINE_TRY(supine_volume_scale(solution->cubic, volume->ml - held, &scale, error));
+  }
+  for (size_t i = 0; i < 6; ++i) {
+    gains[i / 3][i % 3] = scale;
+  }
+  if (!reference->known) {
+    return SUPINE_OK;
   }
   const supine_model *model = &prepared->model;
   double ml[2];

@@ -183,10 +183,6 @@ static supine_status add_frames(studio *s, size_t count, const double (*extent)[
   return SUPINE_OK;
 }
 
-static void close_animation(supine_animation **animation) {
-  supine_render_animation_close(*animation);
-}
-
 /* Draw an animation of the body's turn from one posture to another. A first pass over the frames
  * finds the largest displacement and the extents of the lungs, so that the colour bar and the scale
  * are the same in all frames. */
@@ -196,7 +192,7 @@ static supine_status draw_turn(studio *s, supine_error *error) {
   const double seconds = s->wanted->turn.seconds;
   const double frames = fmax(2.0, floor(seconds * FPS * (1.0 + 1e-12)) + 1.0);
   double extent[SUPINE_VIEWS_MAX][4];
-  SUPINE_FREED_BY(close_animation) supine_animation *animation = NULL;
+  SUPINE_FREED_BY(supine_render_animation_close) supine_animation *animation = NULL;
   SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
   if (!(frames <= FRAMES_MAX)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,

@@ -49,14 +49,15 @@ static supine_status sort(problem *limb, const supine_pv_sample *samples, supine
   const size_t count = limb->count;
   supine_pv_sample *sorted = limb->sample;
   const bool falling = samples[count - 1].pressure < samples[0].pressure;
-  for (size_t j = 0; j < count; ++j) {
-    const double step = j == 0 ? 0.0 : samples[j].pressure - samples[j - 1].pressure;
-    if (j > 0 && step == 0.0) {
+  sorted[falling ? count - 1 : 0] = samples[0];
+  for (size_t j = 1; j < count; ++j) {
+    const double step = samples[j].pressure - samples[j - 1].pressure;
+    if (step == 0.0) {
       return refuse(limb, &samples[j],
                     "the pressure repeats the one before: keep one of the samples, or their mean",
                     error);
     }
-    if (j > 0 && (step > 0.0) != (samples[1].pressure > samples[0].pressure)) {
+    if ((step > 0.0) != (samples[1].pressure > samples[0].pressure)) {
       return refuse(limb, &samples[j],
                     "the pressure changes direction: within a limb it must only rise or only fall; "
                     "sort the samples, or name the limbs in a column \"limb\"",

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "program/view/export/template.h"
 
+#include <stdbool.h>
 #include <string.h>
 
 /* Return the asset whose name is the first `length` bytes of `name`, or NULL. */
@@ -81,8 +82,8 @@ static void write_value(const json_t *value, FILE *file) {
   }
 }
 
-static void fill(const supine_asset *assets, const char *at, const char *end, const scope *around,
-                 FILE *file);
+static const char *fill(const supine_asset *assets, const char *at, const char *end,
+                        const scope *around, FILE *file);
 
 static void write_named(const supine_asset *assets, const tag *named, const scope *around,
                         FILE *file) {
@@ -93,55 +94,46 @@ static void write_named(const supine_asset *assets, const tag *named, const scop
   } else if (asset != NULL && strstr(asset->name, ".html") != NULL) {
     /* Omit the last newline of the asset, because the template has a newline after the tag. */
     const size_t size = asset->size - (asset->bytes[asset->size - 1] == '\n');
-    fill(assets, asset->bytes, asset->bytes + size, around, file);
+    (void)fill(assets, asset->bytes, asset->bytes + size, around, file);
   } else if (asset != NULL) {
     (void)fwrite(asset->bytes, 1, asset->size, file);
   }
 }
 
-/* Return the tag that ends a section; its `end` is NULL if there is none. */
-static tag find_end(const char *at, const char *end) {
-  size_t depth = 1;
-  tag found = next_tag(at, end);
-  while (found.end != NULL) {
-    depth += found.kind == '#';
-    depth -= found.kind == '/';
-    if (depth == 0) {
-      return found;
-    }
-    found = next_tag(found.end, end);
-  }
-  return found;
-}
-
-static void fill_section(const supine_asset *assets, const tag *open, const char *end,
-                         const scope *around, FILE *file) {
+/* Write a section for each of its values. Return the position after the tag that ends it. */
+static const char *fill_section(const supine_asset *assets, const tag *open, const char *end,
+                                const scope *around, FILE *file) {
   const json_t *value = look_up(around, open->name, open->length);
-  const scope inner = {value, around};
-  if (json_is_object(value) || json_is_string(value) || json_is_number(value) ||
-      json_is_true(value)) {
-    fill(assets, open->end, end, &inner, file);
+  const bool once = json_is_object(value) || json_is_string(value) || json_is_number(value) ||
+                    json_is_true(value);
+  const size_t count = once ? 1 : json_array_size(value);
+  scope inner = {value, around};
+  for (size_t i = 0; file != NULL && i < count; ++i) {
+    inner.value = once ? value : json_array_get(value, i);
+    (void)fill(assets, open->end, end, &inner, file);
   }
-  for (size_t i = 0; i < json_array_size(value); ++i) {
-    const scope element = {json_array_get(value, i), around};
-    fill(assets, open->end, end, &element, file);
-  }
+  return fill(assets, open->end, end, &inner, NULL);
 }
 
-static void fill(const supine_asset *assets, const char *at, const char *end, const scope *around,
-                 FILE *file) {
-  for (tag open = next_tag(at, end); open.end != NULL; open = next_tag(at, end)) {
-    (void)fwrite(at, 1, (size_t)(open.begin - at), file);
-    at = open.end;
-    if (open.kind == 0) {
-      write_named(assets, &open, around, file);
-    } else {
-      const tag close = find_end(at, end);
-      fill_section(assets, &open, close.end != NULL ? close.begin : end, around, file);
-      at = close.end != NULL ? close.end : end;
+/* Write a template up to the tag that ends the enclosing section, or to `end`, and return the
+ * position after that. If `file` is NULL, write nothing. */
+static const char *fill(const supine_asset *assets, const char *at, const char *end,
+                        const scope *around, FILE *file) {
+  for (;;) {
+    const tag found = next_tag(at, end);
+    if (file != NULL) {
+      (void)fwrite(at, 1, (size_t)((found.end != NULL ? found.begin : end) - at), file);
+    }
+    if (found.end == NULL || (found.kind == '/' && around->outer != NULL)) {
+      return found.end != NULL ? found.end : end;
+    }
+    at = found.end;
+    if (found.kind == '#') {
+      at = fill_section(assets, &found, end, around, file);
+    } else if (file != NULL && found.kind == 0) {
+      write_named(assets, &found, around, file);
     }
   }
-  (void)fwrite(at, 1, (size_t)(end - at), file);
 }
 
 void supine_template_fill(const supine_asset *assets, const json_t *data, const char *name,
@@ -149,6 +141,6 @@ void supine_template_fill(const supine_asset *assets, const json_t *data, const 
   const supine_asset *asset = find_asset(assets, name, strlen(name));
   const scope outermost = {data, NULL};
   if (asset != NULL) {
-    fill(assets, asset->bytes, asset->bytes + asset->size, &outermost, file);
+    (void)fill(assets, asset->bytes, asset->bytes + asset->size, &outermost, file);
   }
 }

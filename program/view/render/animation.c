@@ -41,7 +41,7 @@ supine_status supine_render_animation_open(size_t width, size_t height,
         made->pixels != NULL ? WebPAnimEncoderNew((int)width, (int)height, &options) : NULL;
   }
   if (made == NULL || made->encoder == NULL) {
-    supine_render_animation_close(made);
+    supine_render_animation_close(&made);
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
   }
   *animation = made;
@@ -58,16 +58,11 @@ supine_status supine_render_animation_add(supine_animation *animation, const sup
     frame.width = (int)animation->width;
     frame.height = (int)animation->height;
     frame.use_argb = 1;
-    if (WebPPictureAlloc(&frame)) {
-      for (size_t i = 0; i < animation->width * animation->height; ++i) {
-        frame.argb[i / animation->width * (size_t)frame.argb_stride + i % animation->width] =
-            0xff000000U | animation->pixels[i];
-      }
-      if (WebPAnimEncoderAdd(animation->encoder, &frame, animation->duration_ms,
-                             &animation->config)) {
-        animation->duration_ms += milliseconds;
-        status = SUPINE_OK;
-      }
+    if (WebPPictureImportBGRX(&frame, (const uint8_t *)animation->pixels, 4 * frame.width) &&
+        WebPAnimEncoderAdd(animation->encoder, &frame, animation->duration_ms,
+                           &animation->config)) {
+      animation->duration_ms += milliseconds;
+      status = SUPINE_OK;
     }
     WebPPictureFree(&frame);
   }
@@ -90,10 +85,10 @@ supine_status supine_render_animation_write(supine_animation *animation, FILE *f
                                                                              : "out of memory");
 }
 
-void supine_render_animation_close(supine_animation *animation) {
-  if (animation != NULL) {
-    WebPAnimEncoderDelete(animation->encoder);
-    free(animation->pixels);
-    free(animation);
+void supine_render_animation_close(supine_animation **animation) {
+  if (*animation != NULL) {
+    WebPAnimEncoderDelete((*animation)->encoder);
+    free((*animation)->pixels);
+    free(*animation);
   }
 }

@@ -169,7 +169,7 @@ supine_status supine_render_animation_add(supine_animation *animation, const sup
 /** Write the animation to a file. */
 supine_status supine_render_animation_write(supine_animation *animation, FILE *file,
                                             supine_error *error);
-/** Free an animation; NULL is legal. */
-void supine_render_animation_close(supine_animation *animation);
+/** Free *animation, which may be NULL; for SUPINE_FREED_BY. */
+void supine_render_animation_close(supine_animation **animation);
 
 #endif
