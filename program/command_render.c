@@ -62,8 +62,7 @@ static const supine_option table[] = {
      FILLS(size), .read = read_size, .wants = "WIDTHxHEIGHT, up to 16384 each"},
     {"view", 0, "LIST",
      "views to draw, one below another, separated by commas: anterior, posterior, left (or "
-     "lateral), right, head, feet, oblique (from the front, left and above), lying (gravity down, "
-     "head left). With --turn, lying is anterior",
+     "lateral), right, head, feet, lying (gravity down, head left). With --turn, lying is anterior",
      .read = read_views, .standard = "lying"},
     {.table = supine_options_from, FILLS(from)},
     {"largest", 0, "MM",

@@ -12,19 +12,6 @@ static const char name[] = "embed";
 /* A grid extends this far beyond the lungs, mm. Displacements fall to 0 over this distance. */
 static const double margin = 60.0;
 
-/* Make a grid of points: the voxels of the image `image_path` or, if it is NULL, equally spaced
- * nodes. */
-static supine_status read_grid(const supine_inside_shells *shells,
-                               const supine_embed_content *wanted, const char *image_path,
-                               supine_inside_content *content, supine_error *error) {
-  SUPINE_FREED_BY(supine_image_free) supine_image image = {0};
-  if (image_path != NULL) {
-    SUPINE_TRY(supine_image_read(image_path, &image, error));
-  }
-  return supine_inside_content_grid(shells, image_path != NULL ? &image : NULL,
-                                    wanted->grid_spacing, margin, content, error);
-}
-
 static supine_status read_labelled(const supine_embed_content *wanted, const char *path,
                                    supine_inside_content *content, supine_error *error) {
   supine_labels_shape *parts = NULL;
@@ -47,21 +34,6 @@ static supine_status read_labelled(const supine_embed_content *wanted, const cha
   }
   supine_labels_shapes_free(parts, count);
   return status;
-}
-
-static supine_status read_all(const supine_inside_shells *shells,
-                              const supine_embed_content *wanted, char **paths, size_t count,
-                              supine_inside_content *content, supine_error *error) {
-  if (count == 0 || (!wanted->labels.given && supine_image_is_named(paths[0]))) {
-    return read_grid(shells, wanted, count > 0 ? paths[0] : NULL, content, error);
-  }
-  for (size_t i = 0; i < count; ++i) {
-    SUPINE_TRY(supine_image_is_named(paths[i]) ? read_labelled(wanted, paths[i], content, error)
-               : supine_mesh_points_named(paths[i])
-                   ? supine_inside_content_points(paths[i], &wanted->load, content, error)
-                   : supine_inside_content_mesh(paths[i], &wanted->load, content, error));
-  }
-  return SUPINE_OK;
 }
 
 /* Tell if the points lie inside the lungs only in other units or axes. Refuse points of which none
@@ -94,6 +66,19 @@ supine_status supine_command_embed_read(const supine_inside_shells *shells,
                                         const supine_embed_content *wanted, char **paths,
                                         size_t count, supine_inside_content *content,
                                         supine_error *error) {
-  SUPINE_TRY(read_all(shells, wanted, paths, count, content, error));
+  SUPINE_FREED_BY(supine_image_free) supine_image image = {0};
+  if (count == 0) {
+    return supine_inside_content_grid(shells, NULL, wanted->grid_spacing, margin, content, error);
+  }
+  if (!wanted->labels.given && supine_image_is_named(paths[0])) {
+    SUPINE_TRY(supine_image_read(paths[0], &image, error));
+    return supine_inside_content_grid(shells, &image, wanted->grid_spacing, margin, content, error);
+  }
+  for (size_t i = 0; i < count; ++i) {
+    SUPINE_TRY(supine_image_is_named(paths[i]) ? read_labelled(wanted, paths[i], content, error)
+               : supine_mesh_points_named(paths[i])
+                   ? supine_inside_content_points(paths[i], &wanted->load, content, error)
+                   : supine_inside_content_mesh(paths[i], &wanted->load, content, error));
+  }
   return check_content(shells, wanted, content, error);
 }

@@ -69,8 +69,7 @@ static const char *const frames[] = {"body", "hilum", NULL};
 const supine_option supine_options_hilum_frame[] = {
     {"frame", 0, "body|hilum",
      "what stays in place: the body (spine, apex and back wall), or the hilum, whose displacement "
-     "is "
-     "then subtracted, as bronchoscopy registers the airways there",
+     "is then subtracted, as bronchoscopy registers the airways there",
      .kind = SUPINE_OPTION_CHOICE, .size = sizeof(int), .choices = frames, .standard = "body"},
     {.name = NULL}};
 

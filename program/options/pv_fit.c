@@ -23,7 +23,6 @@ typedef struct problem {
   size_t count;
   supine_pv_sample *sample; /* [count] sorted by rising pressure */
   gsl_multifit_nlinear_workspace *work;
-  gsl_matrix *covariance;
   double *x; /* [count] pressures, mapped linearly to the range -1 to 1 */
   double *v; /* [count] (volume - first volume) / range of volumes */
   double *q; /* [count] volumes of the curve at the pressures x, scaled to rise from 0 to 1 */
@@ -150,10 +149,13 @@ static void describe(const problem *limb, double span, double confidence,
   *report = (supine_pv_report){.samples = count, .rms = span * share, .rms_percent = 100.0 * share};
   /* Compute (J^T J)^-1 for the Jacobian J. Times misfit^2 / freedom, it is the covariance of the
    * unknowns. */
-  (void)gsl_multifit_nlinear_covar(jacobian, 0.0, limb->covariance);
+  double entries[SUPINE_PV_UNKNOWNS * SUPINE_PV_UNKNOWNS];
+  gsl_matrix_view covariance =
+      gsl_matrix_view_array(entries, SUPINE_PV_UNKNOWNS, SUPINE_PV_UNKNOWNS);
+  (void)gsl_multifit_nlinear_covar(jacobian, 0.0, &covariance.matrix);
   const double t = gsl_cdf_tdist_Pinv(0.5 + 0.5 * confidence, freedom);
   for (size_t i = 0; i < SUPINE_PV_UNKNOWNS; ++i) {
-    const double interval = t * misfit * sqrt(gsl_matrix_get(limb->covariance, i, i) / freedom);
+    const double interval = t * misfit * sqrt(gsl_matrix_get(&covariance.matrix, i, i) / freedom);
     *(i < LOW ? &report->control_interval[i] : &report->volume_interval[i - LOW]) =
         i < LOW ? interval : span * interval;
   }
@@ -216,7 +218,6 @@ static supine_status fit_sorted(problem *limb, double confidence, supine_pv_curv
 
 static void free_workspace(problem *limb) {
   gsl_multifit_nlinear_free(limb->work);
-  gsl_matrix_free(limb->covariance);
 }
 
 supine_status supine_breath_fit(const char *name, size_t count, const supine_pv_sample *samples,
@@ -236,11 +237,10 @@ supine_status supine_breath_fit(const char *name, size_t count, const supine_pv_
                   .sample = supine_arena_take(&arena, count, sizeof *limb.sample),
                   .work = gsl_multifit_nlinear_alloc(gsl_multifit_nlinear_trust, &options, count,
                                                      SUPINE_PV_UNKNOWNS),
-                  .covariance = gsl_matrix_alloc(SUPINE_PV_UNKNOWNS, SUPINE_PV_UNKNOWNS),
                   .x = supine_arena_take(&arena, count, sizeof(double)),
                   .v = supine_arena_take(&arena, count, sizeof(double)),
                   .q = supine_arena_take(&arena, count, sizeof(double))};
-  if (arena.failed || limb.work == NULL || limb.covariance == NULL) {
+  if (arena.failed || limb.work == NULL) {
     return supine_error_memory(error, "%s: %zu samples", name, count);
   }
   SUPINE_TRY(sort(&limb, samples, error));

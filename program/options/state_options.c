@@ -164,17 +164,6 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
   return SUPINE_OK;
 }
 
-/* Compute the fraction of the triangles that turn over in a pose. */
-static supine_status turned_over(const supine_basis *basis, const supine_pose *pose, double *share,
-                                 supine_error *error) {
-  SUPINE_FREED_BY(supine_mesh_free) supine_mesh mesh = {0};
-  SUPINE_FREED_BY(supine_mesh_free) supine_mesh moved = {0};
-  SUPINE_TRY(supine_posed_mesh(basis, NULL, &mesh, error));
-  SUPINE_TRY(supine_posed_mesh(basis, pose, &moved, error));
-  *share = supine_mesh_turned_over(&mesh, moved.vertices);
-  return SUPINE_OK;
-}
-
 supine_status supine_options_plausible(const supine_plausible *lungs, supine_error *error) {
   char state[160];
   char wrong[192];
@@ -211,7 +200,11 @@ supine_status supine_options_pose_check(const supine_basis *basis, const char *c
                             .volume = supine_posed_volume(basis, pose),
                             .parts = "the surface folds; triangles that turn over",
                             .allowed = allow_folds || !info->has_rest};
-  SUPINE_TRY(turned_over(basis, pose, &lungs.folded, error));
+  SUPINE_FREED_BY(supine_mesh_free) supine_mesh mesh = {0};
+  SUPINE_FREED_BY(supine_mesh_free) supine_mesh moved = {0};
+  SUPINE_TRY(supine_posed_mesh(basis, NULL, &mesh, error));
+  SUPINE_TRY(supine_posed_mesh(basis, pose, &moved, error));
+  lungs.folded = supine_mesh_turned_over(&mesh, moved.vertices);
   for (size_t lung = 0; lung < info->lung_count && info->has_rest; ++lung) {
     lungs.full += info->reference_volume[lung];
   }

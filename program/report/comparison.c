@@ -44,10 +44,6 @@ static supine_status find_breath(const supine_comparison *c, float *xyz[2],
     posture->slab[i % SUPINE_COMPARISON_SLABS].volume += slabs[i].volume;
     posture->slab[i % SUPINE_COMPARISON_SLABS].gain += slabs[i].gain;
   }
-  for (size_t i = 0; i < SUPINE_COMPARISON_SLABS; ++i) {
-    const supine_slab *slab = &posture->slab[i];
-    posture->expansion[i] = slab->volume > 0.0 ? slab->gain / slab->volume : 0.0;
-  }
   return status;
 }
 
@@ -77,28 +73,21 @@ static supine_status find_posture(const supine_comparison *c, float *distance, f
   return status;
 }
 
-/* Compute the targets in each posture, with their expected errors. */
-static supine_status find_targets(const supine_comparison *c, supine_compared_posture *posture,
-                                  supine_error *error) {
-  const supine_pose *const pose[2] = {&c->reference.pose, &posture->pose};
-  SUPINE_FREED_BY(supine_posed_expected_free) supine_expected expected = {0};
-  SUPINE_TRY(supine_posed_expected(c->inside, &posture->item->state, &c->reference.state, &expected,
-                                   error));
-  return supine_command_targets_find(c->inside, &c->names, pose, expected.sigma, false,
-                                     &posture->targets, error);
-}
-
-/* Compute the expected error of each posture's displacement, mm RMS; 0 if it is unknown. */
+/* Compute the expected error of each posture's displacement, and the targets in each posture. */
 static supine_status find_errors(supine_comparison *c, supine_error *error) {
   for (size_t i = 0; i < c->postures.count; ++i) {
     supine_compared_posture *posture = &c->posture[i];
-    supine_expected expected = {0};
-    SUPINE_TRY(supine_posed_expected(c->basis, &posture->item->state, &c->reference.state,
-                                     &expected, error));
-    posture->expected_error = expected.rms;
-    supine_posed_expected_free(&expected);
+    const supine_state *state = &posture->item->state;
+    const supine_pose *const pose[2] = {&c->reference.pose, &posture->pose};
+    SUPINE_FREED_BY(supine_posed_expected_free) supine_expected surface = {0};
+    SUPINE_FREED_BY(supine_posed_expected_free) supine_expected inside = {0};
+    SUPINE_TRY(supine_posed_expected(c->basis, state, &c->reference.state, &surface, error));
+    posture->expected_error = surface.rms;
+    c->has_errors = c->has_errors || surface.rms > 0.0;
     if (c->inside != NULL) {
-      SUPINE_TRY(find_targets(c, posture, error));
+      SUPINE_TRY(supine_posed_expected(c->inside, state, &c->reference.state, &inside, error));
+      SUPINE_TRY(supine_command_targets_find(c->inside, &c->names, pose, inside.sigma, false,
+                                             &posture->targets, error));
     }
   }
   return SUPINE_OK;
@@ -152,12 +141,4 @@ void supine_report_volume(const supine_comparison *c, char *text, size_t size) {
   (void)supine_state_describe(&c->volume.state, whole, sizeof whole);
   const char *space = strchr(whole, ' '); /* end of the posture's name */
   (void)snprintf(text, size, "%s", space == NULL ? "as given" : space + 1);
-}
-
-bool supine_report_has_errors(const supine_comparison *c) {
-  double sum = 0.0;
-  for (size_t i = 0; i < c->postures.count; ++i) {
-    sum += c->posture[i].expected_error;
-  }
-  return sum > 0.0;
 }

@@ -27,7 +27,6 @@ typedef struct supine_compared_posture {
   double volume[SUPINE_LUNGS_MAX];           /* volume of each lung, gas and tissue, mL */
   double gain[SUPINE_LUNGS_MAX];             /* volume that each lung gains in the breath, mL */
   supine_slab slab[SUPINE_COMPARISON_SLABS]; /* horizontal slabs, uppermost first */
-  double expansion[SUPINE_COMPARISON_SLABS]; /* volume that each slab gains / its volume before */
 } supine_compared_posture;
 
 typedef struct supine_comparison {
@@ -41,6 +40,7 @@ typedef struct supine_comparison {
   supine_command_names names; /* their names */
   supine_posture_list postures;
   supine_reference_pose reference; /* pose from which displacements are measured */
+  bool has_errors;                 /* whether the expected error of any posture is known */
   supine_compare *compare;
   supine_compared_posture *posture; /* [postures.count] */
 } supine_comparison;
@@ -54,8 +54,10 @@ void supine_report_free(supine_comparison *comparison);
 /* Write the volume of `comparison->volume` to `text`, for example "at rest + 300 mL". */
 void supine_report_volume(const supine_comparison *comparison, char *text, size_t size);
 
-/* Return whether the expected error of any posture is known. */
-bool supine_report_has_errors(const supine_comparison *comparison);
+/* Return the regional expansion of a slab: the volume that it gains / its volume before. */
+static inline double supine_report_expansion(const supine_slab *slab) {
+  return slab->volume > 0.0 ? slab->gain / slab->volume : 0.0;
+}
 
 /* Return the volume of a lung in a posture as {value, low, high, source}, or as text. The source is
  * "measured" in the scan, "given" in mL or by --resting, "assumed" from other people, or "computed"

@@ -14,7 +14,7 @@ const char *supine_report_line(size_t posture) {
 
 /* Return the regional expansion of a slab, %. */
 static double percent(const supine_comparison *c, size_t posture, size_t slab) {
-  return 100.0 * c->posture[posture].expansion[slab];
+  return 100.0 * supine_report_expansion(&c->posture[posture].slab[slab]);
 }
 
 /* Edges of the plot in profile.html, SVG units. */

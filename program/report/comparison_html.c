@@ -38,15 +38,13 @@ static void add_fact(json_t *list, const char *name, json_t *value) {
 }
 
 /* Return the value of {{provenance}}: the command, the program, the basis and its metadata. */
-static json_t *provenance(const supine_comparison *c, json_t *file) {
+static json_t *provenance(const supine_comparison *c, json_t *file, json_t *today) {
   static const char *const keys[] = {"made_by", "assumed",           "scanned",     "law",
                                      "patient", "error_rms_percent", "attribution", "checksum"};
   json_t *list = json_array();
-  json_t *today = date();
   add_fact(list, "command", json_string(c->made_by));
   add_fact(list, "program",
            json_sprintf("supine " SUPINE_VERSION ", %s", json_string_value(today)));
-  json_decref(today);
   add_fact(list, "basis", json_incref(file));
   for (size_t i = 0; i < sizeof keys / sizeof *keys; ++i) {
     const char *value = supine_basis_metadata(c->basis, keys[i]);
@@ -64,9 +62,10 @@ static json_t *facts(const supine_comparison *c) {
   supine_options_basis_title(c->path, title, sizeof title);
   json_t *file = json_string(title);
   supine_report_volume(c, volume, sizeof volume);
-  json_t *list = provenance(c, file);
+  json_t *today = date();
+  json_t *list = provenance(c, file, today);
   return json_pack(
-      "{s:o, s:o, s:o, s:o, s:s, s:I, s:o, s:s}", "file", file, "provenance", list, "date", date(),
+      "{s:o, s:o, s:o, s:o, s:s, s:I, s:o, s:s}", "file", file, "provenance", list, "date", today,
       "count", json_sprintf("%zu posture%s", c->postures.count, c->postures.count == 1 ? "" : "s"),
       "volume", volume, "vertices", (json_int_t)supine_basis_get_info(c->basis)->vertex_count,
       "area", json_sprintf("%.0f", supine_compare_area(c->compare) / 100.0), "version",
@@ -83,7 +82,7 @@ supine_status supine_report_html(const supine_comparison *c, FILE *file, supine_
     (void)json_object_set_new(data, "targeted",
                               json_pack("{s:o}", "targets", supine_report_targets(c)));
   }
-  if (supine_report_has_errors(c)) {
+  if (c->has_errors) {
     (void)json_object_set_new(data, "meaning",
                               json_string(SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT));
   }

@@ -72,7 +72,7 @@ static json_t *encode_slabs(const supine_compared_posture *p) {
     (void)json_array_append_new(
         slabs, json_pack("{s:[f, f], s:f, s:f, s:f}", "height", 1.0 - thickness * (double)(s + 1),
                          1.0 - thickness * (double)s, "volume_ml", p->slab[s].volume, "gain_ml",
-                         p->slab[s].gain, "expansion", p->expansion[s]));
+                         p->slab[s].gain, "expansion", supine_report_expansion(&p->slab[s])));
   }
   return slabs;
 }
@@ -83,7 +83,7 @@ static json_t *encode_posture(const supine_comparison *c, size_t i) {
       json_pack("{s:s, s:o, s:o, s:o}", "name", p->item->name, "gravity",
                 supine_options_json_numbers(3, p->item->state.gravity), "displacement_mm",
                 statistics(&p->displacement), "hilum_mm", supine_options_json_numbers(3, p->hilum));
-  if (supine_report_has_errors(c)) {
+  if (c->has_errors) {
     (void)json_object_set_new(posture, "expected_error_mm", json_real(p->expected_error));
   }
   (void)json_object_set_new(posture, "volume_ml", volumes(c, i, false));
@@ -122,7 +122,7 @@ static void add_tables(const supine_comparison *c, json_t *text) {
     const supine_compared_posture *p = &c->posture[i];
     json_t *moved = statistics(&p->displacement);
     (void)json_object_set_new(moved, "hilum x, y, z", supine_options_json_numbers(3, p->hilum));
-    if (supine_report_has_errors(c)) {
+    if (c->has_errors) {
       (void)json_object_set_new(moved, "expected error", json_real(p->expected_error));
     }
     add_row(text, "displacement, mm", "posture", p->label, moved);
@@ -140,8 +140,9 @@ static void add_tables(const supine_comparison *c, json_t *text) {
     (void)snprintf(height, sizeof height, "%zu-%zu", 100 - 10 * (s + 1), 100 - 10 * s);
     for (size_t i = 0; i < c->postures.count; ++i) {
       if (c->posture[i].has_breath) {
-        (void)json_object_set_new(values, c->posture[i].label,
-                                  json_real(100.0 * c->posture[i].expansion[s]));
+        (void)json_object_set_new(
+            values, c->posture[i].label,
+            json_real(100.0 * supine_report_expansion(&c->posture[i].slab[s])));
       }
     }
     add_row(text, "regional expansion by height along gravity, % of the volume before the breath",
@@ -164,7 +165,7 @@ void supine_report_print(const supine_comparison *c, bool json) {
     (void)json_object_set_new(root, "postures", postures);
   } else {
     add_tables(c, root);
-    if (supine_report_has_errors(c)) {
+    if (c->has_errors) {
       (void)json_object_set_new(root, "expected error",
                                 json_string(SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT));
     }

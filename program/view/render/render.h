@@ -22,7 +22,6 @@ typedef enum supine_view {
   SUPINE_VIEW_RIGHT,
   SUPINE_VIEW_HEAD,
   SUPINE_VIEW_FEET,
-  SUPINE_VIEW_OBLIQUE, /**< in front, to the patient's left, and higher than the lungs */
   SUPINE_VIEW_LYING, /**< gravity points down, and the head is on the left; a patient who stands is
                         seen from the front */
   SUPINE_VIEW_COUNT
