@@ -207,13 +207,10 @@ void supine_command_target_shift(supine_target *target, const double shift[3]) {
 }
 
 json_t *supine_command_target_json(const supine_target *t) {
-  json_t *made = json_pack("{s:s, s:[f, f, f], s:f, s:o}", "name", t->name, "move", t->move[0],
-                           t->move[1], t->move[2], "mm", t->moved, "expected_error_mm",
-                           isnan(t->expected) ? json_null() : json_real(t->expected));
-  if (t->volume[0] != 0) {
-    (void)json_object_set_new(made, "volumes_ml", supine_options_json_numbers(2, t->volume));
-  }
-  return made;
+  return json_pack("{s:s, s:[f, f, f], s:f, s:o, s:o*}", "name", t->name, "move", t->move[0],
+                   t->move[1], t->move[2], "mm", t->moved, "expected_error_mm",
+                   isnan(t->expected) ? json_null() : json_real(t->expected), "volumes_ml",
+                   t->volume[0] != 0 ? supine_options_json_numbers(2, t->volume) : NULL);
 }
 
 supine_status supine_command_marks_make(const supine_basis *inside,

@@ -55,60 +55,45 @@ static json_t *provenance(const supine_comparison *c, json_t *file, json_t *toda
   return list;
 }
 
-/* Return the values of these tags of report.html: {{provenance}}, and those in the heading. */
-static json_t *facts(const supine_comparison *c) {
+/* Return the outlines, with the names and colours of those drawn; NULL for a single posture. */
+static json_t *outlined(const supine_comparison *c) {
+  json_t *outlines = c->postures.count > 1 ? supine_report_outlines(c) : NULL;
+  return outlines == NULL ? NULL
+                          : json_pack("{s:o, s:O}", "outlines", outlines, "drawn",
+                                      json_object_get(json_array_get(outlines, 0), "lines"));
+}
+
+/* Return the values of the tags of report.html but {{pictures}} and {{trouble}}. */
+static json_t *values(const supine_comparison *c) {
   char title[256];
   char volume[160];
   supine_options_basis_title(c->path, title, sizeof title);
   json_t *file = json_string(title);
   supine_report_volume(c, volume, sizeof volume);
   json_t *today = date();
-  json_t *list = provenance(c, file, today);
   return json_pack(
-      "{s:o, s:o, s:o, s:o, s:s, s:I, s:o, s:s}", "file", file, "provenance", list, "date", today,
-      "count", json_sprintf("%zu posture%s", c->postures.count, c->postures.count == 1 ? "" : "s"),
-      "volume", volume, "vertices", (json_int_t)supine_basis_get_info(c->basis)->vertex_count,
-      "area", json_sprintf("%.0f", supine_compare_area(c->compare) / 100.0), "version",
-      SUPINE_VERSION);
+      "{s:o, s:o, s:o, s:o, s:s, s:I, s:o, s:s, s:o, s:o, s:o, s:s, s:o*, s:s*, s:b, s:o*, s:o*}",
+      "provenance", provenance(c, file, today), "file", file, "date", today, "count",
+      json_sprintf("%zu posture%s", c->postures.count, c->postures.count == 1 ? "" : "s"), "volume",
+      volume, "vertices", (json_int_t)supine_basis_get_info(c->basis)->vertex_count, "area",
+      json_sprintf("%.0f", supine_compare_area(c->compare) / 100.0), "version", SUPINE_VERSION,
+      "postures", supine_report_postures(c), "findings", supine_report_findings(c), "lungs",
+      lungs(c), "reference", c->reference.name, "targeted",
+      c->inside != NULL ? json_pack("{s:o}", "targets", supine_report_targets(c)) : NULL, "meaning",
+      c->has_errors ? SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT : NULL, "assumed",
+      supine_basis_metadata(c->basis, "resting_known") == NULL, "outlined", outlined(c),
+      "ventilation",
+      c->breath > 0.0 ? json_pack("{s:o}", "profile", supine_report_profile(c)) : NULL);
 }
 
 supine_status supine_report_html(const supine_comparison *c, FILE *file, supine_error *error) {
-  json_t *data = facts(c);
-  (void)json_object_set_new(data, "postures", supine_report_postures(c));
-  (void)json_object_set_new(data, "findings", supine_report_findings(c));
-  (void)json_object_set_new(data, "lungs", lungs(c));
-  (void)json_object_set_new(data, "reference", json_string(c->reference.name));
-  if (c->inside != NULL) {
-    (void)json_object_set_new(data, "targeted",
-                              json_pack("{s:o}", "targets", supine_report_targets(c)));
-  }
-  if (c->has_errors) {
-    (void)json_object_set_new(data, "meaning",
-                              json_string(SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT));
-  }
-  if (supine_basis_metadata(c->basis, "resting_known") == NULL) {
-    (void)json_object_set_new(data, "assumed", json_true());
-  }
-  if (c->postures.count > 1) {
-    json_t *outlines = supine_report_outlines(c);
-    json_t *drawn = json_object_get(json_array_get(outlines, 0), "lines");
-    (void)json_object_set_new(data, "outlined",
-                              json_pack("{s:o, s:O}", "outlines", outlines, "drawn", drawn));
-  }
-  if (c->breath > 0.0) {
-    (void)json_object_set_new(data, "ventilation",
-                              json_pack("{s:o}", "profile", supine_report_profile(c)));
-  }
+  json_auto_t *data = values(c);
   json_t *pictures = supine_report_pictures(c, error);
-  if (pictures != NULL) {
-    (void)json_object_set_new(data, "pictures", pictures);
-  } else if (error->status == SUPINE_ERROR_MEMORY) {
-    json_decref(data);
+  if (pictures == NULL && error->status == SUPINE_ERROR_MEMORY) {
     return error->status;
-  } else {
-    (void)json_object_set_new(data, "trouble", json_string(error->message));
   }
+  (void)(pictures != NULL ? json_object_set_new(data, "pictures", pictures)
+                          : json_object_set_new(data, "trouble", json_string(error->message)));
   supine_template_fill(supine_report_assets, data, "report.html", file);
-  json_decref(data);
   return SUPINE_OK;
 }

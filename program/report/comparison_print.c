@@ -77,28 +77,24 @@ static json_t *encode_slabs(const supine_compared_posture *p) {
   return slabs;
 }
 
+static json_t *encode_targets(const supine_comparison *c, const supine_compared_posture *p) {
+  json_t *targets = json_array();
+  for (size_t k = 0; k < c->names.count; ++k) {
+    (void)json_array_append_new(targets, supine_command_target_json(&p->targets[k]));
+  }
+  return targets;
+}
+
 static json_t *encode_posture(const supine_comparison *c, size_t i) {
   const supine_compared_posture *p = &c->posture[i];
-  json_t *posture =
-      json_pack("{s:s, s:o, s:o, s:o}", "name", p->item->name, "gravity",
-                supine_options_json_numbers(3, p->item->state.gravity), "displacement_mm",
-                statistics(&p->displacement), "hilum_mm", supine_options_json_numbers(3, p->hilum));
-  if (c->has_errors) {
-    (void)json_object_set_new(posture, "expected_error_mm", json_real(p->expected_error));
-  }
-  (void)json_object_set_new(posture, "volume_ml", volumes(c, i, false));
-  if (p->has_breath) {
-    (void)json_object_set_new(posture, "gain_ml", by_lung(c, p->gain));
-    (void)json_object_set_new(posture, "slabs", encode_slabs(p));
-  }
-  if (c->inside != NULL) {
-    json_t *targets = json_array();
-    for (size_t k = 0; k < c->names.count; ++k) {
-      (void)json_array_append_new(targets, supine_command_target_json(&p->targets[k]));
-    }
-    (void)json_object_set_new(posture, "targets", targets);
-  }
-  return posture;
+  return json_pack("{s:s, s:o, s:o, s:o, s:o*, s:o, s:o*, s:o*, s:o*}", "name", p->item->name,
+                   "gravity", supine_options_json_numbers(3, p->item->state.gravity),
+                   "displacement_mm", statistics(&p->displacement), "hilum_mm",
+                   supine_options_json_numbers(3, p->hilum), "expected_error_mm",
+                   c->has_errors ? json_real(p->expected_error) : NULL, "volume_ml",
+                   volumes(c, i, false), "gain_ml", p->has_breath ? by_lung(c, p->gain) : NULL,
+                   "slabs", p->has_breath ? encode_slabs(p) : NULL, "targets",
+                   c->inside != NULL ? encode_targets(c, p) : NULL);
 }
 
 /* Append a row to the table named `heading`: `value` in the column `name`, then `columns`,
@@ -135,7 +131,7 @@ static void add_tables(const supine_comparison *c, json_t *text) {
     }
   }
   for (size_t s = 0; c->breath > 0.0 && s < SUPINE_COMPARISON_SLABS; ++s) {
-    json_t *values = json_object();
+    json_auto_t *values = json_object(); /* stays empty if no posture has a breath */
     char height[16];
     (void)snprintf(height, sizeof height, "%zu-%zu", 100 - 10 * (s + 1), 100 - 10 * s);
     for (size_t i = 0; i < c->postures.count; ++i) {
@@ -145,8 +141,10 @@ static void add_tables(const supine_comparison *c, json_t *text) {
             json_real(100.0 * supine_report_expansion(&c->posture[i].slab[s])));
       }
     }
-    add_row(text, "regional expansion by height along gravity, % of the volume before the breath",
-            "height, %", height, values);
+    if (json_object_size(values) > 0) {
+      add_row(text, "regional expansion by height along gravity, % of the volume before the breath",
+              "height, %", height, json_incref(values));
+    }
   }
 }
 

@@ -73,27 +73,27 @@ static json_t *write_encoded(glb *g, glb_kind kind, const layout *l, const unsig
                              size_t count, const char *mode) {
   const size_t bytes = count * l->stride;
   const json_int_t begin = (json_int_t)ftell(g->numbers);
-  export_packed packed = {0};
   if (mode == NULL) {
     (void)fwrite(encoded, 1, bytes, g->numbers);
     (void)fwrite("\0\0\0", 1, -bytes % 4, g->numbers);
     return json_pack("{s:i, s:I, s:I}", "buffer", 0, "byteOffset", begin, "byteLength",
                      (json_int_t)bytes);
   }
-  const supine_status status =
+  size_t size = 0;
+  SUPINE_ARENA arena = {0};
+  const void *packed =
       kind == GLB_CORNERS
-          ? supine_export_pack_corners((const uint32_t *)encoded, count, count, &packed)
-          : supine_export_pack_rows(encoded, count, l->stride, &packed);
-  if (status != SUPINE_OK) {
-    g->status = status;
+          ? supine_export_pack_corners(&arena, (const uint32_t *)encoded, count, count, &size)
+          : supine_export_pack_rows(&arena, encoded, count, l->stride, &size);
+  if (packed == NULL) {
+    g->status = SUPINE_ERROR_MEMORY;
     return NULL;
   }
-  (void)fwrite(packed.bytes, 1, packed.size, g->numbers);
-  (void)fwrite("\0\0\0", 1, -packed.size % 4, g->numbers);
-  free(packed.bytes);
+  (void)fwrite(packed, 1, size, g->numbers);
+  (void)fwrite("\0\0\0", 1, -size % 4, g->numbers);
   json_t *extension = json_pack("{s:i, s:I, s:I, s:I, s:I, s:s}", "buffer", 0, "byteOffset", begin,
-                                "byteLength", (json_int_t)packed.size, "byteStride",
-                                (json_int_t)l->stride, "count", (json_int_t)count, "mode", mode);
+                                "byteLength", (json_int_t)size, "byteStride", (json_int_t)l->stride,
+                                "count", (json_int_t)count, "mode", mode);
   if (kind == GLB_NORMALS) {
     (void)json_object_set_new(extension, "filter", json_string("OCTAHEDRAL"));
   }

@@ -32,18 +32,13 @@ typedef struct page {
   supine_arena arena;
 } page;
 
-/* Return SUPINE_ERROR_MEMORY if memory has run out. */
+/* Return SUPINE_ERROR_MEMORY if memory has run out, also before, so that `bytes` is NULL. */
 static supine_status add_tensor(page *p, const char *name, const void *bytes, size_t size) {
-  json_t *text = supine_export_base64(bytes, size);
-  const int failed =
-      json_array_append_new(p->tensors, json_pack("{s:s, s:o}", "name", name, "base64", text));
-  return failed == 0 ? SUPINE_OK : SUPINE_ERROR_MEMORY;
-}
-
-static supine_status add_packed(page *p, const char *name, export_packed packed) {
-  const supine_status status = add_tensor(p, name, packed.bytes, packed.size);
-  free(packed.bytes);
-  return status;
+  json_t *text = bytes != NULL ? supine_export_base64(bytes, size) : NULL;
+  return json_array_append_new(p->tensors, json_pack("{s:s, s:o}", "name", name, "base64", text)) ==
+                 0
+             ? SUPINE_OK
+             : SUPINE_ERROR_MEMORY;
 }
 
 static int16_t quantise(double value, double step) {
@@ -102,7 +97,7 @@ static supine_status add_rows(page *p, const char *name, const supine_basis_info
                               size_t columns, fill_row *fill) {
   const size_t n = info->vertex_count;
   const size_t stride = (columns + 1) / 2 * 2;
-  export_packed packed = {0};
+  size_t size = 0;
   SUPINE_ARENA arena = {0};
   int16_t *rows = supine_arena_zeros(&arena, axes * n, stride * sizeof *rows);
   if (rows == NULL) {
@@ -111,16 +106,18 @@ static supine_status add_rows(page *p, const char *name, const supine_basis_info
   for (size_t i = 0; i < axes * n; ++i) {
     fill(p, info, info == p->info ? p->order.vertex[i % n] : i % n, i / n, rows + i * stride);
   }
-  SUPINE_TRY(supine_export_pack_rows(rows, axes * n, stride * sizeof *rows, &packed));
-  return add_packed(p, name, packed);
+  const void *packed =
+      supine_export_pack_rows(&arena, rows, axes * n, stride * sizeof *rows, &size);
+  return add_tensor(p, name, packed, size);
 }
 
 static supine_status add_corners(page *p, const char *name, const supine_basis_info *info,
                                  const uint32_t *corners) {
-  export_packed packed = {0};
-  SUPINE_TRY(
-      supine_export_pack_corners(corners, 3 * info->triangle_count, info->vertex_count, &packed));
-  return add_packed(p, name, packed);
+  size_t size = 0;
+  SUPINE_ARENA arena = {0};
+  const void *packed = supine_export_pack_corners(&arena, corners, 3 * info->triangle_count,
+                                                  info->vertex_count, &size);
+  return add_tensor(p, name, packed, size);
 }
 
 /* Return the largest displacement of a vertex along an axis by one mode, mm. */

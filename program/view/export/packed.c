@@ -31,26 +31,20 @@ void supine_export_pack_direction(const float direction[3], size_t size, void *n
   meshopt.encodeFilterOct(numbers, 1, size, size == 4 ? 8 : 16, d);
 }
 
-supine_status supine_export_pack_rows(const void *rows, size_t count, size_t stride,
-                                      export_packed *packed) {
+void *supine_export_pack_rows(supine_arena *arena, const void *rows, size_t count, size_t stride,
+                              size_t *size) {
   const size_t room = meshopt.encodeVertexBufferBound(count, stride);
-  *packed = (export_packed){.bytes = malloc(room)};
-  if (packed->bytes == NULL) {
-    return SUPINE_ERROR_MEMORY;
-  }
-  packed->size = meshopt.encodeVertexBuffer(packed->bytes, room, rows, count, stride);
-  return SUPINE_OK;
+  unsigned char *bytes = supine_arena_take(arena, room, 1);
+  *size = bytes != NULL ? meshopt.encodeVertexBuffer(bytes, room, rows, count, stride) : 0;
+  return bytes;
 }
 
-supine_status supine_export_pack_corners(const uint32_t *corners, size_t count, size_t vertices,
-                                         export_packed *packed) {
+void *supine_export_pack_corners(supine_arena *arena, const uint32_t *corners, size_t count,
+                                 size_t vertices, size_t *size) {
   const size_t room = meshopt.encodeIndexBufferBound(count, vertices);
-  *packed = (export_packed){.bytes = malloc(room)};
-  if (packed->bytes == NULL) {
-    return SUPINE_ERROR_MEMORY;
-  }
-  packed->size = meshopt.encodeIndexBuffer(packed->bytes, room, corners, count);
-  return SUPINE_OK;
+  unsigned char *bytes = supine_arena_take(arena, room, 1);
+  *size = bytes != NULL ? meshopt.encodeIndexBuffer(bytes, room, corners, count) : 0;
+  return bytes;
 }
 
 /* Sort a lung's triangles from feet to head, then join them to strips, which run around the lung.

@@ -8,12 +8,6 @@
 
 #include <supine/runtime.h>
 
-/** Compressed bytes; free `bytes` with free(). */
-typedef struct export_packed {
-  unsigned char *bytes;
-  size_t size;
-} export_packed;
-
 /** Load meshoptimizer; call this before the functions below. */
 supine_status supine_export_pack_begin(supine_error *error);
 
@@ -23,13 +17,15 @@ supine_status supine_export_pack_begin(supine_error *error);
  * @param numbers  output: the integers */
 void supine_export_pack_direction(const float direction[3], size_t size, void *numbers);
 
-/** Compress `count` rows of `stride` bytes; the stride is a multiple of 4 and at most 256. */
-supine_status supine_export_pack_rows(const void *rows, size_t count, size_t stride,
-                                      export_packed *packed);
+/** Compress `count` rows of `stride` bytes; the stride is a multiple of 4 and at most 256.
+ * @param size  output: number of compressed bytes
+ * @return the compressed bytes, valid until the arena is freed; NULL if out of memory */
+void *supine_export_pack_rows(supine_arena *arena, const void *rows, size_t count, size_t stride,
+                              size_t *size);
 
-/** Compress triangles, given as `count` vertex indices below `vertices`. */
-supine_status supine_export_pack_corners(const uint32_t *corners, size_t count, size_t vertices,
-                                         export_packed *packed);
+/** Compress triangles, given as `count` vertex indices below `vertices`, as above. */
+void *supine_export_pack_corners(supine_arena *arena, const uint32_t *corners, size_t count,
+                                 size_t vertices, size_t *size);
 
 /** Order in which vertices and triangles are written, lung by lung. */
 typedef struct export_order {
