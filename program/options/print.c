@@ -88,7 +88,6 @@ static const struct {
               {NULL, "determined", "posture determined by the points"},
               {NULL, "deviation_without_points_ml", "  without the points, mL"},
               {"error", "directions", "held-out directions"},
-              {"sphere", "directions", "sampled directions"},
               {NULL, "energy_per_band", "displacement by band, share"},
               {NULL, "error", "compression error"},
               {"error", "volume_ml", "errors in mm at volume, mL"},
@@ -145,7 +144,6 @@ static const struct {
               {NULL, "rms_percent", "residual, % of range of volumes"},
               {"states", "scale", "scale of the displacement"},
               {NULL, "scanned", "state in the scan"},
-              {NULL, "sphere", "all directions of gravity"},
               {NULL, "spread_rms", "RMS deviation / force at centre"},
               {NULL, "standard_errors", "standard errors of c1 to c9"},
               {"linearity", "states", "states"},
@@ -156,7 +154,6 @@ static const struct {
               {"states", "landmarks", "distance between landmarks"},
               {"states", "surface", "distance between surfaces"},
               {"states", "volume_ml", "volume above the start, mL"},
-              {NULL, "volumes_ml", "volumes, mL"},
               {NULL, "volume_deviation_ml", "volume, standard deviation, mL"},
               {NULL, "volume_interval_mL", "  confidence interval, +- mL"},
               {NULL, "volume_mL", "volume, from and to, mL"}};

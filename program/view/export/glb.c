@@ -48,29 +48,23 @@ static supine_status add_all(glb *g, json_t **roots, supine_error *error) {
   return g->status == SUPINE_OK ? SUPINE_OK : supine_error_set(error, g->status, "out of memory");
 }
 
-/* Build the file's JSON. A compressed file has a second buffer, the fallback that
+/* Complete the file's JSON. A compressed file has a second buffer, the fallback that
  * EXT_meshopt_compression requires: it has the size of the decompressed arrays, but no data. */
-static json_t *make_root(glb *g, size_t bytes, json_t *roots) {
+static void complete(glb *g, size_t bytes, json_t *roots) {
   static const char packed[] = "EXT_meshopt_compression";
-  json_t *root =
-      json_pack("{s:{s:s, s:s}, s:i, s:[{s:s, s:o}], s:O, s:O, s:O, s:O, s:O, s:[{s:I}], s:o}",
-                "asset", "version", "2.0", "generator", "supine", "scene", 0, "scenes", "name",
-                "lungs", "nodes", roots, "nodes", g->nodes, "meshes", g->meshes, "materials",
-                g->materials, "bufferViews", g->views, "accessors", g->accessors, "buffers",
-                "byteLength", (json_int_t)bytes, "extras", supine_export_glb_extras(g));
+  json_t *buffers = json_object_get(g->root, "buffers");
+  (void)json_array_append_new(json_object_get(g->root, "scenes"),
+                              json_pack("{s:s, s:o}", "name", "lungs", "nodes", roots));
+  (void)json_array_append_new(buffers, json_pack("{s:I}", "byteLength", (json_int_t)bytes));
+  (void)json_object_set_new(g->root, "extras", supine_export_glb_extras(g));
   if (!g->options->plain) {
-    (void)json_array_append_new(json_object_get(root, "buffers"),
-                                json_pack("{s:I, s:{s:{s:b}}}", "byteLength",
-                                          (json_int_t)g->unpacked, "extensions", packed, "fallback",
-                                          1));
+    (void)json_array_append_new(buffers, json_pack("{s:I, s:{s:{s:b}}}", "byteLength",
+                                                   (json_int_t)g->unpacked, "extensions", packed,
+                                                   "fallback", 1));
     json_t *names = json_pack("[s, s]", packed, "KHR_mesh_quantization");
-    (void)json_object_set(root, "extensionsUsed", names);
-    (void)json_object_set_new(root, "extensionsRequired", names);
+    (void)json_object_set(g->root, "extensionsUsed", names);
+    (void)json_object_set_new(g->root, "extensionsRequired", names);
   }
-  if (json_array_size(g->animations) > 0) {
-    (void)json_object_set(root, "animations", g->animations);
-  }
-  return root;
 }
 
 static supine_status write_file(const char *path, const char *text, const char *numbers,
@@ -114,12 +108,11 @@ static supine_status make_and_write(glb *g, const char *path, size_t *total, sup
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
   }
   if (status == SUPINE_OK) {
-    json_t *root = make_root(g, bytes, roots);
-    char *text = json_dumps(root, JSON_COMPACT | JSON_REAL_PRECISION(9));
+    complete(g, bytes, roots);
+    char *text = json_dumps(g->root, JSON_COMPACT | JSON_REAL_PRECISION(9));
     status = text == NULL ? supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path)
                           : write_file(path, text, numbers, bytes, total, error);
     free(text);
-    json_decref(root);
   } else {
     json_decref(roots);
   }
@@ -129,11 +122,7 @@ static supine_status make_and_write(glb *g, const char *path, size_t *total, sup
 
 static void free_glb(glb **g) {
   if (*g != NULL) {
-    json_t *const parts[] = {(*g)->views, (*g)->accessors, (*g)->meshes,
-                             (*g)->nodes, (*g)->materials, (*g)->animations};
-    for (size_t i = 0; i < sizeof parts / sizeof *parts; ++i) {
-      json_decref(parts[i]);
-    }
+    json_decref((*g)->root);
     supine_arena_free(&(*g)->arena);
     free(*g);
   }
@@ -159,8 +148,11 @@ supine_status supine_export_glb_write(const char *path, const supine_basis *basi
              .accessors = json_array(),
              .meshes = json_array(),
              .nodes = json_array(),
-             .materials = json_array(),
-             .animations = json_array()};
+             .materials = json_array()};
+  g->root = json_pack("{s:{s:s, s:s}, s:i, s:[], s:o, s:o, s:o, s:o, s:o, s:[]}", "asset",
+                      "version", "2.0", "generator", "supine", "scene", 0, "scenes", "nodes",
+                      g->nodes, "meshes", g->meshes, "materials", g->materials, "bufferViews",
+                      g->views, "accessors", g->accessors, "buffers");
   SUPINE_TRY(supine_export_targets_choose(basis, options->breath, &g->targets, error));
   g->step = options->plain ? 1 : fmax(step_min_mm, g->targets.half_extent / (INT16_MAX / 2));
   return make_and_write(g, path, bytes, error);

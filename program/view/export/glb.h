@@ -35,7 +35,8 @@ typedef struct glb {
   float *normals; /**< [N, 3] unit normals of the base mesh */
   float *added; /**< [targets.count, N, 3] change of the normals by each morph target at weight 1 */
   double step;  /**< unit of stored positions and displacements, mm; 1 if options->plain */
-  json_t *views, *accessors, *meshes, *nodes, *materials, *animations;
+  json_t *root; /**< JSON of the file, with the following arrays */
+  json_t *views, *accessors, *meshes, *nodes, *materials;
   FILE *numbers;        /**< binary chunk of the file */
   size_t unpacked;      /**< total size of the compressed arrays after decompression, bytes */
   supine_status status; /**< SUPINE_ERROR_MEMORY if an allocation failed */

@@ -46,7 +46,7 @@ static void make_frame(glb *g, double roll, double seconds, float *rows, size_t 
 }
 
 /* Append an animation of breathing at `roll` radians, or during one full turn if `roll` is NAN. */
-static void add(glb *g, const char *name, double roll, size_t seconds) {
+static void add(glb *g, json_t *animations, const char *name, double roll, size_t seconds) {
   const size_t count = g->info->lung_count;
   const size_t frames = RATE * seconds + 1;
   const size_t targets = g->targets.count;
@@ -79,14 +79,16 @@ static void add(glb *g, const char *name, double roll, size_t seconds) {
                                 json_pack("{s:I, s:{s:I, s:s}}", "sampler", (json_int_t)i + 1,
                                           "target", "node", (json_int_t)i + 1, "path", "weights"));
   }
-  (void)json_array_append_new(g->animations, json_pack("{s:s, s:o, s:o}", "name", name, "samplers",
-                                                       samplers, "channels", channels));
+  (void)json_array_append_new(animations, json_pack("{s:s, s:o, s:o}", "name", name, "samplers",
+                                                    samplers, "channels", channels));
 }
 
 void supine_export_glb_animate(glb *g) {
   static const char *const names[POSTURES] = {"supine", "left side", "prone", "right side"};
-  add(g, "turning", NAN, SECONDS * POSTURES);
+  json_t *animations = json_array();
+  add(g, animations, "turning", NAN, SECONDS * POSTURES);
   for (size_t p = 0; p < POSTURES; ++p) {
-    add(g, names[p], (double)p * pi / 2, BREATH_SECONDS);
+    add(g, animations, names[p], (double)p * pi / 2, BREATH_SECONDS);
   }
+  (void)json_object_set_new(g->root, "animations", animations);
 }

@@ -74,24 +74,17 @@ json_t *supine_export_glb_extras(const glb *g) {
     }
     (void)json_array_append_new(modes, row);
   }
-  json_t *supine =
-      json_pack("{s:s, s:s, s:i, s:o, s:f, s:o, s:o, s:f, s:o}", "frame", frame_text, "weights",
-                weights_text, "band", (int)info->band, "modes", modes, "modeUnit", unit, "bend",
-                supine_options_json_numbers(3, info->bend), "middle",
-                supine_options_json_numbers(3, g->targets.middle), "millimetresPerUnit", g->step,
-                "basis", supine_options_json_metadata(g->basis));
-  (void)(info->is_fields
-             ? json_object_set_new(supine, "gains", json_string(fields_text))
-             : json_object_set_new(supine, "breathVolume", json_real(g->options->breath)));
-  if (has_volume(g)) {
-    (void)json_object_set_new(supine, "volume", json_string(volume_text));
-  }
-  if (info->has_rest) {
-    (void)json_object_update_new(supine, json_pack("{s:s, s:b, s:f}", "rest", resting_text,
-                                                   "byLung", by_lung(g), "fullUprightGain",
-                                                   full != NULL ? strtod(full, NULL) : 0));
-  }
-  return json_pack("{s:o}", "supine", supine);
+  const bool fields = info->is_fields;
+  const bool rest = info->has_rest;
+  return json_pack(
+      "{s:{s:s, s:s, s:i, s:o, s:f, s:o, s:o, s:f, s:o, s:s*, s:o*, s:s*, s:s*, s:o*, s:o*}}",
+      "supine", "frame", frame_text, "weights", weights_text, "band", (int)info->band, "modes",
+      modes, "modeUnit", unit, "bend", supine_options_json_numbers(3, info->bend), "middle",
+      supine_options_json_numbers(3, g->targets.middle), "millimetresPerUnit", g->step, "basis",
+      supine_options_json_metadata(g->basis), "gains", fields ? fields_text : NULL, "breathVolume",
+      fields ? NULL : json_real(g->options->breath), "volume", has_volume(g) ? volume_text : NULL,
+      "rest", rest ? resting_text : NULL, "byLung", rest ? json_boolean(by_lung(g)) : NULL,
+      "fullUprightGain", rest ? json_real(full != NULL ? strtod(full, NULL) : 0) : NULL);
 }
 
 json_t *supine_export_glb_lung_extras(const glb *g, size_t lung) {
