@@ -186,7 +186,7 @@ static void find_weight_range(double breath, size_t tried, size_t phases, double
                                                (double)(i % phases) / (double)(phases - 1), &pose,
                                                NULL),
                      SUPINE_OK);
-    supine_export_targets_weights(supine_basis_get_info(source), targets, &pose, 0, weights);
+    supine_export_targets_weights(targets, &pose, 0, weights);
     for (size_t j = 0; j < TARGETS; ++j) {
       low[j] = fmin(low[j], weights[j]);
       high[j] = fmax(high[j], weights[j]);

@@ -23,9 +23,8 @@ static supine_status prepare(glb *g, supine_error *error) {
     return supine_error_memory(error, "%zu vertices", n);
   }
   SUPINE_TRY(supine_export_order_make(g->info, !g->options->plain, &g->arena, &g->order, error));
-  return supine_export_targets_normals(g->basis, g->options->breath, &g->targets,
-                                       g->options->plain ? NULL : g->order.vertex, g->normals,
-                                       g->added, error);
+  return supine_export_targets_normals(&g->targets, g->options->plain ? NULL : g->order.vertex,
+                                       g->normals, g->added, error);
 }
 
 /* Append the patient with the lungs, the animations, the table under the patient and the arrow of

@@ -38,7 +38,7 @@ static void make_frame(glb *g, double roll, double seconds, float *rows, size_t 
   /* No failure is expected, because supine_export_targets_choose has checked this breath. */
   (void)supine_export_breath_pose(g->basis, g->options->breath, gravity, fraction, &pose, NULL);
   for (size_t i = 0; i < g->info->lung_count; ++i) {
-    supine_export_targets_weights(g->info, &g->targets, &pose, i, weights);
+    supine_export_targets_weights(&g->targets, &pose, i, weights);
     for (size_t j = 0; j < g->targets.count; ++j) {
       rows[i * frames * g->targets.count + j] = (float)weights[j];
     }

@@ -32,7 +32,7 @@ static json_int_t add_material(glb *g, const char *name, const double rgb[3]) {
 
 /* Compute the displacement of a vertex by morph target `j` at weight 1, in units of glb.step. */
 static void place_target(const glb *g, size_t lung, size_t j, size_t vertex, double xyz[3]) {
-  supine_export_targets_field(g->info, vertex, j, xyz);
+  supine_export_targets_field(&g->targets, vertex, j, xyz);
   for (size_t axis = 0; axis < 3; ++axis) {
     xyz[axis] *= g->targets.lung[lung].unit[j] / g->step;
   }
@@ -42,7 +42,7 @@ static void place_target(const glb *g, size_t lung, size_t j, size_t vertex, dou
  * targets, correct the position so that the deformed vertex is exact at the weights `rest`. */
 static void place_base(const glb *g, size_t lung, const double *rest, size_t vertex,
                        double xyz[3]) {
-  supine_export_targets_base(g->info, &g->targets, lung, vertex, xyz);
+  supine_export_targets_base(&g->targets, lung, vertex, xyz);
   for (size_t axis = 0; axis < 3; ++axis) {
     xyz[axis] /= g->step;
   }
@@ -112,7 +112,7 @@ json_int_t supine_export_glb_add(glb *g, size_t lung) {
   supine_pose pose;
   (void)snprintf(name, sizeof name, "%s lung", g->info->lung_names[lung]);
   (void)supine_export_breath_pose(g->basis, g->options->breath, supine, 0, &pose, NULL);
-  supine_export_targets_weights(g->info, &g->targets, &pose, lung, rest);
+  supine_export_targets_weights(&g->targets, &pose, lung, rest);
   for (size_t j = 0; j < g->targets.count; ++j) {
     (void)json_array_append_new(targets,
                                 json_pack("{s:I, s:I}", "POSITION", put_places(g, lung, j, rest),

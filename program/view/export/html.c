@@ -200,8 +200,7 @@ static json_t *describe_inside(const page *p) {
   }
   json_t *names = json_array();
   for (size_t i = 0; i < p->shown->names->count; ++i) {
-    json_t *name = json_string(p->shown->names->text[i]); /* NULL if it is not UTF-8 */
-    (void)json_array_append_new(names, name != NULL ? name : json_string("?"));
+    (void)json_array_append_new(names, supine_options_json_text(p->shown->names->text[i]));
   }
   const supine_tensor *rigid = supine_basis_tensor(p->shown->inside, "rigid");
   json_t *parts = json_array();
@@ -254,7 +253,6 @@ static json_t *describe_froms(const page *p) {
 
 static json_t *describe(const page *p) {
   const supine_basis_info *info = p->info;
-  json_t *title = json_string(p->shown->title);
   return json_pack(
       "{s:I, s:I, s:I, s:I, s:b, s:o, s:o, s:b, s:o, s:f, s:o, s:o, s:o, s:f, s:f, "
       "s:o, s:o, s:o, s:f, s:I, s:o}",
@@ -263,7 +261,7 @@ static json_t *describe(const page *p) {
       (int)info->vector, "lungBegin", begins(info, info->lung_begin), "cornerBegin",
       begins(info, p->order.corner_begin), "hasResting", (int)info->has_rest, "colours", colours(),
       "breathVolume", p->shown->breath, "metadata", supine_options_json_metadata(p->basis), "title",
-      title != NULL ? title : json_string("lungs"), "middle",
+      supine_options_json_text(p->shown->title), "middle",
       supine_options_json_numbers(3, p->middle), "placeUnit", p->position_step, "unit",
       p->coefficient_step, "inside", describe_inside(p), "froms", describe_froms(p), "references",
       supine_options_json_numbers(info->lung_count, info->reference_volume), "scanVolume",

@@ -28,12 +28,12 @@ static void split_gains(const double bend[3], const double gains[3], double spli
 }
 
 /* Compute the factor that multiplies each displacement field of a lung in a pose. */
-static void find_amounts(const supine_basis_info *info, size_t count, const supine_pose *pose,
-                         size_t lung, double *amounts) {
-  const size_t k = info->mode_count;
+static void find_amounts(const export_targets *targets, const supine_pose *pose, size_t lung,
+                         double *amounts) {
+  const size_t k = targets->info->mode_count;
   double gain[2];
-  split_gains(info->bend, pose->gains[lung], gain);
-  for (size_t j = 0; j < count; ++j) {
+  split_gains(targets->info->bend, pose->gains[lung], gain);
+  for (size_t j = 0; j < targets->count; ++j) {
     amounts[j] = gain[j / k] * pose->weights[j % k];
   }
 }
@@ -44,10 +44,10 @@ supine_status supine_export_breath_pose(const supine_basis *basis, double breath
   return supine_basis_pose(basis, &state, pose, error);
 }
 
-void supine_export_targets_weights(const supine_basis_info *info, const export_targets *targets,
-                                   const supine_pose *pose, size_t lung, double *weights) {
+void supine_export_targets_weights(const export_targets *targets, const supine_pose *pose,
+                                   size_t lung, double *weights) {
   const export_weights *w = &targets->lung[lung];
-  find_amounts(info, targets->count, pose, lung, weights);
+  find_amounts(targets, pose, lung, weights);
   for (size_t j = 0; j < targets->count; ++j) {
     weights[j] = (weights[j] - w->offset[j]) / w->unit[j];
   }
@@ -57,20 +57,18 @@ void supine_export_targets_weights(const supine_basis_info *info, const export_t
  * gravity and phase of the breath. Within a large breath, some factors pass an extremum; 10 steps
  * miss it by less than `margin`. Set `offset` to the smallest factor, at which the morph target has
  * weight 0, and `unit` to the difference from the largest, at which it has weight 1. */
-static supine_status find_ranges(const supine_basis *basis, double breath, export_targets *targets,
-                                 supine_error *error) {
+static supine_status find_ranges(export_targets *targets, supine_error *error) {
   enum { STEPS = 10, PHASES = STEPS + 1 };
-  const supine_basis_info *info = supine_basis_get_info(basis);
   double amounts[EXPORT_TARGETS_MAX];
   supine_pose pose;
   for (size_t i = 0; i < PHASES * (size_t)DIRECTIONS; ++i) {
     double g[3];
     supine_spiral((double)(i / PHASES), DIRECTIONS, 0, g);
-    SUPINE_TRY(
-        supine_export_breath_pose(basis, breath, g, (double)(i % PHASES) / STEPS, &pose, error));
-    for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    SUPINE_TRY(supine_export_breath_pose(targets->basis, targets->breath, g,
+                                         (double)(i % PHASES) / STEPS, &pose, error));
+    for (size_t lung = 0; lung < targets->info->lung_count; ++lung) {
       export_weights *w = &targets->lung[lung];
-      find_amounts(info, targets->count, &pose, lung, amounts);
+      find_amounts(targets, &pose, lung, amounts);
       for (size_t j = 0; j < targets->count; ++j) {
         const double high = i == 0 ? amounts[j] : fmax(amounts[j], w->offset[j] + w->unit[j]);
         w->offset[j] = i == 0 ? amounts[j] : fmin(amounts[j], w->offset[j]);
@@ -81,10 +79,10 @@ static supine_status find_ranges(const supine_basis *basis, double breath, expor
   return SUPINE_OK;
 }
 
-static void find_middle(const supine_basis_info *info, export_targets *targets) {
+static void find_middle(export_targets *targets) {
   double low[3] = {INFINITY, INFINITY, INFINITY};
   double high[3] = {-INFINITY, -INFINITY, -INFINITY};
-  supine_render_box(info->vertices, info->vertex_count, low, high);
+  supine_render_box(targets->info->vertices, targets->info->vertex_count, low, high);
   targets->half_extent = 0;
   for (size_t axis = 0; axis < 3; ++axis) {
     targets->middle[axis] = (low[axis] + high[axis]) / 2;
@@ -96,9 +94,12 @@ supine_status supine_export_targets_choose(const supine_basis *basis, double bre
                                            export_targets *targets, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const bool bent = info->bend[0] != 0 || info->bend[1] != 0 || info->bend[2] != 0;
+  targets->basis = basis;
+  targets->info = info;
+  targets->breath = breath;
   targets->count = (bent ? 2 : 1) * info->mode_count;
-  find_middle(info, targets);
-  SUPINE_TRY(find_ranges(basis, breath, targets, error));
+  find_middle(targets);
+  SUPINE_TRY(find_ranges(targets, error));
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     export_weights *w = &targets->lung[lung];
     for (size_t j = 0; j < targets->count; ++j) {
@@ -109,8 +110,9 @@ supine_status supine_export_targets_choose(const supine_basis *basis, double bre
   return SUPINE_OK;
 }
 
-void supine_export_targets_field(const supine_basis_info *info, size_t vertex, size_t j,
+void supine_export_targets_field(const export_targets *targets, size_t vertex, size_t j,
                                  double u[3]) {
+  const supine_basis_info *info = targets->info;
   const size_t k = info->mode_count;
   for (size_t axis = 0; axis < 3; ++axis) {
     u[axis] = info->vector ? (double)info->coefficients[(3 * vertex + axis) * k + j % k]
@@ -121,31 +123,30 @@ void supine_export_targets_field(const supine_basis_info *info, size_t vertex, s
 }
 
 /* Add the displacement fields at a vertex, times `amount` [count], to the position `xyz`, mm. */
-static void add_fields(const supine_basis_info *info, size_t count, const double *amount,
-                       size_t vertex, double xyz[3]) {
-  for (size_t j = 0; j < count; ++j) {
+static void add_fields(const export_targets *targets, const double *amount, size_t vertex,
+                       double xyz[3]) {
+  for (size_t j = 0; j < targets->count; ++j) {
     double u[3];
-    supine_export_targets_field(info, vertex, j, u);
+    supine_export_targets_field(targets, vertex, j, u);
     for (size_t axis = 0; axis < 3; ++axis) {
       xyz[axis] += amount[j] * u[axis];
     }
   }
 }
 
-void supine_export_targets_base(const supine_basis_info *info, const export_targets *targets,
-                                size_t lung, size_t vertex, double xyz[3]) {
+void supine_export_targets_base(const export_targets *targets, size_t lung, size_t vertex,
+                                double xyz[3]) {
   for (size_t axis = 0; axis < 3; ++axis) {
-    xyz[axis] = (double)info->vertices[3 * vertex + axis] - targets->middle[axis];
+    xyz[axis] = (double)targets->info->vertices[3 * vertex + axis] - targets->middle[axis];
   }
-  add_fields(info, targets->count, targets->lung[lung].offset, vertex, xyz);
+  add_fields(targets, targets->lung[lung].offset, vertex, xyz);
 }
 
 /* Compute the normals [N, 3] of the surface at the morph targets' `weights` in each lung. First add
  * `step` to the weight of target `j` in every lung. `xyz` [N, 3] is workspace. */
-static void find_normals(const supine_basis *basis, const export_targets *targets,
-                         double (*weights)[EXPORT_TARGETS_MAX], size_t j, double step, float *xyz,
-                         float *normals) {
-  const supine_basis_info *info = supine_basis_get_info(basis);
+static void find_normals(const export_targets *targets, double (*weights)[EXPORT_TARGETS_MAX],
+                         size_t j, double step, float *xyz, float *normals) {
+  const supine_basis_info *info = targets->info;
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     double amount[EXPORT_TARGETS_MAX];
     for (size_t i = 0; i < targets->count; ++i) {
@@ -153,22 +154,21 @@ static void find_normals(const supine_basis *basis, const export_targets *target
     }
     for (size_t i = info->lung_begin[lung]; i < info->lung_begin[lung + 1]; ++i) {
       double at[3];
-      supine_export_targets_base(info, targets, lung, i, at);
-      add_fields(info, targets->count, amount, i, at);
+      supine_export_targets_base(targets, lung, i, at);
+      add_fields(targets, amount, i, at);
       for (size_t axis = 0; axis < 3; ++axis) {
         xyz[3 * i + axis] = (float)at[axis];
       }
     }
   }
-  supine_normals(basis, xyz, normals);
+  supine_normals(targets->basis, xyz, normals);
 }
 
 /* Divide each base normal by its length, because glTF requires unit normals. Divide the changes of
  * this normal by morph targets by the same length: viewers normalise the sum. */
-static void make_unit(const supine_basis_info *info, const export_targets *targets, float *base,
-                      float *added) {
+static void make_unit(const export_targets *targets, float *base, float *added) {
   static const double least = 0.2; /* smallest divisor of the changes */
-  const size_t n = info->vertex_count;
+  const size_t n = targets->info->vertex_count;
   for (size_t i = 0; i < n; ++i) {
     float *b = base + 3 * i;
     const double length = hypot(hypot((double)b[0], (double)b[1]), (double)b[2]);
@@ -189,11 +189,11 @@ static void make_unit(const supine_basis_info *info, const export_targets *targe
  * of 1 / INT8_MAX, or to the value of the previous vertex in `order` if that is close. The normal
  * at the targets' `weights` is `base` plus the sum of weight times change. Correct `base`, so that
  * this normal stays as it was. */
-static void round_changes(const supine_basis_info *info, const export_targets *targets,
-                          double (*weights)[EXPORT_TARGETS_MAX], const uint32_t *order, float *base,
-                          float *added) {
+static void round_changes(const export_targets *targets, double (*weights)[EXPORT_TARGETS_MAX],
+                          const uint32_t *order, float *base, float *added) {
   /* A component that differs by at most this from that of the previous vertex becomes equal. */
   static const float near = 2.5F / INT8_MAX;
+  const supine_basis_info *info = targets->info;
   for (size_t i = 0, lung = 0; i < info->vertex_count; ++i) {
     lung += i == info->lung_begin[lung + 1];
     float *b = base + 3 * (size_t)order[i];
@@ -215,14 +215,13 @@ static void round_changes(const supine_basis_info *info, const export_targets *t
   }
 }
 
-supine_status supine_export_targets_normals(const supine_basis *basis, double breath,
-                                            const export_targets *targets, const uint32_t *order,
+supine_status supine_export_targets_normals(const export_targets *targets, const uint32_t *order,
                                             float *base, float *added, supine_error *error) {
   static const double supine[3] = {0, 1, 0};
   static const double step = 0.2; /* change of a weight for central differences */
   /* Changes of a lung's normals by a morph target are set to 0 if their RMS is less, radians. */
   static const double least = 0.035;
-  const supine_basis_info *info = supine_basis_get_info(basis);
+  const supine_basis_info *info = targets->info;
   const size_t n = info->vertex_count;
   supine_pose pose;
   SUPINE_ARENA arena = {0};
@@ -233,15 +232,15 @@ supine_status supine_export_targets_normals(const supine_basis *basis, double br
   if (arena.failed) {
     return supine_error_memory(error, "%zu vertices", n);
   }
-  SUPINE_TRY(supine_export_breath_pose(basis, breath, supine, 0, &pose, error));
+  SUPINE_TRY(supine_export_breath_pose(targets->basis, targets->breath, supine, 0, &pose, error));
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
-    supine_export_targets_weights(info, targets, &pose, lung, weights[lung]);
+    supine_export_targets_weights(targets, &pose, lung, weights[lung]);
   }
-  find_normals(basis, targets, weights, 0, 0, xyz, base);
+  find_normals(targets, weights, 0, 0, xyz, base);
   for (size_t j = 0; j < targets->count; ++j) {
     float *d = added + 3 * j * n;
-    find_normals(basis, targets, weights, j, step, xyz, d);
-    find_normals(basis, targets, weights, j, -step, xyz, below);
+    find_normals(targets, weights, j, step, xyz, d);
+    find_normals(targets, weights, j, -step, xyz, below);
     for (size_t lung = 0; lung < info->lung_count; ++lung) {
       const size_t begin = 3 * info->lung_begin[lung];
       const size_t end = 3 * info->lung_begin[lung + 1];
@@ -257,9 +256,9 @@ supine_status supine_export_targets_normals(const supine_basis *basis, double br
       }
     }
   }
-  make_unit(info, targets, base, added);
+  make_unit(targets, base, added);
   if (order != NULL) {
-    round_changes(info, targets, weights, order, base, added);
+    round_changes(targets, weights, order, base, added);
   }
   return SUPINE_OK;
 }

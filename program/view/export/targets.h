@@ -31,8 +31,11 @@ typedef struct export_weights {
 } export_weights;
 
 typedef struct export_targets {
-  size_t count;       /**< number of morph targets of a lung: one or two for each mode */
-  double middle[3];   /**< centre of the bounding box of all vertices, mm */
+  const supine_basis *basis;
+  const supine_basis_info *info; /**< of `basis` */
+  double breath;                 /**< tidal volume, mL */
+  size_t count;                  /**< number of morph targets of a lung: one or two for each mode */
+  double middle[3];              /**< centre of the bounding box of all vertices, mm */
   double half_extent; /**< half of the longest edge of the bounding box of all vertices, mm */
   export_weights lung[SUPINE_LUNGS_MAX];
 } export_targets;
@@ -48,16 +51,16 @@ supine_status supine_export_breath_pose(const supine_basis *basis, double breath
                                         double fraction, supine_pose *pose, supine_error *error);
 
 /** Compute the weights [targets->count] at which the morph targets of a lung show a pose. */
-void supine_export_targets_weights(const supine_basis_info *info, const export_targets *targets,
-                                   const supine_pose *pose, size_t lung, double *weights);
+void supine_export_targets_weights(const export_targets *targets, const supine_pose *pose,
+                                   size_t lung, double *weights);
 
 /** Compute the displacement `u`, mm, of a vertex by field j of export_weights. */
-void supine_export_targets_field(const supine_basis_info *info, size_t vertex, size_t j,
+void supine_export_targets_field(const export_targets *targets, size_t vertex, size_t j,
                                  double u[3]);
 
 /** Compute the position of a vertex in a lung's base mesh, mm, relative to `targets->middle`. */
-void supine_export_targets_base(const supine_basis_info *info, const export_targets *targets,
-                                size_t lung, size_t vertex, double xyz[3]);
+void supine_export_targets_base(const export_targets *targets, size_t lung, size_t vertex,
+                                double xyz[3]);
 
 /** Compute the normals `base` [N, 3] of the base mesh, and the change of the normals by each morph
  * target at weight 1, `added` [targets->count, N, 3]. Both linearise the normals of the deformed
@@ -65,8 +68,7 @@ void supine_export_targets_base(const supine_basis_info *info, const export_targ
  * @param order  [N] order in which the file stores vertices. `added` is then rounded so that it
  *               compresses well in this order, and is 0 for a target that turns a lung's normals
  *               by less than 2.5 degrees (RMS). NULL to keep `added` exact */
-supine_status supine_export_targets_normals(const supine_basis *basis, double breath,
-                                            const export_targets *targets, const uint32_t *order,
+supine_status supine_export_targets_normals(const export_targets *targets, const uint32_t *order,
                                             float *base, float *added, supine_error *error);
 
 #endif
