@@ -130,6 +130,7 @@ const supine_option supine_options_from_scan[] = {FROM("scan"), {.name = NULL}};
 supine_status supine_options_reference(const supine_basis *basis, const supine_from *from,
                                        bool compares, supine_reference_pose *reference,
                                        supine_error *error) {
+  const supine_state in_scan = supine_basis_scan(basis);
   supine_state state = {.gravity = {0.0, 1.0, 0.0}, .volume = {SUPINE_VOLUME_REST, 0.0}};
   bool scan = !from->given && !(compares && supine_basis_get_info(basis)->has_rest);
   if (from->given) {
@@ -137,15 +138,16 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
     const bool posed = g[0] != 0.0 || g[1] != 0.0 || g[2] != 0.0;
     state = from->state;
     /* If --from gives no posture, use supine or, for the volume `scan`, the posture of the scan. */
+    const bool own = state.lung_count == 0 && state.volume.kind == SUPINE_VOLUME_SCAN;
+    scan = !posed && own && state.volume.ml == 0.0;
     if (!posed) {
-      const bool own = state.lung_count == 0 && state.volume.kind == SUPINE_VOLUME_SCAN;
-      const supine_state in = supine_basis_scan(basis);
-      const double supine[3] = {0.0, 1.0, 0.0};
-      memcpy(state.gravity, own ? in.gravity : supine, sizeof state.gravity);
-      scan = own && state.volume.ml == 0.0;
+      state.gravity[1] = 1.0;
+    }
+    if (!posed && own) {
+      memcpy(state.gravity, in_scan.gravity, sizeof state.gravity);
     }
   } else if (scan) {
-    state = supine_basis_scan(basis);
+    state = in_scan;
   }
   supine_error inner;
   const supine_status status = supine_basis_pose(basis, &state, &reference->pose, &inner);

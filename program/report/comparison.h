@@ -5,6 +5,8 @@
 
 #include <stdio.h>
 
+#include <jansson.h>
+
 #include <supine/compare.h>
 
 #include "program/options/basis_input.h"
@@ -62,8 +64,8 @@ static inline double supine_report_expansion(const supine_slab *slab) {
 /* Return the volume of a lung in a posture as {value, low, high, source}, or as text. The source is
  * "measured" in the scan, "given" in mL or by --resting, "assumed" from other people, or "computed"
  * from the scan or from a given volume. */
-struct json_t *supine_report_held(const supine_comparison *comparison, size_t posture, size_t lung,
-                                  bool as_text);
+json_t *supine_report_held(const supine_comparison *comparison, size_t posture, size_t lung,
+                           bool as_text);
 
 /* Print the comparison to standard output, as JSON or as text with tables of the postures. */
 void supine_report_print(const supine_comparison *comparison, bool json);
@@ -72,5 +74,19 @@ void supine_report_print(const supine_comparison *comparison, bool json);
  * place. A write error sets the error indicator of `file`. */
 supine_status supine_report_html(const supine_comparison *comparison, FILE *file,
                                  supine_error *error);
+
+/* Return the colour of a posture's line in charts. */
+const char *supine_report_line(size_t posture);
+
+/* Return the values of the tags of report.html that have these names. */
+json_t *supine_report_findings(const supine_comparison *comparison);
+json_t *supine_report_targets(const supine_comparison *comparison);
+json_t *supine_report_postures(const supine_comparison *comparison);
+json_t *supine_report_profile(const supine_comparison *comparison);
+json_t *supine_report_outlines(const supine_comparison *comparison);
+
+/* Return the value of the tag {{pictures}}. If pictures cannot be drawn, set `error` and return
+ * NULL. */
+json_t *supine_report_pictures(const supine_comparison *comparison, supine_error *error);
 
 #endif

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "base/text.h"
-#include "program/report/comparison_parts.h"
+#include "program/report/comparison.h"
 
 /* Published values, mean (SD), for the postures' table rows; report.html names the sources. */
 static const struct {

@@ -7,7 +7,7 @@
 #include <supine/version.h>
 
 #include "program/options/basis_input.h"
-#include "program/report/comparison_parts.h"
+#include "program/report/comparison.h"
 #include "program/view/export/template.h"
 
 extern const supine_asset supine_report_assets[]; /* the .html and .css files of program/report */

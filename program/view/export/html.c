@@ -6,7 +6,6 @@
 
 #include "base/arena.h"
 
-#include "program/view/export/base64.h"
 #include "program/view/export/export.h"
 #include "program/view/export/packed.h"
 #include "program/view/export/template.h"
@@ -34,7 +33,7 @@ typedef struct page {
 
 /* Return SUPINE_ERROR_MEMORY if memory has run out, also before, so that `bytes` is NULL. */
 static supine_status add_tensor(page *p, const char *name, const void *bytes, size_t size) {
-  json_t *text = bytes != NULL ? supine_export_base64(bytes, size) : NULL;
+  json_t *text = bytes != NULL ? supine_template_base64(bytes, size) : NULL;
   return json_array_append_new(p->tensors, json_pack("{s:s, s:o}", "name", name, "base64", text)) ==
                  0
              ? SUPINE_OK

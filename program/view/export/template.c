@@ -2,6 +2,8 @@
 #include "program/view/export/template.h"
 
 #include <stdbool.h>
+#include <stdint.h>
+#include <stdlib.h>
 #include <string.h>
 
 /* Return the asset whose name is the first `length` bytes of `name`, or NULL. */
@@ -143,4 +145,22 @@ void supine_template_fill(const supine_asset *assets, const json_t *data, const 
   if (asset != NULL) {
     (void)fill(assets, asset->bytes, asset->bytes + asset->size, &outermost, file);
   }
+}
+
+json_t *supine_template_base64(const void *bytes, size_t size) {
+  static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  const unsigned char *from = bytes;
+  size_t length = 0;
+  char *text = malloc((size + 2) / 3 * 4 + 1);
+  for (size_t i = 0; text != NULL && i < size; i += 3) {
+    const size_t left = size - i;
+    const uint32_t group = ((uint32_t)from[i] << 16) | (left > 1 ? (uint32_t)from[i + 1] << 8 : 0) |
+                           (left > 2 ? (uint32_t)from[i + 2] : 0);
+    for (unsigned digit = 0; digit < 4; ++digit) {
+      text[length++] = digit <= left ? digits[group >> (18 - 6 * digit) & 63] : '=';
+    }
+  }
+  json_t *made = text != NULL ? json_stringn_nocheck(text, length) : NULL;
+  free(text);
+  return made;
 }

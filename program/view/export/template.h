@@ -32,4 +32,7 @@ typedef struct supine_asset {
 void supine_template_fill(const supine_asset *assets, const json_t *data, const char *name,
                           FILE *file);
 
+/** Return bytes as base64 with padding (RFC 4648, section 4), or NULL if out of memory. */
+json_t *supine_template_base64(const void *bytes, size_t size);
+
 #endif
