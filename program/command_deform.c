@@ -52,12 +52,8 @@ static const supine_option table[] = {
     {.table = supine_command_deform_content_options, SUPINE_FILLS(request, content)},
     {.name = NULL}};
 
-static void free_expected(supine_deformation *moved) {
-  supine_posed_expected_free(&moved->expected);
-}
-
 static supine_status deform(const supine_basis *basis, const request *wanted, supine_error *error) {
-  SUPINE_FREED_BY(free_expected)
+  SUPINE_FREED_BY(supine_posed_expected_free) supine_expected expected = {0};
   supine_deformation moved = {.state = wanted->volume.state,
                               .from_given = wanted->from.given,
                               .allow_folds = wanted->volume.allow_folds,
@@ -66,7 +62,8 @@ static supine_status deform(const supine_basis *basis, const request *wanted, su
   SUPINE_TRY(supine_options_reference(basis, &wanted->from, false, &moved.from, error));
   SUPINE_TRY(supine_options_pose(basis, name, wanted->volume.allow_folds, &moved.state, &moved.pose,
                                  error));
-  SUPINE_TRY(supine_posed_expected(basis, &moved.state, &moved.from.state, &moved.expected, error));
+  SUPINE_TRY(supine_posed_expected(basis, &moved.state, &moved.from.state, &expected, error));
+  moved.expected = expected;
   SUPINE_TRY(supine_options_hilum(basis, &moved.pose, &moved.from.pose, wanted->frame == 1,
                                   moved.hilum, error));
   (void)snprintf(comment, sizeof comment, "displacement from %s%s", moved.from.name,

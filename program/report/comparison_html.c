@@ -39,17 +39,20 @@ static void add_fact(json_t *list, const char *name, json_t *value) {
 
 /* Return the value of {{provenance}}: the command, the program, the basis and its metadata. */
 static json_t *provenance(const supine_comparison *c, json_t *file, json_t *today) {
-  static const char *const keys[] = {"made_by", "assumed",           "scanned",     "law",
-                                     "patient", "error_rms_percent", "attribution", "checksum"};
+  static const char *const keys[][2] = {
+      {"made_by", "basis made by"},     {"assumed", "assumed"},
+      {"scanned", "state in the scan"}, {"law", "law"},
+      {"patient", "patient"},           {"error_rms_percent", "compression error, RMS, %"},
+      {"attribution", "attribution"},   {"checksum", "checksum"}};
   json_t *list = json_array();
   add_fact(list, "command", json_string(c->made_by));
   add_fact(list, "program",
            json_sprintf("supine " SUPINE_VERSION ", %s", json_string_value(today)));
   add_fact(list, "basis", json_incref(file));
   for (size_t i = 0; i < sizeof keys / sizeof *keys; ++i) {
-    const char *value = supine_basis_metadata(c->basis, keys[i]);
+    const char *value = supine_basis_metadata(c->basis, keys[i][0]);
     if (value != NULL) {
-      add_fact(list, keys[i], json_string(value));
+      add_fact(list, keys[i][1], json_string(value));
     }
   }
   return list;

@@ -89,7 +89,7 @@ for (const format of ['A4', 'Letter']) {
     }
   });
   assert.ok(text.includes(`page ${sheets.length} of ${sheets.length}`));
-  for (const word of ['error_rms_percent', 'made_by', 'comparelungs.safetensors', 'notfordiagnosis', 'lawdeep', 'scannedfull', 'checksumxxh64:']) assert.ok(packed.includes(word), `no ${word}`);
+  for (const word of ['compressionerror,RMS,%', 'basismadeby', 'comparelungs.safetensors', 'notfordiagnosis', 'lawdeep', 'stateinthescanfull', 'checksumxxh64:']) assert.ok(packed.includes(word), `no ${word}`);
   const bySheet = text.split('\f').map((sheet) => sheet.replace(/\s+/g, ''));
   for (const { heading, first } of cards) { // each heading is on one sheet with the beginning of its section
     assert.ok(bySheet.some((sheet) => { const at = sheet.indexOf(heading.replace(/\s+/g, '')); return at >= 0 && sheet.indexOf(first, at + heading.replace(/\s+/g, '').length) >= 0; }), `${format}: '${heading}' is parted from '${first}'`);
