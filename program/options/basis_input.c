@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Open a basis, and print its expected errors and the displacement of its hilum. */
+/* Open a basis, and find the axes of its scan and the displacement of its hilum. */
 #include <math.h>
 #include <string.h>
 

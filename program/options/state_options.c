@@ -37,13 +37,7 @@ static const char *const postures[] = {"supine",  "prone",    "left", "right",
                                        "upright", "inverted", NULL};
 
 const supine_option supine_options_orientation[] = {
-    {"posture", 0, "STATE",
-     "supine, prone, left or right (lying on that side), upright, inverted (head down), or a "
-     "DICOM patient position: HFS, FFS, HFP, FFP, HFDL, FFDL, HFDR, FFDR. +DEGREES turns gravity "
-     "about the left-right axis, from the back towards the head, and -DEGREES the other way: "
-     "supine+15 and prone-15 lower the head (Trendelenburg). With a volume, it is a state: "
-     "prone:rest+500",
-     GRAVITY, .read = read_state, .choices = postures},
+    {"posture", 0, "STATE", SUPINE_POSTURE_HELP, GRAVITY, .read = read_state, .choices = postures},
     {"gravity", 0, "X,Y,Z",
      "direction of gravity in body axes, instead of a posture: x to the left, y to the back, z to "
      "the head; 0,1,0 is supine",
@@ -73,16 +67,14 @@ supine_status supine_options_posture_list_parse(const char *text, const supine_s
                               SUPINE_POSTURE_LIST_MAX);
     }
     supine_posture_item *item = &list->item[list->count++];
-    if (name[0] == '\0' || strlen(name) >= sizeof item->name) {
+    if (name[0] == '\0') {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "no posture '%s': give supine, prone, left, right, upright or "
-                              "inverted, or a gravity X:Y:Z",
-                              name);
+                              "no posture '' in '%s': remove a comma, or name a posture", text);
     }
-    (void)strcpy(item->name, name);
+    (void)snprintf(item->name, sizeof item->name, "%.*s", (int)sizeof item->name - 1, name);
     item->state = *standard;
     item->state.gravity[1] = 1.0; /* supine, if the state names no posture */
-    SUPINE_TRY(supine_state_parse(item->name, &item->state, error));
+    SUPINE_TRY(supine_state_parse(name, &item->state, error));
   }
   return SUPINE_OK;
 }

@@ -33,11 +33,14 @@ typedef struct supine_posture_list {
   supine_posture_item item[SUPINE_POSTURE_LIST_MAX];
 } supine_posture_list;
 
+#define SUPINE_POSTURE_HELP                                                                        \
+  "supine, prone, left or right (lying on that side), upright, inverted (head down), or a DICOM "  \
+  "patient position: HFS, FFS, HFP, FFP, HFDL, FFDL, HFDR, FFDR. +DEGREES turns gravity about "    \
+  "the left-right axis, from the back towards the head, and -DEGREES the other way: supine+15 "    \
+  "and prone-15 lower the head (Trendelenburg). With a volume, it is a state: prone:rest+500"
 #define SUPINE_POSTURE_LIST_HELP                                                                   \
-  "A posture is a name (supine, prone, left, right, upright, inverted, or a DICOM patient "        \
-  "position), a name with degrees by which gravity turns from the back towards the head "          \
-  "(supine+15: Trendelenburg), or a direction of gravity in body axes, X:Y:Z (0.6:0:-0.8). With "  \
-  "a volume it is a state: prone:rest+500."
+  "A posture is a direction of gravity in body axes, X:Y:Z (0.6:0:-0.8), or " SUPINE_POSTURE_HELP  \
+  "."
 
 /* Parse a list of states, such as "supine,prone:rest+500,supine+15,0.6:0:-0.8".
  * @param standard  its volume is that of states that name none */

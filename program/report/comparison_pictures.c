@@ -9,11 +9,10 @@
 #include "program/view/render/render.h"
 
 enum { WIDTH = 360, HEIGHT = 330 };
-static const supine_view view = SUPINE_VIEW_ANTERIOR;
 
 static supine_scene make_scene(const supine_comparison *c, size_t posture, const double extent[4]) {
   return (supine_scene){.pose = &c->posture[posture].pose,
-                        .view = view,
+                        .view = SUPINE_VIEW_ANTERIOR,
                         .width = WIDTH,
                         .height = HEIGHT,
                         .extent = extent};
@@ -38,14 +37,7 @@ static json_t *draw(const supine_basis *basis, const supine_scene *scene, supine
  * picture, degrees, after which gravity points down. If gravity is nearly normal to the picture,
  * {{towards}} or {{away}} replaces both. */
 static void set_gravity(const double g[3], json_t *shot) {
-  double axes[3][3];
-  double seen[3] = {0.0, 0.0, 0.0};
-  supine_render_view_axes(view, g, axes);
-  for (int row = 0; row < 3; ++row) {
-    for (int axis = 0; axis < 3; ++axis) {
-      seen[row] += axes[row][axis] * g[axis];
-    }
-  }
+  const double seen[3] = {g[0], g[2], -g[1]}; /* right, up, towards the viewer in front */
   if (hypot(seen[0], seen[1]) > 0.35) {
     (void)json_object_set_new(
         shot, "turn", json_sprintf("%.1f", 90 + atan2(seen[1], seen[0]) * 180.0 / acos(-1.0)));

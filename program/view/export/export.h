@@ -34,9 +34,6 @@ supine_status supine_export_glb_write(const char *path, const supine_basis *basi
                                       const export_glb_options *options, size_t *bytes,
                                       supine_error *error);
 
-/** Largest number of modes on an HTML page: meshoptimizer compresses rows of up to 256 bytes. */
-enum { EXPORT_PAGE_MODES_MAX = 128 };
-
 /** Options of the exported HTML page. */
 typedef struct export_page {
   double breath;                     /**< tidal volume, mL */

@@ -3,6 +3,7 @@
  * that shows gravity. */
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "program/view/export/glb.h"
 
@@ -153,9 +154,8 @@ static json_int_t sweep(glb *g, const char *name, const double profile[RINGS][2]
       const uint32_t b = (uint32_t)(ring * sides + (i + 1) % sides);
       const uint32_t up = (uint32_t)sides;
       const uint32_t quad[] = {a, b, b + up, a, b + up, a + up};
-      for (size_t c = 0; c < 6; ++c) {
-        corners[at++] = quad[c];
-      }
+      memcpy(corners + at, quad, sizeof quad);
+      at += 6;
     }
   }
   const json_int_t material = add_material(g, name, rgb);

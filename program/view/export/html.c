@@ -13,7 +13,7 @@
 
 extern const supine_asset supine_export_assets[]; /* the files of program/view/page */
 
-enum { STORED_MAX = 32767 };
+enum { STORED_MAX = 32767, MODES_MAX = 128 /* meshoptimizer compresses rows of up to 256 bytes */ };
 
 /* State while a page is printed. The page stores positions and coefficients as 16-bit integers,
  * which the browser multiplies by a quantisation step. */
@@ -301,11 +301,11 @@ supine_status supine_export_html_print(FILE *file, const supine_basis *basis,
             .inside = shown->inside != NULL ? supine_basis_get_info(shown->inside) : NULL,
             .shown = shown,
             .tensors = json_array()};
-  if (p.info->mode_count > EXPORT_PAGE_MODES_MAX) {
+  if (p.info->mode_count > MODES_MAX) {
     return supine_error_set(error, SUPINE_ERROR_UNSUPPORTED,
                             "a page shows up to %d modes, not %zu: precompute the basis with "
                             "--modes %d, or export .glb",
-                            EXPORT_PAGE_MODES_MAX, p.info->mode_count, EXPORT_PAGE_MODES_MAX);
+                            MODES_MAX, p.info->mode_count, MODES_MAX);
   }
   SUPINE_TRY(supine_export_pack_begin(error));
   SUPINE_TRY(supine_export_order_make(p.info, true, &p.arena, &p.order, error));

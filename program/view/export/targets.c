@@ -13,28 +13,23 @@ enum { DIRECTIONS = 4096 }; /* number of sampled directions of gravity */
 /* The range of each weight in the sampled directions is extended by this fraction at both ends. */
 static const double margin = 0.02;
 
-/* Set `split` to {s, t}, such that gains[axis] = s + t bend[axis]. `gains` are the factors of a
- * lung's displacement along x, y and z, and `bend` has the basis's constant for each axis. As gains
- * always have this form, two axes suffice: those with the smallest and the largest bend. */
-static void split_gains(const double bend[3], const double gains[3], double split[2]) {
+/* Compute the factor that multiplies each displacement field of a lung in a pose. */
+static void find_amounts(const export_targets *targets, const supine_pose *pose, size_t lung,
+                         double *amounts) {
+  const size_t k = targets->info->mode_count;
+  const double *bend = targets->info->bend;
+  const double *gains = pose->gains[lung];
   size_t low = 0;
   size_t high = 0;
   for (size_t axis = 1; axis < 3; ++axis) {
     low = bend[axis] < bend[low] ? axis : low;
     high = bend[axis] > bend[high] ? axis : high;
   }
-  split[1] = low == high ? 0 : (gains[high] - gains[low]) / (bend[high] - bend[low]);
-  split[0] = gains[low] - split[1] * bend[low];
-}
-
-/* Compute the factor that multiplies each displacement field of a lung in a pose. */
-static void find_amounts(const export_targets *targets, const supine_pose *pose, size_t lung,
-                         double *amounts) {
-  const size_t k = targets->info->mode_count;
-  double gain[2];
-  split_gains(targets->info->bend, pose->gains[lung], gain);
+  /* gains[axis] = s + t bend[axis] on every axis, so that two axes suffice to find s and t. */
+  const double t = low == high ? 0 : (gains[high] - gains[low]) / (bend[high] - bend[low]);
+  const double s = gains[low] - t * bend[low];
   for (size_t j = 0; j < targets->count; ++j) {
-    amounts[j] = gain[j / k] * pose->weights[j % k];
+    amounts[j] = (j < k ? s : t) * pose->weights[j % k];
   }
 }
 

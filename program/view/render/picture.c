@@ -35,8 +35,7 @@ static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cairo;
 
 static const double pi = 3.14159265358979323846;
 
-static const double ground_top[3] = {0.985, 0.988, 0.992};
-static const double ground_bottom[3] = {0.925, 0.941, 0.957};
+static const double ground[3] = {0.955, 0.965, 0.975};
 static const double card[3] = {1, 1, 1};
 static const double edge[3] = {0.86, 0.885, 0.91};
 static const double ink[3] = {0.09, 0.13, 0.18};
@@ -101,15 +100,6 @@ static void rounded(cairo_t *cr, double x, double y, double width, double height
   cairo.arc(cr, x + radius, y + height - radius, radius, pi / 2, pi);
   cairo.arc(cr, x + radius, y + radius, radius, pi, 3 * pi / 2);
   cairo.close_path(cr);
-}
-
-static void ground(cairo_t *cr, const supine_picture *picture) {
-  cairo_pattern_t *fade = cairo.pattern_create_linear(0, 0, 0, (double)picture->height);
-  cairo.pattern_add_color_stop_rgb(fade, 0, ground_top[0], ground_top[1], ground_top[2]);
-  cairo.pattern_add_color_stop_rgb(fade, 1, ground_bottom[0], ground_bottom[1], ground_bottom[2]);
-  cairo.set_source(cr, fade);
-  cairo.paint(cr);
-  cairo.pattern_destroy(fade);
 }
 
 /* Draw an arrow from `from` to `to`. Its head and its line have the sizes `head` and `line`. */
@@ -475,7 +465,8 @@ static supine_status compose(const painter *by, supine_error *error) {
                             picture->panel_count == 1 ? "" : "s", picture->view_count,
                             picture->view_count == 1 ? "" : "s");
   }
-  ground(by->cr, picture);
+  colour(by->cr, ground);
+  cairo.paint(by->cr);
   for (size_t row = 0; row < picture->view_count; ++row) {
     memcpy(extent[row], picture->extent != NULL ? picture->extent[row] : none, sizeof none);
   }
