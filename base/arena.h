@@ -6,9 +6,7 @@
  *     SUPINE_ARENA arena = {0};
  *     double *a = supine_arena_take(&arena, n, sizeof *a);
  *     double *b = supine_arena_zeros(&arena, n, sizeof *b);
- *     if (arena.failed) {
- *       return supine_error_memory(error, "the surface");
- *     }
+ *     SUPINE_TRY(supine_arena_check(&arena, error, "the surface"));
  *     SUPINE_TRY(first_step(a, error));
  *     return second_step(a, b, error);
  */
@@ -59,6 +57,15 @@ void *supine_arena_zeros(supine_arena *arena, size_t count, size_t size);
 
 /** Free all arrays of an arena, which can then be used again. */
 void supine_arena_free(supine_arena *arena);
+
+/** Return SUPINE_ERROR_MEMORY if an allocation from the arena has failed, otherwise SUPINE_OK. */
+static inline supine_status supine_arena_status(const supine_arena *arena) {
+  return arena->failed ? SUPINE_ERROR_MEMORY : SUPINE_OK;
+}
+
+/** As supine_arena_status, and set the error like supine_error_memory. */
+supine_status supine_arena_check(const supine_arena *arena, supine_error *error, const char *what,
+                                 ...) SUPINE_PRINTF(3, 4);
 
 /** Set the error "out of memory: WHAT".
  * @param what  what the memory was for, such as "20000 vertices"; printf format

@@ -312,9 +312,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   float *vertices = supine_arena_take(&arena, 3 * n, sizeof *vertices);
   float *directions = vector ? NULL : supine_arena_take(&arena, 3 * n, sizeof *directions);
   unsigned char *lung = supine_arena_take(&arena, n, 1);
-  if (arena.failed) {
-    return supine_error_memory(error, "%zu vertices of %s", n, path);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices of %s", n, path));
   supine_tissue_collapse(lungs, share, collapsed);
   to_float(collapsed, 3 * n, vertices);
   if (!vector) {
@@ -327,9 +325,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   }
   SUPINE_TRY(find_normals(content, vertices, directions, &arena, &normals, error));
   add_all(&list, content, share, &normals);
-  if (arena.failed) {
-    return supine_error_memory(error, "metadata of %s", path);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "metadata of %s", path));
   const size_t q = normals.count;
   const supine_tensor all[] = {
       {"vertices", SUPINE_F32, 2, {n, 3}, vertices},
@@ -361,8 +357,6 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   SUPINE_TRY(measure_storage(content, vector ? NULL : collapsed, given, count, &list, error));
   list.count = 0;
   add_all(&list, content, share, &normals);
-  if (arena.failed) {
-    return supine_error_memory(error, "metadata of %s", path);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "metadata of %s", path));
   return supine_safetensors_write(path, given, count, list.metadata, list.count, error);
 }

@@ -67,9 +67,7 @@ static supine_status find_directions(pipeline *p, supine_error *error) {
   const size_t n = p->lungs->mesh.vertex_count;
   p->directions = supine_arena_take(&p->lengths, 3 * n, sizeof *p->directions);
   p->weight = supine_arena_take(&p->lengths, n, sizeof *p->weight);
-  if (p->lengths.failed) {
-    return supine_error_memory(error, "%zu vertices", n);
-  }
+  SUPINE_TRY(supine_arena_check(&p->lengths, error, "%zu vertices", n));
   SUPINE_TRY(supine_physics_directions(p->lungs, &p->model->force, &p->model->direction,
                                        p->directions, error));
   for (size_t i = 0; i < n; ++i) {

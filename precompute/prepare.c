@@ -92,9 +92,7 @@ static supine_status take_patient(const supine_patient_record *fitted, supine_pr
   supine_patient_record *record = supine_arena_take(&p->memory, 1, sizeof *record);
   double *arrays = supine_arena_take(&p->memory, 4 * n, sizeof *arrays);
   supine_scan scan;
-  if (p->memory.failed) {
-    return supine_error_memory(error, "%zu vertices", n);
-  }
+  SUPINE_TRY(supine_arena_check(&p->memory, error, "%zu vertices", n));
   *record = *fitted;
   p->patient = record;
   describe_fit(record, p->fit, sizeof p->fit);
@@ -131,9 +129,7 @@ static supine_status set_expandability(const supine_model_choice *choice, supine
                             "the file of --patient sets the stiffness: leave --expandability out");
   }
   double *a = supine_arena_take(&p->memory, n, sizeof *a);
-  if (a == NULL) {
-    return supine_error_memory(error, "%zu vertices", n);
-  }
+  SUPINE_TRY(supine_arena_check(&p->memory, error, "%zu vertices", n));
   if (choice->expandability != NULL) {
     SUPINE_TRY(supine_tissue_expandability_load(choice->expandability, n, a, error));
   } else {
@@ -169,9 +165,7 @@ static supine_status set_lesions(const supine_model_choice *choice, supine_prepa
     return SUPINE_OK;
   }
   double *factors = supine_arena_take(&p->memory, n, sizeof *factors);
-  if (factors == NULL) {
-    return supine_error_memory(error, "%zu vertices", n);
-  }
+  SUPINE_TRY(supine_arena_check(&p->memory, error, "%zu vertices", n));
   for (size_t i = 0; i < n; ++i) {
     factors[i] = 1.0;
   }

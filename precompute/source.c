@@ -239,9 +239,7 @@ supine_status supine_precompute_source_load(const supine_source_options *options
                .meshes = supine_arena_zeros(&arena, most, sizeof *r.meshes),
                .reports = supine_arena_zeros(&arena, most, sizeof *r.reports),
                .errors = supine_arena_zeros(&arena, most, sizeof *r.errors)};
-  if (arena.failed) {
-    return supine_error_memory(error, "%zu files", count);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu files", count));
   const supine_status status = read_files(&r, source, error);
   for (size_t i = 0; i < most; ++i) {
     supine_mesh_free(&r.meshes[i]);

@@ -23,9 +23,7 @@ static supine_status gram_matrix(const supine_expansion *expansion, const double
   const size_t rank = expansion->rank;
   SUPINE_ARENA arena = {0};
   double *block = supine_arena_take(&arena, BLOCK * rank, sizeof *block);
-  if (block == NULL) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   memset(gram, 0, rank * rank * sizeof *gram);
   for (size_t first = 0; first < expansion->row_count; first += BLOCK) {
     const size_t left = expansion->row_count - first;
@@ -49,9 +47,7 @@ supine_status supine_sh_leading_eigenpairs(size_t n, double *matrix, size_t coun
   SUPINE_ARENA arena = {0};
   lapack_int *support = supine_arena_take(&arena, 2 * n, sizeof *support);
   double *rising = supine_arena_take(&arena, n * count, sizeof *rising);
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   SUPINE_TRY(supine_lapack_status(LAPACKE_dsyevr(LAPACK_COL_MAJOR, 'V', 'I', 'L', size, matrix,
                                                  size, 0.0, 0.0, size - (lapack_int)count + 1, size,
                                                  0.0, &found, values, rising, size, support)));
@@ -84,9 +80,7 @@ static supine_status find_modes(const supine_expansion *expansion, double *gram,
   SUPINE_ARENA arena = {0};
   double *vectors = supine_arena_take(&arena, rank * rank, sizeof *vectors);
   double *reduced = supine_arena_take(&arena, rank * terms, sizeof *reduced);
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   SUPINE_TRY(supine_sh_leading_eigenpairs(rank, gram, rank, values, vectors));
   for (size_t k = 0; k < rank; ++k) {
     cblas_dscal((int)rank, sqrt(fmax(values[k], 0.0)), vectors + k * rank, 1);

@@ -87,9 +87,7 @@ static supine_status read_file(mesh_file *file, supine_arena *arena, mesh_reader
     return cannot_read(file->path, error);
   }
   file->bytes = supine_arena_take(arena, size + 1, 1);
-  if (arena->failed) {
-    return supine_error_memory(error, "%zu bytes of %s", size, file->path);
-  }
+  SUPINE_TRY(supine_arena_check(arena, error, "%zu bytes of %s", size, file->path));
   errno = 0;
   file->size = fread(file->bytes, 1, size, stream);
   file->bytes[file->size] = '\0';

@@ -149,9 +149,7 @@ static supine_status read_map(work *w, const char *const *paths, size_t count,
   SUPINE_ARENA arena = {0};
   labels_tally *tally = supine_arena_take(&arena, LABELS_MAX, sizeof *tally);
   uint8_t *side = supine_arena_take(&arena, LABELS_MAX, 1);
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   SUPINE_TRY(advance(w, 0.2, error));
   SUPINE_TRY(supine_labels_count(w->path, &w->image, tally, error));
   w->choice.taken = report->taken;

@@ -90,9 +90,7 @@ supine_status supine_labels_count(const char *path, const supine_image *image, l
                                   supine_error *error) {
   SUPINE_ARENA arena = {0};
   uint16_t *labels = supine_arena_take(&arena, image->size[0], sizeof *labels);
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   memset(tally, 0, LABELS_MAX * sizeof *tally);
   for (size_t row = 0; row < image->size[1] * image->size[2]; ++row) {
     double bad = 0.0;

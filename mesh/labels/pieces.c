@@ -36,9 +36,7 @@ supine_status supine_labels_pieces_find(const labels_mask *mask, bool zero, supi
   const size_t count = supine_labels_mask_count(mask);
   const size_t *size = mask->size;
   *pieces = (labels_pieces){.of = supine_arena_take(arena, count, sizeof *pieces->of)};
-  if (arena->failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(arena));
   SUPINE_TRY(number_pieces(mask, pieces->of));
   for (size_t i = 0; i < count; ++i) {
     pieces->end = pieces->of[i] >= pieces->end ? pieces->of[i] + 1 : pieces->end;

@@ -60,9 +60,7 @@ static supine_status make_parts(const char *path, const unsigned *wanted, size_t
   labels_tally *tally = supine_arena_take(&arena, LABELS_MAX, sizeof *tally);
   uint8_t *value = supine_arena_zeros(&arena, LABELS_MAX, 1);
   SUPINE_FREED_BY(supine_image_free) supine_image image = {0};
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   SUPINE_TRY(supine_image_read(path, &image, error));
   SUPINE_TRY(supine_labels_count(path, &image, tally, error));
   SUPINE_TRY(choose(path, tally, wanted, wanted_count, parts, count, error));

@@ -69,9 +69,7 @@ static supine_status share_out(labels_mask *both, uint8_t *marks, float *squares
   SUPINE_ARENA arena = {0};
   float *other = supine_arena_take(&arena, count, sizeof *other);
   one.at = supine_arena_take(&arena, count, 1);
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   for (uint8_t value = LABELS_LEFT; value <= LABELS_RIGHT; ++value) {
     for (size_t i = 0; i < count; ++i) {
       one.at[i] = marks[i] == value;
@@ -92,9 +90,7 @@ supine_status supine_labels_split(const char *path, labels_mask *both, double *n
   float *squares = supine_arena_take(&arena, count, sizeof *squares);
   labels_mask eroded = *both;
   eroded.at = supine_arena_take(&arena, count, 1);
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   for (double depth = 0.0; 2.0 * depth <= widest_neck; depth += step) {
     SUPINE_ARENA pass = {0};
     labels_pieces pieces;

@@ -113,9 +113,7 @@ static supine_status predict(const fitting *w, const fit *f, size_t d, size_t mo
   double *eigenvectors = supine_arena_take(&arena, f->terms * f->terms, sizeof *eigenvectors);
   double *target = supine_arena_take(&arena, f->terms, sizeof *target); /* y, or y on the modes */
   double *gram_residual = supine_arena_take(&arena, f->count, sizeof *gram_residual);
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   cblas_dgemv(CblasRowMajor, CblasTrans, p, m, -1.0, f->pinv, m, y, 1, 0.0, residual, 1);
   residual[d] += 1.0;
   memcpy(pinv, f->pinv, f->terms * f->count * sizeof *pinv);
@@ -229,9 +227,7 @@ static supine_status cross_validate(const fitting *w, size_t modes, supine_accur
   SUPINE_ARENA arena = {0};
   supine_tally *tally = supine_arena_zeros(&arena, 1, sizeof *tally);
   double *residual = supine_arena_take(&arena, w->rows, sizeof *residual);
-  if (arena.failed) {
-    return supine_error_memory(error, "%zu vertices", w->fields->vertex_count);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", w->fields->vertex_count));
   for (size_t d = 0; d < m; ++d) {
     double square;
     const supine_status status = predict(w, &w->chosen, d, modes, &square);
@@ -304,9 +300,7 @@ supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_op
   }
   w.gram = supine_arena_take(&w.arena, (size_t)m * (size_t)m, sizeof *w.gram);
   w.residual = supine_arena_take(&w.arena, (size_t)m, sizeof *w.residual);
-  if (w.arena.failed) {
-    return supine_error_memory(error, "%d fields", m);
-  }
+  SUPINE_TRY(supine_arena_check(&w.arena, error, "%d fields", m));
   cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, m, m, rows, 1.0, fields->displacement, rows,
               fields->displacement, rows, 0.0, w.gram, m);
   if (!(square_sum(&w) > 0.0)) {

@@ -37,9 +37,7 @@ SUPINE_CLONES static supine_status choose(size_t count, const double *points, si
                                           supine_inside_biharmonic *fit) {
   SUPINE_ARENA arena = {0};
   double *distance = supine_arena_take(&arena, count, sizeof *distance);
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   size_t farthest = 0;
   for (size_t i = 0; i < count; ++i) {
     distance[i] = supine_distance(points + 3 * i, fit->middle);
@@ -137,9 +135,7 @@ static supine_status solve(supine_inside_biharmonic *fit, const double *values) 
   SUPINE_ARENA arena = {0};
   double *matrix = supine_arena_take(&arena, n * n, sizeof *matrix);
   double *p = supine_arena_take(&arena, n * (AFFINE + fit->columns), sizeof *p);
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   fill(n, fit->centres, matrix);
   for (size_t i = 0; i < n; ++i) {
     p[i] = 1.0;

@@ -142,9 +142,7 @@ supine_status supine_inside_content_check_names(const supine_inside_content *con
                                                 supine_error *error) {
   SUPINE_ARENA arena = {0};
   const char **names = supine_arena_take(&arena, content->part_count, sizeof *names);
-  if (arena.failed) {
-    return supine_error_memory(error, "%zu names", content->part_count);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu names", content->part_count));
   const char *name = content->names;
   for (size_t i = 0; i < content->part_count; ++i, name += strcspn(name, "\n") + 1) {
     names[i] = name;

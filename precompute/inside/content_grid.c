@@ -148,9 +148,7 @@ supine_status supine_inside_content_grid(const supine_inside_shells *shells,
   const size_t nodes = grid.size[0] * grid.size[1] * grid.size[2];
   SUPINE_ARENA arena = {0};
   search work = {shells, &grid, diagonal, supine_arena_take(&arena, nodes, 1)};
-  if (arena.failed) {
-    return supine_error_memory(error, "a grid of %zu nodes", nodes);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "a grid of %zu nodes", nodes));
   supine_parallel_for(grid.size[1] * grid.size[2], 1, 0, search_rows, &work);
   return take_nodes(&grid, work.keep, content, error);
 }

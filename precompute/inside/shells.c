@@ -73,9 +73,7 @@ static supine_status create_shells(supine_inside_shells *shells, supine_error *e
   }
   SUPINE_ARENA arena = {0};
   float *scanned = supine_arena_take(&arena, 3 * info->vertex_count, sizeof *scanned);
-  if (arena.failed) {
-    return supine_error_memory(error, "%zu vertices", info->vertex_count);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", info->vertex_count));
   SUPINE_TRY(supine_basis_pose(basis, &scan, &shells->scan, error));
   (void)supine_deform(basis, &shells->scan, scanned);
   for (size_t i = 0; i < 3 * info->vertex_count; ++i) {

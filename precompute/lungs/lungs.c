@@ -252,9 +252,7 @@ static supine_status measure(supine_lungs *lungs, const double *midline, supine_
                    : fabs(low) < fabs(high)              ? low
                                                          : high;
   (void)supine_lungs_sides(&lungs->mesh, &lungs->topology, 0, lungs->midline, &arena, left);
-  if (arena.failed) {
-    return supine_error_memory(error, "%zu components", lungs->topology.component_count);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu components", lungs->topology.component_count));
   SUPINE_TRY(group(lungs, left, error));
   supine_lungs_measure(lungs);
   return midline != NULL ? check_midline(lungs, overlap < SUPINE_LUNGS_MOST_OVERLAP, error)

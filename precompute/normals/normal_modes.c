@@ -129,9 +129,7 @@ static supine_status find_fit(const normals_work *work, size_t lung,
   double *gram = supine_arena_take(&arena, terms * terms, sizeof *gram);
   double *gram_phi = supine_arena_take(&arena, s * all, sizeof *gram_phi);
   double *product = supine_arena_take(&arena, s * s, sizeof *product);
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   apply_gram(rows, terms, phi, s, gram, gram_phi);
   cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)s, (int)s, (int)all, 1.0, phi, (int)all,
               gram_phi, (int)all, 0.0, product, (int)s);
@@ -286,9 +284,7 @@ static supine_status measure_all(const normals_work *work, supine_normals_modes 
   SUPINE_ARENA arena = {0};
   supine_tally *tally = supine_arena_zeros(&arena, 1, sizeof *tally);
   double sum = 0.0;
-  if (tally == NULL) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   for (size_t lung = 0; lung < work->surface->lung_count; ++lung) {
     measure(work, lung, made, tally, &sum);
   }
@@ -476,9 +472,7 @@ supine_status supine_normals_modes_create(const supine_normals_surface *surface,
   }
   SUPINE_ARENA own = {0};
   normals_work *work = supine_arena_zeros(&own, 1, sizeof *work);
-  if (work == NULL) {
-    return supine_error_memory(error, "normals");
-  }
+  SUPINE_TRY(supine_arena_check(&own, error, "normals"));
   work->surface = surface;
   work->terms = supine_normals_terms(surface->field->mode_count);
   const supine_status status = find_modes(work, arena, made);

@@ -44,9 +44,7 @@ supine_status supine_normals_fans_create(const supine_normals_surface *surface, 
   const size_t corners = 3 * surface->triangle_count;
   fans->begin = supine_arena_zeros(arena, surface->vertex_count + 2, sizeof *fans->begin);
   fans->corner = supine_arena_take(arena, corners, sizeof *fans->corner);
-  if (arena->failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(arena));
   uint32_t *next = fans->begin + 1;
   for (size_t s = 0; s < corners; ++s) {
     ++next[surface->triangles[s] + 1];
@@ -113,9 +111,7 @@ supine_status supine_normals_rows_create(const supine_normals_surface *surface,
   rows->count = 0;
   rows->vertex = supine_arena_take(arena, most, sizeof *rows->vertex);
   rows->terms = supine_arena_take(arena, most * 3 * terms, sizeof *rows->terms);
-  if (arena->failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(arena));
   for (size_t i = begin + offset; i < end; i += stride) {
     double *row = rows->terms + 3 * rows->count * terms;
     memset(row, 0, 3 * terms * sizeof *row);

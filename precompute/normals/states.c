@@ -84,9 +84,7 @@ supine_status supine_normals_states_create(const supine_normals_surface *surface
   double w[SUPINE_MODES_MAX];
   *states = (supine_normals_states){.room = count, .range = {INFINITY, -INFINITY}};
   states->phi = supine_arena_take(arena, surface->lung_count * count * terms, sizeof *states->phi);
-  if (states->phi == NULL) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(arena));
   for (size_t i = 0; i < count; ++i) {
     const double at = (double)i + shift;
     const double share = fmod(at * share_step, 1.0);

@@ -64,9 +64,7 @@ supine_status supine_accuracy_error_table_create(const supine_truth *truth,
   SUPINE_ARENA arena = {0};
   double *gram = supine_arena_take(&arena, rank * rank, sizeof *gram);
   *table = (supine_error_table){.band_count = bands, .mode_count = modes};
-  if (gram == NULL) {
-    return supine_error_memory(error, "the table of errors");
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "the table of errors"));
   find_gram(truth, compression->row_count, directions, gram);
   for (size_t d = 0; d < truth->direction_count; ++d) {
     const double *functions = truth->functions + d * rank;

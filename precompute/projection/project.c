@@ -52,9 +52,7 @@ static supine_status expand(const supine_lungs *lungs, const supine_force_law *l
                           supine_arena_take(&arena, count, sizeof(double)),
                           supine_arena_take(&arena, count, sizeof(double))};
   double *weights = supine_arena_take(&arena, count * span->rank, sizeof *weights);
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   SUPINE_TRY(find_heights(lungs, law->pair, grid, &heights));
   const supine_gravities gravities = {count, heights.directions, heights.minimum, heights.maximum};
   SUPINE_TRY(supine_projection_span_weights(lungs, law, span, &gravities, weights));
@@ -143,9 +141,7 @@ supine_status supine_projection_volume_forms(const supine_compression *compressi
   const size_t values = compression->row_count * count;
   SUPINE_ARENA arena = {0};
   double *columns = supine_arena_take(&arena, values, sizeof *columns);
-  if (columns == NULL) {
-    return supine_error_memory(error, "volume coefficients of %zu modes", count);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "volume coefficients of %zu modes", count));
   for (size_t i = 0; i < values; ++i) {
     columns[i] = (double)compression->coefficients[i];
   }

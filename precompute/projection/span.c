@@ -123,9 +123,7 @@ supine_status supine_projection_span_weights(const supine_lungs *lungs, const su
   const int count = (int)gravities->count;
   SUPINE_ARENA arena = {0};
   double *force = supine_arena_take(&arena, span->rank * gravities->count, sizeof *force);
-  if (force == NULL) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   supine_physics_force(lungs, law, gravities, span->rank, span->vertices, force);
   cblas_dgemm(CblasRowMajor, CblasTrans, CblasTrans, count, rank, rank, 1.0, force, count,
               span->inverse, rank, 0.0, weights, rank);
