@@ -44,8 +44,8 @@ enum {
 /** Number, sum of indices, and bounding box of the voxels of one label. */
 typedef struct labels_tally {
   uint64_t count;
-  uint64_t sum[3];          /**< sum of the voxels' indices along each axis */
-  uint32_t low[3], high[3]; /**< bounding box: first and last voxel index along each axis */
+  uint64_t sum[3];        /**< sum of the voxels' indices along each axis */
+  size_t low[3], high[3]; /**< bounding box: first and last voxel index along each axis */
 } labels_tally;
 
 /** Count the voxels of each label, and find their bounding boxes.

@@ -16,11 +16,9 @@ static const double edge_share = 0.02;
  * @param value  [LABELS_MAX] work space, zero before and after the call */
 static supine_status make_part(const supine_image *image, const labels_tally *tally, uint8_t *value,
                                supine_labels_shape *part) {
-  const size_t low[3] = {tally->low[0], tally->low[1], tally->low[2]};
-  const size_t high[3] = {tally->high[0], tally->high[1], tally->high[2]};
   SUPINE_FREED_BY(supine_labels_mask_free) labels_mask mask;
   value[part->label] = 1;
-  SUPINE_TRY(supine_labels_mask_cut(image, low, high, LABELS_MARGIN, value, &mask));
+  SUPINE_TRY(supine_labels_mask_cut(image, tally->low, tally->high, LABELS_MARGIN, value, &mask));
   value[part->label] = 0;
   part->mask = supine_labels_voxel_ml(&mask) * (double)tally->count;
   const double edge =
