@@ -185,19 +185,14 @@ static supine_status find_normals(const supine_basis_content *content, const flo
                                   const float *directions, supine_arena *arena,
                                   supine_normals_modes *normals, supine_error *error) {
   static const double straight[3] = {0.0, 0.0, 0.0};
-  const double *bend = content->reference != NULL ? content->prepared->model.bend : straight;
-  const supine_lungs *lungs = content->lungs;
-  const supine_normals_surface surface = {.vertex_count = lungs->mesh.vertex_count,
-                                          .triangle_count = lungs->mesh.triangle_count,
-                                          .lung_count = lungs->lung_count,
-                                          .lung_begin = lungs->lung_begin,
-                                          .vertices = vertices,
-                                          .triangles = lungs->mesh.triangles,
-                                          .directions = directions,
-                                          .field = content->compression,
-                                          .resting = content->resting,
-                                          .forms = content->forms,
-                                          .bend = {bend[0], bend[1], bend[2]}};
+  const supine_normals_surface surface = {
+      .lungs = content->lungs,
+      .vertices = vertices,
+      .directions = directions,
+      .field = content->compression,
+      .resting = content->resting,
+      .forms = content->forms,
+      .bend = content->reference != NULL ? content->prepared->model.bend : straight};
   return supine_normals_modes_create(&surface, arena, normals, error);
 }
 

@@ -43,13 +43,6 @@ static supine_model choose_law(const supine_model_choice *choice) {
   return model;
 }
 
-/* What a choice means for lungs that were read. */
-typedef struct meaning {
-  bool has_scan;
-  supine_scan scan;
-  supine_resting resting;
-} meaning;
-
 /* Say what volume the law gives the lungs in the state that was not scanned, beside the measured
  * one. The law is not rescaled to the latter.
  * @param measured  volume of both lungs in this state when the law was fitted, mL, or 0 */
@@ -86,8 +79,9 @@ static void describe_fit(const supine_patient_record *record, char *text, size_t
 
 /* Use the displacement law and the force that were fitted to a patient. If the state of the scan is
  * not given, use the state in the fit. */
-static supine_status take_patient(const supine_patient_record *fitted, supine_prepared *p,
-                                  meaning *means, supine_error *error) {
+static supine_status take_patient(supine_model_choice *choice, supine_prepared *p,
+                                  supine_error *error) {
+  const supine_patient_record *fitted = choice->patient;
   const size_t n = p->source.lungs.mesh.vertex_count;
   supine_patient_record *record = supine_arena_take(&p->memory, 1, sizeof *record);
   double *arrays = supine_arena_take(&p->memory, 4 * n, sizeof *arrays);
@@ -97,14 +91,14 @@ static supine_status take_patient(const supine_patient_record *fitted, supine_pr
   p->patient = record;
   describe_fit(record, p->fit, sizeof p->fit);
   p->model = supine_physics_model(SUPINE_LAW_DEEP);
-  SUPINE_TRY(supine_patient_model(record, &p->source.lungs, &means->resting, &scan, arrays,
+  SUPINE_TRY(supine_patient_model(record, &p->source.lungs, &choice->resting, &scan, arrays,
                                   &p->model, error));
   tell_volume(record, fitted->volume[record->shown == 1.0 ? 0 : 1], &p->source.findings);
-  if (means->has_scan) {
+  if (choice->has_scan) {
     return SUPINE_OK;
   }
-  means->has_scan = true;
-  means->scan = scan;
+  choice->has_scan = true;
+  choice->scan = scan;
   supine_findings_add(&p->source.findings,
                       "note: the scan is assumed to be the %s of the two that were fitted; "
                       "--scanned changes this",
@@ -210,9 +204,9 @@ static bool varies(const supine_model *model, size_t count) {
   return !same;
 }
 
-static void summarize(const supine_model_choice *choice, const supine_resting *resting,
-                      bool predicted, supine_prepared *p) {
+static void summarize(const supine_model_choice *choice, bool predicted, supine_prepared *p) {
   static const double supine[3] = {0.0, 1.0, 0.0};
+  const supine_resting *resting = &choice->resting;
   const supine_reference *reference = &p->reference;
   const size_t size = sizeof p->assumed;
   char state[160];
@@ -265,10 +259,9 @@ static void summarize(const supine_model_choice *choice, const supine_resting *r
 }
 
 /* Decide what state the scan shows, and check that the law and --full go with it. */
-static supine_status find_scan(const supine_model_choice *choice, supine_law law, meaning *means,
-                               supine_error *error) {
-  supine_scan *scan = &means->scan;
-  if (!means->has_scan && law != SUPINE_LAW_PAPER) {
+static supine_status find_scan(supine_model_choice *choice, supine_law law, supine_error *error) {
+  supine_scan *scan = &choice->scan;
+  if (!choice->has_scan && law != SUPINE_LAW_PAPER) {
     (void)supine_reference_scan_parse("full", scan, NULL);
   }
   if (law == SUPINE_LAW_PAPER && scan->known) {
@@ -297,14 +290,14 @@ supine_status supine_precompute_prepare(const supine_model_choice *choice, char 
                                         supine_error *error) {
   supine_prepared *p = prepared;
   supine_lungs *lungs = &p->source.lungs;
-  meaning means = {choice->has_scan, choice->scan, choice->resting};
+  supine_model_choice chosen = *choice; /* and what follows from it for the lungs that are read */
   SUPINE_TRY(supine_precompute_source_load(&choice->source, paths, count, &p->source, error));
   if (choice->patient != NULL) {
-    SUPINE_TRY(take_patient(choice->patient, p, &means, error));
+    SUPINE_TRY(take_patient(&chosen, p, error));
   } else {
     p->model = choose_law(choice);
   }
-  SUPINE_TRY(find_scan(choice, p->model.law, &means, error));
+  SUPINE_TRY(find_scan(&chosen, p->model.law, error));
   SUPINE_TRY(set_expandability(choice, p, error));
   SUPINE_TRY(set_lesions(choice, p, error));
   SUPINE_TRY(set_shares(choice, p, error));
@@ -312,16 +305,16 @@ supine_status supine_precompute_prepare(const supine_model_choice *choice, char 
     SUPINE_TRY(supine_physics_strain_create(lungs, p->model.stiffness, p->model.lesions,
                                             &p->model.strain, error));
   }
-  const supine_reference scanned = {.scan = means.scan,
+  const supine_reference scanned = {.scan = chosen.scan,
                                     .lung_count = lungs->lung_count,
                                     .side = {lungs->side[0], lungs->side[1]}};
-  supine_resting resting = means.resting;
+  supine_resting resting = chosen.resting;
   supine_reference_predict_rest(&scanned, &choice->person, &resting);
-  SUPINE_TRY(supine_reference_find(lungs, &p->model, &means.scan, &resting, &p->reference, error));
-  summarize(choice, &means.resting, resting.ml[2] != means.resting.ml[2], p);
+  SUPINE_TRY(supine_reference_find(lungs, &p->model, &chosen.scan, &resting, &p->reference, error));
+  summarize(&chosen, resting.ml[2] != chosen.resting.ml[2], p);
   char doubt[512] = "";
   if (p->reference.known) {
-    supine_reference_doubt(&p->reference, &choice->person, &means.resting, doubt, sizeof doubt);
+    supine_reference_doubt(&p->reference, &choice->person, &chosen.resting, doubt, sizeof doubt);
   }
   if (doubt[0] != '\0') {
     supine_findings_add(&p->source.findings, "warning: %s", doubt);

@@ -122,14 +122,3 @@ void supine_sh_compression_weights(const supine_compression *compression, const 
     }
   }
 }
-
-void supine_sh_compression_field(const supine_compression *compression, const double *weights,
-                                 double *field) {
-  for (size_t i = 0; i < compression->row_count; ++i) {
-    const float *c = compression->coefficients + i * compression->mode_count;
-    field[i] = 0.0;
-    for (size_t k = 0; k < compression->mode_count; ++k) {
-      field[i] += weights[k] * (double)c[k];
-    }
-  }
-}

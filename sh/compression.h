@@ -66,8 +66,4 @@ supine_status supine_sh_leading_eigenpairs(size_t n, double *matrix, size_t coun
 void supine_sh_compression_weights(const supine_compression *compression, const double g[3],
                                    double *weights);
 
-/** Compute every row: field[i] = sum over k of weights[k] coefficients[i, k]. */
-void supine_sh_compression_field(const supine_compression *compression, const double *weights,
-                                 double *field);
-
 #endif

@@ -17,18 +17,17 @@ enum { AFFINE = 4, POINTS = 32, CENTRES = 64 };
 
 /* Set fit->middle to the centre of the points' bounding box, and fit->unit to half its diagonal. */
 static void frame(size_t count, const double *points, supine_inside_biharmonic *fit) {
-  double square = 0.0;
-  for (int k = 0; k < 3; ++k) {
-    double low = INFINITY;
-    double high = -INFINITY;
-    for (size_t i = 0; i < count; ++i) {
-      low = fmin(low, points[3 * i + (size_t)k]);
-      high = fmax(high, points[3 * i + (size_t)k]);
-    }
-    fit->middle[k] = 0.5 * (low + high);
-    square += 0.25 * (high - low) * (high - low);
+  double low[3];
+  double high[3];
+  supine_box_begin(low, high);
+  for (size_t i = 0; i < count; ++i) {
+    supine_box_add(points + 3 * i, low, high);
   }
-  fit->unit = square > 0.0 ? sqrt(square) : 1.0;
+  for (int k = 0; k < 3; ++k) {
+    fit->middle[k] = 0.5 * (low[k] + high[k]);
+  }
+  const double half = 0.5 * supine_distance(low, high);
+  fit->unit = half > 0.0 ? half : 1.0;
 }
 
 /* Choose the centres: first the point farthest from fit->middle, then repeatedly the point whose

@@ -14,19 +14,13 @@ static const double nodes_max = 2147483648.0;
 /* Find the bounding box of the lungs, extended by the margin, in voxel coordinates of `grid`. */
 static void cover(const supine_inside_shells *shells, const supine_image *grid, double margin,
                   double low[3], double high[3]) {
-  for (int k = 0; k < 3; ++k) {
-    low[k] = INFINITY;
-    high[k] = -INFINITY;
-  }
+  supine_box_begin(low, high);
   for (size_t lung = 0; lung < shells->count; ++lung) {
     const supine_inside_shell *shell = &shells->shell[lung];
     for (size_t i = 0; i < shell->vertex_count; ++i) {
       double node[3];
       supine_image_locate(grid, shell->vertices + 3 * i, node);
-      for (int k = 0; k < 3; ++k) {
-        low[k] = fmin(low[k], node[k]);
-        high[k] = fmax(high[k], node[k]);
-      }
+      supine_box_add(node, low, high);
     }
   }
   for (int k = 0; k < 3; ++k) {

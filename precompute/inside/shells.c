@@ -110,21 +110,24 @@ void supine_inside_shells_free(supine_inside_shells *shells) {
   *shells = (supine_inside_shells){0};
 }
 
+/* Find the displacement of a vertex by each mode at weight and gain 1: row [3, modes], mm. */
+static void move_vertex(const supine_basis_info *info, size_t vertex, double *row) {
+  const size_t modes = info->mode_count;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    for (size_t k = 0; k < modes; ++k) {
+      *row++ = info->vector ? (double)info->coefficients[(3 * vertex + axis) * modes + k]
+                            : (double)info->direction[3 * vertex + axis] *
+                                  (double)info->coefficients[vertex * modes + k];
+    }
+  }
+}
+
 void supine_inside_shell_displacement(const supine_inside_shells *shells, size_t lung,
                                       double *displacement) {
   const supine_basis_info *info = supine_basis_get_info(shells->basis);
   const supine_inside_shell *shell = &shells->shell[lung];
-  const size_t modes = info->mode_count;
   for (size_t i = 0; i < shell->vertex_count; ++i) {
-    const size_t vertex = shell->begin + i;
-    for (size_t axis = 0; axis < 3; ++axis) {
-      double *row = displacement + (3 * i + axis) * modes;
-      for (size_t k = 0; k < modes; ++k) {
-        row[k] = info->vector ? (double)info->coefficients[(3 * vertex + axis) * modes + k]
-                              : (double)info->direction[3 * vertex + axis] *
-                                    (double)info->coefficients[vertex * modes + k];
-      }
-    }
+    move_vertex(info, shell->begin + i, displacement + 3 * i * info->mode_count);
   }
 }
 
@@ -222,8 +225,8 @@ static bool is_hilar(const float *p, const float box[6], bool left) {
 bool supine_inside_hilum(const supine_basis *basis, double *mean) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const supine_tensor *stored = supine_basis_tensor(basis, "lungs_hilum");
-  const size_t modes = info->mode_count;
-  const size_t columns = 3 * modes;
+  const size_t columns = 3 * info->mode_count;
+  double row[3 * SUPINE_MODES_MAX];
   bool found = supine_basis_metadata(basis, "content") == NULL;
   memset(mean, 0, info->lung_count * columns * sizeof *mean);
   if (stored != NULL && stored->dtype == SUPINE_F64 && stored->rank == 3 &&
@@ -234,14 +237,13 @@ bool supine_inside_hilum(const supine_basis *basis, double *mean) {
   for (size_t lung = 0; lung < info->lung_count && found; ++lung) {
     double count = 0.0;
     for (size_t i = info->lung_begin[lung]; i < info->lung_begin[lung + 1]; ++i) {
-      const bool hilar = is_hilar(info->vertices + 3 * i, info->bounds + 6 * lung,
-                                  info->lung_names[lung][0] == 'l');
-      count += hilar ? 1.0 : 0.0;
-      for (size_t k = 0; k < columns && hilar; ++k) {
-        mean[lung * columns + k] += info->vector
-                                        ? (double)info->coefficients[i * columns + k]
-                                        : (double)info->direction[3 * i + k / modes] *
-                                              (double)info->coefficients[i * modes + k % modes];
+      if (is_hilar(info->vertices + 3 * i, info->bounds + 6 * lung,
+                   info->lung_names[lung][0] == 'l')) {
+        count += 1.0;
+        move_vertex(info, i, row);
+        for (size_t k = 0; k < columns; ++k) {
+          mean[lung * columns + k] += row[k];
+        }
       }
     }
     for (size_t k = 0; k < columns; ++k) {

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/vec3.h"
 
 #include "precompute/lungs/lungs.h"
 
@@ -201,17 +202,14 @@ void supine_lungs_measure_volumes(supine_lungs *lungs) {
 
 void supine_lungs_measure(supine_lungs *lungs) {
   supine_lungs_measure_volumes(lungs);
+  supine_box_begin(lungs->minimum, lungs->maximum);
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     const size_t begin = lungs->lung_begin[lung];
     const supine_mesh own = {lungs->lung_begin[lung + 1] - begin, lungs->mesh.vertices + 3 * begin,
                              0, NULL};
     supine_mesh_box(&own, lungs->low[lung], lungs->high[lung]);
-    for (size_t k = 0; k < 3; ++k) {
-      const double *low = lungs->low[lung];
-      const double *high = lungs->high[lung];
-      lungs->minimum[k] = lung == 0 ? low[k] : fmin(lungs->minimum[k], low[k]);
-      lungs->maximum[k] = lung == 0 ? high[k] : fmax(lungs->maximum[k], high[k]);
-    }
+    supine_box_add(lungs->low[lung], lungs->minimum, lungs->maximum);
+    supine_box_add(lungs->high[lung], lungs->minimum, lungs->maximum);
   }
 }
 

@@ -156,7 +156,7 @@ static supine_status find_fit(const normals_work *work, size_t lung,
 /* Find the modes of one lung, and the polynomials of its held-out vertices. */
 static supine_status find_lung(normals_work *work, size_t lung, fit *made) {
   const supine_normals_surface *s = work->surface;
-  const size_t stride = 1 + (s->lung_begin[lung + 1] - s->lung_begin[lung]) / ROWS;
+  const size_t stride = 1 + (s->lungs->lung_begin[lung + 1] - s->lungs->lung_begin[lung]) / ROWS;
   const size_t all = 3 * work->terms;
   SUPINE_ARENA rows_memory = {0};
   SUPINE_ARENA arena = {0};
@@ -285,7 +285,7 @@ static supine_status measure_all(const normals_work *work, supine_normals_modes 
   supine_tally *tally = supine_arena_zeros(&arena, 1, sizeof *tally);
   double sum = 0.0;
   SUPINE_TRY(supine_arena_status(&arena));
-  for (size_t lung = 0; lung < work->surface->lung_count; ++lung) {
+  for (size_t lung = 0; lung < work->surface->lungs->lung_count; ++lung) {
     measure(work, lung, made, tally, &sum);
   }
   made->mean = tally->count > 0 ? sum / (double)tally->count : 0.0;
@@ -307,7 +307,7 @@ typedef struct planes_work {
 } planes_work;
 
 static size_t lung_of(const supine_normals_surface *s, size_t vertex) {
-  return s->lung_count == 2 && vertex >= s->lung_begin[1];
+  return s->lungs->lung_count == 2 && vertex >= s->lungs->lung_begin[1];
 }
 
 SUPINE_CLONES static void place_range(void *context, size_t begin, size_t end, size_t thread) {
@@ -343,7 +343,7 @@ SUPINE_CLONES static void sum_range(void *context, size_t begin, size_t end, siz
     float normal[3][LANES] = {{0.0f}};
     for (size_t at = fans->begin[i]; at < fans->begin[i + 1]; ++at) {
       uint32_t others[2];
-      supine_normals_fan_others(s->triangles, fans->corner[at], others);
+      supine_normals_fan_others(s->lungs->mesh.triangles, fans->corner[at], others);
       const float *a = planes->positions + 3 * (size_t)others[0] * LANES;
       const float *b = planes->positions + 3 * (size_t)others[1] * LANES;
       for (size_t axis = 0; axis < 3; ++axis) {
@@ -381,7 +381,7 @@ SUPINE_CLONES static void sum_range(void *context, size_t begin, size_t end, siz
  * and others. Those for `axis` are therefore found at c = (axis + 2) % 3. */
 static void find_mode_factors(const planes_work *planes) {
   const normals_work *work = planes->work;
-  for (size_t lung = 0; lung < work->surface->lung_count; ++lung) {
+  for (size_t lung = 0; lung < work->surface->lungs->lung_count; ++lung) {
     for (size_t axis = 0; axis < 3; ++axis) {
       for (size_t l = 0; l < LANES; ++l) {
         const size_t lane = planes->first + l;
@@ -401,7 +401,7 @@ static supine_status make_modes(const normals_work *work, size_t count, supine_a
                                 supine_normals_modes *made) {
   enum { GRAIN = 1024 };
   const supine_normals_surface *s = work->surface;
-  const size_t n = s->vertex_count;
+  const size_t n = s->lungs->mesh.vertex_count;
   const size_t all = 3 * work->terms;
   float mode_factors[SUPINE_LUNGS_MAX][3][SUPINE_NORMALS_FIELD_MAX][LANES];
   SUPINE_ARENA own = {0};
@@ -412,13 +412,14 @@ static supine_status make_modes(const normals_work *work, size_t count, supine_a
                         .modes = supine_arena_zeros(&own, 3 * n * count, sizeof(float)),
                         .lengths = supine_arena_take(&own, n, sizeof(float))};
   made->modes = supine_arena_take(arena, 3 * n * (count + 1), sizeof *made->modes);
-  made->weights = supine_arena_take(arena, s->lung_count * count * all, sizeof *made->weights);
+  made->weights =
+      supine_arena_take(arena, s->lungs->lung_count * count * all, sizeof *made->weights);
   made->count = count;
   if (own.failed || arena->failed) {
     return SUPINE_ERROR_MEMORY;
   }
   size_t snapshots = 0;
-  for (size_t lung = 0; lung < s->lung_count; ++lung) {
+  for (size_t lung = 0; lung < s->lungs->lung_count; ++lung) {
     snapshots =
         work->fits[lung].snapshot_count > snapshots ? work->fits[lung].snapshot_count : snapshots;
   }
@@ -427,12 +428,12 @@ static supine_status make_modes(const normals_work *work, size_t count, supine_a
     supine_parallel_for(3 * n, 3 * GRAIN, 0, place_range, &planes);
     supine_parallel_for(n, GRAIN, 0, sum_range, &planes);
   }
-  for (size_t lung = 0; lung < s->lung_count; ++lung) {
-    const size_t begin = s->lung_begin[lung];
+  for (size_t lung = 0; lung < s->lungs->lung_count; ++lung) {
+    const size_t begin = s->lungs->lung_begin[lung];
     double unit[MOST];
     round_modes(planes.modes + 3 * begin * count, planes.lengths + begin,
-                s->lung_begin[lung + 1] - begin, count, made->modes + 3 * begin * (count + 1),
-                unit);
+                s->lungs->lung_begin[lung + 1] - begin, count,
+                made->modes + 3 * begin * (count + 1), unit);
     scale_weights(work->fits[lung].weights, unit, count, work->terms,
                   made->weights + lung * count * all);
   }
@@ -449,7 +450,7 @@ static supine_status find_modes(normals_work *work, supine_arena *arena,
     return SUPINE_OK;
   }
   SUPINE_TRY(supine_normals_fans_create(s, &work->memory, &work->fans));
-  for (size_t lung = 0; lung < s->lung_count; ++lung) {
+  for (size_t lung = 0; lung < s->lungs->lung_count; ++lung) {
     SUPINE_TRY(find_lung(work, lung, &work->fits[lung]));
     most = work->fits[lung].count < most ? work->fits[lung].count : most;
   }
@@ -467,7 +468,8 @@ supine_status supine_normals_modes_create(const supine_normals_surface *surface,
                                           supine_arena *arena, supine_normals_modes *made,
                                           supine_error *error) {
   *made = (supine_normals_modes){0};
-  if (surface->field->mode_count > SUPINE_NORMALS_FIELD_MAX || surface->triangle_count == 0) {
+  if (surface->field->mode_count > SUPINE_NORMALS_FIELD_MAX ||
+      surface->lungs->mesh.triangle_count == 0) {
     return SUPINE_OK;
   }
   SUPINE_ARENA own = {0};
@@ -479,6 +481,6 @@ supine_status supine_normals_modes_create(const supine_normals_surface *surface,
   supine_arena_free(&work->memory);
   return status == SUPINE_OK
              ? status
-             : supine_error_set(error, status, "normals of %zu vertices: %s", surface->vertex_count,
-                                supine_status_string(status));
+             : supine_error_set(error, status, "normals of %zu vertices: %s",
+                                surface->lungs->mesh.vertex_count, supine_status_string(status));
 }

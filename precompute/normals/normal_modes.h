@@ -29,10 +29,8 @@
 
 /** The surface and the displacement field of a basis file. */
 typedef struct supine_normals_surface {
-  size_t vertex_count, triangle_count, lung_count;
-  const size_t *lung_begin;  /**< [lung_count + 1] first vertex of each lung, then N */
+  const supine_lungs *lungs; /**< triangles, and the vertices of each lung */
   const float *vertices;     /**< [N, 3] positions on the reference surface, mm */
-  const uint32_t *triangles; /**< [triangle_count, 3] indices of vertices */
   const float *directions;   /**< [N, 3] displacement of each vertex per unit force, mm; NULL if
                                 `field` holds the displacement itself */
   const supine_compression *field;
@@ -41,7 +39,7 @@ typedef struct supine_normals_surface {
   const double *resting;
   const supine_volume_forms *forms; /**< lung volumes as functions of mode weights and gains; unused
                                        if `resting` is NULL */
-  double bend[3]; /**< [axis] curvature of the vertices' paths (supine_volume_bend) */
+  const double *bend; /**< [3] curvature of the vertices' paths (supine_volume_bend) */
 } supine_normals_surface;
 
 /** Modes from which vertex normals are computed, and the error of these normals. */

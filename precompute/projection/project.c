@@ -127,9 +127,18 @@ supine_status supine_projection_create(const supine_lungs *lungs, const supine_m
 
 void supine_projection_displacement(const supine_compression *compression, const double *directions,
                                     const double *weights, double *u) {
-  supine_sh_compression_field(compression, weights, u);
-  for (size_t i = directions != NULL ? 3 * compression->row_count : 0; i-- > 0;) {
-    u[i] = u[i / 3] * directions[i];
+  const size_t modes = compression->mode_count;
+  for (size_t i = 0; i < compression->row_count; ++i) {
+    double field = 0.0;
+    for (size_t k = 0; k < modes; ++k) {
+      field += weights[k] * (double)compression->coefficients[i * modes + k];
+    }
+    for (size_t at = 3 * i; at < 3 * i + 3 && directions != NULL; ++at) {
+      u[at] = field * directions[at];
+    }
+    if (directions == NULL) {
+      u[i] = field;
+    }
   }
 }
 
