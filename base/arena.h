@@ -47,6 +47,16 @@ static inline void supine_file_close(FILE **file) {
     }                                                                                              \
   } while (0)
 
+/** Refuse an input: if `condition` holds, set the error as supine_error_set does, and return its
+ * status from the calling function. The format and its arguments follow the status; they are
+ * evaluated only then. */
+#define SUPINE_REFUSE_IF(condition, error, ...)                                                    \
+  do {                                                                                             \
+    if (condition) {                                                                               \
+      return supine_error_set(error, __VA_ARGS__);                                                 \
+    }                                                                                              \
+  } while (0)
+
 /** Allocate an array, aligned for any type; valid until the arena is freed.
  * @return NULL if memory is short or count x size overflows; arena->failed is then true. An array
  *   of 0 bytes is not NULL */

@@ -118,10 +118,8 @@ static supine_status set_expandability(const supine_model_choice *choice, supine
       choice->expandability_law.shape == SUPINE_EXPANDABILITY_UNIFORM) {
     return SUPINE_OK;
   }
-  if (p->model.stiffness != NULL) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "the file of --patient sets the stiffness: leave --expandability out");
-  }
+  SUPINE_REFUSE_IF(p->model.stiffness != NULL, error, SUPINE_ERROR_ARGUMENT,
+                   "the file of --patient sets the stiffness: leave --expandability out");
   double *a = supine_arena_take(&p->memory, n, sizeof *a);
   SUPINE_TRY(supine_arena_check(&p->memory, error, "%zu vertices", n));
   if (choice->expandability != NULL) {
@@ -183,10 +181,9 @@ static supine_status set_shares(const supine_model_choice *choice, supine_prepar
     while (lung < lungs->lung_count && lungs->side[lung] != (side == 0 ? 1 : -1)) {
       ++lung;
     }
-    if (choice->share[side] > 0.0 && lung == lungs->lung_count) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "--lung %s: the model has no %s lung: leave it out", name, name);
-    }
+    SUPINE_REFUSE_IF(choice->share[side] > 0.0 && lung == lungs->lung_count, error,
+                     SUPINE_ERROR_ARGUMENT, "--lung %s: the model has no %s lung: leave it out",
+                     name, name);
     if (choice->share[side] > 0.0) {
       p->model.share[lung] = choice->share[side];
     }
@@ -264,24 +261,21 @@ static supine_status find_scan(supine_model_choice *choice, supine_law law, supi
   if (!choice->has_scan && law != SUPINE_LAW_PAPER) {
     (void)supine_reference_scan_parse("full", scan, NULL);
   }
-  if (law == SUPINE_LAW_PAPER && scan->known) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--law paper takes the scan as the reference: leave --scanned out, or "
-                            "use --law deep");
-  }
-  if (scan->known && scan->state.volume.kind == SUPINE_VOLUME_DEFAULT) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--scanned: a posture alone is only for --fields: add the volume, as "
-                            "in supine:rest, or give full or none");
-  }
+  SUPINE_REFUSE_IF(law == SUPINE_LAW_PAPER && scan->known, error, SUPINE_ERROR_ARGUMENT,
+                   "--law paper takes the scan as the reference: leave --scanned out, or "
+                   "use --law deep");
+  SUPINE_REFUSE_IF(scan->known && scan->state.volume.kind == SUPINE_VOLUME_DEFAULT, error,
+                   SUPINE_ERROR_ARGUMENT,
+                   "--scanned: a posture alone is only for --fields: add the volume, as "
+                   "in supine:rest, or give full or none");
   const supine_volume *full = &choice->full.volume;
   scan->full = full->ml;
-  if (full->kind != SUPINE_VOLUME_DEFAULT &&
-      (full->kind != SUPINE_VOLUME_ABSOLUTE || scan->state.volume.kind != SUPINE_VOLUME_REST)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--full is for a scan at rest: give a volume such as 4200mL, and "
-                            "--scanned supine:rest too");
-  }
+  SUPINE_REFUSE_IF(
+      full->kind != SUPINE_VOLUME_DEFAULT &&
+          (full->kind != SUPINE_VOLUME_ABSOLUTE || scan->state.volume.kind != SUPINE_VOLUME_REST),
+      error, SUPINE_ERROR_ARGUMENT,
+      "--full is for a scan at rest: give a volume such as 4200mL, and "
+      "--scanned supine:rest too");
   return SUPINE_OK;
 }
 

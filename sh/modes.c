@@ -110,10 +110,8 @@ supine_status supine_sh_compress_modes(const supine_expansion *expansion, const 
   const size_t most = mode_max < rank ? mode_max : rank;
   const size_t kept = most < terms ? most : terms;
   double energy = 0.0;
-  if (mode_max < 1 || mode_max > SUPINE_MODES_MADE_MAX) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%zu modes: give 1 to %d", mode_max,
-                            SUPINE_MODES_MADE_MAX);
-  }
+  SUPINE_REFUSE_IF(mode_max < 1 || mode_max > SUPINE_MODES_MADE_MAX, error, SUPINE_ERROR_ARGUMENT,
+                   "%zu modes: give 1 to %d", mode_max, SUPINE_MODES_MADE_MAX);
   SUPINE_ARENA arena = {0};
   double *gram = supine_arena_take(&arena, rank * rank, sizeof *gram);
   double *values = supine_arena_take(&arena, rank, sizeof *values);
@@ -130,10 +128,8 @@ supine_status supine_sh_compress_modes(const supine_expansion *expansion, const 
   while (count < kept && values[count] > rank_tolerance * rank_tolerance * values[0]) {
     ++count;
   }
-  if (count == 0) {
-    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                            "the field is zero everywhere: change --base or --gain");
-  }
+  SUPINE_REFUSE_IF(count == 0, error, SUPINE_ERROR_NUMERICAL,
+                   "the field is zero everywhere: change --base or --gain");
   if (supine_sh_compression_create(expansion, count, compression) != SUPINE_OK) {
     return supine_error_memory(error, "%zu modes", count);
   }

@@ -187,9 +187,8 @@ static supine_status take_outcome(const char *path, FILE *stream, supine_mesh *m
                                   size_t *dropped, supine_error *error) {
   outcome result;
   if (fread(&result, sizeof result, 1, stream) == 1) {
-    if (result.error.status != SUPINE_OK) {
-      return supine_error_set(error, result.error.status, "%s", result.error.message);
-    }
+    SUPINE_REFUSE_IF(result.error.status != SUPINE_OK, error, result.error.status, "%s",
+                     result.error.message);
     *dropped = result.dropped;
     const size_t n = result.vertex_count;
     const size_t triangles = result.triangle_count;

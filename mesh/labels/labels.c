@@ -77,11 +77,9 @@ static supine_status join_images(work *w, const char *const *paths, size_t count
       supine_image_free(&image);
       SUPINE_TRY(read_image(w, paths[f], &image, error));
     }
-    if (!same_frame(&first, &image)) {
-      return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s: size, position or axes differ from %s: give masks of one scan",
-                              paths[f], paths[0]);
-    }
+    SUPINE_REFUSE_IF(!same_frame(&first, &image), error, SUPINE_ERROR_FORMAT,
+                     "%s: size, position or axes differ from %s: give masks of one scan", paths[f],
+                     paths[0]);
     for (size_t i = 0; i < voxels; ++i) {
       joined[i] =
           joined[i] == 0 && supine_image_get(&image, i) != 0.0 ? (uint8_t)(f + 1) : joined[i];
@@ -227,21 +225,18 @@ static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung,
   for (int a = 0; a < 3; ++a) {
     longest = fmax(longest, (double)(mask.size[a] - 2 * margin) * mask.spacing[a]);
   }
-  if (!(lung->mask >= least_volume && longest <= longest_lung)) {
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "%s: the %s lung holds %.4g mL in a box %.4g mm long, which is "
-                            "impossible for a lung: check --labels and the voxel size in the "
-                            "header",
-                            w->path, name, lung->mask, longest);
-  }
+  SUPINE_REFUSE_IF(!(lung->mask >= least_volume && longest <= longest_lung), error,
+                   SUPINE_ERROR_MESH,
+                   "%s: the %s lung holds %.4g mL in a box %.4g mm long, which is "
+                   "impossible for a lung: check --labels and the voxel size in the "
+                   "header",
+                   w->path, name, lung->mask, longest);
   SUPINE_TRY(supine_labels_mask_surface(&mask, w->edge, true, mesh));
   supine_labels_mask_free(&mask);
-  if (mesh->triangle_count == 0) {
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "%s: the %s lung is thinner than half of --edge %g everywhere: "
-                            "give a smaller edge",
-                            w->path, name, w->edge);
-  }
+  SUPINE_REFUSE_IF(mesh->triangle_count == 0, error, SUPINE_ERROR_MESH,
+                   "%s: the %s lung is thinner than half of --edge %g everywhere: "
+                   "give a smaller edge",
+                   w->path, name, w->edge);
   SUPINE_FREED_BY(supine_mesh_topology_free) supine_topology topology = {0};
   SUPINE_TRY(supine_mesh_topology_create(mesh, &topology));
   lung->tunnels = topology.genus;
@@ -302,13 +297,13 @@ supine_status supine_labels_surfaces(const char *const *paths, size_t count,
   work w = {.path = paths[0], .options = options, .report = report};
   w.edge = options->edge != 0.0 ? options->edge : SUPINE_LABELS_EDGE;
   *report = (supine_labels_report){.lung_count = 0};
-  if (!(w.edge >= least_edge && w.edge <= most_edge) ||
-      !(options->close >= 0.0 && options->close <= most_closing_radius) || count > FILES_MAX) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "give --edge from %g to %g mm, --close from 0 to %g mm, and at most %d "
-                            "images",
-                            least_edge, most_edge, most_closing_radius, FILES_MAX);
-  }
+  SUPINE_REFUSE_IF(!(w.edge >= least_edge && w.edge <= most_edge) ||
+                       !(options->close >= 0.0 && options->close <= most_closing_radius) ||
+                       count > FILES_MAX,
+                   error, SUPINE_ERROR_ARGUMENT,
+                   "give --edge from %g to %g mm, --close from 0 to %g mm, and at most %d "
+                   "images",
+                   least_edge, most_edge, most_closing_radius, FILES_MAX);
   const supine_status status = make_surfaces(&w, paths, count, surfaces, error);
   supine_image_free(&w.image);
   supine_labels_mask_free(&w.both);

@@ -31,20 +31,15 @@ static supine_status choose(const char *path, const labels_tally *tally, const u
                             supine_error *error) {
   *count = 0;
   for (size_t i = 0; i < wanted_count; ++i) {
-    if (wanted[i] == 0 || wanted[i] >= LABELS_MAX || tally[wanted[i]].count == 0) {
-      return supine_error_set(error, SUPINE_ERROR_MESH,
-                              "%s: no voxel holds the label %u: correct the label", path,
-                              wanted[i]);
-    }
+    SUPINE_REFUSE_IF(wanted[i] == 0 || wanted[i] >= LABELS_MAX || tally[wanted[i]].count == 0,
+                     error, SUPINE_ERROR_MESH, "%s: no voxel holds the label %u: correct the label",
+                     path, wanted[i]);
     parts[(*count)++].label = wanted[i];
   }
   for (unsigned label = 1; label < LABELS_MAX && wanted_count == 0; ++label) {
-    if (tally[label].count > 0 && *count == PARTS_MAX) {
-      return supine_error_set(
-          error, SUPINE_ERROR_MESH,
-          "%s: more than %d labels: if this is a label map, name the labels to use", path,
-          PARTS_MAX);
-    }
+    SUPINE_REFUSE_IF(tally[label].count > 0 && *count == PARTS_MAX, error, SUPINE_ERROR_MESH,
+                     "%s: more than %d labels: if this is a label map, name the labels to use",
+                     path, PARTS_MAX);
     if (tally[label].count > 0) {
       parts[(*count)++].label = label;
     }

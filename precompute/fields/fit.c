@@ -294,19 +294,15 @@ supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_op
   SUPINE_FREED_BY(supine_sh_expansion_free) supine_expansion expansion = {0};
   SUPINE_FREED_BY(supine_sh_compression_free) supine_compression made = {0};
   supine_fit_report found = {0};
-  if (m < 2) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "too few directions of gravity (%d): give fields for at least two", m);
-  }
+  SUPINE_REFUSE_IF(m < 2, error, SUPINE_ERROR_ARGUMENT,
+                   "too few directions of gravity (%d): give fields for at least two", m);
   w.gram = supine_arena_take(&w.arena, (size_t)m * (size_t)m, sizeof *w.gram);
   w.residual = supine_arena_take(&w.arena, (size_t)m, sizeof *w.residual);
   SUPINE_TRY(supine_arena_check(&w.arena, error, "%d fields", m));
   cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, m, m, rows, 1.0, fields->displacement, rows,
               fields->displacement, rows, 0.0, w.gram, m);
-  if (!(square_sum(&w) > 0.0)) {
-    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                            "all displacements are zero: give fields that move the surface");
-  }
+  SUPINE_REFUSE_IF(!(square_sum(&w) > 0.0), error, SUPINE_ERROR_NUMERICAL,
+                   "all displacements are zero: give fields that move the surface");
   SUPINE_TRY(choose_band(&w, options->band, &found, error));
   SUPINE_TRY(project(&w, found.band, &expansion, error));
   SUPINE_TRY(compress(&expansion, options, found.error[found.band], &made, error));

@@ -116,12 +116,10 @@ supine_status supine_inside_content_make_rigid(supine_inside_content *content, c
         content->rigid[i] = found = true;
       }
     }
-    if (!found) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "--rigid: no part is named '%.*s': give a mesh's file name without "
-                              "its ending, or a label as in --labels",
-                              (int)length, at);
-    }
+    SUPINE_REFUSE_IF(!found, error, SUPINE_ERROR_ARGUMENT,
+                     "--rigid: no part is named '%.*s': give a mesh's file name without "
+                     "its ending, or a label as in --labels",
+                     (int)length, at);
     at += length;
     if (*at == '\0') {
       return SUPINE_OK;
@@ -149,11 +147,9 @@ supine_status supine_inside_content_check_names(const supine_inside_content *con
   }
   qsort(names, content->part_count, sizeof *names, compare_names);
   for (size_t i = 1; i < content->part_count; ++i) {
-    if (compare_names(&names[i - 1], &names[i]) == 0) {
-      return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "two parts are named '%.*s': give each a name of its own",
-                              (int)strcspn(names[i], "\n"), names[i]);
-    }
+    SUPINE_REFUSE_IF(compare_names(&names[i - 1], &names[i]) == 0, error, SUPINE_ERROR_FORMAT,
+                     "two parts are named '%.*s': give each a name of its own",
+                     (int)strcspn(names[i], "\n"), names[i]);
   }
   return SUPINE_OK;
 }

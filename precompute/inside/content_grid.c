@@ -50,11 +50,9 @@ static supine_status make_grid(const supine_inside_shells *shells, const supine_
     }
     first[k] = every * floor(low[k] / every);
     const double count = ceil((high[k] - first[k]) / every) + 1.0;
-    if (like != NULL && !(high[k] >= low[k])) {
-      return supine_error_set(
-          error, SUPINE_ERROR_MESH,
-          "the image does not show the lungs: check its axes and the axes of the meshes");
-    }
+    SUPINE_REFUSE_IF(
+        like != NULL && !(high[k] >= low[k]), error, SUPINE_ERROR_MESH,
+        "the image does not show the lungs: check its axes and the axes of the meshes");
     nodes *= count;
     grid->size[k] = (size_t)fmin(count, nodes_max);
     for (int a = 0; a < 3; ++a) {
@@ -105,11 +103,9 @@ static supine_status take_nodes(const supine_image *grid, const unsigned char *k
     count += keep[i] != 0;
     inside += keep[i] == 2;
   }
-  if (inside == 0) {
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "no node of the grid is inside a lung: give a smaller spacing, or an "
-                            "image that shows the lungs");
-  }
+  SUPINE_REFUSE_IF(inside == 0, error, SUPINE_ERROR_MESH,
+                   "no node of the grid is inside a lung: give a smaller spacing, or an "
+                   "image that shows the lungs");
   content->points = malloc(3 * count * sizeof *content->points);
   content->part = malloc(count * sizeof *content->part);
   if (content->points == NULL || content->part == NULL) {
@@ -130,10 +126,8 @@ supine_status supine_inside_content_grid(const supine_inside_shells *shells,
                                          const supine_image *like, double spacing, double margin,
                                          supine_inside_content *content, supine_error *error) {
   supine_image grid = {0};
-  if (!(spacing > 0.0) || !isfinite(spacing)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "the grid's spacing is %g mm: give one above 0", spacing);
-  }
+  SUPINE_REFUSE_IF(!(spacing > 0.0) || !isfinite(spacing), error, SUPINE_ERROR_ARGUMENT,
+                   "the grid's spacing is %g mm: give one above 0", spacing);
   SUPINE_TRY(make_grid(shells, like, spacing, margin, &grid, error));
   double diagonal = 0.0;
   for (int k = 0; k < 3; ++k) {

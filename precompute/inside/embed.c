@@ -398,9 +398,7 @@ supine_status supine_inside_embed(const supine_inside_shells *shells,
   const size_t n = content->count;
   const size_t columns = 3 * supine_basis_get_info(shells->basis)->mode_count;
   *report = (supine_inside_report){0};
-  if (n == 0) {
-    return supine_error_set(error, SUPINE_ERROR_MESH, "nothing to embed: give at least one point");
-  }
+  SUPINE_REFUSE_IF(n == 0, error, SUPINE_ERROR_MESH, "nothing to embed: give at least one point");
   SUPINE_ARENA arena = {0};
   embedding e = {
       .shells = shells,

@@ -44,18 +44,13 @@ static supine_status create_shell(const supine_basis_info *info, const float *sc
       here += corner[k] >= begin && corner[k] < end;
       shell->triangles[3 * shell->triangle_count + k] = corner[k] - (uint32_t)begin;
     }
-    if (here != 0 && here != 3) {
-      return supine_error_set(
-          error, SUPINE_ERROR_MESH,
-          "a triangle of the basis joins two lungs: make a new basis from separate lungs");
-    }
+    SUPINE_REFUSE_IF(
+        here != 0 && here != 3, error, SUPINE_ERROR_MESH,
+        "a triangle of the basis joins two lungs: make a new basis from separate lungs");
     shell->triangle_count += here == 3;
   }
-  if (shell->triangle_count == 0) {
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "lung %s has no triangles: give a basis of a surface",
-                            info->lung_names[lung]);
-  }
+  SUPINE_REFUSE_IF(shell->triangle_count == 0, error, SUPINE_ERROR_MESH,
+                   "lung %s has no triangles: give a basis of a surface", info->lung_names[lung]);
   shell->edge = mean_edge(shell);
   return supine_inside_surface_create(shell->vertices, shell->triangle_count, shell->triangles,
                                       true, &shell->surface, error);
@@ -65,23 +60,18 @@ static supine_status create_shells(supine_inside_shells *shells, supine_error *e
   const supine_basis *basis = shells->basis;
   const supine_basis_info *info = supine_basis_get_info(basis);
   const supine_state scan = supine_basis_scan(basis);
-  if (supine_basis_metadata(basis, "content") != NULL) {
-    return supine_error_set(
-        error, SUPINE_ERROR_FORMAT,
-        "the basis already holds %s inside lungs: give the basis of the lungs' surface",
-        supine_basis_metadata(basis, "content"));
-  }
+  SUPINE_REFUSE_IF(supine_basis_metadata(basis, "content") != NULL, error, SUPINE_ERROR_FORMAT,
+                   "the basis already holds %s inside lungs: give the basis of the lungs' surface",
+                   supine_basis_metadata(basis, "content"));
   SUPINE_ARENA arena = {0};
   float *scanned = supine_arena_take(&arena, 3 * info->vertex_count, sizeof *scanned);
   SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", info->vertex_count));
   SUPINE_TRY(supine_basis_pose(basis, &scan, &shells->scan, error));
   (void)supine_deform(basis, &shells->scan, scanned);
   for (size_t i = 0; i < 3 * info->vertex_count; ++i) {
-    if (!isfinite(scanned[i])) {
-      return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                              "the basis cannot reach the scan's volume: make a new basis, and "
-                              "state with --scanned how full the lungs were in the scan");
-    }
+    SUPINE_REFUSE_IF(!isfinite(scanned[i]), error, SUPINE_ERROR_NUMERICAL,
+                     "the basis cannot reach the scan's volume: make a new basis, and "
+                     "state with --scanned how full the lungs were in the scan");
   }
   for (size_t lung = 0; lung < shells->count; ++lung) {
     SUPINE_TRY(create_shell(info, scanned, lung, &shells->shell[lung], error));

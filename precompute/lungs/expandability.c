@@ -62,11 +62,8 @@ supine_status supine_tissue_expandability_load(const char *path, size_t count, d
     SUPINE_TRY(take_row(&csv, row, count, a, error));
   }
   for (size_t i = 0; i < count; ++i) {
-    if (a[i] == 0.0) {
-      return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s: vertex %zu of %zu has no value: add its expandability", path, i,
-                              count);
-    }
+    SUPINE_REFUSE_IF(a[i] == 0.0, error, SUPINE_ERROR_FORMAT,
+                     "%s: vertex %zu of %zu has no value: add its expandability", path, i, count);
   }
   return SUPINE_OK;
 }

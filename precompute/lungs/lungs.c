@@ -29,15 +29,11 @@ static supine_status join(const supine_mesh *meshes, size_t count, supine_mesh *
     vertices += meshes[m].vertex_count;
     triangles += meshes[m].triangle_count;
   }
-  if (count == 0 || triangles == 0 || vertices == 0) {
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "the surface has no triangles: give a closed surface");
-  }
-  if (vertices > UINT32_MAX) {
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "%zu vertices are more than 32-bit indices reach: give a coarser mesh",
-                            vertices);
-  }
+  SUPINE_REFUSE_IF(count == 0 || triangles == 0 || vertices == 0, error, SUPINE_ERROR_MESH,
+                   "the surface has no triangles: give a closed surface");
+  SUPINE_REFUSE_IF(vertices > UINT32_MAX, error, SUPINE_ERROR_MESH,
+                   "%zu vertices are more than 32-bit indices reach: give a coarser mesh",
+                   vertices);
   if (supine_mesh_allocate(vertices, triangles, joined) != SUPINE_OK) {
     return supine_error_memory(error, "%zu vertices", vertices);
   }
@@ -151,11 +147,9 @@ static supine_status check_surfaces(const supine_mesh *meshes, size_t count, sup
       for (size_t k = 0; k < 6; ++k) {
         apart = fmax(apart, fabs(box[0][k / 3][k % 3] - box[1][k / 3][k % 3]));
       }
-      if (apart <= same_box_share * fmax(side[0], side[1])) {
-        return supine_error_set(
-            error, SUPINE_ERROR_MESH,
-            "surfaces %zu and %zu have the same bounding box: give each lung once", i + 1, m + 1);
-      }
+      SUPINE_REFUSE_IF(apart <= same_box_share * fmax(side[0], side[1]), error, SUPINE_ERROR_MESH,
+                       "surfaces %zu and %zu have the same bounding box: give each lung once",
+                       i + 1, m + 1);
       const bool first = side[0] < side[1];
       if (side[!first] < least_side_share * side[first]) {
         return supine_error_set(
@@ -172,13 +166,11 @@ static supine_status check_surfaces(const supine_mesh *meshes, size_t count, sup
 /* Refuse a given midline that runs through a lung, or leaves both lungs on one side.
  * @param two_sided  whether the surfaces are two lungs */
 static supine_status check_midline(const supine_lungs *lungs, bool two_sided, supine_error *error) {
-  if (two_sided && lungs->lung_count < 2) {
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "the midline x = %g mm leaves both lungs on its %s side: give one "
-                            "near %g",
-                            lungs->midline, supine_lungs_name(lungs, 0),
-                            0.5 * (lungs->minimum[0] + lungs->maximum[0]));
-  }
+  SUPINE_REFUSE_IF(two_sided && lungs->lung_count < 2, error, SUPINE_ERROR_MESH,
+                   "the midline x = %g mm leaves both lungs on its %s side: give one "
+                   "near %g",
+                   lungs->midline, supine_lungs_name(lungs, 0),
+                   0.5 * (lungs->minimum[0] + lungs->maximum[0]));
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     const bool left = lungs->side[lung] > 0;
     const double ends[2] = {lungs->midline - lungs->low[lung][0],
@@ -230,11 +222,8 @@ static supine_status measure(supine_lungs *lungs, const double *midline, supine_
   const double low = lungs->minimum[0];
   const double high = lungs->maximum[0];
   for (int k = 0; k < 3; ++k) {
-    if (!(lungs->maximum[k] > lungs->minimum[k])) {
-      return supine_error_set(error, SUPINE_ERROR_MESH,
-                              "the surface has no extent along %c: give a closed surface",
-                              "xyz"[k]);
-    }
+    SUPINE_REFUSE_IF(!(lungs->maximum[k] > lungs->minimum[k]), error, SUPINE_ERROR_MESH,
+                     "the surface has no extent along %c: give a closed surface", "xyz"[k]);
   }
   const supine_status status = supine_mesh_topology_create(&lungs->mesh, &lungs->topology);
   if (status != SUPINE_OK) {
@@ -260,10 +249,8 @@ static supine_status measure(supine_lungs *lungs, const double *midline, supine_
 supine_status supine_lungs_create(const supine_mesh *meshes, size_t count, const double *midline,
                                   supine_lungs *lungs, supine_error *error) {
   SUPINE_FREED_BY(supine_lungs_free) supine_lungs made = {0};
-  if (midline != NULL && !isfinite(*midline)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "the midline must be a finite x in mm, not %g", *midline);
-  }
+  SUPINE_REFUSE_IF(midline != NULL && !isfinite(*midline), error, SUPINE_ERROR_ARGUMENT,
+                   "the midline must be a finite x in mm, not %g", *midline);
   SUPINE_TRY(check_surfaces(meshes, count, error));
   SUPINE_TRY(join(meshes, count, &made.mesh, error));
   SUPINE_TRY(measure(&made, midline, error));

@@ -87,10 +87,8 @@ static supine_status create(const supine_lungs *lungs, const supine_model *model
   supine_expansion *expansion = &projection->expansion;
   supine_sh_grid *grid = NULL;
   *projection = (supine_projection){.expansion = {.row_count = n, .band = band}};
-  if (band > SUPINE_SH_BAND_MAX) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "band %zu: give at most %d", band,
-                            SUPINE_SH_BAND_MAX);
-  }
+  SUPINE_REFUSE_IF(band > SUPINE_SH_BAND_MAX, error, SUPINE_ERROR_ARGUMENT,
+                   "band %zu: give at most %d", band, SUPINE_SH_BAND_MAX);
   projection->span = malloc(sizeof *projection->span);
   if (projection->span == NULL) {
     return supine_error_memory(error, "the forces");

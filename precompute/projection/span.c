@@ -94,12 +94,10 @@ supine_status supine_projection_span_create(const supine_lungs *lungs, const sup
   const supine_gravities gravities = {DIRECTIONS, directions, range, range + DIRECTIONS};
   supine_physics_force(lungs, law, &gravities, count, vertices, force);
   memcpy(residual, force, values * sizeof *residual);
-  if (!choose(residual, count, law->soften == 0.0 ? rounding : tolerance, &span->rank, rows,
-              columns)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--soften %g is too large for a basis file: give at most 12",
-                            law->soften);
-  }
+  SUPINE_REFUSE_IF(!choose(residual, count, law->soften == 0.0 ? rounding : tolerance, &span->rank,
+                           rows, columns),
+                   error, SUPINE_ERROR_ARGUMENT,
+                   "--soften %g is too large for a basis file: give at most 12", law->soften);
   for (size_t r = 0; r < span->rank; ++r) {
     memcpy(span->directions + 3 * r, directions + 3 * columns[r], 3 * sizeof *directions);
     span->vertices[r] = vertices[rows[r]];
