@@ -261,21 +261,20 @@ static supine_status find_scan(supine_model_choice *choice, supine_law law, supi
   if (!choice->has_scan && law != SUPINE_LAW_PAPER) {
     (void)supine_reference_scan_parse("full", scan, NULL);
   }
-  SUPINE_REFUSE_IF(law == SUPINE_LAW_PAPER && scan->known, error, SUPINE_ERROR_ARGUMENT,
-                   "--law paper takes the scan as the reference: leave --scanned out, or "
-                   "use --law deep");
+  SUPINE_REFUSE_IF(
+      law == SUPINE_LAW_PAPER && scan->known, error, SUPINE_ERROR_ARGUMENT,
+      "--law paper takes the scan as the reference: leave --scanned out, or use --law deep");
   SUPINE_REFUSE_IF(scan->known && scan->state.volume.kind == SUPINE_VOLUME_DEFAULT, error,
                    SUPINE_ERROR_ARGUMENT,
-                   "--scanned: a posture alone is only for --fields: add the volume, as "
-                   "in supine:rest, or give full or none");
+                   "--scanned: a posture alone is only for --fields: add the volume, as in "
+                   "supine:rest, or give full or none");
   const supine_volume *full = &choice->full.volume;
   scan->full = full->ml;
   SUPINE_REFUSE_IF(
       full->kind != SUPINE_VOLUME_DEFAULT &&
           (full->kind != SUPINE_VOLUME_ABSOLUTE || scan->state.volume.kind != SUPINE_VOLUME_REST),
       error, SUPINE_ERROR_ARGUMENT,
-      "--full is for a scan at rest: give a volume such as 4200mL, and "
-      "--scanned supine:rest too");
+      "--full is for a scan at rest: give a volume such as 4200mL, and --scanned supine:rest too");
   return SUPINE_OK;
 }
 

@@ -135,8 +135,8 @@ static supine_status load_maps(reading *r, supine_source *source, supine_error *
   SUPINE_REFUSE_IF(r->options->load.millimetres_per_unit != 0.0 &&
                        r->options->load.millimetres_per_unit != 1.0,
                    error, SUPINE_ERROR_ARGUMENT,
-                   "a label map's header states its unit: leave --units out, or give "
-                   "--units mm to accept any size of the lungs");
+                   "a label map's header states its unit: leave --units out, or give --units mm to "
+                   "accept any size of the lungs");
   SUPINE_TRY(supine_labels_surfaces((const char *const *)(folder ? lobes.list : r->paths),
                                     folder ? lobes.left + lobes.right : r->count, &wanted,
                                     r->meshes, &source->report, error));
@@ -197,8 +197,8 @@ static supine_status check_kinds(const supine_source_options *options, char **pa
   SUPINE_REFUSE_IF(images == 0 && (labels->labels != NULL || labels->edge > 0.0 ||
                                    labels->close > 0.0 || options->surfaces_out != NULL),
                    error, SUPINE_ERROR_ARGUMENT,
-                   "--labels, --edge, --close and --surfaces-out are for label maps "
-                   "(.nrrd, .nii, .nii.gz, .mha): leave them out");
+                   "--labels, --edge, --close and --surfaces-out are for label maps (.nrrd, .nii, "
+                   ".nii.gz, .mha): leave them out");
   return SUPINE_OK;
 }
 

@@ -24,11 +24,9 @@ supine_status supine_sh_compression_create(const supine_expansion *expansion, si
   made->coefficients = malloc(expansion->row_count * mode_count * sizeof(float));
   made->modes = calloc(mode_count * supine_sh_count(expansion->band), sizeof(double));
   made->mix = calloc(expansion->rank * mode_count, sizeof(double));
-  if (made->coefficients == NULL || made->modes == NULL || made->mix == NULL) {
-    supine_sh_compression_free(made);
-    return SUPINE_ERROR_MEMORY;
-  }
-  return SUPINE_OK;
+  return made->coefficients != NULL && made->modes != NULL && made->mix != NULL
+             ? SUPINE_OK
+             : SUPINE_ERROR_MEMORY;
 }
 
 typedef struct mix_work {
@@ -67,8 +65,8 @@ supine_status supine_sh_compress_harmonics(const supine_expansion *expansion,
                                            supine_compression *compression, supine_error *error) {
   const size_t terms = supine_sh_count(expansion->band);
   SUPINE_REFUSE_IF(terms > SUPINE_MODES_MADE_MAX, error, SUPINE_ERROR_ARGUMENT,
-                   "band %zu has %zu harmonics, but a basis file holds at most %d: "
-                   "give --modes 16, or --band 7 or less",
+                   "band %zu has %zu harmonics, but a basis file holds at most %d: give --modes "
+                   "16, or --band 7 or less",
                    expansion->band, terms, SUPINE_MODES_MADE_MAX);
   if (supine_sh_compression_create(expansion, terms, compression) != SUPINE_OK) {
     return supine_error_memory(error, "%zu harmonics", terms);

@@ -48,7 +48,7 @@ size_t supine_sh_modes_needed(size_t count, const double *singular, double total
 void supine_sh_compression_truncate(supine_compression *compression, size_t rank, size_t count);
 
 /** Allocate a compression with the numbers of rows and of harmonics of `expansion`. Its arrays
- * `modes` and `mix` are zero; its `coefficients` are not set. */
+ * `modes` and `mix` are zero; its `coefficients` are not set. Free it also after an error. */
 supine_status supine_sh_compression_create(const supine_expansion *expansion, size_t mode_count,
                                            supine_compression *made);
 

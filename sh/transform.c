@@ -47,8 +47,8 @@ supine_status supine_sh_transform(size_t band, const supine_sh_grid *grid, size_
   const size_t functions = gsl_sf_legendre_array_n(band);
   SUPINE_REFUSE_IF(band > SUPINE_SH_BAND_MAX || grid->latitudes <= band || width <= 2 * band, error,
                    SUPINE_ERROR_ARGUMENT,
-                   "a grid of %zu x %zu directions cannot represent band %zu: give more "
-                   "than %zu latitudes and %zu longitudes, and a band of at most %d",
+                   "a grid of %zu x %zu directions cannot represent band %zu: give more than %zu "
+                   "latitudes and %zu longitudes, and a band of at most %d",
                    grid->latitudes, width, band, band, 2 * band, SUPINE_SH_BAND_MAX);
   SUPINE_ARENA arena = {0};
   double *legendre = supine_arena_take(&arena, functions, sizeof *legendre);

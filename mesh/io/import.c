@@ -273,12 +273,9 @@ supine_status supine_mesh_read_stl(mesh_file *file, supine_mesh *mesh, size_t *d
   mesh_text last = {0};
   if (memchr(file->bytes, '\0', file->size) == NULL) {
     SUPINE_TRY(check_lines(file, "vertex", &last, error));
-    if (!supine_mesh_text_is(last, "endsolid")) {
-      return supine_error_set(
-          error, SUPINE_ERROR_FORMAT,
-          "%s: the STL text does not end with endsolid: it is truncated; save it again",
-          file->path);
-    }
+    SUPINE_REFUSE_IF(!supine_mesh_text_is(last, "endsolid"), error, SUPINE_ERROR_FORMAT,
+                     "%s: the STL text does not end with endsolid: it is truncated; save it again",
+                     file->path);
   }
   return import_file(file, "stl", mesh, dropped, error);
 }

@@ -227,16 +227,15 @@ static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung,
   }
   SUPINE_REFUSE_IF(!(lung->mask >= least_volume && longest <= longest_lung), error,
                    SUPINE_ERROR_MESH,
-                   "%s: the %s lung holds %.4g mL in a box %.4g mm long, which is "
-                   "impossible for a lung: check --labels and the voxel size in the "
-                   "header",
+                   "%s: the %s lung holds %.4g mL in a box %.4g mm long, which is impossible for a "
+                   "lung: check --labels and the voxel size in the header",
                    w->path, name, lung->mask, longest);
   SUPINE_TRY(supine_labels_mask_surface(&mask, w->edge, true, mesh));
   supine_labels_mask_free(&mask);
-  SUPINE_REFUSE_IF(mesh->triangle_count == 0, error, SUPINE_ERROR_MESH,
-                   "%s: the %s lung is thinner than half of --edge %g everywhere: "
-                   "give a smaller edge",
-                   w->path, name, w->edge);
+  SUPINE_REFUSE_IF(
+      mesh->triangle_count == 0, error, SUPINE_ERROR_MESH,
+      "%s: the %s lung is thinner than half of --edge %g everywhere: give a smaller edge", w->path,
+      name, w->edge);
   SUPINE_FREED_BY(supine_mesh_topology_free) supine_topology topology = {0};
   SUPINE_TRY(supine_mesh_topology_create(mesh, &topology));
   lung->tunnels = topology.genus;
@@ -301,8 +300,7 @@ supine_status supine_labels_surfaces(const char *const *paths, size_t count,
                        !(options->close >= 0.0 && options->close <= most_closing_radius) ||
                        count > FILES_MAX,
                    error, SUPINE_ERROR_ARGUMENT,
-                   "give --edge from %g to %g mm, --close from 0 to %g mm, and at most %d "
-                   "images",
+                   "give --edge from %g to %g mm, --close from 0 to %g mm, and at most %d images",
                    least_edge, most_edge, most_closing_radius, FILES_MAX);
   const supine_status status = make_surfaces(&w, paths, count, surfaces, error);
   supine_image_free(&w.image);

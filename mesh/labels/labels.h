@@ -68,8 +68,7 @@ typedef struct supine_labels_report {
  * manifold. It is smoothed without shrinking [Taubin1995]; no vertex moves by more than a cube.
  *
  * @param surfaces  [2] zero-initialised; surface i is that of report->lung[i] and faces outwards
- * Memory: the image and 1 byte per voxel. For each voxel of the lungs' bounding box, splitting lungs
- * takes 10 bytes more and closing gaps takes 4 bytes more. */
+ * Memory: the image, 1 byte per voxel, and up to 18 bytes for each voxel of the lungs' box. */
 supine_status supine_labels_surfaces(const char *const *paths, size_t count,
                                      const supine_labels_options *options, supine_mesh *surfaces,
                                      supine_labels_report *report, supine_error *error);

@@ -69,13 +69,12 @@ supine_status supine_labels_count(const char *path, const supine_image *image, l
   memset(tally, 0, LABELS_MAX * sizeof *tally);
   for (size_t row = 0; row < image->size[1] * image->size[2]; ++row) {
     double bad = 0.0;
-    SUPINE_REFUSE_IF(
-        !read_row(image, row, labels, &bad), error, SUPINE_ERROR_FORMAT,
-        bad < 0.0 ? "%s: a voxel holds %g, but labels are 0 to 65535: if this is the CT itself, "
-                    "segment it first"
-                  : "%s: a voxel holds %g, but labels are whole numbers, 0 to 65535: threshold "
-                    "probabilities into a mask first",
-        path, bad);
+    SUPINE_REFUSE_IF(!read_row(image, row, labels, &bad), error, SUPINE_ERROR_FORMAT,
+                     bad < 0.0 ? "%s: a voxel holds %g, but labels are 0 to 65535: if this is the "
+                                 "CT itself, segment it first"
+                               : "%s: a voxel holds %g, but labels are whole numbers, 0 to 65535: "
+                                 "threshold probabilities into a mask first",
+                     path, bad);
     count_row(image, row, labels, tally);
   }
   return tally[0].count < image->size[0] * image->size[1] * image->size[2]

@@ -62,9 +62,8 @@ static supine_status fit_create(size_t band, size_t count, const double *directi
   double *u = supine_arena_take(&arena, count * terms, sizeof *u);
   double *vt = supine_arena_take(&arena, terms * terms, sizeof *vt);
   double *s = supine_arena_zeros(&arena, terms, sizeof *s);
-  if (kept->failed || arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(kept));
+  SUPINE_TRY(supine_arena_status(&arena));
   SUPINE_TRY(supine_sh_evaluate_many(band, count, directions, f->harmonics));
   memcpy(a, f->harmonics, count * terms * sizeof *a);
   SUPINE_TRY(
@@ -186,13 +185,10 @@ static supine_status choose_band(fitting *w, int wanted, supine_fit_report *repo
       report->band = band;
     }
   }
-  if (w->chosen.harmonics == NULL) {
-    return supine_error_set(
-        error, SUPINE_ERROR_ARGUMENT,
-        "%zu directions do not determine band %d (%d harmonics); the highest "
-        "band that they determine is %d: give more directions, or leave --band out",
-        m, wanted, (wanted + 1) * (wanted + 1), (int)determined_count - 1);
-  }
+  SUPINE_REFUSE_IF(w->chosen.harmonics == NULL, error, SUPINE_ERROR_ARGUMENT,
+                   "%zu directions do not determine band %d (%d harmonics); the highest band that "
+                   "they determine is %d: give more directions, or leave --band out",
+                   m, wanted, (wanted + 1) * (wanted + 1), (int)determined_count - 1);
   report->band_highest = determined_count - 1;
   return SUPINE_OK;
 }

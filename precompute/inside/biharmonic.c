@@ -162,9 +162,6 @@ supine_status supine_inside_biharmonic_fit(size_t count, const double *points, s
   frame(count, points, fit);
   supine_status status = arena.failed ? SUPINE_ERROR_MEMORY : choose(count, points, most, fit);
   status = status == SUPINE_OK ? solve(fit, values) : status;
-  if (status != SUPINE_OK) {
-    supine_inside_biharmonic_free(fit);
-  }
   return status == SUPINE_ERROR_MEMORY
              ? supine_error_memory(error, "interpolation from %zu points", most)
          : status != SUPINE_OK

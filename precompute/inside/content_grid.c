@@ -59,11 +59,8 @@ static supine_status make_grid(const supine_inside_shells *shells, const supine_
       grid->step[k][a] = every * from.step[k][a];
     }
   }
-  if (!(nodes < nodes_max)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "a grid of %g mm has %.3g nodes; give a larger spacing", spacing,
-                            nodes);
-  }
+  SUPINE_REFUSE_IF(!(nodes < nodes_max), error, SUPINE_ERROR_ARGUMENT,
+                   "a grid of %g mm has %.3g nodes; give a larger spacing", spacing, nodes);
   for (int a = 0; a < 3; ++a) {
     grid->origin[a] = from.origin[a] + first[0] * from.step[0][a] + first[1] * from.step[1][a] +
                       first[2] * from.step[2][a];
@@ -104,12 +101,11 @@ static supine_status take_nodes(const supine_image *grid, const unsigned char *k
     inside += keep[i] == 2;
   }
   SUPINE_REFUSE_IF(inside == 0, error, SUPINE_ERROR_MESH,
-                   "no node of the grid is inside a lung: give a smaller spacing, or an "
-                   "image that shows the lungs");
+                   "no node of the grid is inside a lung: give a smaller spacing, or an image that "
+                   "shows the lungs");
   content->points = malloc(3 * count * sizeof *content->points);
   content->part = malloc(count * sizeof *content->part);
   if (content->points == NULL || content->part == NULL) {
-    supine_inside_content_free(content);
     return supine_error_memory(error, "%zu nodes", count);
   }
   content->grid = *grid;

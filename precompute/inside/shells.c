@@ -56,9 +56,10 @@ static supine_status create_shell(const supine_basis_info *info, const float *sc
                                       true, &shell->surface, error);
 }
 
-static supine_status create_shells(supine_inside_shells *shells, supine_error *error) {
-  const supine_basis *basis = shells->basis;
+supine_status supine_inside_shells_create(const supine_basis *basis, supine_inside_shells *shells,
+                                          supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
+  *shells = (supine_inside_shells){.basis = basis, .count = info->lung_count};
   const supine_state scan = supine_basis_scan(basis);
   SUPINE_REFUSE_IF(supine_basis_metadata(basis, "content") != NULL, error, SUPINE_ERROR_FORMAT,
                    "the basis already holds %s inside lungs: give the basis of the lungs' surface",
@@ -70,24 +71,13 @@ static supine_status create_shells(supine_inside_shells *shells, supine_error *e
   (void)supine_deform(basis, &shells->scan, scanned);
   for (size_t i = 0; i < 3 * info->vertex_count; ++i) {
     SUPINE_REFUSE_IF(!isfinite(scanned[i]), error, SUPINE_ERROR_NUMERICAL,
-                     "the basis cannot reach the scan's volume: make a new basis, and "
-                     "state with --scanned how full the lungs were in the scan");
+                     "the basis cannot reach the scan's volume: make a new basis, and state with "
+                     "--scanned how full the lungs were in the scan");
   }
   for (size_t lung = 0; lung < shells->count; ++lung) {
     SUPINE_TRY(create_shell(info, scanned, lung, &shells->shell[lung], error));
   }
   return SUPINE_OK;
-}
-
-supine_status supine_inside_shells_create(const supine_basis *basis, supine_inside_shells *shells,
-                                          supine_error *error) {
-  *shells =
-      (supine_inside_shells){.basis = basis, .count = supine_basis_get_info(basis)->lung_count};
-  const supine_status status = create_shells(shells, error);
-  if (status != SUPINE_OK) {
-    supine_inside_shells_free(shells);
-  }
-  return status;
 }
 
 void supine_inside_shells_free(supine_inside_shells *shells) {

@@ -36,13 +36,10 @@ static supine_status take_row(const supine_csv *csv, size_t row, size_t count, d
                       : !positive        ? "it must be positive"
                       : a[vertex] != 0.0 ? "the vertex was given before"
                                          : NULL;
-  if (wrong != NULL) {
-    return supine_error_set(
-        error, SUPINE_ERROR_FORMAT,
-        "%s:%zu: expandability %g of vertex %.15g: %s; give one positive value for "
-        "each of %zu vertices, counted from 0",
-        csv->path, csv->line, value, number, wrong, count);
-  }
+  SUPINE_REFUSE_IF(wrong != NULL, error, SUPINE_ERROR_FORMAT,
+                   "%s:%zu: expandability %g of vertex %.15g: %s; give one positive value for each "
+                   "of %zu vertices, counted from 0",
+                   csv->path, csv->line, value, number, wrong, count);
   a[vertex] = value;
   return SUPINE_OK;
 }

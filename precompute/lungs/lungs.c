@@ -151,13 +151,10 @@ static supine_status check_surfaces(const supine_mesh *meshes, size_t count, sup
                        "surfaces %zu and %zu have the same bounding box: give each lung once",
                        i + 1, m + 1);
       const bool first = side[0] < side[1];
-      if (side[!first] < least_side_share * side[first]) {
-        return supine_error_set(
-            error, SUPINE_ERROR_MESH,
-            "surface %zu is %.3g mm long beside another of %.3g mm: it is incomplete, "
-            "in other units, or no lung; correct it or leave it out",
-            first ? i + 1 : m + 1, side[!first], side[first]);
-      }
+      SUPINE_REFUSE_IF(side[!first] < least_side_share * side[first], error, SUPINE_ERROR_MESH,
+                       "surface %zu is %.3g mm long beside another of %.3g mm: it is incomplete, "
+                       "in other units, or no lung; correct it or leave it out",
+                       first ? i + 1 : m + 1, side[!first], side[first]);
     }
   }
   return SUPINE_OK;
@@ -167,20 +164,17 @@ static supine_status check_surfaces(const supine_mesh *meshes, size_t count, sup
  * @param two_sided  whether the surfaces are two lungs */
 static supine_status check_midline(const supine_lungs *lungs, bool two_sided, supine_error *error) {
   SUPINE_REFUSE_IF(two_sided && lungs->lung_count < 2, error, SUPINE_ERROR_MESH,
-                   "the midline x = %g mm leaves both lungs on its %s side: give one "
-                   "near %g",
+                   "the midline x = %g mm leaves both lungs on its %s side: give one near %g",
                    lungs->midline, supine_lungs_name(lungs, 0),
                    0.5 * (lungs->minimum[0] + lungs->maximum[0]));
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     const bool left = lungs->side[lung] > 0;
     const double ends[2] = {lungs->midline - lungs->low[lung][0],
                             lungs->high[lung][0] - lungs->midline};
-    if (ends[!left] > most_beyond_share * ends[left]) {
-      return supine_error_set(error, SUPINE_ERROR_MESH,
-                              "the midline x = %g mm runs through the %s lung, which reaches "
-                              "%.3g mm beyond it; give one between the lungs, or none",
-                              lungs->midline, supine_lungs_name(lungs, lung), ends[!left]);
-    }
+    SUPINE_REFUSE_IF(ends[!left] > most_beyond_share * ends[left], error, SUPINE_ERROR_MESH,
+                     "the midline x = %g mm runs through the %s lung, which reaches %.3g mm beyond "
+                     "it; give one between the lungs, or none",
+                     lungs->midline, supine_lungs_name(lungs, lung), ends[!left]);
   }
   return SUPINE_OK;
 }

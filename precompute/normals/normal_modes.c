@@ -163,9 +163,8 @@ static supine_status find_lung(normals_work *work, size_t lung, fit *made) {
   supine_normals_rows rows;
   double *mix = supine_arena_take(&arena, MOST * all, sizeof *mix);
   made->weights = supine_arena_take(&work->memory, MOST * all, sizeof *made->weights);
-  if (arena.failed || work->memory.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
+  SUPINE_TRY(supine_arena_status(&work->memory));
   SUPINE_TRY(supine_normals_rows_create(s, &work->fans, lung, 0, stride, &rows_memory, &rows));
   SUPINE_TRY(find_fit(work, lung, &rows, mix, made));
   supine_arena_free(&rows_memory);
@@ -415,9 +414,8 @@ static supine_status make_modes(const normals_work *work, size_t count, supine_a
   made->weights =
       supine_arena_take(arena, s->lungs->lung_count * count * all, sizeof *made->weights);
   made->count = count;
-  if (own.failed || arena->failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&own));
+  SUPINE_TRY(supine_arena_status(arena));
   size_t snapshots = 0;
   for (size_t lung = 0; lung < s->lungs->lung_count; ++lung) {
     snapshots =

@@ -62,10 +62,9 @@ enum { SUPINE_NORMALS_FEW = 6, SUPINE_NORMALS_MOST = 24 }; /**< least and most m
 enum { SUPINE_NORMALS_FIELD_MAX = 24 }; /**< displacement fields with more modes get no normals */
 
 /** Find modes of the normals: the smallest number with a mean angular error of at most 0.08 degrees
- * and a 99.9th percentile of at most 0.8 degrees. The error is measured at up to 4096 held-out
- * vertices of each lung. Numbers from SUPINE_NORMALS_FEW to SUPINE_NORMALS_MOST are tried in steps
- * of 3, because at run time three modes share a 32-bit word. If no number suffices, the last one is
- * kept. For a displacement field with more than SUPINE_NORMALS_FIELD_MAX modes, made->count is 0.
+ * and a 99.9th percentile of at most 0.8 degrees, or the largest number tried. Numbers are tried in
+ * steps of 3, because at run time three modes share a 32-bit word. For a displacement field with
+ * more than SUPINE_NORMALS_FIELD_MAX modes, made->count is 0.
  * Cost: the surface is deformed about 50 times. Uses all cores.
  * @param arena  takes the arrays of `made` */
 supine_status supine_normals_modes_create(const supine_normals_surface *surface,

@@ -190,13 +190,11 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
     supine_sh_compression_weights(compression, g, weights + d * modes);
   }
   accuracy->volume = find_fraction(&work, forms, volumes, gains);
-  if (accuracy->volume == 0.0) {
-    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                            "the error cannot be measured: the surface folds over at less than a "
-                            "thousandth of the volume change of %g mL; check the surface and the "
-                            "constants of the displacement law",
-                            volumes[0]);
-  }
+  SUPINE_REFUSE_IF(
+      accuracy->volume == 0.0, error, SUPINE_ERROR_NUMERICAL,
+      "the error cannot be measured: the surface folds over at less than a thousandth of the "
+      "volume change of %g mL; check the surface and the constants of the displacement law",
+      volumes[0]);
   supine_parallel_for(PARTS, 1, threads, compare_range, &work);
   conclude(&work, accuracy);
   return SUPINE_OK;

@@ -81,8 +81,9 @@ static supine_status solve(const supine_lungs *lungs, const supine_model *model,
   return status;
 }
 
-static supine_status create(const supine_lungs *lungs, const supine_model *model, size_t band,
-                            supine_projection *projection, supine_error *error) {
+supine_status supine_projection_create(const supine_lungs *lungs, const supine_model *model,
+                                       size_t band, supine_projection *projection,
+                                       supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   supine_expansion *expansion = &projection->expansion;
   supine_sh_grid *grid = NULL;
@@ -111,16 +112,6 @@ static supine_status create(const supine_lungs *lungs, const supine_model *model
                             supine_status_string(status));
   }
   return solve(lungs, model, projection, error);
-}
-
-supine_status supine_projection_create(const supine_lungs *lungs, const supine_model *model,
-                                       size_t band, supine_projection *projection,
-                                       supine_error *error) {
-  const supine_status status = create(lungs, model, band, projection, error);
-  if (status != SUPINE_OK) {
-    supine_projection_free(projection);
-  }
-  return status;
 }
 
 void supine_projection_displacement(const supine_compression *compression, const double *directions,

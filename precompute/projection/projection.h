@@ -25,7 +25,7 @@ typedef struct supine_projection {
 void supine_projection_free(supine_projection *projection);
 
 /** Expand the force on each vertex in equilibrium in spherical harmonics of the direction of
- * gravity. Release the projection with supine_projection_free. */
+ * gravity. Release the projection with supine_projection_free, also after an error. */
 supine_status supine_projection_create(const supine_lungs *lungs, const supine_model *model,
                                        size_t band, supine_projection *projection,
                                        supine_error *error);
