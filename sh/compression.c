@@ -8,7 +8,7 @@
 
 #include "base/arena.h"
 #include "base/parallel.h"
-#include "sh/compression.h"
+#include "sh/expansion.h"
 
 void supine_sh_compression_free(supine_compression *compression) {
   free(compression->coefficients);

@@ -9,7 +9,7 @@
 
 #include "base/arena.h"
 #include "base/lapack.h"
-#include "sh/compression.h"
+#include "sh/expansion.h"
 
 /* Singular values below this share of the largest are rounding errors, because the Gram matrix
  * gives only their squares. */

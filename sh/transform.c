@@ -9,7 +9,7 @@
 #include <supine/sh.h>
 
 #include "base/arena.h"
-#include "sh/transform.h"
+#include "sh/expansion.h"
 
 /* Plan the FFT of one latitude. FFTW_ESTIMATE makes the same plan every time, in microseconds. */
 static fftw_plan plan_fft(int longitudes, int fields, double *ring, fftw_complex *spectrum) {

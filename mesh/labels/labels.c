@@ -8,7 +8,6 @@
 #include "base/text.h"
 #include "base/vec3.h"
 
-#include "mesh/anatomy.h"
 #include "mesh/labels/mask.h"
 
 static const double least_edge = 0.2; /* mm; makes about ten million vertices */

@@ -4,7 +4,6 @@
 #include <stdlib.h>
 
 #include "mesh/labels/mask.h"
-#include "mesh/labels/shapes.h"
 
 enum { PARTS_MAX = 256 }; /* an image with more labels is probably no label map */
 

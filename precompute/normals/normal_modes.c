@@ -217,14 +217,6 @@ static void round_modes(float *values, const float *lengths, size_t n, size_t co
   }
 }
 
-/* Multiply the weights [count, 3, terms] of each mode by its quantisation step, unit[mode]. */
-static void scale_weights(const double *weights, const double *unit, size_t count, size_t terms,
-                          double *scaled) {
-  for (size_t i = 0; i < count * 3 * terms; ++i) {
-    scaled[i] = weights[i] * unit[i / (3 * terms)];
-  }
-}
-
 /* Find the angles [count], degrees, between the columns of a [3, count] and those of b. */
 SUPINE_CLONES static void find_angles(size_t count, const double *a, const double *b,
                                       double *angles) {
@@ -432,8 +424,9 @@ static supine_status make_modes(const normals_work *work, size_t count, supine_a
     round_modes(planes.modes + 3 * begin * count, planes.lengths + begin,
                 s->lungs->lung_begin[lung + 1] - begin, count,
                 made->modes + 3 * begin * (count + 1), unit);
-    scale_weights(work->fits[lung].weights, unit, count, work->terms,
-                  made->weights + lung * count * all);
+    for (size_t i = 0; i < count * all; ++i) { /* the modes are stored as multiples of `unit` */
+      made->weights[lung * count * all + i] = work->fits[lung].weights[i] * unit[i / all];
+    }
   }
   return measure_all(work, made);
 }

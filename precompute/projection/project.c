@@ -6,7 +6,7 @@
 
 #include "base/arena.h"
 #include "precompute/projection/projection.h"
-#include "sh/transform.h"
+#include "sh/expansion.h"
 #include <supine/sh.h>
 
 void supine_projection_free(supine_projection *projection) {
@@ -40,8 +40,8 @@ static supine_status find_heights(const supine_lungs *lungs, bool pair, const su
   return status;
 }
 
-/* Expand the weights w_r(g) of span.h, which depend on the direction g of gravity and have kinks
- * where another vertex becomes the lowest or highest, in spherical harmonics of g. Write the
+/* Expand the weights w_r(g) of projection.h, which depend on the direction g of gravity and have
+ * kinks where another vertex becomes the lowest or highest, in spherical harmonics of g. Write the
  * coefficients to functions [span->rank, (band + 1)^2]. */
 static supine_status expand(const supine_lungs *lungs, const supine_force_law *law, size_t band,
                             const supine_span *span, const supine_sh_grid *grid,

@@ -7,15 +7,15 @@
 #include "base/arena.h"
 #include "base/lapack.h"
 #include "base/vec3.h"
-#include "precompute/projection/span.h"
+#include "precompute/projection/projection.h"
 
-/* The cross approximation (span.h) examines at most VERTICES vertices in DIRECTIONS directions of
- * gravity. */
+/* The cross approximation (projection.h) examines at most VERTICES vertices in DIRECTIONS
+ * directions of gravity. */
 enum { VERTICES = 1024, DIRECTIONS = 512 };
 
-/* Largest accepted residual of the interpolated forces (span.h) on the examined vertices, divided
- * by the largest force, if supine_force_law.soften is not 0. The RMS residual is then 6e-5 of the
- * RMS force, a hundredth of the error that compression to 16 modes causes. */
+/* Largest accepted residual of the interpolated forces (projection.h) on the examined vertices,
+ * divided by the largest force, if supine_force_law.soften is not 0. The RMS residual is then 6e-5
+ * of the RMS force, a hundredth of the error that compression to 16 modes causes. */
 static const double tolerance = 3e-4;
 /* The same limit if supine_force_law.soften is 0, where the interpolation is exact. */
 static const double rounding = 1e-12;
