@@ -87,6 +87,8 @@ typedef struct labels_pieces {
   labels_piece *piece; /**< [end] in the order of their first voxels */
 } labels_pieces;
 
+/** Load teem; call this before the functions below. */
+supine_status supine_labels_pieces_begin(supine_error *error);
 /** Find the connected pieces of zero voxels if `zero` is true, else those of nonzero voxels, all of
  * which must be 1. */
 supine_status supine_labels_pieces_find(const labels_mask *mask, bool zero, supine_arena *arena,

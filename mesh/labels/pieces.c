@@ -13,11 +13,14 @@
 /* clang-format on */
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } teem;
 
+supine_status supine_labels_pieces_begin(supine_error *error) {
+  return SUPINE_LIBRARY_LOAD(SUPINE_TEEM, FUNCTIONS, &teem, error);
+}
+
 /* Number the connected pieces of voxels of equal value, in the order of their first voxels.
  * @param of  [voxels] written: the piece of each voxel */
 static supine_status number_pieces(const labels_mask *mask, uint32_t *of) {
   enum { FACES = 1 };
-  SUPINE_TRY(SUPINE_LIBRARY_LOAD(SUPINE_TEEM, FUNCTIONS, &teem, NULL));
   Nrrd *in = teem.nrrdNew();
   Nrrd *out = teem.nrrdNew();
   const bool good = in != NULL && out != NULL &&

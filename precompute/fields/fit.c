@@ -45,7 +45,7 @@ typedef struct fitting {
   fit chosen;
   double
       *residual; /* [directions] the prediction error is the sum of these times the input fields */
-  supine_arena arena;
+  supine_arena *arena;
 } fitting;
 
 /* Fit harmonics up to degree `band`. The arrays of the fit are valid until `kept` is freed. */
@@ -165,7 +165,7 @@ static supine_status choose_band(fitting *w, int wanted, supine_fit_report *repo
   size_t determined_count = 0;
   for (size_t band = 0; band <= SUPINE_FIT_BAND_MAX && supine_sh_count(band) < m; ++band) {
     fit trial;
-    supine_status status = fit_create(band, m, w->fields->directions, &w->arena, &trial);
+    supine_status status = fit_create(band, m, w->fields->directions, w->arena, &trial);
     const bool determined = status == SUPINE_OK && fit_is_determined(&trial);
     if (determined) {
       status = leave_one_out(w, &trial, &report->error[band]);
@@ -277,24 +277,21 @@ static void subtract_scan(const double scan_gravity[3], supine_compression *made
   }
 }
 
-static void free_fitting(fitting *w) {
-  supine_arena_free(&w->arena);
-}
-
 supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_options *options,
                                 supine_compression *compression, supine_fit_report *report,
                                 supine_error *error) {
   const int m = (int)fields->direction_count;
-  SUPINE_FREED_BY(free_fitting) fitting w = {.fields = fields, .rows = 3 * fields->vertex_count};
+  SUPINE_ARENA arena = {0};
+  fitting w = {.fields = fields, .rows = 3 * fields->vertex_count, .arena = &arena};
   const int rows = (int)w.rows;
   SUPINE_FREED_BY(supine_sh_expansion_free) supine_expansion expansion = {0};
   SUPINE_FREED_BY(supine_sh_compression_free) supine_compression made = {0};
   supine_fit_report found = {0};
   SUPINE_REFUSE_IF(m < 2, error, SUPINE_ERROR_ARGUMENT,
                    "too few directions of gravity (%d): give fields for at least two", m);
-  w.gram = supine_arena_take(&w.arena, (size_t)m * (size_t)m, sizeof *w.gram);
-  w.residual = supine_arena_take(&w.arena, (size_t)m, sizeof *w.residual);
-  SUPINE_TRY(supine_arena_check(&w.arena, error, "%d fields", m));
+  w.gram = supine_arena_take(&arena, (size_t)m * (size_t)m, sizeof *w.gram);
+  w.residual = supine_arena_take(&arena, (size_t)m, sizeof *w.residual);
+  SUPINE_TRY(supine_arena_check(&arena, error, "%d fields", m));
   cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, m, m, rows, 1.0, fields->displacement, rows,
               fields->displacement, rows, 0.0, w.gram, m);
   SUPINE_REFUSE_IF(!(square_sum(&w) > 0.0), error, SUPINE_ERROR_NUMERICAL,

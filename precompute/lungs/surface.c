@@ -88,9 +88,9 @@ static void select_least(keyed *item, ptrdiff_t count, ptrdiff_t half) {
   }
 }
 
-/* Find the bounding box of a tree node and, if `leaf` is not NULL, of each of its triangles. */
+/* Extend the bounding box of a tree node to its triangles and, if `leaf` is not NULL, find the box
+ * of each triangle. */
 static void find_box(const supine_inside_surface *s, node *n, boxes *leaf) {
-  supine_box_begin(n->low, n->high);
   for (size_t i = n->begin; i < n->end; ++i) {
     const double *p[3];
     double low[3];
@@ -161,6 +161,7 @@ static void build(supine_inside_surface *s, keyed *space, uint32_t begin, uint32
     n->leaf = s->leaf_count++;
     return;
   }
+  supine_box_begin(n->low, n->high);
   find_box(s, n, NULL);
   int axis = 0;
   for (int k = 1; k < 3; ++k) {
