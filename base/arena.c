@@ -44,11 +44,25 @@ void supine_arena_free(supine_arena *arena) {
   arena->failed = false;
 }
 
-supine_status supine_error_memory(supine_error *error, const char *what, ...) {
+static supine_status set_error(supine_error *error, const char *what, va_list arguments) {
   char text[256];
+  (void)vsnprintf(text, sizeof text, what, arguments);
+  return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory: %s", text);
+}
+
+supine_status supine_arena_check(const supine_arena *arena, supine_error *error, const char *what,
+                                 ...) {
   va_list arguments;
   va_start(arguments, what);
-  (void)vsnprintf(text, sizeof text, what, arguments);
+  const supine_status status = arena->failed ? set_error(error, what, arguments) : SUPINE_OK;
   va_end(arguments);
-  return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory: %s", text);
+  return status;
+}
+
+supine_status supine_error_memory(supine_error *error, const char *what, ...) {
+  va_list arguments;
+  va_start(arguments, what);
+  const supine_status status = set_error(error, what, arguments);
+  va_end(arguments);
+  return status;
 }

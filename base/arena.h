@@ -6,9 +6,7 @@
  *     SUPINE_ARENA arena = {0};
  *     double *a = supine_arena_take(&arena, n, sizeof *a);
  *     double *b = supine_arena_zeros(&arena, n, sizeof *b);
- *     if (arena.failed) {
- *       return supine_error_memory(error, "the surface");
- *     }
+ *     SUPINE_TRY(supine_arena_check(&arena, error, "the surface"));
  *     SUPINE_TRY(first_step(a, error));
  *     return second_step(a, b, error);
  */
@@ -49,6 +47,16 @@ static inline void supine_file_close(FILE **file) {
     }                                                                                              \
   } while (0)
 
+/** Refuse an input: if `condition` holds, set the error as supine_error_set does, and return its
+ * status from the calling function. The format and its arguments follow the status; they are
+ * evaluated only then. */
+#define SUPINE_REFUSE_IF(condition, error, ...)                                                    \
+  do {                                                                                             \
+    if (condition) {                                                                               \
+      return supine_error_set(error, __VA_ARGS__);                                                 \
+    }                                                                                              \
+  } while (0)
+
 /** Allocate an array, aligned for any type; valid until the arena is freed.
  * @return NULL if memory is short or count x size overflows; arena->failed is then true. An array
  *   of 0 bytes is not NULL */
@@ -59,6 +67,15 @@ void *supine_arena_zeros(supine_arena *arena, size_t count, size_t size);
 
 /** Free all arrays of an arena, which can then be used again. */
 void supine_arena_free(supine_arena *arena);
+
+/** Return SUPINE_ERROR_MEMORY if an allocation from the arena has failed, otherwise SUPINE_OK. */
+static inline supine_status supine_arena_status(const supine_arena *arena) {
+  return arena->failed ? SUPINE_ERROR_MEMORY : SUPINE_OK;
+}
+
+/** As supine_arena_status, and set the error like supine_error_memory. */
+supine_status supine_arena_check(const supine_arena *arena, supine_error *error, const char *what,
+                                 ...) SUPINE_PRINTF(3, 4);
 
 /** Set the error "out of memory: WHAT".
  * @param what  what the memory was for, such as "20000 vertices"; printf format

@@ -55,6 +55,22 @@ static inline double supine_distance(const double a[3], const double b[3]) {
   return supine_length(d);
 }
 
+/** Begin a bounding box: one that contains nothing. */
+static inline void supine_box_begin(double low[3], double high[3]) {
+  for (int k = 0; k < 3; ++k) {
+    low[k] = INFINITY;
+    high[k] = -INFINITY;
+  }
+}
+
+/** Extend a bounding box to a point. */
+static inline void supine_box_add(const double point[3], double low[3], double high[3]) {
+  for (int k = 0; k < 3; ++k) {
+    low[k] = point[k] < low[k] ? point[k] : low[k];
+    high[k] = point[k] > high[k] ? point[k] : high[k];
+  }
+}
+
 /** Compute the normal of the triangle p, q, r. Its length is twice the area of the triangle. */
 static inline void supine_normal(const double p[3], const double q[3], const double r[3],
                                  double normal[3]) {

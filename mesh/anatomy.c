@@ -22,7 +22,7 @@
 
 #include "base/vec3.h"
 
-#include "mesh/anatomy.h"
+#include "mesh/mesh.h"
 
 /* Axes fit clearly better than other axes if their score is higher by more than this. In the lungs
  * of the table at the top of this file, the true axes scored higher by 0.35 to 0.7. */

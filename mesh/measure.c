@@ -43,18 +43,14 @@ double supine_mesh_volume(const supine_mesh *mesh) {
 
 double supine_mesh_box(const supine_mesh *mesh, double minimum[3], double maximum[3]) {
   double side = 0.0;
-  for (int axis = 0; axis < 3; ++axis) {
-    minimum[axis] = mesh->vertex_count == 0 ? 0.0 : mesh->vertices[axis];
-    maximum[axis] = minimum[axis];
+  supine_box_begin(minimum, maximum);
+  for (size_t i = 0; i < mesh->vertex_count; ++i) {
+    supine_box_add(mesh->vertices + 3 * i, minimum, maximum);
   }
-  for (size_t i = 1; i < mesh->vertex_count; ++i) {
-    for (int axis = 0; axis < 3; ++axis) {
-      const double x = mesh->vertices[3 * i + (size_t)axis];
-      minimum[axis] = x < minimum[axis] ? x : minimum[axis];
-      maximum[axis] = x > maximum[axis] ? x : maximum[axis];
+  for (int axis = 0; axis < 3; ++axis) {
+    if (mesh->vertex_count == 0) {
+      minimum[axis] = maximum[axis] = 0.0;
     }
-  }
-  for (int axis = 0; axis < 3; ++axis) {
     side = fmax(side, maximum[axis] - minimum[axis]);
   }
   return side;

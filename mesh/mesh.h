@@ -118,6 +118,19 @@ double supine_mesh_volume(const supine_mesh *mesh);
  * vertices. */
 double supine_mesh_box(const supine_mesh *mesh, double minimum[3], double maximum[3]);
 
+typedef struct supine_mesh_anatomy {
+  supine_axes axes; /**< axes that fit the shape best if clearly better than LPS, otherwise LPS */
+  bool certain;     /**< whether `axes` fit the shape clearly better than all other axes */
+  int side;         /**< +1 left, -1 right; 0 if unknown, for two lungs, or if `axes` are not LPS */
+  bool joined;      /**< whether a single surface seems to hold both lungs */
+} supine_mesh_anatomy;
+
+/** Find the axes from third moments of the volume. A lung is narrow at the head, reaches lowest at
+ * the back, and is hollow towards the heart. The right lung is larger than the left lung, which
+ * leaves room for the heart.
+ * @param lungs  [count] one or two surfaces, each a lung */
+supine_mesh_anatomy supine_mesh_anatomy_find(const supine_mesh *lungs, size_t count);
+
 /** Reverse the order of the corners of each triangle, so that it faces the other way. */
 void supine_mesh_reverse(const supine_mesh *mesh);
 

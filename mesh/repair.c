@@ -156,9 +156,7 @@ static supine_status separate_touching(supine_mesh *mesh, const triangle_forest 
   SUPINE_ARENA arena = {0};
   uint32_t *surface_of = supine_arena_take(&arena, count + corners, sizeof *surface_of);
   uint32_t *next_copy = supine_arena_zeros(&arena, count + corners, sizeof *next_copy);
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   /* sets all to UINT32_MAX, which means unknown */
   memset(surface_of, 0xFF, (count + corners) * sizeof *surface_of);
   for (size_t i = 0; i < corners; ++i) {
@@ -200,9 +198,7 @@ static supine_status mend_links(supine_mesh *mesh, const supine_mesh_side *sides
                              supine_arena_take(&arena, n, 1)};
   uint32_t(*count)[2] = supine_arena_zeros(&arena, n, sizeof *count);
   bool closed;
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   if (link_triangles(mesh, sides, &l, &closed)) {
     report->reversed = turn_minority(mesh, &l, count);
   }
@@ -279,9 +275,7 @@ supine_status supine_mesh_drop_specks(supine_mesh *mesh, double share, size_t *p
   piece *found = supine_arena_zeros(&arena, count, sizeof *found);
   uint8_t *drop = supine_arena_take(&arena, mesh->triangle_count, 1);
   double whole = 0.0;
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   find_volumes(mesh, &topology, found);
   for (size_t p = 0; p < count; ++p) {
     whole += fabs(found[p].volume);

@@ -84,13 +84,6 @@ static void edges_count(const supine_mesh *mesh, const supine_mesh_side *sides,
   }
 }
 
-static void edges_fill(const supine_mesh_side *sides, size_t count, uint32_t *edges) {
-  for (size_t i = 0; i < count; i += supine_mesh_sides_of_edge(sides, i, count)) {
-    *edges++ = sides[i].low;
-    *edges++ = sides[i].high;
-  }
-}
-
 /* Find the root of i's tree, the lowest index in it, with path compression. */
 static uint32_t tree_root(uint32_t *parent, uint32_t i) {
   while (parent[i] != i) {
@@ -144,7 +137,12 @@ supine_status supine_mesh_topology_create(const supine_mesh *mesh, supine_topolo
   if (result.edges == NULL || result.component == NULL) {
     return SUPINE_ERROR_MEMORY;
   }
-  edges_fill(sides, 3 * mesh->triangle_count, result.edges);
+  const size_t count = 3 * mesh->triangle_count;
+  uint32_t *edge = result.edges;
+  for (size_t i = 0; i < count; i += supine_mesh_sides_of_edge(sides, i, count)) {
+    *edge++ = sides[i].low;
+    *edge++ = sides[i].high;
+  }
   components_find(vertices, &result);
 
   result.euler_characteristic =

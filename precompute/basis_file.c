@@ -185,19 +185,14 @@ static supine_status find_normals(const supine_basis_content *content, const flo
                                   const float *directions, supine_arena *arena,
                                   supine_normals_modes *normals, supine_error *error) {
   static const double straight[3] = {0.0, 0.0, 0.0};
-  const double *bend = content->reference != NULL ? content->prepared->model.bend : straight;
-  const supine_lungs *lungs = content->lungs;
-  const supine_normals_surface surface = {.vertex_count = lungs->mesh.vertex_count,
-                                          .triangle_count = lungs->mesh.triangle_count,
-                                          .lung_count = lungs->lung_count,
-                                          .lung_begin = lungs->lung_begin,
-                                          .vertices = vertices,
-                                          .triangles = lungs->mesh.triangles,
-                                          .directions = directions,
-                                          .field = content->compression,
-                                          .resting = content->resting,
-                                          .forms = content->forms,
-                                          .bend = {bend[0], bend[1], bend[2]}};
+  const supine_normals_surface surface = {
+      .lungs = content->lungs,
+      .vertices = vertices,
+      .directions = directions,
+      .field = content->compression,
+      .resting = content->resting,
+      .forms = content->forms,
+      .bend = content->reference != NULL ? content->prepared->model.bend : straight};
   return supine_normals_modes_create(&surface, arena, normals, error);
 }
 
@@ -312,9 +307,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   float *vertices = supine_arena_take(&arena, 3 * n, sizeof *vertices);
   float *directions = vector ? NULL : supine_arena_take(&arena, 3 * n, sizeof *directions);
   unsigned char *lung = supine_arena_take(&arena, n, 1);
-  if (arena.failed) {
-    return supine_error_memory(error, "%zu vertices of %s", n, path);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices of %s", n, path));
   supine_tissue_collapse(lungs, share, collapsed);
   to_float(collapsed, 3 * n, vertices);
   if (!vector) {
@@ -327,9 +320,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   }
   SUPINE_TRY(find_normals(content, vertices, directions, &arena, &normals, error));
   add_all(&list, content, share, &normals);
-  if (arena.failed) {
-    return supine_error_memory(error, "metadata of %s", path);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "metadata of %s", path));
   const size_t q = normals.count;
   const supine_tensor all[] = {
       {"vertices", SUPINE_F32, 2, {n, 3}, vertices},
@@ -361,8 +352,6 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   SUPINE_TRY(measure_storage(content, vector ? NULL : collapsed, given, count, &list, error));
   list.count = 0;
   add_all(&list, content, share, &normals);
-  if (arena.failed) {
-    return supine_error_memory(error, "metadata of %s", path);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "metadata of %s", path));
   return supine_safetensors_write(path, given, count, list.metadata, list.count, error);
 }

@@ -67,9 +67,7 @@ static supine_status find_directions(pipeline *p, supine_error *error) {
   const size_t n = p->lungs->mesh.vertex_count;
   p->directions = supine_arena_take(&p->lengths, 3 * n, sizeof *p->directions);
   p->weight = supine_arena_take(&p->lengths, n, sizeof *p->weight);
-  if (p->lengths.failed) {
-    return supine_error_memory(error, "%zu vertices", n);
-  }
+  SUPINE_TRY(supine_arena_check(&p->lengths, error, "%zu vertices", n));
   SUPINE_TRY(supine_physics_directions(p->lungs, &p->model->force, &p->model->direction,
                                        p->directions, error));
   for (size_t i = 0; i < n; ++i) {
@@ -134,9 +132,8 @@ static supine_status anchor(pipeline *p, supine_error *error) {
     p->anchored = *lungs;
     p->anchored.mesh.vertices = supine_arena_take(&p->memory, 3 * n, sizeof(double));
   }
-  if (arena.failed || p->memory.failed) {
-    return supine_error_memory(error, "%zu vertices", n);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
+  SUPINE_TRY(supine_arena_check(&p->memory, error, "%zu vertices", n));
   supine_sh_compression_weights(field, p->reference.scan.state.gravity, weights);
   supine_projection_displacement(field, p->directions, weights, u);
   for (size_t i = 3 * n; i < 4 * n; ++i) {
@@ -172,13 +169,12 @@ static supine_status check_rest(const supine_compression *compression,
     supine_volume_form form;
     double gains[3];
     supine_physics_volume_forms_contract_lung(forms, lung, weights, &form);
-    if (supine_volume_form_gains(&form, straight, 0.0, volume[lung], gains, &inner) != SUPINE_OK) {
-      return supine_error_set(
-          error, SUPINE_ERROR_NUMERICAL,
-          "with gravity along %g,%g,%g the volume at rest cannot be %.0f mL below full inflation: "
-          "%s; give --resting, or take the scan as it is with --scanned none",
-          g[0], g[1], g[2], -volume[lung], inner.message);
-    }
+    SUPINE_REFUSE_IF(supine_volume_form_gains(&form, straight, 0.0, volume[lung], gains, &inner) !=
+                         SUPINE_OK,
+                     error, SUPINE_ERROR_NUMERICAL,
+                     "with gravity along %g,%g,%g the volume at rest cannot be %.0f mL below full "
+                     "inflation: %s; give --resting, or take the scan as it is with --scanned none",
+                     g[0], g[1], g[2], -volume[lung], inner.message);
   }
   return SUPINE_OK;
 }

@@ -43,13 +43,6 @@ static supine_model choose_law(const supine_model_choice *choice) {
   return model;
 }
 
-/* What a choice means for lungs that were read. */
-typedef struct meaning {
-  bool has_scan;
-  supine_scan scan;
-  supine_resting resting;
-} meaning;
-
 /* Say what volume the law gives the lungs in the state that was not scanned, beside the measured
  * one. The law is not rescaled to the latter.
  * @param measured  volume of both lungs in this state when the law was fitted, mL, or 0 */
@@ -86,27 +79,26 @@ static void describe_fit(const supine_patient_record *record, char *text, size_t
 
 /* Use the displacement law and the force that were fitted to a patient. If the state of the scan is
  * not given, use the state in the fit. */
-static supine_status take_patient(const supine_patient_record *fitted, supine_prepared *p,
-                                  meaning *means, supine_error *error) {
+static supine_status take_patient(supine_model_choice *choice, supine_prepared *p,
+                                  supine_error *error) {
+  const supine_patient_record *fitted = choice->patient;
   const size_t n = p->source.lungs.mesh.vertex_count;
   supine_patient_record *record = supine_arena_take(&p->memory, 1, sizeof *record);
   double *arrays = supine_arena_take(&p->memory, 4 * n, sizeof *arrays);
   supine_scan scan;
-  if (p->memory.failed) {
-    return supine_error_memory(error, "%zu vertices", n);
-  }
+  SUPINE_TRY(supine_arena_check(&p->memory, error, "%zu vertices", n));
   *record = *fitted;
   p->patient = record;
   describe_fit(record, p->fit, sizeof p->fit);
   p->model = supine_physics_model(SUPINE_LAW_DEEP);
-  SUPINE_TRY(supine_patient_model(record, &p->source.lungs, &means->resting, &scan, arrays,
+  SUPINE_TRY(supine_patient_model(record, &p->source.lungs, &choice->resting, &scan, arrays,
                                   &p->model, error));
   tell_volume(record, fitted->volume[record->shown == 1.0 ? 0 : 1], &p->source.findings);
-  if (means->has_scan) {
+  if (choice->has_scan) {
     return SUPINE_OK;
   }
-  means->has_scan = true;
-  means->scan = scan;
+  choice->has_scan = true;
+  choice->scan = scan;
   supine_findings_add(&p->source.findings,
                       "note: the scan is assumed to be the %s of the two that were fitted; "
                       "--scanned changes this",
@@ -126,14 +118,10 @@ static supine_status set_expandability(const supine_model_choice *choice, supine
       choice->expandability_law.shape == SUPINE_EXPANDABILITY_UNIFORM) {
     return SUPINE_OK;
   }
-  if (p->model.stiffness != NULL) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "the file of --patient sets the stiffness: leave --expandability out");
-  }
+  SUPINE_REFUSE_IF(p->model.stiffness != NULL, error, SUPINE_ERROR_ARGUMENT,
+                   "the file of --patient sets the stiffness: leave --expandability out");
   double *a = supine_arena_take(&p->memory, n, sizeof *a);
-  if (a == NULL) {
-    return supine_error_memory(error, "%zu vertices", n);
-  }
+  SUPINE_TRY(supine_arena_check(&p->memory, error, "%zu vertices", n));
   if (choice->expandability != NULL) {
     SUPINE_TRY(supine_tissue_expandability_load(choice->expandability, n, a, error));
   } else {
@@ -169,9 +157,7 @@ static supine_status set_lesions(const supine_model_choice *choice, supine_prepa
     return SUPINE_OK;
   }
   double *factors = supine_arena_take(&p->memory, n, sizeof *factors);
-  if (factors == NULL) {
-    return supine_error_memory(error, "%zu vertices", n);
-  }
+  SUPINE_TRY(supine_arena_check(&p->memory, error, "%zu vertices", n));
   for (size_t i = 0; i < n; ++i) {
     factors[i] = 1.0;
   }
@@ -195,10 +181,9 @@ static supine_status set_shares(const supine_model_choice *choice, supine_prepar
     while (lung < lungs->lung_count && lungs->side[lung] != (side == 0 ? 1 : -1)) {
       ++lung;
     }
-    if (choice->share[side] > 0.0 && lung == lungs->lung_count) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "--lung %s: the model has no %s lung: leave it out", name, name);
-    }
+    SUPINE_REFUSE_IF(choice->share[side] > 0.0 && lung == lungs->lung_count, error,
+                     SUPINE_ERROR_ARGUMENT, "--lung %s: the model has no %s lung: leave it out",
+                     name, name);
     if (choice->share[side] > 0.0) {
       p->model.share[lung] = choice->share[side];
     }
@@ -216,9 +201,9 @@ static bool varies(const supine_model *model, size_t count) {
   return !same;
 }
 
-static void summarize(const supine_model_choice *choice, const supine_resting *resting,
-                      bool predicted, supine_prepared *p) {
+static void summarize(const supine_model_choice *choice, bool predicted, supine_prepared *p) {
   static const double supine[3] = {0.0, 1.0, 0.0};
+  const supine_resting *resting = &choice->resting;
   const supine_reference *reference = &p->reference;
   const size_t size = sizeof p->assumed;
   char state[160];
@@ -271,30 +256,25 @@ static void summarize(const supine_model_choice *choice, const supine_resting *r
 }
 
 /* Decide what state the scan shows, and check that the law and --full go with it. */
-static supine_status find_scan(const supine_model_choice *choice, supine_law law, meaning *means,
-                               supine_error *error) {
-  supine_scan *scan = &means->scan;
-  if (!means->has_scan && law != SUPINE_LAW_PAPER) {
+static supine_status find_scan(supine_model_choice *choice, supine_law law, supine_error *error) {
+  supine_scan *scan = &choice->scan;
+  if (!choice->has_scan && law != SUPINE_LAW_PAPER) {
     (void)supine_reference_scan_parse("full", scan, NULL);
   }
-  if (law == SUPINE_LAW_PAPER && scan->known) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--law paper takes the scan as the reference: leave --scanned out, or "
-                            "use --law deep");
-  }
-  if (scan->known && scan->state.volume.kind == SUPINE_VOLUME_DEFAULT) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--scanned: a posture alone is only for --fields: add the volume, as "
-                            "in supine:rest, or give full or none");
-  }
+  SUPINE_REFUSE_IF(
+      law == SUPINE_LAW_PAPER && scan->known, error, SUPINE_ERROR_ARGUMENT,
+      "--law paper takes the scan as the reference: leave --scanned out, or use --law deep");
+  SUPINE_REFUSE_IF(scan->known && scan->state.volume.kind == SUPINE_VOLUME_DEFAULT, error,
+                   SUPINE_ERROR_ARGUMENT,
+                   "--scanned: a posture alone is only for --fields: add the volume, as in "
+                   "supine:rest, or give full or none");
   const supine_volume *full = &choice->full.volume;
   scan->full = full->ml;
-  if (full->kind != SUPINE_VOLUME_DEFAULT &&
-      (full->kind != SUPINE_VOLUME_ABSOLUTE || scan->state.volume.kind != SUPINE_VOLUME_REST)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--full is for a scan at rest: give a volume such as 4200mL, and "
-                            "--scanned supine:rest too");
-  }
+  SUPINE_REFUSE_IF(
+      full->kind != SUPINE_VOLUME_DEFAULT &&
+          (full->kind != SUPINE_VOLUME_ABSOLUTE || scan->state.volume.kind != SUPINE_VOLUME_REST),
+      error, SUPINE_ERROR_ARGUMENT,
+      "--full is for a scan at rest: give a volume such as 4200mL, and --scanned supine:rest too");
   return SUPINE_OK;
 }
 
@@ -303,14 +283,14 @@ supine_status supine_precompute_prepare(const supine_model_choice *choice, char 
                                         supine_error *error) {
   supine_prepared *p = prepared;
   supine_lungs *lungs = &p->source.lungs;
-  meaning means = {choice->has_scan, choice->scan, choice->resting};
+  supine_model_choice chosen = *choice; /* and what follows from it for the lungs that are read */
   SUPINE_TRY(supine_precompute_source_load(&choice->source, paths, count, &p->source, error));
   if (choice->patient != NULL) {
-    SUPINE_TRY(take_patient(choice->patient, p, &means, error));
+    SUPINE_TRY(take_patient(&chosen, p, error));
   } else {
     p->model = choose_law(choice);
   }
-  SUPINE_TRY(find_scan(choice, p->model.law, &means, error));
+  SUPINE_TRY(find_scan(&chosen, p->model.law, error));
   SUPINE_TRY(set_expandability(choice, p, error));
   SUPINE_TRY(set_lesions(choice, p, error));
   SUPINE_TRY(set_shares(choice, p, error));
@@ -318,16 +298,16 @@ supine_status supine_precompute_prepare(const supine_model_choice *choice, char 
     SUPINE_TRY(supine_physics_strain_create(lungs, p->model.stiffness, p->model.lesions,
                                             &p->model.strain, error));
   }
-  const supine_reference scanned = {.scan = means.scan,
+  const supine_reference scanned = {.scan = chosen.scan,
                                     .lung_count = lungs->lung_count,
                                     .side = {lungs->side[0], lungs->side[1]}};
-  supine_resting resting = means.resting;
+  supine_resting resting = chosen.resting;
   supine_reference_predict_rest(&scanned, &choice->person, &resting);
-  SUPINE_TRY(supine_reference_find(lungs, &p->model, &means.scan, &resting, &p->reference, error));
-  summarize(choice, &means.resting, resting.ml[2] != means.resting.ml[2], p);
+  SUPINE_TRY(supine_reference_find(lungs, &p->model, &chosen.scan, &resting, &p->reference, error));
+  summarize(&chosen, resting.ml[2] != chosen.resting.ml[2], p);
   char doubt[512] = "";
   if (p->reference.known) {
-    supine_reference_doubt(&p->reference, &choice->person, &means.resting, doubt, sizeof doubt);
+    supine_reference_doubt(&p->reference, &choice->person, &chosen.resting, doubt, sizeof doubt);
   }
   if (doubt[0] != '\0') {
     supine_findings_add(&p->source.findings, "warning: %s", doubt);

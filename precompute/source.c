@@ -50,9 +50,8 @@ static void note_mesh(const char *path, const supine_mesh_report *report,
 static supine_status load_meshes(reading *r, supine_source *source, supine_error *error) {
   supine_parallel_for(r->count, 1, r->count, load_range, r);
   for (size_t i = 0; i < r->count; ++i) {
-    if (r->errors[i].status != SUPINE_OK) {
-      return supine_error_set(error, r->errors[i].status, "%s", r->errors[i].message);
-    }
+    SUPINE_REFUSE_IF(r->errors[i].status != SUPINE_OK, error, r->errors[i].status, "%s",
+                     r->errors[i].message);
     note_mesh(r->paths[i], &r->reports[i], &source->findings);
   }
   r->axes = r->reports[0].axes;
@@ -133,12 +132,11 @@ static supine_status load_maps(reading *r, supine_source *source, supine_error *
   wanted.left_masks = lobes.left;
   wanted.right_masks = lobes.right;
   wanted.axes = r->options->load.axes;
-  if (r->options->load.millimetres_per_unit != 0.0 &&
-      r->options->load.millimetres_per_unit != 1.0) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "a label map's header states its unit: leave --units out, or give "
-                            "--units mm to accept any size of the lungs");
-  }
+  SUPINE_REFUSE_IF(r->options->load.millimetres_per_unit != 0.0 &&
+                       r->options->load.millimetres_per_unit != 1.0,
+                   error, SUPINE_ERROR_ARGUMENT,
+                   "a label map's header states its unit: leave --units out, or give --units mm to "
+                   "accept any size of the lungs");
   SUPINE_TRY(supine_labels_surfaces((const char *const *)(folder ? lobes.list : r->paths),
                                     folder ? lobes.left + lobes.right : r->count, &wanted,
                                     r->meshes, &source->report, error));
@@ -194,16 +192,13 @@ static supine_status check_kinds(const supine_source_options *options, char **pa
     images += supine_image_is_named(paths[i]) || (count == 1 && is_folder(paths[i]));
   }
   *is_map = images == count;
-  if (images > 0 && images < count) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "label maps and surfaces were given together: give only one kind");
-  }
-  if (images == 0 && (labels->labels != NULL || labels->edge > 0.0 || labels->close > 0.0 ||
-                      options->surfaces_out != NULL)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--labels, --edge, --close and --surfaces-out are for label maps "
-                            "(.nrrd, .nii, .nii.gz, .mha): leave them out");
-  }
+  SUPINE_REFUSE_IF(images > 0 && images < count, error, SUPINE_ERROR_ARGUMENT,
+                   "label maps and surfaces were given together: give only one kind");
+  SUPINE_REFUSE_IF(images == 0 && (labels->labels != NULL || labels->edge > 0.0 ||
+                                   labels->close > 0.0 || options->surfaces_out != NULL),
+                   error, SUPINE_ERROR_ARGUMENT,
+                   "--labels, --edge, --close and --surfaces-out are for label maps (.nrrd, .nii, "
+                   ".nii.gz, .mha): leave them out");
   return SUPINE_OK;
 }
 
@@ -239,9 +234,7 @@ supine_status supine_precompute_source_load(const supine_source_options *options
                .meshes = supine_arena_zeros(&arena, most, sizeof *r.meshes),
                .reports = supine_arena_zeros(&arena, most, sizeof *r.reports),
                .errors = supine_arena_zeros(&arena, most, sizeof *r.errors)};
-  if (arena.failed) {
-    return supine_error_memory(error, "%zu files", count);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu files", count));
   const supine_status status = read_files(&r, source, error);
   for (size_t i = 0; i < most; ++i) {
     supine_mesh_free(&r.meshes[i]);

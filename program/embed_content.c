@@ -2,7 +2,7 @@
 /* Read what is to move with the lungs, and check its axes and units. */
 #include "base/arena.h"
 #include "mesh/io/points.h"
-#include "mesh/labels/shapes.h"
+#include "mesh/labels/labels.h"
 
 #include "program/embed_content.h"
 #include "program/options/command.h"

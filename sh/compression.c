@@ -8,7 +8,7 @@
 
 #include "base/arena.h"
 #include "base/parallel.h"
-#include "sh/compression.h"
+#include "sh/expansion.h"
 
 void supine_sh_compression_free(supine_compression *compression) {
   free(compression->coefficients);
@@ -24,11 +24,9 @@ supine_status supine_sh_compression_create(const supine_expansion *expansion, si
   made->coefficients = malloc(expansion->row_count * mode_count * sizeof(float));
   made->modes = calloc(mode_count * supine_sh_count(expansion->band), sizeof(double));
   made->mix = calloc(expansion->rank * mode_count, sizeof(double));
-  if (made->coefficients == NULL || made->modes == NULL || made->mix == NULL) {
-    supine_sh_compression_free(made);
-    return SUPINE_ERROR_MEMORY;
-  }
-  return SUPINE_OK;
+  return made->coefficients != NULL && made->modes != NULL && made->mix != NULL
+             ? SUPINE_OK
+             : SUPINE_ERROR_MEMORY;
 }
 
 typedef struct mix_work {
@@ -66,12 +64,10 @@ void supine_sh_compression_mix(const supine_expansion *expansion, supine_compres
 supine_status supine_sh_compress_harmonics(const supine_expansion *expansion,
                                            supine_compression *compression, supine_error *error) {
   const size_t terms = supine_sh_count(expansion->band);
-  if (terms > SUPINE_MODES_MADE_MAX) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "band %zu has %zu harmonics, but a basis file holds at most %d: "
-                            "give --modes 16, or --band 7 or less",
-                            expansion->band, terms, SUPINE_MODES_MADE_MAX);
-  }
+  SUPINE_REFUSE_IF(terms > SUPINE_MODES_MADE_MAX, error, SUPINE_ERROR_ARGUMENT,
+                   "band %zu has %zu harmonics, but a basis file holds at most %d: give --modes "
+                   "16, or --band 7 or less",
+                   expansion->band, terms, SUPINE_MODES_MADE_MAX);
   if (supine_sh_compression_create(expansion, terms, compression) != SUPINE_OK) {
     return supine_error_memory(error, "%zu harmonics", terms);
   }
@@ -119,17 +115,6 @@ void supine_sh_compression_weights(const supine_compression *compression, const 
     weights[k] = 0.0;
     for (size_t t = 0; t < terms; ++t) {
       weights[k] += compression->modes[k * terms + t] * y[t];
-    }
-  }
-}
-
-void supine_sh_compression_field(const supine_compression *compression, const double *weights,
-                                 double *field) {
-  for (size_t i = 0; i < compression->row_count; ++i) {
-    const float *c = compression->coefficients + i * compression->mode_count;
-    field[i] = 0.0;
-    for (size_t k = 0; k < compression->mode_count; ++k) {
-      field[i] += weights[k] * (double)c[k];
     }
   }
 }

@@ -7,7 +7,7 @@
 #include <gsl/gsl_sf_legendre.h>
 
 #include "base/arena.h"
-#include "sh/grid.h"
+#include "sh/expansion.h"
 
 /* Functions with kinks have harmonics of every degree. With 8 latitudes for each degree, those
  * above the band hardly alias. */

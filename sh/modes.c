@@ -9,7 +9,7 @@
 
 #include "base/arena.h"
 #include "base/lapack.h"
-#include "sh/compression.h"
+#include "sh/expansion.h"
 
 /* Singular values below this share of the largest are rounding errors, because the Gram matrix
  * gives only their squares. */
@@ -23,9 +23,7 @@ static supine_status gram_matrix(const supine_expansion *expansion, const double
   const size_t rank = expansion->rank;
   SUPINE_ARENA arena = {0};
   double *block = supine_arena_take(&arena, BLOCK * rank, sizeof *block);
-  if (block == NULL) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   memset(gram, 0, rank * rank * sizeof *gram);
   for (size_t first = 0; first < expansion->row_count; first += BLOCK) {
     const size_t left = expansion->row_count - first;
@@ -49,9 +47,7 @@ supine_status supine_sh_leading_eigenpairs(size_t n, double *matrix, size_t coun
   SUPINE_ARENA arena = {0};
   lapack_int *support = supine_arena_take(&arena, 2 * n, sizeof *support);
   double *rising = supine_arena_take(&arena, n * count, sizeof *rising);
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   SUPINE_TRY(supine_lapack_status(LAPACKE_dsyevr(LAPACK_COL_MAJOR, 'V', 'I', 'L', size, matrix,
                                                  size, 0.0, 0.0, size - (lapack_int)count + 1, size,
                                                  0.0, &found, values, rising, size, support)));
@@ -84,9 +80,7 @@ static supine_status find_modes(const supine_expansion *expansion, double *gram,
   SUPINE_ARENA arena = {0};
   double *vectors = supine_arena_take(&arena, rank * rank, sizeof *vectors);
   double *reduced = supine_arena_take(&arena, rank * terms, sizeof *reduced);
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   SUPINE_TRY(supine_sh_leading_eigenpairs(rank, gram, rank, values, vectors));
   for (size_t k = 0; k < rank; ++k) {
     cblas_dscal((int)rank, sqrt(fmax(values[k], 0.0)), vectors + k * rank, 1);
@@ -116,10 +110,8 @@ supine_status supine_sh_compress_modes(const supine_expansion *expansion, const 
   const size_t most = mode_max < rank ? mode_max : rank;
   const size_t kept = most < terms ? most : terms;
   double energy = 0.0;
-  if (mode_max < 1 || mode_max > SUPINE_MODES_MADE_MAX) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%zu modes: give 1 to %d", mode_max,
-                            SUPINE_MODES_MADE_MAX);
-  }
+  SUPINE_REFUSE_IF(mode_max < 1 || mode_max > SUPINE_MODES_MADE_MAX, error, SUPINE_ERROR_ARGUMENT,
+                   "%zu modes: give 1 to %d", mode_max, SUPINE_MODES_MADE_MAX);
   SUPINE_ARENA arena = {0};
   double *gram = supine_arena_take(&arena, rank * rank, sizeof *gram);
   double *values = supine_arena_take(&arena, rank, sizeof *values);
@@ -136,10 +128,8 @@ supine_status supine_sh_compress_modes(const supine_expansion *expansion, const 
   while (count < kept && values[count] > rank_tolerance * rank_tolerance * values[0]) {
     ++count;
   }
-  if (count == 0) {
-    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                            "the field is zero everywhere: change --base or --gain");
-  }
+  SUPINE_REFUSE_IF(count == 0, error, SUPINE_ERROR_NUMERICAL,
+                   "the field is zero everywhere: change --base or --gain");
   if (supine_sh_compression_create(expansion, count, compression) != SUPINE_OK) {
     return supine_error_memory(error, "%zu modes", count);
   }

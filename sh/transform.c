@@ -9,7 +9,7 @@
 #include <supine/sh.h>
 
 #include "base/arena.h"
-#include "sh/transform.h"
+#include "sh/expansion.h"
 
 /* Plan the FFT of one latitude. FFTW_ESTIMATE makes the same plan every time, in microseconds. */
 static fftw_plan plan_fft(int longitudes, int fields, double *ring, fftw_complex *spectrum) {
@@ -45,12 +45,11 @@ supine_status supine_sh_transform(size_t band, const supine_sh_grid *grid, size_
                                   const double *values, double *coefficients, supine_error *error) {
   const size_t width = grid->longitudes;
   const size_t functions = gsl_sf_legendre_array_n(band);
-  if (band > SUPINE_SH_BAND_MAX || grid->latitudes <= band || width <= 2 * band) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "a grid of %zu x %zu directions cannot represent band %zu: give more "
-                            "than %zu latitudes and %zu longitudes, and a band of at most %d",
-                            grid->latitudes, width, band, band, 2 * band, SUPINE_SH_BAND_MAX);
-  }
+  SUPINE_REFUSE_IF(band > SUPINE_SH_BAND_MAX || grid->latitudes <= band || width <= 2 * band, error,
+                   SUPINE_ERROR_ARGUMENT,
+                   "a grid of %zu x %zu directions cannot represent band %zu: give more than %zu "
+                   "latitudes and %zu longitudes, and a band of at most %d",
+                   grid->latitudes, width, band, band, 2 * band, SUPINE_SH_BAND_MAX);
   SUPINE_ARENA arena = {0};
   double *legendre = supine_arena_take(&arena, functions, sizeof *legendre);
   double *ring = supine_arena_take(&arena, width * fields, sizeof *ring);

@@ -168,7 +168,8 @@ TEST(test_lesion_factor_one_changes_nothing) {
   const double *side = side_of(&lungs);
   const supine_lesion lesion = {{side[0], side[1], side[2]}, 40.0, 1.0};
   double *factors = no_lesions(&lungs);
-  assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, factors, NULL, NULL), SUPINE_OK);
+  assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, factors, &(size_t){0}, NULL),
+                   SUPINE_OK);
   supine_solution same = solve(&lungs, supine);
   assert_memory_equal(same.catch_, healthy.catch_, lungs.mesh.vertex_count * sizeof(double));
   assert_memory_equal(same.cubic, healthy.cubic, sizeof same.cubic);
@@ -184,8 +185,10 @@ TEST(test_lesion_factors_any_distance_follow_documented_profile) {
   const double *centre = side_of(&lungs);
   const supine_lesion lesion = {{centre[0], centre[1], centre[2]}, 50.0, 7.0};
   double *factors = no_lesions(&lungs);
-  assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, factors, NULL, NULL), SUPINE_OK);
-  assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, factors, NULL, NULL), SUPINE_OK);
+  assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, factors, &(size_t){0}, NULL),
+                   SUPINE_OK);
+  assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, factors, &(size_t){0}, NULL),
+                   SUPINE_OK);
   size_t seen[3] = {0, 0, 0};
   for (size_t i = 0; i < lungs.mesh.vertex_count; ++i) {
     const double r = distance(lungs.mesh.vertices + 3 * i, centre) / 50.0;
@@ -234,7 +237,7 @@ TEST(test_lesion_bad_numbers_refused) {
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     supine_error error = {0};
     double *factors = NULL; /* an invalid lesion is refused before `factors` is read */
-    assert_int_equal(supine_tissue_add_lesion(&lungs, &bad[i], factors, NULL, &error),
+    assert_int_equal(supine_tissue_add_lesion(&lungs, &bad[i], factors, &(size_t){0}, &error),
                      SUPINE_ERROR_ARGUMENT);
     assert_says(error.message, "lesion at");
   }

@@ -83,9 +83,10 @@ TEST(test_expandability_load_bad_file_message_names_line_or_vertex) {
       {"vertex,expandability\n0,1\n2,1\n", "", "vertex 1 of 3 has no"},
       {"vertex,expandability\n0,1\n1,1\n0,2\n", ":4:", "vertex 0: the vertex was given before"},
       {"vertex,expandability\n0,1\n7,1\n", ":3:", "vertex 7: there is no"},
-      {"vertex,expandability\n0,1\n-1,1\n", ":3:", "'-1'"},
+      {"vertex,expandability\n0,1\n-1,1\n", ":3:", "vertex -1: there is no such vertex"},
+      {"vertex,expandability\n0,1\n1.5,1\n", ":3:", "vertex 1.5: there is no such vertex"},
       {"vertex,expandability\n0,1\n1;1\n", ":3:", "1 field, but the header has 2"},
-      {"vertex,expandability\n0,1\n99999999999999999999,1\n", ":3:", "not the number"},
+      {"vertex,expandability\n0,1\n99999999999999999999,1\n", ":3:", "1e+20: there is no such"},
       {"vertex,expandability\n0,1\n1,-4\n", ":3:", "-4 of vertex 1: it must be positive"},
   };
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {

@@ -242,6 +242,7 @@ TEST(test_biharmonic_fit_points_in_a_plane_refused) {
   assert_int_equal(supine_inside_biharmonic_fit(5, points, 1, values, 5, &fit, &error),
                    SUPINE_ERROR_NUMERICAL);
   assert_says(error.message, "plane");
+  supine_inside_biharmonic_free(&fit);
 }
 
 /* Make points in the left and the right lung in turn. Each is on a random ray from the centre of
@@ -443,6 +444,7 @@ TEST(test_shells_unreachable_scan_refused) {
   helper_write_scanned_basis(path, 6, 2, "0,1,0", "-1e300");
   supine_basis *far = helper_open(path);
   assert_int_equal(supine_inside_shells_create(far, &none, &error), SUPINE_ERROR_NUMERICAL);
+  supine_inside_shells_free(&none);
   supine_basis_close(far);
 }
 
@@ -477,6 +479,7 @@ TEST(test_embed_file_repeats_weights_volumes_and_metadata) {
   supine_error error;
   assert_int_equal(supine_inside_shells_create(inside, &none, &error), SUPINE_ERROR_FORMAT);
   assert_says(error.message, "points");
+  supine_inside_shells_free(&none);
   supine_basis_close(inside);
   supine_inside_content_free(&content);
 }

@@ -1,10 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Test surfaces made from label maps: accuracy, meanings of labels, reports, refused maps. */
 #include "folder.h"
-#include "mesh/anatomy.h"
 #include "mesh/labels/labels.h"
 #include "mesh/labels/mask.h"
-#include "mesh/labels/shapes.h"
 #include "precompute/lungs/phantom.h"
 #include "precompute/lungs/surface.h"
 

@@ -22,7 +22,7 @@ static double *stiffness_of(const supine_lungs *lungs, const supine_lesion *lesi
     e[i] = 1.0;
   }
   if (lesion != NULL) {
-    assert_int_equal(supine_tissue_add_lesion(lungs, lesion, e, NULL, NULL), SUPINE_OK);
+    assert_int_equal(supine_tissue_add_lesion(lungs, lesion, e, &(size_t){0}, NULL), SUPINE_OK);
   }
   return e;
 }

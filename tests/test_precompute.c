@@ -4,7 +4,7 @@
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
 #include "precompute/projection/projection.h"
-#include "sh/grid.h"
+#include "sh/expansion.h"
 #include "test.h"
 #include <supine/runtime.h>
 #include <supine/safetensors.h>

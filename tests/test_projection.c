@@ -9,7 +9,7 @@
 #include "precompute/physics/solve.h"
 #include "precompute/projection/accuracy.h"
 #include "precompute/projection/tally.h"
-#include "sh/grid.h"
+#include "sh/expansion.h"
 #include <supine/sh.h>
 
 static int setup(void **state) {

@@ -3,7 +3,7 @@
  * edge cases. */
 #include <float.h>
 
-#include "sh/grid.h"
+#include "sh/expansion.h"
 #include "test.h"
 #include <supine/sh.h>
 

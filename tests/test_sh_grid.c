@@ -2,7 +2,7 @@
 /* Test the quadrature rule: tabulated nodes, exactness, directions, refused arguments. */
 #include <float.h>
 
-#include "sh/grid.h"
+#include "sh/expansion.h"
 #include "test.h"
 
 /* The nodes and weights are those of M. Abramowitz and I. A. Stegun, Handbook of Mathematical

@@ -3,7 +3,7 @@
  * arguments. */
 #include <float.h>
 
-#include "sh/transform.h"
+#include "sh/expansion.h"
 #include "test.h"
 #include <supine/sh.h>
 

@@ -73,19 +73,15 @@ supine_status supine_mesh_faces_add(mesh_faces *faces, const double *corners, si
                                     supine_error *error) {
   supine_mesh *mesh = faces->mesh;
   const size_t number = faces->count++;
-  if (count > MESH_CORNERS_MAX) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: face %zu has %zu corners, more than %d; cut it into triangles",
-                            faces->path, number, count, MESH_CORNERS_MAX);
-  }
+  SUPINE_REFUSE_IF(count > MESH_CORNERS_MAX, error, SUPINE_ERROR_FORMAT,
+                   "%s: face %zu has %zu corners, more than %d; cut it into triangles", faces->path,
+                   number, count, MESH_CORNERS_MAX);
   uint32_t corner[MESH_CORNERS_MAX];
   for (size_t k = 0; k < count; ++k) {
-    if (!(corners[k] >= 0.0 && corners[k] < (double)mesh->vertex_count)) {
-      return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s: face %zu names vertex %.0f, but the number of vertices is %zu; "
-                              "save the mesh again",
-                              faces->path, number, corners[k], mesh->vertex_count);
-    }
+    SUPINE_REFUSE_IF(
+        !(corners[k] >= 0.0 && corners[k] < (double)mesh->vertex_count), error, SUPINE_ERROR_FORMAT,
+        "%s: face %zu names vertex %.0f, but the number of vertices is %zu; save the mesh again",
+        faces->path, number, corners[k], mesh->vertex_count);
     corner[k] = (uint32_t)corners[k];
   }
   if (count < 3) {

@@ -187,9 +187,8 @@ static supine_status take_outcome(const char *path, FILE *stream, supine_mesh *m
                                   size_t *dropped, supine_error *error) {
   outcome result;
   if (fread(&result, sizeof result, 1, stream) == 1) {
-    if (result.error.status != SUPINE_OK) {
-      return supine_error_set(error, result.error.status, "%s", result.error.message);
-    }
+    SUPINE_REFUSE_IF(result.error.status != SUPINE_OK, error, result.error.status, "%s",
+                     result.error.message);
     *dropped = result.dropped;
     const size_t n = result.vertex_count;
     const size_t triangles = result.triangle_count;
@@ -274,12 +273,9 @@ supine_status supine_mesh_read_stl(mesh_file *file, supine_mesh *mesh, size_t *d
   mesh_text last = {0};
   if (memchr(file->bytes, '\0', file->size) == NULL) {
     SUPINE_TRY(check_lines(file, "vertex", &last, error));
-    if (!supine_mesh_text_is(last, "endsolid")) {
-      return supine_error_set(
-          error, SUPINE_ERROR_FORMAT,
-          "%s: the STL text does not end with endsolid: it is truncated; save it again",
-          file->path);
-    }
+    SUPINE_REFUSE_IF(!supine_mesh_text_is(last, "endsolid"), error, SUPINE_ERROR_FORMAT,
+                     "%s: the STL text does not end with endsolid: it is truncated; save it again",
+                     file->path);
   }
   return import_file(file, "stl", mesh, dropped, error);
 }

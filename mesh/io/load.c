@@ -44,14 +44,10 @@ static supine_status check_file(const char *path, size_t *size, supine_error *er
   if (stat(path, &about) != 0) {
     return cannot_read(path, error);
   }
-  if (S_ISDIR(about.st_mode)) {
-    return supine_error_set(error, SUPINE_ERROR_READ,
-                            "%s: is a folder; give the mesh file inside it", path);
-  }
-  if (!S_ISREG(about.st_mode)) {
-    return supine_error_set(error, SUPINE_ERROR_READ,
-                            "%s: not a regular file; save the mesh to a file first", path);
-  }
+  SUPINE_REFUSE_IF(S_ISDIR(about.st_mode), error, SUPINE_ERROR_READ,
+                   "%s: is a folder; give the mesh file inside it", path);
+  SUPINE_REFUSE_IF(!S_ISREG(about.st_mode), error, SUPINE_ERROR_READ,
+                   "%s: not a regular file; save the mesh to a file first", path);
   *size = (size_t)about.st_size;
   return *size == 0 ? supine_error_set(error, SUPINE_ERROR_FORMAT,
                                        "%s: the file is empty; save the mesh again", path)
@@ -87,9 +83,7 @@ static supine_status read_file(mesh_file *file, supine_arena *arena, mesh_reader
     return cannot_read(file->path, error);
   }
   file->bytes = supine_arena_take(arena, size + 1, 1);
-  if (arena->failed) {
-    return supine_error_memory(error, "%zu bytes of %s", size, file->path);
-  }
+  SUPINE_TRY(supine_arena_check(arena, error, "%zu bytes of %s", size, file->path));
   errno = 0;
   file->size = fread(file->bytes, 1, size, stream);
   file->bytes[file->size] = '\0';
@@ -131,12 +125,10 @@ static supine_status choose_axes(const mesh_file *file, supine_axes asked,
     report->axes = asked;
     return SUPINE_OK;
   }
-  if (file->tagged && file->space == SUPINE_AXES_AUTO) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: its SPACE tag is not three letters such as LPS or RAS; give "
-                            "the axes, for example --axes LPS",
-                            file->path);
-  }
+  SUPINE_REFUSE_IF(file->tagged && file->space == SUPINE_AXES_AUTO, error, SUPINE_ERROR_FORMAT,
+                   "%s: its SPACE tag is not three letters such as LPS or RAS; give the axes, for "
+                   "example --axes LPS",
+                   file->path);
   report->axes = file->tagged ? file->space : SUPINE_AXES_LPS;
   report->axes_from_tag = file->tagged;
   return SUPINE_OK;
@@ -150,18 +142,14 @@ static supine_status convert(const char *path, double scale, supine_axes axes, s
   for (size_t i = 0; i < mesh->vertex_count; ++i) {
     double *vertex = mesh->vertices + 3 * i;
     const double largest = fmax(fabs(vertex[0]), fmax(fabs(vertex[1]), fabs(vertex[2])));
-    if (!isfinite(vertex[0]) || !isfinite(vertex[1]) || !isfinite(vertex[2])) {
-      return supine_error_set(error, SUPINE_ERROR_MESH,
-                              "%s: vertex %zu of %zu has a coordinate that is not finite; repair "
-                              "the mesh",
-                              path, i, mesh->vertex_count);
-    }
-    if (!(largest * scale <= farthest)) {
-      return supine_error_set(error, SUPINE_ERROR_MESH,
-                              "%s: vertex %zu of %zu has a coordinate of %.3g mm; repair the "
-                              "mesh, or give its --units",
-                              path, i, mesh->vertex_count, largest * scale);
-    }
+    SUPINE_REFUSE_IF(!isfinite(vertex[0]) || !isfinite(vertex[1]) || !isfinite(vertex[2]), error,
+                     SUPINE_ERROR_MESH,
+                     "%s: vertex %zu of %zu has a coordinate that is not finite; repair the mesh",
+                     path, i, mesh->vertex_count);
+    SUPINE_REFUSE_IF(
+        !(largest * scale <= farthest), error, SUPINE_ERROR_MESH,
+        "%s: vertex %zu of %zu has a coordinate of %.3g mm; repair the mesh, or give its --units",
+        path, i, mesh->vertex_count, largest * scale);
     supine_mesh_axes_apply(axes, scale, vertex);
   }
   if (supine_mesh_axes_mirrored(axes)) {
@@ -175,11 +163,8 @@ supine_status supine_mesh_load(const char *path, const supine_mesh_load_options 
   const supine_mesh_load_options chosen =
       options == NULL ? (supine_mesh_load_options){0} : *options;
   const double scale = chosen.millimetres_per_unit == 0.0 ? 1.0 : chosen.millimetres_per_unit;
-  if (!(scale > 0.0) || !isfinite(scale)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%s: %g mm per unit is not a positive number; correct --units", path,
-                            scale);
-  }
+  SUPINE_REFUSE_IF(!(scale > 0.0) || !isfinite(scale), error, SUPINE_ERROR_ARGUMENT,
+                   "%s: %g mm per unit is not a positive number; correct --units", path, scale);
   SUPINE_ARENA arena = {0};
   SUPINE_FREED_BY(supine_mesh_free) supine_mesh loaded = {0};
   supine_mesh_report found = {0};
@@ -196,10 +181,8 @@ supine_status supine_mesh_load(const char *path, const supine_mesh_load_options 
   if (supine_mesh_weld(&loaded, &found) != SUPINE_OK) {
     return supine_error_memory(error, "%zu vertices of %s", loaded.vertex_count, path);
   }
-  if (loaded.triangle_count == 0) {
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "%s: no triangles; give a surface, not points or lines", path);
-  }
+  SUPINE_REFUSE_IF(loaded.triangle_count == 0, error, SUPINE_ERROR_MESH,
+                   "%s: no triangles; give a surface, not points or lines", path);
   *mesh = loaded;
   loaded = (supine_mesh){0};
   if (report != NULL) {

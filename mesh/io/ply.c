@@ -41,10 +41,6 @@ typedef struct ply {
   mesh_faces faces;
 } ply;
 
-static supine_status malformed(const ply *in, const char *what) {
-  return supine_error_set(in->error, SUPINE_ERROR_FORMAT, "%s: %s", in->file->path, what);
-}
-
 /* Return the index of a word in a list that ends with NULL, or the index of the NULL. */
 static int find_name(mesh_text word, const char *const *names) {
   int index = 0;
@@ -124,38 +120,37 @@ static bool read_line(ply *in, mesh_text line, bool *has_format) {
 static supine_status read_header(ply *in) {
   mesh_text line;
   bool has_format = false;
-  if (!supine_mesh_text_line(&in->text, &line) || !supine_mesh_text_is(line, "ply")) {
-    return malformed(in, "does not begin with \"ply\"; give a PLY file");
-  }
+  SUPINE_REFUSE_IF(!supine_mesh_text_line(&in->text, &line) || !supine_mesh_text_is(line, "ply"),
+                   in->error, SUPINE_ERROR_FORMAT,
+                   "%s: does not begin with \"ply\"; give a PLY file", in->file->path);
   for (size_t number = 2; supine_mesh_text_line(&in->text, &line); ++number) {
     mesh_text rest = line;
     mesh_text word;
     if (supine_mesh_text_word(&rest, &word) && supine_mesh_text_is(word, "end_header")) {
-      return has_format ? SUPINE_OK
-                        : malformed(in, "the PLY header has no format line; save the mesh again");
+      SUPINE_REFUSE_IF(!has_format, in->error, SUPINE_ERROR_FORMAT,
+                       "%s: the PLY header has no format line; save the mesh again",
+                       in->file->path);
+      return SUPINE_OK;
     }
-    if (!read_line(in, line, &has_format)) {
-      return supine_error_set(in->error, SUPINE_ERROR_FORMAT,
-                              "%s: line %zu of the PLY header is malformed; save the mesh again",
-                              in->file->path, number);
-    }
+    SUPINE_REFUSE_IF(!read_line(in, line, &has_format), in->error, SUPINE_ERROR_FORMAT,
+                     "%s: line %zu of the PLY header is malformed; save the mesh again",
+                     in->file->path, number);
   }
-  return malformed(in, "the PLY header has no end_header: the file is truncated; save it again");
+  return supine_error_set(
+      in->error, SUPINE_ERROR_FORMAT,
+      "%s: the PLY header has no end_header: the file is truncated; save it again", in->file->path);
 }
 
 static supine_status check_header(const ply *in) {
   static const unsigned needed = 1U << X | 1U << Y | 1U << Z | 1U << CORNERS;
   const char *path = in->file->path;
   for (size_t e = 0; e < in->element_count; ++e) {
-    if (in->elements[e].property_count == 0) {
-      return supine_error_set(
-          in->error, SUPINE_ERROR_FORMAT,
-          "%s: element %zu of the PLY header has no property; save the mesh again", path, e + 1);
-    }
-    if (in->elements[e].kind == STRIPS && in->elements[e].count > 0) {
-      return supine_error_set(in->error, SUPINE_ERROR_MESH,
-                              "%s: it has strips of triangles; save the mesh as triangles", path);
-    }
+    SUPINE_REFUSE_IF(in->elements[e].property_count == 0, in->error, SUPINE_ERROR_FORMAT,
+                     "%s: element %zu of the PLY header has no property; save the mesh again", path,
+                     e + 1);
+    SUPINE_REFUSE_IF(in->elements[e].kind == STRIPS && in->elements[e].count > 0, in->error,
+                     SUPINE_ERROR_MESH,
+                     "%s: it has strips of triangles; save the mesh as triangles", path);
   }
   SUPINE_TRY(in->encoding == ASCII ? supine_mesh_guard_text(in->file, in->error) : SUPINE_OK);
   return (in->present & needed) == needed
@@ -207,11 +202,9 @@ static supine_status take_list(ply *in, const element *of, uint64_t item, const 
   if (!take(in, list->count, &length)) {
     return cut_short(in, of, item);
   }
-  if (length < 0.0 || length > (double)in->file->size) {
-    return supine_error_set(in->error, SUPINE_ERROR_FORMAT,
-                            "%s: a list has the impossible length %.0f; save the mesh again",
-                            in->file->path, length);
-  }
+  SUPINE_REFUSE_IF(length < 0.0 || length > (double)in->file->size, in->error, SUPINE_ERROR_FORMAT,
+                   "%s: a list has the impossible length %.0f; save the mesh again", in->file->path,
+                   length);
   const uint64_t count = (uint64_t)length;
   for (uint64_t k = 0; k < count; ++k) {
     double value = 0.0;
@@ -259,11 +252,9 @@ static supine_status make_room(const ply *in, const element *of, supine_mesh *me
   }
   const uint64_t room = (uint64_t)(in->text.end - in->text.at) / least + 1;
   const uint64_t count = of->count < room ? of->count : room;
-  if (count > MESH_VERTICES_MAX) {
-    return supine_error_set(in->error, SUPINE_ERROR_FORMAT,
-                            "%s: more than %d vertices; give a coarser mesh", in->file->path,
-                            MESH_VERTICES_MAX);
-  }
+  SUPINE_REFUSE_IF(count > MESH_VERTICES_MAX, in->error, SUPINE_ERROR_FORMAT,
+                   "%s: more than %d vertices; give a coarser mesh", in->file->path,
+                   MESH_VERTICES_MAX);
   mesh->vertex_count = (size_t)count;
   mesh->vertices = malloc((size_t)count * 3 * sizeof *mesh->vertices);
   return mesh->vertices == NULL
@@ -281,9 +272,8 @@ supine_status supine_mesh_read_ply(mesh_file *file, supine_mesh *mesh, size_t *d
   SUPINE_TRY(check_header(&in));
   for (size_t e = 0; e < in.element_count; ++e) {
     const element *of = &in.elements[e];
-    if (of->kind == FACES && mesh->vertices == NULL) {
-      return malformed(&in, "its faces come before its vertices; save the mesh again");
-    }
+    SUPINE_REFUSE_IF(of->kind == FACES && mesh->vertices == NULL, in.error, SUPINE_ERROR_FORMAT,
+                     "%s: its faces come before its vertices; save the mesh again", in.file->path);
     SUPINE_TRY(of->kind == VERTICES ? make_room(&in, of, mesh) : SUPINE_OK);
     SUPINE_TRY(take_items(&in, of));
   }

@@ -99,12 +99,10 @@ static supine_status read_markup(reading *r, const json_t *markup) {
       const json_t *number = json_array_get(position, k);
       at[k] = json_is_number(number) ? json_number_value(number) : NAN;
     }
-    if (!isfinite(at[0]) || !isfinite(at[1]) || !isfinite(at[2])) {
-      return supine_error_set(
-          r->error, SUPINE_ERROR_FORMAT,
-          "%s: control point %zu has no position of three numbers: place or delete it", r->path,
-          i + 1);
-    }
+    SUPINE_REFUSE_IF(!isfinite(at[0]) || !isfinite(at[1]) || !isfinite(at[2]), r->error,
+                     SUPINE_ERROR_FORMAT,
+                     "%s: control point %zu has no position of three numbers: place or delete it",
+                     r->path, i + 1);
     SUPINE_TRY(add(r, at, json_string_value(json_object_get(point, "label")), axes, scale));
   }
   return SUPINE_OK;
@@ -113,10 +111,8 @@ static supine_status read_markup(reading *r, const json_t *markup) {
 static supine_status read_markups(reading *r) {
   json_error_t why;
   json_auto_t *root = json_load_file(r->path, 0, &why);
-  if (root == NULL) {
-    return supine_error_set(r->error, why.line < 0 ? SUPINE_ERROR_READ : SUPINE_ERROR_FORMAT,
-                            "%s:%d: %s", r->path, why.line < 0 ? 0 : why.line, why.text);
-  }
+  SUPINE_REFUSE_IF(root == NULL, r->error, why.line < 0 ? SUPINE_ERROR_READ : SUPINE_ERROR_FORMAT,
+                   "%s:%d: %s", r->path, why.line < 0 ? 0 : why.line, why.text);
   const json_t *markups = json_object_get(root, "markups");
   for (size_t i = 0; i < json_array_size(markups); ++i) {
     SUPINE_TRY(read_markup(r, json_array_get(markups, i)));

@@ -28,10 +28,8 @@ bool supine_mesh_save_supports(const char *path) {
 supine_status supine_mesh_save(const char *path, const supine_mesh *mesh,
                                const supine_mesh_save_options *options, supine_error *error) {
   save_function *function = find_function(path);
-  if (function == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%s: unknown ending; end the name in " SUPINE_MESH_ENDINGS, path);
-  }
+  SUPINE_REFUSE_IF(function == NULL, error, SUPINE_ERROR_ARGUMENT,
+                   "%s: unknown ending; end the name in " SUPINE_MESH_ENDINGS, path);
   SUPINE_TRY(supine_mesh_writer_check(path, mesh, error));
   SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
   SUPINE_TRY(supine_output_open(path, &output, error));

@@ -4,6 +4,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/arena.h"
+
 #include "mesh/io/save.h"
 
 static bool fits(double x) {
@@ -12,20 +14,16 @@ static bool fits(double x) {
 
 supine_status supine_mesh_writer_check(const char *path, const supine_mesh *mesh,
                                        supine_error *error) {
-  if (mesh->vertex_count > INT32_MAX || mesh->triangle_count > INT32_MAX / 3) {
-    return supine_error_set(
-        error, SUPINE_ERROR_ARGUMENT,
-        "%s: too large to write: %zu vertices, %zu triangles: write a coarser mesh", path,
-        mesh->vertex_count, mesh->triangle_count);
-  }
+  SUPINE_REFUSE_IF(mesh->vertex_count > INT32_MAX || mesh->triangle_count > INT32_MAX / 3, error,
+                   SUPINE_ERROR_ARGUMENT,
+                   "%s: too large to write: %zu vertices, %zu triangles: write a coarser mesh",
+                   path, mesh->vertex_count, mesh->triangle_count);
   for (size_t i = 0; i < mesh->vertex_count; ++i) {
     const double *vertex = mesh->vertices + 3 * i;
-    if (!fits(vertex[0]) || !fits(vertex[1]) || !fits(vertex[2])) {
-      return supine_error_set(
-          error, SUPINE_ERROR_MESH,
-          "%s: vertex %zu has a coordinate that is not finite: choose a state nearer to the scan",
-          path, i);
-    }
+    SUPINE_REFUSE_IF(
+        !fits(vertex[0]) || !fits(vertex[1]) || !fits(vertex[2]), error, SUPINE_ERROR_MESH,
+        "%s: vertex %zu has a coordinate that is not finite: choose a state nearer to the scan",
+        path, i);
   }
   return SUPINE_OK;
 }

@@ -5,6 +5,8 @@
 #include <string.h>
 #include <strings.h>
 
+#include "base/arena.h"
+
 #include "mesh/io/read.h"
 
 bool supine_mesh_text_line(mesh_text *text, mesh_text *line) {
@@ -108,18 +110,12 @@ double supine_mesh_type_decode(const mesh_type *type, const unsigned char *bytes
 
 supine_status supine_mesh_guard_text(const mesh_file *file, supine_error *error) {
   const unsigned char *end = file->bytes + file->size;
-  if (memchr(file->bytes, '\0', file->size) != NULL) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: the text holds a NUL byte; save it as plain ASCII or UTF-8",
-                            file->path);
-  }
+  SUPINE_REFUSE_IF(memchr(file->bytes, '\0', file->size) != NULL, error, SUPINE_ERROR_FORMAT,
+                   "%s: the text holds a NUL byte; save it as plain ASCII or UTF-8", file->path);
   for (const unsigned char *at = file->bytes; (at = memchr(at, '\r', (size_t)(end - at))) != NULL;
        ++at) {
-    if (at + 1 == end || at[1] != '\n') {
-      return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s: a line ends in CR alone; save the text with LF line ends",
-                              file->path);
-    }
+    SUPINE_REFUSE_IF(at + 1 == end || at[1] != '\n', error, SUPINE_ERROR_FORMAT,
+                     "%s: a line ends in CR alone; save the text with LF line ends", file->path);
   }
   return SUPINE_OK;
 }

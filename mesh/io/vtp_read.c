@@ -25,10 +25,6 @@ typedef struct element {
   const char *body;     /* first byte after the > of the tag */
 } element;
 
-static supine_status malformed(const vtp_file *v, const char *what, supine_error *error) {
-  return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: %s", v->file->path, what);
-}
-
 /* Find the first element called `name` between `from` and `to`; return false if there is none. */
 static bool find_element(const char *from, const char *to, const char *name, element *found) {
   const size_t length = strlen(name);
@@ -190,12 +186,11 @@ static supine_status take_numbers(const vtp_file *v, const element *e, size_t co
       strcmp(name, character.name) == 0 ? &character : supine_mesh_type_find(word);
   *numbers = NULL;
   /* zlib expands a byte to at most 1032 bytes */
-  if (type == NULL || count > 1032 * (size_t)(v->end - v->bytes)) {
-    return malformed(v,
-                     "an array of its points or polygons has an unknown type or is too large; "
-                     "write the file again",
-                     error);
-  }
+  SUPINE_REFUSE_IF(type == NULL || count > 1032 * (size_t)(v->end - v->bytes), error,
+                   SUPINE_ERROR_FORMAT,
+                   "%s: an array of its points or polygons has an unknown type or is too large; "
+                   "write the file again",
+                   v->file->path);
   SUPINE_ARENA arena = {0};
   unsigned char *bytes = supine_arena_take(&arena, count, type->size);
   double *values = malloc((count + 1) * sizeof *values);
@@ -214,8 +209,9 @@ static supine_status take_numbers(const vtp_file *v, const element *e, size_t co
   for (size_t i = 0; i < count && good && !ascii; ++i) {
     values[i] = supine_mesh_type_decode(type, bytes + i * type->size, false);
   }
-  return good ? SUPINE_OK
-              : malformed(v, "an array is truncated or damaged; write the file again", error);
+  SUPINE_REFUSE_IF(!good, error, SUPINE_ERROR_FORMAT,
+                   "%s: an array is truncated or damaged; write the file again", v->file->path);
+  return SUPINE_OK;
 }
 
 /* Find an array in a piece's child element whose name is `within`. The array has the name `name`;
@@ -260,25 +256,23 @@ static supine_status take_polygons(const vtp_file *v, const element *piece, mesh
   if (count == 0) {
     return SUPINE_OK;
   }
-  if (!find_array(v, piece, "Polys", "offsets", &offsets) ||
-      !find_array(v, piece, "Polys", "connectivity", &connectivity)) {
-    return malformed(v, "its polygons have no offsets or connectivity; write the file again",
-                     error);
-  }
+  SUPINE_REFUSE_IF(!find_array(v, piece, "Polys", "offsets", &offsets) ||
+                       !find_array(v, piece, "Polys", "connectivity", &connectivity),
+                   error, SUPINE_ERROR_FORMAT,
+                   "%s: its polygons have no offsets or connectivity; write the file again",
+                   v->file->path);
   static const char wrong[] = "the offsets of its polygons are invalid; write the file again";
   SUPINE_FREED_BY(free_numbers) double *ends = NULL;
   SUPINE_FREED_BY(free_numbers) double *corners = NULL;
   SUPINE_TRY(take_numbers(v, &offsets, count, &ends, error));
   const double total = ends[count - 1];
-  if (!(total >= 0.0 && total <= 3.0 * MESH_TRIANGLES_MAX)) {
-    return malformed(v, wrong, error);
-  }
+  SUPINE_REFUSE_IF(!(total >= 0.0 && total <= 3.0 * MESH_TRIANGLES_MAX), error, SUPINE_ERROR_FORMAT,
+                   "%s: %s", v->file->path, wrong);
   SUPINE_TRY(take_numbers(v, &connectivity, (size_t)total, &corners, error));
   double from = 0.0;
   for (size_t p = 0; p < count; ++p) {
-    if (!(ends[p] >= from && ends[p] <= total)) {
-      return malformed(v, wrong, error);
-    }
+    SUPINE_REFUSE_IF(!(ends[p] >= from && ends[p] <= total), error, SUPINE_ERROR_FORMAT, "%s: %s",
+                     v->file->path, wrong);
     SUPINE_TRY(supine_mesh_faces_add(faces, corners + (size_t)from, (size_t)ends[p] - (size_t)from,
                                      error));
     from = ends[p];
@@ -291,30 +285,28 @@ static supine_status read_head(vtp_file *v, element *piece, supine_error *error)
   element appended;
   element second;
   char compressor[64];
-  if (!find_element(v->bytes, v->end, "VTKFile", &root) ||
-      !is_attribute(&root, "type", "PolyData")) {
-    return malformed(v, "no VTKFile of type PolyData; save the surface as PolyData", error);
-  }
-  if (is_attribute(&root, "byte_order", "BigEndian")) {
-    return malformed(v, "big-endian VTP is not supported; save the surface as PLY", error);
-  }
+  SUPINE_REFUSE_IF(!find_element(v->bytes, v->end, "VTKFile", &root) ||
+                       !is_attribute(&root, "type", "PolyData"),
+                   error, SUPINE_ERROR_FORMAT,
+                   "%s: no VTKFile of type PolyData; save the surface as PolyData", v->file->path);
+  SUPINE_REFUSE_IF(is_attribute(&root, "byte_order", "BigEndian"), error, SUPINE_ERROR_FORMAT,
+                   "%s: big-endian VTP is not supported; save the surface as PLY", v->file->path);
   v->header_size = is_attribute(&root, "header_type", "UInt64") ? 8 : 4;
   v->compressed = attribute(&root, "compressor", compressor, sizeof compressor);
-  if (v->compressed && strcmp(compressor, "vtkZLibDataCompressor") != 0) {
-    return malformed(v, "its compressor is not zlib; save the surface as PLY", error);
-  }
+  SUPINE_REFUSE_IF(v->compressed && strcmp(compressor, "vtkZLibDataCompressor") != 0, error,
+                   SUPINE_ERROR_FORMAT, "%s: its compressor is not zlib; save the surface as PLY",
+                   v->file->path);
   if (find_element(root.body, v->end, "AppendedData", &appended)) {
     const char *mark = memchr(appended.body, '_', (size_t)(v->end - appended.body));
     v->appended_raw = is_attribute(&appended, "encoding", "raw");
     v->appended = mark != NULL ? mark + 1 : NULL;
   }
   const char *limit = v->appended != NULL ? v->appended : v->end;
-  if (!find_element(root.body, limit, "Piece", piece)) {
-    return malformed(v, "no element Piece; write the file again", error);
-  }
-  if (find_element(piece->body, limit, "Piece", &second)) {
-    return malformed(v, "it has several Piece elements; save the surface as one piece", error);
-  }
+  SUPINE_REFUSE_IF(!find_element(root.body, limit, "Piece", piece), error, SUPINE_ERROR_FORMAT,
+                   "%s: no element Piece; write the file again", v->file->path);
+  SUPINE_REFUSE_IF(find_element(piece->body, limit, "Piece", &second), error, SUPINE_ERROR_FORMAT,
+                   "%s: it has several Piece elements; save the surface as one piece",
+                   v->file->path);
   return SUPINE_OK;
 }
 
@@ -349,19 +341,17 @@ supine_status supine_mesh_read_vtp(mesh_file *file, supine_mesh *mesh, size_t *d
   size_t count[3];
   SUPINE_TRY(read_head(&v, &piece, error));
   note_space(&v, &piece, file);
-  if (!count_of(&piece, "NumberOfPoints", &count[0]) ||
-      !count_of(&piece, "NumberOfPolys", &count[1]) ||
-      !count_of(&piece, "NumberOfStrips", &count[2])) {
-    return malformed(&v, "its numbers of points and polygons are invalid; write the file again",
-                     error);
-  }
-  if (count[2] > 0) {
-    return malformed(&v, "it has strips of triangles; save single triangles", error);
-  }
+  SUPINE_REFUSE_IF(!count_of(&piece, "NumberOfPoints", &count[0]) ||
+                       !count_of(&piece, "NumberOfPolys", &count[1]) ||
+                       !count_of(&piece, "NumberOfStrips", &count[2]),
+                   error, SUPINE_ERROR_FORMAT,
+                   "%s: its numbers of points and polygons are invalid; write the file again",
+                   v.file->path);
+  SUPINE_REFUSE_IF(count[2] > 0, error, SUPINE_ERROR_FORMAT,
+                   "%s: it has strips of triangles; save single triangles", v.file->path);
   if (count[0] > 0) {
-    if (!find_array(&v, &piece, "Points", NULL, &points)) {
-      return malformed(&v, "no array of points; write the file again", error);
-    }
+    SUPINE_REFUSE_IF(!find_array(&v, &piece, "Points", NULL, &points), error, SUPINE_ERROR_FORMAT,
+                     "%s: no array of points; write the file again", v.file->path);
     SUPINE_TRY(take_numbers(&v, &points, 3 * count[0], &mesh->vertices, error));
     mesh->vertex_count = count[0];
   }

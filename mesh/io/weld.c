@@ -65,9 +65,7 @@ supine_status supine_mesh_weld(supine_mesh *mesh, supine_mesh_report *report) {
   SUPINE_ARENA arena = {0};
   uint32_t *remap = supine_arena_take(&arena, mesh->vertex_count, sizeof *remap);
   uint32_t *slots = supine_arena_take(&arena, slot_count, sizeof *slots);
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   memset(slots, 0xFF, slot_count * sizeof *slots);
 
   size_t kept = join(mesh, remap, slots, slot_count);

@@ -178,12 +178,10 @@ static supine_status choose(const char *path, const supine_image *image, const l
       *name = wanted;
     }
   }
-  if (!read_sides(labels, side)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--labels must be 'one', 'lungmask', 'lobes', 'totalsegmentator', "
-                            "'totalsegmentator-v1' or left=LABEL+...,right=LABEL+..., not '%s'",
-                            wanted);
-  }
+  SUPINE_REFUSE_IF(!read_sides(labels, side), error, SUPINE_ERROR_ARGUMENT,
+                   "--labels must be 'one', 'lungmask', 'lobes', 'totalsegmentator', "
+                   "'totalsegmentator-v1' or left=LABEL+...,right=LABEL+..., not '%s'",
+                   wanted);
   return SUPINE_OK;
 }
 

@@ -140,9 +140,7 @@ static supine_status one_piece(labels_cubes *cubes) {
   size_t changed = 0;
   SUPINE_ARENA arena = {0};
   inside.at = supine_arena_take(&arena, count, 1);
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   for (size_t i = 0; i < count; ++i) {
     inside.at[i] = cubes->share[i] >= half;
   }
@@ -161,9 +159,7 @@ static supine_status average_cubes(const labels_mask *mask, labels_cubes *cubes)
   SUPINE_ARENA arena = {0};
   float *rows = supine_arena_take(&arena, m[0] * n[1] * n[2], sizeof *rows);
   float *planes = supine_arena_take(&arena, m[0] * m[1] * n[2], sizeof *planes);
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   average_rows(mask, m[0], cubes->ratio[0], rows);
   average(rows, n[2], n[1], m[0], m[1], cubes->ratio[1], planes);
   average(planes, 1, n[2], m[0] * m[1], m[2], cubes->ratio[2], cubes->share);
@@ -182,9 +178,7 @@ supine_status supine_labels_cubes_create(const labels_mask *mask, double edge, b
   }
   cubes->share =
       supine_arena_take(arena, cubes->size[0] * cubes->size[1] * cubes->size[2], sizeof(float));
-  if (arena->failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(arena));
   SUPINE_TRY(average_cubes(mask, cubes));
   do {
     SUPINE_TRY(one ? one_piece(cubes) : SUPINE_OK);

@@ -99,9 +99,7 @@ supine_status supine_labels_distance(const labels_mask *mask, bool zero, float *
   sweep s = {.mask = mask, .zero = zero, .squares = squares};
   s.length = size[1] > size[2] ? size[1] : size[2];
   s.space = supine_arena_take(&arena, threads * 3 * (s.length + 2), sizeof *s.space);
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   supine_parallel_for(size[1] * size[2], GRAIN, threads, along_rows, &s);
   s.axis = 1;
   supine_parallel_for(size[0] * size[2], GRAIN, threads, along_lines, &s);
@@ -116,9 +114,7 @@ supine_status supine_labels_close(labels_mask *mask, double radius, size_t *adde
   SUPINE_ARENA arena = {0};
   float *squares = supine_arena_take(&arena, count, sizeof *squares);
   *added = 0;
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   SUPINE_TRY(supine_labels_distance(mask, false, squares));
   /* set voxels outside the mask, but within `radius` of it, to 2 */
   for (size_t i = 0; i < count; ++i) {

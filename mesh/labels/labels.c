@@ -8,7 +8,6 @@
 #include "base/text.h"
 #include "base/vec3.h"
 
-#include "mesh/anatomy.h"
 #include "mesh/labels/mask.h"
 
 static const double least_edge = 0.2; /* mm; makes about ten million vertices */
@@ -77,11 +76,9 @@ static supine_status join_images(work *w, const char *const *paths, size_t count
       supine_image_free(&image);
       SUPINE_TRY(read_image(w, paths[f], &image, error));
     }
-    if (!same_frame(&first, &image)) {
-      return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s: size, position or axes differ from %s: give masks of one scan",
-                              paths[f], paths[0]);
-    }
+    SUPINE_REFUSE_IF(!same_frame(&first, &image), error, SUPINE_ERROR_FORMAT,
+                     "%s: size, position or axes differ from %s: give masks of one scan", paths[f],
+                     paths[0]);
     for (size_t i = 0; i < voxels; ++i) {
       joined[i] =
           joined[i] == 0 && supine_image_get(&image, i) != 0.0 ? (uint8_t)(f + 1) : joined[i];
@@ -149,9 +146,7 @@ static supine_status read_map(work *w, const char *const *paths, size_t count,
   SUPINE_ARENA arena = {0};
   labels_tally *tally = supine_arena_take(&arena, LABELS_MAX, sizeof *tally);
   uint8_t *side = supine_arena_take(&arena, LABELS_MAX, 1);
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   SUPINE_TRY(advance(w, 0.2, error));
   SUPINE_TRY(supine_labels_count(w->path, &w->image, tally, error));
   w->choice.taken = report->taken;
@@ -229,21 +224,17 @@ static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung,
   for (int a = 0; a < 3; ++a) {
     longest = fmax(longest, (double)(mask.size[a] - 2 * margin) * mask.spacing[a]);
   }
-  if (!(lung->mask >= least_volume && longest <= longest_lung)) {
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "%s: the %s lung holds %.4g mL in a box %.4g mm long, which is "
-                            "impossible for a lung: check --labels and the voxel size in the "
-                            "header",
-                            w->path, name, lung->mask, longest);
-  }
+  SUPINE_REFUSE_IF(!(lung->mask >= least_volume && longest <= longest_lung), error,
+                   SUPINE_ERROR_MESH,
+                   "%s: the %s lung holds %.4g mL in a box %.4g mm long, which is impossible for a "
+                   "lung: check --labels and the voxel size in the header",
+                   w->path, name, lung->mask, longest);
   SUPINE_TRY(supine_labels_mask_surface(&mask, w->edge, true, mesh));
   supine_labels_mask_free(&mask);
-  if (mesh->triangle_count == 0) {
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "%s: the %s lung is thinner than half of --edge %g everywhere: "
-                            "give a smaller edge",
-                            w->path, name, w->edge);
-  }
+  SUPINE_REFUSE_IF(
+      mesh->triangle_count == 0, error, SUPINE_ERROR_MESH,
+      "%s: the %s lung is thinner than half of --edge %g everywhere: give a smaller edge", w->path,
+      name, w->edge);
   SUPINE_FREED_BY(supine_mesh_topology_free) supine_topology topology = {0};
   SUPINE_TRY(supine_mesh_topology_create(mesh, &topology));
   lung->tunnels = topology.genus;
@@ -279,6 +270,7 @@ static supine_status check_sides(const work *w, const supine_mesh *surfaces, sup
 static supine_status make_surfaces(work *w, const char *const *paths, size_t count,
                                    supine_mesh *surfaces, supine_error *error) {
   supine_labels_report *report = w->report;
+  SUPINE_TRY(supine_labels_pieces_begin(error));
   SUPINE_TRY(read_map(w, paths, count, error));
   supine_image_free(&w->image);
   if (memchr(w->both.at, LABELS_EITHER, supine_labels_mask_count(&w->both)) != NULL) {
@@ -304,13 +296,12 @@ supine_status supine_labels_surfaces(const char *const *paths, size_t count,
   work w = {.path = paths[0], .options = options, .report = report};
   w.edge = options->edge != 0.0 ? options->edge : SUPINE_LABELS_EDGE;
   *report = (supine_labels_report){.lung_count = 0};
-  if (!(w.edge >= least_edge && w.edge <= most_edge) ||
-      !(options->close >= 0.0 && options->close <= most_closing_radius) || count > FILES_MAX) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "give --edge from %g to %g mm, --close from 0 to %g mm, and at most %d "
-                            "images",
-                            least_edge, most_edge, most_closing_radius, FILES_MAX);
-  }
+  SUPINE_REFUSE_IF(!(w.edge >= least_edge && w.edge <= most_edge) ||
+                       !(options->close >= 0.0 && options->close <= most_closing_radius) ||
+                       count > FILES_MAX,
+                   error, SUPINE_ERROR_ARGUMENT,
+                   "give --edge from %g to %g mm, --close from 0 to %g mm, and at most %d images",
+                   least_edge, most_edge, most_closing_radius, FILES_MAX);
   const supine_status status = make_surfaces(&w, paths, count, surfaces, error);
   supine_image_free(&w.image);
   supine_labels_mask_free(&w.both);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/** @file Make the closed surface of each lung from a segmenter's label map. */
+/** @file Make closed surfaces from a segmenter's label map: of each lung, or of each label
+ * (nodules, airways, lobes). */
 #ifndef SUPINE_LABELS_H
 #define SUPINE_LABELS_H
 
@@ -68,10 +69,25 @@ typedef struct supine_labels_report {
  * manifold. It is smoothed without shrinking [Taubin1995]; no vertex moves by more than a cube.
  *
  * @param surfaces  [2] zero-initialised; surface i is that of report->lung[i] and faces outwards
- * Memory: the image and 1 byte per voxel. For each voxel of the lungs' bounding box, splitting lungs
- * takes 10 bytes more and closing gaps takes 4 bytes more. */
+ * Memory: the image, 1 byte per voxel, and up to 18 bytes for each voxel of the lungs' box. */
 supine_status supine_labels_surfaces(const char *const *paths, size_t count,
                                      const supine_labels_options *options, supine_mesh *surfaces,
                                      supine_labels_report *report, supine_error *error);
+
+typedef struct supine_labels_shape {
+  unsigned label;
+  double mask; /**< volume of the label's voxels, mL */
+  supine_mesh surface;
+} supine_labels_shape;
+
+/** Make the surface of each wanted label of a map (.nrrd, .nii, .nii.gz, .mha), as
+ * supine_labels_surfaces does, but keep all connected pieces and cavities. The distance between
+ * vertices is about one voxel or, if that is larger, 1/50 of the cube root of the label's volume.
+ * @param wanted  [wanted_count] labels, 1 to 65535; all labels present if the count is 0
+ * @param parts   [*count] output in the order of `wanted`, or by ascending label; release with
+ *             supine_labels_shapes_free */
+supine_status supine_labels_shapes(const char *path, const unsigned *wanted, size_t wanted_count,
+                                   supine_labels_shape **parts, size_t *count, supine_error *error);
+void supine_labels_shapes_free(supine_labels_shape *parts, size_t count);
 
 #endif

@@ -24,31 +24,6 @@ void supine_labels_mask_place(const labels_mask *mask, const double voxel[3], do
   }
 }
 
-/* Find the first and the last index along each axis of the voxels with a value. Return false if
- * there are none. */
-static bool box_of(const labels_mask *mask, uint8_t value, size_t low[3], size_t high[3]) {
-  bool any = false;
-  for (size_t row = 0; row < mask->size[1] * mask->size[2]; ++row) {
-    const uint8_t *at = mask->at + row * mask->size[0];
-    const uint8_t *first = memchr(at, value, mask->size[0]);
-    if (first == NULL) {
-      continue;
-    }
-    const uint8_t *last = at + mask->size[0] - 1;
-    while (*last != value) {
-      --last;
-    }
-    const size_t from[3] = {(size_t)(first - at), row % mask->size[1], row / mask->size[1]};
-    const size_t to[3] = {(size_t)(last - at), from[1], from[2]};
-    for (int a = 0; a < 3; ++a) {
-      low[a] = !any || from[a] < low[a] ? from[a] : low[a];
-      high[a] = !any || to[a] > high[a] ? to[a] : high[a];
-    }
-    any = true;
-  }
-  return any;
-}
-
 /* Read the labels of a row; if a voxel is not a label, set `bad` to its value and return false. */
 static bool read_row(const supine_image *image, size_t row, uint16_t *labels, double *bad) {
   const size_t size = image->size[0];
@@ -78,8 +53,8 @@ static void count_row(const supine_image *image, size_t row, const uint16_t *lab
     const size_t to[3] = {i - 1, place[1], place[2]};
     const uint64_t length = i - begin;
     for (int a = 0; a < 3; ++a) {
-      t->low[a] = t->count == 0 || from[a] < t->low[a] ? (uint32_t)from[a] : t->low[a];
-      t->high[a] = t->count == 0 || to[a] > t->high[a] ? (uint32_t)to[a] : t->high[a];
+      t->low[a] = t->count == 0 || from[a] < t->low[a] ? from[a] : t->low[a];
+      t->high[a] = t->count == 0 || to[a] > t->high[a] ? to[a] : t->high[a];
       t->sum[a] += a == 0 ? length * (begin + i - 1) / 2 : length * place[a];
     }
     t->count += length;
@@ -90,21 +65,16 @@ supine_status supine_labels_count(const char *path, const supine_image *image, l
                                   supine_error *error) {
   SUPINE_ARENA arena = {0};
   uint16_t *labels = supine_arena_take(&arena, image->size[0], sizeof *labels);
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   memset(tally, 0, LABELS_MAX * sizeof *tally);
   for (size_t row = 0; row < image->size[1] * image->size[2]; ++row) {
     double bad = 0.0;
-    if (!read_row(image, row, labels, &bad)) {
-      return supine_error_set(
-          error, SUPINE_ERROR_FORMAT,
-          bad < 0.0 ? "%s: a voxel holds %g, but labels are 0 to 65535: if this is the CT itself, "
-                      "segment it first"
-                    : "%s: a voxel holds %g, but labels are whole numbers, 0 to 65535: threshold "
-                      "probabilities into a mask first",
-          path, bad);
-    }
+    SUPINE_REFUSE_IF(!read_row(image, row, labels, &bad), error, SUPINE_ERROR_FORMAT,
+                     bad < 0.0 ? "%s: a voxel holds %g, but labels are 0 to 65535: if this is the "
+                                 "CT itself, segment it first"
+                               : "%s: a voxel holds %g, but labels are whole numbers, 0 to 65535: "
+                                 "threshold probabilities into a mask first",
+                     path, bad);
     count_row(image, row, labels, tally);
   }
   return tally[0].count < image->size[0] * image->size[1] * image->size[2]
@@ -152,18 +122,20 @@ supine_status supine_labels_mask_cut(const supine_image *image, const size_t low
 
 supine_status supine_labels_mask_extract(const labels_mask *from, uint8_t value, size_t margin,
                                          labels_mask *mask) {
-  size_t low[3];
-  size_t high[3];
   uint8_t kept[UINT8_MAX + 1] = {0};
   supine_image image = {.voxel = SUPINE_VOXEL_U8, .values = from->at};
+  SUPINE_ARENA arena = {0};
+  labels_tally *tally = supine_arena_take(&arena, LABELS_MAX, sizeof *tally);
   *mask = (labels_mask){.at = NULL};
+  SUPINE_TRY(supine_arena_status(&arena));
   memcpy(image.size, from->size, sizeof image.size);
   memcpy(image.origin, from->origin, sizeof image.origin);
   memcpy(image.step, from->step, sizeof image.step);
+  SUPINE_TRY(supine_labels_count("", &image, tally, NULL));
   kept[value] = 1;
-  return box_of(from, value, low, high)
-             ? supine_labels_mask_cut(&image, low, high, margin, kept, mask)
-             : SUPINE_OK;
+  return tally[value].count > 0 ? supine_labels_mask_cut(&image, tally[value].low,
+                                                         tally[value].high, margin, kept, mask)
+                                : SUPINE_OK;
 }
 
 void supine_labels_mask_free(labels_mask *mask) {

@@ -191,9 +191,7 @@ static void step(const surface_net *net, double share, double (*next)[3]) {
 static supine_status relax(surface_net *net) {
   SUPINE_ARENA arena = {0};
   double(*next)[3] = supine_arena_take(&arena, net->count, sizeof *next);
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   for (int turn = 0; turn < 2 * TURNS; ++turn) { /* an even number of exchanges */
     step(net, turn % 2 == 0 ? shrink : swell, next);
     double(*old)[3] = net->at;

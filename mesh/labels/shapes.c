@@ -4,7 +4,6 @@
 #include <stdlib.h>
 
 #include "mesh/labels/mask.h"
-#include "mesh/labels/shapes.h"
 
 enum { PARTS_MAX = 256 }; /* an image with more labels is probably no label map */
 
@@ -16,11 +15,9 @@ static const double edge_share = 0.02;
  * @param value  [LABELS_MAX] work space, zero before and after the call */
 static supine_status make_part(const supine_image *image, const labels_tally *tally, uint8_t *value,
                                supine_labels_shape *part) {
-  const size_t low[3] = {tally->low[0], tally->low[1], tally->low[2]};
-  const size_t high[3] = {tally->high[0], tally->high[1], tally->high[2]};
   SUPINE_FREED_BY(supine_labels_mask_free) labels_mask mask;
   value[part->label] = 1;
-  SUPINE_TRY(supine_labels_mask_cut(image, low, high, LABELS_MARGIN, value, &mask));
+  SUPINE_TRY(supine_labels_mask_cut(image, tally->low, tally->high, LABELS_MARGIN, value, &mask));
   value[part->label] = 0;
   part->mask = supine_labels_voxel_ml(&mask) * (double)tally->count;
   const double edge =
@@ -33,20 +30,15 @@ static supine_status choose(const char *path, const labels_tally *tally, const u
                             supine_error *error) {
   *count = 0;
   for (size_t i = 0; i < wanted_count; ++i) {
-    if (wanted[i] == 0 || wanted[i] >= LABELS_MAX || tally[wanted[i]].count == 0) {
-      return supine_error_set(error, SUPINE_ERROR_MESH,
-                              "%s: no voxel holds the label %u: correct the label", path,
-                              wanted[i]);
-    }
+    SUPINE_REFUSE_IF(wanted[i] == 0 || wanted[i] >= LABELS_MAX || tally[wanted[i]].count == 0,
+                     error, SUPINE_ERROR_MESH, "%s: no voxel holds the label %u: correct the label",
+                     path, wanted[i]);
     parts[(*count)++].label = wanted[i];
   }
   for (unsigned label = 1; label < LABELS_MAX && wanted_count == 0; ++label) {
-    if (tally[label].count > 0 && *count == PARTS_MAX) {
-      return supine_error_set(
-          error, SUPINE_ERROR_MESH,
-          "%s: more than %d labels: if this is a label map, name the labels to use", path,
-          PARTS_MAX);
-    }
+    SUPINE_REFUSE_IF(tally[label].count > 0 && *count == PARTS_MAX, error, SUPINE_ERROR_MESH,
+                     "%s: more than %d labels: if this is a label map, name the labels to use",
+                     path, PARTS_MAX);
     if (tally[label].count > 0) {
       parts[(*count)++].label = label;
     }
@@ -60,9 +52,7 @@ static supine_status make_parts(const char *path, const unsigned *wanted, size_t
   labels_tally *tally = supine_arena_take(&arena, LABELS_MAX, sizeof *tally);
   uint8_t *value = supine_arena_zeros(&arena, LABELS_MAX, 1);
   SUPINE_FREED_BY(supine_image_free) supine_image image = {0};
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   SUPINE_TRY(supine_image_read(path, &image, error));
   SUPINE_TRY(supine_labels_count(path, &image, tally, error));
   SUPINE_TRY(choose(path, tally, wanted, wanted_count, parts, count, error));

@@ -45,7 +45,7 @@ typedef struct fitting {
   fit chosen;
   double
       *residual; /* [directions] the prediction error is the sum of these times the input fields */
-  supine_arena arena;
+  supine_arena *arena;
 } fitting;
 
 /* Fit harmonics up to degree `band`. The arrays of the fit are valid until `kept` is freed. */
@@ -62,9 +62,8 @@ static supine_status fit_create(size_t band, size_t count, const double *directi
   double *u = supine_arena_take(&arena, count * terms, sizeof *u);
   double *vt = supine_arena_take(&arena, terms * terms, sizeof *vt);
   double *s = supine_arena_zeros(&arena, terms, sizeof *s);
-  if (kept->failed || arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(kept));
+  SUPINE_TRY(supine_arena_status(&arena));
   SUPINE_TRY(supine_sh_evaluate_many(band, count, directions, f->harmonics));
   memcpy(a, f->harmonics, count * terms * sizeof *a);
   SUPINE_TRY(
@@ -113,9 +112,7 @@ static supine_status predict(const fitting *w, const fit *f, size_t d, size_t mo
   double *eigenvectors = supine_arena_take(&arena, f->terms * f->terms, sizeof *eigenvectors);
   double *target = supine_arena_take(&arena, f->terms, sizeof *target); /* y, or y on the modes */
   double *gram_residual = supine_arena_take(&arena, f->count, sizeof *gram_residual);
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   cblas_dgemv(CblasRowMajor, CblasTrans, p, m, -1.0, f->pinv, m, y, 1, 0.0, residual, 1);
   residual[d] += 1.0;
   memcpy(pinv, f->pinv, f->terms * f->count * sizeof *pinv);
@@ -168,7 +165,7 @@ static supine_status choose_band(fitting *w, int wanted, supine_fit_report *repo
   size_t determined_count = 0;
   for (size_t band = 0; band <= SUPINE_FIT_BAND_MAX && supine_sh_count(band) < m; ++band) {
     fit trial;
-    supine_status status = fit_create(band, m, w->fields->directions, &w->arena, &trial);
+    supine_status status = fit_create(band, m, w->fields->directions, w->arena, &trial);
     const bool determined = status == SUPINE_OK && fit_is_determined(&trial);
     if (determined) {
       status = leave_one_out(w, &trial, &report->error[band]);
@@ -188,13 +185,10 @@ static supine_status choose_band(fitting *w, int wanted, supine_fit_report *repo
       report->band = band;
     }
   }
-  if (w->chosen.harmonics == NULL) {
-    return supine_error_set(
-        error, SUPINE_ERROR_ARGUMENT,
-        "%zu directions do not determine band %d (%d harmonics); the highest "
-        "band that they determine is %d: give more directions, or leave --band out",
-        m, wanted, (wanted + 1) * (wanted + 1), (int)determined_count - 1);
-  }
+  SUPINE_REFUSE_IF(w->chosen.harmonics == NULL, error, SUPINE_ERROR_ARGUMENT,
+                   "%zu directions do not determine band %d (%d harmonics); the highest band that "
+                   "they determine is %d: give more directions, or leave --band out",
+                   m, wanted, (wanted + 1) * (wanted + 1), (int)determined_count - 1);
   report->band_highest = determined_count - 1;
   return SUPINE_OK;
 }
@@ -229,9 +223,7 @@ static supine_status cross_validate(const fitting *w, size_t modes, supine_accur
   SUPINE_ARENA arena = {0};
   supine_tally *tally = supine_arena_zeros(&arena, 1, sizeof *tally);
   double *residual = supine_arena_take(&arena, w->rows, sizeof *residual);
-  if (arena.failed) {
-    return supine_error_memory(error, "%zu vertices", w->fields->vertex_count);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", w->fields->vertex_count));
   for (size_t d = 0; d < m; ++d) {
     double square;
     const supine_status status = predict(w, &w->chosen, d, modes, &square);
@@ -285,34 +277,25 @@ static void subtract_scan(const double scan_gravity[3], supine_compression *made
   }
 }
 
-static void free_fitting(fitting *w) {
-  supine_arena_free(&w->arena);
-}
-
 supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_options *options,
                                 supine_compression *compression, supine_fit_report *report,
                                 supine_error *error) {
   const int m = (int)fields->direction_count;
-  SUPINE_FREED_BY(free_fitting) fitting w = {.fields = fields, .rows = 3 * fields->vertex_count};
+  SUPINE_ARENA arena = {0};
+  fitting w = {.fields = fields, .rows = 3 * fields->vertex_count, .arena = &arena};
   const int rows = (int)w.rows;
   SUPINE_FREED_BY(supine_sh_expansion_free) supine_expansion expansion = {0};
   SUPINE_FREED_BY(supine_sh_compression_free) supine_compression made = {0};
   supine_fit_report found = {0};
-  if (m < 2) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "too few directions of gravity (%d): give fields for at least two", m);
-  }
-  w.gram = supine_arena_take(&w.arena, (size_t)m * (size_t)m, sizeof *w.gram);
-  w.residual = supine_arena_take(&w.arena, (size_t)m, sizeof *w.residual);
-  if (w.arena.failed) {
-    return supine_error_memory(error, "%d fields", m);
-  }
+  SUPINE_REFUSE_IF(m < 2, error, SUPINE_ERROR_ARGUMENT,
+                   "too few directions of gravity (%d): give fields for at least two", m);
+  w.gram = supine_arena_take(&arena, (size_t)m * (size_t)m, sizeof *w.gram);
+  w.residual = supine_arena_take(&arena, (size_t)m, sizeof *w.residual);
+  SUPINE_TRY(supine_arena_check(&arena, error, "%d fields", m));
   cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, m, m, rows, 1.0, fields->displacement, rows,
               fields->displacement, rows, 0.0, w.gram, m);
-  if (!(square_sum(&w) > 0.0)) {
-    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                            "all displacements are zero: give fields that move the surface");
-  }
+  SUPINE_REFUSE_IF(!(square_sum(&w) > 0.0), error, SUPINE_ERROR_NUMERICAL,
+                   "all displacements are zero: give fields that move the surface");
   SUPINE_TRY(choose_band(&w, options->band, &found, error));
   SUPINE_TRY(project(&w, found.band, &expansion, error));
   SUPINE_TRY(compress(&expansion, options, found.error[found.band], &made, error));

@@ -69,19 +69,16 @@ static bool read_row(const reading *r, const supine_tensor *tensor, size_t row, 
 static supine_status read_direction(const reading *r, size_t row) {
   double *g = r->fields.directions + 3 * row;
   double given[3];
-  if (!read_row(r, r->gravity, row, 1.0, given) || !supine_normalise(given, g)) {
-    return supine_error_set(r->error, SUPINE_ERROR_FORMAT,
-                            "%s: row %zu: gravity %g,%g,%g has no direction: give a vector that is "
-                            "finite and not 0",
-                            r->path, row, given[0], given[1], given[2]);
-  }
+  SUPINE_REFUSE_IF(
+      !read_row(r, r->gravity, row, 1.0, given) || !supine_normalise(given, g), r->error,
+      SUPINE_ERROR_FORMAT,
+      "%s: row %zu: gravity %g,%g,%g has no direction: give a vector that is finite and not 0",
+      r->path, row, given[0], given[1], given[2]);
   for (size_t earlier = 0; earlier < row; ++earlier) {
-    if (supine_distance(g, r->fields.directions + 3 * earlier) < same_direction) {
-      return supine_error_set(r->error, SUPINE_ERROR_FORMAT,
-                              "%s: rows %zu and %zu have the same direction of gravity: keep one "
-                              "of them",
-                              r->path, earlier, row);
-    }
+    SUPINE_REFUSE_IF(supine_distance(g, r->fields.directions + 3 * earlier) < same_direction,
+                     r->error, SUPINE_ERROR_FORMAT,
+                     "%s: rows %zu and %zu have the same direction of gravity: keep one of them",
+                     r->path, earlier, row);
   }
   return SUPINE_OK;
 }
@@ -90,18 +87,15 @@ static supine_status read_direction(const reading *r, size_t row) {
 static supine_status match_point(const reading *r, const supine_inside_surface *vertices,
                                  double limit, size_t p) {
   double at[3];
-  if (!read_row(r, r->points, p, r->frame.millimetres_per_unit, at)) {
-    return supine_error_set(r->error, SUPINE_ERROR_FORMAT,
-                            "%s: point %zu is not finite: correct it", r->path, p);
-  }
+  SUPINE_REFUSE_IF(!read_row(r, r->points, p, r->frame.millimetres_per_unit, at), r->error,
+                   SUPINE_ERROR_FORMAT, "%s: point %zu is not finite: correct it", r->path, p);
   const supine_inside_place place = supine_inside_surface_nearest(vertices, at, NULL);
   const size_t i = place.triangle;
-  if (place.depth <= limit && fabs(place.depth - r->apart[i]) <= 1e-3 * limit) {
-    return supine_error_set(r->error, SUPINE_ERROR_MESH,
-                            "%s: points %zu and %zu are at the same place: keep the one that "
-                            "belongs to the lungs",
-                            r->path, r->point_of[i], p);
-  }
+  SUPINE_REFUSE_IF(
+      place.depth <= limit && fabs(place.depth - r->apart[i]) <= 1e-3 * limit, r->error,
+      SUPINE_ERROR_MESH,
+      "%s: points %zu and %zu are at the same place: keep the one that belongs to the lungs",
+      r->path, r->point_of[i], p);
   if (place.depth <= limit && place.depth < r->apart[i]) {
     r->apart[i] = place.depth;
     r->point_of[i] = p;
@@ -128,13 +122,11 @@ static supine_status match_points(const reading *r) {
   }
   for (size_t i = 0; i < n; ++i) {
     const double *v = lungs->mesh.vertices + 3 * i;
-    if (isinf(r->apart[i])) {
-      return supine_error_set(
-          r->error, SUPINE_ERROR_MESH,
-          "%s: the vertex at %.3f,%.3f,%.3f mm (LPS) has no point of its own within %.2g mm: give "
-          "a point for each vertex of the surface, in the axes and unit of its file",
-          r->path, v[0], v[1], v[2], limit);
-    }
+    SUPINE_REFUSE_IF(
+        isinf(r->apart[i]), r->error, SUPINE_ERROR_MESH,
+        "%s: the vertex at %.3f,%.3f,%.3f mm (LPS) has no point of its own within %.2g mm: give a "
+        "point for each vertex of the surface, in the axes and unit of its file",
+        r->path, v[0], v[1], v[2], limit);
   }
   return SUPINE_OK;
 }
@@ -143,13 +135,12 @@ static supine_status match_points(const reading *r) {
 static supine_status read_field(const reading *r, size_t row) {
   const size_t n = r->fields.vertex_count;
   for (size_t i = 0; i < n; ++i) {
-    if (!read_row(r, r->displacement, row * r->points->shape[0] + r->point_of[i],
-                  r->frame.millimetres_per_unit, r->fields.displacement + 3 * (n * row + i))) {
-      return supine_error_set(r->error, SUPINE_ERROR_FORMAT,
-                              "%s: row %zu: the displacement of point %zu is not finite: correct "
-                              "it",
-                              r->path, row, r->point_of[i]);
-    }
+    SUPINE_REFUSE_IF(!read_row(r, r->displacement, row * r->points->shape[0] + r->point_of[i],
+                               r->frame.millimetres_per_unit,
+                               r->fields.displacement + 3 * (n * row + i)),
+                     r->error, SUPINE_ERROR_FORMAT,
+                     "%s: row %zu: the displacement of point %zu is not finite: correct it",
+                     r->path, row, r->point_of[i]);
   }
   return SUPINE_OK;
 }
@@ -198,12 +189,11 @@ supine_status supine_fields_load(const char *path, const supine_lungs *lungs,
   reading r = {.path = path, .lungs = lungs, .frame = *frame, .error = error};
   r.frame.millimetres_per_unit += r.frame.millimetres_per_unit == 0.0;
   const supine_status status = supine_safetensors_open(path, &r.file, error);
-  if (status == SUPINE_ERROR_FORMAT && !supine_text_ends_in(path, ".safetensors")) {
-    return supine_error_set(error, status,
-                            "%s: no safetensors file: convert the results of another program, such "
-                            "as .frd or .dat of CalculiX or .xplt of FEBio, in Python with " WRITE,
-                            path);
-  }
+  SUPINE_REFUSE_IF(status == SUPINE_ERROR_FORMAT && !supine_text_ends_in(path, ".safetensors"),
+                   error, status,
+                   "%s: no safetensors file: convert the results of another program, such as .frd "
+                   "or .dat of CalculiX or .xplt of FEBio, in Python with " WRITE,
+                   path);
   SUPINE_TRY(status);
   r.points = supine_safetensors_find(r.file, "points");
   r.gravity = supine_safetensors_find(r.file, "gravity");

@@ -17,18 +17,17 @@ enum { AFFINE = 4, POINTS = 32, CENTRES = 64 };
 
 /* Set fit->middle to the centre of the points' bounding box, and fit->unit to half its diagonal. */
 static void frame(size_t count, const double *points, supine_inside_biharmonic *fit) {
-  double square = 0.0;
-  for (int k = 0; k < 3; ++k) {
-    double low = INFINITY;
-    double high = -INFINITY;
-    for (size_t i = 0; i < count; ++i) {
-      low = fmin(low, points[3 * i + (size_t)k]);
-      high = fmax(high, points[3 * i + (size_t)k]);
-    }
-    fit->middle[k] = 0.5 * (low + high);
-    square += 0.25 * (high - low) * (high - low);
+  double low[3];
+  double high[3];
+  supine_box_begin(low, high);
+  for (size_t i = 0; i < count; ++i) {
+    supine_box_add(points + 3 * i, low, high);
   }
-  fit->unit = square > 0.0 ? sqrt(square) : 1.0;
+  for (int k = 0; k < 3; ++k) {
+    fit->middle[k] = 0.5 * (low[k] + high[k]);
+  }
+  const double half = 0.5 * supine_distance(low, high);
+  fit->unit = half > 0.0 ? half : 1.0;
 }
 
 /* Choose the centres: first the point farthest from fit->middle, then repeatedly the point whose
@@ -37,9 +36,7 @@ SUPINE_CLONES static supine_status choose(size_t count, const double *points, si
                                           supine_inside_biharmonic *fit) {
   SUPINE_ARENA arena = {0};
   double *distance = supine_arena_take(&arena, count, sizeof *distance);
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   size_t farthest = 0;
   for (size_t i = 0; i < count; ++i) {
     distance[i] = supine_distance(points + 3 * i, fit->middle);
@@ -137,9 +134,7 @@ static supine_status solve(supine_inside_biharmonic *fit, const double *values) 
   SUPINE_ARENA arena = {0};
   double *matrix = supine_arena_take(&arena, n * n, sizeof *matrix);
   double *p = supine_arena_take(&arena, n * (AFFINE + fit->columns), sizeof *p);
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   fill(n, fit->centres, matrix);
   for (size_t i = 0; i < n; ++i) {
     p[i] = 1.0;
@@ -167,9 +162,6 @@ supine_status supine_inside_biharmonic_fit(size_t count, const double *points, s
   frame(count, points, fit);
   supine_status status = arena.failed ? SUPINE_ERROR_MEMORY : choose(count, points, most, fit);
   status = status == SUPINE_OK ? solve(fit, values) : status;
-  if (status != SUPINE_OK) {
-    supine_inside_biharmonic_free(fit);
-  }
   return status == SUPINE_ERROR_MEMORY
              ? supine_error_memory(error, "interpolation from %zu points", most)
          : status != SUPINE_OK

@@ -15,7 +15,8 @@
 
 #include "base/arena.h"
 
-/** An interpolant of given values. Zero-initialise; release with supine_inside_biharmonic_free. */
+/** An interpolant of given values. Zero-initialise; release with supine_inside_biharmonic_free,
+ * also after an error. */
 typedef struct supine_inside_biharmonic {
   supine_arena arena; /**< holds the arrays */
   size_t count;       /**< number of centres: input points at which the function is exact */

@@ -116,12 +116,10 @@ supine_status supine_inside_content_make_rigid(supine_inside_content *content, c
         content->rigid[i] = found = true;
       }
     }
-    if (!found) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "--rigid: no part is named '%.*s': give a mesh's file name without "
-                              "its ending, or a label as in --labels",
-                              (int)length, at);
-    }
+    SUPINE_REFUSE_IF(!found, error, SUPINE_ERROR_ARGUMENT,
+                     "--rigid: no part is named '%.*s': give a mesh's file name without its "
+                     "ending, or a label as in --labels",
+                     (int)length, at);
     at += length;
     if (*at == '\0') {
       return SUPINE_OK;
@@ -142,20 +140,16 @@ supine_status supine_inside_content_check_names(const supine_inside_content *con
                                                 supine_error *error) {
   SUPINE_ARENA arena = {0};
   const char **names = supine_arena_take(&arena, content->part_count, sizeof *names);
-  if (arena.failed) {
-    return supine_error_memory(error, "%zu names", content->part_count);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu names", content->part_count));
   const char *name = content->names;
   for (size_t i = 0; i < content->part_count; ++i, name += strcspn(name, "\n") + 1) {
     names[i] = name;
   }
   qsort(names, content->part_count, sizeof *names, compare_names);
   for (size_t i = 1; i < content->part_count; ++i) {
-    if (compare_names(&names[i - 1], &names[i]) == 0) {
-      return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "two parts are named '%.*s': give each a name of its own",
-                              (int)strcspn(names[i], "\n"), names[i]);
-    }
+    SUPINE_REFUSE_IF(compare_names(&names[i - 1], &names[i]) == 0, error, SUPINE_ERROR_FORMAT,
+                     "two parts are named '%.*s': give each a name of its own",
+                     (int)strcspn(names[i], "\n"), names[i]);
   }
   return SUPINE_OK;
 }

@@ -14,19 +14,13 @@ static const double nodes_max = 2147483648.0;
 /* Find the bounding box of the lungs, extended by the margin, in voxel coordinates of `grid`. */
 static void cover(const supine_inside_shells *shells, const supine_image *grid, double margin,
                   double low[3], double high[3]) {
-  for (int k = 0; k < 3; ++k) {
-    low[k] = INFINITY;
-    high[k] = -INFINITY;
-  }
+  supine_box_begin(low, high);
   for (size_t lung = 0; lung < shells->count; ++lung) {
     const supine_inside_shell *shell = &shells->shell[lung];
     for (size_t i = 0; i < shell->vertex_count; ++i) {
       double node[3];
       supine_image_locate(grid, shell->vertices + 3 * i, node);
-      for (int k = 0; k < 3; ++k) {
-        low[k] = fmin(low[k], node[k]);
-        high[k] = fmax(high[k], node[k]);
-      }
+      supine_box_add(node, low, high);
     }
   }
   for (int k = 0; k < 3; ++k) {
@@ -56,22 +50,17 @@ static supine_status make_grid(const supine_inside_shells *shells, const supine_
     }
     first[k] = every * floor(low[k] / every);
     const double count = ceil((high[k] - first[k]) / every) + 1.0;
-    if (like != NULL && !(high[k] >= low[k])) {
-      return supine_error_set(
-          error, SUPINE_ERROR_MESH,
-          "the image does not show the lungs: check its axes and the axes of the meshes");
-    }
+    SUPINE_REFUSE_IF(
+        like != NULL && !(high[k] >= low[k]), error, SUPINE_ERROR_MESH,
+        "the image does not show the lungs: check its axes and the axes of the meshes");
     nodes *= count;
     grid->size[k] = (size_t)fmin(count, nodes_max);
     for (int a = 0; a < 3; ++a) {
       grid->step[k][a] = every * from.step[k][a];
     }
   }
-  if (!(nodes < nodes_max)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "a grid of %g mm has %.3g nodes; give a larger spacing", spacing,
-                            nodes);
-  }
+  SUPINE_REFUSE_IF(!(nodes < nodes_max), error, SUPINE_ERROR_ARGUMENT,
+                   "a grid of %g mm has %.3g nodes; give a larger spacing", spacing, nodes);
   for (int a = 0; a < 3; ++a) {
     grid->origin[a] = from.origin[a] + first[0] * from.step[0][a] + first[1] * from.step[1][a] +
                       first[2] * from.step[2][a];
@@ -111,15 +100,12 @@ static supine_status take_nodes(const supine_image *grid, const unsigned char *k
     count += keep[i] != 0;
     inside += keep[i] == 2;
   }
-  if (inside == 0) {
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "no node of the grid is inside a lung: give a smaller spacing, or an "
-                            "image that shows the lungs");
-  }
+  SUPINE_REFUSE_IF(inside == 0, error, SUPINE_ERROR_MESH,
+                   "no node of the grid is inside a lung: give a smaller spacing, or an image that "
+                   "shows the lungs");
   content->points = malloc(3 * count * sizeof *content->points);
   content->part = malloc(count * sizeof *content->part);
   if (content->points == NULL || content->part == NULL) {
-    supine_inside_content_free(content);
     return supine_error_memory(error, "%zu nodes", count);
   }
   content->grid = *grid;
@@ -136,10 +122,8 @@ supine_status supine_inside_content_grid(const supine_inside_shells *shells,
                                          const supine_image *like, double spacing, double margin,
                                          supine_inside_content *content, supine_error *error) {
   supine_image grid = {0};
-  if (!(spacing > 0.0) || !isfinite(spacing)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "the grid's spacing is %g mm: give one above 0", spacing);
-  }
+  SUPINE_REFUSE_IF(!(spacing > 0.0) || !isfinite(spacing), error, SUPINE_ERROR_ARGUMENT,
+                   "the grid's spacing is %g mm: give one above 0", spacing);
   SUPINE_TRY(make_grid(shells, like, spacing, margin, &grid, error));
   double diagonal = 0.0;
   for (int k = 0; k < 3; ++k) {
@@ -148,9 +132,7 @@ supine_status supine_inside_content_grid(const supine_inside_shells *shells,
   const size_t nodes = grid.size[0] * grid.size[1] * grid.size[2];
   SUPINE_ARENA arena = {0};
   search work = {shells, &grid, diagonal, supine_arena_take(&arena, nodes, 1)};
-  if (arena.failed) {
-    return supine_error_memory(error, "a grid of %zu nodes", nodes);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "a grid of %zu nodes", nodes));
   supine_parallel_for(grid.size[1] * grid.size[2], 1, 0, search_rows, &work);
   return take_nodes(&grid, work.keep, content, error);
 }

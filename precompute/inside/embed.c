@@ -72,9 +72,7 @@ static supine_status sort_points(embedding *e, supine_inside_report *report, sup
   const size_t n = e->content->count;
   SUPINE_ARENA arena = {0};
   uint32_t *position = supine_arena_take(&arena, n, sizeof *position);
-  if (arena.failed) {
-    return supine_error_memory(error, "%zu points", n);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu points", n));
   size_t at = 0;
   for (size_t lung = 0; lung < e->shells->count; ++lung) {
     for (size_t i = 0; i < n; ++i) {
@@ -244,9 +242,7 @@ static supine_status embed_lung(embedding *e, size_t lung, size_t begin, size_t 
       supine_arena_take(&arena, shell->vertex_count * e->columns, sizeof *displacement);
   double *space = supine_arena_take(
       &arena, 6 * (size_t)BLOCK + (2 * (size_t)BLOCK + 1) * e->columns, sizeof *space);
-  if (arena.failed) {
-    return supine_error_memory(error, "the motion of %zu vertices", shell->vertex_count);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "the motion of %zu vertices", shell->vertex_count));
   supine_inside_shell_displacement(e->shells, lung, displacement);
   add_squares(e, lung, displacement);
   SUPINE_TRY(begin == end
@@ -316,9 +312,7 @@ static supine_status write_file(const embedding *e, const char *path, supine_ten
   const supine_metadata *from = supine_basis_all_metadata(e->shells->basis, &given);
   SUPINE_ARENA arena = {0};
   supine_metadata *metadata = supine_arena_take(&arena, given + OWN, sizeof *metadata);
-  if (arena.failed) {
-    return supine_error_memory(error, "the metadata of %s", path);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "the metadata of %s", path));
   size_t count = 0;
   for (size_t i = 0; i < given; ++i) {
     if (!is_of_surface(from[i].key)) {
@@ -404,9 +398,7 @@ supine_status supine_inside_embed(const supine_inside_shells *shells,
   const size_t n = content->count;
   const size_t columns = 3 * supine_basis_get_info(shells->basis)->mode_count;
   *report = (supine_inside_report){0};
-  if (n == 0) {
-    return supine_error_set(error, SUPINE_ERROR_MESH, "nothing to embed: give at least one point");
-  }
+  SUPINE_REFUSE_IF(n == 0, error, SUPINE_ERROR_MESH, "nothing to embed: give at least one point");
   SUPINE_ARENA arena = {0};
   embedding e = {
       .shells = shells,
@@ -425,9 +417,8 @@ supine_status supine_inside_embed(const supine_inside_shells *shells,
       .rigid = supine_arena_take(&arena, 2 * content->part_count, sizeof *e.rigid),
       .hilum = supine_arena_take(&arena, shells->count * columns, sizeof *e.hilum),
       .squares = supine_arena_zeros(&arena, shells->count * columns * columns, sizeof *e.squares)};
-  if (arena.failed) {
-    return supine_error_memory(error, "%zu points, each with %zu coefficients", n, columns);
-  }
+  SUPINE_TRY(
+      supine_arena_check(&arena, error, "%zu points, each with %zu coefficients", n, columns));
   supine_parallel_for(n, GRAIN, 0, find_places, &e);
   gather_parts(&e);
   SUPINE_TRY(sort_points(&e, report, error));

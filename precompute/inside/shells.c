@@ -44,62 +44,40 @@ static supine_status create_shell(const supine_basis_info *info, const float *sc
       here += corner[k] >= begin && corner[k] < end;
       shell->triangles[3 * shell->triangle_count + k] = corner[k] - (uint32_t)begin;
     }
-    if (here != 0 && here != 3) {
-      return supine_error_set(
-          error, SUPINE_ERROR_MESH,
-          "a triangle of the basis joins two lungs: make a new basis from separate lungs");
-    }
+    SUPINE_REFUSE_IF(
+        here != 0 && here != 3, error, SUPINE_ERROR_MESH,
+        "a triangle of the basis joins two lungs: make a new basis from separate lungs");
     shell->triangle_count += here == 3;
   }
-  if (shell->triangle_count == 0) {
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "lung %s has no triangles: give a basis of a surface",
-                            info->lung_names[lung]);
-  }
+  SUPINE_REFUSE_IF(shell->triangle_count == 0, error, SUPINE_ERROR_MESH,
+                   "lung %s has no triangles: give a basis of a surface", info->lung_names[lung]);
   shell->edge = mean_edge(shell);
   return supine_inside_surface_create(shell->vertices, shell->triangle_count, shell->triangles,
                                       true, &shell->surface, error);
 }
 
-static supine_status create_shells(supine_inside_shells *shells, supine_error *error) {
-  const supine_basis *basis = shells->basis;
+supine_status supine_inside_shells_create(const supine_basis *basis, supine_inside_shells *shells,
+                                          supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
+  *shells = (supine_inside_shells){.basis = basis, .count = info->lung_count};
   const supine_state scan = supine_basis_scan(basis);
-  if (supine_basis_metadata(basis, "content") != NULL) {
-    return supine_error_set(
-        error, SUPINE_ERROR_FORMAT,
-        "the basis already holds %s inside lungs: give the basis of the lungs' surface",
-        supine_basis_metadata(basis, "content"));
-  }
+  SUPINE_REFUSE_IF(supine_basis_metadata(basis, "content") != NULL, error, SUPINE_ERROR_FORMAT,
+                   "the basis already holds %s inside lungs: give the basis of the lungs' surface",
+                   supine_basis_metadata(basis, "content"));
   SUPINE_ARENA arena = {0};
   float *scanned = supine_arena_take(&arena, 3 * info->vertex_count, sizeof *scanned);
-  if (arena.failed) {
-    return supine_error_memory(error, "%zu vertices", info->vertex_count);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", info->vertex_count));
   SUPINE_TRY(supine_basis_pose(basis, &scan, &shells->scan, error));
   (void)supine_deform(basis, &shells->scan, scanned);
   for (size_t i = 0; i < 3 * info->vertex_count; ++i) {
-    if (!isfinite(scanned[i])) {
-      return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                              "the basis cannot reach the scan's volume: make a new basis, and "
-                              "state with --scanned how full the lungs were in the scan");
-    }
+    SUPINE_REFUSE_IF(!isfinite(scanned[i]), error, SUPINE_ERROR_NUMERICAL,
+                     "the basis cannot reach the scan's volume: make a new basis, and state with "
+                     "--scanned how full the lungs were in the scan");
   }
   for (size_t lung = 0; lung < shells->count; ++lung) {
     SUPINE_TRY(create_shell(info, scanned, lung, &shells->shell[lung], error));
   }
   return SUPINE_OK;
-}
-
-supine_status supine_inside_shells_create(const supine_basis *basis, supine_inside_shells *shells,
-                                          supine_error *error) {
-  *shells =
-      (supine_inside_shells){.basis = basis, .count = supine_basis_get_info(basis)->lung_count};
-  const supine_status status = create_shells(shells, error);
-  if (status != SUPINE_OK) {
-    supine_inside_shells_free(shells);
-  }
-  return status;
 }
 
 void supine_inside_shells_free(supine_inside_shells *shells) {
@@ -112,21 +90,24 @@ void supine_inside_shells_free(supine_inside_shells *shells) {
   *shells = (supine_inside_shells){0};
 }
 
+/* Find the displacement of a vertex by each mode at weight and gain 1: row [3, modes], mm. */
+static void move_vertex(const supine_basis_info *info, size_t vertex, double *row) {
+  const size_t modes = info->mode_count;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    for (size_t k = 0; k < modes; ++k) {
+      *row++ = info->vector ? (double)info->coefficients[(3 * vertex + axis) * modes + k]
+                            : (double)info->direction[3 * vertex + axis] *
+                                  (double)info->coefficients[vertex * modes + k];
+    }
+  }
+}
+
 void supine_inside_shell_displacement(const supine_inside_shells *shells, size_t lung,
                                       double *displacement) {
   const supine_basis_info *info = supine_basis_get_info(shells->basis);
   const supine_inside_shell *shell = &shells->shell[lung];
-  const size_t modes = info->mode_count;
   for (size_t i = 0; i < shell->vertex_count; ++i) {
-    const size_t vertex = shell->begin + i;
-    for (size_t axis = 0; axis < 3; ++axis) {
-      double *row = displacement + (3 * i + axis) * modes;
-      for (size_t k = 0; k < modes; ++k) {
-        row[k] = info->vector ? (double)info->coefficients[(3 * vertex + axis) * modes + k]
-                              : (double)info->direction[3 * vertex + axis] *
-                                    (double)info->coefficients[vertex * modes + k];
-      }
-    }
+    move_vertex(info, shell->begin + i, displacement + 3 * i * info->mode_count);
   }
 }
 
@@ -224,8 +205,8 @@ static bool is_hilar(const float *p, const float box[6], bool left) {
 bool supine_inside_hilum(const supine_basis *basis, double *mean) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const supine_tensor *stored = supine_basis_tensor(basis, "lungs_hilum");
-  const size_t modes = info->mode_count;
-  const size_t columns = 3 * modes;
+  const size_t columns = 3 * info->mode_count;
+  double row[3 * SUPINE_MODES_MAX];
   bool found = supine_basis_metadata(basis, "content") == NULL;
   memset(mean, 0, info->lung_count * columns * sizeof *mean);
   if (stored != NULL && stored->dtype == SUPINE_F64 && stored->rank == 3 &&
@@ -236,14 +217,13 @@ bool supine_inside_hilum(const supine_basis *basis, double *mean) {
   for (size_t lung = 0; lung < info->lung_count && found; ++lung) {
     double count = 0.0;
     for (size_t i = info->lung_begin[lung]; i < info->lung_begin[lung + 1]; ++i) {
-      const bool hilar = is_hilar(info->vertices + 3 * i, info->bounds + 6 * lung,
-                                  info->lung_names[lung][0] == 'l');
-      count += hilar ? 1.0 : 0.0;
-      for (size_t k = 0; k < columns && hilar; ++k) {
-        mean[lung * columns + k] += info->vector
-                                        ? (double)info->coefficients[i * columns + k]
-                                        : (double)info->direction[3 * i + k / modes] *
-                                              (double)info->coefficients[i * modes + k % modes];
+      if (is_hilar(info->vertices + 3 * i, info->bounds + 6 * lung,
+                   info->lung_names[lung][0] == 'l')) {
+        count += 1.0;
+        move_vertex(info, i, row);
+        for (size_t k = 0; k < columns; ++k) {
+          mean[lung * columns + k] += row[k];
+        }
       }
     }
     for (size_t k = 0; k < columns; ++k) {

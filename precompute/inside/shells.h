@@ -28,7 +28,7 @@ typedef struct supine_inside_shells {
 } supine_inside_shells;
 
 /** Extract each lung's surface as it is in the scan.
- * @param shells  output; release with supine_inside_shells_free */
+ * @param shells  output; release with supine_inside_shells_free, also after an error */
 supine_status supine_inside_shells_create(const supine_basis *basis, supine_inside_shells *shells,
                                           supine_error *error);
 void supine_inside_shells_free(supine_inside_shells *shells);

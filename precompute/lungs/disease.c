@@ -24,24 +24,20 @@ supine_status supine_tissue_add_lesion(const supine_lungs *lungs, const supine_l
                                        double *factors, size_t *reached, supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   const double *c = lesion->centre;
-  if (!isfinite(c[0]) || !isfinite(c[1]) || !isfinite(c[2]) || !positive(lesion->radius) ||
-      !positive(lesion->factor)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "lesion at %g,%g,%g, radius %g, factor %g: give finite numbers, and a "
-                            "positive radius and factor",
-                            c[0], c[1], c[2], lesion->radius, lesion->factor);
-  }
-  size_t found = 0;
+  SUPINE_REFUSE_IF(!isfinite(c[0]) || !isfinite(c[1]) || !isfinite(c[2]) ||
+                       !positive(lesion->radius) || !positive(lesion->factor),
+                   error, SUPINE_ERROR_ARGUMENT,
+                   "lesion at %g,%g,%g, radius %g, factor %g: give finite numbers, and a positive "
+                   "radius and factor",
+                   c[0], c[1], c[2], lesion->radius, lesion->factor);
+  *reached = 0;
   for (size_t i = 0; i < n; ++i) {
     const double *p = lungs->mesh.vertices + 3 * i;
     const double w = lesion_weight(supine_distance(p, c), lesion->radius);
     if (w > 0.0) {
       factors[i] *= pow(lesion->factor, w);
-      ++found;
+      ++*reached;
     }
-  }
-  if (reached != NULL) {
-    *reached = found;
   }
   return SUPINE_OK;
 }

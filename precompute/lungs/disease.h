@@ -1,10 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
  * Diseased lungs ([Santhanam2008] VI): tumours, which stiffen the tissue around them, and collapsed
- * lungs.
- *
- * The model (model.h) stores lesions as factors on the stiffness, and collapse as the volume of
- * each lung divided by its healthy volume. */
+ * lungs. */
 #ifndef SUPINE_DISEASE_H
 #define SUPINE_DISEASE_H
 
@@ -26,12 +23,7 @@ typedef struct supine_lesion {
 /** Multiply `factors` [N], which start as 1, by the stiffness factors of a lesion. The factors
  * multiply the stiffness after it is scaled to geometric mean 1. In the reverse order, a stiff
  * lesion would soften all other tissue, by 4 % for a lesion of factor 10 over 2 % of the vertices.
- * Without a smoothing length of the force, a lesion does not change how other tissue moves with the
- * same gain (factor on the displacement).
- * At the same volume of the lungs, all displacements grow by one ratio, to make up for the
- * lesion.
- * @param reached  optional output: number of vertices nearer to the lesion's centre than the
- *   radius */
+ * @param reached  output: number of vertices nearer to the lesion's centre than the radius */
 supine_status supine_tissue_add_lesion(const supine_lungs *lungs, const supine_lesion *lesion,
                                        double *factors, size_t *reached, supine_error *error);
 

@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Compute expandability by a regional model ([Santhanam2008] III-E), or read it from a file. */
-#include <errno.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/arena.h"
@@ -21,40 +19,27 @@ void supine_tissue_expandability_regional(const supine_lungs *lungs,
   }
 }
 
-/* Parse the index of a vertex; return false if it is not a whole number. */
-static bool parse_vertex(const char *text, size_t *vertex) {
-  char *end = NULL;
-  errno = 0;
-  *vertex = (size_t)strtoull(text, &end, 10);
-  return end != text && *end == '\0' && errno == 0 && text[0] != '-';
-}
-
 /* Store the expandability in a CSV row for the vertex in its column `vertex` or, without that
  * column, for vertex `row`. Elements of a [count] are 0 for vertices without a value so far. */
 static supine_status take_row(const supine_csv *csv, size_t row, size_t count, double *a,
                               supine_error *error) {
-  const char *number = supine_csv_text(csv, 1);
-  size_t vertex = row;
+  double number = (double)row;
   double value = 0.0;
-  if (number != NULL && !parse_vertex(number, &vertex)) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s:%zu: '%.40s' is not the number of a vertex: write a whole number, "
-                            "0 for the first vertex",
-                            csv->path, csv->line, number);
+  if (supine_csv_text(csv, 1) != NULL) {
+    SUPINE_TRY(supine_csv_number(csv, 1, "vertex", &number, error));
   }
   SUPINE_TRY(supine_csv_number(csv, 0, "expandability", &value, error));
+  const bool there = number >= 0.0 && number < (double)count && number == floor(number);
+  const size_t vertex = there ? (size_t)number : 0;
   const bool positive = value > 0.0 && isfinite(value) && isfinite(1.0 / value);
-  const char *wrong = vertex >= count    ? "there is no such vertex"
+  const char *wrong = !there             ? "there is no such vertex"
                       : !positive        ? "it must be positive"
                       : a[vertex] != 0.0 ? "the vertex was given before"
                                          : NULL;
-  if (wrong != NULL) {
-    return supine_error_set(
-        error, SUPINE_ERROR_FORMAT,
-        "%s:%zu: expandability %g of vertex %zu: %s; give one positive value for "
-        "each of %zu vertices, counted from 0",
-        csv->path, csv->line, value, vertex, wrong, count);
-  }
+  SUPINE_REFUSE_IF(wrong != NULL, error, SUPINE_ERROR_FORMAT,
+                   "%s:%zu: expandability %g of vertex %.15g: %s; give one positive value for each "
+                   "of %zu vertices, counted from 0",
+                   csv->path, csv->line, value, number, wrong, count);
   a[vertex] = value;
   return SUPINE_OK;
 }
@@ -74,11 +59,8 @@ supine_status supine_tissue_expandability_load(const char *path, size_t count, d
     SUPINE_TRY(take_row(&csv, row, count, a, error));
   }
   for (size_t i = 0; i < count; ++i) {
-    if (a[i] == 0.0) {
-      return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s: vertex %zu of %zu has no value: add its expandability", path, i,
-                              count);
-    }
+    SUPINE_REFUSE_IF(a[i] == 0.0, error, SUPINE_ERROR_FORMAT,
+                     "%s: vertex %zu of %zu has no value: add its expandability", path, i, count);
   }
   return SUPINE_OK;
 }

@@ -8,7 +8,6 @@
 #include "base/arena.h"
 #include "base/vec3.h"
 
-#include "mesh/anatomy.h"
 #include "mesh/repair.h"
 #include "precompute/lungs/gate.h"
 #include "precompute/lungs/surface.h"

@@ -19,14 +19,10 @@ typedef struct supine_lungs_source {
 
 /** Repair and check surfaces, and join them into lungs.
  *
- * - Surfaces are repaired by supine_mesh_repair. Connected components with less than 1 % of
- *   the volume of their surface are dropped.
- * - The longest side of the bounding box, its height, and the volume must be possible for lungs. If
- *   the user gave the units, an impossible size is only a warning.
- * - No component may reach deep into another. A tip of a lung with little volume is a warning, and
- *   refused if it is very long. A flat end towards the head or the feet is a warning.
- * - Axes that the shape contradicts (supine_mesh_anatomy_find) are a warning.
- * - The side of a single lung follows from its shape or, if that is unclear, from its position.
+ * Components with less than 1 % of the volume of their surface are dropped. Open surfaces,
+ * impossible sizes (a warning if the user gave the units), components deep inside others and very
+ * long, thin tips are refused. Thin tips, flat ends and axes that the shape contradicts are warned
+ * of. The side of a single lung follows from its shape or, if that is unclear, from its position.
  * @param meshes     [count] changed in place
  * @param axes_hold  output: whether the shape fits the axes LPS clearly better than all other axes
  * @param findings   notes and warnings are added

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/vec3.h"
 
 #include "precompute/lungs/lungs.h"
 
@@ -28,15 +29,11 @@ static supine_status join(const supine_mesh *meshes, size_t count, supine_mesh *
     vertices += meshes[m].vertex_count;
     triangles += meshes[m].triangle_count;
   }
-  if (count == 0 || triangles == 0 || vertices == 0) {
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "the surface has no triangles: give a closed surface");
-  }
-  if (vertices > UINT32_MAX) {
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "%zu vertices are more than 32-bit indices reach: give a coarser mesh",
-                            vertices);
-  }
+  SUPINE_REFUSE_IF(count == 0 || triangles == 0 || vertices == 0, error, SUPINE_ERROR_MESH,
+                   "the surface has no triangles: give a closed surface");
+  SUPINE_REFUSE_IF(vertices > UINT32_MAX, error, SUPINE_ERROR_MESH,
+                   "%zu vertices are more than 32-bit indices reach: give a coarser mesh",
+                   vertices);
   if (supine_mesh_allocate(vertices, triangles, joined) != SUPINE_OK) {
     return supine_error_memory(error, "%zu vertices", vertices);
   }
@@ -150,19 +147,14 @@ static supine_status check_surfaces(const supine_mesh *meshes, size_t count, sup
       for (size_t k = 0; k < 6; ++k) {
         apart = fmax(apart, fabs(box[0][k / 3][k % 3] - box[1][k / 3][k % 3]));
       }
-      if (apart <= same_box_share * fmax(side[0], side[1])) {
-        return supine_error_set(
-            error, SUPINE_ERROR_MESH,
-            "surfaces %zu and %zu have the same bounding box: give each lung once", i + 1, m + 1);
-      }
+      SUPINE_REFUSE_IF(apart <= same_box_share * fmax(side[0], side[1]), error, SUPINE_ERROR_MESH,
+                       "surfaces %zu and %zu have the same bounding box: give each lung once",
+                       i + 1, m + 1);
       const bool first = side[0] < side[1];
-      if (side[!first] < least_side_share * side[first]) {
-        return supine_error_set(
-            error, SUPINE_ERROR_MESH,
-            "surface %zu is %.3g mm long beside another of %.3g mm: it is incomplete, "
-            "in other units, or no lung; correct it or leave it out",
-            first ? i + 1 : m + 1, side[!first], side[first]);
-      }
+      SUPINE_REFUSE_IF(side[!first] < least_side_share * side[first], error, SUPINE_ERROR_MESH,
+                       "surface %zu is %.3g mm long beside another of %.3g mm: it is incomplete, "
+                       "in other units, or no lung; correct it or leave it out",
+                       first ? i + 1 : m + 1, side[!first], side[first]);
     }
   }
   return SUPINE_OK;
@@ -171,23 +163,18 @@ static supine_status check_surfaces(const supine_mesh *meshes, size_t count, sup
 /* Refuse a given midline that runs through a lung, or leaves both lungs on one side.
  * @param two_sided  whether the surfaces are two lungs */
 static supine_status check_midline(const supine_lungs *lungs, bool two_sided, supine_error *error) {
-  if (two_sided && lungs->lung_count < 2) {
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "the midline x = %g mm leaves both lungs on its %s side: give one "
-                            "near %g",
-                            lungs->midline, supine_lungs_name(lungs, 0),
-                            0.5 * (lungs->minimum[0] + lungs->maximum[0]));
-  }
+  SUPINE_REFUSE_IF(two_sided && lungs->lung_count < 2, error, SUPINE_ERROR_MESH,
+                   "the midline x = %g mm leaves both lungs on its %s side: give one near %g",
+                   lungs->midline, supine_lungs_name(lungs, 0),
+                   0.5 * (lungs->minimum[0] + lungs->maximum[0]));
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     const bool left = lungs->side[lung] > 0;
     const double ends[2] = {lungs->midline - lungs->low[lung][0],
                             lungs->high[lung][0] - lungs->midline};
-    if (ends[!left] > most_beyond_share * ends[left]) {
-      return supine_error_set(error, SUPINE_ERROR_MESH,
-                              "the midline x = %g mm runs through the %s lung, which reaches "
-                              "%.3g mm beyond it; give one between the lungs, or none",
-                              lungs->midline, supine_lungs_name(lungs, lung), ends[!left]);
-    }
+    SUPINE_REFUSE_IF(ends[!left] > most_beyond_share * ends[left], error, SUPINE_ERROR_MESH,
+                     "the midline x = %g mm runs through the %s lung, which reaches %.3g mm beyond "
+                     "it; give one between the lungs, or none",
+                     lungs->midline, supine_lungs_name(lungs, lung), ends[!left]);
   }
   return SUPINE_OK;
 }
@@ -201,17 +188,14 @@ void supine_lungs_measure_volumes(supine_lungs *lungs) {
 
 void supine_lungs_measure(supine_lungs *lungs) {
   supine_lungs_measure_volumes(lungs);
+  supine_box_begin(lungs->minimum, lungs->maximum);
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     const size_t begin = lungs->lung_begin[lung];
     const supine_mesh own = {lungs->lung_begin[lung + 1] - begin, lungs->mesh.vertices + 3 * begin,
                              0, NULL};
     supine_mesh_box(&own, lungs->low[lung], lungs->high[lung]);
-    for (size_t k = 0; k < 3; ++k) {
-      const double *low = lungs->low[lung];
-      const double *high = lungs->high[lung];
-      lungs->minimum[k] = lung == 0 ? low[k] : fmin(lungs->minimum[k], low[k]);
-      lungs->maximum[k] = lung == 0 ? high[k] : fmax(lungs->maximum[k], high[k]);
-    }
+    supine_box_add(lungs->low[lung], lungs->minimum, lungs->maximum);
+    supine_box_add(lungs->high[lung], lungs->minimum, lungs->maximum);
   }
 }
 
@@ -232,11 +216,8 @@ static supine_status measure(supine_lungs *lungs, const double *midline, supine_
   const double low = lungs->minimum[0];
   const double high = lungs->maximum[0];
   for (int k = 0; k < 3; ++k) {
-    if (!(lungs->maximum[k] > lungs->minimum[k])) {
-      return supine_error_set(error, SUPINE_ERROR_MESH,
-                              "the surface has no extent along %c: give a closed surface",
-                              "xyz"[k]);
-    }
+    SUPINE_REFUSE_IF(!(lungs->maximum[k] > lungs->minimum[k]), error, SUPINE_ERROR_MESH,
+                     "the surface has no extent along %c: give a closed surface", "xyz"[k]);
   }
   const supine_status status = supine_mesh_topology_create(&lungs->mesh, &lungs->topology);
   if (status != SUPINE_OK) {
@@ -252,9 +233,7 @@ static supine_status measure(supine_lungs *lungs, const double *midline, supine_
                    : fabs(low) < fabs(high)              ? low
                                                          : high;
   (void)supine_lungs_sides(&lungs->mesh, &lungs->topology, 0, lungs->midline, &arena, left);
-  if (arena.failed) {
-    return supine_error_memory(error, "%zu components", lungs->topology.component_count);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu components", lungs->topology.component_count));
   SUPINE_TRY(group(lungs, left, error));
   supine_lungs_measure(lungs);
   return midline != NULL ? check_midline(lungs, overlap < SUPINE_LUNGS_MOST_OVERLAP, error)
@@ -264,10 +243,8 @@ static supine_status measure(supine_lungs *lungs, const double *midline, supine_
 supine_status supine_lungs_create(const supine_mesh *meshes, size_t count, const double *midline,
                                   supine_lungs *lungs, supine_error *error) {
   SUPINE_FREED_BY(supine_lungs_free) supine_lungs made = {0};
-  if (midline != NULL && !isfinite(*midline)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "the midline must be a finite x in mm, not %g", *midline);
-  }
+  SUPINE_REFUSE_IF(midline != NULL && !isfinite(*midline), error, SUPINE_ERROR_ARGUMENT,
+                   "the midline must be a finite x in mm, not %g", *midline);
   SUPINE_TRY(check_surfaces(meshes, count, error));
   SUPINE_TRY(join(meshes, count, &made.mesh, error));
   SUPINE_TRY(measure(&made, midline, error));

@@ -151,14 +151,11 @@ static void shape(size_t lung, size_t count, double *vertices) {
 
 supine_status supine_phantom_create(size_t vertices, double millilitres, supine_mesh *mesh,
                                     supine_error *error) {
-  if (vertices < SUPINE_PHANTOM_VERTICES_MIN || vertices > SUPINE_PHANTOM_VERTICES_MAX) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "vertex count %zu: give %d to %d",
-                            vertices, SUPINE_PHANTOM_VERTICES_MIN, SUPINE_PHANTOM_VERTICES_MAX);
-  }
-  if (!(millilitres > 0.0) || !isfinite(millilitres)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "a volume of %g mL: give a positive volume", millilitres);
-  }
+  SUPINE_REFUSE_IF(vertices < SUPINE_PHANTOM_VERTICES_MIN || vertices > SUPINE_PHANTOM_VERTICES_MAX,
+                   error, SUPINE_ERROR_ARGUMENT, "vertex count %zu: give %d to %d", vertices,
+                   SUPINE_PHANTOM_VERTICES_MIN, SUPINE_PHANTOM_VERTICES_MAX);
+  SUPINE_REFUSE_IF(!(millilitres > 0.0) || !isfinite(millilitres), error, SUPINE_ERROR_ARGUMENT,
+                   "a volume of %g mL: give a positive volume", millilitres);
   const double exact = sqrt(((double)vertices / 2.0 - 2.0) / 10.0);
   const size_t frequency = (size_t)fmax(2.0, floor(exact + 0.5));
   const size_t count = supine_phantom_geodesic_vertex_count(frequency);

@@ -88,41 +88,22 @@ static void select_least(keyed *item, ptrdiff_t count, ptrdiff_t half) {
   }
 }
 
-static double least(double a, double b) {
-  return a < b ? a : b;
-}
-
-static double greatest(double a, double b) {
-  return a > b ? a : b;
-}
-
-static void triangle_box(const supine_inside_surface *s, size_t triangle, double low[3],
-                         double high[3]) {
-  const double *p[3];
-  corners(s, triangle, p);
-  for (int k = 0; k < 3; ++k) {
-    low[k] = least(p[0][k], least(p[1][k], p[2][k]));
-    high[k] = greatest(p[0][k], greatest(p[1][k], p[2][k]));
-  }
-}
-
-/* Find the bounding box of a tree node and, if `leaf` is not NULL, of each of its triangles. */
+/* Extend the bounding box of a tree node to its triangles and, if `leaf` is not NULL, find the box
+ * of each triangle. */
 static void find_box(const supine_inside_surface *s, node *n, boxes *leaf) {
-  for (int k = 0; k < 3; ++k) {
-    n->low[k] = INFINITY;
-    n->high[k] = -INFINITY;
-  }
   for (size_t i = n->begin; i < n->end; ++i) {
+    const double *p[3];
     double low[3];
     double high[3];
-    triangle_box(s, s->order[i], low, high);
+    corners(s, s->order[i], p);
+    supine_box_begin(low, high);
     for (int k = 0; k < 3; ++k) {
-      n->low[k] = least(n->low[k], low[k]);
-      n->high[k] = greatest(n->high[k], high[k]);
-      if (leaf != NULL) {
-        leaf->low[k][i - n->begin] = nextafterf((float)low[k], -INFINITY);
-        leaf->high[k][i - n->begin] = nextafterf((float)high[k], INFINITY);
-      }
+      supine_box_add(p[k], low, high);
+      supine_box_add(p[k], n->low, n->high);
+    }
+    for (int k = 0; k < 3 && leaf != NULL; ++k) {
+      leaf->low[k][i - n->begin] = nextafterf((float)low[k], -INFINITY);
+      leaf->high[k][i - n->begin] = nextafterf((float)high[k], INFINITY);
     }
   }
 }
@@ -164,7 +145,7 @@ static void find_dipole(const supine_inside_surface *s, const node *n) {
   double square = 0.0;
   for (int k = 0; k < 3; ++k) {
     d->centre[k] = d->area > 0.0 ? d->centre[k] / d->area : 0.5 * (n->low[k] + n->high[k]);
-    const double reach = greatest(n->high[k] - d->centre[k], d->centre[k] - n->low[k]);
+    const double reach = fmax(n->high[k] - d->centre[k], d->centre[k] - n->low[k]);
     square += reach * reach;
   }
   d->radius = sqrt(square);
@@ -180,6 +161,7 @@ static void build(supine_inside_surface *s, keyed *space, uint32_t begin, uint32
     n->leaf = s->leaf_count++;
     return;
   }
+  supine_box_begin(n->low, n->high);
   find_box(s, n, NULL);
   int axis = 0;
   for (int k = 1; k < 3; ++k) {
@@ -203,12 +185,13 @@ static void build(supine_inside_surface *s, keyed *space, uint32_t begin, uint32
 void supine_inside_surface_refit(supine_inside_surface *surface) {
   for (node *n = surface->nodes + surface->node_count; n-- > surface->nodes;) {
     const node *child[2] = {n + 1, &surface->nodes[n->right]};
+    supine_box_begin(n->low, n->high);
+    for (int c = 0; c < 2 && n->right != 0; ++c) {
+      supine_box_add(child[c]->low, n->low, n->high);
+      supine_box_add(child[c]->high, n->low, n->high);
+    }
     if (n->right == 0) {
       find_box(surface, n, &surface->leaves[n->leaf]);
-    }
-    for (int k = 0; k < 3 && n->right != 0; ++k) {
-      n->low[k] = least(child[0]->low[k], child[1]->low[k]);
-      n->high[k] = greatest(child[0]->high[k], child[1]->high[k]);
     }
     find_dipole(surface, n);
   }

@@ -129,9 +129,7 @@ static supine_status find_fit(const normals_work *work, size_t lung,
   double *gram = supine_arena_take(&arena, terms * terms, sizeof *gram);
   double *gram_phi = supine_arena_take(&arena, s * all, sizeof *gram_phi);
   double *product = supine_arena_take(&arena, s * s, sizeof *product);
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   apply_gram(rows, terms, phi, s, gram, gram_phi);
   cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)s, (int)s, (int)all, 1.0, phi, (int)all,
               gram_phi, (int)all, 0.0, product, (int)s);
@@ -158,16 +156,15 @@ static supine_status find_fit(const normals_work *work, size_t lung,
 /* Find the modes of one lung, and the polynomials of its held-out vertices. */
 static supine_status find_lung(normals_work *work, size_t lung, fit *made) {
   const supine_normals_surface *s = work->surface;
-  const size_t stride = 1 + (s->lung_begin[lung + 1] - s->lung_begin[lung]) / ROWS;
+  const size_t stride = 1 + (s->lungs->lung_begin[lung + 1] - s->lungs->lung_begin[lung]) / ROWS;
   const size_t all = 3 * work->terms;
   SUPINE_ARENA rows_memory = {0};
   SUPINE_ARENA arena = {0};
   supine_normals_rows rows;
   double *mix = supine_arena_take(&arena, MOST * all, sizeof *mix);
   made->weights = supine_arena_take(&work->memory, MOST * all, sizeof *made->weights);
-  if (arena.failed || work->memory.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
+  SUPINE_TRY(supine_arena_status(&work->memory));
   SUPINE_TRY(supine_normals_rows_create(s, &work->fans, lung, 0, stride, &rows_memory, &rows));
   SUPINE_TRY(find_fit(work, lung, &rows, mix, made));
   supine_arena_free(&rows_memory);
@@ -217,14 +214,6 @@ static void round_modes(float *values, const float *lengths, size_t n, size_t co
       row[j] = (int8_t)lrintf(from[j] * top[j] / 256);
     }
     row[count] = (int8_t)lrintf(fminf(from[0] * top[0] - 256.0f * row[0], INT8_MAX));
-  }
-}
-
-/* Multiply the weights [count, 3, terms] of each mode by its quantisation step, unit[mode]. */
-static void scale_weights(const double *weights, const double *unit, size_t count, size_t terms,
-                          double *scaled) {
-  for (size_t i = 0; i < count * 3 * terms; ++i) {
-    scaled[i] = weights[i] * unit[i / (3 * terms)];
   }
 }
 
@@ -286,10 +275,8 @@ static supine_status measure_all(const normals_work *work, supine_normals_modes 
   SUPINE_ARENA arena = {0};
   supine_tally *tally = supine_arena_zeros(&arena, 1, sizeof *tally);
   double sum = 0.0;
-  if (tally == NULL) {
-    return SUPINE_ERROR_MEMORY;
-  }
-  for (size_t lung = 0; lung < work->surface->lung_count; ++lung) {
+  SUPINE_TRY(supine_arena_status(&arena));
+  for (size_t lung = 0; lung < work->surface->lungs->lung_count; ++lung) {
     measure(work, lung, made, tally, &sum);
   }
   made->mean = tally->count > 0 ? sum / (double)tally->count : 0.0;
@@ -311,7 +298,7 @@ typedef struct planes_work {
 } planes_work;
 
 static size_t lung_of(const supine_normals_surface *s, size_t vertex) {
-  return s->lung_count == 2 && vertex >= s->lung_begin[1];
+  return s->lungs->lung_count == 2 && vertex >= s->lungs->lung_begin[1];
 }
 
 SUPINE_CLONES static void place_range(void *context, size_t begin, size_t end, size_t thread) {
@@ -347,7 +334,7 @@ SUPINE_CLONES static void sum_range(void *context, size_t begin, size_t end, siz
     float normal[3][LANES] = {{0.0f}};
     for (size_t at = fans->begin[i]; at < fans->begin[i + 1]; ++at) {
       uint32_t others[2];
-      supine_normals_fan_others(s->triangles, fans->corner[at], others);
+      supine_normals_fan_others(s->lungs->mesh.triangles, fans->corner[at], others);
       const float *a = planes->positions + 3 * (size_t)others[0] * LANES;
       const float *b = planes->positions + 3 * (size_t)others[1] * LANES;
       for (size_t axis = 0; axis < 3; ++axis) {
@@ -385,7 +372,7 @@ SUPINE_CLONES static void sum_range(void *context, size_t begin, size_t end, siz
  * and others. Those for `axis` are therefore found at c = (axis + 2) % 3. */
 static void find_mode_factors(const planes_work *planes) {
   const normals_work *work = planes->work;
-  for (size_t lung = 0; lung < work->surface->lung_count; ++lung) {
+  for (size_t lung = 0; lung < work->surface->lungs->lung_count; ++lung) {
     for (size_t axis = 0; axis < 3; ++axis) {
       for (size_t l = 0; l < LANES; ++l) {
         const size_t lane = planes->first + l;
@@ -405,7 +392,7 @@ static supine_status make_modes(const normals_work *work, size_t count, supine_a
                                 supine_normals_modes *made) {
   enum { GRAIN = 1024 };
   const supine_normals_surface *s = work->surface;
-  const size_t n = s->vertex_count;
+  const size_t n = s->lungs->mesh.vertex_count;
   const size_t all = 3 * work->terms;
   float mode_factors[SUPINE_LUNGS_MAX][3][SUPINE_NORMALS_FIELD_MAX][LANES];
   SUPINE_ARENA own = {0};
@@ -416,13 +403,13 @@ static supine_status make_modes(const normals_work *work, size_t count, supine_a
                         .modes = supine_arena_zeros(&own, 3 * n * count, sizeof(float)),
                         .lengths = supine_arena_take(&own, n, sizeof(float))};
   made->modes = supine_arena_take(arena, 3 * n * (count + 1), sizeof *made->modes);
-  made->weights = supine_arena_take(arena, s->lung_count * count * all, sizeof *made->weights);
+  made->weights =
+      supine_arena_take(arena, s->lungs->lung_count * count * all, sizeof *made->weights);
   made->count = count;
-  if (own.failed || arena->failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&own));
+  SUPINE_TRY(supine_arena_status(arena));
   size_t snapshots = 0;
-  for (size_t lung = 0; lung < s->lung_count; ++lung) {
+  for (size_t lung = 0; lung < s->lungs->lung_count; ++lung) {
     snapshots =
         work->fits[lung].snapshot_count > snapshots ? work->fits[lung].snapshot_count : snapshots;
   }
@@ -431,14 +418,15 @@ static supine_status make_modes(const normals_work *work, size_t count, supine_a
     supine_parallel_for(3 * n, 3 * GRAIN, 0, place_range, &planes);
     supine_parallel_for(n, GRAIN, 0, sum_range, &planes);
   }
-  for (size_t lung = 0; lung < s->lung_count; ++lung) {
-    const size_t begin = s->lung_begin[lung];
+  for (size_t lung = 0; lung < s->lungs->lung_count; ++lung) {
+    const size_t begin = s->lungs->lung_begin[lung];
     double unit[MOST];
     round_modes(planes.modes + 3 * begin * count, planes.lengths + begin,
-                s->lung_begin[lung + 1] - begin, count, made->modes + 3 * begin * (count + 1),
-                unit);
-    scale_weights(work->fits[lung].weights, unit, count, work->terms,
-                  made->weights + lung * count * all);
+                s->lungs->lung_begin[lung + 1] - begin, count,
+                made->modes + 3 * begin * (count + 1), unit);
+    for (size_t i = 0; i < count * all; ++i) { /* the modes are stored as multiples of `unit` */
+      made->weights[lung * count * all + i] = work->fits[lung].weights[i] * unit[i / all];
+    }
   }
   return measure_all(work, made);
 }
@@ -453,7 +441,7 @@ static supine_status find_modes(normals_work *work, supine_arena *arena,
     return SUPINE_OK;
   }
   SUPINE_TRY(supine_normals_fans_create(s, &work->memory, &work->fans));
-  for (size_t lung = 0; lung < s->lung_count; ++lung) {
+  for (size_t lung = 0; lung < s->lungs->lung_count; ++lung) {
     SUPINE_TRY(find_lung(work, lung, &work->fits[lung]));
     most = work->fits[lung].count < most ? work->fits[lung].count : most;
   }
@@ -471,20 +459,19 @@ supine_status supine_normals_modes_create(const supine_normals_surface *surface,
                                           supine_arena *arena, supine_normals_modes *made,
                                           supine_error *error) {
   *made = (supine_normals_modes){0};
-  if (surface->field->mode_count > SUPINE_NORMALS_FIELD_MAX || surface->triangle_count == 0) {
+  if (surface->field->mode_count > SUPINE_NORMALS_FIELD_MAX ||
+      surface->lungs->mesh.triangle_count == 0) {
     return SUPINE_OK;
   }
   SUPINE_ARENA own = {0};
   normals_work *work = supine_arena_zeros(&own, 1, sizeof *work);
-  if (work == NULL) {
-    return supine_error_memory(error, "normals");
-  }
+  SUPINE_TRY(supine_arena_check(&own, error, "normals"));
   work->surface = surface;
   work->terms = supine_normals_terms(surface->field->mode_count);
   const supine_status status = find_modes(work, arena, made);
   supine_arena_free(&work->memory);
   return status == SUPINE_OK
              ? status
-             : supine_error_set(error, status, "normals of %zu vertices: %s", surface->vertex_count,
-                                supine_status_string(status));
+             : supine_error_set(error, status, "normals of %zu vertices: %s",
+                                surface->lungs->mesh.vertex_count, supine_status_string(status));
 }

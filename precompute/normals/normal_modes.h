@@ -29,10 +29,8 @@
 
 /** The surface and the displacement field of a basis file. */
 typedef struct supine_normals_surface {
-  size_t vertex_count, triangle_count, lung_count;
-  const size_t *lung_begin;  /**< [lung_count + 1] first vertex of each lung, then N */
+  const supine_lungs *lungs; /**< triangles, and the vertices of each lung */
   const float *vertices;     /**< [N, 3] positions on the reference surface, mm */
-  const uint32_t *triangles; /**< [triangle_count, 3] indices of vertices */
   const float *directions;   /**< [N, 3] displacement of each vertex per unit force, mm; NULL if
                                 `field` holds the displacement itself */
   const supine_compression *field;
@@ -41,7 +39,7 @@ typedef struct supine_normals_surface {
   const double *resting;
   const supine_volume_forms *forms; /**< lung volumes as functions of mode weights and gains; unused
                                        if `resting` is NULL */
-  double bend[3]; /**< [axis] curvature of the vertices' paths (supine_volume_bend) */
+  const double *bend; /**< [3] curvature of the vertices' paths (supine_volume_bend) */
 } supine_normals_surface;
 
 /** Modes from which vertex normals are computed, and the error of these normals. */
@@ -64,10 +62,9 @@ enum { SUPINE_NORMALS_FEW = 6, SUPINE_NORMALS_MOST = 24 }; /**< least and most m
 enum { SUPINE_NORMALS_FIELD_MAX = 24 }; /**< displacement fields with more modes get no normals */
 
 /** Find modes of the normals: the smallest number with a mean angular error of at most 0.08 degrees
- * and a 99.9th percentile of at most 0.8 degrees. The error is measured at up to 4096 held-out
- * vertices of each lung. Numbers from SUPINE_NORMALS_FEW to SUPINE_NORMALS_MOST are tried in steps
- * of 3, because at run time three modes share a 32-bit word. If no number suffices, the last one is
- * kept. For a displacement field with more than SUPINE_NORMALS_FIELD_MAX modes, made->count is 0.
+ * and a 99.9th percentile of at most 0.8 degrees, or the largest number tried. Numbers are tried in
+ * steps of 3, because at run time three modes share a 32-bit word. For a displacement field with
+ * more than SUPINE_NORMALS_FIELD_MAX modes, made->count is 0.
  * Cost: the surface is deformed about 50 times. Uses all cores.
  * @param arena  takes the arrays of `made` */
 supine_status supine_normals_modes_create(const supine_normals_surface *surface,

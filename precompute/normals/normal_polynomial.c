@@ -41,21 +41,20 @@ void supine_normals_monomials(size_t modes, const double *weights, const double 
 
 supine_status supine_normals_fans_create(const supine_normals_surface *surface, supine_arena *arena,
                                          supine_normals_fans *fans) {
-  const size_t corners = 3 * surface->triangle_count;
-  fans->begin = supine_arena_zeros(arena, surface->vertex_count + 2, sizeof *fans->begin);
+  const size_t corners = 3 * surface->lungs->mesh.triangle_count;
+  fans->begin =
+      supine_arena_zeros(arena, surface->lungs->mesh.vertex_count + 2, sizeof *fans->begin);
   fans->corner = supine_arena_take(arena, corners, sizeof *fans->corner);
-  if (arena->failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(arena));
   uint32_t *next = fans->begin + 1;
   for (size_t s = 0; s < corners; ++s) {
-    ++next[surface->triangles[s] + 1];
+    ++next[surface->lungs->mesh.triangles[s] + 1];
   }
-  for (size_t i = 1; i <= surface->vertex_count; ++i) {
+  for (size_t i = 1; i <= surface->lungs->mesh.vertex_count; ++i) {
     next[i] += next[i - 1];
   }
   for (size_t s = 0; s < corners; ++s) {
-    fans->corner[next[surface->triangles[s]]++] = (uint32_t)s;
+    fans->corner[next[surface->lungs->mesh.triangles[s]]++] = (uint32_t)s;
   }
   return SUPINE_OK;
 }
@@ -86,7 +85,7 @@ static void find_row(const supine_normals_surface *s, const supine_normals_fans 
     uint32_t others[2];
     double a[3][COLUMNS];
     double b[3][COLUMNS];
-    supine_normals_fan_others(s->triangles, fans->corner[at], others);
+    supine_normals_fan_others(s->lungs->mesh.triangles, fans->corner[at], others);
     read_side(s, vertex, others[0], a);
     read_side(s, vertex, others[1], b);
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -107,15 +106,13 @@ supine_status supine_normals_rows_create(const supine_normals_surface *surface,
                                          size_t offset, size_t stride, supine_arena *arena,
                                          supine_normals_rows *rows) {
   const size_t terms = supine_normals_terms(surface->field->mode_count);
-  const size_t end = surface->lung_begin[lung + 1];
-  const size_t begin = surface->lung_begin[lung];
+  const size_t end = surface->lungs->lung_begin[lung + 1];
+  const size_t begin = surface->lungs->lung_begin[lung];
   const size_t most = (end - begin) / stride + 1;
   rows->count = 0;
   rows->vertex = supine_arena_take(arena, most, sizeof *rows->vertex);
   rows->terms = supine_arena_take(arena, most * 3 * terms, sizeof *rows->terms);
-  if (arena->failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(arena));
   for (size_t i = begin + offset; i < end; i += stride) {
     double *row = rows->terms + 3 * rows->count * terms;
     memset(row, 0, 3 * terms * sizeof *row);

@@ -19,7 +19,7 @@ static double largest(const supine_normals_surface *s, const double *w) {
   const size_t modes = s->field->mode_count;
   const size_t axes = s->directions == NULL ? 3 : 1;
   double top = 0.0;
-  for (size_t i = 0; i < s->vertex_count; i += 1 + s->vertex_count / SOME) {
+  for (size_t i = 0; i < s->lungs->mesh.vertex_count; i += 1 + s->lungs->mesh.vertex_count / SOME) {
     double square = 0.0;
     for (size_t axis = 0; axis < axes; ++axis) {
       double amount = 0.0;
@@ -46,7 +46,7 @@ static double largest(const supine_normals_surface *s, const double *w) {
 static bool gains_from_rest(const supine_normals_surface *s, const double *y, const double *w,
                             double share, double (*gains)[3], double *amount) {
   *amount = 0.0;
-  for (size_t lung = 0; lung < s->lung_count; ++lung) {
+  for (size_t lung = 0; lung < s->lungs->lung_count; ++lung) {
     supine_volume_form form;
     double rest = 0.0;
     supine_physics_volume_forms_contract_lung(s->forms, lung, w, &form);
@@ -69,7 +69,7 @@ static bool common_gain(const supine_normals_surface *s, const double *w, double
                         double (*gains)[3], double *amount) {
   const double size = largest(s, w);
   *amount = lowest_mm + share * (highest_mm - lowest_mm);
-  for (size_t i = 0; i < 3 * s->lung_count; ++i) {
+  for (size_t i = 0; i < 3 * s->lungs->lung_count; ++i) {
     gains[i / 3][i % 3] = size > 0.0 ? *amount / size : 0.0;
   }
   return size > 0.0;
@@ -83,10 +83,9 @@ supine_status supine_normals_states_create(const supine_normals_surface *surface
   double low[9];
   double w[SUPINE_MODES_MAX];
   *states = (supine_normals_states){.room = count, .range = {INFINITY, -INFINITY}};
-  states->phi = supine_arena_take(arena, surface->lung_count * count * terms, sizeof *states->phi);
-  if (states->phi == NULL) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  states->phi =
+      supine_arena_take(arena, surface->lungs->lung_count * count * terms, sizeof *states->phi);
+  SUPINE_TRY(supine_arena_status(arena));
   for (size_t i = 0; i < count; ++i) {
     const double at = (double)i + shift;
     const double share = fmod(at * share_step, 1.0);
@@ -98,7 +97,7 @@ supine_status supine_normals_states_create(const supine_normals_surface *surface
     supine_sh_compression_weights(surface->field, g, w);
     if (surface->resting != NULL ? gains_from_rest(surface, low, w, share, gains, &amount)
                                  : common_gain(surface, w, share, gains, &amount)) {
-      for (size_t lung = 0; lung < surface->lung_count; ++lung) {
+      for (size_t lung = 0; lung < surface->lungs->lung_count; ++lung) {
         supine_normals_monomials(surface->field->mode_count, w, gains[lung],
                                  states->phi + (lung * count + states->count) * terms);
       }

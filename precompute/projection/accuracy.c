@@ -182,9 +182,7 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
   double *space =
       supine_arena_take(&arena, threads * 3 * BLOCK * (modes + 2 * count), sizeof *space);
   *accuracy = (supine_accuracy){.direction_count = count};
-  if (arena.failed) {
-    return supine_error_memory(error, "errors in %zu directions", count);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "errors in %zu directions", count));
   accuracy_work work = {truth, compression, directions, weights, gains, tallies, space};
   for (size_t d = 0; d < count; ++d) {
     const double *g = truth->directions + 3 * d;
@@ -192,13 +190,11 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
     supine_sh_compression_weights(compression, g, weights + d * modes);
   }
   accuracy->volume = find_fraction(&work, forms, volumes, gains);
-  if (accuracy->volume == 0.0) {
-    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                            "the error cannot be measured: the surface folds over at less than a "
-                            "thousandth of the volume change of %g mL; check the surface and the "
-                            "constants of the displacement law",
-                            volumes[0]);
-  }
+  SUPINE_REFUSE_IF(
+      accuracy->volume == 0.0, error, SUPINE_ERROR_NUMERICAL,
+      "the error cannot be measured: the surface folds over at less than a thousandth of the "
+      "volume change of %g mL; check the surface and the constants of the displacement law",
+      volumes[0]);
   supine_parallel_for(PARTS, 1, threads, compare_range, &work);
   conclude(&work, accuracy);
   return SUPINE_OK;
@@ -217,9 +213,7 @@ supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const doubl
                         supine_arena_take(&arena, 3 * SAMPLES_MAX, sizeof *sample.triangles)};
   double *moved = supine_arena_take(&arena, 3 * n, sizeof *moved);
   *share = 0.0;
-  if (arena.failed) {
-    return supine_error_memory(error, "folds of %zu vertices", n);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "folds of %zu vertices", n));
   for (size_t t = 0; t < sample.triangle_count; ++t) {
     memcpy(sample.triangles + 3 * t, mesh->triangles + 3 * t * stride,
            3 * sizeof *sample.triangles);

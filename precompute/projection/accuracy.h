@@ -75,8 +75,7 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
 /** Add to `accuracy` the error of storage, which is independent of the other errors: add squares of
  * the RMS error and of the percentile, and add the maximum. The error of storage is the difference
  * between the positions that the run time computes and the same sum of modes in double precision,
- * in 16 directions of gravity, at the default volume (supine_basis_default_volume). Directions in
- * which the surface cannot have this volume are left out.
+ * in 16 directions of gravity, at the default volume if the surface can have it.
  * @param basis       opened with the default storage
  * @param directions  [N, 3] displacement of each vertex per unit force, mm, or NULL */
 supine_status supine_accuracy_add_storage(const supine_basis *basis,
@@ -86,10 +85,8 @@ supine_status supine_accuracy_add_storage(const supine_basis *basis,
 /** Find the share of triangles, 0 to 1, whose normals turn by more than 90 degrees from the
  * reference surface to a given volume. It is the largest share in the six postures with gravity
  * along an axis. Postures in which the lungs cannot reach the volume are left out. Up to 50,000
- * evenly chosen triangles are examined. Above a few in a thousand, the surface looks torn.
- * @param directions  [N, 3] displacement of each vertex per unit force, mm
- * @param forms       volumes as polynomials of the weights of the modes (volume_forms.h)
- * @param volume      [9] as in supine_accuracy_measure */
+ * evenly chosen triangles are examined. Above a few in a thousand, the surface looks torn. The
+ * arguments are those of supine_accuracy_measure. */
 supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const double *directions,
                                           const supine_compression *compression,
                                           const supine_volume_forms *forms, const double volume[9],

@@ -41,13 +41,6 @@ static double square_of(const double *gram, size_t rank, const double *coefficie
   return cblas_ddot((int)rank, coefficients, 1, image, 1);
 }
 
-/* Compute residual[r] -= sum over j of part[r stride + j] weights[j], with r < rank, j < count. */
-static void subtract(const double *part, size_t stride, size_t count, const double *weights,
-                     size_t rank, double *residual) {
-  cblas_dgemv(CblasRowMajor, CblasNoTrans, (int)rank, (int)count, -1.0, part, (int)stride, weights,
-              1, 1.0, residual, 1);
-}
-
 supine_status supine_accuracy_error_table_create(const supine_truth *truth,
                                                  const supine_projection *projection,
                                                  const supine_compression *compression,
@@ -64,9 +57,7 @@ supine_status supine_accuracy_error_table_create(const supine_truth *truth,
   SUPINE_ARENA arena = {0};
   double *gram = supine_arena_take(&arena, rank * rank, sizeof *gram);
   *table = (supine_error_table){.band_count = bands, .mode_count = modes};
-  if (gram == NULL) {
-    return supine_error_memory(error, "the table of errors");
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "the table of errors"));
   find_gram(truth, compression->row_count, directions, gram);
   for (size_t d = 0; d < truth->direction_count; ++d) {
     const double *functions = truth->functions + d * rank;
@@ -75,13 +66,15 @@ supine_status supine_accuracy_error_table_create(const supine_truth *truth,
     all += square_of(gram, rank, functions);
     memcpy(residual, functions, rank * sizeof *residual);
     for (size_t l = 0; l < bands; ++l) {
-      subtract(projection->expansion.functions + l * l, terms, 2 * l + 1, y + l * l, rank,
-               residual);
+      cblas_dgemv(CblasRowMajor, CblasNoTrans, (int)rank, 2 * (int)l + 1, -1.0,
+                  projection->expansion.functions + l * l, (int)terms, y + l * l, 1, 1.0, residual,
+                  1);
       table->harmonics[l] += square_of(gram, rank, residual);
     }
     memcpy(residual, functions, rank * sizeof *residual);
     for (size_t k = 0; k < modes; ++k) {
-      subtract(compression->mix + k, modes, 1, weights + k, rank, residual);
+      cblas_dgemv(CblasRowMajor, CblasNoTrans, (int)rank, 1, -1.0, compression->mix + k, (int)modes,
+                  weights + k, 1, 1.0, residual, 1);
       table->modes[k] += square_of(gram, rank, residual);
     }
   }

@@ -45,9 +45,8 @@ supine_status supine_accuracy_truth_create(const supine_lungs *lungs, const supi
   truth->directions = supine_arena_take(&truth->memory, 3 * count, sizeof(double));
   truth->functions = supine_arena_take(&truth->memory, count * rank, sizeof(double));
   truth->cubic = supine_arena_zeros(&truth->memory, 3 * count, sizeof(double));
-  if (arena.failed || truth->memory.failed) {
-    return supine_error_memory(error, "%zu held-out directions", count);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu held-out directions", count));
+  SUPINE_TRY(supine_arena_check(&truth->memory, error, "%zu held-out directions", count));
   supine_accuracy_held_out_directions(count, truth->directions);
   const supine_gravities gravities = {count, truth->directions, range, range + count};
   if (supine_physics_height_range(lungs, model->force.pair, count, truth->directions, range,

@@ -6,7 +6,7 @@
 
 #include "base/arena.h"
 #include "precompute/projection/projection.h"
-#include "sh/transform.h"
+#include "sh/expansion.h"
 #include <supine/sh.h>
 
 void supine_projection_free(supine_projection *projection) {
@@ -40,8 +40,8 @@ static supine_status find_heights(const supine_lungs *lungs, bool pair, const su
   return status;
 }
 
-/* Expand the weights w_r(g) of span.h, which depend on the direction g of gravity and have kinks
- * where another vertex becomes the lowest or highest, in spherical harmonics of g. Write the
+/* Expand the weights w_r(g) of projection.h, which depend on the direction g of gravity and have
+ * kinks where another vertex becomes the lowest or highest, in spherical harmonics of g. Write the
  * coefficients to functions [span->rank, (band + 1)^2]. */
 static supine_status expand(const supine_lungs *lungs, const supine_force_law *law, size_t band,
                             const supine_span *span, const supine_sh_grid *grid,
@@ -52,9 +52,7 @@ static supine_status expand(const supine_lungs *lungs, const supine_force_law *l
                           supine_arena_take(&arena, count, sizeof(double)),
                           supine_arena_take(&arena, count, sizeof(double))};
   double *weights = supine_arena_take(&arena, count * span->rank, sizeof *weights);
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   SUPINE_TRY(find_heights(lungs, law->pair, grid, &heights));
   const supine_gravities gravities = {count, heights.directions, heights.minimum, heights.maximum};
   SUPINE_TRY(supine_projection_span_weights(lungs, law, span, &gravities, weights));
@@ -83,16 +81,15 @@ static supine_status solve(const supine_lungs *lungs, const supine_model *model,
   return status;
 }
 
-static supine_status create(const supine_lungs *lungs, const supine_model *model, size_t band,
-                            supine_projection *projection, supine_error *error) {
+supine_status supine_projection_create(const supine_lungs *lungs, const supine_model *model,
+                                       size_t band, supine_projection *projection,
+                                       supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   supine_expansion *expansion = &projection->expansion;
   supine_sh_grid *grid = NULL;
   *projection = (supine_projection){.expansion = {.row_count = n, .band = band}};
-  if (band > SUPINE_SH_BAND_MAX) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "band %zu: give at most %d", band,
-                            SUPINE_SH_BAND_MAX);
-  }
+  SUPINE_REFUSE_IF(band > SUPINE_SH_BAND_MAX, error, SUPINE_ERROR_ARGUMENT,
+                   "band %zu: give at most %d", band, SUPINE_SH_BAND_MAX);
   projection->span = malloc(sizeof *projection->span);
   if (projection->span == NULL) {
     return supine_error_memory(error, "the forces");
@@ -117,21 +114,20 @@ static supine_status create(const supine_lungs *lungs, const supine_model *model
   return solve(lungs, model, projection, error);
 }
 
-supine_status supine_projection_create(const supine_lungs *lungs, const supine_model *model,
-                                       size_t band, supine_projection *projection,
-                                       supine_error *error) {
-  const supine_status status = create(lungs, model, band, projection, error);
-  if (status != SUPINE_OK) {
-    supine_projection_free(projection);
-  }
-  return status;
-}
-
 void supine_projection_displacement(const supine_compression *compression, const double *directions,
                                     const double *weights, double *u) {
-  supine_sh_compression_field(compression, weights, u);
-  for (size_t i = directions != NULL ? 3 * compression->row_count : 0; i-- > 0;) {
-    u[i] = u[i / 3] * directions[i];
+  const size_t modes = compression->mode_count;
+  for (size_t i = 0; i < compression->row_count; ++i) {
+    double field = 0.0;
+    for (size_t k = 0; k < modes; ++k) {
+      field += weights[k] * (double)compression->coefficients[i * modes + k];
+    }
+    for (size_t at = 3 * i; at < 3 * i + 3 && directions != NULL; ++at) {
+      u[at] = field * directions[at];
+    }
+    if (directions == NULL) {
+      u[i] = field;
+    }
   }
 }
 
@@ -143,9 +139,7 @@ supine_status supine_projection_volume_forms(const supine_compression *compressi
   const size_t values = compression->row_count * count;
   SUPINE_ARENA arena = {0};
   double *columns = supine_arena_take(&arena, values, sizeof *columns);
-  if (columns == NULL) {
-    return supine_error_memory(error, "volume coefficients of %zu modes", count);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "volume coefficients of %zu modes", count));
   for (size_t i = 0; i < values; ++i) {
     columns[i] = (double)compression->coefficients[i];
   }

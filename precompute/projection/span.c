@@ -7,15 +7,15 @@
 #include "base/arena.h"
 #include "base/lapack.h"
 #include "base/vec3.h"
-#include "precompute/projection/span.h"
+#include "precompute/projection/projection.h"
 
-/* The cross approximation (span.h) examines at most VERTICES vertices in DIRECTIONS directions of
- * gravity. */
+/* The cross approximation (projection.h) examines at most VERTICES vertices in DIRECTIONS
+ * directions of gravity. */
 enum { VERTICES = 1024, DIRECTIONS = 512 };
 
-/* Largest accepted residual of the interpolated forces (span.h) on the examined vertices, divided
- * by the largest force, if supine_force_law.soften is not 0. The RMS residual is then 6e-5 of the
- * RMS force, a hundredth of the error that compression to 16 modes causes. */
+/* Largest accepted residual of the interpolated forces (projection.h) on the examined vertices,
+ * divided by the largest force, if supine_force_law.soften is not 0. The RMS residual is then 6e-5
+ * of the RMS force, a hundredth of the error that compression to 16 modes causes. */
 static const double tolerance = 3e-4;
 /* The same limit if supine_force_law.soften is 0, where the interpolation is exact. */
 static const double rounding = 1e-12;
@@ -94,12 +94,10 @@ supine_status supine_projection_span_create(const supine_lungs *lungs, const sup
   const supine_gravities gravities = {DIRECTIONS, directions, range, range + DIRECTIONS};
   supine_physics_force(lungs, law, &gravities, count, vertices, force);
   memcpy(residual, force, values * sizeof *residual);
-  if (!choose(residual, count, law->soften == 0.0 ? rounding : tolerance, &span->rank, rows,
-              columns)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--soften %g is too large for a basis file: give at most 12",
-                            law->soften);
-  }
+  SUPINE_REFUSE_IF(!choose(residual, count, law->soften == 0.0 ? rounding : tolerance, &span->rank,
+                           rows, columns),
+                   error, SUPINE_ERROR_ARGUMENT,
+                   "--soften %g is too large for a basis file: give at most 12", law->soften);
   for (size_t r = 0; r < span->rank; ++r) {
     memcpy(span->directions + 3 * r, directions + 3 * columns[r], 3 * sizeof *directions);
     span->vertices[r] = vertices[rows[r]];
@@ -123,9 +121,7 @@ supine_status supine_projection_span_weights(const supine_lungs *lungs, const su
   const int count = (int)gravities->count;
   SUPINE_ARENA arena = {0};
   double *force = supine_arena_take(&arena, span->rank * gravities->count, sizeof *force);
-  if (force == NULL) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   supine_physics_force(lungs, law, gravities, span->rank, span->vertices, force);
   cblas_dgemm(CblasRowMajor, CblasTrans, CblasTrans, count, rank, rank, 1.0, force, count,
               span->inverse, rank, 0.0, weights, rank);

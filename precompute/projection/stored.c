@@ -21,9 +21,7 @@ supine_status supine_accuracy_add_storage(const supine_basis *basis,
   float *xyz = supine_arena_take(&arena, 3 * n, sizeof *xyz);
   double *u = supine_arena_take(&arena, 3 * n, sizeof *u);
   supine_tally *tally = supine_arena_zeros(&arena, 1, sizeof *tally);
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
+  SUPINE_TRY(supine_arena_status(&arena));
   supine_accuracy_held_out_directions(DIRECTIONS, gravity);
   for (const double *g = gravity; g < gravity + 3 * DIRECTIONS; g += 3) {
     const supine_state state = {.gravity = {g[0], g[1], g[2]}};
