@@ -22,7 +22,6 @@ typedef struct supine_stream_observed {
   supine_observation last[SUPINE_LOCATE_POINTS_MAX];
   bool ras;      /**< true if positions in messages are in RAS, false if in LPS */
   double *space; /**< [supine_locate_space(count)] workspace */
-  supine_location location;
 } supine_stream_observed;
 
 /** Numbers of events since the server was created. */
