@@ -9,6 +9,7 @@
 #include <supine/sh.h>
 
 #include "base/arena.h"
+#include "base/vec3.h"
 #include "runtime/internal.h"
 #include "runtime/safetensors/safetensors_file.h"
 
@@ -166,27 +167,23 @@ static supine_status check_modes(const check *c, supine_basis *basis) {
 }
 
 static void bound_lungs(supine_basis *basis) {
+  for (size_t axis = 0; axis < 3; ++axis) {
+    basis->box[0][axis] = INFINITY;
+    basis->box[1][axis] = -INFINITY;
+  }
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
-    if (basis->lung_begin[lung] == basis->lung_begin[lung + 1]) {
-      continue;
-    }
     float(*box)[3] = basis->bounds[lung];
-    const float *p = basis->info.vertices + 3 * basis->lung_begin[lung];
-    memcpy(box[0], p, sizeof box[0]);
-    memcpy(box[1], p, sizeof box[1]);
-    for (size_t i = basis->lung_begin[lung]; i < basis->lung_begin[lung + 1]; ++i, p += 3) {
-      for (size_t axis = 0; axis < 3; ++axis) {
-        box[0][axis] = p[axis] < box[0][axis] ? p[axis] : box[0][axis];
-        box[1][axis] = p[axis] > box[1][axis] ? p[axis] : box[1][axis];
-      }
+    const size_t begin = 3 * basis->lung_begin[lung];
+    for (size_t i = begin; i < 3 * basis->lung_begin[lung + 1]; ++i) {
+      const float x = basis->info.vertices[i];
+      const size_t axis = (i - begin) % 3;
+      box[0][axis] = i < begin + 3 || x < box[0][axis] ? x : box[0][axis];
+      box[1][axis] = i < begin + 3 || x > box[1][axis] ? x : box[1][axis];
+      basis->box[0][axis] = fmin(basis->box[0][axis], (double)x);
+      basis->box[1][axis] = fmax(basis->box[1][axis], (double)x);
     }
   }
   basis->info.bounds = basis->bounds[0][0];
-  for (size_t i = 0; i < 3 * basis->info.vertex_count; ++i) {
-    const double x = (double)basis->info.vertices[i];
-    basis->box[0][i % 3] = i < 3 || x < basis->box[0][i % 3] ? x : basis->box[0][i % 3];
-    basis->box[1][i % 3] = i < 3 || x > basis->box[1][i % 3] ? x : basis->box[1][i % 3];
-  }
 }
 
 /* Read the names of the lungs from the metadata "lungs", such as "left,right". Name the remaining
@@ -306,11 +303,7 @@ static void measure_lungs(supine_basis *basis) {
         const size_t corner = info->triangles[3 * t + i / 3];
         p[i / 3][i % 3] = (double)info->vertices[3 * corner + i % 3] - (double)origin[i % 3];
       }
-      for (size_t i = 0; i < 3; ++i) {
-        const size_t j = (i + 1) % 3;
-        const size_t k = (i + 2) % 3;
-        volume += 1e-3 / 6 * p[0][i] * (p[1][j] * p[2][k] - p[1][k] * p[2][j]);
-      }
+      volume += 1e-3 / 6 * supine_triple(p[0], p[1], p[2]);
     }
     basis->reference_volume[lung] = volume;
   }

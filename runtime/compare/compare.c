@@ -23,18 +23,13 @@ struct supine_compare {
 static const double four_pi = 12.566370614359172954;
 
 static double twice_area(const supine_basis *basis, const uint32_t *corner) {
-  const float *a = basis->info.vertices + 3 * (size_t)corner[0];
-  const float *b = basis->info.vertices + 3 * (size_t)corner[1];
-  const float *c = basis->info.vertices + 3 * (size_t)corner[2];
-  double u[3];
-  double v[3];
-  for (int axis = 0; axis < 3; ++axis) {
-    u[axis] = (double)b[axis] - (double)a[axis];
-    v[axis] = (double)c[axis] - (double)a[axis];
+  double p[3][3];
+  double normal[3];
+  for (size_t i = 0; i < 9; ++i) {
+    p[i / 3][i % 3] = (double)basis->info.vertices[3 * (size_t)corner[i / 3] + i % 3];
   }
-  double product[3];
-  supine_cross(u, v, product);
-  return supine_length(product);
+  supine_normal(p[0], p[1], p[2], normal);
+  return supine_length(normal);
 }
 
 static supine_status share_area(supine_compare *compare, supine_error *error) {
