@@ -9,7 +9,6 @@
 #include <supine/sh.h>
 
 #include "base/arena.h"
-#include "base/vec3.h"
 #include "runtime/internal.h"
 #include "runtime/safetensors/safetensors_file.h"
 
@@ -300,7 +299,11 @@ static void measure_lungs(supine_basis *basis) {
         const size_t corner = info->triangles[3 * t + i / 3];
         p[i / 3][i % 3] = (double)info->vertices[3 * corner + i % 3] - (double)origin[i % 3];
       }
-      volume += 1e-3 / 6 * supine_triple(p[0], p[1], p[2]);
+      for (size_t i = 0; i < 3; ++i) {
+        const size_t j = (i + 1) % 3;
+        const size_t k = (i + 2) % 3;
+        volume += 1e-3 / 6 * p[0][i] * (p[1][j] * p[2][k] - p[1][k] * p[2][j]);
+      }
     }
     basis->reference_volume[lung] = volume;
   }
