@@ -49,6 +49,20 @@ static inline bool supine_normalise(const double v[3], double unit[3]) {
   return true;
 }
 
+/** Convert a quaternion (w, x, y, z) to a matrix, row by row: a rotation, times the square of the
+ * quaternion's length. */
+static inline void supine_quaternion_matrix(const double quaternion[4], double matrix[9]) {
+  const double w = quaternion[0];
+  const double *v = quaternion + 1;
+  for (int i = 0; i < 3; ++i) {
+    const int j = (i + 1) % 3;
+    const int k = (i + 2) % 3;
+    matrix[4 * i] = w * w + v[i] * v[i] - v[j] * v[j] - v[k] * v[k];
+    matrix[3 * i + j] = 2 * (v[i] * v[j] - w * v[k]);
+    matrix[3 * j + i] = 2 * (v[i] * v[j] + w * v[k]);
+  }
+}
+
 static inline double supine_distance(const double a[3], const double b[3]) {
   double d[3];
   supine_subtract(a, b, d);

@@ -116,7 +116,7 @@ static json_t *outliers_of(const supine_command_names *names, const observations
 static void print(const request *wanted, const supine_command_names *names,
                   const observations *observed, size_t n, double volume,
                   const supine_patient_located *located) {
-  const supine_location *best = located->best;
+  const supine_location_info *best = located->best;
   const double *r = best->rotation;
   const double *t = best->translation;
   const double cosine = fmax(-1.0, fmin(1.0, 0.5 * (r[0] + r[4] + r[8] - 1.0)));

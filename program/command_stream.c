@@ -104,7 +104,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   if ((session->certificate == NULL) != (session->key == NULL)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give --certificate and --key together");
   }
-  supine_stream_rotation(wanted->body_from_tracker, options->setup.body); /* 0 if it is zero */
+  supine_quaternion_matrix(wanted->body_from_tracker, options->setup.body); /* 0 if it is zero */
   if (!supine_normalise(options->setup.body, unit) ||
       !supine_normalise(wanted->world_down, options->setup.down)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,

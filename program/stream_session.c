@@ -27,27 +27,21 @@ static bool stop(void *context) {
 static void report(const supine_stream_results *results, const supine_stream_session *wanted) {
   const supine_stream_counts *n = &results->counts;
   if (wanted->points != NULL) {
-    (void)printf("received positions of observed points: %llu\n", (unsigned long long)n->positions);
+    (void)printf("received positions of observed points: %zu\n", n->positions);
   }
-  (void)printf(
-      "poses: %llu (repaired: %llu; refused: %llu); frames: %llu (sent: %llu); peers: %llu\n",
-      (unsigned long long)n->poses, (unsigned long long)n->repaired, (unsigned long long)n->refused,
-      (unsigned long long)n->frames, (unsigned long long)n->sent, (unsigned long long)n->peers);
+  (void)printf("poses: %zu (repaired: %zu; refused: %zu); frames: %zu (sent: %zu); peers: %zu\n",
+               n->poses, n->repaired, n->refused, n->frames, n->sent, n->peers);
   if (n->malformed + n->skipped + n->lost + n->turned_away + n->unreachable > 0) {
-    (void)printf("malformed messages: %llu; messages not used: %llu; peers disconnected: %llu; "
-                 "peers refused: %llu; frames whose volume is out of reach: %llu\n",
-                 (unsigned long long)n->malformed, (unsigned long long)n->skipped,
-                 (unsigned long long)n->lost, (unsigned long long)n->turned_away,
-                 (unsigned long long)n->unreachable);
+    (void)printf("malformed messages: %zu; messages not used: %zu; peers disconnected: %zu; "
+                 "peers refused: %zu; frames whose volume is out of reach: %zu\n",
+                 n->malformed, n->skipped, n->lost, n->turned_away, n->unreachable);
   }
   for (int surfaces = 0; surfaces < 2; ++surfaces) {
     const supine_stream_latency *latency = &results->latency[surfaces];
     if (latency->count > 0) {
-      (void)printf("pose received to %s sent: %llu of %llu frames within %.0f ms, worst %.3f ms\n",
-                   surfaces != 0 ? "surface" : "weights",
-                   (unsigned long long)(latency->count - latency->late),
-                   (unsigned long long)latency->count, 1e3 * SUPINE_STREAM_BUDGET,
-                   1e3 * latency->worst);
+      (void)printf("pose received to %s sent: %zu of %zu frames within %.0f ms, worst %.3f ms\n",
+                   surfaces != 0 ? "surface" : "weights", latency->count - latency->late,
+                   latency->count, 1e3 * SUPINE_STREAM_BUDGET, 1e3 * latency->worst);
     }
   }
 }

@@ -80,6 +80,16 @@ static const void *require(const check *c, const char *name, supine_dtype dtype,
   return tensor->data;
 }
 
+/* Set a pointer to the numbers of a tensor by require(). If a check fails, return from the calling
+ * function. */
+#define REQUIRE(pointer, ...)                                                                      \
+  do {                                                                                             \
+    (pointer) = require(__VA_ARGS__);                                                              \
+    if ((pointer) == NULL) {                                                                       \
+      return SUPINE_ERROR_FORMAT;                                                                  \
+    }                                                                                              \
+  } while (0)
+
 /* Check the metadata "format", "version" and "kind", and the checksum. Do not check a checksum of
  * 16 digits in a file of version 1: it has an older form. */
 static supine_status check_metadata(const check *c, supine_basis_info *info) {
@@ -111,11 +121,8 @@ static supine_status check_surface(const check *c, supine_basis *basis) {
   size_t vertices[2] = {ANY, 3};
   size_t triangles[2] = {ANY, 3};
   uint32_t highest = 0;
-  info->vertices = require(c, "vertices", SUPINE_F32, 2, vertices);
-  info->triangles = require(c, "triangles", SUPINE_U32, 2, triangles);
-  if (info->vertices == NULL || info->triangles == NULL) {
-    return SUPINE_ERROR_FORMAT;
-  }
+  REQUIRE(info->vertices, c, "vertices", SUPINE_F32, 2, vertices);
+  REQUIRE(info->triangles, c, "triangles", SUPINE_U32, 2, triangles);
   info->vertex_count = vertices[0];
   info->triangle_count = triangles[0];
   for (size_t i = 0; i < 3 * info->triangle_count; ++i) {
@@ -135,27 +142,21 @@ static supine_status check_field(const check *c, supine_basis *basis) {
   const size_t rank = info->vector ? 3 : 2;
   size_t shape[] = {n, info->vector ? 3 : ANY, ANY};
   size_t direction[] = {n, 3};
-  info->coefficients = require(c, "coefficients", SUPINE_F32, rank, shape);
-  if (info->coefficients == NULL) {
-    return SUPINE_ERROR_FORMAT;
-  }
+  REQUIRE(info->coefficients, c, "coefficients", SUPINE_F32, rank, shape);
   info->mode_count = shape[rank - 1];
   if (info->mode_count < 1 || info->mode_count > SUPINE_MODES_MAX) {
     return refuse(c, "the number of modes is %zu, not 1 to %d", info->mode_count, SUPINE_MODES_MAX);
   }
   if (!info->vector) {
-    info->direction = require(c, "direction", SUPINE_F32, 2, direction);
+    REQUIRE(info->direction, c, "direction", SUPINE_F32, 2, direction);
   }
-  return info->vector || info->direction != NULL ? SUPINE_OK : SUPINE_ERROR_FORMAT;
+  return SUPINE_OK;
 }
 
 static supine_status check_modes(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
   size_t shape[] = {info->mode_count, ANY};
-  info->modes = require(c, "modes", SUPINE_F64, 2, shape);
-  if (info->modes == NULL) {
-    return SUPINE_ERROR_FORMAT;
-  }
+  REQUIRE(info->modes, c, "modes", SUPINE_F64, 2, shape);
   while (info->band < SUPINE_SH_BAND_MAX && supine_sh_count(info->band) < shape[1]) {
     ++info->band;
   }
@@ -166,27 +167,23 @@ static supine_status check_modes(const check *c, supine_basis *basis) {
 }
 
 static void bound_lungs(supine_basis *basis) {
+  for (size_t axis = 0; axis < 3; ++axis) {
+    basis->box[0][axis] = INFINITY;
+    basis->box[1][axis] = -INFINITY;
+  }
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
-    if (basis->lung_begin[lung] == basis->lung_begin[lung + 1]) {
-      continue;
-    }
     float(*box)[3] = basis->bounds[lung];
-    const float *p = basis->info.vertices + 3 * basis->lung_begin[lung];
-    memcpy(box[0], p, sizeof box[0]);
-    memcpy(box[1], p, sizeof box[1]);
-    for (size_t i = basis->lung_begin[lung]; i < basis->lung_begin[lung + 1]; ++i, p += 3) {
-      for (size_t axis = 0; axis < 3; ++axis) {
-        box[0][axis] = p[axis] < box[0][axis] ? p[axis] : box[0][axis];
-        box[1][axis] = p[axis] > box[1][axis] ? p[axis] : box[1][axis];
-      }
+    const size_t begin = 3 * basis->lung_begin[lung];
+    for (size_t i = begin; i < 3 * basis->lung_begin[lung + 1]; ++i) {
+      const float x = basis->info.vertices[i];
+      const size_t axis = (i - begin) % 3;
+      box[0][axis] = i < begin + 3 || x < box[0][axis] ? x : box[0][axis];
+      box[1][axis] = i < begin + 3 || x > box[1][axis] ? x : box[1][axis];
+      basis->box[0][axis] = fmin(basis->box[0][axis], (double)x);
+      basis->box[1][axis] = fmax(basis->box[1][axis], (double)x);
     }
   }
   basis->info.bounds = basis->bounds[0][0];
-  for (size_t i = 0; i < 3 * basis->info.vertex_count; ++i) {
-    const double x = (double)basis->info.vertices[i];
-    basis->box[0][i % 3] = i < 3 || x < basis->box[0][i % 3] ? x : basis->box[0][i % 3];
-    basis->box[1][i % 3] = i < 3 || x > basis->box[1][i % 3] ? x : basis->box[1][i % 3];
-  }
 }
 
 /* Read the names of the lungs from the metadata "lungs", such as "left,right". Name the remaining
@@ -214,10 +211,8 @@ static size_t name_lungs(const check *c, supine_basis *basis) {
 static supine_status check_lungs(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
   size_t n = info->vertex_count;
-  const unsigned char *lung = require(c, "lung", SUPINE_U8, 1, &n);
-  if (lung == NULL) {
-    return SUPINE_ERROR_FORMAT;
-  }
+  const unsigned char *lung = NULL;
+  REQUIRE(lung, c, "lung", SUPINE_U8, 1, &n);
   const size_t named = name_lungs(c, basis);
   size_t at = 0;
   size_t count = 0;
@@ -263,12 +258,10 @@ static supine_status check_volume(const check *c, supine_basis *basis) {
   if (!info->has_volume) {
     return SUPINE_OK;
   }
-  info->volume_linear = require(c, names[0], SUPINE_F64, axes == 3 ? 3 : 2, shape);
-  info->volume_quadratic = require(c, names[1], SUPINE_F64, axes == 3 ? 4 : 3, shape);
-  info->volume_cubic = require(c, names[2], SUPINE_F64, 4, cubic);
-  return info->volume_linear != NULL && info->volume_quadratic != NULL && info->volume_cubic != NULL
-             ? SUPINE_OK
-             : SUPINE_ERROR_FORMAT;
+  REQUIRE(info->volume_linear, c, names[0], SUPINE_F64, axes == 3 ? 3 : 2, shape);
+  REQUIRE(info->volume_quadratic, c, names[1], SUPINE_F64, axes == 3 ? 4 : 3, shape);
+  REQUIRE(info->volume_cubic, c, names[2], SUPINE_F64, 4, cubic);
+  return SUPINE_OK;
 }
 
 /* Parse the metadata `key`, which must hold `count` numbers separated by commas. Leave `values`
@@ -368,9 +361,9 @@ static supine_status check_rest(const check *c, supine_basis *basis) {
   size_t shape[2] = {basis->info.lung_count, RESTING_TERMS};
   basis->rest_by_lung = tensor->rank == 2;
   const size_t rank = basis->rest_by_lung ? 2 : 1;
-  basis->resting = require(c, "resting_volume", SUPINE_F64, rank, shape + 2 - rank);
-  basis->info.has_rest = basis->resting != NULL;
-  return basis->resting != NULL ? SUPINE_OK : SUPINE_ERROR_FORMAT;
+  REQUIRE(basis->resting, c, "resting_volume", SUPINE_F64, rank, shape + 2 - rank);
+  basis->info.has_rest = true;
+  return SUPINE_OK;
 }
 
 /* Check the optional tensors 'normals' and 'normal_weights'. Both or neither must exist. */
@@ -383,10 +376,8 @@ static supine_status check_normals(const check *c, supine_basis *basis) {
     return SUPINE_OK;
   }
   const bool bytes = tensor != NULL && tensor->dtype == SUPINE_I8;
-  const void *vectors = require(c, "normals", bytes ? SUPINE_I8 : SUPINE_I16, 3, shape);
-  if (vectors == NULL) {
-    return SUPINE_ERROR_FORMAT;
-  }
+  const void *vectors = NULL;
+  REQUIRE(vectors, c, "normals", bytes ? SUPINE_I8 : SUPINE_I16, 3, shape);
   info->normals = bytes ? NULL : vectors;
   info->normal_bytes = bytes ? vectors : NULL;
   info->normal_count = shape[2] - (bytes && shape[2] > 0);
@@ -396,8 +387,8 @@ static supine_status check_normals(const check *c, supine_basis *basis) {
   }
   const bool by_axis = info->volume_axes == 3;
   size_t weights[] = {info->lung_count, info->normal_count, by_axis ? 3 : terms, terms};
-  info->normal_weights = require(c, "normal_weights", SUPINE_F64, by_axis ? 4 : 3, weights);
-  return info->normal_weights != NULL ? SUPINE_OK : SUPINE_ERROR_FORMAT;
+  REQUIRE(info->normal_weights, c, "normal_weights", SUPINE_F64, by_axis ? 4 : 3, weights);
+  return SUPINE_OK;
 }
 
 /* Identify what determines the meaning of a pose: the modes and the coefficients of the volumes. */
@@ -489,11 +480,9 @@ static supine_status check_expected(const check *c, supine_basis *basis) {
   size_t corners[] = {2, 3};
   size_t products[] = {basis->info.lung_count, 3, k, k};
   if (supine_safetensors_find(c->file, "lungs_squares") != NULL) {
-    const double *box = require(c, "lungs_box", SUPINE_F64, 2, corners);
-    basis->squares = require(c, "lungs_squares", SUPINE_F64, 4, products);
-    if (box == NULL || basis->squares == NULL) {
-      return SUPINE_ERROR_FORMAT;
-    }
+    const double *box = NULL;
+    REQUIRE(box, c, "lungs_box", SUPINE_F64, 2, corners);
+    REQUIRE(basis->squares, c, "lungs_squares", SUPINE_F64, 4, products);
     memcpy(basis->box, box, sizeof basis->box);
   }
   basis->midline = 0.5 * (basis->box[0][0] + basis->box[1][0]);

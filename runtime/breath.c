@@ -109,41 +109,16 @@ static double limb_volume(const integrated *of, double pressure, double *complia
   return curve->volume[0] + gain * (of->sum[part] + within);
 }
 
-/* Find the pressure, cmH2O, at which a limb of a P-V loop has the given volume, mL. The volume at
- * this pressure is accurate to 1e-11 of the limb's range of volumes.
- * @retval SUPINE_ERROR_NUMERICAL  no pressure was found */
-static supine_status limb_pressure(const integrated *of, double volume, double *pressure) {
-  enum { STEPS_MAX = 200 };
-  const supine_pv_curve *curve = &of->curve;
-  const double span = curve->volume[1] - curve->volume[0];
-  const double within = 1e-11 * span;
-  const double share = (volume - curve->volume[0]) / span;
-  double low = curve->pressure[0];
-  double high = curve->pressure[1];
-  double last_miss = HUGE_VAL;
-  double at = (1.0 - share) * low + share * high;
-  for (int step = 0; step < STEPS_MAX; ++step) {
-    double compliance = 0.0;
-    const double held = limb_volume(of, at, &compliance);
-    const double miss = fabs(held - volume);
-    if (held < volume) {
-      low = at;
-    } else {
-      high = at;
-    }
-    double next = at + (volume - held) / compliance;
-    const bool inside = next >= low && next <= high;
-    if (miss <= within || high - low <= 1e-15 * fabs(at)) {
-      *pressure = inside ? next : at;
-      return SUPINE_OK;
-    }
-    if (!inside || miss > 0.5 * last_miss) {
-      next = low + 0.5 * (high - low);
-    }
-    last_miss = miss;
-    at = next;
+/* Find the pressure, cmH2O, at which a limb of a P-V loop has the given volume, mL, by bisection
+ * down to the spacing of doubles. */
+static double limb_pressure(const integrated *of, double volume) {
+  double low = of->curve.pressure[0];
+  double high = of->curve.pressure[1];
+  for (int step = 0; step < 60; ++step) {
+    const double middle = low + 0.5 * (high - low);
+    *(limb_volume(of, middle, NULL) < volume ? &low : &high) = middle;
   }
-  return SUPINE_ERROR_NUMERICAL;
+  return high;
 }
 
 supine_status supine_breath_curve_evaluate(const supine_pv_curve *curve, size_t count,
@@ -267,11 +242,7 @@ static supine_status loop_begin(const supine_pv *pv, const supine_pv_breath *bre
                             "gains above %g cmH2O: give a smaller volume",
                             breath->tidal, inhale->volume[1] - rest, cycle->rest);
   }
-  if (limb_pressure(&cycle->limbs[SUPINE_PV_INHALE], full, &cycle->peak) != SUPINE_OK) {
-    return supine_error_set(
-        error, SUPINE_ERROR_NUMERICAL,
-        "no pressure found at which the inhale limb gives %g mL: check the inhale limb", full);
-  }
+  cycle->peak = limb_pressure(&cycle->limbs[SUPINE_PV_INHALE], full);
   SUPINE_TRY(limb_holds(pv, "peak", cycle->peak, error));
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     cycle->gain[limb] = limb_volume(&cycle->limbs[limb], cycle->peak, NULL) - cycle->volume[limb];
@@ -291,8 +262,8 @@ static double between(double value, double low, double high) {
 
 /* Compute the volume, mL, and the pressure, cmH2O, of a breath at a time, s. If the flow is
  * constant, find the pressure from the volume. Otherwise, find the volume from the pressure. */
-static supine_status follow(const supine_pv_breath *breath, const loop *cycle, double time,
-                            double *volume, double *pressure, supine_error *error) {
+static void follow(const supine_pv_breath *breath, const loop *cycle, double time, double *volume,
+                   double *pressure) {
   static const double pi = 3.14159265358979323846;
   supine_pv_limb of = SUPINE_PV_INHALE;
   double share = breath_share(breath, time, &of);
@@ -301,13 +272,8 @@ static supine_status follow(const supine_pv_breath *breath, const loop *cycle, d
     const double low = cycle->volume[of];
     const double high = low + cycle->gain[of];
     *volume = breath->tidal * share;
-    const supine_status status =
-        limb_pressure(here, between(low + share * cycle->gain[of], low, high), pressure);
-    return status == SUPINE_OK ? status
-                               : supine_error_set(error, status,
-                                                  "at %g s, no pressure gives the volume of the "
-                                                  "breath: check the pressure-volume curve",
-                                                  time);
+    *pressure = limb_pressure(here, between(low + share * cycle->gain[of], low, high));
+    return;
   }
   if (breath->course == SUPINE_PV_COSINE) {
     share = 0.5 - 0.5 * cos(pi * share);
@@ -315,7 +281,6 @@ static supine_status follow(const supine_pv_breath *breath, const loop *cycle, d
   *pressure = between(cycle->rest + share * (cycle->peak - cycle->rest), cycle->rest, cycle->peak);
   const double gained = limb_volume(here, *pressure, NULL) - cycle->volume[of];
   *volume = breath->tidal * between(gained / cycle->gain[of], 0.0, 1.0);
-  return SUPINE_OK;
 }
 
 supine_status supine_breath_evaluate(const supine_pv *pv, const supine_pv_breath *breath,
@@ -347,7 +312,7 @@ supine_status supine_breath_evaluate(const supine_pv *pv, const supine_pv_breath
   for (size_t j = 0; j < count; ++j) {
     double volume = 0.0;
     double pressure = 0.0;
-    SUPINE_TRY(follow(breath, &cycle, times[j], &volume, &pressure, error));
+    follow(breath, &cycle, times[j], &volume, &pressure);
     if (volumes != NULL) {
       volumes[j] = volume;
     }

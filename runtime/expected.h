@@ -10,15 +10,16 @@
 
 enum { LOCATE_BLOCK = 256 }; /**< number of vertices evaluated at once */
 
-/** The result of kriging in supine_locate. It lies at the start of the caller's work space. */
-typedef struct supine_locate_fit {
+/** The result of supine_locate. It lies at the start of the caller's work space. */
+struct supine_location {
+  supine_location_info info;
   supine_kriging kriging;
   supine_kriging_options options;
   /** Mean of the observed positions, minus the rotated mean of the predicted positions, mm. */
   double origin[3];
   double deviation; /**< prior standard deviation of the volume, mL; 0 if the volume is known */
   double factor;    /**< factor on the expected errors, from the residuals of the points */
-} supine_locate_fit;
+};
 
 /** Return the constant c of the formula of the expected error (supine/locate.h), mm. It is the
  * metadata "expected_error_mm" of the file or, if the file lacks it, SUPINE_EXPECTED_ERROR_MM. */

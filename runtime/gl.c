@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include <string.h>
 
+#include "base/arena.h"
 #include "runtime/internal.h"
 #include "runtime/kernels/compact.h"
 
@@ -71,10 +72,7 @@ supine_status supine_gl_normal_weights(const supine_basis *basis, const supine_p
   if (words == 0) {
     return SUPINE_ERROR_UNSUPPORTED;
   }
-  const supine_status status = supine_basis_normal_weights(basis, pose, v);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(supine_basis_normal_weights(basis, pose, v));
   memset(uniforms, 0, 3 * words * basis->info.lung_count * sizeof *uniforms);
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     for (size_t j = 0; j < modes; ++j) {

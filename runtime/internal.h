@@ -5,6 +5,7 @@
 #define SUPINE_RUNTIME_INTERNAL_H
 
 #include <supine/runtime.h>
+#include <supine/volume.h>
 
 #include "runtime/kernels/tiles.h"
 
@@ -96,6 +97,9 @@ supine_target supine_target_after(const supine_target *target, size_t count);
 /** Compute supine_basis_info.storage_error, the bound on position errors from storage and rounding,
  * for the packed numbers of the basis, mm. */
 double supine_basis_storage_error(const supine_basis *basis);
+
+/** Return w^T F w for the matrix F = `form` [count, count]. */
+double supine_volume_square(size_t count, const double *form, const double *w);
 
 /** Set all gains of a pose (factors of the displacement) to the same number, so that all lungs
  * together hold `volume` mL more than the reference surface.

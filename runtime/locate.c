@@ -40,8 +40,8 @@ enum { STEPS_MAX = 20, HALVINGS_MAX = 8 };
 
 typedef struct workspace {
   const supine_locate_task *task;
-  supine_location *found;
-  supine_locate_fit *fit;
+  supine_location_info *found; /* &fit->info */
+  supine_location *fit;
   supine_kriging_point *points; /* [task->count] observed points */
   double *law;                  /* [task->count, 3] predicted positions before correction, mm */
   double *kriging; /* [supine_kriging_space(task->count)] work space of supine_kriging_fit */
@@ -53,12 +53,13 @@ static size_t doubles_of(size_t bytes) {
 }
 
 size_t supine_locate_space(size_t count) {
-  return doubles_of(sizeof(supine_locate_fit)) + doubles_of(count * sizeof(supine_kriging_point)) +
+  return doubles_of(sizeof(supine_location)) + doubles_of(count * sizeof(supine_kriging_point)) +
          4 * count + supine_kriging_space(count);
 }
 
 static void place_in(double *space, size_t count, workspace *s) {
-  s->fit = (supine_locate_fit *)space;
+  s->fit = (supine_location *)space;
+  s->found = &s->fit->info;
   space += doubles_of(sizeof *s->fit);
   s->points = (supine_kriging_point *)space;
   space += doubles_of(count * sizeof *s->points);
@@ -119,14 +120,14 @@ static supine_status initialise(workspace *s, supine_error *error) {
       ++p->lung;
     }
   }
-  *s->found = (supine_location){.state = task->state, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+  *s->fit = (supine_location){
+      .info = {.state = task->state, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}},
+      .options = {.model = supine_kriging_default, .volume = unknown, .rotation = task->rigid},
+      .deviation = unknown ? prior_spread * supine_expected_reference(basis) : 0};
   if (unknown) {
     s->found->state.volume =
         (supine_volume){info->has_rest ? SUPINE_VOLUME_REST : SUPINE_VOLUME_SCAN, 0};
   }
-  *s->fit = (supine_locate_fit){
-      .options = {.model = supine_kriging_default, .volume = unknown, .rotation = task->rigid},
-      .deviation = unknown ? prior_spread * supine_expected_reference(basis) : 0};
   s->fit->options.model.sill = sill_of_error * supine_expected_constant(basis);
   return status;
 }
@@ -168,10 +169,10 @@ static supine_status evaluate(workspace *s, supine_error *error) {
 }
 
 /* For the current rotation, compute the translation from the mean predicted to the mean observed
- * position (supine_locate_fit.origin), and the residual of each point in the frame of the basis. */
+ * position (supine_location.origin), and the residual of each point in the frame of the basis. */
 static void find_residuals(workspace *s) {
   const size_t n = s->task->count;
-  supine_location *found = s->found;
+  supine_location_info *found = s->found;
   double mean[3] = {0};
   double observed[3] = {0};
   for (size_t j = 0; j < n; ++j) {
@@ -261,7 +262,7 @@ static supine_status change_volume(workspace *s, double ml, supine_error *error)
 
 /* Find the unknown volume and rotation by Gauss-Newton steps. */
 static supine_status iterate(workspace *s, supine_error *error) {
-  supine_locate_fit *fit = s->fit;
+  supine_location *fit = s->fit;
   const double deviation = fit->deviation;
   for (int step = 0;; ++step) {
     find_residuals(s);
@@ -393,14 +394,17 @@ static supine_status locate(workspace *s, supine_locate_residual *residuals, sup
 }
 
 supine_status supine_locate(const supine_locate_task *task, supine_locate_residual *residuals,
-                            double *space, supine_location *found, supine_error *error) {
+                            double *space, const supine_location **location, supine_error *error) {
+  *location = NULL;
   supine_status status = check(task, error);
   if (status != SUPINE_OK) {
     return status;
   }
   const supine_basis_info *info = supine_basis_get_info(task->inside);
-  workspace s = {.task = task, .found = found};
+  workspace s = {.task = task};
   place_in(space, task->count, &s);
+  supine_location_info *found = s.found;
+  *location = s.fit;
   memset(residuals, 0, task->count * sizeof *residuals);
   status = locate(&s, residuals, error);
   if (status != SUPINE_OK) {
@@ -426,6 +430,9 @@ supine_status supine_locate(const supine_locate_task *task, supine_locate_residu
     found->translation[i] += s.fit->origin[i];
   }
   found->log_evidence = s.fit->kriging.log_likelihood;
-  found->fit = s.fit;
   return status;
+}
+
+const supine_location_info *supine_location_get_info(const supine_location *found) {
+  return &found->info;
 }

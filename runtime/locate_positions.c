@@ -12,7 +12,7 @@ typedef struct block {
   float shift[3 * LOCATE_BLOCK], variance[LOCATE_BLOCK];
 } block;
 
-static void predict(const supine_locate_fit *fit, const supine_expected_model *model, size_t lung,
+static void predict(const supine_location *fit, const supine_expected_model *model, size_t lung,
                     size_t begin, size_t end, block *b) {
   const float *vertices = supine_basis_vertices(model->basis) + 3 * begin;
   float(*x)[3 * LOCATE_BLOCK] = b->formula.x;
@@ -40,9 +40,8 @@ static void predict(const supine_locate_fit *fit, const supine_expected_model *m
  * of kriging. If at least three points were observed and no rotation was fitted, limit each to the
  * expected error without observations. For two points, this limit would be too small (0.85 of the
  * true error). For a fitted rotation, it would ignore the error of the rotation. */
-static void finish(const supine_location *found, const block *b, size_t count, float *xyz,
+static void finish(const supine_location *fit, const block *b, size_t count, float *xyz,
                    float *sigma) {
-  const supine_locate_fit *fit = found->fit;
   const bool bounded = !fit->options.rotation && fit->kriging.count >= 3;
   for (size_t i = 0; i < count; ++i) {
     double body[3];
@@ -59,7 +58,7 @@ static void finish(const supine_location *found, const block *b, size_t count, f
       body[k] = (double)b->law[3 * i + k] + (double)b->shift[3 * i + k];
     }
     for (size_t k = 0; k < 3; ++k) {
-      const double *row = found->rotation + 3 * k;
+      const double *row = fit->info.rotation + 3 * k;
       xyz[3 * i + k] =
           (float)(row[0] * body[0] + row[1] * body[1] + row[2] * body[2] + fit->origin[k]);
     }
@@ -70,17 +69,17 @@ static void finish(const supine_location *found, const block *b, size_t count, f
 supine_status supine_locate_positions(const supine_location *found, const supine_basis *basis,
                                       float *xyz, float *sigma, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
-  const supine_locate_fit *fit = found->fit;
   const supine_state scan = supine_basis_scan(basis);
   supine_expected_model model;
   block b;
-  const supine_status status = supine_expected_prepare(basis, &found->state, &scan, fit->deviation,
-                                                       fit->options.model.least, &model, error);
+  const supine_status status =
+      supine_expected_prepare(basis, &found->info.state, &scan, found->deviation,
+                              found->options.model.least, &model, error);
   for (size_t lung = 0; lung < info->lung_count && status == SUPINE_OK; ++lung) {
     const size_t last = info->lung_begin[lung + 1];
     for (size_t begin = info->lung_begin[lung]; begin < last; begin += LOCATE_BLOCK) {
       const size_t end = last - begin < LOCATE_BLOCK ? last : begin + LOCATE_BLOCK;
-      predict(fit, &model, lung, begin, end, &b);
+      predict(found, &model, lung, begin, end, &b);
       finish(found, &b, end - begin, xyz + 3 * begin, sigma + begin);
     }
   }

@@ -4,7 +4,6 @@
 #include <string.h>
 
 #include <supine/sh.h>
-#include <supine/volume.h>
 
 #include "base/arena.h"
 #include "base/vec3.h"
@@ -77,9 +76,7 @@ static supine_status find_volumes(const supine_basis *basis, const double gravit
   if (supine_sh_evaluate(2, gravity, y) != SUPINE_OK) {
     return refuse_gravity(error);
   }
-  const double length =
-      sqrt(gravity[0] * gravity[0] + gravity[1] * gravity[1] + gravity[2] * gravity[2]);
-  const double up = fmax(0, -gravity[2] / length);
+  const double up = fmax(0, -gravity[2] / supine_length(gravity));
   for (size_t lung = 0; lung < v->lung_count; ++lung) {
     contract(basis, lung, weights, &v->form[lung]);
     v->full[lung] = basis->upright_gain * up * up * basis->info.reference_volume[lung];

@@ -5,6 +5,7 @@
 
 #include <supine/posture.h>
 
+#include "base/vec3.h"
 #include "runtime/words.h"
 
 static const struct {
@@ -63,15 +64,16 @@ supine_status supine_posture_quaternion(const double quaternion[4], double gravi
   if (largest == 0) {
     return SUPINE_ERROR_ARGUMENT;
   }
-  const double w = quaternion[0] / largest;
-  const double x = quaternion[1] / largest;
-  const double y = quaternion[2] / largest;
-  const double z = quaternion[3] / largest;
-  const double square = w * w + x * x + y * y + z * z;
-  /* In body axes, (0, 0, -1) of world axes is minus the third row of the rotation matrix. */
-  gravity[0] = 2 * (w * y - x * z) / square;
-  gravity[1] = (0 - 2 * (y * z + w * x)) / square;
-  gravity[2] = (x * x + y * y - w * w - z * z) / square;
+  double q[4];
+  double rotation[9]; /* scaled; in body axes, (0, 0, -1) of world axes is minus its third row */
+  for (int i = 0; i < 4; ++i) {
+    q[i] = quaternion[i] / largest;
+  }
+  supine_quaternion_matrix(q, rotation);
+  const double square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+  for (int i = 0; i < 3; ++i) {
+    gravity[i] = (0 - rotation[6 + i]) / square;
+  }
   return SUPINE_OK;
 }
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Find the rigid motion that fits the positions of a rigid part best, by least squares. */
 #include <math.h>
-#include <string.h>
 
+#include "base/vec3.h"
 #include "runtime/rigid.h"
 
 void supine_rigid_rotation(const double h[3][3], double rotation[9]) {
@@ -29,15 +29,11 @@ void supine_rigid_rotation(const double h[3][3], double rotation[9]) {
       q[a] = next[a] / sqrt(square);
     }
   }
-  const double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-  const double w = q[0] / length;
-  const double x = q[1] / length;
-  const double y = q[2] / length;
-  const double z = q[3] / length;
-  const double r[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
-                       2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-                       2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
-  memcpy(rotation, r, sizeof r);
+  const double square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+  supine_quaternion_matrix(q, rotation);
+  for (size_t k = 0; k < 9; ++k) {
+    rotation[k] /= square;
+  }
 }
 
 void supine_rigid_add(supine_rigid_motion *m, const float *p, const float *x, size_t count) {

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <stdbool.h>
 
-#include <supine/volume.h>
+#include "runtime/internal.h"
 
 static double dot(size_t count, const double *a, const double *b) {
   double sum = 0;
@@ -14,8 +14,7 @@ static double dot(size_t count, const double *a, const double *b) {
   return sum;
 }
 
-/* Return w^T F w for the matrix F = `form` [count, count]. */
-static double square(size_t count, const double *form, const double *w) {
+double supine_volume_square(size_t count, const double *form, const double *w) {
   double sum = 0;
   for (size_t i = 0; i < count; ++i) {
     sum += w[i] * dot(count, form + i * count, w);
@@ -28,10 +27,10 @@ void supine_volume_contract(size_t count, size_t axes, const double *linear,
                             supine_volume_form *form) {
   for (size_t axis = 0; axis < axes; ++axis) {
     form->of[axis] += dot(count, linear + axis * count, weights);
-    form->of[3 + axis] += square(count, quadratic + axis * count * count, weights);
+    form->of[3 + axis] += supine_volume_square(count, quadratic + axis * count * count, weights);
   }
   for (size_t i = 0; i < count; ++i) {
-    form->of[6] += weights[i] * square(count, third + i * count * count, weights);
+    form->of[6] += weights[i] * supine_volume_square(count, third + i * count * count, weights);
   }
 }
 

@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run the code blocks of the guide: test_guide.py SOURCE_FOLDER PROGRAM LIBRARY CC [PAGE...]
 
-The blocks `sh` and `python` of each page run in order, in a folder with synthetic_ct.py and a basis of synthetic lungs and of
-a nodule in them, lungs.safetensors and nodules.safetensors. A block `sh not-run`
-may not call supine. Other blocks are not run, and lines in them may not begin with `supine`. Links to files must work, and
-each page must make the pictures that it shows. With GUIDE_PICTURES set, these replace the pictures in docs/guide.
+The blocks `sh` and `python` of each page run in order, in a folder with synthetic_ct.py. A block `sh not-run` may not call supine. Other blocks are not run, and lines in them may not begin with `supine`. Links to files must work, and
+each page must show a picture, and make it. With GUIDE_PICTURES set, these replace the pictures in docs/guide.
 
 The page simulator.md belongs to the test `fem`. Exit with 77 if numpy or nibabel is missing."""
 import glob
@@ -44,8 +42,7 @@ def check_page(page):
         os.symlink(sys.executable, os.path.join(folder, "bin", "python3"))
         here = os.path.join(folder, "here")
         os.mkdir(here)
-        for given in (os.path.join(guide, "synthetic_ct.py"), *glob.glob(os.path.join(start.name, "*.safetensors"))):
-            shutil.copy(given, here)
+        shutil.copy(os.path.join(guide, "synthetic_ct.py"), here)
         shutil.copytree(os.path.join(source, "runtime/python/supine"), os.path.join(folder, "python/supine"))
         shutil.copy(library, os.path.join(folder, "python/supine/libsupine_runtime.so"))
         environment = {**os.environ, "PATH": f"{folder}/bin:{os.environ['PATH']}", "PYTHONPATH": f"{folder}/python",
@@ -61,7 +58,10 @@ def check_page(page):
                     break
             elif re.search(r"^\s*supine\s", code, re.M):
                 faults.append(f"{name}: a block '{language}' calls supine, but is not run:\n{code}")
-        for picture in re.findall(r"!\[[^]]*\]\(([^)]+)\)", text):
+        pictures = re.findall(r"!\[[^]]*\]\(([^)]+)\)", text)
+        if not pictures and name != "README.md":
+            faults.append(f"{name}: no picture")
+        for picture in pictures:
             made = os.path.join(here, picture)
             if not os.path.exists(made):
                 faults.append(f"{name}: no block makes {picture}")
@@ -70,12 +70,6 @@ def check_page(page):
     print(f"{name}: {ran} of {len(blocks)} blocks run")
 
 
-start = tempfile.TemporaryDirectory()
-with open(os.path.join(start.name, "nodules.csv"), "w", encoding="ascii") as file:
-    file.write("name,x,y,z\nnodule,-70,-150,-110\n")
-for command in ("phantom --vertices 2000 -o lungs.ply", "precompute lungs.ply --held-out 20 -o lungs.safetensors",
-                "embed lungs.safetensors nodules.csv -o nodules.safetensors"):
-    subprocess.run([program, *command.split()], cwd=start.name, check=True, capture_output=True)
 pages = sorted(glob.glob(os.path.join(guide, "*.md")))
 if len(sys.argv) > 5:
     pages = [os.path.join(guide, page) for page in sys.argv[5:]]

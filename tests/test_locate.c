@@ -107,10 +107,10 @@ static double miss(const world *w, const supine_location *found, const supine_st
   return sqrt(sum / VERTICES);
 }
 
-static supine_location locate(world *w, const supine_state *state, bool rigid) {
+static const supine_location *locate(world *w, const supine_state *state, bool rigid) {
   const supine_locate_task task = {
       .inside = w->basis, .count = SEEN, .observed = w->seen, .state = *state, .rigid = rigid};
-  supine_location found;
+  const supine_location *found = NULL;
   supine_error error = {0};
   if (supine_locate(&task, w->residuals, w->space, &found, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
@@ -128,16 +128,17 @@ TEST(test_locate_points_moved_by_law_positions_and_volume_recovered) {
   supine_basis_volumes(w->basis, &pose, held);
   for (int rigid = 0; rigid < 2; ++rigid) {
     observe(w, &truth, rigid == 1);
-    const supine_location found = locate(w, &posture, rigid == 1);
+    const supine_location *const found = locate(w, &posture, rigid == 1);
+    const supine_location_info *const about = supine_location_get_info(found);
     print_message("positions err by %.2f mm RMS, volume errs by %.0f mL (expected error %.0f mL), "
                   "residuals %.2f mm RMS\n",
-                  miss(w, &found, &truth, rigid == 1), found.volume - held[0] - held[1],
-                  found.volume_error, found.residual_rms);
-    assert_true(miss(w, &found, &truth, rigid == 1) < 2.5);
-    assert_true(fabs(found.volume - held[0] - held[1]) < found.volume_error);
-    assert_true(found.volume_error < found.volume_prior_error);
-    assert_int_equal(found.outlier_count, 0);
-    assert_true(found.rotation[0] > (rigid == 1 ? 0.7 : 0.999));
+                  miss(w, found, &truth, rigid == 1), about->volume - held[0] - held[1],
+                  about->volume_error, about->residual_rms);
+    assert_true(miss(w, found, &truth, rigid == 1) < 2.5);
+    assert_true(fabs(about->volume - held[0] - held[1]) < about->volume_error);
+    assert_true(about->volume_error < about->volume_prior_error);
+    assert_int_equal(about->outlier_count, 0);
+    assert_true(about->rotation[0] > (rigid == 1 ? 0.7 : 0.999));
   }
 }
 
@@ -145,10 +146,11 @@ TEST(test_locate_given_volume_kept) {
   world *w = *state;
   const supine_state truth = state_of("prone:rest+300");
   observe(w, &truth, false);
-  const supine_location found = locate(w, &truth, false);
-  assert_int_equal(found.state.volume.kind, SUPINE_VOLUME_REST);
-  assert_true(found.volume_error == 0);
-  assert_true(miss(w, &found, &truth, false) < 0.05);
+  const supine_location *const found = locate(w, &truth, false);
+  const supine_location_info *const about = supine_location_get_info(found);
+  assert_int_equal(about->state.volume.kind, SUPINE_VOLUME_REST);
+  assert_true(about->volume_error == 0);
+  assert_true(miss(w, found, &truth, false) < 0.05);
 }
 
 /* Three points, the fewest that determine a rotation, give the exact one. */
@@ -160,9 +162,9 @@ TEST(test_locate_rotation_from_three_points_exact) {
   w->seen[2] = w->seen[18];
   const supine_locate_task task = {
       .inside = w->basis, .count = 3, .observed = w->seen, .state = truth, .rigid = true};
-  supine_location found;
+  const supine_location *found = NULL;
   assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, NULL), SUPINE_OK);
-  assert_true(miss(w, &found, &truth, true) < 0.05);
+  assert_true(miss(w, found, &truth, true) < 0.05);
 }
 
 TEST(test_locate_wrong_point_reported_and_ignored) {
@@ -171,19 +173,19 @@ TEST(test_locate_wrong_point_reported_and_ignored) {
       state_of("left:full-700"); /* a state in which expected errors are about 10 mm */
   const supine_state posture = state_of("left");
   observe(w, &truth, false);
-  const supine_location before = locate(w, &posture, false);
+  const supine_location *const before = locate(w, &posture, false);
   float xyz[2][3 * VERTICES];
   float sigma[VERTICES];
-  assert_int_equal(supine_locate_positions(&before, w->basis, xyz[0], sigma, NULL), SUPINE_OK);
+  assert_int_equal(supine_locate_positions(before, w->basis, xyz[0], sigma, NULL), SUPINE_OK);
   for (size_t wrong = 0; wrong < SEEN; ++wrong) {
     for (size_t axis = 0; axis < 3; ++axis) {
       w->seen[wrong].position[axis] += 30;
-      const supine_location found = locate(w, &posture, false);
+      const supine_location *const found = locate(w, &posture, false);
       w->seen[wrong].position[axis] -= 30;
-      assert_int_equal(found.outlier_count, 1);
+      assert_int_equal(supine_location_get_info(found)->outlier_count, 1);
       assert_true(w->residuals[wrong].outlier);
       assert_true(w->residuals[wrong].distance > 20);
-      assert_int_equal(supine_locate_positions(&found, w->basis, xyz[1], sigma, NULL), SUPINE_OK);
+      assert_int_equal(supine_locate_positions(found, w->basis, xyz[1], sigma, NULL), SUPINE_OK);
       double square = 0;
       for (size_t i = 0; i < (size_t)3 * VERTICES; ++i) {
         square += pow((double)(xyz[1][i] - xyz[0][i]), 2) / VERTICES;
@@ -204,9 +206,9 @@ TEST(test_locate_any_number_of_points_error_at_most_prior) {
   for (size_t count = 3; count <= SEEN; ++count) {
     const supine_locate_task task = {
         .inside = w->basis, .count = count, .observed = w->seen, .state = truth};
-    supine_location found;
+    const supine_location *found = NULL;
     assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, NULL), SUPINE_OK);
-    assert_int_equal(supine_locate_positions(&found, w->basis, xyz, sigma, NULL), SUPINE_OK);
+    assert_int_equal(supine_locate_positions(found, w->basis, xyz, sigma, NULL), SUPINE_OK);
     for (size_t i = 0; i < VERTICES; ++i) {
       /* Observing points must not increase the expected error. Only an error below 3 mm may rise,
        * up to 3 mm: supine_locate treats displacements below 2 mm as 2 mm, for which the expected
@@ -223,10 +225,10 @@ TEST(test_locate_one_point_no_residual) {
   for (size_t count = 1; count < 3; ++count) {
     const supine_locate_task task = {
         .inside = w->basis, .count = count, .observed = w->seen, .state = truth};
-    supine_location found;
+    const supine_location *found = NULL;
     assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, NULL), SUPINE_OK);
     assert_int_equal(w->residuals[0].sigma > 0, count > 1);
-    assert_true(miss(w, &found, &truth, false) < 0.05);
+    assert_true(miss(w, found, &truth, false) < 0.05);
   }
 }
 
@@ -240,7 +242,7 @@ TEST(test_locate_bad_task_refused) {
                                     {0, {0, 0, (double)INFINITY}, 1},
                                     {0, {0, 0, 0}, 0},
                                     {0, {0, 0, 0}, (double)NAN}};
-  supine_location found;
+  const supine_location *found = NULL;
   supine_error error;
   supine_locate_task task = {
       .inside = w->basis, .count = SEEN, .observed = w->seen, .state = truth};
@@ -248,6 +250,7 @@ TEST(test_locate_bad_task_refused) {
     w->seen[0] = bad[i];
     assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, &error),
                      SUPINE_ERROR_ARGUMENT);
+    assert_null(found);
   }
   w->seen[0] = good;
   const size_t counts[] = {0, SUPINE_LOCATE_POINTS_MAX + 1};
@@ -334,7 +337,7 @@ TEST(test_locate_residuals_beyond_stated_errors_raise_them_or_are_refused) {
   const supine_state truth = state_of("supine:full-700");
   float xyz[3 * VERTICES];
   float sigma[2][VERTICES];
-  supine_location found;
+  const supine_location *found = NULL;
   supine_error error;
   for (int off = 0; off < 2; ++off) {
     observe(w, &truth, false);
@@ -342,7 +345,7 @@ TEST(test_locate_residuals_beyond_stated_errors_raise_them_or_are_refused) {
       w->seen[j].position[j % 3] += off * (j % 2 == 0 ? 20 : -20);
     }
     found = locate(w, &truth, false);
-    assert_int_equal(supine_locate_positions(&found, w->basis, xyz, sigma[off], NULL), SUPINE_OK);
+    assert_int_equal(supine_locate_positions(found, w->basis, xyz, sigma[off], NULL), SUPINE_OK);
   }
   assert_true(sigma[1][0] > 1.5F * sigma[0][0]);
   const supine_locate_task task = {

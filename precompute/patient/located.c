@@ -30,7 +30,6 @@ static supine_status try_postures(const supine_locate_task *task, bool posture_g
   located->best = NULL;
   for (size_t k = 0; k < count; ++k) {
     supine_locate_task one = *task;
-    supine_location *location = &located->location[k];
     supine_locate_residual *residuals = supine_arena_take(arena, task->count, sizeof *residuals);
     double *space = supine_arena_take(arena, supine_locate_space(task->count), sizeof *space);
     if (arena->failed) {
@@ -39,13 +38,18 @@ static supine_status try_postures(const supine_locate_task *task, bool posture_g
     if (!posture_given) {
       (void)supine_posture_gravity(postures[k], one.state.gravity);
     }
-    const supine_status tried =
-        supine_locate(&one, residuals, space, location, status == SUPINE_OK ? error : NULL);
+    const supine_status tried = supine_locate(&one, residuals, space, &located->location[k],
+                                              status == SUPINE_OK ? error : NULL);
     status = status == SUPINE_OK ? tried : status;
-    located->probability[k] = tried == SUPINE_OK ? location->log_evidence : -INFINITY;
-    if (tried == SUPINE_OK &&
-        (located->best == NULL || location->log_evidence > located->best->log_evidence)) {
-      located->best = location;
+    if (tried != SUPINE_OK) {
+      located->probability[k] = -INFINITY;
+      continue;
+    }
+    const supine_location_info *found = supine_location_get_info(located->location[k]);
+    located->probability[k] = found->log_evidence;
+    if (located->best == NULL || found->log_evidence > located->best->log_evidence) {
+      located->best = found;
+      located->most_probable = k;
       located->residuals = residuals;
     }
   }
@@ -77,7 +81,7 @@ static void suggest_reading(const supine_locate_task *task, bool posture_given,
   supine_locate_task changed = *task;
   double most = residual_most;
   for (size_t k = 0; k < located->count; ++k) {
-    most = fmax(most, located->location[k].residual_rms);
+    most = fmax(most, supine_location_get_info(located->location[k])->residual_rms);
   }
   changed.observed = other;
   for (size_t i = 0; i < sizeof readings / sizeof *readings && task->count > 2; ++i) {
@@ -110,13 +114,14 @@ static supine_status find_positions(const supine_basis *shown, supine_patient_lo
   if (arena.failed || located->arena.failed) {
     return supine_error_memory(error, "%zu vertices", n);
   }
-  SUPINE_TRY(supine_locate_positions(located->best, shown, located->xyz, located->sigma, error));
+  SUPINE_TRY(supine_locate_positions(located->location[located->most_probable], shown, located->xyz,
+                                     located->sigma, error));
   for (size_t k = 0; k < located->count; ++k) {
     const double share = located->probability[k];
     if (share < negligible) {
       continue;
     }
-    SUPINE_TRY(supine_locate_positions(&located->location[k], shown, xyz, sigma, error));
+    SUPINE_TRY(supine_locate_positions(located->location[k], shown, xyz, sigma, error));
     sum += share;
     for (size_t i = 0; i < n; ++i) {
       double square = (double)sigma[i] * (double)sigma[i];

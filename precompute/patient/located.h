@@ -12,9 +12,10 @@ enum { SUPINE_PATIENT_POSTURES = 6 };
 /* Located lungs. Initialise to zero, and release with supine_patient_located_free. */
 typedef struct supine_patient_located {
   size_t count; /* number of postures tried */
-  supine_location location[SUPINE_PATIENT_POSTURES];
+  const supine_location *location[SUPINE_PATIENT_POSTURES];
   double probability[SUPINE_PATIENT_POSTURES];
-  const supine_location *best;           /* fit in the most probable posture */
+  size_t most_probable;                  /* index of the most probable posture */
+  const supine_location_info *best;      /* fit in that posture */
   double best_probability;               /* 1 if the posture was given */
   supine_locate_residual *residuals;     /* [points] residual of each observed point in that fit */
   float *xyz;                            /* [N, 3] positions in the most probable posture, mm */

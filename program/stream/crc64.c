@@ -11,38 +11,12 @@ static const uint64_t polynomial = 0x42F0E1EBA9EA3693u; /* CRC polynomial withou
 static uint64_t table[16][256];
 static pthread_once_t once = PTHREAD_ONCE_INIT;
 
-static uint64_t times_x(uint64_t a) {
-  return (a << 1) ^ ((a >> 63) != 0 ? polynomial : 0);
-}
-
-static uint64_t multiply(uint64_t a, uint64_t b) {
-  uint64_t product = 0;
-  for (int bit = 63; bit >= 0; --bit) {
-    product = times_x(product) ^ ((b >> bit & 1) != 0 ? a : 0);
-  }
-  return product;
-}
-
-/* Compute x^(8 size) modulo the CRC polynomial: the factor by which `size` appended zero bytes
- * multiply a checksum. */
-static uint64_t power_of(size_t size) {
-  uint64_t power = 1;
-  uint64_t square = 1u << 8; /* in turn x^8, x^16, x^32, ... */
-  for (; size != 0; size >>= 1) {
-    power = (size & 1) != 0 ? multiply(power, square) : power;
-    square = multiply(square, square);
-  }
-  return power;
-}
-
-uint64_t supine_stream_crc64_join(uint64_t first, uint64_t second, size_t size) {
-  return multiply(first, power_of(size)) ^ second;
-}
-
 static void make_tables(void) {
-  for (unsigned b = 0; b < 256; ++b) {
-    for (size_t k = 0; k < 16; ++k) {
-      table[k][b] = multiply(b, power_of(8 + k));
+  for (uint64_t b = 0; b < 256; ++b) {
+    uint64_t crc = b << 56;
+    for (size_t bit = 1; bit <= 8 * 16; ++bit) {
+      crc = (crc << 1) ^ ((crc >> 63) != 0 ? polynomial : 0);
+      table[(bit - 1) / 8][b] = crc; /* the last of eight bits stays */
     }
   }
 }

@@ -20,9 +20,8 @@
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } meshopt;
 
 enum {
-  BATCH = 2048,       /* number of vertices computed together, so that they stay in the L1 cache */
-  GRAIN = 32 * BATCH, /* smallest number of vertices for which a thread is worth starting */
-  THREADS_MAX = 256
+  BATCH = 2048,      /* number of vertices computed together, so that they stay in the L1 cache */
+  GRAIN = 32 * BATCH /* smallest number of vertices for which a thread is worth starting */
 };
 
 struct supine_stream_frames {
@@ -34,7 +33,6 @@ struct supine_stream_frames {
   uint32_t *strips;   /* for each triangle strip: number of corners, then corners; big-endian */
   size_t strips_size; /* size of `strips`, bytes */
   size_t strips_count;
-  uint64_t strips_crc;
   supine_arena arena;
   supine_stream_frame *unused; /* list of frames that can be reused */
 };
@@ -88,7 +86,6 @@ supine_status supine_stream_frames_create(const supine_basis *basis, const char 
     supine_stream_frames_destroy(f);
     return status;
   }
-  f->strips_crc = supine_stream_crc64(0, f->strips, f->strips_size);
   *frames = f;
   return SUPINE_OK;
 }
@@ -119,7 +116,6 @@ supine_stream_frame *supine_stream_frame_acquire(supine_stream_frames *frames,
   frame->users = 1;
   frame->number = ++frames->newest_number;
   frame->snapshot = *snapshot;
-  frame->points_crc = 0;
   return frame;
 }
 
@@ -150,7 +146,6 @@ static bool compute_located_points(supine_stream_frames *f, supine_stream_frame 
   }
   encode_points(f, count, frame->points);
   supine_stream_encode_floats(count, sigma);
-  frame->points_crc = supine_stream_crc64(0, frame->points, 12 * count);
   return true;
 }
 
@@ -158,33 +153,27 @@ static bool compute_located_points(supine_stream_frames *f, supine_stream_frame 
 typedef struct points_work {
   const supine_stream_frames *frames;
   const supine_stream_frame *frame;
-  uint64_t crc[THREADS_MAX]; /* checksum of the positions that each thread has computed */
-  size_t size[THREADS_MAX];  /* size of these positions, bytes; 0 for unused threads */
 } points_work;
 
 static void compute_range(void *context, size_t begin, size_t end, size_t thread) {
-  points_work *p = context;
-  p->size[thread] = 12 * (end - begin);
+  (void)thread;
+  const points_work *p = context;
   for (; begin < end; begin += BATCH) {
     const size_t next = begin + BATCH < end ? begin + BATCH : end;
     float *xyz = p->frame->points + 3 * begin;
     (void)supine_deform_range(p->frames->basis, &p->frame->snapshot.pose, begin, next, xyz);
     encode_points(p->frames, next - begin, xyz);
-    p->crc[thread] = supine_stream_crc64(p->crc[thread], xyz, 12 * (next - begin));
   }
 }
 
 /* Compute a frame's points from the fit in snapshot.location, or else from snapshot.pose. */
 static void compute_points(supine_stream_frames *f, supine_stream_frame *frame) {
-  points_work p = {.frames = f, .frame = frame};
+  points_work p = {f, frame};
   if (frame->snapshot.location != NULL && compute_located_points(f, frame)) {
     return;
   }
   frame->snapshot.location = NULL;
   supine_parallel_for(f->info->vertex_count, GRAIN, 0, compute_range, &p);
-  for (size_t t = 0; t < THREADS_MAX && p.size[t] > 0; ++t) {
-    frame->points_crc = supine_stream_crc64_join(frame->points_crc, p.crc[t], p.size[t]);
-  }
 }
 
 /* Write the NDARRAY of mode weights and displacement factors; return its size in bytes. */
@@ -228,19 +217,18 @@ void supine_stream_frame_pack(supine_stream_frames *frames, supine_stream_frame 
   packet->first = packet->count = 0;
   packet->size = 0;
   add_piece(packet, packet->front, SUPINE_STREAM_HEADER + size);
-  uint64_t crc = supine_stream_crc64(0, body, size);
   if (!weights) {
     add_piece(packet, frame->points, 12 * frames->info->vertex_count);
-    crc = supine_stream_crc64_join(crc, frame->points_crc, 12 * frames->info->vertex_count);
   }
   if (!weights && triangles) {
     add_piece(packet, frames->strips, frames->strips_size);
-    crc = supine_stream_crc64_join(crc, frames->strips_crc, frames->strips_size);
   }
   if (located) {
-    const size_t bytes = SUPINE_STREAM_ATTRIBUTE + 4 * frames->info->vertex_count;
-    add_piece(packet, frame->errors, bytes);
-    crc = supine_stream_crc64(crc, frame->errors, bytes);
+    add_piece(packet, frame->errors, SUPINE_STREAM_ATTRIBUTE + 4 * frames->info->vertex_count);
+  }
+  uint64_t crc = supine_stream_crc64(0, body, size);
+  for (int i = 1; i < packet->count; ++i) {
+    crc = supine_stream_crc64(crc, packet->piece[i].iov_base, packet->piece[i].iov_len);
   }
   supine_stream_header header = {.version = 1,
                                  .stamp = frame->snapshot.stamp,

@@ -5,8 +5,7 @@
  * A message of weights is an NDARRAY of floats: the weight of each mode, then three gains of each
  * lung, the factors that multiply the displacement along x, y and z. A message of points is a
  * POLYDATA. If the lungs were fitted to observed points, it has the expected error of each vertex
- * as an attribute. The triangle strips and their checksum are computed once. The checksum of a
- * message is combined from the checksums of its parts. */
+ * as an attribute. The triangle strips are computed once. */
 #ifndef SUPINE_STREAM_FRAME_H
 #define SUPINE_STREAM_FRAME_H
 
@@ -47,9 +46,8 @@ typedef struct supine_stream_frame {
   size_t users;    /**< peers that it is being sent to, plus 1 for the newest frame */
   uint64_t number; /**< serial number: 1, 2, ... */
   supine_stream_snapshot snapshot;
-  bool has_points; /**< true if `points` and `points_crc` are computed */
-  float *points;   /**< [N, 3] positions as sent, big-endian */
-  uint64_t points_crc;
+  bool has_points;       /**< true if `points` are computed */
+  float *points;         /**< [N, 3] positions as sent, big-endian */
   unsigned char *errors; /**< bytes of the POLYDATA attribute with the expected error of each
                             vertex; unused if snapshot.location is NULL */
   struct supine_stream_frame *next; /**< next frame in the list of unused frames */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Compute the direction of gravity in body axes from the pose of a tracker. */
 #include <math.h>
-#include <string.h>
+#include <stddef.h>
 
 #include "base/vec3.h"
 
@@ -14,18 +14,6 @@ static const double repaired_max = 0.1; /* a matrix with more stretch or shear i
 
 supine_stream_setup supine_stream_setup_default(void) {
   return (supine_stream_setup){.down = {0, 0, -1}, .body = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
-}
-
-void supine_stream_rotation(const double quaternion[4], double matrix[9]) {
-  const double w = quaternion[0];
-  const double x = quaternion[1];
-  const double y = quaternion[2];
-  const double z = quaternion[3];
-  const double rows[9] = {
-      w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z),         2.0 * (x * z + w * y),
-      2.0 * (x * y + w * z),         w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x),
-      2.0 * (x * z - w * y),         2.0 * (y * z + w * x),         w * w - x * x - y * y + z * z};
-  memcpy(matrix, rows, sizeof rows);
 }
 
 /* Compute out = M^T v, for M stored row by row. */

@@ -21,10 +21,6 @@ typedef struct supine_stream_setup {
 /** Return the default setup: the world's z axis points up, and tracker axes equal body axes. */
 supine_stream_setup supine_stream_setup_default(void);
 
-/** Convert a quaternion (w, x, y, z) to a matrix, row by row: a rotation, scaled by the square of
- * the quaternion's length. */
-void supine_stream_rotation(const double quaternion[4], double matrix[9]);
-
 /** Quality of a received pose. */
 typedef enum supine_stream_verdict {
   SUPINE_STREAM_EXACT = 0,

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "base/clones.h"
-#include "program/stream/gravity.h"
+#include "base/vec3.h"
 #include "program/stream/message.h"
 
 static uint64_t number(const unsigned char *bytes, int size) {
@@ -130,7 +130,7 @@ static void quaternion(cursor *c, supine_stream_message *m) {
   for (int i = 0; i < 4; ++i) {
     q[(i + 1) % 4] = real32(c);
   }
-  supine_stream_rotation(q, m->number);
+  supine_quaternion_matrix(q, m->number);
 }
 
 static void transform(cursor *c, const char *device, int ours, supine_stream_message *m) {

@@ -111,9 +111,4 @@ void supine_stream_encode_floats(size_t count, float *values);
 /** Extend `crc`, the checksum of the bytes so far, by `size` bytes; begin with 0. Thread-safe. */
 uint64_t supine_stream_crc64(uint64_t crc, const void *bytes, size_t size);
 
-/** Return the checksum of the bytes A followed by the bytes B. It is first x^(8 size) + second
- * modulo the CRC polynomial, where `first` and `second` are the checksums of A and B, and `size` is
- * the number of bytes of B. */
-uint64_t supine_stream_crc64_join(uint64_t first, uint64_t second, size_t size);
-
 #endif

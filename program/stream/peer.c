@@ -47,7 +47,7 @@ static ssize_t receive_bytes(int socket, void *bytes, size_t size) {
 }
 
 /* Parse a complete header; return false if it is invalid. */
-static bool begin_body(supine_stream_peer *peer, uint64_t *skipped, supine_error *error) {
+static bool begin_body(supine_stream_peer *peer, size_t *skipped, supine_error *error) {
   if (supine_stream_header_read(peer->message, &peer->header, error) != SUPINE_OK) {
     return false;
   }
@@ -66,7 +66,7 @@ static bool begin_body(supine_stream_peer *peer, uint64_t *skipped, supine_error
 
 supine_stream_outcome supine_stream_peer_read(supine_stream_peer *peer, double now,
                                               supine_stream_receive *receive, void *context,
-                                              uint64_t *skipped, supine_error *error) {
+                                              size_t *skipped, supine_error *error) {
   size_t allowed = SUPINE_STREAM_BODY_MAX;
   while (allowed > 0) {
     const bool skips = peer->size > SUPINE_STREAM_MESSAGE_MAX; /* overwrite the start of the body */

@@ -76,7 +76,7 @@ typedef void supine_stream_receive(void *context, supine_stream_peer *peer);
  * @param error    set if the peer sent an invalid header or a body above 256 MiB, else unchanged */
 supine_stream_outcome supine_stream_peer_read(supine_stream_peer *peer, double now,
                                               supine_stream_receive *receive, void *context,
-                                              uint64_t *skipped, supine_error *error);
+                                              size_t *skipped, supine_error *error);
 
 /** Return whether the kernel has sent all bytes of earlier frames. */
 bool supine_stream_peer_ready(const supine_stream_peer *peer);

@@ -1,13 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Run the main loop: read messages, compute a frame for the newest pose, send the frame. */
-#define _GNU_SOURCE /* declares ppoll, part of POSIX since 2024 */ // NOLINT(*-reserved-identifier,cert-*)
 #include <errno.h>
 #include <math.h>
 #include <poll.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
-#include <time.h>
 #include <unistd.h>
 
 #include "base/arena.h"
@@ -41,8 +39,8 @@ struct supine_stream_server {
   unsigned char message[SUPINE_STREAM_PEERS_MAX]
                        [SUPINE_STREAM_MESSAGE_MAX]; /* received by each peer */
   struct pollfd polled[POLLED]; /* sockets of `peer`, listener, pipe of web's poses; -1 if none */
-  double wait_begun;            /* time at which ppoll() was last called */
-  double woke;                  /* time at which ppoll() last returned */
+  double wait_begun;            /* time at which poll() was last called */
+  double woke;                  /* time at which poll() last returned */
 };
 
 /* Return whether a peer wants frames, is sent none at the moment, and lacks the newest frame. */
@@ -138,10 +136,10 @@ static void receive(void *context, supine_stream_peer *peer) {
     take_request(s, peer, message.text);
     return;
   }
-  /* If ppoll() waited, the message has just arrived. Otherwise it may have arrived at any time
+  /* If poll() waited, the message has just arrived. Otherwise it may have arrived at any time
    * since the socket was last empty. */
-  const bool ppoll_waited = s->woke - s->wait_begun > 50e-6;
-  supine_stream_patient_receive(&s->patient, &message, ppoll_waited ? s->woke : peer->emptied,
+  const bool poll_waited = s->woke - s->wait_begun > 50e-6;
+  supine_stream_patient_receive(&s->patient, &message, poll_waited ? s->woke : peer->emptied,
                                 peer->header.stamp);
 }
 
@@ -229,27 +227,18 @@ static void send_peers(supine_stream_server *s) {
   }
 }
 
-/* Compute how many seconds to wait for sockets in a run that ends at the time `end`. */
-static double find_timeout(const supine_stream_server *s, double end) {
+/* Compute how many milliseconds to wait for sockets in a run that ends at the time `end`. */
+static int find_timeout(const supine_stream_server *s, double end) {
   double next = fmin(fmin(s->woke + stop_interval, end), fmin(s->connect_at, frame_due(s)));
   for (size_t i = 0; i < SUPINE_STREAM_PEERS_MAX; ++i) {
     if (needs_frame(s, &s->peer[i])) {
       next = fmin(next, s->woke + send_interval);
     }
   }
-  return fmax(0.0, next - supine_clock_seconds());
+  return (int)ceil(1e3 * fmax(0.0, next - supine_clock_seconds()));
 }
 
-/* Wait for sockets at most some seconds, less than 1. */
-static int wait_for_sockets(struct pollfd *polled, nfds_t count, double seconds) {
-#ifdef __APPLE__
-  return poll(polled, count, (int)ceil(1e3 * seconds));
-#else
-  return ppoll(polled, count, &(struct timespec){0, (long)(1e9 * seconds)}, NULL);
-#endif
-}
-
-/* Choose the sockets for ppoll() to watch. */
+/* Choose the sockets for poll() to watch. */
 static void gather(supine_stream_server *s) {
   for (size_t i = 0; i < SUPINE_STREAM_PEERS_MAX; ++i) {
     const supine_stream_peer *peer = &s->peer[i];
@@ -261,7 +250,7 @@ static void gather(supine_stream_server *s) {
       s->options->web != NULL ? supine_stream_web_descriptor(s->options->web) : -1, POLLIN, 0};
 }
 
-/* Read from all sockets that ppoll() reported. */
+/* Read from all sockets that poll() reported. */
 static void receive_all(supine_stream_server *s) {
   for (size_t i = 0; i < SUPINE_STREAM_PEERS_MAX; ++i) {
     if (s->polled[i].revents != 0) {
@@ -292,9 +281,9 @@ supine_status supine_stream_server_run(supine_stream_server *server, supine_erro
   double asked = s->woke;
   while (s->woke < end) {
     gather(s);
-    const double timeout = find_timeout(s, end);
+    const int timeout = find_timeout(s, end);
     s->wait_begun = supine_clock_seconds();
-    if (wait_for_sockets(s->polled, POLLED, timeout) < 0 && errno != EINTR) {
+    if (poll(s->polled, POLLED, timeout) < 0 && errno != EINTR) {
       return supine_error_set(error, SUPINE_ERROR_WRITE, "cannot wait for the sockets: %s",
                               strerror(errno));
     }

@@ -22,23 +22,22 @@ typedef struct supine_stream_observed {
   supine_observation last[SUPINE_LOCATE_POINTS_MAX];
   bool ras;      /**< true if positions in messages are in RAS, false if in LPS */
   double *space; /**< [supine_locate_space(count)] workspace */
-  supine_location location;
 } supine_stream_observed;
 
 /** Numbers of events since the server was created. */
 typedef struct supine_stream_counts {
-  uint64_t poses;       /**< poses accepted, whether a frame showed them or not */
-  uint64_t positions;   /**< accepted positions of observed points */
-  uint64_t repaired;    /**< poses used although they were not exact rotations */
-  uint64_t refused;     /**< poses that were not used, such as matrices with a reflection */
-  uint64_t malformed;   /**< messages with a wrong checksum or inconsistent lengths */
-  uint64_t skipped;     /**< messages without use, and too large ones */
-  uint64_t unreachable; /**< frames without the wanted volume, because it was unreachable */
-  uint64_t frames;
-  uint64_t sent;        /**< frames sent, summed over peers */
-  uint64_t peers;       /**< peers accepted */
-  uint64_t lost;        /**< peers disconnected because of invalid messages */
-  uint64_t turned_away; /**< connections refused, as there were SUPINE_STREAM_PEERS_MAX peers */
+  size_t poses;       /**< poses accepted, whether a frame showed them or not */
+  size_t positions;   /**< accepted positions of observed points */
+  size_t repaired;    /**< poses used although they were not exact rotations */
+  size_t refused;     /**< poses that were not used, such as matrices with a reflection */
+  size_t malformed;   /**< messages with a wrong checksum or inconsistent lengths */
+  size_t skipped;     /**< messages without use, and too large ones */
+  size_t unreachable; /**< frames without the wanted volume, because it was unreachable */
+  size_t frames;
+  size_t sent;        /**< frames sent, summed over peers */
+  size_t peers;       /**< peers accepted */
+  size_t lost;        /**< peers disconnected because of invalid messages */
+  size_t turned_away; /**< connections refused, as there were SUPINE_STREAM_PEERS_MAX peers */
 } supine_stream_counts;
 
 enum { SUPINE_STREAM_PEERS_MAX = 64 };
@@ -47,9 +46,9 @@ enum { SUPINE_STREAM_PEERS_MAX = 64 };
 #define SUPINE_STREAM_BUDGET 15e-3
 
 typedef struct supine_stream_latency {
-  uint64_t count;
-  uint64_t late; /**< number of latencies above SUPINE_STREAM_BUDGET */
-  double worst;  /**< largest latency, s */
+  size_t count;
+  size_t late;  /**< number of latencies above SUPINE_STREAM_BUDGET */
+  double worst; /**< largest latency, s */
 } supine_stream_latency;
 
 typedef struct supine_stream_server supine_stream_server;

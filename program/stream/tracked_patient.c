@@ -232,6 +232,7 @@ static void find_location(supine_stream_patient *patient, double now,
   supine_locate_residual residuals[SUPINE_LOCATE_POINTS_MAX];
   supine_locate_task task = {.inside = observed->inside, .observed = seen};
   supine_pose pose = snapshot->pose;
+  const supine_location *found = NULL;
   supine_error error;
   if (!volume->breathes) {
     task.state = volume->fixed;
@@ -246,19 +247,20 @@ static void find_location(supine_stream_patient *patient, double now,
   if (task.count == 0) {
     return;
   }
-  supine_status status =
-      supine_locate(&task, residuals, observed->space, &observed->location, &error);
+  supine_status status = supine_locate(&task, residuals, observed->space, &found, &error);
   if (status == SUPINE_OK) {
-    status = supine_basis_gains(patient->basis, &observed->location.state, &pose, &error);
+    status =
+        supine_basis_gains(patient->basis, &supine_location_get_info(found)->state, &pose, &error);
   }
   if (status != SUPINE_OK) {
     supine_stream_patient_warn(
         patient, now, "the lungs cannot be fitted to the observed points: %s", error.message);
   } else {
-    snapshot->location = &observed->location;
+    const double held = supine_location_get_info(found)->volume;
+    snapshot->location = found;
     snapshot->pose = pose;
-    snapshot->above += snapshot->location->volume - snapshot->volume;
-    snapshot->volume = snapshot->location->volume;
+    snapshot->above += held - snapshot->volume;
+    snapshot->volume = held;
   }
 }
 

@@ -57,11 +57,6 @@ typedef struct web_pose {
   double received; /* time of receipt, s by supine_clock_seconds */
 } web_pose;
 
-/* State of a connection to a viewer. */
-typedef struct session {
-  uint64_t number; /* serial number of the last state sent */
-} session;
-
 static supine_stream_web *web_of(struct lws *wsi) {
   return lws.context_user(lws.get_context(wsi));
 }
@@ -100,8 +95,9 @@ static void receive(supine_stream_web *web, const char *bytes, size_t size) {
   }
 }
 
-/* Send the newest state unless it was sent before; return 0, or -1 to disconnect the viewer. */
-static int send_state(supine_stream_web *web, struct lws *wsi, session *s) {
+/* Send the newest state unless it was sent before; return 0, or -1 to disconnect the viewer.
+ * @param sent  serial number of the last state sent to this viewer, updated */
+static int send_state(supine_stream_web *web, struct lws *wsi, uint64_t *sent) {
   enum { AGE = 32 };
   unsigned char bytes[LWS_PRE + TEXT + AGE];
   (void)pthread_mutex_lock(&web->lock);
@@ -110,17 +106,16 @@ static int send_state(supine_stream_web *web, struct lws *wsi, session *s) {
   const int size =
       snprintf((char *)bytes + LWS_PRE, TEXT + AGE, "%s,\"age\":%.3f}", web->text, age);
   (void)pthread_mutex_unlock(&web->lock);
-  if (number == s->number) {
+  if (number == *sent) {
     return 0;
   }
-  s->number = number;
+  *sent = number;
   return lws.write(wsi, bytes + LWS_PRE, (size_t)size, LWS_WRITE_TEXT) < 0 ? -1 : 0;
 }
 
 static int view(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in,
                 size_t size) {
   supine_stream_web *web = web_of(wsi);
-  session *s = user;
   switch (reason) {
   case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:
     return is_ours(wsi) ? 0 : -1;
@@ -131,7 +126,7 @@ static int view(struct lws *wsi, enum lws_callback_reasons reason, void *user, v
     (void)lws.callback_on_writable_all_protocol(web->context, lws.get_protocol(wsi));
     return 0;
   case LWS_CALLBACK_SERVER_WRITEABLE:
-    return send_state(web, wsi, s);
+    return send_state(web, wsi, user);
   case LWS_CALLBACK_RECEIVE: /* ignore messages that are split into fragments */
     if (lws.is_first_fragment(wsi) != 0 && lws.is_final_fragment(wsi) != 0) {
       receive(web, in, size);
@@ -154,7 +149,7 @@ static int serve(struct lws *wsi, enum lws_callback_reasons reason, void *user, 
 
 static const struct lws_protocols protocols[] = {
     {"http", serve, 0, 0, 0, NULL, 0},
-    {"supine", view, sizeof(session), RECEIVED, 0, NULL, 0},
+    {"supine", view, sizeof(uint64_t), RECEIVED, 0, NULL, 0},
     {NULL, NULL, 0, 0, 0, NULL, 0}};
 
 static void *run(void *context) {

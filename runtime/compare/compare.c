@@ -23,18 +23,13 @@ struct supine_compare {
 static const double four_pi = 12.566370614359172954;
 
 static double twice_area(const supine_basis *basis, const uint32_t *corner) {
-  const float *a = basis->info.vertices + 3 * (size_t)corner[0];
-  const float *b = basis->info.vertices + 3 * (size_t)corner[1];
-  const float *c = basis->info.vertices + 3 * (size_t)corner[2];
-  double u[3];
-  double v[3];
-  for (int axis = 0; axis < 3; ++axis) {
-    u[axis] = (double)b[axis] - (double)a[axis];
-    v[axis] = (double)c[axis] - (double)a[axis];
+  double p[3][3];
+  double normal[3];
+  for (size_t i = 0; i < 9; ++i) {
+    p[i / 3][i % 3] = (double)basis->info.vertices[3 * (size_t)corner[i / 3] + i % 3];
   }
-  double product[3];
-  supine_cross(u, v, product);
-  return supine_length(product);
+  supine_normal(p[0], p[1], p[2], normal);
+  return supine_length(normal);
 }
 
 static supine_status share_area(supine_compare *compare, supine_error *error) {
@@ -131,19 +126,6 @@ double supine_compare_area(const supine_compare *compare) {
   return compare->area;
 }
 
-/* Return q^T G q for the matrix G = `gram` [count, count]. */
-static double product(const double *gram, const double *q, size_t count) {
-  double sum = 0;
-  for (size_t k = 0; k < count; ++k) {
-    double row = 0;
-    for (size_t l = 0; l < count; ++l) {
-      row += gram[k * count + l] * q[l];
-    }
-    sum += q[k] * row;
-  }
-  return sum;
-}
-
 /* For each lung, axis and mode, write the displacement factor times the weight of `pose` to `q`.
  * Unless `from` is NULL, subtract the same product of `from`. Return false if a pose is of another
  * basis. */
@@ -169,7 +151,7 @@ void supine_compare_energy(const supine_compare *compare, double *energy) {
       for (size_t k = 0; k < count; ++k) {
         column[k] = compare->basis->info.modes[k * terms + term];
       }
-      energy[l] += product(compare->gram, column, count) / four_pi;
+      energy[l] += supine_volume_square(count, compare->gram, column) / four_pi;
     }
   }
 }
@@ -210,38 +192,22 @@ supine_status supine_compare_distances(const supine_compare *compare, const supi
   return SUPINE_OK;
 }
 
-/* Find the smallest d such that the vertices with distances of at most d have at least the fraction
- * `target` of the area. Non-negative floats have the same order as their bits. Three histograms of
- * the area, each with 2^11 bins, thus determine the upper, middle and lower bits of d. */
+/* Find the largest d such that the vertices with distances below d have less than the fraction
+ * `target` of the area. Non-negative floats have the same order as their bits, which are thus found
+ * one after another, from the highest on. */
 static double percentile(const supine_compare *compare, const float *distance, double target) {
-  enum { ROUNDS = 3, BITS = 11, BINS = 1 << BITS };
-  const size_t n = compare->basis->info.vertex_count;
-  uint32_t prefix = 0;
-  double below = 0;
-  for (int round = 0; round < ROUNDS; ++round) {
-    const unsigned shift = (unsigned)(BITS * (ROUNDS - 1 - round));
-    double bin[BINS] = {0};
-    for (size_t i = 0; i < n; ++i) {
-      uint32_t bits = 0;
-      memcpy(&bits, &distance[i], sizeof bits);
-      if (round == 0 || bits >> (shift + BITS) == prefix) {
-        bin[(bits >> shift) & (BINS - 1)] += (double)compare->share[i];
-      }
-    }
-    uint32_t at = 0;
-    uint32_t last = 0; /* last bin with area; used if `target` exceeds the sum of all bins */
-    for (; at < BINS && (bin[at] == 0 || below + bin[at] < target); ++at) {
-      below += bin[at];
-      last = bin[at] > 0 ? at : last;
-    }
-    if (at == BINS) {
-      at = last;
-      below -= bin[at];
-    }
-    prefix = prefix << BITS | at;
-  }
+  uint32_t found = 0;
   float value = 0;
-  memcpy(&value, &prefix, sizeof value);
+  for (uint32_t bit = UINT32_C(1) << 30; bit > 0; bit >>= 1) {
+    const uint32_t larger = found | bit;
+    double below = 0;
+    memcpy(&value, &larger, sizeof value);
+    for (size_t i = 0; i < compare->basis->info.vertex_count; ++i) {
+      below += distance[i] < value ? (double)compare->share[i] : 0;
+    }
+    found = below < target ? larger : found;
+  }
+  memcpy(&value, &found, sizeof value);
   return (double)value;
 }
 

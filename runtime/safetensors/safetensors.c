@@ -6,6 +6,7 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
+#include "base/arena.h"
 #include "runtime/safetensors/safetensors_file.h"
 
 static uint64_t hash(const void *bytes, size_t size, uint64_t seed) {
@@ -33,9 +34,8 @@ uint64_t supine_safetensors_checksum(const supine_tensor *tensors, size_t tensor
                                      const supine_metadata *metadata, size_t metadata_count) {
   uint64_t sum = 0;
   for (size_t i = 0; i < tensor_count; ++i) {
-    size_t size = 0;
-    (void)supine_safetensors_tensor_size(&tensors[i], &size);
-    sum += hash(tensors[i].data, size, hash_kind(&tensors[i], hash_text(tensors[i].name, 0)));
+    sum += hash(tensors[i].data, supine_safetensors_size(&tensors[i]),
+                hash_kind(&tensors[i], hash_text(tensors[i].name, 0)));
   }
   for (size_t i = 0; i < metadata_count; ++i) {
     if (strcmp(metadata[i].key, "checksum") != 0) {
@@ -51,10 +51,7 @@ supine_status supine_safetensors_open_with(const char *name, const void *bytes, 
   supine_safetensors made = {.bytes = bytes, .size = size, .allocator = *allocator};
   *result = NULL;
   if (bytes == NULL) {
-    const supine_status status = supine_platform_map(name, &made.mapping, error);
-    if (status != SUPINE_OK) {
-      return status;
-    }
+    SUPINE_TRY(supine_platform_map(name, &made.mapping, error));
     made.bytes = made.mapping.bytes;
     made.size = made.mapping.size;
   }

@@ -60,6 +60,9 @@ size_t supine_safetensors_dtype_size(supine_dtype dtype);
 /** Compute the size of a tensor in bytes; return false if the size overflows. */
 bool supine_safetensors_tensor_size(const supine_tensor *tensor, size_t *size);
 
+/** Return the size of a tensor in bytes; it must not overflow. */
+size_t supine_safetensors_size(const supine_tensor *tensor);
+
 /** Parse and check the header of file->bytes, and point the tensors to their data. */
 supine_status supine_safetensors_parse(supine_safetensors *file, supine_error *error);
 

@@ -41,6 +41,12 @@ bool supine_safetensors_tensor_size(const supine_tensor *tensor, size_t *size) {
   return true;
 }
 
+size_t supine_safetensors_size(const supine_tensor *tensor) {
+  size_t size = 0;
+  (void)supine_safetensors_tensor_size(tensor, &size);
+  return size;
+}
+
 /* State of the parser of a header, whose text ends with a NUL. After a failure, take() accepts no
  * character, and further failures do not change the error. */
 typedef struct parser {
@@ -283,17 +289,11 @@ static void parse_header(parser *p) {
   }
 }
 
-static size_t size_of(const supine_tensor *tensor) {
-  size_t size = 0;
-  (void)supine_safetensors_tensor_size(tensor, &size);
-  return size;
-}
-
 static int compare_places(const void *left, const void *right) {
   const supine_tensor *a = left;
   const supine_tensor *b = right;
-  const uintptr_t places[2][2] = {{(uintptr_t)a->data, size_of(a)},
-                                  {(uintptr_t)b->data, size_of(b)}};
+  const uintptr_t places[2][2] = {{(uintptr_t)a->data, supine_safetensors_size(a)},
+                                  {(uintptr_t)b->data, supine_safetensors_size(b)}};
   const int key = places[0][0] == places[1][0];
   return (places[0][key] > places[1][key]) - (places[0][key] < places[1][key]);
 }
@@ -304,7 +304,7 @@ static bool is_aligned(const supine_tensor *tensor) {
 
 /* Return the size of a tensor in bytes, rounded up to a multiple of 8. */
 static size_t padded_size(const supine_tensor *tensor) {
-  return (size_of(tensor) + 7) / 8 * 8;
+  return (supine_safetensors_size(tensor) + 7) / 8 * 8;
 }
 
 /* Check that the tensors fill the data of the file without gaps or overlaps. Point each tensor to
@@ -321,7 +321,7 @@ static supine_status place_tensors(parser *p, size_t data_begin) {
            begin, at);
       return p->status;
     }
-    at += size_of(&file->tensors[i]);
+    at += supine_safetensors_size(&file->tensors[i]);
   }
   if (at != data_size) {
     fail(p, "%s: the tensors need %zu bytes, but the file has %zu: copy or write it again",
@@ -342,7 +342,7 @@ static supine_status place_tensors(parser *p, size_t data_begin) {
   for (size_t i = 0; copy != NULL && i < file->tensor_count; ++i) {
     supine_tensor *tensor = &file->tensors[i];
     if (!is_aligned(tensor)) {
-      tensor->data = memcpy(copy, tensor->data, size_of(tensor));
+      tensor->data = memcpy(copy, tensor->data, supine_safetensors_size(tensor));
       copy += padded_size(tensor);
     }
   }

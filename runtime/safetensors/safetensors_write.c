@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/output.h"
 #include "base/utf8.h"
 #include "runtime/safetensors/safetensors_file.h"
@@ -121,8 +122,7 @@ static size_t put_header(const content *c, FILE *file) {
   size += put(file, "\"checksum\":\"%s\"}", c->checksum);
   for (size_t i = 0; i < c->tensor_count; ++i) {
     const supine_tensor *tensor = tensor_at(c, i);
-    size_t bytes = 0;
-    (void)supine_safetensors_tensor_size(tensor, &bytes);
+    const size_t bytes = supine_safetensors_size(tensor);
     size += put(file, ",") + put_string(file, tensor->name);
     size +=
         put(file, ":{\"dtype\":\"%s\",\"shape\":[", supine_safetensors_dtype_name(tensor->dtype));
@@ -135,30 +135,24 @@ static size_t put_header(const content *c, FILE *file) {
   return size + put(file, "}");
 }
 
-/* Write a whole file. Errors are left in the stream. */
-static void put_file(const content *c, FILE *file) {
-  const size_t header = put_header(c, NULL);
-  const size_t padded = (header + 7) / 8 * 8;
-  const uint64_t length = padded;
-  (void)fwrite(&length, sizeof length, 1, file);
-  (void)put_header(c, file);
-  (void)put(file, "%*s", (int)(padded - header), "");
-  for (size_t i = 0; i < c->tensor_count; ++i) {
-    const supine_tensor *tensor = tensor_at(c, i);
-    size_t size = 0;
-    (void)supine_safetensors_tensor_size(tensor, &size);
-    if (size > 0) {
-      (void)fwrite(tensor->data, 1, size, file);
-    }
-  }
-}
-
 void supine_safetensors_print(FILE *file, const supine_tensor *tensors, size_t tensor_count,
                               const supine_metadata *metadata, size_t metadata_count) {
   content c = {tensors, tensor_count, metadata, metadata_count, ""};
   (void)snprintf(c.checksum, sizeof c.checksum, CHECKSUM_FORMAT,
                  supine_safetensors_checksum(tensors, tensor_count, metadata, metadata_count));
-  put_file(&c, file);
+  const size_t header = put_header(&c, NULL);
+  const size_t padded = (header + 7) / 8 * 8;
+  const uint64_t length = padded;
+  (void)fwrite(&length, sizeof length, 1, file);
+  (void)put_header(&c, file);
+  (void)put(file, "%*s", (int)(padded - header), "");
+  for (size_t i = 0; i < tensor_count; ++i) {
+    const supine_tensor *tensor = tensor_at(&c, i);
+    const size_t size = supine_safetensors_size(tensor);
+    if (size > 0) {
+      (void)fwrite(tensor->data, 1, size, file);
+    }
+  }
 }
 
 supine_status supine_safetensors_write(const char *path, const supine_tensor *tensors,
@@ -166,12 +160,9 @@ supine_status supine_safetensors_write(const char *path, const supine_tensor *te
                                        size_t metadata_count, supine_error *error) {
   const content c = {tensors, tensor_count, metadata, metadata_count, ""};
   supine_output output;
-  supine_status status = check_tensors(&c, path, error);
-  status = status != SUPINE_OK ? status : check_metadata(&c, path, error);
-  status = status != SUPINE_OK ? status : supine_output_open(path, &output, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
+  SUPINE_TRY(check_tensors(&c, path, error));
+  SUPINE_TRY(check_metadata(&c, path, error));
+  SUPINE_TRY(supine_output_open(path, &output, error));
   supine_safetensors_print(output.file, tensors, tensor_count, metadata, metadata_count);
   return supine_output_commit(&output, error);
 }

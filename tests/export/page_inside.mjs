@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Test how the page shows targets, the structures inside the lungs: they have the positions of `supine deform`, the
 // sentence is about the chosen one, a table usable by keyboard lists all, and they can be hidden. Pictures are kept in
-// the folder page_inside of the working folder.
+// the folder tests/page_inside of the build folder.
 import assert from 'node:assert/strict';
-import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
+import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { assertPicture, close, openLungs, picture, press, settled } from './browser.mjs';
 import { basis } from './lungs.mjs';
-import { folder, largestDistance, loadCommon, supine } from './support.mjs';
+import { folder, largestDistance, loadCommon, pictureFolder, supine } from './support.mjs';
 
 const axe = loadCommon('axe-core').source;
 const TOLERANCE_MM = 0.02; // the page stores 16-bit numbers
@@ -172,7 +172,7 @@ async function checkLoss(page) {
 }
 
 async function checkSizes() {
-  mkdirSync('page_inside', { recursive: true });
+  const pictures = pictureFolder('page_inside');
   for (const [width, height, colorScheme] of [[1400, 900, 'light'], [900, 600, 'dark'], [844, 390, 'light'], [390, 844, 'dark']]) {
     const touch = Math.min(width, height) < 400;
     const { page, complaints } = await openLungs(files['inside.html'], { viewport: { width, height }, colorScheme, ...(touch && { hasTouch: true }) }, '#posture=left&target=4');
@@ -184,7 +184,7 @@ async function checkSizes() {
     }
     await page.locator('#targets').scrollIntoViewIfNeeded();
     await settled(page);
-    writeFileSync(join('page_inside', `${width}x${height}-${colorScheme}.png`), await page.screenshot());
+    writeFileSync(join(pictures, `${width}x${height}-${colorScheme}.png`), await page.screenshot());
     if (width === 1400 || touch) { // check accessibility at three sizes; these have the light and the dark theme
       await page.evaluate(axe);
       const { violations } = await page.evaluate(() => window.axe.run(document, { runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'] }));

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Test the page at four sizes in two themes: nothing is cut off, cards do not move when another posture
-// is chosen, and a tap marks a point. Pictures are kept in the folder page_sizes of the working folder.
+// is chosen, and a tap marks a point. Pictures are kept in the folder
+// tests/page_sizes of the build folder.
 import assert from 'node:assert/strict';
-import { mkdirSync, writeFileSync } from 'node:fs';
+import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { close, openLungs, press, settled } from './browser.mjs';
 import { html } from './lungs.mjs';
+import { pictureFolder } from './support.mjs';
 
-mkdirSync('page_sizes', { recursive: true });
+const pictures = pictureFolder('page_sizes');
 
 for (const [width, height] of [[1400, 900], [900, 600], [844, 390], [390, 844]]) {
   const touch = Math.min(width, height) < 400;
@@ -29,7 +31,7 @@ for (const [width, height] of [[1400, 900], [900, 600], [844, 390], [390, 844]])
     cards = { y, tall };
   }
   for (const theme of ['light', 'dark']) {
-    writeFileSync(join('page_sizes', `${width}x${height}-${theme}.png`), await page.screenshot());
+    writeFileSync(join(pictures, `${width}x${height}-${theme}.png`), await page.screenshot());
     await page.evaluate(() => document.getElementById('theme').click());
     await settled(page);
   }

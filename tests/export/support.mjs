@@ -4,10 +4,10 @@
 // skipped.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
-import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
-import { join } from 'node:path';
+import { dirname, join, resolve } from 'node:path';
 import { pathToFileURL } from 'node:url';
 
 export function skip(reason) {
@@ -34,6 +34,13 @@ export function loadCommon(name) {
 
 export function supine(...words) {
   return execFileSync(process.env.SUPINE, words, { encoding: 'utf8' });
+}
+
+/** Make a folder for pictures that are kept: tests/NAME in the folder of the program, which is the build folder. */
+export function pictureFolder(name) {
+  const made = join(dirname(resolve(process.env.SUPINE)), 'tests', name);
+  mkdirSync(made, { recursive: true });
+  return made;
 }
 
 /** Temporary folder, removed when the test ends. */

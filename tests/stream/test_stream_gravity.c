@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Test directions of gravity from trackers' matrices and quaternions, refused poses. */
+#include "base/vec3.h"
 #include "program/stream/gravity.h"
 #include "tests/test.h"
 #include <supine/posture.h>
@@ -103,7 +104,7 @@ TEST(test_gravity_tracker_quaternions_give_postures) {
       for (int k = 0; k < 4; ++k) {
         q[k] = sign * turns[i].q[k];
       }
-      supine_stream_rotation(q, r);
+      supine_quaternion_matrix(q, r);
       assert_int_equal(take(r, gravity), SUPINE_STREAM_EXACT);
       expect_gravity(gravity, turns[i].posture);
     }
@@ -114,7 +115,7 @@ TEST(test_gravity_tracker_quaternions_give_postures) {
 TEST(test_gravity_setup_rotates_world_and_marker) {
   supine_stream_setup setup = {.down = {0, -1, 0}};
   const double half_turn[4] = {0, 0, 0, 1};
-  supine_stream_rotation(half_turn, setup.body);
+  supine_quaternion_matrix(half_turn, setup.body);
   /* The patient lies on the back: the marker's x, y, z axes point along -z, y, x of the world. */
   const double r[9] = {0, 0, 1, 0, 1, 0, -1, 0, 0};
   double gravity[3];
@@ -180,13 +181,13 @@ TEST(test_gravity_invalid_quaternions_and_vectors_refused) {
   double gravity[3] = {7, 7, 7};
   const char *why = NULL;
   for (int i = 0; i < 3; ++i) {
-    supine_stream_rotation(bad[i], r);
+    supine_quaternion_matrix(bad[i], r);
     assert_int_equal(take(r, gravity), SUPINE_STREAM_REFUSED);
     assert_int_equal(supine_stream_gravity_down(&setup, bad[i], gravity, &why),
                      SUPINE_STREAM_REFUSED);
   }
   assert_true(gravity[0] == 7.0);
-  supine_stream_rotation(good, r);
+  supine_quaternion_matrix(good, r);
   assert_int_equal(take(r, gravity), SUPINE_STREAM_REPAIRED);
   expect_gravity(gravity, "supine");
 }

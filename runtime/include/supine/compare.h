@@ -58,7 +58,7 @@ typedef struct supine_distance_statistics {
   double max;
 } supine_distance_statistics;
 
-/** Compute the statistics of distances exactly, in four passes over the vertices, without
+/** Compute the statistics of distances exactly, in 32 passes over the vertices, without
  * allocation.
  * @param distance  [N] mm, none negative */
 SUPINE_API void supine_compare_statistics(const supine_compare *compare, const float *distance,

@@ -112,8 +112,11 @@ typedef struct supine_locate_task {
   bool rigid;         /**< whether to find a rotation in addition to the translation */
 } supine_locate_task;
 
-/** The result of supine_locate. */
-typedef struct supine_location {
+/** Lungs that supine_locate found, in the `space` given to it. */
+typedef struct supine_location supine_location;
+
+/** What supine_locate found. New versions add members only at the end. */
+typedef struct supine_location_info {
   supine_state state; /**< state of the task; the volume found replaces an unknown volume */
   double volume;      /**< volume of all lungs, gas and tissue, mL; 0 if the basis has no volumes */
   double volume_error;       /**< standard deviation of `volume`, mL; 0 if the volume was given */
@@ -123,8 +126,7 @@ typedef struct supine_location {
   double residual_rms;   /**< RMS distance of all points but outliers from their predictions, mm */
   double log_evidence;   /**< log likelihood, for comparing tasks that differ only in the posture */
   size_t outlier_count;  /**< number of points that were left out as outliers */
-  const void *fit; /**< data for supine_locate_positions, in the `space` given to supine_locate */
-} supine_location;
+} supine_location_info;
 
 /** Comparison of an observed point with its prediction by all other points. */
 typedef struct supine_locate_residual {
@@ -156,7 +158,7 @@ SUPINE_API size_t supine_locate_space(size_t count);
  * points, 0.1 s for 300.
  * @param residuals  [count], written
  * @param space      [supine_locate_space(count)]; keep it as long as `found` is used
- * @param found      written
+ * @param found      written; after a failure, NULL or a location for supine_location_get_info alone
  * @return a status of supine_basis_pose, or one of these:
  * @retval SUPINE_ERROR_ARGUMENT   a count, vertex, position or noise is out of range, or a
  *                                 rotation is to be found from fewer than three points, or one of
@@ -166,7 +168,10 @@ SUPINE_API size_t supine_locate_space(size_t count);
  *                                 cannot hold or that is below a tenth of full inflation */
 SUPINE_API supine_status supine_locate(const supine_locate_task *task,
                                        supine_locate_residual *residuals, double *space,
-                                       supine_location *found, supine_error *error);
+                                       const supine_location **found, supine_error *error);
+
+/** Return what supine_locate found. The struct is in the `space` given to supine_locate. */
+SUPINE_API const supine_location_info *supine_location_get_info(const supine_location *found);
 
 /** Compute the positions of all vertices in the frame of the observations, and their expected
  * errors. Statuses: as supine_basis_pose. Cost: about 3 ms for 25,000 vertices and 20 points.

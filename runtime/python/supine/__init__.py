@@ -438,14 +438,15 @@ class Location:
                                                   for v, p in zip(vertices, places, strict=True)))
         residuals = (_c.Residual * max(count, 1))()
         self._space = np.empty(_c.locate_space(count))  # memory that the C library uses in later calls
-        self._c = _c.Location()
+        self._c = ctypes.c_void_p()
         task = _c.LocateTask(inside._c, count, seen, state, rigid)
         _c.locate(task, residuals, self._space.ctypes.data, self._c)
-        self.volume: float = self._c.volume
-        self.volume_error: float = self._c.volume_error
-        self.rotation: Doubles = np.array(self._c.rotation).reshape(3, 3)
-        self.translation: Doubles = np.array(self._c.translation)
-        self.log_evidence: float = self._c.log_evidence
+        info = _c.location_info(self._c).contents
+        self.volume: float = info.volume
+        self.volume_error: float = info.volume_error
+        self.rotation: Doubles = np.array(info.rotation).reshape(3, 3)
+        self.translation: Doubles = np.array(info.translation)
+        self.log_evidence: float = info.log_evidence
         self.distances: Doubles = np.array([r.distance for r in residuals])
         self.sigmas: Doubles = np.array([r.sigma for r in residuals])
         self.outliers: NDArray[np.bool_] = np.array([r.outlier for r in residuals])

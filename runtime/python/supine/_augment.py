@@ -28,7 +28,8 @@ class Sample:
 
     state: posture and volume, such as "prone+4.0:rest+350"
     image, labels: moved image and label map [z, y, x], on the voxels of the given ones; None if not given
-    points: moved points [n, 3], mm, LPS, and points_error [n], their expected errors, mm; None if not given
+    points: moved points [n, 3], mm, LPS, in the order given, and points_error [n], their expected errors, mm; None if
+        not given
     field: displacement [z, y, x, 3] of the tissue at the nodes of a grid in the scan, mm, LPS
     field_origin, field_step: first node of the grid, and the distances (x, y, z) between nodes, mm, LPS
     error: expected error [z, y, x] of the field, mm (3-D RMS); NaN at nodes far from the lungs"""
@@ -127,6 +128,7 @@ def augment(lungs: Any, image: Optional[NDArray[Any]] = None, *, labels: Optiona
 
     wanted = random_states(lungs, states, seed) if isinstance(states, int) else list(states)
     inside = None if points is None else embed(lungs, points)
+    order = None if inside is None else np.argsort(inside.tensor("part"), kind="stable")  # a basis groups points by lung
     nodes = embed(lungs, grid=grid)
     frame, shape = nodes.tensor("grid"), tuple(int(n) for n in nodes.tensor("grid_size"))[::-1]
     place = np.rint((nodes.vertices - frame[0]) @ np.linalg.inv(frame[1:])).astype(int)
@@ -162,8 +164,8 @@ def augment(lungs: Any, image: Optional[NDArray[Any]] = None, *, labels: Optiona
             error = np.full(shape, np.nan, np.float32)
             error[place[:, 2], place[:, 1], place[:, 0]] = nodes.expected_error(state)
             yield Sample(state, moved.get("image"), moved.get("labels"),
-                         None if inside is None else inside.deform(inside.pose(state)),
-                         None if inside is None else inside.expected_error(state),
+                         None if inside is None else inside.deform(inside.pose(state))[order],
+                         None if inside is None else inside.expected_error(state)[order],
                          field, frame[0].copy(), np.diag(frame[1:]).copy(), error)
 
 

@@ -147,11 +147,11 @@ class LocateTask(ctypes.Structure):
                 ("rigid", c_bool)]
 
 
-class Location(ctypes.Structure):
-    """The C struct supine_location."""
+class LocationInfo(ctypes.Structure):
+    """The C struct supine_location_info."""
     _fields_ = [("state", State), ("volume", c_double), ("volume_error", c_double), ("volume_prior_error", c_double),
                 ("rotation", c_double * 9), ("translation", c_double * 3), ("residual_rms", c_double),
-                ("log_evidence", c_double), ("outlier_count", c_size_t), ("fit", c_void_p)]
+                ("log_evidence", c_double), ("outlier_count", c_size_t)]
 
 
 class Surface(ctypes.Structure):
@@ -246,8 +246,9 @@ deform_lit_range = _posed("deform_lit_range", c_void_p, GivenPose, c_size_t, c_s
 deform_batch = _posed("deform_batch", c_void_p, c_size_t, POINTER(CPose), c_size_t, c_size_t, c_void_p)
 expected_error = _checked("expected_error", c_void_p, POINTER(State), POINTER(State), c_void_p)
 locate_space = _declare("locate_space", c_size_t, c_size_t)
-locate = _checked("locate", POINTER(LocateTask), POINTER(Residual), c_void_p, POINTER(Location))
-locate_positions = _checked("locate_positions", POINTER(Location), c_void_p, c_void_p, c_void_p)
+locate = _checked("locate", POINTER(LocateTask), POINTER(Residual), c_void_p, POINTER(c_void_p))
+location_info = _declare("location_get_info", POINTER(LocationInfo), c_void_p)
+locate_positions = _checked("locate_positions", c_void_p, c_void_p, c_void_p, c_void_p)
 normals = _declare("normals", None, c_void_p, c_void_p, c_void_p)
 
 
