@@ -160,8 +160,6 @@ typedef struct supine_mesh_save_options {
   const unsigned char *lung;       /**< [vertex_count] index of the lung, as point data "lung" */
   const supine_mesh_field *fields; /**< [field_count] written as field data */
   size_t field_count;
-  double rounding; /**< mm; 0 for no rounding. Lengths are rounded to multiples of the largest power
-                      of two, in the file's unit, that does not exceed this; normals to 1/256. */
   /** @} */
 } supine_mesh_save_options;
 
@@ -172,7 +170,7 @@ supine_status supine_mesh_save(const char *path, const supine_mesh *mesh,
                                const supine_mesh_save_options *options, supine_error *error);
 
 /** A VTP file of a surface that moves over time, in the form that VTK and ParaView read. The
- * triangles are stored once; every array is compressed. The field data hold the times, "time_s",
+ * triangles are stored once. The field data hold the times, "time_s",
  * and options->fields, with one tuple for each frame. The file appears completely or not at all. */
 typedef struct supine_mesh_series supine_mesh_series;
 

@@ -155,8 +155,6 @@ static void drop_series(supine_mesh_series **series) {
  * @param save  axes, unit and comment of the output; the other options are set here */
 static supine_status write_series(playing *p, const supine_state *from,
                                   supine_mesh_save_options save, supine_error *error) {
-  /* Positions are rounded to multiples of this length, mm. */
-  static const double rounding = 1.0 / 256.0;
   const supine_tensor *lung = supine_basis_tensor(p->basis, "lung");
   const supine_mesh_field fields[] = {{"gravity_LPS", 3, p->gravity},
                                       {"volume_mL", p->lung_count, p->volumes},
@@ -169,7 +167,6 @@ static supine_status write_series(playing *p, const supine_state *from,
   save.lung = lung == NULL ? NULL : lung->data;
   save.fields = fields;
   save.field_count = known ? 3 : 2;
-  save.rounding = rounding;
   SUPINE_TRY(supine_mesh_series_open(p->wanted->path, &p->mesh, &save, p->wanted->count, p->time,
                                      &series, error));
   SUPINE_TRY(play_frames(p, series, error));
