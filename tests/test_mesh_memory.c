@@ -144,30 +144,6 @@ TEST(test_save_each_allocation_failing_reports_memory_error) {
   }
 }
 
-static supine_status save_series(const char *path, supine_error *error) {
-  double vertices[] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
-  uint32_t triangles[] = {0, 1, 2};
-  static const double times[1] = {0.0};
-  const supine_mesh mesh = {3, vertices, 1, triangles};
-  supine_mesh_series *series = NULL;
-  supine_status status = supine_mesh_series_open(path, &mesh, NULL, 1, times, &series, error);
-  if (status == SUPINE_OK) {
-    status = supine_mesh_series_add(series, error);
-  }
-  if (status == SUPINE_OK) {
-    status = supine_mesh_series_commit(series, error);
-  }
-  supine_mesh_series_close(series);
-  assert_int_equal(unlink(path), status == SUPINE_OK ? 0 : -1);
-  return status;
-}
-
-TEST(test_series_each_allocation_failing_reports_memory_error) {
-  char path[256];
-  /* The series is one allocation. */
-  fail_each(save_series, sample_path(state, "a.vtp", path), 1);
-}
-
 static int setup(void **state) {
   allocations_failed = mmap(NULL, sizeof *allocations_failed, PROT_READ | PROT_WRITE,
                             MAP_SHARED | MAP_ANONYMOUS, -1, 0);

@@ -324,31 +324,30 @@ TEST(test_save_vtp_opens_in_vtk) {
   assert_int_equal(unlink(path), 0);
 }
 
-/* A series with an impossible path is refused. A series closed without a commit leaves no file. A
- * series can be written into a pipe. */
-TEST(test_series_impossible_or_uncommitted_leaves_no_file) {
-  static const double times[2] = {0.0, 0.5};
+/* Double a coordinate; stop at the third frame. */
+static supine_status next_frame(void *context, size_t frame, supine_error *error) {
+  supine_mesh *mesh = context;
+  mesh->vertices[4] *= 2.0;
+  return frame < 2 ? SUPINE_OK : supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "stopped");
+}
+
+/* Frames with an impossible path are refused. Frames that fail leave no file. Frames can be written
+ * into a pipe. */
+TEST(test_save_frames_impossible_or_failing_leaves_no_file) {
+  static const double times[3] = {0.0, 0.5, 1.0};
   supine_mesh mesh = sample_tetrahedron();
-  supine_mesh_series *series = NULL;
+  supine_mesh_frames frames = {2, times, next_frame, &mesh};
   supine_error error;
   char path[256];
   (void)sample_path(state, "a.vtp", path);
-  assert_int_equal(
-      supine_mesh_series_open("/nowhere/a.vtp", &mesh, NULL, 2, times, &series, &error),
-      SUPINE_ERROR_WRITE);
-  assert_null(series);
-  supine_mesh_series_close(NULL);
+  assert_int_equal(supine_mesh_save_frames("/nowhere/a.vtp", &mesh, NULL, &frames, &error),
+                   SUPINE_ERROR_WRITE);
 
   assert_int_equal(mkfifo(path, 0600), 0);
   /* Opening a FIFO for writing does not block if it has a reader. */
   const int reader = open(path, O_RDONLY | O_NONBLOCK);
   assert_true(reader >= 0);
-  assert_int_equal(supine_mesh_series_open(path, &mesh, NULL, 2, times, &series, &error),
-                   SUPINE_OK);
-  assert_int_equal(supine_mesh_series_add(series, &error), SUPINE_OK);
-  assert_int_equal(supine_mesh_series_add(series, &error), SUPINE_OK);
-  assert_int_equal(supine_mesh_series_commit(series, &error), SUPINE_OK);
-  supine_mesh_series_close(series);
+  assert_int_equal(supine_mesh_save_frames(path, &mesh, NULL, &frames, &error), SUPINE_OK);
   char text[8192];
   const ssize_t size = read(reader, text, sizeof text);
   assert_true(size > 28 && size < (ssize_t)sizeof text);
@@ -356,21 +355,20 @@ TEST(test_series_impossible_or_uncommitted_leaves_no_file) {
   assert_int_equal(close(reader), 0);
   assert_int_equal(unlink(path), 0);
 
-  assert_int_equal(supine_mesh_series_open(path, &mesh, NULL, 2, times, &series, &error),
-                   SUPINE_OK);
-  assert_int_equal(supine_mesh_series_add(series, &error), SUPINE_OK);
-  mesh.vertices[4] = (double)INFINITY;
-  assert_int_equal(supine_mesh_series_add(series, &error), SUPINE_ERROR_MESH);
+  mesh.vertices[4] = 1e38; /* a float holds twice this, but not four times */
+  assert_int_equal(supine_mesh_save_frames(path, &mesh, NULL, &frames, &error), SUPINE_ERROR_MESH);
   assert_says(error.message, "vertex 1");
-  supine_mesh_series_close(series);
   assert_int_equal(access(path, F_OK), -1);
 
   mesh.vertices[4] = 0.0;
-  assert_int_equal(supine_mesh_series_open("/dev/full", &mesh, NULL, 1, times, &series, &error),
-                   SUPINE_OK);
-  assert_int_equal(supine_mesh_series_add(series, &error), SUPINE_OK);
-  assert_int_equal(supine_mesh_series_commit(series, &error), SUPINE_ERROR_WRITE);
-  supine_mesh_series_close(series);
+  frames.count = 3;
+  assert_int_equal(supine_mesh_save_frames(path, &mesh, NULL, &frames, &error),
+                   SUPINE_ERROR_INTERRUPTED);
+  assert_int_equal(access(path, F_OK), -1);
+
+  frames.count = 1;
+  assert_int_equal(supine_mesh_save_frames("/dev/full", &mesh, NULL, &frames, &error),
+                   SUPINE_ERROR_WRITE);
   supine_mesh_free(&mesh);
 }
 

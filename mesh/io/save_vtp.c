@@ -3,7 +3,6 @@
  * which are surfaces with the same triangles. The arrays of a series are written frame by frame.
  * Nothing is compressed: the size of each array is thus known before, and with it its offset, which
  * the header of the file states. */
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/arena.h"
@@ -37,9 +36,7 @@ typedef struct vtp {
   mesh_writer writer;
   vtp_array arrays[VTP_ARRAYS]; /* points, connectivity, offsets, then point data */
   size_t array_count;
-  size_t frames;
-  const double *times; /* [frames] in s; NULL for one surface without a time */
-  size_t next_frame;
+  const supine_mesh_frames *frames;
 } vtp;
 
 static void find_position(const mesh_writer *writer, size_t i, vtp_item *item) {
@@ -68,11 +65,11 @@ static void find_normal(const mesh_writer *writer, size_t i, vtp_item *item) {
   supine_mesh_writer_normal(writer, i, item->number);
 }
 
-static vtp vtp_begin(const mesh_writer *writer, size_t frames, const double *times) {
+static vtp vtp_begin(const mesh_writer *writer, const supine_mesh_frames *frames) {
   const size_t points = writer->mesh->vertex_count;
   const size_t triangles = writer->mesh->triangle_count;
   const supine_mesh_save_options *options = &writer->options;
-  vtp file = {.writer = *writer, .frames = frames, .times = times};
+  vtp file = {.writer = *writer, .frames = frames};
   vtp_array *to = file.arrays;
   *to++ = (vtp_array){"Float32", "Points", 3, 12, points, false, find_position, NULL};
   *to++ = (vtp_array){"Int32", "connectivity", 1, 12, triangles, true, find_corners, NULL};
@@ -150,23 +147,22 @@ static void put_array(const vtp *file, const vtp_array *array) {
   }
 }
 
-static void vtp_frame(vtp *file) {
+static void vtp_frame(const vtp *file, size_t frame) {
   for (size_t i = 0; i < file->array_count; ++i) {
-    if (is_written(&file->arrays[i], file->next_frame)) {
+    if (is_written(&file->arrays[i], frame)) {
       put_array(file, &file->arrays[i]);
     }
   }
-  ++file->next_frame;
 }
 
 /* Write the DataArray elements of an array, one for each frame. */
 static void write_array(const vtp *file, size_t number) {
   const vtp_array *array = &file->arrays[number];
   FILE *out = file->writer.out;
-  for (size_t frame = 0; frame < file->frames; ++frame) {
+  for (size_t frame = 0; frame < file->frames->count; ++frame) {
     (void)fprintf(out, "<DataArray type=\"%s\" Name=\"%s\" NumberOfComponents=\"%u\"", array->type,
                   array->name, array->components);
-    if (file->times != NULL) {
+    if (file->frames->times != NULL) {
       (void)fprintf(out, " TimeStep=\"%zu\"", frame);
     }
     (void)fprintf(out, " format=\"appended\" offset=\"%llu\"/>\n",
@@ -202,8 +198,8 @@ static void write_numbers(const vtp *file, const supine_mesh_field *field, FILE 
   (void)fprintf(out,
                 "<DataArray type=\"Float64\" Name=\"%s\" NumberOfComponents=\"%zu\" "
                 "NumberOfTuples=\"%zu\" format=\"ascii\">",
-                field->name, field->count, file->frames);
-  for (size_t i = 0; i < file->frames * field->count; ++i) {
+                field->name, field->count, file->frames->count);
+  for (size_t i = 0; i < file->frames->count * field->count; ++i) {
     (void)fprintf(out, "%s%.17g", i > 0 ? " " : "", field->values[i]);
   }
   (void)fputs("</DataArray>\n", out);
@@ -220,8 +216,8 @@ static void write_field_data(const vtp *file) {
   if (writer->comment[0] != '\0') {
     write_text("note", writer->comment, out);
   }
-  if (file->times != NULL) {
-    write_numbers(file, &(supine_mesh_field){"time_s", 1, file->times}, out);
+  if (file->frames->times != NULL) {
+    write_numbers(file, &(supine_mesh_field){"time_s", 1, file->frames->times}, out);
   }
   for (size_t i = 0; i < writer->options.field_count; ++i) {
     write_numbers(file, &writer->options.fields[i], out);
@@ -238,9 +234,9 @@ static void vtp_head(const vtp *file) {
   (void)fputs("<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" "
               "header_type=\"UInt64\">\n<PolyData",
               out);
-  for (size_t frame = 0; file->times != NULL && frame < file->frames; ++frame) {
-    (void)fprintf(out, "%s%.9g%s", frame == 0 ? " TimeValues=\"" : " ", file->times[frame],
-                  frame + 1 == file->frames ? "\"" : "");
+  for (size_t frame = 0; file->frames->times != NULL && frame < file->frames->count; ++frame) {
+    (void)fprintf(out, "%s%.9g%s", frame == 0 ? " TimeValues=\"" : " ", file->frames->times[frame],
+                  frame + 1 == file->frames->count ? "\"" : "");
   }
   (void)fputs(">\n", out);
   write_field_data(file);
@@ -266,55 +262,28 @@ static void vtp_foot(const vtp *file) {
 }
 
 void supine_mesh_save_vtp(const mesh_writer *writer) {
-  vtp file = vtp_begin(writer, 1, NULL);
+  static const supine_mesh_frames one = {.count = 1};
+  const vtp file = vtp_begin(writer, &one);
   vtp_head(&file);
-  vtp_frame(&file);
+  vtp_frame(&file, 0);
   vtp_foot(&file);
 }
 
-struct supine_mesh_series {
-  supine_output output;
-  vtp file;
-};
-
-supine_status supine_mesh_series_open(const char *path, const supine_mesh *mesh,
-                                      const supine_mesh_save_options *options, size_t frames,
-                                      const double *times, supine_mesh_series **series,
-                                      supine_error *error) {
-  *series = NULL;
-  SUPINE_TRY(supine_mesh_writer_check(path, mesh, error));
-  supine_mesh_series *made = calloc(1, sizeof *made);
-  if (made == NULL) {
-    return supine_error_memory(error, "writing %s", path);
-  }
-  const supine_status status = supine_output_open(path, &made->output, error);
-  if (status != SUPINE_OK) {
-    supine_mesh_series_close(made);
-    return status;
-  }
+supine_status supine_mesh_save_frames(const char *path, const supine_mesh *mesh,
+                                      const supine_mesh_save_options *options,
+                                      const supine_mesh_frames *frames, supine_error *error) {
+  SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
   mesh_writer writer;
+  SUPINE_TRY(supine_output_open(path, &output, error));
   supine_mesh_writer_begin(mesh, options, &writer);
-  writer.out = made->output.file;
-  made->file = vtp_begin(&writer, frames, times);
-  vtp_head(&made->file);
-  *series = made;
-  return SUPINE_OK;
-}
-
-supine_status supine_mesh_series_add(supine_mesh_series *series, supine_error *error) {
-  SUPINE_TRY(supine_mesh_writer_check(series->output.path, series->file.writer.mesh, error));
-  vtp_frame(&series->file);
-  return SUPINE_OK;
-}
-
-supine_status supine_mesh_series_commit(supine_mesh_series *series, supine_error *error) {
-  vtp_foot(&series->file);
-  return supine_output_commit(&series->output, error);
-}
-
-void supine_mesh_series_close(supine_mesh_series *series) {
-  if (series != NULL) {
-    supine_output_abandon(&series->output);
-    free(series);
+  writer.out = output.file;
+  const vtp file = vtp_begin(&writer, frames);
+  vtp_head(&file);
+  for (size_t frame = 0; frame < frames->count; ++frame) {
+    SUPINE_TRY(frames->next(frames->context, frame, error));
+    SUPINE_TRY(supine_mesh_writer_check(path, mesh, error));
+    vtp_frame(&file, frame);
   }
+  vtp_foot(&file);
+  return supine_output_commit(&output, error);
 }
