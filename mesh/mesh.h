@@ -149,7 +149,8 @@ double supine_mesh_turned_over(const supine_mesh *mesh, const double *vertices);
 typedef struct supine_mesh_field {
   const char *name; /**< name with a unit, such as "volume_mL" */
   size_t count;
-  const double *values; /**< [frames, count] values; only a series has more than one frame */
+  const double *
+      values; /**< [frames, count] values; only supine_mesh_save_frames takes more than one frame */
 } supine_mesh_field;
 
 /** A number at each vertex: point data of VTP and PLY files. */
@@ -173,8 +174,6 @@ typedef struct supine_mesh_save_options {
   const unsigned char *lung;       /**< [vertex_count] index of the lung, as point data "lung" */
   const supine_mesh_field *fields; /**< [field_count] written as field data */
   size_t field_count;
-  double rounding; /**< mm; 0 for no rounding. Lengths are rounded to multiples of the largest power
-                      of two, in the file's unit, that does not exceed this; normals to 1/256. */
   /** @} */
 } supine_mesh_save_options;
 
@@ -184,24 +183,21 @@ typedef struct supine_mesh_save_options {
 supine_status supine_mesh_save(const char *path, const supine_mesh *mesh,
                                const supine_mesh_save_options *options, supine_error *error);
 
-/** A VTP file of a surface that moves over time, in the form that VTK and ParaView read. The
- * triangles are stored once; every array is compressed. The field data hold the times, "time_s",
- * and options->fields, with one tuple for each frame. The file appears completely or not at all. */
-typedef struct supine_mesh_series supine_mesh_series;
+/** The frames of a surface that moves over time. */
+typedef struct supine_mesh_frames {
+  size_t count;
+  const double *times; /**< [count] in s; NULL for a surface without a time */
+  /** Update the mesh's vertices and the options' normals to a frame. A failure ends the writing. */
+  supine_status (*next)(void *context, size_t frame, supine_error *error);
+  void *context;
+} supine_mesh_frames;
 
-/** Begin a series. All arguments must outlive it; before each frame the caller updates the arrays
- * `mesh->vertices` and `options->normals`.
- * @param times  [frames] in s */
-supine_status supine_mesh_series_open(const char *path, const supine_mesh *mesh,
-                                      const supine_mesh_save_options *options, size_t frames,
-                                      const double *times, supine_mesh_series **series,
-                                      supine_error *error);
-/** Add the next frame. */
-supine_status supine_mesh_series_add(supine_mesh_series *series, supine_error *error);
-/** Complete the file, which then appears at its path. */
-supine_status supine_mesh_series_commit(supine_mesh_series *series, supine_error *error);
-/** Free a series. If it was not committed, no file appears. NULL is allowed. */
-void supine_mesh_series_close(supine_mesh_series *series);
+/** Write a surface that moves over time, in the form of VTP that VTK and ParaView read. The
+ * triangles are stored once. The field data hold the times, "time_s", and options->fields, with one
+ * tuple for each frame. The file appears completely or not at all. */
+supine_status supine_mesh_save_frames(const char *path, const supine_mesh *mesh,
+                                      const supine_mesh_save_options *options,
+                                      const supine_mesh_frames *frames, supine_error *error);
 
 /** The formats of supine_mesh_save, by ending; each has a function supine_mesh_save_NAME in
  * mesh/io. This is the only list of formats. */

@@ -34,17 +34,19 @@ typedef struct playing {
   double *compute_time; /* [frames] s */
   double *origin;       /* [N, 3] positions from which displacements are measured, mm */
   char vtp_comment[512];
+  supine_progress progress;
   supine_arena arena;
 } playing;
 
 static void end(playing *p) {
+  supine_options_progress_end(&p->progress);
   supine_arena_free(&p->arena);
   supine_mesh_free(&p->mesh);
 }
 
-/* Allocate memory for the frames. If `series` is true, keep the positions of one frame only, as
- * each is written before the next is computed. */
-static supine_status begin_frames(playing *p, bool series, supine_error *error) {
+/* Allocate memory for the frames. If `one` is true, keep the positions of one frame only, as each
+ * is written before the next is computed. */
+static supine_status begin_frames(playing *p, bool one, supine_error *error) {
   const size_t count = p->wanted->count;
   const size_t frame = 3 * supine_basis_get_info(p->basis)->vertex_count;
   p->lung_count = supine_basis_get_info(p->basis)->lung_count;
@@ -57,7 +59,7 @@ static supine_status begin_frames(playing *p, bool series, supine_error *error) 
   p->compute_time = supine_arena_take(&p->arena, count, sizeof *p->compute_time);
   p->origin = supine_arena_take(&p->arena, frame, sizeof *p->origin);
   p->normals = supine_arena_take(&p->arena, frame, sizeof *p->normals);
-  p->positions = supine_arena_take(&p->arena, series ? 1 : 1 + count, frame * sizeof *p->positions);
+  p->positions = supine_arena_take(&p->arena, one ? 1 : 1 + count, frame * sizeof *p->positions);
   return p->arena.failed
              ? supine_error_memory(error,
                                    "%zu frames of %zu vertices: lower --seconds or --fps, or write "
@@ -104,31 +106,28 @@ static void report(const playing *p) {
                1e3 * gsl_stats_max(p->compute_time, 1, p->wanted->count), 1e3 * budget);
 }
 
-/* Compute all frames. Call find_volumes first: it checks that each frame has a valid pose.
- * @param series  receives each frame; NULL to store all frames in p->positions */
-static supine_status play_frames(playing *p, supine_mesh_series *series, supine_error *error) {
-  const size_t frame = 3 * p->mesh.vertex_count;
-  SUPINE_FREED_BY(supine_options_progress_end)
-  supine_progress progress = supine_options_progress_begin(name);
-  for (size_t t = 0; t < p->wanted->count; ++t) {
-    supine_pose pose;
-    const double start = supine_clock_seconds();
-    (void)find_pose(p, t, &pose, NULL);
-    (void)supine_deform(p->basis, &pose, p->positions);
-    p->compute_time[t] = supine_clock_seconds() - start;
-    if (series != NULL) {
-      for (size_t i = 0; i < frame; ++i) {
-        p->mesh.vertices[i] = (double)p->positions[i];
-      }
-      supine_normals(p->basis, p->positions, p->normals);
-      SUPINE_TRY(supine_mesh_series_add(series, error));
-    } else {
-      memcpy(p->positions + (1 + t) * frame, p->positions, frame * sizeof *p->positions);
-    }
-    if (!supine_options_progress_step(&progress, (double)(t + 1) / (double)p->wanted->count)) {
-      return supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
-    }
+/* Compute frame t into p->positions. Call find_volumes first: it checks that each frame has a valid
+ * pose. */
+static supine_status play(playing *p, size_t t, supine_error *error) {
+  supine_pose pose;
+  const double start = supine_clock_seconds();
+  (void)find_pose(p, t, &pose, NULL);
+  (void)supine_deform(p->basis, &pose, p->positions);
+  p->compute_time[t] = supine_clock_seconds() - start;
+  return supine_options_progress_step(&p->progress, (double)(t + 1) / (double)p->wanted->count)
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_INTERRUPTED,
+                                "interrupted: nothing was written");
+}
+
+/* Compute frame t with its normals, for VTP. */
+static supine_status next_frame(void *context, size_t t, supine_error *error) {
+  playing *p = context;
+  SUPINE_TRY(play(p, t, error));
+  for (size_t i = 0; i < 3 * p->mesh.vertex_count; ++i) {
+    p->mesh.vertices[i] = (double)p->positions[i];
   }
+  supine_normals(p->basis, p->positions, p->normals);
   return SUPINE_OK;
 }
 
@@ -147,43 +146,30 @@ static supine_status find_expected(const playing *p, const supine_state *from, b
   return SUPINE_OK;
 }
 
-static void drop_series(supine_mesh_series **series) {
-  supine_mesh_series_close(*series);
-}
-
 /* Compute the frames, and write them as VTP.
  * @param save  axes, unit and comment of the output; the other options are set here */
-static supine_status write_series(playing *p, const supine_state *from,
-                                  supine_mesh_save_options save, supine_error *error) {
-  /* Positions are rounded to multiples of this length, mm. */
-  static const double rounding = 1.0 / 256.0;
+static supine_status write_vtp(playing *p, const supine_state *from, supine_mesh_save_options save,
+                               supine_error *error) {
   const supine_tensor *lung = supine_basis_tensor(p->basis, "lung");
   const supine_mesh_field fields[] = {{"gravity_LPS", 3, p->gravity},
                                       {"volume_mL", p->lung_count, p->volumes},
                                       {"expected_error_RMS_mm", 1, p->expected}};
+  const supine_mesh_frames frames = {p->wanted->count, p->time, next_frame, p};
   bool known;
   SUPINE_TRY(find_expected(p, from, &known, error));
-  SUPINE_FREED_BY(drop_series) supine_mesh_series *series = NULL;
   save.from = p->origin;
   save.normals = p->normals;
   save.lung = lung == NULL ? NULL : lung->data;
   save.fields = fields;
   save.field_count = known ? 3 : 2;
-  save.rounding = rounding;
-  SUPINE_TRY(supine_mesh_series_open(p->wanted->path, &p->mesh, &save, p->wanted->count, p->time,
-                                     &series, error));
-  SUPINE_TRY(play_frames(p, series, error));
-  return supine_mesh_series_commit(series, error);
+  return supine_mesh_save_frames(p->wanted->path, &p->mesh, &save, &frames, error);
 }
 
 static supine_status write_tensors(playing *p, supine_error *error) {
   const size_t t = p->wanted->count;
+  const size_t frame = 3 * p->mesh.vertex_count;
   const supine_tensor tensors[] = {
-      {"positions",
-       SUPINE_F32,
-       3,
-       {t, p->mesh.vertex_count, 3},
-       p->positions + 3 * p->mesh.vertex_count},
+      {"positions", SUPINE_F32, 3, {t, p->mesh.vertex_count, 3}, p->positions + frame},
       {"triangles", SUPINE_U32, 2, {p->mesh.triangle_count, 3}, p->mesh.triangles},
       {"time", SUPINE_F64, 1, {t}, p->time},
       {"volume", SUPINE_F64, 2, {t, p->lung_count}, p->volumes},
@@ -193,7 +179,10 @@ static supine_status write_tensors(playing *p, supine_error *error) {
                                       {"units", "mm, s, mL (gas and tissue of each lung)"},
                                       {"axes", "LPS"},
                                       {"made_by", p->wanted->made_by}};
-  SUPINE_TRY(play_frames(p, NULL, error));
+  for (size_t i = 0; i < t; ++i) {
+    SUPINE_TRY(play(p, i, error));
+    memcpy(p->positions + (1 + i) * frame, p->positions, frame * sizeof *p->positions);
+  }
   return supine_safetensors_write(p->wanted->path, tensors, sizeof tensors / sizeof *tensors,
                                   metadata, sizeof metadata / sizeof *metadata, error);
 }
@@ -230,10 +219,11 @@ supine_status supine_command_breath_write(const supine_breath_frames *wanted,
   SUPINE_TRY(check_ends(&p, error));
   SUPINE_TRY(supine_posed_positions(basis, &from.pose, p.origin, error));
   supine_options_signals_catch(true);
+  p.progress = supine_options_progress_begin(name);
   (void)snprintf(p.vtp_comment, sizeof p.vtp_comment,
                  "displacement from %s; volumes are gas and tissue of each lung; %s", from.name,
                  wanted->made_by);
-  SUPINE_TRY(tensors ? write_tensors(&p, error) : write_series(&p, &from.state, save, error));
+  SUPINE_TRY(tensors ? write_tensors(&p, error) : write_vtp(&p, &from.state, save, error));
   report(&p);
   return SUPINE_OK;
 }

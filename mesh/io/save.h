@@ -13,11 +13,10 @@ typedef struct mesh_writer {
   const supine_mesh *mesh;
   supine_mesh_save_options options;
   unsigned char source[3]; /**< axis of `mesh`, 0 to 2, that gives each coordinate of the file */
-  double factor[3]; /**< for each axis of the file: 1 or -1, divided by the file's unit in mm */
-  bool mirrored;    /**< whether the file's axes are left-handed: triangles are then reversed */
-  double step;   /**< lengths are rounded to multiples of this in the file's unit, unless it is 0 */
-  char space[4]; /**< letters of the file's axes: "LPS", "RAS", ... */
-  char unit[24]; /**< unit of lengths: "mm", "cm", ... */
+  double factor[3];  /**< for each axis of the file: 1 or -1, divided by the file's unit in mm */
+  bool mirrored;     /**< whether the file's axes are left-handed: triangles are then reversed */
+  char space[4];     /**< letters of the file's axes: "LPS", "RAS", ... */
+  char unit[24];     /**< unit of lengths: "mm", "cm", ... */
   char comment[256]; /**< one printable line, or "" */
 } mesh_writer;
 
@@ -39,13 +38,8 @@ void supine_mesh_writer_begin(const supine_mesh *mesh, const supine_mesh_save_op
 supine_status supine_mesh_writer_check(const char *path, const supine_mesh *mesh,
                                        supine_error *error);
 
-/** Copy `count` values to *at, and advance *at. */
-void supine_mesh_put_f32(unsigned char **at, const float *values, size_t count);
-void supine_mesh_put_u32(unsigned char **at, const uint32_t *values, size_t count);
-
-/** Write a surface in one format. The caller checks the stream for write errors. On failure, the
- * memory is short. */
-typedef supine_status save_function(const mesh_writer *writer);
+/** Write a surface in one format. The caller checks the stream for write errors. */
+typedef void save_function(const mesh_writer *writer);
 #define SUPINE_MESH_SAVE(name) save_function supine_mesh_save_##name;
 SUPINE_MESH_FORMATS(SUPINE_MESH_SAVE, SUPINE_MESH_SAVE)
 #undef SUPINE_MESH_SAVE

@@ -2,7 +2,7 @@
 /* Write OBJ text. */
 #include "mesh/io/save.h"
 
-supine_status supine_mesh_save_obj(const mesh_writer *writer) {
+void supine_mesh_save_obj(const mesh_writer *writer) {
   const supine_mesh *mesh = writer->mesh;
   (void)fprintf(writer->out, "# SPACE=%s %s\n", writer->space, writer->unit);
   if (writer->comment[0] != '\0') {
@@ -20,5 +20,4 @@ supine_status supine_mesh_save_obj(const mesh_writer *writer) {
     (void)fprintf(writer->out, "f %lu %lu %lu\n", corner[0] + 1UL, corner[1] + 1UL,
                   corner[2] + 1UL);
   }
-  return SUPINE_OK;
 }

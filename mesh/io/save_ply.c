@@ -2,7 +2,7 @@
 /* Write binary little-endian PLY. */
 #include "mesh/io/save.h"
 
-supine_status supine_mesh_save_ply(const mesh_writer *writer) {
+void supine_mesh_save_ply(const mesh_writer *writer) {
   const supine_mesh *mesh = writer->mesh;
   (void)fprintf(writer->out, "ply\nformat binary_little_endian 1.0\ncomment SPACE=%s %s\n",
                 writer->space, writer->unit);
@@ -46,5 +46,4 @@ supine_status supine_mesh_save_ply(const mesh_writer *writer) {
     (void)fputc(3, writer->out);
     (void)fwrite(corner, sizeof corner, 1, writer->out);
   }
-  return SUPINE_OK;
 }

@@ -24,7 +24,7 @@ static void facet_normal(float (*corners)[3], float normal[3]) {
   }
 }
 
-supine_status supine_mesh_save_stl(const mesh_writer *writer) {
+void supine_mesh_save_stl(const mesh_writer *writer) {
   const supine_mesh *mesh = writer->mesh;
   /* The header must not begin with "solid", which marks STL text. */
   char text[HEADER + 1 + sizeof writer->comment];
@@ -45,5 +45,4 @@ supine_status supine_mesh_save_stl(const mesh_writer *writer) {
     (void)fwrite(facet, sizeof facet, 1, writer->out);
     (void)fwrite(&attributes, sizeof attributes, 1, writer->out);
   }
-  return SUPINE_OK;
 }

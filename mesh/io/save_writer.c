@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Convert numbers to the axes and units of a file, and to bytes, for all formats. */
+/* Convert numbers to the axes and units of a file, for all formats. */
 #include <float.h>
 #include <math.h>
-#include <string.h>
 
 #include "base/arena.h"
 
@@ -56,33 +55,21 @@ void supine_mesh_writer_begin(const supine_mesh *mesh, const supine_mesh_save_op
       writer->factor[i % 3] = matrix[i / 3][i % 3] / unit;
     }
   }
-  if (chosen.rounding > 0.0) {
-    writer->step = exp2(floor(log2(chosen.rounding / unit)));
-  }
   copy_comment(chosen.comment, writer->comment, sizeof writer->comment);
   supine_mesh_unit_name(unit, writer->unit);
 }
 
-/* Round a length to a multiple of writer->step, unless that is 0. */
-static double rounded(const mesh_writer *writer, double length) {
-  return writer->step > 0.0 ? rint(length / writer->step) * writer->step : length;
-}
-
 void supine_mesh_writer_normal(const mesh_writer *writer, size_t i, float normal[3]) {
-  static const double steps = 256.0; /* normals are rounded to multiples of 1 / steps */
-  for (size_t axis = 0; axis < 3; ++axis) {
-    const double value = (double)writer->options.normals[3 * i + writer->source[axis]];
-    const double turned = copysign(value, value * writer->factor[axis]);
-    normal[axis] = (float)((writer->step > 0.0 ? rint(steps * turned) / steps : turned) + 0.0);
+  for (size_t axis = 0; axis < 3; ++axis) { /* + 0.0 turns -0.0 into 0.0 */
+    const float value = writer->options.normals[3 * i + writer->source[axis]];
+    normal[axis] = (writer->factor[axis] < 0.0 ? -value : value) + 0.0F;
   }
 }
 
 void supine_mesh_writer_position(const mesh_writer *writer, size_t i, float position[3]) {
-  for (size_t axis = 0; axis < 3; ++axis) { /* + 0.0 turns -0.0 into 0.0 */
-    position[axis] =
-        (float)(rounded(writer, writer->factor[axis] *
-                                    writer->mesh->vertices[3 * i + writer->source[axis]]) +
-                0.0);
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const double vertex = writer->mesh->vertices[3 * i + writer->source[axis]];
+    position[axis] = (float)(writer->factor[axis] * vertex + 0.0);
   }
 }
 
@@ -91,11 +78,11 @@ void supine_mesh_writer_displacement(const mesh_writer *writer, size_t i, float 
   for (size_t axis = 0; axis < 3; ++axis) {
     const size_t from = 3 * i + writer->source[axis];
     const double d = writer->mesh->vertices[from] - writer->options.from[from];
-    const double scaled = rounded(writer, writer->factor[axis] * d);
+    const double scaled = writer->factor[axis] * d;
     displacement[axis] = (float)(scaled + 0.0);
     square += scaled * scaled;
   }
-  displacement[3] = (float)rounded(writer, sqrt(square));
+  displacement[3] = (float)sqrt(square);
 }
 
 void supine_mesh_writer_triangle(const mesh_writer *writer, size_t t, uint32_t corner[3]) {
@@ -103,14 +90,4 @@ void supine_mesh_writer_triangle(const mesh_writer *writer, size_t t, uint32_t c
   corner[0] = from[0];
   corner[1] = from[writer->mirrored ? 2 : 1];
   corner[2] = from[writer->mirrored ? 1 : 2];
-}
-
-void supine_mesh_put_f32(unsigned char **at, const float *values, size_t count) {
-  memcpy(*at, values, count * sizeof *values);
-  *at += count * sizeof *values;
-}
-
-void supine_mesh_put_u32(unsigned char **at, const uint32_t *values, size_t count) {
-  memcpy(*at, values, count * sizeof *values);
-  *at += count * sizeof *values;
 }

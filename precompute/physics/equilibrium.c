@@ -25,7 +25,7 @@ static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cholmod;
 
 /* BATCH: largest number of right-hand sides that are solved together, which limits the work space.
  * LARGE: largest number of vertices of a mesh part whose Cholesky factor is kept after a solve. */
-enum { BATCH = 8, LARGE = 100000 };
+enum { BATCH = 8, LARGE = 40000 };
 
 /* Largest accepted relative residual of a solve. With a smoothing length R and edges of length h,
  * rounding errors alone cause about 1e-16 (R / h)^2. */

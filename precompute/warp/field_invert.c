@@ -84,17 +84,16 @@ static void invert_rows(void *context, size_t begin, size_t end, size_t thread) 
   (void)thread;
   const inversion *work = context;
   const supine_image *nodes = &work->field->nodes;
+  const float *u = nodes->values;
   float *v = work->inverse->nodes.values;
   for (size_t row = begin; row < end; ++row) {
     for (size_t i = 0; i < nodes->size[0]; ++i) {
       const size_t node = row * nodes->size[0] + i;
       double y[3];
-      double u[3];
       double x[3];
       supine_image_place(nodes, node, y);
-      supine_field_at(work->field, y, u);
-      for (int k = 0; k < 3; ++k) {
-        x[k] = y[k] - u[k];
+      for (size_t k = 0; k < 3; ++k) {
+        x[k] = y[k] - (double)u[3 * node + k];
       }
       double off = solve(work->field, y, x);
       if (off > lost_beyond) { /* the iteration failed: restart it without the estimate -u(y) */

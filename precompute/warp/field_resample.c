@@ -39,8 +39,9 @@ typedef struct cells {
   double share[3][RUN]; /* position of each point in its cell, 0 to 1 along each axis */
 } cells;
 
-/* The x, y and z of a vector, and an unused number. */
+/* The x, y and z of a vector, and an unused number; `narrow` as fields store it. */
 typedef double vector __attribute__((vector_size(4 * sizeof(double))));
+typedef float narrow __attribute__((vector_size(4 * sizeof(float))));
 
 /* Find the cells that contain points, given in voxels. */
 INLINE void find_cells(const supine_image *image, double (*at)[RUN], cells *found) {
@@ -114,11 +115,13 @@ INLINE bool displace(const supine_image *nodes, const cells *in, double (*shift)
   weigh_corners(nodes, in, weight, offset);
   for (size_t i = 0; i < RUN; ++i) {
     if (i == 0 || in->first[i] != in->first[i - 1]) {
+      vector squares = {0.0};
       for (size_t corner = 0; corner < 8; ++corner) {
         const float *u = (const float *)nodes->values + in->first[i] + offset[corner];
-        corners[corner] = (vector){(double)u[0], (double)u[1], (double)u[2], 0.0};
-        moves = (corner > 0 && moves) || u[0] != 0.0F || u[1] != 0.0F || u[2] != 0.0F;
+        corners[corner] = __builtin_convertvector((narrow){u[0], u[1], u[2], 0.0F}, vector);
+        squares += corners[corner] * corners[corner];
       }
+      moves = squares[0] + squares[1] + squares[2] > 0.0;
     }
     vector u = {0.0, 0.0, 0.0, 0.0};
     for (size_t corner = 0; corner < 8 && moves; ++corner) {
