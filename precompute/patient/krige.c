@@ -264,7 +264,6 @@ static supine_status krige_create(supine_patient_krige *k,
   k->design = supine_arena_take(a, (TERMS + 1) * count, sizeof *k->design);
   k->normal_matrix = supine_arena_take(a, (size_t)2 * TERMS * TERMS, sizeof *k->normal_matrix);
   k->kernel_weight = supine_arena_take(a, count, sizeof *k->kernel_weight);
-  k->scratch = supine_arena_take(a, count, sizeof *k->scratch);
   if (!options->uncorrected && !options->size_only) {
     k->cholesky = supine_arena_take(a, count * count, sizeof *k->cholesky);
   }
@@ -327,20 +326,6 @@ void supine_patient_krige_errors(const supine_patient_krige *krige,
     x[t] = exponent ? krige->law.c[c] : 1.0;
     error[c] = prior_deviation(krige, t) > 0.0 ? sqrt(variance_of(krige, x)) : 0.0;
   }
-}
-
-double supine_patient_krige_predict(supine_patient_krige *krige, const supine_patient_row *row) {
-  double x[TERMS];
-  double value = supine_patient_power_design(&krige->law, row, x) + row->value;
-  if (krige->sill > 0.0) {
-    const supine_patient_centre at = centre_of(&krige->law, &row->place);
-    supine_patient_covariances(&at, krige->count, krige->centre, krige->scratch);
-    for (size_t i = 0; i < krige->count; ++i) {
-      value += krige->scaled_sill * supine_dot(row->axis, krige->rows[i].axis) * krige->scratch[i] *
-               krige->kernel_weight[i];
-    }
-  }
-  return value;
 }
 
 void supine_patient_krige_copy_law(const supine_patient_krige *krige, supine_patient *patient) {

@@ -37,6 +37,23 @@ supine_patient_place supine_patient_find(const supine_patient_frame *frame, cons
   return place;
 }
 
+/* Find the plane between the lungs: the middle between the mean x of the points on either side of
+ * it. The middle of the bounding box would put points beside the heart into the other lung. */
+static double find_midline(size_t count, const double *points, double middle) {
+  enum { ROUNDS = 20 };
+  for (int round = 0; round < ROUNDS; ++round) {
+    double sum[2] = {0.0, 0.0};
+    double number[2] = {0.0, 0.0};
+    for (size_t i = 0; i < count; ++i) {
+      const int side = points[3 * i] > middle ? 1 : 0;
+      sum[side] += points[3 * i];
+      number[side] += 1.0;
+    }
+    middle = number[0] * number[1] > 0.0 ? 0.5 * (sum[0] / number[0] + sum[1] / number[1]) : middle;
+  }
+  return middle;
+}
+
 supine_patient_frame supine_patient_frame_of_points(size_t count, const double *points,
                                                     const double *midline) {
   supine_patient_frame frame = {
@@ -45,7 +62,9 @@ supine_patient_frame supine_patient_frame_of_points(size_t count, const double *
     frame.minimum[i % 3] = fmin(frame.minimum[i % 3], points[i] - landmark_margin);
     frame.maximum[i % 3] = fmax(frame.maximum[i % 3], points[i] + landmark_margin);
   }
-  frame.midline = midline != NULL ? *midline : 0.5 * (frame.minimum[0] + frame.maximum[0]);
+  frame.midline = midline != NULL
+                      ? *midline
+                      : find_midline(count, points, 0.5 * (frame.minimum[0] + frame.maximum[0]));
   return frame;
 }
 
