@@ -259,8 +259,8 @@ static void set_expected(const study *s, const squares *held_out, const supine_p
     const double own = held_out->back / held_out->path;
     report->expected_constant = (prior_points * constant_of_landmarks + (double)s->triples * own) /
                                 (prior_points + (double)s->triples);
-    report->stretch = sqrt(held_out->back / (double)count) /
-                      report->held_out[SUPINE_PATIENT_SCORE_CORRECTED];
+    report->stretch =
+        sqrt(held_out->back / (double)count) / report->held_out[SUPINE_PATIENT_SCORE_CORRECTED];
   }
   for (size_t i = 0; i < count; ++i) {
     within += s->ratio[i] <= bound * bound * report->expected_constant ? 1.0 : 0.0;

@@ -133,9 +133,9 @@ typedef struct supine_patient_fit_report {
   double band; /**< share of the held-out landmarks with an error below its 95 % bound, %, or 0 */
   double explained; /**< percentage by which the law with its kriging correction reduces the squared
                        `baseline` */
-  /** Errors at held-out landmarks that are moved back to the fuller scan, divided by those where the
-   * emptier scan is predicted: there, tissue and errors are compressed. Without landmarks, the cube
-   * root of the ratio of the volumes. */
+  /** Errors at held-out landmarks that are moved back to the fuller scan, divided by those where
+   * the emptier scan is predicted: there, tissue and errors are compressed. Without landmarks, the
+   * cube root of the ratio of the volumes. */
   double stretch;
   double expected_point;    /**< expected error of a point predicted in the fuller scan, mm */
   double expected_constant; /**< expected squared error there, mm^2, per mm of displacement */
