@@ -87,9 +87,9 @@ static const supine_option table[] = {
      "scans",
      .read = read_further, .wants = "STATE:FILE (at most 8 times), such as prone:rest:prone.ply"},
     {"midline", 0, "X",
-     "x of the plane between the lungs, in mm and LPS; default the middle between the mean x of "
-     "the "
-     "landmarks on either side of it",
+     "x of the plane between the lungs, in mm and LPS; default the widest gap between landmarks "
+     "near "
+     "the middle",
      FILLS(source.midline), SUPINE_SAYS_GIVEN(request, source.has_midline),
      .wants = "a number of mm", .more = true},
     {.table = supine_options_surface_frame, FILLS(source.load)},
