@@ -47,7 +47,8 @@ typedef struct supine_kriging_model {
   double least;  /**< shorter displacements count as displacements of this length, mm */
 } supine_kriging_model;
 
-/** The covariance of residuals, estimated from full breaths of 15 patients. */
+/** The covariance of the residuals of the default law, from the landmarks of full breaths of 15
+ * people, judged on held-out blocks of 40 mm of the same people. */
 extern const supine_kriging_model supine_kriging_default;
 
 typedef struct supine_kriging_point {

@@ -18,7 +18,7 @@ enum {
   STEPS = 60
 };
 
-/* Prior standard deviation of the factor by which the displacement law is multiplied. */
+/* Prior standard deviation of the factor by which the displacement law is multiplied (assumed). */
 static const double scale_deviation = 0.3;
 static const double converged = 1e-10;   /* relative decrease of k->objective that ends a fit */
 static const double damping_most = 1e10; /* a larger damping of the steps ends a fit */
@@ -27,8 +27,8 @@ static const double damping_most = 1e10; /* a larger damping of the steps ends a
  * absolute values of the slopes c7, c8 and c9. */
 static const double exponent_least = 0.5, exponent_most = 4.0, slope_most = 2.5;
 
-/* [law][3] prior standard deviations: of c1, c3 and c5, divided by their prior means; of the
- * logarithms of the exponents c2, c4 and c6; of the slopes c7, c8 and c9 (patient.h). */
+/* [law][3] prior standard deviations (assumed): of c1, c3 and c5, divided by their prior means; of
+ * the logarithms of the exponents c2, c4 and c6; of the slopes c7, c8 and c9 (patient.h). */
 static const double law_deviation[SUPINE_PATIENT_LAW_COUNT][3] = {{0.3, 0.3, 0.3}, {3.0, 1.0, 1.0}};
 
 static supine_patient_centre centre_of(const supine_patient_power *law,

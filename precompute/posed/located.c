@@ -66,7 +66,7 @@ static supine_status try_postures(const supine_locate_task *task, bool posture_g
 /* If the points fit ten times better when they are read in another way, say so in the error. */
 static void suggest_reading(const supine_locate_task *task, bool posture_given,
                             supine_posed_located *located, supine_error *error) {
-  static const double residual_most = 40.0; /* largest residual that supine_locate accepts, mm */
+  static const double residual_most = 40.0; /* the largest that supine_locate accepts, mm */
   static const struct {
     const char *way;
     double factor[3];
