@@ -334,6 +334,24 @@ TEST(test_power_design_each_unknown_matches_difference_quotient) {
   supine_patient_pairs_free(&pairs);
 }
 
+TEST(test_fit_more_points_than_kept_refused) {
+  supine_patient_pairs pairs = scatter(SUPINE_PATIENT_CENTRES_MAX + 1, 6);
+  const supine_patient truth = known(&pairs);
+  supine_patient found = {.frame = truth.frame};
+  supine_patient_fit_report report;
+  const supine_patient_fit_options options = {0};
+  supine_error error;
+  supine_patient_row *rows = malloc(3 * pairs.count * sizeof *rows);
+  assert_non_null(rows);
+  move(&pairs, &truth, 0.2, 8);
+  supine_patient_rows_of_pairs(&truth.frame, &pairs, rows);
+  assert_int_equal(supine_patient_fit(&options, rows, 0, pairs.count, &found, &report, &error),
+                   SUPINE_ERROR_FORMAT);
+  assert_says(error.message, "901 points to fit, more than 900");
+  free(rows);
+  supine_patient_pairs_free(&pairs);
+}
+
 TEST(test_fit_shifted_scan_separates_shift_from_law) {
   supine_patient_pairs pairs = scatter(250, 5);
   const supine_patient truth = known(&pairs);

@@ -260,6 +260,16 @@ static supine_status krige_create(supine_patient_krige *k,
                               .count = count,
                               .options = *options,
                               .mean = supine_patient_deep(options->gravity, options->path_span)};
+  size_t thirds = 0; /* three times the number of points: a landmark has three measurements */
+  for (size_t i = 0; i < count; ++i) {
+    thirds += rows[i].landmark > 0 ? 1 : 3;
+  }
+  if (!options->uncorrected && thirds > 3 * SUPINE_PATIENT_CENTRES_MAX) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%zu points to fit, more than %d: leave landmarks out, evenly over the "
+                            "lungs",
+                            thirds / 3, SUPINE_PATIENT_CENTRES_MAX);
+  }
   k->centre = supine_arena_take(a, count, sizeof *k->centre);
   k->design = supine_arena_take(a, (TERMS + 1) * count, sizeof *k->design);
   k->normal_matrix = supine_arena_take(a, (size_t)2 * TERMS * TERMS, sizeof *k->normal_matrix);
@@ -338,9 +348,8 @@ void supine_patient_krige_copy_law(const supine_patient_krige *krige, supine_pat
       continue;
     }
     /* The three measurements of a landmark share one element of patient->centre. */
-    if ((patient->centre_count == 0 ||
-         memcmp(last[-1].offset, centre.offset, sizeof centre.offset) != 0) &&
-        patient->centre_count < SUPINE_PATIENT_CENTRES_MAX) {
+    if (patient->centre_count == 0 ||
+        memcmp(last[-1].offset, centre.offset, sizeof centre.offset) != 0) {
       ++patient->centre_count;
       *last++ = centre;
     }
