@@ -87,7 +87,9 @@ static const supine_option table[] = {
      "scans",
      .read = read_further, .wants = "STATE:FILE (at most 8 times), such as prone:rest:prone.ply"},
     {"midline", 0, "X",
-     "x of the plane between the lungs, in mm and LPS; default the middle of the points",
+     "x of the plane between the lungs, in mm and LPS; default the widest gap between landmarks "
+     "near "
+     "the middle",
      FILLS(source.midline), SUPINE_SAYS_GIVEN(request, source.has_midline),
      .wants = "a number of mm", .more = true},
     {.table = supine_options_surface_frame, FILLS(source.load)},
@@ -131,7 +133,6 @@ static supine_status load_scans(const request *wanted, supine_patient_scans *sca
     SUPINE_TRY(load_pairs(wanted, wanted->landmarks.path, &scans->pairs, error));
   }
   for (size_t k = 0; k < 2; ++k) {
-    scans->state[k] = wanted->state[k];
     if (wanted->scan_path[k] != NULL) {
       SUPINE_TRY(supine_command_load_lungs(name, wanted->scan_path[k], &wanted->source,
                                            &scans->lungs[k], error));
@@ -192,6 +193,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   (void)snprintf(record.name, sizeof record.name, "%s",
                  wanted->name != NULL ? wanted->name : supine_text_file_name(named_for));
   SUPINE_TRY(load_scans(wanted, &scans, error));
+  memcpy(record.state, wanted->state, sizeof record.state);
   SUPINE_TRY(supine_patient_scans_order(&scans, &record, error));
   for (size_t k = 0; k < SUPINE_PATIENT_NOTES && scans.note[k][0] != '\0'; ++k) {
     supine_options_say(name, "%s", scans.note[k]);

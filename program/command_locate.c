@@ -6,7 +6,7 @@
 #include "base/output.h"
 #include "base/text.h"
 #include "mesh/io/points.h"
-#include "precompute/patient/located.h"
+#include "precompute/posed/located.h"
 #include "program/options/basis_input.h"
 #include "program/options/inside.h"
 #include "program/options/state_options.h"
@@ -115,7 +115,7 @@ static json_t *outliers_of(const supine_command_names *names, const observations
 
 static void print(const request *wanted, const supine_command_names *names,
                   const observations *observed, size_t n, double volume,
-                  const supine_patient_located *located) {
+                  const supine_posed_located *located) {
   const supine_location_info *best = located->best;
   const double *r = best->rotation;
   const double *t = best->translation;
@@ -148,7 +148,7 @@ static void print(const request *wanted, const supine_command_names *names,
 /* Print first and write last, so that a failure leaves no file. */
 static supine_status finish_points(const request *wanted, const supine_basis *inside,
                                    const supine_command_names *names, const observations *observed,
-                                   const supine_patient_located *located, supine_error *error) {
+                                   const supine_posed_located *located, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(inside);
   print(wanted, names, observed, info->vertex_count, located->best->volume, located);
   supine_output output = {0};
@@ -169,7 +169,7 @@ static supine_status finish_points(const request *wanted, const supine_basis *in
 /* Make the located surface, state its volume, print the report, and write the surface. */
 static supine_status finish_surface(const request *wanted, const supine_basis *lungs,
                                     const supine_command_names *names, const observations *observed,
-                                    const supine_patient_located *located, supine_error *error) {
+                                    const supine_posed_located *located, supine_error *error) {
   const size_t n = supine_basis_get_info(lungs)->vertex_count;
   const supine_tensor *lung = supine_basis_tensor(lungs, "lung");
   SUPINE_FREED_BY(supine_mesh_free) supine_mesh mesh = {0};
@@ -196,7 +196,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   SUPINE_FREED_BY(supine_options_basis_close) supine_basis *lungs = NULL;
   SUPINE_FREED_BY(supine_options_basis_close) supine_basis *inside = NULL;
   SUPINE_FREED_BY(supine_command_names_close) supine_command_names names = {0};
-  SUPINE_FREED_BY(supine_patient_located_free) supine_patient_located located = {0};
+  SUPINE_FREED_BY(supine_posed_located_free) supine_posed_located located = {0};
   observations observed = {0};
   if (wanted->orientation.given) {
     SUPINE_TRY(supine_options_state(&wanted->orientation, &wanted->state, error));
@@ -206,8 +206,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   SUPINE_TRY(load_observed(given->operand[1], wanted, &names, &observed, error));
   const supine_locate_task task = {inside, observed.count, observed.points, wanted->state,
                                    wanted->rigid};
-  const supine_status status = supine_patient_locate(&task, wanted->orientation.given,
-                                                     csv ? inside : lungs, &located, error);
+  const supine_status status =
+      supine_posed_locate(&task, wanted->orientation.given, csv ? inside : lungs, &located, error);
   if (status == SUPINE_ERROR_ARGUMENT && wanted->rigid) {
     /* Report a format error: the points in the file do not determine a rotation. */
     return error->status = SUPINE_ERROR_FORMAT;

@@ -314,12 +314,11 @@ supine_status supine_command_deform_content(const supine_deform_content *wanted,
   if (image || wanted->field != NULL) {
     SUPINE_TRY(move_grid(wanted, basis, moved, error));
   }
-  if (image || wanted->path == NULL) {
-    return SUPINE_OK;
+  if (!image && wanted->path != NULL) {
+    SUPINE_TRY(supine_text_ends_in(wanted->path, ".csv")
+                   ? write_points(wanted->path, basis, moved, wanted->vertices, error)
+                   : write_surface(wanted->path, basis, moved, error));
   }
-  SUPINE_TRY(supine_text_ends_in(wanted->path, ".csv")
-                 ? write_points(wanted->path, basis, moved, wanted->vertices, error)
-                 : write_surface(wanted->path, basis, moved, error));
   if (moved->expected.sigma != NULL) {
     (void)printf("expected error %.1f mm (RMS over the points), %.1f mm at most%s\n",
                  moved->expected.rms, moved->expected.largest,

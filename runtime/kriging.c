@@ -10,18 +10,6 @@ enum { ONE = 0, VOLUME = 1, PLACE = 4, VALUE = 7, TERMS = SUPINE_KRIGING_TERMS }
 const supine_kriging_model supine_kriging_default = {
     .sill = 6.0, .length = 90.0, .across = 1.0 / 3.0, .least = 2.0};
 
-double supine_kriging_covariance(const supine_kriging_model *model, const supine_kriging_point *a,
-                                 const supine_kriging_point *b) {
-  double square = 0;
-  for (int i = 0; i < 3; ++i) {
-    const double d = a->position[i] - b->position[i];
-    square += d * d;
-  }
-  const double distance = sqrt(3 * square) / model->length;
-  return model->sill / 3 * sqrt(fmax(a->size, model->least) * fmax(b->size, model->least)) *
-         (a->lung == b->lung ? 1.0 : model->across) * (1 + distance) * exp(-distance);
-}
-
 bool supine_kriging_factor(size_t count, double *matrix) {
   for (size_t i = 0; i < count; ++i) {
     double *row = matrix + i * count;
@@ -217,8 +205,10 @@ supine_status supine_kriging_fit(const supine_kriging_options *options, size_t c
   fit->weights = fit->whitened + SUPINE_KRIGING_COLUMNS * count;
   for (size_t i = 0; i < count; ++i) {
     for (size_t j = 0; j <= i; ++j) {
-      fit->factor[i * count + j] =
-          supine_kriging_covariance(&options->model, &points[i], &points[j]);
+      const supine_kriging_point *p = &points[i];
+      const supine_kriging_point *q = &points[j];
+      fit->factor[i * count + j] = supine_kriging_covariance(
+          &options->model, p->position, p->size, q->position, q->size, p->lung == q->lung);
     }
     fit->factor[i * count + i] += points[i].noise * points[i].noise;
   }

@@ -27,6 +27,7 @@
 #ifndef SUPINE_KRIGING_H
 #define SUPINE_KRIGING_H
 
+#include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
 
@@ -46,7 +47,8 @@ typedef struct supine_kriging_model {
   double least;  /**< shorter displacements count as displacements of this length, mm */
 } supine_kriging_model;
 
-/** The covariance of residuals, estimated from full breaths of 15 patients. */
+/** The covariance of the residuals of the default law, from the landmarks of full breaths of 15
+ * people, judged on held-out blocks of 40 mm of the same people. */
 extern const supine_kriging_model supine_kriging_default;
 
 typedef struct supine_kriging_point {
@@ -91,9 +93,30 @@ typedef struct supine_kriging {
   double log_likelihood; /**< restricted log likelihood of the residuals, up to a constant */
 } supine_kriging;
 
-/** Compute the covariance of one coordinate (x, y or z) of the random field at two points, mm^2. */
-double supine_kriging_covariance(const supine_kriging_model *model, const supine_kriging_point *a,
-                                 const supine_kriging_point *b);
+/** Compute the covariance of one coordinate (x, y or z) of the random field at two points p and q,
+ * mm^2. exp(-a) is the 64th power of exp(-a / 64), which a polynomial of degree 8 approximates, so
+ * that compilers can vectorise a loop over points. The error is below 1e-13 times the covariance at
+ * distance 0.
+ * @param p, q            [3] positions in the scan, mm
+ * @param p_size, q_size  lengths of the displacements from the scan, mm */
+static inline double supine_kriging_covariance(const supine_kriging_model *model, const double *p,
+                                               double p_size, const double *q, double q_size,
+                                               bool same_lung) {
+  const double x = p[0] - q[0];
+  const double y = p[1] - q[1];
+  const double z = p[2] - q[2];
+  const double sizes = (p_size > model->least ? p_size : model->least) *
+                       (q_size > model->least ? q_size : model->least);
+  const double far = sqrt(3.0) / model->length * sqrt(x * x + y * y + z * z);
+  const double a = far < 40.0 ? far : 40.0;
+  const double t = a / -64.0;
+  double e = 1.0 + t / 6.0 * (1.0 + t / 7.0 * (1.0 + t / 8.0));
+  e = 1.0 + t * (1.0 + t / 2.0 * (1.0 + t / 3.0 * (1.0 + t / 4.0 * (1.0 + t / 5.0 * e))));
+  for (int square = 0; square < 6; ++square) {
+    e *= e;
+  }
+  return model->sill / 3.0 * sqrt(sizes) * (same_lung ? 1.0 : model->across) * (1.0 + a) * e;
+}
 
 /** Factor a symmetric positive definite matrix [count, count] as L L', and write L into its lower
  * triangle. Return false if the matrix is not positive definite. */

@@ -11,8 +11,8 @@
 _Static_assert((int)SUPINE_LOCATE_POINTS_MAX == (int)SUPINE_KRIGING_POINTS_MAX,
                "locate.h and kriging.h must allow the same number of points");
 
-/* Prior standard deviation of an unknown volume, divided by the reference volume. It is 0.3 times
- * the difference between the volumes at full inflation (1) and at rest (0.43). */
+/* Prior standard deviation of an unknown volume, divided by the reference volume (assumed): about
+ * 0.3 times the difference between the volumes at full inflation and at rest. */
 static const double prior_spread = 0.17;
 static const double outlier_limit = 3.0; /* outliers exceed this number of standard deviations */
 static const double outlier_noise = 300; /* standard deviation assigned to an outlier, mm */
@@ -24,11 +24,11 @@ static const double rotation_spread = 0.052, other_frame = 0.52;
 /* Points whose residuals exceed this, mm RMS, are not of these lungs: the law alone misses the
  * landmarks of ten people's full breaths by 6 to 19 mm. */
 static const double residual_most = 40;
-static const double share_least = 0.1; /* least plausible volume, as a share of full inflation */
+static const double share_least = 0.1; /* share of full inflation without gas (resting.c) */
 /* If the spread of the observed points is below this share of their spread in the scan, they are at
  * one place. */
 static const double spread_least = 0.05;
-/* The factor on the expected errors counts as estimated from this number of points before. */
+/* The factor on the expected errors counts as 1 for this number of points before (assumed). */
 static const double prior_points = 10;
 /* Ratio of supine_kriging_model.sill, 6 mm, to the factor c of the expected error in
  * supine/locate.h, 4.5 mm. Both are variances (mm^2) per mm of displacement. c is smaller because

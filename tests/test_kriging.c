@@ -43,8 +43,10 @@ static void draw(uint64_t *seed, size_t count, supine_kriging_point *points, con
   double *white = fixture_allocate(count, sizeof *white);
   for (size_t i = 0; i < count; ++i) {
     for (size_t j = 0; j <= i; ++j) {
-      factor[i * count + j] =
-          supine_kriging_covariance(&supine_kriging_default, &points[i], &points[j]);
+      const supine_kriging_point *p = &points[i];
+      const supine_kriging_point *q = &points[j];
+      factor[i * count + j] = supine_kriging_covariance(
+          &supine_kriging_default, p->position, p->size, q->position, q->size, p->lung == q->lung);
     }
     factor[i * count + i] += 1e-6;
   }

@@ -20,28 +20,30 @@ enum {
   SCORES = SUPINE_PATIENT_SCORES
 };
 
-/* Constant c of the expected error (supine/locate.h), mm, by tests/evidence/error.py. Of a fit to
- * surfaces alone, which do not show sliding: five patients with 300 landmarks each need 2.0
- * to 13.6, geometric mean 5.3; leaving out one of them, the mean of the others states 0.56 to 1.84
- * of its error. Of a fit to landmarks, which counts as measured on `prior_points` landmarks before:
- * 0.5 to 3.9, geometric mean 1.0. */
+/* Constant c of the expected error (supine/locate.h), mm, by tests/evidence/error.py from five
+ * people with COPD, 300 landmarks each. Of a fit to surfaces alone, which do not show sliding: they
+ * need 2.0 to 13.6, geometric mean 5.3; leaving out one of them, the mean of the others states 0.56
+ * to 1.84 of its error. Of a fit to landmarks, where it counts as measured on `prior_points`
+ * landmarks before: at 100 held-out landmarks they need 0.4 to 4.1, about 1. */
 static const double constant_of_surfaces = 5.3, constant_of_landmarks = 1.0, prior_points = 10.0;
 static const double displacement_least = 2.0; /* shorter displacements count as this, mm */
 static const double bound = 1.8; /* 95 % of all points err by less than 1.8 expected errors */
-static const double stretch_most = 1.8; /* largest report->stretch: 6 times the volume */
 static const double full_breath = 18.0; /* largest report->expected_from, mm (supine/locate.h) */
 
 typedef struct squares {
   double residual[SCORES]; /* [predictor] weighted sum of squared residuals, mm^2 */
   double weight;
-  double path; /* weighted sum of the predicted displacements of landmarks, mm */
+  double back; /* sum of the squared errors of landmarks that are moved back, mm^2 */
+  double path; /* sum of their predicted displacements, mm */
 } squares;
 
 typedef struct study {
   supine_patient_fit_options options;
+  const supine_patient_frame *frame;
   const supine_patient_row *rows;
   size_t row_count, triples;
-  double *ratio; /* [SEEDS, triples] squared error of a held-out landmark / its displacement, mm */
+  double *ratio; /* [SEEDS, triples] squared error of a held-out landmark that is moved back / its
+                    displacement, mm */
   size_t *fold;  /* [SEEDS, row_count] fold of each measurement */
   squares held_out[ITEMS]; /* [SEEDS, FOLDS] squared errors of held-out measurements, summed */
   supine_status failed[ITEMS];
@@ -81,18 +83,6 @@ static void affine_fit(const supine_patient_row *rows, size_t count, bool transl
   }
 }
 
-/* Return by how much an error of a position is larger in the fuller scan than in the emptier one:
- * the cube root of the ratio of the volumes, by an affine map of the measurements. */
-static double find_stretch(const supine_patient_row *rows, size_t count) {
-  double map[AFFINE];
-  double moved[9];
-  affine_fit(rows, count, false, map);
-  for (size_t i = 0; i < 9; ++i) {
-    moved[i] = 0.01 * map[3 + i] + (i % 4 == 0 ? 1.0 : 0.0);
-  }
-  return fmin(stretch_most, fmax(1.0, pow(supine_triple(moved, moved + 3, moved + 6), -1.0 / 3.0)));
-}
-
 static double affine_residual(const double map[AFFINE], const supine_patient_row *row) {
   double x[AFFINE];
   affine_design(row, x);
@@ -124,24 +114,41 @@ static size_t assign_folds(const supine_patient_frame *frame, supine_patient_row
   return blocks;
 }
 
-/* Predict the length of a point's displacement without the motion of the body, mm. */
-static double displacement_of(supine_patient_krige *krige, const supine_patient_row *row) {
-  supine_patient_row along = *row;
+/* Move a landmark, given by its three measurements, from the emptier scan back to the fuller one,
+ * as a basis of the emptier scan does. Return the squared error, mm^2. Write the length of the
+ * predicted displacement, mm. */
+static double move_back(const supine_patient *patient, const supine_patient_row row[3],
+                        double *size) {
+  const supine_patient_frame *frame = &patient->frame;
+  double from[3];
+  double point[3];
+  double at[3];
   double u[3];
-  supine_patient_motion(&krige->law, &row->place, u);
-  for (size_t a = 0; a < 3; ++a) {
-    memset(along.axis, 0, sizeof along.axis);
-    along.axis[a] = 1.0;
-    u[a] = supine_patient_krige_predict(krige, &along) - u[a];
+  for (size_t k = 0; k < 3; ++k) {
+    from[k] = row->place.offset[k] + 0.5 * (frame->minimum[k] + frame->maximum[k]);
+    at[k] = point[k] = from[k] + row[k].value;
   }
-  return supine_length(u);
+  supine_patient_find_in_fuller(patient, point, row->place.side, 1.0, at, u);
+  *size = fmax(displacement_least, supine_length(u));
+  return pow(supine_distance(at, from), 2.0);
+}
+
+/* Return the residual of a measurement after the displacement law with its correction, mm. */
+static double corrected_residual(const supine_patient *patient, const supine_patient_row *row) {
+  double u[3];
+  double motion[3];
+  supine_patient_displacement(patient, &row->place, 1.0, u);
+  supine_patient_motion(&patient->power, &row->place, motion);
+  return supine_dot(row->axis, u) + supine_dot(row->axis, motion) - row->value;
 }
 
 /* Fit each predictor of supine_patient_score (no displacement, translation, affine map,
  * displacement law, corrected law) to krige->rows. Add the squared errors at `rows` to the sums of
- * each. If there are landmarks, use only these, and write the ratio of each if not NULL. */
+ * each. If there are landmarks, use only these, and write the ratio of each if not NULL.
+ * @param patient  the law and the correction of `krige` */
 static void add_residuals(const study *s, const supine_patient_row *rows, size_t count,
-                          supine_patient_krige *krige, squares *sums, double *ratio) {
+                          const supine_patient_krige *krige, const supine_patient *patient,
+                          squares *sums, double *ratio) {
   double map[2][AFFINE];
   affine_fit(krige->rows, krige->count, true, map[0]);
   affine_fit(krige->rows, krige->count, false, map[1]);
@@ -154,15 +161,17 @@ static void add_residuals(const study *s, const supine_patient_row *rows, size_t
     const double residual[SCORES] = {row->value, affine_residual(map[0], row),
                                      affine_residual(map[1], row),
                                      supine_patient_power_design(&krige->uncorrected_law, row, x),
-                                     supine_patient_krige_predict(krige, row) - row->value};
+                                     corrected_residual(patient, row)};
     for (size_t k = 0; k < SCORES; ++k) {
       sums->residual[k] += row->weight * residual[k] * residual[k];
     }
     sums->weight += row->weight;
-    if (ratio != NULL && row->landmark > 0) { /* the three measurements of a landmark add up */
-      const double size = fmax(displacement_least, displacement_of(krige, row));
-      sums->path += row->weight * size;
-      ratio[row->landmark - 1] += pow(residual[SUPINE_PATIENT_SCORE_CORRECTED], 2.0) / size;
+    if (ratio != NULL && row->axis[0] == 1.0 && row->landmark > 0) { /* x, y and z follow */
+      double size;
+      const double square = move_back(patient, row, &size);
+      sums->back += square;
+      sums->path += size;
+      ratio[row->landmark - 1] = square / size;
     }
   }
 }
@@ -173,6 +182,7 @@ static supine_status hold_out(const study *s, const size_t *fold, size_t which, 
   SUPINE_ARENA arena = {0};
   /* First the measurements to which the law is fitted, then the held-out ones. */
   supine_patient_row *rows = supine_arena_take(&arena, n, sizeof *rows);
+  supine_patient *patient = supine_arena_take(&arena, 1, sizeof *patient);
   SUPINE_FREED_BY(supine_patient_krige_free) supine_patient_krige krige = {0};
   size_t fitted_count = 0;
   size_t count = 0;
@@ -189,7 +199,9 @@ static supine_status hold_out(const study *s, const size_t *fold, size_t which, 
   }
   if (fitted_count < n) {
     SUPINE_TRY(supine_patient_krige_fit(&s->options, rows, fitted_count, &krige, NULL));
-    add_residuals(s, rows + fitted_count, n - fitted_count, &krige, sums, ratio);
+    patient->frame = *s->frame;
+    supine_patient_krige_copy_law(&krige, patient);
+    add_residuals(s, rows + fitted_count, n - fitted_count, &krige, patient, sums, ratio);
   }
   return SUPINE_OK;
 }
@@ -224,18 +236,19 @@ static supine_status hold_all_out(study *s, squares *held_out, supine_error *err
  * that of other patients; the RMS displacement to which it applies; the expected error; and the
  * share of the held-out landmarks that err by less than 1.8 times as much. With c, the sum of the
  * squared errors that are expected of the held-out landmarks is the sum of those that they have,
- * if they are predicted in the fuller scan from their positions in the emptier one. */
-static void set_expected(const study *s, const squares *held_out, supine_patient_krige *krige,
+ * if they are moved back from the emptier to the fuller scan. */
+static void set_expected(const study *s, const squares *held_out, const supine_patient *patient,
                          supine_patient_fit_report *report) {
   const size_t count = SEEDS * s->triples;
-  const double growth = report->stretch * report->stretch;
   double mean = 0.0;
   double square = 0.0;
   double points = 0.0;
   double within = 0.0;
   for (size_t i = 0; i < s->row_count; ++i) {
     if (s->triples == 0 || s->rows[i].landmark > 0) {
-      const double size = displacement_of(krige, &s->rows[i]);
+      double u[3];
+      supine_patient_displacement(patient, &s->rows[i].place, 1.0, u);
+      const double size = fmax(displacement_least, supine_length(u));
       mean += size;
       square += size * size;
       points += 1.0;
@@ -243,13 +256,14 @@ static void set_expected(const study *s, const squares *held_out, supine_patient
   }
   report->expected_constant = constant_of_surfaces;
   if (count > 0) {
-    const double own =
-        3.0 * growth * held_out->residual[SUPINE_PATIENT_SCORE_CORRECTED] / held_out->path;
+    const double own = held_out->back / held_out->path;
     report->expected_constant = (prior_points * constant_of_landmarks + (double)s->triples * own) /
                                 (prior_points + (double)s->triples);
+    report->stretch =
+        sqrt(held_out->back / (double)count) / report->held_out[SUPINE_PATIENT_SCORE_CORRECTED];
   }
   for (size_t i = 0; i < count; ++i) {
-    within += growth * s->ratio[i] <= bound * bound * report->expected_constant ? 1.0 : 0.0;
+    within += s->ratio[i] <= bound * bound * report->expected_constant ? 1.0 : 0.0;
   }
   report->band = count > 0 ? 100.0 * within / (double)count : 0.0;
   report->expected_from = fmin(full_breath, sqrt(square / points));
@@ -277,17 +291,16 @@ static supine_status run(study *s, supine_patient *patient, supine_patient_fit_r
   squares held_out = {.weight = 0.0};
   SUPINE_FREED_BY(supine_patient_krige_free) supine_patient_krige krige = {0};
   SUPINE_TRY(supine_patient_krige_fit(&s->options, s->rows, s->row_count, &krige, error));
-  add_residuals(s, s->rows, s->row_count, &krige, &fitted, NULL);
+  supine_patient_krige_copy_law(&krige, patient);
+  add_residuals(s, s->rows, s->row_count, &krige, patient, &fitted, NULL);
   s->options.sill = krige.sill;
   s->options.uncorrected = krige.sill == 0.0;
   supine_patient_krige_errors(&krige, report->error);
-  supine_patient_krige_copy_law(&krige, patient);
   SUPINE_TRY(hold_all_out(s, &held_out, error));
   (void)find_rms(s, &fitted, report->fitted);
   report->explained = find_rms(s, &held_out, report->held_out);
   report->baseline = report->held_out[baseline_of(s)];
-  report->stretch = find_stretch(s->rows, s->row_count);
-  set_expected(s, &held_out, &krige, report);
+  set_expected(s, &held_out, patient, report);
   return SUPINE_OK;
 }
 
@@ -299,6 +312,7 @@ supine_status supine_patient_fit(const supine_patient_fit_options *options,
   const size_t needed = (options->law == SUPINE_PATIENT_PAPER ? 9 : 1) + options->scan_motion;
   SUPINE_ARENA arena = {0};
   study s = {.options = *options,
+             .frame = &patient->frame,
              .rows = rows,
              .row_count = count,
              .triples = triples,

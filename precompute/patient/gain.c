@@ -19,18 +19,12 @@ static const double converged = 1e-4, not_converged = 1e-2;
 static const double force_least = 0.2; /* before a division, smaller forces are replaced by this */
 enum { ROUNDS = 100, VERTICES_MAX = 2000, BLOCKS = 8, GAIN = 5, UNKNOWNS = 6 };
 
+/* Of a point, in the model of supine_patient_gain_fit. */
 typedef struct point_motion {
-  double u[3]; /* displacement from full inflation to rest, mm */
-  /* Relative change of the applied force, from the posture of the fitted displacement law to that
-   * of a third scan, if the force grows by 1 from the top to the bottom of the lungs. */
-  double force_change;
+  double u[3];         /* displacement from full inflation to rest, mm */
+  double force_change; /* (h' - h) / f: relative change of the force if the gain is 1 */
 } point_motion;
 
-/* Fit to a third scan of lungs whose displacement law was fitted to two scans. The displacement
- * from full inflation to the third scan is modelled as s (1 + gain force_change) u + t:
- * - s is an unknown factor for each lung, and t an unknown translation between the scans.
- * - gain, unknown, is the increase of the force from the top to the bottom of the lungs.
- * - force_change and u are the relative change of force and the displacement in point_motion. */
 typedef struct work {
   const supine_patient_record *record;
   bool fits_translation;
@@ -42,9 +36,8 @@ typedef struct work {
   double x[UNKNOWNS];   /* factors s of the left and right lung, translation t [3], mm, and gain */
 } work;
 
-/* Fit the unknowns w->x of the model in struct work by least squares. The model contains the
- * product of the factor s and the gain; to keep it linear, use the previous s there. Return the RMS
- * residual, mm.
+/* Fit the unknowns w->x by least squares. The model contains the product of the factor s and the
+ * gain; to keep it linear, use the previous s there. Return the RMS residual, mm.
  * @param without  index of the block of measurements to leave out, or BLOCKS to use all */
 static double fit(work *w, bool fits_gain, size_t without) {
   double matrix[UNKNOWNS * UNKNOWNS] = {0.0};
@@ -151,7 +144,7 @@ static void find_motion(work *w, const double gravity[3]) {
   }
 }
 
-/* Displace the vertices by the model in struct work. Match them to the surface of w->matching. */
+/* Displace the vertices by the model. Match them to the surface of w->matching. */
 static supine_status match_surface(work *w, supine_error *error) {
   supine_patient_matching *m = &w->matching;
   for (size_t i = 0; i < m->count; ++i) {

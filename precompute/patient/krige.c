@@ -18,7 +18,7 @@ enum {
   STEPS = 60
 };
 
-/* Prior standard deviation of the factor by which the displacement law is multiplied. */
+/* Prior standard deviation of the factor by which the displacement law is multiplied (assumed). */
 static const double scale_deviation = 0.3;
 static const double converged = 1e-10;   /* relative decrease of k->objective that ends a fit */
 static const double damping_most = 1e10; /* a larger damping of the steps ends a fit */
@@ -27,8 +27,8 @@ static const double damping_most = 1e10; /* a larger damping of the steps ends a
  * absolute values of the slopes c7, c8 and c9. */
 static const double exponent_least = 0.5, exponent_most = 4.0, slope_most = 2.5;
 
-/* [law][3] prior standard deviations: of c1, c3 and c5, divided by their prior means; of the
- * logarithms of the exponents c2, c4 and c6; of the slopes c7, c8 and c9 (patient.h). */
+/* [law][3] prior standard deviations (assumed): of c1, c3 and c5, divided by their prior means; of
+ * the logarithms of the exponents c2, c4 and c6; of the slopes c7, c8 and c9 (patient.h). */
 static const double law_deviation[SUPINE_PATIENT_LAW_COUNT][3] = {{0.3, 0.3, 0.3}, {3.0, 1.0, 1.0}};
 
 static supine_patient_centre centre_of(const supine_patient_power *law,
@@ -260,11 +260,20 @@ static supine_status krige_create(supine_patient_krige *k,
                               .count = count,
                               .options = *options,
                               .mean = supine_patient_deep(options->gravity, options->path_span)};
+  size_t thirds = 0; /* three times the number of points: a landmark has three measurements */
+  for (size_t i = 0; i < count; ++i) {
+    thirds += rows[i].landmark > 0 ? 1 : 3;
+  }
+  if (!options->uncorrected && thirds > 3 * SUPINE_PATIENT_CENTRES_MAX) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%zu points to fit, more than %d: leave landmarks out, evenly over the "
+                            "lungs",
+                            thirds / 3, SUPINE_PATIENT_CENTRES_MAX);
+  }
   k->centre = supine_arena_take(a, count, sizeof *k->centre);
   k->design = supine_arena_take(a, (TERMS + 1) * count, sizeof *k->design);
   k->normal_matrix = supine_arena_take(a, (size_t)2 * TERMS * TERMS, sizeof *k->normal_matrix);
   k->kernel_weight = supine_arena_take(a, count, sizeof *k->kernel_weight);
-  k->scratch = supine_arena_take(a, count, sizeof *k->scratch);
   if (!options->uncorrected && !options->size_only) {
     k->cholesky = supine_arena_take(a, count * count, sizeof *k->cholesky);
   }
@@ -329,20 +338,6 @@ void supine_patient_krige_errors(const supine_patient_krige *krige,
   }
 }
 
-double supine_patient_krige_predict(supine_patient_krige *krige, const supine_patient_row *row) {
-  double x[TERMS];
-  double value = supine_patient_power_design(&krige->law, row, x) + row->value;
-  if (krige->sill > 0.0) {
-    const supine_patient_centre at = centre_of(&krige->law, &row->place);
-    supine_patient_covariances(&at, krige->count, krige->centre, krige->scratch);
-    for (size_t i = 0; i < krige->count; ++i) {
-      value += krige->scaled_sill * supine_dot(row->axis, krige->rows[i].axis) * krige->scratch[i] *
-               krige->kernel_weight[i];
-    }
-  }
-  return value;
-}
-
 void supine_patient_krige_copy_law(const supine_patient_krige *krige, supine_patient *patient) {
   patient->power = krige->law;
   patient->centre_count = 0;
@@ -353,9 +348,8 @@ void supine_patient_krige_copy_law(const supine_patient_krige *krige, supine_pat
       continue;
     }
     /* The three measurements of a landmark share one element of patient->centre. */
-    if ((patient->centre_count == 0 ||
-         memcmp(last[-1].offset, centre.offset, sizeof centre.offset) != 0) &&
-        patient->centre_count < SUPINE_PATIENT_CENTRES_MAX) {
+    if (patient->centre_count == 0 ||
+        memcmp(last[-1].offset, centre.offset, sizeof centre.offset) != 0) {
       ++patient->centre_count;
       *last++ = centre;
     }

@@ -82,7 +82,6 @@ typedef struct supine_patient_krige {
   double *cholesky; /* [count, count] Cholesky factor of the measurements' covariance, or NULL */
   double *design;   /* [count, terms + 1] derivatives and residual of each measurement, whitened */
   double *kernel_weight; /* [count] weight of each measurement in a prediction */
-  double *scratch;       /* [count] temporary values, one for each measurement */
   double *normal_matrix; /* [2, terms, terms] normal matrix, after the fit its Cholesky factor; then
                             work space */
   supine_arena arena;    /* holds the arrays above */
@@ -106,9 +105,7 @@ void supine_patient_krige_free(supine_patient_krige *krige);
 void supine_patient_krige_errors(const supine_patient_krige *krige,
                                  double error[SUPINE_PATIENT_CONSTANTS]);
 
-/* Predict the displacement, mm, along row->axis at row->place. Not thread-safe: overwrites
- * krige->scratch. */
-double supine_patient_krige_predict(supine_patient_krige *krige, const supine_patient_row *row);
+/* Set the law and the correction of a patient to those that were fitted. */
 void supine_patient_krige_copy_law(const supine_patient_krige *krige, supine_patient *patient);
 
 /** Predictors of a displacement, whose errors are compared: no displacement, a translation, an
@@ -136,8 +133,9 @@ typedef struct supine_patient_fit_report {
   double band; /**< share of the held-out landmarks with an error below its 95 % bound, %, or 0 */
   double explained; /**< percentage by which the law with its kriging correction reduces the squared
                        `baseline` */
-  /** Errors are larger in the fuller scan by this factor, about the cube root of the ratio of the
-   * volumes: where the emptier scan is predicted, tissue and errors are compressed. */
+  /** Errors at held-out landmarks that are moved back to the fuller scan, divided by those where
+   * the emptier scan is predicted: there, tissue and errors are compressed. Without landmarks, the
+   * cube root of the ratio of the volumes. */
   double stretch;
   double expected_point;    /**< expected error of a point predicted in the fuller scan, mm */
   double expected_constant; /**< expected squared error there, mm^2, per mm of displacement */

@@ -37,6 +37,27 @@ supine_patient_place supine_patient_find(const supine_patient_frame *frame, cons
   return place;
 }
 
+/* Find the plane between the lungs: the middle of the widest gap between the x of points, in the
+ * middle 40 % of the box. The middle of the box itself can lie in a lung, whose points would then
+ * count as points of the other one. */
+static double find_midline(size_t count, const double *points, double low, double high) {
+  const double ends[2] = {0.7 * low + 0.3 * high, 0.3 * low + 0.7 * high};
+  double midline = 0.5 * (low + high);
+  double widest = 0.0;
+  for (size_t i = 0; i < count; ++i) {
+    const double from = fmax(ends[0], points[3 * i]);
+    double to = ends[1];
+    for (size_t j = 0; j < count; ++j) {
+      to = points[3 * j] > points[3 * i] ? fmin(to, points[3 * j]) : to;
+    }
+    if (to - from > widest) {
+      widest = to - from;
+      midline = 0.5 * (from + to);
+    }
+  }
+  return midline;
+}
+
 supine_patient_frame supine_patient_frame_of_points(size_t count, const double *points,
                                                     const double *midline) {
   supine_patient_frame frame = {
@@ -45,7 +66,8 @@ supine_patient_frame supine_patient_frame_of_points(size_t count, const double *
     frame.minimum[i % 3] = fmin(frame.minimum[i % 3], points[i] - landmark_margin);
     frame.maximum[i % 3] = fmax(frame.maximum[i % 3], points[i] + landmark_margin);
   }
-  frame.midline = midline != NULL ? *midline : 0.5 * (frame.minimum[0] + frame.maximum[0]);
+  frame.midline =
+      midline != NULL ? *midline : find_midline(count, points, frame.minimum[0], frame.maximum[0]);
   return frame;
 }
 
@@ -103,30 +125,13 @@ void supine_patient_motion(const supine_patient_power *power, const supine_patie
   }
 }
 
-/* The covariance contains exp(-a), where a is a scaled distance (kriging.h). Compute exp(-a) as
- * the 64th power of exp(-a / 64), which a polynomial of degree 8 approximates. The error is
- * below 1e-13 times the covariance at distance 0. */
 SUPINE_CLONES void supine_patient_covariances(const supine_patient_centre *here, size_t count,
                                               const supine_patient_centre *centre,
                                               double *covariance) {
-  const supine_kriging_model *model = &supine_kriging_default;
-  const double rate = sqrt(3.0) / model->length;
-  const double here_size = model->sill / 3.0 * fmax(here->size, model->least);
+  const supine_kriging_model model = supine_kriging_default;
   for (size_t i = 0; i < count; ++i) {
-    const double x = here->offset[0] - centre[i].offset[0];
-    const double y = here->offset[1] - centre[i].offset[1];
-    const double z = here->offset[2] - centre[i].offset[2];
-    const double size = centre[i].size > model->least ? centre[i].size : model->least;
-    const double far = rate * sqrt(x * x + y * y + z * z);
-    const double a = far < 40.0 ? far : 40.0;
-    const double t = a / -64.0;
-    double e = 1.0 + t / 6.0 * (1.0 + t / 7.0 * (1.0 + t / 8.0));
-    e = 1.0 + t * (1.0 + t / 2.0 * (1.0 + t / 3.0 * (1.0 + t / 4.0 * (1.0 + t / 5.0 * e))));
-    for (int square = 0; square < 6; ++square) {
-      e *= e;
-    }
-    covariance[i] = sqrt(model->sill / 3.0 * size * here_size) *
-                    (here->side == centre[i].side ? 1.0 : model->across) * (1.0 + a) * e;
+    covariance[i] = supine_kriging_covariance(&model, here->offset, here->size, centre[i].offset,
+                                              centre[i].size, here->side == centre[i].side);
   }
 }
 

@@ -89,7 +89,8 @@ supine_patient_place supine_patient_find(const supine_patient_frame *frame, cons
 
 /** Make a frame from landmarks [count, 3], mm: the bounding box of the landmarks, enlarged by 10 mm
  * on every side, because lungs extend beyond landmarks.
- * @param midline  x of the plane between the lungs, mm, or NULL for the centre of the box */
+ * @param midline  x of the plane between the lungs, mm, or NULL to find the gap between the lungs
+ */
 supine_patient_frame supine_patient_frame_of_points(size_t count, const double *points,
                                                     const double *midline);
 

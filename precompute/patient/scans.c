@@ -115,8 +115,7 @@ static void set_states(supine_patient_scans *scans, supine_patient_record *recor
   const supine_patient_frame frame =
       supine_patient_frame_of_points(scans->pairs.count, scans->pairs.to, NULL);
   for (size_t k = 0; k < 2; ++k) {
-    const supine_volume *volume = &scans->state[k].volume;
-    record->state[k] = scans->state[k];
+    const supine_volume *volume = &record->state[k].volume;
     record->volume[k] = volume_of(&scans->lungs[k]);
     if (record->volume[k] == 0.0 && volume->kind == SUPINE_VOLUME_ABSOLUTE) {
       record->volume[k] = volume->ml;
@@ -132,14 +131,14 @@ static void set_states(supine_patient_scans *scans, supine_patient_record *recor
          sizeof record->emptier[1]);
 }
 
-static void exchange(supine_patient_scans *scans) {
+static void exchange(supine_patient_scans *scans, supine_state state[2]) {
   const supine_lungs lungs = scans->lungs[0];
-  const supine_state state = scans->state[0];
+  const supine_state first = state[0];
   double *from = scans->pairs.from;
   scans->lungs[0] = scans->lungs[1];
   scans->lungs[1] = lungs;
-  scans->state[0] = scans->state[1];
-  scans->state[1] = state;
+  state[0] = state[1];
+  state[1] = first;
   scans->pairs.from = scans->pairs.to;
   scans->pairs.to = from;
   scans->reordered = true;
@@ -150,7 +149,7 @@ supine_status supine_patient_scans_order(supine_patient_scans *scans, supine_pat
   /* The measured volumes contradict the states only if they differ by more than this fraction. */
   static const double volume_error = 0.02;
   const double volume[2] = {volume_of(&scans->lungs[0]), volume_of(&scans->lungs[1])};
-  const int named = named_order(scans->state);
+  const int named = named_order(record->state);
   record->from_surface = volume[0] > 0.0 && volume[1] > 0.0;
   const double growth = record->from_surface     ? volume[1] / volume[0]
                         : scans->pairs.count > 0 ? supine_patient_pairs_growth(&scans->pairs)
@@ -166,7 +165,7 @@ supine_status supine_patient_scans_order(supine_patient_scans *scans, supine_pat
     SUPINE_TRY(find_sides(&scans->lungs[0], &scans->pairs, error));
   }
   if (named > 0 || (named == 0 && growth > 1.0)) {
-    exchange(scans);
+    exchange(scans, record->state);
   }
   set_states(scans, record);
   return record->from_surface || (record->volume[0] > 0.0 && record->volume[1] > 0.0)

@@ -13,9 +13,8 @@ enum { SUPINE_PATIENT_NOTES = 2 };
 typedef struct supine_patient_scans {
   supine_lungs lungs[2];      /**< empty if a scan has no surface */
   supine_patient_pairs pairs; /**< landmarks in both scans; may be empty */
-  supine_state state[2]; /**< a missing volume (SUPINE_VOLUME_DEFAULT) is found from surfaces */
-  const double *midline; /**< x of the plane between the lungs, mm; NULL for the middle */
-  bool reordered;        /**< set by supine_patient_scans_order: they were exchanged */
+  const double *midline;      /**< x of the plane between the lungs, mm; NULL for the middle */
+  bool reordered;             /**< set by supine_patient_scans_order: they were exchanged */
   char note[SUPINE_PATIENT_NOTES][256]; /**< set by supine_patient_scans_order, for the user */
 } supine_patient_scans;
 
@@ -24,7 +23,9 @@ void supine_patient_scans_free(supine_patient_scans *scans);
 /** Put the fuller scan first, and write both states, their volumes and the bounding box of the
  * emptier one into the record. If the states do not tell which scan is fuller, compare the volumes
  * of the surfaces or, without two surfaces, use the volume change of an affine map of the
- * landmarks. */
+ * landmarks.
+ * @param record  in: `state`, of the scans as given; a missing volume (SUPINE_VOLUME_DEFAULT) is
+ *   found from surfaces */
 supine_status supine_patient_scans_order(supine_patient_scans *scans, supine_patient_record *record,
                                          supine_error *error);
 

@@ -96,6 +96,10 @@ static supine_status measure(supine_patient_matching *m, const supine_patient_fi
   const supine_patient_power expanding = record->patient.power;
   SUPINE_TRY(supine_patient_fit(wanted, m->rows, m->count, m->landmark_row_count / 3,
                                 &record->patient, report, error));
+  if (m->landmark_row_count == 0) {
+    const double volume = 1e3 * (m->fuller->volume[0] + m->fuller->volume[1]);
+    report->stretch = cbrt(volume / supine_mesh_volume(m->state));
+  }
   if (record->expand.kept) {
     record->patient.power = expanding;
     record->patient.law = SUPINE_PATIENT_DEEP;

@@ -8,6 +8,7 @@ BUILD is the folder of the build. COPD holds scans of full breaths: label maps N
 and NAME.csv with matched landmarks, exhaled then inhaled. QUIET holds NAME.csv with landmarks at the end of
 expiration and of inspiration of a quiet breath, without scans: the lungs are the landmarks of each side, closed by
 30 mm. All in mm and LPS. Distances are RMS after the translation that fits best, but for 'locate', which finds it.
+Of a fit to landmarks, whole cubes of 40 mm are held out, as 'fit' does; of one to surfaces too, single landmarks.
 
 needed: the constant c of <supine/locate.h> at which the stated error is the true one, with the other terms as stated.
 The last lines have, for each path, the median ratio of stated to true error, the geometric mean of the needed
@@ -34,6 +35,8 @@ class Patient:
         rows = list(csv.reader(open(pairs, encoding="utf-8")))
         self.exhaled, self.inhaled = np.array(rows[1:], float).reshape(-1, 2, 3).transpose(1, 0, 2)
         self.order = np.random.default_rng(7).permutation(len(self.exhaled))
+        cube = np.unique(self.inhaled // 40, axis=0, return_inverse=True)[1].ravel()
+        self.by_cube = np.argsort(np.random.default_rng(7).permutation(len(cube))[cube], kind="stable")
 
     def run(self, *arguments):
         done = subprocess.run([self.program, *map(str, arguments)], cwd=self.folder, capture_output=True, text=True)
@@ -71,7 +74,6 @@ def judge(found, sigma, truth, points=slice(None), free=True):
 
 def full_breath(p, exp, insp):
     """Yield the path, the constant that was used, and what 'judge' returns, for each path of a full breath."""
-    held, fitted = p.order[:HELD], np.sort(p.order[HELD:])
     made = [p.run("precompute", scan, "--edge", 6, "--held-out", 20, "-o", "b.safetensors") for scan in (exp, insp)]
     volume = [sum(float(ml) for ml in re.findall(r"vertices: ([0-9.]+) mL", text)) for text in made]
     p.basis(insp, p.inhaled)
@@ -82,12 +84,14 @@ def full_breath(p, exp, insp):
     (p.folder / "seen.csv").write_text("\n".join([lines[0], *(lines[1 + i] for i in seen)]), encoding="utf-8")
     p.run("locate", "b.safetensors", "seen.csv", "--points", "i.safetensors", "--posture", "supine", "-o", "o.csv")
     yield "locate", 4.5, *judge(*p.read(), p.exhaled, others, False)
-    p.write("fitted.csv", p.exhaled[fitted], p.inhaled[fitted])
     states = ["--rest", "supine:rest", "--other", "supine:full"]
     alone = ["--translation", "--rest", f"{volume[0]:.0f}mL", "--other", f"{volume[1]:.0f}mL"]
-    for path, options, points in (("surfaces", [exp, insp, *states], slice(None)),
-                                  ("surfaces and landmarks", [exp, insp, "--landmarks", "fitted.csv", *states], held),
-                                  ("landmarks", ["--landmarks", "fitted.csv", *alone], held)):
+    for path, options, points, order in (
+            ("surfaces", [exp, insp, *states], slice(None), p.order),
+            ("surfaces and landmarks", [exp, insp, "--landmarks", "fitted.csv", *states], p.order[:HELD], p.order),
+            ("landmarks", ["--landmarks", "fitted.csv", *alone], p.by_cube[:HELD], p.by_cube)):
+        fitted = np.sort(order[HELD:])
+        p.write("fitted.csv", p.exhaled[fitted], p.inhaled[fitted])
         record = p.run("fit", *options, "--json", "-o", "p.json")
         p.basis(exp, p.exhaled, "--patient", "p.json")
         constant = float(record.split('"expected_constant_mm":')[1].split(",")[0])

@@ -5,24 +5,24 @@
 
 #include <supine/posture.h>
 
-#include "precompute/patient/located.h"
+#include "precompute/posed/located.h"
 
 #include "base/text.h"
 
-static const char *const postures[SUPINE_PATIENT_POSTURES] = {"supine", "prone",   "left",
-                                                              "right",  "upright", "inverted"};
+static const char *const postures[SUPINE_POSED_POSTURES] = {"supine", "prone",   "left",
+                                                            "right",  "upright", "inverted"};
 
 static const double negligible = 0.01; /* probability below which a posture is ignored */
 
-void supine_patient_located_free(supine_patient_located *located) {
+void supine_posed_located_free(supine_posed_located *located) {
   supine_arena_free(&located->arena);
 }
 
 /* Fit the lungs in the given posture or in all six; a failed fit gets probability 0. Return the
  * status of the first failed fit if all of them fail. */
 static supine_status try_postures(const supine_locate_task *task, bool posture_given,
-                                  supine_patient_located *located, supine_error *error) {
-  const size_t count = posture_given ? 1 : SUPINE_PATIENT_POSTURES;
+                                  supine_posed_located *located, supine_error *error) {
+  const size_t count = posture_given ? 1 : SUPINE_POSED_POSTURES;
   supine_arena *arena = &located->arena;
   supine_status status = SUPINE_OK;
   double sum = 0.0;
@@ -69,8 +69,8 @@ static supine_status try_postures(const supine_locate_task *task, bool posture_g
 
 /* If the points fit ten times better when they are read in another way, say so in the error. */
 static void suggest_reading(const supine_locate_task *task, bool posture_given,
-                            supine_patient_located *located, supine_error *error) {
-  static const double residual_most = 40.0; /* largest residual that supine_locate accepts, mm */
+                            supine_posed_located *located, supine_error *error) {
+  static const double residual_most = 40.0; /* the largest that supine_locate accepts, mm */
   static const struct {
     const char *way;
     double factor[3];
@@ -101,7 +101,7 @@ static void suggest_reading(const supine_locate_task *task, bool posture_given,
 /* Compute located->xyz, the positions x in the most probable posture, and located->sigma. If
  * posture k has probability p_k, positions x_k and expected errors s_k, then located->sigma squared
  * is the mean of s_k^2 + |x_k - x|^2 over all k, weighted by p_k. */
-static supine_status find_positions(const supine_basis *shown, supine_patient_located *located,
+static supine_status find_positions(const supine_basis *shown, supine_posed_located *located,
                                     supine_error *error) {
   const size_t n = supine_basis_get_info(shown)->vertex_count;
   SUPINE_ARENA arena = {0};
@@ -141,9 +141,9 @@ static supine_status find_positions(const supine_basis *shown, supine_patient_lo
   return SUPINE_OK;
 }
 
-supine_status supine_patient_locate(const supine_locate_task *task, bool posture_given,
-                                    const supine_basis *shown, supine_patient_located *located,
-                                    supine_error *error) {
+supine_status supine_posed_locate(const supine_locate_task *task, bool posture_given,
+                                  const supine_basis *shown, supine_posed_located *located,
+                                  supine_error *error) {
   const supine_status status = try_postures(task, posture_given, located, error);
   if (status == SUPINE_ERROR_NUMERICAL) {
     suggest_reading(task, posture_given, located, error);

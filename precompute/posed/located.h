@@ -1,19 +1,19 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Locate one person's lungs in the posture that explains a few observed points best. */
-#ifndef SUPINE_PATIENT_LOCATED_H
-#define SUPINE_PATIENT_LOCATED_H
+#ifndef SUPINE_POSED_LOCATED_H
+#define SUPINE_POSED_LOCATED_H
 
 #include <supine/locate.h>
 
 #include "base/arena.h"
 
-enum { SUPINE_PATIENT_POSTURES = 6 };
+enum { SUPINE_POSED_POSTURES = 6 };
 
-/* Located lungs. Initialise to zero, and release with supine_patient_located_free. */
-typedef struct supine_patient_located {
+/* Located lungs. Initialise to zero, and release with supine_posed_located_free. */
+typedef struct supine_posed_located {
   size_t count; /* number of postures tried */
-  const supine_location *location[SUPINE_PATIENT_POSTURES];
-  double probability[SUPINE_PATIENT_POSTURES];
+  const supine_location *location[SUPINE_POSED_POSTURES];
+  double probability[SUPINE_POSED_POSTURES];
   size_t most_probable;                  /* index of the most probable posture */
   const supine_location_info *best;      /* fit in that posture */
   double best_probability;               /* 1 if the posture was given */
@@ -22,7 +22,7 @@ typedef struct supine_patient_located {
   float *sigma;                          /* [N] expected errors of the positions, mm */
   double expected_rms, expected_largest; /* RMS and maximum of `sigma`, mm */
   supine_arena arena;
-} supine_patient_located;
+} supine_posed_located;
 
 /* Fit the lungs to observed points, and compute the positions of the vertices of `shown`. If points
  * that do not fit fit ten times better (mean squared residual) when they are read in centimetres,
@@ -30,9 +30,9 @@ typedef struct supine_patient_located {
  * @param posture_given  whether task->state has the posture; otherwise, six postures are tried, and
  *   the expected errors include the differences between them
  * @param shown          task->inside, or the lungs around it */
-supine_status supine_patient_locate(const supine_locate_task *task, bool posture_given,
-                                    const supine_basis *shown, supine_patient_located *located,
-                                    supine_error *error);
-void supine_patient_located_free(supine_patient_located *located);
+supine_status supine_posed_locate(const supine_locate_task *task, bool posture_given,
+                                  const supine_basis *shown, supine_posed_located *located,
+                                  supine_error *error);
+void supine_posed_located_free(supine_posed_located *located);
 
 #endif
