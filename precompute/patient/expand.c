@@ -38,6 +38,9 @@ static const double neighbour_distance_ratio = 1.7;
 /* Regions are kept if the held-out error with regions / that without is less than this. */
 static const double kept_ratio = 0.95;
 
+/* Factor from one trial of the prior's precision to the next, and smallest product of all. */
+static const double ridge_step = 0.3, ridge_least = 1e-3;
+
 /* Smallest expandability of a region, where 1 is the prior mean: it only keeps 1 / a finite. */
 static const double expandability_least = 0.05;
 
@@ -119,6 +122,7 @@ typedef struct work {
   double *response;  /* [count, regions + 1, 3] displacement, mm, of each matched vertex if only one
                         region expands, with the expandability 1; last, if none does */
   double *precision; /* [regions, regions] inverse of the prior covariance of the expandability */
+  double ridge;      /* factor on `precision` */
   double *matrix;    /* [UNKNOWNS_MAX, UNKNOWNS_MAX] normal matrix, then its Cholesky factor */
   double x[UNKNOWNS_MAX]; /* unknowns; see above */
 } work;
@@ -248,7 +252,7 @@ static bool step(work *w, bool uniform, double noise, size_t without) {
   }
   for (size_t k = 0; k < regions; ++k) {
     for (size_t l = 0; l < regions; ++l) {
-      const double precision = w->precision[l * regions + k];
+      const double precision = w->ridge * w->precision[l * regions + k];
       w->matrix[l * size + k] += precision;
       right[k] -= uniform ? 0.0 : precision * (w->x[l] - 1.0);
     }
@@ -300,6 +304,24 @@ static bool cross_validate(work *w, bool uniform, double noise, double *held_out
   return solved;
 }
 
+/* Weaken the prior while that reduces the held-out error, and measure that of uniform tissue. */
+static bool choose_ridge(work *w, double noise, supine_patient_expand_report *report) {
+  double best = w->ridge;
+  double held_out = 0.0;
+  bool solved = cross_validate(w, true, noise, &report->held_out[0], &report->fitted[0]);
+  report->held_out[1] = INFINITY;
+  for (; solved && w->ridge > ridge_least; w->ridge *= ridge_step) {
+    solved = cross_validate(w, false, noise, &held_out, &report->fitted[1]);
+    if (held_out >= report->held_out[1]) {
+      break;
+    }
+    report->held_out[1] = held_out;
+    best = w->ridge;
+  }
+  w->ridge = best;
+  return solved;
+}
+
 static supine_status undetermined(supine_error *error) {
   return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
                           "the surfaces do not determine the expandability of the lungs");
@@ -336,7 +358,7 @@ static void conclude(work *w, supine_patient_power *law, supine_patient_stiffnes
   for (size_t k = 0; k < regions; ++k) {
     double x[UNKNOWNS_MAX] = {0.0};
     for (size_t l = 0; l < regions; ++l) {
-      x[l] = w->precision[k * regions + l];
+      x[l] = w->ridge * w->precision[k * regions + l];
     }
     (void)LAPACKE_dpotrs(LAPACK_COL_MAJOR, 'U', (lapack_int)size, 1, w->matrix, (lapack_int)size, x,
                          (lapack_int)size);
@@ -363,6 +385,7 @@ supine_status supine_patient_expand(supine_patient_matching *matching,
   work w = {.m = matching,
             .stiffness = stiffness,
             .motion = (size_t)options->scan_motion,
+            .ridge = 1.0,
             .response = supine_arena_take(&arena, matching->count * (n + 1) * AXES, sizeof(double)),
             .precision = supine_arena_take(&arena, n * n, sizeof(double)),
             .matrix =
@@ -377,10 +400,11 @@ supine_status supine_patient_expand(supine_patient_matching *matching,
     w.x[t] = 1.0;
   }
   SUPINE_TRY(iterate(&w, &noise, error));
-  if (!cross_validate(&w, true, noise, &report->held_out[0], &report->fitted[0]) ||
-      !cross_validate(&w, false, noise, &report->held_out[1], &report->fitted[1])) {
+  if (!choose_ridge(&w, noise, report)) {
     return undetermined(error);
   }
+  SUPINE_TRY(iterate(&w, &noise, error));
+  report->fitted[1] = residual(&w, FOLDS, NULL);
   conclude(&w, &law, stiffness, report);
   report->kept = report->held_out[1] < kept_ratio * report->held_out[0];
   stiffness->count = report->kept ? n : 0;
