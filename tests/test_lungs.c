@@ -340,7 +340,8 @@ TEST(test_volume_forms_any_scale_equal_measured_volume) {
     for (size_t i = 0; i < n; ++i) {
       amounts[i] = columns[i * COLUMNS + k];
     }
-    supine_physics_volume_of_field(&lungs, NULL, d, amounts, alone);
+    assert_int_equal(supine_physics_volume_of_field(&lungs, NULL, d, amounts, alone, NULL),
+                     SUPINE_OK);
     for (size_t lung = 0; lung < 2; ++lung) {
       assert_close(supine_volume_form_at(&alone[lung], gains),
                    gained(&lungs, lung, d, columns, COLUMNS, one, gains), 1e-9 * 1e3);

@@ -55,6 +55,14 @@ static double triangle_area(const supine_mesh *mesh, size_t t) {
   return 3.0 * area[one.triangles[0]];
 }
 
+static double square_distance(const supine_mesh *mesh, size_t i, size_t j) {
+  double sum = 0.0;
+  for (size_t x = 0; x < 3; ++x) {
+    sum += pow(mesh->vertices[3 * i + x] - mesh->vertices[3 * j + x], 2.0);
+  }
+  return sum;
+}
+
 /* The solution equals the one found with a dense matrix, which describes how force flows between
  * nodes. A node is a mass (vertex) or a spring (edge). The weights of the links between nodes are
  * those of equilibrium.h. */
@@ -80,24 +88,22 @@ TEST(test_reach_solution_equals_dense_solution) {
   }
   for (size_t k = 0; k < lungs.topology.edge_count; ++k) {
     const uint32_t *edge = lungs.topology.edges + 2 * k;
-    double own = 0.0;
-    double h2 = 0.0;
+    const double h2 = square_distance(mesh, edge[0], edge[1]);
+    double cotangents = 0.0;
     for (size_t t = 0; t < mesh->triangle_count; ++t) {
+      const uint32_t *corner = mesh->triangles + 3 * t;
       size_t common = 0;
+      double squares = 0.0;
       for (size_t c = 0; c < 3; ++c) {
-        const uint32_t corner = mesh->triangles[3 * t + c];
-        common += corner == edge[0] || corner == edge[1];
+        common += corner[c] == edge[0] || corner[c] == edge[1];
+        squares += square_distance(mesh, corner[c], corner[(c + 1) % 3]);
       }
-      own += common == 2 ? triangle_area(mesh, t) / 3.0 : 0.0;
-    }
-    for (size_t x = 0; x < 3; ++x) {
-      const double step =
-          mesh->vertices[3 * (size_t)edge[0] + x] - mesh->vertices[3 * (size_t)edge[1] + x];
-      h2 += step * step;
+      /* law of cosines for the angle opposite the edge */
+      cotangents += common == 2 ? (squares - 2.0 * h2) / (4.0 * triangle_area(mesh, t)) : 0.0;
     }
     s[n + k] = 1.0;
     for (size_t c = 0; c < 2; ++c) {
-      const double w = 4.0 * reach * reach / mean * own / h2;
+      const double w = reach * reach / mean * cotangents;
       gsl_matrix_set(link_weight, edge[c], n + k, w);
       gsl_matrix_set(link_weight, n + k, edge[c], w);
     }

@@ -30,22 +30,19 @@ static const double region_deviation = 1.0, neighbour_deviation = 0.3;
 
 /* Lower bound on the standard deviation of the distance between the matched surfaces, mm. */
 static const double noise_least = 0.3;
-/* The errors of about this many vertices are correlated, so that they count as one measurement. */
-static const double vertices_per_error = 10.0;
 
-/* Regions are neighbours if the distance between their centres is less than this number times the
- * smallest distance between any two centres. */
+/* Regions of one lung are neighbours if the distance between their centres is less than this number
+ * times the smallest distance between two centres of one lung. */
 static const double neighbour_distance_ratio = 1.7;
 
 /* Regions are kept if the held-out error with regions / that without is less than this. */
 static const double kept_ratio = 0.95;
 
-/* Smallest expandability of a region, where 1 is the prior mean (assumed): surfaces do not show
- * whether tissue that hardly expands is 4 or 50 times as stiff. */
-static const double expandability_least = 0.25;
+/* Factor from one trial of the prior's precision to the next, and smallest product of all. */
+static const double ridge_step = 0.3, ridge_least = 1e-3;
 
-/* Factors on the precision of the prior, of which cross-validation chooses one. */
-static const double ridges[] = {1.0, 0.3, 0.1, 0.03};
+/* Smallest expandability of a region, where 1 is the prior mean: it only keeps 1 / a finite. */
+static const double expandability_least = 0.05;
 
 /* Find the vertex of one lung that is farthest from all centres of regions. Write its distance from
  * the nearest centre into `distance`. */
@@ -95,9 +92,12 @@ static void find_prior_precision(const supine_patient_stiffness *regions, double
   const size_t n = regions->count;
   double nearest = INFINITY;
   for (size_t i = 0; i < n * n; ++i) {
-    const double distance = supine_distance(region[i / n].centre, region[i % n].centre);
-    nearest = i / n != i % n ? fmin(nearest, distance) : nearest;
-    precision[i] = i / n == i % n ? pow(region_deviation, -2.0) : 0.0;
+    const size_t j = i / n;
+    const size_t k = i % n;
+    if (j != k && region[j].side == region[k].side) {
+      nearest = fmin(nearest, supine_distance(region[j].centre, region[k].centre));
+    }
+    precision[i] = j == k ? pow(region_deviation, -2.0) : 0.0;
   }
   for (size_t i = 0; i < n * n; ++i) {
     const size_t j = i / n;
@@ -304,20 +304,21 @@ static bool cross_validate(work *w, bool uniform, double noise, double *held_out
   return solved;
 }
 
-/* Choose w->ridge, and compare with uniform tissue. */
+/* Weaken the prior while that reduces the held-out error, and measure that of uniform tissue. */
 static bool choose_ridge(work *w, double noise, supine_patient_expand_report *report) {
-  enum { COUNT = sizeof ridges / sizeof *ridges };
-  double best = ridges[0];
-  double least = INFINITY;
+  double best = w->ridge;
+  double held_out = 0.0;
   bool solved = cross_validate(w, true, noise, &report->held_out[0], &report->fitted[0]);
-  for (size_t i = 0; i < COUNT && solved; ++i) {
-    w->ridge = ridges[i];
-    solved = cross_validate(w, false, noise, &report->held_out[1], &report->fitted[1]);
-    best = report->held_out[1] < least ? w->ridge : best;
-    least = fmin(least, report->held_out[1]);
+  report->held_out[1] = INFINITY;
+  for (; solved && w->ridge > ridge_least; w->ridge *= ridge_step) {
+    solved = cross_validate(w, false, noise, &held_out, &report->fitted[1]);
+    if (held_out >= report->held_out[1]) {
+      break;
+    }
+    report->held_out[1] = held_out;
+    best = w->ridge;
   }
   w->ridge = best;
-  report->held_out[1] = least;
   return solved;
 }
 
@@ -331,7 +332,7 @@ static supine_status iterate(work *w, double *noise, supine_error *error) {
   supine_patient_matching *m = w->m;
   for (size_t round = 0; round < ROUNDS; ++round) {
     SUPINE_TRY(supine_patient_matching_weigh(m, INFINITY, error));
-    *noise = sqrt(vertices_per_error) * fmax(noise_least, residual(w, FOLDS, NULL));
+    *noise = fmax(noise_least, residual(w, FOLDS, NULL));
     if (!step(w, round == 0, *noise, FOLDS) || !step(w, false, *noise, FOLDS)) {
       return undetermined(error);
     }
@@ -384,7 +385,7 @@ supine_status supine_patient_expand(supine_patient_matching *matching,
   work w = {.m = matching,
             .stiffness = stiffness,
             .motion = (size_t)options->scan_motion,
-            .ridge = ridges[0],
+            .ridge = 1.0,
             .response = supine_arena_take(&arena, matching->count * (n + 1) * AXES, sizeof(double)),
             .precision = supine_arena_take(&arena, n * n, sizeof(double)),
             .matrix =

@@ -321,7 +321,8 @@ supine_status supine_patient_model(supine_patient_record *record, const supine_l
   }
   memcpy(w.lungs.mesh.vertices, lungs->mesh.vertices, 3 * n * sizeof(double));
   SUPINE_TRY(displace(&w, record->shown == 1.0 ? lungs->mesh.vertices : NULL, error));
-  supine_physics_volume_of_field(&w.lungs, NULL, w.displacement, w.smoothing_ratio + n, forms);
+  SUPINE_TRY(supine_physics_volume_of_field(&w.lungs, NULL, w.displacement, w.smoothing_ratio + n,
+                                            forms, error));
   set_volumes(record, &w.lungs, forms);
   supine_patient_resting(record, resting);
   *scan = supine_patient_scan(record, (size_t)record->shown, lungs->volume[0] + lungs->volume[1],

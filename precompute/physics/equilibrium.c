@@ -174,10 +174,9 @@ static size_t find_edge(const supine_equilibrium *eq, uint32_t a, uint32_t b) {
   return e;
 }
 
-/* Compute eq->area and eq->edge_term = w_ij / 2 for a smoothing length R = eq->reach > 0. With
- * these weights, the sum of 2 s / h^2 (F_i - F_j)^2 over all edges approximates the integral of
- * |grad F|^2; it is exact if edges run equally in all directions. Unlike cotangent weights, they
- * are never negative, but R^2 is accurate only to about 10 %. */
+/* Compute eq->area, and eq->edge_term = w_ij / 2 for a smoothing length R = eq->reach > 0. All
+ * weights of a triangle have one divisor, so that its terms stay positive semidefinite if its area
+ * is less than the lower limit. */
 static void set_reach(supine_equilibrium *eq, const supine_mesh *mesh) {
   const size_t n = eq->vertex_count;
   const double *p = mesh->vertices;
@@ -186,7 +185,7 @@ static void set_reach(supine_equilibrium *eq, const supine_mesh *mesh) {
   for (size_t i = 0; i < n; ++i) {
     mean += eq->area[i] / (double)n;
   }
-  /* Lower limit of areas and squared lengths, mm^2, against zero weights and divisions by zero. */
+  /* Lower limit of areas, mm^2, against zero weights and divisions by zero. */
   const double least = 1e-6 * mean;
   for (size_t i = 0; i < n; ++i) {
     eq->area[i] = fmax(eq->area[i], least) / mean;
@@ -197,16 +196,15 @@ static void set_reach(supine_equilibrium *eq, const supine_mesh *mesh) {
     double normal[3]; /* the length of this vector is twice the area of the triangle */
     supine_normal(p + 3 * (size_t)corner[0], p + 3 * (size_t)corner[1], p + 3 * (size_t)corner[2],
                   normal);
+    const double factor = 0.5 * eq->reach * eq->reach / mean / fmax(supine_length(normal), least);
     for (size_t k = 0; k < 3; ++k) {
-      eq->edge_term[find_edge(eq, corner[k], corner[(k + 1) % 3])] += supine_length(normal) / 6.0;
+      const uint32_t next = corner[(k + 1) % 3];
+      const uint32_t last = corner[(k + 2) % 3];
+      double sides[2][3];
+      supine_subtract(p + 3 * (size_t)next, p + 3 * (size_t)corner[k], sides[0]);
+      supine_subtract(p + 3 * (size_t)last, p + 3 * (size_t)corner[k], sides[1]);
+      eq->edge_term[find_edge(eq, next, last)] += factor * supine_dot(sides[0], sides[1]);
     }
-  }
-  for (size_t e = 0; e < eq->topology->edge_count; ++e) {
-    const double *first = p + 3 * (size_t)eq->topology->edges[2 * e];
-    const double *second = p + 3 * (size_t)eq->topology->edges[2 * e + 1];
-    const double length = supine_distance(first, second);
-    eq->edge_term[e] = 2.0 * eq->reach * eq->reach / mean * fmax(eq->edge_term[e], least) /
-                       fmax(length * length, least);
   }
 }
 

@@ -32,12 +32,13 @@
  *     area_i F_i + sum over edges ij of (w_ij / 2) (F_i - F_j) = area_i f_i
  *
  *     area_i  area of vertex i divided by the mean vertex area
- *     w_ij    weight of edge ij: 4 (R^2 / mean vertex area) s / h^2
- *     h       length of the edge
- *     s       sum of a third of the area of each triangle at the edge
+ *     w_ij    weight of edge ij: (R^2 / mean vertex area) (cot a + cot b), with the angles a and b
+ *             opposite the edge in its two triangles
  *
- * They are a discrete form of (1 - R^2 Laplacian) F = f on the surface. On any mesh, a disturbance
- * decays as exp(-r / R) with the distance r. The sum of area_i F_i equals the sum of area_i f_i.
+ * They are the linear finite elements of (1 - R^2 Laplacian) F = f on the surface. On any mesh, a
+ * disturbance decays as exp(-r / R) with the distance r, and a linear force on a flat part stays as
+ * it is: weights that are never negative would add roughness to it, which turns thin triangles over
+ * in small lungs. The sum of area_i F_i equals the sum of area_i f_i.
  * Stiffness does not change F, but the displacement (strain.h).
  *
  * Both matrices are symmetric and positive definite. CHOLMOD factorises a matrix once and then

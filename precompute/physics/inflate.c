@@ -8,7 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <gsl/gsl_linalg.h>
+#include <cblas.h>
+#include <lapacke.h>
 
 #include <supine/volume.h>
 
@@ -109,7 +110,7 @@ supine_status supine_reference_find_gains(const supine_lungs *scan, const double
   const supine_state *state = &reference->scan.state;
   const bool at_rest = state->volume.kind == SUPINE_VOLUME_REST && state->volume.ml == 0.0;
   supine_volume_form forms[2];
-  supine_physics_volume_of_field(scan, NULL, directions, amounts, forms);
+  SUPINE_TRY(supine_physics_volume_of_field(scan, NULL, directions, amounts, forms, error));
   for (size_t lung = 0; lung < scan->lung_count; ++lung) {
     const double beyond = reference->scan_volume[lung];
     SUPINE_TRY(find_lung_gains(&forms[lung], bend, at_rest, -beyond,
@@ -143,14 +144,6 @@ static supine_status find_map(ascent *a, supine_error *error) {
   return SUPINE_OK;
 }
 
-static double product(const double *a, const double *b, size_t size) {
-  double sum = 0.0;
-  for (size_t i = 0; i < size; ++i) {
-    sum += a[i] * b[i];
-  }
-  return sum;
-}
-
 /* Store a->map, the residual (a->map - a->estimate) and their changes since the last iteration. */
 static void store_differences(ascent *a) {
   double *changes = a->map_changes + a->stored % DEPTH * a->size;
@@ -174,33 +167,28 @@ static supine_status advance(ascent *a, supine_error *error) {
   double matrix[DEPTH * DEPTH];
   double weights[DEPTH] = {0.0};
   const size_t n = a->history;
+  const int size = (int)a->size;
   for (size_t j = 0; j < n; ++j) {
     const double *r = a->residual_changes + j * a->size;
-    weights[j] = product(r, a->previous_residual, a->size);
+    weights[j] = cblas_ddot(size, r, 1, a->previous_residual, 1);
     for (size_t k = 0; k <= j; ++k) {
       matrix[j * n + k] = matrix[k * n + j] =
-          product(r, a->residual_changes + k * a->size, a->size);
+          cblas_ddot(size, r, 1, a->residual_changes + k * a->size, 1);
     }
     matrix[j * n + j] *= 1.0 + ridge;
   }
-  if (n > 0) {
-    gsl_matrix_view system = gsl_matrix_view_array(matrix, n, n);
-    gsl_vector_view right = gsl_vector_view_array(weights, n);
-    if (gsl_linalg_HH_svx(&system.matrix, &right.vector) != 0) {
-      return supine_error_set(
-          error, SUPINE_ERROR_NUMERICAL,
-          "no surface at full inflation was found: the iteration does not progress. If the scan is "
-          "fuller than --scanned says, change --scanned or --resting; --scanned none uses the scan "
-          "as it is");
-    }
+  if (n > 0 && LAPACKE_dposv(LAPACK_ROW_MAJOR, 'L', (lapack_int)n, 1, matrix, (lapack_int)n,
+                             weights, 1) != 0) {
+    return supine_error_set(
+        error, SUPINE_ERROR_NUMERICAL,
+        "no surface at full inflation was found: the iteration does not progress. If the scan is "
+        "fuller than --scanned says, change --scanned or --resting; --scanned none uses the scan "
+        "as it is");
   }
   double *to = a->estimate.mesh.vertices;
   memcpy(to, a->map, a->size * sizeof *to);
   for (size_t j = 0; j < n; ++j) {
-    const double *change = a->map_changes + j * a->size;
-    for (size_t i = 0; i < a->size; ++i) {
-      to[i] -= weights[j] * change[i];
-    }
+    cblas_daxpy(size, -weights[j], a->map_changes + j * a->size, 1, to, 1);
   }
   return SUPINE_OK;
 }

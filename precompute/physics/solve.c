@@ -45,7 +45,8 @@ static supine_status solve(const supine_lungs *lungs, const supine_model *model,
       made->catch_[i] = 1.0;
     }
   }
-  supine_physics_volume_of_field(lungs, model->share, made->directions, made->catch_, made->form);
+  SUPINE_TRY(supine_physics_volume_of_field(lungs, model->share, made->directions, made->catch_,
+                                            made->form, error));
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     supine_physics_volume_form_add(&made->form[lung], made->cubic);
   }

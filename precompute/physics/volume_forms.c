@@ -12,8 +12,8 @@
 
 /* The triangles of each lung are split into PARTS ranges, which are summed separately, BLOCK
  * triangles at a time. The number of ranges is fixed, so that the sums do not depend on the number
- * of threads. FORM: number of terms of a supine_volume_form. */
-enum { PARTS = 16, BLOCK = 128, FORM = 7 };
+ * of threads. */
+enum { PARTS = 16, BLOCK = 128 };
 
 static const double sixth_ml = 1e-3 / 6.0; /* volume of a tetrahedron, mL / its determinant, mm^3 */
 
@@ -37,16 +37,6 @@ typedef struct lung_work {
   double *space;    /* [threads, room] scratch memory, `room` elements for each thread */
   size_t room;
 } lung_work;
-
-static lung_work begin_lung(const supine_lungs *lungs, const double *directions,
-                            const double *columns, size_t count, size_t lung) {
-  lung_work work = {
-      .lungs = lungs, .directions = directions, .columns = columns, .count = count, .lung = lung};
-  for (size_t axis = 0; axis < 3; ++axis) {
-    work.centre[axis] = 0.5 * (lungs->minimum[axis] + lungs->maximum[axis]);
-  }
-  return work;
-}
 
 /* Read a triangle's corners, mm, relative to work->centre. Return their vertex indices. */
 static const uint32_t *read_corners(const lung_work *work, size_t triangle, double p[3][3]) {
@@ -238,59 +228,27 @@ supine_status supine_physics_volume_forms_create(const supine_lungs *lungs, cons
     return supine_error_memory(error, "volume coefficients of %zu columns", count);
   }
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-    lung_work work = begin_lung(lungs, directions, columns, count, lung);
-    work.sums = sums;
-    work.size = size;
-    work.space = space;
-    work.room = room;
+    lung_work work = {lungs, directions, columns, count, lung, {0.0}, sums, size, space, room};
+    for (size_t axis = 0; axis < 3; ++axis) {
+      work.centre[axis] = 0.5 * (lungs->minimum[axis] + lungs->maximum[axis]);
+    }
     supine_parallel_for(PARTS, 1, 0, forms_range, &work);
     forms_collect(&work, sixth_ml * (share == NULL ? 1.0 : share[lung]), forms);
   }
   return SUPINE_OK;
 }
 
-SUPINE_CLONES static void field_range(void *context, size_t begin, size_t end, size_t thread) {
-  const lung_work *work = context;
-  (void)thread;
-  for (size_t part = begin; part < end; ++part) {
-    double sums[FORM] = {0.0};
-    for (size_t t = part_begin(work, part); t < part_begin(work, part + 1); ++t) {
-      double p[3][3];
-      double u[3][3]; /* displacement of each corner */
-      double first[3];
-      double second[3];
-      const uint32_t *corner = read_corners(work, t, p);
-      for (size_t k = 0; k < 9; ++k) {
-        const size_t vertex = corner[k / 3];
-        u[k / 3][k % 3] = work->columns[vertex] * work->directions[3 * vertex + k % 3];
-      }
-      for (size_t v = 0; v < 3; ++v) {
-        supine_cross(p[(v + 1) % 3], p[(v + 2) % 3], first);
-        supine_cross(u[(v + 1) % 3], u[(v + 2) % 3], second);
-        for (size_t axis = 0; axis < 3; ++axis) {
-          sums[axis] += first[axis] * u[v][axis];
-          sums[3 + axis] += second[axis] * p[v][axis];
-        }
-      }
-      sums[6] += supine_triple(u[0], u[1], u[2]);
-    }
-    memcpy(work->sums + part * FORM, sums, sizeof sums);
-  }
-}
-
-void supine_physics_volume_of_field(const supine_lungs *lungs, const double *share,
-                                    const double *directions, const double *amounts,
-                                    supine_volume_form *forms) {
-  double sums[PARTS * FORM];
+supine_status supine_physics_volume_of_field(const supine_lungs *lungs, const double *share,
+                                             const double *directions, const double *amounts,
+                                             supine_volume_form *form, supine_error *error) {
+  static const double one[1] = {1.0};
+  SUPINE_FREED_BY(supine_physics_volume_forms_free) supine_volume_forms forms = {0};
+  SUPINE_TRY(
+      supine_physics_volume_forms_create(lungs, share, directions, amounts, 1, &forms, error));
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-    lung_work work = begin_lung(lungs, directions, amounts, 1, lung);
-    work.sums = sums;
-    forms[lung] = (supine_volume_form){{0.0}};
-    supine_parallel_for(PARTS, 1, 0, field_range, &work);
-    for (size_t i = 0; i < PARTS * FORM; ++i) {
-      forms[lung].of[i % FORM] += sixth_ml * (share == NULL ? 1.0 : share[lung]) * sums[i];
-    }
+    supine_physics_volume_forms_contract_lung(&forms, lung, one, &form[lung]);
   }
+  return SUPINE_OK;
 }
 
 void supine_physics_volume_forms_contract_lung(const supine_volume_forms *forms, size_t lung,

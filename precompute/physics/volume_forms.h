@@ -47,12 +47,12 @@ supine_status supine_physics_volume_forms_create(const supine_lungs *lungs, cons
 
 /** Compute the volume that a displacement adds to each closed lung, as a polynomial of the lung's
  * gains (factors of its displacement along x, y and z).
- * @param share, directions  as in supine_physics_volume_forms_create; directions are not NULL
- * @param amounts  [N] displacement of each vertex, as a multiple of `directions`
- * @param forms    [lungs] output */
-void supine_physics_volume_of_field(const supine_lungs *lungs, const double *share,
-                                    const double *directions, const double *amounts,
-                                    supine_volume_form *forms);
+ * @param amounts  [N] displacement of each vertex, as a multiple of `directions`, which are not
+ * NULL
+ * @param form     [lungs] output */
+supine_status supine_physics_volume_of_field(const supine_lungs *lungs, const double *share,
+                                             const double *directions, const double *amounts,
+                                             supine_volume_form *form, supine_error *error);
 
 /** Compute one lung's change of volume at given mode weights, as a polynomial of its gains
  * (factors of its displacement along x, y and z). */

@@ -51,7 +51,7 @@ ROWS = (
     ("lower half / upper third, to prone", 2, 10, "", "lesions move below the carina (Yankelevitz 1995)"),
     ("expansion of upper / lower lobes, supine", 0.61, 0.94, "", "0.61 to 0.94 (Shin 2020, n 56)"),
     ("expansion of upper / lower lobes, prone", 0.93, 1.06, "", "0.98 to 1.06 (Shin 2020, n 34)"),
-    ("reversed triangles, at most", 0, 0.03, "%", ""),
+    ("reversed triangles, at most", 0, 0, "%", ""),
     ("reversed triangles added by the bend", None, 2, "", ""),
 )
 
