@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run the code blocks of the guide: test_guide.py SOURCE_FOLDER PROGRAM LIBRARY CC [PAGE...]
 
-The blocks `sh` and `python` of each page run in order, in a folder with synthetic_ct.py. A block `sh not-run` may not call supine. Other blocks are not run, and lines in them may not begin with `supine`. Links to files must work, and
+The blocks `sh` and `python` of each page run in order, in a folder with synthetic_ct.py. A block `sh not-run` may not call
+supine. Other blocks are not run, and lines in them may not begin with `supine`. Links to files must work, and
 each page must show a picture, and make it. With GUIDE_PICTURES set, these replace the pictures in docs/guide.
 
 The page simulator.md belongs to the test `fem`. Exit with 77 if numpy or nibabel is missing."""
