@@ -31,6 +31,9 @@ enum { BATCH = 8, LARGE = 40000 };
  * rounding errors alone cause about 1e-16 (R / h)^2. */
 static const double residual_limit = 1e-8;
 
+/* Smallest (twice the area) / (half the sum of the squared sides) of a triangle in the weights. */
+static const double flattest = 2e-3;
+
 /* A part of the mesh without edges to the rest, such as one lung. The parts are solved in parallel,
  * or one after the other, to save memory, if the first has more than LARGE vertices. */
 typedef struct part {
@@ -196,14 +199,18 @@ static void set_reach(supine_equilibrium *eq, const supine_mesh *mesh) {
     double normal[3]; /* the length of this vector is twice the area of the triangle */
     supine_normal(p + 3 * (size_t)corner[0], p + 3 * (size_t)corner[1], p + 3 * (size_t)corner[2],
                   normal);
-    const double factor = 0.5 * eq->reach * eq->reach / mean / fmax(supine_length(normal), least);
+    double dot[3]; /* of the sides at each corner; their sum is half that of the squared sides */
     for (size_t k = 0; k < 3; ++k) {
-      const uint32_t next = corner[(k + 1) % 3];
-      const uint32_t last = corner[(k + 2) % 3];
       double sides[2][3];
-      supine_subtract(p + 3 * (size_t)next, p + 3 * (size_t)corner[k], sides[0]);
-      supine_subtract(p + 3 * (size_t)last, p + 3 * (size_t)corner[k], sides[1]);
-      eq->edge_term[find_edge(eq, next, last)] += factor * supine_dot(sides[0], sides[1]);
+      supine_subtract(p + 3 * (size_t)corner[(k + 1) % 3], p + 3 * (size_t)corner[k], sides[0]);
+      supine_subtract(p + 3 * (size_t)corner[(k + 2) % 3], p + 3 * (size_t)corner[k], sides[1]);
+      dot[k] = supine_dot(sides[0], sides[1]);
+    }
+    const double divisor =
+        fmax(fmax(supine_length(normal), least), flattest * (dot[0] + dot[1] + dot[2]));
+    for (size_t k = 0; k < 3; ++k) {
+      eq->edge_term[find_edge(eq, corner[(k + 1) % 3], corner[(k + 2) % 3])] +=
+          0.5 * eq->reach * eq->reach / mean * dot[k] / divisor;
     }
   }
 }
