@@ -154,7 +154,7 @@ async function checkControls(page) {
   await page.mouse.click(...await onPage(page, 'carina'));
   await page.waitForFunction(() => window.supine.basis.inside.names[window.supine.state.chosen] === 'carina');
   assert.equal(await page.evaluate(() => window.supine.state.probes.length), 0);
-  await page.waitForFunction(() => /target=\d/.test(location.hash));
+  await page.waitForFunction(() => location.hash.includes(`target=${window.supine.state.chosen}`)); // the link is written later
   const { page: again } = await openLungs(files['inside.html'], {}, await page.evaluate(() => `${location.hash.replace(/since=\d/, '')}&since=1&inside=0`));
   assert.deepEqual(await again.evaluate(() => [window.supine.basis.inside.names[window.supine.state.chosen], window.supine.state.from.name, document.getElementById('inside').checked]), ['carina', 'the scan', false]);
   await close(again);
