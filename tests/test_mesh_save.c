@@ -70,9 +70,9 @@ TEST(test_save_load_round_trip_each_format_and_axes) {
       if (supine_mesh_load(path, NULL, &again, &report, &error) != SUPINE_OK) {
         fail_msg("%s", error.message);
       }
-      /* PLY: float32; OBJ: rounded text; STL: float32; VTP: multiples of 1/256 mm */
+      /* PLY: float32; OBJ: rounded text; STL: float32; VTP: float32 */
       static const double tolerance[] = {64.0 * FLT_EPSILON, 512.0 * FLT_EPSILON,
-                                         64.0 * FLT_EPSILON, 0.5 / 256.0};
+                                         64.0 * FLT_EPSILON, 64.0 * FLT_EPSILON};
       expect_same(&again, &mesh, tolerance[k]);
       assert_true(report.axes_from_tag);
       assert_int_equal(report.axes,
