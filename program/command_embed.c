@@ -86,6 +86,7 @@ static void print_summary(const supine_inside_shells *shells, const supine_insid
   (void)printf("%s: %zu %s", wanted->path, report->count,
                grid                          ? "nodes"
                : content->triangle_count > 0 ? "vertices and points"
+               : report->count == 1          ? "point"
                                              : "points");
   for (size_t lung = 0; lung < shells->count; ++lung) {
     (void)printf("%s%zu %s", lung == 0 ? ": " : ", ", report->in_lung[lung],

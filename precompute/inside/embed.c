@@ -16,6 +16,9 @@
 
 enum { BLOCK = 1024 };
 
+/* Distance from the lungs, mm, beyond which their motion is not extrapolated. */
+static const double outside_most = 60.0;
+
 /* The embedded points, sorted by lung, and their displacements. */
 typedef struct embedding {
   const supine_inside_shells *shells;
@@ -65,6 +68,19 @@ static void gather_parts(embedding *e) {
           supine_inside_surface_find(e->shells->shell[most].surface, content->points + 3 * i, NULL);
     }
   }
+}
+
+static supine_status check_distance(const embedding *e, supine_error *error) {
+  double nearest = INFINITY;
+  for (size_t i = 0; i < e->content->count; ++i) {
+    nearest = fmin(nearest, -e->place[i].depth);
+  }
+  SUPINE_REFUSE_IF(nearest > outside_most && !e->options->clamp, error, SUPINE_ERROR_MESH,
+                   "all points are outside the lungs, by %.0f mm or more, where the motion of the "
+                   "lungs says nothing: check the axes and units (--axes, --units), or give "
+                   "--clamp to move them like the nearest point of the surface",
+                   nearest);
+  return SUPINE_OK;
 }
 
 /* Sort the points by lung, in stable order, and renumber the triangles. */
@@ -421,6 +437,7 @@ supine_status supine_inside_embed(const supine_inside_shells *shells,
       supine_arena_check(&arena, error, "%zu points, each with %zu coefficients", n, columns));
   supine_parallel_for(n, GRAIN, 0, find_places, &e);
   gather_parts(&e);
+  SUPINE_TRY(check_distance(&e, error));
   SUPINE_TRY(sort_points(&e, report, error));
   for (size_t lung = 0, begin = 0; lung < shells->count; begin += report->in_lung[lung++]) {
     SUPINE_TRY(embed_lung(&e, lung, begin, begin + report->in_lung[lung], error));

@@ -71,7 +71,9 @@ typedef struct supine_inside_report {
  *         displacements by these modes, divided by the number of vertices of all lungs, mm^2
  *
  * The tensors lungs_* give the expected errors of the points (supine/locate.h).
- * The metadata "content" is "points", "mesh" or "grid". Uses all cores; cost: see biharmonic.h. */
+ * The metadata "content" is "points", "mesh" or "grid". Uses all cores; cost: see biharmonic.h.
+ * Fails with SUPINE_ERROR_MESH if every point is more than 60 mm outside, unless they are clamped.
+ */
 supine_status supine_inside_embed(const supine_inside_shells *shells,
                                   const supine_inside_content *content,
                                   const supine_inside_options *options, const char *path,
