@@ -1,16 +1,18 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Find the smallest and largest height g.p of vertices p along many directions g, for force.h. */
 #include <math.h>
+#include <stdbool.h>
+#include <stdint.h>
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/clones.h"
 #include "base/parallel.h"
-#include "base/vec3.h"
 #include "precompute/physics/force.h"
 
-/* Number of consecutive vertices in a block. The search skips blocks whose bounding boxes cannot
- * contain a new greatest height. */
-enum { BLOCK = 64 };
+/* BLOCK consecutive vertices form a block. The search skips blocks whose bounding boxes cannot
+ * contain a new greatest height. It handles LANES directions together. */
+enum { BLOCK = 64, LANES = 8 };
 
 typedef struct block_box {
   double centre[3];
@@ -26,6 +28,13 @@ typedef struct range_work {
   const double *directions;
   double *minimum, *maximum;
 } range_work;
+
+/* A batch of LANES directions. One search finds the greatest height of a vertex along each. */
+typedef struct lanes {
+  double g[3][LANES];    /* components of the directions, which are unit vectors */
+  double size[3][LANES]; /* absolute values of the elements of `g` */
+  double best[LANES];    /* greatest height found so far along each direction, mm */
+} lanes;
 
 static block_box box_of(const double *vertices, size_t count) {
   block_box box;
@@ -43,41 +52,71 @@ static block_box box_of(const double *vertices, size_t count) {
   return box;
 }
 
-/* Return the greatest of a block's heights along g and `best`. */
-static double highest(const range_work *work, size_t block, const double g[3], double best) {
+/* Return whether a box may contain a vertex whose height along a direction exceeds at->best. */
+static inline bool may_improve(const block_box *box, const lanes *at) {
+  const block_box b = *box;
+  int64_t any = 0;
+#pragma GCC unroll 1 /* full unrolling would prevent vectorisation */
+  for (size_t l = 0; l < LANES; ++l) {
+    const double bound = at->g[0][l] * b.centre[0] + at->size[0][l] * b.half[0] +
+                         at->g[1][l] * b.centre[1] + at->size[1][l] * b.half[1] +
+                         at->g[2][l] * b.centre[2] + at->size[2][l] * b.half[2];
+    any |= bound > at->best[l] ? 1 : 0;
+  }
+  return any != 0;
+}
+
+/* Update at->best, the greatest heights found so far, with the vertices of one block. */
+static inline void raise_best(const range_work *work, size_t block, lanes *at) {
   const size_t end =
       (block + 1) * BLOCK < work->vertex_count ? (block + 1) * BLOCK : work->vertex_count;
   for (size_t i = block * BLOCK; i < end; ++i) {
-    const double h = supine_dot(g, work->vertices + 3 * i);
-    best = h > best ? h : best;
-  }
-  return best;
-}
-
-/* Return the greatest height of a vertex along g. Search block *seed first, and set it to the block
- * that was searched last, a good seed for similar directions. */
-static double search(const range_work *work, const double g[3], size_t *seed) {
-  const double size[3] = {fabs(g[0]), fabs(g[1]), fabs(g[2])};
-  double best = highest(work, *seed, g, -INFINITY);
-  for (size_t block = 0; block < work->box_count; ++block) {
-    const block_box *box = &work->boxes[block];
-    if (supine_dot(g, box->centre) + supine_dot(size, box->half) > best) {
-      best = highest(work, block, g, best);
-      *seed = block;
+    const double x = work->vertices[3 * i];
+    const double y = work->vertices[3 * i + 1];
+    const double z = work->vertices[3 * i + 2];
+#pragma GCC unroll 1
+    for (size_t l = 0; l < LANES; ++l) {
+      const double h = at->g[0][l] * x + at->g[1][l] * y + at->g[2][l] * z;
+      at->best[l] = h > at->best[l] ? h : at->best[l];
     }
   }
-  return best;
 }
 
-static void height_range(void *context, size_t begin, size_t end, size_t thread) {
+/* Find the greatest height of a vertex along each direction. Search the block of vertices `seed`
+ * first. Return the block searched last, a good seed for similar directions. */
+static inline size_t search(const range_work *work, size_t seed, lanes *at) {
+  raise_best(work, seed, at);
+  for (size_t block = 0; block < work->box_count; ++block) {
+    if (may_improve(&work->boxes[block], at)) {
+      raise_best(work, block, at);
+      seed = block;
+    }
+  }
+  return seed;
+}
+
+SUPINE_CLONES static void height_range(void *context, size_t begin, size_t end, size_t thread) {
   const range_work *work = context;
   size_t seed[2] = {0, 0};
   (void)thread;
   for (size_t d = begin; d < end; ++d) {
-    const double *g = work->directions + 3 * d;
-    const double down[3] = {-g[0], -g[1], -g[2]};
-    work->maximum[d] = search(work, g, &seed[0]);
-    work->minimum[d] = -search(work, down, &seed[1]);
+    const size_t left = work->direction_count - d * LANES;
+    for (size_t up = 0; up < 2; ++up) {
+      lanes at;
+      for (size_t l = 0; l < LANES; ++l) {
+        const double *g = work->directions + 3 * (d * LANES + (l < left ? l : 0));
+        for (size_t k = 0; k < 3; ++k) {
+          at.g[k][l] = up ? g[k] : -g[k];
+          at.size[k][l] = fabs(g[k]);
+        }
+        at.best[l] = -INFINITY;
+      }
+      seed[up] = search(work, seed[up], &at);
+      for (size_t l = 0; l < LANES && l < left; ++l) {
+        *(up ? &work->maximum[d * LANES + l] : &work->minimum[d * LANES + l]) =
+            up ? at.best[l] : -at.best[l];
+      }
+    }
   }
 }
 
@@ -102,6 +141,6 @@ supine_status supine_physics_height_range(const supine_lungs *lungs, bool pair, 
   for (size_t i = 0; i < n; i += BLOCK) {
     boxes[i / BLOCK] = box_of(vertices + 3 * i, n - i < BLOCK ? n - i : BLOCK);
   }
-  supine_parallel_for(count, 32, 0, height_range, &work);
+  supine_parallel_for((count + LANES - 1) / LANES, 4, 0, height_range, &work);
   return SUPINE_OK;
 }
