@@ -64,10 +64,7 @@ supine_status supine_breath_turn_read(const char *text, void *turn, supine_error
 }
 
 supine_state supine_breath_state(const supine_basis *basis, const double gravity[3], double ml) {
-  const supine_basis_info *info = supine_basis_get_info(basis);
-  supine_state state = {.gravity = {gravity[0], gravity[1], gravity[2]}};
-  if (!info->is_fields) {
-    state.volume = (supine_volume){info->has_rest ? SUPINE_VOLUME_REST : SUPINE_VOLUME_SCAN, ml};
-  }
-  return state;
+  const bool known = supine_basis_get_info(basis)->has_rest;
+  return (supine_state){.gravity = {gravity[0], gravity[1], gravity[2]},
+                        .volume = {known ? SUPINE_VOLUME_REST : SUPINE_VOLUME_SCAN, ml}};
 }

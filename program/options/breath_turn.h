@@ -21,7 +21,7 @@ void supine_breath_turn_gravity(const breath_turn *turn, double time, double gra
 supine_status supine_breath_turn_read(const char *text, void *turn, supine_error *error);
 
 /* Return the state whose volume is `ml` mL above the resting volume or, if the resting volume is
- * unknown, above the scan's volume. Another simulator's fields have no volumes. */
+ * unknown, above the scan's volume. */
 supine_state supine_breath_state(const supine_basis *basis, const double gravity[3], double ml);
 
 #endif

@@ -146,8 +146,8 @@ const supine_option supine_command_model_options[] = {
      "left and the right lung\ncopd: the usual share in COPD, 0.64 supine (SD 0.11; ten patients)\n"
      "The volumes of other postures keep the default proportions to these. A lung-function test "
      "gives the gas alone, seated: add about 0.9 L of tissue, and give the sum as upright. "
-     "Default, from healthy people (SD 0.08): the shares that 'supine info' prints; with --height "
-     "and --sex, mL that these predict (GLI 2021, less 0.806 L for lying, plus 0.86 L of tissue)",
+     "Default, from healthy people (SD 0.08): the shares that 'supine info' prints, or the mL that "
+     "--height and --sex predict (GLI 2021, less 0.806 L for lying, plus 0.86 L of tissue)",
      .read = read_resting, .wants = "copd, POSTURE=2600mL or POSTURE=SHARE,..."},
     {"full", 0, "VOLUME",
      "for a scan at rest: volume of gas and tissue of the scanned lungs at full inflation, such as "
