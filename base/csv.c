@@ -36,11 +36,8 @@ static supine_status csv_line(supine_csv *csv, char **text, supine_error *error)
                  : SUPINE_OK;
     }
     ++csv->line;
-    if (strlen(csv->text) != (size_t)length) {
-      return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s:%zu: a NUL byte: save the file as CSV text", csv->path,
-                              csv->line);
-    }
+    SUPINE_REFUSE_IF(strlen(csv->text) != (size_t)length, error, SUPINE_ERROR_FORMAT,
+                     "%s:%zu: a NUL byte: save the file as CSV text", csv->path, csv->line);
     static const char mark[] = "\xEF\xBB\xBF"; /* byte-order mark of UTF-8 */
     const size_t skip = csv->line == 1 && strncmp(csv->text, mark, 3) == 0 ? 3 : 0;
     *text = trim(csv->text + skip);
@@ -84,16 +81,12 @@ static char *csv_field(char **rest, char separator) {
 static supine_status csv_split(supine_csv *csv, char *text, supine_error *error) {
   csv->field_count = 0;
   for (char *rest = text; rest != NULL;) {
-    if (csv->field_count == SUPINE_CSV_FIELDS_MAX) {
-      return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s:%zu: more than %d fields: delete columns", csv->path, csv->line,
-                              (int)SUPINE_CSV_FIELDS_MAX);
-    }
+    SUPINE_REFUSE_IF(csv->field_count == SUPINE_CSV_FIELDS_MAX, error, SUPINE_ERROR_FORMAT,
+                     "%s:%zu: more than %d fields: delete columns", csv->path, csv->line,
+                     (int)SUPINE_CSV_FIELDS_MAX);
     char *field = csv_field(&rest, csv->separator);
-    if (field == NULL) {
-      return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s:%zu: a quote is not closed: add \"",
-                              csv->path, csv->line);
-    }
+    SUPINE_REFUSE_IF(field == NULL, error, SUPINE_ERROR_FORMAT,
+                     "%s:%zu: a quote is not closed: add \"", csv->path, csv->line);
     csv->field[csv->field_count++] = field;
   }
   return SUPINE_OK;
@@ -103,10 +96,8 @@ static supine_status csv_header(supine_csv *csv, const char *const *names, size_
                                 size_t required, supine_error *error) {
   char *text = NULL;
   SUPINE_TRY(csv_line(csv, &text, error));
-  if (text == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: the file is empty; expected a header %s,...", csv->path, names[0]);
-  }
+  SUPINE_REFUSE_IF(text == NULL, error, SUPINE_ERROR_FORMAT,
+                   "%s: the file is empty; expected a header %s,...", csv->path, names[0]);
   csv->separator = strchr(text, ',') != NULL    ? ','
                    : strchr(text, ';') != NULL  ? ';'
                    : strchr(text, '\t') != NULL ? '\t'
@@ -120,21 +111,17 @@ static supine_status csv_header(supine_csv *csv, const char *const *names, size_
     while (c < count && strcasecmp(csv->field[f], names[c]) != 0) {
       ++c;
     }
-    if (c < count && csv->column[c] != SIZE_MAX) {
-      return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s:%zu: repeated column \"%s\" in the header: delete or rename one",
-                              csv->path, csv->line, csv->field[f]);
-    }
+    SUPINE_REFUSE_IF(c < count && csv->column[c] != SIZE_MAX, error, SUPINE_ERROR_FORMAT,
+                     "%s:%zu: repeated column \"%s\" in the header: delete or rename one",
+                     csv->path, csv->line, csv->field[f]);
     if (c < count) { /* columns that the caller does not expect are ignored */
       csv->column[c] = f;
     }
   }
   for (size_t c = 0; c < required; ++c) {
-    if (csv->column[c] == SIZE_MAX) {
-      return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s:%zu: the header has no column \"%s\"; expected %s,%s,...",
-                              csv->path, csv->line, names[c], names[0], names[1]);
-    }
+    SUPINE_REFUSE_IF(csv->column[c] == SIZE_MAX, error, SUPINE_ERROR_FORMAT,
+                     "%s:%zu: the header has no column \"%s\"; expected %s,%s,...", csv->path,
+                     csv->line, names[c], names[0], names[1]);
   }
   csv->column_count = csv->field_count;
   return SUPINE_OK;
@@ -144,9 +131,8 @@ supine_status supine_csv_open(const char *path, const char *const *names, size_t
                               size_t required, supine_csv *csv, supine_error *error) {
   *csv = (supine_csv){.path = path};
   csv->file = fopen(path, "rb");
-  if (csv->file == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot open: %s", path, strerror(errno));
-  }
+  SUPINE_REFUSE_IF(csv->file == NULL, error, SUPINE_ERROR_READ, "%s: cannot open: %s", path,
+                   strerror(errno));
   const supine_status status = csv_header(csv, names, count, required, error);
   if (status != SUPINE_OK) {
     supine_csv_close(csv);
@@ -162,12 +148,10 @@ supine_status supine_csv_next(supine_csv *csv, bool *more, supine_error *error) 
     return SUPINE_OK;
   }
   SUPINE_TRY(csv_split(csv, text, error));
-  if (csv->field_count != csv->column_count) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s:%zu: %zu field%s, but the header has %zu: add or delete fields",
-                            csv->path, csv->line, csv->field_count,
-                            csv->field_count == 1 ? "" : "s", csv->column_count);
-  }
+  SUPINE_REFUSE_IF(csv->field_count != csv->column_count, error, SUPINE_ERROR_FORMAT,
+                   "%s:%zu: %zu field%s, but the header has %zu: add or delete fields", csv->path,
+                   csv->line, csv->field_count, csv->field_count == 1 ? "" : "s",
+                   csv->column_count);
   return SUPINE_OK;
 }
 
@@ -184,11 +168,9 @@ supine_status supine_csv_number(const supine_csv *csv, size_t column, const char
     *comma = '.';
   }
   *number = strtod(text, &end);
-  if (end == text || *end != '\0' || !isfinite(*number)) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s:%zu: %s \"%s\" is not a finite number: give a number", csv->path,
-                            csv->line, name, text);
-  }
+  SUPINE_REFUSE_IF(end == text || *end != '\0' || !isfinite(*number), error, SUPINE_ERROR_FORMAT,
+                   "%s:%zu: %s \"%s\" is not a finite number: give a number", csv->path, csv->line,
+                   name, text);
   return SUPINE_OK;
 }
 

@@ -3,6 +3,7 @@
 #include <dlfcn.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/library.h"
 
 supine_status supine_library_load(const char *library, const char *const *names, void *members,
@@ -10,10 +11,8 @@ supine_status supine_library_load(const char *library, const char *const *names,
   void *handle = dlopen(library, RTLD_LAZY);
   for (size_t i = 0; names[i] != NULL; ++i) {
     void *function = handle != NULL ? dlsym(handle, names[i]) : NULL;
-    if (function == NULL) {
-      return supine_error_set(error, SUPINE_ERROR_UNSUPPORTED, "%s cannot be loaded: install it",
-                              library);
-    }
+    SUPINE_REFUSE_IF(function == NULL, error, SUPINE_ERROR_UNSUPPORTED,
+                     "%s cannot be loaded: install it", library);
     memcpy((char *)members + i * sizeof function, &function, sizeof function);
   }
   return SUPINE_OK;

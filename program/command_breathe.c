@@ -71,18 +71,16 @@ static const supine_option table[] = {
 static supine_status complete(request *wanted, supine_error *error) {
   enum { FRAMES_MAX = 1000000 };
   supine_breath_frames *frames = &wanted->frames;
-  if (frames->as_scanned && supine_text_ends_in(frames->path, ".safetensors")) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--as-scanned is for VTP files only: leave it out, as safetensors "
-                            "files are always in LPS and mm");
-  }
+  SUPINE_REFUSE_IF(frames->as_scanned && supine_text_ends_in(frames->path, ".safetensors"), error,
+                   SUPINE_ERROR_ARGUMENT,
+                   "--as-scanned is for VTP files only: leave it out, as safetensors "
+                   "files are always in LPS and mm");
   if (!wanted->turns) {
     supine_state state = {.lung_count = 0};
     SUPINE_TRY(supine_options_state(&wanted->orientation, &state, error));
-    if (state.volume.kind != SUPINE_VOLUME_DEFAULT || state.lung_count > 0) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "a breath starts at rest: give --posture without a volume");
-    }
+    SUPINE_REFUSE_IF(state.volume.kind != SUPINE_VOLUME_DEFAULT || state.lung_count > 0, error,
+                     SUPINE_ERROR_ARGUMENT,
+                     "a breath starts at rest: give --posture without a volume");
     memcpy(frames->turn.to, state.gravity, sizeof frames->turn.to);
     memcpy(frames->turn.from, frames->turn.to, sizeof frames->turn.from);
   }

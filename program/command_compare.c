@@ -148,9 +148,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
                                          "hilum is for: give a basis made "
                                          "by 'supine embed', or use 'supine deform --frame hilum'"
                                        : NULL;
-  if (refused != NULL) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, refused, c->path);
-  }
+  SUPINE_REFUSE_IF(refused != NULL, error, SUPINE_ERROR_ARGUMENT, refused, c->path);
   return content ? compare_content(c, wanted, error) : report(c, wanted, error);
 }
 

@@ -84,15 +84,14 @@ static supine_status read_row(const supine_csv *csv, request *row, supine_error 
   if (status == SUPINE_OK && volume != NULL && volume[0] != '\0') {
     status = supine_state_parse_volume(volume, state, &reason);
   }
-  if (status != SUPINE_OK) {
-    return supine_error_set(error, status, "%s:%zu: %s", csv->path, csv->line, reason.message);
-  }
+  SUPINE_REFUSE_IF(status != SUPINE_OK, error, status, "%s:%zu: %s", csv->path, csv->line,
+                   reason.message);
   const bool voxels = supine_image_supports(output);
   const bool image = row->content.image != NULL || row->content.labels != NULL;
-  if (!voxels && !supine_mesh_save_supports(output) && !supine_text_ends_in(output, ".csv")) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%s:%zu: %s: the name must end in %s",
-                            csv->path, csv->line, output, ENDINGS);
-  }
+  SUPINE_REFUSE_IF(!voxels && !supine_mesh_save_supports(output) &&
+                       !supine_text_ends_in(output, ".csv"),
+                   error, SUPINE_ERROR_ARGUMENT, "%s:%zu: %s: the name must end in %s", csv->path,
+                   csv->line, output, ENDINGS);
   for (size_t i = 0; i < 3; ++i) { /* the columns output, labels and field */
     const char *const named = supine_csv_text(csv, 1 + i);
     if (named != NULL && named[0] != '\0') {
@@ -122,11 +121,8 @@ static supine_status check_output(const char *basis, const request *rows, size_t
   }
   for (size_t i = 0; i < 3 * (count - 1) + which; ++i) {
     const char *const earlier = rows[i / 3].outputs[i % 3];
-    if (earlier != NULL && strcmp(earlier, output) == 0) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "%s: two rows write %s: give each row its own file", row->states,
-                              output);
-    }
+    SUPINE_REFUSE_IF(earlier != NULL && strcmp(earlier, output) == 0, error, SUPINE_ERROR_ARGUMENT,
+                     "%s: two rows write %s: give each row its own file", row->states, output);
   }
   return supine_output_try(output, error);
 }

@@ -145,21 +145,17 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   for (size_t i = 1; i < given->count; ++i) {
     image = image || supine_image_is_named(given->operand[i]);
   }
-  if (given->count == 1 && !wanted->content.has_grid) {
-    return supine_error_set(
-        error, SUPINE_ERROR_ARGUMENT,
-        "nothing to embed: give points (.csv, .mrk.json), meshes or an image, or --grid MM");
-  }
-  if (labels && (!image || wanted->content.has_grid)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            image ? "--labels embeds surfaces, --grid embeds nodes: give only one"
-                                  : "--labels needs a label map: name one (.nrrd, .nii, .nii.gz)");
-  }
-  if (!labels && given->count > 1 && (image ? given->count > 2 : wanted->content.has_grid)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "a grid or an image cannot be embedded with other content: embed it "
-                            "alone, or give --labels to embed the parts of a label map");
-  }
+  SUPINE_REFUSE_IF(
+      given->count == 1 && !wanted->content.has_grid, error, SUPINE_ERROR_ARGUMENT,
+      "nothing to embed: give points (.csv, .mrk.json), meshes or an image, or --grid MM");
+  SUPINE_REFUSE_IF(labels && (!image || wanted->content.has_grid), error, SUPINE_ERROR_ARGUMENT,
+                   image ? "--labels embeds surfaces, --grid embeds nodes: give only one"
+                         : "--labels needs a label map: name one (.nrrd, .nii, .nii.gz)");
+  SUPINE_REFUSE_IF(!labels && given->count > 1 &&
+                       (image ? given->count > 2 : wanted->content.has_grid),
+                   error, SUPINE_ERROR_ARGUMENT,
+                   "a grid or an image cannot be embedded with other content: embed it "
+                   "alone, or give --labels to embed the parts of a label map");
   SUPINE_TRY(supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, error));
   return embed(basis, wanted, given, error);
 }

@@ -118,23 +118,20 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   const char *path = given->operand[0];
   const bool page = supine_text_ends_in(wanted->path, ".html");
   SUPINE_FREED_BY(supine_options_basis_close) supine_basis *basis = NULL;
-  if (page && wanted->glb_only) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--plain and --animate need an output that ends in .glb");
-  }
-  if (!page && (wanted->title != NULL || wanted->inside != NULL || wanted->from.given)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%s needs an output that ends in .html",
-                            wanted->from.given       ? "--from"
-                            : wanted->inside != NULL ? "--inside"
-                                                     : "--title");
-  }
+  SUPINE_REFUSE_IF(page && wanted->glb_only, error, SUPINE_ERROR_ARGUMENT,
+                   "--plain and --animate need an output that ends in .glb");
+  SUPINE_REFUSE_IF(!page && (wanted->title != NULL || wanted->inside != NULL || wanted->from.given),
+                   error, SUPINE_ERROR_ARGUMENT, "%s needs an output that ends in .html",
+                   wanted->from.given       ? "--from"
+                   : wanted->inside != NULL ? "--inside"
+                                            : "--title");
   SUPINE_TRY(supine_options_basis_open(path, SUPINE_STORAGE_EXACT, &basis, error));
-  if (supine_basis_get_info(basis)->is_fields && (wanted->breathes || wanted->glb.animate)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%s holds another simulator's fields of gravity, which have no "
-                            "breaths: leave --breath and --animate out",
-                            path);
-  }
+  SUPINE_REFUSE_IF(supine_basis_get_info(basis)->is_fields &&
+                       (wanted->breathes || wanted->glb.animate),
+                   error, SUPINE_ERROR_ARGUMENT,
+                   "%s holds another simulator's fields of gravity, which have no "
+                   "breaths: leave --breath and --animate out",
+                   path);
   return page ? write_page(basis, wanted, path, error) : write_glb(basis, wanted, error);
 }
 

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/output.h"
 #include "base/text.h"
 #include "mesh/io/points.h"
@@ -81,11 +82,9 @@ static supine_status load_observed(const char *path, const request *wanted,
                                    supine_error *error) {
   SUPINE_FREED_BY(supine_mesh_points_free) supine_mesh_points read = {0};
   SUPINE_TRY(supine_mesh_points_read(path, &wanted->load, &read, error));
-  if (read.count > SUPINE_LOCATE_POINTS_MAX) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: %zu points, more than %d: leave some out", path, read.count,
-                            (int)SUPINE_LOCATE_POINTS_MAX);
-  }
+  SUPINE_REFUSE_IF(read.count > SUPINE_LOCATE_POINTS_MAX, error, SUPINE_ERROR_FORMAT,
+                   "%s: %zu points, more than %d: leave some out", path, read.count,
+                   (int)SUPINE_LOCATE_POINTS_MAX);
   for (; observed->count < read.count; ++observed->count) {
     supine_observation *point = &observed->points[observed->count];
     point->noise = wanted->noise;

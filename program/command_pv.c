@@ -95,10 +95,8 @@ static supine_status run_show(const char *path, const request *chosen, supine_er
   const double low = fmin(pv.limb[0].pressure[0], pv.limb[1].pressure[0]);
   const double high = fmax(pv.limb[0].pressure[1], pv.limb[1].pressure[1]);
   const double steps = (high - low) / chosen->step;
-  if (!(steps < ROWS_MAX)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--step gives more than %d rows: give a larger step", ROWS_MAX);
-  }
+  SUPINE_REFUSE_IF(!(steps < ROWS_MAX), error, SUPINE_ERROR_ARGUMENT,
+                   "--step gives more than %d rows: give a larger step", ROWS_MAX);
   (void)puts("pressure_cmH2O,inhale_mL,inhale_mL_per_cmH2O,exhale_mL,exhale_mL_per_cmH2O");
   for (size_t j = 0; (double)j < steps * (1.0 - 1e-12); ++j) {
     SUPINE_TRY(print_row(&pv, low + (double)j * chosen->step, error));

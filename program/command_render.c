@@ -33,10 +33,8 @@ static supine_status read_views(const char *text, void *field, supine_error *err
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "no view '%s'; did you mean '%s'?",
                               word, nearest != NULL ? nearest : "anterior");
     }
-    if (wanted->view_count == SUPINE_VIEWS_MAX) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "more than %d views: name fewer",
-                              SUPINE_VIEWS_MAX);
-    }
+    SUPINE_REFUSE_IF(wanted->view_count == SUPINE_VIEWS_MAX, error, SUPINE_ERROR_ARGUMENT,
+                     "more than %d views: name fewer", SUPINE_VIEWS_MAX);
     wanted->view[wanted->view_count++] =
         view == SUPINE_VIEW_COUNT ? SUPINE_VIEW_LEFT : (supine_view)view;
   }
@@ -80,16 +78,12 @@ static const supine_option table[] = {
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   supine_pictures *wanted = chosen;
-  if (!wanted->turns && wanted->postures == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "the posture is missing: give --posture or --turn");
-  }
-  if (wanted->turns != supine_text_ends_in(wanted->output, ".webp")) {
-    return supine_error_set(
-        error, SUPINE_ERROR_ARGUMENT,
-        wanted->turns ? "--turn writes an animation: give -o a name that ends in .webp"
-                      : "--posture writes a still picture: give -o a name that ends in .png");
-  }
+  SUPINE_REFUSE_IF(!wanted->turns && wanted->postures == NULL, error, SUPINE_ERROR_ARGUMENT,
+                   "the posture is missing: give --posture or --turn");
+  SUPINE_REFUSE_IF(
+      wanted->turns != supine_text_ends_in(wanted->output, ".webp"), error, SUPINE_ERROR_ARGUMENT,
+      wanted->turns ? "--turn writes an animation: give -o a name that ends in .webp"
+                    : "--posture writes a still picture: give -o a name that ends in .png");
   if (wanted->turns && wanted->view[0] == SUPINE_VIEW_LYING) {
     wanted->view[0] = SUPINE_VIEW_ANTERIOR; /* the camera of a film stays where it is */
   }

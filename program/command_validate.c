@@ -150,23 +150,17 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   const char *path = given->operand[0];
   SUPINE_FREED_BY(supine_options_basis_close) supine_basis *basis = NULL;
   SUPINE_FREED_BY(supine_validation_free) supine_validation s = {0};
-  if (wanted->count == 0 && wanted->landmarks.path == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "nothing to compare with: give --state or --landmarks");
-  }
-  if (wanted->path != NULL && wanted->count == 0) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "-o writes the errors of a surface: name a surface with --state");
-  }
+  SUPINE_REFUSE_IF(wanted->count == 0 && wanted->landmarks.path == NULL, error,
+                   SUPINE_ERROR_ARGUMENT, "nothing to compare with: give --state or --landmarks");
+  SUPINE_REFUSE_IF(wanted->path != NULL && wanted->count == 0, error, SUPINE_ERROR_ARGUMENT,
+                   "-o writes the errors of a surface: name a surface with --state");
   for (size_t i = 0; i < wanted->count && wanted->path != NULL; ++i) {
     SUPINE_TRY(supine_options_check_output(wanted->path, wanted->state[i].path, error));
   }
-  if (supine_text_ends_in(path, ".json")) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%s is a patient model without a surface: make a basis from it first "
-                            "with 'supine precompute --patient'",
-                            path);
-  }
+  SUPINE_REFUSE_IF(supine_text_ends_in(path, ".json"), error, SUPINE_ERROR_ARGUMENT,
+                   "%s is a patient model without a surface: make a basis from it first "
+                   "with 'supine precompute --patient'",
+                   path);
   s.moved = wanted->landmarks.rigid         ? SUPINE_PATIENT_RIGID
             : wanted->landmarks.translation ? SUPINE_PATIENT_TRANSLATION
                                             : SUPINE_PATIENT_STILL;

@@ -49,33 +49,25 @@ const supine_option supine_command_deform_content_options[] = {
 supine_status supine_command_deform_content_check(const supine_deform_content *wanted,
                                                   supine_error *error) {
   const bool image = wanted->image != NULL || wanted->labels != NULL;
-  if (wanted->path == NULL && (image || wanted->field == NULL)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "-o FILE is missing; its name must end in %s",
-                            image ? ".nrrd, .nii, .nii.gz or .mha" : SUPINE_MESH_ENDINGS);
-  }
-  if (wanted->path != NULL && image != supine_image_supports(wanted->path)) {
-    return supine_error_set(
-        error, SUPINE_ERROR_ARGUMENT,
-        image ? "%s: with --image or --labels, the name must end in .nrrd, .nii, .nii.gz or .mha"
-              : "%s: no image to write: give --image FILE or --labels FILE",
-        wanted->path);
-  }
-  if ((wanted->image != NULL && wanted->labels != NULL) != (wanted->labels_path != NULL)) {
-    return supine_error_set(
-        error, SUPINE_ERROR_ARGUMENT,
-        "--image with --labels needs a list of --states with the column labels, "
-        "and this column needs both");
-  }
-  if (wanted->labels_path != NULL && !supine_image_supports(wanted->labels_path)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%s: the name must end in .nrrd, .nii, .nii.gz or .mha",
-                            wanted->labels_path);
-  }
-  if (wanted->inverse && wanted->field == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--inverse needs --field-out FILE: give both");
-  }
+  SUPINE_REFUSE_IF(wanted->path == NULL && (image || wanted->field == NULL), error,
+                   SUPINE_ERROR_ARGUMENT, "-o FILE is missing; its name must end in %s",
+                   image ? ".nrrd, .nii, .nii.gz or .mha" : SUPINE_MESH_ENDINGS);
+  SUPINE_REFUSE_IF(
+      wanted->path != NULL && image != supine_image_supports(wanted->path), error,
+      SUPINE_ERROR_ARGUMENT,
+      image ? "%s: with --image or --labels, the name must end in .nrrd, .nii, .nii.gz or .mha"
+            : "%s: no image to write: give --image FILE or --labels FILE",
+      wanted->path);
+  SUPINE_REFUSE_IF((wanted->image != NULL && wanted->labels != NULL) !=
+                       (wanted->labels_path != NULL),
+                   error, SUPINE_ERROR_ARGUMENT,
+                   "--image with --labels needs a list of --states with the column labels, "
+                   "and this column needs both");
+  SUPINE_REFUSE_IF(wanted->labels_path != NULL && !supine_image_supports(wanted->labels_path),
+                   error, SUPINE_ERROR_ARGUMENT,
+                   "%s: the name must end in .nrrd, .nii, .nii.gz or .mha", wanted->labels_path);
+  SUPINE_REFUSE_IF(wanted->inverse && wanted->field == NULL, error, SUPINE_ERROR_ARGUMENT,
+                   "--inverse needs --field-out FILE: give both");
   return wanted->density && wanted->image == NULL
              ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                                 "--density needs --image FILE: give both")

@@ -53,11 +53,10 @@ static supine_status check_content(const supine_inside_shells *shells,
   }
   (void)snprintf(text, sizeof text, "%zu of %zu points are inside the lungs, but %zu with %s",
                  reading.as_read, reading.tested, reading.inside, reading.options);
-  if (reading.as_read == 0 && reading.tested > 2 && reading.other_units &&
-      !(wanted->load.millimetres_per_unit > 0.0)) {
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "%s: give that, or --units mm to embed the points as they are", text);
-  }
+  SUPINE_REFUSE_IF(reading.as_read == 0 && reading.tested > 2 && reading.other_units &&
+                       !(wanted->load.millimetres_per_unit > 0.0),
+                   error, SUPINE_ERROR_MESH,
+                   "%s: give that, or --units mm to embed the points as they are", text);
   supine_options_say(name, "warning: %s: check the axes and units of the points", text);
   return SUPINE_OK;
 }

@@ -176,9 +176,8 @@ static supine_status add_frames(studio *s, size_t count, const double (*extent)[
     picture.extent = extent;
     SUPINE_TRY(supine_render_animation_add(animation, s->basis, &picture,
                                            frame + 1 < count ? 1000 / FPS : LAST_FRAME_MS, error));
-    if (!supine_options_progress_step(&progress, (double)(frame + 1) / (double)count)) {
-      return supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
-    }
+    SUPINE_REFUSE_IF(!supine_options_progress_step(&progress, (double)(frame + 1) / (double)count),
+                     error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
   }
   return SUPINE_OK;
 }
@@ -194,11 +193,9 @@ static supine_status draw_turn(studio *s, supine_error *error) {
   double extent[SUPINE_VIEWS_MAX][4];
   SUPINE_FREED_BY(supine_render_animation_close) supine_animation *animation = NULL;
   SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
-  if (!(frames <= FRAMES_MAX)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "a turn of %g s has more than %d frames: give a shorter turn", seconds,
-                            FRAMES_MAX);
-  }
+  SUPINE_REFUSE_IF(!(frames <= FRAMES_MAX), error, SUPINE_ERROR_ARGUMENT,
+                   "a turn of %g s has more than %d frames: give a shorter turn", seconds,
+                   FRAMES_MAX);
   const size_t count = (size_t)frames;
   for (size_t view = 0; view < SUPINE_VIEWS_MAX; ++view) {
     memcpy(extent[view], none, sizeof none);
@@ -227,10 +224,8 @@ supine_status supine_command_pictures_draw(const supine_pictures *wanted, const 
     SUPINE_TRY(supine_options_posture_list_parse(wanted->postures, &wanted->volume.state,
                                                  &s.postures, error));
   }
-  if (s.postures.count > SUPINE_PANELS_MAX) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "a picture holds at most %d postures: name fewer", SUPINE_PANELS_MAX);
-  }
+  SUPINE_REFUSE_IF(s.postures.count > SUPINE_PANELS_MAX, error, SUPINE_ERROR_ARGUMENT,
+                   "a picture holds at most %d postures: name fewer", SUPINE_PANELS_MAX);
   SUPINE_TRY(open_studio(&s, path, error));
   return wanted->turns ? draw_turn(&s, error) : draw_postures(&s, error);
 }

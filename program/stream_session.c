@@ -72,11 +72,9 @@ static supine_status open_points(const supine_basis *basis, const supine_stream_
                                                        .noise = wanted->noise};
     }
   }
-  if (count == 0 || count > SUPINE_LOCATE_POINTS_MAX) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s holds %zu points: give a file with 1 to %d", wanted->points, count,
-                            (int)SUPINE_LOCATE_POINTS_MAX);
-  }
+  SUPINE_REFUSE_IF(count == 0 || count > SUPINE_LOCATE_POINTS_MAX, error, SUPINE_ERROR_FORMAT,
+                   "%s holds %zu points: give a file with 1 to %d", wanted->points, count,
+                   (int)SUPINE_LOCATE_POINTS_MAX);
   observed->ras = wanted->options.ras;
   observed->inside = points->inside;
   observed->count = count;
@@ -110,9 +108,8 @@ static supine_status open_page(const supine_stream_session *wanted, const supine
   if (file != NULL) {
     SUPINE_TRY(supine_export_html_print(file, basis, &shown, error));
   }
-  if (file == NULL || fflush(file) != 0) {
-    return supine_error_set(error, SUPINE_ERROR_WRITE, "%s: %s", page, strerror(errno));
-  }
+  SUPINE_REFUSE_IF(file == NULL || fflush(file) != 0, error, SUPINE_ERROR_WRITE, "%s: %s", page,
+                   strerror(errno));
   site.address = address.host;
   site.port = address.port;
   site.page = page;
@@ -129,11 +126,9 @@ static supine_status set_volume(const supine_basis *basis, const supine_stream_s
   supine_pv pv = *supine_breath_normal();
   if (supine_basis_get_info(basis)->is_fields) {
     supine_pose pose;
-    if (wanted->has_breath) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "the basis was made with --fields and has no breaths: leave out "
-                              "--tidal, --rate and --pv");
-    }
+    SUPINE_REFUSE_IF(wanted->has_breath, error, SUPINE_ERROR_ARGUMENT,
+                     "the basis was made with --fields and has no breaths: leave out "
+                     "--tidal, --rate and --pv");
     volume->fixed = wanted->volume;
     volume->fixed.gravity[1] = 1.0;
     return supine_basis_pose(basis, &volume->fixed, &pose, error);

@@ -120,10 +120,8 @@ supine_status supine_sh_compress_modes(const supine_expansion *expansion, const 
   if (status == SUPINE_OK) {
     status = find_modes(expansion, gram, kept, values, modes, &energy);
   }
-  if (status != SUPINE_OK) {
-    return supine_error_set(error, status, "modes of band %zu: %s", expansion->band,
-                            supine_status_string(status));
-  }
+  SUPINE_REFUSE_IF(status != SUPINE_OK, error, status, "modes of band %zu: %s", expansion->band,
+                   supine_status_string(status));
   size_t count = 0;
   while (count < kept && values[count] > rank_tolerance * rank_tolerance * values[0]) {
     ++count;

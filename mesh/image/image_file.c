@@ -64,23 +64,19 @@ supine_status supine_image_read(const char *path, supine_image *image, supine_er
   SUPINE_FREED_BY(supine_image_free) supine_image read = {.channels = 1};
   SUPINE_FREED_BY(supine_file_close) FILE *file = NULL;
   image_storage storage = {0};
-  if (!supine_image_supports(path)) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: an image's name must end in .nrrd, .nii, .nii.gz or .mha; convert "
-                            "other formats, for example with 3D Slicer",
-                            path);
-  }
+  SUPINE_REFUSE_IF(!supine_image_supports(path), error, SUPINE_ERROR_FORMAT,
+                   "%s: an image's name must end in .nrrd, .nii, .nii.gz or .mha; convert "
+                   "other formats, for example with 3D Slicer",
+                   path);
   if (stat(path, &about) != 0 || !S_ISREG(about.st_mode) || (file = fopen(path, "rb")) == NULL) {
     const bool other = about.st_mode != 0 && !S_ISREG(about.st_mode);
     return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path,
                             other ? "it is not a regular file" : strerror(errno));
   }
   SUPINE_TRY(formats[format_of(path)].describe(path, file, &read, &storage, error));
-  if (!is_frame(&read)) {
-    return supine_error_set(
-        error, SUPINE_ERROR_FORMAT,
-        "%s: the header's axis directions are linearly dependent: write the image again", path);
-  }
+  SUPINE_REFUSE_IF(!is_frame(&read), error, SUPINE_ERROR_FORMAT,
+                   "%s: the header's axis directions are linearly dependent: write the image again",
+                   path);
   SUPINE_TRY(supine_image_read_voxels(path, file, (size_t)about.st_size, &storage, &read, error));
   *image = read;
   read.values = NULL;
@@ -89,10 +85,8 @@ supine_status supine_image_read(const char *path, supine_image *image, supine_er
 
 supine_status supine_image_write(const char *path, const supine_image *image, const char *note,
                                  supine_error *error) {
-  if (!supine_image_supports(path)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%s: end the name of an image in .nrrd, .nii, .nii.gz or .mha", path);
-  }
+  SUPINE_REFUSE_IF(!supine_image_supports(path), error, SUPINE_ERROR_ARGUMENT,
+                   "%s: end the name of an image in .nrrd, .nii, .nii.gz or .mha", path);
   SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
   SUPINE_TRY(supine_output_open(path, &output, error));
   const supine_status status =

@@ -44,27 +44,22 @@ static supine_status check(const char *path, const nifti_image *nifti, supine_im
   const nifti_dmat44 *m = nifti->sform_code > 0 ? &nifti->sto_xyz : &nifti->qto_xyz;
   const int64_t size[3] = {nifti->nx, nifti->ny, nifti->nz};
   size_t type = 0;
-  if (nifti->ndim < 3 || nifti->nx * nifti->ny * nifti->nz != nifti->nvox) {
-    return supine_error_set(
-        error, SUPINE_ERROR_FORMAT,
-        "%s: ndim is %d; give an image with one number per voxel, three axes and one volume", path,
-        (int)nifti->ndim);
-  }
-  if (nifti->sform_code <= 0 && nifti->qform_code <= 0) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: the header has no orientation (qform and sform are 0); give the "
-                            "file that the segmenter wrote",
-                            path);
-  }
+  SUPINE_REFUSE_IF(
+      nifti->ndim < 3 || nifti->nx * nifti->ny * nifti->nz != nifti->nvox, error,
+      SUPINE_ERROR_FORMAT,
+      "%s: ndim is %d; give an image with one number per voxel, three axes and one volume", path,
+      (int)nifti->ndim);
+  SUPINE_REFUSE_IF(nifti->sform_code <= 0 && nifti->qform_code <= 0, error, SUPINE_ERROR_FORMAT,
+                   "%s: the header has no orientation (qform and sform are 0); give the "
+                   "file that the segmenter wrote",
+                   path);
   const bool wide = nifti->datatype == DT_INT64 || nifti->datatype == DT_UINT64;
   while (type < SUPINE_VOXEL_COUNT && types[type] != (wide ? DT_FLOAT64 : nifti->datatype)) {
     ++type;
   }
-  if (type == SUPINE_VOXEL_COUNT) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: voxels of type %s are not supported; convert them to int16", path,
-                            nifti_datatype_string(nifti->datatype));
-  }
+  SUPINE_REFUSE_IF(type == SUPINE_VOXEL_COUNT, error, SUPINE_ERROR_FORMAT,
+                   "%s: voxels of type %s are not supported; convert them to int16", path,
+                   nifti_datatype_string(nifti->datatype));
   image->voxel = (supine_image_voxel)type;
   image->axes = SUPINE_AXES_RAS;
   image->frame_source = nifti->sform_code > 0 ? "sform" : "qform";
@@ -95,10 +90,8 @@ supine_status supine_image_describe_nifti(const char *path, FILE *file, supine_i
   (void)file;
   nifti_set_debug_level(0);
   nifti_image *nifti = nifti_image_read(path, 0);
-  if (nifti == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: not a NIfTI header; give a NIfTI file",
-                            path);
-  }
+  SUPINE_REFUSE_IF(nifti == NULL, error, SUPINE_ERROR_FORMAT,
+                   "%s: not a NIfTI header; give a NIfTI file", path);
   const supine_status status = check(path, nifti, image, storage, error);
   nifti_image_free(nifti);
   return status;
@@ -158,13 +151,12 @@ supine_status supine_image_write_nifti(const char *path, const supine_image *ima
                                        const char *note, FILE *file, supine_error *error) {
   unsigned char header[352];
   const bool vectors = image->channels == 3 && image->voxel == SUPINE_VOXEL_F32;
-  if ((image->channels != 1 && !vectors) || image->size[0] > INT16_MAX ||
-      image->size[1] > INT16_MAX || image->size[2] > INT16_MAX) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%s: NIfTI-1 holds one number or a 3-vector per voxel, and at most "
-                            "%d voxels along an axis: save it as .nrrd",
-                            path, INT16_MAX);
-  }
+  SUPINE_REFUSE_IF((image->channels != 1 && !vectors) || image->size[0] > INT16_MAX ||
+                       image->size[1] > INT16_MAX || image->size[2] > INT16_MAX,
+                   error, SUPINE_ERROR_ARGUMENT,
+                   "%s: NIfTI-1 holds one number or a 3-vector per voxel, and at most "
+                   "%d voxels along an axis: save it as .nrrd",
+                   path, INT16_MAX);
   SUPINE_ARENA arena = {0};
   const void *values = vectors ? planes(image, &arena) : image->values;
   if (arena.failed) {

@@ -49,13 +49,11 @@ static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState
   if (io->detachedHeader || io->dataFNFormat != NULL || io->dataFNArr->len > 0) {
     return malformed(path, "its voxels are in another file; save all in one file", error);
   }
-  if (nrrd->dim != 3 || nrrd->spaceDim != 3) {
-    return supine_error_set(
-        error, SUPINE_ERROR_FORMAT,
-        nrrd->dim != 3 ? "%s: dimension %u; give an image with one number per voxel and three axes"
+  SUPINE_REFUSE_IF(nrrd->dim != 3 || nrrd->spaceDim != 3, error, SUPINE_ERROR_FORMAT,
+                   nrrd->dim != 3
+                       ? "%s: dimension %u; give an image with one number per voxel and three axes"
                        : "%s: the header lacks space directions for its %u axes; add them",
-        path, nrrd->dim);
-  }
+                   path, nrrd->dim);
   const double turn = nrrd->space == nrrdSpaceLeftPosteriorSuperior   ? 1.0
                       : nrrd->space == nrrdSpaceRightAnteriorSuperior ? -1.0
                                                                       : 0.0;
@@ -79,11 +77,9 @@ static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState
   while (type < SUPINE_VOXEL_COUNT && types[type].type != (wide ? nrrdTypeDouble : nrrd->type)) {
     ++type;
   }
-  if (type == SUPINE_VOXEL_COUNT) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: voxels of type %s are not supported; convert them to int16", path,
-                            teem.airEnumStr(*teem.nrrdType, nrrd->type));
-  }
+  SUPINE_REFUSE_IF(type == SUPINE_VOXEL_COUNT, error, SUPINE_ERROR_FORMAT,
+                   "%s: voxels of type %s are not supported; convert them to int16", path,
+                   teem.airEnumStr(*teem.nrrdType, nrrd->type));
   image->voxel = (supine_image_voxel)type;
   image->axes = turn > 0.0 ? SUPINE_AXES_LPS : SUPINE_AXES_RAS;
   image->frame_source = "space directions";

@@ -100,24 +100,23 @@ supine_status supine_image_read_voxels(const char *path, FILE *file, size_t file
   const size_t each = supine_image_voxel_size(image->voxel);
   const double bytes =
       (double)image->size[0] * (double)image->size[1] * (double)image->size[2] * (double)each;
-  if (!(bytes > 0.0 && bytes <= gzip_ratio * (double)file_size)) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: %zu x %zu x %zu voxels do not fit in %zu bytes: the file is "
-                            "truncated; fetch or write it again",
-                            path, image->size[0], image->size[1], image->size[2], file_size);
-  }
+  SUPINE_REFUSE_IF(!(bytes > 0.0 && bytes <= gzip_ratio * (double)file_size), error,
+                   SUPINE_ERROR_FORMAT,
+                   "%s: %zu x %zu x %zu voxels do not fit in %zu bytes: the file is "
+                   "truncated; fetch or write it again",
+                   path, image->size[0], image->size[1], image->size[2], file_size);
   const size_t count = image->size[0] * image->size[1] * image->size[2];
   image->values = malloc(count * each);
   if (image->values == NULL) {
     return supine_error_memory(error, "%zu voxels of %s", count, path);
   }
-  if (fseeko(file, storage->offset, SEEK_SET) != 0 ||
-      !(storage->packed ? inflate_into(file, (uint64_t)storage->skip, image->values, count * each)
-        : storage->text ? read_text(file, image, count)
-                        : fread(image->values, each, count, file) == count)) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: truncated or damaged; fetch or write the file again", path);
-  }
+  SUPINE_REFUSE_IF(fseeko(file, storage->offset, SEEK_SET) != 0 ||
+                       !(storage->packed ? inflate_into(file, (uint64_t)storage->skip,
+                                                        image->values, count * each)
+                         : storage->text ? read_text(file, image, count)
+                                         : fread(image->values, each, count, file) == count),
+                   error, SUPINE_ERROR_FORMAT,
+                   "%s: truncated or damaged; fetch or write the file again", path);
   if (storage->big_endian && !storage->text) {
     swap_bytes(image->values, count, each);
   }

@@ -170,10 +170,8 @@ static supine_status choose_band(fitting *w, int wanted, supine_fit_report *repo
     if (determined) {
       status = leave_one_out(w, &trial, &report->error[band]);
     }
-    if (status != SUPINE_OK) {
-      return supine_error_set(error, status, "fit of band %zu: %s", band,
-                              supine_status_string(status));
-    }
+    SUPINE_REFUSE_IF(status != SUPINE_OK, error, status, "fit of band %zu: %s", band,
+                     supine_status_string(status));
     if (!determined) {
       break;
     }
@@ -227,9 +225,8 @@ static supine_status cross_validate(const fitting *w, size_t modes, supine_accur
   for (size_t d = 0; d < m; ++d) {
     double square;
     const supine_status status = predict(w, &w->chosen, d, modes, &square);
-    if (status != SUPINE_OK) {
-      return supine_error_set(error, status, "cross-validation: %s", supine_status_string(status));
-    }
+    SUPINE_REFUSE_IF(status != SUPINE_OK, error, status, "cross-validation: %s",
+                     supine_status_string(status));
     cblas_dgemv(CblasRowMajor, CblasTrans, (int)m, (int)w->rows, 1.0, w->fields->displacement,
                 (int)w->rows, w->residual, 1, 0.0, residual, 1);
     for (size_t i = 0; i < w->rows; i += 3) {

@@ -329,9 +329,7 @@ supine_status supine_lungs_gate(supine_mesh *meshes, size_t count,
     SUPINE_TRY(mend(&meshes[m], source->name, findings, error));
   }
   const supine_status status = supine_lungs_create(meshes, count, source->midline, lungs, &inner);
-  if (status != SUPINE_OK) {
-    return supine_error_set(error, status, "%s: %s", source->name, inner.message);
-  }
+  SUPINE_REFUSE_IF(status != SUPINE_OK, error, status, "%s: %s", source->name, inner.message);
   checks c = {source, findings, error, SUPINE_OK};
   check_shape(&c, lungs, &side, axes_hold);
   check_overlap(&c, lungs);

@@ -220,10 +220,8 @@ static supine_status measure(supine_lungs *lungs, const double *midline, supine_
                      "the surface has no extent along %c: give a closed surface", "xyz"[k]);
   }
   const supine_status status = supine_mesh_topology_create(&lungs->mesh, &lungs->topology);
-  if (status != SUPINE_OK) {
-    return supine_error_set(error, status, "no memory for the edges of %zu triangles",
-                            lungs->mesh.triangle_count);
-  }
+  SUPINE_REFUSE_IF(status != SUPINE_OK, error, status, "no memory for the edges of %zu triangles",
+                   lungs->mesh.triangle_count);
   SUPINE_ARENA arena = {0};
   uint8_t *left = supine_arena_take(&arena, lungs->topology.component_count, 1);
   const double overlap =

@@ -8,6 +8,7 @@
 
 #include "precompute/patient/krige.h"
 
+#include "base/arena.h"
 #include "base/vec3.h"
 
 enum {
@@ -264,12 +265,11 @@ static supine_status krige_create(supine_patient_krige *k,
   for (size_t i = 0; i < count; ++i) {
     thirds += rows[i].landmark > 0 ? 1 : 3;
   }
-  if (!options->uncorrected && thirds > 3 * SUPINE_PATIENT_CENTRES_MAX) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%zu points to fit, more than %d: leave landmarks out, evenly over the "
-                            "lungs",
-                            thirds / 3, SUPINE_PATIENT_CENTRES_MAX);
-  }
+  SUPINE_REFUSE_IF(!options->uncorrected && thirds > 3 * SUPINE_PATIENT_CENTRES_MAX, error,
+                   SUPINE_ERROR_FORMAT,
+                   "%zu points to fit, more than %d: leave landmarks out, evenly over the "
+                   "lungs",
+                   thirds / 3, SUPINE_PATIENT_CENTRES_MAX);
   k->centre = supine_arena_take(a, count, sizeof *k->centre);
   k->design = supine_arena_take(a, (TERMS + 1) * count, sizeof *k->design);
   k->normal_matrix = supine_arena_take(a, (size_t)2 * TERMS * TERMS, sizeof *k->normal_matrix);

@@ -204,13 +204,10 @@ static supine_status find_state(supine_patient_record *record, const supine_lung
                                  surface's, divided by the width of the state's box */
   double sum[2] = {0.0, 0.0}; /* [state] sum of the squares of all these distances */
   size_t axis[2] = {0};
-  if (frame->only_side != 0 && frame->only_side != only_side) {
-    return supine_error_set(
-        error, SUPINE_ERROR_MESH,
-        "the patient's law was fitted to the %s lung alone: give that lung, or fit "
-        "the law to both lungs",
-        frame->only_side > 0 ? "left" : "right");
-  }
+  SUPINE_REFUSE_IF(frame->only_side != 0 && frame->only_side != only_side, error, SUPINE_ERROR_MESH,
+                   "the patient's law was fitted to the %s lung alone: give that lung, or fit "
+                   "the law to both lungs",
+                   frame->only_side > 0 ? "left" : "right");
   for (size_t s = 0; s < 2; ++s) {
     /* Do not compare x if the surface lacks one of two fitted lungs. */
     for (size_t k = only_side != frame->only_side ? 1 : 0; k < 3; ++k) {

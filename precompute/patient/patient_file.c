@@ -9,6 +9,7 @@
 
 #include "precompute/patient/patient_file.h"
 
+#include "base/arena.h"
 #include "base/output.h"
 
 static const char format[] = "supine-patient";
@@ -171,9 +172,7 @@ supine_status supine_patient_write(const char *path, const supine_patient_record
                                    const char *made_by, supine_error *error) {
   supine_output output = {0};
   char *text = supine_patient_text(record, made_by);
-  if (text == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %s", path);
-  }
+  SUPINE_REFUSE_IF(text == NULL, error, SUPINE_ERROR_MEMORY, "no memory for %s", path);
   supine_status status = supine_output_open(path, &output, error);
   if (status == SUPINE_OK) {
     (void)fprintf(output.file, "%s\n", text);
@@ -290,10 +289,8 @@ static const char *read_record(const json_t *root, supine_patient_record *record
 static supine_status decode(const char *name, json_t *root, const json_error_t *where,
                             supine_patient_record *record, supine_error *error) {
   double version = 0.0;
-  if (root == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s:%d: %s", name, where->line,
-                            where->text);
-  }
+  SUPINE_REFUSE_IF(root == NULL, error, SUPINE_ERROR_FORMAT, "%s:%d: %s", name, where->line,
+                   where->text);
   memset(record, 0, sizeof *record);
   const bool known = strcmp(text_of(root, NULL, "format"), format) == 0 &&
                      read_numbers(json_object_get(root, "version"), 1, &version) &&
@@ -323,9 +320,8 @@ supine_status supine_patient_read(const char *path, supine_patient_record *recor
                                   supine_error *error) {
   json_error_t where;
   FILE *file = fopen(path, "rb");
-  if (file == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot open: %s", path, strerror(errno));
-  }
+  SUPINE_REFUSE_IF(file == NULL, error, SUPINE_ERROR_READ, "%s: cannot open: %s", path,
+                   strerror(errno));
   json_t *root = json_loadf(file, 0, &where);
   (void)fclose(file);
   return decode(path, root, &where, record, error);

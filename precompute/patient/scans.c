@@ -154,13 +154,12 @@ supine_status supine_patient_scans_order(supine_patient_scans *scans, supine_pat
   const double growth = record->from_surface     ? volume[1] / volume[0]
                         : scans->pairs.count > 0 ? supine_patient_pairs_growth(&scans->pairs)
                                                  : 1.0;
-  if ((named > 0 && growth < 1.0 - volume_error) || (named < 0 && growth > 1.0 + volume_error)) {
-    return supine_error_set(
-        error, SUPINE_ERROR_FORMAT,
-        "the scan given as the fuller one has only %.0f %% of the volume of the "
-        "other scan: exchange --rest and --other, or give --reverse",
-        100.0 * (named > 0 ? growth : 1.0 / growth));
-  }
+  SUPINE_REFUSE_IF((named > 0 && growth < 1.0 - volume_error) ||
+                       (named < 0 && growth > 1.0 + volume_error),
+                   error, SUPINE_ERROR_FORMAT,
+                   "the scan given as the fuller one has only %.0f %% of the volume of the "
+                   "other scan: exchange --rest and --other, or give --reverse",
+                   100.0 * (named > 0 ? growth : 1.0 / growth));
   if (volume[0] > 0.0 && scans->pairs.count > 0) {
     SUPINE_TRY(find_sides(&scans->lungs[0], &scans->pairs, error));
   }

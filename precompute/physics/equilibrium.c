@@ -87,11 +87,8 @@ supine_status supine_physics_stiffness_normalise(size_t count, const double *sti
   }
   double logarithms = 0.0;
   for (size_t i = 0; i < count; ++i) {
-    if (!(stiffness[i] > 0.0) || !isfinite(stiffness[i])) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "the stiffness of vertex %zu is %g: give a positive number", i,
-                              stiffness[i]);
-    }
+    SUPINE_REFUSE_IF(!(stiffness[i] > 0.0) || !isfinite(stiffness[i]), error, SUPINE_ERROR_ARGUMENT,
+                     "the stiffness of vertex %zu is %g: give a positive number", i, stiffness[i]);
     logarithms += log(stiffness[i]);
   }
   const double factor = exp(-logarithms / (double)count);
@@ -426,13 +423,12 @@ supine_status supine_physics_equilibrium_solve(supine_equilibrium *equilibrium, 
       return supine_error_memory(error, "the equilibrium of %zu vertices",
                                  equilibrium->vertex_count);
     }
-    if (s.status[k] != SUPINE_OK || !(s.residual[k] <= residual_limit)) {
-      return supine_error_set(
-          error, SUPINE_ERROR_NUMERICAL,
-          "the equilibrium was not solved: the relative residual is %.3g, above "
-          "%.3g. Check that forces and stiffnesses are finite, or give a shorter --reach",
-          s.status[k] != SUPINE_OK ? INFINITY : s.residual[k], residual_limit);
-    }
+    SUPINE_REFUSE_IF(
+        s.status[k] != SUPINE_OK || !(s.residual[k] <= residual_limit), error,
+        SUPINE_ERROR_NUMERICAL,
+        "the equilibrium was not solved: the relative residual is %.3g, above "
+        "%.3g. Check that forces and stiffnesses are finite, or give a shorter --reach",
+        s.status[k] != SUPINE_OK ? INFINITY : s.residual[k], residual_limit);
   }
   return SUPINE_OK;
 }
@@ -468,11 +464,9 @@ supine_status supine_physics_equilibrium_force(supine_equilibrium *equilibrium,
 supine_status supine_physics_transfer_column(supine_equilibrium *equilibrium, size_t vertex,
                                              double *column, supine_error *error) {
   const size_t n = equilibrium->vertex_count;
-  if (vertex >= n) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "vertex %zu is out of range: the mesh has %zu vertices, counted from 0",
-                            vertex, n);
-  }
+  SUPINE_REFUSE_IF(vertex >= n, error, SUPINE_ERROR_ARGUMENT,
+                   "vertex %zu is out of range: the mesh has %zu vertices, counted from 0", vertex,
+                   n);
   SUPINE_ARENA arena = {0};
   double *force = supine_arena_zeros(&arena, n, sizeof *force);
   if (force == NULL) {

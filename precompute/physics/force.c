@@ -104,11 +104,10 @@ supine_status supine_physics_directions(const supine_lungs *lungs, const supine_
                                         supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   for (size_t k = 0; k < 6; ++k) {
-    if (!isfinite(law->c[k]) || (k % 2 == 1 && !(law->c[k] > 0.0))) {
-      return supine_error_set(
-          error, SUPINE_ERROR_ARGUMENT, "direction constant c%zu is %g: %s", k + 1, law->c[k],
-          k % 2 == 1 ? "it is an exponent: give a number above 0" : "give a finite number");
-    }
+    SUPINE_REFUSE_IF(!isfinite(law->c[k]) || (k % 2 == 1 && !(law->c[k] > 0.0)), error,
+                     SUPINE_ERROR_ARGUMENT, "direction constant c%zu is %g: %s", k + 1, law->c[k],
+                     k % 2 == 1 ? "it is an exponent: give a number above 0"
+                                : "give a finite number");
   }
   for (size_t i = 0; i < n && law->vectors == NULL; ++i) {
     box_direction(lungs, law->c, i, directions + 3 * i);

@@ -177,14 +177,13 @@ static supine_status advance(ascent *a, supine_error *error) {
     }
     matrix[j * n + j] *= 1.0 + ridge;
   }
-  if (n > 0 && LAPACKE_dposv(LAPACK_ROW_MAJOR, 'L', (lapack_int)n, 1, matrix, (lapack_int)n,
-                             weights, 1) != 0) {
-    return supine_error_set(
-        error, SUPINE_ERROR_NUMERICAL,
-        "no surface at full inflation was found: the iteration does not progress. If the scan is "
-        "fuller than --scanned says, change --scanned or --resting; --scanned none uses the scan "
-        "as it is");
-  }
+  SUPINE_REFUSE_IF(
+      n > 0 && LAPACKE_dposv(LAPACK_ROW_MAJOR, 'L', (lapack_int)n, 1, matrix, (lapack_int)n,
+                             weights, 1) != 0,
+      error, SUPINE_ERROR_NUMERICAL,
+      "no surface at full inflation was found: the iteration does not progress. If the scan is "
+      "fuller than --scanned says, change --scanned or --resting; --scanned none uses the scan "
+      "as it is");
   double *to = a->estimate.mesh.vertices;
   memcpy(to, a->map, a->size * sizeof *to);
   for (size_t j = 0; j < n; ++j) {

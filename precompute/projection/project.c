@@ -107,10 +107,8 @@ supine_status supine_projection_create(const supine_lungs *lungs, const supine_m
     status = expand(lungs, &model->force, band, projection->span, grid, expansion->functions);
     supine_sh_grid_destroy(grid);
   }
-  if (status != SUPINE_OK) {
-    return supine_error_set(error, status, "projection to band %zu: %s", band,
-                            supine_status_string(status));
-  }
+  SUPINE_REFUSE_IF(status != SUPINE_OK, error, status, "projection to band %zu: %s", band,
+                   supine_status_string(status));
   return solve(lungs, model, projection, error);
 }
 

@@ -59,9 +59,8 @@ supine_validation_points(const supine_patient_pairs *pairs, const double *predic
                          supine_validation_distance distance[SUPINE_PATIENT_MAP_COUNT],
                          supine_error *error) {
   double *space = malloc(pairs->count * sizeof *space);
-  if (space == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu points", pairs->count);
-  }
+  SUPINE_REFUSE_IF(space == NULL, error, SUPINE_ERROR_MEMORY, "no memory for %zu points",
+                   pairs->count);
   for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT; ++k) {
     supine_patient_affinity by;
     distance[k].expected = distance[k].within = 0.0;

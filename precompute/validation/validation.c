@@ -47,11 +47,9 @@ static supine_status find_gains(const supine_validation *s, const supine_validat
                                 supine_error *error) {
   supine_state asked = state->state;
   if (asked.volume.kind == SUPINE_VOLUME_DEFAULT) {
-    if (scan == NULL) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "the volume of the other state is unknown, and landmarks do not give "
-                              "it: give --to POSTURE:VOLUME");
-    }
+    SUPINE_REFUSE_IF(scan == NULL, error, SUPINE_ERROR_ARGUMENT,
+                     "the volume of the other state is unknown, and landmarks do not give "
+                     "it: give --to POSTURE:VOLUME");
     asked.volume = (supine_volume){SUPINE_VOLUME_ABSOLUTE, 1e-3 * supine_mesh_volume(scan)};
   }
   SUPINE_TRY(supine_basis_gains(s->basis, &asked, &outcome->pose, error));

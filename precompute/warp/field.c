@@ -75,11 +75,10 @@ static supine_status read_grid(const supine_basis *basis, supine_image *nodes,
   const supine_tensor *size = supine_basis_tensor(basis, "grid_size");
   const supine_tensor *of = supine_basis_tensor(basis, "part");
   const supine_tensor *deep = supine_basis_tensor(basis, "depth");
-  if (grid == NULL || size == NULL || of == NULL || deep == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "the basis holds no grid: make one with 'supine embed BASIS --grid MM' "
-                            "or 'supine embed BASIS IMAGE'");
-  }
+  SUPINE_REFUSE_IF(grid == NULL || size == NULL || of == NULL || deep == NULL, error,
+                   SUPINE_ERROR_FORMAT,
+                   "the basis holds no grid: make one with 'supine embed BASIS --grid MM' "
+                   "or 'supine embed BASIS IMAGE'");
   bool valid = grid->dtype == SUPINE_F64 && grid->rank == 2 && grid->shape[0] == 4 &&
                grid->shape[1] == 3 && size->dtype == SUPINE_U32 && size->rank == 1 &&
                size->shape[0] == 3 && of->dtype == SUPINE_U32 && of->rank == 1 &&
@@ -105,11 +104,8 @@ static supine_status read_grid(const supine_basis *basis, supine_image *nodes,
     /* The result is finite only if the axes of the grid are linearly independent. */
     supine_image_locate(nodes, axes, axes);
   }
-  if (!valid || !isfinite(axes[0] + axes[1] + axes[2])) {
-    return supine_error_set(
-        error, SUPINE_ERROR_FORMAT,
-        "the grid in the basis is malformed: make it again with 'supine embed'");
-  }
+  SUPINE_REFUSE_IF(!valid || !isfinite(axes[0] + axes[1] + axes[2]), error, SUPINE_ERROR_FORMAT,
+                   "the grid in the basis is malformed: make it again with 'supine embed'");
   *part = of->data;
   *depth = deep->data;
   return SUPINE_OK;

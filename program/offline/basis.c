@@ -2,6 +2,7 @@
 /* The options of `supine precompute`, and what they do. */
 #include <string.h>
 
+#include "base/arena.h"
 #include "precompute/fields/fields.h"
 #include "program/offline/basis.h"
 #include "program/options/model_options.h"
@@ -174,17 +175,14 @@ void supine_offline_begin(void *request) {
 
 supine_status supine_offline_check(supine_offline_request *wanted, supine_error *error) {
   supine_scan *scan = &wanted->model.scan;
-  if (supine_mesh_save_supports(wanted->basis.path)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%s: this is the name of a mesh: give a name that ends in .safetensors",
-                            wanted->basis.path);
-  }
+  SUPINE_REFUSE_IF(supine_mesh_save_supports(wanted->basis.path), error, SUPINE_ERROR_ARGUMENT,
+                   "%s: this is the name of a mesh: give a name that ends in .safetensors",
+                   wanted->basis.path);
   if (wanted->fields != NULL) { /* they displace the surface as it is */
-    if (scan->known && scan->state.volume.kind != SUPINE_VOLUME_DEFAULT) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "--scanned: with --fields, give the posture alone, such as supine, "
-                              "as fields of gravity have no volume");
-    }
+    SUPINE_REFUSE_IF(scan->known && scan->state.volume.kind != SUPINE_VOLUME_DEFAULT, error,
+                     SUPINE_ERROR_ARGUMENT,
+                     "--scanned: with --fields, give the posture alone, such as supine, "
+                     "as fields of gravity have no volume");
     wanted->posture = *scan;
     scan->known = false;
     wanted->model.has_scan = true;

@@ -109,14 +109,11 @@ supine_status supine_precompute_basis(const supine_precompute_input *input,
   char path[sizeof folder + 32];
   job j = {.input = input, .result = result};
   *result = (supine_precompute_result){.bytes = NULL};
-  if (input->path_count > 0 && input->surface_count > 0) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give files or arrays, not both");
-  }
+  SUPINE_REFUSE_IF(input->path_count > 0 && input->surface_count > 0, error, SUPINE_ERROR_ARGUMENT,
+                   "give files or arrays, not both");
   (void)snprintf(folder, sizeof folder, "%s/supine-XXXXXX", temporary != NULL ? temporary : "/tmp");
-  if (input->output == NULL && mkdtemp(folder) == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_WRITE,
-                            "%s: cannot write: set TMPDIR to another folder", folder);
-  }
+  SUPINE_REFUSE_IF(input->output == NULL && mkdtemp(folder) == NULL, error, SUPINE_ERROR_WRITE,
+                   "%s: cannot write: set TMPDIR to another folder", folder);
   (void)snprintf(path, sizeof path, "%s/basis.safetensors", folder);
   gsl_error_handler_t *handler = gsl_set_error_handler_off();
   const int threads = openblas_get_num_threads();

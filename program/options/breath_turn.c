@@ -51,10 +51,9 @@ supine_status supine_breath_turn_read(const char *text, void *turn, supine_error
   if (*unit == 's') {
     *unit = '\0';
   }
-  if (!supine_options_parse_number(seconds, &made->seconds) || !(made->seconds > 0.0)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "'%s': the time must be above 0 s, as in supine:left:5s", text);
-  }
+  SUPINE_REFUSE_IF(!supine_options_parse_number(seconds, &made->seconds) || !(made->seconds > 0.0),
+                   error, SUPINE_ERROR_ARGUMENT,
+                   "'%s': the time must be above 0 s, as in supine:left:5s", text);
   supine_state state[2] = {{.lung_count = 0}};
   SUPINE_TRY(supine_state_parse_posture(from, &state[0], error));
   SUPINE_TRY(supine_state_parse_posture(to, &state[1], error));

@@ -36,12 +36,10 @@ supine_status supine_command_names_open(const supine_basis *basis, supine_comman
   const supine_tensor *text = supine_basis_tensor(basis, "names");
   const supine_tensor *part = supine_basis_tensor(basis, "part");
   *names = (supine_command_names){0};
-  if (text == NULL || part == NULL || text->dtype != SUPINE_U8 || text->rank != 1 ||
-      part->dtype != SUPINE_U32 || part->rank != 1 || part->shape[0] != n) {
-    return supine_error_set(
-        error, SUPINE_ERROR_FORMAT,
-        "the basis names no points: make one with 'supine embed BASIS POINTS.csv'");
-  }
+  SUPINE_REFUSE_IF(text == NULL || part == NULL || text->dtype != SUPINE_U8 || text->rank != 1 ||
+                       part->dtype != SUPINE_U32 || part->rank != 1 || part->shape[0] != n,
+                   error, SUPINE_ERROR_FORMAT,
+                   "the basis names no points: make one with 'supine embed BASIS POINTS.csv'");
   const size_t length = text->shape[0];
   char *space = supine_arena_zeros(&names->arena, length + 1, 1);
   names->part = part->data;
@@ -58,12 +56,10 @@ supine_status supine_command_names_open(const supine_basis *basis, supine_comman
     }
   }
   for (size_t i = 0; i < n; ++i) {
-    if (names->part[i] >= names->count) {
-      return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "point %zu of the basis has no name: make the file again with "
-                              "'supine embed BASIS POINTS.csv'",
-                              i);
-    }
+    SUPINE_REFUSE_IF(names->part[i] >= names->count, error, SUPINE_ERROR_FORMAT,
+                     "point %zu of the basis has no name: make the file again with "
+                     "'supine embed BASIS POINTS.csv'",
+                     i);
   }
   return sort_by_name(names, n, error);
 }

@@ -266,10 +266,8 @@ supine_status supine_command_load_lungs(const char *command, const char *operand
   const char *second = operand;
   supine_source source = {.is_map = false};
   (void)supine_options_next_item(&second, first, sizeof first);
-  if (second != NULL && strchr(second, ',') != NULL) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "'%s' names more than two surfaces: give one or two", operand);
-  }
+  SUPINE_REFUSE_IF(second != NULL && strchr(second, ',') != NULL, error, SUPINE_ERROR_ARGUMENT,
+                   "'%s' names more than two surfaces: give one or two", operand);
   char *paths[] = {first, (char *)second};
   const supine_status status =
       supine_precompute_source_load(options, paths, second != NULL ? 2 : 1, &source, error);

@@ -155,9 +155,7 @@ static supine_status refuse_unknown(const reading *r, int got, const char *given
     names[i] = r->rows[i].option->name;
   }
   names[r->count] = "help";
-  if (got == ':') {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "option '%s' needs a value", given);
-  }
+  SUPINE_REFUSE_IF(got == ':', error, SUPINE_ERROR_ARGUMENT, "option '%s' needs a value", given);
   const char *nearest =
       strncmp(given, "--", 2) == 0 ? supine_options_suggest(given + 2, names, r->count + 1) : NULL;
   return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "no option '%s'%s%s%s", given,
@@ -224,11 +222,9 @@ static supine_status check_partners(const reading *r, const supine_option *optio
     const supine_option *other = r->rows[i].option;
     char name[40];
     (void)snprintf(name, sizeof name, " %s ", other->name);
-    if (r->rows[i].given && other != option && strstr(listed, name) == NULL) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "--%s has no effect with --%s: leave one of them out", other->name,
-                              option->name);
-    }
+    SUPINE_REFUSE_IF(r->rows[i].given && other != option && strstr(listed, name) == NULL, error,
+                     SUPINE_ERROR_ARGUMENT, "--%s has no effect with --%s: leave one of them out",
+                     other->name, option->name);
   }
   return SUPINE_OK;
 }
@@ -248,16 +244,13 @@ static supine_status check_given(const reading *r, size_t operands, char **argv,
       most = alone ? 0 : most;
     }
   }
-  if (operands > most && most == 0) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "unexpected argument '%s': remove it",
-                            argv[optind]);
-  }
+  SUPINE_REFUSE_IF(operands > most && most == 0, error, SUPINE_ERROR_ARGUMENT,
+                   "unexpected argument '%s': remove it", argv[optind]);
   if (alone) {
     return SUPINE_OK;
   }
-  if (operands < command->operands_least || operands > command->operands_most) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%s", command->operands_missing);
-  }
+  SUPINE_REFUSE_IF(operands < command->operands_least || operands > command->operands_most, error,
+                   SUPINE_ERROR_ARGUMENT, "%s", command->operands_missing);
   for (size_t i = 0; i < r->count; ++i) {
     const supine_option *option = r->rows[i].option;
     if (option->required && !r->rows[i].given) {
@@ -268,11 +261,10 @@ static supine_status check_given(const reading *r, size_t operands, char **argv,
                               option->endings != NULL ? "; its name must end in " : "",
                               option->endings != NULL ? option->endings : "");
     }
-    if (option->endings != NULL && r->rows[i].given &&
-        !has_ending(r->rows[i].value, option->endings)) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%s: the name must end in %s",
-                              r->rows[i].value, option->endings);
-    }
+    SUPINE_REFUSE_IF(option->endings != NULL && r->rows[i].given &&
+                         !has_ending(r->rows[i].value, option->endings),
+                     error, SUPINE_ERROR_ARGUMENT, "%s: the name must end in %s", r->rows[i].value,
+                     option->endings);
   }
   return SUPINE_OK;
 }
@@ -317,11 +309,10 @@ static supine_status check_outputs(const reading *r, const supine_arguments *giv
     }
   }
   for (size_t i = 0; i < r->count; ++i) {
-    if (r->rows[i].given && r->rows[i].option->file == SUPINE_FILE_OUT &&
-        supine_output_is_standard(r->rows[i].value) && !supine_output_take_standard()) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "standard output is closed: give a file instead of -");
-    }
+    SUPINE_REFUSE_IF(
+        r->rows[i].given && r->rows[i].option->file == SUPINE_FILE_OUT &&
+            supine_output_is_standard(r->rows[i].value) && !supine_output_take_standard(),
+        error, SUPINE_ERROR_ARGUMENT, "standard output is closed: give a file instead of -");
   }
   return SUPINE_OK;
 }

@@ -104,30 +104,22 @@ supine_status supine_breath_load(const char *path, supine_pv *pv, supine_error *
   json_t *limbs[SUPINE_PV_LIMB_COUNT];
   SUPINE_FREED_BY(supine_file_close) FILE *file = fopen(path, "rb");
   json_auto_t *root = file == NULL ? NULL : json_loadf(file, JSON_REJECT_DUPLICATES, &why);
-  if (file == NULL || ferror(file) != 0) {
-    return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path, strerror(errno));
-  }
-  if (root == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s:%d: %s: make the file with 'supine pv fit'", path, why.line,
-                            why.text);
-  }
+  SUPINE_REFUSE_IF(file == NULL || ferror(file) != 0, error, SUPINE_ERROR_READ,
+                   "%s: cannot read: %s", path, strerror(errno));
+  SUPINE_REFUSE_IF(root == NULL, error, SUPINE_ERROR_FORMAT,
+                   "%s:%d: %s: make the file with 'supine pv fit'", path, why.line, why.text);
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     const char *name = supine_breath_limb_name((supine_pv_limb)limb);
     supine_error wrong;
     limbs[limb] = json_object_get(root, name);
-    if (limbs[limb] != NULL && read_curve(limbs[limb], &found.limb[limb], &wrong) != SUPINE_OK) {
-      return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s: %s: %.300s: make the file with 'supine pv fit'", path, name,
-                              wrong.message);
-    }
+    SUPINE_REFUSE_IF(
+        limbs[limb] != NULL && read_curve(limbs[limb], &found.limb[limb], &wrong) != SUPINE_OK,
+        error, SUPINE_ERROR_FORMAT, "%s: %s: %.300s: make the file with 'supine pv fit'", path,
+        name, wrong.message);
   }
-  if (limbs[0] == NULL && limbs[1] == NULL) {
-    return supine_error_set(
-        error, SUPINE_ERROR_FORMAT,
-        "%s: neither the limb inhale nor exhale is given: make the file with 'supine pv fit'",
-        path);
-  }
+  SUPINE_REFUSE_IF(
+      limbs[0] == NULL && limbs[1] == NULL, error, SUPINE_ERROR_FORMAT,
+      "%s: neither the limb inhale nor exhale is given: make the file with 'supine pv fit'", path);
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     pv->limb[limb] = found.limb[limbs[limb] != NULL ? limb : 1 - limb];
   }

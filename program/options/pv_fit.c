@@ -202,11 +202,9 @@ static supine_status fit_sorted(problem *limb, double confidence, supine_pv_curv
     limb->v[j] = (s[j].volume - s[0].volume) / span;
   }
   SUPINE_TRY(check_falls(limb, span, error));
-  if (minimise(limb) != SUPINE_OK) {
-    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                            "%s: no pressure-volume curve fits: look for an outlier and remove it",
-                            limb->name);
-  }
+  SUPINE_REFUSE_IF(minimise(limb) != SUPINE_OK, error, SUPINE_ERROR_NUMERICAL,
+                   "%s: no pressure-volume curve fits: look for an outlier and remove it",
+                   limb->name);
   const double *found = gsl_multifit_nlinear_position(limb->work)->data;
   *curve = (supine_pv_curve){
       .pressure = {low, high},
@@ -224,12 +222,10 @@ supine_status supine_breath_fit(const char *name, size_t count, const supine_pv_
                                 double confidence, supine_pv_curve *curve, supine_pv_report *report,
                                 supine_error *error) {
   gsl_multifit_nlinear_parameters options = gsl_multifit_nlinear_default_parameters();
-  if (count <= SUPINE_PV_UNKNOWNS) {
-    return supine_error_set(
-        error, SUPINE_ERROR_FORMAT,
-        "%s: a limb has %zu sample%s, too few for %d unknowns: give at least %d", name, count,
-        count == 1 ? "" : "s", (int)SUPINE_PV_UNKNOWNS, (int)SUPINE_PV_UNKNOWNS + 1);
-  }
+  SUPINE_REFUSE_IF(count <= SUPINE_PV_UNKNOWNS, error, SUPINE_ERROR_FORMAT,
+                   "%s: a limb has %zu sample%s, too few for %d unknowns: give at least %d", name,
+                   count, count == 1 ? "" : "s", (int)SUPINE_PV_UNKNOWNS,
+                   (int)SUPINE_PV_UNKNOWNS + 1);
   SUPINE_ARENA arena = {0};
   SUPINE_FREED_BY(free_workspace)
   problem limb = {.name = name,

@@ -62,15 +62,11 @@ supine_status supine_options_posture_list_parse(const char *text, const supine_s
   char name[2 * SUPINE_POSTURE_NAME_MAX];
   list->count = 0;
   for (const char *at = text; supine_options_next_item(&at, name, sizeof name);) {
-    if (list->count == SUPINE_POSTURE_LIST_MAX) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "more than %d postures: name fewer",
-                              SUPINE_POSTURE_LIST_MAX);
-    }
+    SUPINE_REFUSE_IF(list->count == SUPINE_POSTURE_LIST_MAX, error, SUPINE_ERROR_ARGUMENT,
+                     "more than %d postures: name fewer", SUPINE_POSTURE_LIST_MAX);
     supine_posture_item *item = &list->item[list->count++];
-    if (name[0] == '\0') {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "no posture '' in '%s': remove a comma, or name a posture", text);
-    }
+    SUPINE_REFUSE_IF(name[0] == '\0', error, SUPINE_ERROR_ARGUMENT,
+                     "no posture '' in '%s': remove a comma, or name a posture", text);
     (void)snprintf(item->name, sizeof item->name, "%.*s", (int)sizeof item->name - 1, name);
     item->state = *standard;
     item->state.gravity[1] = 1.0; /* supine, if the state names no posture */
@@ -144,9 +140,8 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
   supine_error inner;
   const supine_status status = supine_basis_pose(basis, &state, &reference->pose, &inner);
   reference->state = state;
-  if (status != SUPINE_OK) {
-    return supine_error_set(error, status, "%s%s", from->given ? "--from: " : "", inner.message);
-  }
+  SUPINE_REFUSE_IF(status != SUPINE_OK, error, status, "%s%s", from->given ? "--from: " : "",
+                   inner.message);
   if (state.lung_count == 0 && state.volume.kind == SUPINE_VOLUME_DEFAULT) {
     state.volume = supine_basis_default_volume(basis); /* the name states the volume */
   }
@@ -175,12 +170,10 @@ supine_status supine_options_plausible(const supine_plausible *lungs, supine_err
   } else {
     return SUPINE_OK;
   }
-  if (!lungs->allowed) {
-    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                            "%s: %s: choose a volume nearer to rest, or accept this with "
-                            "--allow-folds",
-                            state, wrong);
-  }
+  SUPINE_REFUSE_IF(!lungs->allowed, error, SUPINE_ERROR_NUMERICAL,
+                   "%s: %s: choose a volume nearer to rest, or accept this with "
+                   "--allow-folds",
+                   state, wrong);
   supine_options_say(lungs->command, "warning: %s: %s", state, wrong);
   return SUPINE_OK;
 }

@@ -27,9 +27,7 @@ static supine_status find_breath(const supine_comparison *c, float *xyz[2],
   }
   supine_error wrong;
   supine_status status = supine_basis_gains(c->basis, &state, &after, &wrong);
-  if (status != SUPINE_OK) {
-    return supine_error_set(error, status, "%s: %s", item->name, wrong.message);
-  }
+  SUPINE_REFUSE_IF(status != SUPINE_OK, error, status, "%s: %s", item->name, wrong.message);
   SUPINE_TRY(
       supine_options_pose_check(c->basis, command, c->volume.allow_folds, &state, &after, error));
   (void)supine_basis_volumes(c->basis, &after, posture->gain);
@@ -52,9 +50,7 @@ static supine_status find_posture(const supine_comparison *c, float *distance, f
   const supine_posture_item *item = posture->item;
   supine_error wrong;
   supine_status status = supine_basis_pose(c->basis, &item->state, &posture->pose, &wrong);
-  if (status != SUPINE_OK) {
-    return supine_error_set(error, status, "%s: %s", item->name, wrong.message);
-  }
+  SUPINE_REFUSE_IF(status != SUPINE_OK, error, status, "%s: %s", item->name, wrong.message);
   (void)supine_compare_distances(c->compare, &posture->pose, &c->reference.pose, distance);
   supine_compare_statistics(c->compare, distance, &posture->displacement);
   (void)supine_basis_volumes(c->basis, &posture->pose, posture->volume);
@@ -111,11 +107,8 @@ supine_status supine_report_find(supine_comparison *c, supine_error *error) {
     c->posture[i].item = &c->postures.item[i];
     c->posture[i].label = supine_options_posture_label(c->postures.item[i].name);
     const supine_status status = find_posture(c, distance, xyz, &c->posture[i], &wrong);
-    if (status != SUPINE_OK) {
-      return supine_error_set(error, status, "%s: %s", c->path,
-                              wrong.message[0] != '\0' ? wrong.message
-                                                       : supine_status_string(status));
-    }
+    SUPINE_REFUSE_IF(status != SUPINE_OK, error, status, "%s: %s", c->path,
+                     wrong.message[0] != '\0' ? wrong.message : supine_status_string(status));
   }
   return find_errors(c, error);
 }

@@ -8,6 +8,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "base/arena.h"
 #include "program/stream/peer.h"
 
 supine_status supine_stream_address_read(const char *text, bool numeric,
@@ -19,30 +20,24 @@ supine_status supine_stream_address_read(const char *text, bool numeric,
   if (colon != NULL) {
     const bool bracketed = text[0] == '[' && colon > text + 1 && colon[-1] == ']';
     const size_t length = (size_t)(colon - text) - (bracketed ? 2 : 0);
-    if (length == 0 || length >= sizeof address->host) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "'%s': the host before the port is missing or longer than 255 "
-                              "characters: give HOST:PORT",
-                              text);
-    }
+    SUPINE_REFUSE_IF(length == 0 || length >= sizeof address->host, error, SUPINE_ERROR_ARGUMENT,
+                     "'%s': the host before the port is missing or longer than 255 "
+                     "characters: give HOST:PORT",
+                     text);
     memcpy(host, text + (bracketed ? 1 : 0), length);
     host[length] = '\0';
   }
   char *end = NULL;
   const long number = strtol(port, &end, 10);
-  if (end == port || *end != '\0' || number < 0 || number > 65535) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "'%s' is not a port: give 0 to 65535",
-                            port);
-  }
+  SUPINE_REFUSE_IF(end == port || *end != '\0' || number < 0 || number > 65535, error,
+                   SUPINE_ERROR_ARGUMENT, "'%s' is not a port: give 0 to 65535", port);
   const struct addrinfo wanted = {.ai_socktype = SOCK_STREAM,
                                   .ai_flags = AI_NUMERICSERV | (numeric ? AI_NUMERICHOST : 0)};
   struct addrinfo *found = NULL;
   const int failure = getaddrinfo(host, port, &wanted, &found);
-  if (failure != 0) {
-    return supine_error_set(
-        error, SUPINE_ERROR_ARGUMENT, "'%s': %s: give %s", host, gai_strerror(failure),
-        numeric ? "a numeric address, such as 127.0.0.1" : "a host name or a numeric address");
-  }
+  SUPINE_REFUSE_IF(
+      failure != 0, error, SUPINE_ERROR_ARGUMENT, "'%s': %s: give %s", host, gai_strerror(failure),
+      numeric ? "a numeric address, such as 127.0.0.1" : "a host name or a numeric address");
   memcpy(&address->where, found->ai_addr, found->ai_addrlen);
   address->size = found->ai_addrlen;
   address->port = (int)number;

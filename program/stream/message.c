@@ -5,6 +5,7 @@
 #include <stdbool.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/clones.h"
 #include "base/vec3.h"
 #include "program/stream/message.h"
@@ -31,16 +32,11 @@ supine_status supine_stream_header_read(const unsigned char bytes[SUPINE_STREAM_
                                    .crc = number(bytes + 50, 8)};
   memcpy(header->type, bytes + 2, sizeof header->type - 1);
   memcpy(header->device, bytes + 14, sizeof header->device - 1);
-  if (header->version != 1 && header->version != 2) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "message header version %u is unknown: send version 1 or 2",
-                            header->version);
-  }
+  SUPINE_REFUSE_IF(header->version != 1 && header->version != 2, error, SUPINE_ERROR_FORMAT,
+                   "message header version %u is unknown: send version 1 or 2", header->version);
   for (const char *c = header->type; *c != '\0'; ++c) {
-    if (!isprint((unsigned char)*c)) {
-      return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "the type of a message is not text: send OpenIGTLink messages");
-    }
+    SUPINE_REFUSE_IF(!isprint((unsigned char)*c), error, SUPINE_ERROR_FORMAT,
+                     "the type of a message is not text: send OpenIGTLink messages");
   }
   return SUPINE_OK;
 }
@@ -235,17 +231,12 @@ supine_status supine_stream_message_read(const supine_stream_header *header,
                                          supine_stream_message *message, supine_error *error) {
   *message = (supine_stream_message){0};
   const size_t size = (size_t)header->size;
-  if (supine_stream_crc64(0, body, size) != header->crc) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: the checksum is wrong: send the message again", header->type);
-  }
+  SUPINE_REFUSE_IF(supine_stream_crc64(0, body, size) != header->crc, error, SUPINE_ERROR_FORMAT,
+                   "%s: the checksum is wrong: send the message again", header->type);
   cursor c = {body, size, 0};
-  if (header->version == 2 && !unwrap(&c)) {
-    return supine_error_set(
-        error, SUPINE_ERROR_FORMAT,
-        "%s: the sizes of extension and metadata exceed the body: correct the sender",
-        header->type);
-  }
+  SUPINE_REFUSE_IF(header->version == 2 && !unwrap(&c), error, SUPINE_ERROR_FORMAT,
+                   "%s: the sizes of extension and metadata exceed the body: correct the sender",
+                   header->type);
   const int ours = device == NULL || strcmp(header->device, device) == 0;
   if (strcmp(header->device, "VOLUME") == 0 || strcmp(header->device, "SEND") == 0) {
     const int volume = header->device[0] == 'V';

@@ -73,12 +73,10 @@ static supine_status write_file(const char *path, const char *text, const char *
   const size_t length = strlen(text);
   const size_t padding = -length % 4;
   *total = 12 + 8 + length + padding + 8 + bytes;
-  if (*total > UINT32_MAX) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%s: %zu bytes exceed glTF's limit of 4 GiB: use fewer modes or "
-                            "vertices",
-                            path, *total);
-  }
+  SUPINE_REFUSE_IF(*total > UINT32_MAX, error, SUPINE_ERROR_ARGUMENT,
+                   "%s: %zu bytes exceed glTF's limit of 4 GiB: use fewer modes or "
+                   "vertices",
+                   path, *total);
   SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
   SUPINE_TRY(supine_output_open(path, &output, error));
   const uint32_t head[] = {magic, VERSION, (uint32_t)*total, (uint32_t)(length + padding),
@@ -98,9 +96,7 @@ static supine_status make_and_write(glb *g, const char *path, size_t *total, sup
   size_t bytes = 0;
   json_t *roots = NULL;
   g->numbers = open_memstream(&numbers, &bytes);
-  if (g->numbers == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
-  }
+  SUPINE_REFUSE_IF(g->numbers == NULL, error, SUPINE_ERROR_MEMORY, "out of memory");
   supine_status status = add_all(g, &roots, error);
   const bool whole = ferror(g->numbers) == 0;
   if (fclose(g->numbers) != 0 || !whole) {
@@ -131,10 +127,8 @@ supine_status supine_export_glb_write(const char *path, const supine_basis *basi
                                       const export_glb_options *options, size_t *bytes,
                                       supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
-  if (info->triangle_count == 0) {
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "the basis has no triangles to draw: precompute it from a surface");
-  }
+  SUPINE_REFUSE_IF(info->triangle_count == 0, error, SUPINE_ERROR_MESH,
+                   "the basis has no triangles to draw: precompute it from a surface");
   SUPINE_TRY(supine_export_pack_begin(error));
   SUPINE_FREED_BY(free_glb) glb *g = calloc(1, sizeof *g);
   if (g == NULL) {

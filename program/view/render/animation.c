@@ -23,11 +23,9 @@ struct supine_animation {
 supine_status supine_render_animation_open(size_t width, size_t height,
                                            supine_animation **animation, supine_error *error) {
   WebPAnimEncoderOptions options;
-  if (width > SIDE_MAX || height > SIDE_MAX) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "an animation has at most %d x %d pixels: give a smaller --size",
-                            SIDE_MAX, SIDE_MAX);
-  }
+  SUPINE_REFUSE_IF(width > SIDE_MAX || height > SIDE_MAX, error, SUPINE_ERROR_ARGUMENT,
+                   "an animation has at most %d x %d pixels: give a smaller --size", SIDE_MAX,
+                   SIDE_MAX);
   supine_animation *made = calloc(1, sizeof *made);
   if (made != NULL && WebPAnimEncoderOptionsInit(&options) && WebPConfigInit(&made->config)) {
     /* Use key frames only: differences between lossy frames add up to visible steps of colour. */

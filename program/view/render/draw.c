@@ -412,12 +412,11 @@ static void find_colours(canvas *c) {
 
 supine_status supine_render_draw(const supine_basis *basis, const supine_scene *scene,
                                  uint32_t *pixels, supine_error *error) {
-  if (scene->width == 0 || scene->height == 0 || scene->width > SIDE_MAX ||
-      scene->height > SIDE_MAX) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%zu x %zu pixels cannot be drawn: give sides of 1 to %d pixels",
-                            scene->width, scene->height, SIDE_MAX);
-  }
+  SUPINE_REFUSE_IF(scene->width == 0 || scene->height == 0 || scene->width > SIDE_MAX ||
+                       scene->height > SIDE_MAX,
+                   error, SUPINE_ERROR_ARGUMENT,
+                   "%zu x %zu pixels cannot be drawn: give sides of 1 to %d pixels", scene->width,
+                   scene->height, SIDE_MAX);
   SUPINE_ARENA arena = {0};
   const size_t count = OVERSAMPLE * OVERSAMPLE * scene->width * scene->height;
   const supine_basis_info *info = supine_basis_get_info(basis);

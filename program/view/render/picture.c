@@ -295,10 +295,9 @@ static void free_surface(cairo_surface_t **surface) {
 static supine_status draw_scene(const supine_basis *basis, const supine_scene *scene,
                                 cairo_surface_t **image, supine_error *error) {
   *image = cairo.image_surface_create(CAIRO_FORMAT_ARGB32, (int)scene->width, (int)scene->height);
-  if (cairo.surface_status(*image) != CAIRO_STATUS_SUCCESS ||
-      (size_t)cairo.image_surface_get_stride(*image) != 4 * scene->width) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
-  }
+  SUPINE_REFUSE_IF(cairo.surface_status(*image) != CAIRO_STATUS_SUCCESS ||
+                       (size_t)cairo.image_surface_get_stride(*image) != 4 * scene->width,
+                   error, SUPINE_ERROR_MEMORY, "out of memory");
   cairo.surface_flush(*image);
   const supine_status status = supine_render_draw(
       basis, scene, (uint32_t *)(void *)cairo.image_surface_get_data(*image), error);
@@ -457,14 +456,12 @@ static supine_status compose(const painter *by, supine_error *error) {
   static const double none[4] = SUPINE_EXTENT_NONE;
   const supine_picture *picture = by->picture;
   double extent[SUPINE_VIEWS_MAX][4];
-  if (by->at.font < 4) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%zu x %zu pixels are too few for %zu posture%s and %zu view%s: give "
-                            "a larger --size",
-                            picture->width, picture->height, picture->panel_count,
-                            picture->panel_count == 1 ? "" : "s", picture->view_count,
-                            picture->view_count == 1 ? "" : "s");
-  }
+  SUPINE_REFUSE_IF(by->at.font < 4, error, SUPINE_ERROR_ARGUMENT,
+                   "%zu x %zu pixels are too few for %zu posture%s and %zu view%s: give "
+                   "a larger --size",
+                   picture->width, picture->height, picture->panel_count,
+                   picture->panel_count == 1 ? "" : "s", picture->view_count,
+                   picture->view_count == 1 ? "" : "s");
   colour(by->cr, ground);
   cairo.paint(by->cr);
   for (size_t row = 0; row < picture->view_count; ++row) {
