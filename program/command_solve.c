@@ -158,9 +158,7 @@ static supine_status write_solution(const supine_prepared *prepared, const reque
   SUPINE_TRY(find_gains(prepared, wanted, solution, gains, error));
   deformed.vertices = supine_arena_take(&arena, values, sizeof(double));
   reference.vertices = supine_arena_take(&arena, values, sizeof(double));
-  if (arena.failed) {
-    return supine_error_memory(error, "%zu vertices", deformed.vertex_count);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", deformed.vertex_count));
   supine_tissue_collapse(lungs, prepared->model.share, reference.vertices);
   for (size_t i = 0; i < values; ++i) {
     solution->directions[i] *=

@@ -267,9 +267,7 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
   SUPINE_ARENA arena = {0};
   float *normals = supine_arena_take(&arena, info->vertex_count, 3 * sizeof *normals);
   float *xyz = supine_arena_take(&arena, info->vertex_count, 3 * sizeof *xyz);
-  if (arena.failed) {
-    return supine_error_memory(error, "%zu vertices", info->vertex_count);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", info->vertex_count));
   SUPINE_TRY(supine_posed_mesh(basis, &moved->from.pose, &from, error));
   SUPINE_TRY(supine_posed_mesh(basis, &moved->pose, &mesh, error));
   (void)supine_deform(basis, &moved->pose, xyz);

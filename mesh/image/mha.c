@@ -169,9 +169,7 @@ supine_status supine_image_describe_mha(const char *path, FILE *file, supine_ima
                                         image_storage *storage, supine_error *error) {
   SUPINE_ARENA arena = {0};
   char *text = supine_arena_take(&arena, HEADER_MAX + 1, 1);
-  if (arena.failed) {
-    return supine_error_memory(error, "the header of %s", path);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "the header of %s", path));
   header h;
   size_t type = 0;
   text[fread(text, 1, HEADER_MAX, file)] = '\0';

@@ -104,9 +104,7 @@ supine_status supine_patient_applied_find(supine_patient_matching *matching,
   SUPINE_ARENA arena = {0};
   double *spread = supine_arena_take(&arena, 2 * n, sizeof *spread);
   double *means = supine_arena_take(&arena, (ALL + 1) * n, sizeof *means);
-  if (arena.failed) {
-    return supine_error_memory(error, "%zu vertices", n);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
   supine_patient_matching_choose(matching, n);
   find_smoothed_force(matching, patient, spread);
   SUPINE_TRY(supine_physics_equilibrium_force(matching->equilibrium, spread, spread + n, error));

@@ -176,9 +176,7 @@ static supine_status find_responses(work *w, const supine_patient_power *law, su
   SUPINE_ARENA arena = {0};
   double *shares = supine_arena_zeros(&arena, (regions + 1) * n, sizeof *shares);
   double *u = supine_arena_take(&arena, 6 * n, sizeof *u);
-  if (arena.failed) {
-    return supine_error_memory(error, "%zu vertices", n);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
   SUPINE_TRY(supine_physics_strain_create(m->fuller, NULL, NULL, &strain, error));
   for (size_t i = 0; i < n; ++i) {
     double of[SUPINE_PATIENT_REGIONS_MAX];

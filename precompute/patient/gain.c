@@ -108,9 +108,7 @@ static supine_status make_rows(work *w, const supine_lungs *lungs,
     m->rows = supine_arena_take(&m->arena, m->count, sizeof *m->rows);
   }
   w->motion = supine_arena_take(&m->arena, m->count, sizeof *w->motion);
-  if (m->arena.failed) {
-    return supine_error_memory(error, "the fit to a further state");
-  }
+  SUPINE_TRY(supine_arena_check(&m->arena, error, "the fit to a further state"));
   if (pairs != NULL) {
     supine_patient_rows_of_pairs(&w->record->patient.frame, pairs, m->rows);
   }

@@ -115,9 +115,7 @@ supine_status supine_patient_matching_create(const supine_lungs *fuller, const s
   m->match = supine_arena_take(a, n, sizeof *m->match);
   m->rows = supine_arena_take(a, n + 3 * landmarks, sizeof *m->rows);
   m->space = supine_arena_take(a, n, sizeof(double));
-  if (a->failed) {
-    return supine_error_memory(error, "%zu vertices", n);
-  }
+  SUPINE_TRY(supine_arena_check(a, error, "%zu vertices", n));
   supine_mesh_vertex_normals(&fuller->mesh, m->fuller_normals);
   supine_mesh_vertex_normals(state, m->state_normals);
   const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);

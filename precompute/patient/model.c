@@ -313,9 +313,7 @@ supine_status supine_patient_model(supine_patient_record *record, const supine_l
   supine_volume_form forms[2] = {{{0.0}}};
   SUPINE_TRY(find_state(record, lungs, error));
   w.lungs.mesh.vertices = supine_arena_take(&arena, 3 * n, sizeof(double));
-  if (arena.failed) {
-    return supine_error_memory(error, "%zu vertices", n);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
   memcpy(w.lungs.mesh.vertices, lungs->mesh.vertices, 3 * n * sizeof(double));
   SUPINE_TRY(displace(&w, record->shown == 1.0 ? lungs->mesh.vertices : NULL, error));
   SUPINE_TRY(supine_physics_volume_of_field(&w.lungs, NULL, w.displacement, w.smoothing_ratio + n,

@@ -52,9 +52,7 @@ supine_status supine_patient_stiffness_write(const char *path,
   SUPINE_ARENA arena = {0};
   float *a = supine_arena_take(&arena, n, sizeof *a);
   float *determined = supine_arena_zeros(&arena, n, sizeof *determined);
-  if (arena.failed) {
-    return supine_error_memory(error, "%zu vertices", n);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
   for (size_t i = 0; i < n; ++i) {
     double shares[SUPINE_PATIENT_REGIONS_MAX];
     supine_patient_stiffness_shares(stiffness, lungs, i, shares);

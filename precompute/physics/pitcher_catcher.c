@@ -107,9 +107,7 @@ supine_physics_pitcher_catcher(const supine_mesh *mesh, const supine_topology *t
   SUPINE_ARENA arena = {0};
   iteration it = allocate(&arena, nodes, topology->edge_count);
   double *scaled = supine_arena_take(&arena, n, sizeof *scaled);
-  if (arena.failed) {
-    return supine_error_memory(error, "%zu nodes", nodes);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu nodes", nodes));
   SUPINE_TRY(supine_physics_stiffness_normalise(n, stiffness, scaled, error));
   connect(mesh, topology, scaled, &it);
   double largest = 0.0;

@@ -32,9 +32,7 @@ static supine_status try_postures(const supine_locate_task *task, bool posture_g
     supine_locate_task one = *task;
     supine_locate_residual *residuals = supine_arena_take(arena, task->count, sizeof *residuals);
     double *space = supine_arena_take(arena, supine_locate_space(task->count), sizeof *space);
-    if (arena->failed) {
-      return supine_error_memory(error, "%zu points", task->count);
-    }
+    SUPINE_TRY(supine_arena_check(arena, error, "%zu points", task->count));
     if (!posture_given) {
       (void)supine_posture_gravity(postures[k], one.state.gravity);
     }

@@ -192,9 +192,7 @@ supine_validation_surfaces(const supine_mesh *start, supine_patient_scan_motion 
                 .state = state,
                 .space = supine_arena_take(&arena, numbers, sizeof(double))};
   SUPINE_TRY(supine_patient_check_boxes(start, state, error));
-  if (arena.failed) {
-    return supine_error_memory(error, "%zu vertices", n);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
   const supine_status status = compare(&s, start, moved, predicted, nearest, distance, error);
   supine_inside_surface_destroy(s.state_tree);
   supine_inside_surface_destroy(s.tree);

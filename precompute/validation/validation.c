@@ -65,9 +65,7 @@ static supine_status predict_surface(supine_validation *s, const supine_validati
   const size_t n = s->start.vertex_count;
   outcome->nearest = supine_arena_take(&s->arena, n, 3 * sizeof(double));
   outcome->predicted = supine_arena_take(&s->arena, n, 3 * sizeof(double));
-  if (s->arena.failed) {
-    return supine_error_memory(error, "%zu vertices", n);
-  }
+  SUPINE_TRY(supine_arena_check(&s->arena, error, "%zu vertices", n));
   SUPINE_TRY(supine_basis_weights(s->basis, state->state.gravity, outcome->pose.weights));
   SUPINE_TRY(find_gains(s, state, scan, outcome, error));
   return supine_posed_positions(s->basis, &outcome->pose, outcome->predicted, error);
@@ -118,9 +116,7 @@ static supine_status find_best(const supine_validation *s, const supine_mesh *sc
                  .measured_count = n < MEASURED_VERTICES_MAX ? n : MEASURED_VERTICES_MAX,
                  .positions = supine_arena_take(&arena, n, 3 * sizeof(double)),
                  .distance = supine_arena_take(&arena, n, sizeof(double))};
-  if (arena.failed) {
-    return supine_error_memory(error, "%zu vertices", n);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
   SUPINE_TRY(supine_inside_surface_create(scan->vertices, scan->triangle_count, scan->triangles,
                                           false, &tree, error));
   const double span = search_span * fmax(1.0, fabs(outcome->scale));

@@ -72,9 +72,7 @@ static supine_status make(job *j, const char *path, supine_error *error) {
   const char **words = supine_arena_zeros(&arena, count + 5, sizeof *words);
   char(*names)[NAME] = supine_arena_take(&arena, input->surface_count + 1, sizeof *names);
   supine_mesh *surfaces = supine_arena_take(&arena, input->surface_count + 1, sizeof *surfaces);
-  if (arena.failed) {
-    return supine_error_memory(error, "%zu words", count);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu words", count));
   size_t n = 0;
   words[n++] = "precompute";
   for (size_t i = 0; i < input->option_count; ++i) {

@@ -15,9 +15,7 @@
 static supine_status sort_by_name(supine_command_names *names, size_t n, supine_error *error) {
   size_t *begin = names->begin = supine_arena_zeros(&names->arena, names->count + 2, sizeof *begin);
   names->order = supine_arena_take(&names->arena, n, sizeof *names->order);
-  if (names->arena.failed) {
-    return supine_error_memory(error, "the names of %zu vertices", n);
-  }
+  SUPINE_TRY(supine_arena_check(&names->arena, error, "the names of %zu vertices", n));
   for (size_t i = 0; i < n; ++i) {
     ++begin[names->part[i] + 2];
   }
@@ -44,9 +42,7 @@ supine_status supine_command_names_open(const supine_basis *basis, supine_comman
   char *space = supine_arena_zeros(&names->arena, length + 1, 1);
   names->part = part->data;
   names->text = supine_arena_take(&names->arena, length + 1, sizeof *names->text);
-  if (names->arena.failed) {
-    return supine_error_memory(error, "the names of %zu vertices", n);
-  }
+  SUPINE_TRY(supine_arena_check(&names->arena, error, "the names of %zu vertices", n));
   memcpy(space, text->data, length);
   names->text[names->count++] = space;
   for (size_t i = 0; i < length; ++i) {

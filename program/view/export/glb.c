@@ -19,9 +19,7 @@ static supine_status prepare(glb *g, supine_error *error) {
   g->xyz = supine_arena_take(&g->arena, n, 3 * sizeof *g->xyz);
   g->normals = supine_arena_take(&g->arena, n, 3 * sizeof *g->normals);
   g->added = supine_arena_take(&g->arena, n * g->targets.count, 3 * sizeof *g->added);
-  if (g->arena.failed) {
-    return supine_error_memory(error, "%zu vertices", n);
-  }
+  SUPINE_TRY(supine_arena_check(&g->arena, error, "%zu vertices", n));
   SUPINE_TRY(supine_export_order_make(g->info, !g->options->plain, &g->arena, &g->order, error));
   return supine_export_targets_normals(&g->targets, g->options->plain ? NULL : g->order.vertex,
                                        g->normals, g->added, error);

@@ -227,9 +227,7 @@ supine_status supine_export_targets_normals(const export_targets *targets, const
       supine_arena_take(&arena, info->lung_count, sizeof *weights);
   float *xyz = supine_arena_take(&arena, 3 * n, sizeof *xyz);
   float *below = supine_arena_take(&arena, 3 * n, sizeof *below);
-  if (arena.failed) {
-    return supine_error_memory(error, "%zu vertices", n);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
   SUPINE_TRY(supine_export_breath_pose(targets->basis, targets->breath, supine, 0, &pose, error));
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     supine_export_targets_weights(targets, &pose, lung, weights[lung]);

@@ -187,9 +187,7 @@ static supine_status find_corners(const canvas *c, const supine_basis *basis, su
   SUPINE_ARENA arena = {0};
   float *xyz = supine_arena_take(&arena, 3 * n, sizeof *xyz);
   float *normals = supine_arena_take(&arena, 3 * n, sizeof *normals);
-  if (arena.failed) {
-    return supine_error_memory(error, "%zu vertices", n);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
   find_frame(basis, c->scene, frame);
   (void)supine_deform(basis, c->scene->pose, xyz);
   supine_normals(basis, xyz, normals);
@@ -429,9 +427,7 @@ supine_status supine_render_draw(const supine_basis *basis, const supine_scene *
               .nearness = supine_arena_zeros(&arena, count, sizeof *c.nearness),
               .line_step = (float)supine_render_bar_step(scene->largest),
               .pixels = pixels};
-  if (arena.failed) {
-    return supine_error_memory(error, "%zu samples", count);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu samples", count));
   memset(c.nearest, 0xFF, count * sizeof *c.nearest);
   find_colours(&c);
   SUPINE_TRY(find_corners(&c, basis, error));
