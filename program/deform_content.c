@@ -2,6 +2,7 @@
 /* Write deformed surfaces, displacement fields, moved images, and a CSV file of moved points. */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/arena.h"
 #include "base/output.h"
@@ -252,6 +253,21 @@ static supine_status move_grid(const supine_deform_content *wanted, const supine
   return SUPINE_OK;
 }
 
+/* Print the range of the volume of all lungs if it was assumed from other people. */
+static void print_range(const supine_basis *basis, const supine_deformation *moved) {
+  double range[2] = {0.0, 0.0};
+  bool assumed = false;
+  for (size_t lung = 0; lung < supine_basis_get_info(basis)->lung_count; ++lung) {
+    json_auto_t *held = supine_options_held(basis, &moved->state, &moved->pose, lung, false);
+    range[0] += json_number_value(json_object_get(held, "low"));
+    range[1] += json_number_value(json_object_get(held, "high"));
+    assumed = assumed || strcmp(json_string_value(json_object_get(held, "source")), "assumed") == 0;
+  }
+  if (assumed) {
+    (void)printf("; assumed from other people: %.0f to %.0f mL", range[0], range[1]);
+  }
+}
+
 /* Write a surface, and print its largest displacement and its volume. */
 static supine_status write_surface(const char *path, const supine_basis *basis,
                                    supine_deformation *moved, supine_error *error) {
@@ -292,6 +308,7 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
   if (supine_basis_metadata(basis, "content") == NULL) {
     const double held = 1e-3 * supine_mesh_volume(&mesh);
     (void)printf(", %.2f mL (%+.2f mL)", held, held - 1e-3 * supine_mesh_volume(&from));
+    print_range(basis, moved);
   }
   (void)putchar('\n');
   return SUPINE_OK;

@@ -7,19 +7,6 @@
 #include "runtime/expected.h"
 #include "runtime/internal.h"
 
-/* Relative standard deviation of an assumed volume, that at rest if full inflation was scanned and
- * full inflation if rest was scanned, unless metadata "resting_spread" gives it: 0.08 / 0.48, the
- * published share at rest and its spread between people (precompute/physics/resting.h). */
-static const double usual_spread = 0.17;
-/* RMS displacement of a full breath, mm, below which c falls in proportion: 4.5 mm / 0.25, where
- * 0.25 was measured on the quiet breaths of ten people (4-D CTs). Nobody was held out; what is then
- * stated is 0.66 to 1.32 of the true error. */
-static const double full_breath = 18;
-/* Error beside the heart for a change of gravity of 1 across the body, and the error along gravity
- * for a change of 1 sideways, mm. The former is chosen so that from supine to prone (a change of 2)
- * the RMS beside the heart is about that of its motion (up to 19 mm; Chino & Marks 2008, n 16); the
- * latter is assumed. Landmarks have not checked them: nobody was scanned in two postures. */
-static const double beside_heart = 12, sliding = 3;
 const double supine_expected_shift = 0.01;
 
 static const struct {
@@ -164,7 +151,7 @@ supine_status supine_expected_prepare(const supine_basis *basis, const supine_st
                                       supine_expected_model *m, supine_error *error) {
   const supine_state *const states[2] = {state, from};
   const supine_volume_kind assumed = assumed_kind(basis);
-  const double spread = number_of(basis, "resting_spread", usual_spread) *
+  const double spread = number_of(basis, "resting_spread", EXPECTED_SPREAD) *
                         (assumed == SUPINE_VOLUME_REST ? resting_share(basis) : 1);
   const double own = supine_expected_constant(basis);
   supine_status status = SUPINE_OK;
@@ -186,9 +173,9 @@ supine_status supine_expected_prepare(const supine_basis *basis, const supine_st
                             ? mean_square_of_lungs(basis, &m->pose[0], &m->pose[1])
                             : mean_square(basis, &m->pose[0], &m->pose[1]);
   const double rms = fmax(least, sqrt(square));
-  m->law = own * fmin(1, rms / number_of(basis, "expected_error_from_mm", full_breath));
+  m->law = own * fmin(1, rms / number_of(basis, "expected_error_from_mm", EXPECTED_FULL_BREATH));
   if (supine_basis_metadata(basis, "turn_fitted") == NULL) {
-    m->turn = fmax(0, SUPINE_EXPECTED_ERROR_MM * fmin(1, rms / full_breath) - m->law);
+    m->turn = fmax(0, SUPINE_EXPECTED_ERROR_MM * fmin(1, rms / EXPECTED_FULL_BREATH) - m->law);
   }
   for (size_t k = 0; k < 2 && m->turn > 0 && status == SUPINE_OK; ++k) {
     supine_state level = *states[k];
@@ -235,12 +222,12 @@ void supine_expected_evaluate(const supine_expected_model *m, size_t begin, size
       turned += (u[0] - u[2]) * (u[0] - u[2]);
     }
     const double heart =
-        beside_heart * m->across * near_heart(m->basis, vertices + 3 * (begin + i));
+        EXPECTED_HEART * m->across * near_heart(m->basis, vertices + 3 * (begin + i));
     b->square[SUPINE_EXPECTED_DISPLACEMENT][i] = m->law * fmax(m->least, sqrt(moved));
     b->square[SUPINE_EXPECTED_TURN][i] = m->turn * sqrt(turned);
     b->square[SUPINE_EXPECTED_VOLUME][i] = m->per_step * m->per_step * slope;
     b->square[SUPINE_EXPECTED_HEART][i] = heart * heart;
-    b->square[SUPINE_EXPECTED_SLIDING][i] = sliding * sliding * m->sideways * m->sideways;
+    b->square[SUPINE_EXPECTED_SLIDING][i] = pow(EXPECTED_SLIDING * m->sideways, 2);
   }
 }
 

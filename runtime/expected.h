@@ -21,6 +21,21 @@ struct supine_location {
   double factor;    /**< factor on the expected errors, from the residuals of the points */
 };
 
+/* Relative standard deviation of an assumed volume, that at rest if full inflation was scanned and
+ * full inflation if rest was scanned, unless metadata "resting_spread" gives it: 0.08 / 0.48, the
+ * published share at rest and its spread between people (precompute/physics/resting.h). */
+#define EXPECTED_SPREAD 0.17
+/* RMS displacement of a full breath, mm, below which c falls in proportion: 4.5 mm / 0.25, where
+ * 0.25 was measured on the quiet breaths of ten people (4-D CTs). Nobody was held out; what is then
+ * stated is 0.66 to 1.32 of the true error. */
+#define EXPECTED_FULL_BREATH 18.0
+/* Error beside the heart for a change of gravity of 1 across the body, and the error along gravity
+ * for a change of 1 sideways, mm. The former is chosen so that from supine to prone (a change of 2)
+ * the RMS beside the heart is about that of its motion (up to 19 mm; Chino & Marks 2008, n 16); the
+ * latter is assumed. Landmarks have not checked them: nobody was scanned in two postures. */
+#define EXPECTED_HEART 12.0
+#define EXPECTED_SLIDING 3.0
+
 /** Return the constant c of the formula of the expected error (supine/locate.h), mm. It is the
  * metadata "expected_error_mm" of the file or, if the file lacks it, SUPINE_EXPECTED_ERROR_MM. */
 double supine_expected_constant(const supine_basis *basis);

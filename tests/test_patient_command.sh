@@ -27,12 +27,20 @@ near() {
 vertices() {
   awk '/^v / { print $2 "," $3 "," $4 }' "$1"
 }
-# pairs FROM TO NAME: write NAME.csv with every tenth vertex of two OBJ files as landmarks.
+# pairs FROM TO NAME: write NAME.csv with landmarks: every tenth vertex of two OBJ files that is at least 10 mm inside
+# their bounding box, as the lungs of a patient extend about 10 mm beyond the outermost landmarks. With vertices nearer
+# to its faces, the box around the landmarks is too large, and so is the gain, which is the increase over that box.
 pairs() {
   {
     echo x,y,z,to_x,to_y,to_z
     vertices "$1.obj" >from.csv
-    vertices "$2.obj" | paste -d, from.csv - | awk 'NR % 10 == 1'
+    vertices "$2.obj" | paste -d, from.csv - | awk -F, '
+      NR == FNR { for (k = 1; k <= 3; ++k) {
+        if (NR == 1 || $k < low[k]) low[k] = $k
+        if (NR == 1 || $k > high[k]) high[k] = $k
+      } next }
+      { inside = 1; for (k = 1; k <= 3; ++k) inside = inside && $k >= low[k] + 10 && $k <= high[k] - 10 }
+      inside && ++kept % 10 == 1' from.csv -
   } >"$3.csv"
 }
 # surfaces FILE: print the RMS distance, mm, between the predicted and the scanned surface of the first state in FILE,

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Declare --posture, --gravity, --volume and --from, and compute the poses that they request. */
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/arena.h"
+#include "precompute/posed/posed.h"
 #include "program/options/basis_input.h"
 #include "program/options/state_options.h"
 
@@ -203,4 +205,42 @@ supine_status supine_options_pose(const supine_basis *basis, const char *command
                                   supine_error *error) {
   SUPINE_TRY(supine_basis_pose(basis, state, pose, error));
   return supine_options_pose_check(basis, command, allow_folds, state, pose, error);
+}
+
+/* The logarithm of an assumed volume has a normal distribution, so that its range, one standard
+ * deviation to either side, is longer upwards. */
+json_t *supine_options_held(const supine_basis *basis, const supine_state *state,
+                            const supine_pose *pose, size_t lung, bool as_text) {
+  const char *name = supine_basis_get_info(basis)->lung_names[lung];
+  const bool named = state->lung_count > 0;
+  const supine_volume *volume =
+      named ? &state->lungs[strcmp(state->lungs[0].name, name) != 0].volume : &state->volume;
+  const char *spread = supine_basis_metadata(basis, "resting_spread");
+  const char *scanned = supine_basis_metadata(basis, "scan_state");
+  const bool at_rest = scanned != NULL && strstr(scanned, "rest") != NULL;
+  const supine_state scan = supine_basis_scan(basis);
+  double in_scan[SUPINE_LUNGS_MAX] = {0.0};
+  double volumes[SUPINE_LUNGS_MAX] = {0.0};
+  supine_pose scanned_pose;
+  if (supine_basis_pose(basis, &scan, &scanned_pose, NULL) == SUPINE_OK) {
+    supine_basis_volumes(basis, &scanned_pose, in_scan);
+  }
+  (void)supine_basis_volumes(basis, pose, volumes);
+  const double held = volumes[lung];
+  const double share = named ? 1.0 : held / supine_posed_volume(basis, pose);
+  const double above = share * volume->ml; /* part of the volume that is given */
+  const supine_volume_kind kind =
+      volume->kind == SUPINE_VOLUME_DEFAULT ? SUPINE_VOLUME_REST : volume->kind;
+  const bool other = kind == (at_rest ? SUPINE_VOLUME_FULL : SUPINE_VOLUME_REST);
+  const bool measured = fabs(held - in_scan[lung]) < 0.05;
+  const bool assumed = !measured && other && spread != NULL;
+  const bool given = kind == SUPINE_VOLUME_ABSOLUTE || other;
+  const double ratio = assumed ? exp(strtod(spread, NULL)) : 1.0;
+  const double low = above + (held - above) / ratio;
+  const double high = above + (held - above) * ratio;
+  const char *source = measured ? "measured" : assumed ? "assumed" : given ? "given" : "computed";
+  return !as_text  ? json_pack("{s:f, s:f, s:f, s:s}", "value", held, "low", low, "high", high,
+                               "source", source)
+         : assumed ? json_sprintf("%.0f (%.0f to %.0f, %s)", held, low, high, source)
+                   : json_sprintf("%.0f (%s)", held, source);
 }

@@ -61,12 +61,6 @@ static inline double supine_report_expansion(const supine_slab *slab) {
   return slab->volume > 0.0 ? slab->gain / slab->volume : 0.0;
 }
 
-/* Return the volume of a lung in a posture as {value, low, high, source}, or as text. The source is
- * "measured" in the scan, "given" in mL or by --resting, "assumed" from other people, or "computed"
- * from the scan or from a given volume. */
-json_t *supine_report_held(const supine_comparison *comparison, size_t posture, size_t lung,
-                           bool as_text);
-
 /* Print the comparison to standard output, as JSON or as text with tables of the postures. */
 void supine_report_print(const supine_comparison *comparison, bool json);
 

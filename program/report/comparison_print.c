@@ -20,47 +20,14 @@ static json_t *by_lung(const supine_comparison *c, const double *values) {
   return list;
 }
 
-/* The logarithm of an assumed volume has a normal distribution, so that its range, one standard
- * deviation to either side, is longer upwards. */
-json_t *supine_report_held(const supine_comparison *c, size_t posture, size_t lung, bool as_text) {
-  const supine_compared_posture *of = &c->posture[posture];
-  const supine_state *state = &of->item->state;
-  const char *name = supine_basis_get_info(c->basis)->lung_names[lung];
-  const bool named = state->lung_count > 0;
-  const supine_volume *volume =
-      named ? &state->lungs[strcmp(state->lungs[0].name, name) != 0].volume : &state->volume;
-  const char *spread = supine_basis_metadata(c->basis, "resting_spread");
-  const char *scanned = supine_basis_metadata(c->basis, "scan_state");
-  const bool at_rest = scanned != NULL && strstr(scanned, "rest") != NULL;
-  const supine_state scan = supine_basis_scan(c->basis);
-  double in_scan[SUPINE_LUNGS_MAX] = {0.0};
-  supine_pose pose;
-  if (supine_basis_pose(c->basis, &scan, &pose, NULL) == SUPINE_OK) {
-    supine_basis_volumes(c->basis, &pose, in_scan);
-  }
-  const double held = of->volume[lung];
-  const double share = named ? 1.0 : held / supine_posed_volume(c->basis, &of->pose);
-  const double above = share * volume->ml; /* part of the volume that is given */
-  const bool other = volume->kind == (at_rest ? SUPINE_VOLUME_FULL : SUPINE_VOLUME_REST);
-  const bool measured = fabs(held - in_scan[lung]) < 0.05;
-  const bool assumed = !measured && other && spread != NULL;
-  const bool given = volume->kind == SUPINE_VOLUME_ABSOLUTE || other;
-  const double ratio = assumed ? exp(strtod(spread, NULL)) : 1.0;
-  const double low = above + (held - above) / ratio;
-  const double high = above + (held - above) * ratio;
-  const char *source = measured ? "measured" : assumed ? "assumed" : given ? "given" : "computed";
-  return !as_text  ? json_pack("{s:f, s:f, s:f, s:s}", "value", held, "low", low, "high", high,
-                               "source", source)
-         : assumed ? json_sprintf("%.0f (%.0f to %.0f, %s)", held, low, high, source)
-                   : json_sprintf("%.0f (%s)", held, source);
-}
-
 static json_t *volumes(const supine_comparison *c, size_t posture, bool as_text) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);
+  const supine_compared_posture *p = &c->posture[posture];
   json_t *list = json_object();
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
-    (void)json_object_set_new(list, info->lung_names[lung],
-                              supine_report_held(c, posture, lung, as_text));
+    (void)json_object_set_new(
+        list, info->lung_names[lung],
+        supine_options_held(c->basis, &p->item->state, &p->pose, lung, as_text));
   }
   return list;
 }

@@ -46,7 +46,7 @@ function distancesOf(basis, after, before) {
  * is only assumed, by the change of u if the volumes of the states that count from rest grow by 1 % of the reference
  * volume; beside the heart; and sideways. `places(moment)` returns the points in a state of the lungs, `reference` has
  * their reference positions, and `terms` is the result of movedBetween. */
-function expectedError({ now, from, law, turn: turning, level, perStep, fuller, heart, sideways }, places, reference) {
+function expectedError({ now, from, law, turn: turning, level, perStep, fuller, heart, sliding }, places, reference) {
   const [a, b] = [places(now), places(from)];
   const [more, flat] = [fuller?.map(places), level?.map(places)];
   let sum = 0;
@@ -58,32 +58,32 @@ function expectedError({ now, from, law, turn: turning, level, perStep, fuller, 
       if (more) slope += (more[0][k] - more[1][k] - u) ** 2;
       if (flat) turned += (u - flat[0][k] + flat[1][k]) ** 2;
     }
-    sum += law * Math.sqrt(square) + turning * Math.sqrt(turned) + perStep ** 2 * slope + heart(reference.subarray(i, i + 3)) ** 2 + (3 * sideways) ** 2;
+    sum += law * Math.sqrt(square) + turning * Math.sqrt(turned) + perStep ** 2 * slope + heart(reference.subarray(i, i + 3)) ** 2 + sliding ** 2;
   }
   return Math.sqrt(sum / (a.length / 3));
 }
 
 /** Return a function that computes, from a reference position, the error beside the heart, mm, for a change of gravity
  * by `across` across the body. */
-function heartError({ metadata, torso: { low, high } }, across) {
+function heartError({ metadata, expected, torso: { low, high } }, across) {
   const middle = Number(metadata.midline_mm);
   return ([x, y, z]) => {
     const width = x > middle ? high[0] - middle : middle - low[0];
     const share = (v, axis) => (high[axis] > low[axis] ? (high[axis] - v) / (high[axis] - low[axis]) : 0.5);
     const [out, back, down] = [width > 0 ? Math.abs(x - middle) / width : 0, share(y, 1), share(z, 2)];
-    return 12 * across * Math.max(0, 1 - out / 0.7) * Math.max(0, 4 * back * (1 - back)) * Math.max(0, 1 - Math.abs(down - 0.65) / 0.35);
+    return expected.heart * across * Math.max(0, 1 - out / 0.7) * Math.max(0, 4 * back * (1 - back)) * Math.max(0, 1 - Math.abs(down - 0.65) / 0.35);
   };
 }
 
 /** Return how the lungs move from the state `from` to the state `now`, which has `depth` mL above rest: the statistics of
  * distancesOf, and what expectedError needs. `error` is that of the surface, mm; null if it is unknown. */
 function movedBetween(basis, now, depth, from) {
-  const { metadata } = basis;
+  const { metadata, expected } = basis;
   const surface = distancesOf(basis, placesOf(basis, now), placesOf(basis, from));
   const number = (key, usual) => (Number(metadata[key]) > 0 ? Number(metadata[key]) : usual);
-  const full = Math.min(1, surface.rms / 18);
-  const law = number('expected_error_mm', 4.5) * Math.min(1, surface.rms / number('expected_error_from_mm', 18));
-  const turning = metadata.turn_fitted ? 0 : Math.max(0, 4.5 * full - law);
+  const full = Math.min(1, surface.rms / expected.fullBreath);
+  const law = number('expected_error_mm', expected.constant) * Math.min(1, surface.rms / number('expected_error_from_mm', expected.fullBreath));
+  const turning = metadata.turn_fitted ? 0 : Math.max(0, expected.constant * full - law);
   const scan = (metadata.scan_gravity ?? '0,1,0').split(',').map(Number);
   const volume = sumOf(basis.references);
   const assumed = basis.hasResting && !metadata.resting_known && metadata.scanned !== 'rest' && !metadata.scan_state?.includes('rest');
@@ -91,7 +91,7 @@ function movedBetween(basis, now, depth, from) {
   const change = unit(now.gravity).map((x, i) => x - unit(from.gravity)[i]);
   const terms = {
     now, from, law, turn: turning, level: turning > 0 ? at(scan, 0) : null, fuller: assumed ? at(null, 0.01 * volume) : null,
-    perStep: assumed ? (number('resting_spread', 0.17) * (volume + restFor(basis, scan))) / volume / 0.01 : 0, heart: heartError(basis, Math.hypot(change[0], change[1])), sideways: Math.abs(change[0]),
+    perStep: assumed ? (number('resting_spread', expected.spread) * (volume + restFor(basis, scan))) / volume / 0.01 : 0, heart: heartError(basis, Math.hypot(change[0], change[1])), sliding: expected.sliding * Math.abs(change[0]),
   };
   const known = metadata.expected_error_mm && now.held;
   return { ...surface, ...terms, known, error: known ? expectedError(terms, (moment) => placesOf(basis, moment), basis.surface) : null };
