@@ -2,7 +2,6 @@
 /* Write deformed surfaces, displacement fields, moved images, and a CSV file of moved points. */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "base/arena.h"
 #include "base/output.h"
@@ -255,16 +254,15 @@ static supine_status move_grid(const supine_deform_content *wanted, const supine
 
 /* Print the range of the volume of all lungs if it was assumed from other people. */
 static void print_range(const supine_basis *basis, const supine_deformation *moved) {
-  double range[2] = {0.0, 0.0};
-  bool assumed = false;
+  supine_held sum = {0};
   for (size_t lung = 0; lung < supine_basis_get_info(basis)->lung_count; ++lung) {
-    json_auto_t *held = supine_options_held(basis, &moved->state, &moved->pose, lung, false);
-    range[0] += json_number_value(json_object_get(held, "low"));
-    range[1] += json_number_value(json_object_get(held, "high"));
-    assumed = assumed || strcmp(json_string_value(json_object_get(held, "source")), "assumed") == 0;
+    const supine_held held = supine_options_held(basis, &moved->state, &moved->pose, lung);
+    sum.low += held.low;
+    sum.high += held.high;
+    sum.assumed = sum.assumed || held.assumed;
   }
-  if (assumed) {
-    (void)printf("; assumed from other people: %.0f to %.0f mL", range[0], range[1]);
+  if (sum.assumed) {
+    (void)printf("; assumed from other people: %.0f to %.0f mL", sum.low, sum.high);
   }
 }
 

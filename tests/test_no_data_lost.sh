@@ -25,7 +25,7 @@ fail() {
 "$supine" precompute lungs.ply --band 3 -o lungs.safetensors >/dev/null || exit 1
 "$supine" pv show | cut -d, -f1,2 | sed '1s/.*/pressure_cmH2O,volume_mL/' >samples.csv
 "$supine" pv fit samples.csv -o lungs.pv >/dev/null || exit 1
-awk 'BEGIN { print "name,x,y,z"; for (i = 0; i < 300; ++i) printf "p%d,%d,%d,%d\n", i, 60 + i % 50, i % 40, i % 60 }' >points.csv
+awk 'BEGIN { print "name,x,y,z"; for (i = 0; i < 300; ++i) printf "p%d,%d,%d,%d\n", i, 60 + i % 50, -100 - i % 40, -100 - i % 60 }' >points.csv
 "$supine" embed lungs.safetensors points.csv -o points.safetensors >/dev/null 2>&1 || exit 1
 
 # refused INPUT ENDING COMMAND...: copy INPUT to "input" with this ending. Run the command with the copy as its output,

@@ -38,7 +38,7 @@ def make_inputs():
                 if 0 < corners[0] <= half:
                     file.write("f %d %d %d\n" % tuple(corners))
     with open("nodules.csv", "w", encoding="ascii") as file:
-        file.write("name,x,y,z\na,71,3,-40\nb,90,20,10\n")
+        file.write("name,x,y,z\na,71,-150,-100\nb,90,-180,-140\n")
     with open("list.csv", "w", encoding="ascii") as file:
         file.write("posture,volume,output\nprone,rest,moved.nii.gz\n")
     run("embed", "lungs.safetensors", "nodules.csv", "-o", "inside.safetensors")

@@ -209,8 +209,8 @@ supine_status supine_options_pose(const supine_basis *basis, const char *command
 
 /* The logarithm of an assumed volume has a normal distribution, so that its range, one standard
  * deviation to either side, is longer upwards. */
-json_t *supine_options_held(const supine_basis *basis, const supine_state *state,
-                            const supine_pose *pose, size_t lung, bool as_text) {
+supine_held supine_options_held(const supine_basis *basis, const supine_state *state,
+                                const supine_pose *pose, size_t lung) {
   const char *name = supine_basis_get_info(basis)->lung_names[lung];
   const bool named = state->lung_count > 0;
   const supine_volume *volume =
@@ -236,11 +236,12 @@ json_t *supine_options_held(const supine_basis *basis, const supine_state *state
   const bool assumed = !measured && other && spread != NULL;
   const bool given = kind == SUPINE_VOLUME_ABSOLUTE || other;
   const double ratio = assumed ? exp(strtod(spread, NULL)) : 1.0;
-  const double low = above + (held - above) / ratio;
-  const double high = above + (held - above) * ratio;
-  const char *source = measured ? "measured" : assumed ? "assumed" : given ? "given" : "computed";
-  return !as_text  ? json_pack("{s:f, s:f, s:f, s:s}", "value", held, "low", low, "high", high,
-                               "source", source)
-         : assumed ? json_sprintf("%.0f (%.0f to %.0f, %s)", held, low, high, source)
-                   : json_sprintf("%.0f (%s)", held, source);
+  return (supine_held){.value = held,
+                       .low = above + (held - above) / ratio,
+                       .high = above + (held - above) * ratio,
+                       .assumed = assumed,
+                       .source = measured  ? "measured"
+                                 : assumed ? "assumed"
+                                 : given   ? "given"
+                                           : "computed"};
 }

@@ -118,10 +118,15 @@ supine_status supine_options_pose(const supine_basis *basis, const char *command
                                   const supine_state *state, supine_pose *pose,
                                   supine_error *error);
 
-/* Return the volume of a lung in a state, mL, as {value, low, high, source}, or as text. The source
- * is "measured" in the scan, "given" in mL or by --resting, "assumed" from other people, or
- * "computed" from the scan or from a given volume. */
-json_t *supine_options_held(const supine_basis *basis, const supine_state *state,
-                            const supine_pose *pose, size_t lung, bool as_text);
+/* Volume of a lung, mL, and its range. */
+typedef struct supine_held {
+  double value, low, high;
+  bool assumed;
+  const char *source; /* "measured" in the scan, "given" in mL or by --resting, "assumed" from other
+                         people, or "computed" from the scan or from a given volume */
+} supine_held;
+
+supine_held supine_options_held(const supine_basis *basis, const supine_state *state,
+                                const supine_pose *pose, size_t lung);
 
 #endif

@@ -117,9 +117,8 @@ json_t *supine_report_postures(const supine_comparison *c) {
     find_changes(c, i, percent);
     for (size_t lung = 0; lung < info->lung_count; ++lung) {
       (void)json_array_append_new(
-          lungs, json_pack("{s:o, s:o, s:o}", "range",
-                           supine_options_held(c->basis, &p->item->state, &p->pose, lung, true),
-                           "ml", json_sprintf("%.0f", p->volume[lung]), "percent",
+          lungs, json_pack("{s:o, s:o, s:o}", "range", supine_report_held(c, i, lung, true), "ml",
+                           json_sprintf("%.0f", p->volume[lung]), "percent",
                            json_sprintf(fabs(percent[lung]) < 0.5 ? "0" : "%+.0f", percent[lung])));
     }
     for (size_t j = 0; j < sizeof published / sizeof *published; ++j) {

@@ -20,14 +20,22 @@ static json_t *by_lung(const supine_comparison *c, const double *values) {
   return list;
 }
 
+json_t *supine_report_held(const supine_comparison *c, size_t posture, size_t lung, bool as_text) {
+  const supine_compared_posture *of = &c->posture[posture];
+  const supine_held held = supine_options_held(c->basis, &of->item->state, &of->pose, lung);
+  return !as_text ? json_pack("{s:f, s:f, s:f, s:s}", "value", held.value, "low", held.low, "high",
+                              held.high, "source", held.source)
+         : held.assumed
+             ? json_sprintf("%.0f (%.0f to %.0f, %s)", held.value, held.low, held.high, held.source)
+             : json_sprintf("%.0f (%s)", held.value, held.source);
+}
+
 static json_t *volumes(const supine_comparison *c, size_t posture, bool as_text) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);
-  const supine_compared_posture *p = &c->posture[posture];
   json_t *list = json_object();
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
-    (void)json_object_set_new(
-        list, info->lung_names[lung],
-        supine_options_held(c->basis, &p->item->state, &p->pose, lung, as_text));
+    (void)json_object_set_new(list, info->lung_names[lung],
+                              supine_report_held(c, posture, lung, as_text));
   }
   return list;
 }

@@ -190,7 +190,7 @@ static void make_unit(const export_targets *targets, float *base, float *added) 
 static void round_changes(const export_targets *targets, double (*weights)[EXPORT_TARGETS_MAX],
                           const uint32_t *order, float *base, float *added) {
   /* A component that differs by at most this from that of the previous vertex becomes equal. */
-  static const float near = 2.5F / INT8_MAX;
+  static const float near = 2.0F / INT8_MAX;
   const supine_basis_info *info = targets->info;
   for (size_t i = 0, lung = 0; i < info->vertex_count; ++i) {
     lung += i == info->lung_begin[lung + 1];

@@ -67,7 +67,7 @@ void supine_export_targets_base(const export_targets *targets, size_t lung, size
  * surface about the supine posture.
  * @param order  [N] order in which the file stores vertices. `added` is then rounded so that it
  *               compresses well in this order, and is 0 for a target that turns a lung's normals
- *               by less than 2.5 degrees (RMS). NULL to keep `added` exact */
+ *               by less than 2 degrees (RMS). NULL to keep `added` exact */
 supine_status supine_export_targets_normals(const export_targets *targets, const uint32_t *order,
                                             float *base, float *added, supine_error *error);
 
