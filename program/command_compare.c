@@ -62,7 +62,8 @@ static void add_target(const supine_posture_item *const item[2], const supine_ta
 static supine_status add_pair(const supine_basis *basis, const supine_command_names *names,
                               const supine_posture_item *const item[2], bool in_hilum, json_t *list,
                               supine_error *error) {
-  supine_target hilum = {.name = in_hilum ? "hilum, subtracted" : "hilum", .expected = (double)NAN};
+  supine_target row = {.name = in_hilum ? "hilum, subtracted" : "hilum"};
+  supine_hilum hilum;
   supine_pose pose[2];
   SUPINE_FREED_BY(supine_posed_expected_free) supine_expected expected = {0};
   SUPINE_FREED_BY(supine_command_targets_free) supine_target *targets = NULL;
@@ -73,7 +74,8 @@ static supine_status add_pair(const supine_basis *basis, const supine_command_na
   SUPINE_TRY(supine_command_targets_find(basis, names,
                                          (const supine_pose *const[2]){&pose[0], &pose[1]},
                                          expected.sigma, false, &targets, error));
-  SUPINE_TRY(supine_options_hilum(basis, &pose[1], &pose[0], in_hilum, hilum.move, error));
+  SUPINE_TRY(
+      supine_options_hilum(basis, &item[1]->state, &item[0]->state, in_hilum, &hilum, error));
   for (size_t i = 0; i < names->count; ++i) {
     if (in_hilum) {
       supine_command_target_shift(&targets[i], hilum.move);
@@ -81,9 +83,11 @@ static supine_status add_pair(const supine_basis *basis, const supine_command_na
     add_target(item, &targets[i], list);
   }
   if (supine_length(hilum.move) > 0.0) {
-    hilum.moved = supine_length(hilum.move);
-    hilum.volume[0] = hilum.volume[1] = targets[0].volume[0] != 0.0 ? (double)NAN : 0.0;
-    add_target(item, &hilum, list);
+    memcpy(row.move, hilum.move, sizeof row.move);
+    row.moved = supine_length(hilum.move);
+    row.expected = hilum.expected;
+    row.volume[0] = row.volume[1] = targets[0].volume[0] != 0.0 ? (double)NAN : 0.0;
+    add_target(item, &row, list);
   }
   return SUPINE_OK;
 }

@@ -64,8 +64,8 @@ static supine_status deform(const supine_basis *basis, const request *wanted, su
                                  error));
   SUPINE_TRY(supine_posed_expected(basis, &moved.state, &moved.from.state, &expected, error));
   moved.expected = expected;
-  SUPINE_TRY(supine_options_hilum(basis, &moved.pose, &moved.from.pose, wanted->frame == 1,
-                                  moved.hilum, error));
+  SUPINE_TRY(supine_options_hilum(basis, &moved.state, &moved.from.state, wanted->frame == 1,
+                                  &moved.hilum, error));
   (void)snprintf(comment, sizeof comment, "displacement from %s%s", moved.from.name,
                  wanted->frame == 1 ? ", in the frame of the hilum" : "");
   moved.save.comment = comment;

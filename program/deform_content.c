@@ -142,7 +142,7 @@ static supine_status write_points(const char *path, const supine_basis *basis,
       supine_command_targets_find(basis, &names, pose, moved->expected.sigma, each, &rows, error));
   SUPINE_TRY(supine_output_open(path, &output, error));
   for (size_t i = 0; i < count && moved->subtract_hilum; ++i) {
-    supine_command_target_shift(&rows[i], moved->hilum);
+    supine_command_target_shift(&rows[i], moved->hilum.move);
   }
   print_rows(moved, info, rows, count, output.file);
   SUPINE_TRY(supine_output_commit(&output, error));
@@ -287,7 +287,7 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
   (void)supine_deform(basis, &moved->pose, xyz);
   supine_normals(basis, xyz, normals);
   for (size_t i = 0; i < 3 * mesh.vertex_count && moved->subtract_hilum; ++i) {
-    mesh.vertices[i] -= moved->hilum[i % 3];
+    mesh.vertices[i] -= moved->hilum.move[i % 3];
   }
   (void)supine_basis_volumes(basis, &moved->pose, volumes);
   save->from = from.vertices;
@@ -329,10 +329,13 @@ supine_status supine_command_deform_content(const supine_deform_content *wanted,
                  moved->expected.rms, moved->expected.largest,
                  moved->expected.turned ? "; an extrapolation, as the posture changes" : "");
   }
-  if (supine_length(moved->hilum) != 0.0) {
-    (void)printf("the hilum moves by %.1f, %.1f, %.1f mm (to the left, back and head)%s\n",
-                 moved->hilum[0], moved->hilum[1], moved->hilum[2],
-                 moved->subtract_hilum ? ", subtracted from all positions" : "");
+  if (supine_length(moved->hilum.move) != 0.0) {
+    (void)printf("the hilum moves by %.1f, %.1f, %.1f mm (to the left, back and head)",
+                 moved->hilum.move[0], moved->hilum.move[1], moved->hilum.move[2]);
+    if (!isnan(moved->hilum.expected)) {
+      (void)printf(", expected error %.1f mm", moved->hilum.expected);
+    }
+    (void)printf("%s\n", moved->subtract_hilum ? ", subtracted from all positions" : "");
   }
   return SUPINE_OK;
 }

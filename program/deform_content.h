@@ -29,7 +29,7 @@ typedef struct supine_deformation {
   bool allow_folds;           /* whether folded fields cause only a warning */
   bool from_given;            /* whether --from was given; otherwise `from` is the scan */
   supine_expected expected;
-  double hilum[3];               /* displacement of the hilum, LPS, mm */
+  supine_hilum hilum;
   bool subtract_hilum;           /* whether outputs are in the frame of the hilum */
   supine_mesh_save_options save; /* axes, unit and comment of the output */
 } supine_deformation;

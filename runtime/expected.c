@@ -197,6 +197,23 @@ static double near_heart(const supine_basis *basis, const float *p) {
   return fmax(0, 1 - x / 0.7) * fmax(0, 4 * y * (1 - y)) * fmax(0, 1 - fabs(z - 0.65) / 0.35);
 }
 
+void supine_expected_squares(const supine_expected_model *m, double u[EXPECTED_POSES / 2][3],
+                             double beside_heart, double square[SUPINE_EXPECTED_TERMS]) {
+  double moved = 0;
+  double slope = 0;
+  double turned = 0;
+  for (size_t k = 0; k < 3; ++k) {
+    moved += u[0][k] * u[0][k];
+    slope += (u[1][k] - u[0][k]) * (u[1][k] - u[0][k]);
+    turned += (u[0][k] - u[2][k]) * (u[0][k] - u[2][k]);
+  }
+  square[SUPINE_EXPECTED_DISPLACEMENT] = m->law * fmax(m->least, sqrt(moved));
+  square[SUPINE_EXPECTED_TURN] = m->turn * sqrt(turned);
+  square[SUPINE_EXPECTED_VOLUME] = m->per_step * m->per_step * slope;
+  square[SUPINE_EXPECTED_HEART] = pow(EXPECTED_HEART * m->across * beside_heart, 2);
+  square[SUPINE_EXPECTED_SLIDING] = pow(EXPECTED_SLIDING * m->sideways, 2);
+}
+
 void supine_expected_evaluate(const supine_expected_model *m, size_t begin, size_t end,
                               supine_expected_block *b) {
   const float *vertices = supine_basis_vertices(m->basis);
@@ -209,25 +226,12 @@ void supine_expected_evaluate(const supine_expected_model *m, size_t begin, size
     }
   }
   for (size_t i = 0; i < end - begin; ++i) {
-    double moved = 0;
-    double slope = 0;
-    double turned = 0;
-    for (size_t j = 3 * i; j < 3 * i + 3; ++j) {
-      double u[EXPECTED_POSES / 2];
-      for (size_t k = 0; k < EXPECTED_POSES; k += 2) {
-        u[k / 2] = (double)b->x[k][j] - (double)b->x[k + 1][j];
-      }
-      moved += u[0] * u[0];
-      slope += (u[1] - u[0]) * (u[1] - u[0]);
-      turned += (u[0] - u[2]) * (u[0] - u[2]);
+    double u[EXPECTED_POSES / 2][3];
+    for (size_t j = 0; j < EXPECTED_POSES / 2 * 3; ++j) {
+      const size_t at = 3 * i + j % 3;
+      u[j / 3][j % 3] = (double)b->x[j / 3 * 2][at] - (double)b->x[j / 3 * 2 + 1][at];
     }
-    const double heart =
-        EXPECTED_HEART * m->across * near_heart(m->basis, vertices + 3 * (begin + i));
-    b->square[SUPINE_EXPECTED_DISPLACEMENT][i] = m->law * fmax(m->least, sqrt(moved));
-    b->square[SUPINE_EXPECTED_TURN][i] = m->turn * sqrt(turned);
-    b->square[SUPINE_EXPECTED_VOLUME][i] = m->per_step * m->per_step * slope;
-    b->square[SUPINE_EXPECTED_HEART][i] = heart * heart;
-    b->square[SUPINE_EXPECTED_SLIDING][i] = pow(EXPECTED_SLIDING * m->sideways, 2);
+    supine_expected_squares(m, u, near_heart(m->basis, vertices + 3 * (begin + i)), b->square[i]);
   }
 }
 
@@ -255,8 +259,8 @@ static supine_status evaluate_all(const supine_basis *basis, const supine_state 
     for (size_t i = 0; i < count; ++i) {
       double square = 0;
       for (size_t k = 0; k < SUPINE_EXPECTED_TERMS; ++k) {
-        square += block.square[k][i];
-        mean[k] += block.square[k][i] / (double)info->vertex_count;
+        square += block.square[i][k];
+        mean[k] += block.square[i][k] / (double)info->vertex_count;
       }
       if (sigma != NULL) {
         sigma[begin + i] = (float)sqrt(square);

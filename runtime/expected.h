@@ -80,7 +80,7 @@ typedef struct supine_expected_model {
 /** Displacements of vertices in each pose of a model, and their squared errors by term, mm^2. */
 typedef struct supine_expected_block {
   float x[EXPECTED_POSES][3 * LOCATE_BLOCK];
-  double square[SUPINE_EXPECTED_TERMS][LOCATE_BLOCK];
+  double square[LOCATE_BLOCK][SUPINE_EXPECTED_TERMS];
 } supine_expected_block;
 
 /** Prepare the formula for the displacement from state `from` to `state`.
@@ -91,6 +91,12 @@ typedef struct supine_expected_block {
 supine_status supine_expected_prepare(const supine_basis *basis, const supine_state *state,
                                       const supine_state *from, double deviation, double least,
                                       supine_expected_model *model, supine_error *error);
+
+/** Compute the squared errors of a displacement by term, mm^2.
+ * @param u             displacement between the two states, mm, by each pair of poses of the model
+ * @param beside_heart  the number b of the formula */
+void supine_expected_squares(const supine_expected_model *model, double u[EXPECTED_POSES / 2][3],
+                             double beside_heart, double square[SUPINE_EXPECTED_TERMS]);
 
 /** Evaluate vertices begin <= i < end, at most LOCATE_BLOCK. */
 void supine_expected_evaluate(const supine_expected_model *model, size_t begin, size_t end,

@@ -48,11 +48,11 @@ static void finish(const supine_location *fit, const block *b, size_t count, flo
     double variance = (double)b->variance[i];
     double prior = 0;
     for (size_t k = 0; k < SUPINE_EXPECTED_HEART; ++k) {
-      prior += b->formula.square[k][i];
+      prior += b->formula.square[i][k];
     }
     variance = bounded && prior < variance ? prior : variance;
     for (size_t k = SUPINE_EXPECTED_HEART; k < SUPINE_EXPECTED_TERMS; ++k) {
-      variance += b->formula.square[k][i];
+      variance += b->formula.square[i][k];
     }
     for (size_t k = 0; k < 3; ++k) {
       body[k] = (double)b->law[3 * i + k] + (double)b->shift[3 * i + k];

@@ -35,10 +35,16 @@ void supine_options_basis_title(const char *path, char *title, size_t size);
  * hilum, else 0. */
 extern const supine_option supine_options_hilum_frame[];
 
-/* Compute the displacement of the hilum (precompute/inside/shells.h) from one pose to another, mm;
- * 0 if the file does not determine it, which is an error if `needed`. */
-supine_status supine_options_hilum(const supine_basis *basis, const supine_pose *pose,
-                                   const supine_pose *from, bool needed, double shift[3],
+/* Displacement of the hilum between two states. */
+typedef struct supine_hilum {
+  double move[3];  /* LPS, mm; 0 if the file does not say how the hilum moves */
+  double expected; /* expected error, mm; NAN if unknown */
+} supine_hilum;
+
+/* Find the displacement of the hilum. If the file does not say how the hilum moves, fail only if it
+ * is needed. Other statuses: as supine_basis_pose. */
+supine_status supine_options_hilum(const supine_basis *basis, const supine_state *state,
+                                   const supine_state *from, bool needed, supine_hilum *hilum,
                                    supine_error *error);
 
 /* Return the metadata of a basis as a JSON object. */

@@ -54,7 +54,7 @@ static supine_status find_posture(const supine_comparison *c, float *distance, f
   (void)supine_compare_distances(c->compare, &posture->pose, &c->reference.pose, distance);
   supine_compare_statistics(c->compare, distance, &posture->displacement);
   (void)supine_basis_volumes(c->basis, &posture->pose, posture->volume);
-  (void)supine_options_hilum(c->basis, &posture->pose, &c->reference.pose, false, posture->hilum,
+  (void)supine_options_hilum(c->basis, &item->state, &c->reference.state, false, &posture->hilum,
                              NULL);
   status = supine_options_pose_check(c->basis, command, c->volume.allow_folds, &item->state,
                                      &posture->pose, error);

@@ -22,8 +22,8 @@ typedef struct supine_compared_posture {
   supine_pose pose;
   supine_distance_statistics displacement; /* displacement from the reference pose, mm */
   double expected_error;                   /* expected RMS error, mm; 0 if unknown */
-  double hilum[3];        /* displacement of the hilum from the reference pose, mm; 0 if unknown */
-  supine_target *targets; /* [names.count] structures inside the lungs, or NULL */
+  supine_hilum hilum;                      /* from the reference pose */
+  supine_target *targets;                  /* [names.count] structures inside the lungs, or NULL */
   bool has_breath; /* whether the lungs can hold the breath; if not, the members from `gain` on are
                       0 */
   double volume[SUPINE_LUNGS_MAX];           /* volume of each lung, gas and tissue, mL */
