@@ -187,9 +187,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   SUPINE_TRY(supine_basis_open_with(path, &options, &basis, error));
   const size_t bands = supine_basis_get_info(basis)->band + 1;
   double *energy = supine_arena_zeros(&arena, bands, sizeof *energy);
-  if (energy == NULL) {
-    return supine_error_memory(error, "%zu bands", bands);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu bands", bands));
   SUPINE_TRY(band_energy(basis, energy, error));
   SUPINE_TRY(describe(path, basis, energy, &described, error));
   supine_options_print(json_incref(described), wanted->json);

@@ -54,9 +54,7 @@ static supine_status write_column(const supine_prepared *prepared, const request
   supine_output output = {0};
   SUPINE_ARENA arena = {0};
   double *column = supine_arena_take(&arena, n, sizeof *column);
-  if (column == NULL) {
-    return supine_error_memory(error, "%zu vertices", n);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
   supine_status status =
       supine_physics_model_equilibrium(lungs, &prepared->model, &equilibrium, error);
   if (status == SUPINE_OK) {

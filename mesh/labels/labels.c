@@ -270,7 +270,6 @@ static supine_status check_sides(const work *w, const supine_mesh *surfaces, sup
 static supine_status make_surfaces(work *w, const char *const *paths, size_t count,
                                    supine_mesh *surfaces, supine_error *error) {
   supine_labels_report *report = w->report;
-  SUPINE_TRY(supine_labels_pieces_begin(error));
   SUPINE_TRY(read_map(w, paths, count, error));
   supine_image_free(&w->image);
   if (memchr(w->both.at, LABELS_EITHER, supine_labels_mask_count(&w->both)) != NULL) {

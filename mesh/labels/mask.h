@@ -72,25 +72,28 @@ supine_status supine_labels_mask_cut(const supine_image *image, const size_t low
                                      const size_t high[3], size_t margin, const uint8_t *value,
                                      labels_mask *mask);
 
-/* ---- pieces.c: pieces, which are connected components of voxels that share faces
- */
+/* ---- pieces.c: pieces, which are connected components of voxels that share faces ---- */
+
+/** A run: consecutive voxels begin <= i < end of one row along x, all zero or all nonzero. */
+typedef struct labels_run {
+  uint32_t begin, end;
+  uint32_t parent; /**< index of the first run of the connected piece to which this run belongs */
+} labels_run;
 
 typedef struct labels_piece {
-  uint64_t count; /**< number of voxels; 0 for a piece of voxels that were not wanted */
+  uint64_t count; /**< number of voxels */
   double sum[3];  /**< sum of the voxels' indices along each axis */
 } labels_piece;
 
 typedef struct labels_pieces {
-  uint32_t *of;        /**< [voxels] index of the piece of each voxel, wanted or not */
-  uint32_t end;        /**< largest index plus 1 */
-  size_t count;        /**< number of pieces of wanted voxels */
-  labels_piece *piece; /**< [end] in the order of their first voxels */
+  size_t run_count;
+  size_t *row;         /**< [rows + 1] index of the first run of each row of voxels */
+  labels_run *run;     /**< [run_count] runs of all rows, row by row */
+  labels_piece *piece; /**< [run_count] element r is the piece whose first run is r, if any */
+  size_t piece_count;
 } labels_pieces;
 
-/** Load teem; call this before the functions below. */
-supine_status supine_labels_pieces_begin(supine_error *error);
-/** Find the connected pieces of zero voxels if `zero` is true, else those of nonzero voxels, all of
- * which must be 1. */
+/** Find the connected pieces of zero voxels if `zero` is true, else those of nonzero voxels. */
 supine_status supine_labels_pieces_find(const labels_mask *mask, bool zero, supine_arena *arena,
                                         labels_pieces *pieces);
 /** If `zero` is false, set all connected pieces of nonzero voxels except the largest to 0.

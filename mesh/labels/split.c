@@ -13,10 +13,10 @@ static const double widest_neck = 40.0;
 
 /* Find the two largest connected pieces. Return false unless they lie side by side along x, and the
  * smaller one has at least `least_share` of the volume of the larger one.
- * @param found  written: indices of the pieces, left piece first */
+ * @param found  written: index of the first run of voxels of each piece, left piece first */
 static bool find_pair(const labels_mask *mask, const labels_pieces *pieces, uint32_t found[2]) {
   uint32_t top[2] = {0, 0};
-  for (uint32_t r = 1; r < pieces->end; ++r) {
+  for (uint32_t r = 1; r < pieces->run_count; ++r) {
     if (pieces->piece[r].count > pieces->piece[top[0]].count) {
       top[1] = top[0];
       top[0] = r;
@@ -55,9 +55,15 @@ static void erode(const labels_mask *both, const float *squares, double depth, u
 /* Mark the voxels of two pieces as LABELS_LEFT and LABELS_RIGHT, all others as 0. */
 static void mark_pair(const labels_mask *mask, const labels_pieces *pieces, const uint32_t found[2],
                       uint8_t *marks) {
-  for (size_t i = 0; i < supine_labels_mask_count(mask); ++i) {
-    const uint32_t piece = pieces->of[i];
-    marks[i] = piece == found[0] ? LABELS_LEFT : piece == found[1] ? LABELS_RIGHT : 0;
+  memset(marks, 0, supine_labels_mask_count(mask));
+  for (size_t row = 0; row < mask->size[1] * mask->size[2]; ++row) {
+    for (size_t r = pieces->row[row]; r < pieces->row[row + 1]; ++r) {
+      const labels_run *run = &pieces->run[r];
+      const uint8_t mark = run->parent == found[0]   ? LABELS_LEFT
+                           : run->parent == found[1] ? LABELS_RIGHT
+                                                     : 0;
+      memset(marks + row * mask->size[0] + run->begin, mark, run->end - run->begin);
+    }
   }
 }
 
@@ -100,12 +106,12 @@ supine_status supine_labels_split(const char *path, labels_mask *both, double *n
     }
     erode(both, squares, depth, eroded.at);
     SUPINE_TRY(supine_labels_pieces_find(&eroded, false, &pass, &pieces));
-    if (pieces.count == 0 || !find_pair(both, &pieces, found)) {
+    if (pieces.run_count == 0 || !find_pair(both, &pieces, found)) {
       continue;
     }
     *neck = 2.0 * depth;
     mark_pair(both, &pieces, found, eroded.at);
-    if (depth > 0.0 || pieces.count > 2) { /* not all voxels are in the two pieces */
+    if (depth > 0.0 || pieces.piece_count > 2) { /* not all voxels are in the two pieces */
       supine_arena_free(&pass);
       return share_out(both, eroded.at, squares);
     }

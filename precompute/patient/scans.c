@@ -182,9 +182,7 @@ static supine_status fit_landmarks(const supine_patient_scans *scans,
   const supine_patient_pairs *pairs = &scans->pairs;
   SUPINE_ARENA arena = {0};
   supine_patient_row *rows = supine_arena_take(&arena, pairs->count, 3 * sizeof *rows);
-  if (rows == NULL) {
-    return supine_error_memory(error, "%zu landmarks", pairs->count);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu landmarks", pairs->count));
   record->patient.frame = supine_patient_frame_of_points(pairs->count, pairs->from, scans->midline);
   supine_patient_rows_of_pairs(&record->patient.frame, pairs, rows);
   return supine_patient_fit(options, rows, 0, pairs->count, &record->patient, &record->report,

@@ -442,9 +442,7 @@ supine_status supine_physics_equilibrium_force(supine_equilibrium *equilibrium,
   double zero[2] = {0.0, 0.0};
   SUPINE_ARENA arena = {0};
   double *t = supine_arena_take(&arena, n, sizeof *t);
-  if (t == NULL) {
-    return supine_error_memory(error, "%zu vertices", n);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
   for (size_t i = 0; i < n; ++i) {
     t[i] = retained[i] / (eq->mass_weight[i] * eq->mass_weight[i]);
   }
@@ -469,9 +467,7 @@ supine_status supine_physics_transfer_column(supine_equilibrium *equilibrium, si
                    n);
   SUPINE_ARENA arena = {0};
   double *force = supine_arena_zeros(&arena, n, sizeof *force);
-  if (force == NULL) {
-    return supine_error_memory(error, "%zu forces", n);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu forces", n));
   force[vertex] = 1.0;
   return supine_physics_equilibrium_solve(equilibrium, 1, force, column, error);
 }

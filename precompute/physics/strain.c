@@ -69,9 +69,7 @@ supine_status supine_physics_strain_apply(supine_strain *strain, const double *e
   const double *a = expandability != NULL ? expandability : strain->expandability;
   SUPINE_ARENA arena = {0};
   double *load = supine_arena_take(&arena, strain->vertex_count * count, sizeof *load);
-  if (load == NULL) {
-    return supine_error_memory(error, "%zu displacements", strain->vertex_count * count);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu displacements", strain->vertex_count * count));
   for (size_t i = 0; i < strain->vertex_count * count; ++i) {
     load[i] = strain->hold[i / count] * displacements[i];
   }

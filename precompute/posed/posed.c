@@ -22,9 +22,7 @@ supine_status supine_posed_positions(const supine_basis *basis, const supine_pos
   const size_t n = supine_basis_get_info(basis)->vertex_count;
   SUPINE_ARENA arena = {0};
   float *xyz = supine_arena_take(&arena, n, 3 * sizeof *xyz);
-  if (xyz == NULL) {
-    return supine_error_memory(error, "%zu vertices", n);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
   if (pose != NULL) {
     (void)supine_deform(basis, pose, xyz);
   }

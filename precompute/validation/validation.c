@@ -179,9 +179,7 @@ static supine_status predict_points(const supine_validation *s, size_t which,
   SUPINE_FREED_BY(supine_posed_expected_free) supine_expected expected = {0};
   SUPINE_ARENA arena = {0};
   double *values = supine_arena_take(&arena, n, 4 * sizeof *values);
-  if (values == NULL) {
-    return supine_error_memory(error, "%zu vertices", n);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
   SUPINE_TRY(supine_posed_expected(s->basis, &outcome->state, &s->from.state, &expected, error));
   for (size_t i = 0; i < 4 * n; ++i) {
     const size_t k = 3 * (i / 4) + i % 4;
@@ -225,9 +223,7 @@ static supine_status validate_points(supine_validation *s, size_t which,
                                      const supine_patient_pairs *pairs, supine_error *error) {
   SUPINE_ARENA arena = {0};
   double *predicted = supine_arena_take(&arena, pairs->count, 8 * sizeof *predicted);
-  if (predicted == NULL) {
-    return supine_error_memory(error, "%zu landmarks", pairs->count);
-  }
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu landmarks", pairs->count));
   SUPINE_TRY(supine_patient_pairs_check(pairs, s->moved != SUPINE_PATIENT_STILL, error));
   SUPINE_TRY(check_points(s, pairs, error));
   SUPINE_TRY(predict_points(s, which, pairs, predicted, error));
