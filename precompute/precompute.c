@@ -283,10 +283,10 @@ static supine_status write_file(pipeline *p, supine_error *error) {
 
 static supine_status tell_progress(const supine_basis_choice *choice, double fraction,
                                    supine_error *error) {
-  return choice->progress == NULL || choice->progress(choice->progress_context, fraction)
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_INTERRUPTED,
-                                "interrupted: nothing was written");
+  SUPINE_REFUSE_IF(
+      !(choice->progress == NULL || choice->progress(choice->progress_context, fraction)), error,
+      SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
+  return SUPINE_OK;
 }
 
 supine_status supine_precompute(const supine_prepared *prepared, const supine_basis_choice *choice,

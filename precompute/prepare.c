@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/text.h"
 #include "base/vec3.h"
 
@@ -103,12 +104,11 @@ static supine_status take_patient(supine_model_choice *choice, supine_prepared *
                       "note: the scan is assumed to be the %s of the two that were fitted; "
                       "--scanned changes this",
                       record->shown == 0.0 ? "fuller" : "emptier");
-  return record->shown == 0.0 || scan.known
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                "this scan is the emptier of the two that were fitted, and how far "
-                                "it is below full inflation is unknown: give its state, such as "
-                                "--scanned supine:rest, or use the fuller scan");
+  SUPINE_REFUSE_IF(record->shown != 0.0 && !scan.known, error, SUPINE_ERROR_ARGUMENT,
+                   "this scan is the emptier of the two that were fitted, and how far it is below "
+                   "full inflation is unknown: give its state, such as --scanned supine:rest, or "
+                   "use the fuller scan");
+  return SUPINE_OK;
 }
 
 static supine_status set_expandability(const supine_model_choice *choice, supine_prepared *p,

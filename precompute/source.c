@@ -114,12 +114,11 @@ static supine_status find_lobes(const char *folder, lobe_files *found, supine_er
       }
     }
   }
-  return found->left + found->right > 0
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_READ,
-                                "%s: no lung_upper_lobe_left.nii.gz or other lobe of "
-                                "TotalSegmentator in this folder; give files instead of the folder",
-                                folder);
+  SUPINE_REFUSE_IF(found->left + found->right == 0, error, SUPINE_ERROR_READ,
+                   "%s: no lung_upper_lobe_left.nii.gz or other lobe of TotalSegmentator in this "
+                   "folder; give files instead of the folder",
+                   folder);
+  return SUPINE_OK;
 }
 
 static supine_status load_maps(reading *r, supine_source *source, supine_error *error) {

@@ -61,10 +61,10 @@ static supine_status begin_frames(playing *p, bool one, supine_error *error) {
   p->normals = supine_arena_take(&p->arena, frame, sizeof *p->normals);
   p->positions = supine_arena_take(&p->arena, one ? 1 : 1 + count, frame * sizeof *p->positions);
   return p->arena.failed
-             ? supine_error_memory(error,
-                                   "%zu frames of %zu vertices: lower --seconds or --fps, or write "
-                                   "a .vtp file",
-                                   count, frame / 3)
+             ? supine_error_memory(
+                   error,
+                   "%zu frames of %zu vertices: lower --seconds or --fps, or write a .vtp file",
+                   count, frame / 3)
              : supine_posed_mesh(p->basis, NULL, &p->mesh, error);
 }
 
@@ -113,10 +113,10 @@ static supine_status play(playing *p, size_t t, supine_error *error) {
   (void)find_pose(p, t, &pose, NULL);
   (void)supine_deform(p->basis, &pose, p->positions);
   p->compute_time[t] = supine_clock_seconds() - start;
-  return supine_options_progress_step(&p->progress, (double)(t + 1) / (double)p->wanted->count)
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_INTERRUPTED,
-                                "interrupted: nothing was written");
+  SUPINE_REFUSE_IF(
+      !supine_options_progress_step(&p->progress, (double)(t + 1) / (double)p->wanted->count),
+      error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
+  return SUPINE_OK;
 }
 
 /* Compute frame t with its normals, for VTP. */

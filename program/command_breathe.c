@@ -73,8 +73,8 @@ static supine_status complete(request *wanted, supine_error *error) {
   supine_breath_frames *frames = &wanted->frames;
   SUPINE_REFUSE_IF(frames->as_scanned && supine_text_ends_in(frames->path, ".safetensors"), error,
                    SUPINE_ERROR_ARGUMENT,
-                   "--as-scanned is for VTP files only: leave it out, as safetensors "
-                   "files are always in LPS and mm");
+                   "--as-scanned is for VTP files only: leave it out, as safetensors files are "
+                   "always in LPS and mm");
   if (!wanted->turns) {
     supine_state state = {.lung_count = 0};
     SUPINE_TRY(supine_options_state(&wanted->orientation, &state, error));
@@ -88,12 +88,10 @@ static supine_status complete(request *wanted, supine_error *error) {
   seconds = wanted->duration > 0.0 ? wanted->duration : seconds;
   const double count = floor(seconds * frames->fps * (1.0 + 1e-12)) + 1.0;
   frames->count = (size_t)fmin(count, FRAMES_MAX);
-  return count <= FRAMES_MAX
-             ? SUPINE_OK
-             : supine_error_set(
-                   error, SUPINE_ERROR_ARGUMENT,
+  SUPINE_REFUSE_IF(!(count <= FRAMES_MAX), error, SUPINE_ERROR_ARGUMENT,
                    "%g s at %g frames a second is more than %d frames: lower --seconds or --fps",
                    seconds, frames->fps, FRAMES_MAX);
+  return SUPINE_OK;
 }
 
 static void begin(void *chosen) {

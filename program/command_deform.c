@@ -174,10 +174,9 @@ static supine_status read_rows(const char *basis, batch *b, supine_error *error)
       }
     }
   }
-  return b->count > 0 ? SUPINE_OK
-                      : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                         "%s: no row follows the header: add at least one",
-                                         b->wanted->states);
+  SUPINE_REFUSE_IF(!(b->count > 0), error, SUPINE_ERROR_ARGUMENT,
+                   "%s: no row follows the header: add at least one", b->wanted->states);
+  return SUPINE_OK;
 }
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {

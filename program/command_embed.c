@@ -154,8 +154,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   SUPINE_REFUSE_IF(!labels && given->count > 1 &&
                        (image ? given->count > 2 : wanted->content.has_grid),
                    error, SUPINE_ERROR_ARGUMENT,
-                   "a grid or an image cannot be embedded with other content: embed it "
-                   "alone, or give --labels to embed the parts of a label map");
+                   "a grid or an image cannot be embedded with other content: embed it alone, or "
+                   "give --labels to embed the parts of a label map");
   SUPINE_TRY(supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, error));
   return embed(basis, wanted, given, error);
 }

@@ -129,8 +129,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   SUPINE_REFUSE_IF(supine_basis_get_info(basis)->is_fields &&
                        (wanted->breathes || wanted->glb.animate),
                    error, SUPINE_ERROR_ARGUMENT,
-                   "%s holds another simulator's fields of gravity, which have no "
-                   "breaths: leave --breath and --animate out",
+                   "%s holds another simulator's fields of gravity, which have no breaths: leave "
+                   "--breath and --animate out",
                    path);
   return page ? write_page(basis, wanted, path, error) : write_glb(basis, wanted, error);
 }

@@ -67,10 +67,10 @@ static supine_status find_vertex(const char *path, const char *text,
       supine_options_suggest(text, (const char *const *)names->text, names->count);
   return found == 1 ? SUPINE_OK
          : found > 1
-             ? supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%s: '%s' has %zu vertices, so it is not a point: give the "
-                                "name of a point",
-                                path, text, found)
+             ? supine_error_set(
+                   error, SUPINE_ERROR_FORMAT,
+                   "%s: '%s' has %zu vertices, so it is not a point: give the name of a point",
+                   path, text, found)
              : supine_error_set(error, SUPINE_ERROR_FORMAT,
                                 "%s: no point '%s' in the file of --points%s%s%s", path, text,
                                 nearest == NULL ? "" : "; did you mean '",

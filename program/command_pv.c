@@ -14,9 +14,10 @@
 
 static const char command[] = "pv";
 
+static const double confidence = 0.95; /* level of the intervals */
+
 typedef struct request {
   const char *output;
-  double confidence;
   double step;
   bool json;
 } request;
@@ -25,9 +26,6 @@ static const supine_option table[] = {
     {"output", 'o', "FILE",
      "JSON file of the parameters and the report, for --pv of 'supine breathe'",
      SUPINE_FILLS(request, output), .file = SUPINE_FILE_OUT},
-    {"confidence", 'c', "SHARE", "confidence level of the intervals, between 0 and 1",
-     SUPINE_FILLS(request, confidence), .standard = "0.95", .range = {0.0, 1.0}, .open = true,
-     .wants = "a number between 0 and 1"},
     {"json", 'j', NULL, "print the report as JSON", SUPINE_FILLS(request, json)},
     {"step", 's', "CMH2O", "for 'show': step of pressure, in cmH2O", SUPINE_FILLS(request, step),
      .standard = "1", SUPINE_ABOVE_ZERO, .wants = "a positive number of cmH2O"},
@@ -47,8 +45,8 @@ static json_t *json_limb(const supine_pv_curve *curve, const supine_pv_report *r
 static supine_status run_fit(const char *path, const request *chosen, supine_error *error) {
   supine_pv pv = {0};
   supine_pv_report reports[SUPINE_PV_LIMB_COUNT];
-  SUPINE_TRY(supine_breath_fit_file(path, chosen->confidence, &pv, reports, error));
-  json_auto_t *root = json_pack("{s:f}", "confidence", chosen->confidence);
+  SUPINE_TRY(supine_breath_fit_file(path, confidence, &pv, reports, error));
+  json_auto_t *root = json_pack("{s:f}", "confidence", confidence);
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     const char *name = supine_breath_limb_name((supine_pv_limb)limb);
     if (reports[limb].rms_percent > 1.0) {
@@ -120,13 +118,14 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
 const supine_command supine_command_pv = {
     command,
     "fit a pressure-volume relation to samples, or print one",
-    .usage = "fit SAMPLES.csv [-o FILE] [--confidence SHARE] [--json]\n"
+    .usage = "fit SAMPLES.csv [-o FILE] [--json]\n"
              "show [FILE] [--step CMH2O]",
     .about = "Fits a lung's pressure-volume relation to samples, for 'supine breathe --pv FILE', "
              "or prints a relation.\n"
              "\n"
-             "fit determines the five control parameters of each limb, their confidence intervals, "
-             "and the residual of the samples (RMS, in mL and as a percentage of the range of "
+             "fit determines the five control parameters of each limb, their 95 % confidence "
+             "intervals, and the residual of the samples (RMS, in mL and as a percentage of the "
+             "range of "
              "volumes).\n"
              "\n"
              "show prints volume and compliance against pressure as CSV; without FILE, it prints "

@@ -81,8 +81,8 @@ static supine_status find_volumes(const supine_reference *reference, const supin
   const supine_volume_kind kind = state->volume.kind;
   double part[2];
   SUPINE_REFUSE_IF(state->lung_count > 0, error, SUPINE_ERROR_ARGUMENT,
-                   "--volume: 'supine solve' takes one volume of all lungs together, not "
-                   "a volume for each lung");
+                   "--volume: 'supine solve' takes one volume of all lungs together, not a volume "
+                   "for each lung");
   const double total =
       state->volume.ml + (kind == SUPINE_VOLUME_ABSOLUTE ? 0.0
                           : kind == SUPINE_VOLUME_SCAN   ? full[0] + full[1] + scan[0] + scan[1]
@@ -107,8 +107,8 @@ static supine_status find_gains(const supine_prepared *prepared, const request *
   if (!reference->known && volume->kind != SUPINE_VOLUME_DEFAULT) {
     SUPINE_REFUSE_IF(volume->kind != SUPINE_VOLUME_SCAN && volume->kind != SUPINE_VOLUME_ABSOLUTE,
                      error, SUPINE_ERROR_ARGUMENT,
-                     "rest and full are unknown with --scanned none: give scan+ML or an "
-                     "absolute volume, such as 2600mL");
+                     "rest and full are unknown with --scanned none: give scan+ML or an absolute "
+                     "volume, such as 2600mL");
     const double held =
         volume->kind == SUPINE_VOLUME_ABSOLUTE ? lungs->volume[0] + lungs->volume[1] : 0.0;
     SUPINE_TRY(supine_volume_scale(solution->cubic, volume->ml - held, &scale, error));

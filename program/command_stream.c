@@ -107,8 +107,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   SUPINE_REFUSE_IF(!supine_normalise(options->setup.body, unit) ||
                        !supine_normalise(wanted->world_down, options->setup.down),
                    error, SUPINE_ERROR_ARGUMENT,
-                   "--world-down or --body-from-tracker is zero: give a direction, such "
-                   "as 0,0,-1, and a quaternion, such as 1,0,0,0");
+                   "--world-down or --body-from-tracker is zero: give a direction, such as 0,0,-1, "
+                   "and a quaternion, such as 1,0,0,0");
   SUPINE_FREED_BY(supine_options_basis_close) supine_basis *basis = NULL;
   SUPINE_TRY(supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, error));
   return supine_command_stream_run(session, basis, error);

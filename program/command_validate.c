@@ -158,8 +158,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
     SUPINE_TRY(supine_options_check_output(wanted->path, wanted->state[i].path, error));
   }
   SUPINE_REFUSE_IF(supine_text_ends_in(path, ".json"), error, SUPINE_ERROR_ARGUMENT,
-                   "%s is a patient model without a surface: make a basis from it first "
-                   "with 'supine precompute --patient'",
+                   "%s is a patient model without a surface: make a basis from it first with "
+                   "'supine precompute --patient'",
                    path);
   s.moved = wanted->landmarks.rigid         ? SUPINE_PATIENT_RIGID
             : wanted->landmarks.translation ? SUPINE_PATIENT_TRANSLATION

@@ -61,8 +61,8 @@ supine_status supine_command_deform_content_check(const supine_deform_content *w
   SUPINE_REFUSE_IF((wanted->image != NULL && wanted->labels != NULL) !=
                        (wanted->labels_path != NULL),
                    error, SUPINE_ERROR_ARGUMENT,
-                   "--image with --labels needs a list of --states with the column labels, "
-                   "and this column needs both");
+                   "--image with --labels needs a list of --states with the column labels, and "
+                   "this column needs both");
   SUPINE_REFUSE_IF(wanted->labels_path != NULL && !supine_image_supports(wanted->labels_path),
                    error, SUPINE_ERROR_ARGUMENT,
                    "%s: the name must end in .nrrd, .nii, .nii.gz or .mha", wanted->labels_path);
@@ -213,11 +213,11 @@ static supine_status find_field(const supine_basis *basis, const supine_deformat
   supine_field_folded(field, folded);
   const double around = folded[1];
   if (around > told && (around <= allowed || moved->allow_folds)) {
-    supine_options_say("deform",
-                       "warning: the field folds in the body around the lungs, in %.2g %% as many "
-                       "cells as the lungs have: voxels of the body and of the rim of the lungs "
-                       "are wrong there",
-                       100.0 * around);
+    supine_options_say(
+        "deform",
+        "warning: the field folds in the body around the lungs, in %.2g %% as many cells as the "
+        "lungs have: voxels of the body and of the rim of the lungs are wrong there",
+        100.0 * around);
   }
   const supine_plausible lungs = {
       .command = "deform",

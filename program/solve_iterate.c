@@ -30,9 +30,9 @@ supine_status supine_command_iterate(const supine_lungs *lungs, const supine_mod
   SUPINE_ARENA arena = {0};
   double *force = supine_arena_take(&arena, n, sizeof *force);
   double *caught = supine_arena_take(&arena, n, sizeof *caught);
-  SUPINE_REFUSE_IF(model->reach > 0.0 || model->lesions != NULL, error, SUPINE_ERROR_ARGUMENT,
-                   "--pitcher-catcher needs --law paper, and cannot be combined with "
-                   "--reach or --lesion");
+  SUPINE_REFUSE_IF(
+      model->reach > 0.0 || model->lesions != NULL, error, SUPINE_ERROR_ARGUMENT,
+      "--pitcher-catcher needs --law paper, and cannot be combined with --reach or --lesion");
   if (arena.failed ||
       supine_physics_height_range(lungs, model->force.pair, 1, g, range, range + 1) != SUPINE_OK) {
     return supine_error_memory(error, "%zu vertices", n);

@@ -126,9 +126,9 @@ static supine_status set_volume(const supine_basis *basis, const supine_stream_s
   supine_pv pv = *supine_breath_normal();
   if (supine_basis_get_info(basis)->is_fields) {
     supine_pose pose;
-    SUPINE_REFUSE_IF(wanted->has_breath, error, SUPINE_ERROR_ARGUMENT,
-                     "the basis was made with --fields and has no breaths: leave out "
-                     "--tidal, --rate and --pv");
+    SUPINE_REFUSE_IF(
+        wanted->has_breath, error, SUPINE_ERROR_ARGUMENT,
+        "the basis was made with --fields and has no breaths: leave out --tidal, --rate and --pv");
     volume->fixed = wanted->volume;
     volume->fixed.gravity[1] = 1.0;
     return supine_basis_pose(basis, &volume->fixed, &pose, error);

@@ -65,8 +65,8 @@ supine_status supine_image_read(const char *path, supine_image *image, supine_er
   SUPINE_FREED_BY(supine_file_close) FILE *file = NULL;
   image_storage storage = {0};
   SUPINE_REFUSE_IF(!supine_image_supports(path), error, SUPINE_ERROR_FORMAT,
-                   "%s: an image's name must end in .nrrd, .nii, .nii.gz or .mha; convert "
-                   "other formats, for example with 3D Slicer",
+                   "%s: an image's name must end in .nrrd, .nii, .nii.gz or .mha; convert other "
+                   "formats, for example with 3D Slicer",
                    path);
   if (stat(path, &about) != 0 || !S_ISREG(about.st_mode) || (file = fopen(path, "rb")) == NULL) {
     const bool other = about.st_mode != 0 && !S_ISREG(about.st_mode);

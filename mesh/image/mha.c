@@ -183,8 +183,8 @@ supine_status supine_image_describe_mha(const char *path, FILE *file, supine_ima
       .integer = !types[type].wide            ? 0
                  : types[type].name[4] != 'U' ? 1
                                               : -1};
-  return wrong == NULL ? SUPINE_OK
-                       : supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: %s", path, wrong);
+  SUPINE_REFUSE_IF(wrong != NULL, error, SUPINE_ERROR_FORMAT, "%s: %s", path, wrong);
+  return SUPINE_OK;
 }
 
 static void write_header(const supine_image *image, const char *note, size_t packed, FILE *file) {

@@ -50,8 +50,8 @@ static supine_status check(const char *path, const nifti_image *nifti, supine_im
       "%s: ndim is %d; give an image with one number per voxel, three axes and one volume", path,
       (int)nifti->ndim);
   SUPINE_REFUSE_IF(nifti->sform_code <= 0 && nifti->qform_code <= 0, error, SUPINE_ERROR_FORMAT,
-                   "%s: the header has no orientation (qform and sform are 0); give the "
-                   "file that the segmenter wrote",
+                   "%s: the header has no orientation (qform and sform are 0); give the file that "
+                   "the segmenter wrote",
                    path);
   const bool wide = nifti->datatype == DT_INT64 || nifti->datatype == DT_UINT64;
   while (type < SUPINE_VOXEL_COUNT && types[type] != (wide ? DT_FLOAT64 : nifti->datatype)) {
@@ -154,8 +154,8 @@ supine_status supine_image_write_nifti(const char *path, const supine_image *ima
   SUPINE_REFUSE_IF((image->channels != 1 && !vectors) || image->size[0] > INT16_MAX ||
                        image->size[1] > INT16_MAX || image->size[2] > INT16_MAX,
                    error, SUPINE_ERROR_ARGUMENT,
-                   "%s: NIfTI-1 holds one number or a 3-vector per voxel, and at most "
-                   "%d voxels along an axis: save it as .nrrd",
+                   "%s: NIfTI-1 holds one number or a 3-vector per voxel, and at most %d voxels "
+                   "along an axis: save it as .nrrd",
                    path, INT16_MAX);
   SUPINE_ARENA arena = {0};
   const void *values = vectors ? planes(image, &arena) : image->values;

@@ -102,8 +102,8 @@ supine_status supine_image_read_voxels(const char *path, FILE *file, size_t file
       (double)image->size[0] * (double)image->size[1] * (double)image->size[2] * (double)each;
   SUPINE_REFUSE_IF(!(bytes > 0.0 && bytes <= gzip_ratio * (double)file_size), error,
                    SUPINE_ERROR_FORMAT,
-                   "%s: %zu x %zu x %zu voxels do not fit in %zu bytes: the file is "
-                   "truncated; fetch or write it again",
+                   "%s: %zu x %zu x %zu voxels do not fit in %zu bytes: the file is truncated; "
+                   "fetch or write it again",
                    path, image->size[0], image->size[1], image->size[2], file_size);
   const size_t count = image->size[0] * image->size[1] * image->size[2];
   image->values = malloc(count * each);

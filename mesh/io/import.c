@@ -200,10 +200,10 @@ static supine_status take_outcome(const char *path, FILE *stream, supine_mesh *m
       return SUPINE_OK;
     }
   }
-  return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                          "%s: malformed: assimp crashed, or exceeded its time or memory; "
-                          "save the mesh as PLY or STL",
-                          path);
+  return supine_error_set(
+      error, SUPINE_ERROR_FORMAT,
+      "%s: malformed: assimp crashed, or exceeded its time or memory; save the mesh as PLY or STL",
+      path);
 }
 
 static supine_status import_file(const mesh_file *file, const char *kind, supine_mesh *mesh,

@@ -92,11 +92,10 @@ static supine_status read_file(mesh_file *file, supine_arena *arena, mesh_reader
   }
   find_space(file);
   *reader = find_reader(file->path);
-  return *reader != NULL ? SUPINE_OK
-                         : supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                            "%s: no importer for this ending; give the mesh "
-                                            "as .ply, .obj, .stl or .vtp",
-                                            file->path);
+  SUPINE_REFUSE_IF(*reader == NULL, error, SUPINE_ERROR_FORMAT,
+                   "%s: no importer for this ending; give the mesh as .ply, .obj, .stl or .vtp",
+                   file->path);
+  return SUPINE_OK;
 }
 
 /* Copy a surface as a reader copies that of a file. */

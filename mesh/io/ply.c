@@ -153,13 +153,11 @@ static supine_status check_header(const ply *in) {
                      "%s: it has strips of triangles; save the mesh as triangles", path);
   }
   SUPINE_TRY(in->encoding == ASCII ? supine_mesh_guard_text(in->file, in->error) : SUPINE_OK);
-  return (in->present & needed) == needed
-             ? SUPINE_OK
-             : supine_error_set(
-                   in->error, SUPINE_ERROR_MESH,
-                   "%s: no triangles: the PLY header has no faces with "
-                   "vertex_indices, or no vertices with x, y and z; save the mesh as triangles",
+  SUPINE_REFUSE_IF((in->present & needed) != needed, in->error, SUPINE_ERROR_MESH,
+                   "%s: no triangles: the PLY header has no faces with vertex_indices, or no "
+                   "vertices with x, y and z; save the mesh as triangles",
                    path);
+  return SUPINE_OK;
 }
 
 /* Read the next number; return false if it is missing or malformed. */

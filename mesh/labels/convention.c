@@ -200,8 +200,8 @@ static supine_status check(const char *path, const supine_image *image, const la
       list_labels(tally, NULL, 0, present, sizeof present);
       return supine_error_set(
           error, SUPINE_ERROR_MESH,
-          "%s: no voxel has a label that --labels gives to the %s lung; the labels present are "
-          "%s. Correct --labels, or name only one lung, such as --labels %s=1+2",
+          "%s: no voxel has a label that --labels gives to the %s lung; the labels present are %s. "
+          "Correct --labels, or name only one lung, such as --labels %s=1+2",
           path, names[s], present, names[1 - s]);
     }
   }

@@ -28,10 +28,10 @@ typedef struct work {
 
 static supine_status advance(work *w, double fraction, supine_error *error) {
   const supine_labels_options *options = w->options;
-  return options->progress == NULL || options->progress(options->progress_context, fraction)
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_INTERRUPTED,
-                                "interrupted: nothing was written");
+  SUPINE_REFUSE_IF(
+      !(options->progress == NULL || options->progress(options->progress_context, fraction)), error,
+      SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
+  return SUPINE_OK;
 }
 
 /* Return whether two images have the same size, and corners that differ by at most 0.01 voxels. */

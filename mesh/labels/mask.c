@@ -77,10 +77,9 @@ supine_status supine_labels_count(const char *path, const supine_image *image, l
                      path, bad);
     count_row(image, row, labels, tally);
   }
-  return tally[0].count < image->size[0] * image->size[1] * image->size[2]
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_MESH,
-                                "%s: every voxel is 0: give an image with labels", path);
+  SUPINE_REFUSE_IF(tally[0].count == image->size[0] * image->size[1] * image->size[2], error,
+                   SUPINE_ERROR_MESH, "%s: every voxel is 0: give an image with labels", path);
+  return SUPINE_OK;
 }
 
 supine_status supine_labels_mask_cut(const supine_image *image, const size_t low[3],

@@ -155,12 +155,12 @@ static supine_status check_tensors(const reading *r) {
   const bool valid = is_real(r->points, 2) && is_real(r->gravity, 2) && is_real(u, 3) &&
                      r->gravity->shape[0] == u->shape[0] && r->points->shape[0] == u->shape[1] &&
                      u->shape[0] > 0;
-  return valid ? SUPINE_OK
-               : supine_error_set(r->error, SUPINE_ERROR_FORMAT,
-                                  "%s: expected tensors points [P,3], gravity [M,3] and "
-                                  "displacement [M,P,3], F32 or F64. Write all three, with the "
-                                  "position of each point that is displaced, in Python: " WRITE,
-                                  r->path);
+  SUPINE_REFUSE_IF(
+      !valid, r->error, SUPINE_ERROR_FORMAT,
+      "%s: expected tensors points [P,3], gravity [M,3] and displacement [M,P,3], F32 or F64. "
+      "Write all three, with the position of each point that is displaced, in Python: " WRITE,
+      r->path);
+  return SUPINE_OK;
 }
 
 static supine_status take_tensors(reading *r) {

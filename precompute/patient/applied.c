@@ -112,10 +112,9 @@ supine_status supine_patient_applied_find(supine_patient_matching *matching,
   applied->blocks = (double)blocks;
   supine_mesh_vertex_area(&matching->fuller->mesh, spread);
   sum_products(matching, spread + n, gravity, spread, blocks, means, products);
-  return fit_force(products, applied)
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                                "the displacement between the two surfaces does not determine the "
-                                "applied force: check that both surfaces show the same lungs, and "
-                                "that neither surface is cut off");
+  SUPINE_REFUSE_IF(
+      !fit_force(products, applied), error, SUPINE_ERROR_NUMERICAL,
+      "the displacement between the two surfaces does not determine the applied force: check that "
+      "both surfaces show the same lungs, and that neither surface is cut off");
+  return SUPINE_OK;
 }

@@ -221,8 +221,8 @@ static supine_status hold_all_out(study *s, squares *held_out, supine_error *err
   for (size_t item = 0; item < ITEMS; ++item) {
     const squares *item_sums = &s->held_out[item];
     SUPINE_REFUSE_IF(s->failed[item] != SUPINE_OK, error, s->failed[item],
-                     "the points outside some blocks of 40 mm do not determine the law "
-                     "(%s): give more points, spread over both lungs",
+                     "the points outside some blocks of 40 mm do not determine the law (%s): give "
+                     "more points, spread over both lungs",
                      supine_status_string(s->failed[item]));
     for (size_t k = 0; k < sizeof *item_sums / sizeof(double); ++k) {
       ((double *)held_out)[k] += ((const double *)item_sums)[k];
@@ -319,10 +319,10 @@ supine_status supine_patient_fit(const supine_patient_fit_options *options,
              .fold = supine_arena_take(&arena, SEEDS * count, sizeof(size_t))};
   *report = (supine_patient_fit_report){.points = (double)(triples > 0 ? triples : count)};
   patient->law = options->law;
-  SUPINE_REFUSE_IF(single + triples < needed, error, SUPINE_ERROR_FORMAT,
-                   "points: %zu, fewer than the %zu unknowns of the %s law: give more "
-                   "points, or use --law deep",
-                   single + triples, needed, supine_patient_law_names[options->law]);
+  SUPINE_REFUSE_IF(
+      single + triples < needed, error, SUPINE_ERROR_FORMAT,
+      "points: %zu, fewer than the %zu unknowns of the %s law: give more points, or use --law deep",
+      single + triples, needed, supine_patient_law_names[options->law]);
   for (size_t seed = 0; seed < SEEDS; ++seed) {
     const size_t blocks =
         arena.failed ? 0 : assign_folds(&patient->frame, rows, count, seed, s.fold + seed * count);

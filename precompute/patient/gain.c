@@ -173,11 +173,11 @@ static supine_status iterate(work *w, supine_patient_further *further, supine_er
     change =
         fabs(w->x[0] - before[0]) + fabs(w->x[1] - before[1]) + fabs(w->x[GAIN] - before[GAIN]);
   }
-  SUPINE_REFUSE_IF(change >= not_converged, error, SUPINE_ERROR_NUMERICAL,
-                   "the fit to a scan in another state does not converge (after %d "
-                   "rounds, scales and gain still change by %.2g): check that all scans "
-                   "have the same axes and show the same person",
-                   ROUNDS, change);
+  SUPINE_REFUSE_IF(
+      change >= not_converged, error, SUPINE_ERROR_NUMERICAL,
+      "the fit to a scan in another state does not converge (after %d rounds, scales and gain "
+      "still change by %.2g): check that all scans have the same axes and show the same person",
+      ROUNDS, change);
   memcpy(further->scale, w->x, sizeof further->scale);
   further->gain = w->x[GAIN];
   for (size_t without = 0; without < BLOCKS && further->fits_gain; ++without) {

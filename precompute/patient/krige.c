@@ -267,8 +267,7 @@ static supine_status krige_create(supine_patient_krige *k,
   }
   SUPINE_REFUSE_IF(!options->uncorrected && thirds > 3 * SUPINE_PATIENT_CENTRES_MAX, error,
                    SUPINE_ERROR_FORMAT,
-                   "%zu points to fit, more than %d: leave landmarks out, evenly over the "
-                   "lungs",
+                   "%zu points to fit, more than %d: leave landmarks out, evenly over the lungs",
                    thirds / 3, SUPINE_PATIENT_CENTRES_MAX);
   k->centre = supine_arena_take(a, count, sizeof *k->centre);
   k->design = supine_arena_take(a, (TERMS + 1) * count, sizeof *k->design);

@@ -67,9 +67,9 @@ supine_status supine_patient_matching_weigh(supine_patient_matching *matching, d
   }
   matching->matched = (double)count / (double)matching->count;
   SUPINE_REFUSE_IF(matching->matched < matched_least, error, SUPINE_ERROR_MESH,
-                   "only %.0f %% of the vertices have a normal like that of the nearest "
-                   "point of the other surface: check that both surfaces have the same "
-                   "axes and show the same person, and that no triangles face inwards",
+                   "only %.0f %% of the vertices have a normal like that of the nearest point of "
+                   "the other surface: check that both surfaces have the same axes and show the "
+                   "same person, and that no triangles face inwards",
                    100.0 * matching->matched);
   gsl_sort(matching->space, 1, count);
   const double cutoff_scale = fmax(fmax(scale_least, scale), 1.4826 * matching->space[count / 2]);

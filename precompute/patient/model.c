@@ -205,8 +205,8 @@ static supine_status find_state(supine_patient_record *record, const supine_lung
   double sum[2] = {0.0, 0.0}; /* [state] sum of the squares of all these distances */
   size_t axis[2] = {0};
   SUPINE_REFUSE_IF(frame->only_side != 0 && frame->only_side != only_side, error, SUPINE_ERROR_MESH,
-                   "the patient's law was fitted to the %s lung alone: give that lung, or fit "
-                   "the law to both lungs",
+                   "the patient's law was fitted to the %s lung alone: give that lung, or fit the "
+                   "law to both lungs",
                    frame->only_side > 0 ? "left" : "right");
   for (size_t s = 0; s < 2; ++s) {
     /* Do not compare x if the surface lacks one of two fitted lungs. */
@@ -224,14 +224,13 @@ static supine_status find_state(supine_patient_record *record, const supine_lung
           : sum[1] < sum[0];
   const size_t k = axis[state];
   record->shown = (double)state;
-  return off[state] <= apart_most[record->from_surface]
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_MESH,
-                                "the patient's law was fitted to lungs from %c = %.0f to %.0f mm, "
-                                "but this surface extends from %.0f to %.0f mm: check that it has "
-                                "the same coordinate frame and unit, and shows the same person",
-                                "xyz"[k], low[state][k], high[state][k], lungs -> minimum[k],
-                                lungs -> maximum[k]);
+  SUPINE_REFUSE_IF(!(off[state] <= apart_most[record->from_surface]), error, SUPINE_ERROR_MESH,
+                   "the patient's law was fitted to lungs from %c = %.0f to %.0f mm, but this "
+                   "surface extends from %.0f to %.0f mm: check that it has the same coordinate "
+                   "frame and unit, and shows the same person",
+                   "xyz"[k], low[state][k], high[state][k], lungs -> minimum[k],
+                   lungs -> maximum[k]);
+  return SUPINE_OK;
 }
 
 void supine_patient_resting(const supine_patient_record *record, supine_resting *resting) {

@@ -39,8 +39,8 @@ static supine_status find_columns(const supine_csv *csv, bool reverse, size_t co
   for (size_t k = 0; k < COORDINATES; ++k) {
     column[k] = first + (swap ? (k + 3) % COORDINATES : k);
     SUPINE_REFUSE_IF(supine_csv_text(csv, first + k) == NULL, error, SUPINE_ERROR_FORMAT,
-                     "%s:%zu: the header has no column \"%s\"; expected "
-                     "x,y,z,to_x,to_y,to_z or im1_x,im1_y,im1_z,im2_x,im2_y,im2_z",
+                     "%s:%zu: the header has no column \"%s\"; expected x,y,z,to_x,to_y,to_z or "
+                     "im1_x,im1_y,im1_z,im2_x,im2_y,im2_z",
                      csv->path, csv->line, columns[first + k]);
   }
   return SUPINE_OK;
@@ -73,10 +73,9 @@ static supine_status read_rows(supine_csv *csv, bool reverse, supine_patient_pai
     }
     ++pairs->count;
   }
-  return pairs->count > 0
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%s: no pairs of points: give one pair in each line", csv->path);
+  SUPINE_REFUSE_IF(pairs->count == 0, error, SUPINE_ERROR_FORMAT,
+                   "%s: no pairs of points: give one pair in each line", csv->path);
+  return SUPINE_OK;
 }
 
 supine_status supine_patient_pairs_load(const char *path, bool reverse, supine_patient_pairs *pairs,
@@ -203,33 +202,33 @@ static summary measure(const supine_patient_pairs *pairs, bool scans_moved) {
 
 supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool scans_moved,
                                          supine_error *error) {
-  SUPINE_REFUSE_IF(pairs->count < PAIRS_LEAST, error, SUPINE_ERROR_FORMAT,
-                   "pairs of points: %zu, but at least %d are needed, spread over the "
-                   "lungs: add more pairs",
-                   pairs->count, PAIRS_LEAST);
+  SUPINE_REFUSE_IF(
+      pairs->count < PAIRS_LEAST, error, SUPINE_ERROR_FORMAT,
+      "pairs of points: %zu, but at least %d are needed, spread over the lungs: add more pairs",
+      pairs->count, PAIRS_LEAST);
   const summary s = measure(pairs, scans_moved);
   for (int state = 0; state < 2; ++state) {
     const char *unit = NULL;
     SUPINE_REFUSE_IF(!supine_mesh_unit_is_likely(s.size[state], &unit), error, SUPINE_ERROR_FORMAT,
-                     "the points %s extend over %.3g mm, which is too small or too large "
-                     "for lungs%s%s: give landmarks in mm, spread over the lungs",
+                     "the points %s extend over %.3g mm, which is too small or too large for "
+                     "lungs%s%s: give landmarks in mm, spread over the lungs",
                      state == 0 ? "of the first state" : "of the second state", s.size[state],
                      unit == NULL ? "" : "; the unit may be ", unit == NULL ? "" : unit);
   }
   SUPINE_REFUSE_IF(s.flat, error, SUPINE_ERROR_FORMAT,
                    "all points lie in one plane: give landmarks spread over the lungs");
   SUPINE_REFUSE_IF(s.residual > residual_most * s.spread[1], error, SUPINE_ERROR_FORMAT,
-                   "the points of the two states do not match (%.0f mm RMS remain after "
-                   "an affine map): check that both lists are in the same order",
+                   "the points of the two states do not match (%.0f mm RMS remain after an affine "
+                   "map): check that both lists are in the same order",
                    s.residual);
   SUPINE_REFUSE_IF(s.growth < 0.0 || s.rotation > rotation_most, error, SUPINE_ERROR_FORMAT,
-                   "the two states differ by %sa rotation of %.0f degrees: give both in "
-                   "LPS axes (x to the left, y to the back, z to the head)",
+                   "the two states differ by %sa rotation of %.0f degrees: give both in LPS axes "
+                   "(x to the left, y to the back, z to the head)",
                    s.growth < 0.0 ? "a reflection and " : "", s.rotation);
   SUPINE_REFUSE_IF(
       !scans_moved && s.translation > apart_most * s.spread[0], error, SUPINE_ERROR_FORMAT,
-      "the centres of the two states are %.0f mm apart: give all points in one coordinate "
-      "frame, or fit the motion between the scans with --translation or --rigid",
+      "the centres of the two states are %.0f mm apart: give all points in one coordinate frame, "
+      "or fit the motion between the scans with --translation or --rigid",
       s.translation);
   SUPINE_REFUSE_IF(
       s.displacement < displacement_least, error, SUPINE_ERROR_FORMAT,
@@ -247,11 +246,10 @@ supine_status supine_patient_check_boxes(const supine_mesh *first, const supine_
   for (int k = 0; k < 3; ++k) {
     const double larger = fmax(high[0][k] - low[0][k], high[1][k] - low[1][k]);
     const double overlap = fmin(high[0][k], high[1][k]) - fmax(low[0][k], low[1][k]);
-    SUPINE_REFUSE_IF(
-        !(overlap >= box_overlap_least * larger), error, SUPINE_ERROR_MESH,
-        "the two surfaces overlap too little along %c (%.0f to %.0f and %.0f to %.0f mm): check "
-        "that both show the same lungs in one coordinate frame and unit",
-        "xyz"[k], low[0][k], high[0][k], low[1][k], high[1][k]);
+    SUPINE_REFUSE_IF(!(overlap >= box_overlap_least * larger), error, SUPINE_ERROR_MESH,
+                     "the two surfaces overlap too little along %c (%.0f to %.0f and %.0f to %.0f "
+                     "mm): check that both show the same lungs in one coordinate frame and unit",
+                     "xyz"[k], low[0][k], high[0][k], low[1][k], high[1][k]);
   }
   return SUPINE_OK;
 }

@@ -297,15 +297,15 @@ static supine_status decode(const char *name, json_t *root, const json_error_t *
                      version == VERSION;
   const char *invalid_key = known ? read_record(root, record) : NULL;
   json_decref(root);
-  return !known ? supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                   "%s: not a patient file of version %d: make a new one with "
-                                   "'supine fit'",
-                                   name, VERSION)
+  return !known ? supine_error_set(
+                      error, SUPINE_ERROR_FORMAT,
+                      "%s: not a patient file of version %d: make a new one with 'supine fit'",
+                      name, VERSION)
          : invalid_key != NULL
-             ? supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%s: \"%s\" is missing or invalid: make a new file with "
-                                "'supine fit'",
-                                name, invalid_key)
+             ? supine_error_set(
+                   error, SUPINE_ERROR_FORMAT,
+                   "%s: \"%s\" is missing or invalid: make a new file with 'supine fit'", name,
+                   invalid_key)
              : SUPINE_OK;
 }
 

@@ -157,8 +157,8 @@ supine_status supine_patient_scans_order(supine_patient_scans *scans, supine_pat
   SUPINE_REFUSE_IF((named > 0 && growth < 1.0 - volume_error) ||
                        (named < 0 && growth > 1.0 + volume_error),
                    error, SUPINE_ERROR_FORMAT,
-                   "the scan given as the fuller one has only %.0f %% of the volume of the "
-                   "other scan: exchange --rest and --other, or give --reverse",
+                   "the scan given as the fuller one has only %.0f %% of the volume of the other "
+                   "scan: exchange --rest and --other, or give --reverse",
                    100.0 * (named > 0 ? growth : 1.0 / growth));
   if (volume[0] > 0.0 && scans->pairs.count > 0) {
     SUPINE_TRY(find_sides(&scans->lungs[0], &scans->pairs, error));
@@ -167,13 +167,12 @@ supine_status supine_patient_scans_order(supine_patient_scans *scans, supine_pat
     exchange(scans, record->state);
   }
   set_states(scans, record);
-  return record->from_surface || (record->volume[0] > 0.0 && record->volume[1] > 0.0)
-             ? SUPINE_OK
-             : supine_error_set(
+  SUPINE_REFUSE_IF(!(record->from_surface || (record->volume[0] > 0.0 && record->volume[1] > 0.0)),
                    error, SUPINE_ERROR_ARGUMENT,
                    "landmarks do not show the volume of the lungs, which decides what rest and "
                    "full inflation are: give both volumes of gas and tissue, such as --rest 2600mL "
                    "--other 5400mL, or both surfaces");
+  return SUPINE_OK;
 }
 
 static supine_status fit_landmarks(const supine_patient_scans *scans,

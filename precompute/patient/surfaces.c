@@ -7,6 +7,8 @@
 
 #include "precompute/patient/matching.h"
 
+#include "base/arena.h"
+
 enum {
   VERTICES_MAX = 600,  /* largest number of matched vertices */
   REGIONAL_MAX = 4000, /* the same, if the stiffness of lung regions is fitted */
@@ -82,12 +84,10 @@ static supine_status check_apart(supine_patient_matching *m, supine_patient_surf
   const size_t stride = sizeof *m->match / sizeof(double);
   report->before =
       sqrt(gsl_stats_tss_m(&m->match->distance, stride, m->count, 0.0) / (double)m->count);
-  return report->before >= same_state
-             ? SUPINE_OK
-             : supine_error_set(
-                   error, SUPINE_ERROR_MESH,
+  SUPINE_REFUSE_IF(!(report->before >= same_state), error, SUPINE_ERROR_MESH,
                    "the two surfaces are the same (%.2g mm RMS apart): give two different states",
                    report->before);
+  return SUPINE_OK;
 }
 
 static supine_status measure(supine_patient_matching *m, const supine_patient_fit_options *wanted,

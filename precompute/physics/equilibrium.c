@@ -423,12 +423,11 @@ supine_status supine_physics_equilibrium_solve(supine_equilibrium *equilibrium, 
       return supine_error_memory(error, "the equilibrium of %zu vertices",
                                  equilibrium->vertex_count);
     }
-    SUPINE_REFUSE_IF(
-        s.status[k] != SUPINE_OK || !(s.residual[k] <= residual_limit), error,
-        SUPINE_ERROR_NUMERICAL,
-        "the equilibrium was not solved: the relative residual is %.3g, above "
-        "%.3g. Check that forces and stiffnesses are finite, or give a shorter --reach",
-        s.status[k] != SUPINE_OK ? INFINITY : s.residual[k], residual_limit);
+    SUPINE_REFUSE_IF(s.status[k] != SUPINE_OK || !(s.residual[k] <= residual_limit), error,
+                     SUPINE_ERROR_NUMERICAL,
+                     "the equilibrium was not solved: the relative residual is %.3g, above %.3g. "
+                     "Check that forces and stiffnesses are finite, or give a shorter --reach",
+                     s.status[k] != SUPINE_OK ? INFINITY : s.residual[k], residual_limit);
   }
   return SUPINE_OK;
 }

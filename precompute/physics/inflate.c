@@ -49,14 +49,12 @@ typedef struct ascent {
 
 static supine_status check_folds(const ascent *a, supine_error *error) {
   const double share = supine_mesh_turned_over(&a->scan.mesh, a->estimate.mesh.vertices);
-  return share <= folded_share
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                                "the scan folds on its way to full inflation: %.3g %% of its "
-                                "triangles turn over. If the scan is fuller than --scanned says, "
-                                "change --scanned or --resting; --scanned none uses the scan as it "
-                                "is",
-                                100.0 * share);
+  SUPINE_REFUSE_IF(!(share <= folded_share), error, SUPINE_ERROR_NUMERICAL,
+                   "the scan folds on its way to full inflation: %.3g %% of its triangles turn "
+                   "over. If the scan is fuller than --scanned says, change --scanned or "
+                   "--resting; --scanned none uses the scan as it is",
+                   100.0 * share);
+  return SUPINE_OK;
 }
 
 /* Find the gains A of one lung in the scan: factors of its displacement along x, y and z, which are
@@ -177,13 +175,12 @@ static supine_status advance(ascent *a, supine_error *error) {
     }
     matrix[j * n + j] *= 1.0 + ridge;
   }
-  SUPINE_REFUSE_IF(
-      n > 0 && LAPACKE_dposv(LAPACK_ROW_MAJOR, 'L', (lapack_int)n, 1, matrix, (lapack_int)n,
-                             weights, 1) != 0,
-      error, SUPINE_ERROR_NUMERICAL,
-      "no surface at full inflation was found: the iteration does not progress. If the scan is "
-      "fuller than --scanned says, change --scanned or --resting; --scanned none uses the scan "
-      "as it is");
+  SUPINE_REFUSE_IF(n > 0 && LAPACKE_dposv(LAPACK_ROW_MAJOR, 'L', (lapack_int)n, 1, matrix,
+                                          (lapack_int)n, weights, 1) != 0,
+                   error, SUPINE_ERROR_NUMERICAL,
+                   "no surface at full inflation was found: the iteration does not progress. If "
+                   "the scan is fuller than --scanned says, change --scanned or --resting; "
+                   "--scanned none uses the scan as it is");
   double *to = a->estimate.mesh.vertices;
   memcpy(to, a->map, a->size * sizeof *to);
   for (size_t j = 0; j < n; ++j) {
@@ -212,9 +209,9 @@ static supine_status iterate(ascent *a, supine_error *error) {
     SUPINE_TRY(advance(a, error));
   }
   return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                          "no surface at full inflation was found: after %d steps it still "
-                          "changes by %.3g mm RMS. If the scan is fuller than --scanned says, "
-                          "change --scanned or --resting; --scanned none uses the scan as it is",
+                          "no surface at full inflation was found: after %d steps it still changes "
+                          "by %.3g mm RMS. If the scan is fuller than --scanned says, change "
+                          "--scanned or --resting; --scanned none uses the scan as it is",
                           SOLVES_MAX, a->rms);
 }
 

@@ -22,8 +22,8 @@ supine_status supine_reference_scan_parse(const char *text, supine_scan *scan,
   SUPINE_REFUSE_IF(read.state.lung_count > 0 ||
                        (kind != SUPINE_VOLUME_REST && kind != SUPINE_VOLUME_FULL),
                    error, SUPINE_ERROR_ARGUMENT,
-                   "'%s' is not the state of a scan: give full or "
-                   "POSTURE:rest, either with +ML or -ML for both lungs together, or none",
+                   "'%s' is not the state of a scan: give full or POSTURE:rest, either with +ML or "
+                   "-ML for both lungs together, or none",
                    text);
   *scan = read;
   return SUPINE_OK;

@@ -112,8 +112,8 @@ supine_status supine_reference_resting_set(supine_resting *resting, const char *
   for (size_t k = 0; k < 3 && value != NULL; ++k) {
     SUPINE_REFUSE_IF(
         g[k] != 0.0 && !read_value(&set, 2 * k + (g[k] < 0.0), value), error, SUPINE_ERROR_ARGUMENT,
-        "%s=%s: give a share of the full volume above %g and at most %g (0.48, or "
-        "0.47/0.49 for the left and the right lung) or a volume of gas and tissue (2600mL)",
+        "%s=%s: give a share of the full volume above %g and at most %g (0.48, or 0.47/0.49 for "
+        "the left and the right lung) or a volume of gas and tissue (2600mL)",
         posture, value, least_share, most_share);
   }
   *resting = set;
@@ -161,9 +161,9 @@ supine_status supine_reference_resting_settle(supine_resting *resting, size_t co
       fits = fits && is_share(*share);
     }
     SUPINE_REFUSE_IF(!relative && !fits, error, SUPINE_ERROR_ARGUMENT,
-                     "lungs with a full volume of %.0f mL do not hold %.0f mL at rest in "
-                     "posture %s: if the scan was not at full inflation, give its state, "
-                     "such as --scanned supine:rest; otherwise change --resting",
+                     "lungs with a full volume of %.0f mL do not hold %.0f mL at rest in posture "
+                     "%s: if the scan was not at full inflation, give its state, such as --scanned "
+                     "supine:rest; otherwise change --resting",
                      full[0] + (count > 1 ? full[1] : 0.0),
                      at_rest(resting, axis, count, side, full), names[axis]);
     resting->ml[axis] = relative ? resting->ml[axis] : 0.0;

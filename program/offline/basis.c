@@ -181,8 +181,8 @@ supine_status supine_offline_check(supine_offline_request *wanted, supine_error 
   if (wanted->fields != NULL) { /* they displace the surface as it is */
     SUPINE_REFUSE_IF(scan->known && scan->state.volume.kind != SUPINE_VOLUME_DEFAULT, error,
                      SUPINE_ERROR_ARGUMENT,
-                     "--scanned: with --fields, give the posture alone, such as supine, "
-                     "as fields of gravity have no volume");
+                     "--scanned: with --fields, give the posture alone, such as supine, as fields "
+                     "of gravity have no volume");
     wanted->posture = *scan;
     scan->known = false;
     wanted->model.has_scan = true;

@@ -24,12 +24,11 @@ supine_status supine_options_basis_open(const char *path, supine_storage storage
   const supine_basis_options options = {sizeof options, .storage = storage,
                                         .without_normals = true};
   SUPINE_TRY(supine_basis_open_with(path, &options, basis, error));
-  return supine_basis_get_info(*basis)->has_volume
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
-                                "%s: the surface is open and encloses no volume: close the mesh "
-                                "before 'supine precompute'",
-                                path);
+  SUPINE_REFUSE_IF(
+      !supine_basis_get_info(*basis)->has_volume, error, SUPINE_ERROR_OPEN_SURFACE,
+      "%s: the surface is open and encloses no volume: close the mesh before 'supine precompute'",
+      path);
+  return SUPINE_OK;
 }
 
 json_t *supine_options_json_metadata(const supine_basis *basis) {

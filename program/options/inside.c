@@ -53,8 +53,8 @@ supine_status supine_command_names_open(const supine_basis *basis, supine_comman
   }
   for (size_t i = 0; i < n; ++i) {
     SUPINE_REFUSE_IF(names->part[i] >= names->count, error, SUPINE_ERROR_FORMAT,
-                     "point %zu of the basis has no name: make the file again with "
-                     "'supine embed BASIS POINTS.csv'",
+                     "point %zu of the basis has no name: make the file again with 'supine embed "
+                     "BASIS POINTS.csv'",
                      i);
   }
   return sort_by_name(names, n, error);
@@ -78,13 +78,11 @@ supine_status supine_command_inside_open(const supine_basis *lungs, const char *
   SUPINE_TRY(supine_options_basis_open(path, SUPINE_STORAGE_AUTO, inside, error));
   SUPINE_TRY(supine_command_names_open(*inside, names, error));
   const supine_basis_info *info = supine_basis_get_info(*inside);
-  return info->vector && info->identity == supine_basis_get_info(lungs)->identity
-             ? SUPINE_OK
-             : supine_error_set(
-                   error, SUPINE_ERROR_FORMAT,
-                   "%s belongs to another basis: make it again with 'supine embed' from "
-                   "the given basis",
-                   path);
+  SUPINE_REFUSE_IF(
+      !(info->vector && info->identity == supine_basis_get_info(lungs)->identity), error,
+      SUPINE_ERROR_FORMAT,
+      "%s belongs to another basis: make it again with 'supine embed' from the given basis", path);
+  return SUPINE_OK;
 }
 
 /* Average the vertices order[begin] to order[end - 1] to a target; [N, 3] positions before and

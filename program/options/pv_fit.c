@@ -36,11 +36,11 @@ static supine_status refuse(const problem *limb, const supine_pv_sample *sample,
 
 static supine_status refuse_fall(const problem *limb, const supine_pv_sample *sample, double larger,
                                  supine_error *error) {
-  return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                          "%.200s:%zu: volume %g mL is not above the %g mL at a lower pressure: "
-                          "volume must rise with pressure, apart from a little noise; correct or "
-                          "remove the sample",
-                          limb->name, sample->line, sample->volume, larger);
+  return supine_error_set(
+      error, SUPINE_ERROR_FORMAT,
+      "%.200s:%zu: volume %g mL is not above the %g mL at a lower pressure: volume must rise with "
+      "pressure, apart from a little noise; correct or remove the sample",
+      limb->name, sample->line, sample->volume, larger);
 }
 
 /* Check that pressures keep rising or keep falling, and sort the samples by rising pressure. */

@@ -53,10 +53,10 @@ supine_status supine_options_state(const supine_orientation *orientation, supine
     *state = *given;
   }
   memcpy(state->gravity, given->gravity, sizeof given->gravity);
-  return given->gravity[0] != 0.0 || given->gravity[1] != 0.0 || given->gravity[2] != 0.0
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                "the posture is missing: give --posture or --gravity");
+  SUPINE_REFUSE_IF(
+      !(given->gravity[0] != 0.0 || given->gravity[1] != 0.0 || given->gravity[2] != 0.0), error,
+      SUPINE_ERROR_ARGUMENT, "the posture is missing: give --posture or --gravity");
+  return SUPINE_OK;
 }
 
 supine_status supine_options_posture_list_parse(const char *text, const supine_state *standard,
@@ -173,8 +173,7 @@ supine_status supine_options_plausible(const supine_plausible *lungs, supine_err
     return SUPINE_OK;
   }
   SUPINE_REFUSE_IF(!lungs->allowed, error, SUPINE_ERROR_NUMERICAL,
-                   "%s: %s: choose a volume nearer to rest, or accept this with "
-                   "--allow-folds",
+                   "%s: %s: choose a volume nearer to rest, or accept this with --allow-folds",
                    state, wrong);
   supine_options_say(lungs->command, "warning: %s: %s", state, wrong);
   return SUPINE_OK;
@@ -219,8 +218,7 @@ supine_held supine_options_held(const supine_basis *basis, const supine_state *s
   const char *scanned = supine_basis_metadata(basis, "scan_state");
   const bool at_rest = scanned != NULL && strstr(scanned, "rest") != NULL;
   const supine_state scan = supine_basis_scan(basis);
-  double in_scan[SUPINE_LUNGS_MAX] = {0.0};
-  double volumes[SUPINE_LUNGS_MAX] = {0.0};
+  double in_scan[SUPINE_LUNGS_MAX] = {0.0}, volumes[SUPINE_LUNGS_MAX] = {0.0};
   supine_pose scanned_pose;
   if (supine_basis_pose(basis, &scan, &scanned_pose, NULL) == SUPINE_OK) {
     supine_basis_volumes(basis, &scanned_pose, in_scan);
@@ -234,14 +232,13 @@ supine_held supine_options_held(const supine_basis *basis, const supine_state *s
   const bool other = kind == (at_rest ? SUPINE_VOLUME_FULL : SUPINE_VOLUME_REST);
   const bool measured = fabs(held - in_scan[lung]) < 0.05;
   const bool assumed = !measured && other && spread != NULL;
-  const bool given = kind == SUPINE_VOLUME_ABSOLUTE || other;
   const double ratio = assumed ? exp(strtod(spread, NULL)) : 1.0;
   return (supine_held){.value = held,
                        .low = above + (held - above) / ratio,
                        .high = above + (held - above) * ratio,
                        .assumed = assumed,
-                       .source = measured  ? "measured"
-                                 : assumed ? "assumed"
-                                 : given   ? "given"
-                                           : "computed"};
+                       .source = measured                                  ? "measured"
+                                 : assumed                                 ? "assumed"
+                                 : other || kind == SUPINE_VOLUME_ABSOLUTE ? "given"
+                                                                           : "computed"};
 }

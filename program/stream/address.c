@@ -20,10 +20,10 @@ supine_status supine_stream_address_read(const char *text, bool numeric,
   if (colon != NULL) {
     const bool bracketed = text[0] == '[' && colon > text + 1 && colon[-1] == ']';
     const size_t length = (size_t)(colon - text) - (bracketed ? 2 : 0);
-    SUPINE_REFUSE_IF(length == 0 || length >= sizeof address->host, error, SUPINE_ERROR_ARGUMENT,
-                     "'%s': the host before the port is missing or longer than 255 "
-                     "characters: give HOST:PORT",
-                     text);
+    SUPINE_REFUSE_IF(
+        length == 0 || length >= sizeof address->host, error, SUPINE_ERROR_ARGUMENT,
+        "'%s': the host before the port is missing or longer than 255 characters: give HOST:PORT",
+        text);
     memcpy(host, text + (bracketed ? 1 : 0), length);
     host[length] = '\0';
   }

@@ -42,7 +42,8 @@ static supine_status add_all(glb *g, json_t **roots, supine_error *error) {
     supine_export_glb_animate(g);
   }
   *roots = supine_export_glb_room(g);
-  return g->status == SUPINE_OK ? SUPINE_OK : supine_error_set(error, g->status, "out of memory");
+  SUPINE_REFUSE_IF(g->status != SUPINE_OK, error, g->status, "out of memory");
+  return SUPINE_OK;
 }
 
 /* Complete the file's JSON. A compressed file has a second buffer, the fallback that
@@ -72,9 +73,8 @@ static supine_status write_file(const char *path, const char *text, const char *
   const size_t padding = -length % 4;
   *total = 12 + 8 + length + padding + 8 + bytes;
   SUPINE_REFUSE_IF(*total > UINT32_MAX, error, SUPINE_ERROR_ARGUMENT,
-                   "%s: %zu bytes exceed glTF's limit of 4 GiB: use fewer modes or "
-                   "vertices",
-                   path, *total);
+                   "%s: %zu bytes exceed glTF's limit of 4 GiB: use fewer modes or vertices", path,
+                   *total);
   SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
   SUPINE_TRY(supine_output_open(path, &output, error));
   const uint32_t head[] = {magic, VERSION, (uint32_t)*total, (uint32_t)(length + padding),

@@ -304,10 +304,10 @@ supine_status supine_export_html_print(FILE *file, const supine_basis *basis,
             .inside = shown->inside != NULL ? supine_basis_get_info(shown->inside) : NULL,
             .shown = shown,
             .tensors = json_array()};
-  SUPINE_REFUSE_IF(p.info->mode_count > MODES_MAX, error, SUPINE_ERROR_UNSUPPORTED,
-                   "a page shows up to %d modes, not %zu: precompute the basis with "
-                   "--modes %d, or export .glb",
-                   MODES_MAX, p.info->mode_count, MODES_MAX);
+  SUPINE_REFUSE_IF(
+      p.info->mode_count > MODES_MAX, error, SUPINE_ERROR_UNSUPPORTED,
+      "a page shows up to %d modes, not %zu: precompute the basis with --modes %d, or export .glb",
+      MODES_MAX, p.info->mode_count, MODES_MAX);
   SUPINE_TRY(supine_export_pack_begin(error));
   SUPINE_TRY(supine_export_order_make(p.info, true, &p.arena, &p.order, error));
   find_steps(&p);

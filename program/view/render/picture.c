@@ -456,12 +456,11 @@ static supine_status compose(const painter *by, supine_error *error) {
   static const double none[4] = SUPINE_EXTENT_NONE;
   const supine_picture *picture = by->picture;
   double extent[SUPINE_VIEWS_MAX][4];
-  SUPINE_REFUSE_IF(by->at.font < 4, error, SUPINE_ERROR_ARGUMENT,
-                   "%zu x %zu pixels are too few for %zu posture%s and %zu view%s: give "
-                   "a larger --size",
-                   picture->width, picture->height, picture->panel_count,
-                   picture->panel_count == 1 ? "" : "s", picture->view_count,
-                   picture->view_count == 1 ? "" : "s");
+  SUPINE_REFUSE_IF(
+      by->at.font < 4, error, SUPINE_ERROR_ARGUMENT,
+      "%zu x %zu pixels are too few for %zu posture%s and %zu view%s: give a larger --size",
+      picture->width, picture->height, picture->panel_count, picture->panel_count == 1 ? "" : "s",
+      picture->view_count, picture->view_count == 1 ? "" : "s");
   colour(by->cr, ground);
   cairo.paint(by->cr);
   for (size_t row = 0; row < picture->view_count; ++row) {
@@ -486,9 +485,9 @@ static cairo_status_t to_file(void *file, const unsigned char *bytes, unsigned l
 
 static supine_status write_png(cairo_surface_t *surface, FILE *file, supine_error *error) {
   const cairo_status_t written = cairo.surface_write_to_png_stream(surface, to_file, file);
-  return written == CAIRO_STATUS_SUCCESS ? SUPINE_OK
-                                         : supine_error_set(error, SUPINE_ERROR_WRITE, "PNG: %s",
-                                                            cairo.status_to_string(written));
+  SUPINE_REFUSE_IF(written != CAIRO_STATUS_SUCCESS, error, SUPINE_ERROR_WRITE, "PNG: %s",
+                   cairo.status_to_string(written));
+  return SUPINE_OK;
 }
 
 static supine_status draw_on(cairo_surface_t *surface, const supine_basis *basis,
