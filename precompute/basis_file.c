@@ -318,7 +318,9 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   for (size_t i = 0; i < n; ++i) {
     lung[i] = g == 2 && i >= lungs->lung_begin[1] ? 1 : 0;
   }
-  SUPINE_TRY(find_normals(content, vertices, directions, &arena, &normals, error));
+  if (!content->choice->without_normals) {
+    SUPINE_TRY(find_normals(content, vertices, directions, &arena, &normals, error));
+  }
   add_all(&list, content, share, &normals);
   SUPINE_TRY(supine_arena_check(&arena, error, "metadata of %s", path));
   const size_t q = normals.count;

@@ -9,11 +9,12 @@
 
 /** The user's choices for a basis. */
 typedef struct supine_basis_choice {
-  const char *path;    /**< file to write */
-  size_t band;         /**< highest degree of the harmonics */
-  size_t modes;        /**< largest number of modes; 0 uses the harmonics instead of modes */
-  size_t held_out;     /**< number of held-out directions of gravity, or 0 for the default */
-  const char *made_by; /**< for the metadata: the command line that makes the basis, or NULL */
+  const char *path;     /**< file to write */
+  size_t band;          /**< highest degree of the harmonics */
+  size_t modes;         /**< largest number of modes; 0 uses the harmonics instead of modes */
+  size_t held_out;      /**< number of held-out directions of gravity, or 0 for the default */
+  bool without_normals; /**< leave the modes of the normals out of the file */
+  const char *made_by;  /**< for the metadata: the command line that makes the basis, or NULL */
   /** Receives the fraction of the work done, 0 to 1; returns false to stop. NULL: none. */
   bool (*progress)(void *context, double fraction);
   void *progress_context;

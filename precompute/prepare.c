@@ -60,11 +60,12 @@ static void tell_volume(const supine_patient_record *record, double measured,
     (void)snprintf(beside, sizeof beside, "; measured: %.0f mL", measured);
   }
   const double off = beside[0] != '\0' ? fabs((lung[0] + lung[1]) / measured - 1.0) : 0.0;
-  supine_findings_add(findings, "%s: by the fitted law, the lungs hold %.0f mL %s%s%s",
-                      off > different ? "warning" : "note", lung[0] + lung[1], state, beside,
-                      off > different ? ". Check that the scans show the same lungs; give "
-                                        "--landmarks to 'supine fit'"
-                                      : "");
+  supine_findings_add(
+      findings, "%s: by the fitted law, the lungs hold %.0f mL %s%s%s",
+      off > different ? "warning" : "note", lung[0] + lung[1], state, beside,
+      off > different
+          ? ". Check that the scans show the same lungs; give --landmarks to 'supine fit'"
+          : "");
 }
 
 static void describe_fit(const supine_patient_record *record, char *text, size_t size) {
@@ -100,10 +101,10 @@ static supine_status take_patient(supine_model_choice *choice, supine_prepared *
   }
   choice->has_scan = true;
   choice->scan = scan;
-  supine_findings_add(&p->source.findings,
-                      "note: the scan is assumed to be the %s of the two that were fitted; "
-                      "--scanned changes this",
-                      record->shown == 0.0 ? "fuller" : "emptier");
+  supine_findings_add(
+      &p->source.findings,
+      "note: the scan is assumed to be the %s of the two that were fitted; --scanned changes this",
+      record->shown == 0.0 ? "fuller" : "emptier");
   SUPINE_REFUSE_IF(record->shown != 0.0 && !scan.known, error, SUPINE_ERROR_ARGUMENT,
                    "this scan is the emptier of the two that were fitted, and how far it is below "
                    "full inflation is unknown: give its state, such as --scanned supine:rest, or "
@@ -144,8 +145,8 @@ static void warn_of_lesion(const supine_lungs *lungs, const supine_lesion *lesio
   }
   supine_findings_add(
       findings,
-      "warning: the lesion at %g,%g,%g is %.0f mm from the nearest vertex of the "
-      "surface: with a radius of %g mm it changes nothing: correct its centre or radius",
+      "warning: the lesion at %g,%g,%g is %.0f mm from the nearest vertex of the surface: with a "
+      "radius of %g mm it changes nothing: correct its centre or radius",
       c[0], c[1], c[2], nearest, lesion->radius);
 }
 

@@ -61,10 +61,10 @@ static supine_status load_meshes(reading *r, supine_source *source, supine_error
 static void note_map(const char *path, const supine_labels_report *report,
                      supine_findings *findings) {
   if (report->frames_differ) {
-    supine_findings_add(findings,
-                        "%s: warning: its qform and sform do not agree; the sform was used: check "
-                        "the positions",
-                        path);
+    supine_findings_add(
+        findings,
+        "%s: warning: its qform and sform do not agree; the sform was used: check the positions",
+        path);
   }
   for (size_t i = 0; i < report->lung_count; ++i) {
     const supine_labels_lung *lung = &report->lung[i];

@@ -148,10 +148,10 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
       : content && wanted->html != NULL
           ? "%s holds structures inside the lungs, but -o needs the lungs: give the basis of the "
             "lungs, and the structures by --inside"
-      : !content && wanted->frame == 1 ? "%s holds no structures inside the lungs, which --frame "
-                                         "hilum is for: give a basis made "
-                                         "by 'supine embed', or use 'supine deform --frame hilum'"
-                                       : NULL;
+      : !content && wanted->frame == 1
+          ? "%s holds no structures inside the lungs, which --frame hilum is for: give a basis "
+            "made by 'supine embed', or use 'supine deform --frame hilum'"
+          : NULL;
   SUPINE_REFUSE_IF(refused != NULL, error, SUPINE_ERROR_ARGUMENT, refused, c->path);
   return content ? compare_content(c, wanted, error) : report(c, wanted, error);
 }

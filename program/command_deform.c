@@ -37,11 +37,10 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, content.path), .file = SUPINE_FILE_OUT, .endings = ENDINGS},
     {"states", 0, "LIST",
      "CSV file with a state in each row, in the columns posture, volume and output; the basis and "
-     "the images are read once for all states. An output is a surface, points, or "
-     "an image: the image of --image or --labels, moved, or without these the displacement field. "
-     "With --image and --labels, the column labels has the file of the moved labels; the column "
-     "field has that of the field. Each state's field is computed once. Paths are relative to the "
-     "folder of LIST",
+     "the images are read once for all states. An output is a surface, points, or an image: the "
+     "image of --image or --labels, moved, or without these the displacement field. With --image "
+     "and --labels, the column labels has the file of the moved labels; the column field has that "
+     "of the field. Each state's field is computed once. Paths are relative to the folder of LIST",
      SUPINE_FILLS(request, states), .file = SUPINE_FILE_IN,
      .partners = "volume allow-folds from as-scanned frame vertices inverse image density labels"},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},

@@ -169,8 +169,7 @@ const supine_command supine_command_embed = {
              "3D Slicer, or CSV with the columns x, y, z and name), meshes (airways, vessels, "
              "nodules), the parts of a label map, or the nodes of a grid, which may be that of an "
              "image (.nrrd, .nii, .nii.gz). 'supine deform', 'breathe', 'compare', 'info' and "
-             "'stream' read the file like any basis; 'render' and 'export' show it with "
-             "--inside.\n"
+             "'stream' read the file like any basis; 'render' and 'export' show it with --inside.\n"
              "\n"
              "Displacements inside are interpolated from the displacements of each lung's surface "
              "by biharmonic splines, which are exact on the surface and for affine motion.",

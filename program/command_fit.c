@@ -81,15 +81,13 @@ static const supine_option table[] = {
      FILLS(name), .more = true},
     {"state", 0, "STATE:FILE",
      "further state: its surface, or landmarks (.csv) from the first scan to this state. May be "
-     "repeated, up to 8 times. A state in another posture determines how strongly the "
-     "displacement depends on gravity (--gain of 'supine precompute'); for a state in the same "
-     "posture, only the size of the displacement is fitted. All other constants come from the two "
-     "scans",
+     "repeated, up to 8 times. A state in another posture determines how strongly the displacement "
+     "depends on gravity (--gain of 'supine precompute'); for a state in the same posture, only "
+     "the size of the displacement is fitted. All other constants come from the two scans",
      .read = read_further, .wants = "STATE:FILE (at most 8 times), such as prone:rest:prone.ply"},
     {"midline", 0, "X",
      "x of the plane between the lungs, in mm and LPS; default the widest gap between landmarks "
-     "near "
-     "the middle",
+     "near the middle",
      FILLS(source.midline), SUPINE_SAYS_GIVEN(request, source.has_midline),
      .wants = "a number of mm", .more = true},
     {.table = supine_options_surface_frame, FILLS(source.load)},
@@ -101,8 +99,7 @@ static const supine_option table[] = {
     {"map", 0, "FILE",
      "with --expandability: write the expandability of every vertex of the fuller scan, and how "
      "far the surfaces determine it, 0 (not at all) to 1. 'supine precompute --expandability' "
-     "reads "
-     "the .csv; a .vtp or .ply has both as colours of the surface",
+     "reads the .csv; a .vtp or .ply has both as colours of the surface",
      FILLS(map), .file = SUPINE_FILE_OUT, .endings = ".csv, .vtp or .ply", .more = true},
     {"json", 0, NULL, "print JSON instead of text", FILLS(json)},
     {.name = NULL}};
@@ -235,8 +232,8 @@ const supine_command supine_command_fit = {
         "the part of it that equation (18) of Santhanam 2008 does not explain.\n"
         "\n"
         "Examples:\n"
-        "  supine fit --landmarks pairs.csv --translation --rest 2600mL --other 5400mL "
-        "-o patient.json\n"
+        "  supine fit --landmarks pairs.csv --translation --rest 2600mL --other 5400mL -o "
+        "patient.json\n"
         "  supine fit rest.ply full.ply --other supine:full --landmarks pairs.csv -o patient.json\n"
         "  supine fit rest.ply later.ply --other supine:rest+500 -o patient.json\n"
         "  supine fit rest.ply full.ply --other supine:full --state prone:rest:prone.ply --law "

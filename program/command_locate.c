@@ -127,20 +127,19 @@ static void print(const request *wanted, const supine_command_names *names,
   char text[160];
   (void)supine_state_describe(&posture, text, sizeof text);
   supine_options_print(
-      json_pack(
-          "{s:o, s:I, s:f, s:f, s:s, s:o*, s:o*, s:f, s:o*, s:o*, s:[f, f, f], s:o*, s:I, s:f, "
-          "s:o}",
-          "file", supine_options_json_text(wanted->output), "points", (json_int_t)n,
-          "expected_rms_mm", located->expected_rms, "expected_largest_mm",
-          located->expected_largest, "posture", text, "probability_percent",
-          given ? NULL : json_real(100.0 * share), "determined",
-          given ? NULL : json_boolean(share >= determined), "volume_ml", volume,
-          "volume_deviation_ml", fitted ? json_real(best->volume_error) : NULL,
-          "deviation_without_points_ml", fitted ? json_real(best->volume_prior_error) : NULL,
-          "translation_mm", t[0], t[1], t[2], "rotation_degrees",
-          wanted->rigid ? json_real(acos(cosine) * (180.0 / 3.14159265358979)) : NULL,
-          "observed_points", (json_int_t)observed->count, "left_rms_mm", best->residual_rms,
-          "outliers", outliers_of(names, observed, located->residuals)),
+      json_pack("{s:o, s:I, s:f, s:f, s:s, s:o*, s:o*, s:f, s:o*, s:o*, s:[f, f, f], s:o*, s:I, "
+                "s:f, s:o}",
+                "file", supine_options_json_text(wanted->output), "points", (json_int_t)n,
+                "expected_rms_mm", located->expected_rms, "expected_largest_mm",
+                located->expected_largest, "posture", text, "probability_percent",
+                given ? NULL : json_real(100.0 * share), "determined",
+                given ? NULL : json_boolean(share >= determined), "volume_ml", volume,
+                "volume_deviation_ml", fitted ? json_real(best->volume_error) : NULL,
+                "deviation_without_points_ml", fitted ? json_real(best->volume_prior_error) : NULL,
+                "translation_mm", t[0], t[1], t[2], "rotation_degrees",
+                wanted->rigid ? json_real(acos(cosine) * (180.0 / 3.14159265358979)) : NULL,
+                "observed_points", (json_int_t)observed->count, "left_rms_mm", best->residual_rms,
+                "outliers", outliers_of(names, observed, located->residuals)),
       wanted->json);
 }
 
@@ -230,18 +229,17 @@ const supine_command supine_command_locate = {
              "a .mrk.json of 3D Slicer, or a CSV with the columns name,x,y,z, with the names given "
              "to 'supine embed'.",
     .options = table,
-    .notes =
-        "Expected errors are " SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT
-        " They are multiplied by a factor that the residuals of the points decide. A few points "
-        "seldom determine the posture: give --posture. Without it, six postures are "
-        "tried, and the error includes the differences between them.\n"
-        "\n"
-        "Examples:\n"
-        "  supine embed lungs.safetensors airways.csv -o inside.safetensors\n"
-        "  supine locate lungs.safetensors observed.csv --points inside.safetensors --posture "
-        "supine -o found.vtp\n"
-        "  supine locate lungs.safetensors observed.csv --points inside.safetensors --posture left "
-        "--volume rest --rigid -o found.csv",
+    .notes = "Expected errors are " SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT
+             " They are multiplied by a factor that the residuals of the points decide. A few "
+             "points seldom determine the posture: give --posture. Without it, six postures are "
+             "tried, and the error includes the differences between them.\n"
+             "\n"
+             "Examples:\n"
+             "  supine embed lungs.safetensors airways.csv -o inside.safetensors\n"
+             "  supine locate lungs.safetensors observed.csv --points inside.safetensors --posture "
+             "supine -o found.vtp\n"
+             "  supine locate lungs.safetensors observed.csv --points inside.safetensors --posture "
+             "left --volume rest --rigid -o found.csv",
     .operands_least = 2,
     .operands_most = 2,
     .operands_missing = "name a basis file and a file of observed points",

@@ -64,8 +64,8 @@ static const supine_option table[] = {
      .read = read_views, .standard = "lying"},
     {.table = supine_options_from, FILLS(from)},
     {"largest", 0, "MM",
-     "end of the colour bar. If values exceed it, the bar has a pointed end. Default the "
-     "largest displacement, rounded up",
+     "end of the colour bar. If values exceed it, the bar has a pointed end. Default the largest "
+     "displacement, rounded up",
      FILLS(largest), SUPINE_ABOVE_ZERO, .wants = "millimetres above 0", .more = true},
     {"inside", 0, "FILE",
      "structures made by 'supine embed' from the same basis, shown inside transparent lungs with "

@@ -24,9 +24,8 @@ static const supine_option table[] = {
     {"output", 'o', "FILE", SUPINE_MESH_ENDINGS "; PLY and VTP files include displacements",
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT},
     {"volume", 0, "VOLUME",
-     SUPINE_VOLUME_HELP
-     ". Default rest; if rest is unknown (--scanned none, --law paper), the solved displacement, "
-     "without scaling to a volume",
+     SUPINE_VOLUME_HELP ". Default rest; if rest is unknown (--scanned none, --law paper), the "
+                        "solved displacement, without scaling to a volume",
      SUPINE_FILLS(request, state), .read = supine_options_read_volume},
     {.table = supine_options_folds, SUPINE_FILLS(request, allow_folds)},
     {"unit-force", 0, "VERTEX",

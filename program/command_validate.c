@@ -189,15 +189,15 @@ const supine_command supine_command_validate = {
         ".\nDistances between surfaces are measured in both directions; the largest is the "
         "Hausdorff distance. The translation and the affine map are fitted to the other state. "
         "'explained' is 1 minus the ratio of the mean squared distances with and without the "
-        "motion. A small distance between surfaces does not prove that the motion inside is "
-        "right; landmarks measure that. Santhanam 2008 reported surfaces 2 mm apart, in smaller "
+        "motion. A small distance between surfaces does not prove that the motion inside is right; "
+        "landmarks measure that. Santhanam 2008 reported surfaces 2 mm apart, in smaller "
         "breaths.\nWith several states, the factor on the displacement that brings the predicted "
         "surface nearest to the scanned one is also sought for each state. For states in the "
         "posture of the first --state, a straight line is fitted to factor against volume, with "
         "factor 0 at the volume of --from. Its largest deviation is given in percent of the "
-        "largest factor.\n\nExamples:\n  supine validate lungs.safetensors --state "
-        "prone:prone.ply -o errors.png\n  supine validate lungs.safetensors --from supine:rest "
-        "--state supine:mid.ply \\\n      --state supine:full:full.ply --landmarks pairs.csv",
+        "largest factor.\n\nExamples:\n  supine validate lungs.safetensors --state prone:prone.ply "
+        "-o errors.png\n  supine validate lungs.safetensors --from supine:rest --state "
+        "supine:mid.ply \\\n      --state supine:full:full.ply --landmarks pairs.csv",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),
     .run = run};

@@ -175,11 +175,12 @@ static supine_status write_image(const char *path, const supine_image *source, b
                                  supine_error *error) {
   SUPINE_FREED_BY(supine_image_free) supine_image moved = {0};
   SUPINE_TRY(supine_field_resample(inverse, depth, labels, source, &moved, error));
-  SUPINE_TRY(supine_image_write(path, &moved,
-                                depth != NULL ? "HU + 1000 inside the lungs scaled by the local "
-                                                "change of volume: mass is kept"
-                                              : NULL,
-                                error));
+  SUPINE_TRY(supine_image_write(
+      path, &moved,
+      depth != NULL
+          ? "HU + 1000 inside the lungs scaled by the local change of volume: mass is kept"
+          : NULL,
+      error));
   const size_t *size = source->size;
   (void)printf("%s: %zu x %zu x %zu voxels%s\n", path, size[0], size[1], size[2],
                depth != NULL ? ", densities scaled inside the lungs" : "");

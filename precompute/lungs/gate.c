@@ -62,8 +62,7 @@ static supine_status mend(supine_mesh *mesh, const char *name, supine_findings *
   if (specks > 0) {
     supine_findings_add(
         findings,
-        "%s: note: dropped %zu small component%s, each below %g %% of the volume; %zu "
-        "component%s",
+        "%s: note: dropped %zu small component%s, each below %g %% of the volume; %zu component%s",
         name, specks, plural(specks), 100.0 * speck_share, pieces,
         pieces == 1 ? " remains" : "s remain");
   }

@@ -150,14 +150,13 @@ json_t *supine_patient_encode(const supine_patient_record *record, const char *m
     (void)json_object_set_new(group_of(root, "expandability"), "kept",
                               json_boolean(record->expand.kept));
   }
-  (void)json_object_set_new(group_of(root, "force"), "gain_from",
-                            json_string(record->gain_undetermined
-                                            ? "the deep law: the scans of --state do not determine "
-                                              "the gain"
-                                        : record->gain_error > 0.0
-                                            ? "the states in other postures"
-                                            : "the deep law: scans in one posture do not determine "
-                                              "the gain; give --state in another posture"));
+  (void)json_object_set_new(
+      group_of(root, "force"), "gain_from",
+      json_string(
+          record->gain_undetermined ? "the deep law: the scans of --state do not determine the gain"
+          : record->gain_error > 0.0 ? "the states in other postures"
+                                     : "the deep law: scans in one posture do not determine the "
+                                       "gain; give --state in another posture"));
   return root;
 }
 

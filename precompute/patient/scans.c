@@ -102,11 +102,11 @@ static void warn_of_rest(supine_patient_scans *scans, const supine_patient_recor
   const double share[2] = {supine_reference_resting_total(&usual, g),
                            supine_reference_resting_total(&shown, g)};
   if (fabs(share[1] - share[0]) > SUPINE_REST_SPREAD) {
-    (void)snprintf(next_note(scans), sizeof scans->note[0],
-                   "warning: the volume at rest is %.0f %% of full inflation in the two scans, but "
-                   "%.0f %% in healthy people: check --rest. 'supine precompute --patient' uses "
-                   "the volume in the scans",
-                   100.0 * share[1], 100.0 * share[0]);
+    (void)snprintf(
+        next_note(scans), sizeof scans->note[0],
+        "warning: the volume at rest is %.0f %% of full inflation in the two scans, but %.0f %% in "
+        "healthy people: check --rest. 'supine precompute --patient' uses the volume in the scans",
+        100.0 * share[1], 100.0 * share[0]);
   }
 }
 

@@ -118,11 +118,11 @@ void supine_reference_doubt(const supine_reference *reference, const supine_pers
                             : "the scan was probably not at full inflation: give its state with "
                               "--scanned, such as supine:rest or full-1000");
   } else if (full > part * most_ml) {
-    supine_text_add(
-        text, size, "%sat full inflation the lungs hold %.0f mL (%s mL): %s", separator, full,
-        expected,
-        at_rest ? "if the scan was fuller than rest, give --scanned full or supine:rest+1000, or "
-                  "change --resting"
-                : "check the voxel spacing or the unit, and that all of the mask is lung");
+    supine_text_add(text, size, "%sat full inflation the lungs hold %.0f mL (%s mL): %s", separator,
+                    full, expected,
+                    at_rest
+                        ? "if the scan was fuller than rest, give --scanned full or "
+                          "supine:rest+1000, or change --resting"
+                        : "check the voxel spacing or the unit, and that all of the mask is lung");
   }
 }

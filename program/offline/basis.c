@@ -37,10 +37,15 @@ const supine_option supine_offline_options[] = {
      "number of held-out directions in which the error is measured; default 1000; fewer, but at "
      "least 100, for more than 20000 vertices",
      FILLS(basis.held_out), .range = {1.0, 100000.0}, .more = true},
+    {"without-normals", 0, NULL,
+     "leave out the normals: 65 bytes a vertex for 95, and programs compute them from the "
+     "triangles",
+     FILLS(basis.without_normals), .more = true},
     {"patient", 0, "FILE",
      "model of the patient's motion, made by 'supine fit', to use instead of the built-in law",
      FILLS(patient), .file = SUPINE_FILE_IN, .rivals = "directions",
-     .partners = "output band modes held-out axes units midline labels edge close surfaces-out "
+     .partners = "output band modes held-out without-normals axes units midline labels edge close "
+                 "surfaces-out "
                  "scanned resting full height sex expandability lesion lung"},
     {.help = "Displacements from another simulator, instead of the built-in physics:"},
     {"fields", 0, "FILE",
@@ -51,7 +56,8 @@ const supine_option supine_offline_options[] = {
      "of a volume mesh. The fields give gravity alone: the basis has no volumes and no breaths. "
      "Without --band and --modes, cross-validation chooses both",
      FILLS(fields), .file = SUPINE_FILE_IN, .rivals = "directions",
-     .partners = "output band modes axes units midline labels edge close surfaces-out scanned"},
+     .partners = "output band modes without-normals axes units midline labels edge close "
+                 "surfaces-out scanned"},
     {"directions", 0, "N",
      "only print N directions of gravity that cover the sphere evenly, as CSV, to simulate",
      FILLS(directions), .range = {2.0, 1000.0}, .partners = ""},

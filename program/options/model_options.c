@@ -136,8 +136,8 @@ const supine_option supine_command_model_options[] = {
      "the end of a quiet expiration (FRC). POSTURE is supine, prone, left or right (lying on that "
      "side), upright or inverted\nnone: unknown. Breaths are added to the shape in the scan, and a "
      "change of posture alone does not deform it\nPOSTURE alone: with --fields, which then do not "
-     "displace the surface in this posture\nfull and rest may have +ML or -ML, for both "
-     "lungs together: supine:rest+300, full-2000. Default full",
+     "displace the surface in this posture\nfull and rest may have +ML or -ML, for both lungs "
+     "together: supine:rest+300, full-2000. Default full",
      .read = read_scan, .wants = "full or POSTURE:rest, optionally with +ML or -ML, or none"},
     {"resting", 0, "LIST",
      "volume of the patient's lungs at rest (FRC), for one posture or several, separated by "
@@ -179,10 +179,10 @@ const supine_option supine_command_model_options[] = {
      "expands more. With --law paper, --reach must be given too. Default 0",
      FILLS(model.force.soften), .more = true},
     {"constants", 0, "C1,...,C6",
-     "constants of the displacement for a unit force, equations (15)-(17) of Santhanam 2008: "
-     "C1 X^C2 outwards, C3 Y^C4 to the front and C5 Z^C6 to the feet, in mm. Those of deep are "
-     "fitted to landmarks in ten full breaths (DIR-Lab COPDgene). Those of paper are fitted to "
-     "landmarks in ten 4-D CTs (DIR-Lab), as the original ones are lost" SUPINE_LAWS(LAW_CONSTANTS),
+     "constants of the displacement for a unit force, equations (15)-(17) of Santhanam 2008: C1 "
+     "X^C2 outwards, C3 Y^C4 to the front and C5 Z^C6 to the feet, in mm. Those of deep are fitted "
+     "to landmarks in ten full breaths (DIR-Lab COPDgene). Those of paper are fitted to landmarks "
+     "in ten 4-D CTs (DIR-Lab), as the original ones are lost" SUPINE_LAWS(LAW_CONSTANTS),
      FILLS(model.direction.c), .wants = "six numbers, C1,C2,C3,C4,C5,C6", .more = true},
     {"shear", 0, "BETA",
      "motion from back to front that grows from apex to base as lungs fill: BETA (Z - 1/2) times "

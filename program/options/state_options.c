@@ -97,8 +97,8 @@ const supine_option supine_options_volume[] = {
     {"volume", 0, "VOLUME",
      SUPINE_VOLUME_HELP
      "\nleft=VOLUME,right=VOLUME: a volume for each lung; name every lung\nDefault rest; for a "
-     "basis made by 'supine precompute' with --scanned none or --law paper, scan+500. A basis "
-     "made with --fields has no volumes",
+     "basis made by 'supine precompute' with --scanned none or --law paper, scan+500. A basis made "
+     "with --fields has no volumes",
      SUPINE_FILLS(supine_volume_options, state), .read = supine_options_read_volume,
      .rivals = "breath"},
     {.table = supine_options_folds, SUPINE_FILLS(supine_volume_options, allow_folds)},

@@ -25,31 +25,30 @@ static bool by_lung(const glb *g) {
 
 static const char frame_text[] =
     "Vertices of a lung's mesh are in the patient's axes, LPS (x left, y back, z head), from "
-    "'middle', mm: position = middle + millimetresPerUnit * vertex. The mesh's node converts "
-    "them to glTF's metres (y head, z front); the node 'patient' lays the patient down.";
+    "'middle', mm: position = middle + millimetresPerUnit * vertex. The mesh's node converts them "
+    "to glTF's metres (y head, z front); the node 'patient' lays the patient down.";
 static const char weights_text[] =
-    "weight[j] = (amount[j] - offset[j]) / unit[j], with the lung's offset and unit. With K "
-    "modes, amount[j] = s v[j] for j < K and amount[K + k] = t v[k]. v[k] = modeUnit * sum over "
-    "i of modes[k][i] * Y[i](g), where g is the unit vector of gravity in the patient's axes "
-    "(supine 0,1,0). Y: real orthonormal spherical harmonics, index l*l+l+m, sine terms at m < "
-    "0, no Condon-Shortley phase: Y[0] = 0.28209479, Y[1..3] = 0.48860251 * (y, z, x). The gain "
-    "along axis a is A[a] = s + t * bend[a]; s = t = 0 is the reference surface.";
+    "weight[j] = (amount[j] - offset[j]) / unit[j], with the lung's offset and unit. With K modes, "
+    "amount[j] = s v[j] for j < K and amount[K + k] = t v[k]. v[k] = modeUnit * sum over i of "
+    "modes[k][i] * Y[i](g), where g is the unit vector of gravity in the patient's axes (supine "
+    "0,1,0). Y: real orthonormal spherical harmonics, index l*l+l+m, sine terms at m < 0, no "
+    "Condon-Shortley phase: Y[0] = 0.28209479, Y[1..3] = 0.48860251 * (y, z, x). The gain along "
+    "axis a is A[a] = s + t * bend[a]; s = t = 0 is the reference surface.";
 static const char fields_text[] =
     "s = 1 and t = 0: another simulator's fields of gravity, without volumes and breaths";
 static const char volume_text[] =
-    "volume of a lung minus its referenceVolume, mL: sum over axes a of L[a] A[a], plus Q[0] "
-    "A[1] A[2] + Q[1] A[0] A[2] + Q[2] A[0] A[1] + C A[0] A[1] A[2], where L[a] = sum "
-    "linear[a][k] v[k], Q[a] = sum quadratic[a][k][l] v[k] v[l], C = sum cubic[k][l][m] v[k] "
-    "v[l] v[m]. Arrays are flat, last index fastest. If linear has only K numbers, all gains are "
-    "s and the volume is L s + Q s^2 + C s^3. To reach a volume if bend is 0, solve for s on the "
-    "branch through s = 0. With bend, first find r, the s of the volume at rest with t = 0; then "
-    "find the q at which s = r q, t = 2 r e(q) give the volume, where e = (q^3 - q) / 2 for q <= "
-    "1, else (q - 1) / q^6.";
+    "volume of a lung minus its referenceVolume, mL: sum over axes a of L[a] A[a], plus Q[0] A[1] "
+    "A[2] + Q[1] A[0] A[2] + Q[2] A[0] A[1] + C A[0] A[1] A[2], where L[a] = sum linear[a][k] "
+    "v[k], Q[a] = sum quadratic[a][k][l] v[k] v[l], C = sum cubic[k][l][m] v[k] v[l] v[m]. Arrays "
+    "are flat, last index fastest. If linear has only K numbers, all gains are s and the volume is "
+    "L s + Q s^2 + C s^3. To reach a volume if bend is 0, solve for s on the branch through s = 0. "
+    "With bend, first find r, the s of the volume at rest with t = 0; then find the q at which s = "
+    "r q, t = 2 r e(q) give the volume, where e = (q^3 - q) / 2 for q <= 1, else (q - 1) / q^6.";
 static const char resting_text[] =
-    "volume of a lung at rest minus referenceVolume, mL: sum over l <= 2 and m of "
-    "resting[l*l+l+m] * Y[l*l+l+m](g); of all lungs together if byLung is false. Full inflation "
-    "minus referenceVolume is max(0, -g_z)^2 * fullUprightGain * referenceVolume. Above rest, "
-    "all lungs have covered the same fraction of the way from rest to full inflation.";
+    "volume of a lung at rest minus referenceVolume, mL: sum over l <= 2 and m of resting[l*l+l+m] "
+    "* Y[l*l+l+m](g); of all lungs together if byLung is false. Full inflation minus "
+    "referenceVolume is max(0, -g_z)^2 * fullUprightGain * referenceVolume. Above rest, all lungs "
+    "have covered the same fraction of the way from rest to full inflation.";
 
 /* Return the names of the morph targets, such as "mode_3" and "bend_3". */
 static json_t *target_names(const glb *g) {

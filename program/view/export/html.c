@@ -254,8 +254,8 @@ static json_t *describe_froms(const page *p) {
 static json_t *describe(const page *p) {
   const supine_basis_info *info = p->info;
   return json_pack(
-      "{s:I, s:I, s:I, s:I, s:b, s:o, s:o, s:b, s:o, s:f, s:o, s:o, s:o, s:f, s:f, "
-      "s:o, s:o, s:o, s:f, s:I, s:o, s:{s:f, s:f, s:f, s:f, s:f}}",
+      "{s:I, s:I, s:I, s:I, s:b, s:o, s:o, s:b, s:o, s:f, s:o, s:o, s:o, s:f, s:f, s:o, s:o, s:o, "
+      "s:f, s:I, s:o, s:{s:f, s:f, s:f, s:f, s:f}}",
       "vertices", (json_int_t)info->vertex_count, "triangles", (json_int_t)info->triangle_count,
       "modes", (json_int_t)info->mode_count, "band", (json_int_t)info->band, "vector",
       (int)info->vector, "lungBegin", begins(info, info->lung_begin), "cornerBegin",
