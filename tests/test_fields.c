@@ -513,6 +513,7 @@ TEST(test_precompute_fields_every_option_used_or_refused) {
                {"modes", "2", 0, "2 modes"},
                {"axes", "LPS", 0, "LPS axes (by --axes)"},
                {"units", "in", 0, "25.4 mm a unit"},
+               {"without-normals", "", 0, "b.safetensors: fields"},
                {"midline", "60", 2, "midline"},
                {"scanned", "supine", 0, "  scan supine\n"},
                {"labels", "lungmask", 1, "are for label maps"},
