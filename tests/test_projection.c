@@ -174,15 +174,18 @@ TEST(test_projection_impossible_softening_refused) {
   model.force.soften = 1.0;
   assert_int_equal(supine_projection_create(&lungs, &model, 5, &made, &error),
                    SUPINE_ERROR_ARGUMENT);
+  supine_projection_free(&made);
   assert_says(error.message, "--soften needs the distance --reach");
   model = supine_physics_model(SUPINE_LAW_DEEP);
   model.force.soften = 18.0;
   assert_int_equal(supine_projection_create(&lungs, &model, 5, &made, &error),
                    SUPINE_ERROR_ARGUMENT);
+  supine_projection_free(&made);
   assert_says(error.message, "at most 12");
   model.force = (supine_force_law){0};
   assert_int_equal(supine_projection_create(&lungs, &model, 5, &made, &error),
                    SUPINE_ERROR_NUMERICAL);
+  supine_projection_free(&made);
   supine_lungs_free(&lungs);
   supine_mesh_free(&mesh);
 }
