@@ -284,7 +284,7 @@ supine_status supine_precompute_prepare(const supine_model_choice *choice, char 
                                         supine_error *error) {
   supine_prepared *p = prepared;
   supine_lungs *lungs = &p->source.lungs;
-  supine_model_choice chosen = *choice; /* and what follows from it for the lungs that are read */
+  supine_model_choice chosen = *choice; /* completed by the patient's file and the scan */
   SUPINE_TRY(supine_precompute_source_load(&choice->source, paths, count, &p->source, error));
   if (choice->patient != NULL) {
     SUPINE_TRY(take_patient(&chosen, p, error));

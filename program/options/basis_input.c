@@ -116,9 +116,9 @@ supine_status supine_options_hilum(const supine_basis *basis, const supine_state
   }
   memcpy(hilum->move, u[0], sizeof hilum->move);
   supine_expected_squares(&model, u, hilum_beside_heart, square);
-  for (size_t k = 0; k < SUPINE_EXPECTED_TERMS && !info->is_fields; ++k) {
+  for (size_t k = 0; k < SUPINE_EXPECTED_TERMS; ++k) {
     sum += square[k];
-    hilum->expected = sqrt(sum);
   }
+  hilum->expected = info->is_fields ? (double)NAN : sqrt(sum);
   return SUPINE_OK;
 }
