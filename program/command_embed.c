@@ -185,4 +185,5 @@ const supine_command supine_command_embed = {
     .operands_most = SIZE_MAX,
     .operands_missing = "name a basis file (made by 'supine precompute'), then what to embed",
     .request_size = sizeof(request),
+    .uses_blas = true,
     .run = run};

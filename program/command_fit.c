@@ -244,4 +244,5 @@ const supine_command supine_command_fit = {
     .operands_most = 2,
     .operands_missing = "more than two scans: give further ones as --state STATE:FILE",
     .request_size = sizeof(request),
+    .uses_blas = true,
     .run = run};

@@ -51,5 +51,6 @@ const supine_command supine_command_precompute = {
              "  supine precompute lungs.stl --axes RAS --units cm -o lungs.safetensors",
     SUPINE_SURFACES,
     .request_size = sizeof(supine_offline_request),
+    .uses_blas = true,
     .begin = supine_offline_begin,
     .run = run};

@@ -231,5 +231,6 @@ const supine_command supine_command_solve = {
              "  supine solve lungs.nii.gz --posture left -o left.vtp",
     SUPINE_SURFACES,
     .request_size = sizeof(request),
+    .uses_blas = true,
     .begin = begin,
     .run = run};

@@ -139,10 +139,17 @@ static void confine(size_t bytes) {
   const struct rlimit memory = {(rlim_t)GIGABYTES_MOST << 30, (rlim_t)GIGABYTES_MOST << 30};
   (void)setrlimit(RLIMIT_AS, &memory);
 #endif
-  static const int signals[] = {SIGINT, SIGTERM, SIGXCPU, SIGXFSZ, SIGALRM, SIGSEGV, SIGABRT};
+  static const int signals[] = {SIGINT,  SIGTERM, SIGHUP,  SIGXCPU,
+                                SIGXFSZ, SIGALRM, SIGSEGV, SIGABRT};
   for (size_t i = 0; i < sizeof signals / sizeof *signals; ++i) {
-    /* an inherited handler would delete the unfinished outputs of the parent */
-    (void)signal(signals[i], SIG_DFL);
+    /* An inherited handler would delete the unfinished outputs of the parent. A signal that the
+     * parent ignores stays ignored, except those of the limits above. */
+    const bool from_outside = signals[i] == SIGINT || signals[i] == SIGTERM || signals[i] == SIGHUP;
+    struct sigaction before = {0};
+    (void)sigaction(signals[i], NULL, &before);
+    if (!from_outside || before.sa_handler != SIG_IGN) {
+      (void)signal(signals[i], SIG_DFL);
+    }
   }
   (void)alarm(10 * (unsigned)seconds); /* ends the process if it hangs */
   (void)freopen("/dev/null", "w", stderr);

@@ -63,6 +63,7 @@ static supine_status make(job *j, const char *path, supine_error *error) {
   static const supine_command library = {.options = supine_offline_options,
                                          SUPINE_SURFACES,
                                          .request_size = sizeof(supine_offline_request),
+                                         .uses_blas = true,
                                          .begin = supine_offline_begin,
                                          .run = run};
   enum { NAME = 32 };

@@ -87,18 +87,18 @@ const char *supine_options_suggest(const char *text, const char *const *candidat
 }
 
 static volatile sig_atomic_t command_polls, interrupted;
-static volatile time_t interrupted_at; /* s since 1970 */
+static volatile double interrupted_at; /* s by supine_clock_seconds */
 
 /* Handle a signal. A command that polls supine_options_interrupted is told to stop, and only a
- * later signal ends it. Signals within about a second of the first are ignored, because timeout(1)
+ * later signal ends it. Signals within a second of the first are ignored, because timeout(1)
  * sends each signal twice. Any other command ends at once. */
 static void on_signal(int number) {
-  const time_t now = time(NULL);
+  const double now = supine_clock_seconds(); /* this clock never steps back */
   if (command_polls != 0 && interrupted == 0) {
     interrupted = 1;
     interrupted_at = now;
   }
-  if (command_polls != 0 && now - interrupted_at < 2) {
+  if (command_polls != 0 && now - interrupted_at < 1.0) {
     return;
   }
   supine_output_abandon_all();
@@ -113,7 +113,12 @@ void supine_options_signals_catch(bool orderly_end) {
   action.sa_flags = SA_RESTART;
   command_polls = orderly_end ? 1 : 0;
   for (size_t i = 0; i < sizeof numbers / sizeof *numbers; ++i) {
-    (void)sigaction(numbers[i], &action, NULL);
+    struct sigaction before;
+    /* A signal that nohup(1), or a shell in the background, made the program ignore stays ignored.
+     */
+    if (sigaction(numbers[i], NULL, &before) == 0 && before.sa_handler != SIG_IGN) {
+      (void)sigaction(numbers[i], &action, NULL);
+    }
   }
   (void)signal(SIGXFSZ, SIG_IGN); /* makes a write beyond the file size limit fail */
 }

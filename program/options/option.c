@@ -9,7 +9,9 @@
 #include <supine/version.h>
 
 #include "base/arena.h"
+#include "base/blas.h"
 #include "base/output.h"
+#include "base/parallel.h"
 #include "base/text.h"
 
 #include "program/options/command.h"
@@ -348,6 +350,9 @@ static supine_status read_and_run(reading *r, int argc, char **argv, const void 
   const supine_arguments given = {argv + optind, (size_t)(argc - optind), made_by, context};
   SUPINE_TRY(check_given(r, given.count, argv, error));
   SUPINE_TRY(check_outputs(r, &given, error));
+  if (command->uses_blas) {
+    SUPINE_TRY(supine_blas_reserve(supine_thread_count(), error));
+  }
   return command->run(r->request, &given, error);
 }
 

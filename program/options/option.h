@@ -101,6 +101,7 @@ typedef struct supine_command {
   size_t operands_least, operands_most;
   const char *operands_missing; /* message if the number of operands is wrong */
   size_t request_size;
+  bool uses_blas;               /* the command calls OpenBLAS, in as many threads as it starts */
   void (*begin)(void *request); /* sets defaults other than supine_option.standard; may be NULL */
   supine_status (*run)(void *request, const supine_arguments *given, supine_error *error);
 } supine_command;
