@@ -88,12 +88,12 @@ static void handle_gsl(const char *reason, const char *file, int line, int code)
 }
 
 /* Open those of the descriptors 0 to 2 that are closed, so that no file gets their numbers: output
- * meant for the user would go into it. Open /dev/null in the mode that makes the use of the
- * descriptor fail, as the use of a closed one does. */
+ * meant for the user would go into it. Reading standard input and writing standard output then
+ * fail, as they do with a closed descriptor; messages are dropped. */
 static void open_standard_descriptors(void) {
   for (int descriptor = STDIN_FILENO; descriptor <= STDERR_FILENO; ++descriptor) {
     if (fcntl(descriptor, F_GETFD) < 0 && errno == EBADF) {
-      (void)open("/dev/null", descriptor == STDIN_FILENO ? O_WRONLY : O_RDONLY);
+      (void)open("/dev/null", descriptor == STDOUT_FILENO ? O_RDONLY : O_WRONLY);
     }
   }
 }

@@ -20,6 +20,8 @@ supine_test(lungs supine_precompute supine_lungs supine_mesh_io)
 supine_test(precompute supine_precompute supine_lungs supine_mesh_io umfpack)
 supine_test(program supine_status)
 target_compile_definitions(test_program PRIVATE SUPINE_PROGRAM="$<TARGET_FILE:supine>")
+supine_test(process supine_commands supine_gsl)
+target_compile_definitions(test_process PRIVATE SUPINE_PROGRAM="$<TARGET_FILE:supine>")
 # Compare the complete output of the commands with golden files.
 add_test(NAME command_output COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_command_output.sh
   $<TARGET_FILE:supine> ${CMAKE_CURRENT_SOURCE_DIR}/golden)
