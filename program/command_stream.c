@@ -75,8 +75,13 @@ static const supine_option table[] = {
     {.help = "A live page:"},
     {"web", 0, "[ADDRESS:]PORT",
      "serve a page that shows the lungs live. A phone on which the page is open can send its own "
-     "tilt. A port without an address can be reached from this machine only",
+     "tilt. A port without an address can be reached from this machine only. There is no access "
+     "control: whoever can reach the address sees the lungs and can send a pose",
      SUPINE_FILLS(request, session.web)},
+    {"web-host", 0, "NAME[,NAME...]",
+     "host names by which browsers may open the page, besides numeric addresses and localhost. "
+     "Other names are refused, because a web site could make them point to this machine",
+     SUPINE_FILLS(request, session.web_host), .more = true},
     {.table = supine_options_from, SUPINE_FILLS(request, session.from)},
     {"certificate", 0, "PEM",
      "certificate, with --key, to serve the page encrypted. Without encryption, browsers do not "

@@ -23,6 +23,9 @@ if(Python3_EXECUTABLE)
   add_test(NAME stream_points COMMAND ${Python3_EXECUTABLE}
     ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_points.py $<TARGET_FILE:supine> ${samples})
   set_tests_properties(stream_points PROPERTIES TIMEOUT 900)
+  add_test(NAME stream_web COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_web.py
+    $<TARGET_FILE:supine>)
+  set_tests_properties(stream_web PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
   # Test the Unity sample, compiled by Mono with stubs for the types of the engine.
   find_program(MCS_PROGRAM mcs)
   find_program(MONO_PROGRAM mono)
