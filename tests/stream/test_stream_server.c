@@ -474,6 +474,52 @@ TEST(test_server_stuck_or_vanished_peers_delay_nobody) {
   stage_destroy(s);
 }
 
+static const double idle_seconds = 0.5;
+
+/* A peer that asked for no frames and sends nothing is disconnected. One that only reads stays,
+ * although there is no new frame. */
+TEST(test_server_idle_peer_disconnected_reader_stays) {
+  enum { MORE = 15 }; /* frames that the reader gets; without a new frame, ten a second or fewer */
+  stage *s = stage_create();
+  s->options.idle = idle_seconds;
+  const int port = stage_run(s);
+  const int reader = connect_peer(port);
+  const int idle = connect_peer(port);
+  supine_stream_header header;
+  unsigned char body[4096];
+  assert_true(send_text(idle, "SEND", "nothing"));
+  assert_true(closed_by_server(idle));
+  for (int i = 0; i < MORE; ++i) {
+    assert_true(receive(reader, &header, body));
+  }
+  const supine_stream_counts counts = stage_end(s);
+  assert_int_equal(counts.idle, 1);
+  assert_int_equal(counts.frames, 1);
+  assert_true(counts.sent >= MORE);
+  const supine_stream_latency *latency = supine_stream_server_results(s->server)->latency;
+  assert_int_equal(latency[0].count + latency[1].count, 0); /* a repeated frame answers no pose */
+  (void)close(reader);
+  (void)close(idle);
+  stage_destroy(s);
+}
+
+/* A peer that does not read its frames is disconnected. */
+TEST(test_server_peer_that_never_reads_disconnected) {
+  stage *s = stage_create();
+  s->options.idle = idle_seconds;
+  const int stuck = connect_peer(stage_run(s));
+  const int small = 4096;
+  assert_int_equal(setsockopt(stuck, SOL_SOCKET, SO_RCVBUF, &small, sizeof small), 0);
+  assert_true(send_text(stuck, "SEND", "surface"));
+  for (int i = 0; i < 6000 && atomic_load(&s->warnings) == 0; ++i) {
+    sleep_for(0.01);
+  }
+  const supine_stream_counts counts = stage_end(s);
+  assert_int_equal(counts.idle, 1);
+  (void)close(stuck);
+  stage_destroy(s);
+}
+
 TEST(test_server_full_of_peers_one_more_refused) {
   enum { MANY = SUPINE_STREAM_PEERS_MAX };
   stage *s = stage_create();
