@@ -5,8 +5,9 @@
 
 Each row of the table names a folder, says what it contains, and lists folders of earlier rows. The files of a folder may
 include headers of the listed folders, and headers that those folders may include. Check also that files do not depend on
-each other in cycles, that external names have the prefix of their folder, and that functions have few lines and few
-parameters."""
+each other in cycles, that external names have the prefix of their folder, that functions have few lines and few parameters, and that the
+files of the licences name files that exist."""
+import glob
 import os
 import re
 import subprocess
@@ -161,8 +162,22 @@ def check_sizes(files):
                 faults.append(f"{file}: {name} has {lines} lines: at most 60, or give the reason above it")
 
 
+def check_licences():
+    """Check that LICENSE and .reuse/dep5 name no file and no folder that does not exist."""
+    with open(os.path.join(source, "LICENSE"), encoding="utf-8") as opened:
+        named = [("LICENSE", path) for path in re.findall(r"[\w.-]+/[\w./-]*\w", opened.read())]
+    dep5 = os.path.join(source, ".reuse", "dep5")
+    if os.path.exists(dep5):
+        with open(dep5, encoding="utf-8") as opened:
+            named += [(".reuse/dep5", path) for line in re.findall(r"^Files:(.*)$", opened.read(), re.M) for path in line.split()]
+    for file, path in named:
+        if not glob.glob(os.path.join(source, path)):
+            faults.append(f"{file}: {path} does not exist")
+
+
 folders = read_table()
 files = tracked()
+check_licences()
 check_sizes(files)
 check_includes(folders, files)
 check_system_headers(files)

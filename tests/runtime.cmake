@@ -58,6 +58,9 @@ foreach(name malloc calloc realloc aligned_alloc strdup free mmap munmap open cl
   target_link_options(test_runtime_quiet PRIVATE -Wl,--wrap=${name})
 endforeach()
 supine_test(runtime_threads runtime_fixture Threads::Threads)
+if(NOT SUPINE_SANITIZE) # sanitizers use more stack
+  supine_test(runtime_stack runtime_fixture Threads::Threads)
+endif()
 
 # Test the GPU shader, if EGL can run it without a window, but not with the thread sanitizer, which does not know the
 # threads of the driver.
