@@ -11,6 +11,7 @@
 #include "base/arena.h"
 #include "base/input.h"
 #include "base/output.h"
+#include "base/text.h"
 
 static void free_path(char **path) {
   free(*path);
@@ -59,12 +60,22 @@ supine_status supine_input_open(const char *path, FILE **file, size_t *size, sup
   return open_regular(path, 0, file, size, error);
 }
 
+/* Copy the begin of a name from a file for a message of one line. */
+static void make_shown(const char *name, char shown[96]) {
+  (void)snprintf(shown, 96, "%s", name);
+  for (char *c = supine_text_make_utf8(shown); *c != '\0'; ++c) {
+    *c = (unsigned char)*c < ' ' || *c == '\x7F' ? '?' : *c;
+  }
+}
+
 supine_status supine_input_open_beside(const char *path, const char *name, FILE **file,
                                        size_t *size, supine_error *error) {
   const char *plain = strncmp(name, "./", 2) == 0 ? name + 2 : name;
+  char shown[96];
+  make_shown(name, shown);
   SUPINE_REFUSE_IF(*plain == '\0' || strchr(plain, '/') != NULL, error, SUPINE_ERROR_FORMAT,
                    "%s: it refers to the file \"%s\" in another folder; save it as one file", path,
-                   name);
+                   shown);
   SUPINE_FREED_BY(free_path) char *named = supine_path_beside(path, plain);
   SUPINE_FREED_BY(free_path) char *beside = supine_path_beside(path, ".");
   if (named == NULL || beside == NULL) {
@@ -73,7 +84,7 @@ supine_status supine_input_open_beside(const char *path, const char *name, FILE 
   SUPINE_FREED_BY(free_path) char *folder = realpath(beside, NULL);
   SUPINE_FREED_BY(free_path) char *target = realpath(named, NULL);
   SUPINE_REFUSE_IF(folder == NULL || target == NULL, error, SUPINE_ERROR_READ,
-                   "%s: it refers to the file \"%s\", which cannot be read: %s", path, name,
+                   "%s: it refers to the file \"%s\", which cannot be read: %s", path, shown,
                    strerror(errno));
   SUPINE_FREED_BY(free_path) char *beside_target = supine_path_beside(target, ".");
   if (beside_target == NULL) {
@@ -83,10 +94,10 @@ supine_status supine_input_open_beside(const char *path, const char *name, FILE 
   const bool inside = target_folder != NULL && strcmp(target_folder, folder) == 0;
   SUPINE_REFUSE_IF(!inside, error, SUPINE_ERROR_FORMAT,
                    "%s: it refers to the file \"%s\", a link to another folder; copy the file here",
-                   path, name);
+                   path, shown);
   struct stat about = {0};
   SUPINE_REFUSE_IF(stat(target, &about) != 0 || !S_ISREG(about.st_mode), error, SUPINE_ERROR_FORMAT,
                    "%s: it refers to \"%s\", which is not a regular file; save it as one file",
-                   path, name);
+                   path, shown);
   return open_regular(target, O_NOFOLLOW, file, size, error);
 }

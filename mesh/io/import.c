@@ -147,26 +147,42 @@ static void source_close(struct aiFileIO *io, struct aiFile *file) {
   free(s);
 }
 
+/* Open the imported file, whose bytes are in memory, or one that it names. */
+static supine_status make_source(const sources *from, const char *name, bool itself, source **made,
+                                 supine_error *error) {
+  *made = calloc(1, sizeof **made);
+  if (*made == NULL) {
+    return supine_error_memory(error, "reading %s", from->file->path);
+  }
+  (*made)->calls = (struct aiFile){source_read, source_write, source_tell,          source_size,
+                                   source_seek, source_flush, (char *)(void *)*made};
+  if (!itself) {
+    return read_beside(from, name, *made, error);
+  }
+  (*made)->bytes = from->file->bytes;
+  (*made)->size = from->file->size;
+  return SUPINE_OK;
+}
+
 static struct aiFile *source_open(struct aiFileIO *io, const char *name, const char *mode) {
   (void)mode;
   sources *from = (sources *)(void *)io->UserData;
   const bool itself = strcmp(name, supine_text_file_name(from->file->path)) == 0;
   supine_error error = {SUPINE_OK, ""};
-  source *s = itself || !from->alone ? calloc(1, sizeof *s) : NULL;
-  if (s == NULL) {
+  source *made = NULL;
+  if (!itself && from->alone) {
     return NULL;
   }
-  s->calls = (struct aiFile){source_read, source_write, source_tell,      source_size,
-                             source_seek, source_flush, (char *)(void *)s};
-  if (itself) {
-    s->bytes = from->file->bytes;
-    s->size = from->file->size;
-  } else if (read_beside(from, name, s, &error) != SUPINE_OK) {
-    from->refused = from->refused.status == SUPINE_OK ? error : from->refused;
-    source_close(io, &s->calls);
-    return NULL;
+  if (make_source(from, name, itself, &made, &error) == SUPINE_OK) {
+    return &made->calls;
   }
-  return &s->calls;
+  if (made != NULL) {
+    source_close(io, &made->calls);
+  }
+  if (from->refused.status == SUPINE_OK) {
+    from->refused = error;
+  }
+  return NULL;
 }
 
 /* Import the file from memory. Files that it names are only opened in its folder. Those that an OBJ
@@ -181,8 +197,9 @@ static const struct aiScene *import(const assimp *ai, const mesh_file *file, sup
   const struct aiScene *scene =
       ai->ImportFileExWithProperties(supine_text_file_name(file->path), 0, &io, properties);
   ai->ReleasePropertyStore(properties);
-  const bool optional = scene != NULL && from.refused.status == SUPINE_ERROR_READ;
-  if (from.refused.status != SUPINE_OK && !optional) { /* importers look for files that may be */
+  /* some importers look for files that need not exist */
+  const bool not_needed = scene != NULL && from.refused.status == SUPINE_ERROR_READ;
+  if (from.refused.status != SUPINE_OK && !not_needed) {
     *error = from.refused;
   } else if (scene == NULL) {
     (void)import_fail(file->path, ai->GetErrorString(), error);
