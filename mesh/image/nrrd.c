@@ -18,7 +18,7 @@ static const struct {
   int integer; /* as in image_storage */
   const char *names[7];
 } types[] = {
-    {SUPINE_VOXEL_I8, 0, {"int8", "int8_t", "signed char", "char"}},
+    {SUPINE_VOXEL_I8, 0, {"int8", "int8_t", "signed char"}},
     {SUPINE_VOXEL_U8, 0, {"uint8", "uint8_t", "unsigned char", "uchar"}},
     {SUPINE_VOXEL_I16,
      0,
@@ -115,8 +115,8 @@ static char *trim(char *text) {
   return text;
 }
 
-/* Store the value of a line "field: value". Skip "key:=value", which may hold anything. Return
- * whether the line is one of both. */
+/* Store the value of a line "field: value", which may not set a field again. Skip "key:=value",
+ * which may hold anything. Return whether the line is one of both. */
 static bool take_line(char *line, header *h, supine_arena *arena) {
   const char *key = strstr(line, ":=");
   char *colon = strchr(line, ':');
@@ -137,6 +137,12 @@ static bool take_line(char *line, header *h, supine_arena *arena) {
     ++f;
   }
   if (f == sizeof fields / sizeof *fields) {
+    return false;
+  }
+  if (fields[f].field == FIELD_UNUSED) {
+    return true;
+  }
+  if (*h->value[fields[f].field] != '\0') {
     return false;
   }
   const size_t size = strlen(value) + 1;
@@ -179,9 +185,10 @@ static supine_status read_header(const char *path, FILE *file, header *h, supine
       return supine_arena_check(arena, error, "the header of %s", path);
     }
     const bool known = text && (*line == '#' || take_line(line, h, arena));
-    SUPINE_REFUSE_IF(!known, error, SUPINE_ERROR_FORMAT,
-                     "%s: line %zu is not a field of an NRRD header; write the image again", path,
-                     number);
+    SUPINE_REFUSE_IF(
+        !known, error, SUPINE_ERROR_FORMAT,
+        "%s: line %zu is not a field of an NRRD header, or sets one again; write the image again",
+        path, number);
     SUPINE_REFUSE_IF(*h->value[FIELD_DATA_FILE] != '\0', error, SUPINE_ERROR_FORMAT,
                      "%s: its voxels are in another file; save all in one file", path);
   }
@@ -302,7 +309,7 @@ static supine_status find_storage(const char *path, const header *h, supine_imag
     ++type;
   }
   SUPINE_REFUSE_IF(type == TYPES, error, SUPINE_ERROR_FORMAT,
-                   "%s: voxels of type %s are not supported; convert them to int16", path,
+                   "%s: voxels of the type \"%s\" are not supported; convert them to int16", path,
                    h->value[FIELD_TYPE]);
   image->voxel = types[type].voxel;
   storage->integer = types[type].integer;
