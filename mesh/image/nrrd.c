@@ -309,8 +309,8 @@ static supine_status find_storage(const char *path, const header *h, supine_imag
     ++type;
   }
   SUPINE_REFUSE_IF(type == TYPES, error, SUPINE_ERROR_FORMAT,
-                   "%s: voxels of the type \"%s\" are not supported; convert them to int16", path,
-                   h->value[FIELD_TYPE]);
+                   "%s: its type is not a number of 8 to 64 bits; convert the voxels to int16",
+                   path);
   image->voxel = types[type].voxel;
   storage->integer = types[type].integer;
   const bool ordered = storage->big_endian || strcasecmp(endian, "little") == 0;
