@@ -173,6 +173,21 @@ def check_licences():
     for file, path in named:
         if not glob.glob(os.path.join(source, path)):
             faults.append(f"{file}: {path} does not exist")
+# Sources that open files. All others call supine_input_open for a file that the user names, and
+# supine_input_open_beside for a file that another file names. Those after the first line read CSV and JSON, which may
+# come from a pipe, from the path that the user gives.
+OPENING = ("base/input.c", "base/output.c", "runtime/safetensors/posix.c", "runtime/safetensors/windows.c",
+           "base/csv.c", "mesh/io/points.c", "precompute/patient/patient_file.c", "program/options/pv_file.c")
+
+
+def check_opening(files):
+    """Check that only the sources in OPENING open files, so that what a file names is never opened by its bare name."""
+    opening = re.compile(r"\b(fopen|freopen|open|openat|gzopen|json_load_file)\((?!\s*\")")
+    for file in files:
+        if file.endswith(".c") and file not in OPENING:
+            with open(os.path.join(source, file), encoding="utf-8") as text:
+                for name in opening.findall(text.read()):
+                    faults.append(f"{file} calls {name}: call supine_input_open, or supine_input_open_beside for a name from a file")
 
 
 folders = read_table()
@@ -181,6 +196,7 @@ check_licences()
 check_sizes(files)
 check_includes(folders, files)
 check_system_headers(files)
+check_opening(files)
 check_include_cycles(files)
 check_names(folders)
 for fault in faults:

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Test images in NRRD, NIfTI and MetaImage: round trips and invalid files. */
+#include <sys/inotify.h>
 #include <sys/stat.h>
 
 #include "folder.h"
@@ -173,6 +174,169 @@ TEST(test_nrrd_bad_files_refused) {
   }
 }
 
+#define NRRD_FRAME                                                                                 \
+  "space: LPS\nsizes: 2 2 1\nspace directions: (1,0,0) (0,1,0) (0,0,1)\nspace origin: (0,0,0)\n"
+
+/* What a header names is not opened: inotify reports no access, and a pipe does not make the reader
+ * wait. */
+TEST(test_nrrd_data_file_not_opened) {
+  static const char *const lines[] = {
+      "data file: %s/data.raw\n",      "datafile: data.raw\n",
+      "Data File: ../%s/data.raw\n",   "data file: pipe.raw\n",
+      "data file: %s/pipe.raw\n",      "data file: LIST\ndata.raw\n",
+      "data file: LIST 2\npipe.raw\n", "data file: pipe%%d.raw 0 1 1\n",
+      "data file:\tpipe.raw\n"};
+  static const char *const ends[] = {"", "\n", "\nabcd"};
+  char events[4096];
+  write_bytes(in_folder("data.raw"), "abcd", 4);
+  assert_int_equal(mkfifo(in_folder("pipe.raw"), 0600), 0);
+  assert_int_equal(mkfifo(in_folder("pipe0.raw"), 0600), 0);
+  const int watch = inotify_init1(IN_NONBLOCK);
+  assert_true(watch >= 0);
+  assert_true(inotify_add_watch(watch, in_folder("data.raw"), IN_OPEN) >= 0);
+  (void)alarm(60); /* ends a reader that waits for the pipe */
+  for (size_t i = 0; i < 3 * (sizeof lines / sizeof *lines); ++i) {
+    char line[256];
+    char text[1024];
+    (void)snprintf(line, sizeof line, lines[i / 3], folder); /* NOLINT(*-nonliteral) */
+    const int length = snprintf(
+        text, sizeof text, "NRRD0004\ntype: uchar\ndimension: 3\n" NRRD_FRAME "encoding: raw\n%s%s",
+        line, ends[i % 3]);
+    write_bytes(in_folder("bad.nrrd"), text, (size_t)length);
+    check_refused("bad.nrrd", SUPINE_ERROR_FORMAT, "in another file");
+    if (read(watch, events, sizeof events) >= 0) {
+      fail_msg("opened for %s", line);
+    }
+  }
+  (void)alarm(0);
+  assert_int_equal(close(watch), 0);
+}
+
+/* Each name of a type, an encoding, a space and an order of bytes, each way to write a field, and
+ * each field that is not used. */
+TEST(test_nrrd_header_variants_read) {
+  static const struct {
+    const char *header;
+    supine_image_voxel voxel;
+  } good[] = {
+      {"type: signed char\n", SUPINE_VOXEL_I8},
+      {"type: int8\n", SUPINE_VOXEL_I8},
+      {"type: int8_t\n", SUPINE_VOXEL_I8},
+      {"type: unsigned char\n", SUPINE_VOXEL_U8},
+      {"type: uint8_t\n", SUPINE_VOXEL_U8},
+      {"type: short\n", SUPINE_VOXEL_I16},
+      {"type: signed short int\n", SUPINE_VOXEL_I16},
+      {"type: int16_t\n", SUPINE_VOXEL_I16},
+      {"type: ushort\n", SUPINE_VOXEL_U16},
+      {"type: unsigned short int\n", SUPINE_VOXEL_U16},
+      {"type: int\n", SUPINE_VOXEL_I32},
+      {"type: signed int\n", SUPINE_VOXEL_I32},
+      {"type: uint32\n", SUPINE_VOXEL_U32},
+      {"type: unsigned int\n", SUPINE_VOXEL_U32},
+      {"type: long long\n", SUPINE_VOXEL_F64},
+      {"type: signed long long int\n", SUPINE_VOXEL_F64},
+      {"type: uint64_t\n", SUPINE_VOXEL_F64},
+      {"type: ulonglong\n", SUPINE_VOXEL_F64},
+      {"type: float\n", SUPINE_VOXEL_F32},
+      {"TYPE:  Double \n", SUPINE_VOXEL_F64},
+      {"type: uchar\r\n", SUPINE_VOXEL_U8},
+      {"# a comment: with a colon\n#\ntype: uchar\n", SUPINE_VOXEL_U8},
+      {"type: uchar\nSegment0_Name:=left lung: upper lobe\nurn:x:=data file: y\n:=\n",
+       SUPINE_VOXEL_U8},
+      {"type: uchar\ncontent:\nunits: \"mm\" \"mm\" \"mm\"\nkinds: domain domain domain\n"
+       "labels: \"\" \"\" \"\"\nspace units: \"mm\" \"mm\" \"mm\"\n"
+       "measurement frame: (1,0,0) (0,1,0) (0,0,1)\ncenterings: cell cell cell\nmin: 0\n"
+       "old max: 9\nsample units: HU\nthicknesses: 1 1 1\nblock size: 1\nnumber: 4\n"
+       "axismins: 0 0 0\nbyte skip: 0\nlineskip: 0\nspacings: nan nan nan\n",
+       SUPINE_VOXEL_U8},
+      {"type: uchar\nSpace Origin: (0,0,0)\nspace directions: ( 1 , 0 ,0)(0,1e0,0) (0,0,+1.0)\n"
+       "sizes:  2 2\t1 \nspace: left-posterior-superior\n",
+       SUPINE_VOXEL_U8}};
+  static const char *const encodings[] = {"ascii", "text", "TXT"};
+  for (size_t i = 0; i < sizeof good / sizeof *good; ++i) {
+    char text[1500];
+    supine_image image = {0};
+    const bool framed = strstr(good[i].header, "sizes:") != NULL;
+    supine_error error;
+    const int length =
+        snprintf(text, sizeof text,
+                 "NRRD000%zu\ndimension: 3\n"
+                 "%s%sencoding: %s\n\n"
+                 "4 5\n 6\t7",
+                 1 + i % 6, framed ? "" : NRRD_FRAME, good[i].header, encodings[i % 3]);
+    write_bytes(in_folder("good.nrrd"), text, (size_t)length);
+    if (supine_image_read(in_folder("good.nrrd"), &image, &error) != SUPINE_OK) {
+      fail_msg("%s: %s", good[i].header, error.message);
+    }
+    assert_int_equal(image.voxel, good[i].voxel);
+    assert_close(image.step[1][1], 1.0, 0.0);
+    for (size_t v = 0; v < 4; ++v) {
+      assert_close(supine_image_get(&image, v), 4.0 + (double)v, 0.0);
+    }
+    supine_image_free(&image);
+  }
+}
+
+TEST(test_nrrd_malformed_headers_refused) {
+  static const char sound[] =
+      "NRRD0004\ntype: uchar\ndimension: 3\n" NRRD_FRAME "encoding: raw\n\nabcd";
+  static const struct {
+    const char *from, *to, *said; /* text replaced in the sound header, and its replacement */
+  } bad[] = {{"NRRD0004", "NRRD0000", "first line"},
+             {"NRRD0004", "NRRD0007", "first line"},
+             {"NRRD0004", "NRRD0004 and more text", "first line"},
+             {"raw", "hex", "encoding"},
+             {"raw", "bzip2", "encoding"},
+             {"encoding: raw\n", "", "encoding"},
+             {"raw\n", "raw\nbyte skip: -1\n", "skips"},
+             {"raw\n", "raw\nlineskip: 2\n", "skips"},
+             {"uchar", "block", "its type"},
+             {"uchar", "char", "its type"},
+             {"type: uchar\n", "", "its type"},
+             {"uchar", "short", "endian"},
+             {"uchar", "short\nendian: middle", "endian"},
+             {"uchar", "uchar\nwidth: 3", "line 3"},
+             {"uchar", "uchar\nwords", "line 3"},
+             {"uchar", "uchar\ntype: short", "line 3"},
+             {"sizes: 2 2 1", "sizes: 2 2 1\nsizes: 2 2 2", "line 6"},
+             {"sizes: 2 2 1", "sizes: 2 2", "sizes"},
+             {"sizes: 2 2 1", "sizes: 2 2 1 1", "sizes"},
+             {"sizes: 2 2 1", "sizes: 2 2 0", "sizes"},
+             {"sizes: 2 2 1", "sizes: 2 2 -1", "sizes"},
+             {"sizes: 2 2 1", "sizes: 2 2 1.5", "sizes"},
+             {"sizes: 2 2 1", "sizes: 2 2 nan", "sizes"},
+             {"sizes: 2 2 1", "sizes: 2 2 1e30", "sizes"},
+             {"sizes: 2 2 1\n", "", "sizes"},
+             {"origin: (0,0,0)", "origin: (0,0)", "vectors"},
+             {"origin: (0,0,0)", "origin: (0,0,0", "vectors"},
+             {"origin: (0,0,0)", "origin:", "vectors"},
+             {"origin: (0,0,0)", "origin: (0,0,nan)", "linearly"},
+             {"(0,0,1)", "", "vectors"},
+             {"(0,0,1)", "none", "vectors"},
+             {"(0,0,1)", "(0,0,1) (0,0,1)", "vectors"},
+             {"(0,0,1)", "(0;0;1)", "vectors"},
+             {"dimension: 3\n", "", "dimension"},
+             {"dimension: 3", "dimension: x", "dimension"}};
+  supine_image image = {0};
+  write_bytes(in_folder("sound.nrrd"), sound, sizeof sound - 1);
+  assert_int_equal(supine_image_read(in_folder("sound.nrrd"), &image, NULL), SUPINE_OK);
+  supine_image_free(&image);
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
+    char text[1024];
+    const char *at = strstr(sound, bad[i].from);
+    assert_non_null(at);
+    const int length = snprintf(text, sizeof text, "%.*s%s%s", (int)(at - sound), sound, bad[i].to,
+                                at + strlen(bad[i].from));
+    write_bytes(in_folder("bad.nrrd"), text, (size_t)length);
+    check_refused("bad.nrrd", SUPINE_ERROR_FORMAT, bad[i].said);
+  }
+  static const char head[] = "NRRD0004\n" NRRD_FRAME "type: uchar\ndimension: 3\nencoding: raw\n";
+  for (size_t size = 0; size < sizeof head; ++size) { /* no empty line */
+    write_bytes(in_folder("cut.nrrd"), head, size);
+    check_refused("cut.nrrd", SUPINE_ERROR_FORMAT, "cut.nrrd");
+  }
+}
+
 TEST(test_nifti_bad_files_refused) {
   unsigned char bytes[472];
   unsigned char changed[472];
@@ -203,6 +367,30 @@ TEST(test_nifti_bad_files_refused) {
     write_bytes(in_folder("short.nii"), bytes, size);
     check_refused("short.nii", SUPINE_ERROR_FORMAT, "short.nii");
   }
+}
+
+/* The header of a pair of files, named like a single file, is not read as voxels. */
+TEST(test_nifti_voxels_in_other_file_refused) {
+  unsigned char bytes[472];
+  supine_image image = made(SUPINE_VOXEL_I16, 5);
+  assert_int_equal(supine_image_write(in_folder("pair.nii"), &image, NULL, NULL), SUPINE_OK);
+  assert_int_equal(read_bytes(in_folder("pair.nii"), bytes, sizeof bytes), sizeof bytes);
+  memcpy(bytes + 344, "ni1", 4);
+  write_bytes(in_folder("pair.nii"), bytes, sizeof bytes);
+  assert_int_equal(mkfifo(in_folder("pair.img"), 0600), 0);
+  check_refused("pair.nii", SUPINE_ERROR_FORMAT, "in another file");
+  supine_image_free(&image);
+}
+
+/* Pipes, which opening would wait for, are refused. */
+TEST(test_image_pipe_refused_without_waiting) {
+  static const char *const names[] = {"p.nrrd", "p.nii", "p.nii.gz", "p.mha"};
+  (void)alarm(60);
+  for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
+    assert_int_equal(mkfifo(in_folder(names[i]), 0600), 0);
+    check_refused(names[i], SUPINE_ERROR_READ, "not a regular file");
+  }
+  (void)alarm(0);
 }
 
 /* A wrong checksum is refused, although all voxels can be decompressed. */

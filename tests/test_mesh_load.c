@@ -445,23 +445,133 @@ static void *read_often(void *argument) {
   return NULL;
 }
 
-/* Material files that an OBJ file names are not opened: inotify reports no access. */
+/* Material files that an OBJ file names are not opened, however the line is written: inotify
+ * reports no access. */
 TEST(test_load_obj_materials_not_opened) {
+  static const char *const lines[] = {"mtllib %s\n", " MtlLib %s\n", "mtl\\\nlib %s\n",
+                                      "mtllib \\\n%s\n", "# \\\nmtllib %s\n"};
   char materials[256];
-  char text[1024];
-  char path[256];
   (void)sample_text(state, "a.mtl", "newmtl a\n", materials);
-  (void)snprintf(text, sizeof text, "mtllib %s\n MtlLib %s\n%s", materials, materials,
-                 tetrahedron_obj);
   const int watch = inotify_init1(IN_NONBLOCK);
   assert_true(watch >= 0);
   assert_true(inotify_add_watch(watch, materials, IN_OPEN) >= 0);
-  supine_mesh mesh = load(sample_text(state, "a.obj", text, path), NULL, NULL);
-  char events[4096];
-  assert_true(read(watch, events, sizeof events) < 0);
+  for (size_t i = 0; i < sizeof lines / sizeof *lines; ++i) {
+    char line[300];
+    char text[1024];
+    char path[256];
+    char events[4096];
+    (void)snprintf(line, sizeof line, lines[i], materials); /* NOLINT(*-nonliteral) */
+    (void)snprintf(text, sizeof text, "%s%susemtl a\n", line, tetrahedron_obj);
+    supine_mesh mesh = load(sample_text(state, "a.obj", text, path), NULL, NULL);
+    expect_tetrahedron(&mesh);
+    if (read(watch, events, sizeof events) >= 0) {
+      fail_msg("opened for %s", line);
+    }
+    supine_mesh_free(&mesh);
+  }
   assert_int_equal(close(watch), 0);
-  supine_mesh_free(&mesh);
   assert_int_equal(unlink(materials), 0);
+}
+
+/* Write a glTF file whose numbers are in the file `uri`. */
+static const char *gltf_naming(void **state, const char *uri, char path[256]) {
+  static const char text[] =
+      "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],"
+      "\"nodes\":[{\"mesh\":0}],"
+      "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0},\"indices\":1}]}],"
+      "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":4,\"type\":\"VEC3\","
+      "\"min\":[0,0,0],\"max\":[120,120,120]},"
+      "{\"bufferView\":1,\"componentType\":5123,\"count\":12,\"type\":\"SCALAR\"}],"
+      "\"bufferViews\":[{\"buffer\":0,\"byteOffset\":0,\"byteLength\":48},"
+      "{\"buffer\":0,\"byteOffset\":48,\"byteLength\":24}],"
+      "\"buffers\":[{\"byteLength\":72,\"uri\":\"%s\"}]}";
+  char made[2048];
+  (void)snprintf(made, sizeof made, text, uri);
+  return sample_text(state, "a.gltf", made, path);
+}
+
+/* Write the numbers of a tetrahedron for gltf_naming. */
+static const char *gltf_numbers(void **state, const char *name, char path[256]) {
+  static const float vertices[12] = {0, 0, 0, 120, 0, 0, 0, 120, 0, 0, 0, 120};
+  static const uint16_t corners[12] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
+  unsigned char bytes[72];
+  memcpy(bytes, vertices, sizeof vertices);
+  memcpy(bytes + 48, corners, sizeof corners);
+  return sample_write(state, name, bytes, sizeof bytes, path);
+}
+
+TEST(test_load_gltf_file_in_same_folder_read) {
+  static const char *const names[] = {"n.bin", "./n.bin", "link.bin"};
+  char numbers[256];
+  char link[256];
+  (void)gltf_numbers(state, "n.bin", numbers);
+  assert_int_equal(symlink("n.bin", sample_path(state, "link.bin", link)), 0);
+  for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
+    char path[256];
+    supine_mesh mesh = load(gltf_naming(state, names[i], path), NULL, NULL);
+    expect_tetrahedron(&mesh);
+    supine_mesh_free(&mesh);
+  }
+  assert_int_equal(unlink(link) + unlink(numbers), 0);
+}
+
+/* A glTF file in the folder `in` names files elsewhere that hold what it needs, and what is no file
+ * at all. None is opened, and none makes the reader wait. */
+TEST(test_load_gltf_other_files_refused) {
+  char numbers[256];
+  char folder[64];
+  char pipe[256];
+  char link[256];
+  void *inner = folder;
+  (void)gltf_numbers(state, "n.bin", numbers);
+  (void)snprintf(folder, sizeof folder, "%s/in", (const char *)*state);
+  assert_int_equal(mkdir(folder, 0700), 0);
+  assert_int_equal(mkfifo(sample_path(&inner, "pipe.bin", pipe), 0600), 0);
+  assert_int_equal(symlink("../n.bin", sample_path(&inner, "link.bin", link)), 0);
+  const struct {
+    const char *uri, *words;
+    supine_status status;
+  } refused[] = {{"../n.bin", "in another folder", SUPINE_ERROR_FORMAT},
+                 {numbers, "in another folder", SUPINE_ERROR_FORMAT},
+                 {"..\\\\n.bin", "cannot be read", SUPINE_ERROR_READ},
+                 {".//n.bin", "in another folder", SUPINE_ERROR_FORMAT},
+                 {"./../n.bin", "in another folder", SUPINE_ERROR_FORMAT},
+                 {"link.bin", "link to another folder", SUPINE_ERROR_FORMAT},
+                 {"pipe.bin", "not a regular file", SUPINE_ERROR_FORMAT},
+                 {".", "link to another folder", SUPINE_ERROR_FORMAT},
+                 {"..", "link to another folder", SUPINE_ERROR_FORMAT},
+                 {"absent\\n.bin", "absent?.bin", SUPINE_ERROR_READ},
+                 {"/dev/zero", "in another folder", SUPINE_ERROR_FORMAT}};
+  const int watch = inotify_init1(IN_NONBLOCK);
+  assert_true(watch >= 0);
+  assert_true(inotify_add_watch(watch, numbers, IN_OPEN) >= 0);
+  (void)alarm(60); /* ends a reader that waits for the pipe */
+  for (size_t i = 0; i < sizeof refused / sizeof *refused; ++i) {
+    char path[256];
+    char events[4096];
+    expect_refused(gltf_naming(&inner, refused[i].uri, path), NULL, refused[i].status,
+                   refused[i].words);
+    if (read(watch, events, sizeof events) >= 0) {
+      fail_msg("opened for %s", refused[i].uri);
+    }
+    assert_int_equal(unlink(path), 0);
+  }
+  (void)alarm(0);
+  assert_int_equal(close(watch), 0);
+  assert_int_equal(unlink(pipe) + unlink(link) + rmdir(folder) + unlink(numbers), 0);
+}
+
+/* Pipes, which opening would wait for, are refused. */
+TEST(test_load_pipe_refused_without_waiting) {
+  static const char *const names[] = {"p.ply", "p.obj", "p.stl", "p.vtp", "p.gltf"};
+  (void)alarm(60);
+  for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
+    char path[256];
+    assert_int_equal(mkfifo(sample_path(state, names[i], path), 0600), 0);
+    expect_refused(path, NULL, SUPINE_ERROR_READ, "not a regular file");
+    assert_int_equal(unlink(path), 0);
+  }
+  (void)alarm(0);
 }
 
 TEST(test_load_in_several_threads_same_results) {

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Test safetensors files: round trips, refused files and checksums. */
+#include <sys/stat.h>
+
 #include "test.h"
 
 #include <supine/safetensors.h>
@@ -292,6 +294,21 @@ TEST(test_open_unreadable_paths_report_read_error) {
   assert_int_equal(supine_safetensors_open("/tmp", &file, &error), SUPINE_ERROR_READ);
   assert_int_equal(supine_safetensors_open("/dev/null", &file, &error), SUPINE_ERROR_READ);
   supine_safetensors_close(NULL);
+}
+
+/* A pipe, which opening would wait for, is refused. */
+TEST(test_open_pipe_refused_without_waiting) {
+  char *folder = fixture_folder();
+  char path[512];
+  supine_safetensors *file = NULL;
+  supine_error error = {0};
+  (void)snprintf(path, sizeof path, "%s/pipe", folder);
+  assert_int_equal(mkfifo(path, 0600), 0);
+  (void)alarm(60);
+  assert_int_equal(supine_safetensors_open(path, &file, &error), SUPINE_ERROR_READ);
+  (void)alarm(0);
+  assert_says(error.message, "not a regular file");
+  fixture_folder_remove(folder);
 }
 
 TEST(test_open_memory_any_alignment_same_content) {

@@ -1,11 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* Choose the reader of an image by the ending of the file's name, and check what it has read. */
-#include <errno.h>
 #include <math.h>
-#include <string.h>
-#include <sys/stat.h>
 
 #include "base/arena.h"
+#include "base/input.h"
 #include "base/output.h"
 #include "base/text.h"
 #include "base/vec3.h"
@@ -60,24 +58,20 @@ static bool is_frame(const supine_image *image) {
 }
 
 supine_status supine_image_read(const char *path, supine_image *image, supine_error *error) {
-  struct stat about = {0};
   SUPINE_FREED_BY(supine_image_free) supine_image read = {.channels = 1};
   SUPINE_FREED_BY(supine_file_close) FILE *file = NULL;
+  size_t size = 0;
   image_storage storage = {0};
   SUPINE_REFUSE_IF(!supine_image_supports(path), error, SUPINE_ERROR_FORMAT,
                    "%s: an image's name must end in .nrrd, .nii, .nii.gz or .mha; convert other "
                    "formats, for example with 3D Slicer",
                    path);
-  if (stat(path, &about) != 0 || !S_ISREG(about.st_mode) || (file = fopen(path, "rb")) == NULL) {
-    const bool other = about.st_mode != 0 && !S_ISREG(about.st_mode);
-    return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path,
-                            other ? "it is not a regular file" : strerror(errno));
-  }
+  SUPINE_TRY(supine_input_open(path, &file, &size, error));
   SUPINE_TRY(formats[format_of(path)].describe(path, file, &read, &storage, error));
   SUPINE_REFUSE_IF(!is_frame(&read), error, SUPINE_ERROR_FORMAT,
                    "%s: the header's axis directions are linearly dependent: write the image again",
                    path);
-  SUPINE_TRY(supine_image_read_voxels(path, file, (size_t)about.st_size, &storage, &read, error));
+  SUPINE_TRY(supine_image_read_voxels(path, file, size, &storage, &read, error));
   *image = read;
   read.values = NULL;
   return SUPINE_OK;

@@ -7,17 +7,12 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
-#include <sys/stat.h>
 
 #include "base/arena.h"
+#include "base/input.h"
 #include "base/text.h"
 
 #include "mesh/io/read.h"
-
-static supine_status cannot_read(const char *path, supine_error *error) {
-  const int code = errno == 0 ? EIO : errno;
-  return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path, strerror(code));
-}
 
 static mesh_reader *find_reader(const char *path) {
   static const struct {
@@ -35,23 +30,6 @@ static mesh_reader *find_reader(const char *path) {
   const char *slash = strrchr(path, '/');
   const char *ending = strrchr(slash == NULL ? path : slash, '.');
   return ending != NULL && supine_mesh_import_knows(ending) ? supine_mesh_import : NULL;
-}
-
-/* Check that the path names a file that is not empty, and return its size in *size. */
-static supine_status check_file(const char *path, size_t *size, supine_error *error) {
-  struct stat about;
-  errno = 0;
-  if (stat(path, &about) != 0) {
-    return cannot_read(path, error);
-  }
-  SUPINE_REFUSE_IF(S_ISDIR(about.st_mode), error, SUPINE_ERROR_READ,
-                   "%s: is a folder; give the mesh file inside it", path);
-  SUPINE_REFUSE_IF(!S_ISREG(about.st_mode), error, SUPINE_ERROR_READ,
-                   "%s: not a regular file; save the mesh to a file first", path);
-  *size = (size_t)about.st_size;
-  return *size == 0 ? supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                       "%s: the file is empty; save the mesh again", path)
-                    : SUPINE_OK;
 }
 
 /* Find the axes in the first 4095 bytes of the file, where 3D Slicer writes a tag such as
@@ -77,19 +55,17 @@ static void find_space(mesh_file *file) {
 static supine_status read_file(mesh_file *file, supine_arena *arena, mesh_reader **reader,
                                supine_error *error) {
   size_t size = 0;
-  SUPINE_TRY(check_file(file->path, &size, error));
-  SUPINE_FREED_BY(supine_file_close) FILE *stream = fopen(file->path, "rb");
-  if (stream == NULL) {
-    return cannot_read(file->path, error);
-  }
+  SUPINE_FREED_BY(supine_file_close) FILE *stream = NULL;
+  SUPINE_TRY(supine_input_open(file->path, &stream, &size, error));
+  SUPINE_REFUSE_IF(size == 0, error, SUPINE_ERROR_FORMAT,
+                   "%s: the file is empty; save the mesh again", file->path);
   file->bytes = supine_arena_take(arena, size + 1, 1);
   SUPINE_TRY(supine_arena_check(arena, error, "%zu bytes of %s", size, file->path));
   errno = 0;
   file->size = fread(file->bytes, 1, size, stream);
   file->bytes[file->size] = '\0';
-  if (ferror(stream) != 0) {
-    return cannot_read(file->path, error);
-  }
+  SUPINE_REFUSE_IF(ferror(stream) != 0, error, SUPINE_ERROR_READ, "%s: cannot read: %s", file->path,
+                   strerror(errno == 0 ? EIO : errno));
   find_space(file);
   *reader = find_reader(file->path);
   SUPINE_REFUSE_IF(*reader == NULL, error, SUPINE_ERROR_FORMAT,
