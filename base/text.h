@@ -22,4 +22,16 @@ const char *supine_text_file_name(const char *path);
 /** Return whether a name ends in `ending` (".csv"), ignoring case, after at least one character. */
 bool supine_text_ends_in(const char *name, const char *ending);
 
+/** Distances below this one, in mm, are at the level of the storage of positions: their digits
+ * depend on the processor. */
+#define SUPINE_TEXT_DISTANCE_LEAST 0.002
+
+/** Text of a distance (supine_text_distance). */
+typedef struct supine_distance_text {
+  char text[32];
+} supine_distance_text;
+
+/** Format a distance in mm: with three decimals, or as "below 0.002". */
+supine_distance_text supine_text_distance(double mm);
+
 #endif

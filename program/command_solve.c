@@ -2,6 +2,7 @@
 /* supine solve: solve the full physics for one direction of gravity. */
 #include "base/arena.h"
 #include "base/output.h"
+#include "base/text.h"
 #include "precompute/lungs/disease.h"
 #include "precompute/physics/solve.h"
 
@@ -177,8 +178,8 @@ static supine_status write_solution(const supine_prepared *prepared, const reque
   SUPINE_TRY(supine_mesh_save(wanted->path, &deformed, &save, error));
   (void)printf("%s: gravity %.4g,%.4g,%.4g", wanted->path, g[0], g[1], g[2]);
   print_gains(lungs, gains);
-  (void)printf(", largest displacement %.3f mm, %+.2f mL\n",
-               supine_physics_solution_largest(solution), volume - full);
+  (void)printf(", largest displacement %s mm, %+.2f mL\n",
+               supine_text_distance(supine_physics_solution_largest(solution)).text, volume - full);
   return SUPINE_OK;
 }
 

@@ -191,8 +191,9 @@ static supine_status invert(const supine_field *forward, supine_field *inverse,
                             supine_error *error) {
   supine_field_residual residual = {0};
   SUPINE_TRY(supine_field_invert(forward, inverse, &residual, error));
-  (void)printf("field followed by inverse: residual %.3g mm RMS, %.3g mm at most, inside the lungs",
-               residual.rms, residual.largest);
+  (void)printf("field followed by inverse: residual %s mm RMS, %s mm at most, inside the lungs",
+               supine_text_distance(residual.rms).text,
+               supine_text_distance(residual.largest).text);
   if (residual.lost > 0) {
     (void)printf("; the field folds and has no inverse at %zu %s", residual.lost,
                  residual.lost == 1 ? "node" : "nodes");
@@ -302,8 +303,8 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
   for (size_t i = 0; i < mesh.vertex_count; ++i) {
     largest = fmax(largest, supine_distance(mesh.vertices + 3 * i, from.vertices + 3 * i));
   }
-  (void)printf("%s: gravity %.4g,%.4g,%.4g, largest displacement %.3f mm from %s", path, gravity[0],
-               gravity[1], gravity[2], largest, moved->from.name);
+  (void)printf("%s: gravity %.4g,%.4g,%.4g, largest displacement %s mm from %s", path, gravity[0],
+               gravity[1], gravity[2], supine_text_distance(largest).text, moved->from.name);
   if (supine_basis_metadata(basis, "content") == NULL) {
     const double held = 1e-3 * supine_mesh_volume(&mesh);
     (void)printf(", %.2f mL (%+.2f mL)", held, held - 1e-3 * supine_mesh_volume(&from));

@@ -419,7 +419,10 @@ static supine_status prepare(const check *c, supine_basis *basis,
   if (basis->kernels == NULL) {
     return supine_error_set(
         c->error, SUPINE_ERROR_UNSUPPORTED,
-        "this processor or build lacks the instruction set: choose SUPINE_SIMD_AUTO");
+        options->simd == SUPINE_SIMD_AUTO
+            ? "the environment variable SUPINE_SIMD names no instruction set of this processor or "
+              "build: set it to portable, avx2 or avx512, or unset it"
+            : "this processor or build lacks the instruction set: choose SUPINE_SIMD_AUTO");
   }
   basis->info.simd = simd;
   const bool choose = storage == SUPINE_STORAGE_AUTO;

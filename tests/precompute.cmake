@@ -25,6 +25,7 @@ target_compile_definitions(test_process PRIVATE SUPINE_PROGRAM="$<TARGET_FILE:su
 # Compare the complete output of the commands with golden files.
 add_test(NAME command_output COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_command_output.sh
   $<TARGET_FILE:supine> ${CMAKE_CURRENT_SOURCE_DIR}/golden)
+add_test(NAME same_output COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/test_same_output.py)
 set_tests_properties(command_output PROPERTIES TIMEOUT 900)
 # Run the commands that README.md and FIGURES.md quote.
 add_test(NAME quoted COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/test_quoted.py $<TARGET_FILE:supine>

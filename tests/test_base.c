@@ -50,6 +50,14 @@ TEST(test_text_ends_in_ending_alone_false) {
   assert_false(supine_text_ends_in(".NII", ".nii"));
 }
 
+TEST(test_text_distance_below_level_of_storage_without_digits) {
+  assert_string_equal(supine_text_distance(0.0).text, "below 0.002");
+  assert_string_equal(supine_text_distance(0.00199).text, "below 0.002");
+  assert_string_equal(supine_text_distance(0.00201).text, "0.002");
+  assert_string_equal(supine_text_distance(70.88649).text, "70.886");
+  assert_string_equal(supine_text_distance((double)NAN).text, "nan");
+}
+
 static void read_text(const char *path, char *text, size_t size) {
   FILE *file = fopen(path, "rb");
   assert_non_null(file);

@@ -303,12 +303,14 @@ TEST(test_breathe_interrupted_leaves_no_file) {
     _exit(supine_options_run(&supine_command_breathe, 8, argv));
   }
   assert_true(child > 0);
-  for (int i = 0; i < 200 && count_files() == before; ++i) {
-    (void)nanosleep(&(struct timespec){0, 10000000}, NULL);
-  }
-  (void)nanosleep(&(struct timespec){0, 50000000}, NULL);
-  assert_int_equal(kill(child, SIGINT), 0);
   int how = 0;
+  pid_t ended = 0;
+  while (ended == 0 && count_files() == before) { /* until the child writes, or ends too early */
+    (void)nanosleep(&(struct timespec){0, 10000000}, NULL);
+    ended = waitpid(child, &how, WNOHANG);
+  }
+  assert_int_equal(ended, 0);
+  assert_int_equal(kill(child, SIGINT), 0);
   assert_int_equal(waitpid(child, &how, 0), child);
   assert_true(WIFEXITED(how));
   assert_int_equal(WEXITSTATUS(how), SUPINE_EXIT_OUTPUT);

@@ -5,7 +5,7 @@
 # Each golden file FOLDER/*.txt is a session: lines "$ COMMAND", each followed by what the command prints on
 # stdout and stderr, and by the exit code if it is not 0. Sessions run in a folder with lungs.ply, synthetic
 # lungs of about 500 vertices, and lungs.safetensors, the basis of these lungs. Numbers that depend on the
-# processor are rounded by the filter `rounded`, and same_output.py then accepts a difference of one in their
+# processor are rounded by the filter `rounded`; same_output.py then accepts a difference of one in the
 # last digit. sed replaces times and residuals. To replace the golden files by the current output:
 #
 #   SUPINE_GOLDEN_UPDATE=1 ctest --preset release -R command_output
@@ -18,16 +18,18 @@ mkdir "$work/bin"
 ln -s "$program" "$work/bin/supine"
 cat >"$work/bin/rounded" <<'END'
 #!/bin/sh
-# rounded [DIGITS] [FILE]: round decimal numbers to DIGITS significant digits (default 4), and numbers below 1e-7 to 0.
-# A test passes fewer digits if rounding to four could go either way for one of its numbers.
+# rounded [DIGITS [LEAST]] [FILE]: round decimal numbers to DIGITS significant digits (default 4), and numbers below
+# LEAST (default 1e-7) to 0. A session gives LEAST if its numbers are small differences of large ones.
 digits=4
+least=1e-7
 case ${1-} in [1-9]) digits=$1; shift ;; esac
-exec awk -v digits="$digits" '{
+case ${1-} in 0.*) least=$1; shift ;; esac
+exec awk -v digits="$digits" -v least="$least" '{
   line = $0
   out = ""
   while (match(line, /-?[0-9]+(\.[0-9]+(e[-+]?[0-9]+)?|e[-+]?[0-9]+)/)) {
     number = substr(line, RSTART, RLENGTH) + 0
-    out = out substr(line, 1, RSTART - 1) sprintf("%.*g", digits, number * number < 1e-14 ? 0 : number)
+    out = out substr(line, 1, RSTART - 1) sprintf("%.*g", digits, number * number < least * least ? 0 : number)
     line = substr(line, RSTART + RLENGTH)
   }
   print out line

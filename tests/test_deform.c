@@ -276,6 +276,45 @@ TEST(test_open_bad_options_refused) {
   drop(&o);
 }
 
+#if defined(__x86_64__)
+/* Open a basis whose instruction set SUPINE_SIMD names. Return the status, and the set in use. */
+static supine_status open_named(const opened *o, const char *name, supine_simd *simd) {
+  const supine_basis_options options = {.size = sizeof options};
+  supine_basis *basis = NULL;
+  assert_int_equal(setenv("SUPINE_SIMD", name, 1), 0);
+  const supine_status status =
+      supine_basis_open_memory_with(o->bytes, o->size, &options, &basis, NULL);
+  *simd = basis != NULL ? supine_basis_get_info(basis)->simd : SUPINE_SIMD_AUTO;
+  supine_basis_close(basis);
+  return status;
+}
+
+TEST(test_open_simd_of_environment_used_unknown_refused) {
+  static const char *const names[SUPINE_SIMD_COUNT] = {[SUPINE_SIMD_PORTABLE] = "portable",
+                                                       [SUPINE_SIMD_AVX2] = "avx2",
+                                                       [SUPINE_SIMD_AVX512] = "avx512"};
+  static const char *const wrong[] = {"", "sse", "avx", "avx2 "};
+  opened o = made(fixture_create(50, 1, 0, 1, false, false, 1, 1));
+  const char *before = getenv("SUPINE_SIMD");
+  char *kept = before != NULL ? strdup(before) : NULL;
+  for (int i = SUPINE_SIMD_PORTABLE; i < SUPINE_SIMD_COUNT; ++i) {
+    supine_basis *chosen = open_as(&o, SUPINE_STORAGE_AUTO, (supine_simd)i);
+    const bool there = chosen != NULL;
+    supine_simd simd;
+    supine_basis_close(chosen);
+    assert_int_equal(open_named(&o, names[i], &simd), there ? SUPINE_OK : SUPINE_ERROR_UNSUPPORTED);
+    assert_int_equal(simd, there ? i : SUPINE_SIMD_AUTO);
+  }
+  for (size_t i = 0; i < sizeof wrong / sizeof *wrong; ++i) {
+    supine_simd simd;
+    assert_int_equal(open_named(&o, wrong[i], &simd), SUPINE_ERROR_UNSUPPORTED);
+  }
+  assert_int_equal(kept != NULL ? setenv("SUPINE_SIMD", kept, 1) : unsetenv("SUPINE_SIMD"), 0);
+  free(kept);
+  drop(&o);
+}
+#endif
+
 /* Assert that positions of any range of vertices, written at any alignment, have the same bits as
  * in one call for all vertices, and that nothing outside the range is written. */
 static void check_ranges(size_t vertices, size_t modes, size_t lungs, supine_simd simd,

@@ -10,6 +10,7 @@
 
 #include "base/arena.h"
 #include "base/csv.h"
+#include "base/text.h"
 #include "base/vec3.h"
 #include "runtime/rigid.h"
 
@@ -232,8 +233,8 @@ supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool
       s.translation);
   SUPINE_REFUSE_IF(
       s.displacement < displacement_least, error, SUPINE_ERROR_FORMAT,
-      "the points do not move between the states (%.2g mm RMS%s): give two different states",
-      s.displacement, scans_moved ? " after a translation" : "");
+      "the points do not move between the states (%s mm RMS%s): give two different states",
+      supine_text_distance(s.displacement).text, scans_moved ? " after a translation" : "");
   return SUPINE_OK;
 }
 

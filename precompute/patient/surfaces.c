@@ -8,6 +8,7 @@
 #include "precompute/patient/matching.h"
 
 #include "base/arena.h"
+#include "base/text.h"
 
 enum {
   VERTICES_MAX = 600,  /* largest number of matched vertices */
@@ -85,8 +86,8 @@ static supine_status check_apart(supine_patient_matching *m, supine_patient_surf
   report->before =
       sqrt(gsl_stats_tss_m(&m->match->distance, stride, m->count, 0.0) / (double)m->count);
   SUPINE_REFUSE_IF(!(report->before >= same_state), error, SUPINE_ERROR_MESH,
-                   "the two surfaces are the same (%.2g mm RMS apart): give two different states",
-                   report->before);
+                   "the two surfaces are the same (%s mm RMS apart): give two different states",
+                   supine_text_distance(report->before).text);
   return SUPINE_OK;
 }
 

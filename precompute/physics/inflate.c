@@ -14,6 +14,7 @@
 #include <supine/volume.h>
 
 #include "base/arena.h"
+#include "base/text.h"
 #include "precompute/physics/reference.h"
 #include "precompute/physics/solve.h"
 #include "precompute/physics/volume_forms.h"
@@ -210,9 +211,9 @@ static supine_status iterate(ascent *a, supine_error *error) {
   }
   return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
                           "no surface at full inflation was found: after %d steps it still changes "
-                          "by %.3g mm RMS. If the scan is fuller than --scanned says, change "
+                          "by %s mm RMS. If the scan is fuller than --scanned says, change "
                           "--scanned or --resting; --scanned none uses the scan as it is",
-                          SOLVES_MAX, a->rms);
+                          SOLVES_MAX, supine_text_distance(a->rms).text);
 }
 
 supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *model,

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/text.h"
 #include "precompute/fields/fields.h"
 #include "program/offline/basis.h"
 #include "program/options/model_options.h"
@@ -85,10 +86,11 @@ static void print_errors(FILE *out, const supine_accuracy *accuracy, const char 
                          const char *state) {
   (void)fprintf(out,
                 "  %.3g %% RMS, %.3g %% 95th percentile, %.3g %% largest, of the RMS displacement\n"
-                "  %.3g mm RMS, %.3g mm 95th percentile, %.3g mm largest%s%s\n",
+                "  %s mm RMS, %s mm 95th percentile, %s mm largest%s%s\n",
                 100.0 * accuracy->relative_rms, 100.0 * accuracy->relative_p95,
-                100.0 * accuracy->relative_max, accuracy->rms_mm, accuracy->p95_mm,
-                accuracy->max_mm, at, state);
+                100.0 * accuracy->relative_max, supine_text_distance(accuracy->rms_mm).text,
+                supine_text_distance(accuracy->p95_mm).text,
+                supine_text_distance(accuracy->max_mm).text, at, state);
 }
 
 static void report_result(FILE *out, const supine_basis_choice *choice,

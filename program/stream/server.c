@@ -287,6 +287,8 @@ static void receive_all(supine_stream_server *s) {
       } else if ((s->polled[i].revents & (POLLIN | POLLHUP | POLLERR)) != 0) {
         read_peer(s, &s->peer[i]);
       }
+    } else {
+      s->peer[i].emptied = s->woke; /* nothing has arrived so far */
     }
   }
   if (s->polled[LISTENER].revents != 0) {

@@ -62,7 +62,10 @@ typedef enum supine_storage {
 /** The instruction set of the evaluation. Positions from different sets differ by at most twice
  * supine_basis_error. */
 typedef enum supine_simd {
-  SUPINE_SIMD_AUTO = 0, /**< the widest instruction set that this processor has */
+  /** The widest instruction set that this processor has. On x86-64 the environment variable
+   * SUPINE_SIMD (portable, avx2 or avx512) can name a narrower one, to get the numbers of another
+   * processor. */
+  SUPINE_SIMD_AUTO = 0,
   SUPINE_SIMD_PORTABLE, /**< vectors of four numbers: SSE2, NEON, WebAssembly */
   SUPINE_SIMD_AVX2,     /**< AVX2 and FMA */
   SUPINE_SIMD_AVX512,   /**< AVX-512 F and BW */
