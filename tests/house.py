@@ -173,6 +173,8 @@ def check_licences():
     for file, path in named:
         if not glob.glob(os.path.join(source, path)):
             faults.append(f"{file}: {path} does not exist")
+
+
 # Sources that open files. All others call supine_input_open for a file that the user names, and
 # supine_input_open_beside for a file that another file names. Those after the first line read CSV and JSON, which may
 # come from a pipe, from the path that the user gives.
