@@ -6,6 +6,7 @@
 
 #include "base/arena.h"
 #include "base/library.h"
+#include "base/number.h"
 #include "mesh/image/image_formats.h"
 
 /* clang-format off */
@@ -135,9 +136,10 @@ supine_status supine_image_write_nrrd(const char *path, const supine_image *imag
                 vector ? " none" : "");
   for (int a = 0; a < 3; ++a) {
     const double *s = image->step[a];
-    (void)fprintf(file, " (%.17g,%.17g,%.17g)", s[0], s[1], s[2]);
+    (void)supine_print(file, " (%.17g,%.17g,%.17g)", s[0], s[1], s[2]);
   }
-  (void)fprintf(file, "\nspace origin: (%.17g,%.17g,%.17g)\nendian: little\nencoding: gzip\n\n",
-                image->origin[0], image->origin[1], image->origin[2]);
+  (void)supine_print(file,
+                     "\nspace origin: (%.17g,%.17g,%.17g)\nendian: little\nencoding: gzip\n\n",
+                     image->origin[0], image->origin[1], image->origin[2]);
   return supine_image_pack(IMAGE_GZIP, NULL, 0, image, image->values, file);
 }

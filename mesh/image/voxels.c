@@ -9,6 +9,7 @@
 #include <zlib.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 
 #include "mesh/image/image_formats.h"
 
@@ -85,12 +86,19 @@ static supine_status rescale(const char *path, const image_storage *storage, sup
 }
 
 static bool read_text(FILE *file, supine_image *image, size_t count) {
-  double value = 0.0;
-  size_t i = 0;
-  for (; i < count && fscanf(file, "%lf", &value) == 1; ++i) { /* NOLINT(cert-err34-c) */
+  char word[512];
+  for (size_t i = 0; i < count; ++i) {
+    char *end = word;
+    if (fscanf(file, "%511s", word) != 1) {
+      return false;
+    }
+    const double value = supine_number_parse(word, &end);
+    if (end == word || *end != '\0') {
+      return false;
+    }
     supine_image_put(image, i, 1, &value);
   }
-  return i == count;
+  return true;
 }
 
 supine_status supine_image_read_voxels(const char *path, FILE *file, size_t file_size,

@@ -9,6 +9,7 @@
 
 #include "base/arena.h"
 #include "base/csv.h"
+#include "base/locale.h"
 #include "base/text.h"
 
 #include "mesh/io/points.h"
@@ -109,6 +110,7 @@ static supine_status read_markup(reading *r, const json_t *markup) {
 }
 
 static supine_status read_markups(reading *r) {
+  SUPINE_C_LOCALE;
   json_error_t why;
   json_auto_t *root = json_load_file(r->path, 0, &why);
   SUPINE_REFUSE_IF(root == NULL, r->error, why.line < 0 ? SUPINE_ERROR_READ : SUPINE_ERROR_FORMAT,

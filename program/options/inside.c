@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "base/text.h"
 #include "base/vec3.h"
 
@@ -233,8 +234,8 @@ supine_status supine_command_marks_make(const supine_basis *inside,
       middle->xyz[k] = (float)t->at[k];
       middle->from[k] = (float)(t->at[k] - t->move[k]);
     }
-    (void)snprintf(marks->label[part], sizeof marks->label[part],
-                   t->moved <= t->expected ? "%.30s" : "%.30s %.1f mm", t->name, t->moved);
+    (void)supine_print_text(marks->label[part], sizeof marks->label[part],
+                            t->moved <= t->expected ? "%.30s" : "%.30s %.1f mm", t->name, t->moved);
     middle->label = marks->label[part];
     middle->point = count == 1;
     marks->marks.count += count > 0;
