@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /** @file Classify and compare characters of ASCII in the same way in every locale. In a Turkish
- * locale strcasecmp finds that "i" and "I" differ, and in Latin 1 isspace accepts a byte of UTF-8. */
+ * locale strcasecmp finds that "i" and "I" differ, and in Latin 1 isspace accepts a byte of UTF-8.
+ */
 #ifndef SUPINE_ASCII_H
 #define SUPINE_ASCII_H
 

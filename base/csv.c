@@ -75,8 +75,8 @@ static bool is_open_after(const char *line, const char *separators, bool open) {
 /* Set `text` to the next record, trimmed; NULL at the end. It is a line that is neither blank nor a
  * comment, with the lines after it that its quoted fields contain. */
 static supine_status csv_line(supine_csv *csv, char **text, supine_error *error) {
-  const char separators[] = {csv->separator != '\0' ? csv->separator : ',',
-                             csv->separator != '\0' ? '\0' : ';', '\t', '\0'};
+  const char own[] = {csv->separator, '\0'};
+  const char *separators = csv->separator != '\0' ? own : ",;\t";
   size_t used = 0;
   do {
     SUPINE_TRY(read_line(csv, 0, &used, error));
@@ -131,7 +131,7 @@ static char *csv_field(char **rest, char separator) {
   }
   *to = '\0';
   ++end;
-  end += strspn(end, " \t");
+  end += strspn(end, " ");
   if (*end != separator && *end != '\0') {
     return NULL;
   }

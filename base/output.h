@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /** @file Write output files whole or not at all.
  *
- * A file is written under a temporary name in its folder. It gets its final name when it is complete
- * and on the disk. */
+ * A file is written under a temporary name in its folder. It gets its final name when it is
+ * complete and on the disk. */
 #ifndef SUPINE_OUTPUT_H
 #define SUPINE_OUTPUT_H
 

@@ -40,6 +40,17 @@ bool supine_text_is_utf8(const char *text) {
   return true;
 }
 
+size_t supine_text_fit(const char *text, size_t most) {
+  size_t length = strnlen(text, most + 1);
+  if (length > most) {
+    length = most;
+    while (length > 0 && ((unsigned char)text[length] & 0xC0U) == 0x80U) {
+      --length;
+    }
+  }
+  return length;
+}
+
 char *supine_text_make_utf8(char *text) {
   const char *const end = text + strlen(text);
   for (char *at = text; at < end;) {

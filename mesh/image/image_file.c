@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 
 #include "base/arena.h"
+#include "base/locale.h"
 #include "base/output.h"
 #include "base/text.h"
 #include "base/vec3.h"
@@ -60,6 +61,7 @@ static bool is_frame(const supine_image *image) {
 }
 
 supine_status supine_image_read(const char *path, supine_image *image, supine_error *error) {
+  SUPINE_C_LOCALE; /* for the libraries that read headers */
   struct stat about = {0};
   SUPINE_FREED_BY(supine_image_free) supine_image read = {.channels = 1};
   SUPINE_FREED_BY(supine_file_close) FILE *file = NULL;

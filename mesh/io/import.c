@@ -17,6 +17,7 @@
 
 #include "base/arena.h"
 #include "base/library.h"
+#include "base/locale.h"
 #include "mesh/io/read.h"
 
 /* clang-format off */
@@ -155,6 +156,7 @@ static _Noreturn void be_child(const mesh_file *file, const char *kind, size_t b
   gathering out = {.error = &result.error};
   out.faces = (mesh_faces){.path = file->path, .mesh = &out.mesh};
   confine(bytes);
+  (void)supine_locale_enter(); /* a child of a host program inherits its locale */
   if (SUPINE_LIBRARY_LOAD(SUPINE_ASSIMP, FUNCTIONS, &out.ai, &result.error) == SUPINE_OK) {
     out.scene = import(&out.ai, file, kind);
     struct aiMatrix4x4 identity;
