@@ -5,6 +5,8 @@
 
 #include <supine/status.h>
 
+#include "base/number.h"
+
 const char *supine_status_string(supine_status status) {
   static const char *const phrases[] = {
       "success",        "argument out of range", "out of memory",   "cannot read",
@@ -20,7 +22,7 @@ supine_status supine_error_set(supine_error *error, supine_status status, const 
     va_list arguments;
     va_start(arguments, format);
     error->status = status;
-    (void)vsnprintf(error->message, sizeof error->message, format, arguments);
+    (void)supine_print_text_list(error->message, sizeof error->message, format, arguments);
     va_end(arguments);
   }
   return status;

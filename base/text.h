@@ -13,6 +13,13 @@
 SUPINE_PRINTF(3, 4)
 void supine_text_add(char *text, size_t size, const char *format, ...);
 
+/** Return whether a text is UTF-8. */
+bool supine_text_is_utf8(const char *text);
+
+/** Return the length of the longest part of `text`, from its begin, that has at most `most` bytes
+ * and does not cut a UTF-8 character. */
+size_t supine_text_fit(const char *text, size_t most);
+
 /** Replace bytes that are not UTF-8, which file names may contain, by '?'. Return `text`. */
 char *supine_text_make_utf8(char *text);
 

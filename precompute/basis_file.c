@@ -11,6 +11,7 @@
 #include <supine/sh.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "base/text.h"
 #include "precompute/basis_file.h"
 #include "precompute/lungs/disease.h"
@@ -30,14 +31,14 @@ SUPINE_PRINTF(3, 4)
 static void add(entries *list, const char *key, const char *format, ...) {
   va_list arguments;
   va_start(arguments, format);
-  const int length = vsnprintf(NULL, 0, format, arguments);
+  const int length = supine_print_text_list(NULL, 0, format, arguments);
   va_end(arguments);
   char *text = supine_arena_take(list->memory, (size_t)length + 1, 1);
   va_start(arguments, format);
   if (list->count == ENTRIES_MAX) {
     list->memory->failed = true;
   } else if (text != NULL) {
-    (void)vsnprintf(text, (size_t)length + 1, format, arguments);
+    (void)supine_print_text_list(text, (size_t)length + 1, format, arguments);
     list->metadata[list->count++] = (supine_metadata){key, supine_text_make_utf8(text)};
   }
   va_end(arguments);

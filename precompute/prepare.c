@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "base/text.h"
 #include "base/vec3.h"
 
@@ -57,7 +58,7 @@ static void tell_volume(const supine_patient_record *record, double measured,
   char beside[64] = "";
   (void)supine_state_describe(&record->state[other], state, sizeof state);
   if (measured > 0.0 && both) {
-    (void)snprintf(beside, sizeof beside, "; measured: %.0f mL", measured);
+    (void)supine_print_text(beside, sizeof beside, "; measured: %.0f mL", measured);
   }
   const double off = beside[0] != '\0' ? fabs((lung[0] + lung[1]) / measured - 1.0) : 0.0;
   supine_findings_add(
@@ -70,13 +71,14 @@ static void tell_volume(const supine_patient_record *record, double measured,
 
 static void describe_fit(const supine_patient_record *record, char *text, size_t size) {
   const supine_patient_fit_report *report = &record->report;
-  (void)snprintf(text, size,
-                 "%s: %s law%s from %.0f points; held-out residual %.1f of %.1f mm RMS, %.0f %% "
-                 "explained; expected error %.1f mm RMS",
-                 record->name, supine_patient_law_names[record->patient.law],
-                 record->patient.centre_count > 0 ? " and kriging" : "", report->points,
-                 report->held_out[SUPINE_PATIENT_SCORE_CORRECTED], report->baseline,
-                 report->explained, report->expected_point);
+  (void)supine_print_text(
+      text, size,
+      "%s: %s law%s from %.0f points; held-out residual %.1f of %.1f mm RMS, %.0f %% "
+      "explained; expected error %.1f mm RMS",
+      record->name, supine_patient_law_names[record->patient.law],
+      record->patient.centre_count > 0 ? " and kriging" : "", report->points,
+      report->held_out[SUPINE_PATIENT_SCORE_CORRECTED], report->baseline, report->explained,
+      report->expected_point);
 }
 
 /* Use the displacement law and the force that were fitted to a patient. If the state of the scan is

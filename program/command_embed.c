@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "mesh/image/image.h"
 #include "precompute/inside/embed.h"
 #include "precompute/patient/patient_file.h"
@@ -106,10 +107,11 @@ static void print_summary(const supine_inside_shells *shells, const supine_insid
   if (report->outside > 0 && !grid) {
     char text[64];
     part_name(content, report->farthest, text, sizeof text);
-    (void)printf("outside the lungs: %zu of %zu, by at most %.1f mm (%s); motion %s\n",
-                 report->outside, report->count, report->farthest_mm, text,
-                 wanted->clamp ? "taken from the nearest point of the surface"
-                               : "extrapolated from inside (--clamp changes this)");
+    (void)supine_print(stdout,
+                       "outside the lungs: %zu of %zu, by at most %.1f mm (%s); motion %s\n",
+                       report->outside, report->count, report->farthest_mm, text,
+                       wanted->clamp ? "taken from the nearest point of the surface"
+                                     : "extrapolated from inside (--clamp changes this)");
   }
 }
 

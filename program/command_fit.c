@@ -187,8 +187,11 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   const char *named_for =
       wanted->landmarks.path != NULL ? wanted->landmarks.path : wanted->scan_path[1];
   SUPINE_FREED_BY(supine_patient_scans_free) supine_patient_scans scans = {0};
+  SUPINE_REFUSE_IF(wanted->name != NULL && !supine_text_is_utf8(wanted->name), error,
+                   SUPINE_ERROR_ARGUMENT, "--name is not UTF-8: give it in this encoding");
   (void)snprintf(record.name, sizeof record.name, "%s",
                  wanted->name != NULL ? wanted->name : supine_text_file_name(named_for));
+  (void)supine_text_make_utf8(record.name); /* of a file, or cut off */
   SUPINE_TRY(load_scans(wanted, &scans, error));
   memcpy(record.state, wanted->state, sizeof record.state);
   SUPINE_TRY(supine_patient_scans_order(&scans, &record, error));

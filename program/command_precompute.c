@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine precompute: make a basis file from lung surfaces or a label map. */
+#include "base/csv.h"
 #include "base/vec3.h"
 #include "program/offline/basis.h"
 #include "program/options/model_options.h"
@@ -11,7 +12,9 @@ static void print_directions(size_t count) {
   for (size_t i = 0; i < count; ++i) {
     double g[3];
     supine_spiral((double)i, (double)count, 0.0, g);
-    (void)printf("%.9g,%.9g,%.9g\n", g[0], g[1], g[2]);
+    supine_csv_row row = {.file = stdout};
+    supine_csv_add(&row, "%.9g,%.9g,%.9g", g[0], g[1], g[2]);
+    supine_csv_end_row(&row);
   }
 }
 

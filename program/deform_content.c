@@ -4,6 +4,8 @@
 #include <stdlib.h>
 
 #include "base/arena.h"
+#include "base/csv.h"
+#include "base/number.h"
 #include "base/output.h"
 #include "base/text.h"
 #include "base/vec3.h"
@@ -121,10 +123,15 @@ static void print_rows(const supine_deformation *moved, const supine_basis_info 
     double move[3];
     in_frame(frame->axes, unit, row->at, at);
     in_frame(frame->axes, unit, row->move, move);
-    (void)fprintf(file, "%s,%s,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f", row->name,
-                  info->lung_names[row->lung], at[0], at[1], at[2], move[0], move[1], move[2],
-                  row->moved);
-    (void)fprintf(file, known ? ",%.3f\n" : "\n", row->expected);
+    supine_csv_row line = {.file = file};
+    supine_csv_add_text(&line, row->name);
+    supine_csv_add_text(&line, info->lung_names[row->lung]);
+    supine_csv_add(&line, "%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f", at[0], at[1], at[2], move[0],
+                   move[1], move[2], row->moved);
+    if (known) {
+      supine_csv_add(&line, "%.3f", row->expected);
+    }
+    supine_csv_end_row(&line);
   }
 }
 
@@ -264,7 +271,7 @@ static void print_range(const supine_basis *basis, const supine_deformation *mov
     sum.assumed = sum.assumed || held.assumed;
   }
   if (sum.assumed) {
-    (void)printf("; assumed from other people: %.0f to %.0f mL", sum.low, sum.high);
+    (void)supine_print(stdout, "; assumed from other people: %.0f to %.0f mL", sum.low, sum.high);
   }
 }
 
@@ -303,11 +310,13 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
   for (size_t i = 0; i < mesh.vertex_count; ++i) {
     largest = fmax(largest, supine_distance(mesh.vertices + 3 * i, from.vertices + 3 * i));
   }
-  (void)printf("%s: gravity %.4g,%.4g,%.4g, largest displacement %s mm from %s", path, gravity[0],
-               gravity[1], gravity[2], supine_text_distance(largest).text, moved->from.name);
+  (void)supine_print(stdout, "%s: gravity %.4g,%.4g,%.4g, largest displacement %s mm from %s", path,
+                     gravity[0], gravity[1], gravity[2], supine_text_distance(largest).text,
+                     moved->from.name);
   if (supine_basis_metadata(basis, "content") == NULL) {
     const double held = 1e-3 * supine_mesh_volume(&mesh);
-    (void)printf(", %.2f mL (%+.2f mL)", held, held - 1e-3 * supine_mesh_volume(&from));
+    (void)supine_print(stdout, ", %.2f mL (%+.2f mL)", held,
+                       held - 1e-3 * supine_mesh_volume(&from));
     print_range(basis, moved);
   }
   (void)putchar('\n');
@@ -327,15 +336,16 @@ supine_status supine_command_deform_content(const supine_deform_content *wanted,
                    : write_surface(wanted->path, basis, moved, error));
   }
   if (moved->expected.sigma != NULL) {
-    (void)printf("expected error %.1f mm (RMS over the points), %.1f mm at most%s\n",
-                 moved->expected.rms, moved->expected.largest,
-                 moved->expected.turned ? "; an extrapolation, as the posture changes" : "");
+    (void)supine_print(stdout, "expected error %.1f mm (RMS over the points), %.1f mm at most%s\n",
+                       moved->expected.rms, moved->expected.largest,
+                       moved->expected.turned ? "; an extrapolation, as the posture changes" : "");
   }
   if (supine_length(moved->hilum.move) != 0.0) {
-    (void)printf("the hilum moves by %.1f, %.1f, %.1f mm (to the left, back and head)",
-                 moved->hilum.move[0], moved->hilum.move[1], moved->hilum.move[2]);
+    (void)supine_print(stdout,
+                       "the hilum moves by %.1f, %.1f, %.1f mm (to the left, back and head)",
+                       moved->hilum.move[0], moved->hilum.move[1], moved->hilum.move[2]);
     if (!isnan(moved->hilum.expected)) {
-      (void)printf(", expected error %.1f mm", moved->hilum.expected);
+      (void)supine_print(stdout, ", expected error %.1f mm", moved->hilum.expected);
     }
     (void)printf("%s\n", moved->subtract_hilum ? ", subtracted from all positions" : "");
   }

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "program/options/basis_input.h"
 #include "program/options/inside.h"
 #include "program/stream/peer.h"
@@ -38,9 +39,10 @@ static void report(const supine_stream_results *results, const supine_stream_ses
   for (int surfaces = 0; surfaces < 2; ++surfaces) {
     const supine_stream_latency *latency = &results->latency[surfaces];
     if (latency->count > 0) {
-      (void)printf("pose received to %s sent: %zu of %zu frames within %.0f ms, worst %.3f ms\n",
-                   surfaces != 0 ? "surface" : "weights", latency->count - latency->late,
-                   latency->count, 1e3 * SUPINE_STREAM_BUDGET, 1e3 * latency->worst);
+      (void)supine_print(
+          stdout, "pose received to %s sent: %zu of %zu frames within %.0f ms, worst %.3f ms\n",
+          surfaces != 0 ? "surface" : "weights", latency->count - latency->late, latency->count,
+          1e3 * SUPINE_STREAM_BUDGET, 1e3 * latency->worst);
     }
   }
 }

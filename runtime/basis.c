@@ -9,6 +9,7 @@
 #include <supine/sh.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "runtime/internal.h"
 #include "runtime/safetensors/safetensors_file.h"
 
@@ -23,7 +24,7 @@ static supine_status SUPINE_PRINTF(2, 3) refuse(const check *c, const char *form
   char detail[256];
   va_list arguments;
   va_start(arguments, format);
-  (void)vsnprintf(detail, sizeof detail, format, arguments);
+  (void)supine_print_text_list(detail, sizeof detail, format, arguments);
   va_end(arguments);
   const bool embedded = supine_safetensors_metadata(c->file, "content") != NULL;
   return supine_error_set(c->error, SUPINE_ERROR_FORMAT, "%s: %s: make the file again with '%s'",
@@ -271,7 +272,7 @@ static supine_status read_numbers(const check *c, const char *key, size_t count,
   const char *at = text;
   for (size_t i = 0; at != NULL && i < count; ++i) {
     char *end = NULL;
-    values[i] = strtod(at, &end);
+    values[i] = supine_number_parse(at, &end);
     if (end == at || *end != (i + 1 < count ? ',' : '\0') || !isfinite(values[i])) {
       return refuse(c, "metadata '%s' is not a list of %zu finite number%s: %.48s", key, count,
                     count == 1 ? "" : "s", text);

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/number.h"
 #include "runtime/expected.h"
 #include "runtime/internal.h"
 
@@ -22,7 +23,7 @@ static const struct {
 /* Return the positive number that the metadata `key` holds, or `usual`. */
 static double number_of(const supine_basis *basis, const char *key, double usual) {
   const char *text = supine_basis_metadata(basis, key);
-  const double stated = text == NULL ? 0 : strtod(text, NULL);
+  const double stated = text == NULL ? 0 : supine_number_parse(text, NULL);
   return stated > 0 && isfinite(stated) ? stated : usual;
 }
 

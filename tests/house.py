@@ -5,8 +5,8 @@
 
 Each row of the table names a folder, says what it contains, and lists folders of earlier rows. The files of a folder may
 include headers of the listed folders, and headers that those folders may include. Check also that files do not depend on
-each other in cycles, that external names have the prefix of their folder, that functions have few lines and few parameters, and that the
-files of the licences name files that exist."""
+each other in cycles, that external names have the prefix of their folder, that functions have few lines and few
+parameters, that the licences name files that exist, and that nothing depends on the locale of the host program."""
 import glob
 import os
 import re
@@ -190,11 +190,73 @@ def check_opening(files):
             with open(os.path.join(source, file), encoding="utf-8") as text:
                 for name in opening.findall(text.read()):
                     faults.append(f"{file} calls {name}: call supine_input_open, or supine_input_open_beside for a name from a file")
+LOCALE_FILES = ("base/number.c", "base/locale.c", "base/locale.h")
+CALL = re.compile(r"\b((?:v|f|s|vf|vs|sn|vsn|d|as)?printf|(?:f|s)?scanf|strto[dfl]|strtold|ato[fil]|\w*locale\w*|is(?:alnum|alpha|blank|cntrl|digit|"
+                  r"graph|lower|print|punct|space|upper|xdigit)|to(?:lower|upper)|strn?casecmp|strcoll|json_\w+)\s*\(")
+REAL = re.compile(r"%[-+ #0]*(?:\*|\d+)?(?:\.(?:\*|\d+)?)?[lL]?[aAeEfFgG]")
+LITERAL = re.compile(r'"((?:\\.|[^"\\])*)"')
+
+
+def without_comments(text):
+    """Replace comments by blanks, so that positions stay."""
+    return re.sub(r'"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])*\'|/\*.*?\*/|//[^\n]*',
+                  lambda found: found[0] if found[0][0] in "\"'" else re.sub(r"[^\n]", " ", found[0]), text, flags=re.S)
+
+
+def arguments(text, begin):
+    """Return the arguments of a call, of which the first begins at `begin`."""
+    parts, depth, at = [""], 0, begin
+    while depth > 0 or text[at] != ")":
+        literal = re.compile(r'"(?:\\.|[^"\\])*"|\'(?:\\.|[^\'\\])*\'').match(text, at)
+        token = literal[0] if literal else text[at]
+        depth += (token in "([{") - (token in ")]}")
+        if token == "," and depth == 0:
+            parts.append("")
+        else:
+            parts[-1] += token
+        at += len(token)
+    return parts
+
+
+def locale_fault(name, parts, function):
+    """Return what is wrong about a call, or None."""
+    literals = "".join(LITERAL.findall("".join(parts)))
+    if name.startswith("json_"):
+        prints = name in ("json_sprintf", "json_vsprintf") and REAL.search(literals)
+        if (prints or name.startswith(("json_load", "json_dump"))) and "SUPINE_C_LOCALE" not in function:
+            return "jansson uses the host's locale: begin the function with SUPINE_C_LOCALE (base/locale.h)"
+    elif name.startswith(("supine_", "is", "to", "strcase", "strncase", "strcoll")):
+        if not name.startswith("supine_"):
+            return "the result depends on the host's locale: use base/ascii.h"
+    elif name.endswith("printf"):
+        position = 2 if name == "snprintf" else 0 if name == "printf" else 1
+        if name[0] == "v" or REAL.search(literals) or (len(parts) > position and '"' not in parts[position]):
+            return "reals depend on the host's locale: use supine_print or supine_print_text (base/number.h)"
+    elif name.endswith("scanf"):
+        if REAL.search(literals):
+            return "reals depend on the host's locale: use supine_number_parse (base/number.h)"
+    elif name not in ("strtol", "atoi", "atol"):
+        return "the result depends on the host's locale: use base/number.h"
+    return None
+
+
+def check_locale(files):
+    """Check that numbers are parsed and printed, and letters compared, only by functions that ignore the locale of the host."""
+    for file in files:
+        with open(os.path.join(source, file), encoding="utf-8") as opened:
+            text = without_comments(opened.read())
+        for call in CALL.finditer(text if file not in LOCALE_FILES else ""):
+            function = text[text.rfind("\n}", 0, call.start()) + 1:call.start()]
+            fault = locale_fault(call[1], arguments(text, call.end()), function)
+            if fault is not None:
+                line = text.count("\n", 0, call.start()) + 1
+                faults.append(f"{file}:{line}: {call[1]}: {fault}")
 
 
 folders = read_table()
 files = tracked()
 check_licences()
+check_locale(files)
 check_sizes(files)
 check_includes(folders, files)
 check_system_headers(files)

@@ -3,6 +3,7 @@
 
 #include "program_helpers.h"
 
+#include "base/number.h"
 #include "base/vec3.h"
 #include "precompute/fields/fields.h"
 #include "precompute/lungs/phantom.h"
@@ -589,20 +590,20 @@ TEST(test_fields_file_of_another_program_named) {
 
 TEST(test_directions_printed_evenly_spread) {
   double g[3] = {0.0};
-  int used = 0;
-  int length = 0;
   EXPECT(0, "x,y,z\n", "precompute --directions 32");
+  char *at = printed + 6;
   for (int count = 0; count < 32; ++count) {
     double next[3];
-    assert_int_equal(
-        sscanf(printed + 6 + used, "%lf,%lf,%lf\n%n", &next[0], &next[1], &next[2], &length), 3);
+    for (int k = 0; k < 3; ++k) {
+      next[k] = supine_number_parse(at, &at);
+      assert_int_equal(*at++, k < 2 ? ',' : '\n');
+    }
     assert_close(supine_length(next), 1.0, 1e-8);
-    used += length;
     for (int k = 0; k < 3; ++k) {
       g[k] += next[k] / 32.0;
     }
   }
-  assert_int_equal(printed[6 + used], '\0');
+  assert_int_equal(*at, '\0');
   assert_true(supine_length(g) < 0.02);
   EXPECT(1, "--modes has no effect with --directions", "precompute --directions 32 --modes 3");
   EXPECT(1, "unexpected argument 'm.obj'", "precompute m.obj --directions 32");

@@ -3,6 +3,8 @@
  * fails, exit with 77, so that CTest reports a skipped program. */
 #include "test.h"
 
+#include <locale.h>
+
 #include <gsl/gsl_errno.h>
 
 /* In a program that is linked without GSL, the address of gsl_set_error_handler_off is NULL. */
@@ -37,7 +39,17 @@ void __wrap__skip(const char *file, int line) {
 }
 /* NOLINTEND(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp) */
 
+/* Set the locale of the environment variable SUPINE_TEST_LOCALE, as a host program sets its own. */
+static void set_locale(void) {
+  const char *name = getenv("SUPINE_TEST_LOCALE");
+  if (name != NULL && setlocale(LC_ALL, name) == NULL) {
+    (void)fprintf(stderr, "there is no locale %s\n", name);
+    abort();
+  }
+}
+
 int main(void) {
+  set_locale();
   if (gsl_set_error_handler_off != NULL) {
     (void)gsl_set_error_handler_off(); /* GSL's default handler would abort the program */
   }

@@ -6,6 +6,7 @@
 #include <sys/inotify.h>
 #include <sys/stat.h>
 
+#include "base/number.h"
 #include "mesh_samples.h"
 
 static const char tetrahedron_obj[] = "v 0 0 0\nv 120 0 0\nv 0 120 0\nv 0 0 120\n"
@@ -158,8 +159,8 @@ TEST(test_load_concave_face_triangulated_inside_outline) {
     char path[256];
     for (size_t i = 0; i < 7; ++i) {
       const size_t length = strlen(text);
-      (void)snprintf(text + length, sizeof text - length, "%g %g %g\n", size * corners[i][0],
-                     size * corners[i][1], size * corners[i][2]);
+      (void)supine_print_text(text + length, sizeof text - length, "%g %g %g\n",
+                              size * corners[i][0], size * corners[i][1], size * corners[i][2]);
     }
     (void)strcat(text, "6 0 1 2 3 4 5\n4 6 5 3 0\n");
     supine_mesh mesh = load(sample_text(state, "u.ply", text, path), NULL, NULL);

@@ -2,6 +2,7 @@
 /* Test files of pressure-volume samples and of fitted curves. */
 #include "test.h"
 
+#include "base/number.h"
 #include "program/options/pv.h"
 
 static char folder[] = "/tmp/supine-pv-XXXXXX";
@@ -162,8 +163,8 @@ static void write_limbs(bool inhale, bool exhale) {
       assert_int_equal(supine_breath_curve_evaluate(&supine_breath_normal()->limb[limb], 1,
                                                     &pressure, &volume, NULL, NULL),
                        SUPINE_OK);
-      (void)fprintf(file, "%s, %.17g ,\t%.17g\n", supine_breath_limb_name((supine_pv_limb)limb),
-                    volume, pressure);
+      (void)supine_print(file, "%s, %.17g ,\t%.17g\n",
+                         supine_breath_limb_name((supine_pv_limb)limb), volume, pressure);
     }
   }
   assert_int_equal(fclose(file), 0);

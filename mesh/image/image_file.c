@@ -4,6 +4,7 @@
 
 #include "base/arena.h"
 #include "base/input.h"
+#include "base/locale.h"
 #include "base/output.h"
 #include "base/text.h"
 #include "base/vec3.h"
@@ -58,6 +59,7 @@ static bool is_frame(const supine_image *image) {
 }
 
 supine_status supine_image_read(const char *path, supine_image *image, supine_error *error) {
+  SUPINE_C_LOCALE; /* for the libraries that read headers */
   SUPINE_FREED_BY(supine_image_free) supine_image read = {.channels = 1};
   SUPINE_FREED_BY(supine_file_close) FILE *file = NULL;
   size_t size = 0;

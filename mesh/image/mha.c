@@ -5,9 +5,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
 #include "base/arena.h"
+#include "base/ascii.h"
+#include "base/number.h"
 #include "base/vec3.h"
 
 #include "mesh/image/image_formats.h"
@@ -51,7 +52,7 @@ static const char *value_of(const header *h, const char *key, const char *second
 }
 
 static bool is_true(const char *value) {
-  return strcasecmp(value, "true") == 0 || strcmp(value, "1") == 0;
+  return supine_ascii_same(value, "true") || strcmp(value, "1") == 0;
 }
 
 /* Parse `count` numbers; return false if `text` is malformed. An empty `text` changes nothing. */
@@ -59,7 +60,7 @@ static bool numbers(const char *text, double *values, size_t count) {
   bool good = true;
   for (size_t i = 0; i < count && good && *text != '\0'; ++i) {
     char *end;
-    values[i] = strtod(text, &end);
+    values[i] = supine_number_parse(text, &end);
     good = end != text && (*end != '\0' || i + 1 == count);
     text = end;
   }
@@ -98,10 +99,10 @@ static const char *read_header(char *text, header *h) {
 static const char *check(const header *h) {
   const char *object = value_of(h, "ObjectType", "", "");
   const char *binary = value_of(h, "BinaryData", "", "");
-  if (*object != '\0' && strcasecmp(object, "Image") != 0) {
+  if (*object != '\0' && !supine_ascii_same(object, "Image")) {
     return "its ObjectType is not Image; give an image";
   }
-  if (strcasecmp(value_of(h, "ElementDataFile", "", ""), "LOCAL") != 0) {
+  if (!supine_ascii_same(value_of(h, "ElementDataFile", "", ""), "LOCAL")) {
     return "the voxels are in another file; save header and voxels in one .mha";
   }
   if (*binary != '\0' && !is_true(binary)) {
@@ -204,15 +205,15 @@ static void write_header(const supine_image *image, const char *note, size_t pac
   for (int a = 0; a < 3; ++a) {
     spacing[a] = supine_length(image->step[a]);
     for (int k = 0; k < 3; ++k) {
-      (void)fprintf(file, " %.17g", image->step[a][k] / spacing[a]);
+      (void)supine_print(file, " %.17g", image->step[a][k] / spacing[a]);
     }
   }
-  (void)fprintf(file,
-                "\nOffset = %.17g %.17g %.17g\nCenterOfRotation = 0 0 0\n"
-                "AnatomicalOrientation = RAI\nElementSpacing = %.17g %.17g %.17g\n"
-                "DimSize = %zu %zu %zu\n",
-                image->origin[0], image->origin[1], image->origin[2], spacing[0], spacing[1],
-                spacing[2], image->size[0], image->size[1], image->size[2]);
+  (void)supine_print(file,
+                     "\nOffset = %.17g %.17g %.17g\nCenterOfRotation = 0 0 0\n"
+                     "AnatomicalOrientation = RAI\nElementSpacing = %.17g %.17g %.17g\n"
+                     "DimSize = %zu %zu %zu\n",
+                     image->origin[0], image->origin[1], image->origin[2], spacing[0], spacing[1],
+                     spacing[2], image->size[0], image->size[1], image->size[2]);
   if (image->channels > 1) {
     (void)fprintf(file, "ElementNumberOfChannels = %zu\n", image->channels);
   }

@@ -5,11 +5,10 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 #include <sys/types.h>
 
 #include "base/arena.h"
-
+#include "base/ascii.h"
 #include "mesh/image/image_formats.h"
 
 /* The names of each type of voxels. The first is the one that is written. */
@@ -133,7 +132,7 @@ static bool take_line(char *line, header *h, supine_arena *arena) {
   const char *name = trim(line);
   const char *value = trim(colon + 1);
   size_t f = 0;
-  while (f < sizeof fields / sizeof *fields && strcasecmp(name, fields[f].name) != 0) {
+  while (f < sizeof fields / sizeof *fields && !supine_ascii_same(name, fields[f].name)) {
     ++f;
   }
   if (f == sizeof fields / sizeof *fields) {
@@ -235,7 +234,7 @@ static bool read_counts(const char *text, size_t count, size_t *counts) {
 static bool is_one_of(const char *value, const char *const *words, size_t count) {
   bool is = false;
   for (size_t i = 0; i < count; ++i) {
-    is = is || (words[i] != NULL && strcasecmp(value, words[i]) == 0);
+    is = is || (words[i] != NULL && supine_ascii_same(value, words[i]));
   }
   return is;
 }
@@ -297,8 +296,8 @@ static supine_status find_storage(const char *path, const header *h, supine_imag
       (*lines != '\0' && strcmp(lines, "0") != 0) || (*bytes != '\0' && strcmp(bytes, "0") != 0);
   storage->packed = is_one_of(encoding, gzip, 2);
   storage->text = is_one_of(encoding, text, 3);
-  storage->big_endian = strcasecmp(endian, "big") == 0;
-  const bool raw = strcasecmp(encoding, "raw") == 0;
+  storage->big_endian = supine_ascii_same(endian, "big");
+  const bool raw = supine_ascii_same(encoding, "raw");
   SUPINE_REFUSE_IF(
       (!raw && !storage->packed && !storage->text) || skips, error, SUPINE_ERROR_FORMAT,
       "%s: its encoding is not raw, gzip or ascii, or its header skips lines or bytes; "
@@ -313,7 +312,7 @@ static supine_status find_storage(const char *path, const header *h, supine_imag
                    path);
   image->voxel = types[type].voxel;
   storage->integer = types[type].integer;
-  const bool ordered = storage->big_endian || strcasecmp(endian, "little") == 0;
+  const bool ordered = storage->big_endian || supine_ascii_same(endian, "little");
   SUPINE_REFUSE_IF(!ordered && !storage->text && supine_image_voxel_size(image->voxel) > 1, error,
                    SUPINE_ERROR_FORMAT,
                    "%s: its endian is neither little nor big; write the image again", path);
@@ -349,9 +348,10 @@ supine_status supine_image_write_nrrd(const char *path, const supine_image *imag
                 vector ? " none" : "");
   for (int a = 0; a < 3; ++a) {
     const double *s = image->step[a];
-    (void)fprintf(file, " (%.17g,%.17g,%.17g)", s[0], s[1], s[2]);
+    (void)supine_print(file, " (%.17g,%.17g,%.17g)", s[0], s[1], s[2]);
   }
-  (void)fprintf(file, "\nspace origin: (%.17g,%.17g,%.17g)\nendian: little\nencoding: gzip\n\n",
-                image->origin[0], image->origin[1], image->origin[2]);
+  (void)supine_print(file,
+                     "\nspace origin: (%.17g,%.17g,%.17g)\nendian: little\nencoding: gzip\n\n",
+                     image->origin[0], image->origin[1], image->origin[2]);
   return supine_image_pack(IMAGE_GZIP, NULL, 0, image, image->values, file);
 }

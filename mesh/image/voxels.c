@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* Read and write the voxels of all image formats: plain, or compressed by zlib or gzip. */
-#include <ctype.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,6 +9,8 @@
 #include <zlib.h>
 
 #include "base/arena.h"
+#include "base/ascii.h"
+#include "base/number.h"
 
 #include "mesh/image/image_formats.h"
 
@@ -87,7 +88,7 @@ static supine_status rescale(const char *path, const image_storage *storage, sup
 
 bool supine_image_number(const char **text, double *value) {
   char *end = NULL;
-  *value = strtod(*text, &end);
+  *value = supine_number_parse(*text, &end);
   const bool found = end != *text;
   *text = end;
   return found;
@@ -97,15 +98,15 @@ bool supine_image_number(const char **text, double *value) {
 static bool read_word(FILE *file, char *word, size_t size) {
   size_t length = 0;
   int c = getc(file);
-  while (isspace(c)) {
+  while (c != EOF && supine_ascii_is_space((char)c)) {
     c = getc(file);
   }
-  while (c != EOF && !isspace(c) && length < size - 1) {
+  while (c != EOF && !supine_ascii_is_space((char)c) && length < size - 1) {
     word[length++] = (char)c;
     c = getc(file);
   }
   word[length] = '\0';
-  return length > 0 && (c == EOF || isspace(c));
+  return length > 0 && (c == EOF || supine_ascii_is_space((char)c));
 }
 
 static bool read_text(FILE *file, supine_image *image, size_t count) {

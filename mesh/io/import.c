@@ -19,6 +19,7 @@
 #include "base/input.h"
 #include "base/library.h"
 #include "base/text.h"
+#include "base/locale.h"
 #include "mesh/io/read.h"
 
 /* clang-format off */
@@ -292,6 +293,7 @@ static _Noreturn void be_child(const mesh_file *file, int pipe_end) {
   gathering out = {.error = &result.error};
   out.faces = (mesh_faces){.path = file->path, .mesh = &out.mesh};
   confine(file->size);
+  (void)supine_locale_enter(); /* a child of a host program inherits its locale */
   if (SUPINE_LIBRARY_LOAD(SUPINE_ASSIMP, FUNCTIONS, &out.ai, &result.error) == SUPINE_OK) {
     out.scene = import(&out.ai, file, &result.error);
     struct aiMatrix4x4 identity;

@@ -1,14 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /* Load a file into a welded surface in millimetres, LPS. */
-#include <ctype.h>
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
 #include "base/arena.h"
+#include "base/ascii.h"
 #include "base/input.h"
 #include "base/text.h"
 
@@ -32,6 +31,10 @@ static mesh_reader *find_reader(const char *path) {
   return ending != NULL && supine_mesh_import_knows(ending) ? supine_mesh_import : NULL;
 }
 
+static bool is_letter_or_digit(char c) {
+  return supine_ascii_is_letter(c) || supine_ascii_is_digit(c);
+}
+
 /* Find the axes in the first 4095 bytes of the file, where 3D Slicer writes a tag such as
  * SPACE=LPS. */
 static void find_space(mesh_file *file) {
@@ -39,14 +42,14 @@ static void find_space(mesh_file *file) {
   char letters[4] = "";
   (void)snprintf(head, sizeof head, "%s", (const char *)file->bytes);
   const char *tag = head;
-  while (*tag != '\0' &&
-         (strncasecmp(tag, "SPACE=", 6) != 0 || (tag > head && isalnum((unsigned char)tag[-1])))) {
+  while (*tag != '\0' && (!supine_ascii_same_begin(tag, "SPACE=", 6) ||
+                          (tag > head && is_letter_or_digit(tag[-1])))) {
     ++tag;
   }
   file->tagged = *tag != '\0';
-  if (file->tagged && !isalnum((unsigned char)tag[strnlen(tag, 9)])) {
+  if (file->tagged && !is_letter_or_digit(tag[strnlen(tag, 9)])) {
     for (size_t k = 0; k < 3; ++k) {
-      letters[k] = (char)toupper((unsigned char)tag[strnlen(tag, 6 + k)]);
+      letters[k] = supine_ascii_upper(tag[strnlen(tag, 6 + k)]);
     }
     (void)supine_mesh_axes_parse(letters, &file->space);
   }

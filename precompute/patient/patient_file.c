@@ -10,6 +10,7 @@
 #include "precompute/patient/patient_file.h"
 
 #include "base/arena.h"
+#include "base/locale.h"
 #include "base/output.h"
 
 static const char format[] = "supine-patient";
@@ -161,6 +162,7 @@ json_t *supine_patient_encode(const supine_patient_record *record, const char *m
 }
 
 char *supine_patient_text(const supine_patient_record *record, const char *made_by) {
+  SUPINE_C_LOCALE;
   json_t *root = supine_patient_encode(record, made_by);
   char *text = root == NULL ? NULL : json_dumps(root, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
   json_decref(root);
@@ -310,6 +312,7 @@ static supine_status decode(const char *name, json_t *root, const json_error_t *
 
 supine_status supine_patient_decode(const char *name, const char *text,
                                     supine_patient_record *record, supine_error *error) {
+  SUPINE_C_LOCALE;
   json_error_t where;
   json_t *root = json_loads(text, 0, &where);
   return decode(name, root, &where, record, error);
@@ -317,6 +320,7 @@ supine_status supine_patient_decode(const char *name, const char *text,
 
 supine_status supine_patient_read(const char *path, supine_patient_record *record,
                                   supine_error *error) {
+  SUPINE_C_LOCALE;
   json_error_t where;
   FILE *file = fopen(path, "rb");
   SUPINE_REFUSE_IF(file == NULL, error, SUPINE_ERROR_READ, "%s: cannot open: %s", path,

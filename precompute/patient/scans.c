@@ -7,6 +7,7 @@
 #include "precompute/patient/scans.h"
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "precompute/lungs/surface.h"
 
 void supine_patient_scans_free(supine_patient_scans *scans) {
@@ -87,9 +88,9 @@ static void name_volumes(supine_patient_scans *scans, supine_patient_record *rec
     record->state[1].volume = (supine_volume){SUPINE_VOLUME_REST, 0.0};
     record->state[0].volume = breath ? (supine_volume){SUPINE_VOLUME_REST, v[0] - v[1]}
                                      : (supine_volume){SUPINE_VOLUME_FULL, 0.0};
-    (void)snprintf(next_note(scans), sizeof scans->note[0],
-                   "note: the scan of %.0f mL counts as rest, that of %.0f mL as %s", v[1], v[0],
-                   breath ? "a breath above it" : "full inflation");
+    (void)supine_print_text(next_note(scans), sizeof scans->note[0],
+                            "note: the scan of %.0f mL counts as rest, that of %.0f mL as %s", v[1],
+                            v[0], breath ? "a breath above it" : "full inflation");
   }
 }
 
@@ -102,7 +103,7 @@ static void warn_of_rest(supine_patient_scans *scans, const supine_patient_recor
   const double share[2] = {supine_reference_resting_total(&usual, g),
                            supine_reference_resting_total(&shown, g)};
   if (fabs(share[1] - share[0]) > SUPINE_REST_SPREAD) {
-    (void)snprintf(
+    (void)supine_print_text(
         next_note(scans), sizeof scans->note[0],
         "warning: the volume at rest is %.0f %% of full inflation in the two scans, but %.0f %% in "
         "healthy people: check --rest. 'supine precompute --patient' uses the volume in the scans",

@@ -11,6 +11,7 @@
 #include "precompute/physics/resting.h"
 
 #include "base/arena.h"
+#include "base/number.h"
 
 /* Volumes at rest of healthy people divided by the volume at full inflation supine, both with
  * tissue. Rows: left lung, right lung. Columns: lying on the left, on the right, supine, prone,
@@ -65,7 +66,7 @@ static const double parts[2] = {SUPINE_LEFT_SHARE, 1.0 - SUPINE_LEFT_SHARE};
  * false if the text has another form or is out of range. */
 static bool read_value(supine_resting *resting, size_t axis, const char *text) {
   char *end = NULL;
-  const double first = strtod(text, &end);
+  const double first = supine_number_parse(text, &end);
   double share[2] = {first, first};
   if (end == text) {
     return false;
@@ -77,7 +78,7 @@ static bool read_value(supine_resting *resting, size_t axis, const char *text) {
   }
   if (*end == '/') {
     const char *second = end + 1;
-    share[1] = strtod(second, &end);
+    share[1] = supine_number_parse(second, &end);
     if (end == second) {
       return false;
     }
@@ -125,8 +126,9 @@ static const char *const names[] = {"left", "right", "supine", "prone", "inverte
 void supine_reference_resting_print(const supine_resting *resting, char *text, size_t size) {
   size_t used = 0;
   for (size_t axis = 0; axis < 6 && used < size; ++axis) {
-    used += (size_t)snprintf(text + used, size - used, "%s%s=%.4g/%.4g", axis == 0 ? "" : ",",
-                             names[axis], resting->share[0][axis], resting->share[1][axis]);
+    used +=
+        (size_t)supine_print_text(text + used, size - used, "%s%s=%.4g/%.4g", axis == 0 ? "" : ",",
+                                  names[axis], resting->share[0][axis], resting->share[1][axis]);
   }
 }
 

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "base/text.h"
 #include "precompute/fields/fields.h"
 #include "program/offline/basis.h"
@@ -84,13 +85,14 @@ static void print_assumed(FILE *out, const char *options, const char *assumed) {
 
 static void print_errors(FILE *out, const supine_accuracy *accuracy, const char *at,
                          const char *state) {
-  (void)fprintf(out,
-                "  %.3g %% RMS, %.3g %% 95th percentile, %.3g %% largest, of the RMS displacement\n"
-                "  %s mm RMS, %s mm 95th percentile, %s mm largest%s%s\n",
-                100.0 * accuracy->relative_rms, 100.0 * accuracy->relative_p95,
-                100.0 * accuracy->relative_max, supine_text_distance(accuracy->rms_mm).text,
-                supine_text_distance(accuracy->p95_mm).text,
-                supine_text_distance(accuracy->max_mm).text, at, state);
+  (void)supine_print(
+      out,
+      "  %.3g %% RMS, %.3g %% 95th percentile, %.3g %% largest, of the RMS displacement\n"
+      "  %s mm RMS, %s mm 95th percentile, %s mm largest%s%s\n",
+      100.0 * accuracy->relative_rms, 100.0 * accuracy->relative_p95,
+      100.0 * accuracy->relative_max, supine_text_distance(accuracy->rms_mm).text,
+      supine_text_distance(accuracy->p95_mm).text, supine_text_distance(accuracy->max_mm).text, at,
+      state);
 }
 
 static void report_result(FILE *out, const supine_basis_choice *choice,
@@ -99,12 +101,12 @@ static void report_result(FILE *out, const supine_basis_choice *choice,
   const supine_accuracy *accuracy = &report->accuracy;
   char state[64];
   if (!prepared->reference.known) {
-    (void)snprintf(state, sizeof state, "%g mL", accuracy->volume);
+    (void)supine_print_text(state, sizeof state, "%g mL", accuracy->volume);
   } else if (accuracy->volume == 1.0) {
     (void)snprintf(state, sizeof state, "rest");
   } else {
-    (void)snprintf(state, sizeof state, "%g of the volume change from full to rest",
-                   accuracy->volume);
+    (void)supine_print_text(state, sizeof state, "%g of the volume change from full to rest",
+                            accuracy->volume);
   }
   (void)fprintf(out, "%s: %s, %zu vertices, band %zu, %zu %s%s\n", choice->path,
                 lungs->lung_count == 2 ? "two lungs" : "one lung", lungs->mesh.vertex_count,
@@ -115,7 +117,7 @@ static void report_result(FILE *out, const supine_basis_choice *choice,
                 accuracy->direction_count, plural(accuracy->direction_count));
   print_errors(out, accuracy, ", at ", state);
   if (report->turned_over > turned_over_limit) {
-    (void)fprintf(
+    (void)supine_print(
         out,
         "the surface folds: %.3g %% of its triangles turn over at %s in the worst of six\n"
         "postures. %s\n",
@@ -139,8 +141,8 @@ static void report_fit(FILE *out, const char *path, const char *assumed,
                 "the directions determine bands up to %zu (%zu harmonic%s); leave-one-out error:\n",
                 highest, (highest + 1) * (highest + 1), highest > 0 ? "s" : "");
   for (size_t band = 0; band <= highest; ++band) {
-    (void)fprintf(out, "  band %-2zu  %8.3g %%%s\n", band, 100.0 * fit->error[band],
-                  band == fit->band ? "  <- chosen" : "");
+    (void)supine_print(out, "  band %-2zu  %8.3g %%%s\n", band, 100.0 * fit->error[band],
+                       band == fit->band ? "  <- chosen" : "");
   }
   if (fit->band == highest && highest < SUPINE_FIT_BAND_MAX) {
     (void)fprintf(out,

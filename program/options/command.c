@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "base/number.h"
 #include "base/output.h"
 
 #include "program/options/command.h"
@@ -20,7 +21,7 @@ void supine_options_say(const char *command, const char *format, ...) {
   va_list arguments;
   va_start(arguments, format);
   (void)fprintf(stderr, "supine %s: ", command);
-  (void)vfprintf(stderr, format, arguments);
+  (void)supine_print_list(stderr, format, arguments);
   (void)fputc('\n', stderr);
   va_end(arguments);
 }
@@ -42,7 +43,7 @@ bool supine_options_parse_numbers(const char *text, size_t count, double *values
   const char *at = text;
   for (size_t i = 0; i < count; ++i) {
     char *end = NULL;
-    values[i] = strtod(at, &end);
+    values[i] = supine_number_parse(at, &end);
     if (end == at || !isfinite(values[i]) || *end != (i + 1 < count ? ',' : '\0')) {
       return false;
     }
@@ -140,9 +141,9 @@ bool supine_options_progress_step(void *progress, double fraction) {
   } else if (state->stderr_is_terminal && time - state->shown_at > 0.1) {
     state->shown_at = time;
     const double spent = time - state->start;
-    (void)fprintf(stderr, "\r%s: %3.0f %%", state->label, 100.0 * fraction);
+    (void)supine_print(stderr, "\r%s: %3.0f %%", state->label, 100.0 * fraction);
     if (fraction > 0.02 && spent > 1.0) {
-      (void)fprintf(stderr, ", %.0f s left ", spent * (1.0 - fraction) / fraction);
+      (void)supine_print(stderr, ", %.0f s left ", spent * (1.0 - fraction) / fraction);
     }
     (void)fflush(stderr);
   }

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "program/options/model_options.h"
 #include "program/options/state_options.h"
 #include "program/options/surface_options.h"
@@ -220,24 +221,26 @@ const supine_option supine_command_model_options[] = {
 static void print_map(const char *path, const supine_source *source) {
   const supine_labels_report *report = &source->report;
   const supine_lungs *lungs = &source->lungs;
-  (void)printf("%s: %zu x %zu x %zu voxels of %.3g x %.3g x %.3g mm, %s (%s)\n  labels %s\n", path,
-               report->size[0], report->size[1], report->size[2], report->spacing[0],
-               report->spacing[1], report->spacing[2], report->axes, report->source, report->taken);
+  (void)supine_print(
+      stdout, "%s: %zu x %zu x %zu voxels of %.3g x %.3g x %.3g mm, %s (%s)\n  labels %s\n", path,
+      report->size[0], report->size[1], report->size[2], report->spacing[0], report->spacing[1],
+      report->spacing[2], report->axes, report->source, report->taken);
   if (report->neck > 0.0) {
-    (void)printf("  the lungs touch: separated at necks up to %.3g mm wide\n", report->neck);
+    (void)supine_print(stdout, "  the lungs touch: separated at necks up to %.3g mm wide\n",
+                       report->neck);
   }
   for (size_t i = 0; i < report->lung_count; ++i) {
     const supine_labels_lung *lung = &report->lung[i];
-    (void)printf("%s lung: %.1f mL", lung->side > 0 ? "left" : "right", lung->mask);
+    (void)supine_print(stdout, "%s lung: %.1f mL", lung->side > 0 ? "left" : "right", lung->mask);
     if (lung->closed > 0.0) {
-      (void)printf("; closed gaps of %.2g mL", lung->closed);
+      (void)supine_print(stdout, "; closed gaps of %.2g mL", lung->closed);
     }
-    (void)printf("; dropped %zu %s (%.2g mL), filled %zu %s (%.2g mL)\n", lung->islands,
-                 lung->islands == 1 ? "island" : "islands", lung->dropped, lung->cavities,
-                 lung->cavities == 1 ? "cavity" : "cavities", lung->filled);
-    (void)printf("  surface of %zu vertices: %.1f mL (%+.2g mL)\n",
-                 lungs->lung_begin[i + 1] - lungs->lung_begin[i], lung->surface,
-                 lung->surface - lung->mask);
+    (void)supine_print(stdout, "; dropped %zu %s (%.2g mL), filled %zu %s (%.2g mL)\n",
+                       lung->islands, lung->islands == 1 ? "island" : "islands", lung->dropped,
+                       lung->cavities, lung->cavities == 1 ? "cavity" : "cavities", lung->filled);
+    (void)supine_print(stdout, "  surface of %zu vertices: %.1f mL (%+.2g mL)\n",
+                       lungs->lung_begin[i + 1] - lungs->lung_begin[i], lung->surface,
+                       lung->surface - lung->mask);
   }
   if (source->axes_hold) {
     (void)printf("the shape of the lungs confirms the axes in the header: narrow at the head, "

@@ -3,13 +3,14 @@
 #include <getopt.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 #include <sys/stat.h>
 
 #include <supine/version.h>
 
 #include "base/arena.h"
+#include "base/ascii.h"
 #include "base/blas.h"
+#include "base/number.h"
 #include "base/output.h"
 #include "base/parallel.h"
 #include "base/text.h"
@@ -53,7 +54,7 @@ static bool within(const supine_option *option, double number) {
 
 static supine_status read_choice(const supine_option *option, const char *text, unsigned *choice) {
   for (unsigned i = 0; option->choices[i] != NULL; ++i) {
-    if (strcasecmp(option->choices[i], text) == 0) {
+    if (supine_ascii_same(option->choices[i], text)) {
       *choice = i;
       return SUPINE_OK;
     }
@@ -101,7 +102,7 @@ static void describe_valid_values(const supine_option *option, char *text, size_
       used += (size_t)snprintf(text + used, size - used, "%s%s", before, option->choices[i]);
     }
   } else if (option->range[1] > 0.0 && !option->open) {
-    (void)snprintf(text, size, "%g to %g", option->range[0], option->range[1]);
+    (void)supine_print_text(text, size, "%g to %g", option->range[0], option->range[1]);
   } else {
     (void)snprintf(text, size, "%s",
                    option->kind == SUPINE_OPTION_COUNT     ? "a whole number"
@@ -207,7 +208,7 @@ static bool has_ending(const char *path, const char *endings) {
   }
   const size_t length = strlen(dot);
   for (const char *at = endings; (at = strchr(at, '.')) != NULL; ++at) {
-    if (strncasecmp(at, dot, length) == 0 && strchr(", ", at[length]) != NULL) {
+    if (supine_ascii_same_begin(at, dot, length) && strchr(", ", at[length]) != NULL) {
       return true;
     }
   }

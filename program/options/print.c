@@ -5,6 +5,7 @@
 
 #include <jansson.h>
 
+#include "base/locale.h"
 #include "base/text.h"
 
 #include "program/options/command.h"
@@ -321,6 +322,7 @@ json_t *supine_options_json_numbers(size_t count, const double *numbers) {
 }
 
 void supine_options_print(json_t *value, bool json) {
+  SUPINE_C_LOCALE;
   if (json) {
     (void)json_dumpf(value, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
     (void)putchar('\n');

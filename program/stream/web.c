@@ -9,12 +9,14 @@
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 #include <unistd.h>
 
 #include "base/arena.h"
+#include "base/ascii.h"
 #include "base/clock.h"
 #include "base/library.h"
+#include "base/locale.h"
+#include "base/number.h"
 #include "program/options/command.h"
 #include "program/stream/peer.h"
 #include "program/stream/web.h"
@@ -80,11 +82,11 @@ bool supine_stream_web_is_host(const char *host, const char *names) {
   if (bracketed) {
     return inet_pton(AF_INET6, name, &address) == 1;
   }
-  if (inet_pton(AF_INET, name, &address) == 1 || strcasecmp(name, "localhost") == 0) {
+  if (inet_pton(AF_INET, name, &address) == 1 || supine_ascii_same(name, "localhost")) {
     return true;
   }
   for (char given[256]; supine_options_next_item(&names, given, sizeof given);) {
-    if (strcasecmp(name, given) == 0) {
+    if (supine_ascii_same(name, given)) {
       return true;
     }
   }
@@ -112,12 +114,13 @@ static bool is_ours(struct lws *wsi) {
     return false;
   }
   const char *from = strstr(origin, "://");
-  return from != NULL && strcasecmp(from + 3, host) == 0;
+  return from != NULL && supine_ascii_same(from + 3, host);
 }
 
 /* Parse a viewer's message {"gravity":[x,y,z]} and pass its pose to the server's thread. Ignore all
  * other messages. */
 static void receive(supine_stream_web *web, const char *bytes, size_t size) {
+  SUPINE_C_LOCALE;
   json_t *pose = json_loadb(bytes, size, 0, NULL);
   const json_t *gravity = json_object_get(pose, "gravity");
   web_pose taken = {.received = supine_clock_seconds()};
@@ -142,7 +145,7 @@ static int send_state(supine_stream_web *web, struct lws *wsi, uint64_t *sent) {
   const uint64_t number = web->number;
   const double age = web->pose_received >= 0 ? supine_clock_seconds() - web->pose_received : -1;
   const int size =
-      snprintf((char *)bytes + LWS_PRE, TEXT + AGE, "%s,\"age\":%.3f}", web->text, age);
+      supine_print_text((char *)bytes + LWS_PRE, TEXT + AGE, "%s,\"age\":%.3f}", web->text, age);
   (void)pthread_mutex_unlock(&web->lock);
   if (number == *sent) {
     return 0;
@@ -335,10 +338,10 @@ bool supine_stream_web_take(supine_stream_web *web, double gravity[3], double *r
 
 void supine_stream_web_send(supine_stream_web *web, const supine_stream_snapshot *snapshot) {
   (void)pthread_mutex_lock(&web->lock);
-  (void)snprintf(web->text, sizeof web->text,
-                 "{\"gravity\":[%.9g,%.9g,%.9g],\"volume\":%.9g,\"above\":%.9g",
-                 snapshot->gravity[0], snapshot->gravity[1], snapshot->gravity[2], snapshot->volume,
-                 snapshot->above);
+  (void)supine_print_text(web->text, sizeof web->text,
+                          "{\"gravity\":[%.9g,%.9g,%.9g],\"volume\":%.9g,\"above\":%.9g",
+                          snapshot->gravity[0], snapshot->gravity[1], snapshot->gravity[2],
+                          snapshot->volume, snapshot->above);
   web->pose_received = snapshot->pose_received;
   ++web->number;
   (void)pthread_mutex_unlock(&web->lock);

@@ -4,6 +4,7 @@
     inside.py REFERENCE BASIS        REFERENCE is the program reference.c, which computes expected results"""
 import ctypes
 import gc
+import locale
 import os
 import shutil
 import subprocess
@@ -16,6 +17,7 @@ import numpy as np
 
 import supine
 
+locale.setlocale(locale.LC_ALL, "")  # as host programs do: results must not depend on it
 reference, path, maker = sys.argv[1:4]  # maker: "program" or "library", which makes bases
 
 

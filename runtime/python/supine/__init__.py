@@ -343,8 +343,8 @@ class Basis:
             with io.open(scan, "wb") as file:
                 file.write(header)
                 file.write(image.data)
-            with io.open(table, "w") as file:
-                file.writelines(["posture,output\n", *(f'"{state}",{i}.nrrd\n' for i, state in enumerate(wanted))])
+            with io.open(table, "wb") as file:
+                file.write(_program.table([["posture", "output"], *([state, f"{i}.nrrd"] for i, state in enumerate(wanted))]))
             options = {"states": table, "labels" if labels else "image": scan, "density": density, "from": since or None}
             _program.run("deform", [basis], options, {basis: "basis", scan: "image"}, None)
             moved = []

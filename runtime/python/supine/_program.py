@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import ctypes
+import io
 import json
 import os
 import re
@@ -12,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 import warnings
-from typing import Any, Callable, Mapping, Optional, Sequence, Union
+from typing import Any, Callable, Iterable, Mapping, Optional, Sequence, Union
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -73,6 +74,13 @@ def _write_mesh(path: str, points: np.ndarray[Any, Any], corners: np.ndarray[Any
         file.write(points.tobytes() + records.tobytes())
 
 
+def table(rows: Iterable[Sequence[Any]]) -> bytes:
+    """Return rows as the content of a CSV file."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue().encode()
+
+
 def _write_points(path: str, points: Union[ArrayLike, Mapping[str, Sequence[float]]]) -> None:
     """Write points [n, 3], or a dict from names to points, as CSV."""
     names = [[name] for name in points] if isinstance(points, Mapping) else None
@@ -80,10 +88,9 @@ def _write_points(path: str, points: Union[ArrayLike, Mapping[str, Sequence[floa
     if places.size == 0 or places.shape[-1] != 3:
         raise ValueError(f"points must be [n, 3], not {list(places.shape)}")
     rows = places.reshape(-1, 3).tolist()
-    with open(path, "w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["x", "y", "z", "name"] if names else ["x", "y", "z"])
-        writer.writerows([row + name for row, name in zip(rows, names)] if names else rows)
+    with open(path, "wb") as file:
+        file.write(table([["x", "y", "z", "name"], *(row + name for row, name in zip(rows, names))] if names
+                         else [["x", "y", "z"], *rows]))
 
 
 def save_fields(path: Union[str, "os.PathLike[str]"], points: ArrayLike, gravity: ArrayLike,
