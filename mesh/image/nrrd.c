@@ -9,6 +9,7 @@
 
 #include "base/arena.h"
 #include "base/ascii.h"
+#include "base/number.h"
 #include "mesh/image/image_formats.h"
 
 /* The names of each type of voxels. The first is the one that is written. */
