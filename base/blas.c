@@ -53,18 +53,20 @@ static void take_buffers(size_t count) {
 static supine_status refuse(size_t missing, size_t threads, supine_error *error) {
   struct rlimit addresses;
   const size_t needed = missing * (buffer_size >> 20);
+  const char *plural = threads == 1 ? "" : "s";
+  const char *fewer = threads == 1 ? "" : ", or set SUPINE_THREADS to a smaller number";
   SUPINE_REFUSE_IF(
       getrlimit(RLIMIT_AS, &addresses) != 0 || addresses.rlim_cur == RLIM_INFINITY, error,
       SUPINE_ERROR_MEMORY,
-      "OpenBLAS needs %zu MiB for %zu threads, and the system does not give them: close other "
-      "programs, or set SUPINE_THREADS to a smaller number",
-      needed, threads);
-  return supine_error_set(
-      error, SUPINE_ERROR_MEMORY,
-      "OpenBLAS needs another %zu MiB of addresses for %zu threads, and the limit of the process "
-      "is "
-      "%llu MiB: raise it (ulimit -v), or set SUPINE_THREADS to a smaller number",
-      needed, threads, (unsigned long long)(addresses.rlim_cur >> 20));
+      "OpenBLAS needs another %zu MiB for %zu thread%s, and the system does not give them: close "
+      "other programs%s",
+      needed, threads, plural, fewer);
+  return supine_error_set(error, SUPINE_ERROR_MEMORY,
+                          "OpenBLAS needs another %zu MiB of addresses for %zu thread%s, and the "
+                          "limit of the process is "
+                          "%llu MiB: raise it (ulimit -v)%s",
+                          needed, threads, plural, (unsigned long long)(addresses.rlim_cur >> 20),
+                          fewer);
 }
 
 supine_status supine_blas_reserve(size_t threads, supine_error *error) {

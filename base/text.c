@@ -66,7 +66,7 @@ char *supine_text_make_utf8(char *text) {
 supine_distance_text supine_text_distance(double mm) {
   supine_distance_text distance = {"below 0.002"};
   if (!(mm < SUPINE_TEXT_DISTANCE_LEAST)) { /* true if it is NaN */
-    (void)snprintf(distance.text, sizeof distance.text, "%.3f", mm);
+    (void)supine_print_text(distance.text, sizeof distance.text, "%.3f", mm);
   }
   return distance;
 }

@@ -7,6 +7,7 @@
 #include <jansson.h>
 
 #include "base/arena.h"
+#include "base/blas.h"
 #include "base/csv.h"
 #include "base/locale.h"
 #include "base/output.h"
@@ -48,6 +49,7 @@ static supine_status run_fit(const char *path, const request *chosen, supine_err
   SUPINE_C_LOCALE;
   supine_pv pv = {0};
   supine_pv_report reports[SUPINE_PV_LIMB_COUNT];
+  SUPINE_TRY(supine_blas_reserve(1, error)); /* the fit of many samples uses it */
   SUPINE_TRY(supine_breath_fit_file(path, confidence, &pv, reports, error));
   json_auto_t *root = json_pack("{s:f}", "confidence", confidence);
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {

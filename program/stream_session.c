@@ -214,11 +214,11 @@ supine_status supine_command_stream_run(const supine_stream_session *wanted,
   options.web = s.page.web;
   SUPINE_TRY(supine_stream_server_create(basis, &options, &s.server, error));
   const supine_stream_results *results = supine_stream_server_results(s.server);
+  supine_options_signals_catch(true); /* before the line from which others know that it runs */
   if (results->port != 0) {
     (void)printf("listening on port %d\n", results->port);
   }
   (void)fflush(stdout);
-  supine_options_signals_catch(true);
   const supine_status status = supine_stream_server_run(s.server, error);
   report(results, wanted);
   return status;

@@ -30,7 +30,7 @@
   EACH(lws_, get_protocol) EACH(lws_, get_vhost_by_name) EACH(lws_, get_vhost_listen_port)         \
   EACH(lws_, hdr_copy) EACH(lws_, hdr_total_length) EACH(lws_, http_transaction_completed)         \
   EACH(lws_, is_final_fragment) EACH(lws_, is_first_fragment) EACH(lws_, return_http_status)       \
-  EACH(lws_, service) EACH(lws_, set_log_level) EACH(lws_, write)
+  EACH(lws_, service) EACH(lws_, set_log_level) EACH(lws_, set_timeout) EACH(lws_, write)
 /* clang-format on */
 
 /* Functions of libwebsockets. The library is loaded at run time: linking it would also require
@@ -42,7 +42,8 @@ enum {
   TEXT = 256,            /* size of the buffer for a state as JSON, bytes */
   RECEIVED = 512,        /* size of the buffer for received bytes */
   HEADERS = 1024,        /* size of the buffer for the headers of an answer, bytes */
-  PIECE = 1 << 14        /* part of the page that is sent at once, bytes */
+  PIECE = 1 << 14,       /* part of the page that is sent at once, bytes */
+  PIECE_SECONDS = 60     /* time after which a browser is disconnected that takes no piece, s */
 };
 
 struct supine_stream_web {
@@ -189,6 +190,7 @@ static int begin_page(struct lws *wsi, size_t *sent) {
       lws.finalize_write_http_header(wsi, start, &end, bytes + sizeof bytes) != 0) {
     return -1;
   }
+  lws.set_timeout(wsi, PENDING_TIMEOUT_HTTP_CONTENT, PIECE_SECONDS);
   (void)lws.callback_on_writable(wsi);
   return 0;
 }
@@ -209,6 +211,7 @@ static int send_page(struct lws *wsi, size_t *sent) {
   if (size == left) {
     return lws.http_transaction_completed(wsi) != 0 ? -1 : 0;
   }
+  lws.set_timeout(wsi, PENDING_TIMEOUT_HTTP_CONTENT, PIECE_SECONDS);
   (void)lws.callback_on_writable(wsi);
   return 0;
 }

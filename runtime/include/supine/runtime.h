@@ -19,8 +19,9 @@
  * In the shapes of arrays, N is the number of vertices, and M the number of triangles.
  *
  * After opening, no function allocates, reads files or locks; any number of threads may use one
- * basis. A thread that calls this library needs a stack of 128 kB, the default of musl. Gravity is a direction in body axes (DICOM LPS) that points where things fall: supine
- * (0,1,0), prone (0,-1,0), left lateral (1,0,0), right lateral (-1,0,0), upright (0,0,-1).
+ * basis. A thread that calls this library needs a stack of 128 kB, the default of musl. Gravity is
+ * a direction in body axes (DICOM LPS) that points where things fall: supine (0,1,0), prone
+ * (0,-1,0), left lateral (1,0,0), right lateral (-1,0,0), upright (0,0,-1).
  *
  * A compiled program works with newer versions of the shared library of the same name:
  * supine_basis_info only grows at its end, supine_basis_options begins with its size, and no other
