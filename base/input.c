@@ -17,14 +17,13 @@ static void free_path(char **path) {
   free(*path);
 }
 
-static void close_descriptor(const int *descriptor) {
-  if (*descriptor >= 0) {
-    (void)close(*descriptor);
-  }
-}
-
 static supine_status cannot_read(const char *path, supine_error *error) {
   return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path, strerror(errno));
+}
+
+static supine_status not_regular(const char *path, supine_error *error) {
+  return supine_error_set(error, SUPINE_ERROR_READ,
+                          "%s: not a regular file; save the data to a file first", path);
 }
 
 /* Open a regular file. Anything else is refused before it is opened, because opening a pipe waits
@@ -38,20 +37,23 @@ static supine_status open_regular(const char *path, int flags, FILE **file, size
   }
   SUPINE_REFUSE_IF(S_ISDIR(about.st_mode), error, SUPINE_ERROR_READ,
                    "%s: is a folder, not a regular file; give the file inside it", path);
-  SUPINE_FREED_BY(close_descriptor) int descriptor = -1;
-  if (S_ISREG(about.st_mode)) {
-    descriptor = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | flags);
-    if (descriptor < 0 || fstat(descriptor, &about) != 0) {
-      return cannot_read(path, error);
-    }
+  if (!S_ISREG(about.st_mode)) {
+    return not_regular(path, error);
   }
-  SUPINE_REFUSE_IF(!S_ISREG(about.st_mode), error, SUPINE_ERROR_READ,
-                   "%s: not a regular file; save the data to a file first", path);
+  const int descriptor = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | flags);
+  if (descriptor < 0) {
+    return cannot_read(path, error);
+  }
   *file = fdopen(descriptor, "rb");
   if (*file == NULL) {
+    (void)close(descriptor);
     return supine_error_memory(error, "reading %s", path);
   }
-  descriptor = -1; /* now closed with the file */
+  if (fstat(descriptor, &about) != 0 || !S_ISREG(about.st_mode)) {
+    supine_file_close(file);
+    *file = NULL;
+    return not_regular(path, error);
+  }
   *size = (size_t)about.st_size;
   return SUPINE_OK;
 }
@@ -60,11 +62,13 @@ supine_status supine_input_open(const char *path, FILE **file, size_t *size, sup
   return open_regular(path, 0, file, size, error);
 }
 
-/* Copy the begin of a name from a file for a message of one line. */
+/* Copy the beginning of a name from a file for a message of one line. */
 static void make_shown(const char *name, char shown[96]) {
   (void)snprintf(shown, 96, "%s", name);
   for (char *c = supine_text_make_utf8(shown); *c != '\0'; ++c) {
-    *c = (unsigned char)*c < ' ' || *c == '\x7F' ? '?' : *c;
+    if ((unsigned char)*c < ' ' || *c == '\x7F') {
+      *c = '?';
+    }
   }
 }
 

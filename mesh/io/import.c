@@ -69,7 +69,7 @@ static supine_status import_fail(const char *path, const char *words, supine_err
 typedef struct sources {
   const mesh_file *file;
   bool alone;           /* whether the files that it names are not needed */
-  supine_error refused; /* why the first of them was not opened; SUPINE_OK if all were */
+  supine_error refused; /* why one of them was not opened; SUPINE_OK if all were */
 } sources;
 
 /* A file that assimp reads, in memory. */
@@ -180,7 +180,8 @@ static struct aiFile *source_open(struct aiFileIO *io, const char *name, const c
   if (made != NULL) {
     source_close(io, &made->calls);
   }
-  if (from->refused.status == SUPINE_OK) {
+  /* a missing file may not be needed: another refusal takes its place */
+  if (from->refused.status == SUPINE_OK || from->refused.status == SUPINE_ERROR_READ) {
     from->refused = error;
   }
   return NULL;
