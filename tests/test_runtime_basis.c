@@ -247,11 +247,15 @@ typedef struct parts {
 
 static const float zeros[64] = {0};
 static const double zeros64[64] = {0};
+static const float corners[64] = {0, 0, 0, 100, 0, 0, 0, 100, 0, 0, 0, 100}; /* mm */
+static const uint32_t faces[16] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
+/* Volume at rest minus that of the tetrahedron, 167 mL: -100 mL, divided by Y(0, 0). */
+static const double resting[18] = {-354, 0, 0, 0, 0, 0, 0, 0, 0, -354};
 
-/* Return a valid basis of four vertices and one mode. */
+/* Return a valid basis of a tetrahedron and one mode. */
 static parts sound(void) {
-  return (parts){.tensors = {{"vertices", SUPINE_F32, 2, {4, 3}, zeros},
-                             {"triangles", SUPINE_U32, 2, {2, 3}, zeros},
+  return (parts){.tensors = {{"vertices", SUPINE_F32, 2, {4, 3}, corners},
+                             {"triangles", SUPINE_U32, 2, {4, 3}, faces},
                              {"direction", SUPINE_F32, 2, {4, 3}, zeros},
                              {"coefficients", SUPINE_F32, 2, {4, 1}, zeros},
                              {"modes", SUPINE_F64, 2, {1, 4}, zeros64},
@@ -309,18 +313,18 @@ TEST(test_open_wrong_structure_refused) {
     assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
   }
   p = sound(); /* Volumes at rest are optional. They have nine coefficients. */
-  p.tensors[p.tensor_count++] = (supine_tensor){"resting_volume", SUPINE_F64, 1, {9}, zeros64};
+  p.tensors[p.tensor_count++] = (supine_tensor){"resting_volume", SUPINE_F64, 1, {9}, resting};
   assert_int_equal(open_parts(&p), SUPINE_OK);
   p.tensors[9].dtype = SUPINE_F32;
   assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
   for (size_t terms = 4; terms <= 16; terms += 4) {
-    p.tensors[9] = (supine_tensor){"resting_volume", SUPINE_F64, 1, {terms}, zeros64};
+    p.tensors[9] = (supine_tensor){"resting_volume", SUPINE_F64, 1, {terms}, resting};
     assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
   }
   /* Volumes at rest may have one row for each lung. */
-  p.tensors[9] = (supine_tensor){"resting_volume", SUPINE_F64, 2, {1, 9}, zeros64};
+  p.tensors[9] = (supine_tensor){"resting_volume", SUPINE_F64, 2, {1, 9}, resting};
   assert_int_equal(open_parts(&p), SUPINE_OK);
-  p.tensors[9] = (supine_tensor){"resting_volume", SUPINE_F64, 2, {2, 9}, zeros64};
+  p.tensors[9] = (supine_tensor){"resting_volume", SUPINE_F64, 2, {2, 9}, resting};
   assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
   /* If the modes are of the kind `vector`, coefficients are [N, 3, modes], not [N, modes]. */
   p = sound();

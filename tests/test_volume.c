@@ -160,9 +160,9 @@ TEST(test_scale_not_finite_volume_refused) {
   const double one = 1;
   const double bad = NAN;
   double scale = 0;
-  assert_int_equal(posed_scale(basis, &one, NAN, &scale, NULL), SUPINE_ERROR_NUMERICAL);
-  assert_int_equal(posed_scale(basis, &one, INFINITY, &scale, NULL), SUPINE_ERROR_NUMERICAL);
-  assert_int_equal(posed_scale(basis, &bad, 1, &scale, NULL), SUPINE_ERROR_NUMERICAL);
+  assert_int_equal(posed_scale(basis, &one, NAN, &scale, NULL), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(posed_scale(basis, &one, INFINITY, &scale, NULL), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(posed_scale(basis, &bad, 1, &scale, NULL), SUPINE_ERROR_ARGUMENT);
   supine_basis_close(basis);
   free(bytes);
 }
