@@ -218,9 +218,9 @@ TEST(test_storage_auto_small_last_modes_chooses_mixed) {
  * A file with a coefficient of 2^30 is refused. */
 TEST(test_storage_error_largest_numbers_finite) {
   fixture *f = fixture_create(50, 16, 3, 1, false, false, 11, 5);
-  for (size_t i = 0; i < 3; ++i) { /* displacements of up to 700 m, near the limit of 1 km */
+  for (size_t i = 0; i < 3; ++i) { /* displacements of up to 600 m, near the limit of 1 km */
     f->direction[i] = 0x1p16F;
-    f->coefficient[i] = 0.8F;
+    f->coefficient[i] = 0.4F;
   }
   opened o = made(f);
   for (int storage = SUPINE_STORAGE_AUTO; storage < SUPINE_STORAGE_COUNT; ++storage) {
