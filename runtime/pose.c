@@ -73,10 +73,11 @@ static supine_status find_volumes(const supine_basis *basis, const double gravit
                                   const double *weights, volumes *v, supine_error *error) {
   double y[RESTING_TERMS];
   *v = (volumes){.lung_count = basis->info.lung_count};
-  if (supine_sh_evaluate(2, gravity, y) != SUPINE_OK) {
+  double unit[3];
+  if (supine_sh_evaluate(2, gravity, y) != SUPINE_OK || !supine_normalise(gravity, unit)) {
     return refuse_gravity(error);
   }
-  const double up = fmax(0, -gravity[2] / supine_length(gravity));
+  const double up = fmax(0, -unit[2]);
   for (size_t lung = 0; lung < v->lung_count; ++lung) {
     contract(basis, lung, weights, &v->form[lung]);
     v->full[lung] = basis->upright_gain * up * up * basis->info.reference_volume[lung];

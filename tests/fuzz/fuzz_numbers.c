@@ -212,7 +212,7 @@ static char *write_basis(const numbers *x, size_t *size) {
   return bytes;
 }
 
-static bool finite(size_t count, const double *x) {
+static bool are_finite(size_t count, const double *x) {
   for (size_t i = 0; i < count; ++i) {
     if (!isfinite(x[i])) {
       return false;
@@ -221,7 +221,7 @@ static bool finite(size_t count, const double *x) {
   return true;
 }
 
-static bool finite_floats(size_t count, const float *x) {
+static bool are_finite_floats(size_t count, const float *x) {
   for (size_t i = 0; i < count; ++i) {
     if (!isfinite(x[i])) {
       return false;
@@ -240,14 +240,14 @@ static void evaluate(const supine_basis *basis, const supine_pose *pose) {
   float normals[3 * N];
   double volumes[LUNGS];
   const supine_status status = supine_deform_lit(basis, pose, xyz, normals);
-  const bool given = finite(1, pose->weights) && finite(3 * LUNGS, pose->gains[0]);
+  const bool given = are_finite(1, pose->weights) && are_finite(3 * LUNGS, pose->gains[0]);
   expect_refused(given, status, "a pose that is not finite to be refused");
   if (status == SUPINE_OK) {
-    supine_fuzz_expect(finite_floats(3 * N, xyz), "finite positions");
-    supine_fuzz_expect(finite_floats(3 * N, normals), "finite normals");
+    supine_fuzz_expect(are_finite_floats(3 * N, xyz), "finite positions");
+    supine_fuzz_expect(are_finite_floats(3 * N, normals), "finite normals");
     supine_fuzz_expect(isfinite(supine_basis_error(basis, pose)), "a finite error of storage");
     supine_fuzz_expect(supine_basis_volumes(basis, pose, volumes) == SUPINE_OK &&
-                           finite(LUNGS, volumes),
+                           are_finite(LUNGS, volumes),
                        "finite volumes");
   }
 }
@@ -263,15 +263,15 @@ static void pose_state(const supine_basis *basis, const supine_state *state, boo
   status = supine_expected_error(basis, state, NULL, sigma, NULL);
   expect_refused(given, status, "a state that is not finite to be refused");
   if (status == SUPINE_OK) {
-    supine_fuzz_expect(finite_floats(N, sigma), "finite expected errors");
+    supine_fuzz_expect(are_finite_floats(N, sigma), "finite expected errors");
   }
 }
 
 static void pose_all(const supine_basis *basis, const numbers *x) {
   supine_state state = {.gravity = {x->gravity[0], x->gravity[1], x->gravity[2]}};
-  const bool gravity = finite(3, x->gravity);
-  for (int kind = 0; kind < SUPINE_VOLUME_KIND_COUNT; ++kind) {
-    state.volume = (supine_volume){(supine_volume_kind)kind, x->volume};
+  const bool gravity = are_finite(3, x->gravity);
+  for (int k = 0; k < SUPINE_VOLUME_KIND_COUNT; ++k) {
+    state.volume = (supine_volume){(supine_volume_kind)k, x->volume};
     pose_state(basis, &state, gravity && isfinite(x->volume));
   }
   state.lung_count = LUNGS;
@@ -279,7 +279,7 @@ static void pose_all(const supine_basis *basis, const numbers *x) {
     (void)strcpy(state.lungs[lung].name, lung == 0 ? "left" : "right");
     state.lungs[lung].volume = (supine_volume){SUPINE_VOLUME_REST, x->lung_volume[lung]};
   }
-  pose_state(basis, &state, gravity && finite(LUNGS, x->lung_volume));
+  pose_state(basis, &state, gravity && are_finite(LUNGS, x->lung_volume));
   supine_pose own = {.weights = {x->weight}};
   memcpy(own.gains, x->gains, sizeof x->gains);
   evaluate(basis, &own);
@@ -300,13 +300,13 @@ static void find_points(const supine_basis *basis, const numbers *x) {
   const supine_location *location = NULL;
   supine_fuzz_expect(supine_locate_space(3) <= sizeof space / sizeof *space, "enough work space");
   const supine_status status = supine_locate(&task, residuals, space, &location, NULL);
-  expect_refused(finite(3, x->position) && isfinite(x->noise), status,
+  expect_refused(are_finite(3, x->position) && isfinite(x->noise), status,
                  "an observed point that is not finite to be refused");
   if (status == SUPINE_OK) {
     float xyz[3 * N];
     float sigma[N];
     supine_fuzz_expect(supine_locate_positions(location, basis, xyz, sigma, NULL) != SUPINE_OK ||
-                           (finite_floats(3 * N, xyz) && finite_floats(N, sigma)),
+                           (are_finite_floats(3 * N, xyz) && are_finite_floats(N, sigma)),
                        "finite positions of located lungs");
   }
 }
@@ -319,7 +319,7 @@ static void breathe(const numbers *x) {
                                      (supine_pv_course)course};
     const supine_status status = supine_breath_evaluate(supine_breath_normal(), &breath, 1,
                                                         &x->time, &volume, &pressure, NULL);
-    expect_refused(finite(4, x->breath) && isfinite(x->time), status,
+    expect_refused(are_finite(4, x->breath) && isfinite(x->time), status,
                    "a breath that is not finite to be refused");
     supine_fuzz_expect(status != SUPINE_OK || (isfinite(volume) && isfinite(pressure)),
                        "a finite volume and pressure");
