@@ -295,8 +295,8 @@ supine_status supine_breath_evaluate(const supine_pv *pv, const supine_pv_breath
   for (size_t j = 0; j < count; ++j) {
     if (!isfinite(times[j] * (breath->rate / 60.0))) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "times[%zu], or the breaths until then, are not finite: give a time "
-                              "in s",
+                              "times[%zu] is not finite, or its number of breaths is not: give a "
+                              "time in s",
                               j);
     }
   }
