@@ -252,6 +252,18 @@ static void evaluate(const supine_basis *basis, const supine_pose *pose) {
   }
 }
 
+/* Expect that normals of positions that are not finite are finite: 0 beside such a vertex. */
+static void find_normals(const supine_basis *basis, const numbers *x) {
+  float xyz[3 * N];
+  float normals[3 * N];
+  memcpy(xyz, supine_basis_vertices(basis), sizeof xyz);
+  for (size_t k = 0; k < 3; ++k) {
+    xyz[k] = (float)x->position[k];
+  }
+  supine_normals(basis, xyz, normals);
+  supine_fuzz_expect(are_finite_floats(3 * N, normals), "finite normals of any positions");
+}
+
 static void pose_state(const supine_basis *basis, const supine_state *state, bool given) {
   supine_pose pose = {.basis = 0};
   float sigma[N];
@@ -342,6 +354,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
   if (status == SUPINE_OK) {
     pose_all(basis, &x);
     find_points(basis, &x);
+    find_normals(basis, &x);
   }
   breathe(&x);
   supine_basis_close(basis);

@@ -362,7 +362,8 @@ SUPINE_API supine_status supine_deform_lit_range(const supine_basis *basis, cons
 /** Compute the unit normals of a deformed surface in one pass over its triangles, in the caller's
  * thread. The normal of a vertex is the mean of its triangles' normals, weighted by area.
  * @param xyz      [N, 3] positions of all vertices, mm
- * @param normals  [N, 3], written; 0 for a vertex without a triangle of positive area */
+ * @param normals  [N, 3], written; 0 for a vertex without a triangle of positive area, or with a
+ *                 triangle whose positions are not finite */
 SUPINE_API void supine_normals(const supine_basis *basis, const float *xyz, float *normals);
 
 /** Limits of supine.glsl: the largest number of modes, and the number of floats of a vertex before
