@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/number.h"
+#include "base/vec3.h"
 #include "runtime/expected.h"
 #include "runtime/internal.h"
 
@@ -136,13 +137,11 @@ supine_status supine_expected_shifted(const supine_basis *basis, const supine_st
 static void find_turn(const supine_state *state, const supine_state *from,
                       supine_expected_model *m) {
   double change[3];
-  const double *g = state->gravity;
-  const double *f = from->gravity;
-  const double length = sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
-  const double other = sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
-  for (size_t i = 0; i < 3; ++i) {
-    change[i] = g[i] / length - f[i] / other;
-  }
+  double unit[3];
+  double other[3];
+  (void)supine_normalise(state->gravity, unit); /* supine_basis_pose has accepted both vectors */
+  (void)supine_normalise(from->gravity, other);
+  supine_subtract(unit, other, change);
   m->across = sqrt(change[0] * change[0] + change[1] * change[1]);
   m->sideways = fabs(change[0]);
 }

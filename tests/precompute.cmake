@@ -30,6 +30,7 @@ set_tests_properties(command_output PROPERTIES TIMEOUT 900)
 # Run the commands that README.md and FIGURES.md quote.
 add_test(NAME quoted COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/test_quoted.py $<TARGET_FILE:supine>
   ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR})
+add_test(NAME printed COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/test_printed.py $<TARGET_FILE:supine>)
 # Check manual pages and completions, which are made from the tables of options.
 add_test(NAME manual COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_manual.sh $<TARGET_FILE:supine>
   ${PROJECT_BINARY_DIR}/packaging/manual)

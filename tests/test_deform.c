@@ -218,9 +218,9 @@ TEST(test_storage_auto_small_last_modes_chooses_mixed) {
  * A file with a coefficient of 2^30 is refused. */
 TEST(test_storage_error_largest_numbers_finite) {
   fixture *f = fixture_create(50, 16, 3, 1, false, false, 11, 5);
-  for (size_t i = 0; i < 3; ++i) {
-    f->direction[i] = 0x1.fffffep29F;
-    f->coefficient[i] = 0x1.fffffep29F;
+  for (size_t i = 0; i < 3; ++i) { /* displacements of up to 600 m, near the limit of 1 km */
+    f->direction[i] = 0x1p16F;
+    f->coefficient[i] = 0.4F;
   }
   opened o = made(f);
   for (int storage = SUPINE_STORAGE_AUTO; storage < SUPINE_STORAGE_COUNT; ++storage) {
@@ -229,7 +229,7 @@ TEST(test_storage_error_largest_numbers_finite) {
     supine_basis_close(basis);
   }
   free(o.bytes);
-  f->coefficient[1] = 0x1p30F;
+  f->coefficient[1] = 8;
   supine_basis *basis = NULL;
   o.bytes = fixture_bytes(f, &o.size);
   assert_int_equal(supine_basis_open_memory(o.bytes, o.size, &basis, NULL), SUPINE_ERROR_FORMAT);

@@ -441,7 +441,7 @@ TEST(test_shells_unreachable_scan_refused) {
   supine_inside_shells none;
   supine_error error;
   (void)snprintf(path, sizeof path, "%s/far", folder);
-  helper_write_scanned_basis(path, 6, 2, "0,1,0", "-1e300");
+  helper_write_scanned_basis(path, 6, 2, "0,1,0", "-9e5");
   supine_basis *far = helper_open(path);
   assert_int_equal(supine_inside_shells_create(far, &none, &error), SUPINE_ERROR_NUMERICAL);
   supine_inside_shells_free(&none);

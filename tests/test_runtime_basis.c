@@ -247,11 +247,15 @@ typedef struct parts {
 
 static const float zeros[64] = {0};
 static const double zeros64[64] = {0};
+static const float corners[64] = {0, 0, 0, 100, 0, 0, 0, 100, 0, 0, 0, 100}; /* mm */
+static const uint32_t faces[16] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
+/* Volume at rest minus that of the tetrahedron, 167 mL: -100 mL, divided by Y(0, 0). */
+static const double resting[18] = {-354, 0, 0, 0, 0, 0, 0, 0, 0, -354};
 
-/* Return a valid basis of four vertices and one mode. */
+/* Return a valid basis of a tetrahedron and one mode. */
 static parts sound(void) {
-  return (parts){.tensors = {{"vertices", SUPINE_F32, 2, {4, 3}, zeros},
-                             {"triangles", SUPINE_U32, 2, {2, 3}, zeros},
+  return (parts){.tensors = {{"vertices", SUPINE_F32, 2, {4, 3}, corners},
+                             {"triangles", SUPINE_U32, 2, {4, 3}, faces},
                              {"direction", SUPINE_F32, 2, {4, 3}, zeros},
                              {"coefficients", SUPINE_F32, 2, {4, 1}, zeros},
                              {"modes", SUPINE_F64, 2, {1, 4}, zeros64},
@@ -309,18 +313,18 @@ TEST(test_open_wrong_structure_refused) {
     assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
   }
   p = sound(); /* Volumes at rest are optional. They have nine coefficients. */
-  p.tensors[p.tensor_count++] = (supine_tensor){"resting_volume", SUPINE_F64, 1, {9}, zeros64};
+  p.tensors[p.tensor_count++] = (supine_tensor){"resting_volume", SUPINE_F64, 1, {9}, resting};
   assert_int_equal(open_parts(&p), SUPINE_OK);
   p.tensors[9].dtype = SUPINE_F32;
   assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
   for (size_t terms = 4; terms <= 16; terms += 4) {
-    p.tensors[9] = (supine_tensor){"resting_volume", SUPINE_F64, 1, {terms}, zeros64};
+    p.tensors[9] = (supine_tensor){"resting_volume", SUPINE_F64, 1, {terms}, resting};
     assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
   }
   /* Volumes at rest may have one row for each lung. */
-  p.tensors[9] = (supine_tensor){"resting_volume", SUPINE_F64, 2, {1, 9}, zeros64};
+  p.tensors[9] = (supine_tensor){"resting_volume", SUPINE_F64, 2, {1, 9}, resting};
   assert_int_equal(open_parts(&p), SUPINE_OK);
-  p.tensors[9] = (supine_tensor){"resting_volume", SUPINE_F64, 2, {2, 9}, zeros64};
+  p.tensors[9] = (supine_tensor){"resting_volume", SUPINE_F64, 2, {2, 9}, resting};
   assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
   /* If the modes are of the kind `vector`, coefficients are [N, 3, modes], not [N, modes]. */
   p = sound();
@@ -333,6 +337,85 @@ TEST(test_open_wrong_structure_refused) {
   p.tensor_count = 6;
   assert_int_equal(open_parts(&p), SUPINE_OK);
   p.tensor_count = 7;
+  assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
+}
+
+TEST(test_open_implausible_metadata_refused) {
+  static const char *const wrong[][2] = {
+      {"scan_gravity", "0,0,0"},
+      {"scan_gravity", "0,5,0"},
+      {"full_upright_gain", "7"},
+      {"full_upright_gain", "-0.1"},
+      {"scan_volume_ml", "1e7"},
+      {"midline_mm", "-1e8"},
+      {"expected_error_mm", "0"},
+      {"expected_error_mm", "nan"},
+      {"expected_error_mm", "4.5,4.5"},
+      {"expected_error_from_mm", ""},
+      {"resting_spread", "-0.17"},
+      {"resting_spread", "1e300"},
+      {"bend", "0,1e9,0"},
+      {"bend", "0,inf,0"},
+  };
+  for (size_t i = 0; i < sizeof wrong / sizeof *wrong; ++i) {
+    parts p = sound();
+    p.tensors[p.tensor_count++] = (supine_tensor){"resting_volume", SUPINE_F64, 2, {1, 9}, resting};
+    assert_int_equal(open_parts(&p), SUPINE_OK);
+    p.metadata[p.metadata_count++] = (supine_metadata){wrong[i][0], wrong[i][1]};
+    p.message = strcmp(wrong[i][0], "midline_mm") == 0 ? "midline" : wrong[i][0];
+    assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
+  }
+}
+
+/* Open a basis with one row of volumes at rest, of which the first number is given. */
+static supine_status open_rest(double first, const char *message) {
+  const double row[9] = {first};
+  parts p = sound();
+  p.tensors[p.tensor_count++] = (supine_tensor){"resting_volume", SUPINE_F64, 2, {1, 9}, row};
+  p.message = message;
+  return open_parts(&p);
+}
+
+TEST(test_open_implausible_volumes_refused) {
+  const double large[1] = {1e8};
+  assert_int_equal(open_rest(-354, NULL), SUPINE_OK);
+  assert_int_equal(open_rest(-1e-300, "differs from the reference volume by only"),
+                   SUPINE_ERROR_FORMAT);
+  assert_int_equal(open_rest(0, "differs from the reference volume by only"), SUPINE_ERROR_FORMAT);
+  assert_int_equal(open_rest(-620, "mL at rest in a posture"), SUPINE_ERROR_FORMAT);
+  assert_int_equal(open_rest(1e6, "mL at rest in a posture"), SUPINE_ERROR_FORMAT);
+  for (size_t i = 6; i < 9; ++i) {
+    parts p = sound();
+    p.tensors[i].data = large;
+    p.message = "a coefficient of the volumes is 1e+08 mL";
+    assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
+  }
+}
+
+TEST(test_open_implausible_tensors_refused) {
+  static const double large[4] = {1e8};
+  static const float far[12] = {0, 2e7F};
+  static const float infinite[1] = {INFINITY};
+  static const uint32_t part[4] = {0, 1, 2, 1};
+  parts p = sound();
+  p.tensors[4].data = large;
+  p.message = "modes have weights of up to";
+  assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
+  p = sound();
+  p.tensors[0].data = far;
+  p.message = "from the origin";
+  assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
+  p = sound(); /* a tensor that the library does not read */
+  p.tensors[p.tensor_count++] = (supine_tensor){"other", SUPINE_F32, 1, {1}, infinite};
+  p.message = "'other' has a number that is not finite";
+  assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
+  p = sound();
+  p.tensor_count = 6; /* an open surface, with names */
+  p.tensors[p.tensor_count++] = (supine_tensor){"part", SUPINE_U32, 1, {4}, part};
+  p.tensors[p.tensor_count++] = (supine_tensor){"names", SUPINE_U8, 1, {5}, "a\nb\nc"};
+  assert_int_equal(open_parts(&p), SUPINE_OK);
+  p.tensors[7].shape[0] = 3;
+  p.message = "vertex 2 has name 2, but tensor 'names' has 2";
   assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
 }
 

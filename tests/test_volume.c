@@ -160,11 +160,43 @@ TEST(test_scale_not_finite_volume_refused) {
   const double one = 1;
   const double bad = NAN;
   double scale = 0;
-  assert_int_equal(posed_scale(basis, &one, NAN, &scale, NULL), SUPINE_ERROR_NUMERICAL);
-  assert_int_equal(posed_scale(basis, &one, INFINITY, &scale, NULL), SUPINE_ERROR_NUMERICAL);
-  assert_int_equal(posed_scale(basis, &bad, 1, &scale, NULL), SUPINE_ERROR_NUMERICAL);
+  assert_int_equal(posed_scale(basis, &one, NAN, &scale, NULL), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(posed_scale(basis, &one, INFINITY, &scale, NULL), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(posed_scale(basis, &bad, 1, &scale, NULL), SUPINE_ERROR_ARGUMENT);
   supine_basis_close(basis);
   free(bytes);
+}
+
+/* A lung that hardly changes its volume on the way to rest would need very many steps. */
+TEST(test_volume_form_gains_tiny_rest_refused) {
+  static const supine_volume_form form = {{-300, -600, -700, 50, 40, 30, -5}};
+  static const double bend[3] = {0, -0.45, 0.45};
+  static const double tiny[] = {-1e-300, -1e-9, 1e-300, -1};
+  for (size_t i = 0; i < sizeof tiny / sizeof *tiny; ++i) {
+    double gains[3];
+    supine_error error = {0};
+    assert_int_equal(supine_volume_form_gains(&form, bend, tiny[i], -900, gains, &error),
+                     SUPINE_ERROR_NUMERICAL);
+  }
+}
+
+TEST(test_volume_form_gains_not_finite_refused) {
+  static const double bend[3] = {0, -0.45, 0.45};
+  static const double wrong[] = {(double)NAN, (double)INFINITY, -(double)INFINITY};
+  for (size_t i = 0; i < sizeof wrong / sizeof *wrong; ++i) {
+    supine_volume_form form = {{-300, -600, -700, 50, 40, 30, -5}};
+    const double bad_bend[3] = {0, wrong[i], 0};
+    double gains[3];
+    assert_int_equal(supine_volume_form_gains(&form, bend, -800, wrong[i], gains, NULL),
+                     SUPINE_ERROR_ARGUMENT);
+    assert_int_equal(supine_volume_form_gains(&form, bend, wrong[i], -900, gains, NULL),
+                     SUPINE_ERROR_ARGUMENT);
+    assert_int_equal(supine_volume_form_gains(&form, bad_bend, -800, -900, gains, NULL),
+                     SUPINE_ERROR_ARGUMENT);
+    form.of[3] = wrong[i];
+    assert_int_equal(supine_volume_form_gains(&form, bend, -800, -900, gains, NULL),
+                     SUPINE_ERROR_ARGUMENT);
+  }
 }
 
 TEST(test_pose_open_surface_refused) {

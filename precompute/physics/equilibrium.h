@@ -118,7 +118,8 @@ supine_status supine_physics_transfer_column(supine_equilibrium *equilibrium, si
  * @param force      [vertices] force applied to each vertex
  * @param masses     [vertices] force that each vertex keeps, written
  * @param progress   called at the beginning and after every N steps, with the number of steps and
- *   the sum of |Pitcher| over all nodes divided by the sum of |force|; may be NULL */
+ *   the sum of |Pitcher| over all nodes divided by the sum of |force|; may be NULL
+ * @retval SUPINE_ERROR_NUMERICAL  the iteration has not converged after 100 000 N steps */
 supine_status
 supine_physics_pitcher_catcher(const supine_mesh *mesh, const supine_topology *topology,
                                const double *stiffness, const double *force, double tolerance,

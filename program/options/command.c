@@ -13,17 +13,21 @@
 #include "base/clock.h"
 #include "base/number.h"
 #include "base/output.h"
+#include "base/utf8.h"
 
 #include "program/options/command.h"
 #include "runtime/words.h"
 
 void supine_options_say(const char *command, const char *format, ...) {
+  enum { LONGEST = 4096 };
+  char text[LONGEST];
+  char printable[LONGEST];
   va_list arguments;
   va_start(arguments, format);
-  (void)fprintf(stderr, "supine %s: ", command);
-  (void)supine_print_list(stderr, format, arguments);
-  (void)fputc('\n', stderr);
+  (void)supine_print_text_list(text, sizeof text, format, arguments);
   va_end(arguments);
+  supine_utf8_escape(text, "\n", printable, sizeof printable);
+  (void)fprintf(stderr, "supine %s: %s\n", command, printable);
 }
 
 int supine_options_finish(const char *command) {

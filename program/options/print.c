@@ -7,6 +7,7 @@
 
 #include "base/locale.h"
 #include "base/text.h"
+#include "base/utf8.h"
 
 #include "program/options/command.h"
 
@@ -50,12 +51,13 @@ static void add_real(double real, quantity kind, char text[TEXT_MAX]) {
   }
 }
 
-/* Format a value, or the first LIST_MAX values of a list, as one line. */
+/* Format a value, or the first LIST_MAX values of a list, as one line. Escape control characters of
+ * texts, which may come from files. NULL is a value that is missing. */
 static void write_text(const json_t *value, quantity kind, char text[TEXT_MAX]) {
   size_t i;
   const json_t *item;
   text[0] = '\0';
-  switch (json_typeof(value)) {
+  switch (value == NULL ? JSON_NULL : json_typeof(value)) {
   case JSON_ARRAY:
     json_array_foreach(value, i, item) {
       char one[TEXT_MAX];
@@ -69,7 +71,7 @@ static void write_text(const json_t *value, quantity kind, char text[TEXT_MAX]) 
     }
     break;
   case JSON_STRING:
-    supine_text_add(text, TEXT_MAX, "%s", json_string_value(value));
+    supine_utf8_escape(json_string_value(value), "", text, TEXT_MAX);
     break;
   case JSON_INTEGER:
     supine_text_add(text, TEXT_MAX, "%" JSON_INTEGER_FORMAT, json_integer_value(value));
@@ -211,24 +213,46 @@ static void write_label(const char *parent, const char *key, char text[TEXT_MAX]
       length -= strlen(units[i][0]);
     }
   }
-  (void)snprintf(text, TEXT_MAX, "%.*s%s", (int)length, key, unit);
+  char plain[TEXT_MAX];
+  (void)snprintf(plain, sizeof plain, "%.*s%s", (int)length, key, unit);
+  supine_utf8_escape(plain, "", text, TEXT_MAX);
   for (char *at = text; (at = strchr(at, '_')) != NULL;) {
     *at = ' ';
   }
 }
 
-/* Print a list of objects, which have the same keys, as a table. `heading` stands above it. */
+/* Return an object with the columns of a table: each key of any row, in the order of appearance,
+ * with the value true if its column has only numbers, which are aligned right. */
+static json_t *find_columns(const json_t *rows) {
+  json_t *columns = json_object();
+  size_t i;
+  json_t *row;
+  const char *name;
+  json_t *member;
+  json_array_foreach(rows, i, row) {
+    json_object_foreach(row, name, member) {
+      const bool numbers = json_is_number(member) || json_is_null(member);
+      const json_t *before = json_object_get(columns, name);
+      (void)json_object_set_new(columns, name,
+                                json_boolean(numbers && (before == NULL || json_is_true(before))));
+    }
+  }
+  return columns;
+}
+
+/* Print a list of objects as a table; `heading` stands above it. A row may lack the values of some
+ * columns. */
 static void print_table(const char *heading, const json_t *rows) {
-  json_t *first = json_array_get(rows, 0);
+  json_auto_t *columns = find_columns(rows);
   size_t width[COLUMNS_MAX] = {0};
   char text[TEXT_MAX];
   char label[TEXT_MAX];
   for (int pass = 0; pass < 2; ++pass) { /* first measure the columns, then print */
     for (size_t i = 0; i <= json_array_size(rows); ++i) {
       const char *name;
-      json_t *member;
+      json_t *numbers;
       size_t column = 0;
-      json_object_foreach(first, name, member) {
+      json_object_foreach(columns, name, numbers) {
         write_label("", name, label);
         if (i > 0) {
           write_text(json_object_get(json_array_get(rows, i - 1), name),
@@ -239,8 +263,8 @@ static void print_table(const char *heading, const json_t *rows) {
         if (pass == 0) {
           width[column] = length > width[column] ? length : width[column];
         } else {
-          const bool last = column + 1 == json_object_size(first);
-          const int side = json_is_number(member) ? 1 : last ? 0 : -1; /* align numbers right */
+          const bool last = column + 1 == json_object_size(columns);
+          const int side = json_is_true(numbers) ? 1 : last ? 0 : -1; /* align numbers right */
           (void)printf("  %*s", side * (int)width[column], cell);
         }
         column += column + 1 < COLUMNS_MAX;

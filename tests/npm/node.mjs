@@ -61,6 +61,8 @@ assert.equal(lungs.metadata.format, 'supine-basis');
 assert.equal(Math.max(...lungs.triangles), lungs.vertexCount - 1);
 assert.deepEqual(lungs.tensor('coefficients').shape[0], lungs.vertexCount);
 assert.equal(lungs.tensor('none'), undefined);
+assert.ok(lungs.tensor('normals').data instanceof Int8Array); // numbers.mjs reads every tensor of a file
+for (const gain of [NaN, Infinity]) assert.throws(() => lungs.pose({ gravity: [0, 1, 0], gain }), { status: 'argument' });
 assert.equal((await open(readFileSync(inside))).tensor('names').data.length > 0, true);
 
 /* The targets are the rows of 'supine deform': a row for each name, also of a mesh. */

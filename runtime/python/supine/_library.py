@@ -198,7 +198,7 @@ def _checked(name: str, *arguments: Any) -> Any:
     return call
 
 
-_POSED = {1: b"the pose was made by another basis: make it by Basis.pose of this basis",
+_POSED = {1: b"the pose was made by another basis, or has a number that is not finite: make it by Basis.pose of this basis",
           6: b"the surface is open and encloses no volume",
           7: b"the basis was made or opened without normals: normals() computes them from the triangles"}
 
