@@ -56,7 +56,7 @@ static int teardown(void **state) {
 static supine_field made_field(void) {
   supine_field field;
   supine_error error;
-  if (supine_field_create(grid, POSED(grid, weights, scales), 60.0, &field, &error) != SUPINE_OK) {
+  if (supine_field_create(grid, POSED(grid, weights, scales), &field, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
   return field;
@@ -160,14 +160,14 @@ TEST(test_field_scan_below_full_measured_from_scan) {
   if (supine_inside_shells_create(surface, &below, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
-  assert_int_equal(supine_field_create(grid, &below.scan, 60.0, &field, &error), SUPINE_OK);
+  assert_int_equal(supine_field_create(grid, &below.scan, &field, &error), SUPINE_OK);
   const size_t count = field.nodes.size[0] * field.nodes.size[1] * field.nodes.size[2];
   for (size_t i = 0; i < 3 * count; ++i) {
     assert_true(fabs((double)((const float *)field.nodes.values)[i]) < 1e-4);
   }
   supine_field_free(&field);
   /* Compare the field at a grid node in the lungs with the motion of a point embedded there. */
-  assert_int_equal(supine_field_create(grid, POSED(grid, weights, scales), 60.0, &field, &error),
+  assert_int_equal(supine_field_create(grid, POSED(grid, weights, scales), &field, &error),
                    SUPINE_OK);
   size_t node = count / 2;
   while (!(((const float *)field.depth.values)[node] > 0.0F)) {
@@ -404,7 +404,7 @@ TEST(test_resample_scaled_density_keeps_mass) {
   supine_field inverse;
   supine_field_residual residual;
   const double larger[2] = {-1.4, 1.2}; /* one lung inflates, the other deflates */
-  assert_int_equal(supine_field_create(grid, POSED(grid, weights, larger), 60.0, &field, NULL),
+  assert_int_equal(supine_field_create(grid, POSED(grid, weights, larger), &field, NULL),
                    SUPINE_OK);
   assert_int_equal(supine_field_invert(&field, &inverse, &residual, NULL), SUPINE_OK);
   for (int lung = 0; lung < 2; ++lung) {
@@ -566,9 +566,8 @@ TEST(test_resample_displacement_0_voxels_copied_exactly) {
 TEST(test_field_create_without_grid_refused) {
   supine_field field;
   supine_error error;
-  assert_int_equal(
-      supine_field_create(surface, POSED(surface, weights, scales), 60.0, &field, &error),
-      SUPINE_ERROR_FORMAT);
+  assert_int_equal(supine_field_create(surface, POSED(surface, weights, scales), &field, &error),
+                   SUPINE_ERROR_FORMAT);
   assert_says(error.message, "supine embed");
 }
 
@@ -602,7 +601,7 @@ TEST(test_field_malformed_grids_refused) {
     supine_basis *bad = helper_open(in_folder("lie"));
     supine_field field;
     supine_error error;
-    assert_int_equal(supine_field_create(bad, POSED(bad, weights, scales), 60.0, &field, &error),
+    assert_int_equal(supine_field_create(bad, POSED(bad, weights, scales), &field, &error),
                      SUPINE_ERROR_FORMAT);
     assert_says(error.message, "malformed");
     supine_basis_close(bad);

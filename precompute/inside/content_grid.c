@@ -11,9 +11,9 @@
 
 static const double nodes_max = 2147483648.0;
 
-/* Find the bounding box of the lungs, extended by the margin, in voxel coordinates of `grid`. */
-static void cover(const supine_inside_shells *shells, const supine_image *grid, double margin,
-                  double low[3], double high[3]) {
+/* Find the bounding box of the lungs in voxel coordinates of `grid`. */
+static void cover(const supine_inside_shells *shells, const supine_image *grid, double low[3],
+                  double high[3]) {
   supine_box_begin(low, high);
   for (size_t lung = 0; lung < shells->count; ++lung) {
     const supine_inside_shell *shell = &shells->shell[lung];
@@ -23,47 +23,54 @@ static void cover(const supine_inside_shells *shells, const supine_image *grid, 
       supine_box_add(node, low, high);
     }
   }
-  for (int k = 0; k < 3; ++k) {
-    low[k] -= margin / supine_length(grid->step[k]);
-    high[k] += margin / supine_length(grid->step[k]);
-  }
 }
 
-/* Make the grid that covers the lungs. Its nodes are voxels of `like`, at about the given spacing;
- * if `like` is NULL, the axes of the grid are x, y and z. */
+/* Return the distance between neighbouring planes of voxels that the axis `a` crosses. It is less
+ * than the length of the step if the axes are not at right angles, as in a tilted CT. */
+static double plane_distance(const supine_image *image, int a) {
+  double normal[3];
+  supine_cross(image->step[(a + 1) % 3], image->step[(a + 2) % 3], normal);
+  return fabs(supine_dot(image->step[a], normal)) / supine_length(normal);
+}
+
+/* Make the grid that covers the lungs. Its nodes are voxels of `like`, at about the given spacing,
+ * and continue beyond its border; if `like` is NULL, the axes of the grid are x, y and z. */
 static supine_status make_grid(const supine_inside_shells *shells, const supine_image *like,
                                double spacing, double margin, supine_image *grid,
                                supine_error *error) {
   static const supine_image plain = {.step = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}}};
-  supine_image from = like != NULL ? *like : plain;
+  const supine_image from = like != NULL ? *like : plain;
   double low[3];
   double high[3];
   double first[3];
+  double every[3];
   double nodes = 1.0;
-  cover(shells, &from, margin, low, high);
+  double reach = margin; /* distance from the lungs to the border of the grid */
+  cover(shells, &from, low, high);
   for (int k = 0; k < 3; ++k) {
-    const double every =
-        like != NULL ? fmax(1.0, rint(spacing / supine_length(from.step[k]))) : spacing;
-    if (like != NULL) {
-      low[k] = fmax(low[k], 0.0);
-      high[k] = fmin(high[k], (double)from.size[k] - 1.0);
-    }
-    first[k] = every * floor(low[k] / every);
-    const double count = ceil((high[k] - first[k]) / every) + 1.0;
+    const double edge = supine_length(from.step[k]);
+    every[k] = like != NULL ? fmax(1.0, rint(spacing / edge)) : spacing;
+    reach += every[k] * edge;
     SUPINE_REFUSE_IF(
-        like != NULL && !(high[k] >= low[k]), error, SUPINE_ERROR_MESH,
+        like != NULL && (high[k] < 0.0 || low[k] > (double)from.size[k] - 1.0), error,
+        SUPINE_ERROR_MESH,
         "the image does not show the lungs: check its axes and the axes of the meshes");
+  }
+  for (int k = 0; k < 3; ++k) {
+    const double voxels = reach / plane_distance(&from, k);
+    first[k] = floor((low[k] - voxels) / every[k]);
+    const double count = ceil((high[k] + voxels) / every[k]) - first[k] + 1.0;
     nodes *= count;
     grid->size[k] = (size_t)fmin(count, nodes_max);
     for (int a = 0; a < 3; ++a) {
-      grid->step[k][a] = every * from.step[k][a];
+      grid->step[k][a] = every[k] * from.step[k][a];
     }
   }
   SUPINE_REFUSE_IF(!(nodes < nodes_max), error, SUPINE_ERROR_ARGUMENT,
                    "a grid of %g mm has %.3g nodes; give a larger spacing", spacing, nodes);
   for (int a = 0; a < 3; ++a) {
-    grid->origin[a] = from.origin[a] + first[0] * from.step[0][a] + first[1] * from.step[1][a] +
-                      first[2] * from.step[2][a];
+    grid->origin[a] = from.origin[a] + first[0] * grid->step[0][a] + first[1] * grid->step[1][a] +
+                      first[2] * grid->step[2][a];
   }
   return SUPINE_OK;
 }
