@@ -2,9 +2,7 @@
 /* Extend a displacement field from the lungs to the border of its grid, where it is 0. */
 #include <math.h>
 #include <stddef.h>
-#include <stdint.h>
 
-#include "base/arena.h"
 #include "base/vec3.h"
 
 #include "precompute/warp/fade.h"
@@ -32,30 +30,6 @@ static double cell_diagonal(const supine_image *nodes) {
   return longest;
 }
 
-/* The neighbours of a node along the axes of the grid. */
-typedef struct neighbours {
-  size_t count;
-  size_t node[6];
-} neighbours;
-
-static neighbours neighbours_of(const supine_image *nodes, size_t node) {
-  neighbours found = {.count = 0};
-  size_t left = node;
-  size_t stride = 1;
-  for (size_t a = 0; a < 3; ++a) {
-    const size_t at = left % nodes->size[a];
-    if (at > 0) {
-      found.node[found.count++] = node - stride;
-    }
-    if (at + 1 < nodes->size[a]) {
-      found.node[found.count++] = node + stride;
-    }
-    left /= nodes->size[a];
-    stride *= nodes->size[a];
-  }
-  return found;
-}
-
 /* Offsets from a node to the 13 of its 26 neighbours that come later in the order of the nodes. */
 typedef struct later {
   int by[13][3];
@@ -81,118 +55,94 @@ static later later_of(const supine_image *nodes) {
   return found;
 }
 
-/* Find the depth of the nodes at which it is unknown, -INFINITY, from that of their neighbours:
- * minus the length of the shortest path to the lungs, which is at most a tenth longer than the
- * straight one. One pass goes forwards through the nodes, and one backwards. */
-static void spread_depth(const supine_image *nodes, const unsigned char *known, float *depth) {
-  const later to = later_of(nodes);
-  const size_t count = nodes->size[0] * nodes->size[1] * nodes->size[2];
-  for (int pass = 0; pass < 2; ++pass) {
-    const int sign = pass == 0 ? -1 : 1;
-    for (size_t n = 0; n < count; ++n) {
-      const size_t i = pass == 0 ? n : count - 1 - n;
-      const size_t at[3] = {i % nodes->size[0], i / nodes->size[0] % nodes->size[1],
-                            i / nodes->size[0] / nodes->size[1]};
-      for (size_t k = 0; k < 13 && known[i] == 0; ++k) {
-        bool within = true;
-        for (size_t a = 0; a < 3; ++a) {
-          within = within && at[a] + (size_t)(sign * to.by[k][a]) < nodes->size[a];
-        }
-        if (within) {
-          const size_t j = (size_t)((ptrdiff_t)i + sign * to.node[k]);
-          depth[i] = fmaxf(depth[i], depth[j] - to.length[k]);
-        }
-      }
-    }
+/* Return whether a node is not at the border of the grid. */
+static bool is_inner(const supine_image *nodes, const size_t at[3]) {
+  bool inner = true;
+  for (size_t a = 0; a < 3; ++a) {
+    inner = inner && at[a] > 0 && at[a] + 1 < nodes->size[a];
   }
+  return inner;
 }
 
-/* Extend the field in layers of nodes: each takes the mean of its neighbours in earlier layers.
- * `known` is 1 at the nodes at which the field is given.
- * @param order  [nodes] work space */
-static void extend(supine_image *nodes, unsigned char *known, uint32_t *order) {
-  enum { UNKNOWN = 0, KNOWN = 1, NEXT = 2 };
+/* Take depth and displacement of the node `i` from the neighbour by which its depth is largest. */
+static void take_from_neighbours(supine_field *field, const later *to, int sign, size_t i,
+                                 const size_t at[3]) {
+  const supine_image *nodes = &field->nodes;
   float *u = nodes->values;
-  const size_t count = nodes->size[0] * nodes->size[1] * nodes->size[2];
-  size_t end = 0;
-  for (size_t i = 0; i < count; ++i) {
-    const neighbours next = neighbours_of(nodes, i);
-    for (size_t k = 0; k < next.count && known[i] == KNOWN; ++k) {
-      if (known[next.node[k]] == UNKNOWN) {
-        known[next.node[k]] = NEXT;
-        order[end++] = (uint32_t)next.node[k];
+  float *depth = field->depth.values;
+  const bool inner = is_inner(nodes, at);
+  size_t best = i;
+  for (size_t k = 0; k < 13; ++k) {
+    bool within = true;
+    for (size_t a = 0; a < 3 && !inner; ++a) {
+      within = within && at[a] + (size_t)(sign * to->by[k][a]) < nodes->size[a];
+    }
+    if (within) {
+      const size_t j = (size_t)((ptrdiff_t)i + sign * to->node[k]);
+      const float reached = depth[j] - to->length[k];
+      if (reached > depth[i]) {
+        depth[i] = reached;
+        best = j;
       }
     }
   }
-  for (size_t begin = 0; begin < end;) {
-    const size_t layer_end = end;
-    for (size_t n = begin; n < layer_end; ++n) {
-      const neighbours next = neighbours_of(nodes, order[n]);
-      float sum[3] = {0.0F, 0.0F, 0.0F};
-      float from = 0.0F;
-      for (size_t k = 0; k < next.count; ++k) {
-        const float weight = known[next.node[k]] == KNOWN ? 1.0F : 0.0F;
-        from += weight;
-        for (size_t c = 0; c < 3; ++c) {
-          sum[c] += weight * u[3 * next.node[k] + c];
-        }
-      }
-      for (size_t c = 0; c < 3; ++c) {
-        u[3 * (size_t)order[n] + c] = sum[c] / from;
-      }
-    }
-    for (size_t n = begin; n < layer_end; ++n) {
-      known[order[n]] = KNOWN;
-    }
-    for (size_t n = begin; n < layer_end; ++n) {
-      const neighbours next = neighbours_of(nodes, order[n]);
-      for (size_t k = 0; k < next.count; ++k) {
-        if (known[next.node[k]] == UNKNOWN) {
-          known[next.node[k]] = NEXT;
-          order[end++] = (uint32_t)next.node[k];
-        }
-      }
-    }
-    begin = layer_end;
+  for (size_t c = 0; c < 3; ++c) {
+    u[3 * i + c] = u[3 * best + c];
   }
 }
 
-/* Replace the field at the nodes deeper than `near` mm outside the lungs by the mean of their
+/* Find depth and displacement of the nodes at which they are unknown: the depth is minus the length
+ * of the shortest path to the lungs along the 26 directions of the grid, which is at most a tenth
+ * longer than the straight one, and the displacement is that at the start of this path. One pass
+ * goes forwards through the nodes, and one backwards. */
+static void extend(supine_field *field, const unsigned char *known) {
+  const size_t *size = field->nodes.size;
+  const size_t count = size[0] * size[1] * size[2];
+  const later to = later_of(&field->nodes);
+  size_t at[3] = {0, 0, 0};
+  for (size_t i = 0; i < count; ++i) {
+    if (known[i] == 0) {
+      take_from_neighbours(field, &to, -1, i, at);
+    }
+    for (size_t a = 0; a < 3 && ++at[a] == size[a]; ++a) {
+      at[a] = 0;
+    }
+  }
+  for (size_t i = count; i-- > 0;) {
+    for (size_t a = 0; a < 3 && at[a]-- == 0; ++a) {
+      at[a] = size[a] - 1;
+    }
+    if (known[i] == 0) {
+      take_from_neighbours(field, &to, 1, i, at);
+    }
+  }
+}
+
+/* Replace the field at the nodes more than `near` mm outside the lungs by the mean of their
  * neighbours, as between the lungs the extensions of their fields differ. */
 static void smooth(supine_image *nodes, const float *depth, double near) {
   float *u = nodes->values;
-  const size_t count = nodes->size[0] * nodes->size[1] * nodes->size[2];
+  const size_t *size = nodes->size;
+  const size_t row = size[0];
+  const size_t slice = size[0] * size[1];
   for (int pass = 0; pass < PASSES; ++pass) {
-    for (size_t n = 0; n < count; ++n) {
-      const size_t i = pass % 2 == 0 ? n : count - 1 - n;
-      if ((double)depth[i] >= -near) {
+    for (size_t r = 0; r < size[1] * size[2]; ++r) {
+      const size_t line = pass % 2 == 0 ? r : size[1] * size[2] - 1 - r;
+      if (!is_inner(nodes, (const size_t[]){1, line % size[1], line / size[1]})) {
         continue;
       }
-      const neighbours next = neighbours_of(nodes, i);
-      for (size_t c = 0; c < 3; ++c) {
-        float sum = 0.0F;
-        for (size_t k = 0; k < next.count; ++k) {
-          sum += u[3 * next.node[k] + c];
+      for (size_t i = line * row + 1; i + 1 < (line + 1) * row; ++i) {
+        for (size_t c = 3 * i; c < 3 * i + 3 && (double)depth[i] < -near; ++c) {
+          u[c] = (u[c - 3] + u[c + 3] + u[c - 3 * row] + u[c + 3 * row] + u[c - 3 * slice] +
+                  u[c + 3 * slice]) /
+                 6.0F;
         }
-        u[3 * i + c] = sum / (float)next.count;
       }
     }
   }
 }
 
-/* Return the distance, mm, of a node from the border of the grid. */
-static double border_distance(const supine_image *nodes, const double height[3], size_t node) {
-  double least = INFINITY;
-  size_t left = node;
-  for (size_t a = 0; a < 3; ++a) {
-    const size_t at = left % nodes->size[a];
-    const size_t last = nodes->size[a] - 1 - at;
-    least = fmin(least, height[a] * (double)(at < last ? at : last));
-    left /= nodes->size[a];
-  }
-  return least;
-}
-
+/* Find the distance between neighbouring planes of nodes that each axis crosses, mm. */
 static void find_heights(const supine_image *nodes, double height[3]) {
   const double whole = supine_triple(nodes->step[0], nodes->step[1], nodes->step[2]);
   for (size_t a = 0; a < 3; ++a) {
@@ -213,29 +163,30 @@ static double largest_near(const supine_image *nodes, const float *depth, double
   return sqrt(square);
 }
 
-supine_status supine_field_fade_out(supine_field *field, unsigned char *known,
-                                    supine_error *error) {
+void supine_field_fade_out(supine_field *field, const unsigned char *known) {
   supine_image *nodes = &field->nodes;
   float *u = nodes->values;
   float *depth = field->depth.values;
   const size_t count = nodes->size[0] * nodes->size[1] * nodes->size[2];
   const double near = cell_diagonal(nodes);
   double height[3];
-  SUPINE_ARENA arena = {0};
-  uint32_t *order = supine_arena_take(&arena, count, sizeof *order);
-  SUPINE_TRY(supine_arena_check(&arena, error, "a field of %zu nodes", count));
   find_heights(nodes, height);
-  spread_depth(nodes, known, depth);
+  extend(field, known);
   const double length = supine_field_fade(largest_near(nodes, depth, near));
-  extend(nodes, known, order);
   smooth(nodes, depth, near);
   for (size_t i = 0; i < count; ++i) {
-    const double gone = fmax(0.0, -(double)depth[i] - near);
-    const double left = fmin(border_distance(nodes, height, i), length - gone);
+    const size_t at[3] = {i % nodes->size[0], i / nodes->size[0] % nodes->size[1],
+                          i / nodes->size[0] / nodes->size[1]};
+    const double gone = -(double)depth[i] > near ? -(double)depth[i] - near : 0.0;
+    double left = length - gone;
+    for (size_t a = 0; a < 3; ++a) {
+      const size_t other = nodes->size[a] - 1 - at[a];
+      const double border = height[a] * (double)(at[a] < other ? at[a] : other);
+      left = border < left ? border : left;
+    }
     const float share = left > 0.0 ? (float)(left / (left + gone)) : 0.0F;
     for (size_t c = 0; c < 3; ++c) {
       u[3 * i + c] *= share;
     }
   }
-  return SUPINE_OK;
 }

@@ -10,7 +10,7 @@
  * the factor falls linearly to 0 over the distance of supine_field_fade, and at the latest at the
  * border of the grid.
  * @param field  depths at the nodes that are not known: -INFINITY; they are replaced
- * @param known  [nodes] 1 at the nodes at which the field is given, otherwise 0; changed */
-supine_status supine_field_fade_out(supine_field *field, unsigned char *known, supine_error *error);
+ * @param known  [nodes] 1 at the nodes at which the field is given, otherwise 0 */
+void supine_field_fade_out(supine_field *field, const unsigned char *known);
 
 #endif

@@ -148,11 +148,7 @@ supine_status supine_field_create(const supine_basis *basis, const supine_pose *
     known[part[i]] = 1;
     below[part[i]] = depth[i];
   }
-  const supine_status status = supine_field_fade_out(&made, known, error);
-  if (status != SUPINE_OK) {
-    supine_field_free(&made);
-    return status;
-  }
+  supine_field_fade_out(&made, known);
   *field = made;
   return SUPINE_OK;
 }
