@@ -121,6 +121,25 @@ void supine_image_place(const supine_image *image, size_t index, double point[3]
   }
 }
 
+double supine_image_plane_distance(const supine_image *image, size_t axis) {
+  double normal[3];
+  supine_cross(image->step[(axis + 1) % 3], image->step[(axis + 2) % 3], normal);
+  return fabs(supine_dot(image->step[axis], normal)) / supine_length(normal);
+}
+
+double supine_image_cell_diagonal(const supine_image *image) {
+  double longest = 0.0;
+  for (unsigned signs = 0; signs < 4; ++signs) {
+    double diagonal[3];
+    for (size_t k = 0; k < 3; ++k) {
+      diagonal[k] = image->step[0][k] + (signs & 1U ? -1.0 : 1.0) * image->step[1][k] +
+                    (signs & 2U ? -1.0 : 1.0) * image->step[2][k];
+    }
+    longest = fmax(longest, supine_length(diagonal));
+  }
+  return longest;
+}
+
 void supine_image_locate(const supine_image *image, const double point[3], double voxel[3]) {
   const double whole = supine_triple(image->step[0], image->step[1], image->step[2]);
   double from[3];

@@ -79,6 +79,13 @@ void supine_image_set_axes(supine_image *image, supine_axes axes);
 /** Compute the centre of voxel `index` = i + size[0] (j + size[1] k), mm, LPS. */
 void supine_image_place(const supine_image *image, size_t index, double point[3]);
 
+/** Return the distance, mm, between neighbouring planes of voxels that the axis `axis` crosses. It
+ * is less than the length of the step if the axes are not at right angles, as in a tilted CT. */
+double supine_image_plane_distance(const supine_image *image, size_t axis);
+
+/** Return the longest diagonal, mm, of the cell between eight voxels. */
+double supine_image_cell_diagonal(const supine_image *image);
+
 /** Convert a point, mm, LPS, to voxel coordinates: (0, 0, 0) is the centre of the first voxel. */
 void supine_image_locate(const supine_image *image, const double point[3], double voxel[3]);
 

@@ -39,8 +39,8 @@ supine_status supine_inside_content_make_rigid(supine_inside_content *content, c
                                                supine_error *error);
 
 /** Make a grid of nodes. Keep the nodes inside the lungs, and the nodes outside whose distance from
- * a lung is less than the sum of the three edges of a grid cell. Then every point inside a lung
- * lies between nodes.
+ * a lung is less than the diagonal of a grid cell. Then every point inside a lung lies between
+ * nodes.
  *
  * @param like     image whose voxels are the nodes, or every n-th voxel along an axis if `spacing`
  *                 is n voxels. The grid continues beyond the image where that does not reach far

@@ -25,14 +25,6 @@ static void cover(const supine_inside_shells *shells, const supine_image *grid, 
   }
 }
 
-/* Return the distance between neighbouring planes of voxels that the axis `a` crosses. It is less
- * than the length of the step if the axes are not at right angles, as in a tilted CT. */
-static double plane_distance(const supine_image *image, int a) {
-  double normal[3];
-  supine_cross(image->step[(a + 1) % 3], image->step[(a + 2) % 3], normal);
-  return fabs(supine_dot(image->step[a], normal)) / supine_length(normal);
-}
-
 /* Make the grid that covers the lungs. Its nodes are voxels of `like`, at about the given spacing,
  * and continue beyond its border; if `like` is NULL, the axes of the grid are x, y and z. */
 static supine_status make_grid(const supine_inside_shells *shells, const supine_image *like,
@@ -57,7 +49,7 @@ static supine_status make_grid(const supine_inside_shells *shells, const supine_
         "the image does not show the lungs: check its axes and the axes of the meshes");
   }
   for (int k = 0; k < 3; ++k) {
-    const double voxels = reach / plane_distance(&from, k);
+    const double voxels = reach / supine_image_plane_distance(&from, (size_t)k);
     first[k] = floor((low[k] - voxels) / every[k]);
     const double count = ceil((high[k] + voxels) / every[k]) - first[k] + 1.0;
     nodes *= count;
@@ -132,10 +124,7 @@ supine_status supine_inside_content_grid(const supine_inside_shells *shells,
   SUPINE_REFUSE_IF(!(spacing > 0.0) || !isfinite(spacing), error, SUPINE_ERROR_ARGUMENT,
                    "the grid's spacing is %g mm: give one above 0", spacing);
   SUPINE_TRY(make_grid(shells, like, spacing, margin, &grid, error));
-  double diagonal = 0.0;
-  for (int k = 0; k < 3; ++k) {
-    diagonal += supine_length(grid.step[k]);
-  }
+  const double diagonal = supine_image_cell_diagonal(&grid);
   const size_t nodes = grid.size[0] * grid.size[1] * grid.size[2];
   SUPINE_ARENA arena = {0};
   search work = {shells, &grid, diagonal, supine_arena_take(&arena, nodes, 1)};

@@ -17,19 +17,6 @@ double supine_field_fade(double largest) {
 /* Number of passes that smooth the field around the lungs. */
 enum { PASSES = 8 };
 
-static double cell_diagonal(const supine_image *nodes) {
-  double longest = 0.0;
-  for (unsigned signs = 0; signs < 4; ++signs) {
-    double sum[3];
-    for (size_t k = 0; k < 3; ++k) {
-      sum[k] = nodes->step[0][k] + (signs & 1U ? -1.0 : 1.0) * nodes->step[1][k] +
-               (signs & 2U ? -1.0 : 1.0) * nodes->step[2][k];
-    }
-    longest = fmax(longest, supine_length(sum));
-  }
-  return longest;
-}
-
 /* Offsets from a node to the 13 of its 26 neighbours that come later in the order of the nodes. */
 typedef struct later {
   int by[13][3];
@@ -142,16 +129,6 @@ static void smooth(supine_image *nodes, const float *depth, double near) {
   }
 }
 
-/* Find the distance between neighbouring planes of nodes that each axis crosses, mm. */
-static void find_heights(const supine_image *nodes, double height[3]) {
-  const double whole = supine_triple(nodes->step[0], nodes->step[1], nodes->step[2]);
-  for (size_t a = 0; a < 3; ++a) {
-    double normal[3];
-    supine_cross(nodes->step[(a + 1) % 3], nodes->step[(a + 2) % 3], normal);
-    height[a] = fabs(whole) / supine_length(normal);
-  }
-}
-
 /* Return the largest displacement in the lungs and at the nodes up to `near` mm from them. */
 static double largest_near(const supine_image *nodes, const float *depth, double near) {
   const float *u = nodes->values;
@@ -168,9 +145,11 @@ void supine_field_fade_out(supine_field *field, const unsigned char *known) {
   float *u = nodes->values;
   float *depth = field->depth.values;
   const size_t count = nodes->size[0] * nodes->size[1] * nodes->size[2];
-  const double near = cell_diagonal(nodes);
+  const double near = supine_image_cell_diagonal(nodes);
   double height[3];
-  find_heights(nodes, height);
+  for (size_t a = 0; a < 3; ++a) {
+    height[a] = supine_image_plane_distance(nodes, a);
+  }
   extend(field, known);
   const double length = supine_field_fade(largest_near(nodes, depth, near));
   smooth(nodes, depth, near);
