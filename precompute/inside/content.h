@@ -44,7 +44,8 @@ supine_status supine_inside_content_make_rigid(supine_inside_content *content, c
  *
  * @param like     image whose voxels are the nodes, or every n-th voxel along an axis if `spacing`
  *                 is n voxels. The grid continues beyond the image where that does not reach far
- *                 enough. If NULL, the axes of the grid are x, y and z
+ *                 enough, has axes at right angles even if the image (a tilted CT) does not, and is
+ *                 right-handed. If NULL, the axes of the grid are x, y and z
  * @param spacing  distance between nodes, mm; with `like`, rounded to a multiple of its spacing
  * @param margin   distance, mm, by which the grid extends beyond the nodes around the lungs
  * @param content  zero-initialised */

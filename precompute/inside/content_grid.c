@@ -25,13 +25,40 @@ static void cover(const supine_inside_shells *shells, const supine_image *grid, 
   }
 }
 
+/* Make the axes of an image right-angled: keep the first, the plane of the first two, and the
+ * distance between slices. DICOM and ITK have no other grids; a CT with a tilted gantry has. */
+static void make_right_angled(supine_image *image) {
+  static const double rounding = 1e-5; /* of cosines, if the file stores float32 */
+  double normal[3];
+  double largest = 0.0;
+  for (size_t a = 0; a < 3; ++a) {
+    const double *s = image->step[a];
+    const double *t = image->step[(a + 1) % 3];
+    const double cosine = supine_dot(s, t) / supine_length(s) / supine_length(t);
+    largest = fmax(largest, fabs(cosine));
+  }
+  if (largest < rounding) {
+    return;
+  }
+  const double plane = supine_image_plane_distance(image, 2);
+  supine_cross(image->step[0], image->step[1], normal);
+  const double side = supine_dot(normal, image->step[2]) < 0.0 ? -1.0 : 1.0;
+  const double along =
+      supine_dot(image->step[0], image->step[1]) / supine_dot(image->step[0], image->step[0]);
+  for (size_t k = 0; k < 3; ++k) {
+    image->step[1][k] -= along * image->step[0][k];
+    image->step[2][k] = side * plane * normal[k] / supine_length(normal);
+  }
+}
+
 /* Make the grid that covers the lungs. Its nodes are voxels of `like`, at about the given spacing,
- * and continue beyond its border; if `like` is NULL, the axes of the grid are x, y and z. */
+ * and continue beyond its border; if `like` is NULL, the axes of the grid are x, y and z. Its axes
+ * are right-handed and at right angles. */
 static supine_status make_grid(const supine_inside_shells *shells, const supine_image *like,
                                double spacing, double margin, supine_image *grid,
                                supine_error *error) {
   static const supine_image plain = {.step = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}}};
-  const supine_image from = like != NULL ? *like : plain;
+  supine_image from = like != NULL ? *like : plain;
   double low[3];
   double high[3];
   double first[3];
@@ -40,13 +67,17 @@ static supine_status make_grid(const supine_inside_shells *shells, const supine_
   double reach = margin; /* distance from the lungs to the border of the grid */
   cover(shells, &from, low, high);
   for (int k = 0; k < 3; ++k) {
-    const double edge = supine_length(from.step[k]);
-    every[k] = like != NULL ? fmax(1.0, rint(spacing / edge)) : spacing;
-    reach += every[k] * edge;
     SUPINE_REFUSE_IF(
         like != NULL && (high[k] < 0.0 || low[k] > (double)from.size[k] - 1.0), error,
         SUPINE_ERROR_MESH,
         "the image does not show the lungs: check its axes and the axes of the meshes");
+  }
+  make_right_angled(&from);
+  cover(shells, &from, low, high);
+  for (int k = 0; k < 3; ++k) {
+    const double edge = supine_length(from.step[k]);
+    every[k] = like != NULL ? fmax(1.0, rint(spacing / edge)) : spacing;
+    reach += every[k] * edge;
   }
   for (int k = 0; k < 3; ++k) {
     const double voxels = reach / supine_image_plane_distance(&from, (size_t)k);
@@ -63,6 +94,9 @@ static supine_status make_grid(const supine_inside_shells *shells, const supine_
   for (int a = 0; a < 3; ++a) {
     grid->origin[a] = from.origin[a] + first[0] * grid->step[0][a] + first[1] * grid->step[1][a] +
                       first[2] * grid->step[2][a];
+  }
+  if (supine_image_is_left_handed(grid)) {
+    supine_image_reverse(grid, 0);
   }
   return SUPINE_OK;
 }
