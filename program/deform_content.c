@@ -33,7 +33,10 @@ const supine_option supine_command_deform_content_options[] = {
      "where its tissue was. Resampling of an image needs the inverse",
      SUPINE_FILLS(supine_deform_content, inverse)},
     {"image", 0, "FILE",
-     "image to move and write to -o (.nrrd, .nii, .nii.gz or .mha), interpolated linearly",
+     "image to move and write to -o (.nrrd, .nii, .nii.gz or .mha), interpolated linearly. The "
+     "output "
+     "has the voxels of FILE in the same order, even if their axes are left-handed (as dcm2niix's "
+     "often are), so that the two can be compared voxel by voxel; fields are always right-handed",
      SUPINE_FILLS(supine_deform_content, image), .file = SUPINE_FILE_IN},
     {"density", 0, NULL,
      "with --image, if it is a CT in Hounsfield units: scale densities inside the lungs by the "
