@@ -52,7 +52,9 @@ static const supine_option table[] = {
     {"grid", 0, "MM",
      "embed the nodes of a grid over the lungs, MM apart, for displacement fields. An image "
      "without --labels embeds a grid even without this option: nodes are centres of its voxels, "
-     "and MM is rounded to a multiple of the distance between them",
+     "continued beyond its border, and MM is rounded to a multiple of the distance between them. "
+     "The "
+     "grid reaches 60 mm past the lungs, or 1.5 times their largest displacement",
      SUPINE_FILLS(request, content.grid_spacing), SUPINE_SAYS_GIVEN(request, content.has_grid),
      .standard = "4", SUPINE_ABOVE_ZERO, .wants = "millimetres"},
     {"labels", 0, "all|N[=NAME],...",

@@ -15,10 +15,6 @@
 #include "program/deform_content.h"
 #include "program/options/inside.h"
 
-/* Distance from the lungs at which a displacement field reaches 0, mm. Grids made by 'supine embed'
- * extend this far around the lungs. */
-static const double fade = 60.0;
-
 const supine_option supine_command_deform_content_options[] = {
     {.help = "For structures made by 'supine embed', -o FILE.csv writes a row for each named "
              "structure: the mean position of its vertices, its displacement and expected error:"},
@@ -29,7 +25,9 @@ const supine_option supine_command_deform_content_options[] = {
      "displacement field to write (.nrrd, .nii, .nii.gz or .mha): the displacement of the tissue "
      "that is at each node in the scan, or in the state of --from. It is in mm and LPS, also in "
      "NIfTI, as ITK and ANTs expect; for NiftyReg, negate x and y. Outside the lungs it falls to 0 "
-     "within 60 mm",
+     "within 60 mm, or 1.5 times the largest displacement if that is more, and it is 0 at the "
+     "border "
+     "of the grid and beyond",
      SUPINE_FILLS(supine_deform_content, field), .file = SUPINE_FILE_OUT,
      .endings = ".nrrd, .nii, .nii.gz or .mha"},
     {"inverse", 0, NULL,
@@ -37,7 +35,10 @@ const supine_option supine_command_deform_content_options[] = {
      "where its tissue was. Resampling of an image needs the inverse",
      SUPINE_FILLS(supine_deform_content, inverse)},
     {"image", 0, "FILE",
-     "image to move and write to -o (.nrrd, .nii, .nii.gz or .mha), interpolated linearly",
+     "image to move and write to -o (.nrrd, .nii, .nii.gz or .mha), interpolated linearly. The "
+     "output "
+     "has the voxels of FILE in the same order, even if their axes are left-handed (as dcm2niix's "
+     "often are), so that the two can be compared voxel by voxel; fields are always right-handed",
      SUPINE_FILLS(supine_deform_content, image), .file = SUPINE_FILE_IN},
     {"density", 0, NULL,
      "with --image, if it is a CT in Hounsfield units: scale densities inside the lungs by the "
@@ -217,7 +218,7 @@ static supine_status find_field(const supine_basis *basis, const supine_deformat
   static const double told = 0.01;
   static const double allowed = 0.1;
   SUPINE_TRY(supine_field_between(basis, moved->from_given ? &moved->from.pose : NULL, &moved->pose,
-                                  fade, field, error));
+                                  field, error));
   double folded[2];
   supine_field_folded(field, folded);
   const double around = folded[1];

@@ -12,4 +12,7 @@ add_test(NAME labels_orientation COMMAND /usr/bin/python3
 add_test(NAME foreign_tools COMMAND /usr/bin/python3
   ${CMAKE_CURRENT_SOURCE_DIR}/test_foreign_tools.py $<TARGET_FILE:supine>)
 set_tests_properties(foreign_tools PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
+add_test(NAME grid_axes COMMAND /usr/bin/python3
+  ${CMAKE_CURRENT_SOURCE_DIR}/test_grid_axes.py $<TARGET_FILE:supine>)
+set_tests_properties(grid_axes PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
 set_tests_properties(labels_orientation PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)

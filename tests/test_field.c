@@ -56,7 +56,7 @@ static int teardown(void **state) {
 static supine_field made_field(void) {
   supine_field field;
   supine_error error;
-  if (supine_field_create(grid, POSED(grid, weights, scales), 60.0, &field, &error) != SUPINE_OK) {
+  if (supine_field_create(grid, POSED(grid, weights, scales), &field, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
   return field;
@@ -142,6 +142,74 @@ TEST(test_field_at_nodes_and_cells_interpolates_basis) {
   supine_field_free(&field);
 }
 
+/* Return the largest displacement at the border of the grid, and at points beyond it. */
+static double at_border_and_beyond(const supine_field *field) {
+  const size_t *size = field->nodes.size;
+  double largest = 0.0;
+  for (size_t i = 0; i < size[0] * size[1] * size[2]; ++i) {
+    const size_t at[3] = {i % size[0], i / size[0] % size[1], i / size[0] / size[1]};
+    double way[3] = {0.0, 0.0, 0.0}; /* out of the grid, in nodes */
+    for (size_t a = 0; a < 3; ++a) {
+      way[a] = at[a] == 0 ? -1.0 : 0.0;
+      way[a] = at[a] + 1 == size[a] ? 1.0 : way[a];
+    }
+    for (int nodes = 0; nodes < 60 && supine_length(way) > 0.0; nodes += 7) {
+      double point[3];
+      double u[3];
+      supine_image_place(&field->nodes, i, point);
+      for (size_t k = 0; k < 9; ++k) {
+        point[k % 3] += nodes * way[k / 3] * field->nodes.step[k / 3][k % 3];
+      }
+      supine_field_at(field, point, u);
+      largest = fmax(largest, supine_length(u));
+    }
+  }
+  return largest;
+}
+
+/* Fields of 60 mm on a fine and on a coarse grid, their inverses, and the field between two poses
+ * are 0 at the border of the grid and beyond it, and fold nowhere outside the lungs. */
+TEST(test_field_border_and_outside_zero_without_folds) {
+  static const double spacings[] = {6.0, 12.0};
+  static const double gains[2] = {3.0, -1.5};
+  supine_basis *kept = grid;
+  for (size_t i = 0; i < sizeof spacings / sizeof *spacings; ++i) {
+    supine_field field;
+    supine_field inverse;
+    supine_field between;
+    supine_field_residual residual;
+    double folded[2];
+    make_grid(spacings[i]);
+    grid = helper_open(in_folder("grid"));
+    assert_int_equal(supine_field_create(grid, POSED(grid, weights, gains), &field, NULL),
+                     SUPINE_OK);
+    assert_int_equal(supine_field_invert(&field, &inverse, &residual, NULL), SUPINE_OK);
+    assert_int_equal(supine_field_between(grid, POSED(grid, weights, scales),
+                                          POSED(grid, weights, gains), &between, NULL),
+                     SUPINE_OK);
+    double largest = 0.0;
+    const float *u = field.nodes.values;
+    for (size_t n = 0; n < field.nodes.size[0] * field.nodes.size[1] * field.nodes.size[2]; ++n) {
+      const double by[3] = {(double)u[3 * n], (double)u[3 * n + 1], (double)u[3 * n + 2]};
+      largest = fmax(largest, supine_length(by));
+    }
+    supine_field_folded(&field, folded);
+    print_message("%g mm: %.1f mm at most, at the border %.3f, %.3f and %.3f mm, folds %g\n",
+                  spacings[i], largest, at_border_and_beyond(&field),
+                  at_border_and_beyond(&inverse), at_border_and_beyond(&between), folded[1]);
+    assert_true(largest > 40.0);
+    assert_true(at_border_and_beyond(&field) == 0.0);
+    assert_true(at_border_and_beyond(&inverse) == 0.0);
+    assert_true(at_border_and_beyond(&between) == 0.0);
+    assert_true(folded[1] == 0.0);
+    supine_field_free(&field);
+    supine_field_free(&inverse);
+    supine_field_free(&between);
+    supine_basis_close(grid);
+  }
+  grid = kept;
+}
+
 /* The displacements of a field are relative to the scan: they are 0 in the state of the scan. In
  * another state they equal those of a point that was embedded in the lungs. */
 TEST(test_field_scan_below_full_measured_from_scan) {
@@ -160,14 +228,14 @@ TEST(test_field_scan_below_full_measured_from_scan) {
   if (supine_inside_shells_create(surface, &below, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
-  assert_int_equal(supine_field_create(grid, &below.scan, 60.0, &field, &error), SUPINE_OK);
+  assert_int_equal(supine_field_create(grid, &below.scan, &field, &error), SUPINE_OK);
   const size_t count = field.nodes.size[0] * field.nodes.size[1] * field.nodes.size[2];
   for (size_t i = 0; i < 3 * count; ++i) {
     assert_true(fabs((double)((const float *)field.nodes.values)[i]) < 1e-4);
   }
   supine_field_free(&field);
   /* Compare the field at a grid node in the lungs with the motion of a point embedded there. */
-  assert_int_equal(supine_field_create(grid, POSED(grid, weights, scales), 60.0, &field, &error),
+  assert_int_equal(supine_field_create(grid, POSED(grid, weights, scales), &field, &error),
                    SUPINE_OK);
   size_t node = count / 2;
   while (!(((const float *)field.depth.values)[node] > 0.0F)) {
@@ -404,7 +472,7 @@ TEST(test_resample_scaled_density_keeps_mass) {
   supine_field inverse;
   supine_field_residual residual;
   const double larger[2] = {-1.4, 1.2}; /* one lung inflates, the other deflates */
-  assert_int_equal(supine_field_create(grid, POSED(grid, weights, larger), 60.0, &field, NULL),
+  assert_int_equal(supine_field_create(grid, POSED(grid, weights, larger), &field, NULL),
                    SUPINE_OK);
   assert_int_equal(supine_field_invert(&field, &inverse, &residual, NULL), SUPINE_OK);
   for (int lung = 0; lung < 2; ++lung) {
@@ -566,9 +634,8 @@ TEST(test_resample_displacement_0_voxels_copied_exactly) {
 TEST(test_field_create_without_grid_refused) {
   supine_field field;
   supine_error error;
-  assert_int_equal(
-      supine_field_create(surface, POSED(surface, weights, scales), 60.0, &field, &error),
-      SUPINE_ERROR_FORMAT);
+  assert_int_equal(supine_field_create(surface, POSED(surface, weights, scales), &field, &error),
+                   SUPINE_ERROR_FORMAT);
   assert_says(error.message, "supine embed");
 }
 
@@ -602,7 +669,7 @@ TEST(test_field_malformed_grids_refused) {
     supine_basis *bad = helper_open(in_folder("lie"));
     supine_field field;
     supine_error error;
-    assert_int_equal(supine_field_create(bad, POSED(bad, weights, scales), 60.0, &field, &error),
+    assert_int_equal(supine_field_create(bad, POSED(bad, weights, scales), &field, &error),
                      SUPINE_ERROR_FORMAT);
     assert_says(error.message, "malformed");
     supine_basis_close(bad);

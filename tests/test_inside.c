@@ -615,6 +615,40 @@ TEST(test_grid_points_inside_have_all_cell_corners) {
   }
 }
 
+/* Around the lungs, a grid reaches as far as it is asked to, even if the image ends in the lungs,
+ * and if its axes are not at right angles. Its nodes are voxels of the image, or continue them. */
+TEST(test_grid_like_cropped_image_reaches_past_lungs) {
+  const double margin = 70.0;
+  supine_image like = {.size = {30, 30, 20},
+                       .origin = {90.0, -20.0, -60.0},
+                       .step = {{-1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.6, 2.0}}};
+  supine_inside_content content = {0};
+  supine_error error;
+  if (supine_inside_content_grid(&shells, &like, 6.0, margin, &content, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  const supine_image *made = &content.grid;
+  for (size_t lung = 0; lung < shells.count; ++lung) {
+    for (size_t i = 0; i < shells.shell[lung].vertex_count; ++i) {
+      double node[3];
+      supine_image_locate(made, shells.shell[lung].vertices + 3 * i, node);
+      for (size_t a = 0; a < 3; ++a) {
+        const double last = (double)made->size[a] - 1.0;
+        const double plane = supine_image_plane_distance(made, a);
+        assert_true(plane * fmin(node[a], last - node[a]) >= margin);
+      }
+    }
+  }
+  double voxel[3];
+  supine_image_locate(&like, made->origin, voxel);
+  for (size_t a = 0; a < 3; ++a) {
+    assert_true(fabs(voxel[a] - rint(voxel[a])) < 1e-9);
+  }
+  assert_true(fabs(supine_image_plane_distance(&like, 1) - 2.0 / hypot(2.0, 0.6)) < 1e-12);
+  assert_true(fabs(supine_image_cell_diagonal(&like) - sqrt(1.0 + 1.6 * 1.6 + 4.0)) < 1e-12);
+  supine_inside_content_free(&content);
+}
+
 TEST(test_grid_bad_requests_refused) {
   supine_inside_content content = {0};
   supine_error error;

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Choose the reader of an image by the ending of the file's name, and check what it has read. */
 #include <math.h>
+#include <stdlib.h>
+#include <string.h>
 
 #include "base/arena.h"
 #include "base/input.h"
@@ -79,10 +81,28 @@ supine_status supine_image_read(const char *path, supine_image *image, supine_er
   return SUPINE_OK;
 }
 
+/* Copy a field of displacements, and reverse the first axis of the copy. */
+static supine_status reversed_copy(const supine_image *image, supine_image *copy,
+                                   supine_error *error) {
+  *copy = *image;
+  copy->values = malloc(supine_image_bytes(image));
+  if (copy->values == NULL) {
+    return supine_error_memory(error, "%zu bytes of a field", supine_image_bytes(image));
+  }
+  memcpy(copy->values, image->values, supine_image_bytes(image));
+  supine_image_reverse(copy, 0);
+  return SUPINE_OK;
+}
+
 supine_status supine_image_write(const char *path, const supine_image *image, const char *note,
                                  supine_error *error) {
   SUPINE_REFUSE_IF(!supine_image_supports(path), error, SUPINE_ERROR_ARGUMENT,
                    "%s: end the name of an image in .nrrd, .nii, .nii.gz or .mha", path);
+  SUPINE_FREED_BY(supine_image_free) supine_image turned = {0};
+  if (image->channels == 3 && supine_image_is_left_handed(image)) {
+    SUPINE_TRY(reversed_copy(image, &turned, error));
+    image = &turned;
+  }
   SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
   SUPINE_TRY(supine_output_open(path, &output, error));
   const supine_status status =

@@ -288,7 +288,8 @@ function gainsFor(basis, forms, volumes, total) {
 
 /** Return a moment: {gravity, weights, gains, held, folds}, the state of the lungs for a direction of gravity and a
  * volume `depth` mL above rest. `weights` are those of the modes, `gains` the factors of the displacement of each lung
- * along x, y, z, and `held` the volume (gas and tissue) of each lung, mL. `folds`: whether the surface folds before.
+ * along x, y, z, `held` the volume (gas and tissue) of each lung, mL, and `above` is `depth`. `folds`: whether the
+ * surface folds before.
  * Another simulator's fields are not scaled to a volume. */
 function momentFor(basis, gravity, depth) {
   const weights = weightsFor(basis, gravity);
@@ -296,7 +297,7 @@ function momentFor(basis, gravity, depth) {
   const volumes = volumesFor(basis, gravity);
   const gains = basis.fields ? forms.map(() => [1, 1, 1]) : gainsFor(basis, forms, volumes, sumOf(volumes.rest) + depth);
   const held = gains.map((gain, lung) => basis.references[lung] + formAt(forms[lung], gain));
-  return { gravity, weights, gains: Float64Array.from(gains.flat()), held, folds: !gains.flat().every(Number.isFinite) };
+  return { gravity, weights, gains: Float64Array.from(gains.flat()), held, above: depth, folds: !gains.flat().every(Number.isFinite) };
 }
 
 function lungOf({ lungBegin }, vertex) {
