@@ -3,7 +3,7 @@
 #include <float.h>
 #ifdef _WIN32
 #include <locale.h>
-#else
+#elif !defined __wasm__
 #include <langinfo.h>
 #endif
 #include <stdbool.h>
@@ -131,6 +131,8 @@ double supine_number_parse(const char *text, char **end) {
 static bool mark_is_point(void) {
 #ifdef _WIN32
   return strcmp(localeconv()->decimal_point, ".") == 0; /* of the calling thread */
+#elif defined __wasm__
+  return true; /* there is no other locale; the code for others is left out */
 #else
   return strcmp(nl_langinfo(RADIXCHAR), ".") == 0;
 #endif
