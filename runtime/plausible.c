@@ -6,6 +6,7 @@
 
 #include <supine/sh.h>
 
+#include "base/number.h"
 #include "runtime/internal.h"
 
 static const double farthest_mm = 1e7;     /* limit for distances from the origin, mm */
@@ -38,7 +39,7 @@ static bool plausible_positions(const supine_basis *basis, char *detail, size_t 
     ordered = ordered && low <= high;
   }
   if (!ordered || farthest > farthest_mm) {
-    (void)snprintf(detail, size,
+    (void)supine_print_text(detail, size,
                    "a position, the box of the lungs or the midline is %g mm from the origin, more "
                    "than %g mm, or the box is empty",
                    farthest, farthest_mm);
@@ -67,7 +68,7 @@ static bool plausible_modes(const supine_basis *basis, char *detail, size_t size
     moved += most * basis->mode_size[k];
   }
   if (!(weight <= largest_weight) || !(moved <= largest_move_mm)) {
-    (void)snprintf(detail, size,
+    (void)supine_print_text(detail, size,
                    "modes have weights of up to %g and displacements of up to %g mm, more than %g "
                    "and %g mm",
                    weight, moved, largest_weight, largest_move_mm);
@@ -86,12 +87,12 @@ static bool plausible_forms(const supine_basis *basis, char *detail, size_t size
   const size_t normals = info->lung_count * info->normal_count * (info->volume_axes == 3 ? 3 : 1) *
                          supine_basis_normal_terms(basis);
   if (form > largest_form_ml) {
-    (void)snprintf(detail, size, "a coefficient of the volumes is %g mL, above %g mL", form,
+    (void)supine_print_text(detail, size, "a coefficient of the volumes is %g mL, above %g mL", form,
                    largest_form_ml);
     return false;
   }
   if (largest_of(info->normal_weights, normals) > largest_normal) {
-    (void)snprintf(detail, size, "tensor 'normal_weights' has a number above %g", largest_normal);
+    (void)supine_print_text(detail, size, "tensor 'normal_weights' has a number above %g", largest_normal);
     return false;
   }
   return true;
@@ -103,27 +104,27 @@ static bool plausible_scan(const supine_basis *basis, char *detail, size_t size)
   const double length = sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     if (!(fabs(basis->reference_volume[lung]) <= largest_ml)) {
-      (void)snprintf(detail, size, "the reference volume of lung '%s' is %g mL, above %g mL",
+      (void)supine_print_text(detail, size, "the reference volume of lung '%s' is %g mL, above %g mL",
                      basis->info.lung_names[lung], basis->reference_volume[lung], largest_ml);
       return false;
     }
   }
   if (!(fabs(basis->scan_volume) <= largest_ml)) {
-    (void)snprintf(detail, size, "metadata 'scan_volume_ml' is %g, above %g", basis->scan_volume,
+    (void)supine_print_text(detail, size, "metadata 'scan_volume_ml' is %g, above %g", basis->scan_volume,
                    largest_ml);
     return false;
   }
   if (!(fabs(length - 1) <= 1e-3)) {
-    (void)snprintf(detail, size, "metadata 'scan_gravity' has the length %g, not 1", length);
+    (void)supine_print_text(detail, size, "metadata 'scan_gravity' has the length %g, not 1", length);
     return false;
   }
   if (!(basis->upright_gain >= 0 && basis->upright_gain <= 1)) {
-    (void)snprintf(detail, size, "metadata 'full_upright_gain' is %g, not 0 to 1",
+    (void)supine_print_text(detail, size, "metadata 'full_upright_gain' is %g, not 0 to 1",
                    basis->upright_gain);
     return false;
   }
   if (largest_of(basis->info.bend, 3) > largest_bend) {
-    (void)snprintf(detail, size, "metadata 'bend' has a number above %g", largest_bend);
+    (void)supine_print_text(detail, size, "metadata 'bend' has a number above %g", largest_bend);
     return false;
   }
   return true;
@@ -144,7 +145,7 @@ static bool plausible_row(const double *row, double reference, char *detail, siz
       change += row[t] * y[t];
     }
     if (!(change > -reference && change < reference)) {
-      (void)snprintf(detail, size,
+      (void)supine_print_text(detail, size,
                      "tensor 'resting_volume' has %g mL at rest in a posture, for lungs with a "
                      "reference volume of %g mL",
                      reference + change, reference);
@@ -153,7 +154,7 @@ static bool plausible_row(const double *row, double reference, char *detail, siz
     farthest = fmax(farthest, fabs(change));
   }
   if (farthest < least_rest_share * reference) {
-    (void)snprintf(detail, size,
+    (void)supine_print_text(detail, size,
                    "tensor 'resting_volume' differs from the reference volume by only %g mL",
                    farthest);
     return false;

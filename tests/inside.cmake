@@ -6,6 +6,9 @@ supine_test(field supine_inside supine_warp supine_lungs)
 set_tests_properties(image labels PROPERTIES
   ENVIRONMENT "LSAN_OPTIONS=suppressions=${CMAKE_CURRENT_SOURCE_DIR}/lsan.supp:print_suppressions=0")
 
+# Pass names with commas, quotes and umlauts through all CSV files.
+add_test(NAME names COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/test_names.py $<TARGET_FILE:supine>)
+
 # Compare results with those of nibabel, VTK and other tools that are installed.
 add_test(NAME labels_orientation COMMAND /usr/bin/python3
   ${CMAKE_CURRENT_SOURCE_DIR}/test_labels_orientation.py $<TARGET_FILE:supine>)
