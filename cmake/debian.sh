@@ -4,6 +4,7 @@
 #   sh cmake/debian.sh demo    build; make, precompute, deform and draw synthetic lungs
 #   sh cmake/debian.sh build   build the program and the tests
 #   sh cmake/debian.sh test    build, and run the tests
+#   sh cmake/debian.sh anywhere   build, and run tests as on other processors, on one, and on a busy machine
 #   sh cmake/debian.sh platforms   build the library also for musl, aarch64 and Windows, and run it
 #   sh cmake/debian.sh count   print the lines that the quick tests do not reach
 set -eu
@@ -46,7 +47,7 @@ demo)
   cmake --build --preset release
   exec sh cmake/demo.sh build/release/supine demo
   ;;
-build | test | platforms)
+build | test | anywhere | platforms)
   [ "$1" != platforms ] || build="$build $platforms"
   # Tests open exported files in node and Chromium. Install each only if it is not on PATH.
   command -v npm >/dev/null || tests="$tests nodejs npm"
@@ -59,11 +60,12 @@ build | test | platforms)
   cmake --preset release -DBUILD_TESTING=ON
   cmake --build --preset release
   [ "$1" != platforms ] || exec ctest --preset release -R '^platform_'
+  [ "$1" != anywhere ] || exec sh tests/anywhere.sh
   # One test more than processors at a time, as some tests wait for servers and pages.
   [ "$1" = build ] || exec ctest --preset release -j "$(($(nproc) + 1))"
   ;;
 *)
-  echo "usage: sh cmake/debian.sh demo|build|test|platforms|count" >&2
+  echo "usage: sh cmake/debian.sh demo|build|test|anywhere|platforms|count" >&2
   exit 1
   ;;
 esac

@@ -6,7 +6,8 @@
 Each row of the table names a folder, says what it contains, and lists folders of earlier rows. The files of a folder may
 include headers of the listed folders, and headers that those folders may include. Check also that files do not depend on
 each other in cycles, that external names have the prefix of their folder, that functions have few lines and few
-parameters, that the licences name files that exist, and that nothing depends on the locale of the host program."""
+parameters, that the licences name files that exist, that nothing depends on the locale of the host program, that
+distances are printed without digits below rounding, and that tests do not wait for a time."""
 import glob
 import os
 import re
@@ -190,6 +191,8 @@ def check_opening(files):
             with open(os.path.join(source, file), encoding="utf-8") as text:
                 for name in opening.findall(text.read()):
                     faults.append(f"{file} calls {name}: call supine_input_open, or supine_input_open_beside for a name from a file")
+
+
 LOCALE_FILES = ("base/number.c", "base/locale.c", "base/locale.h")
 CALL = re.compile(r"\b((?:v|f|s|vf|vs|sn|vsn|d|as)?printf|(?:f|s)?scanf|strto[dfl]|strtold|ato[fil]|\w*locale\w*|is(?:alnum|alpha|blank|cntrl|digit|"
                   r"graph|lower|print|punct|space|upper|xdigit)|to(?:lower|upper)|strn?casecmp|strcoll|json_\w+)\s*\(")
@@ -253,11 +256,31 @@ def check_locale(files):
                 faults.append(f"{file}:{line}: {call[1]}: {fault}")
 
 
+def check_distances(files):
+    """Check that distances in mm which may be rounding errors are printed by supine_text_distance."""
+    for file in files:
+        with open(os.path.join(source, file), encoding="utf-8") as opened:
+            for digits in re.findall(r"%\.\dg mm (?:RMS|at most|largest|apart|95th)|(?:residual|displacement|distance) %\.\dg mm", opened.read()):
+                faults.append(f"{file}: '{digits}': digits below rounding depend on the processor: use supine_text_distance")
+
+
+def check_waits():
+    """Check that tests wait for events, not for a time."""
+    for folder, below, names in os.walk(os.path.join(source, "tests")):
+        below[:] = [name for name in below if name not in ("node_modules", "bench")]
+        for name in (name for name in names if name.endswith((".c", ".cpp", ".py", ".mjs", ".sh")) and name != "house.py"):
+            with open(os.path.join(folder, name), encoding="utf-8") as opened:
+                for wait in re.findall(r"\bwaitForTimeout\(|\btime\.sleep\(|\bu?sleep\(|^ *sleep [\d$].*", opened.read(), re.M):
+                    faults.append(f"{os.path.join(folder, name)}: '{wait}': wait for an event or for the answer to a later message")
+
+
 folders = read_table()
 files = tracked()
 check_licences()
 check_locale(files)
 check_sizes(files)
+check_distances(files)
+check_waits()
 check_includes(folders, files)
 check_system_headers(files)
 check_opening(files)
