@@ -60,7 +60,13 @@ run(supine, "precompute", "p.ply", "--held-out", "20", "-o", "l.safetensors")
 run(supine, "embed", "l.safetensors", "--grid", "10", "-o", "g.safetensors")
 for ending in ("nrrd", "nii.gz", "mha"):
     run(supine, "deform", "g.safetensors", "--posture", "prone", "--volume", "rest", "--field-out", f"f.{ending}")
-vectors, origin = read_nrrd("f.nrrd")
+run(supine, "embed", "l.safetensors", "--grid", "12", "-o", "coarse.safetensors")
+run(supine, "deform", "coarse.safetensors", "--from", "supine:rest", "--posture", "left", "--volume", "full", "--field-out", "coarse.nrrd")
+for name in ("coarse.nrrd", "f.nrrd"):
+    vectors, origin = read_nrrd(name)
+    border = max(numpy.abs(numpy.take(vectors, end, axis)).max() for axis in range(3) for end in (0, -1))
+    if border != 0 or numpy.abs(vectors).max() < 20:
+        faults.append(f"{name}: {border} mm at the border of the grid, {numpy.abs(vectors).max()} mm at most")
 
 if faults:
     sys.exit("\n".join(faults))
