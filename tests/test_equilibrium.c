@@ -2,6 +2,7 @@
 /* Test that the equilibrium solves its equations, and equals the iteration of [Santhanam2008]. */
 
 #include "precompute/physics/equilibrium.h"
+#include "precompute/physics/network.h"
 #include "test.h"
 #include <gsl/gsl_linalg.h>
 

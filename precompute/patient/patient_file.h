@@ -64,7 +64,7 @@ typedef struct supine_patient_expand_report {
  *
  * - u_i is the displacement from the fuller to the emptier surface.
  * - d_i is the displacement that a force of 1 causes, [Santhanam2008] (15)-(17).
- * - F_i is the applied force after smoothing over the surface (equilibrium.h).
+ * - F_i is the applied force after smoothing over the surface (smoothing.h).
  * - f is the applied force before smoothing; the matrix A inverts the smoothing.
  * A amplifies roughness of u, so f is averaged over the vertices in each cube of 40 mm. */
 typedef struct supine_patient_applied {
@@ -140,7 +140,7 @@ supine_status supine_patient_read(const char *path, supine_patient_record *recor
  * whatever volume was measured. The direction of a vertex is d = -u / F:
  * - u is the patient's displacement of the vertex between the two scanned states, extrapolated to
  *   the displacement from full inflation to rest.
- * - F is the patient's force on the vertex, smoothed over the surface (equilibrium.h). The
+ * - F is the patient's force on the vertex, smoothed over the surface (smoothing.h). The
  *   unsmoothed force, and the ratio of F to it, are at least 0.2.
  * @param record   `shown`, `path_span`, `volume` and `lung_volume` are written
  * @param lungs    scan of one of the two states
@@ -206,7 +206,7 @@ supine_status supine_patient_fit_surface(const supine_lungs *fuller, const supin
  * - f is the force on the point by this law.
  * - h and h' are its depths along gravity, 0 to 1, in the posture of the two and the third scan.
  * - g is the gain, s a factor for each lung, and t a translation; all three are fitted.
- * On a surface, f, h and h' are smoothed (equilibrium.h), and every fit starts from new matches.
+ * On a surface, f, h and h' are smoothed (smoothing.h), and every fit starts from new matches.
  * @param fuller   surface in the fuller of the two scans; NULL if `surface` is NULL
  * @param pairs    points in the fuller and in the third scan; NULL if `surface` is given
  * @param scans_moved  whether to fit t; otherwise it is 0

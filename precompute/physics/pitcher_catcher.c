@@ -4,7 +4,8 @@
 #include <string.h>
 
 #include "base/arena.h"
-#include "precompute/physics/equilibrium.h"
+#include "precompute/physics/network.h"
+#include "precompute/physics/stiffness.h"
 
 /* State of the iteration. Node i < N is vertex i of a mesh of N vertices; node N + e is edge e. */
 typedef struct iteration {
