@@ -50,7 +50,7 @@ static double fit(work *w, bool fits_gain, size_t without) {
     const supine_patient_row *row = &w->matching.rows[i];
     const double weight = row->block == without ? 0.0 : row->weight;
     const double along = supine_dot(row->axis, w->motion[i].u);
-    const size_t lung = row->place.side > 0.0 ? 0U : 1U;
+    const size_t lung = row->place.side > 0 ? 0U : 1U;
     double x[UNKNOWNS] = {0.0};
     x[lung] = along;
     x[GAIN] = fits_gain ? scale[lung] * w->motion[i].force_change * along : 0.0;
@@ -79,7 +79,7 @@ static double fit(work *w, bool fits_gain, size_t without) {
 /* Compute the depth along gravity: 0 at the top of the lungs' bounding box, 1 at its bottom. */
 static double depth_at(const supine_patient_frame *frame, const supine_patient_place *place,
                        const double gravity[3]) {
-  const double outer = place->side > 0.0 ? frame->maximum[0] : frame->minimum[0];
+  const double outer = place->side > 0 ? frame->maximum[0] : frame->minimum[0];
   double depth = 0.0;
   double range = 0.0;
   for (int k = 0; k < 3; ++k) {
@@ -128,7 +128,7 @@ static void find_motion(work *w, const double gravity[3]) {
     const double fitted_depth = 0.5 * columns[0] - g[1] * columns[2] - g[2] * columns[3];
     w->motion[i].force_change = (depth_at(frame, &place, gravity) - fitted_depth) /
                                 fmax(force_least, supine_patient_force_at(&patient->power, &place));
-    m->rows[i].block = (place.side > 0.0 ? 4U : 0U) + (place.box[1] > 0.5 ? 2U : 0U) +
+    m->rows[i].block = (place.side > 0 ? 4U : 0U) + (place.box[1] > 0.5 ? 2U : 0U) +
                        (place.box[2] > 0.5 ? 1U : 0U);
     if (m->state != NULL && !w->record->from_surface) {
       /* Use the bounding box of the landmarks, because the displacement law was fitted in it. */
@@ -147,8 +147,8 @@ static void find_motion(work *w, const double gravity[3]) {
 static supine_status match_surface(work *w, supine_error *error) {
   supine_patient_matching *m = &w->matching;
   for (size_t i = 0; i < m->count; ++i) {
-    const double scale = w->x[m->rows[i].place.side > 0.0 ? 0U : 1U] *
-                         (1.0 + w->x[GAIN] * w->motion[i].force_change);
+    const double scale =
+        w->x[m->rows[i].place.side > 0 ? 0U : 1U] * (1.0 + w->x[GAIN] * w->motion[i].force_change);
     for (size_t k = 0; k < 3; ++k) {
       m->match[i].position[k] = m->fuller->mesh.vertices[3 * m->match[i].vertex + k] +
                                 (scale - w->state_share[0][k]) * w->motion[i].u[k] + w->x[2 + k];
@@ -180,12 +180,14 @@ static supine_status iterate(work *w, supine_patient_further *further, supine_er
       ROUNDS, change);
   memcpy(further->scale, w->x, sizeof further->scale);
   further->gain = w->x[GAIN];
-  for (size_t without = 0; without < BLOCKS && further->fits_gain; ++without) {
-    memcpy(w->x, further->scale, sizeof further->scale);
-    (void)fit(w, true, without);
-    const double change_of_gain = w->x[GAIN] - further->gain;
-    sum += change_of_gain;
-    square += change_of_gain * change_of_gain;
+  if (further->fits_gain) {
+    for (size_t without = 0; without < BLOCKS; ++without) {
+      memcpy(w->x, further->scale, sizeof further->scale);
+      (void)fit(w, true, without);
+      const double change_of_gain = w->x[GAIN] - further->gain;
+      sum += change_of_gain;
+      square += change_of_gain * change_of_gain;
+    }
   }
   further->residual_without_gain = fit(w, false, BLOCKS);
   further->gain_error = sqrt(fmax(0.0, (BLOCKS - 1.0) / BLOCKS * (square - sum * sum / BLOCKS)));
@@ -218,12 +220,13 @@ void supine_patient_gain_set(supine_patient_record *record) {
     gain += weight * further->gain;
     precision += weight;
   }
-  if (precision > 0.0) {
+  record->gain_fitted = precision > 0.0;
+  if (record->gain_fitted) {
     gain /= precision;
     record->gain_error = pow(precision, -0.5);
     record->gain_undetermined = gain < gain_least || gain > gain_most;
   }
-  if (precision > 0.0 && !record->gain_undetermined) {
+  if (record->gain_fitted && !record->gain_undetermined) {
     record->force = supine_patient_force(&record->patient.power, gain, record->state[1].gravity);
   }
 }
