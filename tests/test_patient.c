@@ -501,6 +501,66 @@ TEST(test_record_written_then_read_same) {
   supine_patient_pairs_free(&pairs);
 }
 
+/* Replace the first `old` in `text`, and read the result as a file. Return its status. */
+static supine_status decode_changed(const char *text, const char *old, const char *new,
+                                    supine_error *error) {
+  static supine_patient_record record;
+  const char *at = strstr(text, old);
+  assert_non_null(at);
+  const size_t size = strlen(text) + strlen(new) + 1;
+  char *changed = malloc(size);
+  (void)snprintf(changed, size, "%.*s%s%s", (int)(at - text), text, new, at + strlen(old));
+  const supine_status status = supine_patient_decode("a.json", changed, &record, error);
+  free(changed);
+  return status;
+}
+
+/* Counts are integers, sides and states are words, flags are booleans. Other values are refused by
+ * their key. */
+TEST(test_decode_value_of_wrong_type_names_key) {
+  static const struct {
+    const char *old, *new, *key;
+  } wrong[] = {
+      {"\"points\": 300", "\"points\": 300.5", "\"points\""},
+      {"\"points\": 300", "\"points\": -1", "\"points\""},
+      {"\"scan\": \"emptier\"", "\"scan\": \"empty\"", "\"basis.scan\""},
+      {"\"scan\": \"emptier\"", "\"scan\": 1", "\"basis.scan\""},
+      {"\"kept\": true", "\"kept\": 1", "\"expandability.kept\""},
+      {"\"unseen_regions\": 1", "\"unseen_regions\": 1.0", "\"expandability.unseen_regions\""},
+      {"\"lung\": \"left\"", "\"lung\": \"both\"", "\"centres.lung\""},
+      {"\"lung\": \"right\"", "\"lung\": -1.0", "\"regions.lung\""},
+      {"\"radius_mm\": 40", "\"radius_mm\": -40", "\"regions.radius_mm\""},
+      {"\"displacement_mm\": 12.5", "\"displacement\": 12.5", "\"centres.displacement_mm\""},
+      {"\"lungs\": \"both\"", "\"lungs\": \"left lung\"", "\"frame.lungs\""},
+      {"\"state\": \"supine:full\"", "\"state\": \"full of air\"", "\"fuller.state\""}};
+  supine_patient_pairs pairs = scatter(30, 2);
+  supine_patient patient = known(&pairs);
+  patient.centre_count = 1;
+  patient.centre[0] = (supine_patient_centre){{1.0, -2.0, 5.0}, 1, 12.5, {0.1, 0.2, 0.3}};
+  supine_patient_record record = record_of(&patient);
+  record.in_basis = true;
+  record.shown = 1;
+  record.expand.kept = true;
+  record.expand.undetermined = 1;
+  record.stiffness = (supine_patient_stiffness){
+      .count = 1, .region = {{-1, 1.0 / 3.0, {1.0, -2.0, 0.1}, 40.0, 0.0}}};
+  char *text = supine_patient_text(&record, NULL);
+  supine_error error;
+  assert_int_equal(decode_changed(text, "\"points\": 300", "\"points\": 301", &error), SUPINE_OK);
+  for (size_t i = 0; i < sizeof wrong / sizeof *wrong; ++i) {
+    assert_int_equal(decode_changed(text, wrong[i].old, wrong[i].new, &error), SUPINE_ERROR_FORMAT);
+    assert_says(error.message, wrong[i].key);
+  }
+  assert_int_equal(decode_changed(text, "\"version\": 5", "\"version\": 4", &error),
+                   SUPINE_ERROR_FORMAT);
+  assert_says(error.message, "version 4");
+  assert_int_equal(decode_changed(text, "supine-patient", "supine-basis", &error),
+                   SUPINE_ERROR_FORMAT);
+  assert_says(error.message, "not a patient file");
+  free(text);
+  supine_patient_pairs_free(&pairs);
+}
+
 /* The volumes of the two fitted states determine the volume at rest. If a scan is in one of these
  * states, --scanned may be omitted. */
 TEST(test_scan_fitted_states_known_without_option) {
