@@ -670,7 +670,7 @@ TEST(test_gain_fit_third_scan_recovers_gain) {
       }
     }
     memcpy(other->state.gravity, g, sizeof other->state.gravity);
-    assert_int_equal(supine_patient_gain_fit(&record, NULL, &pairs, NULL, moved, other, &error),
+    assert_int_equal(supine_patient_gain_fit_landmarks(&record, &pairs, moved, other, &error),
                      SUPINE_OK);
     supine_patient_gain_set(&record);
     printf("gain: true value %.2f, found %.3f +- %.3f; scales %.3f %.3f, residual %.2f mm, %.2f mm "
@@ -688,7 +688,7 @@ TEST(test_gain_fit_third_scan_recovers_gain) {
   gsl_rng_free(random);
   const double kept = record.force.gain;
   memcpy(other->state.gravity, record.state[1].gravity, sizeof other->state.gravity);
-  assert_int_equal(supine_patient_gain_fit(&record, NULL, &pairs, NULL, false, other, &error),
+  assert_int_equal(supine_patient_gain_fit_landmarks(&record, &pairs, false, other, &error),
                    SUPINE_OK);
   assert_false(other->fits_gain);
   supine_patient_gain_set(&record);

@@ -207,15 +207,22 @@ supine_status supine_patient_fit_surface(const supine_lungs *fuller, const supin
  * - f is the force on the point by this law.
  * - h and h' are its depths along gravity, 0 to 1, in the posture of the two and the third scan.
  * - g is the gain, s a factor for each lung, and t a translation; all three are fitted.
- * On a surface, f, h and h' are smoothed (smoothing.h), and every fit starts from new matches.
- * @param fuller   surface in the fuller of the two scans; NULL if `surface` is NULL
- * @param pairs    points in the fuller and in the third scan; NULL if `surface` is given
+ * @param pairs    points in the fuller and in the third scan
  * @param scans_moved  whether to fit t; otherwise it is 0
  * @param further  in: the state of the third scan; out: the fit */
-supine_status supine_patient_gain_fit(const supine_patient_record *record,
-                                      const supine_lungs *fuller, const supine_patient_pairs *pairs,
-                                      const supine_mesh *surface, bool scans_moved,
-                                      supine_patient_further *further, supine_error *error);
+supine_status supine_patient_gain_fit_landmarks(const supine_patient_record *record,
+                                                const supine_patient_pairs *pairs, bool scans_moved,
+                                                supine_patient_further *further,
+                                                supine_error *error);
+
+/** Fit the gain as supine_patient_gain_fit_landmarks, to the surface of a third scan. f, h and h'
+ * are smoothed (smoothing.h), and every fit starts from new matches.
+ * @param fuller   surface in the fuller of the two scans
+ * @param surface  surface in the third scan */
+supine_status supine_patient_gain_fit_surface(const supine_patient_record *record,
+                                              const supine_lungs *fuller,
+                                              const supine_mesh *surface, bool scans_moved,
+                                              supine_patient_further *further, supine_error *error);
 
 /** Set record->force.gain to the mean of the gains in record->further, weighted by 1 /
  * gain_error^2. If the mean is not between 0.01 and 2, keep the previous gain. */

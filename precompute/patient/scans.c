@@ -216,25 +216,36 @@ supine_status supine_patient_scans_fit(const supine_patient_scans *scans,
   return SUPINE_OK;
 }
 
-supine_status supine_patient_scans_fit_further(supine_patient_scans *scans,
-                                               const supine_state *state, bool scans_moved,
-                                               supine_patient_pairs *pairs,
-                                               const supine_mesh *surface,
-                                               supine_patient_record *record, supine_error *error) {
-  const supine_patient *patient = &record->patient;
-  supine_lungs *from = &scans->lungs[0];
+/* Append a further state to the record, without a result. */
+static supine_patient_further *append(supine_patient_record *record, const supine_state *state) {
   supine_patient_further *further = &record->further[record->further_count++];
   *further = (supine_patient_further){.state = *state};
-  if (from->mesh.vertex_count == 0 && surface != NULL) {
+  return further;
+}
+
+supine_status supine_patient_scans_fit_further_landmarks(
+    const supine_patient_scans *scans, const supine_state *state, bool scans_moved,
+    supine_patient_pairs *pairs, supine_patient_record *record, supine_error *error) {
+  supine_patient_further *further = append(record, state);
+  if (scans->reordered) {
+    supine_patient_points_to_fuller(&record->patient, pairs->count, pairs->from);
+  }
+  return supine_patient_gain_fit_landmarks(record, pairs, scans_moved, further, error);
+}
+
+supine_status supine_patient_scans_fit_further_surface(supine_patient_scans *scans,
+                                                       const supine_state *state, bool scans_moved,
+                                                       const supine_mesh *surface,
+                                                       supine_patient_record *record,
+                                                       supine_error *error) {
+  supine_lungs *from = &scans->lungs[0];
+  supine_patient_further *further = append(record, state);
+  if (from->mesh.vertex_count == 0) {
     /* The fuller scan has no surface: move that of the emptier one to the fuller state. */
     *from = scans->lungs[1];
     scans->lungs[1] = (supine_lungs){0};
-    supine_patient_points_to_fuller(patient, from->mesh.vertex_count, from->mesh.vertices);
+    supine_patient_points_to_fuller(&record->patient, from->mesh.vertex_count, from->mesh.vertices);
     supine_lungs_measure(from);
   }
-  if (surface == NULL && scans->reordered) {
-    supine_patient_points_to_fuller(patient, pairs->count, pairs->from);
-  }
-  return supine_patient_gain_fit(record, from, surface == NULL ? pairs : NULL, surface, scans_moved,
-                                 further, error);
+  return supine_patient_gain_fit_surface(record, from, surface, scans_moved, further, error);
 }
