@@ -16,7 +16,7 @@ build="gcc libc6-dev cmake ninja-build pkg-config libfftw3-dev libgsl-dev libass
   libwebsockets-dev libnifti2-dev zlib1g-dev
   libmeshoptimizer-dev help2man"
 tests="g++ libegl-dev libgles-dev libgl1-mesa-dri poppler-utils libcmocka-dev libopenigtlink-dev mono-mcs mono-runtime
-  locales python3-vtk9 python3-numpy python3-nibabel python3-pip python3-setuptools python3-wheel gnuplot-nox
+  locales python3-vtk9 python3-yaml python3-numpy python3-nibabel python3-pip python3-setuptools python3-wheel gnuplot-nox
   plastimatch elastix tetgen calculix-ccx clang lld wasi-libc libclang-rt-dev-wasm32
   binaryen reuse abigail-tools gcc-aarch64-linux-gnu libc6-dev-arm64-cross doxygen dcmtk"
 platforms="clang musl-tools gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user gcc-mingw-w64-x86-64-win32 wine64 wine"

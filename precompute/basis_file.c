@@ -146,7 +146,7 @@ static void add_expected_error(entries *list, const supine_basis_content *conten
     add(list, "expected_error_from_mm", "%g", record->report.expected_from);
     add(list, "expected_error_source", "%s", content->prepared->fit);
   }
-  if (fitted && record->gain_error > 0.0) {
+  if (fitted && record->gain_fitted) {
     add(list, "turn_fitted", "yes");
   }
 }

@@ -51,7 +51,7 @@ static supine_model choose_law(const supine_model_choice *choice) {
 static void tell_volume(const supine_patient_record *record, double measured,
                         supine_findings *findings) {
   static const double different = 1.0 / 3.0; /* ratio of volumes minus 1 from which to warn */
-  const size_t other = record->shown == 1.0 ? 0 : 1;
+  const size_t other = 1 - record->shown;
   const double *lung = record->lung_volume[other];
   const bool both = (lung[0] > 0.0 && lung[1] > 0.0) || record->patient.frame.only_side != 0;
   char state[160];
@@ -73,7 +73,7 @@ static void describe_fit(const supine_patient_record *record, char *text, size_t
   const supine_patient_fit_report *report = &record->report;
   (void)supine_print_text(
       text, size,
-      "%s: %s law%s from %.0f points; held-out residual %.1f of %.1f mm RMS, %.0f %% "
+      "%s: %s law%s from %zu points; held-out residual %.1f of %.1f mm RMS, %.0f %% "
       "explained; expected error %.1f mm RMS",
       record->name, supine_patient_law_names[record->patient.law],
       record->patient.centre_count > 0 ? " and kriging" : "", report->points,
@@ -81,33 +81,35 @@ static void describe_fit(const supine_patient_record *record, char *text, size_t
       report->expected_point);
 }
 
-/* Use the displacement law and the force that were fitted to a patient. If the state of the scan is
- * not given, use the state in the fit. */
-static supine_status take_patient(supine_model_choice *choice, supine_prepared *p,
-                                  supine_error *error) {
-  const supine_patient_record *fitted = choice->patient;
+/* Use the displacement law and the force that were fitted to a patient.
+ * @param resting  in: the chosen volumes at rest; out: those of the patient
+ * @param scan     written: the state of the scan by the fit */
+static supine_status take_patient(const supine_patient_record *fitted, supine_prepared *p,
+                                  supine_resting *resting, supine_scan *scan, supine_error *error) {
   const size_t n = p->source.lungs.mesh.vertex_count;
   supine_patient_record *record = supine_arena_take(&p->memory, 1, sizeof *record);
   double *arrays = supine_arena_take(&p->memory, 4 * n, sizeof *arrays);
-  supine_scan scan;
   SUPINE_TRY(supine_arena_check(&p->memory, error, "%zu vertices", n));
   *record = *fitted;
   p->patient = record;
   describe_fit(record, p->fit, sizeof p->fit);
   p->model = supine_physics_model(SUPINE_LAW_DEEP);
-  SUPINE_TRY(supine_patient_model(record, &p->source.lungs, &choice->resting, &scan, arrays,
-                                  &p->model, error));
-  tell_volume(record, fitted->volume[record->shown == 1.0 ? 0 : 1], &p->source.findings);
-  if (choice->has_scan) {
-    return SUPINE_OK;
-  }
-  choice->has_scan = true;
-  choice->scan = scan;
+  SUPINE_TRY(
+      supine_patient_model(record, &p->source.lungs, resting, scan, arrays, &p->model, error));
+  tell_volume(record, fitted->volume[1 - record->shown], &p->source.findings);
+  return SUPINE_OK;
+}
+
+/* Say that the state of the scan is taken from the fit. Refuse a scan whose state the fit does not
+ * tell. */
+static supine_status assume_fitted_state(const supine_patient_record *record,
+                                         const supine_scan *scan, supine_findings *findings,
+                                         supine_error *error) {
   supine_findings_add(
-      &p->source.findings,
+      findings,
       "note: the scan is assumed to be the %s of the two that were fitted; --scanned changes this",
-      record->shown == 0.0 ? "fuller" : "emptier");
-  SUPINE_REFUSE_IF(record->shown != 0.0 && !scan.known, error, SUPINE_ERROR_ARGUMENT,
+      record->shown == 0 ? "fuller" : "emptier");
+  SUPINE_REFUSE_IF(record->shown == 1 && !scan->known, error, SUPINE_ERROR_ARGUMENT,
                    "this scan is the emptier of the two that were fitted, and how far it is below "
                    "full inflation is unknown: give its state, such as --scanned supine:rest, or "
                    "use the fuller scan");
@@ -204,9 +206,11 @@ static bool varies(const supine_model *model, size_t count) {
   return !same;
 }
 
-static void summarize(const supine_model_choice *choice, bool predicted, supine_prepared *p) {
+/* Describe what was assumed.
+ * @param resting  volumes at rest before a prediction from height and sex */
+static void summarize(const supine_model_choice *choice, const supine_resting *resting,
+                      bool predicted, supine_prepared *p) {
   static const double supine[3] = {0.0, 1.0, 0.0};
-  const supine_resting *resting = &choice->resting;
   const supine_reference *reference = &p->reference;
   const size_t size = sizeof p->assumed;
   char state[160];
@@ -258,12 +262,10 @@ static void summarize(const supine_model_choice *choice, bool predicted, supine_
   }
 }
 
-/* Decide what state the scan shows, and check that the law and --full go with it. */
-static supine_status find_scan(supine_model_choice *choice, supine_law law, supine_error *error) {
-  supine_scan *scan = &choice->scan;
-  if (!choice->has_scan && law != SUPINE_LAW_PAPER) {
-    (void)supine_reference_scan_parse("full", scan, NULL);
-  }
+/* Add the volume at full inflation to the state of the scan, and check that the law and --full go
+ * with it. */
+static supine_status complete_scan(const supine_model_choice *choice, supine_law law,
+                                   supine_scan *scan, supine_error *error) {
   SUPINE_REFUSE_IF(
       law == SUPINE_LAW_PAPER && scan->known, error, SUPINE_ERROR_ARGUMENT,
       "--law paper takes the scan as the reference: leave --scanned out, or use --law deep");
@@ -281,19 +283,36 @@ static supine_status find_scan(supine_model_choice *choice, supine_law law, supi
   return SUPINE_OK;
 }
 
+/* Choose the model: the patient's, or that of the displacement law. Where they were not given, also
+ * choose the volumes at rest and the state of the scan. */
+static supine_status choose_model(const supine_model_choice *choice, supine_prepared *p,
+                                  supine_resting *resting, supine_scan *scan, supine_error *error) {
+  if (choice->patient != NULL) {
+    supine_scan fitted;
+    SUPINE_TRY(take_patient(choice->patient, p, resting, &fitted, error));
+    if (!choice->has_scan) {
+      *scan = fitted;
+      SUPINE_TRY(assume_fitted_state(p->patient, scan, &p->source.findings, error));
+    }
+    return SUPINE_OK;
+  }
+  p->model = choose_law(choice);
+  if (!choice->has_scan && p->model.law != SUPINE_LAW_PAPER) {
+    (void)supine_reference_scan_parse("full", scan, NULL);
+  }
+  return SUPINE_OK;
+}
+
 supine_status supine_precompute_prepare(const supine_model_choice *choice, char **paths,
                                         size_t count, supine_prepared *prepared,
                                         supine_error *error) {
   supine_prepared *p = prepared;
   supine_lungs *lungs = &p->source.lungs;
-  supine_model_choice chosen = *choice; /* completed by the patient's file and the scan */
+  supine_resting resting = choice->resting;
+  supine_scan scan = choice->scan;
   SUPINE_TRY(supine_precompute_source_load(&choice->source, paths, count, &p->source, error));
-  if (choice->patient != NULL) {
-    SUPINE_TRY(take_patient(&chosen, p, error));
-  } else {
-    p->model = choose_law(choice);
-  }
-  SUPINE_TRY(find_scan(&chosen, p->model.law, error));
+  SUPINE_TRY(choose_model(choice, p, &resting, &scan, error));
+  SUPINE_TRY(complete_scan(choice, p->model.law, &scan, error));
   SUPINE_TRY(set_expandability(choice, p, error));
   SUPINE_TRY(set_lesions(choice, p, error));
   SUPINE_TRY(set_shares(choice, p, error));
@@ -301,16 +320,15 @@ supine_status supine_precompute_prepare(const supine_model_choice *choice, char 
     SUPINE_TRY(supine_physics_strain_create(lungs, p->model.stiffness, p->model.lesions,
                                             &p->model.strain, error));
   }
-  const supine_reference scanned = {.scan = chosen.scan,
-                                    .lung_count = lungs->lung_count,
-                                    .side = {lungs->side[0], lungs->side[1]}};
-  supine_resting resting = chosen.resting;
-  supine_reference_predict_rest(&scanned, &choice->person, &resting);
-  SUPINE_TRY(supine_reference_find(lungs, &p->model, &chosen.scan, &resting, &p->reference, error));
-  summarize(&chosen, resting.ml[2] != chosen.resting.ml[2], p);
+  const supine_reference scanned = {
+      .scan = scan, .lung_count = lungs->lung_count, .side = {lungs->side[0], lungs->side[1]}};
+  supine_resting predicted = resting;
+  supine_reference_predict_rest(&scanned, &choice->person, &predicted);
+  SUPINE_TRY(supine_reference_find(lungs, &p->model, &scan, &predicted, &p->reference, error));
+  summarize(choice, &resting, predicted.predicted, p);
   char doubt[512] = "";
   if (p->reference.known) {
-    supine_reference_doubt(&p->reference, &choice->person, &chosen.resting, doubt, sizeof doubt);
+    supine_reference_doubt(&p->reference, &choice->person, &resting, doubt, sizeof doubt);
   }
   if (doubt[0] != '\0') {
     supine_findings_add(&p->source.findings, "warning: %s", doubt);

@@ -129,7 +129,7 @@ static supine_status embed(const supine_basis *basis, const request *wanted,
   if (law != NULL && !supine_basis_get_info(basis)->vector) {
     SUPINE_TRY(supine_patient_decode(given->operand[0], law, &record, error));
     options.context = &record;
-    options.field = record.path_span[0] != 0.0 ? supine_patient_field : NULL;
+    options.field = record.in_basis ? supine_patient_field : NULL;
   }
   SUPINE_TRY(supine_command_embed_read(&shells, &wanted->content, given->operand + 1,
                                        given->count - 1, &content, error));

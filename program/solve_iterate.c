@@ -6,6 +6,7 @@
 #include "base/arena.h"
 #include "base/number.h"
 
+#include "precompute/physics/network.h"
 #include "program/solve_iterate.h"
 
 /* The Pitcher/Catcher iteration of [Santhanam2008] stops when the force that remains on each vertex

@@ -180,7 +180,7 @@ def check_licences():
 # supine_input_open_beside for a file that another file names. Those after the first line read CSV and JSON, which may
 # come from a pipe, from the path that the user gives.
 OPENING = ("base/input.c", "base/output.c", "runtime/safetensors/posix.c", "runtime/safetensors/windows.c",
-           "base/csv.c", "mesh/io/points.c", "precompute/patient/patient_file.c", "program/options/pv_file.c")
+           "base/csv.c", "mesh/io/points.c", "precompute/patient/patient_decode.c", "program/options/pv_file.c")
 
 
 def check_opening(files):

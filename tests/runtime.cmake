@@ -76,6 +76,11 @@ endif()
 if(Python3_FOUND)
   add_test(NAME house COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/house.py
     ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR})
+  add_test(NAME workflows COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_workflows.py
+    ${PROJECT_SOURCE_DIR})
+  set_tests_properties(workflows PROPERTIES SKIP_RETURN_CODE 77)
+  # Check that the numbers of docs/model.md are those of the code, and the promises those of the headers.
+  add_test(NAME pages COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_pages.py ${PROJECT_SOURCE_DIR})
 endif()
 
 # Check that README.md shows the program that the test `install` builds.

@@ -2,6 +2,8 @@
 /* Test that the equilibrium solves its equations, and equals the iteration of [Santhanam2008]. */
 
 #include "precompute/physics/equilibrium.h"
+#include "precompute/physics/factorisation.h"
+#include "precompute/physics/network.h"
 #include "test.h"
 #include <gsl/gsl_linalg.h>
 
@@ -192,6 +194,56 @@ TEST(test_transfer_column_two_vertices_reciprocal) {
   supine_physics_equilibrium_destroy(eq);
   free(a);
   free(b);
+}
+
+/* The product of the matrix and a vector, solved for, is the vector again, also in place and for
+ * two parts of the mesh without edges between them. The elements of the matrix are irregular. */
+TEST(test_factorisation_solve_of_product_returns_vector) {
+  static const double area = 0.3;
+  const supine_mesh lumps[2] = {helper_lump(3, 60.0, 7), helper_lump(4, -60.0, 8)};
+  supine_lungs lungs = {0};
+  supine_factorisation *factorisation = NULL;
+  uint64_t seed = 99;
+  assert_int_equal(supine_lungs_create(lumps, 2, NULL, &lungs, NULL), SUPINE_OK);
+  const size_t n = lungs.mesh.vertex_count;
+  const size_t edges = lungs.topology.edge_count;
+  double *diagonal = malloc(n * sizeof *diagonal);
+  double *coupling = malloc(edges * sizeof *coupling);
+  double *vector = malloc(n * sizeof *vector);
+  double *product = malloc(n * sizeof *product);
+  double *expected = calloc(n, sizeof *expected);
+  for (size_t i = 0; i < n; ++i) {
+    diagonal[i] = area + helper_random(&seed);
+    vector[i] = helper_random(&seed) - 0.4;
+  }
+  for (size_t e = 0; e < edges; ++e) {
+    coupling[e] = 0.1 + helper_random(&seed);
+    diagonal[lungs.topology.edges[2 * e]] += coupling[e];
+    diagonal[lungs.topology.edges[2 * e + 1]] += coupling[e];
+  }
+  for (size_t i = 0; i < n; ++i) {
+    expected[i] = diagonal[i] * vector[i];
+  }
+  for (size_t e = 0; e < edges; ++e) {
+    const uint32_t *edge = lungs.topology.edges + 2 * e;
+    expected[edge[0]] -= coupling[e] * vector[edge[1]];
+    expected[edge[1]] -= coupling[e] * vector[edge[0]];
+  }
+  assert_int_equal(supine_physics_factorisation_create(&lungs.topology, n, &factorisation, NULL),
+                   SUPINE_OK);
+  supine_physics_factorisation_set(factorisation, diagonal, coupling);
+  supine_physics_factorisation_multiply(factorisation, vector, product);
+  assert_true(helper_difference(n, product, expected) < 1e-13 * helper_largest(n, expected));
+  assert_int_equal(supine_physics_factorisation_solve(factorisation, 1, product, product, NULL),
+                   SUPINE_OK);
+  assert_true(helper_difference(n, product, vector) < 1e-12);
+  supine_physics_factorisation_destroy(factorisation);
+  supine_lungs_free(&lungs);
+  free(diagonal);
+  free(coupling);
+  free(vector);
+  free(product);
+  free(expected);
 }
 
 TEST(test_transfer_column_all_vertices_superpose_to_solution) {

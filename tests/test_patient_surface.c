@@ -92,7 +92,7 @@ TEST(test_fit_surface_known_law_recovered_on_another_mesh) {
   const supine_patient_applied *applied = &fit.applied;
   printf(
       "force: correlation with height %.3f, c7 to c9 %.3f %.3f %.3f, spread %.3f, residual %.3f, "
-      "%.0f blocks\n",
+      "%zu blocks\n",
       applied->correlation, applied->slopes[0], applied->slopes[1], applied->slopes[2],
       applied->spread, applied->residual, applied->blocks);
   assert_true(applied->correlation > 0.9);

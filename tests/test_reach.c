@@ -65,7 +65,7 @@ static double square_distance(const supine_mesh *mesh, size_t i, size_t j) {
 
 /* The solution equals the one found with a dense matrix, which describes how force flows between
  * nodes. A node is a mass (vertex) or a spring (edge). The weights of the links between nodes are
- * those of equilibrium.h. */
+ * those of smoothing.h. */
 TEST(test_reach_solution_equals_dense_solution) {
   const double reach = 30.0;
   supine_lungs lungs = lungs_of(helper_lump(4, 60.0, 77), reach);

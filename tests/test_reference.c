@@ -342,8 +342,9 @@ TEST(test_predict_rest_height_and_sex_literal) {
   supine_resting resting = supine_reference_resting_default();
   supine_reference_predict_rest(&full, &unknown, &resting);
   supine_reference_predict_rest(&rest, &man, &resting);
-  assert_true(resting.ml[2] == 0.0);
+  assert_true(resting.ml[2] == 0.0 && !resting.predicted);
   supine_reference_predict_rest(&full, &man, &resting);
+  assert_true(resting.predicted);
   assert_true(fabs(resting.ml[2] - 3552.9) < 1.0);
   supine_reference_predict_rest(&full, &woman, &resting);
   assert_true(fabs(resting.ml[2] - 2797.6) < 1.0);

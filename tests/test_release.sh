@@ -36,14 +36,17 @@ refuse() {
   rm -rf "$work/refused"
 }
 refuse 'v9.9.9 has version' v9.9.9
-refuse "write '## \[$version\], 20" "v$version"
+refuse 'CITATION.cff has no date-released' "v$version"
 refuse 'v8.8.8 is not a commit' v8.8.8
 cp CITATION.cff "$work"
 sed -i 's/^version: .*/version: 8.8.8/' CITATION.cff
 commit other
 refuse 'CITATION.cff: the version is not' HEAD
 cp "$work/CITATION.cff" .
-sed -i "s/^## \[$version\].*/## [$version], $(sed -n 's/^date-released: *//p' CITATION.cff)/" CHANGELOG.md
+sed -i "s/^version: .*/&\ndate-released: 2026-11-23/" CITATION.cff
+commit cited
+refuse "write '## \[$version\], 20" HEAD
+sed -i "s/^## \[$version\].*/## [$version], 2026-11-23/" CHANGELOG.md
 commit dated
 git tag -f "v$version" >/dev/null
 

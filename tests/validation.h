@@ -14,6 +14,7 @@
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_odeiv2.h>
 
+#include "precompute/physics/network.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
 #include <supine/volume.h>

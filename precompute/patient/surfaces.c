@@ -80,7 +80,7 @@ static supine_status iterate(supine_patient_matching *m, const supine_patient_fi
 
 static supine_status check_apart(supine_patient_matching *m, supine_patient_surface_report *report,
                                  supine_error *error) {
-  report->vertices = (double)m->count;
+  report->vertices = m->count;
   supine_patient_matching_find(m);
   const size_t stride = sizeof *m->match / sizeof(double);
   report->before =
@@ -104,6 +104,7 @@ static supine_status measure(supine_patient_matching *m, const supine_patient_fi
   if (record->expand.kept) {
     record->patient.power = expanding;
     record->patient.law = SUPINE_PATIENT_DEEP;
+    report->has_errors = false;
     memset(report->error, 0, sizeof report->error);
     report->held_out[SUPINE_PATIENT_SCORE_CORRECTED] = record->expand.held_out[1];
     report->explained = 100.0 * (1.0 - pow(record->expand.held_out[1] / report->baseline, 2.0));

@@ -176,9 +176,12 @@ static supine_status advance(ascent *a, supine_error *error) {
     }
     matrix[j * n + j] *= 1.0 + ridge;
   }
-  SUPINE_REFUSE_IF(n > 0 && LAPACKE_dposv(LAPACK_ROW_MAJOR, 'L', (lapack_int)n, 1, matrix,
-                                          (lapack_int)n, weights, 1) != 0,
-                   error, SUPINE_ERROR_NUMERICAL,
+  lapack_int failed = 0;
+  if (n > 0) {
+    failed =
+        LAPACKE_dposv(LAPACK_ROW_MAJOR, 'L', (lapack_int)n, 1, matrix, (lapack_int)n, weights, 1);
+  }
+  SUPINE_REFUSE_IF(failed != 0, error, SUPINE_ERROR_NUMERICAL,
                    "no surface at full inflation was found: the iteration does not progress. If "
                    "the scan is fuller than --scanned says, change --scanned or --resting; "
                    "--scanned none uses the scan as it is");

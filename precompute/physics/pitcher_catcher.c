@@ -4,7 +4,8 @@
 #include <string.h>
 
 #include "base/arena.h"
-#include "precompute/physics/equilibrium.h"
+#include "precompute/physics/network.h"
+#include "precompute/physics/stiffness.h"
 
 /* Most steps for each vertex. A uniform stiffness needs about 20 for a tolerance of 1e-6. */
 enum { STEPS_EACH = 100000 };

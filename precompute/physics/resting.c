@@ -93,6 +93,17 @@ static bool read_value(supine_resting *resting, size_t axis, const char *text) {
   return *end == '\0' && is_share(first) && is_share(share[0]) && is_share(share[1]);
 }
 
+/* Read the volume at rest into each axis along which gravity has a component. */
+static bool read_values(supine_resting *resting, const double gravity[3], const char *text) {
+  bool read = true;
+  for (size_t k = 0; k < 3; ++k) {
+    if (gravity[k] != 0.0) {
+      read = read_value(resting, 2 * k + (gravity[k] < 0.0), text) && read;
+    }
+  }
+  return read;
+}
+
 bool supine_reference_resting_given(const supine_resting *resting) {
   static const bool none[6] = {false};
   return memcmp(resting->given, none, sizeof none) != 0;
@@ -110,9 +121,10 @@ supine_status supine_reference_resting_set(supine_resting *resting, const char *
                             "'%s' is not a posture; did you mean '%s'?", posture,
                             supine_posture_nearest(posture));
   }
-  for (size_t k = 0; k < 3 && value != NULL; ++k) {
+  if (value != NULL) {
+    const bool read = read_values(&set, g, value);
     SUPINE_REFUSE_IF(
-        g[k] != 0.0 && !read_value(&set, 2 * k + (g[k] < 0.0), value), error, SUPINE_ERROR_ARGUMENT,
+        !read, error, SUPINE_ERROR_ARGUMENT,
         "%s=%s: give a share of the full volume above %g and at most %g (0.48, or 0.47/0.49 for "
         "the left and the right lung) or a volume of gas and tissue (2600mL)",
         posture, value, least_share, most_share);
@@ -143,9 +155,12 @@ supine_status supine_reference_resting_settle(supine_resting *resting, size_t co
   side = relative ? sides : side;
   full = relative ? parts : full;
   for (size_t axis = 0; axis < 6; ++axis) {
-    const double rest = resting->ml[axis] > 0.0 ? (relative ? 0.0 : resting->ml[axis])
-                        : resting->given[axis]  ? at_rest(resting, axis, count, side, full)
-                                                : 0.0;
+    double rest = 0.0;
+    if (resting->ml[axis] > 0.0) {
+      rest = relative ? 0.0 : resting->ml[axis];
+    } else if (resting->given[axis]) {
+      rest = at_rest(resting, axis, count, side, full);
+    }
     factor[axis] = rest / at_rest(&usual, axis, count, side, full);
     sum += factor[axis];
     known += factor[axis] > 0.0 ? 1.0 : 0.0;

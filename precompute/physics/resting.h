@@ -44,6 +44,7 @@ typedef struct supine_resting {
   double share[2][6]; /**< [lung, posture] volume at rest / reference volume; left lung first */
   double ml[6];   /**< [posture] volume of both lungs at rest, mL; 0 if `share` gives it instead */
   bool given[6];  /**< [posture] whether the volume is the patient's own, not assumed */
+  bool predicted; /**< whether supine_reference_predict_rest has set the supine volume */
   double assumed; /**< share of both lungs, supine, from which other volumes are assumed */
   double spread;  /**< standard deviation of an assumed volume at rest / volume at full inflation */
 } supine_resting;
