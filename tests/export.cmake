@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-supine_test(export_glb runtime_fixture supine_commands PkgConfig::JANSSON supine_gsl)
-supine_test(export_html runtime_fixture supine_commands supine_gsl ${MESHOPT_LINK_LIBRARIES})
+supine_test(program/export_glb runtime_fixture supine_commands PkgConfig::JANSSON supine_gsl)
+supine_test(program/export_html runtime_fixture supine_commands supine_gsl ${MESHOPT_LINK_LIBRARIES})
 
 # Open exported files in other programs, and compare them with the C evaluator. The tests need node, the packages in
 # tests/export/package.json (npm install in that folder) and, for pages, Chromium; otherwise they are skipped.

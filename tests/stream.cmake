@@ -40,7 +40,7 @@ if(Python3_EXECUTABLE)
       ${MONO_PROGRAM} ${unity}/link.exe {port} {basis})
     set_tests_properties(stream_unity_link_compiles PROPERTIES FIXTURES_SETUP unity)
     set_tests_properties(stream_unity PROPERTIES FIXTURES_REQUIRED unity TIMEOUT 900)
-    add_test(NAME csharp COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_csharp.sh ${PROJECT_SOURCE_DIR}
+    add_test(NAME csharp COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_csharp.sh ${PROJECT_SOURCE_DIR}
       $<TARGET_FILE:supine_runtime_shared> $<TARGET_FILE:supine> ${CMAKE_C_COMPILER} ${MCS_PROGRAM} ${MONO_PROGRAM})
   endif()
   # Test the live page in headless Chromium.

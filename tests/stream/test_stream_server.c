@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The server with peers on loopback: regular, slow, stuck, vanishing, hostile, and many. */
-#include "tests/test.h"
+#include "tests/helpers/test.h"
 
 #include <endian.h>
 #include <errno.h>
@@ -14,9 +14,9 @@
 #include "base/clock.h"
 #include "program/stream/peer.h"
 #include "program/stream/tracked_patient.h"
-#include "tests/runtime_fixture.h"
+#include "tests/helpers/runtime_fixture.h"
 
-#include "tests/poses.h"
+#include "tests/helpers/poses.h"
 
 enum { VERTICES = 6000, MODES = 6, LUNGS = 2, FLOATS = MODES + 3 * LUNGS };
 
