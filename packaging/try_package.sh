@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Test a package in a clean Debian 12, as root: try_package.sh supine_*.deb EXAMPLE.c
+# Test a package in a clean Debian 12, as root: try_package.sh supine_*.deb examples/deform/deform.c
 # Install the package by apt, run the program, compile the example with the library, purge the package, and check
 # that no file is left.
 set -eu

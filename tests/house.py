@@ -6,7 +6,8 @@
 Each row of the table names a folder, says what it contains, and lists folders of earlier rows. The files of a folder may
 include headers of the listed folders, and headers that those folders may include. Check also that files do not depend on
 each other in cycles, that external names have the prefix of their folder, that functions have few lines and few
-parameters, that the licences name files that exist, that nothing depends on the locale of the host program, that
+parameters, that the licences name files that exist, that examples
+have a README and a test, that nothing depends on the locale of the host program, that
 distances are printed without digits below rounding, and that tests do not wait for a time."""
 import glob
 import os
@@ -274,8 +275,32 @@ def check_waits():
                     faults.append(f"{os.path.join(folder, name)}: '{wait}': wait for an event or for the answer to a later message")
 
 
+def check_examples():
+    """Check that each example has a README that names its files and an existing test, and a row in examples/README.md."""
+    defined = set()
+    for path in glob.glob(os.path.join(source, "tests", "*.cmake")) + [os.path.join(source, "tests", "CMakeLists.txt")]:
+        with open(path, encoding="utf-8") as opened:
+            defined |= set(re.findall(r"add_test\(NAME ([\w$\{}]+)", opened.read().replace("npm_${where}", "npm_node")))
+    with open(os.path.join(source, "examples", "README.md"), encoding="utf-8") as opened:
+        table = set(re.findall(r"^\| \[(\w+)\]\(\1/README\.md\) \|", opened.read(), re.M))
+    present = {name for name in os.listdir(os.path.join(source, "examples")) if name != "README.md"}
+    faults.extend(f"examples/README.md: no row for {name}" for name in sorted(present - table))
+    faults.extend(f"examples/README.md: {name} does not exist" for name in sorted(table - present))
+    for name in sorted(present & table):
+        with open(os.path.join(source, "examples", name, "README.md"), encoding="utf-8") as opened:
+            text = opened.read()
+        tests = set(re.findall(r"test `(\w+)`", text))
+        if not tests or not tests <= defined | {"npm_browser"}:
+            faults.append(f"examples/{name}/README.md: name the tests that build or run the example: {sorted(tests)}")
+        for _, below, names in os.walk(os.path.join(source, "examples", name)):
+            below[:] = [inner for inner in below if inner != "__pycache__"]
+            faults.extend(f"examples/{name}/README.md does not name {file}" for file in names if file not in text and
+                          os.path.splitext(file)[0] not in text and file not in ("README.md", "CMakeLists.txt"))
+
+
 folders = read_table()
 files = tracked()
+check_examples()
 check_licences()
 check_locale(files)
 check_sizes(files)

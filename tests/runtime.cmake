@@ -24,14 +24,14 @@ supine_test(runtime/deform runtime_fixture)
 supine_test(runtime/deform_lit runtime_fixture)
 
 # Use the installed library by CMake and by pkg-config.
-add_executable(make_basis example/make_basis.c)
+add_executable(make_basis install/make_basis.c)
 target_include_directories(make_basis PRIVATE ${CMAKE_CURRENT_SOURCE_DIR})
 target_link_libraries(make_basis PRIVATE supine_build runtime_fixture PkgConfig::CMOCKA)
 include(CheckLanguage)
 check_language(CXX)
 if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE AND CMAKE_CXX_COMPILER)
   add_test(NAME install COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_install.sh ${CMAKE_COMMAND}
-    ${PROJECT_BINARY_DIR} ${CMAKE_CURRENT_SOURCE_DIR}/example $<TARGET_FILE:make_basis>
+    ${PROJECT_BINARY_DIR} ${PROJECT_SOURCE_DIR} $<TARGET_FILE:make_basis>
     ${CMAKE_C_COMPILER} ${CMAKE_CXX_COMPILER})
   set_tests_properties(install PROPERTIES TIMEOUT 900)
 endif()
@@ -85,5 +85,5 @@ endif()
 
 # Check that README.md shows the program that the test `install` builds.
 add_test(NAME readme_example COMMAND sh -c
-  "sed -n '/^```c$/,/^```$/p' README.md | sed '1d;$d' | cmp - tests/example/example.c"
+  "sed -n '/^```c$/,/^```$/p' README.md | sed '1d;$d' | cmp - examples/deform/deform.c"
   WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})

@@ -10,30 +10,32 @@ supine_stream_test(server supine_base Threads::Threads)
 
 # Run clients with a real server.
 find_package(Python3 COMPONENTS Interpreter)
-set(samples ${PROJECT_SOURCE_DIR}/program/stream)
+set(examples ${PROJECT_SOURCE_DIR}/examples)
 set(with_server ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/stream/with_server.py
   $<TARGET_FILE:supine>)
 if(Python3_EXECUTABLE)
   add_test(NAME stream_link COMMAND ${with_server} 1000 "--volume rest+400 --device Patient"
-    ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_link.py ${samples} {port} {basis})
+    ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_link.py ${examples}/tracker {port} {basis})
+  add_test(NAME stream_turn COMMAND ${with_server} 500 "--volume rest+400"
+    ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_turn.py ${examples}/tracker/turn.py {port} {basis})
   add_test(NAME stream_slicer COMMAND ${with_server} 500
       "--volume rest+400 --space ras --world-down 0,-1,0 --body-from-tracker 0,0,0,1"
-    ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_slicer.py ${samples}
+    ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_slicer.py ${examples}
     {port} {basis})
   add_test(NAME stream_points COMMAND ${Python3_EXECUTABLE}
-    ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_points.py $<TARGET_FILE:supine> ${samples})
+    ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_points.py $<TARGET_FILE:supine> ${examples}/tracker)
   set_tests_properties(stream_points PROPERTIES TIMEOUT 900)
   add_test(NAME stream_web COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_web.py
     $<TARGET_FILE:supine>)
   set_tests_properties(stream_web PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
-  # Test the Unity sample, compiled by Mono with stubs for the types of the engine.
+  # Test the Unity example, compiled by Mono with stubs for the types of the engine.
   find_program(MCS_PROGRAM mcs)
   find_program(MONO_PROGRAM mono)
   if(MCS_PROGRAM AND MONO_PROGRAM AND NOT SUPINE_SANITIZE)
     set(unity ${CMAKE_CURRENT_BINARY_DIR}/unity)
     file(MAKE_DIRECTORY ${unity})
     add_test(NAME stream_unity_link_compiles COMMAND ${MCS_PROGRAM} -warnaserror
-      -out:${unity}/link.exe ${samples}/SupineLink.cs ${samples}/LungBehaviour.cs
+      -out:${unity}/link.exe ${examples}/unity/SupineLink.cs ${examples}/unity/LungBehaviour.cs
       ${CMAKE_CURRENT_SOURCE_DIR}/stream/UnityStub.cs ${CMAKE_CURRENT_SOURCE_DIR}/stream/TestLink.cs)
     add_test(NAME stream_unity COMMAND ${with_server} 1000 "--volume rest+400"
       ${CMAKE_COMMAND} -E env LD_LIBRARY_PATH=$<TARGET_FILE_DIR:supine_runtime_shared>

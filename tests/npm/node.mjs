@@ -90,6 +90,11 @@ for (const readme of [join(packed, 'README.md'), process.env.README]) {
   assert.match(execFileSync(process.execPath, ['readme.mjs'], { cwd: folder, encoding: 'utf8' }), /Float32Array/);
 }
 
+/* The example runs, and prints the volumes of both lungs. */
+writeFileSync(join(folder, 'lungs.mjs'), readFileSync(join(folder, 'node_modules/supine/examples/lungs.mjs')));
+assert.match(execFileSync(process.execPath, ['lungs.mjs', demo, 'prone:rest+500'], { cwd: folder, encoding: 'utf8' }),
+  /vertices; the first is at .*\nleft lung: \d+ mL\nright lung: \d+ mL\n$/);
+
 /* In TypeScript, correct use of the package compiles, and each line of wrong use gives one error. */
 const typescript = loadCommon('typescript');
 const use = `import { open, SupineError, type State } from 'supine';

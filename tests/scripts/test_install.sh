@@ -3,9 +3,10 @@
 # Install the libraries to an empty folder, and build the examples with them by CMake and by pkg-config. Check the
 # dependencies and the exported names of the libraries.
 #
-#     test_install.sh CMAKE BUILD_FOLDER EXAMPLE_FOLDER MAKE_BASIS CC CXX
+#     test_install.sh CMAKE BUILD_FOLDER SOURCE_FOLDER MAKE_BASIS CC CXX
 set -eu
-cmake=$1 build=$2 example=$3 make_basis=$4 cc=$5 cxx=$6
+cmake=$1 build=$2 source=$3 make_basis=$4 cc=$5 cxx=$6
+example=$source/examples/deform tests=$source/tests/install
 unset SUPINE_THREADS
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -18,11 +19,14 @@ check() {
   grep -q '^100 vertices; the first is at' "$work/out" || { cat "$work/out"; exit 1; }
 }
 
-# Build the example by CMake, which finds the headers only in the installed package.
-CC=$cc CXX=$cxx "$cmake" -S "$example" -B "$work/build" -G Ninja -DCMAKE_PREFIX_PATH="$prefix" >>"$work/log"
+# Build the example and the tests by CMake, which finds the headers only in the installed package.
+CC=$cc CXX=$cxx "$cmake" -S "$example" -B "$work/example" -G Ninja -DCMAKE_PREFIX_PATH="$prefix" >>"$work/log"
+"$cmake" --build "$work/example" >>"$work/log"
+CC=$cc CXX=$cxx "$cmake" -S "$tests" -B "$work/build" -G Ninja -DCMAKE_PREFIX_PATH="$prefix" >>"$work/log"
 "$cmake" --build "$work/build" >>"$work/log"
-check "$work/build/example_static"
-check "$work/build/example_shared"
+check "$work/example/deform"
+check "$work/example/deform_cpp"
+check "$work/build/deform_shared"
 "$work/build/header_cpp"
 
 # Build the example with the flags that pkg-config prints.
@@ -30,13 +34,15 @@ PKG_CONFIG_PATH=$(dirname "$(find "$prefix" -name supine-runtime.pc)")
 export PKG_CONFIG_PATH
 lib=$(dirname "$PKG_CONFIG_PATH")
 # shellcheck disable=SC2046
-"$cc" -std=c17 -Wall -Wextra -Werror "$example/example.c" $(pkg-config --cflags --libs supine-runtime) -o "$work/shared"
+"$cc" -std=c17 -Wall -Wextra -Werror "$example/deform.c" $(pkg-config --cflags --libs supine-runtime) -o "$work/shared"
 check env LD_LIBRARY_PATH="$lib" "$work/shared"
 # shellcheck disable=SC2046
-"$cc" -std=c17 "$example/example.c" $(pkg-config --cflags supine-runtime) "$lib/libsupine_runtime.a" -lm -o "$work/static"
+"$cc" -std=c17 "$example/deform.c" $(pkg-config --cflags supine-runtime) "$lib/libsupine_runtime.a" -lm -o "$work/static"
 check "$work/static"
-"$work/static" "$work/basis.safetensors" pron 2>"$work/out" && exit 1
-grep -q "'prone'?" "$work/out"
+for program in static example/deform_cpp; do
+  "$work/$program" "$work/basis.safetensors" pron 2>"$work/out" && exit 1
+  grep -q "'prone'?" "$work/out"
+done
 
 # The library needs only libc and libm, not FFTW, GSL or assimp.
 needed=$(objdump -p "$lib/libsupine_runtime.so" | awk '/NEEDED/ {print $2}' | sort | tr '\n' ' ')
@@ -80,10 +86,10 @@ nm --undefined-only "$lib/libsupine_runtime.a" | awk '{print $2}' | sort -u >"$w
 if grep -Ei 'fftw|gsl_|assimp|^ai[A-Z]|pthread|cblas' "$work/undefined"; then exit 1; fi
 
 # The offline library makes a basis from arrays. CMake finds it once it is installed, and refuses it as a component before.
-"$cmake" -S "$example" -B "$work/missing" -G Ninja -DCMAKE_PREFIX_PATH="$prefix" -DNEEDED=precompute >"$work/out" 2>&1 && exit 1
+"$cmake" -S "$source/examples/precompute" -B "$work/missing" -G Ninja -DCMAKE_PREFIX_PATH="$prefix" >"$work/out" 2>&1 && exit 1
 grep -q 'precompute' "$work/out"
 "$cmake" --install "$build" --prefix "$prefix" --component precompute >>"$work/log"
-CC=$cc CXX=$cxx "$cmake" -S "$example" -B "$work/offline" -G Ninja -DCMAKE_PREFIX_PATH="$prefix" -DNEEDED=precompute >>"$work/log"
+CC=$cc CXX=$cxx "$cmake" -S "$tests" -B "$work/offline" -G Ninja -DCMAKE_PREFIX_PATH="$prefix" -DNEEDED=precompute >>"$work/log"
 "$cmake" --build "$work/offline" >>"$work/log"
 "$build/supine" phantom --vertices 1000 -o "$work/lungs.ply" >>"$work/log"
 /usr/bin/python3 - "$work/lungs.ply" >"$work/lungs.txt" <<'EOF'
@@ -98,11 +104,19 @@ for t in range(m):
     print(*struct.unpack_from("<3I", data, at + 3 * width * n + 13 * t + 1))
 EOF
 # shellcheck disable=SC2046
-"$cc" -std=c17 -Wall -Wextra -Werror "$example/offline.c" $(pkg-config --cflags --libs supine-precompute) -o "$work/by_flags"
+"$cc" -std=c17 -Wall -Wextra -Werror "$tests/offline.c" $(pkg-config --cflags --libs supine-precompute) -o "$work/by_flags"
 for program in offline/offline_static offline/offline_shared by_flags; do
   LD_LIBRARY_PATH=$lib "$work/$program" "$work/lungs.txt" >"$work/out" || { cat "$work/out"; echo "failed: $program"; exit 1; }
   grep -q ' vertices, [1-8] modes$' "$work/out" || { cat "$work/out"; exit 1; }
 done
+# The example makes a basis from a file, which the other example deforms; it refuses a file that is missing.
+CC=$cc "$cmake" -S "$source/examples/precompute" -B "$work/precompute" -G Ninja -DCMAKE_PREFIX_PATH="$prefix" >>"$work/log"
+"$cmake" --build "$work/precompute" >>"$work/log"
+"$work/precompute/precompute" "$work/made.safetensors" "$work/lungs.ply" >"$work/out" 2>>"$work/log"
+grep -q '^assumed: ' "$work/out"
+"$work/example/deform" "$work/made.safetensors" prone:rest+500 | grep -q ' vertices; the first is at'
+"$work/precompute/precompute" "$work/none.safetensors" "$work/absent.ply" 2>"$work/out" && exit 1
+grep -q 'absent.ply' "$work/out"
 nm -D --defined-only "$lib/libsupine_precompute.so" | awk '$2 == "T" {print $3}' | sed 's/@@.*//' | sort >"$work/shown"
 "$cc" -std=c17 -E -P -I"$prefix/include" -include supine/precompute.h -x c /dev/null |
   grep -o 'supine_precompute_[a-z0-9_]*(' | tr -d '(' | sort -u | diff - "$work/shown"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Test the link of the Unity sample with a real server: TestLink.exe PORT BASIS
+// Test the link of the Unity example with a real server: TestLink.exe PORT BASIS
 using System;
 using System.Diagnostics;
 using System.Threading;

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Send observed points, and receive the located lungs with their expected error.
 
-    stream_points.py PROGRAM FOLDER_OF_SAMPLE_CLIENTS
+    stream_points.py PROGRAM FOLDER_OF_SUPINE_LINK
 
 The observed points come from deformed and shifted lungs. Send a TRANSFORM message for each, then all in a POINT message."""
 import csv
@@ -12,8 +12,8 @@ import subprocess
 import sys
 import tempfile
 
-supine, samples = sys.argv[1:]
-sys.path.insert(0, samples)
+supine, folder_of_link = sys.argv[1:]
+sys.path.insert(0, folder_of_link)
 from answers import answer  # noqa: E402
 from supine_link import Link, transform, unpack  # noqa: E402
 

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Test the sample for 3D Slicer, without Slicer, with a real server started with the options of the sample:
+"""Test the example for 3D Slicer, without Slicer, with a real server started with the options of the example:
 
-    stream_slicer.py SAMPLES PORT BASIS"""
+    stream_slicer.py EXAMPLES PORT BASIS"""
+import os
 import sys
 
-sys.path.insert(0, sys.argv[1])
+sys.path[:0] = [os.path.join(sys.argv[1], folder) for folder in ("slicer", "tracker")]
 from answers import faces, number_messages, wait_for  # noqa: E402
 from slicer_lung import SERVER_OPTIONS, Surface  # noqa: E402
 from supine_link import Basis, Link, array  # noqa: E402
@@ -96,7 +97,7 @@ slicer, qt = mock.MagicMock(), mock.MagicMock()
 qt.QLineEdit = lambda text: types.SimpleNamespace(text=text)
 sys.modules.update({"slicer": slicer, "slicer.ScriptedLoadableModule": loadable, "qt": qt,
                     "vtk": types.SimpleNamespace(vtkMatrix4x4=VtkMatrix)})
-sys.path.insert(0, os.path.join(sys.argv[1], "slicer"))
+sys.path.insert(0, os.path.join(sys.argv[1], "slicer", "SupineLung"))
 import SupineLung  # noqa: E402
 
 listed = mock.MagicMock()

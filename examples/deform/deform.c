@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Deform the lungs of a basis file to one state, which is a posture and a volume:
  *
- *     example lungs.safetensors prone:rest+500 */
+ *     deform lungs.safetensors prone:rest+500 */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -9,7 +9,7 @@
 
 int main(int argc, char **argv) {
   if (argc != 3) {
-    fprintf(stderr, "usage: example BASIS STATE\n");
+    fprintf(stderr, "usage: deform BASIS STATE\n");
     return 1;
   }
   supine_error error;

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: MIT
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The headers of the run-time library, from C++.
 #include <supine/posture.h>
 #include <supine/runtime.h>

@@ -7,7 +7,7 @@ Start the server:
 
 then, in Slicer's Python console:
 
-    import sys; sys.path.append("/path/to/samples")   # the folder of this file and supine_link.py
+    import sys; sys.path += ["/path/to/examples/slicer", "/path/to/examples/tracker"]
     from slicer_lung import Follow
     follow = Follow("PatientToRoom")   # a linear transform node with the patient's orientation
     follow.stop()
