@@ -30,8 +30,8 @@ typedef struct tally {
 typedef struct accuracy_work {
   const supine_truth *truth;
   const supine_compression *compression;
-  const double *directions; /* [N, 3] displacement of each vertex per unit force, mm */
-  const double *weights;    /* [held-out directions, modes] weight of each mode */
+  const supine_rows *rows; /* kind of the rows of `compression` */
+  const double *weights;   /* [held-out directions, modes] weight of each mode */
   const double *gains; /* [held-out directions, 2] factors on exact and compressed displacement */
   tally *tallies;
   double *space; /* work space of all threads */
@@ -52,7 +52,7 @@ SUPINE_CLONES static void find_errors(size_t n, size_t axes, const double *const
 
 /* Return the number of rows of the compression for each vertex. */
 static size_t axes_of(const accuracy_work *work) {
-  return work->directions == NULL ? 3 : 1;
+  return supine_rows_per_vertex(work->rows->kind);
 }
 
 static void compare_block(const accuracy_work *work, size_t begin, size_t n, double *space,
@@ -69,7 +69,7 @@ static void compare_block(const accuracy_work *work, size_t begin, size_t n, dou
   double length[BLOCK];
   double errors[3 * BLOCK];
   for (size_t i = 0; i < n && axes == 1; ++i) {
-    length[i] = supine_length(work->directions + 3 * (begin + i));
+    length[i] = supine_length(work->rows->directions + 3 * (begin + i));
   }
   for (size_t i = 0; i < rows * modes; ++i) {
     coefficients[i] = (double)work->compression->coefficients[axes * begin * modes + i];
@@ -168,7 +168,7 @@ static void conclude(const accuracy_work *work, supine_accuracy *made) {
 
 supine_status supine_accuracy_measure(const supine_truth *truth,
                                       const supine_compression *compression,
-                                      const double *directions, const supine_volume_forms *forms,
+                                      const supine_rows *rows, const supine_volume_forms *forms,
                                       const double volume[9], supine_accuracy *accuracy,
                                       supine_error *error) {
   const size_t count = truth->direction_count;
@@ -183,7 +183,7 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
       supine_arena_take(&arena, threads * 3 * BLOCK * (modes + 2 * count), sizeof *space);
   *accuracy = (supine_accuracy){.direction_count = count};
   SUPINE_TRY(supine_arena_check(&arena, error, "errors in %zu directions", count));
-  accuracy_work work = {truth, compression, directions, weights, gains, tallies, space};
+  accuracy_work work = {truth, compression, rows, weights, gains, tallies, space};
   for (size_t d = 0; d < count; ++d) {
     const double *g = truth->directions + 3 * d;
     volumes[d] = volume_along(volume, g);
@@ -200,7 +200,7 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
   return SUPINE_OK;
 }
 
-supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const double *directions,
+supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const supine_rows *rows,
                                           const supine_compression *compression,
                                           const supine_volume_forms *forms, const double volume[9],
                                           double *share, supine_error *error) {
@@ -229,7 +229,7 @@ supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const doubl
     if (supine_volume_scale(cubic, volume_along(volume, g), &scale, NULL) != SUPINE_OK) {
       continue;
     }
-    supine_projection_displacement(compression, directions, weights, moved);
+    supine_projection_displacement(compression, rows, weights, moved);
     for (size_t i = 0; i < 3 * n; ++i) {
       moved[i] = mesh->vertices[i] + scale * moved[i];
     }

@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "base/arena.h"
-#include "base/vec3.h"
 #include <supine/sh.h>
 
 #include "precompute/projection/accuracy.h"
@@ -16,19 +15,18 @@ enum { VERTICES_MAX = 4096 };
 /* Compute the scalar products gram [rank, rank] of the columns of truth->columns over evenly chosen
  * vertices. Each vertex has the weight |d|^2, where d is its displacement per unit force. For any
  * vector w, w^T gram w is then the sum of the squared displacements by the forces columns * w.
- * Without directions, the rows of truth->columns are coordinates of displacements. */
-static void find_gram(const supine_truth *truth, size_t row_count, const double *directions,
-                      double *gram) {
+ * VECTOR rows have the weight 1. */
+static void find_gram(const supine_truth *truth, const supine_gravity_field *field, double *gram) {
   const size_t rank = truth->rank;
-  const size_t axes = directions == NULL ? 3 : 1;
-  const size_t vertex_count = row_count / axes;
+  const size_t axes = supine_rows_per_vertex(field->rows.kind);
+  const size_t vertex_count = field->expansion.row_count / axes;
   const size_t stride = (vertex_count + VERTICES_MAX - 1) / VERTICES_MAX;
   memset(gram, 0, rank * rank * sizeof *gram);
   for (size_t i = 0; i < vertex_count; i += stride) {
     for (size_t row = axes * i; row < axes * (i + 1); ++row) {
-      const double *d = directions + 3 * i;
-      cblas_dsyr(CblasRowMajor, CblasLower, (int)rank, directions == NULL ? 1.0 : supine_dot(d, d),
-                 truth->columns + row * rank, 1, gram, (int)rank);
+      const double weight = field->weight != NULL ? field->weight[row] : 1.0;
+      cblas_dsyr(CblasRowMajor, CblasLower, (int)rank, weight, truth->columns + row * rank, 1, gram,
+                 (int)rank);
     }
   }
 }
@@ -42,12 +40,12 @@ static double square_of(const double *gram, size_t rank, const double *coefficie
 }
 
 supine_status supine_accuracy_error_table_create(const supine_truth *truth,
-                                                 const supine_projection *projection,
+                                                 const supine_gravity_field *field,
                                                  const supine_compression *compression,
-                                                 const double *directions,
                                                  supine_error_table *table, supine_error *error) {
-  const size_t rank = projection->expansion.rank;
-  const size_t bands = projection->expansion.band + 1;
+  const supine_expansion *expansion = &field->expansion;
+  const size_t rank = expansion->rank;
+  const size_t bands = expansion->band + 1;
   const size_t terms = bands * bands;
   const size_t modes = compression->mode_count;
   double weights[SUPINE_MODES_MADE_MAX];
@@ -58,17 +56,16 @@ supine_status supine_accuracy_error_table_create(const supine_truth *truth,
   double *gram = supine_arena_take(&arena, rank * rank, sizeof *gram);
   *table = (supine_error_table){.band_count = bands, .mode_count = modes};
   SUPINE_TRY(supine_arena_check(&arena, error, "the table of errors"));
-  find_gram(truth, compression->row_count, directions, gram);
+  find_gram(truth, field, gram);
   for (size_t d = 0; d < truth->direction_count; ++d) {
     const double *functions = truth->functions + d * rank;
-    (void)supine_sh_evaluate(projection->expansion.band, truth->directions + 3 * d, y);
+    (void)supine_sh_evaluate(expansion->band, truth->directions + 3 * d, y);
     supine_sh_compression_weights(compression, truth->directions + 3 * d, weights);
     all += square_of(gram, rank, functions);
     memcpy(residual, functions, rank * sizeof *residual);
     for (size_t l = 0; l < bands; ++l) {
       cblas_dgemv(CblasRowMajor, CblasNoTrans, (int)rank, 2 * (int)l + 1, -1.0,
-                  projection->expansion.functions + l * l, (int)terms, y + l * l, 1, 1.0, residual,
-                  1);
+                  expansion->functions + l * l, (int)terms, y + l * l, 1, 1.0, residual, 1);
       table->harmonics[l] += square_of(gram, rank, residual);
     }
     memcpy(residual, functions, rank * sizeof *residual);

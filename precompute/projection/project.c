@@ -112,7 +112,7 @@ supine_status supine_projection_create(const supine_lungs *lungs, const supine_m
   return solve(lungs, model, projection, error);
 }
 
-void supine_projection_displacement(const supine_compression *compression, const double *directions,
+void supine_projection_displacement(const supine_compression *compression, const supine_rows *rows,
                                     const double *weights, double *u) {
   const size_t modes = compression->mode_count;
   for (size_t i = 0; i < compression->row_count; ++i) {
@@ -120,18 +120,19 @@ void supine_projection_displacement(const supine_compression *compression, const
     for (size_t k = 0; k < modes; ++k) {
       field += weights[k] * (double)compression->coefficients[i * modes + k];
     }
-    for (size_t at = 3 * i; at < 3 * i + 3 && directions != NULL; ++at) {
-      u[at] = field * directions[at];
-    }
-    if (directions == NULL) {
+    if (rows->kind == SUPINE_ROWS_VECTOR) {
       u[i] = field;
+    } else {
+      for (size_t at = 3 * i; at < 3 * i + 3; ++at) {
+        u[at] = field * rows->directions[at];
+      }
     }
   }
 }
 
 supine_status supine_projection_volume_forms(const supine_compression *compression,
                                              const supine_lungs *lungs, const double *share,
-                                             const double *directions, supine_volume_forms *forms,
+                                             const supine_rows *rows, supine_volume_forms *forms,
                                              supine_error *error) {
   const size_t count = compression->mode_count;
   const size_t values = compression->row_count * count;
@@ -141,5 +142,5 @@ supine_status supine_projection_volume_forms(const supine_compression *compressi
   for (size_t i = 0; i < values; ++i) {
     columns[i] = (double)compression->coefficients[i];
   }
-  return supine_physics_volume_forms_create(lungs, share, directions, columns, count, forms, error);
+  return supine_physics_volume_forms_create(lungs, share, rows, columns, count, forms, error);
 }

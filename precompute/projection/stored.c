@@ -11,7 +11,7 @@
 
 supine_status supine_accuracy_add_storage(const supine_basis *basis,
                                           const supine_compression *compression,
-                                          const double *directions, supine_accuracy *accuracy) {
+                                          const supine_rows *rows, supine_accuracy *accuracy) {
   enum { DIRECTIONS = 16 };
   const supine_basis_info *info = supine_basis_get_info(basis);
   const size_t n = info->vertex_count;
@@ -30,7 +30,7 @@ supine_status supine_accuracy_add_storage(const supine_basis *basis,
         supine_deform(basis, &pose, xyz) != SUPINE_OK) {
       continue;
     }
-    supine_projection_displacement(compression, directions, pose.weights, u);
+    supine_projection_displacement(compression, rows, pose.weights, u);
     for (size_t i = 0, lung = 0; i < n; ++i) {
       double error[3];
       lung += i >= info->lung_begin[lung + 1];

@@ -21,8 +21,8 @@ static supine_status read_modes(const char *text, void *field, supine_error *err
 #define FILLS(member) SUPINE_FILLS(supine_offline_request, member)
 
 const supine_option supine_offline_options[] = {
-    {"output", 'o', "FILE", "basis file to write (.safetensors)", FILLS(basis.path),
-     .required = true, .file = SUPINE_FILE_OUT},
+    {"output", 'o', "FILE", "basis file to write (.safetensors)", FILLS(path), .required = true,
+     .file = SUPINE_FILE_OUT},
     {"band", 0, "L", "highest band L of the spherical harmonics, 0 to 64", FILLS(basis.band),
      SUPINE_SAYS_GIVEN(supine_offline_request, has_band), .standard = "23",
      .range = {0.0, SUPINE_SH_BAND_MAX}, .more = true},
@@ -91,8 +91,8 @@ static void print_errors(FILE *out, const supine_accuracy *accuracy, const char 
                 accuracy->max_mm, at, state);
 }
 
-static void report_result(FILE *out, const supine_basis_choice *choice,
-                          const supine_prepared *prepared, const supine_precompute_report *report) {
+static void report_result(FILE *out, const char *path, const supine_basis_choice *choice,
+                          const supine_prepared *prepared, const supine_basis_report *report) {
   const supine_lungs *lungs = &prepared->source.lungs;
   const supine_accuracy *accuracy = &report->accuracy;
   char state[64];
@@ -104,7 +104,7 @@ static void report_result(FILE *out, const supine_basis_choice *choice,
     (void)snprintf(state, sizeof state, "%g of the volume change from full to rest",
                    accuracy->volume);
   }
-  (void)fprintf(out, "%s: %s, %zu vertices, band %zu, %zu %s%s\n", choice->path,
+  (void)fprintf(out, "%s: %s, %zu vertices, band %zu, %zu %s%s\n", path,
                 lungs->lung_count == 2 ? "two lungs" : "one lung", lungs->mesh.vertex_count,
                 choice->band, report->mode_count, choice->modes == 0 ? "harmonic" : "mode",
                 plural(report->mode_count));
@@ -127,11 +127,12 @@ static void report_result(FILE *out, const supine_basis_choice *choice,
 /* Print the highest band (degree) of spherical harmonics that the given directions of gravity
  * determine, and the leave-one-out error of each band. */
 static void report_fit(FILE *out, const char *path, const char *assumed,
-                       const supine_fields *fields, const supine_fit_report *fit) {
+                       const supine_fields *fields, const supine_basis_report *report) {
+  const supine_fit_report *fit = &report->fit;
   const size_t highest = fit->band_highest;
   (void)fprintf(out, "%s: fields of gravity: %zu vertices, %zu directions, band %zu, %zu mode%s\n",
-                path, fields->vertex_count, fields->direction_count, fit->band, fit->mode_count,
-                plural(fit->mode_count));
+                path, fields->vertex_count, fields->direction_count, fit->band, report->mode_count,
+                plural(report->mode_count));
   print_assumed(out, "--axes, --units and --scanned", assumed);
   (void)fprintf(out,
                 "the directions determine bands up to %zu (%zu harmonic%s); leave-one-out error:\n",
@@ -147,7 +148,7 @@ static void report_fit(FILE *out, const char *path, const char *assumed,
                   highest, 2 * (highest + 2) * (highest + 2), highest + 1);
   }
   (void)fprintf(out, "error of the basis, each direction predicted from the others:\n");
-  print_errors(out, &fit->accuracy, "", "");
+  print_errors(out, &report->accuracy, "", "");
 }
 
 /* Compress the fields, and write a basis of them. */
@@ -156,13 +157,12 @@ static supine_status compress_fields(const supine_offline_request *wanted,
   const supine_scan *scan = &wanted->posture;
   supine_basis_choice basis = wanted->basis;
   basis.modes = wanted->has_modes ? basis.modes : SUPINE_MODES_MADE_MAX;
-  const supine_fit_options fit = {.band = wanted->has_band ? (int)basis.band : -1,
-                                  .modes = basis.modes,
-                                  .fewest_modes = !wanted->has_modes,
-                                  .scan_gravity = scan->known ? scan->state.gravity : NULL};
+  basis.choose_band = !wanted->has_band;
+  basis.keep_modes = wanted->has_modes;
+  basis.scan_gravity = scan->known ? scan->state.gravity : NULL;
   char posture[160] = "not displaced by gravity";
   SUPINE_FREED_BY(supine_fields_free) supine_fields fields = {0};
-  supine_fit_report report;
+  supine_basis_report report;
   if (scan->known) {
     (void)supine_state_describe(&scan->state, posture, sizeof posture);
   }
@@ -170,8 +170,9 @@ static supine_status compress_fields(const supine_offline_request *wanted,
                  prepared->source.summary, posture);
   SUPINE_TRY(supine_fields_load(wanted->fields, &prepared->source.lungs, &prepared->source.frame,
                                 &fields, error));
-  SUPINE_TRY(supine_fields_write(prepared, &fields, &fit, &basis, &report, error));
-  report_fit(out, basis.path, prepared->assumed, &fields, &report);
+  basis.fields = &fields;
+  SUPINE_TRY(supine_precompute_write(wanted->path, prepared, &basis, &report, error));
+  report_fit(out, wanted->path, prepared->assumed, &fields, &report);
   return SUPINE_OK;
 }
 
@@ -181,9 +182,9 @@ void supine_offline_begin(void *request) {
 
 supine_status supine_offline_check(supine_offline_request *wanted, supine_error *error) {
   supine_scan *scan = &wanted->model.scan;
-  SUPINE_REFUSE_IF(supine_mesh_save_supports(wanted->basis.path), error, SUPINE_ERROR_ARGUMENT,
+  SUPINE_REFUSE_IF(supine_mesh_save_supports(wanted->path), error, SUPINE_ERROR_ARGUMENT,
                    "%s: this is the name of a mesh: give a name that ends in .safetensors",
-                   wanted->basis.path);
+                   wanted->path);
   if (wanted->fields != NULL) { /* they displace the surface as it is */
     SUPINE_REFUSE_IF(scan->known && scan->state.volume.kind != SUPINE_VOLUME_DEFAULT, error,
                      SUPINE_ERROR_ARGUMENT,
@@ -202,14 +203,14 @@ supine_status supine_offline_check(supine_offline_request *wanted, supine_error 
 
 supine_status supine_offline_write(const supine_offline_request *wanted, supine_prepared *prepared,
                                    FILE *out, supine_error *error) {
-  supine_precompute_report report;
+  supine_basis_report report;
   if (wanted->fields != NULL) {
     return compress_fields(wanted, prepared, out, error);
   }
   if (prepared->patient != NULL) {
     (void)fprintf(out, "%s\n", prepared->fit);
   }
-  SUPINE_TRY(supine_precompute(prepared, &wanted->basis, &report, error));
-  report_result(out, &wanted->basis, prepared, &report);
+  SUPINE_TRY(supine_precompute_write(wanted->path, prepared, &wanted->basis, &report, error));
+  report_result(out, wanted->path, &wanted->basis, prepared, &report);
   return SUPINE_OK;
 }

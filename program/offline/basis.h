@@ -11,6 +11,7 @@
 typedef struct supine_offline_request {
   supine_model_choice model;
   supine_basis_choice basis;
+  const char *path;             /* of the basis file */
   const char *fields, *patient; /* paths, or NULL */
   bool has_band, has_modes;
   size_t directions;            /* number of directions of gravity to print; 0 to make a basis */

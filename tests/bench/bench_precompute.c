@@ -76,8 +76,8 @@ static double run_ours(pair *files, const char *out, double times[STAGES], size_
                                    &prepared.reference, &error);
   }
   if (status == SUPINE_OK) {
-    const supine_basis_choice choice = {.path = out, .band = 23, .modes = 16};
-    status = supine_precompute(&prepared, &choice, NULL, &error);
+    const supine_basis_choice choice = {.band = 23, .modes = 16};
+    status = supine_precompute_write(out, &prepared, &choice, NULL, &error);
   }
   supine_precompute_prepared_free(&prepared);
   const double end = supine_clock_seconds();
