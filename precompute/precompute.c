@@ -304,19 +304,10 @@ supine_status supine_precompute(const supine_prepared *prepared, const supine_ba
   return tell_progress(choice, 7, error);
 }
 
-supine_status supine_precompute_write(const char *path, const supine_prepared *prepared,
-                                      const supine_basis_choice *choice,
-                                      supine_basis_report *report, supine_error *error) {
-  supine_bytes bytes = {0};
+supine_status supine_precompute_save(const char *path, const supine_bytes *bytes,
+                                     supine_error *error) {
   supine_output output;
-  supine_status status = supine_precompute(prepared, choice, &bytes, report, error);
-  if (status == SUPINE_OK) {
-    status = supine_output_open(path, &output, error);
-  }
-  if (status == SUPINE_OK) {
-    (void)fwrite(bytes.data, 1, bytes.size, output.file); /* the commit reports errors */
-    status = supine_output_commit(&output, error);
-  }
-  free(bytes.data);
-  return status;
+  SUPINE_TRY(supine_output_open(path, &output, error));
+  (void)fwrite(bytes->data, 1, bytes->size, output.file); /* the commit reports errors */
+  return supine_output_commit(&output, error);
 }

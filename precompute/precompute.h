@@ -42,9 +42,8 @@ supine_status supine_precompute(const supine_prepared *prepared, const supine_ba
                                 supine_bytes *bytes, supine_basis_report *report,
                                 supine_error *error);
 
-/** Make a basis, and write its file atomically: a failure leaves no partial file. */
-supine_status supine_precompute_write(const char *path, const supine_prepared *prepared,
-                                      const supine_basis_choice *choice,
-                                      supine_basis_report *report, supine_error *error);
+/** Write a basis file atomically: a failure leaves no partial file. */
+supine_status supine_precompute_save(const char *path, const supine_bytes *bytes,
+                                     supine_error *error);
 
 #endif

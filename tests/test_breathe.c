@@ -9,6 +9,7 @@
 #include "precompute/lungs/phantom.h"
 #include "precompute/precompute.h"
 #include "test.h"
+#include "tests/basis_helpers.h"
 #include <supine/safetensors.h>
 
 #include "command_helpers.h"
@@ -25,7 +26,7 @@ static supine_status make_basis(const supine_lungs *lungs, double left_share, co
                               .model = supine_physics_model(SUPINE_LAW_PAPER)};
   const supine_basis_choice choice = {.band = 5, .modes = 16, .held_out = 5};
   prepared.model.share[0] = left_share;
-  return supine_precompute_write(path, &prepared, &choice, NULL, NULL);
+  return helper_write_basis(path, &prepared, &choice, NULL, NULL);
 }
 
 static int setup(void **state) {

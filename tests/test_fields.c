@@ -8,6 +8,7 @@
 #include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
+#include "tests/basis_helpers.h"
 #include <supine/runtime.h>
 #include <supine/safetensors.h>
 
@@ -197,7 +198,7 @@ static void check_stated_error(const supine_lungs *of, supine_fields fields, sup
       .modes = 16, .fields = &fields, .choose_band = true, .keep_modes = true};
   supine_basis_report report;
   supine_error error;
-  if (supine_precompute_write(path, &prepared, &choice, &report, &error) != SUPINE_OK) {
+  if (helper_write_basis(path, &prepared, &choice, &report, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
   supine_basis *basis = NULL;
@@ -311,7 +312,7 @@ TEST(test_fit_vector_volumes_exact) {
                                     .model = supine_physics_model(SUPINE_LAW_DEEP)};
   const supine_basis_choice choice = {
       .modes = 8, .fields = &fields, .choose_band = true, .keep_modes = true};
-  assert_int_equal(supine_precompute_write(path, &prepared, &choice, NULL, NULL), SUPINE_OK);
+  assert_int_equal(helper_write_basis(path, &prepared, &choice, NULL, NULL), SUPINE_OK);
   const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
   supine_basis *basis = NULL;
   assert_int_equal(supine_basis_open_with(path, &exact, &basis, NULL), SUPINE_OK);

@@ -8,6 +8,7 @@
 
 #include "precompute/lungs/phantom.h"
 #include "precompute/precompute.h"
+#include "tests/basis_helpers.h"
 
 #include "lungs_helpers.h"
 
@@ -45,7 +46,7 @@ static supine_basis *make_basis(supine_lungs *lungs, double soften, size_t modes
   const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
   if (supine_reference_find(&prepared.source.lungs, &prepared.model, &full, &resting,
                             &prepared.reference, &error) != SUPINE_OK ||
-      supine_precompute_write(path, &prepared, &choice, NULL, &error) != SUPINE_OK ||
+      helper_write_basis(path, &prepared, &choice, NULL, &error) != SUPINE_OK ||
       supine_basis_open_with(path, &exact, &basis, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }

@@ -6,6 +6,7 @@
 #include "precompute/projection/projection.h"
 #include "sh/expansion.h"
 #include "test.h"
+#include "tests/basis_helpers.h"
 #include <supine/runtime.h>
 #include <supine/safetensors.h>
 #include <supine/sh.h>
@@ -66,7 +67,7 @@ static supine_basis_report make_basis(const supine_lungs *lungs, size_t band, si
   prepared.model.reach = soften != 0.0 ? 10.0 : reach;
   supine_basis_report report;
   supine_error error;
-  if (supine_precompute_write(path, &prepared, &choice, &report, &error) != SUPINE_OK) {
+  if (helper_write_basis(path, &prepared, &choice, &report, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
   return report;
@@ -585,11 +586,11 @@ TEST(test_precompute_turned_over_share_equals_run_time) {
     stiffness[i] = exp(8.0 * helper_random(&seed));
   }
   supine_basis_report report;
-  assert_int_equal(supine_precompute_write(path, &prepared, &choice, &report, NULL), SUPINE_OK);
+  assert_int_equal(helper_write_basis(path, &prepared, &choice, &report, NULL), SUPINE_OK);
   assert_true(report.turned_over < 0.001);
   assert_close(report.turned_over, turned_over_at_run_time(report.accuracy.volume), 1e-4);
   prepared.model.stiffness = stiffness; /* irregular stiffness reverses triangles */
-  assert_int_equal(supine_precompute_write(path, &prepared, &choice, &report, NULL), SUPINE_OK);
+  assert_int_equal(helper_write_basis(path, &prepared, &choice, &report, NULL), SUPINE_OK);
   assert_true(report.turned_over > 0.01);
   assert_close(report.turned_over, turned_over_at_run_time(report.accuracy.volume), 1e-3);
   free(stiffness);
@@ -615,19 +616,19 @@ TEST(test_precompute_bad_options_refused) {
                               .model = supine_physics_model(SUPINE_LAW_PAPER)};
   supine_basis_choice choice = {.band = 65, .modes = 16};
   supine_error error;
-  assert_int_equal(supine_precompute_write(path, &prepared, &choice, NULL, &error),
+  assert_int_equal(helper_write_basis(path, &prepared, &choice, NULL, &error),
                    SUPINE_ERROR_ARGUMENT);
   choice.band = 8;
   choice.modes = 0; /* all 81 harmonics: too many */
-  assert_int_equal(supine_precompute_write(path, &prepared, &choice, NULL, &error),
+  assert_int_equal(helper_write_basis(path, &prepared, &choice, NULL, &error),
                    SUPINE_ERROR_ARGUMENT);
   choice.modes = 65;
-  assert_int_equal(supine_precompute_write(path, &prepared, &choice, NULL, &error),
+  assert_int_equal(helper_write_basis(path, &prepared, &choice, NULL, &error),
                    SUPINE_ERROR_ARGUMENT);
   choice.modes = 16;
   /* Softening of lower tissue (`soften`) requires a smoothing distance of forces (`reach`) > 0. */
   prepared.model.force.soften = 1.0;
-  assert_int_equal(supine_precompute_write(path, &prepared, &choice, NULL, &error),
+  assert_int_equal(helper_write_basis(path, &prepared, &choice, NULL, &error),
                    SUPINE_ERROR_ARGUMENT);
   supine_lungs_free(&lungs);
 }

@@ -11,6 +11,7 @@
 #include "precompute/physics/reference.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
+#include "tests/basis_helpers.h"
 
 #include "lungs_helpers.h"
 
@@ -428,7 +429,7 @@ static supine_basis *basis_of(supine_lungs *lungs, const supine_scan *scan, doub
   supine_error error = {0};
   if (supine_reference_find(&prepared.source.lungs, &prepared.model, scan, &resting,
                             &prepared.reference, &error) != SUPINE_OK ||
-      supine_precompute_write(path, &prepared, &choice, &report, &error) != SUPINE_OK ||
+      helper_write_basis(path, &prepared, &choice, &report, &error) != SUPINE_OK ||
       supine_basis_open(path, &basis, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }

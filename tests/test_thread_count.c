@@ -3,6 +3,7 @@
 #include "precompute/lungs/phantom.h"
 #include "precompute/precompute.h"
 #include "test.h"
+#include "tests/basis_helpers.h"
 
 enum { VERTICES = 9000 }; /* several blocks of each parallel sum, the last incomplete */
 
@@ -22,7 +23,7 @@ static unsigned char *bytes_of(const supine_prepared *prepared, const char *thre
   supine_error error;
   (void)close(mkstemp(path));
   assert_int_equal(setenv("SUPINE_THREADS", threads, 1), 0);
-  if (supine_precompute_write(path, prepared, &choice, NULL, &error) != SUPINE_OK) {
+  if (helper_write_basis(path, prepared, &choice, NULL, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
   unsigned char *bytes = test_read(path, size);

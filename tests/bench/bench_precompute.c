@@ -17,6 +17,7 @@
 #include "base/clock.h"
 #include "base/parallel.h"
 #include "precompute/precompute.h"
+#include "tests/basis_helpers.h"
 
 static const char *const sizes[][2] = {
     {"chaste_left_5k.obj", "chaste_right_5k.obj"},
@@ -77,7 +78,7 @@ static double run_ours(pair *files, const char *out, double times[STAGES], size_
   }
   if (status == SUPINE_OK) {
     const supine_basis_choice choice = {.band = 23, .modes = 16};
-    status = supine_precompute_write(out, &prepared, &choice, NULL, &error);
+    status = helper_write_basis(out, &prepared, &choice, NULL, &error);
   }
   supine_precompute_prepared_free(&prepared);
   const double end = supine_clock_seconds();
