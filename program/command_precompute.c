@@ -5,7 +5,7 @@
 
 #include "base/arena.h"
 #include "base/vec3.h"
-#include "precompute/make.h"
+#include "precompute/library.h"
 #include "program/options/model_options.h"
 
 static const char name[] = "precompute";

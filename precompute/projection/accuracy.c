@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Measure the error of a compressed displacement field against exact solutions of the physical
- * model for held-out directions of gravity, and the share of triangles that turn over. */
+ * model for held-out directions of gravity, the share of triangles that turn over, and the
+ * error that storage adds. */
 #include <cblas.h>
 #include <math.h>
 #include <string.h>
@@ -10,6 +11,7 @@
 #include "base/parallel.h"
 #include "base/vec3.h"
 #include "precompute/projection/accuracy.h"
+#include <supine/runtime.h>
 #include <supine/sh.h>
 #include <supine/volume.h>
 
@@ -235,5 +237,53 @@ supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const supin
     }
     *share = fmax(*share, supine_mesh_turned_over(&sample, moved));
   }
+  return SUPINE_OK;
+}
+
+supine_status supine_accuracy_add_storage(const supine_basis *basis,
+                                          const supine_compression *compression,
+                                          const supine_rows *rows, supine_accuracy *accuracy) {
+  enum { DIRECTIONS = 16 };
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const size_t n = info->vertex_count;
+  double gravity[3 * DIRECTIONS];
+  double square_sum = 0.0;
+  SUPINE_ARENA arena = {0};
+  float *xyz = supine_arena_take(&arena, 3 * n, sizeof *xyz);
+  double *u = supine_arena_take(&arena, 3 * n, sizeof *u);
+  supine_tally *errors = supine_arena_zeros(&arena, 1, sizeof *errors);
+  SUPINE_TRY(supine_arena_status(&arena));
+  supine_accuracy_held_out_directions(DIRECTIONS, gravity);
+  for (const double *g = gravity; g < gravity + 3 * DIRECTIONS; g += 3) {
+    const supine_state state = {.gravity = {g[0], g[1], g[2]}};
+    supine_pose pose = {.basis = 0};
+    if (supine_basis_pose(basis, &state, &pose, NULL) != SUPINE_OK ||
+        supine_deform(basis, &pose, xyz) != SUPINE_OK) {
+      continue;
+    }
+    supine_projection_displacement(compression, rows, pose.weights, u);
+    for (size_t i = 0, lung = 0; i < n; ++i) {
+      double error[3];
+      lung += i >= info->lung_begin[lung + 1];
+      for (size_t j = 3 * i; j < 3 * i + 3; ++j) {
+        u[j] *= pose.gains[lung][j % 3];
+        error[j % 3] = (double)xyz[j] - (double)info->vertices[j] - u[j];
+      }
+      square_sum += supine_dot(u + 3 * i, u + 3 * i);
+      supine_accuracy_tally_add(errors, 1, (double[]){supine_length(error)});
+    }
+  }
+  if (!(square_sum > 0.0)) {
+    return SUPINE_OK;
+  }
+  const double rms = sqrt(errors->square_sum / (double)errors->count);
+  const double p95 = supine_accuracy_tally_percentile(errors, 0.95);
+  const double size = sqrt(square_sum / (double)errors->count);
+  accuracy->relative_rms = hypot(accuracy->relative_rms, rms / size);
+  accuracy->relative_p95 = hypot(accuracy->relative_p95, p95 / size);
+  accuracy->relative_max += errors->largest / size;
+  accuracy->rms_mm = hypot(accuracy->rms_mm, rms);
+  accuracy->p95_mm = hypot(accuracy->p95_mm, p95);
+  accuracy->max_mm += errors->largest;
   return SUPINE_OK;
 }

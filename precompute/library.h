@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Make a basis of prepared lungs, as options say. */
-#ifndef SUPINE_MAKE_H
-#define SUPINE_MAKE_H
+ * Make a basis of prepared lungs, as options say: the part of the library that the program shares,
+ * as it prints what was found between both steps. */
+#ifndef SUPINE_PRECOMPUTE_LIBRARY_H
+#define SUPINE_PRECOMPUTE_LIBRARY_H
 
 #include "precompute/precompute.h"
 
