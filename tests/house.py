@@ -23,9 +23,9 @@ PREFIX = {"base": ("supine_",), "runtime": ("supine_",), "runtime/safetensors": 
           "mesh/io": ("supine_mesh_",), "precompute/lungs": ("supine_lungs_", "supine_phantom_", "supine_tissue_", "supine_inside_surface_"),
           "precompute/physics": ("supine_physics_", "supine_reference_"),
           "precompute/projection": ("supine_projection_", "supine_accuracy_"),
-          "precompute": ("supine_precompute_", "supine_writer_"), "precompute/warp": ("supine_field_",), "mesh/image": ("supine_image_",), "program/view/render": ("supine_render_",), "program/view/export": ("supine_export_", "supine_template_"), "program/options": ("supine_options_", "supine_breath_", "supine_command_"),
-          "program/offline": ("supine_offline_", "supine_precompute_"), "program": ("supine_command_",)}
-PUBLIC = ("runtime/include/supine", "program/offline/include/supine")
+          "precompute/warp": ("supine_field_",), "mesh/image": ("supine_image_",), "program/view/render": ("supine_render_",), "program/view/export": ("supine_export_", "supine_template_"), "program/options": ("supine_options_", "supine_breath_", "supine_command_"),
+          "program": ("supine_command_",)}
+PUBLIC = ("runtime/include/supine", "precompute/include/supine")
 
 
 def read_table():

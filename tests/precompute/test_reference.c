@@ -11,6 +11,7 @@
 #include "precompute/physics/reference.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
+#include "tests/helpers/basis_helpers.h"
 
 #include "tests/helpers/lungs_helpers.h"
 
@@ -423,13 +424,13 @@ static supine_basis *basis_of(supine_lungs *lungs, const supine_scan *scan, doub
   const supine_resting resting = supine_reference_resting_default();
   supine_prepared prepared = {.source = {.lungs = *lungs},
                               .model = supine_physics_model(SUPINE_LAW_DEEP)};
-  const supine_basis_choice choice = {.path = path, .band = 15, .modes = 16, .held_out = 20};
-  supine_precompute_report report;
+  const supine_basis_choice choice = {.band = 15, .modes = 16, .held_out = 20};
+  supine_basis_report report;
   supine_basis *basis = NULL;
   supine_error error = {0};
   if (supine_reference_find(&prepared.source.lungs, &prepared.model, scan, &resting,
                             &prepared.reference, &error) != SUPINE_OK ||
-      supine_precompute(&prepared, &choice, &report, &error) != SUPINE_OK ||
+      helper_write_basis(path, &prepared, &choice, &report, &error) != SUPINE_OK ||
       supine_basis_open(path, &basis, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
