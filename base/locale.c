@@ -16,6 +16,16 @@ void supine_locale_leave(const supine_locale *before) {
   (void)setlocale(LC_NUMERIC, before->numeric);
   (void)_configthreadlocale(before->per_thread);
 }
+#elif defined(__wasi__)
+/* WebAssembly has only the C locale. newlocale() would read the environment, which the JavaScript
+ * package does not import. */
+supine_locale supine_locale_enter(void) {
+  return (locale_t)0;
+}
+
+void supine_locale_leave(const supine_locale *before) {
+  (void)before;
+}
 #else
 supine_locale supine_locale_enter(void) {
   /* In glibc and musl this locale is a constant: it is neither allocated nor freed. */

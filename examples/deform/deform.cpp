@@ -20,7 +20,8 @@ public:
     positions.resize(3 * supine_basis_get_info(opened)->vertex_count);
   }
 
-  // Return the positions [3 N] in a state such as "prone:rest+500", mm, LPS. The next call replaces them.
+  // Return the positions [3 N] in a state such as "prone:rest+500", mm, LPS. The next call replaces
+  // them.
   const std::vector<float> &deform(const std::string &text) {
     supine_state state = {};
     state.gravity[1] = 1; // supine, if the text names no posture
@@ -33,7 +34,9 @@ public:
 
 private:
   struct Close {
-    void operator()(supine_basis *opened) const { supine_basis_close(opened); }
+    void operator()(supine_basis *opened) const {
+      supine_basis_close(opened);
+    }
   };
   std::unique_ptr<supine_basis, Close> basis;
   std::vector<float> positions;
@@ -54,7 +57,8 @@ int main(int argc, char **argv) {
   try {
     Lungs lungs(argv[1]);
     const std::vector<float> &xyz = lungs.deform(argv[2]);
-    std::printf("%zu vertices; the first is at %g %g %g mm\n", xyz.size() / 3, xyz[0], xyz[1], xyz[2]);
+    std::printf("%zu vertices; the first is at %g %g %g mm\n", xyz.size() / 3, xyz[0], xyz[1],
+                xyz[2]);
   } catch (const std::exception &failure) {
     std::fprintf(stderr, "%s\n", failure.what());
     return 2;
