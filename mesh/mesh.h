@@ -199,7 +199,7 @@ supine_status supine_mesh_save_frames(const char *path, const supine_mesh *mesh,
                                       const supine_mesh_save_options *options,
                                       const supine_mesh_frames *frames, supine_error *error);
 
-/** The formats of supine_mesh_save, by ending; each has a function supine_mesh_save_NAME in
+/** The formats of supine_mesh_save, by ending; each has a function supine_io_save_NAME in
  * mesh/io. This is the only list of formats. */
 #define SUPINE_MESH_FORMATS(FIRST, NEXT) FIRST(ply) NEXT(obj) NEXT(stl) NEXT(vtp)
 

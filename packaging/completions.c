@@ -8,6 +8,7 @@
 
 #include "base/output.h"
 
+#include "program/command/list.h"
 #include "program/options/command.h"
 
 /* Write FOLDER/NAME by `write`; end the program if that fails. */

@@ -123,11 +123,11 @@ static void add_reference(entries *list, const supine_reference *reference, cons
   add_by_lung(list, "scan_volume_ml", reference->lung_count, volume);
   add(list, "full_volume_ml", "%.9g", reference->full_volume[0] + reference->full_volume[1]);
   add(list, "full_upright_gain", "%g", SUPINE_FULL_UPRIGHT_GAIN);
-  supine_reference_resting_print(&reference->resting, shares, sizeof shares);
+  supine_physics_resting_print(&reference->resting, shares, sizeof shares);
   add(list, "resting_shares", "%s", shares);
   /* State whether the ratio of the volumes at rest (FRC) and at full inflation is the patient's own
    * or, if not, the standard deviation of its logarithm. */
-  if (supine_reference_resting_given(&reference->resting) || reference->scan.full > 0.0) {
+  if (supine_physics_resting_given(&reference->resting) || reference->scan.full > 0.0) {
     add(list, "resting_known", "yes");
   } else {
     add(list, "resting_spread", "%.4g", reference->resting.spread / reference->resting.assumed);
@@ -218,7 +218,7 @@ static supine_status store(const supine_basis_content *content, supine_arena *ar
                    .field = *field,
                    .rows = content->rows};
   SUPINE_TRY(supine_arena_check(arena, error, "%zu vertices of a basis", n));
-  supine_tissue_collapse(lungs, share, collapsed);
+  supine_lungs_collapse(lungs, share, collapsed);
   to_float(collapsed, 3 * n, made->vertices);
   for (size_t i = 0; i < n; ++i) {
     made->lung[i] = lungs->lung_count == 2 && i >= lungs->lung_begin[1] ? 1 : 0;
@@ -227,7 +227,7 @@ static supine_status store(const supine_basis_content *content, supine_arena *ar
     made->directions = supine_arena_take(arena, 3 * n, sizeof(float));
     SUPINE_TRY(supine_arena_check(arena, error, "%zu vertices of a basis", n));
     memcpy(collapsed, content->rows.directions, 3 * n * sizeof *collapsed);
-    supine_tissue_collapse_directions(lungs, share, collapsed);
+    supine_lungs_collapse_directions(lungs, share, collapsed);
     to_float(collapsed, 3 * n, made->directions);
     made->rows.directions = collapsed;
   } else if (share[0] != 1.0 || share[1] != 1.0) {
@@ -400,7 +400,8 @@ static supine_status measure_storage(const supine_basis_content *content, const 
       .size = sizeof options, .simd = SUPINE_SIMD_PORTABLE, .without_normals = true};
   SUPINE_FREED_BY(basis_close) supine_basis *basis = NULL;
   SUPINE_TRY(supine_basis_open_memory_with(bytes->data, bytes->size, &options, &basis, error));
-  return supine_accuracy_add_storage(basis, &made->field, &made->rows, content->accuracy);
+  return supine_projection_accuracy_add_storage(basis, &made->field, &made->rows,
+                                                content->accuracy);
 }
 
 supine_status supine_precompute_print(const supine_basis_content *content, supine_bytes *bytes,

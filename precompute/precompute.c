@@ -42,7 +42,7 @@ typedef struct evidence {
 } evidence;
 
 static void evidence_free(evidence *given) {
-  supine_accuracy_truth_free(&given->truth);
+  supine_projection_truth_free(&given->truth);
   supine_fields_fit_free(&given->fit);
 }
 
@@ -54,8 +54,8 @@ static supine_status solve_model(const supine_lungs *lungs, const supine_model *
   const size_t count = held_out_count(lungs, choice->held_out);
   SUPINE_TRY(supine_projection_create(lungs, model, choice->band, &projection, error));
   SUPINE_TRY(supine_projection_field(lungs, model, &projection, field, error));
-  return supine_accuracy_truth_create(lungs, model, projection.span, field, count, &given->truth,
-                                      error);
+  return supine_projection_truth_create(lungs, model, projection.span, field, count, &given->truth,
+                                        error);
 }
 
 /* Another simulator's fields -> field of displacements, and predictions of each from the others. */
@@ -85,8 +85,8 @@ static supine_status compress(const supine_gravity_field *field, const supine_ba
   if (given->is_fields) {
     relative = supine_fields_fit_error(&given->fit);
   } else {
-    SUPINE_TRY(supine_accuracy_error_table_create(&given->truth, field, compression, &given->table,
-                                                  error));
+    SUPINE_TRY(supine_projection_error_table_create(&given->truth, field, compression,
+                                                    &given->table, error));
     relative = given->table.modes[count - 1];
   }
   if (choice->modes > 0 && !choice->keep_modes) {
@@ -137,8 +137,8 @@ static supine_status anchor(const supine_prepared *prepared, const supine_rows *
   }
   memcpy(vertices, lungs->scanned, 3 * n * sizeof *vertices);
   made->lungs.mesh.vertices = vertices;
-  SUPINE_TRY(supine_reference_find_gains(&made->lungs, prepared->model.bend, u, ones,
-                                         &made->reference, error));
+  SUPINE_TRY(supine_physics_reference_find_gains(&made->lungs, prepared->model.bend, u, ones,
+                                                 &made->reference, error));
   for (size_t i = 0; i < 3 * n; ++i) {
     const size_t lung = lungs->lung_count == 2 && i >= 3 * lungs->lung_begin[1];
     vertices[i] -= made->reference.scan_gains[lung][i % 3] * u[i];
@@ -204,7 +204,7 @@ static supine_status find_volumes(const supine_reference *reference, const doubl
     double g[3] = {0.0, 0.0, 0.0};
     double rest[2];
     g[axis / 2] = axis % 2 == 0 ? 1.0 : -1.0;
-    (void)supine_reference_rest(reference, g, rest);
+    (void)supine_physics_reference_rest(reference, g, rest);
     for (size_t lung = 0; lung < reference->lung_count; ++lung) {
       rest[lung] = share[lung] * (rest[lung] - reference->full_volume[lung]);
       volume[lung][axis] = rest[lung];
@@ -212,7 +212,7 @@ static supine_status find_volumes(const supine_reference *reference, const doubl
     SUPINE_TRY(check_rest(compression, forms, g, rest, error));
   }
   for (size_t lung = 0; lung < reference->lung_count; ++lung) {
-    supine_reference_harmonics(volume[lung], found->resting[lung]);
+    supine_physics_resting_harmonics(volume[lung], found->resting[lung]);
   }
   for (size_t t = 0; t < 9; ++t) {
     found->measured[t] = found->resting[0][t] + found->resting[1][t];
@@ -229,11 +229,12 @@ static supine_status measure(const evidence *given, const supine_basis_content *
     return supine_fields_measure(&given->fit, basis->is_harmonics ? 0 : compression->mode_count,
                                  &made->accuracy, error);
   }
-  SUPINE_TRY(supine_accuracy_measure(&given->truth, compression, &basis->rows, basis->forms,
-                                     at->measured, &made->accuracy, error));
+  SUPINE_TRY(supine_projection_accuracy_measure(&given->truth, compression, &basis->rows,
+                                                basis->forms, at->measured, &made->accuracy,
+                                                error));
   made->accuracy.volume *= basis->reference != NULL ? 1.0 : breath_volume;
-  return supine_accuracy_turned_over(basis->lungs, &basis->rows, compression, basis->forms,
-                                     at->measured, &made->turned_over, error);
+  return supine_projection_turned_over(basis->lungs, &basis->rows, compression, basis->forms,
+                                       at->measured, &made->turned_over, error);
 }
 
 /* Tell that `done` of the steps of supine_precompute are done. */

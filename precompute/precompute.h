@@ -30,7 +30,7 @@ typedef struct supine_basis_choice {
 typedef struct supine_basis_report {
   size_t band, mode_count;
   supine_accuracy accuracy;
-  double turned_over;    /**< share of triangles, 0 to 1 (supine_accuracy_turned_over) */
+  double turned_over;    /**< share of triangles, 0 to 1 (supine_projection_turned_over) */
   supine_fit_report fit; /**< of another simulator's fields */
 } supine_basis_report;
 

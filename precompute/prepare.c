@@ -81,13 +81,14 @@ static void tell_volume(const supine_patient_record *record, double measured,
 
 static void describe_fit(const supine_patient_record *record, char *text, size_t size) {
   const supine_patient_fit_report *report = &record->report;
-  (void)supine_print_text(text, size,
-                 "%s: %s law%s from %zu points; held-out residual %.1f of %.1f mm RMS, %.0f %% "
-                 "explained; expected error %.1f mm RMS",
-                 record->name, supine_patient_law_names[record->patient.law],
-                 record->patient.centre_count > 0 ? " and kriging" : "", report->points,
-                 report->held_out[SUPINE_PATIENT_SCORE_CORRECTED], report->baseline,
-                 report->explained, report->expected_point);
+  (void)supine_print_text(
+      text, size,
+      "%s: %s law%s from %zu points; held-out residual %.1f of %.1f mm RMS, %.0f %% "
+      "explained; expected error %.1f mm RMS",
+      record->name, supine_patient_law_names[record->patient.law],
+      record->patient.centre_count > 0 ? " and kriging" : "", report->points,
+      report->held_out[SUPINE_PATIENT_SCORE_CORRECTED], report->baseline, report->explained,
+      report->expected_point);
 }
 
 /* Use the displacement law, the force and the volumes at rest that were fitted to a patient.
@@ -141,7 +142,7 @@ static supine_status choose_model(const supine_precompute_options *options,
   }
   p->model = choose_law(options);
   if (!known->has_scan && p->model.law != SUPINE_LAW_PAPER) {
-    (void)supine_reference_scan_parse("full", &known->scan, NULL);
+    (void)supine_physics_reference_scan_parse("full", &known->scan, NULL);
   }
   return SUPINE_OK;
 }
@@ -157,7 +158,7 @@ static supine_status set_expandability(const supine_precompute_tissue *tissue, s
   double *a = supine_arena_take(&p->memory, n, sizeof *a);
   SUPINE_TRY(supine_arena_check(&p->memory, error, "%zu vertices", n));
   if (tissue->expandability != NULL) {
-    SUPINE_TRY(supine_tissue_expandability_load(tissue->expandability, n, a, error));
+    SUPINE_TRY(supine_lungs_expandability_load(tissue->expandability, n, a, error));
   } else {
     const supine_expandability_law law = {.shape = tissue->profile == SUPINE_PROFILE_LINEAR
                                                        ? SUPINE_EXPANDABILITY_LINEAR
@@ -170,7 +171,7 @@ static supine_status set_expandability(const supine_precompute_tissue *tissue, s
                      "expandability along axis %d from %g to %g: give an axis 0 to 2, and values "
                      "above 0",
                      law.axis, law.from, law.to);
-    supine_tissue_expandability_regional(&p->source.lungs, &law, a);
+    supine_lungs_expandability_regional(&p->source.lungs, &law, a);
   }
   for (size_t i = 0; i < n; ++i) {
     a[i] = 1.0 / a[i];
@@ -214,7 +215,7 @@ static supine_status set_lesions(const supine_precompute_tissue *tissue, supine_
     const double *c = given->centre;
     const supine_lesion lesion = {{c[0], c[1], c[2]}, given->radius, given->factor};
     size_t reached = 0;
-    SUPINE_TRY(supine_tissue_add_lesion(lungs, &lesion, factors, &reached, error));
+    SUPINE_TRY(supine_lungs_add_lesion(lungs, &lesion, factors, &reached, error));
     if (reached == 0) {
       warn_of_lesion(lungs, &lesion, &p->source.findings);
     }
@@ -273,7 +274,7 @@ static void summarize(const knowledge *given, bool predicted, supine_prepared *p
   (void)supine_state_describe(&reference->scan.state, state, sizeof state);
   const double full = reference->full_volume[0] + reference->full_volume[1];
   const double held = full + reference->scan_volume[0] + reference->scan_volume[1];
-  const bool known = supine_reference_resting_given(resting);
+  const bool known = supine_physics_resting_given(resting);
   const bool at_rest = reference->scan.state.volume.kind == SUPINE_VOLUME_REST;
   if (held != full) {
     supine_text_add(p->assumed, size, "%s, %.0f mL; ", state, held);
@@ -283,8 +284,8 @@ static void summarize(const knowledge *given, bool predicted, supine_prepared *p
                   : !at_rest                 ? ""
                   : known                    ? "from rest, "
                                              : "assumed from rest, ");
-  supine_reference_compare(reference, &given->person, p->assumed, size);
-  const double rest = supine_reference_rest(reference, supine, ml);
+  supine_physics_reference_compare(reference, &given->person, p->assumed, size);
+  const double rest = supine_physics_reference_rest(reference, supine, ml);
   const double ratio = exp(resting->spread / resting->assumed);
   supine_text_add(p->assumed, size, "); rest supine %.0f mL (", rest);
   if (!at_rest && !known) {
@@ -348,16 +349,15 @@ static supine_status read_knowledge(const supine_precompute_options *options, su
   const bool has_state = options->scan.shown == SUPINE_SHOWN_STATE;
   *known = (knowledge){.has_scan = options->scan.shown != SUPINE_SHOWN_DEFAULT,
                        .scan = {.known = has_state, .state = options->scan.state},
-                       .resting = supine_reference_resting_default(),
+                       .resting = supine_physics_resting_default(),
                        .person = {volumes->height, (supine_sex)volumes->sex}};
   if (volumes->copd) {
-    SUPINE_TRY(supine_reference_resting_set(&known->resting, "copd", NULL, error));
+    SUPINE_TRY(supine_physics_resting_set(&known->resting, "copd", NULL, error));
   }
   for (size_t axis = 0; axis < SUPINE_REST_COUNT; ++axis) {
     const supine_precompute_rest *rest = &volumes->rest[axis];
     if (rest->ml != 0.0 || rest->share[0] != 0.0) {
-      SUPINE_TRY(
-          supine_reference_resting_give(&known->resting, axis, rest->ml, rest->share, error));
+      SUPINE_TRY(supine_physics_resting_give(&known->resting, axis, rest->ml, rest->share, error));
     }
   }
   if (options->fields != NULL) { /* they displace the surface as it is */
@@ -398,11 +398,13 @@ static supine_status find_reference(supine_prepared *p, const knowledge *known,
                                     .side = {lungs->side[0], lungs->side[1]}};
   supine_resting resting = known->resting;
   char doubt[512] = "";
-  supine_reference_predict_rest(&scanned, &known->person, &resting);
-  SUPINE_TRY(supine_reference_find(lungs, &p->model, &known->scan, &resting, &p->reference, error));
+  supine_physics_reference_predict_rest(&scanned, &known->person, &resting);
+  SUPINE_TRY(supine_physics_reference_find(lungs, &p->model, &known->scan, &resting, &p->reference,
+                                           error));
   summarize(known, resting.predicted, p);
   if (p->reference.known) {
-    supine_reference_doubt(&p->reference, &known->person, &known->resting, doubt, sizeof doubt);
+    supine_physics_reference_doubt(&p->reference, &known->person, &known->resting, doubt,
+                                   sizeof doubt);
   }
   if (doubt[0] != '\0') {
     supine_findings_add(&p->source.findings, "warning: %s", doubt);

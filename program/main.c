@@ -17,6 +17,7 @@
 
 #include "base/output.h"
 #include "base/parallel.h"
+#include "program/command/list.h"
 #include "program/options/command.h"
 
 static void print_help(void) {

@@ -1,25 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
  * Expected errors of predicted positions: the terms of the formula in supine/locate.h. */
-#ifndef SUPINE_LOCATE_INTERNAL_H
-#define SUPINE_LOCATE_INTERNAL_H
+#ifndef SUPINE_EXPECTED_H
+#define SUPINE_EXPECTED_H
 
 #include <supine/locate.h>
 
 #include "runtime/kriging.h"
 
 enum { LOCATE_BLOCK = 256 }; /**< number of vertices evaluated at once */
-
-/** The result of supine_locate. It lies at the start of the caller's work space. */
-struct supine_location {
-  supine_location_info info;
-  supine_kriging kriging;
-  supine_kriging_options options;
-  /** Mean of the observed positions, minus the rotated mean of the predicted positions, mm. */
-  double origin[3];
-  double deviation; /**< prior standard deviation of the volume, mL; 0 if the volume is known */
-  double factor;    /**< factor on the expected errors, from the residuals of the points */
-};
 
 /* Relative standard deviation of an assumed volume, that at rest if full inflation was scanned and
  * full inflation if rest was scanned, unless metadata "resting_spread" gives it: 0.08 / 0.48, the

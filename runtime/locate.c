@@ -6,6 +6,7 @@
 
 #include "base/vec3.h"
 #include "runtime/expected.h"
+#include "runtime/location.h"
 #include "runtime/rigid.h"
 
 _Static_assert((int)SUPINE_LOCATE_POINTS_MAX == (int)SUPINE_KRIGING_POINTS_MAX,

@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "runtime/expected.h"
+#include "runtime/location.h"
 #include "runtime/rigid.h"
 
 typedef struct block {

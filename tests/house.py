@@ -18,14 +18,10 @@ import sys
 source, build = sys.argv[1:3]
 faults = []
 
-# Prefixes of external names, for folders whose prefix is not supine_<folder>_.
-PREFIX = {"base": ("supine_",), "runtime": ("supine_",), "runtime/safetensors": ("supine_",),
-          "mesh/io": ("supine_mesh_",), "precompute/lungs": ("supine_lungs_", "supine_phantom_", "supine_tissue_", "supine_inside_surface_"),
-          "precompute/physics": ("supine_physics_", "supine_reference_"),
-          "precompute/projection": ("supine_projection_", "supine_accuracy_"),
-          "precompute/warp": ("supine_field_",), "mesh/image": ("supine_image_",), "program/view/render": ("supine_render_",), "program/view/export": ("supine_export_", "supine_template_"), "program/options": ("supine_options_", "supine_breath_", "supine_command_"),
-          "program": ("supine_command_",)}
 PUBLIC = ("runtime/include/supine", "precompute/include/supine")
+# The folders of the public library name functions supine_<object>_<verb>, as installed headers do: there is one object, the
+# library. In every other folder, a function's prefix is supine_<folder>_, for the folder whose header declares it.
+LIBRARY = ("base", "runtime") + PUBLIC
 
 
 def read_table():
@@ -113,7 +109,7 @@ def objects():
     for folder, _, names in os.walk(build):
         match = re.search(r"(.*)/CMakeFiles/supine_[a-z_]+\.dir(.*)$", os.path.relpath(folder, build))
         for name in names if match else []:
-            file = os.path.normpath(f"{match[1]}{match[2]}/{name[:-len('.o')]}")
+            file = os.path.normpath(f"{match[1]}{match[2]}/{name[:-len('.o')]}".replace("/__/", "/../"))
             if name.endswith(".c.o") and os.path.exists(os.path.join(source, file)):
                 sources[os.path.join(folder, name)] = file[:-len(".c")]
     listed = subprocess.run(["nm", "--extern-only", *sources], capture_output=True, text=True, check=True).stdout
@@ -122,16 +118,30 @@ def objects():
         yield (sources[path], re.findall(r" [A-TV-Z] (\w+)$", names, re.M), re.findall(r" U (\w+)$", names, re.M))
 
 
-def check_names(folders):
+def declaring_folders(files):
+    """Return the folder of the header that declares each function or variable. Names that a macro makes are missing."""
+    folder_of = {}
+    for file in files:
+        if file.endswith(".h"):
+            with open(os.path.join(source, file), encoding="utf-8") as opened:
+                text = without_comments(opened.read())
+            for name in re.findall(r"\b(supine_\w+)\(", text) + [
+                    name for names in re.findall(r"^extern ([^;]*);", text, re.M) for name in re.findall(r"\bsupine_\w+", names)]:
+                folder_of.setdefault(name, os.path.dirname(file))
+    return folder_of
+
+
+def check_names(folders, files):
     """Check that external names begin with the prefix of their folder, and that files do not use each other in cycles."""
     listed = list(objects())
     home = {name: file for file, defined, _ in listed for name in defined}
+    folder_of = declaring_folders(files)
     for file, defined, _ in listed:
-        folder = os.path.dirname(file)
-        prefix = PREFIX.get(folder, (f"supine_{os.path.basename(folder)}_",))
         for symbol in defined:
-            if not symbol.startswith((*prefix, "__")) and symbol + "_" not in prefix:
-                faults.append(f"{file}.c defines {symbol}, which does not begin with {' or '.join(prefix)}")
+            folder = folder_of.get(symbol, os.path.dirname(file))
+            prefix = "supine_" if folder in LIBRARY else f"supine_{os.path.basename(folder)}_"
+            if not symbol.startswith((prefix, "__")) and symbol + "_" != prefix:
+                faults.append(f"{file}.c defines {symbol}, which does not begin with {prefix}")
     graph = {file: {home[name] for name in used if name in home} - {file} for file, _, used in listed}
     while leaves := {f for f, out in graph.items() if not out & set(graph)}:
         graph = {f: out for f, out in graph.items() if f not in leaves}
@@ -310,7 +320,7 @@ check_includes(folders, files)
 check_system_headers(files)
 check_opening(files)
 check_include_cycles(files)
-check_names(folders)
+check_names(folders, files)
 for fault in faults:
     print(fault)
 print(f"{len(folders)} folders, {len(files)} files, {len(faults)} faults")

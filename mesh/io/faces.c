@@ -69,8 +69,8 @@ static supine_status make_room(mesh_faces *faces, size_t triangles, supine_error
   return SUPINE_OK;
 }
 
-supine_status supine_mesh_faces_add(mesh_faces *faces, const double *corners, size_t count,
-                                    supine_error *error) {
+supine_status supine_io_faces_add(mesh_faces *faces, const double *corners, size_t count,
+                                  supine_error *error) {
   supine_mesh *mesh = faces->mesh;
   const size_t number = faces->count++;
   SUPINE_REFUSE_IF(count > MESH_CORNERS_MAX, error, SUPINE_ERROR_FORMAT,

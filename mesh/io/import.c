@@ -18,8 +18,8 @@
 #include "base/arena.h"
 #include "base/input.h"
 #include "base/library.h"
-#include "base/text.h"
 #include "base/locale.h"
+#include "base/text.h"
 #include "mesh/io/read.h"
 
 /* clang-format off */
@@ -242,7 +242,7 @@ static bool take_faces(const struct aiMesh *part, bool mirrored, gathering *out)
     for (unsigned k = 0; k < count && k < MESH_CORNERS_MAX; ++k) {
       corner[k] = (double)first + (double)face->mIndices[mirrored ? count - 1 - k : k];
     }
-    good = supine_mesh_faces_add(&out->faces, corner, count, out->error) == SUPINE_OK;
+    good = supine_io_faces_add(&out->faces, corner, count, out->error) == SUPINE_OK;
   }
   return good;
 }
@@ -344,8 +344,8 @@ static supine_status take_outcome(const char *path, FILE *stream, supine_mesh *m
       path);
 }
 
-supine_status supine_mesh_import(mesh_file *file, supine_mesh *mesh, size_t *dropped,
-                                 supine_error *error) {
+supine_status supine_io_import(mesh_file *file, supine_mesh *mesh, size_t *dropped,
+                               supine_error *error) {
   int ends[2] = {-1, -1};
   FILE *stream = pipe(ends) == 0 ? fdopen(ends[0], "rb") : NULL;
   if (stream == NULL) {
@@ -371,14 +371,14 @@ static supine_status check_lines(const mesh_file *file, const char *keyword, mes
                                  supine_error *error) {
   mesh_text text = {file->bytes, file->bytes + file->size};
   mesh_text line;
-  for (size_t number = 1; supine_mesh_text_line(&text, &line); ++number) {
+  for (size_t number = 1; supine_io_text_line(&text, &line); ++number) {
     mesh_text word;
     double position[3];
-    if (!supine_mesh_text_word(&line, &word)) {
+    if (!supine_io_text_word(&line, &word)) {
       continue;
     }
     *last = word;
-    if (supine_mesh_text_is(word, keyword) && !supine_mesh_text_position(&line, position)) {
+    if (supine_io_text_is(word, keyword) && !supine_io_text_position(&line, position)) {
       return supine_error_set(error, SUPINE_ERROR_FORMAT,
                               "%s: line %zu: a vertex needs three numbers; save the mesh again",
                               file->path, number);
@@ -387,28 +387,28 @@ static supine_status check_lines(const mesh_file *file, const char *keyword, mes
   return SUPINE_OK;
 }
 
-supine_status supine_mesh_read_obj(mesh_file *file, supine_mesh *mesh, size_t *dropped,
-                                   supine_error *error) {
+supine_status supine_io_read_obj(mesh_file *file, supine_mesh *mesh, size_t *dropped,
+                                 supine_error *error) {
   mesh_text last;
-  SUPINE_TRY(supine_mesh_guard_text(file, error));
+  SUPINE_TRY(supine_io_guard_text(file, error));
   SUPINE_TRY(check_lines(file, "v", &last, error));
-  return supine_mesh_import(file, mesh, dropped, error);
+  return supine_io_import(file, mesh, dropped, error);
 }
 
 /* Read STL, as text or binary. A file with a NUL byte is binary, even if it begins with "solid". */
-supine_status supine_mesh_read_stl(mesh_file *file, supine_mesh *mesh, size_t *dropped,
-                                   supine_error *error) {
+supine_status supine_io_read_stl(mesh_file *file, supine_mesh *mesh, size_t *dropped,
+                                 supine_error *error) {
   mesh_text last = {0};
   if (memchr(file->bytes, '\0', file->size) == NULL) {
     SUPINE_TRY(check_lines(file, "vertex", &last, error));
-    SUPINE_REFUSE_IF(!supine_mesh_text_is(last, "endsolid"), error, SUPINE_ERROR_FORMAT,
+    SUPINE_REFUSE_IF(!supine_io_text_is(last, "endsolid"), error, SUPINE_ERROR_FORMAT,
                      "%s: the STL text does not end with endsolid: it is truncated; save it again",
                      file->path);
   }
-  return supine_mesh_import(file, mesh, dropped, error);
+  return supine_io_import(file, mesh, dropped, error);
 }
 
-bool supine_mesh_import_knows(const char *ending) {
+bool supine_io_import_knows(const char *ending) {
   assimp ai;
   return SUPINE_LIBRARY_LOAD(SUPINE_ASSIMP, FUNCTIONS, &ai, NULL) == SUPINE_OK &&
          ai.IsExtensionSupported(ending) == AI_TRUE;

@@ -17,10 +17,10 @@ static mesh_reader *find_reader(const char *path) {
   static const struct {
     const char *ending;
     mesh_reader *read;
-  } known[] = {{".ply", supine_mesh_read_ply},
-               {".vtp", supine_mesh_read_vtp},
-               {".stl", supine_mesh_read_stl},
-               {".obj", supine_mesh_read_obj}};
+  } known[] = {{".ply", supine_io_read_ply},
+               {".vtp", supine_io_read_vtp},
+               {".stl", supine_io_read_stl},
+               {".obj", supine_io_read_obj}};
   for (size_t i = 0; i < sizeof known / sizeof *known; ++i) {
     if (supine_text_ends_in(path, known[i].ending)) {
       return known[i].read;
@@ -28,7 +28,7 @@ static mesh_reader *find_reader(const char *path) {
   }
   const char *slash = strrchr(path, '/');
   const char *ending = strrchr(slash == NULL ? path : slash, '.');
-  return ending != NULL && supine_mesh_import_knows(ending) ? supine_mesh_import : NULL;
+  return ending != NULL && supine_io_import_knows(ending) ? supine_io_import : NULL;
 }
 
 static bool is_letter_or_digit(char c) {
@@ -92,7 +92,7 @@ static supine_status copy_arrays(const char *name, const supine_mesh *given, sup
   for (size_t t = 0; t < given->triangle_count; ++t) {
     const uint32_t *corner = given->triangles + 3 * t;
     const double corners[3] = {corner[0], corner[1], corner[2]};
-    SUPINE_TRY(supine_mesh_faces_add(&faces, corners, 3, error));
+    SUPINE_TRY(supine_io_faces_add(&faces, corners, 3, error));
   }
   return SUPINE_OK;
 }
@@ -156,7 +156,7 @@ supine_status supine_mesh_load(const char *path, const supine_mesh_load_options 
   }
   SUPINE_TRY(choose_axes(&file, chosen.axes, &found, error));
   SUPINE_TRY(convert(path, scale, found.axes, &loaded, error));
-  if (supine_mesh_weld(&loaded, &found) != SUPINE_OK) {
+  if (supine_io_weld(&loaded, &found) != SUPINE_OK) {
     return supine_error_memory(error, "%zu vertices of %s", loaded.vertex_count, path);
   }
   SUPINE_REFUSE_IF(loaded.triangle_count == 0, error, SUPINE_ERROR_MESH,

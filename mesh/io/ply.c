@@ -44,7 +44,7 @@ typedef struct ply {
 /* Return the index of a word in a list that ends with NULL, or the index of the NULL. */
 static int find_name(mesh_text word, const char *const *names) {
   int index = 0;
-  while (names[index] != NULL && !supine_mesh_text_is(word, names[index])) {
+  while (names[index] != NULL && !supine_io_text_is(word, names[index])) {
     ++index;
   }
   return index;
@@ -63,22 +63,22 @@ static bool add_element(ply *in, mesh_text name, mesh_text count) {
     }
   }
   ++in->element_count;
-  return supine_mesh_text_count(count, &added->count);
+  return supine_io_text_count(count, &added->count);
 }
 
 /* Add the property that the words after "property" describe. */
 static bool add_property(ply *in, const mesh_text *word, size_t words) {
   static const char *const columns[] = {"x", "y", "z", NULL};
   static const char *const corners[] = {"vertex_indices", "vertex_index", NULL};
-  const bool list = words > 0 && supine_mesh_text_is(word[0], "list");
+  const bool list = words > 0 && supine_io_text_is(word[0], "list");
   if (in->property_count == PROPERTIES_MAX || in->element_count == 0 || words < (list ? 4 : 2)) {
     return false;
   }
   element *of = &in->elements[in->element_count - 1];
   property *added = &in->properties[in->property_count++];
   const mesh_text name = word[list ? 3 : 1];
-  *added = (property){.count = list ? supine_mesh_type_find(word[1]) : NULL,
-                      .type = supine_mesh_type_find(word[list ? 2 : 0]),
+  *added = (property){.count = list ? supine_io_type_find(word[1]) : NULL,
+                      .type = supine_io_type_find(word[list ? 2 : 0]),
                       .role = NONE};
   if (of->kind == VERTICES && !list) {
     const int column = find_name(name, columns);
@@ -102,17 +102,17 @@ static bool read_line(ply *in, mesh_text line, bool *has_format) {
       return false;
     }
   }
-  while (words < 5 && supine_mesh_text_word(&line, &word[words])) {
+  while (words < 5 && supine_io_text_word(&line, &word[words])) {
     ++words;
   }
-  if (words > 0 && supine_mesh_text_is(word[0], "format")) {
+  if (words > 0 && supine_io_text_is(word[0], "format")) {
     in->encoding = words > 1 ? (encoding)find_name(word[1], encodings) : ENCODINGS;
     *has_format = in->encoding < ENCODINGS;
     return *has_format;
   }
-  return words > 0 && supine_mesh_text_is(word[0], "element")
+  return words > 0 && supine_io_text_is(word[0], "element")
              ? words > 2 && add_element(in, word[1], word[2])
-         : words > 0 && supine_mesh_text_is(word[0], "property")
+         : words > 0 && supine_io_text_is(word[0], "property")
              ? add_property(in, word + 1, words - 1)
              : true;
 }
@@ -120,13 +120,13 @@ static bool read_line(ply *in, mesh_text line, bool *has_format) {
 static supine_status read_header(ply *in) {
   mesh_text line;
   bool has_format = false;
-  SUPINE_REFUSE_IF(!supine_mesh_text_line(&in->text, &line) || !supine_mesh_text_is(line, "ply"),
+  SUPINE_REFUSE_IF(!supine_io_text_line(&in->text, &line) || !supine_io_text_is(line, "ply"),
                    in->error, SUPINE_ERROR_FORMAT,
                    "%s: does not begin with \"ply\"; give a PLY file", in->file->path);
-  for (size_t number = 2; supine_mesh_text_line(&in->text, &line); ++number) {
+  for (size_t number = 2; supine_io_text_line(&in->text, &line); ++number) {
     mesh_text rest = line;
     mesh_text word;
-    if (supine_mesh_text_word(&rest, &word) && supine_mesh_text_is(word, "end_header")) {
+    if (supine_io_text_word(&rest, &word) && supine_io_text_is(word, "end_header")) {
       SUPINE_REFUSE_IF(!has_format, in->error, SUPINE_ERROR_FORMAT,
                        "%s: the PLY header has no format line; save the mesh again",
                        in->file->path);
@@ -152,7 +152,7 @@ static supine_status check_header(const ply *in) {
                      SUPINE_ERROR_MESH,
                      "%s: it has strips of triangles; save the mesh as triangles", path);
   }
-  SUPINE_TRY(in->encoding == ASCII ? supine_mesh_guard_text(in->file, in->error) : SUPINE_OK);
+  SUPINE_TRY(in->encoding == ASCII ? supine_io_guard_text(in->file, in->error) : SUPINE_OK);
   SUPINE_REFUSE_IF((in->present & needed) != needed, in->error, SUPINE_ERROR_MESH,
                    "%s: no triangles: the PLY header has no faces with vertex_indices, or no "
                    "vertices with x, y and z; save the mesh as triangles",
@@ -166,21 +166,21 @@ static bool take(ply *in, const mesh_type *type, double *value) {
     if ((size_t)(in->text.end - in->text.at) < type->size) {
       return false;
     }
-    *value = supine_mesh_type_decode(type, in->text.at, in->encoding == BIG);
+    *value = supine_io_type_decode(type, in->text.at, in->encoding == BIG);
     in->text.at += type->size;
     return true;
   }
   mesh_text word;
   uint64_t count = 0;
   if (type->is_real) {
-    return supine_mesh_text_number(&in->line, value);
+    return supine_io_text_number(&in->line, value);
   }
-  if (!supine_mesh_text_word(&in->line, &word)) {
+  if (!supine_io_text_word(&in->line, &word)) {
     return false;
   }
   const bool negative = type->is_signed && *word.at == '-';
   word.at += negative;
-  const bool good = supine_mesh_text_count(word, &count);
+  const bool good = supine_io_text_count(word, &count);
   *value = negative ? -(double)count : (double)count;
   return good;
 }
@@ -213,15 +213,14 @@ static supine_status take_list(ply *in, const element *of, uint64_t item, const 
       corners[k] = value;
     }
   }
-  return list->role == CORNERS
-             ? supine_mesh_faces_add(&in->faces, corners, (size_t)count, in->error)
-             : SUPINE_OK;
+  return list->role == CORNERS ? supine_io_faces_add(&in->faces, corners, (size_t)count, in->error)
+                               : SUPINE_OK;
 }
 
 static supine_status take_items(ply *in, const element *of) {
   double *vertices = in->faces.mesh->vertices;
   for (uint64_t i = 0; i < of->count; ++i) {
-    if (in->encoding == ASCII && !supine_mesh_text_line(&in->text, &in->line)) {
+    if (in->encoding == ASCII && !supine_io_text_line(&in->text, &in->line)) {
       return cut_short(in, of, i);
     }
     for (size_t p = 0; p < of->property_count; ++p) {
@@ -260,8 +259,8 @@ static supine_status make_room(const ply *in, const element *of, supine_mesh *me
              : SUPINE_OK;
 }
 
-supine_status supine_mesh_read_ply(mesh_file *file, supine_mesh *mesh, size_t *dropped,
-                                   supine_error *error) {
+supine_status supine_io_read_ply(mesh_file *file, supine_mesh *mesh, size_t *dropped,
+                                 supine_error *error) {
   ply in = {.file = file,
             .error = error,
             .text = {file->bytes, file->bytes + file->size},

@@ -17,7 +17,7 @@
 typedef struct reading {
   const char *path;
   const supine_mesh_load_options *options;
-  supine_mesh_points points;
+  supine_io_points points;
   size_t room;
   supine_error *error;
 } reading;
@@ -29,7 +29,7 @@ static supine_status no_memory(const reading *r) {
 /* Append a point. Convert it from `axes` and `unit`, unless the options name others. */
 static supine_status add(reading *r, const double at[3], const char *name, supine_axes axes,
                          double unit) {
-  supine_mesh_points *p = &r->points;
+  supine_io_points *p = &r->points;
   char number[24];
   if (p->count == r->room) {
     const size_t room = 2 * r->room + 64;
@@ -126,12 +126,12 @@ static supine_status read_markups(reading *r) {
   return SUPINE_OK;
 }
 
-bool supine_mesh_points_named(const char *path) {
+bool supine_io_points_named(const char *path) {
   return supine_text_ends_in(path, ".csv") || supine_text_ends_in(path, ".json");
 }
 
-supine_status supine_mesh_points_read(const char *path, const supine_mesh_load_options *options,
-                                      supine_mesh_points *points, supine_error *error) {
+supine_status supine_io_points_read(const char *path, const supine_mesh_load_options *options,
+                                    supine_io_points *points, supine_error *error) {
   reading r = {.path = path, .options = options, .error = error};
   supine_status status = supine_text_ends_in(path, ".json") ? read_markups(&r) : read_csv(&r);
   if (status == SUPINE_OK && r.points.count == 0) {
@@ -140,16 +140,16 @@ supine_status supine_mesh_points_read(const char *path, const supine_mesh_load_o
   if (status == SUPINE_OK) {
     *points = r.points;
   } else {
-    supine_mesh_points_free(&r.points);
+    supine_io_points_free(&r.points);
   }
   return status;
 }
 
-void supine_mesh_points_free(supine_mesh_points *points) {
+void supine_io_points_free(supine_io_points *points) {
   for (size_t i = 0; i < points->count; ++i) {
     free(points->names[i]);
   }
   free(points->names);
   free(points->at);
-  *points = (supine_mesh_points){0};
+  *points = (supine_io_points){0};
 }

@@ -5,21 +5,21 @@
 
 #include "mesh/mesh.h"
 
-typedef struct supine_mesh_points {
+typedef struct supine_io_points {
   size_t count;
   double *at;   /**< [count, 3] positions, mm, LPS */
   char **names; /**< [count] "1", "2", ... if the file has no names; never NULL */
-} supine_mesh_points;
+} supine_io_points;
 
 /** Read points from a CSV file with the columns x,y,z and optionally name (or label), or from 3D
  * Slicer's .mrk.json (placed control points, in the file's coordinate system).
  * @param options  axes and unit to use instead of the file's; NULL for the file's own
  * @param points   zero-initialised; written only on success */
-supine_status supine_mesh_points_read(const char *path, const supine_mesh_load_options *options,
-                                      supine_mesh_points *points, supine_error *error);
-void supine_mesh_points_free(supine_mesh_points *points);
+supine_status supine_io_points_read(const char *path, const supine_mesh_load_options *options,
+                                    supine_io_points *points, supine_error *error);
+void supine_io_points_free(supine_io_points *points);
 
 /** Return whether the name ends in .csv or .json. */
-bool supine_mesh_points_named(const char *path);
+bool supine_io_points_named(const char *path);
 
 #endif

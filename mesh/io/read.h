@@ -19,18 +19,18 @@ typedef struct mesh_text {
 
 /** Remove the next line from `text`, and set `line` to it without LF or CRLF. Return false at the
  * end of the text. */
-bool supine_mesh_text_line(mesh_text *text, mesh_text *line);
+bool supine_io_text_line(mesh_text *text, mesh_text *line);
 /** Remove the next word between blanks from `text`; return false at the end of the text. */
-bool supine_mesh_text_word(mesh_text *text, mesh_text *word);
+bool supine_io_text_word(mesh_text *text, mesh_text *word);
 /** Return whether the word is `expected`, ignoring case. */
-bool supine_mesh_text_is(mesh_text word, const char *expected);
+bool supine_io_text_is(mesh_text word, const char *expected);
 /** Parse decimal digits; return false for anything else, or for a value near or above 2^63. */
-bool supine_mesh_text_count(mesh_text word, uint64_t *value);
+bool supine_io_text_count(mesh_text word, uint64_t *value);
 /** Remove the next word from `text` and parse it with strtod; return false if it is missing or
  * not a number. A NUL must follow the text. */
-bool supine_mesh_text_number(mesh_text *text, double *value);
+bool supine_io_text_number(mesh_text *text, double *value);
 /** Remove the next three numbers from `text`, and round them to float; return false on failure. */
-bool supine_mesh_text_position(mesh_text *text, double position[3]);
+bool supine_io_text_position(mesh_text *text, double position[3]);
 
 /** A number type of a binary file. */
 typedef struct mesh_type {
@@ -41,9 +41,9 @@ typedef struct mesh_type {
 } mesh_type;
 
 /** Return the type that PLY or VTP calls `name`, ignoring case; NULL if there is none. */
-const mesh_type *supine_mesh_type_find(mesh_text name);
+const mesh_type *supine_io_type_find(mesh_text name);
 /** Convert the bytes of a number to double. */
-double supine_mesh_type_decode(const mesh_type *type, const unsigned char *bytes, bool big_endian);
+double supine_io_type_decode(const mesh_type *type, const unsigned char *bytes, bool big_endian);
 
 typedef struct mesh_file {
   const char *path;
@@ -55,7 +55,7 @@ typedef struct mesh_file {
 
 /** Refuse a text with a NUL byte, or with a CR that no LF follows: other readers would split its
  * lines differently. */
-supine_status supine_mesh_guard_text(const mesh_file *file, supine_error *error);
+supine_status supine_io_guard_text(const mesh_file *file, supine_error *error);
 
 /* ---- faces.c: add faces to a mesh that already has its vertices. ---- */
 
@@ -75,8 +75,8 @@ typedef struct mesh_faces {
 
 /** Cut a face into triangles, and add them. A face of more than MESH_CORNERS_MAX corners is refused
  * without reading `corners`. */
-supine_status supine_mesh_faces_add(mesh_faces *faces, const double *corners, size_t count,
-                                    supine_error *error);
+supine_status supine_io_faces_add(mesh_faces *faces, const double *corners, size_t count,
+                                  supine_error *error);
 
 /* ---- ply.c, vtp_read.c, import.c: one function for each format. ---- */
 
@@ -85,19 +85,19 @@ supine_status supine_mesh_faces_add(mesh_faces *faces, const double *corners, si
  * points or lines. If the format can hold the axes in a SPACE tag, they are stored in `file`. */
 typedef supine_status mesh_reader(mesh_file *file, supine_mesh *mesh, size_t *dropped,
                                   supine_error *error);
-mesh_reader supine_mesh_read_ply;
-mesh_reader supine_mesh_read_vtp;
-mesh_reader supine_mesh_read_stl;
-mesh_reader supine_mesh_read_obj;
+mesh_reader supine_io_read_ply;
+mesh_reader supine_io_read_vtp;
+mesh_reader supine_io_read_stl;
+mesh_reader supine_io_read_obj;
 /** Read any other format with the library assimp. */
-mesh_reader supine_mesh_import;
+mesh_reader supine_io_import;
 /** Return whether assimp is installed and imports files whose names have this ending. */
-bool supine_mesh_import_knows(const char *ending);
+bool supine_io_import_knows(const char *ending);
 
 /* ---- weld.c ---- */
 
 /** Weld vertices at equal positions, drop degenerate triangles, then drop unused vertices, all in
  * place. No coordinate may be -0. The numbers of dropped items are added to the report. */
-supine_status supine_mesh_weld(supine_mesh *mesh, supine_mesh_report *report);
+supine_status supine_io_weld(supine_mesh *mesh, supine_mesh_report *report);
 
 #endif

@@ -7,7 +7,7 @@
 #include "mesh/io/save.h"
 
 static save_function *find_function(const char *path) {
-#define ROW(name) {SUPINE_MESH_ENDING(name), supine_mesh_save_##name},
+#define ROW(name) {SUPINE_MESH_ENDING(name), supine_io_save_##name},
   static const struct {
     const char *ending;
     save_function *function;
@@ -30,11 +30,11 @@ supine_status supine_mesh_save(const char *path, const supine_mesh *mesh,
   save_function *function = find_function(path);
   SUPINE_REFUSE_IF(function == NULL, error, SUPINE_ERROR_ARGUMENT,
                    "%s: unknown ending; end the name in " SUPINE_MESH_ENDINGS, path);
-  SUPINE_TRY(supine_mesh_writer_check(path, mesh, error));
+  SUPINE_TRY(supine_io_writer_check(path, mesh, error));
   SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
   SUPINE_TRY(supine_output_open(path, &output, error));
   mesh_writer writer;
-  supine_mesh_writer_begin(mesh, options, &writer);
+  supine_io_writer_begin(mesh, options, &writer);
   writer.out = output.file;
   function(&writer);
   return supine_output_commit(&output, error);

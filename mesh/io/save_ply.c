@@ -2,7 +2,7 @@
 /* Write binary little-endian PLY. */
 #include "mesh/io/save.h"
 
-void supine_mesh_save_ply(const mesh_writer *writer) {
+void supine_io_save_ply(const mesh_writer *writer) {
   const supine_mesh *mesh = writer->mesh;
   (void)fprintf(writer->out, "ply\nformat binary_little_endian 1.0\ncomment SPACE=%s %s\n",
                 writer->space, writer->unit);
@@ -28,9 +28,9 @@ void supine_mesh_save_ply(const mesh_writer *writer) {
   for (size_t i = 0; i < mesh->vertex_count; ++i) {
     float row[7 + SUPINE_MESH_SCALARS];
     size_t count = 3;
-    supine_mesh_writer_position(writer, i, row);
+    supine_io_writer_position(writer, i, row);
     if (writer->options.from != NULL) {
-      supine_mesh_writer_displacement(writer, i, row + 3);
+      supine_io_writer_displacement(writer, i, row + 3);
       count = 7;
     }
     for (size_t k = 0; k < SUPINE_MESH_SCALARS; ++k) {
@@ -42,7 +42,7 @@ void supine_mesh_save_ply(const mesh_writer *writer) {
   }
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
     uint32_t corner[3];
-    supine_mesh_writer_triangle(writer, t, corner);
+    supine_io_writer_triangle(writer, t, corner);
     (void)fputc(3, writer->out);
     (void)fwrite(corner, sizeof corner, 1, writer->out);
   }

@@ -24,7 +24,7 @@ static void facet_normal(float (*corners)[3], float normal[3]) {
   }
 }
 
-void supine_mesh_save_stl(const mesh_writer *writer) {
+void supine_io_save_stl(const mesh_writer *writer) {
   const supine_mesh *mesh = writer->mesh;
   /* The header must not begin with "solid", which marks STL text. */
   char text[HEADER + 1 + sizeof writer->comment];
@@ -37,9 +37,9 @@ void supine_mesh_save_stl(const mesh_writer *writer) {
     static const uint16_t attributes = 0;
     float facet[4][3]; /* normal, then the corners */
     uint32_t corner[3];
-    supine_mesh_writer_triangle(writer, t, corner);
+    supine_io_writer_triangle(writer, t, corner);
     for (size_t k = 0; k < 3; ++k) {
-      supine_mesh_writer_position(writer, corner[k], facet[1 + k]);
+      supine_io_writer_position(writer, corner[k], facet[1 + k]);
     }
     facet_normal(facet + 1, facet[0]);
     (void)fwrite(facet, sizeof facet, 1, writer->out);

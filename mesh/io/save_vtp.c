@@ -41,11 +41,11 @@ typedef struct vtp {
 } vtp;
 
 static void find_position(const mesh_writer *writer, size_t i, vtp_item *item) {
-  supine_mesh_writer_position(writer, i, item->number);
+  supine_io_writer_position(writer, i, item->number);
 }
 
 static void find_corners(const mesh_writer *writer, size_t i, vtp_item *item) {
-  supine_mesh_writer_triangle(writer, i, item->index);
+  supine_io_writer_triangle(writer, i, item->index);
 }
 
 static void find_stop(const mesh_writer *writer, size_t i, vtp_item *item) {
@@ -54,16 +54,16 @@ static void find_stop(const mesh_writer *writer, size_t i, vtp_item *item) {
 }
 
 static void find_displacement(const mesh_writer *writer, size_t i, vtp_item *item) {
-  supine_mesh_writer_displacement(writer, i, item->number);
+  supine_io_writer_displacement(writer, i, item->number);
 }
 
 static void find_magnitude(const mesh_writer *writer, size_t i, vtp_item *item) {
-  supine_mesh_writer_displacement(writer, i, item->number);
+  supine_io_writer_displacement(writer, i, item->number);
   item->number[0] = item->number[3];
 }
 
 static void find_normal(const mesh_writer *writer, size_t i, vtp_item *item) {
-  supine_mesh_writer_normal(writer, i, item->number);
+  supine_io_writer_normal(writer, i, item->number);
 }
 
 static vtp vtp_begin(const mesh_writer *writer, const supine_mesh_frames *frames) {
@@ -262,7 +262,7 @@ static void vtp_foot(const vtp *file) {
   (void)fputs("\n</AppendedData>\n</VTKFile>\n", file->writer.out);
 }
 
-void supine_mesh_save_vtp(const mesh_writer *writer) {
+void supine_io_save_vtp(const mesh_writer *writer) {
   static const supine_mesh_frames one = {.count = 1};
   const vtp file = vtp_begin(writer, &one);
   vtp_head(&file);
@@ -276,13 +276,13 @@ supine_status supine_mesh_save_frames(const char *path, const supine_mesh *mesh,
   SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
   mesh_writer writer;
   SUPINE_TRY(supine_output_open(path, &output, error));
-  supine_mesh_writer_begin(mesh, options, &writer);
+  supine_io_writer_begin(mesh, options, &writer);
   writer.out = output.file;
   const vtp file = vtp_begin(&writer, frames);
   vtp_head(&file);
   for (size_t frame = 0; frame < frames->count; ++frame) {
     SUPINE_TRY(frames->next(frames->context, frame, error));
-    SUPINE_TRY(supine_mesh_writer_check(path, mesh, error));
+    SUPINE_TRY(supine_io_writer_check(path, mesh, error));
     vtp_frame(&file, frame);
   }
   vtp_foot(&file);

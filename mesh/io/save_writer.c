@@ -11,8 +11,8 @@ static bool fits(double x) {
   return fabs(x) <= (double)FLT_MAX;
 }
 
-supine_status supine_mesh_writer_check(const char *path, const supine_mesh *mesh,
-                                       supine_error *error) {
+supine_status supine_io_writer_check(const char *path, const supine_mesh *mesh,
+                                     supine_error *error) {
   SUPINE_REFUSE_IF(mesh->vertex_count > INT32_MAX || mesh->triangle_count > INT32_MAX / 3, error,
                    SUPINE_ERROR_ARGUMENT,
                    "%s: too large to write: %zu vertices, %zu triangles: write a coarser mesh",
@@ -39,8 +39,8 @@ static void copy_comment(const char *comment, char *line, size_t size) {
   line[length] = '\0';
 }
 
-void supine_mesh_writer_begin(const supine_mesh *mesh, const supine_mesh_save_options *options,
-                              mesh_writer *writer) {
+void supine_io_writer_begin(const supine_mesh *mesh, const supine_mesh_save_options *options,
+                            mesh_writer *writer) {
   const supine_mesh_save_options chosen =
       options == NULL ? (supine_mesh_save_options){0} : *options;
   const double unit = chosen.millimetres_per_unit == 0.0 ? 1.0 : chosen.millimetres_per_unit;
@@ -59,21 +59,21 @@ void supine_mesh_writer_begin(const supine_mesh *mesh, const supine_mesh_save_op
   supine_mesh_unit_name(unit, writer->unit);
 }
 
-void supine_mesh_writer_normal(const mesh_writer *writer, size_t i, float normal[3]) {
+void supine_io_writer_normal(const mesh_writer *writer, size_t i, float normal[3]) {
   for (size_t axis = 0; axis < 3; ++axis) { /* + 0.0 turns -0.0 into 0.0 */
     const float value = writer->options.normals[3 * i + writer->source[axis]];
     normal[axis] = (writer->factor[axis] < 0.0 ? -value : value) + 0.0F;
   }
 }
 
-void supine_mesh_writer_position(const mesh_writer *writer, size_t i, float position[3]) {
+void supine_io_writer_position(const mesh_writer *writer, size_t i, float position[3]) {
   for (size_t axis = 0; axis < 3; ++axis) {
     const double vertex = writer->mesh->vertices[3 * i + writer->source[axis]];
     position[axis] = (float)(writer->factor[axis] * vertex + 0.0);
   }
 }
 
-void supine_mesh_writer_displacement(const mesh_writer *writer, size_t i, float displacement[4]) {
+void supine_io_writer_displacement(const mesh_writer *writer, size_t i, float displacement[4]) {
   double square = 0.0;
   for (size_t axis = 0; axis < 3; ++axis) {
     const size_t from = 3 * i + writer->source[axis];
@@ -85,7 +85,7 @@ void supine_mesh_writer_displacement(const mesh_writer *writer, size_t i, float 
   displacement[3] = (float)sqrt(square);
 }
 
-void supine_mesh_writer_triangle(const mesh_writer *writer, size_t t, uint32_t corner[3]) {
+void supine_io_writer_triangle(const mesh_writer *writer, size_t t, uint32_t corner[3]) {
   const uint32_t *from = writer->mesh->triangles + 3 * t;
   corner[0] = from[0];
   corner[1] = from[writer->mirrored ? 2 : 1];

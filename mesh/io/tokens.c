@@ -9,7 +9,7 @@
 
 #include "mesh/io/read.h"
 
-bool supine_mesh_text_line(mesh_text *text, mesh_text *line) {
+bool supine_io_text_line(mesh_text *text, mesh_text *line) {
   if (text->at >= text->end) {
     return false;
   }
@@ -22,7 +22,7 @@ bool supine_mesh_text_line(mesh_text *text, mesh_text *line) {
   return true;
 }
 
-bool supine_mesh_text_word(mesh_text *text, mesh_text *word) {
+bool supine_io_text_word(mesh_text *text, mesh_text *word) {
   while (text->at < text->end && supine_ascii_is_space((char)*text->at)) {
     ++text->at;
   }
@@ -34,13 +34,13 @@ bool supine_mesh_text_word(mesh_text *text, mesh_text *word) {
   return word->at < word->end;
 }
 
-bool supine_mesh_text_is(mesh_text word, const char *expected) {
+bool supine_io_text_is(mesh_text word, const char *expected) {
   const size_t length = strlen(expected);
   return (size_t)(word.end - word.at) == length &&
          supine_ascii_same_begin((const char *)word.at, expected, length);
 }
 
-bool supine_mesh_text_count(mesh_text word, uint64_t *value) {
+bool supine_io_text_count(mesh_text word, uint64_t *value) {
   *value = 0;
   for (const unsigned char *p = word.at; p < word.end; ++p) {
     if (!supine_ascii_is_digit((char)*p) || *value > (uint64_t)INT64_MAX / 10 - 1) {
@@ -51,27 +51,27 @@ bool supine_mesh_text_count(mesh_text word, uint64_t *value) {
   return word.at < word.end;
 }
 
-bool supine_mesh_text_number(mesh_text *text, double *value) {
+bool supine_io_text_number(mesh_text *text, double *value) {
   mesh_text word;
   char *end = NULL;
   *value = 0.0;
-  if (!supine_mesh_text_word(text, &word)) {
+  if (!supine_io_text_word(text, &word)) {
     return false;
   }
   *value = supine_number_parse((const char *)word.at, &end);
   return (const unsigned char *)end == word.end;
 }
 
-bool supine_mesh_text_position(mesh_text *text, double position[3]) {
+bool supine_io_text_position(mesh_text *text, double position[3]) {
   bool good = true;
   for (int k = 0; good && k < 3; ++k) {
-    good = supine_mesh_text_number(text, &position[k]);
+    good = supine_io_text_number(text, &position[k]);
     position[k] = (double)(float)position[k];
   }
   return good;
 }
 
-const mesh_type *supine_mesh_type_find(mesh_text name) {
+const mesh_type *supine_io_type_find(mesh_text name) {
   static const mesh_type types[] = {
       {"char", 1, true, false},    {"int8", 1, true, false},    {"uchar", 1, false, false},
       {"uint8", 1, false, false},  {"short", 2, true, false},   {"int16", 2, true, false},
@@ -80,14 +80,14 @@ const mesh_type *supine_mesh_type_find(mesh_text name) {
       {"int64", 8, true, false},   {"uint64", 8, false, false}, {"float", 4, true, true},
       {"float32", 4, true, true},  {"double", 8, true, true},   {"float64", 8, true, true}};
   for (size_t i = 0; i < sizeof types / sizeof *types; ++i) {
-    if (supine_mesh_text_is(name, types[i].name)) {
+    if (supine_io_text_is(name, types[i].name)) {
       return &types[i];
     }
   }
   return NULL;
 }
 
-double supine_mesh_type_decode(const mesh_type *type, const unsigned char *bytes, bool big_endian) {
+double supine_io_type_decode(const mesh_type *type, const unsigned char *bytes, bool big_endian) {
   uint64_t bits = 0;
   for (unsigned k = 0; k < type->size; ++k) {
     bits = bits << 8 | bytes[big_endian ? k : type->size - 1 - k];
@@ -108,7 +108,7 @@ double supine_mesh_type_decode(const mesh_type *type, const unsigned char *bytes
                                                : (double)bits;
 }
 
-supine_status supine_mesh_guard_text(const mesh_file *file, supine_error *error) {
+supine_status supine_io_guard_text(const mesh_file *file, supine_error *error) {
   const unsigned char *end = file->bytes + file->size;
   SUPINE_REFUSE_IF(memchr(file->bytes, '\0', file->size) != NULL, error, SUPINE_ERROR_FORMAT,
                    "%s: the text holds a NUL byte; save it as plain ASCII or UTF-8", file->path);

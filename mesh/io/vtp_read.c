@@ -183,7 +183,7 @@ static supine_status take_numbers(const vtp_file *v, const element *e, size_t co
   const mesh_text word = {(const unsigned char *)name, (const unsigned char *)strchr(name, '\0')};
   static const mesh_type character = {"String", 1, false, false};
   const mesh_type *type =
-      strcmp(name, character.name) == 0 ? &character : supine_mesh_type_find(word);
+      strcmp(name, character.name) == 0 ? &character : supine_io_type_find(word);
   *numbers = NULL;
   /* zlib expands a byte to at most 1032 bytes */
   SUPINE_REFUSE_IF(type == NULL || count > 1032 * (size_t)(v->end - v->bytes), error,
@@ -204,10 +204,10 @@ static supine_status take_numbers(const vtp_file *v, const element *e, size_t co
                     (const unsigned char *)(tag != NULL ? tag : v->end)};
   bool good = ascii || take_bytes(v, e, count * type->size, bytes);
   for (size_t i = 0; i < count && good && ascii; ++i) {
-    good = supine_mesh_text_number(&text, &values[i]);
+    good = supine_io_text_number(&text, &values[i]);
   }
   for (size_t i = 0; i < count && good && !ascii; ++i) {
-    values[i] = supine_mesh_type_decode(type, bytes + i * type->size, false);
+    values[i] = supine_io_type_decode(type, bytes + i * type->size, false);
   }
   SUPINE_REFUSE_IF(!good, error, SUPINE_ERROR_FORMAT,
                    "%s: an array is truncated or damaged; write the file again", v->file->path);
@@ -273,8 +273,8 @@ static supine_status take_polygons(const vtp_file *v, const element *piece, mesh
   for (size_t p = 0; p < count; ++p) {
     SUPINE_REFUSE_IF(!(ends[p] >= from && ends[p] <= total), error, SUPINE_ERROR_FORMAT, "%s: %s",
                      v->file->path, wrong);
-    SUPINE_TRY(supine_mesh_faces_add(faces, corners + (size_t)from, (size_t)ends[p] - (size_t)from,
-                                     error));
+    SUPINE_TRY(
+        supine_io_faces_add(faces, corners + (size_t)from, (size_t)ends[p] - (size_t)from, error));
     from = ends[p];
   }
   return SUPINE_OK;
@@ -331,8 +331,8 @@ static void note_space(const vtp_file *v, const element *piece, mesh_file *file)
   }
 }
 
-supine_status supine_mesh_read_vtp(mesh_file *file, supine_mesh *mesh, size_t *dropped,
-                                   supine_error *error) {
+supine_status supine_io_read_vtp(mesh_file *file, supine_mesh *mesh, size_t *dropped,
+                                 supine_error *error) {
   vtp_file v = {.file = file,
                 .bytes = (const char *)file->bytes,
                 .end = (const char *)file->bytes + file->size};

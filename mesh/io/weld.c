@@ -57,7 +57,7 @@ static size_t drop_degenerate(supine_mesh *mesh, const uint32_t *remap) {
   return kept;
 }
 
-supine_status supine_mesh_weld(supine_mesh *mesh, supine_mesh_report *report) {
+supine_status supine_io_weld(supine_mesh *mesh, supine_mesh_report *report) {
   size_t slot_count = 16;
   while (slot_count < 2 * mesh->vertex_count) {
     slot_count *= 2;

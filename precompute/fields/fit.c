@@ -240,13 +240,13 @@ supine_status supine_fields_measure(const supine_fit *fit, size_t modes, supine_
                 (int)rows, weights, 1, 0.0, residual, 1);
     for (size_t i = 0; i < rows; i += 3) {
       const double length = supine_length(residual + i);
-      supine_accuracy_tally_add(tally, 1, &length);
+      supine_projection_tally_add(tally, 1, &length);
     }
   }
   const double size = sqrt(square_sum(fit) / samples);
   *accuracy = (supine_accuracy){.direction_count = m,
                                 .rms_mm = sqrt(tally->square_sum / samples),
-                                .p95_mm = supine_accuracy_tally_percentile(tally, 0.95),
+                                .p95_mm = supine_projection_tally_percentile(tally, 0.95),
                                 .max_mm = tally->largest};
   accuracy->relative_rms = accuracy->rms_mm / size;
   accuracy->relative_p95 = accuracy->p95_mm / size;

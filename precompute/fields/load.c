@@ -84,12 +84,12 @@ static supine_status read_direction(const reading *r, size_t row) {
 }
 
 /* Match point p to the vertex nearest to it, unless that is far away or has a nearer point. */
-static supine_status match_point(const reading *r, const supine_inside_surface *vertices,
+static supine_status match_point(const reading *r, const supine_lungs_surface *vertices,
                                  double limit, size_t p) {
   double at[3];
   SUPINE_REFUSE_IF(!read_row(r, r->points, p, r->frame.millimetres_per_unit, at), r->error,
                    SUPINE_ERROR_FORMAT, "%s: point %zu is not finite: correct it", r->path, p);
-  const supine_inside_place place = supine_inside_surface_nearest(vertices, at, NULL);
+  const supine_inside_place place = supine_lungs_surface_nearest(vertices, at, NULL);
   const size_t i = place.triangle;
   SUPINE_REFUSE_IF(
       place.depth <= limit && fabs(place.depth - r->apart[i]) <= 1e-3 * limit, r->error,
@@ -110,13 +110,13 @@ static supine_status match_points(const reading *r) {
   const supine_lungs *lungs = r->lungs;
   const size_t n = lungs->mesh.vertex_count;
   const double limit = farthest_point * supine_distance(lungs->minimum, lungs->maximum);
-  SUPINE_FREED_BY(supine_inside_surface_drop) supine_inside_surface *tree = NULL;
+  SUPINE_FREED_BY(supine_lungs_surface_drop) supine_lungs_surface *tree = NULL;
   for (size_t i = 0; i < n; ++i) {
     r->apart[i] = INFINITY;
     r->corner[3 * i] = r->corner[3 * i + 1] = r->corner[3 * i + 2] = (uint32_t)i;
   }
   SUPINE_TRY(
-      supine_inside_surface_create(lungs->mesh.vertices, n, r->corner, false, &tree, r->error));
+      supine_lungs_surface_create(lungs->mesh.vertices, n, r->corner, false, &tree, r->error));
   for (size_t p = 0; p < r->points->shape[0]; ++p) {
     SUPINE_TRY(match_point(r, tree, limit, p));
   }

@@ -46,9 +46,9 @@ static char *add_name(supine_inside_content *content, const char *name, size_t l
 supine_status supine_inside_content_points(const char *path,
                                            const supine_mesh_load_options *options,
                                            supine_inside_content *content, supine_error *error) {
-  SUPINE_FREED_BY(supine_mesh_points_free) supine_mesh_points read = {0};
+  SUPINE_FREED_BY(supine_io_points_free) supine_io_points read = {0};
   size_t length = 0;
-  SUPINE_TRY(supine_mesh_points_read(path, options, &read, error));
+  SUPINE_TRY(supine_io_points_read(path, options, &read, error));
   for (size_t i = 0; i < read.count; ++i) {
     length += strlen(read.names[i]) + 1;
   }

@@ -20,7 +20,7 @@ typedef struct supine_inside_content {
   supine_image grid;   /**< for a grid: numbers of nodes, position of the first node, and steps */
 } supine_inside_content;
 
-/** Append each point of a file as one part. Options as supine_mesh_points_read. */
+/** Append each point of a file as one part. Options as supine_io_points_read. */
 supine_status supine_inside_content_points(const char *path,
                                            const supine_mesh_load_options *options,
                                            supine_inside_content *content, supine_error *error);

@@ -65,7 +65,7 @@ static void gather_parts(embedding *e) {
     for (size_t i = begin; i < end && content->rigid[content->part[begin]]; ++i) {
       e->lung[i] = (unsigned char)most;
       e->place[i] =
-          supine_inside_surface_find(e->shells->shell[most].surface, content->points + 3 * i, NULL);
+          supine_lungs_surface_find(e->shells->shell[most].surface, content->points + 3 * i, NULL);
     }
   }
 }

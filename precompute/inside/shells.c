@@ -52,8 +52,8 @@ static supine_status create_shell(const supine_basis_info *info, const float *sc
   SUPINE_REFUSE_IF(shell->triangle_count == 0, error, SUPINE_ERROR_MESH,
                    "lung %s has no triangles: give a basis of a surface", info->lung_names[lung]);
   shell->edge = mean_edge(shell);
-  return supine_inside_surface_create(shell->vertices, shell->triangle_count, shell->triangles,
-                                      true, &shell->surface, error);
+  return supine_lungs_surface_create(shell->vertices, shell->triangle_count, shell->triangles, true,
+                                     &shell->surface, error);
 }
 
 supine_status supine_inside_shells_create(const supine_basis *basis, supine_inside_shells *shells,
@@ -85,7 +85,7 @@ void supine_inside_shells_free(supine_inside_shells *shells) {
     supine_inside_shell *shell = &shells->shell[lung];
     free(shell->vertices);
     free(shell->triangles);
-    supine_inside_surface_destroy(shell->surface);
+    supine_lungs_surface_destroy(shell->surface);
   }
   *shells = (supine_inside_shells){0};
 }
@@ -167,8 +167,8 @@ static void step_to(const supine_inside_shells *shells, const double point[3], s
       return;
     }
   }
-  *place = supine_inside_surface_find(shells->shell[lung].surface, point,
-                                      walk->known[lung] ? place : NULL);
+  *place = supine_lungs_surface_find(shells->shell[lung].surface, point,
+                                     walk->known[lung] ? place : NULL);
   walk->known[lung] = true;
 }
 

@@ -17,7 +17,7 @@ typedef struct supine_inside_shell {
   size_t triangle_count;
   uint32_t *triangles; /**< [triangle_count, 3] vertex indices minus `begin` */
   double edge;         /**< mean length of the edges, mm */
-  supine_inside_surface *surface;
+  supine_lungs_surface *surface;
 } supine_inside_shell;
 
 typedef struct supine_inside_shells {

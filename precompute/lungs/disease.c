@@ -20,8 +20,8 @@ static bool positive(double value) {
   return value > 0.0 && isfinite(value);
 }
 
-supine_status supine_tissue_add_lesion(const supine_lungs *lungs, const supine_lesion *lesion,
-                                       double *factors, size_t *reached, supine_error *error) {
+supine_status supine_lungs_add_lesion(const supine_lungs *lungs, const supine_lesion *lesion,
+                                      double *factors, size_t *reached, supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   const double *c = lesion->centre;
   SUPINE_REFUSE_IF(!isfinite(c[0]) || !isfinite(c[1]) || !isfinite(c[2]) ||
@@ -71,7 +71,7 @@ static void find_hilum(const supine_lungs *lungs, size_t lung, double hilum[3]) 
   }
 }
 
-void supine_tissue_collapse(const supine_lungs *lungs, const double share[2], double *vertices) {
+void supine_lungs_collapse(const supine_lungs *lungs, const double share[2], double *vertices) {
   memcpy(vertices, lungs->mesh.vertices, 3 * lungs->mesh.vertex_count * sizeof *vertices);
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     if (share[lung] == 1.0) {
@@ -88,8 +88,8 @@ void supine_tissue_collapse(const supine_lungs *lungs, const double share[2], do
   }
 }
 
-void supine_tissue_collapse_directions(const supine_lungs *lungs, const double share[2],
-                                       double *directions) {
+void supine_lungs_collapse_directions(const supine_lungs *lungs, const double share[2],
+                                      double *directions) {
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     if (share[lung] == 1.0) {
       continue;

@@ -24,8 +24,8 @@ typedef struct supine_lesion {
  * multiply the stiffness after it is scaled to geometric mean 1. In the reverse order, a stiff
  * lesion would soften all other tissue, by 4 % for a lesion of factor 10 over 2 % of the vertices.
  * @param reached  output: number of vertices nearer to the lesion's centre than the radius */
-supine_status supine_tissue_add_lesion(const supine_lungs *lungs, const supine_lesion *lesion,
-                                       double *factors, size_t *reached, supine_error *error);
+supine_status supine_lungs_add_lesion(const supine_lungs *lungs, const supine_lesion *lesion,
+                                      double *factors, size_t *reached, supine_error *error);
 
 /** Compute the surface with collapsed lungs (pneumothorax). lungs->mesh keeps the healthy shape,
  * from which displacements are computed.
@@ -39,11 +39,11 @@ supine_status supine_tissue_add_lesion(const supine_lungs *lungs, const supine_l
  *
  * @param share     [lungs] volume divided by healthy volume, 0 < share <= 1
  * @param vertices  [N, 3] output, mm */
-void supine_tissue_collapse(const supine_lungs *lungs, const double share[2], double *vertices);
+void supine_lungs_collapse(const supine_lungs *lungs, const double share[2], double *vertices);
 
 /** Multiply the displacement directions [N, 3] of each collapsed lung by share^(1/3), in place.
  * `share` is the volume of each lung divided by its healthy volume. */
-void supine_tissue_collapse_directions(const supine_lungs *lungs, const double share[2],
-                                       double *directions);
+void supine_lungs_collapse_directions(const supine_lungs *lungs, const double share[2],
+                                      double *directions);
 
 #endif

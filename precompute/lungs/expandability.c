@@ -8,8 +8,8 @@
 
 #include "precompute/lungs/expandability.h"
 
-void supine_tissue_expandability_regional(const supine_lungs *lungs,
-                                          const supine_expandability_law *law, double *a) {
+void supine_lungs_expandability_regional(const supine_lungs *lungs,
+                                         const supine_expandability_law *law, double *a) {
   for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
     double box[3];
     supine_lungs_box_coordinates(lungs, i, box);
@@ -44,8 +44,8 @@ static supine_status take_row(const supine_csv *csv, size_t row, size_t count, d
   return SUPINE_OK;
 }
 
-supine_status supine_tissue_expandability_load(const char *path, size_t count, double *a,
-                                               supine_error *error) {
+supine_status supine_lungs_expandability_load(const char *path, size_t count, double *a,
+                                              supine_error *error) {
   static const char *const columns[] = {"expandability", "vertex"};
   SUPINE_FREED_BY(supine_csv_close) supine_csv csv;
   SUPINE_TRY(supine_csv_open(path, columns, 2, 1, &csv, error));

@@ -26,13 +26,13 @@ typedef struct supine_expandability_law {
 
 /** Compute the expandability a [N] of all vertices by a law whose shape is not
  * SUPINE_EXPANDABILITY_UNIFORM. */
-void supine_tissue_expandability_regional(const supine_lungs *lungs,
-                                          const supine_expandability_law *law, double *a);
+void supine_lungs_expandability_regional(const supine_lungs *lungs,
+                                         const supine_expandability_law *law, double *a);
 
 /** Read the expandability a [count] from the column `expandability` of a CSV file. Lines are in the
  * order of the vertices, or in any order if a column `vertex` numbers the vertices from 0. Empty
  * lines, and lines that begin with #, are skipped. Every vertex must have one positive value. */
-supine_status supine_tissue_expandability_load(const char *path, size_t count, double *a,
-                                               supine_error *error);
+supine_status supine_lungs_expandability_load(const char *path, size_t count, double *a,
+                                              supine_error *error);
 
 #endif

@@ -191,7 +191,7 @@ static void check_overlap(checks *c, const supine_lungs *lungs) {
   uint32_t *corners = supine_arena_take(&arena, 3 * mesh->triangle_count, sizeof *corners);
   check(c, !arena.failed, SUPINE_ERROR_MEMORY, "no memory for %zu components", parts);
   for (size_t of = 0; of < parts && parts > 1 && c->status == SUPINE_OK; ++of) {
-    supine_inside_surface *surface = NULL;
+    supine_lungs_surface *surface = NULL;
     supine_inside_place deepest = {.depth = 0.0};
     size_t count = 0;
     for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {
@@ -200,15 +200,15 @@ static void check_overlap(checks *c, const supine_lungs *lungs) {
       }
     }
     c->status =
-        supine_inside_surface_create(mesh->vertices, count / 3, corners, true, &surface, c->error);
+        supine_lungs_surface_create(mesh->vertices, count / 3, corners, true, &surface, c->error);
     for (size_t i = 0; i < mesh->vertex_count && c->status == SUPINE_OK;
          i += mesh->vertex_count / SAMPLES + 1) {
       const double *p = mesh->vertices + 3 * i;
       const supine_inside_place place =
-          part[i] == of ? deepest : supine_inside_surface_find(surface, p, NULL);
+          part[i] == of ? deepest : supine_lungs_surface_find(surface, p, NULL);
       deepest = place.depth > deepest.depth ? place : deepest;
     }
-    supine_inside_surface_destroy(surface);
+    supine_lungs_surface_destroy(surface);
     check(c, deepest.depth <= most_overlap, SUPINE_ERROR_MESH,
           "one of its surfaces reaches %.0f mm into another one, at %.0f,%.0f,%.0f mm (LPS): give "
           "both lungs in the axes of one scan, and remove surfaces inside a lung",

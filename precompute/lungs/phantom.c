@@ -28,11 +28,11 @@ static const unsigned char edges[EDGES][2] = {
     {6, 8},  {3, 8}, {8, 9},  {4, 9},  {2, 4}, {4, 11}, {2, 10}, {6, 7},   {7, 8}, {1, 9},
 };
 
-size_t supine_phantom_geodesic_vertex_count(size_t frequency) {
+size_t supine_lungs_phantom_geodesic_vertex_count(size_t frequency) {
   return 10 * frequency * frequency + 2;
 }
 
-size_t supine_phantom_geodesic_triangle_count(size_t frequency) {
+size_t supine_lungs_phantom_geodesic_triangle_count(size_t frequency) {
   return 20 * frequency * frequency;
 }
 
@@ -78,8 +78,8 @@ static size_t vertex_index(size_t face, size_t f, size_t i, size_t j) {
   return CORNERS + EDGES * (f - 1) + face * ((f - 1) * (f - 2) / 2) + row + (j - 1);
 }
 
-void supine_phantom_geodesic(size_t frequency, uint32_t base, double *vertices,
-                             uint32_t *triangles) {
+void supine_lungs_phantom_geodesic(size_t frequency, uint32_t base, double *vertices,
+                                   uint32_t *triangles) {
   const size_t f = frequency;
   uint32_t *out = triangles;
   for (size_t face = 0; face < FACES; ++face) {
@@ -149,8 +149,8 @@ static void shape(size_t lung, size_t count, double *vertices) {
   }
 }
 
-supine_status supine_phantom_create(size_t vertices, double millilitres, supine_mesh *mesh,
-                                    supine_error *error) {
+supine_status supine_lungs_phantom_create(size_t vertices, double millilitres, supine_mesh *mesh,
+                                          supine_error *error) {
   SUPINE_REFUSE_IF(vertices < SUPINE_PHANTOM_VERTICES_MIN || vertices > SUPINE_PHANTOM_VERTICES_MAX,
                    error, SUPINE_ERROR_ARGUMENT, "vertex count %zu: give %d to %d", vertices,
                    SUPINE_PHANTOM_VERTICES_MIN, SUPINE_PHANTOM_VERTICES_MAX);
@@ -158,15 +158,15 @@ supine_status supine_phantom_create(size_t vertices, double millilitres, supine_
                    "a volume of %g mL: give a positive volume", millilitres);
   const double exact = sqrt(((double)vertices / 2.0 - 2.0) / 10.0);
   const size_t frequency = (size_t)fmax(2.0, floor(exact + 0.5));
-  const size_t count = supine_phantom_geodesic_vertex_count(frequency);
-  const size_t triangles = supine_phantom_geodesic_triangle_count(frequency);
+  const size_t count = supine_lungs_phantom_geodesic_vertex_count(frequency);
+  const size_t triangles = supine_lungs_phantom_geodesic_triangle_count(frequency);
   if (supine_mesh_allocate(2 * count, 2 * triangles, mesh) != SUPINE_OK) {
     return supine_error_memory(error, "%zu vertices", 2 * count);
   }
   for (size_t lung = 0; lung < 2; ++lung) {
     double *part = mesh->vertices + 3 * lung * count;
-    supine_phantom_geodesic(frequency, (uint32_t)(lung * count), part,
-                            mesh->triangles + 3 * lung * triangles);
+    supine_lungs_phantom_geodesic(frequency, (uint32_t)(lung * count), part,
+                                  mesh->triangles + 3 * lung * triangles);
     shape(lung, count, part);
   }
   const double factor = cbrt(1e3 * millilitres / supine_mesh_volume(mesh));

@@ -17,17 +17,17 @@ enum { SUPINE_PHANTOM_VERTICES_MIN = 84, SUPINE_PHANTOM_VERTICES_MAX = 20000000 
  * @param millilitres  volume of both lungs together, > 0; adults have about 6000 at full
  *                     inflation
  * @param mesh         written on success */
-supine_status supine_phantom_create(size_t vertices, double millilitres, supine_mesh *mesh,
-                                    supine_error *error);
+supine_status supine_lungs_phantom_create(size_t vertices, double millilitres, supine_mesh *mesh,
+                                          supine_error *error);
 
 /** Return the number of vertices, 10 f^2 + 2, or of triangles, 20 f^2, of a geodesic sphere. It is
  * an icosahedron with each face cut into f^2 triangles; f is the frequency. */
-size_t supine_phantom_geodesic_vertex_count(size_t frequency);
-size_t supine_phantom_geodesic_triangle_count(size_t frequency);
+size_t supine_lungs_phantom_geodesic_vertex_count(size_t frequency);
+size_t supine_lungs_phantom_geodesic_triangle_count(size_t frequency);
 
 /** Make a geodesic sphere of frequency f >= 1: unit vertices [10 f^2 + 2, 3], and outward triangles
  * [20 f^2, 3] whose vertices are numbered from `base`. */
-void supine_phantom_geodesic(size_t frequency, uint32_t base, double *vertices,
-                             uint32_t *triangles);
+void supine_lungs_phantom_geodesic(size_t frequency, uint32_t base, double *vertices,
+                                   uint32_t *triangles);
 
 #endif

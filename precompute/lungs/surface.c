@@ -22,7 +22,7 @@ typedef struct node {
   double low[3], high[3];
   uint32_t begin, end; /* triangles of the node: order[begin] to order[end - 1] */
   uint32_t right;      /* index of the second child (the first is the next node); 0 in a leaf */
-  uint32_t leaf;       /* of a leaf: index in supine_inside_surface.leaves */
+  uint32_t leaf;       /* of a leaf: index in supine_lungs_surface.leaves */
 } node;
 
 /* The dipole that replaces the triangles of a tree node, seen from a distant point. */
@@ -37,7 +37,7 @@ typedef struct boxes {
   float low[3][LEAF], high[3][LEAF];
 } boxes;
 
-struct supine_inside_surface {
+struct supine_lungs_surface {
   supine_arena arena; /* holds this struct and its arrays */
   const double *vertices;
   const uint32_t *triangles;
@@ -50,7 +50,7 @@ struct supine_inside_surface {
   uint32_t leaf_count;
 };
 
-static void corners(const supine_inside_surface *s, size_t triangle, const double *corner[3]) {
+static void corners(const supine_lungs_surface *s, size_t triangle, const double *corner[3]) {
   for (int k = 0; k < 3; ++k) {
     corner[k] = s->vertices + 3 * (size_t)s->triangles[3 * triangle + (size_t)k];
   }
@@ -90,7 +90,7 @@ static void select_least(keyed *item, ptrdiff_t count, ptrdiff_t half) {
 
 /* Extend the bounding box of a tree node to its triangles and, if `leaf` is not NULL, find the box
  * of each triangle. */
-static void find_box(const supine_inside_surface *s, node *n, boxes *leaf) {
+static void find_box(const supine_lungs_surface *s, node *n, boxes *leaf) {
   for (size_t i = n->begin; i < n->end; ++i) {
     const double *p[3];
     double low[3];
@@ -118,7 +118,7 @@ static void add_part(dipole *d, double area, const double centre[3], const doubl
 }
 
 /* Compute the dipole of a leaf from its triangles, or of another tree node from its children. */
-static void find_dipole(const supine_inside_surface *s, const node *n) {
+static void find_dipole(const supine_lungs_surface *s, const node *n) {
   if (s->dipoles == NULL) {
     return;
   }
@@ -152,7 +152,7 @@ static void find_dipole(const supine_inside_surface *s, const node *n) {
 }
 
 /* Build the tree node of the triangles order[begin] to order[end - 1], and its descendants. */
-static void build(supine_inside_surface *s, keyed *space, uint32_t begin, uint32_t end) {
+static void build(supine_lungs_surface *s, keyed *space, uint32_t begin, uint32_t end) {
   node *n = &s->nodes[s->node_count++];
   n->begin = begin;
   n->end = end;
@@ -182,7 +182,7 @@ static void build(supine_inside_surface *s, keyed *space, uint32_t begin, uint32
   build(s, space, middle, end);
 }
 
-void supine_inside_surface_refit(supine_inside_surface *surface) {
+void supine_lungs_surface_refit(supine_lungs_surface *surface) {
   for (node *n = surface->nodes + surface->node_count; n-- > surface->nodes;) {
     const node *child[2] = {n + 1, &surface->nodes[n->right]};
     supine_box_begin(n->low, n->high);
@@ -197,16 +197,16 @@ void supine_inside_surface_refit(supine_inside_surface *surface) {
   }
 }
 
-supine_status supine_inside_surface_create(const double *vertices, size_t count,
-                                           const uint32_t *triangles, bool sides,
-                                           supine_inside_surface **surface, supine_error *error) {
+supine_status supine_lungs_surface_create(const double *vertices, size_t count,
+                                          const uint32_t *triangles, bool sides,
+                                          supine_lungs_surface **surface, supine_error *error) {
   const size_t leaves = 2 * count / LEAF + 1; /* upper bound: each leaf is at least half full */
   *surface = NULL;
   SUPINE_ARENA temporary = {0};
   SUPINE_ARENA arena = {0};
   keyed *space = supine_arena_take(&temporary, count, sizeof *space);
-  supine_inside_surface *s = supine_arena_take(&arena, 1, sizeof *s);
-  const supine_inside_surface made = {
+  supine_lungs_surface *s = supine_arena_take(&arena, 1, sizeof *s);
+  const supine_lungs_surface made = {
       .vertices = vertices,
       .triangles = triangles,
       .triangle_count = count,
@@ -222,14 +222,14 @@ supine_status supine_inside_surface_create(const double *vertices, size_t count,
     s->order[i] = i;
   }
   build(s, space, 0, (uint32_t)count);
-  supine_inside_surface_refit(s);
+  supine_lungs_surface_refit(s);
   s->arena = arena;
   arena = (supine_arena){0};
   *surface = s;
   return SUPINE_OK;
 }
 
-void supine_inside_surface_destroy(supine_inside_surface *surface) {
+void supine_lungs_surface_destroy(supine_lungs_surface *surface) {
   if (surface != NULL) {
     supine_arena arena = surface->arena;
     supine_arena_free(&arena);
@@ -328,7 +328,7 @@ SUPINE_CLONES static void boxes_squares(const boxes *leaf, const double x[3], do
 
 /* Search tree node `at` and its descendants for the point nearest to x. Ignore points at a
  * squared distance of *best or more. If a point is nearer, update *best and `place`. */
-static void search(const supine_inside_surface *s, size_t at, const double x[3], double *best,
+static void search(const supine_lungs_surface *s, size_t at, const double x[3], double *best,
                    supine_inside_place *place) {
   const node *n = &s->nodes[at];
   if (n->right != 0) {
@@ -388,7 +388,7 @@ static double solid_angle(const double *const p[3], const double x[3]) {
                                             supine_dot(b, c) * la + supine_dot(c, a) * lb);
 }
 
-static double angle(const supine_inside_surface *s, size_t at, const double x[3]) {
+static double angle(const supine_lungs_surface *s, size_t at, const double x[3]) {
   const node *n = &s->nodes[at];
   const dipole *d = &s->dipoles[at];
   double apart[3];
@@ -409,9 +409,9 @@ static double angle(const supine_inside_surface *s, size_t at, const double x[3]
   return sum;
 }
 
-supine_inside_place supine_inside_surface_nearest(const supine_inside_surface *surface,
-                                                  const double point[3],
-                                                  const supine_inside_place *near) {
+supine_inside_place supine_lungs_surface_nearest(const supine_lungs_surface *surface,
+                                                 const double point[3],
+                                                 const supine_inside_place *near) {
   supine_inside_place place = {.point = {point[0], point[1], point[2]}};
   double best = INFINITY;
   if (near != NULL) {
@@ -425,7 +425,7 @@ supine_inside_place supine_inside_surface_nearest(const supine_inside_surface *s
 }
 
 typedef struct distances {
-  const supine_inside_surface *surface;
+  const supine_lungs_surface *surface;
   const double *points;
   double *distance;
   double *nearest; /* [points, 3] nearest points of the surface, mm; NULL if not wanted */
@@ -436,7 +436,7 @@ static void distance_range(void *context, size_t begin, size_t end, size_t threa
   const distances *d = context;
   supine_inside_place place;
   for (size_t i = begin; i < end; ++i) {
-    place = supine_inside_surface_nearest(d->surface, d->points + 3 * i, i > begin ? &place : NULL);
+    place = supine_lungs_surface_nearest(d->surface, d->points + 3 * i, i > begin ? &place : NULL);
     d->distance[i] = place.depth;
     if (d->nearest != NULL) {
       memcpy(d->nearest + 3 * i, place.nearest, sizeof place.nearest);
@@ -444,17 +444,17 @@ static void distance_range(void *context, size_t begin, size_t end, size_t threa
   }
 }
 
-void supine_inside_surface_distances(const supine_inside_surface *surface, size_t count,
-                                     const double *points, double *distance, double *nearest) {
+void supine_lungs_surface_distances(const supine_lungs_surface *surface, size_t count,
+                                    const double *points, double *distance, double *nearest) {
   distances all = {surface, points, distance, nearest};
   supine_parallel_for(count, DISTANCE_GRAIN, 0, distance_range, &all);
 }
 
-supine_inside_place supine_inside_surface_find(const supine_inside_surface *surface,
-                                               const double point[3],
-                                               const supine_inside_place *near) {
+supine_inside_place supine_lungs_surface_find(const supine_lungs_surface *surface,
+                                              const double point[3],
+                                              const supine_inside_place *near) {
   static const double half = 6.283185307179586; /* half the full solid angle of 4 pi */
-  supine_inside_place place = supine_inside_surface_nearest(surface, point, near);
+  supine_inside_place place = supine_lungs_surface_nearest(surface, point, near);
   const bool inside = place.depth <= on_surface ||
                       (near != NULL && supine_distance(point, near->point) < fabs(near->depth)
                            ? near->depth > 0.0

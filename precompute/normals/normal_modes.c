@@ -266,7 +266,7 @@ static void measure(const normals_work *work, size_t lung, const supine_normals_
     for (size_t i = 0; i < states; ++i) {
       *sum += angles[i];
     }
-    supine_accuracy_tally_add(tally, states, angles);
+    supine_projection_tally_add(tally, states, angles);
   }
 }
 
@@ -280,7 +280,7 @@ static supine_status measure_all(const normals_work *work, supine_normals_modes 
     measure(work, lung, made, tally, &sum);
   }
   made->mean = tally->count > 0 ? sum / (double)tally->count : 0.0;
-  made->p999 = supine_accuracy_tally_percentile(tally, 0.999);
+  made->p999 = supine_projection_tally_percentile(tally, 0.999);
   return SUPINE_OK;
 }
 

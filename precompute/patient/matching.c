@@ -30,7 +30,7 @@ static void match_range(void *context, size_t begin, size_t end, size_t thread) 
     const double *from = m->fuller->mesh.vertices + 3 * match->vertex;
     supine_patient_row *row = &m->rows[i];
     supine_inside_place *place = &match->nearest;
-    *place = supine_inside_surface_nearest(m->tree, match->position, place);
+    *place = supine_lungs_surface_nearest(m->tree, match->position, place);
     const uint32_t *corner = m->state->triangles + 3 * place->triangle;
     double normal[3] = {0.0, 0.0, 0.0};
     double cosine = 0.0;
@@ -127,12 +127,12 @@ supine_status supine_patient_matching_create(const supine_lungs *fuller, const s
   SUPINE_TRY(supine_physics_equilibrium_solve(m->equilibrium, SUPINE_PATIENT_COLUMNS,
                                               m->smoothed_force, m->smoothed_force, error));
   supine_patient_matching_choose(m, limit);
-  return supine_inside_surface_create(state->vertices, state->triangle_count, state->triangles,
-                                      false, &m->tree, error);
+  return supine_lungs_surface_create(state->vertices, state->triangle_count, state->triangles,
+                                     false, &m->tree, error);
 }
 
 void supine_patient_matching_free(supine_patient_matching *matching) {
-  supine_inside_surface_destroy(matching->tree);
+  supine_lungs_surface_destroy(matching->tree);
   supine_physics_equilibrium_destroy(matching->equilibrium);
   supine_arena_free(&matching->arena);
 }

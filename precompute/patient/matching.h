@@ -19,7 +19,7 @@ typedef struct supine_patient_matching {
   const supine_lungs *fuller; /* surface of the lungs in the fuller state, to be displaced */
   const supine_mesh *state;   /* surface of the same lungs in another state, to be matched */
   supine_patient_frame frame;
-  supine_inside_surface *tree;
+  supine_lungs_surface *tree;
   supine_equilibrium *equilibrium;
   /* [vertices, 4] 1, X - 1/2, Y - 1/2 and Z - 1/2, smoothed over the surface; X, Y and Z are
    * coordinates 0 to 1 in the lungs' bounding box */

@@ -36,9 +36,9 @@ static double full_volume(const supine_patient_record *record, size_t state,
   }
   switch (shown->volume.kind) {
   case SUPINE_VOLUME_FULL:
-    return end / supine_reference_full_share(shown->gravity);
+    return end / supine_physics_resting_full_share(shown->gravity);
   case SUPINE_VOLUME_REST:
-    return end / supine_reference_resting_total(resting, shown->gravity);
+    return end / supine_physics_resting_total(resting, shown->gravity);
   default:
     return 0.0;
   }
@@ -52,10 +52,10 @@ static double either_full_volume(const supine_patient_record *record,
 
 /* Find where the two scanned states lie on the path from full inflation (0) to rest (1). */
 static void find_parts(const supine_patient_record *record, double part[2]) {
-  supine_resting resting = supine_reference_resting_default();
+  supine_resting resting = supine_physics_resting_default();
   supine_patient_resting(record, &resting);
   const double full = either_full_volume(record, &resting);
-  const double rest = full * supine_reference_resting_total(&resting, record->state[1].gravity);
+  const double rest = full * supine_physics_resting_total(&resting, record->state[1].gravity);
   for (size_t k = 0; k < 2; ++k) {
     const supine_volume *stated = &record->state[k].volume;
     if (stated->ml == 0.0 && stated->kind == SUPINE_VOLUME_REST) {
@@ -178,8 +178,8 @@ static void find_path_span(const work *w, const supine_resting *resting,
   const supine_patient_record *record = w->record;
   const double lung_volume = w->lungs.volume[0] + w->lungs.volume[1];
   const double full = either_full_volume(record, resting);
-  const double volume[2] = {
-      full, full * supine_reference_resting_total(resting, record->state[1].gravity)};
+  const double volume[2] = {full,
+                            full * supine_physics_resting_total(resting, record->state[1].gravity)};
   const int rounds = full > 0.0 ? ROUNDS : 0; /* without a known volume, keep the positions */
   double part[2];
   double gains[2][3];
@@ -256,12 +256,12 @@ void supine_patient_resting(const supine_patient_record *record, supine_resting 
     if (share <= share_least || share >= share_most) {
       continue;
     }
-    resting->assumed *= share / supine_reference_resting_total(resting, shown->gravity);
-    (void)supine_reference_resting_settle(resting, 0, NULL, NULL, NULL);
+    resting->assumed *= share / supine_physics_resting_total(resting, shown->gravity);
+    (void)supine_physics_resting_settle(resting, 0, NULL, NULL, NULL);
     const double *of = record->lung_volume[k];
     const double *full_of = record->lung_volume[1 - k];
-    const double own[2] = {supine_reference_along_axes(resting->share[0], shown->gravity),
-                           supine_reference_along_axes(resting->share[1], shown->gravity)};
+    const double own[2] = {supine_physics_resting_along_axes(resting->share[0], shown->gravity),
+                           supine_physics_resting_along_axes(resting->share[1], shown->gravity)};
     for (size_t i = 0; i < 12; ++i) {
       const size_t side = i / 6;
       const double found =

@@ -23,16 +23,15 @@ static double volume_of(const supine_lungs *lungs) {
 /* Assign each landmark to the lung whose surface is nearest to it in the first scan. */
 static supine_status find_sides(const supine_lungs *lungs, supine_patient_pairs *pairs,
                                 supine_error *error) {
-  SUPINE_FREED_BY(supine_inside_surface_drop) supine_inside_surface *tree = NULL;
+  SUPINE_FREED_BY(supine_lungs_surface_drop) supine_lungs_surface *tree = NULL;
   pairs->side = malloc(pairs->count * sizeof *pairs->side);
   if (pairs->side == NULL) {
     return supine_error_memory(error, "%zu landmarks", pairs->count);
   }
-  SUPINE_TRY(supine_inside_surface_create(lungs->mesh.vertices, lungs->mesh.triangle_count,
-                                          lungs->mesh.triangles, false, &tree, error));
+  SUPINE_TRY(supine_lungs_surface_create(lungs->mesh.vertices, lungs->mesh.triangle_count,
+                                         lungs->mesh.triangles, false, &tree, error));
   for (size_t i = 0; i < pairs->count; ++i) {
-    const supine_inside_place place =
-        supine_inside_surface_nearest(tree, pairs->from + 3 * i, NULL);
+    const supine_inside_place place = supine_lungs_surface_nearest(tree, pairs->from + 3 * i, NULL);
     const size_t lung =
         lungs->lung_count == 2 && place.triangle >= lungs->triangle_begin[1] ? 1 : 0;
     pairs->side[i] = lungs->side[lung];
@@ -98,12 +97,12 @@ static void name_volumes(supine_patient_scans *scans, supine_patient_record *rec
 
 /* Warn if the volume at rest in the scans differs from the volume at rest of healthy people. */
 static void warn_of_rest(supine_patient_scans *scans, const supine_patient_record *record) {
-  const supine_resting usual = supine_reference_resting_default();
+  const supine_resting usual = supine_physics_resting_default();
   const double *g = record->state[1].gravity;
   supine_resting shown = usual;
   supine_patient_resting(record, &shown);
-  const double share[2] = {supine_reference_resting_total(&usual, g),
-                           supine_reference_resting_total(&shown, g)};
+  const double share[2] = {supine_physics_resting_total(&usual, g),
+                           supine_physics_resting_total(&shown, g)};
   if (fabs(share[1] - share[0]) > SUPINE_REST_SPREAD) {
     (void)supine_print_text(
         next_note(scans), sizeof scans->note[0],

@@ -23,7 +23,7 @@ static const double least_gas = 1000.0; /* or below this gas at rest, supine, mL
 /* Largest accepted relative difference between the scan's volume and that given by --resting. */
 static const double agreement = 0.05;
 
-void supine_reference_capacity(const supine_person *person, double range[2]) {
+void supine_physics_reference_capacity(const supine_person *person, double range[2]) {
   static const struct {
     double slope, offset; /* capacity in L is slope x height in m - offset */
     double usual[2];      /* range of an adult's height if it is unknown, cm */
@@ -57,12 +57,12 @@ static double part_of_pair(const supine_reference *reference) {
  * A
  * + 2.6049 ln H) L in women, times a spline of age that is left out (0.97 in men of 45 years). A is
  * 45, as the age is unknown: from 25 to 70 years, FRC changes by -7 to +6 %. */
-void supine_reference_predict_rest(const supine_reference *reference, const supine_person *person,
-                                   supine_resting *resting) {
+void supine_physics_reference_predict_rest(const supine_reference *reference,
+                                           const supine_person *person, supine_resting *resting) {
   static const double of[2][2] = {{-12.2912, 2.6049}, {-13.0669, 2.7634}}; /* [0] women, [1] men */
   const double *c = of[person->sex == SUPINE_SEX_MALE];
   if (reference->scan.state.volume.kind == SUPINE_VOLUME_FULL && person->height > 0.0 &&
-      person->sex != SUPINE_SEX_UNKNOWN && !supine_reference_resting_given(resting) &&
+      person->sex != SUPINE_SEX_UNKNOWN && !supine_physics_resting_given(resting) &&
       resting->assumed == SUPINE_REST_SHARE) {
     resting->ml[2] = part_of_pair(reference) * (1e3 * exp(c[0] + c[1] * log(person->height)) -
                                                 SUPINE_LYING_ML + SUPINE_TISSUE_ML);
@@ -70,18 +70,18 @@ void supine_reference_predict_rest(const supine_reference *reference, const supi
   }
 }
 
-void supine_reference_compare(const supine_reference *reference, const supine_person *person,
-                              char *text, size_t size) {
+void supine_physics_reference_compare(const supine_reference *reference,
+                                      const supine_person *person, char *text, size_t size) {
   const double part = part_of_pair(reference);
   double range[2];
-  supine_reference_capacity(person, range);
+  supine_physics_reference_capacity(person, range);
   const bool known = person->height > 0.0 && person->sex != SUPINE_SEX_UNKNOWN;
   supine_text_add(text, size, known ? "expected %.0f" : "an adult's %.0f to %.0f", part * range[0],
                   part * range[1]);
 }
 
-void supine_reference_doubt(const supine_reference *reference, const supine_person *person,
-                            const supine_resting *given, char *text, size_t size) {
+void supine_physics_reference_doubt(const supine_reference *reference, const supine_person *person,
+                                    const supine_resting *given, char *text, size_t size) {
   const supine_state *state = &reference->scan.state;
   const bool at_rest = state->volume.kind == SUPINE_VOLUME_REST;
   const double part = part_of_pair(reference);
@@ -92,8 +92,8 @@ void supine_reference_doubt(const supine_reference *reference, const supine_pers
   double rest[2];
   char expected[64] = "";
   text[0] = '\0';
-  supine_reference_capacity(person, range);
-  supine_reference_compare(reference, person, expected, sizeof expected);
+  supine_physics_reference_capacity(person, range);
+  supine_physics_reference_compare(reference, person, expected, sizeof expected);
   for (size_t lung = 0; lung < reference->lung_count; ++lung) {
     full += reference->full_volume[lung];
     held += reference->full_volume[lung] + reference->scan_volume[lung];
@@ -111,7 +111,8 @@ void supine_reference_doubt(const supine_reference *reference, const supine_pers
     }
   }
   const char *separator = text[0] == '\0' ? "" : "; ";
-  const double gas = supine_reference_rest(reference, supine, rest) - part * SUPINE_TISSUE_ML;
+  const double gas =
+      supine_physics_reference_rest(reference, supine, rest) - part * SUPINE_TISSUE_ML;
   if (full < part * fmax(least_share * range[0], least_ml) || gas < part * least_gas) {
     supine_text_add(text, size,
                     "%sat full inflation the lungs hold %.0f mL (%s mL), at rest %.0f mL of gas, "

@@ -103,9 +103,10 @@ static supine_status find_lung_gains(const supine_volume_form *form, const doubl
                           "--scanned or --resting");
 }
 
-supine_status supine_reference_find_gains(const supine_lungs *scan, const double bend[3],
-                                          const double *directions, const double *amounts,
-                                          supine_reference *reference, supine_error *error) {
+supine_status supine_physics_reference_find_gains(const supine_lungs *scan, const double bend[3],
+                                                  const double *directions, const double *amounts,
+                                                  supine_reference *reference,
+                                                  supine_error *error) {
   const supine_state *state = &reference->scan.state;
   const bool at_rest = state->volume.kind == SUPINE_VOLUME_REST && state->volume.ml == 0.0;
   supine_volume_form forms[2];
@@ -128,8 +129,8 @@ static supine_status find_map(ascent *a, supine_error *error) {
   supine_mesh_box(&a->estimate.mesh, a->estimate.minimum, a->estimate.maximum);
   SUPINE_TRY(
       supine_physics_solve(&a->estimate, &a->model, a->found->scan.state.gravity, field, error));
-  SUPINE_TRY(supine_reference_find_gains(&a->scan, a->model.bend, field->directions, field->catch_,
-                                         a->found, error));
+  SUPINE_TRY(supine_physics_reference_find_gains(&a->scan, a->model.bend, field->directions,
+                                                 field->catch_, a->found, error));
   for (size_t lung = 0; lung < a->scan.lung_count; ++lung) {
     const double *gains = a->found->scan_gains[lung];
     for (size_t i = 3 * a->scan.lung_begin[lung]; i < 3 * a->scan.lung_begin[lung + 1]; ++i) {
@@ -219,8 +220,8 @@ static supine_status iterate(ascent *a, supine_error *error) {
                           SOLVES_MAX, supine_text_distance(a->rms).text);
 }
 
-supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *model,
-                                       supine_reference *found, supine_error *error) {
+supine_status supine_physics_reference_inflate(supine_lungs *lungs, const supine_model *model,
+                                               supine_reference *found, supine_error *error) {
   SUPINE_ARENA arena = {0};
   const size_t size = 3 * lungs->mesh.vertex_count;
   ascent a = {.estimate = *lungs,

@@ -10,8 +10,8 @@
 
 static const double tissue_share = 0.1; /* volume of the tissue as a share of the full volume */
 
-supine_status supine_reference_scan_parse(const char *text, supine_scan *scan,
-                                          supine_error *error) {
+supine_status supine_physics_reference_scan_parse(const char *text, supine_scan *scan,
+                                                  supine_error *error) {
   supine_scan read = {.known = true, .state = {.gravity = {0.0, 1.0, 0.0}}};
   if (strcmp(text, "none") == 0) {
     *scan = (supine_scan){0};
@@ -35,31 +35,33 @@ static double volume_at(double rest, double full, double t) {
   return t < 0.0 ? rest * (1.0 + t) : rest * (1.0 - t) + full * t;
 }
 
-double supine_reference_rest(const supine_reference *reference, const double g[3], double *ml) {
+double supine_physics_reference_rest(const supine_reference *reference, const double g[3],
+                                     double *ml) {
   double sum = 0.0;
   for (size_t lung = 0; lung < reference->lung_count; ++lung) {
     ml[lung] = reference->full_volume[lung] *
-               supine_reference_resting_share(&reference->resting, reference->side[lung], g);
+               supine_physics_resting_share(&reference->resting, reference->side[lung], g);
     sum += ml[lung];
   }
   return sum;
 }
 
-double supine_reference_full(const supine_reference *reference, const double g[3], double *ml) {
+double supine_physics_reference_full(const supine_reference *reference, const double g[3],
+                                     double *ml) {
   double sum = 0.0;
   for (size_t lung = 0; lung < reference->lung_count; ++lung) {
-    ml[lung] = reference->full_volume[lung] * supine_reference_full_share(g);
+    ml[lung] = reference->full_volume[lung] * supine_physics_resting_full_share(g);
     sum += ml[lung];
   }
   return sum;
 }
 
-void supine_reference_share_out(const supine_reference *reference, const double g[3], double total,
-                                double *ml) {
+void supine_physics_reference_share_out(const supine_reference *reference, const double g[3],
+                                        double total, double *ml) {
   double full[2];
   double rest[2];
-  const double at_full = supine_reference_full(reference, g, full);
-  const double at_rest = supine_reference_rest(reference, g, rest);
+  const double at_full = supine_physics_reference_full(reference, g, full);
+  const double at_rest = supine_physics_reference_rest(reference, g, rest);
   const double t =
       total < at_rest ? total / at_rest - 1.0 : (total - at_rest) / (at_full - at_rest);
   for (size_t lung = 0; lung < reference->lung_count; ++lung) {
@@ -76,7 +78,7 @@ void supine_reference_share_out(const supine_reference *reference, const double 
 static supine_status find_full(supine_reference *found, const double *volume, supine_error *error) {
   const supine_state *state = &found->scan.state;
   const bool from_rest = state->volume.kind == SUPINE_VOLUME_REST;
-  const double full = supine_reference_full_share(state->gravity);
+  const double full = supine_physics_resting_full_share(state->gravity);
   double low = -1.0;
   double high = 1.0;
   double t = from_rest ? 0.0 : 1.0;
@@ -84,7 +86,7 @@ static supine_status find_full(supine_reference *found, const double *volume, su
     double beyond = 0.0; /* mL by which the scan exceeds rest (if from_rest) or full inflation */
     for (size_t lung = 0; lung < found->lung_count; ++lung) {
       const double rest =
-          supine_reference_resting_share(&found->resting, found->side[lung], state->gravity);
+          supine_physics_resting_share(&found->resting, found->side[lung], state->gravity);
       found->full_volume[lung] = volume[lung] / volume_at(rest, full, t);
       beyond += volume[lung] - found->full_volume[lung] * (from_rest ? rest : full);
     }
@@ -125,7 +127,7 @@ static supine_status find_rest(supine_reference *found, const double *volume, su
   for (int step = 0; step < 30 && status == SUPINE_OK && fabs(off - 1.0) > 1e-9; ++step) {
     off = (found->full_volume[0] + found->full_volume[1]) / found->scan.full;
     found->resting.assumed = fmin(1.0, found->resting.assumed * off);
-    (void)supine_reference_resting_settle(&found->resting, 0, NULL, NULL, NULL);
+    (void)supine_physics_resting_settle(&found->resting, 0, NULL, NULL, NULL);
     status = find_full(found, volume, error);
   }
   SUPINE_TRY(status);
@@ -136,9 +138,9 @@ static supine_status find_rest(supine_reference *found, const double *volume, su
   return SUPINE_OK;
 }
 
-supine_status supine_reference_find(supine_lungs *lungs, const supine_model *model,
-                                    const supine_scan *scan, const supine_resting *resting,
-                                    supine_reference *reference, supine_error *error) {
+supine_status supine_physics_reference_find(supine_lungs *lungs, const supine_model *model,
+                                            const supine_scan *scan, const supine_resting *resting,
+                                            supine_reference *reference, supine_error *error) {
   supine_reference found = {.scan = *scan,
                             .resting = *resting,
                             .lung_count = lungs->lung_count,
@@ -152,11 +154,11 @@ supine_status supine_reference_find(supine_lungs *lungs, const supine_model *mod
   } else {
     SUPINE_TRY(find_full(&found, lungs->volume, error));
   }
-  SUPINE_TRY(supine_reference_resting_settle(&found.resting, found.lung_count, found.side,
-                                             found.full_volume, error));
+  SUPINE_TRY(supine_physics_resting_settle(&found.resting, found.lung_count, found.side,
+                                           found.full_volume, error));
   if (found.scan_volume[0] != 0.0 || found.scan_volume[1] != 0.0) {
-    (void)supine_reference_rest(&found, scan->state.gravity, found.scan_rest);
-    SUPINE_TRY(supine_reference_inflate(lungs, model, &found, error));
+    (void)supine_physics_reference_rest(&found, scan->state.gravity, found.scan_rest);
+    SUPINE_TRY(supine_physics_reference_inflate(lungs, model, &found, error));
   }
   found.known = true;
   *reference = found;

@@ -35,7 +35,8 @@ typedef struct supine_scan {
 
 /** Parse a scan's state: "full", "supine:rest", "left:rest+300", "full-2000", or "none". The
  * default posture is supine. */
-supine_status supine_reference_scan_parse(const char *text, supine_scan *scan, supine_error *error);
+supine_status supine_physics_reference_scan_parse(const char *text, supine_scan *scan,
+                                                  supine_error *error);
 
 /** Axes and unit of the input files; both are zero if the files have different axes. */
 typedef struct supine_scan_frame {
@@ -60,26 +61,28 @@ typedef struct supine_reference {
 
 /** Find the volumes of scanned lungs at full inflation, and move the lungs to full inflation.
  * @param lungs  the vertices and the bounding box are changed, the midline is not */
-supine_status supine_reference_find(supine_lungs *lungs, const supine_model *model,
-                                    const supine_scan *scan, const supine_resting *resting,
-                                    supine_reference *reference, supine_error *error);
+supine_status supine_physics_reference_find(supine_lungs *lungs, const supine_model *model,
+                                            const supine_scan *scan, const supine_resting *resting,
+                                            supine_reference *reference, supine_error *error);
 
 /** Compute the volume of each lung at rest, with gravity along g, into ml. Return their sum. */
-double supine_reference_rest(const supine_reference *reference, const double g[3], double *ml);
+double supine_physics_reference_rest(const supine_reference *reference, const double g[3],
+                                     double *ml);
 
 /** Compute the volume of each lung at full inflation into ml [lung_count]. Return their sum. */
-double supine_reference_full(const supine_reference *reference, const double g[3], double *ml);
+double supine_physics_reference_full(const supine_reference *reference, const double g[3],
+                                     double *ml);
 
 /** Divide the volume `total`, mL, between the lungs so that both are filled to the same degree
  * between rest and full inflation. Write their volumes to ml [lung_count]. */
-void supine_reference_share_out(const supine_reference *reference, const double g[3], double total,
-                                double *ml);
+void supine_physics_reference_share_out(const supine_reference *reference, const double g[3],
+                                        double total, double *ml);
 
 /** Move the vertices of scanned lungs to full inflation, in place, where each lung has the volume
  * reference->full_volume. Write the vertices of the scan to lungs->scanned, and set
- * reference->scan_gains and reference->solves. Statuses as supine_reference_find. */
-supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *model,
-                                       supine_reference *reference, supine_error *error);
+ * reference->scan_gains and reference->solves. Statuses as supine_physics_reference_find. */
+supine_status supine_physics_reference_inflate(supine_lungs *lungs, const supine_model *model,
+                                               supine_reference *reference, supine_error *error);
 
 /** Find the gains A of each lung in the scan, reference->scan_gains: factors of its displacement
  * from full inflation along x, y and z. At rest, the gains on all axes are equal, s. Displacing the
@@ -89,9 +92,9 @@ supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *
  * @param directions  [vertices, 3] displacement of each vertex at a force of 1, mm
  * @param amounts     [vertices] force that each vertex retains after exchange with its neighbours
  */
-supine_status supine_reference_find_gains(const supine_lungs *scan, const double bend[3],
-                                          const double *directions, const double *amounts,
-                                          supine_reference *reference, supine_error *error);
+supine_status supine_physics_reference_find_gains(const supine_lungs *scan, const double bend[3],
+                                                  const double *directions, const double *amounts,
+                                                  supine_reference *reference, supine_error *error);
 
 typedef enum supine_sex { SUPINE_SEX_UNKNOWN = 0, SUPINE_SEX_FEMALE, SUPINE_SEX_MALE } supine_sex;
 
@@ -103,24 +106,24 @@ typedef struct supine_person {
 /** Estimate the volume of both lungs at full inflation, supine, as a range in mL of gas and tissue.
  * If the height or the sex is unknown, the range covers the usual heights of adults or both sexes.
  * If both are known, the two values are equal. */
-void supine_reference_capacity(const supine_person *person, double range[2]);
+void supine_physics_reference_capacity(const supine_person *person, double range[2]);
 
 /** Set resting->ml for supine to the volume at rest that height and sex predict, unless these are
  * unknown, a volume at rest is given or the scan was at rest.
  * @param reference  `scan`, `lung_count` and `side` are used */
-void supine_reference_predict_rest(const supine_reference *reference, const supine_person *person,
-                                   supine_resting *resting);
+void supine_physics_reference_predict_rest(const supine_reference *reference,
+                                           const supine_person *person, supine_resting *resting);
 
 /** Append the expected volume at full inflation, mL, to text [size]: "expected 6500", or "an
  * adult's 4566 to 8525" if height or sex is unknown. */
-void supine_reference_compare(const supine_reference *reference, const supine_person *person,
-                              char *text, size_t size);
+void supine_physics_reference_compare(const supine_reference *reference,
+                                      const supine_person *person, char *text, size_t size);
 
 /** Write a warning if the volume at full inflation is implausible for the person, or if the volume
  * of a scan at rest contradicts the volume that the user gave for rest.
- * @param given  the user's volumes at rest, before supine_reference_resting_settle
+ * @param given  the user's volumes at rest, before supine_physics_resting_settle
  * @param text   [size] the warning; empty if there is none */
-void supine_reference_doubt(const supine_reference *reference, const supine_person *person,
-                            const supine_resting *given, char *text, size_t size);
+void supine_physics_reference_doubt(const supine_reference *reference, const supine_person *person,
+                                    const supine_resting *given, char *text, size_t size);
 
 #endif

@@ -39,7 +39,7 @@ static const supine_resting usual = {.share = {{0.462, 0.629, 0.467, 0.519, 0.46
 static const double least_share = 0.1;
 static const double most_share = 1.0;
 
-supine_resting supine_reference_resting_default(void) {
+supine_resting supine_physics_resting_default(void) {
   return usual;
 }
 
@@ -104,13 +104,13 @@ static bool read_values(supine_resting *resting, const double gravity[3], const 
   return read;
 }
 
-bool supine_reference_resting_given(const supine_resting *resting) {
+bool supine_physics_resting_given(const supine_resting *resting) {
   static const bool none[6] = {false};
   return memcmp(resting->given, none, sizeof none) != 0;
 }
 
-supine_status supine_reference_resting_set(supine_resting *resting, const char *posture,
-                                           const char *value, supine_error *error) {
+supine_status supine_physics_resting_set(supine_resting *resting, const char *posture,
+                                         const char *value, supine_error *error) {
   double g[3];
   supine_resting set = *resting;
   if (strcmp(posture, "copd") == 0) {
@@ -130,13 +130,13 @@ supine_status supine_reference_resting_set(supine_resting *resting, const char *
         posture, value, least_share, most_share);
   }
   *resting = set;
-  return supine_reference_resting_settle(resting, 0, NULL, NULL, error);
+  return supine_physics_resting_settle(resting, 0, NULL, NULL, error);
 }
 
 static const char *const names[6] = {"left", "right", "supine", "prone", "inverted", "upright"};
 
-supine_status supine_reference_resting_give(supine_resting *resting, size_t axis, double ml,
-                                            const double share[2], supine_error *error) {
+supine_status supine_physics_resting_give(supine_resting *resting, size_t axis, double ml,
+                                          const double share[2], supine_error *error) {
   double parts_of[2] = {share[0], share[1]};
   if (share[1] == 0.0) {
     const double both = at_rest(&usual, axis, 2, sides, parts);
@@ -155,10 +155,10 @@ supine_status supine_reference_resting_give(supine_resting *resting, size_t axis
     resting->share[0][axis] = parts_of[0];
     resting->share[1][axis] = parts_of[1];
   }
-  return supine_reference_resting_settle(resting, 0, NULL, NULL, error);
+  return supine_physics_resting_settle(resting, 0, NULL, NULL, error);
 }
 
-void supine_reference_resting_print(const supine_resting *resting, char *text, size_t size) {
+void supine_physics_resting_print(const supine_resting *resting, char *text, size_t size) {
   size_t used = 0;
   for (size_t axis = 0; axis < 6 && used < size; ++axis) {
     used +=
@@ -167,9 +167,8 @@ void supine_reference_resting_print(const supine_resting *resting, char *text, s
   }
 }
 
-supine_status supine_reference_resting_settle(supine_resting *resting, size_t count,
-                                              const int *side, const double *full,
-                                              supine_error *error) {
+supine_status supine_physics_resting_settle(supine_resting *resting, size_t count, const int *side,
+                                            const double *full, supine_error *error) {
   const bool relative = full == NULL;
   double factor[6]; /* [posture] (known volume) / (default volume), or 0 */
   double sum = 0.0;
@@ -211,21 +210,21 @@ supine_status supine_reference_resting_settle(supine_resting *resting, size_t co
   return SUPINE_OK;
 }
 
-double supine_reference_resting_share(const supine_resting *resting, int side, const double g[3]) {
-  return supine_reference_along_axes(resting->share[side < 0], g);
+double supine_physics_resting_share(const supine_resting *resting, int side, const double g[3]) {
+  return supine_physics_resting_along_axes(resting->share[side < 0], g);
 }
 
-double supine_reference_resting_total(const supine_resting *resting, const double g[3]) {
-  return SUPINE_LEFT_SHARE * supine_reference_along_axes(resting->share[0], g) +
-         (1.0 - SUPINE_LEFT_SHARE) * supine_reference_along_axes(resting->share[1], g);
+double supine_physics_resting_total(const supine_resting *resting, const double g[3]) {
+  return SUPINE_LEFT_SHARE * supine_physics_resting_along_axes(resting->share[0], g) +
+         (1.0 - SUPINE_LEFT_SHARE) * supine_physics_resting_along_axes(resting->share[1], g);
 }
 
-double supine_reference_full_share(const double g[3]) {
+double supine_physics_resting_full_share(const double g[3]) {
   const double up = fmax(0.0, -g[2]);
   return 1.0 + SUPINE_FULL_UPRIGHT_GAIN * up * up;
 }
 
-double supine_reference_along_axes(const double values[6], const double g[3]) {
+double supine_physics_resting_along_axes(const double values[6], const double g[3]) {
   double value = 0.0;
   for (size_t k = 0; k < 3; ++k) {
     const double odd = 0.5 * (values[2 * k] - values[2 * k + 1]);
@@ -242,7 +241,7 @@ double supine_reference_along_axes(const double values[6], const double g[3]) {
  *     e_x x^2 + e_y y^2 + e_z z^2 = m + (e_z - m) (3 z^2 - 1) / 2 + (e_x - e_y) (x^2 - y^2) / 2
  *
  * Up to a constant factor each, 1, 3 z^2 - 1 and x^2 - y^2 are harmonics, too. */
-void supine_reference_harmonics(const double values[6], double harmonics[9]) {
+void supine_physics_resting_harmonics(const double values[6], double harmonics[9]) {
   static const size_t axis_term[3] = {3, 1, 2}; /* harmonics proportional to x, y and z */
   double even[3];
   for (size_t t = 0; t < 9; ++t) {

@@ -44,36 +44,36 @@ typedef struct supine_resting {
   double share[2][6]; /**< [lung, posture] volume at rest / reference volume; left lung first */
   double ml[6];   /**< [posture] volume of both lungs at rest, mL; 0 if `share` gives it instead */
   bool given[6];  /**< [posture] whether the volume is the patient's own, not assumed */
-  bool predicted; /**< whether supine_reference_predict_rest has set the supine volume */
+  bool predicted; /**< whether supine_physics_reference_predict_rest has set the supine volume */
   double assumed; /**< share of both lungs, supine, from which other volumes are assumed */
   double spread;  /**< standard deviation of an assumed volume at rest / volume at full inflation */
 } supine_resting;
 
 /** Return the default volumes at rest, those of healthy people; resting.c names their sources. */
-supine_resting supine_reference_resting_default(void);
+supine_resting supine_physics_resting_default(void);
 
 /** Set the volume at rest in a posture with gravity along an axis, such as "prone" (posture.h). A
  * share scales the default shares of the postures that are not given, by the mean of (given share)
  * / (default share). The posture "copd" stands for the usual share in COPD, supine.
  * @param value  "0.48", a share of the full volume; "0.47/0.49", shares for the left and the right
  *   lung; "2600mL", gas and tissue of both lungs together; NULL for "copd" */
-supine_status supine_reference_resting_set(supine_resting *resting, const char *posture,
-                                           const char *value, supine_error *error);
+supine_status supine_physics_resting_set(supine_resting *resting, const char *posture,
+                                         const char *value, supine_error *error);
 
 /** Set the volume at rest with gravity along axis 0 to 5 (supine_resting), as
- * supine_reference_resting_set does.
+ * supine_physics_resting_set does.
  * @param ml     gas and tissue of both lungs, mL; or 0 to use `share`
  * @param share  [2] shares of the full volume of the left and the right lung; if the second is 0,
  *   the first is the share of both lungs together */
-supine_status supine_reference_resting_give(supine_resting *resting, size_t axis, double ml,
-                                            const double share[2], supine_error *error);
+supine_status supine_physics_resting_give(supine_resting *resting, size_t axis, double ml,
+                                          const double share[2], supine_error *error);
 
 /** Print the volumes at rest as shares of the full volume, left lung/right lung, in the form of the
  * option --resting: "left=0.462/0.61,...,upright=0.538/0.566". 256 characters are enough. */
-void supine_reference_resting_print(const supine_resting *resting, char *text, size_t size);
+void supine_physics_resting_print(const supine_resting *resting, char *text, size_t size);
 
 /** Return whether the volume at rest in a posture is the patient's own. */
-bool supine_reference_resting_given(const supine_resting *resting);
+bool supine_physics_resting_given(const supine_resting *resting);
 
 /** Convert volumes at rest in mL into shares of the reference volumes. Set the shares of the
  * postures that are not given to their defaults, times the mean of (given volume) / (default
@@ -81,28 +81,28 @@ bool supine_reference_resting_given(const supine_resting *resting);
  * @param side  [count] +1: left lung, -1: right lung
  * @param full  [count] reference volume of each lung, mL; if NULL, volumes in mL are kept for later
  */
-supine_status supine_reference_resting_settle(supine_resting *resting, size_t count,
-                                              const int *side, const double *full,
-                                              supine_error *error);
+supine_status supine_physics_resting_settle(supine_resting *resting, size_t count, const int *side,
+                                            const double *full, supine_error *error);
 
 /** Compute a lung's volume at rest as a share of its reference volume, with gravity along g.
  * @param side  +1: left lung, -1: right lung */
-double supine_reference_resting_share(const supine_resting *resting, int side, const double g[3]);
+double supine_physics_resting_share(const supine_resting *resting, int side, const double g[3]);
 
 /** Compute the volume at full inflation as a share of the reference volume, for gravity along g. */
-double supine_reference_full_share(const double g[3]);
+double supine_physics_resting_full_share(const double g[3]);
 
 /** Compute the volume of both lungs at rest divided by their reference volume, with gravity along
  * g. Assume that the left lung has the share SUPINE_LEFT_SHARE of the reference volume. */
-double supine_reference_resting_total(const supine_resting *resting, const double g[3]);
+double supine_physics_resting_total(const supine_resting *resting, const double g[3]);
 
 /** Interpolate values v, given along +x, -x, +y, -y, +z, -z, at the unit vector g. Return
  *
  *     sum over k = x, y, z of [(v(+k) - v(-k)) g_k + (v(+k) + v(-k)) g_k^2] / 2 */
-double supine_reference_along_axes(const double values[6], const double g[3]);
+double supine_physics_resting_along_axes(const double values[6], const double g[3]);
 
-/** Interpolate values that are given along +x, -x, +y, -y, +z, -z (supine_reference_along_axes),
- * and expand the result in real spherical harmonics of degrees 0 to 2, with 9 coefficients. */
-void supine_reference_harmonics(const double values[6], double harmonics[9]);
+/** Interpolate values that are given along +x, -x, +y, -y, +z, -z
+ * (supine_physics_resting_along_axes), and expand the result in real spherical harmonics of degrees
+ * 0 to 2, with 9 coefficients. */
+void supine_physics_resting_harmonics(const double values[6], double harmonics[9]);
 
 #endif

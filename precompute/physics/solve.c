@@ -50,7 +50,7 @@ static supine_status solve(const supine_lungs *lungs, const supine_model *model,
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     supine_physics_volume_form_add(&made->form[lung], made->cubic);
   }
-  supine_tissue_collapse_directions(lungs, model->share, made->directions);
+  supine_lungs_collapse_directions(lungs, model->share, made->directions);
   return SUPINE_OK;
 }
 

@@ -37,7 +37,7 @@ void supine_physics_solution_free(supine_solution *solution);
 double supine_physics_solution_largest(const supine_solution *solution);
 
 /** Compute the positions [N, 3] of displaced vertices, mm.
- * @param reference  mesh of the lungs; for collapsed lungs the surface of supine_tissue_collapse
+ * @param reference  mesh of the lungs; for collapsed lungs the surface of supine_lungs_collapse
  * @param scale      factor on the displacements */
 void supine_physics_solution_apply(const supine_solution *solution, const supine_mesh *reference,
                                    double scale, double *positions);

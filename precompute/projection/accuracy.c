@@ -89,9 +89,9 @@ static void compare_block(const accuracy_work *work, size_t begin, size_t n, dou
       sums->square_sum_mm2 += field * field;
     }
     find_errors(n, axes, fields, length, same, errors);
-    supine_accuracy_tally_add(&sums->same_gain, n, errors);
+    supine_projection_tally_add(&sums->same_gain, n, errors);
     find_errors(n, axes, fields, length, work->gains + 2 * d, errors);
-    supine_accuracy_tally_add(&sums->same_volume, n, errors);
+    supine_projection_tally_add(&sums->same_volume, n, errors);
   }
 }
 
@@ -156,23 +156,24 @@ static void conclude(const accuracy_work *work, supine_accuracy *made) {
   tally *all = &work->tallies[0];
   for (size_t t = 1; t < PARTS; ++t) {
     all->square_sum_mm2 += work->tallies[t].square_sum_mm2;
-    supine_accuracy_tally_merge(&all->same_gain, &work->tallies[t].same_gain);
-    supine_accuracy_tally_merge(&all->same_volume, &work->tallies[t].same_volume);
+    supine_projection_tally_merge(&all->same_gain, &work->tallies[t].same_gain);
+    supine_projection_tally_merge(&all->same_volume, &work->tallies[t].same_volume);
   }
   const double field = sqrt(all->square_sum_mm2 / samples);
   made->relative_rms = sqrt(all->same_gain.square_sum / samples) / field;
-  made->relative_p95 = supine_accuracy_tally_percentile(&all->same_gain, 0.95) / field;
+  made->relative_p95 = supine_projection_tally_percentile(&all->same_gain, 0.95) / field;
   made->relative_max = all->same_gain.largest / field;
   made->rms_mm = sqrt(all->same_volume.square_sum / samples);
-  made->p95_mm = supine_accuracy_tally_percentile(&all->same_volume, 0.95);
+  made->p95_mm = supine_projection_tally_percentile(&all->same_volume, 0.95);
   made->max_mm = all->same_volume.largest;
 }
 
-supine_status supine_accuracy_measure(const supine_truth *truth,
-                                      const supine_compression *compression,
-                                      const supine_rows *rows, const supine_volume_forms *forms,
-                                      const double volume[9], supine_accuracy *accuracy,
-                                      supine_error *error) {
+supine_status supine_projection_accuracy_measure(const supine_truth *truth,
+                                                 const supine_compression *compression,
+                                                 const supine_rows *rows,
+                                                 const supine_volume_forms *forms,
+                                                 const double volume[9], supine_accuracy *accuracy,
+                                                 supine_error *error) {
   const size_t count = truth->direction_count;
   const size_t modes = compression->mode_count;
   const size_t threads = supine_thread_count();
@@ -202,10 +203,11 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
   return SUPINE_OK;
 }
 
-supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const supine_rows *rows,
-                                          const supine_compression *compression,
-                                          const supine_volume_forms *forms, const double volume[9],
-                                          double *share, supine_error *error) {
+supine_status supine_projection_turned_over(const supine_lungs *lungs, const supine_rows *rows,
+                                            const supine_compression *compression,
+                                            const supine_volume_forms *forms,
+                                            const double volume[9], double *share,
+                                            supine_error *error) {
   enum { SAMPLES_MAX = 50000 };
   const supine_mesh *mesh = &lungs->mesh;
   const size_t n = mesh->vertex_count;
@@ -240,9 +242,10 @@ supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const supin
   return SUPINE_OK;
 }
 
-supine_status supine_accuracy_add_storage(const supine_basis *basis,
-                                          const supine_compression *compression,
-                                          const supine_rows *rows, supine_accuracy *accuracy) {
+supine_status supine_projection_accuracy_add_storage(const supine_basis *basis,
+                                                     const supine_compression *compression,
+                                                     const supine_rows *rows,
+                                                     supine_accuracy *accuracy) {
   enum { DIRECTIONS = 16 };
   const supine_basis_info *info = supine_basis_get_info(basis);
   const size_t n = info->vertex_count;
@@ -253,7 +256,7 @@ supine_status supine_accuracy_add_storage(const supine_basis *basis,
   double *u = supine_arena_take(&arena, 3 * n, sizeof *u);
   supine_tally *errors = supine_arena_zeros(&arena, 1, sizeof *errors);
   SUPINE_TRY(supine_arena_status(&arena));
-  supine_accuracy_held_out_directions(DIRECTIONS, gravity);
+  supine_projection_held_out_directions(DIRECTIONS, gravity);
   for (const double *g = gravity; g < gravity + 3 * DIRECTIONS; g += 3) {
     const supine_state state = {.gravity = {g[0], g[1], g[2]}};
     supine_pose pose = {.basis = 0};
@@ -270,14 +273,14 @@ supine_status supine_accuracy_add_storage(const supine_basis *basis,
         error[j % 3] = (double)xyz[j] - (double)info->vertices[j] - u[j];
       }
       square_sum += supine_dot(u + 3 * i, u + 3 * i);
-      supine_accuracy_tally_add(errors, 1, (double[]){supine_length(error)});
+      supine_projection_tally_add(errors, 1, (double[]){supine_length(error)});
     }
   }
   if (!(square_sum > 0.0)) {
     return SUPINE_OK;
   }
   const double rms = sqrt(errors->square_sum / (double)errors->count);
-  const double p95 = supine_accuracy_tally_percentile(errors, 0.95);
+  const double p95 = supine_projection_tally_percentile(errors, 0.95);
   const double size = sqrt(square_sum / (double)errors->count);
   accuracy->relative_rms = hypot(accuracy->relative_rms, rms / size);
   accuracy->relative_p95 = hypot(accuracy->relative_p95, p95 / size);

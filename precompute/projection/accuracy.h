@@ -23,7 +23,7 @@ typedef struct supine_accuracy {
    * the lungs. For another simulator's fields, these are leave-one-out errors without scaling. */
   double rms_mm, p95_mm, max_mm;
   /** Change of volume at which the errors in mm were measured, as a fraction of the change
-   * requested from supine_accuracy_measure. If the resting volume (FRC) is unknown,
+   * requested from supine_projection_accuracy_measure. If the resting volume (FRC) is unknown,
    * supine_precompute stores the change in mL instead. 0 for another simulator's fields. */
   double volume;
 } supine_accuracy;
@@ -47,16 +47,16 @@ typedef struct supine_truth {
 /** Solve the physical model for `count` held-out directions of gravity. `truth` refers to `field`,
  * which must outlive it.
  * @param span   directions of gravity of the columns of `field`
- * @param truth  release with supine_accuracy_truth_free, also after an error */
-supine_status supine_accuracy_truth_create(const supine_lungs *lungs, const supine_model *model,
-                                           const supine_span *span,
-                                           const supine_gravity_field *field, size_t count,
-                                           supine_truth *truth, supine_error *error);
-void supine_accuracy_truth_free(supine_truth *truth);
+ * @param truth  release with supine_projection_truth_free, also after an error */
+supine_status supine_projection_truth_create(const supine_lungs *lungs, const supine_model *model,
+                                             const supine_span *span,
+                                             const supine_gravity_field *field, size_t count,
+                                             supine_truth *truth, supine_error *error);
+void supine_projection_truth_free(supine_truth *truth);
 
 /** Compute `count` unit vectors along a golden-angle spiral that avoids the nodes of the grid from
  * which harmonics are computed, into directions [count, 3]. */
-void supine_accuracy_held_out_directions(size_t count, double *directions);
+void supine_projection_held_out_directions(size_t count, double *directions);
 
 /** Measure the error of the displacement computed from the modes of `compression`, against the
  * exact solutions `truth`. Percentiles come from a histogram whose bins are at most 0.4 % wide.
@@ -66,11 +66,12 @@ void supine_accuracy_held_out_directions(size_t count, double *directions);
  *   measured: coefficients of spherical harmonics of the direction of gravity. It is halved until
  *   the lungs can reach it in every held-out direction; SUPINE_ERROR_NUMERICAL below a thousandth
  */
-supine_status supine_accuracy_measure(const supine_truth *truth,
-                                      const supine_compression *compression,
-                                      const supine_rows *rows, const supine_volume_forms *forms,
-                                      const double volume[9], supine_accuracy *accuracy,
-                                      supine_error *error);
+supine_status supine_projection_accuracy_measure(const supine_truth *truth,
+                                                 const supine_compression *compression,
+                                                 const supine_rows *rows,
+                                                 const supine_volume_forms *forms,
+                                                 const double volume[9], supine_accuracy *accuracy,
+                                                 supine_error *error);
 
 /** Add to `accuracy` the error of storage, which is independent of the other errors: add squares of
  * the RMS error and of the percentile, and add the maximum. The error of storage is the difference
@@ -78,19 +79,21 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
  * in 16 directions of gravity, at the default volume if the surface can have it.
  * @param basis  opened with the default storage
  * @param rows   kind of the rows of `compression` */
-supine_status supine_accuracy_add_storage(const supine_basis *basis,
-                                          const supine_compression *compression,
-                                          const supine_rows *rows, supine_accuracy *accuracy);
+supine_status supine_projection_accuracy_add_storage(const supine_basis *basis,
+                                                     const supine_compression *compression,
+                                                     const supine_rows *rows,
+                                                     supine_accuracy *accuracy);
 
 /** Find the share of triangles, 0 to 1, whose normals turn by more than 90 degrees from the
  * reference surface to a given volume. It is the largest share in the six postures with gravity
  * along an axis. Postures in which the lungs cannot reach the volume are left out. Up to 50,000
  * evenly chosen triangles are examined. Above a few in a thousand, the surface looks torn. The
- * arguments are those of supine_accuracy_measure. */
-supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const supine_rows *rows,
-                                          const supine_compression *compression,
-                                          const supine_volume_forms *forms, const double volume[9],
-                                          double *share, supine_error *error);
+ * arguments are those of supine_projection_accuracy_measure. */
+supine_status supine_projection_turned_over(const supine_lungs *lungs, const supine_rows *rows,
+                                            const supine_compression *compression,
+                                            const supine_volume_forms *forms,
+                                            const double volume[9], double *share,
+                                            supine_error *error);
 
 /** Relative RMS errors for the held-out directions of gravity, over at most 4096 evenly chosen
  * vertices. */
@@ -102,9 +105,9 @@ typedef struct supine_error_table {
 } supine_error_table;
 
 /** Tabulate the error of the displacement by number of harmonics and by number of modes. */
-supine_status supine_accuracy_error_table_create(const supine_truth *truth,
-                                                 const supine_gravity_field *field,
-                                                 const supine_compression *compression,
-                                                 supine_error_table *table, supine_error *error);
+supine_status supine_projection_error_table_create(const supine_truth *truth,
+                                                   const supine_gravity_field *field,
+                                                   const supine_compression *compression,
+                                                   supine_error_table *table, supine_error *error);
 
 #endif

@@ -7,7 +7,7 @@
 
 enum { BIN_SHIFT = 15 };
 
-void supine_accuracy_tally_add(supine_tally *tally, size_t count, const double *values) {
+void supine_projection_tally_add(supine_tally *tally, size_t count, const double *values) {
   double square_sum = 0.0;
   double largest = tally->largest;
   for (size_t i = 0; i < count; ++i) {
@@ -23,7 +23,7 @@ void supine_accuracy_tally_add(supine_tally *tally, size_t count, const double *
   tally->count += count;
 }
 
-void supine_accuracy_tally_merge(supine_tally *tally, const supine_tally *other) {
+void supine_projection_tally_merge(supine_tally *tally, const supine_tally *other) {
   tally->square_sum += other->square_sum;
   tally->largest = fmax(tally->largest, other->largest);
   tally->count += other->count;
@@ -32,7 +32,7 @@ void supine_accuracy_tally_merge(supine_tally *tally, const supine_tally *other)
   }
 }
 
-double supine_accuracy_tally_percentile(const supine_tally *tally, double share) {
+double supine_projection_tally_percentile(const supine_tally *tally, double share) {
   const double wanted = share * (double)tally->count;
   uint64_t seen = 0;
   for (uint32_t b = 0; b < SUPINE_TALLY_BINS; ++b) {

@@ -19,12 +19,12 @@ typedef struct supine_tally {
 } supine_tally;
 
 /* Add `count` values, none of which is negative. */
-void supine_accuracy_tally_add(supine_tally *tally, size_t count, const double *values);
+void supine_projection_tally_add(supine_tally *tally, size_t count, const double *values);
 
-void supine_accuracy_tally_merge(supine_tally *tally, const supine_tally *other);
+void supine_projection_tally_merge(supine_tally *tally, const supine_tally *other);
 
 /* Return the value below which `share`, 0 to 1, of the numbers lie, rounded up to the edge of its
  * bin. Return 0 if there are no numbers. */
-double supine_accuracy_tally_percentile(const supine_tally *tally, double share);
+double supine_projection_tally_percentile(const supine_tally *tally, double share);
 
 #endif

@@ -12,14 +12,14 @@
 #include "precompute/projection/accuracy.h"
 #include "precompute/projection/projection.h"
 
-void supine_accuracy_held_out_directions(size_t count, double *directions) {
+void supine_projection_held_out_directions(size_t count, double *directions) {
   static const double first_longitude = 0.3; /* rad; off the nodes of the harmonics' grid */
   for (size_t i = 0; i < count; ++i) {
     supine_spiral((double)i, (double)count, first_longitude, directions + 3 * i);
   }
 }
 
-void supine_accuracy_truth_free(supine_truth *truth) {
+void supine_projection_truth_free(supine_truth *truth) {
   supine_arena_free(&truth->memory);
   *truth = (supine_truth){0};
 }
@@ -40,10 +40,10 @@ static supine_status find_cubics(const supine_lungs *lungs, const double *share,
   return SUPINE_OK;
 }
 
-supine_status supine_accuracy_truth_create(const supine_lungs *lungs, const supine_model *model,
-                                           const supine_span *span,
-                                           const supine_gravity_field *field, size_t count,
-                                           supine_truth *truth, supine_error *error) {
+supine_status supine_projection_truth_create(const supine_lungs *lungs, const supine_model *model,
+                                             const supine_span *span,
+                                             const supine_gravity_field *field, size_t count,
+                                             supine_truth *truth, supine_error *error) {
   const size_t rank = span->rank;
   SUPINE_ARENA arena = {0};
   double *range = supine_arena_take(&arena, 2 * count, sizeof *range);
@@ -54,7 +54,7 @@ supine_status supine_accuracy_truth_create(const supine_lungs *lungs, const supi
   truth->cubic = supine_arena_zeros(&truth->memory, 3 * count, sizeof(double));
   SUPINE_TRY(supine_arena_check(&arena, error, "%zu held-out directions", count));
   SUPINE_TRY(supine_arena_check(&truth->memory, error, "%zu held-out directions", count));
-  supine_accuracy_held_out_directions(count, truth->directions);
+  supine_projection_held_out_directions(count, truth->directions);
   const supine_gravities gravities = {count, truth->directions, range, range + count};
   if (supine_physics_height_range(lungs, model->force.pair, count, truth->directions, range,
                                   range + count) != SUPINE_OK ||
@@ -94,10 +94,10 @@ static double square_of(const double *gram, size_t rank, const double *coefficie
   return cblas_ddot((int)rank, coefficients, 1, image, 1);
 }
 
-supine_status supine_accuracy_error_table_create(const supine_truth *truth,
-                                                 const supine_gravity_field *field,
-                                                 const supine_compression *compression,
-                                                 supine_error_table *table, supine_error *error) {
+supine_status supine_projection_error_table_create(const supine_truth *truth,
+                                                   const supine_gravity_field *field,
+                                                   const supine_compression *compression,
+                                                   supine_error_table *table, supine_error *error) {
   const supine_expansion *expansion = &field->expansion;
   const size_t rank = expansion->rank;
   const size_t bands = expansion->band + 1;

@@ -102,7 +102,7 @@ typedef struct surfaces {
   size_t count;
   double *moved; /* [count, 3] vertices of the first surface, mm */
   const supine_mesh *state;
-  supine_inside_surface *tree, *state_tree;
+  supine_lungs_surface *tree, *state_tree;
   double *space;
 } surfaces;
 
@@ -118,17 +118,17 @@ static void surface_distance(const surfaces *s, double *nearest, supine_validati
   double *distance = s->space;
   double *points = distance + n + m;
   sample(s->count, s->moved, n, points);
-  supine_inside_surface_distances(s->state_tree, n, points, distance, nearest);
+  supine_lungs_surface_distances(s->state_tree, n, points, distance, nearest);
   sample(total, s->state->vertices, m, points);
-  supine_inside_surface_refit(s->tree);
-  supine_inside_surface_distances(s->tree, m, points, distance + n, NULL);
+  supine_lungs_surface_refit(s->tree);
+  supine_lungs_surface_distances(s->tree, m, points, distance + n, NULL);
   summarise(distance, n + m, of);
 }
 
 /* Fit a map from vertices onto a surface by iterated nearest points; apply it to all n vertices.
  * Return false if the map is undetermined. `space` holds 10 * FITTED_MAX numbers. */
 static bool fit_map(supine_patient_map kind, size_t n, const double *vertices,
-                    const supine_inside_surface *tree, double *space, double *moved) {
+                    const supine_lungs_surface *tree, double *space, double *moved) {
   const size_t count = at_most(n, FITTED_MAX);
   double *from = space;
   double *at = from + 3 * count;
@@ -141,7 +141,7 @@ static bool fit_map(supine_patient_map kind, size_t n, const double *vertices,
     for (size_t i = 0; i < count; ++i) {
       supine_patient_map_apply(&by, from + 3 * i, at + 3 * i);
     }
-    supine_inside_surface_distances(tree, count, at, distance, to);
+    supine_lungs_surface_distances(tree, count, at, distance, to);
     if (!supine_patient_map_fit(kind, count, from, to, &by)) {
       return false;
     }
@@ -160,10 +160,10 @@ static supine_status compare(surfaces *s, const supine_mesh *start,
   const supine_mesh *state = s->state;
   const size_t bytes = 3 * s->count * sizeof(double);
   memcpy(s->moved, predicted, bytes);
-  SUPINE_TRY(supine_inside_surface_create(state->vertices, state->triangle_count, state->triangles,
-                                          false, &s->state_tree, error));
-  SUPINE_TRY(supine_inside_surface_create(s->moved, start->triangle_count, start->triangles, false,
-                                          &s->tree, error));
+  SUPINE_TRY(supine_lungs_surface_create(state->vertices, state->triangle_count, state->triangles,
+                                         false, &s->state_tree, error));
+  SUPINE_TRY(supine_lungs_surface_create(s->moved, start->triangle_count, start->triangles, false,
+                                         &s->tree, error));
   for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT; ++k) {
     const bool own = k == SUPINE_PATIENT_MAP_PREDICTED;
     if (!fit_map(map_of(k, moved), s->count, own ? predicted : start->vertices, s->state_tree,
@@ -194,7 +194,7 @@ supine_validation_surfaces(const supine_mesh *start, supine_patient_scan_motion 
   SUPINE_TRY(supine_patient_check_boxes(start, state, error));
   SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
   const supine_status status = compare(&s, start, moved, predicted, nearest, distance, error);
-  supine_inside_surface_destroy(s.state_tree);
-  supine_inside_surface_destroy(s.tree);
+  supine_lungs_surface_destroy(s.state_tree);
+  supine_lungs_surface_destroy(s.tree);
   return status;
 }

@@ -72,7 +72,7 @@ static supine_status predict_surface(supine_validation *s, const supine_validati
 }
 
 typedef struct search {
-  const supine_inside_surface *tree;
+  const supine_lungs_surface *tree;
   size_t vertex_count, measured_count;
   double *positions; /* [N, 3] workspace: predicted positions, mm */
   double *distance;  /* [measured_count] distances from the scanned surface, mm */
@@ -97,8 +97,7 @@ static supine_status distance_at(const supine_validation *s,
     memmove(positions + 3 * i, positions + 3 * (i * look->vertex_count / look->measured_count),
             3 * sizeof(double));
   }
-  supine_inside_surface_distances(look->tree, look->measured_count, positions, look->distance,
-                                  NULL);
+  supine_lungs_surface_distances(look->tree, look->measured_count, positions, look->distance, NULL);
   for (size_t i = 0; i < look->measured_count; ++i) {
     sum += look->distance[i] * look->distance[i] / (double)look->measured_count;
   }
@@ -111,14 +110,14 @@ static supine_status find_best(const supine_validation *s, const supine_mesh *sc
                                supine_validation_outcome *outcome, supine_error *error) {
   const size_t n = s->start.vertex_count;
   SUPINE_ARENA arena = {0};
-  SUPINE_FREED_BY(supine_inside_surface_drop) supine_inside_surface *tree = NULL;
+  SUPINE_FREED_BY(supine_lungs_surface_drop) supine_lungs_surface *tree = NULL;
   search look = {.vertex_count = n,
                  .measured_count = n < MEASURED_VERTICES_MAX ? n : MEASURED_VERTICES_MAX,
                  .positions = supine_arena_take(&arena, n, 3 * sizeof(double)),
                  .distance = supine_arena_take(&arena, n, sizeof(double))};
   SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
-  SUPINE_TRY(supine_inside_surface_create(scan->vertices, scan->triangle_count, scan->triangles,
-                                          false, &tree, error));
+  SUPINE_TRY(supine_lungs_surface_create(scan->vertices, scan->triangle_count, scan->triangles,
+                                         false, &tree, error));
   const double span = search_span * fmax(1.0, fabs(outcome->scale));
   double low = outcome->scale - span;
   double high = outcome->scale + span;

@@ -7,7 +7,7 @@
 
 #include "precompute/warp/fade.h"
 
-double supine_field_fade(double largest) {
+double supine_warp_fade(double largest) {
   static const double least = 60.0;
   /* The field falls linearly: tissue keeps at least a third of its length, and does not fold. */
   static const double per_displacement = 1.5;
@@ -140,7 +140,7 @@ static double largest_near(const supine_image *nodes, const float *depth, double
   return sqrt(square);
 }
 
-void supine_field_fade_out(supine_field *field, const unsigned char *known) {
+void supine_warp_fade_out(supine_field *field, const unsigned char *known) {
   supine_image *nodes = &field->nodes;
   float *u = nodes->values;
   float *depth = field->depth.values;
@@ -151,7 +151,7 @@ void supine_field_fade_out(supine_field *field, const unsigned char *known) {
     height[a] = supine_image_plane_distance(nodes, a);
   }
   extend(field, known);
-  const double length = supine_field_fade(largest_near(nodes, depth, near));
+  const double length = supine_warp_fade(largest_near(nodes, depth, near));
   smooth(nodes, depth, near);
   for (size_t i = 0; i < count; ++i) {
     const size_t at[3] = {i % nodes->size[0], i / nodes->size[0] % nodes->size[1],

@@ -9,10 +9,10 @@
 
 #include "precompute/warp/fade.h"
 
-const double supine_field_aerated = -300.0;
+const double supine_warp_aerated = -300.0;
 
-void supine_field_find_cell(const supine_image *image, const double point[3],
-                            supine_field_cell *cell) {
+void supine_warp_find_cell(const supine_image *image, const double point[3],
+                           supine_warp_cell *cell) {
   double voxel[3];
   supine_image_locate(image, point, voxel);
   for (size_t a = 0; a < 3; ++a) {
@@ -27,7 +27,7 @@ void supine_field_find_cell(const supine_image *image, const double point[3],
 /* Inlined, so that the loops over a constant number of channels are unrolled. */
 static inline __attribute__((always_inline)) void interpolate(const supine_image *image,
                                                               size_t channels,
-                                                              const supine_field_cell *cell,
+                                                              const supine_warp_cell *cell,
                                                               double *values, double (*slope)[3]) {
   const float *numbers = image->values;
   for (size_t c = 0; c < channels; ++c) {
@@ -58,8 +58,8 @@ static inline __attribute__((always_inline)) void interpolate(const supine_image
   }
 }
 
-void supine_field_interpolate(const supine_image *image, const supine_field_cell *cell,
-                              double *values, double (*slope)[3]) {
+void supine_warp_interpolate(const supine_image *image, const supine_warp_cell *cell,
+                             double *values, double (*slope)[3]) {
   if (image->channels == 3) {
     interpolate(image, 3, cell, values, slope);
   } else {
@@ -111,8 +111,8 @@ static supine_status read_grid(const supine_basis *basis, supine_image *nodes,
   return SUPINE_OK;
 }
 
-supine_status supine_field_create(const supine_basis *basis, const supine_pose *pose,
-                                  supine_field *field, supine_error *error) {
+supine_status supine_warp_create(const supine_basis *basis, const supine_pose *pose,
+                                 supine_field *field, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const size_t n = info->vertex_count;
   supine_field made = {.nodes = {.voxel = SUPINE_VOXEL_F32, .channels = 3}};
@@ -130,7 +130,7 @@ supine_status supine_field_create(const supine_basis *basis, const supine_pose *
   made.depth.channels = 1;
   made.depth.values = below;
   if (arena.failed || u == NULL || below == NULL) {
-    supine_field_free(&made);
+    supine_warp_free(&made);
     return supine_error_memory(error, "a field of %zu nodes", count);
   }
   (void)supine_displace_range(basis, pose, 0, n, moved);
@@ -148,28 +148,28 @@ supine_status supine_field_create(const supine_basis *basis, const supine_pose *
     known[part[i]] = 1;
     below[part[i]] = depth[i];
   }
-  supine_field_fade_out(&made, known);
+  supine_warp_fade_out(&made, known);
   *field = made;
   return SUPINE_OK;
 }
 
-void supine_field_free(supine_field *field) {
+void supine_warp_free(supine_field *field) {
   supine_image_free(&field->nodes);
   supine_image_free(&field->depth);
   *field = (supine_field){0};
 }
 
-void supine_field_at(const supine_field *field, const double point[3], double u[3]) {
-  supine_field_cell cell;
-  supine_field_find_cell(&field->nodes, point, &cell);
-  supine_field_interpolate(&field->nodes, &cell, u, NULL);
+void supine_warp_at(const supine_field *field, const double point[3], double u[3]) {
+  supine_warp_cell cell;
+  supine_warp_find_cell(&field->nodes, point, &cell);
+  supine_warp_interpolate(&field->nodes, &cell, u, NULL);
 }
 
-double supine_field_stretch(const supine_image *nodes, const supine_field_cell *cell) {
+double supine_warp_stretch(const supine_image *nodes, const supine_warp_cell *cell) {
   double u[3];
   double slope[3][3];
   double edge[3][3];
-  supine_field_interpolate(nodes, cell, u, slope);
+  supine_warp_interpolate(nodes, cell, u, slope);
   for (size_t k = 0; k < 9; ++k) {
     edge[k / 3][k % 3] = nodes->step[k / 3][k % 3] + slope[k % 3][k / 3];
   }
@@ -177,18 +177,18 @@ double supine_field_stretch(const supine_image *nodes, const supine_field_cell *
          supine_triple(nodes->step[0], nodes->step[1], nodes->step[2]);
 }
 
-void supine_field_folded(const supine_field *field, double share[2]) {
+void supine_warp_folded(const supine_field *field, double share[2]) {
   const size_t *size = field->nodes.size;
   size_t inside = 0;
   size_t folded[2] = {0, 0};
   for (size_t i = 0; i < size[0] * size[1] * size[2]; ++i) {
-    const supine_field_cell cell = {{i % size[0], i / size[0] % size[1], i / size[0] / size[1]},
-                                    {0.5, 0.5, 0.5}};
+    const supine_warp_cell cell = {{i % size[0], i / size[0] % size[1], i / size[0] / size[1]},
+                                   {0.5, 0.5, 0.5}};
     if (cell.corner[0] + 1 < size[0] && cell.corner[1] + 1 < size[1] &&
         cell.corner[2] + 1 < size[2]) {
       const bool lung = ((const float *)field->depth.values)[i] > 0.0F;
       inside += lung ? 1 : 0;
-      folded[lung ? 0 : 1] += supine_field_stretch(&field->nodes, &cell) > 0.0 ? 0 : 1;
+      folded[lung ? 0 : 1] += supine_warp_stretch(&field->nodes, &cell) > 0.0 ? 0 : 1;
     }
   }
   for (size_t k = 0; k < 2; ++k) {

@@ -18,81 +18,81 @@ typedef struct supine_field {
 
 /** Return the distance from the lungs, mm, over which a field falls to 0 if its largest
  * displacement is `largest` mm: 60 mm, or 1.5 times the largest displacement if that is more. */
-double supine_field_fade(double largest);
+double supine_warp_fade(double largest);
 
 /** Compute the displacement field from the scan to a pose. It has a physical meaning only in the
  * lungs, and at the grid nodes around them to which 'supine embed' extrapolated it. From the lungs
- * it falls to 0 over the distance of supine_field_fade, and at the latest at the border of the
+ * it falls to 0 over the distance of supine_warp_fade, and at the latest at the border of the
  * grid.
- * @param field  release with supine_field_free */
-supine_status supine_field_create(const supine_basis *basis, const supine_pose *pose,
-                                  supine_field *field, supine_error *error);
-void supine_field_free(supine_field *field);
+ * @param field  release with supine_warp_free */
+supine_status supine_warp_create(const supine_basis *basis, const supine_pose *pose,
+                                 supine_field *field, supine_error *error);
+void supine_warp_free(supine_field *field);
 
 /** Interpolate the field at a point. */
-void supine_field_at(const supine_field *field, const double point[3], double u[3]);
+void supine_warp_at(const supine_field *field, const double point[3], double u[3]);
 
-/** Compute the displacement field from a pose (NULL: the scan) to another, as supine_field_create.
+/** Compute the displacement field from a pose (NULL: the scan) to another, as supine_warp_create.
  * Release `field` even after a failure. */
-supine_status supine_field_between(const supine_basis *basis, const supine_pose *from,
-                                   const supine_pose *to, supine_field *field, supine_error *error);
+supine_status supine_warp_between(const supine_basis *basis, const supine_pose *from,
+                                  const supine_pose *to, supine_field *field, supine_error *error);
 
 /** Count the cells that the field u turns over (det(I + du/dx) is not positive at their centre):
  * share[0] in the lungs, share[1] in the body around them, where the field fades out. Both are
  * shares of the number of cells in the lungs. Near each of these cells, voxels are lost. */
-void supine_field_folded(const supine_field *field, double share[2]);
+void supine_warp_folded(const supine_field *field, double share[2]);
 
 /** Residual u(x) + v(x + u(x)) of a field u and its inverse v. */
-typedef struct supine_field_residual {
+typedef struct supine_warp_residual {
   double rms, largest; /**< RMS and largest length of the residual inside the lungs, mm */
   size_t lost; /**< number of nodes at which the inverse errs by more than 0.01 mm, because the
                   field folds there */
-} supine_field_residual;
+} supine_warp_residual;
 
 /** Invert a field u by Newton's method, on the same nodes: v(y) = x - y, where x + u(x) = y. A
  * resampled image takes the value of its voxel y from the place y + v(y). Cost: about ten
  * evaluations of u per node, in parallel. */
-supine_status supine_field_invert(const supine_field *field, supine_field *inverse,
-                                  supine_field_residual *residual, supine_error *error);
+supine_status supine_warp_invert(const supine_field *field, supine_field *inverse,
+                                 supine_warp_residual *residual, supine_error *error);
 
 /** Density below which a voxel near the surface of the lungs belongs to them, HU. All lungs have
  * such voxels. */
-extern const double supine_field_aerated;
+extern const double supine_warp_aerated;
 
-/** Check that an image is in Hounsfield units: at least one voxel is below supine_field_aerated.
+/** Check that an image is in Hounsfield units: at least one voxel is below supine_warp_aerated.
  * @param path  names the image in the message */
-supine_status supine_field_check_hounsfield(const supine_image *image, const char *path,
-                                            supine_error *error);
+supine_status supine_warp_check_hounsfield(const supine_image *image, const char *path,
+                                           supine_error *error);
 
 /** Move an image: moved(y) = image(y + v(y)) at the voxels y of the image; places outside the image
  * have the value of the nearest voxel. If `depth` is given, densities (Hounsfield units + 1000)
  * inside the lungs are multiplied by det(I + dv/dy). This is the tissue's volume before the motion,
  * divided by its volume after the motion; it keeps the mass.
- * @param inverse  field v, made by supine_field_invert
+ * @param inverse  field v, made by supine_warp_invert
  * @param depth    depth of the nodes below the lungs' surface; NULL to keep densities unscaled
  * @param labels   whether to take the value of the nearest voxel instead of interpolating
  * @param moved    release with supine_image_free */
-supine_status supine_field_resample(const supine_field *inverse, const supine_image *depth,
-                                    bool labels, const supine_image *image, supine_image *moved,
-                                    supine_error *error);
+supine_status supine_warp_resample(const supine_field *inverse, const supine_image *depth,
+                                   bool labels, const supine_image *image, supine_image *moved,
+                                   supine_error *error);
 
 /* The cell between eight voxels that contains a point. */
-typedef struct supine_field_cell {
+typedef struct supine_warp_cell {
   size_t corner[3]; /* voxel at the lowest corner */
   double share[3];  /* position of the point in the cell, 0 to 1 along each axis */
-} supine_field_cell;
+} supine_warp_cell;
 
 /* Find the cell that contains a point, mm; a point outside the image is clamped to its border. */
-void supine_field_find_cell(const supine_image *image, const double point[3],
-                            supine_field_cell *cell);
+void supine_warp_find_cell(const supine_image *image, const double point[3],
+                           supine_warp_cell *cell);
 
 /* Return det(I + du/dx) at a point in a cell of the field u. */
-double supine_field_stretch(const supine_image *nodes, const supine_field_cell *cell);
+double supine_warp_stretch(const supine_image *nodes, const supine_warp_cell *cell);
 
 /* Interpolate all channels of an F32 image at a point in a cell. Unless `slope` is NULL, also
  * compute the derivatives [channels, 3] with respect to cell->share, the position of the point in
  * the cell. */
-void supine_field_interpolate(const supine_image *image, const supine_field_cell *cell,
-                              double *values, double (*slope)[3]);
+void supine_warp_interpolate(const supine_image *image, const supine_warp_cell *cell,
+                             double *values, double (*slope)[3]);
 
 #endif

@@ -9,10 +9,10 @@
  * to B: u(x) = v(x) + second(x + v(x)). v is the inverse of `first`, the displacement from the scan
  * to A. Also replace each node's depth below the lungs' surface by its depth in state A. */
 static supine_status join(const supine_field *first, supine_field *second, supine_error *error) {
-  SUPINE_FREED_BY(supine_field_free) supine_field back = {0};
-  supine_field_residual residual;
+  SUPINE_FREED_BY(supine_warp_free) supine_field back = {0};
+  supine_warp_residual residual;
   supine_image depth;
-  SUPINE_TRY(supine_field_invert(first, &back, &residual, error));
+  SUPINE_TRY(supine_warp_invert(first, &back, &residual, error));
   const size_t *size = second->nodes.size;
   const size_t count = size[0] * size[1] * size[2];
   float *u = malloc(3 * count * sizeof *u);
@@ -27,27 +27,26 @@ static supine_status join(const supine_field *first, supine_field *second, supin
     for (size_t k = 0; k < 3; ++k) {
       place[k] += (double)v[k];
     }
-    supine_field_at(second, place, moved);
+    supine_warp_at(second, place, moved);
     for (size_t k = 0; k < 3; ++k) {
       u[3 * i + k] = (float)(moved[k] + (double)v[k]);
     }
   }
   free(second->nodes.values);
   second->nodes.values = u;
-  SUPINE_TRY(supine_field_resample(&back, NULL, false, &second->depth, &depth, error));
+  SUPINE_TRY(supine_warp_resample(&back, NULL, false, &second->depth, &depth, error));
   supine_image_free(&second->depth);
   second->depth = depth;
   return SUPINE_OK;
 }
 
-supine_status supine_field_between(const supine_basis *basis, const supine_pose *from,
-                                   const supine_pose *to, supine_field *field,
-                                   supine_error *error) {
-  SUPINE_FREED_BY(supine_field_free) supine_field first = {0};
-  SUPINE_TRY(supine_field_create(basis, to, field, error));
+supine_status supine_warp_between(const supine_basis *basis, const supine_pose *from,
+                                  const supine_pose *to, supine_field *field, supine_error *error) {
+  SUPINE_FREED_BY(supine_warp_free) supine_field first = {0};
+  SUPINE_TRY(supine_warp_create(basis, to, field, error));
   if (from == NULL) {
     return SUPINE_OK;
   }
-  SUPINE_TRY(supine_field_create(basis, from, &first, error));
+  SUPINE_TRY(supine_warp_create(basis, from, &first, error));
   return join(&first, field, error);
 }

@@ -17,10 +17,10 @@ static const double lost_beyond = 0.01; /* residual above which a node has no in
  * derivative of the residual with respect to x, counted in grid spacings along each axis. */
 static double misfit(const supine_field *field, const double x[3], const double y[3],
                      double residual[3], double (*slope)[3]) {
-  supine_field_cell cell;
+  supine_warp_cell cell;
   double u[3];
-  supine_field_find_cell(&field->nodes, x, &cell);
-  supine_field_interpolate(&field->nodes, &cell, u, slope);
+  supine_warp_find_cell(&field->nodes, x, &cell);
+  supine_warp_interpolate(&field->nodes, &cell, u, slope);
   for (int k = 0; k < 3; ++k) {
     residual[k] = x[k] + u[k] - y[k];
     for (int a = 0; a < 3 && slope != NULL; ++a) {
@@ -115,7 +115,7 @@ static void invert_rows(void *context, size_t begin, size_t end, size_t thread) 
 
 /* Measure the residual of a field and its inverse at every node inside the lungs. */
 static void measure(const supine_field *field, const supine_field *inverse,
-                    supine_field_residual *residual) {
+                    supine_warp_residual *residual) {
   const supine_image *nodes = &field->nodes;
   const float *u = nodes->values;
   size_t count = 0;
@@ -130,7 +130,7 @@ static void measure(const supine_field *field, const supine_field *inverse,
     for (size_t k = 0; k < 3; ++k) {
       x[k] += (double)u[3 * node + k];
     }
-    supine_field_at(inverse, x, back);
+    supine_warp_at(inverse, x, back);
     for (size_t k = 0; k < 3; ++k) {
       back[k] += (double)u[3 * node + k];
     }
@@ -142,17 +142,17 @@ static void measure(const supine_field *field, const supine_field *inverse,
   residual->rms = count > 0 ? sqrt(sum / (double)count) : 0.0;
 }
 
-supine_status supine_field_invert(const supine_field *field, supine_field *inverse,
-                                  supine_field_residual *residual, supine_error *error) {
+supine_status supine_warp_invert(const supine_field *field, supine_field *inverse,
+                                 supine_warp_residual *residual, supine_error *error) {
   const supine_image *nodes = &field->nodes;
   const size_t count = nodes->size[0] * nodes->size[1] * nodes->size[2];
   supine_field made = {.nodes = *nodes};
   SUPINE_ARENA arena = {0};
   unsigned char *lost = supine_arena_take(&arena, count, 1);
   made.nodes.values = malloc(3 * count * sizeof(float));
-  *residual = (supine_field_residual){0};
+  *residual = (supine_warp_residual){0};
   if (arena.failed || made.nodes.values == NULL) {
-    supine_field_free(&made);
+    supine_warp_free(&made);
     return supine_error_memory(error, "a field of %zu nodes", count);
   }
   inversion work = {field, &made, lost};

@@ -166,10 +166,10 @@ INLINE void take_nearest(const supine_image *image, cells in, double *values) {
  * This is det(I + dv/dy) for the inverse field v; return 0 if the field folds at y. */
 static double volume_ratio(const supine_image *nodes, const cells *in, size_t i) {
   const size_t node = in->first[i] / 3;
-  const supine_field_cell cell = {{node % nodes->size[0], node / nodes->size[0] % nodes->size[1],
-                                   node / nodes->size[0] / nodes->size[1]},
-                                  {in->share[0][i], in->share[1][i], in->share[2][i]}};
-  return fmax(0.0, supine_field_stretch(nodes, &cell));
+  const supine_warp_cell cell = {{node % nodes->size[0], node / nodes->size[0] % nodes->size[1],
+                                  node / nodes->size[0] / nodes->size[1]},
+                                 {in->share[0][i], in->share[1][i], in->share[2][i]}};
+  return fmax(0.0, supine_warp_stretch(nodes, &cell));
 }
 
 /* Interpolate densities, and multiply those inside the lungs by volume_ratio(). A point is
@@ -234,7 +234,7 @@ SUPINE_CLONES static void mark_run(const resampling *work, size_t row, size_t be
   interpolate(work->depth, &in, depth);
   supine_image_gather(work->from, first, index, left < RUN ? left : RUN, value);
   for (size_t i = 0; i < RUN; ++i) {
-    const bool aerated = value[i] < supine_field_aerated;
+    const bool aerated = value[i] < supine_warp_aerated;
     const bool near = depth[i] > -rim && aerated && (depth[i] > 0.0 || value[i] > air);
     kind[i] = (unsigned char)((depth[i] > rim || near ? LUNG : 0) + (aerated ? 1 : 0));
   }
@@ -288,9 +288,9 @@ static void process_rows(void *context, size_t begin, size_t end, size_t thread)
   }
 }
 
-supine_status supine_field_resample(const supine_field *inverse, const supine_image *depth,
-                                    bool labels, const supine_image *image, supine_image *moved,
-                                    supine_error *error) {
+supine_status supine_warp_resample(const supine_field *inverse, const supine_image *depth,
+                                   bool labels, const supine_image *image, supine_image *moved,
+                                   supine_error *error) {
   const size_t count = image->size[0] * image->size[1] * image->size[2];
   const size_t rows = image->size[1] * image->size[2];
   resampling work = {inverse, depth, *image, image, moved, labels, {{0.0}}, mark_run};
@@ -317,15 +317,15 @@ supine_status supine_field_resample(const supine_field *inverse, const supine_im
   return SUPINE_OK;
 }
 
-supine_status supine_field_check_hounsfield(const supine_image *image, const char *path,
-                                            supine_error *error) {
+supine_status supine_warp_check_hounsfield(const supine_image *image, const char *path,
+                                           supine_error *error) {
   bool aerated = false; /* whether a voxel is; the search stops there */
   for (size_t i = 0; i < image->size[0] * image->size[1] * image->size[2] && !aerated; ++i) {
-    aerated = supine_image_get(image, i) < supine_field_aerated;
+    aerated = supine_image_get(image, i) < supine_warp_aerated;
   }
   SUPINE_REFUSE_IF(!aerated, error, SUPINE_ERROR_FORMAT,
                    "%s: no voxel is below %g, so the image is not in Hounsfield units: convert it, "
                    "or leave --density out",
-                   path, supine_field_aerated);
+                   path, supine_warp_aerated);
   return SUPINE_OK;
 }

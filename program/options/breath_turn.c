@@ -25,7 +25,7 @@ static void find_quarter(const breath_turn *turn, double quarter[3]) {
   supine_cross(axis, from, quarter);
 }
 
-void supine_breath_turn_gravity(const breath_turn *turn, double time, double gravity[3]) {
+void supine_options_turn_gravity(const breath_turn *turn, double time, double gravity[3]) {
   const double cosine = fmax(-1.0, fmin(1.0, supine_dot(turn->from, turn->to)));
   if (time >= turn->seconds || cosine > 1.0 - 1e-15) {
     memcpy(gravity, turn->to, 3 * sizeof *gravity);
@@ -39,7 +39,7 @@ void supine_breath_turn_gravity(const breath_turn *turn, double time, double gra
   }
 }
 
-supine_status supine_breath_turn_read(const char *text, void *turn, supine_error *error) {
+supine_status supine_options_turn_read(const char *text, void *turn, supine_error *error) {
   breath_turn *made = turn;
   char from[SUPINE_POSTURE_NAME_MAX];
   char to[SUPINE_POSTURE_NAME_MAX];
@@ -62,7 +62,8 @@ supine_status supine_breath_turn_read(const char *text, void *turn, supine_error
   return SUPINE_OK;
 }
 
-supine_state supine_breath_state(const supine_basis *basis, const double gravity[3], double ml) {
+supine_state supine_options_breath_state(const supine_basis *basis, const double gravity[3],
+                                         double ml) {
   const bool known = supine_basis_get_info(basis)->has_rest;
   return (supine_state){.gravity = {gravity[0], gravity[1], gravity[2]},
                         .volume = {known ? SUPINE_VOLUME_REST : SUPINE_VOLUME_SCAN, ml}};

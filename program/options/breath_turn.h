@@ -15,13 +15,14 @@ typedef struct breath_turn {
 /* Compute the direction of gravity at a time, s, on the shorter arc from turn->from to turn->to.
  * Between opposite directions, the body turns over its left side; but if gravity begins within 60
  * degrees of the long axis of the body, or exactly along x, the body turns over its back. */
-void supine_breath_turn_gravity(const breath_turn *turn, double time, double gravity[3]);
+void supine_options_turn_gravity(const breath_turn *turn, double time, double gravity[3]);
 
 /* Read a text such as "supine:left:10s" into the breath_turn `turn`. */
-supine_status supine_breath_turn_read(const char *text, void *turn, supine_error *error);
+supine_status supine_options_turn_read(const char *text, void *turn, supine_error *error);
 
 /* Return the state whose volume is `ml` mL above the resting volume or, if the resting volume is
  * unknown, above the scan's volume. */
-supine_state supine_breath_state(const supine_basis *basis, const double gravity[3], double ml);
+supine_state supine_options_breath_state(const supine_basis *basis, const double gravity[3],
+                                         double ml);
 
 #endif

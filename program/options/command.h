@@ -22,14 +22,6 @@ enum {
   SUPINE_EXIT_NUMERICAL = 5
 };
 
-extern const supine_command supine_command_phantom, supine_command_precompute, supine_command_info,
-    supine_command_deform, supine_command_compare, supine_command_render, supine_command_breathe,
-    supine_command_export, supine_command_solve, supine_command_pv, supine_command_stream,
-    supine_command_fit, supine_command_validate, supine_command_embed, supine_command_locate;
-
-/* All commands, in the order of the program's help, ended by NULL. */
-extern const supine_command *const supine_command_list[];
-
 /* Print "supine COMMAND: MESSAGE" to stderr. */
 void supine_options_say(const char *command, const char *format, ...) SUPINE_PRINTF(2, 3);
 

@@ -13,7 +13,7 @@
 #include "program/options/inside.h"
 
 /* Sort the vertices by structure, then in input order. */
-static supine_status sort_by_name(supine_command_names *names, size_t n, supine_error *error) {
+static supine_status sort_by_name(supine_options_names *names, size_t n, supine_error *error) {
   size_t *begin = names->begin = supine_arena_zeros(&names->arena, names->count + 2, sizeof *begin);
   names->order = supine_arena_take(&names->arena, n, sizeof *names->order);
   SUPINE_TRY(supine_arena_check(&names->arena, error, "the names of %zu vertices", n));
@@ -29,12 +29,12 @@ static supine_status sort_by_name(supine_command_names *names, size_t n, supine_
   return SUPINE_OK;
 }
 
-supine_status supine_command_names_open(const supine_basis *basis, supine_command_names *names,
+supine_status supine_options_names_open(const supine_basis *basis, supine_options_names *names,
                                         supine_error *error) {
   const size_t n = supine_basis_get_info(basis)->vertex_count;
   const supine_tensor *text = supine_basis_tensor(basis, "names");
   const supine_tensor *part = supine_basis_tensor(basis, "part");
-  *names = (supine_command_names){0};
+  *names = (supine_options_names){0};
   SUPINE_REFUSE_IF(text == NULL || part == NULL || text->dtype != SUPINE_U8 || text->rank != 1 ||
                        part->dtype != SUPINE_U32 || part->rank != 1 || part->shape[0] != n,
                    error, SUPINE_ERROR_FORMAT,
@@ -65,11 +65,11 @@ supine_status supine_command_names_open(const supine_basis *basis, supine_comman
   return sort_by_name(names, n, error);
 }
 
-void supine_command_names_close(supine_command_names *names) {
+void supine_options_names_close(supine_options_names *names) {
   supine_arena_free(&names->arena);
 }
 
-size_t supine_command_lung_of(const supine_basis_info *info, size_t vertex) {
+size_t supine_options_lung_of(const supine_basis_info *info, size_t vertex) {
   size_t lung = 0;
   while (vertex >= info->lung_begin[lung + 1]) {
     ++lung;
@@ -77,11 +77,11 @@ size_t supine_command_lung_of(const supine_basis_info *info, size_t vertex) {
   return lung;
 }
 
-supine_status supine_command_inside_open(const supine_basis *lungs, const char *path,
-                                         supine_basis **inside, supine_command_names *names,
+supine_status supine_options_inside_open(const supine_basis *lungs, const char *path,
+                                         supine_basis **inside, supine_options_names *names,
                                          supine_error *error) {
   SUPINE_TRY(supine_options_basis_open(path, SUPINE_STORAGE_AUTO, inside, error));
-  SUPINE_TRY(supine_command_names_open(*inside, names, error));
+  SUPINE_TRY(supine_options_names_open(*inside, names, error));
   const supine_basis_info *info = supine_basis_get_info(*inside);
   SUPINE_REFUSE_IF(
       !(info->vector && info->identity == supine_basis_get_info(lungs)->identity), error,
@@ -93,7 +93,7 @@ supine_status supine_command_inside_open(const supine_basis *lungs, const char *
 /* Average the vertices order[begin] to order[end - 1] to a target; [N, 3] positions before and
  * after.
  */
-static supine_target average(const supine_command_names *names, size_t begin, size_t end,
+static supine_target average(const supine_options_names *names, size_t begin, size_t end,
                              const float *after, const float *before, const float *sigma) {
   const double count = (double)(end - begin);
   supine_target target = {.name = names->text[names->part[names->order[begin]]]};
@@ -115,7 +115,7 @@ static supine_target average(const supine_command_names *names, size_t begin, si
 /* Compute the volume of each structure whose positions are `xyz` [N, 3]. The normals of a closed
  * surface sum to 0, and its volume is a sixth of the sum of (corner) . (normal) over its triangles.
  */
-static void find_volumes(const supine_basis_info *info, const supine_command_names *names,
+static void find_volumes(const supine_basis_info *info, const supine_options_names *names,
                          const float *xyz, int side, supine_target *targets) {
   for (size_t part = 0; part < names->count; ++part) {
     double sum[5] = {0.0}; /* of the normals x, y, z, of their lengths, and of corner . normal */
@@ -140,8 +140,8 @@ static void find_volumes(const supine_basis_info *info, const supine_command_nam
   }
 }
 
-supine_status supine_command_targets_find(const supine_basis *inside,
-                                          const supine_command_names *names,
+supine_status supine_options_targets_find(const supine_basis *inside,
+                                          const supine_options_names *names,
                                           const supine_pose *const pose[2], const float *sigma,
                                           bool each, supine_target **targets, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(inside);
@@ -161,7 +161,7 @@ supine_status supine_command_targets_find(const supine_basis *inside,
     const size_t end = each ? i + 1 : names->begin[i + 1];
     if (end > begin) {
       (*targets)[i] = average(names, begin, end, after, before, sigma);
-      (*targets)[i].lung = supine_command_lung_of(info, names->order[begin]);
+      (*targets)[i].lung = supine_options_lung_of(info, names->order[begin]);
     } else { /* a name may have no vertices */
       (*targets)[i].name = names->text[i];
     }
@@ -173,11 +173,11 @@ supine_status supine_command_targets_find(const supine_basis *inside,
   return SUPINE_OK;
 }
 
-void supine_command_targets_free(supine_target **targets) {
+void supine_options_targets_free(supine_target **targets) {
   free(*targets);
 }
 
-const char *supine_command_target_way(const supine_target *target, size_t most, char way[96]) {
+const char *supine_options_target_way(const supine_target *target, size_t most, char way[96]) {
   static const char *const names[3][2] = {{"right", "left"}, {"front", "back"}, {"feet", "head"}};
   double left[3] = {fabs(target->move[0]), fabs(target->move[1]), fabs(target->move[2])};
   (void)snprintf(way, 96, "%s", target->moved <= target->expected ? SUPINE_TARGET_UNTOLD : "");
@@ -193,7 +193,7 @@ const char *supine_command_target_way(const supine_target *target, size_t most, 
   return way;
 }
 
-void supine_command_target_shift(supine_target *target, const double shift[3]) {
+void supine_options_target_shift(supine_target *target, const double shift[3]) {
   for (size_t k = 0; k < 3; ++k) {
     target->at[k] -= shift[k];
     target->move[k] -= shift[k];
@@ -201,29 +201,29 @@ void supine_command_target_shift(supine_target *target, const double shift[3]) {
   target->moved = supine_length(target->move);
 }
 
-json_t *supine_command_target_json(const supine_target *t) {
+json_t *supine_options_target_json(const supine_target *t) {
   return json_pack("{s:s, s:[f, f, f], s:f, s:o, s:o*}", "name", t->name, "move", t->move[0],
                    t->move[1], t->move[2], "mm", t->moved, "expected_error_mm",
                    isnan(t->expected) ? json_null() : json_real(t->expected), "volumes_ml",
                    t->volume[0] != 0 ? supine_options_json_numbers(2, t->volume) : NULL);
 }
 
-supine_status supine_command_marks_make(const supine_basis *inside,
-                                        const supine_command_names *names,
+supine_status supine_options_marks_make(const supine_basis *inside,
+                                        const supine_options_names *names,
                                         const supine_pose *const pose[2], const float *sigma,
-                                        supine_command_marks *marks, supine_error *error) {
+                                        supine_options_marks *marks, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(inside);
   const size_t n = info->vertex_count;
   SUPINE_ARENA arena = {0};
-  SUPINE_FREED_BY(supine_command_targets_free) supine_target *targets = NULL;
+  SUPINE_FREED_BY(supine_options_targets_free) supine_target *targets = NULL;
   float *xyz = supine_arena_take(&arena, 3 * n, sizeof *xyz);
-  supine_command_marks_free(marks);
+  supine_options_marks_free(marks);
   marks->mark = supine_arena_zeros(&marks->arena, n + names->count, sizeof *marks->mark);
   marks->label = supine_arena_zeros(&marks->arena, names->count, sizeof *marks->label);
   if (arena.failed || marks->arena.failed) {
     return supine_error_memory(error, "%zu points", n);
   }
-  SUPINE_TRY(supine_command_targets_find(inside, names, pose, sigma, false, &targets, error));
+  SUPINE_TRY(supine_options_targets_find(inside, names, pose, sigma, false, &targets, error));
   (void)supine_deform(inside, pose[1], xyz);
   marks->marks = (supine_marks){n, marks->mark, info->triangle_count, info->triangles};
   marks->first = targets[0];
@@ -249,7 +249,7 @@ supine_status supine_command_marks_make(const supine_basis *inside,
   return SUPINE_OK;
 }
 
-void supine_command_marks_free(supine_command_marks *marks) {
+void supine_options_marks_free(supine_options_marks *marks) {
   supine_arena_free(&marks->arena);
-  *marks = (supine_command_marks){.mark = NULL};
+  *marks = (supine_options_marks){.mark = NULL};
 }

@@ -9,28 +9,28 @@
 
 #include "program/view/render/render.h"
 
-typedef struct supine_command_names {
+typedef struct supine_options_names {
   size_t count;
   char **text;          /* [count] name of each structure */
   const uint32_t *part; /* [N] index of each vertex's name in `text` */
   size_t *order;        /* [N] indices of the vertices, sorted by structure, then in input order */
   size_t *begin;        /* [count + 1] index of each structure's first vertex in `order` */
   supine_arena arena;
-} supine_command_names;
+} supine_options_names;
 
 /* Read the names of embedded structures. Close `names` even after a failure. */
-supine_status supine_command_names_open(const supine_basis *basis, supine_command_names *names,
+supine_status supine_options_names_open(const supine_basis *basis, supine_options_names *names,
                                         supine_error *error);
-void supine_command_names_close(supine_command_names *names);
+void supine_options_names_close(supine_options_names *names);
 
 /* Return the index of the lung that a vertex belongs to. */
-size_t supine_command_lung_of(const supine_basis_info *info, size_t vertex);
+size_t supine_options_lung_of(const supine_basis_info *info, size_t vertex);
 
 /* Open the basis file of embedded structures, read their names, and check that they were embedded
  * in `lungs`. Initialise *inside and *names to zero before the call; close both after it, even if
  * it fails. */
-supine_status supine_command_inside_open(const supine_basis *lungs, const char *path,
-                                         supine_basis **inside, supine_command_names *names,
+supine_status supine_options_inside_open(const supine_basis *lungs, const char *path,
+                                         supine_basis **inside, supine_options_names *names,
                                          supine_error *error);
 
 /* Where a group of vertices is, and how it has moved. */
@@ -48,44 +48,44 @@ typedef struct supine_target {
  * @param sigma    [N] expected error of each vertex, mm; NULL if unknown
  * @param each     true for a target for each vertex, false for one for each structure
  * @param targets  output: array of targets in the order of `names`, which the caller frees */
-supine_status supine_command_targets_find(const supine_basis *inside,
-                                          const supine_command_names *names,
+supine_status supine_options_targets_find(const supine_basis *inside,
+                                          const supine_options_names *names,
                                           const supine_pose *const pose[2], const float *sigma,
                                           bool each, supine_target **targets, supine_error *error);
 
 /* Free *targets; for SUPINE_FREED_BY. */
-void supine_command_targets_free(supine_target **targets);
+void supine_options_targets_free(supine_target **targets);
 
 #define SUPINE_TARGET_UNTOLD "no change that the model can tell"
 
 /* Write the direction of a target's displacement in words, with at most `most` parts and the
  * largest first: "12 to the feet, 7 to the front". A displacement below its expected error is
  * SUPINE_TARGET_UNTOLD. Return `way`. */
-const char *supine_command_target_way(const supine_target *target, size_t most, char way[96]);
+const char *supine_options_target_way(const supine_target *target, size_t most, char way[96]);
 
 /* Subtract a displacement, mm, such as that of the hilum, from a target's position and
  * displacement. */
-void supine_command_target_shift(supine_target *target, const double shift[3]);
+void supine_options_target_shift(supine_target *target, const double shift[3]);
 
 /* Return a target as JSON: its name, displacement, and the expected error. */
-json_t *supine_command_target_json(const supine_target *target);
+json_t *supine_options_target_json(const supine_target *target);
 
 /* Marks of a picture: the vertices of each structure, and a label with name and displacement. */
-typedef struct supine_command_marks {
+typedef struct supine_options_marks {
   supine_marks marks;
   supine_mark *mark;
   char (*label)[64];
   supine_target first; /* the first structure */
   supine_arena arena;
-} supine_command_marks;
+} supine_options_marks;
 
 /* Make the marks that show the structures in pose[1], with arrows from where they were in pose[0].
  * Those that `marks` held before are freed.
  * @param sigma  [N] expected error of each vertex, mm; NULL if unknown */
-supine_status supine_command_marks_make(const supine_basis *inside,
-                                        const supine_command_names *names,
+supine_status supine_options_marks_make(const supine_basis *inside,
+                                        const supine_options_names *names,
                                         const supine_pose *const pose[2], const float *sigma,
-                                        supine_command_marks *marks, supine_error *error);
-void supine_command_marks_free(supine_command_marks *marks);
+                                        supine_options_marks *marks, supine_error *error);
+void supine_options_marks_free(supine_options_marks *marks);
 
 #endif

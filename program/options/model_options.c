@@ -18,7 +18,7 @@ static supine_status read_scan(const char *text, void *field, supine_error *erro
     given->state = posture;
     return SUPINE_OK;
   }
-  SUPINE_TRY(supine_reference_scan_parse(text, &scan, error));
+  SUPINE_TRY(supine_physics_reference_scan_parse(text, &scan, error));
   given->shown = scan.known ? SUPINE_SHOWN_STATE : SUPINE_SHOWN_UNKNOWN;
   given->state = scan.state;
   return SUPINE_OK;
@@ -29,14 +29,14 @@ static supine_status read_resting(const char *text, void *field, supine_error *e
   supine_precompute_volumes *volumes = &((supine_model_options *)field)->precompute.volumes;
   char piece[64];
   for (const char *at = text; supine_options_next_item(&at, piece, sizeof piece);) {
-    supine_resting read = supine_reference_resting_default();
+    supine_resting read = supine_physics_resting_default();
     char *value = strchr(piece, '=');
     if (value != NULL) {
       *value++ = '\0';
     } else if (strcmp(piece, "copd") != 0) {
       return SUPINE_ERROR_ARGUMENT;
     }
-    SUPINE_TRY(supine_reference_resting_set(&read, piece, value, error));
+    SUPINE_TRY(supine_physics_resting_set(&read, piece, value, error));
     volumes->copd = volumes->copd || strcmp(piece, "copd") == 0;
     for (size_t axis = 0; axis < SUPINE_REST_COUNT; ++axis) {
       if (read.given[axis] && read.ml[axis] > 0.0) {
@@ -122,7 +122,7 @@ static const char *const sexes[] = {"unknown", "female", "male", NULL};
 #define FILLS(member) SUPINE_FILLS(supine_model_options, member)
 #define GIVEN(member) SUPINE_SAYS_GIVEN(supine_model_options, member)
 
-const supine_option supine_command_model_options[] = {
+const supine_option supine_options_model[] = {
     {.help = "Surfaces:"},
     {.table = supine_options_surface_frame, FILLS(frame)},
     {"midline", 0, "X",
@@ -272,7 +272,7 @@ static int show_progress(void *progress, double fraction) {
   return supine_options_progress_step(progress, fraction) ? 0 : 1;
 }
 
-supine_status supine_command_prepare(const char *command, supine_model_options *model,
+supine_status supine_options_prepare(const char *command, supine_model_options *model,
                                      const supine_arguments *given, supine_prepared *prepared,
                                      supine_error *error) {
   static const supine_precompute_law_kind kinds[SUPINE_LAW_COUNT] = {
@@ -310,7 +310,7 @@ supine_status supine_command_prepare(const char *command, supine_model_options *
   return status;
 }
 
-supine_status supine_command_load_lungs(const char *command, const char *operand,
+supine_status supine_options_load_lungs(const char *command, const char *operand,
                                         const supine_source_options *options, supine_lungs *lungs,
                                         supine_error *error) {
   char first[4096];

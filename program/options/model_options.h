@@ -9,7 +9,7 @@
 
 #include "program/options/command.h"
 
-/* Options of lungs and their model. supine_command_prepare completes `precompute` from the others.
+/* Options of lungs and their model. supine_options_prepare completes `precompute` from the others.
  */
 typedef struct supine_model_options {
   supine_precompute_options precompute;
@@ -21,17 +21,17 @@ typedef struct supine_model_options {
 } supine_model_options;
 
 /* Option table that fills a supine_model_options. */
-extern const supine_option supine_command_model_options[];
+extern const supine_option supine_options_model[];
 
 /* Load the lungs from the given files and make their model. Print what the checks found. */
-supine_status supine_command_prepare(const char *command, supine_model_options *model,
+supine_status supine_options_prepare(const char *command, supine_model_options *model,
                                      const supine_arguments *given, supine_prepared *prepared,
                                      supine_error *error);
 
 /* Load lungs from one or two surfaces, such as "left.ply,right.ply", or from a label map, and print
  * what the checks of the files found.
  * @param lungs  must be initialised to zero */
-supine_status supine_command_load_lungs(const char *command, const char *operand,
+supine_status supine_options_load_lungs(const char *command, const char *operand,
                                         const supine_source_options *options, supine_lungs *lungs,
                                         supine_error *error);
 

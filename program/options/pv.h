@@ -46,19 +46,19 @@ typedef struct supine_pv_report {
  * @param count       at least SUPINE_PV_UNKNOWNS + 1
  * @param samples     [count] finite
  * @param confidence  confidence level of the intervals, between 0 and 1 */
-supine_status supine_breath_fit(const char *name, size_t count, const supine_pv_sample *samples,
-                                double confidence, supine_pv_curve *curve, supine_pv_report *report,
-                                supine_error *error);
+supine_status supine_options_pv_fit(const char *name, size_t count, const supine_pv_sample *samples,
+                                    double confidence, supine_pv_curve *curve,
+                                    supine_pv_report *report, supine_error *error);
 
 /** Fit both limbs to a file of samples. A limb without samples takes the other limb's curve.
  *
  * The file is CSV with the columns pressure_cmH2O, volume_mL and, optionally, limb (inhale or
  * exhale). Without that column all samples belong to inhale.
  * @param reports  [SUPINE_PV_LIMB_COUNT] */
-supine_status supine_breath_fit_file(const char *path, double confidence, supine_pv *pv,
-                                     supine_pv_report *reports, supine_error *error);
+supine_status supine_options_pv_fit_file(const char *path, double confidence, supine_pv *pv,
+                                         supine_pv_report *reports, supine_error *error);
 
 /** Read the parameters that 'supine pv fit -o' wrote. A file with one limb sets both limbs. */
-supine_status supine_breath_load(const char *path, supine_pv *pv, supine_error *error);
+supine_status supine_options_pv_load(const char *path, supine_pv *pv, supine_error *error);
 
 #endif

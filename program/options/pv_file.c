@@ -67,16 +67,16 @@ static void free_samples(samples (*limbs)[SUPINE_PV_LIMB_COUNT]) {
   }
 }
 
-supine_status supine_breath_fit_file(const char *path, double confidence, supine_pv *pv,
-                                     supine_pv_report *reports, supine_error *error) {
+supine_status supine_options_pv_fit_file(const char *path, double confidence, supine_pv *pv,
+                                         supine_pv_report *reports, supine_error *error) {
   SUPINE_FREED_BY(free_samples) samples limbs[SUPINE_PV_LIMB_COUNT] = {{0}};
   SUPINE_TRY(load_samples(path, limbs, error));
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     const samples *of = &limbs[limb];
     reports[limb] = (supine_pv_report){0};
     if (of->count > 0 || limbs[1 - limb].count == 0) {
-      SUPINE_TRY(supine_breath_fit(path, of->count, of->sample, confidence, &pv->limb[limb],
-                                   &reports[limb], error));
+      SUPINE_TRY(supine_options_pv_fit(path, of->count, of->sample, confidence, &pv->limb[limb],
+                                       &reports[limb], error));
     }
   }
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
@@ -99,7 +99,7 @@ static supine_status read_curve(json_t *limb, supine_pv_curve *curve, supine_err
              : supine_error_set(error, SUPINE_ERROR_FORMAT, "%s", why.text);
 }
 
-supine_status supine_breath_load(const char *path, supine_pv *pv, supine_error *error) {
+supine_status supine_options_pv_load(const char *path, supine_pv *pv, supine_error *error) {
   SUPINE_C_LOCALE;
   json_error_t why;
   supine_pv found = {0};

@@ -218,9 +218,9 @@ static void free_workspace(problem *limb) {
   gsl_multifit_nlinear_free(limb->work);
 }
 
-supine_status supine_breath_fit(const char *name, size_t count, const supine_pv_sample *samples,
-                                double confidence, supine_pv_curve *curve, supine_pv_report *report,
-                                supine_error *error) {
+supine_status supine_options_pv_fit(const char *name, size_t count, const supine_pv_sample *samples,
+                                    double confidence, supine_pv_curve *curve,
+                                    supine_pv_report *report, supine_error *error) {
   gsl_multifit_nlinear_parameters options = gsl_multifit_nlinear_default_parameters();
   SUPINE_REFUSE_IF(count <= SUPINE_PV_UNKNOWNS, error, SUPINE_ERROR_FORMAT,
                    "%s: a limb has %zu sample%s, too few for %d unknowns: give at least %d", name,

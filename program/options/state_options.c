@@ -120,7 +120,7 @@ const supine_option supine_options_from[] = {FROM("supine:rest, or the scan if r
 const supine_option supine_options_from_scan[] = {FROM("scan"), {.name = NULL}};
 
 supine_status supine_options_reference(const supine_basis *basis, const supine_from *from,
-                                       bool compares, supine_reference_pose *reference,
+                                       bool compares, supine_options_reference_pose *reference,
                                        supine_error *error) {
   const supine_state in_scan = supine_basis_scan(basis);
   supine_state state = {.gravity = {0.0, 1.0, 0.0}, .volume = {SUPINE_VOLUME_REST, 0.0}};

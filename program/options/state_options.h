@@ -79,17 +79,17 @@ typedef struct supine_from {
 } supine_from;
 
 /* State that displacements are measured from, with its pose and its name in words. */
-typedef struct supine_reference_pose {
+typedef struct supine_options_reference_pose {
   supine_state state;
   supine_pose pose;
   char name[96]; /* such as "the scan" or "supine at rest" */
-} supine_reference_pose;
+} supine_options_reference_pose;
 
 /* Choose the state that displacements are measured from: the state of --from if it is given; supine
  * at rest if the command compares postures and rest is known; the scan in all other cases. Statuses
  * as supine_basis_pose. */
 supine_status supine_options_reference(const supine_basis *basis, const supine_from *from,
-                                       bool compares, supine_reference_pose *reference,
+                                       bool compares, supine_options_reference_pose *reference,
                                        supine_error *error);
 
 /* What decides whether the lungs in a state are plausible. */

@@ -82,7 +82,7 @@ static supine_status find_errors(supine_comparison *c, supine_error *error) {
     c->has_errors = c->has_errors || surface.rms > 0.0;
     if (c->inside != NULL) {
       SUPINE_TRY(supine_posed_expected(c->inside, state, &c->reference.state, &inside, error));
-      SUPINE_TRY(supine_command_targets_find(c->inside, &c->names, pose, inside.sigma, false,
+      SUPINE_TRY(supine_options_targets_find(c->inside, &c->names, pose, inside.sigma, false,
                                              &posture->targets, error));
     }
   }

@@ -39,10 +39,10 @@ typedef struct supine_comparison {
   double breath; /* volume that a breath adds, mL; 0 if no breath is computed */
   supine_basis *basis;
   supine_basis *inside;       /* structures inside the lungs; NULL if there are none */
-  supine_command_names names; /* their names */
+  supine_options_names names; /* their names */
   supine_posture_list postures;
-  supine_reference_pose reference; /* pose from which displacements are measured */
-  bool has_errors;                 /* whether the expected error of any posture is known */
+  supine_options_reference_pose reference; /* pose from which displacements are measured */
+  bool has_errors;                         /* whether the expected error of any posture is known */
   supine_compare *compare;
   supine_compared_posture *posture; /* [postures.count] */
 } supine_comparison;

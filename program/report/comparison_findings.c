@@ -61,7 +61,7 @@ static json_t *finding(const supine_comparison *c, size_t posture) {
     supine_text_add(text, sizeof text, ": " SUPINE_TARGET_UNTOLD " (%.1f mm", moved);
   } else if (t != NULL) {
     supine_text_add(text, sizeof text, " moves %.1f mm: %s", moved,
-                    supine_command_target_way(t, 2, way));
+                    supine_options_target_way(t, 2, way));
   } else {
     supine_text_add(text, sizeof text, " moves %.1f mm on average, %.1f mm at most", moved,
                     p->displacement.max);
@@ -98,7 +98,7 @@ json_t *supine_report_targets(const supine_comparison *c) {
       (void)json_array_append_new(
           list, json_pack("{s:s, s:s, s:o, s:s, s:o}", "name", name, "posture", c->posture[i].label,
                           "moved", json_sprintf("%.1f", t->moved), "way",
-                          supine_command_target_way(t, 3, way), "error",
+                          supine_options_target_way(t, 3, way), "error",
                           isnan(t->expected) ? json_string("unknown")
                                              : json_sprintf("%.1f", t->expected)));
       name = "";

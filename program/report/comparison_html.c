@@ -99,6 +99,6 @@ supine_status supine_report_html(const supine_comparison *c, FILE *file, supine_
   }
   (void)(pictures != NULL ? json_object_set_new(data, "pictures", pictures)
                           : json_object_set_new(data, "trouble", json_string(error->message)));
-  supine_template_fill(supine_report_assets, data, "report.html", file);
+  supine_export_template_fill(supine_report_assets, data, "report.html", file);
   return SUPINE_OK;
 }

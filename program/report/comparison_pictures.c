@@ -27,7 +27,7 @@ static json_t *draw(const supine_basis *basis, const supine_scene *scene, supine
   const bool drawn = file != NULL && supine_render_png(basis, scene, file, error) == SUPINE_OK;
   json_t *made = NULL;
   if (file != NULL && fclose(file) == 0 && drawn) {
-    made = supine_template_base64(bytes, size);
+    made = supine_export_template_base64(bytes, size);
   }
   free(bytes);
   return made;

@@ -58,7 +58,7 @@ static json_t *encode_slabs(const supine_compared_posture *p) {
 static json_t *encode_targets(const supine_comparison *c, const supine_compared_posture *p) {
   json_t *targets = json_array();
   for (size_t k = 0; k < c->names.count; ++k) {
-    (void)json_array_append_new(targets, supine_command_target_json(&p->targets[k]));
+    (void)json_array_append_new(targets, supine_options_target_json(&p->targets[k]));
   }
   return targets;
 }
@@ -106,7 +106,7 @@ static void add_tables(const supine_comparison *c, json_t *text) {
     }
     add_row(text, "displacement, mm", "posture", p->label, moved);
     for (size_t k = 0; c->inside != NULL && k < c->names.count; ++k) {
-      add_row(text, "targets", "posture", p->label, supine_command_target_json(&p->targets[k]));
+      add_row(text, "targets", "posture", p->label, supine_options_target_json(&p->targets[k]));
     }
     add_row(text, "volume of each lung, mL", "posture", p->label, volumes(c, i, true));
     if (p->has_breath) {

@@ -35,7 +35,7 @@ supine_state supine_stream_volume_at(const supine_stream_volume *volume, const s
   if (volume->breathes) {
     /* This cannot fail: supine_stream_volume_breathe has checked the arguments. */
     (void)supine_breath_evaluate(&volume->pv, &volume->breath, 1, &time, &above, NULL, NULL);
-    return supine_breath_state(basis, gravity, above);
+    return supine_options_breath_state(basis, gravity, above);
   }
   supine_state state = volume->fixed;
   memcpy(state.gravity, gravity, sizeof state.gravity);
@@ -205,7 +205,7 @@ static void find_gains(supine_stream_patient *patient, double now,
   const supine_basis *basis = patient->basis;
   const supine_state state = supine_stream_volume_at(
       patient->options->volume, basis, snapshot->gravity, now - patient->breath_begun);
-  const supine_state rest = supine_breath_state(basis, snapshot->gravity, 0.0);
+  const supine_state rest = supine_options_breath_state(basis, snapshot->gravity, 0.0);
   supine_error error;
   if (supine_basis_gains(basis, &rest, &snapshot->pose, NULL) == SUPINE_OK) {
     snapshot->above = -supine_posed_volume(basis, &snapshot->pose);

@@ -11,11 +11,12 @@
 
 #include "runtime/safetensors/platform.h"
 
-supine_status supine_platform_map(const char *path, supine_platform_file *file,
-                                  supine_error *error) {
+supine_status supine_safetensors_platform_map(const char *path,
+                                              supine_safetensors_platform_file *file,
+                                              supine_error *error) {
   supine_status status = SUPINE_OK;
   struct stat about = {0};
-  *file = (supine_platform_file){NULL, 0};
+  *file = (supine_safetensors_platform_file){NULL, 0};
   /* without O_NONBLOCK, opening a pipe waits for a writer */
   const int descriptor = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (descriptor < 0 || fstat(descriptor, &about) != 0) {
@@ -30,7 +31,7 @@ supine_status supine_platform_map(const char *path, supine_platform_file *file,
       status = supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot map the file into memory: %s",
                                 path, strerror(errno));
     } else {
-      *file = (supine_platform_file){bytes, (size_t)about.st_size};
+      *file = (supine_safetensors_platform_file){bytes, (size_t)about.st_size};
     }
   }
   if (descriptor >= 0) {
@@ -39,13 +40,13 @@ supine_status supine_platform_map(const char *path, supine_platform_file *file,
   return status;
 }
 
-void supine_platform_unmap(const supine_platform_file *file) {
+void supine_safetensors_platform_unmap(const supine_safetensors_platform_file *file) {
   if (file->bytes != NULL) {
     (void)munmap((void *)file->bytes, file->size);
   }
 }
 
-void *supine_platform_allocate(size_t bytes) {
+void *supine_safetensors_platform_allocate(size_t bytes) {
   enum { LINE = 64, HUGE_PAGE = 1 << 21 };
   const size_t alignment = bytes >= 2 * (size_t)HUGE_PAGE ? HUGE_PAGE : LINE;
   const size_t rounded = (bytes + alignment - 1) / alignment * alignment;
@@ -58,6 +59,6 @@ void *supine_platform_allocate(size_t bytes) {
   return memory;
 }
 
-void supine_platform_free(void *memory) {
+void supine_safetensors_platform_free(void *memory) {
   free(memory);
 }

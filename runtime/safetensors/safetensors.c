@@ -52,13 +52,13 @@ supine_status supine_safetensors_open_with(const char *name, const void *bytes, 
   supine_safetensors made = {.bytes = bytes, .size = size, .allocator = *allocator};
   *result = NULL;
   if (bytes == NULL) {
-    SUPINE_TRY(supine_platform_map(name, &made.mapping, error));
+    SUPINE_TRY(supine_safetensors_platform_map(name, &made.mapping, error));
     made.bytes = made.mapping.bytes;
     made.size = made.mapping.size;
   }
   supine_safetensors *file = supine_safetensors_allocate(&made, sizeof made + strlen(name) + 1);
   if (file == NULL) {
-    supine_platform_unmap(&made.mapping);
+    supine_safetensors_platform_unmap(&made.mapping);
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", name);
   }
   *file = made;
@@ -87,7 +87,7 @@ void supine_safetensors_close(supine_safetensors *file) {
   if (file == NULL) {
     return;
   }
-  supine_platform_unmap(&file->mapping);
+  supine_safetensors_platform_unmap(&file->mapping);
   supine_safetensors_release(file, file->copies);
   supine_safetensors_release(file, file->tensors); /* with the metadata and the header */
   supine_safetensors_release(file, file);

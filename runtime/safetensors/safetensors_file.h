@@ -19,7 +19,8 @@ enum { CHECKSUM_SIZE = 23 };
 struct supine_safetensors {
   const unsigned char *bytes;
   size_t size;
-  supine_platform_file mapping; /**< mapping that contains `bytes`; zero if the caller owns them */
+  supine_safetensors_platform_file
+      mapping; /**< mapping that contains `bytes`; zero if the caller owns them */
   supine_allocator allocator;
   supine_tensor *tensors; /**< tensors, sorted by the position of their data */
   char *header;           /**< a copy of the header, in which strings are decoded */
@@ -34,14 +35,14 @@ struct supine_safetensors {
 static inline void *supine_safetensors_allocate(const supine_safetensors *file, size_t bytes) {
   const supine_allocator *with = &file->allocator;
   return with->allocate != NULL ? with->allocate(with->user, bytes)
-                                : supine_platform_allocate(bytes);
+                                : supine_safetensors_platform_allocate(bytes);
 }
 
 /** Free memory of supine_safetensors_allocate; NULL is legal. */
 static inline void supine_safetensors_release(const supine_safetensors *file, void *memory) {
   const supine_allocator *with = &file->allocator;
   if (with->release == NULL) {
-    supine_platform_free(memory);
+    supine_safetensors_platform_free(memory);
   } else if (memory != NULL) {
     with->release(with->user, memory);
   }

@@ -34,12 +34,13 @@ static const void *map_handle(HANDLE handle) {
   return bytes;
 }
 
-supine_status supine_platform_map(const char *path, supine_platform_file *file,
-                                  supine_error *error) {
+supine_status supine_safetensors_platform_map(const char *path,
+                                              supine_safetensors_platform_file *file,
+                                              supine_error *error) {
   supine_status status = SUPINE_OK;
   LARGE_INTEGER size = {.QuadPart = 0};
   wchar_t *wide = widen(path);
-  *file = (supine_platform_file){NULL, 0};
+  *file = (supine_safetensors_platform_file){NULL, 0};
   HANDLE handle = wide == NULL ? INVALID_HANDLE_VALUE
                                : CreateFileW(wide, GENERIC_READ, FILE_SHARE_READ, NULL,
                                              OPEN_EXISTING, FILE_ATTRIBUTE_NORMAL, NULL);
@@ -64,18 +65,18 @@ supine_status supine_platform_map(const char *path, supine_platform_file *file,
   return status;
 }
 
-void supine_platform_unmap(const supine_platform_file *file) {
+void supine_safetensors_platform_unmap(const supine_safetensors_platform_file *file) {
   if (file->bytes != NULL) {
     (void)UnmapViewOfFile(file->bytes);
   }
 }
 
-void *supine_platform_allocate(size_t bytes) {
+void *supine_safetensors_platform_allocate(size_t bytes) {
   enum { LINE = 64 };
   return _aligned_malloc(bytes > 0 ? bytes : 1, LINE);
 }
 
-void supine_platform_free(void *memory) {
+void supine_safetensors_platform_free(void *memory) {
   _aligned_free(memory);
 }
 

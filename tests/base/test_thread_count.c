@@ -10,7 +10,7 @@ enum { VERTICES = 9000 }; /* several blocks of each parallel sum, the last incom
 static supine_lungs phantom(void) {
   supine_mesh mesh = {0};
   supine_lungs lungs = {0};
-  assert_int_equal(supine_phantom_create(VERTICES, 2500.0, &mesh, NULL), SUPINE_OK);
+  assert_int_equal(supine_lungs_phantom_create(VERTICES, 2500.0, &mesh, NULL), SUPINE_OK);
   assert_int_equal(supine_lungs_create(&mesh, 1, NULL, &lungs, NULL), SUPINE_OK);
   supine_mesh_free(&mesh);
   return lungs;

@@ -69,12 +69,12 @@ static double run_ours(pair *files, const char *out, double times[STAGES], size_
   *vertices = lungs.mesh.vertex_count;
   static const supine_scan full = {.known = true,
                                    .state = {.gravity = {0, 1, 0}, .volume = {SUPINE_VOLUME_FULL}}};
-  const supine_resting resting = supine_reference_resting_default();
+  const supine_resting resting = supine_physics_resting_default();
   supine_prepared prepared = {.source = {.lungs = lungs},
                               .model = supine_physics_model(SUPINE_LAW_DEEP)};
   if (status == SUPINE_OK) {
-    status = supine_reference_find(&prepared.source.lungs, &prepared.model, &full, &resting,
-                                   &prepared.reference, &error);
+    status = supine_physics_reference_find(&prepared.source.lungs, &prepared.model, &full, &resting,
+                                           &prepared.reference, &error);
   }
   if (status == SUPINE_OK) {
     const supine_basis_choice choice = {.band = 23, .modes = 16};

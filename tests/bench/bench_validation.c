@@ -201,7 +201,7 @@ static bool load_lungs(int resolution, supine_lungs *lungs) {
     static const size_t vertices[3] = {10000, 40000, 500000};
     count = 1;
     (void)printf("no real lungs in %s: a synthetic pair is used\n", data);
-    need(supine_phantom_create(vertices[resolution], 6000.0, &meshes[0], &error) == SUPINE_OK,
+    need(supine_lungs_phantom_create(vertices[resolution], 6000.0, &meshes[0], &error) == SUPINE_OK,
          error.message);
   }
   const bool good = supine_lungs_create(meshes, count, NULL, lungs, &error) == SUPINE_OK;

@@ -11,9 +11,9 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
   const char *path = supine_fuzz_file(bytes, size, FUZZ_ENDING);
-  supine_mesh_points points = {0};
+  supine_io_points points = {0};
   supine_error error = {0};
-  const supine_status status = supine_mesh_points_read(path, NULL, &points, &error);
+  const supine_status status = supine_io_points_read(path, NULL, &points, &error);
   if (status == SUPINE_OK) {
     supine_fuzz_expect(points.count > 0, "at least one point");
     for (size_t i = 0; i < points.count; ++i) {
@@ -28,7 +28,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
                            points.names == NULL,
                        "no points from a refused file, and a message that names the file");
   }
-  supine_mesh_points_free(&points);
+  supine_io_points_free(&points);
   (void)unlink(path);
   return 0;
 }

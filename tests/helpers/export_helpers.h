@@ -3,6 +3,7 @@
 #ifndef SUPINE_TEST_EXPORT_HELPERS_H
 #define SUPINE_TEST_EXPORT_HELPERS_H
 
+#include "program/command/list.h"
 #include "tests/helpers/command_helpers.h"
 #include "tests/helpers/runtime_fixture.h"
 

@@ -24,11 +24,11 @@ static inline double helper_random(uint64_t *seed) {
 /* Return a closed, asymmetric surface with 10 frequency^2 + 2 vertices. It is about 250 mm high,
  * and its centre is at the given x, mm. */
 static inline supine_mesh helper_lump(size_t frequency, double x, uint64_t seed) {
-  supine_mesh mesh = {.vertex_count = supine_phantom_geodesic_vertex_count(frequency),
-                      .triangle_count = supine_phantom_geodesic_triangle_count(frequency)};
+  supine_mesh mesh = {.vertex_count = supine_lungs_phantom_geodesic_vertex_count(frequency),
+                      .triangle_count = supine_lungs_phantom_geodesic_triangle_count(frequency)};
   mesh.vertices = malloc(3 * mesh.vertex_count * sizeof *mesh.vertices);
   mesh.triangles = malloc(3 * mesh.triangle_count * sizeof *mesh.triangles);
-  supine_phantom_geodesic(frequency, 0, mesh.vertices, mesh.triangles);
+  supine_lungs_phantom_geodesic(frequency, 0, mesh.vertices, mesh.triangles);
   for (size_t i = 0; i < mesh.vertex_count; ++i) {
     double *p = mesh.vertices + 3 * i;
     const double radius =

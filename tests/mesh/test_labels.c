@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Test surfaces made from label maps: accuracy, meanings of labels, reports, refused maps. */
-#include "tests/helpers/folder.h"
 #include "mesh/labels/labels.h"
 #include "mesh/labels/mask.h"
 #include "precompute/lungs/phantom.h"
 #include "precompute/lungs/surface.h"
+#include "tests/helpers/folder.h"
 
 #include "tests/helpers/labels_helpers.h"
 #include "tests/helpers/sh_helpers.h"
@@ -77,14 +77,14 @@ static void check_closed(const supine_mesh *mesh) {
 
 /* Return the RMS distance, mm, of vertices of the left and the right lung's surface in `out` from
  * the true surface. */
-static double rms_from(const supine_inside_surface *truth, const made *out) {
+static double rms_from(const supine_lungs_surface *truth, const made *out) {
   enum { EVERY = 29 };
   double sum = 0.0;
   double count = 0.0;
   for (size_t lung = 0; lung < 2; ++lung) {
     supine_inside_place place = {.depth = 0.0};
     for (size_t i = 0; i < out->surface[lung].vertex_count; i += EVERY) {
-      place = supine_inside_surface_find(truth, out->surface[lung].vertices + 3 * i, NULL);
+      place = supine_lungs_surface_find(truth, out->surface[lung].vertices + 3 * i, NULL);
       sum += place.depth * place.depth;
       count += 1.0;
     }
@@ -96,10 +96,10 @@ static double rms_from(const supine_inside_surface *truth, const made *out) {
  * and are within half a voxel (RMS) of the true surface. */
 TEST(test_labels_phantom_volume_and_surface_recovered) {
   supine_mesh phantom = {0};
-  supine_inside_surface *truth = NULL;
-  assert_int_equal(supine_phantom_create(20000, 6000.0, &phantom, NULL), SUPINE_OK);
-  assert_int_equal(supine_inside_surface_create(phantom.vertices, phantom.triangle_count,
-                                                phantom.triangles, true, &truth, NULL),
+  supine_lungs_surface *truth = NULL;
+  assert_int_equal(supine_lungs_phantom_create(20000, 6000.0, &phantom, NULL), SUPINE_OK);
+  assert_int_equal(supine_lungs_surface_create(phantom.vertices, phantom.triangle_count,
+                                               phantom.triangles, true, &truth, NULL),
                    SUPINE_OK);
   const size_t half = phantom.triangle_count / 2; /* the triangles of the left lung come first */
   const double share[] = {0.005, 0.01, 0.02};
@@ -136,7 +136,7 @@ TEST(test_labels_phantom_volume_and_surface_recovered) {
     release(&out);
     supine_image_free(&image);
   }
-  supine_inside_surface_destroy(truth);
+  supine_lungs_surface_destroy(truth);
   supine_mesh_free(&phantom);
 }
 
@@ -346,7 +346,7 @@ TEST(test_labels_flipped_header_axes_found_by_anatomy) {
   static const double spacing[3] = {4.0, 4.0, 4.0};
   const supine_labels_options options = {.labels = "one", .edge = 5.0};
   supine_mesh phantom = {0};
-  assert_int_equal(supine_phantom_create(2000, 6000.0, &phantom, NULL), SUPINE_OK);
+  assert_int_equal(supine_lungs_phantom_create(2000, 6000.0, &phantom, NULL), SUPINE_OK);
   const size_t half = phantom.triangle_count / 2; /* the triangles of the left lung come first */
   supine_image image = helper_image_over(&phantom, spacing);
   helper_voxelise(&phantom, 0, half, 2, &image);

@@ -74,7 +74,7 @@ static change change_by(const supine_lungs *lungs, const supine_lesion *lesion, 
   supine_solution healthy = solve(lungs, supine);
   double *factors = no_lesions(lungs);
   size_t reached = 0;
-  assert_int_equal(supine_tissue_add_lesion(lungs, lesion, factors, &reached, NULL), SUPINE_OK);
+  assert_int_equal(supine_lungs_add_lesion(lungs, lesion, factors, &reached, NULL), SUPINE_OK);
   assert_true(reached > 10);
   supine_solution ill = solve(lungs, supine);
   double scale[2] = {1.0, 1.0};
@@ -149,7 +149,7 @@ TEST(test_lesion_large_other_lung_unchanged) {
   const supine_lesion lesion = {{side[0], side[1], side[2]}, 90.0, 50.0};
   size_t reached = 0;
   double *factors = no_lesions(&lungs);
-  assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, factors, &reached, NULL), SUPINE_OK);
+  assert_int_equal(supine_lungs_add_lesion(&lungs, &lesion, factors, &reached, NULL), SUPINE_OK);
   assert_true(20 * reached > lungs.mesh.vertex_count);
   supine_solution ill = solve(&lungs, supine);
   for (size_t i = lungs.lung_begin[1]; i < lungs.lung_begin[2]; ++i) {
@@ -168,7 +168,7 @@ TEST(test_lesion_factor_one_changes_nothing) {
   const double *side = side_of(&lungs);
   const supine_lesion lesion = {{side[0], side[1], side[2]}, 40.0, 1.0};
   double *factors = no_lesions(&lungs);
-  assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, factors, &(size_t){0}, NULL),
+  assert_int_equal(supine_lungs_add_lesion(&lungs, &lesion, factors, &(size_t){0}, NULL),
                    SUPINE_OK);
   supine_solution same = solve(&lungs, supine);
   assert_memory_equal(same.catch_, healthy.catch_, lungs.mesh.vertex_count * sizeof(double));
@@ -185,9 +185,9 @@ TEST(test_lesion_factors_any_distance_follow_documented_profile) {
   const double *centre = side_of(&lungs);
   const supine_lesion lesion = {{centre[0], centre[1], centre[2]}, 50.0, 7.0};
   double *factors = no_lesions(&lungs);
-  assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, factors, &(size_t){0}, NULL),
+  assert_int_equal(supine_lungs_add_lesion(&lungs, &lesion, factors, &(size_t){0}, NULL),
                    SUPINE_OK);
-  assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, factors, &(size_t){0}, NULL),
+  assert_int_equal(supine_lungs_add_lesion(&lungs, &lesion, factors, &(size_t){0}, NULL),
                    SUPINE_OK);
   size_t seen[3] = {0, 0, 0};
   for (size_t i = 0; i < lungs.mesh.vertex_count; ++i) {
@@ -217,7 +217,7 @@ TEST(test_lesion_outside_lungs_changes_nothing) {
   const supine_lesion lesion = {{900.0, 0.0, 0.0}, 40.0, 9.0};
   size_t reached = 1;
   double *factors = no_lesions(&lungs);
-  assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, factors, &reached, NULL), SUPINE_OK);
+  assert_int_equal(supine_lungs_add_lesion(&lungs, &lesion, factors, &reached, NULL), SUPINE_OK);
   assert_int_equal(reached, 0);
   supine_solution same = solve(&lungs, supine);
   assert_memory_equal(same.catch_, healthy.catch_, lungs.mesh.vertex_count * sizeof(double));
@@ -237,7 +237,7 @@ TEST(test_lesion_bad_numbers_refused) {
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     supine_error error = {0};
     double *factors = NULL; /* an invalid lesion is refused before `factors` is read */
-    assert_int_equal(supine_tissue_add_lesion(&lungs, &bad[i], factors, &(size_t){0}, &error),
+    assert_int_equal(supine_lungs_add_lesion(&lungs, &bad[i], factors, &(size_t){0}, &error),
                      SUPINE_ERROR_ARGUMENT);
     assert_says(error.message, "lesion at");
   }
@@ -268,7 +268,7 @@ TEST(test_collapse_any_direction_volume_and_breath_scaled) {
     for (int ill = 0; ill < 2; ++ill) {
       model.share[0] = ill == 1 ? share : 1.0;
       supine_solution solution = solve(&lungs, directions[d]);
-      supine_tissue_collapse(&lungs, model.share, collapsed);
+      supine_lungs_collapse(&lungs, model.share, collapsed);
       const supine_mesh shape = {n, collapsed, 0, NULL};
       supine_physics_solution_apply(&solution, &shape, scale, moved);
       for (size_t lung = 0; lung < 2; ++lung) {
@@ -301,7 +301,7 @@ TEST(test_collapse_fixed_point_at_hilum) {
   const double *p = lungs.mesh.vertices;
   const double share[2] = {0.3, 0.6};
   double *collapsed = malloc(3 * n * sizeof *collapsed);
-  supine_tissue_collapse(&lungs, share, collapsed);
+  supine_lungs_collapse(&lungs, share, collapsed);
   for (size_t lung = 0; lung < 2; ++lung) {
     const double outwards = lung == 0 ? 1.0 : -1.0;
     double inner = INFINITY;
@@ -340,7 +340,7 @@ TEST(test_collapse_real_lung_shrinks_towards_midline) {
   }
   model.share[1] = 0.25;
   double *collapsed = malloc(3 * lungs.mesh.vertex_count * sizeof *collapsed);
-  supine_tissue_collapse(&lungs, model.share, collapsed);
+  supine_lungs_collapse(&lungs, model.share, collapsed);
   double outer[2] = {0.0, 0.0};
   for (size_t i = 0; i < lungs.mesh.vertex_count; ++i) {
     for (size_t k = 0; k < 3; ++k) {

@@ -33,12 +33,12 @@ TEST(test_expandability_regional_any_axis_follows_box_coordinate) {
     const supine_expandability_law linear = {SUPINE_EXPANDABILITY_LINEAR, axis, 0.5, 1.5};
     const supine_expandability_law ratios = {SUPINE_EXPANDABILITY_EXPONENTIAL, axis, 0.25, 4.0};
     double box[3];
-    supine_tissue_expandability_regional(&lungs, &linear, a);
+    supine_lungs_expandability_regional(&lungs, &linear, a);
     for (size_t i = 0; i < n; ++i) {
       supine_lungs_box_coordinates(&lungs, i, box);
       assert_true(fabs(a[i] - 0.5 - box[axis]) <= 4.0 * DBL_EPSILON);
     }
-    supine_tissue_expandability_regional(&lungs, &ratios, a);
+    supine_lungs_expandability_regional(&lungs, &ratios, a);
     for (size_t i = 0; i < n; ++i) {
       supine_lungs_box_coordinates(&lungs, i, box);
       assert_true(fabs(log2(a[i]) + 2.0 - 4.0 * box[axis]) <= 1e-14);
@@ -58,7 +58,7 @@ TEST(test_expandability_load_with_or_without_vertex_column_same_values) {
     double a[3] = {-1.0, -1.0, -1.0};
     supine_error error = {0};
     test_write(path, texts[t]);
-    if (supine_tissue_expandability_load(path, 3, a, &error) != SUPINE_OK) {
+    if (supine_lungs_expandability_load(path, 3, a, &error) != SUPINE_OK) {
       fail_msg("%s", error.message);
     }
     assert_memory_equal(a, wanted, sizeof a);
@@ -93,7 +93,7 @@ TEST(test_expandability_load_bad_file_message_names_line_or_vertex) {
     double a[3];
     supine_error error = {0};
     test_write(path, bad[i].text);
-    assert_int_equal(supine_tissue_expandability_load(path, 3, a, &error), SUPINE_ERROR_FORMAT);
+    assert_int_equal(supine_lungs_expandability_load(path, 3, a, &error), SUPINE_ERROR_FORMAT);
     assert_says(error.message, bad[i].line);
     assert_says(error.message, bad[i].detail);
   }
@@ -105,12 +105,12 @@ TEST(test_expandability_load_binary_or_missing_file_refused) {
   assert_non_null(file);
   (void)fwrite("a\n1\0\n", 1, 5, file);
   assert_int_equal(fclose(file), 0);
-  assert_int_equal(supine_tissue_expandability_load(path, 3, a, NULL), SUPINE_ERROR_FORMAT);
+  assert_int_equal(supine_lungs_expandability_load(path, 3, a, NULL), SUPINE_ERROR_FORMAT);
   supine_error error = {0};
-  assert_int_equal(supine_tissue_expandability_load("/nowhere/a.csv", 3, a, &error),
+  assert_int_equal(supine_lungs_expandability_load("/nowhere/a.csv", 3, a, &error),
                    SUPINE_ERROR_READ);
   assert_says(error.message, "/nowhere/a.csv");
-  assert_int_equal(supine_tissue_expandability_load("/tmp", 3, a, NULL), SUPINE_ERROR_READ);
+  assert_int_equal(supine_lungs_expandability_load("/tmp", 3, a, NULL), SUPINE_ERROR_READ);
 }
 
 /* Doubling the expandability of all tissue changes nothing. If it differs between regions,
@@ -125,7 +125,7 @@ TEST(test_solve_uneven_expandability_expandable_tissue_moves_more) {
                                           i == 0 ? 1.0 : 1.5 * i};
     supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
     model.stiffness = e;
-    supine_tissue_expandability_regional(&lungs, &law, e);
+    supine_lungs_expandability_regional(&lungs, &law, e);
     for (size_t v = 0; v < n; ++v) {
       e[v] = 1.0 / e[v];
     }

@@ -47,7 +47,7 @@ static int setup(void **state) {
 }
 
 static int teardown(void **state) {
-  supine_field_free(&inverse_kept);
+  supine_warp_free(&inverse_kept);
   supine_basis_close(surface);
   supine_basis_close(grid);
   return folder_remove(state);
@@ -56,7 +56,7 @@ static int teardown(void **state) {
 static supine_field made_field(void) {
   supine_field field;
   supine_error error;
-  if (supine_field_create(grid, POSED(grid, weights, scales), &field, &error) != SUPINE_OK) {
+  if (supine_warp_create(grid, POSED(grid, weights, scales), &field, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
   return field;
@@ -66,9 +66,9 @@ static supine_field made_field(void) {
 static const supine_field *made_inverse(void) {
   if (inverse_kept.nodes.values == NULL) {
     supine_field field = made_field();
-    supine_field_residual residual;
-    assert_int_equal(supine_field_invert(&field, &inverse_kept, &residual, NULL), SUPINE_OK);
-    supine_field_free(&field);
+    supine_warp_residual residual;
+    assert_int_equal(supine_warp_invert(&field, &inverse_kept, &residual, NULL), SUPINE_OK);
+    supine_warp_free(&field);
   }
   return &inverse_kept;
 }
@@ -82,7 +82,7 @@ TEST(test_field_folded_counts_cells_in_lungs_and_around) {
   supine_field field = made_field();
   const float *depth = field.depth.values;
   double share[2];
-  supine_field_folded(&field, share);
+  supine_warp_folded(&field, share);
   assert_true(share[0] == 0.0);
   for (int part = 0; part < 2; ++part) {
     const size_t *size = field.nodes.size;
@@ -95,11 +95,11 @@ TEST(test_field_folded_counts_cells_in_lungs_and_around) {
       }
       supine_image_put(&field.nodes, 3 * i, 3, u);
     }
-    supine_field_folded(&field, share);
+    supine_warp_folded(&field, share);
     assert_true(share[part] > 0.5);
     assert_true(share[part] > share[1 - part]);
   }
-  supine_field_free(&field);
+  supine_warp_free(&field);
 }
 
 /* At grid nodes the field equals the displacement computed by the basis. Between nodes it is
@@ -115,7 +115,7 @@ TEST(test_field_at_nodes_and_cells_interpolates_basis) {
     for (size_t k = 0; k < 3; ++k) {
       p[k] = (double)info->vertices[3 * i + k];
     }
-    supine_field_at(&field, p, u);
+    supine_warp_at(&field, p, u);
     for (size_t k = 0; k < 3; ++k) {
       /* The tolerance is twice the rounding of a float32 position, mm. */
       assert_close(u[k], (double)moved[3 * i + k], 2e-5);
@@ -133,13 +133,13 @@ TEST(test_field_at_nodes_and_cells_interpolates_basis) {
                 (double)(n[1] / 2) * field.nodes.step[1][k] +
                 (double)(n[2] / 2) * field.nodes.step[2][k] + 0.25 * field.nodes.step[0][k];
   }
-  supine_field_at(&field, middle, u);
+  supine_warp_at(&field, middle, u);
   for (size_t k = 0; k < 3; ++k) {
     assert_close(u[k], 0.75 * (double)values[3 * at + k] + 0.25 * (double)values[3 * (at + 1) + k],
                  1e-5);
   }
   free(moved);
-  supine_field_free(&field);
+  supine_warp_free(&field);
 }
 
 /* Return the largest displacement at the border of the grid, and at points beyond it. */
@@ -160,7 +160,7 @@ static double at_border_and_beyond(const supine_field *field) {
       for (size_t k = 0; k < 9; ++k) {
         point[k % 3] += nodes * way[k / 3] * field->nodes.step[k / 3][k % 3];
       }
-      supine_field_at(field, point, u);
+      supine_warp_at(field, point, u);
       largest = fmax(largest, supine_length(u));
     }
   }
@@ -177,15 +177,15 @@ TEST(test_field_border_and_outside_zero_without_folds) {
     supine_field field;
     supine_field inverse;
     supine_field between;
-    supine_field_residual residual;
+    supine_warp_residual residual;
     double folded[2];
     make_grid(spacings[i]);
     grid = helper_open(in_folder("grid"));
-    assert_int_equal(supine_field_create(grid, POSED(grid, weights, gains), &field, NULL),
+    assert_int_equal(supine_warp_create(grid, POSED(grid, weights, gains), &field, NULL),
                      SUPINE_OK);
-    assert_int_equal(supine_field_invert(&field, &inverse, &residual, NULL), SUPINE_OK);
-    assert_int_equal(supine_field_between(grid, POSED(grid, weights, scales),
-                                          POSED(grid, weights, gains), &between, NULL),
+    assert_int_equal(supine_warp_invert(&field, &inverse, &residual, NULL), SUPINE_OK);
+    assert_int_equal(supine_warp_between(grid, POSED(grid, weights, scales),
+                                         POSED(grid, weights, gains), &between, NULL),
                      SUPINE_OK);
     double largest = 0.0;
     const float *u = field.nodes.values;
@@ -193,7 +193,7 @@ TEST(test_field_border_and_outside_zero_without_folds) {
       const double by[3] = {(double)u[3 * n], (double)u[3 * n + 1], (double)u[3 * n + 2]};
       largest = fmax(largest, supine_length(by));
     }
-    supine_field_folded(&field, folded);
+    supine_warp_folded(&field, folded);
     print_message("%g mm: %.1f mm at most, at the border %.3f, %.3f and %.3f mm, folds %g\n",
                   spacings[i], largest, at_border_and_beyond(&field),
                   at_border_and_beyond(&inverse), at_border_and_beyond(&between), folded[1]);
@@ -202,9 +202,9 @@ TEST(test_field_border_and_outside_zero_without_folds) {
     assert_true(at_border_and_beyond(&inverse) == 0.0);
     assert_true(at_border_and_beyond(&between) == 0.0);
     assert_true(folded[1] == 0.0);
-    supine_field_free(&field);
-    supine_field_free(&inverse);
-    supine_field_free(&between);
+    supine_warp_free(&field);
+    supine_warp_free(&inverse);
+    supine_warp_free(&between);
     supine_basis_close(grid);
   }
   grid = kept;
@@ -228,14 +228,14 @@ TEST(test_field_scan_below_full_measured_from_scan) {
   if (supine_inside_shells_create(surface, &below, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
-  assert_int_equal(supine_field_create(grid, &below.scan, &field, &error), SUPINE_OK);
+  assert_int_equal(supine_warp_create(grid, &below.scan, &field, &error), SUPINE_OK);
   const size_t count = field.nodes.size[0] * field.nodes.size[1] * field.nodes.size[2];
   for (size_t i = 0; i < 3 * count; ++i) {
     assert_true(fabs((double)((const float *)field.nodes.values)[i]) < 1e-4);
   }
-  supine_field_free(&field);
+  supine_warp_free(&field);
   /* Compare the field at a grid node in the lungs with the motion of a point embedded there. */
-  assert_int_equal(supine_field_create(grid, POSED(grid, weights, scales), &field, &error),
+  assert_int_equal(supine_warp_create(grid, POSED(grid, weights, scales), &field, &error),
                    SUPINE_OK);
   size_t node = count / 2;
   while (!(((const float *)field.depth.values)[node] > 0.0F)) {
@@ -264,7 +264,7 @@ TEST(test_field_scan_below_full_measured_from_scan) {
                  (double)((const float *)field.nodes.values)[3 * node + k], 1e-4);
   }
   supine_basis_close(point);
-  supine_field_free(&field);
+  supine_warp_free(&field);
   supine_inside_shells_free(&below);
   supine_basis_close(surface);
   supine_basis_close(grid);
@@ -275,8 +275,8 @@ TEST(test_field_scan_below_full_measured_from_scan) {
 TEST(test_field_invert_residual_within_a_tenth_of_a_mm) {
   supine_field field = made_field();
   supine_field inverse;
-  supine_field_residual residual;
-  assert_int_equal(supine_field_invert(&field, &inverse, &residual, NULL), SUPINE_OK);
+  supine_warp_residual residual;
+  assert_int_equal(supine_warp_invert(&field, &inverse, &residual, NULL), SUPINE_OK);
   print_message("a point moved forth and back misses its start by %.4f mm RMS, %.4f mm at most\n",
                 residual.rms, residual.largest);
   assert_true(residual.largest <= 0.1);
@@ -297,19 +297,19 @@ TEST(test_field_invert_residual_within_a_tenth_of_a_mm) {
     for (size_t k = 0; k < 3; ++k) {
       x[k] = centre[k] + share * ((double)info->vertices[3 * vertex + k] - centre[k]);
     }
-    supine_field_at(&field, x, u);
+    supine_warp_at(&field, x, u);
     for (int k = 0; k < 3; ++k) {
       y[k] = x[k] + u[k];
     }
-    supine_field_at(&inverse, y, v);
+    supine_warp_at(&inverse, y, v);
     for (int k = 0; k < 3; ++k) {
       v[k] += u[k];
     }
     largest = fmax(largest, size_of(v));
   }
   assert_true(largest <= 1.5 * residual.largest);
-  supine_field_free(&field);
-  supine_field_free(&inverse);
+  supine_warp_free(&field);
+  supine_warp_free(&inverse);
 }
 
 enum { LANDMARKS = 5 };
@@ -432,7 +432,7 @@ TEST(test_resample_landmarks_follow_embedded_points) {
   for (int labels = 0; labels < 2; ++labels) {
     supine_image image = ball_image(labels ? SUPINE_VOXEL_U8 : SUPINE_VOXEL_I16);
     supine_image moved = {0};
-    assert_int_equal(supine_field_resample(made_inverse(), NULL, labels != 0, &image, &moved, NULL),
+    assert_int_equal(supine_warp_resample(made_inverse(), NULL, labels != 0, &image, &moved, NULL),
                      SUPINE_OK);
     for (size_t i = 0; i < image.size[0] * image.size[1] * image.size[2] && labels; ++i) {
       assert_true(supine_image_get(&moved, i) <= LANDMARKS);
@@ -447,10 +447,10 @@ TEST(test_resample_landmarks_follow_embedded_points) {
 static double depth_at(const supine_field *field, const supine_image *image, size_t i) {
   double p[3];
   double depth;
-  supine_field_cell cell;
+  supine_warp_cell cell;
   supine_image_place(image, i, p);
-  supine_field_find_cell(&field->depth, p, &cell);
-  supine_field_interpolate(&field->depth, &cell, &depth, NULL);
+  supine_warp_find_cell(&field->depth, p, &cell);
+  supine_warp_interpolate(&field->depth, &cell, &depth, NULL);
   return depth;
 }
 
@@ -470,11 +470,10 @@ static double mass_of(const supine_image *image, const supine_image *mask, doubl
 TEST(test_resample_scaled_density_keeps_mass) {
   supine_field field;
   supine_field inverse;
-  supine_field_residual residual;
+  supine_warp_residual residual;
   const double larger[2] = {-1.4, 1.2}; /* one lung inflates, the other deflates */
-  assert_int_equal(supine_field_create(grid, POSED(grid, weights, larger), &field, NULL),
-                   SUPINE_OK);
-  assert_int_equal(supine_field_invert(&field, &inverse, &residual, NULL), SUPINE_OK);
+  assert_int_equal(supine_warp_create(grid, POSED(grid, weights, larger), &field, NULL), SUPINE_OK);
+  assert_int_equal(supine_warp_invert(&field, &inverse, &residual, NULL), SUPINE_OK);
   for (int lung = 0; lung < 2; ++lung) {
     for (int wall = 0; wall < 2; ++wall) {
       supine_image image = field.depth;
@@ -505,17 +504,17 @@ TEST(test_resample_scaled_density_keeps_mass) {
       supine_image plain;
       supine_image moved;
       supine_error error;
-      if (supine_field_resample(&inverse, &field.depth, false, &image, &scaled, &error) !=
+      if (supine_warp_resample(&inverse, &field.depth, false, &image, &scaled, &error) !=
               SUPINE_OK ||
-          supine_field_resample(&inverse, NULL, false, &image, &plain, &error) != SUPINE_OK ||
-          supine_field_resample(&inverse, NULL, true, &mask, &moved, &error) != SUPINE_OK) {
+          supine_warp_resample(&inverse, NULL, false, &image, &plain, &error) != SUPINE_OK ||
+          supine_warp_resample(&inverse, NULL, true, &mask, &moved, &error) != SUPINE_OK) {
         fail_msg("%s", error.message);
       }
       for (size_t i = 0; i < count; ++i) {
         supine_image_put(&image, i, 1, &(double){-850.0});
       }
       supine_image uniform;
-      assert_int_equal(supine_field_resample(&inverse, &field.depth, false, &image, &uniform, NULL),
+      assert_int_equal(supine_warp_resample(&inverse, &field.depth, false, &image, &uniform, NULL),
                        SUPINE_OK);
       for (size_t i = 0; i < count; ++i) { /* 0.5: both are rounded to whole HU */
         const double scale = (supine_image_get(&uniform, i) + 1000.5) / 150.0;
@@ -544,8 +543,8 @@ TEST(test_resample_scaled_density_keeps_mass) {
       supine_image_free(&moved);
     }
   }
-  supine_field_free(&field);
-  supine_field_free(&inverse);
+  supine_warp_free(&field);
+  supine_warp_free(&inverse);
 }
 
 /* Run `command`, which warps balls.nrrd by the field v.nrrd to warped.nrrd with another program,
@@ -624,7 +623,7 @@ TEST(test_resample_displacement_0_voxels_copied_exactly) {
     for (size_t i = 0; i < COUNT; ++i) {
       supine_image_put(&image, i, 1, &(double){60.0 + 59.0 * sin((double)i)});
     }
-    assert_int_equal(supine_field_resample(&field, NULL, false, &image, &moved, NULL), SUPINE_OK);
+    assert_int_equal(supine_warp_resample(&field, NULL, false, &image, &moved, NULL), SUPINE_OK);
     assert_memory_equal(moved.values, image.values, COUNT * supine_image_voxel_size(image.voxel));
     supine_image_free(&moved);
     free(image.values);
@@ -634,7 +633,7 @@ TEST(test_resample_displacement_0_voxels_copied_exactly) {
 TEST(test_field_create_without_grid_refused) {
   supine_field field;
   supine_error error;
-  assert_int_equal(supine_field_create(surface, POSED(surface, weights, scales), &field, &error),
+  assert_int_equal(supine_warp_create(surface, POSED(surface, weights, scales), &field, &error),
                    SUPINE_ERROR_FORMAT);
   assert_says(error.message, "supine embed");
 }
@@ -669,7 +668,7 @@ TEST(test_field_malformed_grids_refused) {
     supine_basis *bad = helper_open(in_folder("lie"));
     supine_field field;
     supine_error error;
-    assert_int_equal(supine_field_create(bad, POSED(bad, weights, scales), &field, &error),
+    assert_int_equal(supine_warp_create(bad, POSED(bad, weights, scales), &field, &error),
                      SUPINE_ERROR_FORMAT);
     assert_says(error.message, "malformed");
     supine_basis_close(bad);

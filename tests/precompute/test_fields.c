@@ -23,7 +23,8 @@ static supine_lungs lungs;
 
 static int setup(void **state) {
   supine_mesh mesh = {0};
-  if (folder_make(state) != 0 || supine_phantom_create(400, 2500.0, &mesh, NULL) != SUPINE_OK ||
+  if (folder_make(state) != 0 ||
+      supine_lungs_phantom_create(400, 2500.0, &mesh, NULL) != SUPINE_OK ||
       supine_lungs_create(&mesh, 1, NULL, &lungs, NULL) != SUPINE_OK) {
     return -1;
   }

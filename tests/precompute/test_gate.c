@@ -7,7 +7,7 @@
 
 static supine_mesh phantom(void) {
   supine_mesh mesh = {0};
-  assert_int_equal(supine_phantom_create(3000, 6000.0, &mesh, NULL), SUPINE_OK);
+  assert_int_equal(supine_lungs_phantom_create(3000, 6000.0, &mesh, NULL), SUPINE_OK);
   return mesh;
 }
 

@@ -125,7 +125,7 @@ TEST(test_surface_find_random_points_side_and_distance_correct) {
       continue;
     }
     point_at_share(0, &seed, share, p);
-    const supine_inside_place place = supine_inside_surface_find(shells.shell[0].surface, p, NULL);
+    const supine_inside_place place = supine_lungs_surface_find(shells.shell[0].surface, p, NULL);
     assert_int_equal(place.depth > 0.0, share < 1.0);
     assert_true(fabs(distance(p, place.nearest) - fabs(place.depth)) < 1e-9);
     if (i < 40) {
@@ -147,9 +147,9 @@ TEST(test_surface_find_with_hint_same_answer) {
         p[k] = near.point[k] + 8.0 * random_signed(&seed);
       }
     }
-    const supine_inside_place alone = supine_inside_surface_find(shells.shell[0].surface, p, NULL);
+    const supine_inside_place alone = supine_lungs_surface_find(shells.shell[0].surface, p, NULL);
     const supine_inside_place hinted =
-        supine_inside_surface_find(shells.shell[0].surface, p, i > 0 ? &near : NULL);
+        supine_lungs_surface_find(shells.shell[0].surface, p, i > 0 ? &near : NULL);
     assert_true(fabs(alone.depth - hinted.depth) <= 1e-9);
     near = hinted;
   }
@@ -157,44 +157,44 @@ TEST(test_surface_find_with_hint_same_answer) {
 
 TEST(test_surface_find_surface_with_hole_side_correct) {
   const supine_inside_shell *shell = &shells.shell[0];
-  supine_inside_surface *torn = NULL;
+  supine_lungs_surface *torn = NULL;
   uint64_t seed = 15;
   /* Omitting the first 12 triangles leaves a hole. */
-  assert_int_equal(supine_inside_surface_create(shell->vertices, shell->triangle_count - 12,
-                                                shell->triangles + 36, true, &torn, NULL),
+  assert_int_equal(supine_lungs_surface_create(shell->vertices, shell->triangle_count - 12,
+                                               shell->triangles + 36, true, &torn, NULL),
                    SUPINE_OK);
   for (int i = 0; i < 200; ++i) {
     double p[3];
     const double share = i % 2 == 0 ? 0.8 * helper_random(&seed) : 1.3 + helper_random(&seed);
     point_at_share(0, &seed, share, p);
-    assert_int_equal(supine_inside_surface_find(torn, p, NULL).depth > 0.0, share < 1.0);
+    assert_int_equal(supine_lungs_surface_find(torn, p, NULL).depth > 0.0, share < 1.0);
   }
-  supine_inside_surface_destroy(torn);
+  supine_lungs_surface_destroy(torn);
 }
 
 TEST(test_surface_refit_moved_vertices_as_new_tree) {
   const supine_inside_shell *shell = &shells.shell[0];
-  supine_inside_surface *tree[2];
+  supine_lungs_surface *tree[2];
   uint64_t seed = 23;
   double *moved = malloc(3 * shell->vertex_count * sizeof *moved);
   memcpy(moved, shell->vertices, 3 * shell->vertex_count * sizeof *moved);
   for (size_t i = 0; i < 2; ++i) {
-    assert_int_equal(supine_inside_surface_create(moved, shell->triangle_count, shell->triangles,
-                                                  true, &tree[i], NULL),
+    assert_int_equal(supine_lungs_surface_create(moved, shell->triangle_count, shell->triangles,
+                                                 true, &tree[i], NULL),
                      SUPINE_OK);
     for (size_t v = 0; v < 3 * shell->vertex_count && i == 0; ++v) {
       moved[v] = 1.2 * moved[v] + 30.0 * sin(moved[v] / 50.0);
     }
   }
-  supine_inside_surface_refit(tree[0]);
+  supine_lungs_surface_refit(tree[0]);
   for (int i = 0; i < 300; ++i) {
     double p[3];
     point_at_share(0, &seed, 2.0 * helper_random(&seed), p);
-    const double depth = supine_inside_surface_find(tree[1], p, NULL).depth;
-    assert_true(fabs(supine_inside_surface_find(tree[0], p, NULL).depth - depth) < 1e-9);
+    const double depth = supine_lungs_surface_find(tree[1], p, NULL).depth;
+    assert_true(fabs(supine_lungs_surface_find(tree[0], p, NULL).depth - depth) < 1e-9);
   }
-  supine_inside_surface_destroy(tree[0]);
-  supine_inside_surface_destroy(tree[1]);
+  supine_lungs_surface_destroy(tree[0]);
+  supine_lungs_surface_destroy(tree[1]);
   free(moved);
 }
 
@@ -538,7 +538,7 @@ TEST(test_embed_point_outside_counted_and_clamped) {
   supine_inside_report report = embed(&content, false, 0);
   assert_int_equal(report.outside, 1);
   assert_int_equal(report.farthest, 17);
-  const supine_inside_place place = supine_inside_surface_find(shells.shell[0].surface, far, NULL);
+  const supine_inside_place place = supine_lungs_surface_find(shells.shell[0].surface, far, NULL);
   assert_true(fabs(report.farthest_mm + place.depth) < 1e-9 && report.farthest_mm > 600.0);
   /* A point outside the lungs follows an affine motion exactly, too. */
   assert_true(farthest_from(&content, 0) < 8.0 * 0x1p-24 * 1024.0);

@@ -13,7 +13,7 @@ static supine_precompute_surface surface;
 
 static int setup(void **state) {
   (void)state;
-  assert_int_equal(supine_phantom_create(2000, 4000.0, &mesh, NULL), SUPINE_OK);
+  assert_int_equal(supine_lungs_phantom_create(2000, 4000.0, &mesh, NULL), SUPINE_OK);
   surface = (supine_precompute_surface){mesh.vertex_count, mesh.vertices, mesh.triangle_count,
                                         mesh.triangles};
   return 0;

@@ -32,7 +32,7 @@ static const double p999_ratio_most = 1.4;
 static supine_basis *make_basis(supine_lungs *lungs, double soften, size_t modes) {
   static const supine_scan full = {.known = true,
                                    .state = {.gravity = {0, 1, 0}, .volume = {SUPINE_VOLUME_FULL}}};
-  const supine_resting resting = supine_reference_resting_default();
+  const supine_resting resting = supine_physics_resting_default();
   supine_prepared prepared = {.model = supine_physics_model(SUPINE_LAW_DEEP)};
   supine_error error = {0};
   supine_basis *basis = NULL;
@@ -44,8 +44,8 @@ static supine_basis *make_basis(supine_lungs *lungs, double soften, size_t modes
   prepared.source.lungs = *lungs;
   /* Use exact storage: rounded positions would change the normals of small triangles. */
   const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
-  if (supine_reference_find(&prepared.source.lungs, &prepared.model, &full, &resting,
-                            &prepared.reference, &error) != SUPINE_OK ||
+  if (supine_physics_reference_find(&prepared.source.lungs, &prepared.model, &full, &resting,
+                                    &prepared.reference, &error) != SUPINE_OK ||
       helper_write_basis(path, &prepared, &choice, NULL, &error) != SUPINE_OK ||
       supine_basis_open_with(path, &exact, &basis, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
@@ -145,7 +145,7 @@ static void check_real(const char *left, const char *right, supine_axes axes, do
 TEST(test_deform_lit_synthetic_lungs_angles_as_stated) {
   supine_mesh mesh = {0};
   supine_lungs lungs = {0};
-  assert_int_equal(supine_phantom_create(8000, 6000.0, &mesh, NULL), SUPINE_OK);
+  assert_int_equal(supine_lungs_phantom_create(8000, 6000.0, &mesh, NULL), SUPINE_OK);
   assert_int_equal(supine_lungs_create(&mesh, 1, NULL, &lungs, NULL), SUPINE_OK);
   check_angles(&lungs, 0.0, 16);
   supine_mesh_free(&mesh);

@@ -226,7 +226,7 @@ TEST(test_phantom_pair_closed_with_given_volume) {
   for (size_t s = 0; s < sizeof sizes / sizeof *sizes; ++s) {
     supine_mesh mesh = {0};
     supine_lungs lungs = {0};
-    assert_int_equal(supine_phantom_create(sizes[s], 2500.0, &mesh, NULL), SUPINE_OK);
+    assert_int_equal(supine_lungs_phantom_create(sizes[s], 2500.0, &mesh, NULL), SUPINE_OK);
     assert_in_range(mesh.vertex_count, sizes[s] - sizes[s] / 5, sizes[s] + sizes[s] / 5);
     assert_close(supine_mesh_volume(&mesh), 2.5e6, 1e-6);
     assert_int_equal(supine_lungs_create(&mesh, 1, NULL, &lungs, NULL), SUPINE_OK);
@@ -239,9 +239,9 @@ TEST(test_phantom_pair_closed_with_given_volume) {
     supine_mesh_free(&mesh);
   }
   supine_mesh mesh = {0};
-  assert_int_equal(supine_phantom_create(10, 2500.0, &mesh, NULL), SUPINE_ERROR_ARGUMENT);
-  assert_int_equal(supine_phantom_create(1000, 0.0, &mesh, NULL), SUPINE_ERROR_ARGUMENT);
-  assert_int_equal(supine_phantom_create(1000, NAN, &mesh, NULL), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_lungs_phantom_create(10, 2500.0, &mesh, NULL), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_lungs_phantom_create(1000, 0.0, &mesh, NULL), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_lungs_phantom_create(1000, NAN, &mesh, NULL), SUPINE_ERROR_ARGUMENT);
 }
 
 /* The expected sums over vertices were computed with NumPy from the coefficients. They depend on
@@ -249,7 +249,7 @@ TEST(test_phantom_pair_closed_with_given_volume) {
 TEST(test_phantom_create_fixed_size_shape_as_computed_apart) {
   static const double made[2] = {-763.870223, 414.035588};
   supine_mesh mesh = {0};
-  assert_int_equal(supine_phantom_create(1000, 6000.0, &mesh, NULL), SUPINE_OK);
+  assert_int_equal(supine_lungs_phantom_create(1000, 6000.0, &mesh, NULL), SUPINE_OK);
   const size_t half = mesh.vertex_count / 2;
   for (size_t lung = 0; lung < 2; ++lung) {
     double sum = 0.0;

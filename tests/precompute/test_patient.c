@@ -567,10 +567,10 @@ TEST(test_scan_fitted_states_known_without_option) {
   supine_patient_pairs pairs = scatter(30, 2);
   const supine_patient patient = known(&pairs);
   supine_patient_record record = record_of(&patient);
-  supine_resting resting = supine_reference_resting_default();
+  supine_resting resting = supine_physics_resting_default();
   static const double supine[3] = {0.0, 1.0, 0.0};
   supine_patient_resting(&record, &resting);
-  assert_true(fabs(supine_reference_resting_total(&resting, supine) - 2410.25 / 5321.5) < 1e-12);
+  assert_true(fabs(supine_physics_resting_total(&resting, supine) - 2410.25 / 5321.5) < 1e-12);
   supine_scan scan = supine_patient_scan(&record, 0, 5321.5, &resting);
   assert_true(scan.known && scan.state.volume.kind == SUPINE_VOLUME_FULL);
   scan = supine_patient_scan(&record, 1, 2410.25, &resting);
@@ -585,8 +585,8 @@ TEST(test_scan_fitted_states_known_without_option) {
    * volume at rest to that at full inflation. */
   record.state[0].volume = (supine_volume){SUPINE_VOLUME_REST, 500.0};
   record.volume[0] = 2910.25;
-  resting = supine_reference_resting_default();
-  const double full = 2410.25 / supine_reference_resting_total(&resting, supine);
+  resting = supine_physics_resting_default();
+  const double full = 2410.25 / supine_physics_resting_total(&resting, supine);
   scan = supine_patient_scan(&record, 0, 2910.25, &resting);
   assert_true(scan.known && scan.state.volume.kind == SUPINE_VOLUME_REST);
   assert_true(scan.state.volume.ml == 500.0);
@@ -762,7 +762,7 @@ TEST(test_compare_points_each_map_explains_its_motions) {
  * near that of all vertices. */
 TEST(test_compare_surfaces_sampled_vertices_keep_statistics) {
   supine_mesh start = {0};
-  assert_int_equal(supine_phantom_create(30000, 3000.0, &start, NULL), SUPINE_OK);
+  assert_int_equal(supine_lungs_phantom_create(30000, 3000.0, &start, NULL), SUPINE_OK);
   const size_t n = start.vertex_count;
   supine_mesh end = start;
   end.vertices = malloc(3 * n * sizeof(double));
@@ -774,16 +774,16 @@ TEST(test_compare_surfaces_sampled_vertices_keep_statistics) {
   }
   for (int way = 0; way < 2; ++way) {
     const supine_mesh *mesh = way == 0 ? &start : &end;
-    supine_inside_surface *tree;
-    assert_int_equal(supine_inside_surface_create(mesh->vertices, mesh->triangle_count,
-                                                  mesh->triangles, false, &tree, NULL),
+    supine_lungs_surface *tree;
+    assert_int_equal(supine_lungs_surface_create(mesh->vertices, mesh->triangle_count,
+                                                 mesh->triangles, false, &tree, NULL),
                      SUPINE_OK);
     double *distance = malloc(n * sizeof *distance);
-    supine_inside_surface_distances(tree, n, (way == 0 ? &end : &start)->vertices, distance, NULL);
+    supine_lungs_surface_distances(tree, n, (way == 0 ? &end : &start)->vertices, distance, NULL);
     for (size_t i = 0; i < n; ++i) {
       mean += 0.5 * distance[i] / (double)n;
     }
-    supine_inside_surface_destroy(tree);
+    supine_lungs_surface_destroy(tree);
     free(distance);
   }
   supine_validation_distance of[SUPINE_PATIENT_MAP_COUNT];

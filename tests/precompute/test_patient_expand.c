@@ -22,7 +22,7 @@ static double *stiffness_of(const supine_lungs *lungs, const supine_lesion *lesi
     e[i] = 1.0;
   }
   if (lesion != NULL) {
-    assert_int_equal(supine_tissue_add_lesion(lungs, lesion, e, &(size_t){0}, NULL), SUPINE_OK);
+    assert_int_equal(supine_lungs_add_lesion(lungs, lesion, e, &(size_t){0}, NULL), SUPINE_OK);
   }
   return e;
 }
@@ -30,7 +30,7 @@ static double *stiffness_of(const supine_lungs *lungs, const supine_lesion *lesi
 static double *gradient_of(const supine_lungs *lungs, const supine_expandability_law *law) {
   const size_t n = lungs->mesh.vertex_count;
   double *e = malloc(n * sizeof *e);
-  supine_tissue_expandability_regional(lungs, law, e);
+  supine_lungs_expandability_regional(lungs, law, e);
   for (size_t i = 0; i < n; ++i) {
     e[i] = 1.0 / e[i];
   }
@@ -159,7 +159,7 @@ TEST(test_fit_real_lung_with_lesion_recovers_stiffness) {
 static void make_lungs(size_t vertices, supine_lungs *lungs) {
   supine_mesh mesh = {0};
   supine_error error;
-  assert_int_equal(supine_phantom_create(vertices, 6000.0, &mesh, &error), SUPINE_OK);
+  assert_int_equal(supine_lungs_phantom_create(vertices, 6000.0, &mesh, &error), SUPINE_OK);
   assert_int_equal(supine_lungs_create(&mesh, 1, NULL, lungs, &error), SUPINE_OK);
   supine_mesh_free(&mesh);
 }

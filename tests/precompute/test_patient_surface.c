@@ -63,7 +63,7 @@ TEST(test_fit_surface_known_law_recovered_on_another_mesh) {
   memcpy(record.state[1].gravity, supine_gravity, sizeof supine_gravity);
   record.force = supine_patient_force(&patient.power, 0.4, supine_gravity);
   supine_model found = truth();
-  supine_resting resting = supine_reference_resting_default();
+  supine_resting resting = supine_physics_resting_default();
   supine_scan scan;
   double *directions = malloc(4 * rest.mesh.vertex_count * sizeof *directions);
   assert_int_equal(

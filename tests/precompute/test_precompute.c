@@ -38,7 +38,7 @@ static int teardown(void **state) {
 static supine_lungs phantom(size_t vertices) {
   supine_mesh mesh = {0};
   supine_lungs lungs = {0};
-  assert_int_equal(supine_phantom_create(vertices, 2500.0, &mesh, NULL), SUPINE_OK);
+  assert_int_equal(supine_lungs_phantom_create(vertices, 2500.0, &mesh, NULL), SUPINE_OK);
   assert_int_equal(supine_lungs_create(&mesh, 1, NULL, &lungs, NULL), SUPINE_OK);
   supine_mesh_free(&mesh);
   return lungs;
@@ -289,7 +289,7 @@ static void check_stated_error(const supine_lungs *lungs, size_t band, size_t mo
   double error_mm2[HELD_OUT];
   model.force.soften = soften;
   model.reach = soften != 0.0 ? 10.0 : 0.0;
-  supine_accuracy_held_out_directions(HELD_OUT, g);
+  supine_projection_held_out_directions(HELD_OUT, g);
   true_errors(lungs, &model, basis, HELD_OUT, g, report.accuracy.volume, error2, field2, error_mm2);
   const double relative = sqrt(mean_of(HELD_OUT, error2).mean / mean_of(HELD_OUT, field2).mean);
   const double rounding = soften == 0.0 ? 1e-4 : 1e-3;
@@ -555,14 +555,15 @@ TEST(test_turned_over_one_posture_emptied_finds_more_reversed) {
     double share = 0.0;
     double least = 0.0;
     assert_int_equal(
-        supine_accuracy_turned_over(&lungs, &rows, &field, &forms, resting, &share, NULL),
+        supine_projection_turned_over(&lungs, &rows, &field, &forms, resting, &share, NULL),
         SUPINE_OK);
-    assert_int_equal(supine_accuracy_turned_over(&lungs, &rows, &field, &forms, even, &least, NULL),
-                     SUPINE_OK);
+    assert_int_equal(
+        supine_projection_turned_over(&lungs, &rows, &field, &forms, even, &least, NULL),
+        SUPINE_OK);
     supine_lungs dense = with_more_triangles(&lungs);
     double sampled = 0.0;
     assert_int_equal(
-        supine_accuracy_turned_over(&dense, &rows, &field, &forms, resting, &sampled, NULL),
+        supine_projection_turned_over(&dense, &rows, &field, &forms, resting, &sampled, NULL),
         SUPINE_OK);
     free(dense.mesh.triangles);
     assert_close(sampled, share, 1e-12);

@@ -15,7 +15,7 @@
 static int setup(void **state) {
   supine_mesh mesh = {0};
   supine_lungs *lungs = calloc(1, sizeof *lungs);
-  assert_int_equal(supine_phantom_create(700, 2500.0, &mesh, NULL), SUPINE_OK);
+  assert_int_equal(supine_lungs_phantom_create(700, 2500.0, &mesh, NULL), SUPINE_OK);
   assert_int_equal(supine_lungs_create(&mesh, 1, NULL, lungs, NULL), SUPINE_OK);
   supine_mesh_free(&mesh);
   *state = lungs;
@@ -117,7 +117,7 @@ static void check_superposition(const supine_lungs *lungs, const supine_model *m
   double missed = 0.0;
   double all = 0.0;
   assert_int_equal(supine_projection_create(lungs, model, 3, &made, NULL), SUPINE_OK);
-  supine_accuracy_held_out_directions(COUNT, g);
+  supine_projection_held_out_directions(COUNT, g);
   double *weights = weights_at(lungs, model, made.span, COUNT, g);
   for (size_t d = 0; d < COUNT; ++d) {
     supine_solution solution = {0};
@@ -169,7 +169,7 @@ TEST(test_projection_impossible_softening_refused) {
   supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_projection made;
   supine_error error;
-  assert_int_equal(supine_phantom_create(20000, 6000.0, &mesh, NULL), SUPINE_OK);
+  assert_int_equal(supine_lungs_phantom_create(20000, 6000.0, &mesh, NULL), SUPINE_OK);
   assert_int_equal(supine_lungs_create(&mesh, 1, NULL, &lungs, NULL), SUPINE_OK);
   model.force.soften = 1.0;
   assert_int_equal(supine_projection_create(&lungs, &model, 5, &made, &error),
@@ -303,11 +303,11 @@ TEST(test_tally_percentile_is_upper_edge_of_bin) {
   supine_tally *other = calloc(1, sizeof *other);
   static const double low[] = {1.0, 1.001, 1.003};
   static const double high[] = {5.01};
-  supine_accuracy_tally_add(tally, 3, low);
-  supine_accuracy_tally_add(other, 1, high);
-  supine_accuracy_tally_merge(tally, other);
-  assert_close(supine_accuracy_tally_percentile(tally, 0.75), 1.0 + 1.0 / 256.0, 0.0);
-  assert_close(supine_accuracy_tally_percentile(tally, 0.76), 5.015625, 0.0);
+  supine_projection_tally_add(tally, 3, low);
+  supine_projection_tally_add(other, 1, high);
+  supine_projection_tally_merge(tally, other);
+  assert_close(supine_projection_tally_percentile(tally, 0.75), 1.0 + 1.0 / 256.0, 0.0);
+  assert_close(supine_projection_tally_percentile(tally, 0.76), 5.015625, 0.0);
   assert_close(tally->largest, 5.01, 0.0);
   assert_close(tally->square_sum, 28.108110, 1e-12);
   free(tally);

@@ -172,12 +172,12 @@ TEST(test_reach_constant_force_gives_constant_catch) {
 /* Make a sphere of radius 100 mm about the origin, whose vertices are shifted within the surface by
  * up to about `irregularity` times the length of an edge. */
 static supine_mesh sphere(size_t frequency, double irregularity) {
-  supine_mesh mesh = {.vertex_count = supine_phantom_geodesic_vertex_count(frequency),
-                      .triangle_count = supine_phantom_geodesic_triangle_count(frequency)};
+  supine_mesh mesh = {.vertex_count = supine_lungs_phantom_geodesic_vertex_count(frequency),
+                      .triangle_count = supine_lungs_phantom_geodesic_triangle_count(frequency)};
   uint64_t seed = 99;
   mesh.vertices = calloc(3 * mesh.vertex_count, sizeof *mesh.vertices);
   mesh.triangles = calloc(3 * mesh.triangle_count, sizeof *mesh.triangles);
-  supine_phantom_geodesic(frequency, 0, mesh.vertices, mesh.triangles);
+  supine_lungs_phantom_geodesic(frequency, 0, mesh.vertices, mesh.triangles);
   for (size_t i = 0; i < mesh.vertex_count; ++i) {
     double *p = mesh.vertices + 3 * i;
     for (size_t k = 0; k < 3; ++k) {
@@ -275,7 +275,7 @@ TEST(test_reach_finer_mesh_spreads_same_distance) {
     with[f] = spread(frequencies[f], 12.0);
     without[f] = spread(frequencies[f], 0.0);
     printf("%zu vertices: a unit force spreads %.2f mm with a reach of 12 mm, %.2f mm without\n",
-           supine_phantom_geodesic_vertex_count(frequencies[f]), with[f], without[f]);
+           supine_lungs_phantom_geodesic_vertex_count(frequencies[f]), with[f], without[f]);
     assert_true(fabs(with[f] - 24.0) < 0.1 * 24.0);
   }
   assert_true(fabs(with[2] / with[0] - 1.0) < 0.05);

@@ -22,7 +22,7 @@ static char path[] = "/tmp/supine-reference-XXXXXX";
 static supine_lungs made_lungs(void) {
   supine_mesh mesh = {0};
   supine_lungs lungs = {0};
-  assert_int_equal(supine_phantom_create(1200, 6000.0, &mesh, NULL), SUPINE_OK);
+  assert_int_equal(supine_lungs_phantom_create(1200, 6000.0, &mesh, NULL), SUPINE_OK);
   assert_int_equal(supine_lungs_create(&mesh, 1, NULL, &lungs, NULL), SUPINE_OK);
   supine_mesh_free(&mesh);
   return lungs;
@@ -31,7 +31,7 @@ static supine_lungs made_lungs(void) {
 static supine_scan scan_named(const char *text) {
   supine_scan scan;
   supine_error error = {0};
-  if (supine_reference_scan_parse(text, &scan, &error) != SUPINE_OK) {
+  if (supine_physics_reference_scan_parse(text, &scan, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
   return scan;
@@ -40,9 +40,10 @@ static supine_scan scan_named(const char *text) {
 /* Return the reference surface of lungs scanned at full inflation. */
 static supine_reference reference_of(supine_lungs *full, const supine_model *model) {
   const supine_scan scan = scan_named("full");
-  const supine_resting resting = supine_reference_resting_default();
+  const supine_resting resting = supine_physics_resting_default();
   supine_reference found;
-  assert_int_equal(supine_reference_find(full, model, &scan, &resting, &found, NULL), SUPINE_OK);
+  assert_int_equal(supine_physics_reference_find(full, model, &scan, &resting, &found, NULL),
+                   SUPINE_OK);
   assert_int_equal(found.solves, 0);
   return found;
 }
@@ -59,8 +60,8 @@ static supine_lungs scan_of(supine_lungs *full, const supine_model *model, const
   double rest[2];
   double gains[2][3];
   assert_int_equal(supine_physics_solve(full, model, g, &solution, NULL), SUPINE_OK);
-  supine_reference_share_out(&reference, g, volume, ml);
-  (void)supine_reference_rest(&reference, g, rest);
+  supine_physics_reference_share_out(&reference, g, volume, ml);
+  (void)supine_physics_reference_rest(&reference, g, rest);
   for (size_t lung = 0; lung < full->lung_count; ++lung) {
     assert_int_equal(supine_volume_form_gains(&solution.form[lung], model->bend,
                                               rest[lung] - reference.full_volume[lung],
@@ -91,11 +92,11 @@ TEST(test_resting_axes_values_interpolated_by_harmonics) {
   static const double values[6] = {-3.1, 2.7, 0.4, -1.9, 5.3, 0.08};
   double harmonics[9];
   uint64_t seed = 77;
-  supine_reference_harmonics(values, harmonics);
+  supine_physics_resting_harmonics(values, harmonics);
   for (size_t axis = 0; axis < 6; ++axis) {
     double g[3] = {0.0, 0.0, 0.0};
     g[axis / 2] = axis % 2 == 0 ? 1.0 : -1.0;
-    assert_true(fabs(supine_reference_along_axes(values, g) - values[axis]) < 1e-15 * 16.0);
+    assert_true(fabs(supine_physics_resting_along_axes(values, g) - values[axis]) < 1e-15 * 16.0);
   }
   for (int trial = 0; trial < 50; ++trial) {
     double g[3] = {helper_random(&seed) - 0.5, helper_random(&seed) - 0.5,
@@ -110,42 +111,42 @@ TEST(test_resting_axes_values_interpolated_by_harmonics) {
     for (size_t t = 0; t < 9; ++t) {
       sum += harmonics[t] * y[t];
     }
-    assert_true(fabs(sum - supine_reference_along_axes(values, g)) < 1e-14 * 16.0);
+    assert_true(fabs(sum - supine_physics_resting_along_axes(values, g)) < 1e-14 * 16.0);
   }
 }
 
 TEST(test_resting_options_override_defaults) {
   static const double left[6] = {0.462, 0.629, 0.467, 0.519, 0.467, 0.538};
   static const double right[6] = {0.610, 0.486, 0.492, 0.531, 0.492, 0.566};
-  supine_resting resting = supine_reference_resting_default();
+  supine_resting resting = supine_physics_resting_default();
   supine_error error = {0};
   assert_memory_equal(resting.share[0], left, sizeof left);
   assert_memory_equal(resting.share[1], right, sizeof right);
   /* Set the volume at rest of both lungs together to 0.5 of full inflation. One factor scales the
    * default shares of the two lungs, and those of all postures that are not given. */
-  assert_int_equal(supine_reference_resting_set(&resting, "HFP", "0.5", &error), SUPINE_OK);
+  assert_int_equal(supine_physics_resting_set(&resting, "HFP", "0.5", &error), SUPINE_OK);
   assert_true(fabs(0.45 * resting.share[0][3] + 0.55 * resting.share[1][3] - 0.5) < 1e-15);
   assert_true(fabs(resting.share[0][3] / resting.share[1][3] - 0.519 / 0.531) < 1e-15);
   const double factor = 0.5 / (0.45 * 0.519 + 0.55 * 0.531);
   assert_true(fabs(resting.share[0][5] - 0.538 * factor) < 1e-15);
-  assert_int_equal(supine_reference_resting_set(&resting, "left", "0.4/0.52", &error), SUPINE_OK);
+  assert_int_equal(supine_physics_resting_set(&resting, "left", "0.4/0.52", &error), SUPINE_OK);
   assert_true(resting.share[0][0] == 0.4 && resting.share[1][0] == 0.52);
-  assert_int_equal(supine_reference_resting_set(&resting, "pron", "0.5", &error),
+  assert_int_equal(supine_physics_resting_set(&resting, "pron", "0.5", &error),
                    SUPINE_ERROR_ARGUMENT);
   assert_says(error.message, "prone");
   static const char *const bad[] = {"0.1",  "0",        "-0.4", "1.01",   "nan",      "x",  "0.4x",
                                     "0.4/", "0.4/0.05", "-5mL", "2600 L", "0.4/0.5/", "mL", "1.0"};
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     const supine_resting before = resting;
-    assert_int_equal(supine_reference_resting_set(&resting, "right", bad[i], &error),
+    assert_int_equal(supine_physics_resting_set(&resting, "right", bad[i], &error),
                      SUPINE_ERROR_ARGUMENT);
     assert_memory_equal(&before, &resting, sizeof before);
   }
   /* The share in COPD scales all postures, up to 1, and counts as assumed. */
-  resting = supine_reference_resting_default();
-  assert_int_equal(supine_reference_resting_set(&resting, "copd", NULL, &error), SUPINE_OK);
+  resting = supine_physics_resting_default();
+  assert_int_equal(supine_physics_resting_set(&resting, "copd", NULL, &error), SUPINE_OK);
   assert_true(fabs(resting.share[0][5] - 0.538 * 0.64 / 0.48) < 1e-15);
-  assert_true(resting.spread == 0.11 && !supine_reference_resting_given(&resting));
+  assert_true(resting.spread == 0.11 && !supine_physics_resting_given(&resting));
 }
 
 /* A resting volume in mL is converted to a share of full inflation. The default shares of the other
@@ -153,13 +154,13 @@ TEST(test_resting_options_override_defaults) {
 TEST(test_resting_volumes_become_shares) {
   static const int side[2] = {1, -1};
   static const double full[2] = {2500.0, 3100.0};
-  supine_resting resting = supine_reference_resting_default();
+  supine_resting resting = supine_physics_resting_default();
   const supine_resting usual = resting;
   supine_error error = {0};
   char text[256];
-  assert_int_equal(supine_reference_resting_set(&resting, "supine", "3000mL", &error), SUPINE_OK);
-  assert_int_equal(supine_reference_resting_set(&resting, "prone", "0.6/0.6", &error), SUPINE_OK);
-  assert_int_equal(supine_reference_resting_settle(&resting, 2, side, full, &error), SUPINE_OK);
+  assert_int_equal(supine_physics_resting_set(&resting, "supine", "3000mL", &error), SUPINE_OK);
+  assert_int_equal(supine_physics_resting_set(&resting, "prone", "0.6/0.6", &error), SUPINE_OK);
+  assert_int_equal(supine_physics_resting_settle(&resting, 2, side, full, &error), SUPINE_OK);
   const double supine = 3000.0 / (2500.0 * 0.467 + 3100.0 * 0.492);
   const double prone = 0.6 * 5600.0 / (2500.0 * 0.519 + 3100.0 * 0.531);
   assert_true(fabs(2500.0 * resting.share[0][2] + 3100.0 * resting.share[1][2] - 3000.0) < 1e-9);
@@ -170,12 +171,12 @@ TEST(test_resting_volumes_become_shares) {
       assert_true(fabs(resting.share[k][axis] - wanted) < 1e-12);
     }
   }
-  supine_reference_resting_print(&usual, text, sizeof text);
+  supine_physics_resting_print(&usual, text, sizeof text);
   assert_string_equal(text, "left=0.462/0.61,right=0.629/0.486,supine=0.467/0.492,"
                             "prone=0.519/0.531,inverted=0.467/0.492,upright=0.538/0.566");
   resting = usual;
-  assert_int_equal(supine_reference_resting_set(&resting, "supine", "5700mL", &error), SUPINE_OK);
-  assert_int_equal(supine_reference_resting_settle(&resting, 2, side, full, &error),
+  assert_int_equal(supine_physics_resting_set(&resting, "supine", "5700mL", &error), SUPINE_OK);
+  assert_int_equal(supine_physics_resting_settle(&resting, 2, side, full, &error),
                    SUPINE_ERROR_ARGUMENT);
   assert_says(error.message, "--resting");
 }
@@ -210,7 +211,7 @@ TEST(test_scan_parse_states_accepted_or_refused) {
   }
   assert_false(scan_named("none").known);
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
-    assert_int_equal(supine_reference_scan_parse(bad[i].text, &scan, &error),
+    assert_int_equal(supine_physics_reference_scan_parse(bad[i].text, &scan, &error),
                      SUPINE_ERROR_ARGUMENT);
     assert_says(error.message, bad[i].said);
   }
@@ -223,20 +224,20 @@ TEST(test_share_out_any_volume_divided_along_straight_lines) {
   static const double left_side[3] = {1.0, 0.0, 0.0};
   static const double upright[3] = {0.0, 0.0, -1.0};
   const supine_reference r = {.known = true,
-                              .resting = supine_reference_resting_default(),
+                              .resting = supine_physics_resting_default(),
                               .lung_count = 2,
                               .side = {1, -1},
                               .full_volume = {2000.0, 3000.0}};
   double ml[2];
-  assert_true(fabs(supine_reference_rest(&r, left_side, ml) - (924.0 + 1830.0)) < 1e-9);
-  supine_reference_share_out(&r, left_side, 924.0 + 1830.0 + 500.0, ml);
+  assert_true(fabs(supine_physics_reference_rest(&r, left_side, ml) - (924.0 + 1830.0)) < 1e-9);
+  supine_physics_reference_share_out(&r, left_side, 924.0 + 1830.0 + 500.0, ml);
   const double t = 500.0 / (5000.0 - 2754.0);
   assert_true(fabs(ml[0] - (924.0 + t * (2000.0 - 924.0))) < 1e-9);
   assert_true(fabs(ml[1] - (1830.0 + t * (3000.0 - 1830.0))) < 1e-9);
-  supine_reference_share_out(&r, left_side, 0.9 * 2754.0, ml);
+  supine_physics_reference_share_out(&r, left_side, 0.9 * 2754.0, ml);
   assert_true(fabs(ml[0] - 0.9 * 924.0) < 1e-9 && fabs(ml[1] - 0.9 * 1830.0) < 1e-9);
-  assert_true(fabs(supine_reference_full(&r, upright, ml) - 1.109 * 5000.0) < 1e-9);
-  supine_reference_share_out(&r, upright, 1.109 * 5000.0, ml);
+  assert_true(fabs(supine_physics_reference_full(&r, upright, ml) - 1.109 * 5000.0) < 1e-9);
+  supine_physics_reference_share_out(&r, upright, 1.109 * 5000.0, ml);
   assert_true(fabs(ml[0] - 1.109 * 2000.0) < 1e-9 && fabs(ml[1] - 1.109 * 3000.0) < 1e-9);
 }
 
@@ -273,20 +274,22 @@ TEST(test_reference_scan_of_any_state_recovers_full_lungs) {
   supine_lungs full = made_lungs();
   const size_t n = full.mesh.vertex_count;
   const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
-  const supine_resting resting = supine_reference_resting_default();
+  const supine_resting resting = supine_physics_resting_default();
   const supine_reference whole = reference_of(&full, &model);
   for (size_t s = 0; s < sizeof scans / sizeof *scans; ++s) {
     const supine_scan scan = scan_named(scans[s].scanned);
     const double *g = scan.state.gravity;
     const bool rests = scan.state.volume.kind == SUPINE_VOLUME_REST;
     double ml[2];
-    const double volume = scans[s].volume + (rests ? supine_reference_rest(&whole, g, ml) : 0.0);
+    const double volume =
+        scans[s].volume + (rests ? supine_physics_reference_rest(&whole, g, ml) : 0.0);
     supine_lungs lungs = scan_of(&full, &model, g, volume);
     supine_reference found;
     supine_error error = {0};
     double *scanned = malloc(3 * n * sizeof *scanned);
     memcpy(scanned, lungs.mesh.vertices, 3 * n * sizeof *scanned);
-    if (supine_reference_find(&lungs, &model, &scan, &resting, &found, &error) != SUPINE_OK) {
+    if (supine_physics_reference_find(&lungs, &model, &scan, &resting, &found, &error) !=
+        SUPINE_OK) {
       fail_msg("%s", error.message);
     }
     const double off = farthest(lungs.mesh.vertices, full.mesh.vertices, n);
@@ -294,7 +297,7 @@ TEST(test_reference_scan_of_any_state_recovers_full_lungs) {
            found.solves, off);
     assert_true(found.known && found.solves > 2 && found.solves <= 15);
     assert_true(off < 2.0 * promised);
-    supine_reference_share_out(&whole, g, volume, ml);
+    supine_physics_reference_share_out(&whole, g, volume, ml);
     for (size_t lung = 0; lung < 2; ++lung) {
       assert_true(fabs(found.full_volume[lung] - whole.full_volume[lung]) < 0.01);
       assert_true(fabs(found.scan_volume[lung] - (ml[lung] - whole.full_volume[lung])) < 0.01);
@@ -323,11 +326,11 @@ TEST(test_capacity_height_and_sex_literal) {
   const supine_reference pair = {.lung_count = 2};
   for (size_t i = 0; i < sizeof known / sizeof *known; ++i) {
     double range[2];
-    supine_reference_capacity(&known[i].person, range);
+    supine_physics_reference_capacity(&known[i].person, range);
     assert_true(fabs(range[0] - known[i].range[0]) < 1.0);
     assert_true(fabs(range[1] - known[i].range[1]) < 1.0);
     char text[64] = "";
-    supine_reference_compare(&pair, &known[i].person, text, sizeof text);
+    supine_physics_reference_compare(&pair, &known[i].person, text, sizeof text);
     assert_string_equal(text, known[i].text);
   }
 }
@@ -340,14 +343,14 @@ TEST(test_predict_rest_height_and_sex_literal) {
   static const supine_person unknown = {178.0, SUPINE_SEX_UNKNOWN};
   const supine_reference full = {.scan = scan_named("full"), .lung_count = 2, .side = {1, -1}};
   const supine_reference rest = {.scan = scan_named("supine:rest"), .lung_count = 2};
-  supine_resting resting = supine_reference_resting_default();
-  supine_reference_predict_rest(&full, &unknown, &resting);
-  supine_reference_predict_rest(&rest, &man, &resting);
+  supine_resting resting = supine_physics_resting_default();
+  supine_physics_reference_predict_rest(&full, &unknown, &resting);
+  supine_physics_reference_predict_rest(&rest, &man, &resting);
   assert_true(resting.ml[2] == 0.0 && !resting.predicted);
-  supine_reference_predict_rest(&full, &man, &resting);
+  supine_physics_reference_predict_rest(&full, &man, &resting);
   assert_true(resting.predicted);
   assert_true(fabs(resting.ml[2] - 3552.9) < 1.0);
-  supine_reference_predict_rest(&full, &woman, &resting);
+  supine_physics_reference_predict_rest(&full, &woman, &resting);
   assert_true(fabs(resting.ml[2] - 2797.6) < 1.0);
 }
 
@@ -370,7 +373,7 @@ TEST(test_doubt_implausible_volume_names_option) {
   for (size_t i = 0; i < sizeof known / sizeof *known; ++i) {
     const supine_person person = {0};
     const double full = known[i].full;
-    supine_resting resting = supine_reference_resting_default();
+    supine_resting resting = supine_physics_resting_default();
     supine_reference reference = {.scan = scan_named(known[i].scanned),
                                   .lung_count = 2,
                                   .side = {1, -1},
@@ -381,7 +384,7 @@ TEST(test_doubt_implausible_volume_names_option) {
       reference.scan_volume[0] = reference.scan_volume[1] = 1300.0 - full;
     }
     resting.ml[2] = known[i].rest;
-    supine_reference_doubt(&reference, &person, &resting, text, sizeof text);
+    supine_physics_reference_doubt(&reference, &person, &resting, text, sizeof text);
     if (known[i].doubts == NULL ? text[0] != '\0' : strstr(text, known[i].doubts) == NULL) {
       fail_msg("%s of %g mL: '%s'", known[i].scanned, full, text);
     }
@@ -398,16 +401,17 @@ TEST(test_reference_real_scans_reach_full_inflation) {
     for (size_t s = 0; s < sizeof states / sizeof *states; ++s) {
       const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
       const supine_scan scan = scan_named(states[s]);
-      supine_resting resting = supine_reference_resting_default();
+      supine_resting resting = supine_physics_resting_default();
       supine_lungs lungs = {0};
       supine_reference found;
       supine_error error = {0};
       if (!helper_real_lungs(pairs[p], 2, p == 0 ? SUPINE_AXES_AUTO : SUPINE_AXES_RAS, &lungs)) {
         skip();
       }
-      assert_int_equal(supine_reference_resting_set(&resting, "supine", "0.35/0.35", &error),
+      assert_int_equal(supine_physics_resting_set(&resting, "supine", "0.35/0.35", &error),
                        SUPINE_OK);
-      if (supine_reference_find(&lungs, &model, &scan, &resting, &found, &error) != SUPINE_OK) {
+      if (supine_physics_reference_find(&lungs, &model, &scan, &resting, &found, &error) !=
+          SUPINE_OK) {
         fail_msg("%s %s: %s", pairs[p][0], states[s], error.message);
       }
       const double moved = farthest(lungs.mesh.vertices, lungs.scanned, lungs.mesh.vertex_count);
@@ -421,15 +425,15 @@ TEST(test_reference_real_scans_reach_full_inflation) {
 
 /* Make a basis of lungs scanned in a state, and write its RMS error, mm, to `rms_mm`. */
 static supine_basis *basis_of(supine_lungs *lungs, const supine_scan *scan, double *rms_mm) {
-  const supine_resting resting = supine_reference_resting_default();
+  const supine_resting resting = supine_physics_resting_default();
   supine_prepared prepared = {.source = {.lungs = *lungs},
                               .model = supine_physics_model(SUPINE_LAW_DEEP)};
   const supine_basis_choice choice = {.band = 15, .modes = 16, .held_out = 20};
   supine_basis_report report;
   supine_basis *basis = NULL;
   supine_error error = {0};
-  if (supine_reference_find(&prepared.source.lungs, &prepared.model, scan, &resting,
-                            &prepared.reference, &error) != SUPINE_OK ||
+  if (supine_physics_reference_find(&prepared.source.lungs, &prepared.model, scan, &resting,
+                                    &prepared.reference, &error) != SUPINE_OK ||
       helper_write_basis(path, &prepared, &choice, &report, &error) != SUPINE_OK ||
       supine_basis_open(path, &basis, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
@@ -474,8 +478,8 @@ TEST(test_basis_of_any_scan_reproduces_scan_and_rest) {
     double ml[2];
     double wanted[2];
     double rms = 0.0;
-    const double at_rest = supine_reference_rest(&whole, g, ml);
-    const double at_full = supine_reference_full(&whole, g, ml);
+    const double at_rest = supine_physics_reference_rest(&whole, g, ml);
+    const double at_full = supine_physics_reference_full(&whole, g, ml);
     const bool rests = scan.state.volume.kind == SUPINE_VOLUME_REST;
     supine_lungs lungs =
         scan_of(&full, &model, g, (rests ? at_rest : at_full) + scan.state.volume.ml);
@@ -498,7 +502,7 @@ TEST(test_basis_of_any_scan_reproduces_scan_and_rest) {
     for (size_t axis = 0; axis < 6; ++axis) {
       supine_state rest = {.volume = {SUPINE_VOLUME_REST, 0.0}};
       rest.gravity[axis / 2] = axis % 2 == 0 ? 1.0 : -1.0;
-      supine_reference_rest(&whole, rest.gravity, wanted);
+      supine_physics_reference_rest(&whole, rest.gravity, wanted);
       free(positions_in(basis, &rest, ml));
       assert_true(fabs(ml[0] - wanted[0]) < 0.1 && fabs(ml[1] - wanted[1]) < 0.1);
     }
@@ -512,7 +516,7 @@ TEST(test_basis_of_any_scan_reproduces_scan_and_rest) {
 TEST(test_reference_impossible_states_refused) {
   supine_lungs lungs = made_lungs();
   const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
-  const supine_resting resting = supine_reference_resting_default();
+  const supine_resting resting = supine_physics_resting_default();
   supine_reference found;
   supine_error error = {0};
   static const struct {
@@ -523,7 +527,7 @@ TEST(test_reference_impossible_states_refused) {
              {"supine:rest-40000", "tissue"}};
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     const supine_scan scan = scan_named(bad[i].scanned);
-    assert_int_equal(supine_reference_find(&lungs, &model, &scan, &resting, &found, &error),
+    assert_int_equal(supine_physics_reference_find(&lungs, &model, &scan, &resting, &found, &error),
                      SUPINE_ERROR_ARGUMENT);
     assert_says(error.message, bad[i].said);
     assert_says(error.message, "--scanned");
@@ -539,7 +543,7 @@ TEST(test_reference_impossible_states_refused) {
   }
   rough.stiffness = stiffness;
   supine_scan scan = scan_named("full-4000");
-  assert_int_equal(supine_reference_find(&lungs, &rough, &scan, &resting, &found, &error),
+  assert_int_equal(supine_physics_reference_find(&lungs, &rough, &scan, &resting, &found, &error),
                    SUPINE_ERROR_NUMERICAL);
   printf("%s\n", error.message);
   assert_says(error.message, "--scanned");

@@ -8,7 +8,7 @@
 
 static supine_mesh phantom(void) {
   supine_mesh mesh = {0};
-  assert_int_equal(supine_phantom_create(3000, 2500.0, &mesh, NULL), SUPINE_OK);
+  assert_int_equal(supine_lungs_phantom_create(3000, 2500.0, &mesh, NULL), SUPINE_OK);
   return mesh;
 }
 

@@ -12,9 +12,10 @@
 #include "tests/helpers/test.h"
 #include <supine/safetensors.h>
 
+#include "program/command/list.h"
+#include "program/options/breath_turn.h"
 #include "tests/helpers/command_helpers.h"
 #include "tests/helpers/lungs_helpers.h"
-#include "program/options/breath_turn.h"
 
 static char folder[] = "/tmp/supine-breathe-XXXXXX";
 static char basis[64], breath[64], series[64];
@@ -39,7 +40,7 @@ static int setup(void **state) {
   (void)snprintf(series, sizeof series, "%s/a & b.vtp", folder);
   supine_mesh mesh = {0};
   supine_lungs lungs = {0};
-  const bool good = supine_phantom_create(2000, 3000.0, &mesh, NULL) == SUPINE_OK &&
+  const bool good = supine_lungs_phantom_create(2000, 3000.0, &mesh, NULL) == SUPINE_OK &&
                     supine_lungs_create(&mesh, 1, NULL, &lungs, NULL) == SUPINE_OK &&
                     make_basis(&lungs, 1.0, basis) == SUPINE_OK;
   supine_lungs_free(&lungs);
@@ -332,7 +333,7 @@ TEST(test_breath_turn_gravity_any_turn_keeps_unit_length_and_speed) {
     double angle = -1.0;
     for (int s = 0; s <= 8; ++s) {
       double g[3];
-      supine_breath_turn_gravity(&turn, s, g);
+      supine_options_turn_gravity(&turn, s, g);
       assert_true(fabs(hypot(hypot(g[0], g[1]), g[2]) - 1.0) < 1e-12);
       if (s > 0) {
         const double step = hypot(hypot(g[0] - last[0], g[1] - last[1]), g[2] - last[2]);
@@ -351,7 +352,7 @@ TEST(test_breath_turn_gravity_any_turn_keeps_unit_length_and_speed) {
       memcpy(last, g, sizeof last);
     }
     assert_memory_equal(last, turn.to, sizeof last);
-    supine_breath_turn_gravity(&turn, 100.0, last);
+    supine_options_turn_gravity(&turn, 100.0, last);
     assert_memory_equal(last, turn.to, sizeof last);
   }
 }

@@ -9,8 +9,9 @@
 #include <export.h>
 
 #include "base/vec3.h"
-#include "tests/helpers/export_helpers.h"
+#include "program/command/list.h"
 #include "program/view/export/targets.h"
+#include "tests/helpers/export_helpers.h"
 
 enum { TARGETS = 8 };
 

@@ -35,7 +35,8 @@ static void expect_load(const char *text, size_t size, const char *expected) {
   supine_pv pv;
   supine_pv_report reports[SUPINE_PV_LIMB_COUNT];
   supine_error error = {0};
-  assert_int_equal(supine_breath_fit_file(path, 0.95, &pv, reports, &error), SUPINE_ERROR_FORMAT);
+  assert_int_equal(supine_options_pv_fit_file(path, 0.95, &pv, reports, &error),
+                   SUPINE_ERROR_FORMAT);
   assert_says(error.message, expected);
   assert_says(error.message, path);
 }
@@ -76,17 +77,17 @@ TEST(test_load_missing_file_or_folder_reports_read_error) {
   supine_pv pv;
   supine_pv_report reports[SUPINE_PV_LIMB_COUNT];
   supine_error error = {0};
-  assert_int_equal(supine_breath_fit_file("/nonexistent/s.csv", 0.95, &pv, reports, &error),
+  assert_int_equal(supine_options_pv_fit_file("/nonexistent/s.csv", 0.95, &pv, reports, &error),
                    SUPINE_ERROR_READ);
   assert_says(error.message, "/nonexistent/s.csv");
-  assert_int_equal(supine_breath_load("/nonexistent/p.csv", &pv, &error), SUPINE_ERROR_READ);
-  assert_int_equal(supine_breath_load(folder, &pv, &error), SUPINE_ERROR_READ);
+  assert_int_equal(supine_options_pv_load("/nonexistent/p.csv", &pv, &error), SUPINE_ERROR_READ);
+  assert_int_equal(supine_options_pv_load(folder, &pv, &error), SUPINE_ERROR_READ);
   assert_says(error.message, folder);
 }
 
 static supine_status load(const char *text, supine_pv *pv, supine_error *error) {
   write_bytes(text, strlen(text));
-  return supine_breath_load(path, pv, error);
+  return supine_options_pv_load(path, pv, error);
 }
 
 #define CURVE(name, pressure, volume, control)                                                     \
@@ -175,7 +176,7 @@ TEST(test_fit_file_missing_limb_uses_the_other) {
     write_limbs((which & 1) != 0, (which & 2) != 0);
     supine_pv pv;
     supine_pv_report reports[SUPINE_PV_LIMB_COUNT];
-    assert_int_equal(supine_breath_fit_file(path, 0.95, &pv, reports, NULL), SUPINE_OK);
+    assert_int_equal(supine_options_pv_fit_file(path, 0.95, &pv, reports, NULL), SUPINE_OK);
     for (int limb = 0; limb < 2; ++limb) {
       const bool own = (which & (1 << limb)) != 0;
       assert_int_equal(reports[limb].samples, own ? 12 : 0);

@@ -87,8 +87,8 @@ static supine_status fit(size_t count, const double *pressures, const double *vo
   for (size_t j = 0; j < count; ++j) {
     samples[j] = (supine_pv_sample){pressures[j], volumes[j], 100 + j};
   }
-  return supine_breath_fit("s.csv", count, samples, confidence, curve,
-                           report != NULL ? report : &ignored, error);
+  return supine_options_pv_fit("s.csv", count, samples, confidence, curve,
+                               report != NULL ? report : &ignored, error);
 }
 
 TEST(test_fit_published_curves_error_below_one_percent) {

@@ -15,7 +15,7 @@ static void check(const char *text, const char *json, const char *expected) {
   FILE *file = open_memstream(&made, &size);
   assert_non_null(data);
   assert_non_null(file);
-  supine_template_fill(assets, data, "main.html", file);
+  supine_export_template_fill(assets, data, "main.html", file);
   assert_int_equal(fclose(file), 0);
   assert_string_equal(made, expected);
   free(made);

@@ -3,6 +3,7 @@
  * output. */
 #include "mesh/mesh.h"
 #include "precompute/lungs/phantom.h"
+#include "program/command/list.h"
 #include "tests/helpers/test.h"
 #include <supine/runtime.h>
 
@@ -24,7 +25,7 @@ static int setup(void **state) {
   (void)snprintf(out, sizeof out, "%s/out.ply", folder);
   (void)snprintf(other, sizeof other, "%s/other", folder);
   supine_mesh mesh = {0};
-  const bool made = supine_phantom_create(2000, 3000.0, &mesh, NULL) == SUPINE_OK &&
+  const bool made = supine_lungs_phantom_create(2000, 3000.0, &mesh, NULL) == SUPINE_OK &&
                     supine_mesh_save(lungs, &mesh, NULL, NULL) == SUPINE_OK;
   supine_mesh_free(&mesh);
   return made ? 0 : -1;

@@ -36,14 +36,14 @@ supine_status supine_export_glb_write(const char *path, const supine_basis *basi
 
 /** Options of the exported HTML page. */
 typedef struct export_page {
-  double breath;                     /**< tidal volume, mL */
-  const supine_reference_pose *from; /**< [from_count] states from which displacements can be
-                                        measured; the first is shown */
-  size_t from_count;                 /**< at least 1 */
-  const char *title;                 /**< title of the page, UTF-8 */
+  double breath;                             /**< tidal volume, mL */
+  const supine_options_reference_pose *from; /**< [from_count] states from which displacements can
+                                        be measured; the first is shown */
+  size_t from_count;                         /**< at least 1 */
+  const char *title;                         /**< title of the page, UTF-8 */
   /** Basis of the structures inside the lungs, made by 'supine embed'; NULL to show none. */
   const supine_basis *inside;
-  const supine_command_names *names; /**< names of the structures; unused if `inside` is NULL */
+  const supine_options_names *names; /**< names of the structures; unused if `inside` is NULL */
   bool live;                         /**< true to show also the states that 'supine stream' sends */
 } export_page;
 

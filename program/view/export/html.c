@@ -35,7 +35,7 @@ typedef struct page {
 
 /* Return SUPINE_ERROR_MEMORY if memory has run out, also before, so that `bytes` is NULL. */
 static supine_status add_tensor(page *p, const char *name, const void *bytes, size_t size) {
-  json_t *text = bytes != NULL ? supine_template_base64(bytes, size) : NULL;
+  json_t *text = bytes != NULL ? supine_export_template_base64(bytes, size) : NULL;
   return json_array_append_new(p->tensors, json_pack("{s:s, s:o}", "name", name, "base64", text)) ==
                  0
              ? SUPINE_OK
@@ -237,7 +237,7 @@ static double scan_volume(const page *p) {
 static json_t *describe_froms(const page *p) {
   json_t *list = json_array();
   for (size_t i = 0; i < p->shown->from_count; ++i) {
-    const supine_reference_pose *from = &p->shown->from[i];
+    const supine_options_reference_pose *from = &p->shown->from[i];
     const supine_volume volume = from->state.volume;
     const bool rest = from->state.lung_count == 0 &&
                       (volume.kind == SUPINE_VOLUME_REST || volume.kind == SUPINE_VOLUME_DEFAULT);
@@ -321,7 +321,7 @@ supine_status supine_export_html_print(FILE *file, const supine_basis *basis,
   json_auto_t *data =
       json_pack("{s:O, s:s, s:O, s:b}", "title", json_object_get(description, "title"), "basis",
                 text, "tensors", p.tensors, "live", (int)shown->live);
-  supine_template_fill(supine_export_assets, data, "page.html", file);
+  supine_export_template_fill(supine_export_assets, data, "page.html", file);
   free(text);
   return SUPINE_OK;
 }

@@ -35,7 +35,7 @@ static void find_amounts(const export_targets *targets, const supine_pose *pose,
 
 supine_status supine_export_breath_pose(const supine_basis *basis, double breath, const double g[3],
                                         double fraction, supine_pose *pose, supine_error *error) {
-  supine_state state = supine_breath_state(basis, g, fraction * breath);
+  supine_state state = supine_options_breath_state(basis, g, fraction * breath);
   if (supine_basis_get_info(basis)->is_fields) {
     state.volume = (supine_volume){SUPINE_VOLUME_DEFAULT, 0};
   }

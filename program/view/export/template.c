@@ -140,8 +140,8 @@ static const char *fill(const supine_asset *assets, const char *at, const char *
   }
 }
 
-void supine_template_fill(const supine_asset *assets, const json_t *data, const char *name,
-                          FILE *file) {
+void supine_export_template_fill(const supine_asset *assets, const json_t *data, const char *name,
+                                 FILE *file) {
   const supine_asset *asset = find_asset(assets, name, strlen(name));
   const scope outermost = {data, NULL};
   if (asset != NULL) {
@@ -149,7 +149,7 @@ void supine_template_fill(const supine_asset *assets, const json_t *data, const 
   }
 }
 
-json_t *supine_template_base64(const void *bytes, size_t size) {
+json_t *supine_export_template_base64(const void *bytes, size_t size) {
   static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   const unsigned char *from = bytes;
   size_t length = 0;

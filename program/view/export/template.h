@@ -29,10 +29,10 @@ typedef struct supine_asset {
 /** Write the asset `name` with its tags filled from `data` and the other assets. Tags with unknown
  * names write nothing; supine_embed refuses such tags when the program is built. A write error sets
  * the error indicator of `file`. */
-void supine_template_fill(const supine_asset *assets, const json_t *data, const char *name,
-                          FILE *file);
+void supine_export_template_fill(const supine_asset *assets, const json_t *data, const char *name,
+                                 FILE *file);
 
 /** Return bytes as base64 with padding (RFC 4648, section 4), or NULL if out of memory. */
-json_t *supine_template_base64(const void *bytes, size_t size);
+json_t *supine_export_template_base64(const void *bytes, size_t size);
 
 #endif

@@ -5,7 +5,7 @@
 #include "mesh/labels/labels.h"
 #include "precompute/warp/field.h"
 
-#include "program/embed_content.h"
+#include "program/command/embed_content.h"
 #include "program/options/command.h"
 
 static const char name[] = "embed";
@@ -65,7 +65,7 @@ static supine_status make_grid(const supine_inside_shells *shells, const supine_
                                supine_error *error) {
   double largest = 0.0;
   SUPINE_TRY(supine_inside_shells_reach(shells, &largest, error));
-  return supine_inside_content_grid(shells, like, spacing, supine_field_fade(largest), content,
+  return supine_inside_content_grid(shells, like, spacing, supine_warp_fade(largest), content,
                                     error);
 }
 
@@ -83,7 +83,7 @@ supine_status supine_command_embed_read(const supine_inside_shells *shells,
   }
   for (size_t i = 0; i < count; ++i) {
     SUPINE_TRY(supine_image_is_named(paths[i]) ? read_labelled(wanted, paths[i], content, error)
-               : supine_mesh_points_named(paths[i])
+               : supine_io_points_named(paths[i])
                    ? supine_inside_content_points(paths[i], &wanted->load, content, error)
                    : supine_inside_content_mesh(paths[i], &wanted->load, content, error));
   }

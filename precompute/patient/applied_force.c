@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute the force on the lungs from a measured displacement. */
+/* Compute the applied force on the lungs from a measured displacement ([Santhanam2008] IV-B.3). */
 #include <math.h>
 #include <string.h>
 

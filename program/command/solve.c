@@ -1,16 +1,17 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine solve: solve the full physics for one direction of gravity. */
+#include "precompute/physics/solve.h"
 #include "base/arena.h"
 #include "base/csv.h"
 #include "base/number.h"
 #include "base/output.h"
 #include "base/text.h"
 #include "precompute/lungs/disease.h"
-#include "precompute/physics/solve.h"
 
+#include "program/command/list.h"
+#include "program/command/solve_iterate.h"
 #include "program/options/model_options.h"
 #include "program/options/state_options.h"
-#include "program/solve_iterate.h"
 
 static const char name[] = "solve";
 
@@ -43,7 +44,7 @@ static const supine_option table[] = {
      "paper",
      SUPINE_FILLS(request, pitcher_catcher), .more = true},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
-    {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
+    {.table = supine_options_model, SUPINE_FILLS(request, model)},
     {.name = NULL}};
 
 /* Write a CSV file of the response of every vertex to a unit force on the vertex that --unit-force
@@ -90,9 +91,10 @@ static supine_status find_volumes(const supine_reference *reference, const supin
   const double total =
       state->volume.ml + (kind == SUPINE_VOLUME_ABSOLUTE ? 0.0
                           : kind == SUPINE_VOLUME_SCAN   ? full[0] + full[1] + scan[0] + scan[1]
-                          : kind == SUPINE_VOLUME_FULL   ? supine_reference_full(reference, g, part)
-                                                       : supine_reference_rest(reference, g, part));
-  supine_reference_share_out(reference, g, total, ml);
+                          : kind == SUPINE_VOLUME_FULL
+                              ? supine_physics_reference_full(reference, g, part)
+                              : supine_physics_reference_rest(reference, g, part));
+  supine_physics_reference_share_out(reference, g, total, ml);
   for (size_t lung = 0; lung < reference->lung_count; ++lung) {
     ml[lung] -= full[lung];
   }
@@ -126,7 +128,7 @@ static supine_status find_gains(const supine_prepared *prepared, const request *
   const supine_model *model = &prepared->model;
   double ml[2];
   double rest[2];
-  (void)supine_reference_rest(reference, wanted->state.gravity, rest);
+  (void)supine_physics_reference_rest(reference, wanted->state.gravity, rest);
   SUPINE_TRY(find_volumes(reference, &wanted->state, ml, error));
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     const double share = model->share[lung];
@@ -161,7 +163,7 @@ static supine_status write_solution(const supine_prepared *prepared, const reque
   deformed.vertices = supine_arena_take(&arena, values, sizeof(double));
   reference.vertices = supine_arena_take(&arena, values, sizeof(double));
   SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", deformed.vertex_count));
-  supine_tissue_collapse(lungs, prepared->model.share, reference.vertices);
+  supine_lungs_collapse(lungs, prepared->model.share, reference.vertices);
   for (size_t i = 0; i < values; ++i) {
     solution->directions[i] *=
         gains[lungs->lung_count == 2 && i >= 3 * lungs->lung_begin[1]][i % 3];
@@ -212,7 +214,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   } else {
     SUPINE_TRY(supine_options_state(&wanted->orientation, &wanted->state, error));
   }
-  SUPINE_TRY(supine_command_prepare(name, &wanted->model, given, &prepared, error));
+  SUPINE_TRY(supine_options_prepare(name, &wanted->model, given, &prepared, error));
   return wanted->has_vertex ? write_column(&prepared, wanted, error)
                             : solve(&prepared, wanted, error);
 }

@@ -9,7 +9,8 @@
 #include "base/text.h"
 #include <supine/runtime.h>
 
-#include "program/deform_content.h"
+#include "program/command/deform_content.h"
+#include "program/command/list.h"
 #include "program/options/basis_input.h"
 #include "program/options/state_options.h"
 

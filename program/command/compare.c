@@ -8,6 +8,7 @@
 #include "base/output.h"
 #include "base/vec3.h"
 
+#include "program/command/list.h"
 #include "program/options/basis_input.h"
 #include "program/options/inside.h"
 #include "program/options/state_options.h"
@@ -53,32 +54,32 @@ static const supine_option table[] = {
 static void add_target(const supine_posture_item *const item[2], const supine_target *target,
                        json_t *list) {
   json_t *entry = json_pack("{s:s, s:s}", "from", item[0]->name, "to", item[1]->name);
-  (void)json_object_update_new(entry, supine_command_target_json(target));
+  (void)json_object_update_new(entry, supine_options_target_json(target));
   (void)json_array_append_new(list, entry);
 }
 
 /* Append to a list the displacements of each named structure and of the hilum between two postures.
  * If `in_hilum`, subtract the hilum's from the others. */
-static supine_status add_pair(const supine_basis *basis, const supine_command_names *names,
+static supine_status add_pair(const supine_basis *basis, const supine_options_names *names,
                               const supine_posture_item *const item[2], bool in_hilum, json_t *list,
                               supine_error *error) {
   supine_target row = {.name = in_hilum ? "hilum, subtracted" : "hilum"};
   supine_hilum hilum;
   supine_pose pose[2];
   SUPINE_FREED_BY(supine_posed_expected_free) supine_expected expected = {0};
-  SUPINE_FREED_BY(supine_command_targets_free) supine_target *targets = NULL;
+  SUPINE_FREED_BY(supine_options_targets_free) supine_target *targets = NULL;
   for (size_t i = 0; i < 2; ++i) {
     SUPINE_TRY(supine_basis_pose(basis, &item[i]->state, &pose[i], error));
   }
   SUPINE_TRY(supine_posed_expected(basis, &item[1]->state, &item[0]->state, &expected, error));
-  SUPINE_TRY(supine_command_targets_find(basis, names,
+  SUPINE_TRY(supine_options_targets_find(basis, names,
                                          (const supine_pose *const[2]){&pose[0], &pose[1]},
                                          expected.sigma, false, &targets, error));
   SUPINE_TRY(
       supine_options_hilum(basis, &item[1]->state, &item[0]->state, in_hilum, &hilum, error));
   for (size_t i = 0; i < names->count; ++i) {
     if (in_hilum) {
-      supine_command_target_shift(&targets[i], hilum.move);
+      supine_options_target_shift(&targets[i], hilum.move);
     }
     add_target(item, &targets[i], list);
   }
@@ -96,7 +97,7 @@ static supine_status add_pair(const supine_basis *basis, const supine_command_na
 static supine_status compare_content(supine_comparison *c, const request *wanted,
                                      supine_error *error) {
   json_auto_t *list = json_array();
-  SUPINE_TRY(supine_command_names_open(c->basis, &c->names, error));
+  SUPINE_TRY(supine_options_names_open(c->basis, &c->names, error));
   for (size_t i = 0; i < c->postures.count; ++i) {
     for (size_t j = i + 1; j < c->postures.count; ++j) {
       const supine_posture_item *const item[2] = {&c->postures.item[i], &c->postures.item[j]};
@@ -110,7 +111,7 @@ static supine_status compare_content(supine_comparison *c, const request *wanted
 static void end(request **wanted) {
   supine_comparison *c = &(*wanted)->comparison;
   supine_report_free(c);
-  supine_command_names_close(&c->names);
+  supine_options_names_close(&c->names);
   supine_basis_close(c->inside);
   supine_basis_close(c->basis);
 }
@@ -118,7 +119,7 @@ static void end(request **wanted) {
 /* Compute, print and write the comparison of the lungs. */
 static supine_status report(supine_comparison *c, const request *wanted, supine_error *error) {
   if (wanted->inside != NULL) {
-    SUPINE_TRY(supine_command_inside_open(c->basis, wanted->inside, &c->inside, &c->names, error));
+    SUPINE_TRY(supine_options_inside_open(c->basis, wanted->inside, &c->inside, &c->names, error));
   }
   SUPINE_TRY(supine_report_find(c, error));
   supine_report_print(c, wanted->json);

@@ -7,7 +7,7 @@
 #include "base/number.h"
 
 #include "precompute/physics/network.h"
-#include "program/solve_iterate.h"
+#include "program/command/solve_iterate.h"
 
 /* The Pitcher/Catcher iteration of [Santhanam2008] stops when the force that remains on each vertex
  * is at most this fraction of the largest applied force. */

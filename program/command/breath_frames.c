@@ -11,7 +11,7 @@
 #include "base/text.h"
 #include "mesh/mesh.h"
 
-#include "program/breath_frames.h"
+#include "program/command/breath_frames.h"
 #include "program/options/basis_input.h"
 
 static const char name[] = "breathe";
@@ -20,7 +20,7 @@ static const double budget = 15e-3; /* longest compute time allowed for one fram
 
 /* A breath, and the memory for its frames. */
 typedef struct playing {
-  const supine_breath_frames *wanted;
+  const supine_command_breath_frames *wanted;
   const supine_basis *basis;
   size_t lung_count;
   double *time;     /* [frames] time since the start, s */
@@ -70,7 +70,7 @@ static supine_status begin_frames(playing *p, bool one, supine_error *error) {
 }
 
 static supine_status find_pose(const playing *p, size_t t, supine_pose *pose, supine_error *error) {
-  const supine_state state = supine_breath_state(p->basis, p->gravity + 3 * t, p->above[t]);
+  const supine_state state = supine_options_breath_state(p->basis, p->gravity + 3 * t, p->above[t]);
   return supine_basis_pose(p->basis, &state, pose, error);
 }
 
@@ -78,7 +78,7 @@ static supine_status find_pose(const playing *p, size_t t, supine_pose *pose, su
 static supine_status find_volumes(playing *p, const supine_pv *pv, supine_error *error) {
   for (size_t t = 0; t < p->wanted->count; ++t) {
     p->time[t] = (double)t / p->wanted->fps;
-    supine_breath_turn_gravity(&p->wanted->turn, p->time[t], p->gravity + 3 * t);
+    supine_options_turn_gravity(&p->wanted->turn, p->time[t], p->gravity + 3 * t);
   }
   SUPINE_TRY(supine_breath_evaluate(pv, &p->wanted->breath, p->wanted->count, p->time, p->above,
                                     NULL, error));
@@ -140,7 +140,8 @@ static supine_status find_expected(const playing *p, const supine_state *from, b
   *known = true;
   for (size_t t = 0; t < p->wanted->count && *known; ++t) {
     SUPINE_FREED_BY(supine_posed_expected_free) supine_expected expected = {0};
-    const supine_state state = supine_breath_state(p->basis, p->gravity + 3 * t, p->above[t]);
+    const supine_state state =
+        supine_options_breath_state(p->basis, p->gravity + 3 * t, p->above[t]);
     SUPINE_TRY(supine_posed_expected(p->basis, &state, from, &expected, error));
     *known = expected.sigma != NULL;
     p->expected[t] = expected.rms;
@@ -196,7 +197,7 @@ static supine_status check_ends(const playing *p, supine_error *error) {
   for (size_t i = 0; i < 2; ++i) {
     supine_pose pose;
     const supine_state state =
-        supine_breath_state(p->basis, p->gravity + 3 * ends[i], p->above[ends[i]]);
+        supine_options_breath_state(p->basis, p->gravity + 3 * ends[i], p->above[ends[i]]);
     SUPINE_TRY(supine_basis_pose(p->basis, &state, &pose, error));
     SUPINE_TRY(
         supine_options_pose_check(p->basis, name, p->wanted->allow_folds, &state, &pose, error));
@@ -204,17 +205,17 @@ static supine_status check_ends(const playing *p, supine_error *error) {
   return SUPINE_OK;
 }
 
-supine_status supine_command_breath_write(const supine_breath_frames *wanted,
+supine_status supine_command_breath_write(const supine_command_breath_frames *wanted,
                                           const supine_basis *basis, supine_error *error) {
   SUPINE_FREED_BY(end) playing p = {.wanted = wanted, .basis = basis};
   const bool tensors = supine_text_ends_in(wanted->path, ".safetensors");
   supine_mesh_save_options save = {.comment = p.vtp_comment};
   supine_pv pv = *supine_breath_normal();
-  supine_reference_pose from;
+  supine_options_reference_pose from;
   SUPINE_TRY(supine_options_basis_frame(basis, wanted->as_scanned, &save, error));
   SUPINE_TRY(begin_frames(&p, !tensors, error));
   if (wanted->pv != NULL) {
-    SUPINE_TRY(supine_breath_load(wanted->pv, &pv, error));
+    SUPINE_TRY(supine_options_pv_load(wanted->pv, &pv, error));
   }
   SUPINE_TRY(find_volumes(&p, &pv, error));
   SUPINE_TRY(supine_options_reference(basis, &wanted->from, false, &from, error));

@@ -6,11 +6,12 @@
 #include "base/arena.h"
 #include "base/text.h"
 
-#include "program/breath_frames.h"
+#include "program/command/breath_frames.h"
+#include "program/command/list.h"
 #include "program/options/basis_input.h"
 
 typedef struct request {
-  supine_breath_frames frames;
+  supine_command_breath_frames frames;
   supine_orientation orientation;
   bool turns;
   double duration; /* length of the output, s; 0 for the length of the turn or of one breath */
@@ -32,7 +33,7 @@ static const supine_option table[] = {
      "turn from one posture to another at constant speed: supine:left:10s takes 10 s. Between "
      "opposite postures, the body turns through left (supine to prone) or through supine (upright "
      "to inverted, left to right). The volume at rest changes with the posture",
-     SUPINE_FILLS(request, frames.turn), .read = supine_breath_turn_read,
+     SUPINE_FILLS(request, frames.turn), .read = supine_options_turn_read,
      .wants = "FROM:TO:SECONDS", SUPINE_SAYS_GIVEN(request, turns), .rivals = "gravity"},
     {.help = "The breath:"},
     {"tidal", 0, "ML",
@@ -70,7 +71,7 @@ static const supine_option table[] = {
 /* Check the options, set the start and the end of gravity's turn, and count the frames. */
 static supine_status complete(request *wanted, supine_error *error) {
   enum { FRAMES_MAX = 1000000 };
-  supine_breath_frames *frames = &wanted->frames;
+  supine_command_breath_frames *frames = &wanted->frames;
   SUPINE_REFUSE_IF(frames->as_scanned && supine_text_ends_in(frames->path, ".safetensors"), error,
                    SUPINE_ERROR_ARGUMENT,
                    "--as-scanned is for VTP files only: leave it out, as safetensors files are "

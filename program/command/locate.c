@@ -9,6 +9,7 @@
 #include "base/text.h"
 #include "mesh/io/points.h"
 #include "precompute/posed/located.h"
+#include "program/command/list.h"
 #include "program/options/basis_input.h"
 #include "program/options/inside.h"
 #include "program/options/state_options.h"
@@ -54,7 +55,7 @@ typedef struct observations {
 
 /* Find the vertex of the embedded point that is called `text` in the file `path`. */
 static supine_status find_vertex(const char *path, const char *text,
-                                 const supine_command_names *names, size_t *vertex,
+                                 const supine_options_names *names, size_t *vertex,
                                  supine_error *error) {
   size_t found = 0;
   for (size_t part = 0; part < names->count; ++part) {
@@ -79,10 +80,10 @@ static supine_status find_vertex(const char *path, const char *text,
 }
 
 static supine_status load_observed(const char *path, const request *wanted,
-                                   const supine_command_names *names, observations *observed,
+                                   const supine_options_names *names, observations *observed,
                                    supine_error *error) {
-  SUPINE_FREED_BY(supine_mesh_points_free) supine_mesh_points read = {0};
-  SUPINE_TRY(supine_mesh_points_read(path, &wanted->load, &read, error));
+  SUPINE_FREED_BY(supine_io_points_free) supine_io_points read = {0};
+  SUPINE_TRY(supine_io_points_read(path, &wanted->load, &read, error));
   SUPINE_REFUSE_IF(read.count > SUPINE_LOCATE_POINTS_MAX, error, SUPINE_ERROR_FORMAT,
                    "%s: %zu points, more than %d: leave some out", path, read.count,
                    (int)SUPINE_LOCATE_POINTS_MAX);
@@ -98,7 +99,7 @@ static supine_status load_observed(const char *path, const request *wanted,
 static const double determined = 0.95; /* postures at least this probable count as determined */
 
 /* Return the names of the points that were left out as outliers, with their distances. */
-static json_t *outliers_of(const supine_command_names *names, const observations *observed,
+static json_t *outliers_of(const supine_options_names *names, const observations *observed,
                            const supine_locate_residual *residuals) {
   json_t *outliers = json_array();
   for (size_t j = 0; j < observed->count; ++j) {
@@ -113,7 +114,7 @@ static json_t *outliers_of(const supine_command_names *names, const observations
   return outliers;
 }
 
-static void print(const request *wanted, const supine_command_names *names,
+static void print(const request *wanted, const supine_options_names *names,
                   const observations *observed, size_t n, double volume,
                   const supine_posed_located *located) {
   const supine_location_info *best = located->best;
@@ -146,7 +147,7 @@ static void print(const request *wanted, const supine_command_names *names,
 
 /* Print first and write last, so that a failure leaves no file. */
 static supine_status finish_points(const request *wanted, const supine_basis *inside,
-                                   const supine_command_names *names, const observations *observed,
+                                   const supine_options_names *names, const observations *observed,
                                    const supine_posed_located *located, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(inside);
   print(wanted, names, observed, info->vertex_count, located->best->volume, located);
@@ -160,7 +161,7 @@ static supine_status finish_points(const request *wanted, const supine_basis *in
     const float *p = located->xyz + 3 * at;
     supine_csv_row row = {.file = output.file};
     supine_csv_add_text(&row, names->text[names->part[at]]);
-    supine_csv_add_text(&row, info->lung_names[supine_command_lung_of(info, at)]);
+    supine_csv_add_text(&row, info->lung_names[supine_options_lung_of(info, at)]);
     supine_csv_add(&row, "%.3f,%.3f,%.3f,%.3f", (double)p[0], (double)p[1], (double)p[2],
                    (double)located->sigma[at]);
     supine_csv_end_row(&row);
@@ -170,7 +171,7 @@ static supine_status finish_points(const request *wanted, const supine_basis *in
 
 /* Make the located surface, state its volume, print the report, and write the surface. */
 static supine_status finish_surface(const request *wanted, const supine_basis *lungs,
-                                    const supine_command_names *names, const observations *observed,
+                                    const supine_options_names *names, const observations *observed,
                                     const supine_posed_located *located, supine_error *error) {
   const size_t n = supine_basis_get_info(lungs)->vertex_count;
   const supine_tensor *lung = supine_basis_tensor(lungs, "lung");
@@ -197,14 +198,14 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   const bool csv = supine_text_ends_in(wanted->output, ".csv");
   SUPINE_FREED_BY(supine_options_basis_close) supine_basis *lungs = NULL;
   SUPINE_FREED_BY(supine_options_basis_close) supine_basis *inside = NULL;
-  SUPINE_FREED_BY(supine_command_names_close) supine_command_names names = {0};
+  SUPINE_FREED_BY(supine_options_names_close) supine_options_names names = {0};
   SUPINE_FREED_BY(supine_posed_located_free) supine_posed_located located = {0};
   observations observed = {0};
   if (wanted->orientation.given) {
     SUPINE_TRY(supine_options_state(&wanted->orientation, &wanted->state, error));
   }
   SUPINE_TRY(supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &lungs, error));
-  SUPINE_TRY(supine_command_inside_open(lungs, wanted->points, &inside, &names, error));
+  SUPINE_TRY(supine_options_inside_open(lungs, wanted->points, &inside, &names, error));
   SUPINE_TRY(load_observed(given->operand[1], wanted, &names, &observed, error));
   const supine_locate_task task = {inside, observed.count, observed.points, wanted->state,
                                    wanted->rigid};

@@ -9,6 +9,7 @@
 #include <supine/compare.h>
 #include <supine/runtime.h>
 
+#include "program/command/list.h"
 #include "program/options/basis_input.h"
 
 /* Compute the share of each spherical-harmonic band (degree) in the squared displacement; 0 if the

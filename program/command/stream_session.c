@@ -6,10 +6,10 @@
 
 #include "base/arena.h"
 #include "base/number.h"
+#include "program/command/stream_session.h"
 #include "program/options/basis_input.h"
 #include "program/options/inside.h"
 #include "program/stream/peer.h"
-#include "program/stream_session.h"
 #include "program/view/export/export.h"
 
 static const char name[] = "stream";
@@ -50,7 +50,7 @@ static void report(const supine_stream_results *results, const supine_stream_ses
 /* The observed points, and the file made by 'supine embed' that names them. */
 typedef struct observed_points {
   supine_basis *inside;
-  supine_command_names names;
+  supine_options_names names;
   supine_stream_observed observed;
 } observed_points;
 
@@ -59,10 +59,10 @@ typedef struct observed_points {
 static supine_status open_points(const supine_basis *basis, const supine_stream_session *wanted,
                                  observed_points *points, supine_arena *arena,
                                  supine_error *error) {
-  const supine_command_names *names = &points->names;
+  const supine_options_names *names = &points->names;
   supine_stream_observed *observed = &points->observed;
   SUPINE_TRY(
-      supine_command_inside_open(basis, wanted->points, &points->inside, &points->names, error));
+      supine_options_inside_open(basis, wanted->points, &points->inside, &points->names, error));
   size_t count = 0;
   for (size_t part = 0; part < names->count; ++part) {
     const bool single = names->begin[part + 1] - names->begin[part] == 1;
@@ -98,7 +98,7 @@ static void page_close(live_page *page) {
 
 static supine_status print_page(const supine_stream_session *wanted, const supine_basis *basis,
                                 live_page *page, supine_error *error) {
-  supine_reference_pose from;
+  supine_options_reference_pose from;
   SUPINE_TRY(supine_options_reference(basis, &wanted->from, true, &from, error));
   const export_page shown = {.breath = wanted->breath.tidal,
                              .from = &from,
@@ -176,7 +176,7 @@ static supine_status set_volume(const supine_basis *basis, const supine_stream_s
     return SUPINE_OK;
   }
   if (wanted->pv != NULL) {
-    SUPINE_TRY(supine_breath_load(wanted->pv, &pv, error));
+    SUPINE_TRY(supine_options_pv_load(wanted->pv, &pv, error));
   }
   return supine_stream_volume_breathe(volume, &pv, &wanted->breath, error);
 }
@@ -192,7 +192,7 @@ typedef struct running {
 static void end(running *s) {
   supine_stream_server_destroy(s->server);
   page_close(&s->page);
-  supine_command_names_close(&s->points.names);
+  supine_options_names_close(&s->points.names);
   supine_basis_close(s->points.inside);
   supine_arena_free(&s->arena);
 }

@@ -5,11 +5,12 @@
 #include "base/arena.h"
 #include "base/text.h"
 
+#include "program/command/list.h"
+#include "program/command/validation_report.h"
 #include "program/options/basis_input.h"
 #include "program/options/model_options.h"
 #include "program/options/state_options.h"
 #include "program/options/surface_options.h"
-#include "program/validation_report.h"
 
 static const char name[] = "validate";
 
@@ -125,7 +126,7 @@ static supine_status validate_state(const request *wanted, supine_validation *s,
   SUPINE_FREED_BY(supine_lungs_free) supine_lungs lungs = {0};
   SUPINE_FREED_BY(supine_patient_pairs_free) supine_patient_pairs pairs = {0};
   if (path != NULL) {
-    SUPINE_TRY(supine_command_load_lungs(name, path, &wanted->source, &lungs, error));
+    SUPINE_TRY(supine_options_load_lungs(name, path, &wanted->source, &lungs, error));
   }
   if (landmarks != NULL) {
     SUPINE_TRY(supine_patient_pairs_load(landmarks, wanted->landmarks.reverse, &pairs, error));

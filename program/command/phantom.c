@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine phantom: make synthetic lungs. */
+#include "precompute/lungs/phantom.h"
 #include "base/arena.h"
 #include "base/number.h"
-#include "precompute/lungs/phantom.h"
 
+#include "program/command/list.h"
 #include "program/options/command.h"
 
 typedef struct request {
@@ -28,7 +29,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
                                              "data (BSD-3-Clause, University of Oxford)"};
   SUPINE_FREED_BY(supine_mesh_free) supine_mesh mesh = {0};
   (void)given;
-  SUPINE_TRY(supine_phantom_create(wanted->vertices, wanted->volume, &mesh, error));
+  SUPINE_TRY(supine_lungs_phantom_create(wanted->vertices, wanted->volume, &mesh, error));
   SUPINE_TRY(supine_mesh_save(wanted->path, &mesh, &save, error));
   (void)supine_print(stdout, "%s: two lungs, %zu vertices, %zu triangles, %.1f mL\n", wanted->path,
                      mesh.vertex_count, mesh.triangle_count, 1e-3 * supine_mesh_volume(&mesh));

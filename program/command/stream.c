@@ -3,8 +3,9 @@
 #include "base/arena.h"
 #include "base/vec3.h"
 
+#include "program/command/list.h"
+#include "program/command/stream_session.h"
 #include "program/options/basis_input.h"
-#include "program/stream_session.h"
 
 typedef struct request {
   supine_stream_session session;

@@ -10,9 +10,9 @@
 #include "base/output.h"
 #include "base/vec3.h"
 
+#include "program/command/render_pictures.h"
 #include "program/options/basis_input.h"
 #include "program/options/inside.h"
-#include "program/render_pictures.h"
 
 static const char name[] = "render";
 static const double inside_opacity = 0.35; /* default opacity of the lungs with --inside */
@@ -25,17 +25,17 @@ typedef struct drawn {
   float *value; /* [N] length of the displacement, mm */
   char subtitle[160];
   char note[48];
-  supine_command_marks marks;
+  supine_options_marks marks;
 } drawn;
 
 /* The panels of a picture or of one frame of an animation, and the objects that draw them. */
 typedef struct studio {
   const supine_pictures *wanted;
   supine_basis *basis;
-  supine_reference_pose from;
+  supine_options_reference_pose from;
   supine_compare *compare;
   supine_basis *inside; /* NULL if there are no structures inside the lungs */
-  supine_command_names names;
+  supine_options_names names;
   supine_posture_list postures; /* posture of each panel */
   drawn shown[SUPINE_PANELS_MAX];
   supine_panel panel[SUPINE_PANELS_MAX];
@@ -46,9 +46,9 @@ typedef struct studio {
 
 static void close_studio(studio *s) {
   for (size_t i = 0; i < SUPINE_PANELS_MAX; ++i) {
-    supine_command_marks_free(&s->shown[i].marks);
+    supine_options_marks_free(&s->shown[i].marks);
   }
-  supine_command_names_close(&s->names);
+  supine_options_names_close(&s->names);
   supine_basis_close(s->inside);
   supine_compare_destroy(s->compare);
   supine_arena_free(&s->arena);
@@ -61,7 +61,7 @@ static supine_status open_studio(studio *s, const char *path, supine_error *erro
   SUPINE_TRY(supine_compare_create(s->basis, &s->compare, error));
   if (s->wanted->inside != NULL) {
     SUPINE_TRY(
-        supine_command_inside_open(s->basis, s->wanted->inside, &s->inside, &s->names, error));
+        supine_options_inside_open(s->basis, s->wanted->inside, &s->inside, &s->names, error));
   }
   const size_t n = supine_basis_get_info(s->basis)->vertex_count;
   for (size_t i = 0; i < s->postures.count; ++i) {
@@ -103,13 +103,13 @@ static supine_status mark_panel(studio *s, size_t i, supine_error *error) {
   double sigma = expected.sigma != NULL && expected.rms >= 0.05 ? expected.rms : NAN;
   if (s->inside != NULL) {
     s->panel[i].marks = &shown->marks.marks;
-    SUPINE_TRY(supine_command_marks_make(s->inside, &s->names, pose, expected.sigma, &shown->marks,
+    SUPINE_TRY(supine_options_marks_make(s->inside, &s->names, pose, expected.sigma, &shown->marks,
                                          error));
     const supine_target *t = &shown->marks.first;
     char way[96];
     const bool still = t->moved < 0.05;
     (void)snprintf(shown->subtitle, sizeof shown->subtitle, "%s: %s", t->name,
-                   still ? "where arrows begin" : supine_command_target_way(t, 2, way));
+                   still ? "where arrows begin" : supine_options_target_way(t, 2, way));
     sigma = still ? NAN : t->expected;
   }
   if (!isnan(sigma)) {
@@ -159,7 +159,7 @@ static supine_status find_frame(studio *s, size_t frame, size_t count, supine_er
   const double cosine = fmax(-1.0, fmin(1.0, supine_dot(turn->from, turn->to)));
   const double angle = acos(cosine) * 180.0 / 3.14159265358979323846;
   const double share = (double)frame / (double)(count - 1);
-  supine_breath_turn_gravity(turn, share * turn->seconds, item->state.gravity);
+  supine_options_turn_gravity(turn, share * turn->seconds, item->state.gravity);
   (void)supine_print_text(item->name, sizeof item->name, "turned by %.0f of %.0f degrees",
                           share * angle, angle);
   return fill_panel(s, 0, error);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Every command, in the order of the program's help. */
-#include "program/options/command.h"
+#include "program/command/list.h"
 
 const supine_command *const supine_command_list[] = {
     &supine_command_phantom, &supine_command_precompute,

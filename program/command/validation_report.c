@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "base/arena.h"
-#include "program/validation_report.h"
+#include "program/command/validation_report.h"
 
 #include "base/number.h"
 #include "base/vec3.h"

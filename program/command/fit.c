@@ -9,6 +9,7 @@
 
 #include "precompute/patient/matching.h"
 #include "precompute/patient/scans.h"
+#include "program/command/list.h"
 #include "program/options/model_options.h"
 #include "program/options/surface_options.h"
 
@@ -131,7 +132,7 @@ static supine_status load_scans(const request *wanted, supine_patient_scans *sca
   }
   for (size_t k = 0; k < 2; ++k) {
     if (wanted->scan_path[k] != NULL) {
-      SUPINE_TRY(supine_command_load_lungs(name, wanted->scan_path[k], &wanted->source,
+      SUPINE_TRY(supine_options_load_lungs(name, wanted->scan_path[k], &wanted->source,
                                            &scans->lungs[k], error));
     }
   }
@@ -151,7 +152,7 @@ static supine_status fit_further(const request *wanted, size_t which, supine_pat
                                                       record, error);
   }
   SUPINE_FREED_BY(supine_lungs_free) supine_lungs lungs = {0};
-  SUPINE_TRY(supine_command_load_lungs(name, path, &wanted->source, &lungs, error));
+  SUPINE_TRY(supine_options_load_lungs(name, path, &wanted->source, &lungs, error));
   return supine_patient_scans_fit_further_surface(scans, state, scans_moved(wanted), &lungs.mesh,
                                                   record, error);
 }

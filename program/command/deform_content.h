@@ -25,9 +25,9 @@ extern const supine_option supine_command_deform_content_options[];
 typedef struct supine_deformation {
   supine_state state;
   supine_pose pose;
-  supine_reference_pose from; /* state in the input image, where displacements are 0 */
-  bool allow_folds;           /* whether folded fields cause only a warning */
-  bool from_given;            /* whether --from was given; otherwise `from` is the scan */
+  supine_options_reference_pose from; /* state in the input image, where displacements are 0 */
+  bool allow_folds;                   /* whether folded fields cause only a warning */
+  bool from_given;                    /* whether --from was given; otherwise `from` is the scan */
   supine_expected expected;
   supine_hilum hilum;
   bool subtract_hilum;           /* whether outputs are in the frame of the hilum */

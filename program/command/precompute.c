@@ -9,6 +9,7 @@
 #include "base/text.h"
 #include "base/vec3.h"
 #include "precompute/library.h"
+#include "program/command/list.h"
 #include "program/options/model_options.h"
 
 static const char name[] = "precompute";
@@ -75,7 +76,7 @@ static const supine_option table[] = {
     {"directions", 0, "N",
      "only print N directions of gravity that cover the sphere evenly, as CSV, to simulate",
      FILLS(directions), .range = {2.0, 1000.0}, .partners = ""},
-    {.table = supine_command_model_options, FILLS(model)},
+    {.table = supine_options_model, FILLS(model)},
     {.name = NULL}};
 
 /* Fraction of turned-over triangles above which a warning is printed. */
@@ -216,7 +217,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
     options->modes.count = wanted->modes;
     options->modes.harmonics = wanted->modes == 0;
   }
-  SUPINE_TRY(supine_command_prepare(name, &wanted->model, given, &prepared, error));
+  SUPINE_TRY(supine_options_prepare(name, &wanted->model, given, &prepared, error));
   if (prepared.patient != NULL) {
     (void)printf("%s\n", prepared.fit);
   }

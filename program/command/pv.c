@@ -12,6 +12,7 @@
 #include "base/locale.h"
 #include "base/output.h"
 
+#include "program/command/list.h"
 #include "program/options/command.h"
 #include "program/options/pv.h"
 
@@ -50,7 +51,7 @@ static supine_status run_fit(const char *path, const request *chosen, supine_err
   supine_pv pv = {0};
   supine_pv_report reports[SUPINE_PV_LIMB_COUNT];
   SUPINE_TRY(supine_blas_reserve(1, error)); /* the fit of many samples uses it */
-  SUPINE_TRY(supine_breath_fit_file(path, confidence, &pv, reports, error));
+  SUPINE_TRY(supine_options_pv_fit_file(path, confidence, &pv, reports, error));
   json_auto_t *root = json_pack("{s:f}", "confidence", confidence);
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     const char *name = supine_breath_limb_name((supine_pv_limb)limb);
@@ -95,7 +96,7 @@ static supine_status run_show(const char *path, const request *chosen, supine_er
   enum { ROWS_MAX = 1000000 };
   supine_pv pv = *supine_breath_normal();
   if (path != NULL) {
-    SUPINE_TRY(supine_breath_load(path, &pv, error));
+    SUPINE_TRY(supine_options_pv_load(path, &pv, error));
   }
   const double low = fmin(pv.limb[0].pressure[0], pv.limb[1].pressure[0]);
   const double high = fmax(pv.limb[0].pressure[1], pv.limb[1].pressure[1]);

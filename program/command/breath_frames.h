@@ -7,7 +7,7 @@
 #include "program/options/pv.h"
 #include "program/options/state_options.h"
 
-typedef struct supine_breath_frames {
+typedef struct supine_command_breath_frames {
   const char *path; /* file to write, .vtp or .safetensors */
   breath_turn turn; /* both directions are equal if the body does not turn */
   supine_pv_breath breath;
@@ -17,10 +17,10 @@ typedef struct supine_breath_frames {
   double fps;
   size_t count;        /* number of frames */
   const char *made_by; /* the command line */
-} supine_breath_frames;
+} supine_command_breath_frames;
 
 /* Compute and write the frames, and print their volumes and compute times. */
-supine_status supine_command_breath_write(const supine_breath_frames *wanted,
+supine_status supine_command_breath_write(const supine_command_breath_frames *wanted,
                                           const supine_basis *basis, supine_error *error);
 
 #endif

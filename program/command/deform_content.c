@@ -12,7 +12,7 @@
 
 #include "mesh/mesh.h"
 #include "precompute/warp/field.h"
-#include "program/deform_content.h"
+#include "program/command/deform_content.h"
 #include "program/options/inside.h"
 
 const supine_option supine_command_deform_content_options[] = {
@@ -91,7 +91,7 @@ supine_status supine_command_deform_content_read(supine_deform_content *wanted, 
                                 "--density to keep the tissue's mass");
     return SUPINE_OK;
   }
-  return supine_field_check_hounsfield(&wanted->source, wanted->image, error);
+  return supine_warp_check_hounsfield(&wanted->source, wanted->image, error);
 }
 
 /* Convert a vector from LPS and mm to other axes and another unit. */
@@ -141,16 +141,16 @@ static supine_status write_points(const char *path, const supine_basis *basis,
                                   const supine_deformation *moved, bool each, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const supine_pose *const pose[2] = {&moved->from.pose, &moved->pose};
-  SUPINE_FREED_BY(supine_command_names_close) supine_command_names names = {0};
-  SUPINE_FREED_BY(supine_command_targets_free) supine_target *rows = NULL;
+  SUPINE_FREED_BY(supine_options_names_close) supine_options_names names = {0};
+  SUPINE_FREED_BY(supine_options_targets_free) supine_target *rows = NULL;
   supine_output output;
-  SUPINE_TRY(supine_command_names_open(basis, &names, error));
+  SUPINE_TRY(supine_options_names_open(basis, &names, error));
   const size_t count = each ? info->vertex_count : names.count;
   SUPINE_TRY(
-      supine_command_targets_find(basis, &names, pose, moved->expected.sigma, each, &rows, error));
+      supine_options_targets_find(basis, &names, pose, moved->expected.sigma, each, &rows, error));
   SUPINE_TRY(supine_output_open(path, &output, error));
   for (size_t i = 0; i < count && moved->subtract_hilum; ++i) {
-    supine_command_target_shift(&rows[i], moved->hilum.move);
+    supine_options_target_shift(&rows[i], moved->hilum.move);
   }
   print_rows(moved, info, rows, count, output.file);
   SUPINE_TRY(supine_output_commit(&output, error));
@@ -182,7 +182,7 @@ static supine_status write_image(const char *path, const supine_image *source, b
                                  const supine_image *depth, const supine_field *inverse,
                                  supine_error *error) {
   SUPINE_FREED_BY(supine_image_free) supine_image moved = {0};
-  SUPINE_TRY(supine_field_resample(inverse, depth, labels, source, &moved, error));
+  SUPINE_TRY(supine_warp_resample(inverse, depth, labels, source, &moved, error));
   SUPINE_TRY(supine_image_write(
       path, &moved,
       depth != NULL
@@ -197,8 +197,8 @@ static supine_status write_image(const char *path, const supine_image *source, b
 
 static supine_status invert(const supine_field *forward, supine_field *inverse,
                             supine_error *error) {
-  supine_field_residual residual = {0};
-  SUPINE_TRY(supine_field_invert(forward, inverse, &residual, error));
+  supine_warp_residual residual = {0};
+  SUPINE_TRY(supine_warp_invert(forward, inverse, &residual, error));
   (void)printf("field followed by inverse: residual %s mm RMS, %s mm at most, inside the lungs",
                supine_text_distance(residual.rms).text,
                supine_text_distance(residual.largest).text);
@@ -217,10 +217,10 @@ static supine_status find_field(const supine_basis *basis, const supine_deformat
                                 supine_field *field, supine_error *error) {
   static const double told = 0.01;
   static const double allowed = 0.1;
-  SUPINE_TRY(supine_field_between(basis, moved->from_given ? &moved->from.pose : NULL, &moved->pose,
-                                  field, error));
+  SUPINE_TRY(supine_warp_between(basis, moved->from_given ? &moved->from.pose : NULL, &moved->pose,
+                                 field, error));
   double folded[2];
-  supine_field_folded(field, folded);
+  supine_warp_folded(field, folded);
   const double around = folded[1];
   if (around > told && (around <= allowed || moved->allow_folds)) {
     supine_options_say(
@@ -242,8 +242,8 @@ static supine_status move_grid(const supine_deform_content *wanted, const supine
                                const supine_deformation *moved, supine_error *error) {
   const bool image = wanted->image != NULL;
   const bool labels = wanted->labels != NULL;
-  SUPINE_FREED_BY(supine_field_free) supine_field forward = {0};
-  SUPINE_FREED_BY(supine_field_free) supine_field inverse = {0};
+  SUPINE_FREED_BY(supine_warp_free) supine_field forward = {0};
+  SUPINE_FREED_BY(supine_warp_free) supine_field inverse = {0};
   SUPINE_TRY(find_field(basis, moved, &forward, error));
   if (image || labels || wanted->inverse) {
     SUPINE_TRY(invert(&forward, &inverse, error));

@@ -9,7 +9,8 @@
 #include "precompute/inside/embed.h"
 #include "precompute/patient/patient_file.h"
 
-#include "program/embed_content.h"
+#include "program/command/embed_content.h"
+#include "program/command/list.h"
 #include "program/options/basis_input.h"
 #include "program/options/surface_options.h"
 

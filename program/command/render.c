@@ -5,7 +5,8 @@
 #include "base/arena.h"
 #include "base/text.h"
 
-#include "program/render_pictures.h"
+#include "program/command/list.h"
+#include "program/command/render_pictures.h"
 
 static supine_status read_size(const char *text, void *field, supine_error *error) {
   size_t *size = field;
@@ -49,7 +50,7 @@ static const supine_option table[] = {
     {"turn", 0, "FROM:TO:SECONDS",
      "draw an animation instead: gravity turns from one posture to another at constant speed, "
      "pauses for a second, and starts again. For example, supine:left:5s turns for 5 s",
-     FILLS(turn), .read = supine_breath_turn_read, .wants = "FROM:TO:SECONDS",
+     FILLS(turn), .read = supine_options_turn_read, .wants = "FROM:TO:SECONDS",
      SUPINE_SAYS_GIVEN(supine_pictures, turns), .rivals = "gravity"},
     {.table = supine_options_volume, FILLS(volume)},
     {"output", 'o', "FILE", ".png for --posture; .webp for --turn, an animation that browsers play",

@@ -9,6 +9,7 @@
 #include "base/output.h"
 #include "base/text.h"
 
+#include "program/command/list.h"
 #include "program/options/basis_input.h"
 #include "program/options/inside.h"
 #include "program/options/state_options.h"
@@ -70,7 +71,7 @@ static supine_status write_glb(const supine_basis *basis, const request *wanted,
 /* Find the states from which the page measures displacements: that of --from or its default, the
  * scan, and supine at rest, each once. */
 static supine_status find_references(const supine_basis *basis, const supine_from *from,
-                                     supine_reference_pose found[3], size_t *count,
+                                     supine_options_reference_pose found[3], size_t *count,
                                      supine_error *error) {
   const supine_from none = {.given = false};
   for (size_t i = 0; i < 3; ++i) {
@@ -87,10 +88,10 @@ static supine_status find_references(const supine_basis *basis, const supine_fro
 
 static supine_status write_page(const supine_basis *basis, const request *wanted,
                                 const char *basis_path, supine_error *error) {
-  supine_reference_pose from[3];
+  supine_options_reference_pose from[3];
   char title[256];
   SUPINE_FREED_BY(supine_options_basis_close) supine_basis *inside = NULL;
-  SUPINE_FREED_BY(supine_command_names_close) supine_command_names names = {0};
+  SUPINE_FREED_BY(supine_options_names_close) supine_options_names names = {0};
   SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
   supine_options_basis_title(basis_path, title, sizeof title);
   export_page page = {.breath = wanted->glb.breath,
@@ -99,7 +100,7 @@ static supine_status write_page(const supine_basis *basis, const request *wanted
                       .names = &names};
   SUPINE_TRY(find_references(basis, &wanted->from, from, &page.from_count, error));
   if (wanted->inside != NULL) {
-    SUPINE_TRY(supine_command_inside_open(basis, wanted->inside, &inside, &names, error));
+    SUPINE_TRY(supine_options_inside_open(basis, wanted->inside, &inside, &names, error));
     page.inside = inside;
   }
   SUPINE_TRY(supine_output_open(wanted->path, &output, error));
