@@ -55,9 +55,10 @@ static supine_status refuse(size_t missing, size_t threads, supine_error *error)
   const size_t needed = missing * (buffer_size >> 20);
   const char *plural = threads == 1 ? "" : "s";
   const char *fewer = threads == 1 ? "" : ", or set SUPINE_THREADS to a smaller number";
+  const bool is_limited =
+      getrlimit(RLIMIT_AS, &addresses) == 0 && addresses.rlim_cur != RLIM_INFINITY;
   SUPINE_REFUSE_IF(
-      getrlimit(RLIMIT_AS, &addresses) != 0 || addresses.rlim_cur == RLIM_INFINITY, error,
-      SUPINE_ERROR_MEMORY,
+      !is_limited, error, SUPINE_ERROR_MEMORY,
       "OpenBLAS needs another %zu MiB for %zu thread%s, and the system does not give them: close "
       "other programs%s",
       needed, threads, plural, fewer);

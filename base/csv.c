@@ -159,10 +159,14 @@ static supine_status csv_header(supine_csv *csv, const char *const *names, size_
   SUPINE_TRY(csv_line(csv, &text, error));
   SUPINE_REFUSE_IF(text == NULL, error, SUPINE_ERROR_FORMAT,
                    "%s: the file is empty; expected a header %s,...", csv->path, names[0]);
-  csv->separator = strchr(text, ',') != NULL    ? ','
-                   : strchr(text, ';') != NULL  ? ';'
-                   : strchr(text, '\t') != NULL ? '\t'
-                                                : ',';
+  static const char separators[] = ",;\t";
+  csv->separator = ','; /* if there is only one column */
+  for (const char *one = separators; *one != '\0'; ++one) {
+    if (strchr(text, *one) != NULL) {
+      csv->separator = *one;
+      break;
+    }
+  }
   SUPINE_TRY(csv_split(csv, text, error));
   for (size_t c = 0; c < SUPINE_CSV_FIELDS_MAX; ++c) {
     csv->column[c] = SIZE_MAX;

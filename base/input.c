@@ -100,7 +100,8 @@ supine_status supine_input_open_beside(const char *path, const char *name, FILE 
                    "%s: it refers to the file \"%s\", a link to another folder; copy the file here",
                    path, shown);
   struct stat about = {0};
-  SUPINE_REFUSE_IF(stat(target, &about) != 0 || !S_ISREG(about.st_mode), error, SUPINE_ERROR_FORMAT,
+  const bool exists = stat(target, &about) == 0;
+  SUPINE_REFUSE_IF(!exists || !S_ISREG(about.st_mode), error, SUPINE_ERROR_FORMAT,
                    "%s: it refers to \"%s\", which is not a regular file; save it as one file",
                    path, shown);
   return open_regular(target, O_NOFOLLOW, file, size, error);

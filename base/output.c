@@ -103,17 +103,19 @@ static int open_temporary(supine_output *output) {
   static atomic_uint counter;
   const size_t size = strlen(output->target) + ENDING;
   output->temporary = malloc(size);
-  for (int i = 0; output->temporary != NULL && i < TRIES; ++i) {
-    (void)snprintf(output->temporary, size, "%s.part-%ld-%u", output->target, (long)getpid(),
-                   atomic_fetch_add(&counter, 1));
-    replace_name(NULL, output->temporary); /* before the file exists: a signal may come at once */
-    const int descriptor = open(output->temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    if (descriptor >= 0) {
-      return descriptor;
-    }
-    replace_name(output->temporary, NULL);
-    if (errno != EEXIST) {
-      break;
+  if (output->temporary != NULL) {
+    for (int i = 0; i < TRIES; ++i) {
+      (void)snprintf(output->temporary, size, "%s.part-%ld-%u", output->target, (long)getpid(),
+                     atomic_fetch_add(&counter, 1));
+      replace_name(NULL, output->temporary); /* before the file exists: a signal may come at once */
+      const int descriptor = open(output->temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+      if (descriptor >= 0) {
+        return descriptor;
+      }
+      replace_name(output->temporary, NULL);
+      if (errno != EEXIST) {
+        break;
+      }
     }
   }
   free(output->temporary);

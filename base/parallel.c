@@ -50,7 +50,10 @@ size_t supine_thread_count(void) {
     count = CPU_COUNT(&allowed);
   }
 #endif
-  return count < 1 ? 1 : count > THREADS_MAX ? THREADS_MAX : (size_t)count;
+  if (count < 1) {
+    return 1;
+  }
+  return count > THREADS_MAX ? THREADS_MAX : (size_t)count;
 }
 
 void supine_parallel_for(size_t count, size_t grain, size_t threads,

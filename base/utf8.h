@@ -13,7 +13,12 @@ static inline size_t supine_utf8_length(const char *text, size_t size) {
   if (size == 0 || u[0] < 0x80) {
     return size == 0 ? 0 : 1;
   }
-  const size_t length = u[0] >= 0xF0 ? 4 : u[0] >= 0xE0 ? 3 : 2;
+  size_t length = 2;
+  if (u[0] >= 0xF0) {
+    length = 4;
+  } else if (u[0] >= 0xE0) {
+    length = 3;
+  }
   if (u[0] < 0xC2 || u[0] > 0xF4 || size < length) {
     return 0;
   }

@@ -243,7 +243,12 @@ supine_mesh_anatomy supine_mesh_anatomy_find(const supine_mesh *lungs, size_t co
   if (count == 1 && found.axes == SUPINE_AXES_LPS) {
     const view v = view_of(found.axes);
     const double side = hollow(&s[0], &v);
-    found.side = side > least_side ? 1 : side < -least_side ? -1 : 0;
+    found.side = 0;
+    if (side > least_side) {
+      found.side = 1;
+    } else if (side < -least_side) {
+      found.side = -1;
+    }
   }
   return found;
 }

@@ -110,8 +110,10 @@ void supine_mesh_vertex_normals(const supine_mesh *mesh, double *normals) {
   for (size_t i = 0; i < mesh->vertex_count; ++i) {
     double *n = normals + 3 * i;
     const double length = supine_length(n);
-    for (size_t k = 0; k < 3 && length > 0.0; ++k) {
-      n[k] /= length;
+    if (length > 0.0) {
+      for (size_t k = 0; k < 3; ++k) {
+        n[k] /= length;
+      }
     }
   }
 }

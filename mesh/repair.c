@@ -47,9 +47,11 @@ static void mark_loose(const supine_mesh *mesh, const supine_mesh_side *sides, u
   memset(drop, 1, mesh->triangle_count);
   for (size_t i = 0; i < count; i += supine_mesh_sides_of_edge(sides, i, count)) {
     const size_t size = supine_mesh_sides_of_edge(sides, i, count);
-    for (size_t s = 0; size == 2 && s < size; ++s) {
-      loose -= drop[sides[i + s].at / 3];
-      drop[sides[i + s].at / 3] = 0;
+    if (size == 2) {
+      for (size_t s = 0; s < 2; ++s) {
+        loose -= drop[sides[i + s].at / 3];
+        drop[sides[i + s].at / 3] = 0;
+      }
     }
   }
   if ((double)loose > most_loose * (double)mesh->triangle_count) {
@@ -214,12 +216,14 @@ supine_status supine_mesh_repair(supine_mesh *mesh, supine_mesh_repair_report *r
   uint8_t *drop = supine_arena_zeros(&arena, mesh->triangle_count, 1);
   const supine_mesh_side *sides = supine_mesh_sides_sort(mesh, &of_sides);
   *report = (supine_mesh_repair_report){0};
-  for (size_t m = 0; m < 2 && drop != NULL && sides != NULL; ++m) {
-    markers[m](mesh, sides, drop);
-    *counts[m] = drop_marked(mesh, drop);
-    if (*counts[m] > 0) {
-      supine_arena_free(&of_sides);
-      sides = supine_mesh_sides_sort(mesh, &of_sides);
+  if (drop != NULL) {
+    for (size_t m = 0; m < 2 && sides != NULL; ++m) {
+      markers[m](mesh, sides, drop);
+      *counts[m] = drop_marked(mesh, drop);
+      if (*counts[m] > 0) {
+        supine_arena_free(&of_sides);
+        sides = supine_mesh_sides_sort(mesh, &of_sides);
+      }
     }
   }
   return drop != NULL && sides != NULL ? mend_links(mesh, sides, report) : SUPINE_ERROR_MEMORY;

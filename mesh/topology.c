@@ -51,8 +51,10 @@ supine_mesh_side *supine_mesh_sides_sort(const supine_mesh *mesh, supine_arena *
         sides[next[low]++] = (supine_mesh_side){low, a < b ? b : a, (uint32_t)i};
       }
     }
-    for (size_t v = 0; pass == 0 && v < mesh->vertex_count; ++v) {
-      next[v + 1] += next[v];
+    if (pass == 0) {
+      for (size_t v = 0; v < mesh->vertex_count; ++v) {
+        next[v + 1] += next[v];
+      }
     }
   }
   for (size_t v = 0, begin = 0; v < mesh->vertex_count; begin = next[v++]) {

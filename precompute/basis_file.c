@@ -111,10 +111,11 @@ static void add_reference(entries *list, const supine_reference *reference, cons
   char shares[256];
   double volume[2];
   (void)supine_state_print(&reference->scan.state, text, sizeof text);
-  add(list, "scanned", "%s",
-      reference->scan.state.volume.ml != 0.0 ? "volume"
-      : full                                 ? "full"
-                                             : "rest");
+  const char *scanned = full ? "full" : "rest";
+  if (reference->scan.state.volume.ml != 0.0) {
+    scanned = "volume";
+  }
+  add(list, "scanned", "%s", scanned);
   add(list, "scan_state", "%s", text);
   add(list, "scan_gravity", "%.9g,%.9g,%.9g", g[0], g[1], g[2]);
   for (size_t lung = 0; lung < reference->lung_count; ++lung) {

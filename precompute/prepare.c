@@ -257,6 +257,24 @@ static bool varies(const supine_model *model, size_t count) {
   return !same;
 }
 
+/* Return what the volume at rest is known from. */
+static const char *source_of_rest(const supine_resting *resting, bool predicted,
+                                  const supine_prepared *p) {
+  if (p->reference.scan.state.volume.kind == SUPINE_VOLUME_REST) {
+    return "the scan";
+  }
+  if (p->patient != NULL) {
+    return "the fit";
+  }
+  if (supine_physics_resting_given(resting)) {
+    return "--resting";
+  }
+  if (predicted) {
+    return "height and sex";
+  }
+  return resting->assumed == SUPINE_REST_SHARE ? "healthy people's share" : "the share in COPD";
+}
+
 static void summarize(const knowledge *given, bool predicted, supine_prepared *p) {
   static const double supine[3] = {0.0, 1.0, 0.0};
   const supine_resting *resting = &given->resting;
@@ -279,11 +297,14 @@ static void summarize(const knowledge *given, bool predicted, supine_prepared *p
   if (held != full) {
     supine_text_add(p->assumed, size, "%s, %.0f mL; ", state, held);
   }
+  const char *full_from = "";
+  if (reference->scan.full > 0.0) {
+    full_from = "given, ";
+  } else if (at_rest) {
+    full_from = known ? "from rest, " : "assumed from rest, ";
+  }
   supine_text_add(p->assumed, size, "%sfull inflation %.0f mL (%s", held != full ? "" : "at ", full,
-                  reference->scan.full > 0.0 ? "given, "
-                  : !at_rest                 ? ""
-                  : known                    ? "from rest, "
-                                             : "assumed from rest, ");
+                  full_from);
   supine_physics_reference_compare(reference, &given->person, p->assumed, size);
   const double rest = supine_physics_reference_rest(reference, supine, ml);
   const double ratio = exp(resting->spread / resting->assumed);
@@ -291,13 +312,7 @@ static void summarize(const knowledge *given, bool predicted, supine_prepared *p
   if (!at_rest && !known) {
     supine_text_add(p->assumed, size, "%.0f to %.0f ", rest / ratio, rest * ratio);
   }
-  supine_text_add(p->assumed, size, "by %s)",
-                  at_rest                                 ? "the scan"
-                  : p->patient != NULL                    ? "the fit"
-                  : known                                 ? "--resting"
-                  : predicted                             ? "height and sex"
-                  : resting->assumed == SUPINE_REST_SHARE ? "healthy people's share"
-                                                          : "the share in COPD");
+  supine_text_add(p->assumed, size, "by %s)", source_of_rest(resting, predicted, p));
   double collapsed = 0.0; /* volume in the scan as the basis holds it, mL */
   for (size_t lung = 0; lung < reference->lung_count; ++lung) {
     collapsed +=

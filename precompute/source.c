@@ -173,10 +173,11 @@ static void summarize(const reading *r, supine_source *source) {
   const size_t size = sizeof source->summary;
   char letters[4];
   supine_mesh_axes_letters(report->axes, letters);
-  supine_text_add(source->summary, size, "%s axes (%s), %g mm a unit", letters,
-                  load->axes != SUPINE_AXES_AUTO ? "by --axes"
-                  : report->axes_from_tag        ? "the file's tag"
-                                                 : "assumed",
+  const char *axes_from = report->axes_from_tag ? "the file's tag" : "assumed";
+  if (load->axes != SUPINE_AXES_AUTO) {
+    axes_from = "by --axes";
+  }
+  supine_text_add(source->summary, size, "%s axes (%s), %g mm a unit", letters, axes_from,
                   load->millimetres_per_unit == 0.0 ? 1.0 : load->millimetres_per_unit);
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     supine_text_add(source->summary, size, "; %s lung in", supine_lungs_name(lungs, lung));

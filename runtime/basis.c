@@ -139,12 +139,14 @@ static supine_status check_surface(const check *c, supine_basis *basis) {
   for (size_t i = 0; i < 3 * info->triangle_count; ++i) {
     highest = info->triangles[i] > highest ? info->triangles[i] : highest;
   }
-  return info->vertex_count < 1 || info->vertex_count > UINT32_MAX
-             ? refuse(c, "the number of vertices is %zu, not 1 to 4294967295", info->vertex_count)
-         : highest >= info->vertex_count
-             ? refuse(c, "a triangle refers to vertex %u, but the number of vertices is %zu",
-                      highest, info->vertex_count)
-             : SUPINE_OK;
+  if (info->vertex_count < 1 || info->vertex_count > UINT32_MAX) {
+    return refuse(c, "the number of vertices is %zu, not 1 to 4294967295", info->vertex_count);
+  }
+  if (highest >= info->vertex_count) {
+    return refuse(c, "a triangle refers to vertex %u, but the number of vertices is %zu", highest,
+                  info->vertex_count);
+  }
+  return SUPINE_OK;
 }
 
 static supine_status check_field(const check *c, supine_basis *basis) {

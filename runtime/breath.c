@@ -18,7 +18,14 @@ typedef struct integrated {
 } integrated;
 
 const char *supine_breath_limb_name(supine_pv_limb limb) {
-  return limb == SUPINE_PV_INHALE ? "inhale" : limb == SUPINE_PV_EXHALE ? "exhale" : "unknown limb";
+  switch (limb) {
+  case SUPINE_PV_INHALE:
+    return "inhale";
+  case SUPINE_PV_EXHALE:
+    return "exhale";
+  default:
+    return "unknown limb";
+  }
 }
 
 supine_status supine_breath_curve_check(const supine_pv_curve *curve, supine_error *error) {
@@ -89,6 +96,13 @@ static void limb_begin(const supine_pv_curve *curve, integrated *of) {
   }
 }
 
+static double between(double value, double low, double high) {
+  if (value < low) {
+    return low;
+  }
+  return value > high ? high : value;
+}
+
 /* Return the volume of a limb at a pressure, mL. Write the compliance, mL/cmH2O, unless it is NULL.
  * Replace a pressure outside the range of the limb by the nearest end of the range. */
 static double limb_volume(const integrated *of, double pressure, double *compliance) {
@@ -97,7 +111,7 @@ static double limb_volume(const integrated *of, double pressure, double *complia
   const double high = curve->pressure[1];
   const double gain = (curve->volume[1] - curve->volume[0]) / of->sum[LIMB_PARTS];
   const double raw = ((pressure - low) - (high - pressure)) / (high - low);
-  const double x = raw < -1.0 ? -1.0 : raw > 1.0 ? 1.0 : raw;
+  const double x = between(raw, -1.0, 1.0);
   if (compliance != NULL) {
     *compliance = 2.0 * gain / (high - low) * slope(curve, x);
   }
@@ -259,10 +273,6 @@ static supine_status loop_begin(const supine_pv *pv, const supine_pv_breath *bre
     }
   }
   return SUPINE_OK;
-}
-
-static double between(double value, double low, double high) {
-  return value < low ? low : value > high ? high : value;
 }
 
 /* Compute the volume, mL, and the pressure, cmH2O, of a breath at a time, s. If the flow is

@@ -84,11 +84,11 @@ static supine_volume_kind assumed_kind(const supine_basis *basis) {
   const char *state = supine_basis_metadata(basis, "scan_state");
   const bool at_rest = (scanned != NULL && strcmp(scanned, "rest") == 0) ||
                        (state != NULL && strstr(state, "rest") != NULL);
-  return !supine_basis_get_info(basis)->has_rest ||
-                 supine_basis_metadata(basis, "resting_known") != NULL
-             ? SUPINE_VOLUME_DEFAULT
-         : at_rest ? SUPINE_VOLUME_FULL
-                   : SUPINE_VOLUME_REST;
+  if (!supine_basis_get_info(basis)->has_rest ||
+      supine_basis_metadata(basis, "resting_known") != NULL) {
+    return SUPINE_VOLUME_DEFAULT;
+  }
+  return at_rest ? SUPINE_VOLUME_FULL : SUPINE_VOLUME_REST;
 }
 
 /* Return the volume of all lungs at rest, in the posture of the scan, divided by that at full
@@ -252,18 +252,20 @@ static supine_status evaluate_all(const supine_basis *basis, const supine_state 
   const supine_status status =
       supine_expected_prepare(basis, state, from == NULL ? &scan : from, 0, 0, &model, error);
   memset(mean, 0, SUPINE_EXPECTED_TERMS * sizeof *mean);
-  for (size_t begin = 0; begin < info->vertex_count && status == SUPINE_OK; begin += LOCATE_BLOCK) {
-    const size_t left = info->vertex_count - begin;
-    const size_t count = left < LOCATE_BLOCK ? left : LOCATE_BLOCK;
-    supine_expected_evaluate(&model, begin, begin + count, &block);
-    for (size_t i = 0; i < count; ++i) {
-      double square = 0;
-      for (size_t k = 0; k < SUPINE_EXPECTED_TERMS; ++k) {
-        square += block.square[i][k];
-        mean[k] += block.square[i][k] / (double)info->vertex_count;
-      }
-      if (sigma != NULL) {
-        sigma[begin + i] = (float)sqrt(square);
+  if (status == SUPINE_OK) {
+    for (size_t begin = 0; begin < info->vertex_count; begin += LOCATE_BLOCK) {
+      const size_t left = info->vertex_count - begin;
+      const size_t count = left < LOCATE_BLOCK ? left : LOCATE_BLOCK;
+      supine_expected_evaluate(&model, begin, begin + count, &block);
+      for (size_t i = 0; i < count; ++i) {
+        double square = 0;
+        for (size_t k = 0; k < SUPINE_EXPECTED_TERMS; ++k) {
+          square += block.square[i][k];
+          mean[k] += block.square[i][k] / (double)info->vertex_count;
+        }
+        if (sigma != NULL) {
+          sigma[begin + i] = (float)sqrt(square);
+        }
       }
     }
   }
@@ -282,9 +284,12 @@ supine_status supine_expected_parts(const supine_basis *basis, const supine_stat
   const char *own = supine_basis_metadata(basis, "expected_error_source");
   double mean[SUPINE_EXPECTED_TERMS];
   const supine_status status = evaluate_all(basis, state, from, NULL, mean, error);
-  for (size_t k = 0; k < SUPINE_EXPECTED_TERMS && status == SUPINE_OK; ++k) {
-    const bool fitted = k == SUPINE_EXPECTED_DISPLACEMENT && own != NULL;
-    parts[k] = (supine_expected_part){terms[k].name, fitted ? own : terms[k].source, sqrt(mean[k])};
+  if (status == SUPINE_OK) {
+    for (size_t k = 0; k < SUPINE_EXPECTED_TERMS; ++k) {
+      const bool fitted = k == SUPINE_EXPECTED_DISPLACEMENT && own != NULL;
+      parts[k] =
+          (supine_expected_part){terms[k].name, fitted ? own : terms[k].source, sqrt(mean[k])};
+    }
   }
   return status;
 }

@@ -57,7 +57,12 @@ static int column_of(size_t term, size_t axis, double *sign) {
     return VOLUME + (int)axis;
   }
   const size_t about = term - 4;
-  *sign = axis == (about + 1) % 3 ? -1 : axis == (about + 2) % 3 ? 1 : 0;
+  *sign = 0;
+  if (axis == (about + 1) % 3) {
+    *sign = -1;
+  } else if (axis == (about + 2) % 3) {
+    *sign = 1;
+  }
   return PLACE + (int)((6 - about - axis) % 3);
 }
 
@@ -102,8 +107,16 @@ static bool is_known(const supine_kriging_options *options, size_t term) {
  */
 static double prior_of(const supine_kriging_options *options, size_t term, double *mean) {
   const double deviation = term > 3 && options->rotation ? options->rotation_deviation : 0;
-  *mean = term == 3 ? options->volume_mean : term > 3 ? options->rotation_mean[term - 4] : 0;
-  return term == 3 && options->volume ? 1 : deviation > 0 ? 1 / (deviation * deviation) : 0;
+  *mean = 0;
+  if (term == 3) {
+    *mean = options->volume_mean;
+  } else if (term > 3) {
+    *mean = options->rotation_mean[term - 4];
+  }
+  if (term == 3 && options->volume) {
+    return 1;
+  }
+  return deviation > 0 ? 1 / (deviation * deviation) : 0;
 }
 
 /* Compute A and the right side of the normal equations for the fitted terms: translation, volume

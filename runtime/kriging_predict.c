@@ -115,14 +115,22 @@ static void vary(const supine_kriging *fit, const run *in, float (*w)[RUN], floa
       continue;
     }
     project(fit->count, w, fit->whitened + c * fit->count, column[c]);
-    for (size_t v = 0; v < RUN; ++v) {
-      const float here = c == 0 ? 1 : c < 4 ? in->volume[c - 1][v] : in->place[c - 4][v];
-      column[c][v] = here - column[c][v];
+    if (c == 0) {
+      for (size_t v = 0; v < RUN; ++v) {
+        column[c][v] = 1 - column[c][v];
+      }
+    } else {
+      const float *here = c < 4 ? in->volume[c - 1] : in->place[c - 4];
+      for (size_t v = 0; v < RUN; ++v) {
+        column[c][v] = here[v] - column[c][v];
+      }
     }
     for (size_t d = 0; d <= c; ++d) {
       const float number = (float)((d < c ? 2 : 1) * fit->spread[c][d]);
-      for (size_t v = 0; v < RUN && fit->spread[d][d] != 0; ++v) {
-        variance[v] += number * column[c][v] * column[d][v];
+      if (fit->spread[d][d] != 0) {
+        for (size_t v = 0; v < RUN; ++v) {
+          variance[v] += number * column[c][v] * column[d][v];
+        }
       }
     }
   }

@@ -113,12 +113,14 @@ static supine_status initialise(workspace *s, supine_error *error) {
                        task->state.volume.kind == SUPINE_VOLUME_DEFAULT;
   supine_pose pose;
   const supine_status status = supine_basis_pose(basis, &scan, &pose, error);
-  for (size_t j = 0; j < task->count && status == SUPINE_OK; ++j) {
-    supine_kriging_point *p = &s->points[j];
-    *p = (supine_kriging_point){.noise = task->observed[j].noise};
-    position(basis, &pose, task->observed[j].vertex, p->position);
-    while (task->observed[j].vertex >= info->lung_begin[p->lung + 1]) {
-      ++p->lung;
+  if (status == SUPINE_OK) {
+    for (size_t j = 0; j < task->count; ++j) {
+      supine_kriging_point *p = &s->points[j];
+      *p = (supine_kriging_point){.noise = task->observed[j].noise};
+      position(basis, &pose, task->observed[j].vertex, p->position);
+      while (task->observed[j].vertex >= info->lung_begin[p->lung + 1]) {
+        ++p->lung;
+      }
     }
   }
   *s->fit = (supine_location){
@@ -150,21 +152,23 @@ static supine_status evaluate(workspace *s, supine_error *error) {
   if (status == SUPINE_OK && s->fit->options.volume) {
     status = supine_expected_shifted(task->inside, &s->found->state, &fuller, error);
   }
-  for (size_t j = 0; j < task->count && status == SUPINE_OK; ++j) {
-    double *x = s->law + 3 * j;
-    double other[3];
-    double square = 0;
-    position(task->inside, &pose, task->observed[j].vertex, x);
-    if (s->fit->options.volume) {
-      position(task->inside, &fuller, task->observed[j].vertex, other);
+  if (status == SUPINE_OK) {
+    for (size_t j = 0; j < task->count; ++j) {
+      double *x = s->law + 3 * j;
+      double other[3];
+      double square = 0;
+      position(task->inside, &pose, task->observed[j].vertex, x);
+      if (s->fit->options.volume) {
+        position(task->inside, &fuller, task->observed[j].vertex, other);
+      }
+      for (size_t i = 0; i < 3; ++i) {
+        const double u = x[i] - s->points[j].position[i];
+        square += u * u;
+        s->points[j].volume[i] =
+            s->fit->options.volume ? (other[i] - x[i]) * s->fit->deviation / step : 0;
+      }
+      s->points[j].size = sqrt(square);
     }
-    for (size_t i = 0; i < 3; ++i) {
-      const double u = x[i] - s->points[j].position[i];
-      square += u * u;
-      s->points[j].volume[i] =
-          s->fit->options.volume ? (other[i] - x[i]) * s->fit->deviation / step : 0;
-    }
-    s->points[j].size = sqrt(square);
   }
   return status;
 }

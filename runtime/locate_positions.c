@@ -76,12 +76,14 @@ supine_status supine_locate_positions(const supine_location *found, const supine
   const supine_status status =
       supine_expected_prepare(basis, &found->info.state, &scan, found->deviation,
                               found->options.model.least, &model, error);
-  for (size_t lung = 0; lung < info->lung_count && status == SUPINE_OK; ++lung) {
-    const size_t last = info->lung_begin[lung + 1];
-    for (size_t begin = info->lung_begin[lung]; begin < last; begin += LOCATE_BLOCK) {
-      const size_t end = last - begin < LOCATE_BLOCK ? last : begin + LOCATE_BLOCK;
-      predict(found, &model, lung, begin, end, &b);
-      finish(found, &b, end - begin, xyz + 3 * begin, sigma + begin);
+  if (status == SUPINE_OK) {
+    for (size_t lung = 0; lung < info->lung_count; ++lung) {
+      const size_t last = info->lung_begin[lung + 1];
+      for (size_t begin = info->lung_begin[lung]; begin < last; begin += LOCATE_BLOCK) {
+        const size_t end = last - begin < LOCATE_BLOCK ? last : begin + LOCATE_BLOCK;
+        predict(found, &model, lung, begin, end, &b);
+        finish(found, &b, end - begin, xyz + 3 * begin, sigma + begin);
+      }
     }
   }
   if (status == SUPINE_OK) {

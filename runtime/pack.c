@@ -40,9 +40,11 @@ static float flush(float value) {
  * by it, so that one quantisation step suits all vertices. */
 static double direction_length(const supine_basis *basis, size_t i) {
   double square = 0;
-  for (size_t axis = 0; axis < 3 && basis->info.direction != NULL; ++axis) {
-    const double d = (double)basis->info.direction[3 * i + axis];
-    square += d * d;
+  if (basis->info.direction != NULL) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const double d = (double)basis->info.direction[3 * i + axis];
+      square += d * d;
+    }
   }
   return square > 0 ? sqrt(square) : 1;
 }
@@ -100,7 +102,10 @@ static double reference_step(float top) {
 /* Return the number of bits of a packed coefficient of mode k (compact.h). */
 static int word_bits(const supine_tiles *tiles, size_t k) {
   const size_t paired = supine_tiles_paired(tiles->storage, tiles->modes);
-  return k < paired ? 16 : (k - paired) % 3 == 2 ? 10 : 11;
+  if (k < paired) {
+    return 16;
+  }
+  return (k - paired) % 3 == 2 ? 10 : 11;
 }
 
 /* Choose the quantisation steps. Bound the displacement and the error of each mode. The error is
@@ -146,16 +151,21 @@ static void pack_coefficients(const supine_tiles *tiles, const double *unit, con
     const float *second = first + TILE;
     const float *third = second + TILE;
     const double *u = unit + k;
-    for (size_t v = 0; v < TILE && k < paired; ++v) {
-      words[v] =
-          pair_narrow((double)first[v] / u[0], k + 1 < paired ? (double)second[v] / u[1] : 0);
-    }
-    for (size_t v = 0; v < TILE && k >= paired; ++v) {
-      words[v] =
-          triple_narrow((double)first[v] / u[0], (double)second[v] / u[1], (double)third[v] / u[2]);
+    size_t step = 3; /* number of modes in the words */
+    if (k < paired) {
+      for (size_t v = 0; v < TILE; ++v) {
+        words[v] =
+            pair_narrow((double)first[v] / u[0], k + 1 < paired ? (double)second[v] / u[1] : 0);
+      }
+      step = k + 1 < paired ? 2 : 1;
+    } else {
+      for (size_t v = 0; v < TILE; ++v) {
+        words[v] = triple_narrow((double)first[v] / u[0], (double)second[v] / u[1],
+                                 (double)third[v] / u[2]);
+      }
     }
     memcpy(at, words, sizeof words);
-    k = k + 1 == paired ? paired : k + (k < paired ? 2 : 3);
+    k += step;
   }
 }
 

@@ -23,8 +23,10 @@ static const double least_rest_share = 1e-6;
 /* Return the largest magnitude of `count` numbers; 0 if there are none. */
 static double largest_of(const double *values, size_t count) {
   double largest = 0;
-  for (size_t i = 0; i < count && values != NULL; ++i) {
-    largest = fmax(largest, fabs(values[i]));
+  if (values != NULL) {
+    for (size_t i = 0; i < count; ++i) {
+      largest = fmax(largest, fabs(values[i]));
+    }
   }
   return largest;
 }
@@ -39,10 +41,11 @@ static bool plausible_positions(const supine_basis *basis, char *detail, size_t 
     ordered = ordered && low <= high;
   }
   if (!ordered || farthest > farthest_mm) {
-    (void)supine_print_text(detail, size,
-                   "a position, the box of the lungs or the midline is %g mm from the origin, more "
-                   "than %g mm, or the box is empty",
-                   farthest, farthest_mm);
+    (void)supine_print_text(
+        detail, size,
+        "a position, the box of the lungs or the midline is %g mm from the origin, more "
+        "than %g mm, or the box is empty",
+        farthest, farthest_mm);
     return false;
   }
   return true;
@@ -68,10 +71,11 @@ static bool plausible_modes(const supine_basis *basis, char *detail, size_t size
     moved += most * basis->mode_size[k];
   }
   if (!(weight <= largest_weight) || !(moved <= largest_move_mm)) {
-    (void)supine_print_text(detail, size,
-                   "modes have weights of up to %g and displacements of up to %g mm, more than %g "
-                   "and %g mm",
-                   weight, moved, largest_weight, largest_move_mm);
+    (void)supine_print_text(
+        detail, size,
+        "modes have weights of up to %g and displacements of up to %g mm, more than %g "
+        "and %g mm",
+        weight, moved, largest_weight, largest_move_mm);
     return false;
   }
   return true;
@@ -87,12 +91,13 @@ static bool plausible_forms(const supine_basis *basis, char *detail, size_t size
   const size_t normals = info->lung_count * info->normal_count * (info->volume_axes == 3 ? 3 : 1) *
                          supine_basis_normal_terms(basis);
   if (form > largest_form_ml) {
-    (void)supine_print_text(detail, size, "a coefficient of the volumes is %g mL, above %g mL", form,
-                   largest_form_ml);
+    (void)supine_print_text(detail, size, "a coefficient of the volumes is %g mL, above %g mL",
+                            form, largest_form_ml);
     return false;
   }
   if (largest_of(info->normal_weights, normals) > largest_normal) {
-    (void)supine_print_text(detail, size, "tensor 'normal_weights' has a number above %g", largest_normal);
+    (void)supine_print_text(detail, size, "tensor 'normal_weights' has a number above %g",
+                            largest_normal);
     return false;
   }
   return true;
@@ -104,23 +109,25 @@ static bool plausible_scan(const supine_basis *basis, char *detail, size_t size)
   const double length = sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     if (!(fabs(basis->reference_volume[lung]) <= largest_ml)) {
-      (void)supine_print_text(detail, size, "the reference volume of lung '%s' is %g mL, above %g mL",
-                     basis->info.lung_names[lung], basis->reference_volume[lung], largest_ml);
+      (void)supine_print_text(
+          detail, size, "the reference volume of lung '%s' is %g mL, above %g mL",
+          basis->info.lung_names[lung], basis->reference_volume[lung], largest_ml);
       return false;
     }
   }
   if (!(fabs(basis->scan_volume) <= largest_ml)) {
-    (void)supine_print_text(detail, size, "metadata 'scan_volume_ml' is %g, above %g", basis->scan_volume,
-                   largest_ml);
+    (void)supine_print_text(detail, size, "metadata 'scan_volume_ml' is %g, above %g",
+                            basis->scan_volume, largest_ml);
     return false;
   }
   if (!(fabs(length - 1) <= 1e-3)) {
-    (void)supine_print_text(detail, size, "metadata 'scan_gravity' has the length %g, not 1", length);
+    (void)supine_print_text(detail, size, "metadata 'scan_gravity' has the length %g, not 1",
+                            length);
     return false;
   }
   if (!(basis->upright_gain >= 0 && basis->upright_gain <= 1)) {
     (void)supine_print_text(detail, size, "metadata 'full_upright_gain' is %g, not 0 to 1",
-                   basis->upright_gain);
+                            basis->upright_gain);
     return false;
   }
   if (largest_of(basis->info.bend, 3) > largest_bend) {
@@ -145,18 +152,19 @@ static bool plausible_row(const double *row, double reference, char *detail, siz
       change += row[t] * y[t];
     }
     if (!(change > -reference && change < reference)) {
-      (void)supine_print_text(detail, size,
-                     "tensor 'resting_volume' has %g mL at rest in a posture, for lungs with a "
-                     "reference volume of %g mL",
-                     reference + change, reference);
+      (void)supine_print_text(
+          detail, size,
+          "tensor 'resting_volume' has %g mL at rest in a posture, for lungs with a "
+          "reference volume of %g mL",
+          reference + change, reference);
       return false;
     }
     farthest = fmax(farthest, fabs(change));
   }
   if (farthest < least_rest_share * reference) {
-    (void)supine_print_text(detail, size,
-                   "tensor 'resting_volume' differs from the reference volume by only %g mL",
-                   farthest);
+    (void)supine_print_text(
+        detail, size, "tensor 'resting_volume' differs from the reference volume by only %g mL",
+        farthest);
     return false;
   }
   return true;

@@ -25,8 +25,10 @@ void supine_rigid_rotation(const double h[3][3], double rotation[9]) {
       next[a] = shift * q[a] + m[a][0] * q[0] + m[a][1] * q[1] + m[a][2] * q[2] + m[a][3] * q[3];
       square += next[a] * next[a];
     }
-    for (size_t a = 0; a < 4 && square > 0; ++a) {
-      q[a] = next[a] / sqrt(square);
+    if (square > 0) {
+      for (size_t a = 0; a < 4; ++a) {
+        q[a] = next[a] / sqrt(square);
+      }
     }
   }
   const double square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];

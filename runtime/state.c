@@ -266,7 +266,8 @@ static size_t add_state(const supine_state *state, bool described, char *text, s
     add_volume(&out, &state->volume, described);
   }
   for (size_t i = 0; i < state->lung_count; ++i) {
-    add(&out, described ? ", %s lung " : i == 0 ? ":%s=" : ",%s=", state->lungs[i].name);
+    const char *format = i == 0 ? ":%s=" : ",%s=";
+    add(&out, described ? ", %s lung " : format, state->lungs[i].name);
     add_volume(&out, &state->lungs[i].volume, described);
   }
   return out.length;

@@ -220,7 +220,11 @@ static supine_status follow_path(const supine_volume_form *form, const double be
   for (int halving = 0; halving < 60; ++halving) {
     const double middle = 0.5 * (near + far);
     held = volume_on_path(form, bend, scale, middle, gains);
-    *(side * held < side * volume ? &near : &far) = middle;
+    if (side * held < side * volume) {
+      near = middle;
+    } else {
+      far = middle;
+    }
   }
   return SUPINE_OK;
 }

@@ -285,6 +285,107 @@ def check_waits():
                     faults.append(f"{os.path.join(folder, name)}: '{wait}': wait for an event or for the answer to a later message")
 
 
+QUOTED = re.compile(r'"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])*\'')
+CHANGED = r"(?:(?:\+\+|--|&)\s*{0}\b|\b{0}\s*(?:\+\+|--)|\b{0}(?:(?:->|\.)\w+|\[[^]]*\])*\s*(?:[-+*/%&|^]|<<|>>)?=(?!=))"
+# What a condition of SUPINE_REFUSE_IF may call: functions that answer a question about values, without effects.
+QUESTION = re.compile(r"(?:\w+_)?(?:is|has|same|supports|fits|ends_in|allows|starts|positive|known)(?:_\w+)?|is(?:finite|inf|nan)|S_IS\w+|f(?:abs|max|min|error|eof)|"
+                      r"str(?:n?cmp|len|chr|str)|memchr|\w*_(?:metadata|info|size|distance|status|stride|code|value|named|text|names|sum)|failed|sizeof")
+
+
+def code_of(text):
+    """Blank comments, the contents of literals and preprocessor lines, so that positions stay."""
+    text = QUOTED.sub(lambda found: found[0][0] + " " * (len(found[0]) - 2) + found[0][0], without_comments(text))
+    return re.sub(r"^[ \t]*#(?:[^\n]*\\\n)*[^\n]*", lambda found: re.sub(r"[^\n]", " ", found[0]), text, flags=re.M)
+
+
+def end_of(text, begin, pair="()"):
+    """Return the position behind the bracket that closes the one at `begin`."""
+    depth = 0
+    for at in range(begin, len(text)):
+        depth += (text[at] == pair[0]) - (text[at] == pair[1])
+        if depth == 0:
+            return at + 1
+    return len(text)
+
+
+def split_at(text, separator):
+    """Split at separators that are outside brackets."""
+    parts, depth, at = [""], 0, 0
+    while at < len(text):
+        depth += (text[at] in "([{") - (text[at] in ")]}")
+        if depth == 0 and text.startswith(separator, at):
+            parts.append("")
+            at += len(separator)
+        else:
+            parts[-1] += text[at]
+            at += 1
+    return parts
+
+
+def hidden_if(text, begin):
+    """Return the part of the condition of a `for` that no turn of the loop can change, or None."""
+    after = end_of(text, begin)
+    head = split_at(text[begin + 1:after - 1], ";")
+    body = after + len(text[after:]) - len(text[after:].lstrip())
+    body = text[body:end_of(text, body, "{}")] if text[body] == "{" else text[body:text.index(";", body)]
+    turn = f"{head[2]};{body}" if len(head) == 3 else ""
+    parts = split_at(head[1], "&&") if len(head) == 3 else []
+    for part in parts if len(parts) > 1 else []:
+        names = set(re.findall(r"(?<![.\w>])[A-Za-z_]\w*", part)) | set(re.findall(r"->\s*(\w+)", part))
+        passed = re.findall(r"\w\(([^;{}]*)\)", turn)
+        changes = any(re.search(CHANGED.format(name), turn) for name in names)
+        reached = any(re.search(r"(?<!\w)%s\b(?!\s*(?:->|\[|\.))" % name, call) for name in re.findall(r"(\w+)\s*(?:->|\[)", part) for call in passed)
+        if not changes and not reached and not re.search(r"\w\(", part.replace("sizeof(", "")):
+            return part.strip()
+    return None
+
+
+def nested_choice(statement):
+    """Return whether a branch or the condition of one ?: is another."""
+    for first in (at for at, letter in enumerate(statement) if letter == "?"):
+        depth = 0
+        for letter in statement[first + 1:]:
+            depth += (letter in "([") - (letter in ")]")
+            if depth < 0 or (letter == "," and depth == 0):
+                break
+            if letter == "?" and depth == 0:
+                return True
+    return bool(re.search(r"[?:]\s*\([^()]*(?:\([^()]*\)[^()]*)*\?(?:[^()]|\([^()]*\))*:(?:[^()]|\([^()]*\))*\)\s*[;:,)]", statement))
+
+
+def forms_of(text):
+    """Yield the position of each form that a reader pays for, and how to write it plainly."""
+    for found in re.finditer(r"\bfor \(", text):
+        part = hidden_if(text, found.end() - 1)
+        if part is not None:
+            yield found.start(), f"the condition of the loop hides an if ({part}): write the if around the loop"
+    for found in re.finditer(r"[^;{}]*[;{}]", text):
+        if nested_choice(found[0]):
+            yield found.start() + len(found[0]) - len(found[0].lstrip()), "nested ?: are hard to read: use if, switch or a table"
+    for found in re.finditer(r"\bSUPINE_TRY\(", text):
+        if len(split_at(text[found.end():end_of(text, found.end() - 1) - 1], "?")) > 1:
+            yield found.start(), "SUPINE_TRY(c ? a : b): write if (c) { SUPINE_TRY(a); }"
+    for found in re.finditer(r"\*\([^();]*\?[^();]*\)\s*=(?!=)", text):
+        yield found.start(), "*(c ? &a : &b) = x: use if and else"
+    for found in re.finditer(r"\bSUPINE_REFUSE_IF\(", text):
+        condition = arguments(text, found.end())[0]
+        for called in re.findall(r"\b(\w+)\s*\(", condition):
+            if not QUESTION.fullmatch(called):
+                yield found.start(), f"{called} is work inside a condition of SUPINE_REFUSE_IF: call it in a statement before"
+        if re.search(r"!\([^()]*>\s*0\)", condition):
+            yield found.start(), "write count == 0 instead of !(count > 0)"
+
+
+def check_forms(files):
+    """Check that sources have none of the forms that save lines at the expense of the reader."""
+    for file in files:
+        with open(os.path.join(source, file), encoding="utf-8") as opened:
+            text = code_of(opened.read())
+        for position, form in forms_of(text):
+            line = text.count("\n", 0, position) + 1
+            faults.append(f"{file}:{line}: {form}")
+
+
 def check_examples():
     """Check that each example has a README that names its files and an existing test, and a row in examples/README.md."""
     defined = set()
@@ -315,6 +416,7 @@ check_licences()
 check_locale(files)
 check_sizes(files)
 check_distances(files)
+check_forms(files)
 check_waits()
 check_includes(folders, files)
 check_system_headers(files)

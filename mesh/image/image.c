@@ -62,7 +62,10 @@ SUPINE_CLONES void supine_image_gather(const supine_image *image, size_t from, c
 
 static double clip(double value, double low, double high) {
   const double whole = rint(value);
-  return whole > low ? (whole < high ? whole : high) : low; /* NaN becomes `low` */
+  if (!(whole > low)) { /* also NaN */
+    return low;
+  }
+  return whole < high ? whole : high;
 }
 
 #define PUT(type, number)                                                                          \

@@ -107,7 +107,8 @@ supine_status supine_image_write(const char *path, const supine_image *image, co
   SUPINE_TRY(supine_output_open(path, &output, error));
   const supine_status status =
       formats[format_of(path)].write(path, image, note, output.file, error);
-  return status == SUPINE_OK             ? supine_output_commit(&output, error)
-         : status == SUPINE_ERROR_MEMORY ? supine_error_memory(error, "writing %s", path)
-                                         : status;
+  if (status == SUPINE_ERROR_MEMORY) {
+    return supine_error_memory(error, "writing %s", path);
+  }
+  return status == SUPINE_OK ? supine_output_commit(&output, error) : status;
 }

@@ -161,8 +161,10 @@ static const char *describe(const header *h, supine_image *image, size_t *type_i
     }
   }
   /* if the header has no matrix, the axes of the image are x, y and z */
-  for (size_t a = 0; !framed && a < 3; ++a) {
-    image->step[a][a] = spacing[a];
+  if (!framed) {
+    for (size_t a = 0; a < 3; ++a) {
+      image->step[a][a] = spacing[a];
+    }
   }
   return NULL;
 }
@@ -178,13 +180,15 @@ supine_status supine_image_describe_mha(const char *path, FILE *file, supine_ima
   const char *wrong = read_header(text, &h);
   wrong = wrong == NULL ? check(&h) : wrong;
   wrong = wrong == NULL ? describe(&h, image, &type) : wrong;
+  int integer = 0; /* 1: int64, -1: uint64 */
+  if (types[type].wide) {
+    integer = types[type].name[4] == 'U' ? -1 : 1;
+  }
   *storage = (image_storage){
       .offset = (int64_t)h.length,
       .packed = is_true(value_of(&h, "CompressedData", "", "")),
       .big_endian = is_true(value_of(&h, "BinaryDataByteOrderMSB", "ElementByteOrderMSB", "")),
-      .integer = !types[type].wide            ? 0
-                 : types[type].name[4] != 'U' ? 1
-                                              : -1};
+      .integer = integer};
   SUPINE_REFUSE_IF(wrong != NULL, error, SUPINE_ERROR_FORMAT, "%s: %s", path, wrong);
   return SUPINE_OK;
 }

@@ -38,9 +38,12 @@ static bool forms_differ(const nifti_image *nifti) {
 /* Check the image's size and type. Convert origin and steps from RAS, NIfTI's axes, to LPS. */
 static supine_status check(const char *path, const nifti_image *nifti, supine_image *image,
                            image_storage *storage, supine_error *error) {
-  const double unit = nifti->xyz_units == NIFTI_UNITS_METER    ? 1000.0
-                      : nifti->xyz_units == NIFTI_UNITS_MICRON ? 1e-3
-                                                               : 1.0;
+  double unit = 1.0; /* mm */
+  if (nifti->xyz_units == NIFTI_UNITS_METER) {
+    unit = 1000.0;
+  } else if (nifti->xyz_units == NIFTI_UNITS_MICRON) {
+    unit = 1e-3;
+  }
   const nifti_dmat44 *m = nifti->sform_code > 0 ? &nifti->sto_xyz : &nifti->qto_xyz;
   const int64_t size[3] = {nifti->nx, nifti->ny, nifti->nz};
   size_t type = 0;
@@ -73,13 +76,17 @@ static supine_status check(const char *path, const nifti_image *nifti, supine_im
     }
   }
   const bool packed = nifti_is_gzfile(path) != 0;
+  int integer = 0; /* 1: int64, -1: uint64 */
+  if (nifti->datatype == DT_INT64) {
+    integer = 1;
+  } else if (nifti->datatype == DT_UINT64) {
+    integer = -1;
+  }
   *storage = (image_storage){.offset = packed ? 0 : nifti->iname_offset,
                              .skip = packed ? nifti->iname_offset : 0,
                              .packed = packed,
                              .big_endian = nifti->byteorder != nifti_short_order(),
-                             .integer = nifti->datatype == DT_INT64    ? 1
-                                        : nifti->datatype == DT_UINT64 ? -1
-                                                                       : 0,
+                             .integer = integer,
                              .slope = nifti->scl_slope,
                              .intercept = nifti->scl_inter};
   return SUPINE_OK;

@@ -30,7 +30,12 @@ static bool inflate_into(FILE *file, uint64_t skip, unsigned char *values, size_
       z.avail_in = (unsigned)fread(packed, 1, PIECE, file);
     }
     const bool wanted = unpacked >= skip && unpacked < end;
-    const uint64_t room = wanted ? end - unpacked : unpacked < skip ? skip - unpacked : PIECE;
+    uint64_t room = PIECE;
+    if (wanted) {
+      room = end - unpacked;
+    } else if (unpacked < skip) {
+      room = skip - unpacked;
+    }
     const unsigned given = (unsigned)(room < PIECE ? room : PIECE);
     z.next_out = wanted ? values + (unpacked - skip) : discarded;
     z.avail_out = given;
@@ -139,12 +144,17 @@ supine_status supine_image_read_voxels(const char *path, FILE *file, size_t file
   if (image->values == NULL) {
     return supine_error_memory(error, "%zu voxels of %s", count, path);
   }
-  SUPINE_REFUSE_IF(fseeko(file, storage->offset, SEEK_SET) != 0 ||
-                       !(storage->packed ? inflate_into(file, (uint64_t)storage->skip,
-                                                        image->values, count * each)
-                         : storage->text ? read_text(file, image, count)
-                                         : fread(image->values, each, count, file) == count),
-                   error, SUPINE_ERROR_FORMAT,
+  bool complete = fseeko(file, storage->offset, SEEK_SET) == 0;
+  if (!complete) {
+    /* the file is too short, or cannot be read at another place */
+  } else if (storage->packed) {
+    complete = inflate_into(file, (uint64_t)storage->skip, image->values, count * each);
+  } else if (storage->text) {
+    complete = read_text(file, image, count);
+  } else {
+    complete = fread(image->values, each, count, file) == count;
+  }
+  SUPINE_REFUSE_IF(!complete, error, SUPINE_ERROR_FORMAT,
                    "%s: truncated or damaged; fetch or write the file again", path);
   if (storage->big_endian && !storage->text) {
     swap_bytes(image->values, count, each);

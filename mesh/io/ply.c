@@ -57,9 +57,11 @@ static bool add_element(ply *in, mesh_text name, mesh_text count) {
   }
   element *added = &in->elements[in->element_count];
   *added = (element){.kind = (kind)find_name(name, kinds), .first_property = in->property_count};
-  for (size_t e = 0; added->kind != OTHER && e < in->element_count; ++e) {
-    if (in->elements[e].kind == added->kind) { /* two elements of the same kind are ambiguous */
-      return false;
+  if (added->kind != OTHER) {
+    for (size_t e = 0; e < in->element_count; ++e) {
+      if (in->elements[e].kind == added->kind) { /* two elements of the same kind are ambiguous */
+        return false;
+      }
     }
   }
   ++in->element_count;
@@ -110,18 +112,20 @@ static bool read_line(ply *in, mesh_text line, bool *has_format) {
     *has_format = in->encoding < ENCODINGS;
     return *has_format;
   }
-  return words > 0 && supine_io_text_is(word[0], "element")
-             ? words > 2 && add_element(in, word[1], word[2])
-         : words > 0 && supine_io_text_is(word[0], "property")
-             ? add_property(in, word + 1, words - 1)
-             : true;
+  if (words > 0 && supine_io_text_is(word[0], "element")) {
+    return words > 2 && add_element(in, word[1], word[2]);
+  }
+  if (words > 0 && supine_io_text_is(word[0], "property")) {
+    return add_property(in, word + 1, words - 1);
+  }
+  return true;
 }
 
 static supine_status read_header(ply *in) {
   mesh_text line;
   bool has_format = false;
-  SUPINE_REFUSE_IF(!supine_io_text_line(&in->text, &line) || !supine_io_text_is(line, "ply"),
-                   in->error, SUPINE_ERROR_FORMAT,
+  const bool has_line = supine_io_text_line(&in->text, &line);
+  SUPINE_REFUSE_IF(!has_line || !supine_io_text_is(line, "ply"), in->error, SUPINE_ERROR_FORMAT,
                    "%s: does not begin with \"ply\"; give a PLY file", in->file->path);
   for (size_t number = 2; supine_io_text_line(&in->text, &line); ++number) {
     mesh_text rest = line;
@@ -132,7 +136,8 @@ static supine_status read_header(ply *in) {
                        in->file->path);
       return SUPINE_OK;
     }
-    SUPINE_REFUSE_IF(!read_line(in, line, &has_format), in->error, SUPINE_ERROR_FORMAT,
+    const bool good = read_line(in, line, &has_format);
+    SUPINE_REFUSE_IF(!good, in->error, SUPINE_ERROR_FORMAT,
                      "%s: line %zu of the PLY header is malformed; save the mesh again",
                      in->file->path, number);
   }
@@ -152,7 +157,9 @@ static supine_status check_header(const ply *in) {
                      SUPINE_ERROR_MESH,
                      "%s: it has strips of triangles; save the mesh as triangles", path);
   }
-  SUPINE_TRY(in->encoding == ASCII ? supine_io_guard_text(in->file, in->error) : SUPINE_OK);
+  if (in->encoding == ASCII) {
+    SUPINE_TRY(supine_io_guard_text(in->file, in->error));
+  }
   SUPINE_REFUSE_IF((in->present & needed) != needed, in->error, SUPINE_ERROR_MESH,
                    "%s: no triangles: the PLY header has no faces with vertex_indices, or no "
                    "vertices with x, y and z; save the mesh as triangles",
@@ -243,9 +250,11 @@ static supine_status make_room(const ply *in, const element *of, supine_mesh *me
   uint64_t least = 0; /* smallest possible size of a vertex in the file, bytes */
   for (size_t p = 0; p < of->property_count; ++p) {
     const property *item = &in->properties[of->first_property + p];
-    least += in->encoding == ASCII ? 2 /* at least a digit and a blank */
-             : item->count != NULL ? item->count->size
-                                   : item->type->size;
+    if (in->encoding == ASCII) {
+      least += 2; /* at least a digit and a blank */
+    } else {
+      least += item->count != NULL ? item->count->size : item->type->size;
+    }
   }
   const uint64_t room = (uint64_t)(in->text.end - in->text.at) / least + 1;
   const uint64_t count = of->count < room ? of->count : room;
@@ -271,7 +280,9 @@ supine_status supine_io_read_ply(mesh_file *file, supine_mesh *mesh, size_t *dro
     const element *of = &in.elements[e];
     SUPINE_REFUSE_IF(of->kind == FACES && mesh->vertices == NULL, in.error, SUPINE_ERROR_FORMAT,
                      "%s: its faces come before its vertices; save the mesh again", in.file->path);
-    SUPINE_TRY(of->kind == VERTICES ? make_room(&in, of, mesh) : SUPINE_OK);
+    if (of->kind == VERTICES) {
+      SUPINE_TRY(make_room(&in, of, mesh));
+    }
     SUPINE_TRY(take_items(&in, of));
   }
   *dropped = in.faces.dropped;

@@ -235,9 +235,11 @@ static void vtp_head(const vtp *file) {
   (void)fputs("<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" "
               "header_type=\"UInt64\">\n<PolyData",
               out);
-  for (size_t frame = 0; file->frames->times != NULL && frame < file->frames->count; ++frame) {
-    (void)supine_print(out, "%s%.9g%s", frame == 0 ? " TimeValues=\"" : " ",
-                       file->frames->times[frame], frame + 1 == file->frames->count ? "\"" : "");
+  if (file->frames->times != NULL) {
+    for (size_t frame = 0; frame < file->frames->count; ++frame) {
+      (void)supine_print(out, "%s%.9g%s", frame == 0 ? " TimeValues=\"" : " ",
+                         file->frames->times[frame], frame + 1 == file->frames->count ? "\"" : "");
+    }
   }
   (void)fputs(">\n", out);
   write_field_data(file);

@@ -29,11 +29,13 @@ supine_status supine_io_writer_check(const char *path, const supine_mesh *mesh,
 
 static void copy_comment(const char *comment, char *line, size_t size) {
   size_t length = 0;
-  for (; comment != NULL && comment[length] != '\0' && length < size - 1; ++length) {
-    const unsigned char c = (unsigned char)comment[length];
-    line[length] = comment[length];
-    if (c < ' ' || c == 0x7F) {
-      line[length] = ' ';
+  if (comment != NULL) {
+    for (; comment[length] != '\0' && length < size - 1; ++length) {
+      const unsigned char c = (unsigned char)comment[length];
+      line[length] = comment[length];
+      if (c < ' ' || c == 0x7F) {
+        line[length] = ' ';
+      }
     }
   }
   line[length] = '\0';

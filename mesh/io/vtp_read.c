@@ -203,11 +203,14 @@ static supine_status take_numbers(const vtp_file *v, const element *e, size_t co
   mesh_text text = {(const unsigned char *)e->body,
                     (const unsigned char *)(tag != NULL ? tag : v->end)};
   bool good = ascii || take_bytes(v, e, count * type->size, bytes);
-  for (size_t i = 0; i < count && good && ascii; ++i) {
-    good = supine_io_text_number(&text, &values[i]);
-  }
-  for (size_t i = 0; i < count && good && !ascii; ++i) {
-    values[i] = supine_io_type_decode(type, bytes + i * type->size, false);
+  if (ascii) {
+    for (size_t i = 0; i < count && good; ++i) {
+      good = supine_io_text_number(&text, &values[i]);
+    }
+  } else if (good) {
+    for (size_t i = 0; i < count; ++i) {
+      values[i] = supine_io_type_decode(type, bytes + i * type->size, false);
+    }
   }
   SUPINE_REFUSE_IF(!good, error, SUPINE_ERROR_FORMAT,
                    "%s: an array is truncated or damaged; write the file again", v->file->path);
@@ -256,9 +259,9 @@ static supine_status take_polygons(const vtp_file *v, const element *piece, mesh
   if (count == 0) {
     return SUPINE_OK;
   }
-  SUPINE_REFUSE_IF(!find_array(v, piece, "Polys", "offsets", &offsets) ||
-                       !find_array(v, piece, "Polys", "connectivity", &connectivity),
-                   error, SUPINE_ERROR_FORMAT,
+  const bool found = find_array(v, piece, "Polys", "offsets", &offsets) &&
+                     find_array(v, piece, "Polys", "connectivity", &connectivity);
+  SUPINE_REFUSE_IF(!found, error, SUPINE_ERROR_FORMAT,
                    "%s: its polygons have no offsets or connectivity; write the file again",
                    v->file->path);
   static const char wrong[] = "the offsets of its polygons are invalid; write the file again";
@@ -285,9 +288,9 @@ static supine_status read_head(vtp_file *v, element *piece, supine_error *error)
   element appended;
   element second;
   char compressor[64];
-  SUPINE_REFUSE_IF(!find_element(v->bytes, v->end, "VTKFile", &root) ||
-                       !is_attribute(&root, "type", "PolyData"),
-                   error, SUPINE_ERROR_FORMAT,
+  const bool has_root = find_element(v->bytes, v->end, "VTKFile", &root);
+  SUPINE_REFUSE_IF(!has_root || !is_attribute(&root, "type", "PolyData"), error,
+                   SUPINE_ERROR_FORMAT,
                    "%s: no VTKFile of type PolyData; save the surface as PolyData", v->file->path);
   SUPINE_REFUSE_IF(is_attribute(&root, "byte_order", "BigEndian"), error, SUPINE_ERROR_FORMAT,
                    "%s: big-endian VTP is not supported; save the surface as PLY", v->file->path);
@@ -302,9 +305,11 @@ static supine_status read_head(vtp_file *v, element *piece, supine_error *error)
     v->appended = mark != NULL ? mark + 1 : NULL;
   }
   const char *limit = v->appended != NULL ? v->appended : v->end;
-  SUPINE_REFUSE_IF(!find_element(root.body, limit, "Piece", piece), error, SUPINE_ERROR_FORMAT,
+  const bool has_piece = find_element(root.body, limit, "Piece", piece);
+  SUPINE_REFUSE_IF(!has_piece, error, SUPINE_ERROR_FORMAT,
                    "%s: no element Piece; write the file again", v->file->path);
-  SUPINE_REFUSE_IF(find_element(piece->body, limit, "Piece", &second), error, SUPINE_ERROR_FORMAT,
+  const bool has_second = find_element(piece->body, limit, "Piece", &second);
+  SUPINE_REFUSE_IF(has_second, error, SUPINE_ERROR_FORMAT,
                    "%s: it has several Piece elements; save the surface as one piece",
                    v->file->path);
   return SUPINE_OK;
@@ -341,16 +346,17 @@ supine_status supine_io_read_vtp(mesh_file *file, supine_mesh *mesh, size_t *dro
   size_t count[3];
   SUPINE_TRY(read_head(&v, &piece, error));
   note_space(&v, &piece, file);
-  SUPINE_REFUSE_IF(!count_of(&piece, "NumberOfPoints", &count[0]) ||
-                       !count_of(&piece, "NumberOfPolys", &count[1]) ||
-                       !count_of(&piece, "NumberOfStrips", &count[2]),
-                   error, SUPINE_ERROR_FORMAT,
+  const bool counted = count_of(&piece, "NumberOfPoints", &count[0]) &&
+                       count_of(&piece, "NumberOfPolys", &count[1]) &&
+                       count_of(&piece, "NumberOfStrips", &count[2]);
+  SUPINE_REFUSE_IF(!counted, error, SUPINE_ERROR_FORMAT,
                    "%s: its numbers of points and polygons are invalid; write the file again",
                    v.file->path);
   SUPINE_REFUSE_IF(count[2] > 0, error, SUPINE_ERROR_FORMAT,
                    "%s: it has strips of triangles; save single triangles", v.file->path);
   if (count[0] > 0) {
-    SUPINE_REFUSE_IF(!find_array(&v, &piece, "Points", NULL, &points), error, SUPINE_ERROR_FORMAT,
+    const bool found = find_array(&v, &piece, "Points", NULL, &points);
+    SUPINE_REFUSE_IF(!found, error, SUPINE_ERROR_FORMAT,
                      "%s: no array of points; write the file again", v.file->path);
     SUPINE_TRY(take_numbers(&v, &points, 3 * count[0], &mesh->vertices, error));
     mesh->vertex_count = count[0];

@@ -26,10 +26,12 @@ static bool centre_of(const supine_image *image, const labels_tally *tally, cons
   double count = 0.0;
   double voxel[3] = {0.0, 0.0, 0.0};
   for (size_t label = 1; label < LABELS_MAX; ++label) {
-    for (int a = 0; side[label] == wanted && a < 3; ++a) {
-      voxel[a] += (double)tally[label].sum[a];
+    if (side[label] == wanted) {
+      for (int a = 0; a < 3; ++a) {
+        voxel[a] += (double)tally[label].sum[a];
+      }
+      count += (double)tally[label].count;
     }
-    count += side[label] == wanted ? (double)tally[label].count : 0.0;
   }
   for (int k = 0; k < 3; ++k) {
     centre[k] = image->origin[k];
@@ -178,7 +180,8 @@ static supine_status choose(const char *path, const supine_image *image, const l
       *name = wanted;
     }
   }
-  SUPINE_REFUSE_IF(!read_sides(labels, side), error, SUPINE_ERROR_ARGUMENT,
+  const bool good = read_sides(labels, side);
+  SUPINE_REFUSE_IF(!good, error, SUPINE_ERROR_ARGUMENT,
                    "--labels must be 'one', 'lungmask', 'lobes', 'totalsegmentator', "
                    "'totalsegmentator-v1' or left=LABEL+...,right=LABEL+..., not '%s'",
                    wanted);

@@ -29,8 +29,10 @@ static void average(const float *in, size_t outer, size_t n, size_t inner, size_
       for (double i = first; i - 0.5 < to && i < (double)n; ++i) {
         const double overlap = (fmin(to, i + 0.5) - fmax(from, i - 0.5)) / width;
         const float *source = in + (o * n + (size_t)i) * inner;
-        for (size_t x = 0; x < inner && overlap > 0.0; ++x) {
-          line[x] += (float)overlap * source[x];
+        if (overlap > 0.0) {
+          for (size_t x = 0; x < inner; ++x) {
+            line[x] += (float)overlap * source[x];
+          }
         }
       }
     }
@@ -150,7 +152,9 @@ static supine_status one_piece(labels_cubes *cubes) {
   SUPINE_TRY(supine_labels_keep_one(&inside, true, &pieces, &changed));
   for (size_t i = 0; i < count; ++i) {
     const bool is = cubes->share[i] >= half;
-    cubes->share[i] = is == (inside.at[i] != 0) ? cubes->share[i] : is ? 0.0F : half;
+    if (is != (inside.at[i] != 0)) {
+      cubes->share[i] = is ? 0.0F : half;
+    }
   }
   return SUPINE_OK;
 }

@@ -118,7 +118,11 @@ supine_status supine_labels_close(labels_mask *mask, double radius, size_t *adde
   SUPINE_TRY(supine_labels_distance(mask, false, squares));
   /* set voxels outside the mask, but within `radius` of it, to 2 */
   for (size_t i = 0; i < count; ++i) {
-    mask->at[i] = mask->at[i] != 0 ? 1 : squares[i] <= reach ? 2 : 0;
+    if (mask->at[i] != 0) {
+      mask->at[i] = 1;
+    } else if (squares[i] <= reach) {
+      mask->at[i] = 2;
+    }
   }
   SUPINE_TRY(supine_labels_distance(mask, true, squares));
   for (size_t i = 0; i < count; ++i) {

@@ -28,9 +28,11 @@ typedef struct work {
 
 static supine_status advance(work *w, double fraction, supine_error *error) {
   const supine_labels_options *options = w->options;
-  SUPINE_REFUSE_IF(
-      !(options->progress == NULL || options->progress(options->progress_context, fraction)), error,
-      SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
+  bool goes_on = true;
+  if (options->progress != NULL) {
+    goes_on = options->progress(options->progress_context, fraction);
+  }
+  SUPINE_REFUSE_IF(!goes_on, error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
   return SUPINE_OK;
 }
 
@@ -93,9 +95,11 @@ static supine_status make_mask(work *w, const labels_tally *tally, const uint8_t
   size_t low[3] = {SIZE_MAX, SIZE_MAX, SIZE_MAX};
   size_t high[3] = {0, 0, 0};
   for (size_t label = 1; label < LABELS_MAX; ++label) {
-    for (int a = 0; side[label] != 0 && tally[label].count > 0 && a < 3; ++a) {
-      low[a] = tally[label].low[a] < low[a] ? tally[label].low[a] : low[a];
-      high[a] = tally[label].high[a] > high[a] ? tally[label].high[a] : high[a];
+    if (side[label] != 0 && tally[label].count > 0) {
+      for (int a = 0; a < 3; ++a) {
+        low[a] = tally[label].low[a] < low[a] ? tally[label].low[a] : low[a];
+        high[a] = tally[label].high[a] > high[a] ? tally[label].high[a] : high[a];
+      }
     }
   }
   return supine_labels_mask_cut(&w->image, low, high, LABELS_MARGIN, side, &w->both);

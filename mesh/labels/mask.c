@@ -69,7 +69,8 @@ supine_status supine_labels_count(const char *path, const supine_image *image, l
   memset(tally, 0, LABELS_MAX * sizeof *tally);
   for (size_t row = 0; row < image->size[1] * image->size[2]; ++row) {
     double bad = 0.0;
-    SUPINE_REFUSE_IF(!read_row(image, row, labels, &bad), error, SUPINE_ERROR_FORMAT,
+    const bool good = read_row(image, row, labels, &bad);
+    SUPINE_REFUSE_IF(!good, error, SUPINE_ERROR_FORMAT,
                      bad < 0.0 ? "%s: a voxel holds %g, but labels are 0 to 65535: if this is the "
                                  "CT itself, segment it first"
                                : "%s: a voxel holds %g, but labels are whole numbers, 0 to 65535: "

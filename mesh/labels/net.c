@@ -173,15 +173,17 @@ static void step(const surface_net *net, double share, double (*next)[3]) {
     double count = 0.0;
     for (size_t n = 0; n < 6; ++n) {
       const uint32_t other = net->neighbour[v][n];
-      for (size_t a = 0; other != NONE && a < 3; ++a) {
-        sum[a] += (double)net->cell[other][a] - (double)net->cell[v][a] + net->at[other][a];
+      if (other != NONE) {
+        for (size_t a = 0; a < 3; ++a) {
+          sum[a] += (double)net->cell[other][a] - (double)net->cell[v][a] + net->at[other][a];
+        }
+        count += 1.0;
       }
-      count += other != NONE;
     }
     for (size_t a = 0; a < 3; ++a) {
       const double here = net->at[v][a];
       const double there = here + share * (sum[a] / count - here);
-      next[v][a] = there < 0.0 ? 0.0 : there > 1.0 ? 1.0 : there;
+      next[v][a] = fmin(fmax(there, 0.0), 1.0);
     }
   }
 }

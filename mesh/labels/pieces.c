@@ -113,8 +113,10 @@ supine_status supine_labels_keep_one(labels_mask *mask, bool zero, size_t *other
   SUPINE_TRY(supine_labels_pieces_find(mask, zero, &arena, &pieces));
   /* first run of the piece to keep: run 0 for voxels of value 0, as it is in the outer margin */
   uint32_t kept = 0;
-  for (size_t r = 1; !zero && r < pieces.run_count; ++r) {
-    kept = pieces.piece[r].count > pieces.piece[kept].count ? (uint32_t)r : kept;
+  if (!zero) {
+    for (size_t r = 1; r < pieces.run_count; ++r) {
+      kept = pieces.piece[r].count > pieces.piece[kept].count ? (uint32_t)r : kept;
+    }
   }
   *others = pieces.piece_count > 0 ? pieces.piece_count - 1 : 0;
   *voxels = 0;

@@ -35,12 +35,14 @@ static supine_status choose(const char *path, const labels_tally *tally, const u
                      path, wanted[i]);
     parts[(*count)++].label = wanted[i];
   }
-  for (unsigned label = 1; label < LABELS_MAX && wanted_count == 0; ++label) {
-    SUPINE_REFUSE_IF(tally[label].count > 0 && *count == PARTS_MAX, error, SUPINE_ERROR_MESH,
-                     "%s: more than %d labels: if this is a label map, name the labels to use",
-                     path, PARTS_MAX);
-    if (tally[label].count > 0) {
-      parts[(*count)++].label = label;
+  if (wanted_count == 0) {
+    for (unsigned label = 1; label < LABELS_MAX; ++label) {
+      SUPINE_REFUSE_IF(tally[label].count > 0 && *count == PARTS_MAX, error, SUPINE_ERROR_MESH,
+                       "%s: more than %d labels: if this is a label map, name the labels to use",
+                       path, PARTS_MAX);
+      if (tally[label].count > 0) {
+        parts[(*count)++].label = label;
+      }
     }
   }
   return SUPINE_OK;

@@ -59,9 +59,12 @@ static void mark_pair(const labels_mask *mask, const labels_pieces *pieces, cons
   for (size_t row = 0; row < mask->size[1] * mask->size[2]; ++row) {
     for (size_t r = pieces->row[row]; r < pieces->row[row + 1]; ++r) {
       const labels_run *run = &pieces->run[r];
-      const uint8_t mark = run->parent == found[0]   ? LABELS_LEFT
-                           : run->parent == found[1] ? LABELS_RIGHT
-                                                     : 0;
+      uint8_t mark = 0;
+      if (run->parent == found[0]) {
+        mark = LABELS_LEFT;
+      } else if (run->parent == found[1]) {
+        mark = LABELS_RIGHT;
+      }
       memset(marks + row * mask->size[0] + run->begin, mark, run->end - run->begin);
     }
   }
@@ -83,7 +86,9 @@ static supine_status share_out(labels_mask *both, uint8_t *marks, float *squares
     SUPINE_TRY(supine_labels_distance(&one, false, value == LABELS_LEFT ? squares : other));
   }
   for (size_t i = 0; i < count; ++i) {
-    both->at[i] = both->at[i] == 0 ? 0 : squares[i] <= other[i] ? LABELS_LEFT : LABELS_RIGHT;
+    if (both->at[i] != 0) {
+      both->at[i] = squares[i] <= other[i] ? LABELS_LEFT : LABELS_RIGHT;
+    }
   }
   return SUPINE_OK;
 }

@@ -69,9 +69,9 @@ static bool read_row(const reading *r, const supine_tensor *tensor, size_t row, 
 static supine_status read_direction(const reading *r, size_t row) {
   double *g = r->fields.directions + 3 * row;
   double given[3];
+  const bool good = read_row(r, r->gravity, row, 1.0, given) && supine_normalise(given, g);
   SUPINE_REFUSE_IF(
-      !read_row(r, r->gravity, row, 1.0, given) || !supine_normalise(given, g), r->error,
-      SUPINE_ERROR_FORMAT,
+      !good, r->error, SUPINE_ERROR_FORMAT,
       "%s: row %zu: gravity %g,%g,%g has no direction: give a vector that is finite and not 0",
       r->path, row, given[0], given[1], given[2]);
   for (size_t earlier = 0; earlier < row; ++earlier) {
@@ -87,8 +87,9 @@ static supine_status read_direction(const reading *r, size_t row) {
 static supine_status match_point(const reading *r, const supine_lungs_surface *vertices,
                                  double limit, size_t p) {
   double at[3];
-  SUPINE_REFUSE_IF(!read_row(r, r->points, p, r->frame.millimetres_per_unit, at), r->error,
-                   SUPINE_ERROR_FORMAT, "%s: point %zu is not finite: correct it", r->path, p);
+  const bool good = read_row(r, r->points, p, r->frame.millimetres_per_unit, at);
+  SUPINE_REFUSE_IF(!good, r->error, SUPINE_ERROR_FORMAT, "%s: point %zu is not finite: correct it",
+                   r->path, p);
   const supine_inside_place place = supine_lungs_surface_nearest(vertices, at, NULL);
   const size_t i = place.triangle;
   SUPINE_REFUSE_IF(
@@ -135,10 +136,10 @@ static supine_status match_points(const reading *r) {
 static supine_status read_field(const reading *r, size_t row) {
   const size_t n = r->fields.vertex_count;
   for (size_t i = 0; i < n; ++i) {
-    SUPINE_REFUSE_IF(!read_row(r, r->displacement, row * r->points->shape[0] + r->point_of[i],
-                               r->frame.millimetres_per_unit,
-                               r->fields.displacement + 3 * (n * row + i)),
-                     r->error, SUPINE_ERROR_FORMAT,
+    const bool good =
+        read_row(r, r->displacement, row * r->points->shape[0] + r->point_of[i],
+                 r->frame.millimetres_per_unit, r->fields.displacement + 3 * (n * row + i));
+    SUPINE_REFUSE_IF(!good, r->error, SUPINE_ERROR_FORMAT,
                      "%s: row %zu: the displacement of point %zu is not finite: correct it",
                      r->path, row, r->point_of[i]);
   }

@@ -162,13 +162,12 @@ supine_status supine_inside_biharmonic_fit(size_t count, const double *points, s
   frame(count, points, fit);
   supine_status status = arena.failed ? SUPINE_ERROR_MEMORY : choose(count, points, most, fit);
   status = status == SUPINE_OK ? solve(fit, values) : status;
-  return status == SUPINE_ERROR_MEMORY
-             ? supine_error_memory(error, "interpolation from %zu points", most)
-         : status != SUPINE_OK
-             ? supine_error_set(
-                   error, status,
-                   "cannot interpolate from %zu points in one plane: give closed lungs", most)
-             : SUPINE_OK;
+  if (status == SUPINE_ERROR_MEMORY) {
+    return supine_error_memory(error, "interpolation from %zu points", most);
+  }
+  SUPINE_REFUSE_IF(status != SUPINE_OK, error, status,
+                   "cannot interpolate from %zu points in one plane: give closed lungs", most);
+  return SUPINE_OK;
 }
 
 void supine_inside_biharmonic_free(supine_inside_biharmonic *fit) {

@@ -119,7 +119,13 @@ static void search_rows(void *context, size_t begin, size_t end, size_t thread) 
       supine_image_place(work->grid, row * size[0] + i, point);
       const size_t lung = supine_inside_shells_find(work->shells, point, work->limit, &walk);
       const double depth = walk.place[lung].depth;
-      work->keep[row * size[0] + i] = depth > 0.0 ? 2 : depth > -work->limit ? 1 : 0;
+      unsigned char keep = 0;
+      if (depth > 0.0) {
+        keep = 2;
+      } else if (depth > -work->limit) {
+        keep = 1;
+      }
+      work->keep[row * size[0] + i] = keep;
     }
   }
 }

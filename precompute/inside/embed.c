@@ -62,10 +62,12 @@ static void gather_parts(embedding *e) {
       const size_t lung = e->lung[end];
       most = ++count[lung] > count[most] ? lung : most;
     }
-    for (size_t i = begin; i < end && content->rigid[content->part[begin]]; ++i) {
-      e->lung[i] = (unsigned char)most;
-      e->place[i] =
-          supine_lungs_surface_find(e->shells->shell[most].surface, content->points + 3 * i, NULL);
+    if (content->rigid[content->part[begin]]) {
+      for (size_t i = begin; i < end; ++i) {
+        e->lung[i] = (unsigned char)most;
+        e->place[i] = supine_lungs_surface_find(e->shells->shell[most].surface,
+                                                content->points + 3 * i, NULL);
+      }
     }
   }
 }
@@ -166,20 +168,25 @@ static void take_field(const embedding *e, size_t lung, size_t count, const doub
   const size_t modes = e->columns / 3;
   const double *weights = e->shells->scan.weights;
   const char *name = supine_basis_get_info(e->shells->basis)->lung_names[lung];
-  for (size_t i = 0; i < count && e->options->field != NULL; ++i) {
-    double *of[3] = {values + 3 * i * modes, values + (3 * i + 1) * modes,
-                     values + (3 * i + 2) * modes};
-    double sum[3] = {0.0, 0.0, 0.0};
-    double u[3];
-    for (size_t k = 0; k < 3 * modes; ++k) {
-      sum[k / modes] += weights[k % modes] * of[k / modes][k % modes];
-    }
-    const double square = supine_dot(sum, sum);
-    e->options->field(e->options->context, positions + 3 * i, name[0] == 'l' ? 1.0 : -1.0, u);
-    for (size_t k = 0; k < modes && square > 0.0; ++k) {
-      const double factor = (of[0][k] * sum[0] + of[1][k] * sum[1] + of[2][k] * sum[2]) / square;
-      for (size_t axis = 0; axis < 3; ++axis) {
-        of[axis][k] = factor * u[axis];
+  if (e->options->field != NULL) {
+    for (size_t i = 0; i < count; ++i) {
+      double *of[3] = {values + 3 * i * modes, values + (3 * i + 1) * modes,
+                       values + (3 * i + 2) * modes};
+      double sum[3] = {0.0, 0.0, 0.0};
+      double u[3];
+      for (size_t k = 0; k < 3 * modes; ++k) {
+        sum[k / modes] += weights[k % modes] * of[k / modes][k % modes];
+      }
+      const double square = supine_dot(sum, sum);
+      e->options->field(e->options->context, positions + 3 * i, name[0] == 'l' ? 1.0 : -1.0, u);
+      if (square > 0.0) {
+        for (size_t k = 0; k < modes; ++k) {
+          const double factor =
+              (of[0][k] * sum[0] + of[1][k] * sum[1] + of[2][k] * sum[2]) / square;
+          for (size_t axis = 0; axis < 3; ++axis) {
+            of[axis][k] = factor * u[axis];
+          }
+        }
       }
     }
   }
@@ -261,10 +268,10 @@ static supine_status embed_lung(embedding *e, size_t lung, size_t begin, size_t 
   SUPINE_TRY(supine_arena_check(&arena, error, "the motion of %zu vertices", shell->vertex_count));
   supine_inside_shell_displacement(e->shells, lung, displacement);
   add_squares(e, lung, displacement);
-  SUPINE_TRY(begin == end
-                 ? SUPINE_OK
-                 : supine_inside_biharmonic_fit(shell->vertex_count, shell->vertices, e->columns,
-                                                displacement, centres, &fit, error));
+  if (begin < end) {
+    SUPINE_TRY(supine_inside_biharmonic_fit(shell->vertex_count, shell->vertices, e->columns,
+                                            displacement, centres, &fit, error));
+  }
   const double reach =
       e->options->field != NULL ? shell->edge : reach_spacings * (fit.spacing + shell->edge);
   for (size_t at = begin; at < end; at += BLOCK) {
@@ -300,8 +307,10 @@ static void rigid_to_full(embedding *e, size_t begin, size_t end) {
         const double moved = scan[b] - given[b] - ((double)e->vertices[3 * i + b] - full[b]);
         h[k / 3][b] += p[k / 3] * (p[b] + moved);
       }
-      for (size_t a = 0; a < 3 && turn == TURNS; ++a) {
-        e->vertices[3 * i + a] = (float)(full[a] + p[a]);
+      if (turn == TURNS) {
+        for (size_t a = 0; a < 3; ++a) {
+          e->vertices[3 * i + a] = (float)(full[a] + p[a]);
+        }
       }
     }
     supine_rigid_rotation((const double(*)[3])h, r);
@@ -340,9 +349,11 @@ static supine_status write_file(const embedding *e, const char *path, supine_ten
   const supine_inside_content *content = e->content;
   metadata[count++] = (supine_metadata){"kind", "vector"};
   metadata[count++] = (supine_metadata){"mode_count", modes};
-  metadata[count++] = (supine_metadata){"content", content->part_count == 0      ? "grid"
-                                                   : content->triangle_count > 0 ? "mesh"
-                                                                                 : "points"};
+  const char *kind = content->triangle_count > 0 ? "mesh" : "points";
+  if (content->part_count == 0) {
+    kind = "grid";
+  }
+  metadata[count++] = (supine_metadata){"content", kind};
   metadata[count++] = (supine_metadata){"outside", e->options->clamp ? "clamped" : "extrapolated"};
   metadata[count++] = (supine_metadata){
       "made_by", e->options->made_by != NULL ? e->options->made_by : "supine_inside_embed"};

@@ -32,10 +32,14 @@ static supine_status take_row(const supine_csv *csv, size_t row, size_t count, d
   const bool there = number >= 0.0 && number < (double)count && number == floor(number);
   const size_t vertex = there ? (size_t)number : 0;
   const bool positive = value > 0.0 && isfinite(value) && isfinite(1.0 / value);
-  const char *wrong = !there             ? "there is no such vertex"
-                      : !positive        ? "it must be positive"
-                      : a[vertex] != 0.0 ? "the vertex was given before"
-                                         : NULL;
+  const char *wrong = NULL;
+  if (!there) {
+    wrong = "there is no such vertex";
+  } else if (!positive) {
+    wrong = "it must be positive";
+  } else if (a[vertex] != 0.0) {
+    wrong = "the vertex was given before";
+  }
   SUPINE_REFUSE_IF(wrong != NULL, error, SUPINE_ERROR_FORMAT,
                    "%s:%zu: expandability %g of vertex %.15g: %s; give one positive value for each "
                    "of %zu vertices, counted from 0",

@@ -190,29 +190,33 @@ static void check_overlap(checks *c, const supine_lungs *lungs) {
   SUPINE_ARENA arena = {0};
   uint32_t *corners = supine_arena_take(&arena, 3 * mesh->triangle_count, sizeof *corners);
   check(c, !arena.failed, SUPINE_ERROR_MEMORY, "no memory for %zu components", parts);
-  for (size_t of = 0; of < parts && parts > 1 && c->status == SUPINE_OK; ++of) {
-    supine_lungs_surface *surface = NULL;
-    supine_inside_place deepest = {.depth = 0.0};
-    size_t count = 0;
-    for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {
-      if (part[mesh->triangles[i]] == of) {
-        corners[count++] = mesh->triangles[i];
+  if (parts > 1) {
+    for (size_t of = 0; of < parts && c->status == SUPINE_OK; ++of) {
+      supine_lungs_surface *surface = NULL;
+      supine_inside_place deepest = {.depth = 0.0};
+      size_t count = 0;
+      for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {
+        if (part[mesh->triangles[i]] == of) {
+          corners[count++] = mesh->triangles[i];
+        }
       }
-    }
-    c->status =
-        supine_lungs_surface_create(mesh->vertices, count / 3, corners, true, &surface, c->error);
-    for (size_t i = 0; i < mesh->vertex_count && c->status == SUPINE_OK;
-         i += mesh->vertex_count / SAMPLES + 1) {
-      const double *p = mesh->vertices + 3 * i;
-      const supine_inside_place place =
-          part[i] == of ? deepest : supine_lungs_surface_find(surface, p, NULL);
-      deepest = place.depth > deepest.depth ? place : deepest;
-    }
-    supine_lungs_surface_destroy(surface);
-    check(c, deepest.depth <= most_overlap, SUPINE_ERROR_MESH,
+      c->status =
+          supine_lungs_surface_create(mesh->vertices, count / 3, corners, true, &surface, c->error);
+      if (c->status == SUPINE_OK) {
+        for (size_t i = 0; i < mesh->vertex_count; i += mesh->vertex_count / SAMPLES + 1) {
+          const double *p = mesh->vertices + 3 * i;
+          const supine_inside_place place =
+              part[i] == of ? deepest : supine_lungs_surface_find(surface, p, NULL);
+          deepest = place.depth > deepest.depth ? place : deepest;
+        }
+      }
+      supine_lungs_surface_destroy(surface);
+      check(
+          c, deepest.depth <= most_overlap, SUPINE_ERROR_MESH,
           "one of its surfaces reaches %.0f mm into another one, at %.0f,%.0f,%.0f mm (LPS): give "
           "both lungs in the axes of one scan, and remove surfaces inside a lung",
           deepest.depth, deepest.point[0], deepest.point[1], deepest.point[2]);
+    }
   }
 }
 
@@ -303,7 +307,12 @@ static supine_status take_side(const supine_mesh *meshes, size_t count,
                                supine_findings *findings, supine_error *error) {
   const double low = lungs->minimum[0];
   const double high = lungs->maximum[0];
-  const int taken = source->side != 0 ? source->side : side != 0 ? side : lungs->side[0];
+  int taken = lungs->side[0];
+  if (source->side != 0) {
+    taken = source->side;
+  } else if (side != 0) {
+    taken = side;
+  }
   const double midline = taken > 0 ? low : high;
   if (source->side == 0) {
     supine_findings_add(findings,

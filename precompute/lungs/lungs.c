@@ -226,10 +226,13 @@ static supine_status measure(supine_lungs *lungs, const double *midline, supine_
   uint8_t *left = supine_arena_take(&arena, lungs->topology.component_count, 1);
   const double overlap =
       supine_lungs_sides(&lungs->mesh, &lungs->topology, 0, 0.5 * (low + high), &arena, left);
-  lungs->midline = midline != NULL                       ? *midline
-                   : overlap < SUPINE_LUNGS_MOST_OVERLAP ? 0.5 * (low + high)
-                   : fabs(low) < fabs(high)              ? low
-                                                         : high;
+  if (midline != NULL) {
+    lungs->midline = *midline;
+  } else if (overlap < SUPINE_LUNGS_MOST_OVERLAP) {
+    lungs->midline = 0.5 * (low + high);
+  } else { /* one lung: its side that is nearer to x = 0 */
+    lungs->midline = fabs(low) < fabs(high) ? low : high;
+  }
   (void)supine_lungs_sides(&lungs->mesh, &lungs->topology, 0, lungs->midline, &arena, left);
   SUPINE_TRY(supine_arena_check(&arena, error, "%zu components", lungs->topology.component_count));
   SUPINE_TRY(group(lungs, left, error));

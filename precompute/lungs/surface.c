@@ -130,17 +130,19 @@ static void find_dipole(const supine_lungs_surface *s, const node *n) {
       add_part(d, child[i]->area, child[i]->centre, child[i]->normal);
     }
   }
-  for (size_t i = n->begin; i < n->end && n->right == 0; ++i) {
-    const double *p[3];
-    double normal[3];
-    double centre[3];
-    corners(s, s->order[i], p);
-    supine_normal(p[0], p[1], p[2], normal);
-    for (int k = 0; k < 3; ++k) {
-      normal[k] *= 0.5;
-      centre[k] = (p[0][k] + p[1][k] + p[2][k]) / 3.0;
+  if (n->right == 0) {
+    for (size_t i = n->begin; i < n->end; ++i) {
+      const double *p[3];
+      double normal[3];
+      double centre[3];
+      corners(s, s->order[i], p);
+      supine_normal(p[0], p[1], p[2], normal);
+      for (int k = 0; k < 3; ++k) {
+        normal[k] *= 0.5;
+        centre[k] = (p[0][k] + p[1][k] + p[2][k]) / 3.0;
+      }
+      add_part(d, sqrt(supine_dot(normal, normal)), centre, normal);
     }
-    add_part(d, sqrt(supine_dot(normal, normal)), centre, normal);
   }
   double square = 0.0;
   for (int k = 0; k < 3; ++k) {
@@ -186,9 +188,11 @@ void supine_lungs_surface_refit(supine_lungs_surface *surface) {
   for (node *n = surface->nodes + surface->node_count; n-- > surface->nodes;) {
     const node *child[2] = {n + 1, &surface->nodes[n->right]};
     supine_box_begin(n->low, n->high);
-    for (int c = 0; c < 2 && n->right != 0; ++c) {
-      supine_box_add(child[c]->low, n->low, n->high);
-      supine_box_add(child[c]->high, n->low, n->high);
+    if (n->right != 0) {
+      for (int c = 0; c < 2; ++c) {
+        supine_box_add(child[c]->low, n->low, n->high);
+        supine_box_add(child[c]->high, n->low, n->high);
+      }
     }
     if (n->right == 0) {
       find_box(surface, n, &surface->leaves[n->leaf]);
@@ -241,7 +245,10 @@ void supine_lungs_surface_destroy(supine_lungs_surface *surface) {
 static double along(const double offset[3], const double edge[3]) {
   const double length = supine_dot(edge, edge);
   const double t = length > 0.0 ? supine_dot(offset, edge) / length : 0.0;
-  return t > 1.0 ? 1.0 : t > 0.0 ? t : 0.0;
+  if (t > 1.0) {
+    return 1.0;
+  }
+  return t > 0.0 ? t : 0.0;
 }
 
 /* Find the barycentric coordinates b of the point nearest to x in a triangle. Return false, with b

@@ -14,10 +14,13 @@ enum { COLUMNS = SUPINE_NORMALS_FIELD_MAX + 1 };
 static size_t term_of(size_t modes, size_t k, size_t l) {
   const size_t low = (k < l ? k : l) - 1;
   const size_t high = (k < l ? l : k) - 1;
-  return k == 0 && l == 0 ? 0
-         : l == 0         ? k
-         : k == 0         ? modes + l
-                          : 1 + 2 * modes + low * modes - low * (low + 1) / 2 + high;
+  if (k == 0) {
+    return l == 0 ? 0 : modes + l;
+  }
+  if (l == 0) {
+    return k;
+  }
+  return 1 + 2 * modes + low * modes - low * (low + 1) / 2 + high;
 }
 
 void supine_normals_monomials(size_t modes, const double *weights, const double gains[3],

@@ -82,16 +82,18 @@ static void suggest_reading(const supine_locate_task *task, bool posture_given,
     most = fmax(most, supine_location_get_info(located->location[k])->residual_rms);
   }
   changed.observed = other;
-  for (size_t i = 0; i < sizeof readings / sizeof *readings && task->count > 2; ++i) {
-    memcpy(other, task->observed, task->count * sizeof *other);
-    for (size_t j = 0; j < 3 * task->count; ++j) {
-      other[j / 3].position[j % 3] *= readings[i].factor[j % 3];
-    }
-    if (try_postures(&changed, posture_given, located, NULL) == SUPINE_OK &&
-        10.0 * pow(located->best->residual_rms, 2.0) < most * most) {
-      supine_text_add(error->message, sizeof error->message, ". Read %s, they fit within %.1f mm",
-                      readings[i].way, located->best->residual_rms);
-      return;
+  if (task->count > 2) {
+    for (size_t i = 0; i < sizeof readings / sizeof *readings; ++i) {
+      memcpy(other, task->observed, task->count * sizeof *other);
+      for (size_t j = 0; j < 3 * task->count; ++j) {
+        other[j / 3].position[j % 3] *= readings[i].factor[j % 3];
+      }
+      if (try_postures(&changed, posture_given, located, NULL) == SUPINE_OK &&
+          10.0 * pow(located->best->residual_rms, 2.0) < most * most) {
+        supine_text_add(error->message, sizeof error->message, ". Read %s, they fit within %.1f mm",
+                        readings[i].way, located->best->residual_rms);
+        return;
+      }
     }
   }
 }

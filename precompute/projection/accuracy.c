@@ -47,8 +47,10 @@ SUPINE_CLONES static void find_errors(size_t n, size_t axes, const double *const
   for (size_t i = 0; i < axes * n; ++i) {
     out[i] = fabs(gain[1] * field[1][i] - gain[0] * field[0][i]) * (axes == 1 ? length[i] : 1.0);
   }
-  for (size_t i = 0; axes == 3 && i < n; ++i) {
-    out[i] = supine_length(out + 3 * i);
+  if (axes == 3) {
+    for (size_t i = 0; i < n; ++i) {
+      out[i] = supine_length(out + 3 * i);
+    }
   }
 }
 
@@ -70,8 +72,10 @@ static void compare_block(const accuracy_work *work, size_t begin, size_t n, dou
   double *exact = approximate + truth->direction_count * axes * BLOCK;
   double length[BLOCK];
   double errors[3 * BLOCK];
-  for (size_t i = 0; i < n && axes == 1; ++i) {
-    length[i] = supine_length(work->rows->directions + 3 * (begin + i));
+  if (axes == 1) {
+    for (size_t i = 0; i < n; ++i) {
+      length[i] = supine_length(work->rows->directions + 3 * (begin + i));
+    }
   }
   for (size_t i = 0; i < rows * modes; ++i) {
     coefficients[i] = (double)work->compression->coefficients[axes * begin * modes + i];

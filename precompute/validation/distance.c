@@ -42,10 +42,17 @@ static void explain(supine_patient_scan_motion moved,
 
 /* Return the map to fit: `kind` or, for the basis's prediction, the body motion to remove. */
 static supine_patient_map map_of(int kind, supine_patient_scan_motion moved) {
-  return kind != SUPINE_PATIENT_MAP_PREDICTED  ? (supine_patient_map)kind
-         : moved == SUPINE_PATIENT_RIGID       ? SUPINE_PATIENT_MAP_RIGID
-         : moved == SUPINE_PATIENT_TRANSLATION ? SUPINE_PATIENT_MAP_TRANSLATION
-                                               : SUPINE_PATIENT_MAP_NONE;
+  if (kind != SUPINE_PATIENT_MAP_PREDICTED) {
+    return (supine_patient_map)kind;
+  }
+  switch (moved) {
+  case SUPINE_PATIENT_RIGID:
+    return SUPINE_PATIENT_MAP_RIGID;
+  case SUPINE_PATIENT_TRANSLATION:
+    return SUPINE_PATIENT_MAP_TRANSLATION;
+  default:
+    return SUPINE_PATIENT_MAP_NONE;
+  }
 }
 
 static supine_status undetermined(supine_error *error) {

@@ -128,7 +128,11 @@ static supine_status find_best(const supine_validation *s, const supine_mesh *sc
     double left[2] = {0};
     SUPINE_TRY(distance_at(s, outcome, a, &look, &left[0], error));
     SUPINE_TRY(distance_at(s, outcome, b, &look, &left[1], error));
-    *(left[0] < left[1] ? &high : &low) = left[0] < left[1] ? b : a;
+    if (left[0] < left[1]) {
+      high = b;
+    } else {
+      low = a;
+    }
   }
   outcome->best_scale = 0.5 * (low + high);
   outcome->has_best = true;
@@ -181,11 +185,15 @@ static supine_status predict_points(const supine_validation *s, size_t which,
   SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
   SUPINE_TRY(supine_posed_expected(s->basis, &outcome->state, &s->from.state, &expected, error));
   for (size_t i = 0; i < 4 * n; ++i) {
-    const size_t k = 3 * (i / 4) + i % 4;
-    values[i] = i % 4 < 3 ? outcome->predicted[k] - s->start.vertices[k]
-                : expected.sigma != NULL
-                    ? (double)expected.sigma[i / 4] * (double)expected.sigma[i / 4]
-                    : 0.0;
+    const size_t vertex = i / 4;
+    const size_t k = 3 * vertex + i % 4;
+    if (i % 4 < 3) {
+      values[i] = outcome->predicted[k] - s->start.vertices[k];
+    } else if (expected.sigma != NULL) {
+      values[i] = (double)expected.sigma[vertex] * (double)expected.sigma[vertex];
+    } else {
+      values[i] = 0.0;
+    }
   }
   SUPINE_TRY(supine_inside_biharmonic_fit(n, s->start.vertices, 4, values, CENTRES, &fit, error));
   supine_inside_biharmonic_evaluate(&fit, pairs->count, pairs->from, predicted + 4 * count);

@@ -61,8 +61,10 @@ static void take_from_neighbours(supine_field *field, const later *to, int sign,
   size_t best = i;
   for (size_t k = 0; k < 13; ++k) {
     bool within = true;
-    for (size_t a = 0; a < 3 && !inner; ++a) {
-      within = within && at[a] + (size_t)(sign * to->by[k][a]) < nodes->size[a];
+    if (!inner) {
+      for (size_t a = 0; a < 3; ++a) {
+        within = within && at[a] + (size_t)(sign * to->by[k][a]) < nodes->size[a];
+      }
     }
     if (within) {
       const size_t j = (size_t)((ptrdiff_t)i + sign * to->node[k]);
@@ -119,10 +121,12 @@ static void smooth(supine_image *nodes, const float *depth, double near) {
         continue;
       }
       for (size_t i = line * row + 1; i + 1 < (line + 1) * row; ++i) {
-        for (size_t c = 3 * i; c < 3 * i + 3 && (double)depth[i] < -near; ++c) {
-          u[c] = (u[c - 3] + u[c + 3] + u[c - 3 * row] + u[c + 3 * row] + u[c - 3 * slice] +
-                  u[c + 3 * slice]) /
-                 6.0F;
+        if ((double)depth[i] < -near) {
+          for (size_t c = 3 * i; c < 3 * i + 3; ++c) {
+            u[c] = (u[c - 3] + u[c + 3] + u[c - 3 * row] + u[c + 3 * row] + u[c - 3 * slice] +
+                    u[c + 3 * slice]) /
+                   6.0F;
+          }
         }
       }
     }

@@ -93,7 +93,11 @@ static supine_status read_grid(const supine_basis *basis, supine_image *nodes,
   valid = valid && count < 2147483648.0;
   for (size_t i = 0; i < 12 && valid; ++i) {
     const double value = ((const double *)grid->data)[i];
-    *(i < 3 ? &nodes->origin[i] : &nodes->step[i / 3 - 1][i % 3]) = value;
+    if (i < 3) {
+      nodes->origin[i] = value;
+    } else {
+      nodes->step[i / 3 - 1][i % 3] = value;
+    }
     valid = isfinite(value);
   }
   for (size_t i = 0; i < n && valid; ++i) {

@@ -50,7 +50,8 @@ INLINE void find_cells(const supine_image *image, double (*at)[RUN], cells *foun
     const double last = (double)frame.size[a] - 1.0;
     const double top = last > 1.0 ? last - 1.0 : 0.0;
     for (size_t i = 0; i < RUN; ++i) {
-      const double voxel = at[a][i] > 0.0 ? (at[a][i] < last ? at[a][i] : last) : 0.0;
+      const double above = at[a][i] > 0.0 ? at[a][i] : 0.0; /* NaN becomes 0 */
+      const double voxel = above < last ? above : last;
       const double below = floor(voxel);
       at[a][i] = below < top ? below : top;
       found->share[a][i] = voxel - at[a][i];
@@ -124,8 +125,10 @@ INLINE bool displace(const supine_image *nodes, const cells *in, double (*shift)
       moves = squares[0] + squares[1] + squares[2] > 0.0;
     }
     vector u = {0.0, 0.0, 0.0, 0.0};
-    for (size_t corner = 0; corner < 8 && moves; ++corner) {
-      u += weight[corner][i] * corners[corner];
+    if (moves) {
+      for (size_t corner = 0; corner < 8; ++corner) {
+        u += weight[corner][i] * corners[corner];
+      }
     }
     for (size_t k = 0; k < 3; ++k) {
       shift[k][i] = u[k];

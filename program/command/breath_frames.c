@@ -116,9 +116,9 @@ static supine_status play(playing *p, size_t t, supine_error *error) {
   (void)find_pose(p, t, &pose, NULL);
   (void)supine_deform(p->basis, &pose, p->positions);
   p->compute_time[t] = supine_clock_seconds() - start;
-  SUPINE_REFUSE_IF(
-      !supine_options_progress_step(&p->progress, (double)(t + 1) / (double)p->wanted->count),
-      error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
+  const bool goes_on =
+      supine_options_progress_step(&p->progress, (double)(t + 1) / (double)p->wanted->count);
+  SUPINE_REFUSE_IF(!goes_on, error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
   return SUPINE_OK;
 }
 
@@ -226,7 +226,11 @@ supine_status supine_command_breath_write(const supine_command_breath_frames *wa
   (void)snprintf(p.vtp_comment, sizeof p.vtp_comment,
                  "displacement from %s; volumes are gas and tissue of each lung; %s", from.name,
                  wanted->made_by);
-  SUPINE_TRY(tensors ? write_tensors(&p, error) : write_vtp(&p, &from.state, save, error));
+  if (tensors) {
+    SUPINE_TRY(write_tensors(&p, error));
+  } else {
+    SUPINE_TRY(write_vtp(&p, &from.state, save, error));
+  }
   report(&p);
   return SUPINE_OK;
 }

@@ -142,18 +142,21 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   }
   SUPINE_TRY(supine_options_posture_list_parse(wanted->postures, state, &c->postures, error));
   const bool content = supine_basis_metadata(c->basis, "content") != NULL; /* by 'supine embed' */
-  const char *refused =
-      content && c->from.given
-          ? "%s holds structures inside the lungs, which are compared between every two postures: "
-            "leave --from out, or use 'supine deform --from'"
-      : content && wanted->html != NULL
-          ? "%s holds structures inside the lungs, but -o needs the lungs: give the basis of the "
-            "lungs, and the structures by --inside"
-      : !content && wanted->frame == 1
-          ? "%s holds no structures inside the lungs, which --frame hilum is for: give a basis "
-            "made by 'supine embed', or use 'supine deform --frame hilum'"
-          : NULL;
-  SUPINE_REFUSE_IF(refused != NULL, error, SUPINE_ERROR_ARGUMENT, refused, c->path);
+  SUPINE_REFUSE_IF(
+      content && c->from.given, error, SUPINE_ERROR_ARGUMENT,
+      "%s holds structures inside the lungs, which are compared between every two postures: "
+      "leave --from out, or use 'supine deform --from'",
+      c->path);
+  SUPINE_REFUSE_IF(
+      content && wanted->html != NULL, error, SUPINE_ERROR_ARGUMENT,
+      "%s holds structures inside the lungs, but -o needs the lungs: give the basis of the "
+      "lungs, and the structures by --inside",
+      c->path);
+  SUPINE_REFUSE_IF(
+      !content && wanted->frame == 1, error, SUPINE_ERROR_ARGUMENT,
+      "%s holds no structures inside the lungs, which --frame hilum is for: give a basis "
+      "made by 'supine embed', or use 'supine deform --frame hilum'",
+      c->path);
   return content ? compare_content(c, wanted, error) : report(c, wanted, error);
 }
 

@@ -103,7 +103,11 @@ static supine_status read_row(const supine_csv *csv, request *row, supine_error 
   }
   row->content.labels_path = row->outputs[1];
   row->content.field = row->outputs[2];
-  *(voxels && !image ? &row->content.field : &row->content.path) = row->outputs[0];
+  if (voxels && !image) {
+    row->content.field = row->outputs[0];
+  } else {
+    row->content.path = row->outputs[0];
+  }
   return supine_command_deform_content_check(&row->content, error);
 }
 
@@ -174,7 +178,7 @@ static supine_status read_rows(const char *basis, batch *b, supine_error *error)
       }
     }
   }
-  SUPINE_REFUSE_IF(!(b->count > 0), error, SUPINE_ERROR_ARGUMENT,
+  SUPINE_REFUSE_IF(b->count == 0, error, SUPINE_ERROR_ARGUMENT,
                    "%s: no row follows the header: add at least one", b->wanted->states);
   return SUPINE_OK;
 }

@@ -149,8 +149,10 @@ static supine_status write_points(const char *path, const supine_basis *basis,
   SUPINE_TRY(
       supine_options_targets_find(basis, &names, pose, moved->expected.sigma, each, &rows, error));
   SUPINE_TRY(supine_output_open(path, &output, error));
-  for (size_t i = 0; i < count && moved->subtract_hilum; ++i) {
-    supine_options_target_shift(&rows[i], moved->hilum.move);
+  if (moved->subtract_hilum) {
+    for (size_t i = 0; i < count; ++i) {
+      supine_options_target_shift(&rows[i], moved->hilum.move);
+    }
   }
   print_rows(moved, info, rows, count, output.file);
   SUPINE_TRY(supine_output_commit(&output, error));
@@ -296,8 +298,10 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
   SUPINE_TRY(supine_posed_mesh(basis, &moved->pose, &mesh, error));
   (void)supine_deform(basis, &moved->pose, xyz);
   supine_normals(basis, xyz, normals);
-  for (size_t i = 0; i < 3 * mesh.vertex_count && moved->subtract_hilum; ++i) {
-    mesh.vertices[i] -= moved->hilum.move[i % 3];
+  if (moved->subtract_hilum) {
+    for (size_t i = 0; i < 3 * mesh.vertex_count; ++i) {
+      mesh.vertices[i] -= moved->hilum.move[i % 3];
+    }
   }
   (void)supine_basis_volumes(basis, &moved->pose, volumes);
   save->from = from.vertices;
@@ -332,9 +336,11 @@ supine_status supine_command_deform_content(const supine_deform_content *wanted,
     SUPINE_TRY(move_grid(wanted, basis, moved, error));
   }
   if (!image && wanted->path != NULL) {
-    SUPINE_TRY(supine_text_ends_in(wanted->path, ".csv")
-                   ? write_points(wanted->path, basis, moved, wanted->vertices, error)
-                   : write_surface(wanted->path, basis, moved, error));
+    if (supine_text_ends_in(wanted->path, ".csv")) {
+      SUPINE_TRY(write_points(wanted->path, basis, moved, wanted->vertices, error));
+    } else {
+      SUPINE_TRY(write_surface(wanted->path, basis, moved, error));
+    }
   }
   if (moved->expected.sigma != NULL) {
     (void)supine_print(stdout, "expected error %.1f mm (RMS over the points), %.1f mm at most%s\n",

@@ -87,11 +87,13 @@ static void print_summary(const supine_inside_shells *shells, const supine_insid
                           const supine_inside_report *report, const request *wanted) {
   const supine_basis_info *info = supine_basis_get_info(shells->basis);
   const bool grid = content->part_count == 0;
-  (void)printf("%s: %zu %s", wanted->path, report->count,
-               grid                          ? "nodes"
-               : content->triangle_count > 0 ? "vertices and points"
-               : report->count == 1          ? "point"
-                                             : "points");
+  const char *what = report->count == 1 ? "point" : "points";
+  if (grid) {
+    what = "nodes";
+  } else if (content->triangle_count > 0) {
+    what = "vertices and points";
+  }
+  (void)printf("%s: %zu %s", wanted->path, report->count, what);
   for (size_t lung = 0; lung < shells->count; ++lung) {
     (void)printf("%s%zu %s", lung == 0 ? ": " : ", ", report->in_lung[lung],
                  info->lung_names[lung]);

@@ -82,10 +82,13 @@ supine_status supine_command_embed_read(const supine_inside_shells *shells,
     return make_grid(shells, &image, wanted->grid_spacing, content, error);
   }
   for (size_t i = 0; i < count; ++i) {
-    SUPINE_TRY(supine_image_is_named(paths[i]) ? read_labelled(wanted, paths[i], content, error)
-               : supine_io_points_named(paths[i])
-                   ? supine_inside_content_points(paths[i], &wanted->load, content, error)
-                   : supine_inside_content_mesh(paths[i], &wanted->load, content, error));
+    if (supine_image_is_named(paths[i])) {
+      SUPINE_TRY(read_labelled(wanted, paths[i], content, error));
+    } else if (supine_io_points_named(paths[i])) {
+      SUPINE_TRY(supine_inside_content_points(paths[i], &wanted->load, content, error));
+    } else {
+      SUPINE_TRY(supine_inside_content_mesh(paths[i], &wanted->load, content, error));
+    }
   }
   return check_content(shells, wanted, content, error);
 }

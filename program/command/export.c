@@ -122,11 +122,15 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   SUPINE_FREED_BY(supine_options_basis_close) supine_basis *basis = NULL;
   SUPINE_REFUSE_IF(page && wanted->glb_only, error, SUPINE_ERROR_ARGUMENT,
                    "--plain and --animate need an output that ends in .glb");
-  SUPINE_REFUSE_IF(!page && (wanted->title != NULL || wanted->inside != NULL || wanted->from.given),
-                   error, SUPINE_ERROR_ARGUMENT, "%s needs an output that ends in .html",
-                   wanted->from.given       ? "--from"
-                   : wanted->inside != NULL ? "--inside"
-                                            : "--title");
+  const char *of_page =
+      wanted->title != NULL ? "--title" : NULL; /* an option that only pages take */
+  if (wanted->from.given) {
+    of_page = "--from";
+  } else if (wanted->inside != NULL) {
+    of_page = "--inside";
+  }
+  SUPINE_REFUSE_IF(!page && of_page != NULL, error, SUPINE_ERROR_ARGUMENT,
+                   "%s needs an output that ends in .html", of_page);
   SUPINE_TRY(supine_options_basis_open(path, SUPINE_STORAGE_EXACT, &basis, error));
   SUPINE_REFUSE_IF(supine_basis_get_info(basis)->is_fields &&
                        (wanted->breathes || wanted->glb.animate),

@@ -165,30 +165,28 @@ static supine_status check(request *wanted, const supine_arguments *given, supin
   for (size_t k = 0; k < wanted->further_count; ++k) {
     further_surfaces = further_surfaces || !supine_text_ends_in(wanted->further_path[k], ".csv");
   }
-  const char *wrong =
-      wanted->landmarks.path == NULL && wanted->scan_path[1] == NULL
-          ? "nothing to fit to: give --landmarks, the surfaces of both scans, or both"
-      : further_surfaces && wanted->scan_path[0] == NULL
-          ? "--state with a surface needs a first scan: name the surface of the first scan too"
-      : wanted->expandability && wanted->scan_path[1] == NULL
-          ? "--expandability needs surfaces: give those of both scans"
-      : wanted->map != NULL && !wanted->expandability
-          ? "--map writes what --expandability finds: give both"
-      : wanted->expandability && wanted->has_law && wanted->law == SUPINE_PATIENT_PAPER
-          ? "--expandability uses the deep law: leave --law out"
-          : NULL;
-  return wrong != NULL ? supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%s", wrong) : SUPINE_OK;
+  const supine_status wrong = SUPINE_ERROR_ARGUMENT;
+  SUPINE_REFUSE_IF(wanted->landmarks.path == NULL && wanted->scan_path[1] == NULL, error, wrong,
+                   "nothing to fit to: give --landmarks, the surfaces of both scans, or both");
+  SUPINE_REFUSE_IF(
+      further_surfaces && wanted->scan_path[0] == NULL, error, wrong,
+      "--state with a surface needs a first scan: name the surface of the first scan too");
+  SUPINE_REFUSE_IF(wanted->expandability && wanted->scan_path[1] == NULL, error, wrong,
+                   "--expandability needs surfaces: give those of both scans");
+  SUPINE_REFUSE_IF(wanted->map != NULL && !wanted->expandability, error, wrong,
+                   "--map writes what --expandability finds: give both");
+  SUPINE_REFUSE_IF(wanted->expandability && wanted->has_law && wanted->law == SUPINE_PATIENT_PAPER,
+                   error, wrong, "--expandability uses the deep law: leave --law out");
+  return SUPINE_OK;
 }
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
   static supine_patient_record record; /* static, as it is too large for the stack */
   SUPINE_TRY(check(wanted, given, error));
-  const supine_patient_fit_options options = {
-      .law = (supine_patient_law)wanted->law,
-      .scan_motion = wanted->landmarks.rigid         ? SUPINE_PATIENT_RIGID
-                     : wanted->landmarks.translation ? SUPINE_PATIENT_TRANSLATION
-                                                     : SUPINE_PATIENT_STILL};
+  const supine_patient_fit_options options = {.law = (supine_patient_law)wanted->law,
+                                              .scan_motion =
+                                                  supine_options_scan_motion(&wanted->landmarks)};
   const char *named_for =
       wanted->landmarks.path != NULL ? wanted->landmarks.path : wanted->scan_path[1];
   SUPINE_FREED_BY(supine_patient_scans_free) supine_patient_scans scans = {0};

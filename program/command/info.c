@@ -153,8 +153,10 @@ static supine_status describe(const char *path, const supine_basis *basis, const
   if (supine_basis_metadata(basis, "content") != NULL) {
     add_content(root, basis);
   }
-  for (const char *line; at != NULL && (line = supine_findings_next(&at, &length)) != NULL;) {
-    (void)json_array_append_new(warnings, json_stringn(line, length));
+  if (at != NULL) {
+    for (const char *line; (line = supine_findings_next(&at, &length)) != NULL;) {
+      (void)json_array_append_new(warnings, json_stringn(line, length));
+    }
   }
   (void)json_object_set_new(root, "warnings", warnings);
   for (size_t i = 0; i < sizeof errors / sizeof *errors; ++i) {

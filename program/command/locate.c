@@ -67,16 +67,14 @@ static supine_status find_vertex(const char *path, const char *text,
   }
   const char *nearest =
       supine_options_suggest(text, (const char *const *)names->text, names->count);
-  return found == 1 ? SUPINE_OK
-         : found > 1
-             ? supine_error_set(
-                   error, SUPINE_ERROR_FORMAT,
+  SUPINE_REFUSE_IF(found > 1, error, SUPINE_ERROR_FORMAT,
                    "%s: '%s' has %zu vertices, so it is not a point: give the name of a point",
-                   path, text, found)
-             : supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%s: no point '%s' in the file of --points%s%s%s", path, text,
-                                nearest == NULL ? "" : "; did you mean '",
-                                nearest == NULL ? "" : nearest, nearest == NULL ? "" : "'?");
+                   path, text, found);
+  SUPINE_REFUSE_IF(found == 0, error, SUPINE_ERROR_FORMAT,
+                   "%s: no point '%s' in the file of --points%s%s%s", path, text,
+                   nearest == NULL ? "" : "; did you mean '", nearest == NULL ? "" : nearest,
+                   nearest == NULL ? "" : "'?");
+  return SUPINE_OK;
 }
 
 static supine_status load_observed(const char *path, const request *wanted,

@@ -121,9 +121,10 @@ static supine_status mark_panel(studio *s, size_t i, supine_error *error) {
 static supine_picture make_picture(studio *s) {
   const supine_pictures *wanted = s->wanted;
   const size_t count = s->postures.count;
-  const double opacity = wanted->opacity > 0.0    ? wanted->opacity
-                         : wanted->inside != NULL ? inside_opacity
-                                                  : 1.0;
+  double opacity = wanted->inside != NULL ? inside_opacity : 1.0;
+  if (wanted->opacity > 0.0) {
+    opacity = wanted->opacity;
+  }
   const double largest = wanted->largest > 0.0 ? wanted->largest : supine_render_bar_end(s->max);
   (void)snprintf(s->label, sizeof s->label, "displacement from %s, mm", s->from.name);
   return (supine_picture){.panel = s->panel,
@@ -178,8 +179,9 @@ static supine_status add_frames(studio *s, size_t count, const double (*extent)[
     picture.extent = extent;
     SUPINE_TRY(supine_render_animation_add(animation, s->basis, &picture,
                                            frame + 1 < count ? 1000 / FPS : LAST_FRAME_MS, error));
-    SUPINE_REFUSE_IF(!supine_options_progress_step(&progress, (double)(frame + 1) / (double)count),
-                     error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
+    const bool goes_on =
+        supine_options_progress_step(&progress, (double)(frame + 1) / (double)count);
+    SUPINE_REFUSE_IF(!goes_on, error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
   }
   return SUPINE_OK;
 }
@@ -213,8 +215,10 @@ static supine_status draw_turn(studio *s, supine_error *error) {
   supine_options_signals_catch(true);
   SUPINE_TRY(add_frames(s, count, (const double(*)[4])extent, animation, error));
   const supine_status status = supine_render_animation_write(animation, output.file, error);
-  SUPINE_TRY(status == SUPINE_OK || ferror(output.file) != 0 ? supine_output_commit(&output, error)
-                                                             : status);
+  if (ferror(output.file) == 0) {
+    SUPINE_TRY(status);
+  }
+  SUPINE_TRY(supine_output_commit(&output, error)); /* which says why the file cannot be written */
   (void)printf("%s: %zu x %zu pixels, %zu frames\n", path, picture.width, picture.height, count);
   return SUPINE_OK;
 }

@@ -88,12 +88,20 @@ static supine_status find_volumes(const supine_reference *reference, const supin
   SUPINE_REFUSE_IF(state->lung_count > 0, error, SUPINE_ERROR_ARGUMENT,
                    "--volume: 'supine solve' takes one volume of all lungs together, not a volume "
                    "for each lung");
-  const double total =
-      state->volume.ml + (kind == SUPINE_VOLUME_ABSOLUTE ? 0.0
-                          : kind == SUPINE_VOLUME_SCAN   ? full[0] + full[1] + scan[0] + scan[1]
-                          : kind == SUPINE_VOLUME_FULL
-                              ? supine_physics_reference_full(reference, g, part)
-                              : supine_physics_reference_rest(reference, g, part));
+  double total = state->volume.ml;
+  switch (kind) {
+  case SUPINE_VOLUME_ABSOLUTE:
+    break;
+  case SUPINE_VOLUME_SCAN:
+    total += full[0] + full[1] + scan[0] + scan[1];
+    break;
+  case SUPINE_VOLUME_FULL:
+    total += supine_physics_reference_full(reference, g, part);
+    break;
+  default:
+    total += supine_physics_reference_rest(reference, g, part);
+    break;
+  }
   supine_physics_reference_share_out(reference, g, total, ml);
   for (size_t lung = 0; lung < reference->lung_count; ++lung) {
     ml[lung] -= full[lung];

@@ -110,9 +110,9 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   SUPINE_REFUSE_IF((session->certificate == NULL) != (session->key == NULL), error,
                    SUPINE_ERROR_ARGUMENT, "give --certificate and --key together");
   supine_quaternion_matrix(wanted->body_from_tracker, options->setup.body); /* 0 if it is zero */
-  SUPINE_REFUSE_IF(!supine_normalise(options->setup.body, unit) ||
-                       !supine_normalise(wanted->world_down, options->setup.down),
-                   error, SUPINE_ERROR_ARGUMENT,
+  const bool directed = supine_normalise(options->setup.body, unit) &&
+                        supine_normalise(wanted->world_down, options->setup.down);
+  SUPINE_REFUSE_IF(!directed, error, SUPINE_ERROR_ARGUMENT,
                    "--world-down or --body-from-tracker is zero: give a direction, such as 0,0,-1, "
                    "and a quaternion, such as 1,0,0,0");
   SUPINE_FREED_BY(supine_options_basis_close) supine_basis *basis = NULL;

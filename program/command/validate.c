@@ -155,16 +155,16 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
                    SUPINE_ERROR_ARGUMENT, "nothing to compare with: give --state or --landmarks");
   SUPINE_REFUSE_IF(wanted->path != NULL && wanted->count == 0, error, SUPINE_ERROR_ARGUMENT,
                    "-o writes the errors of a surface: name a surface with --state");
-  for (size_t i = 0; i < wanted->count && wanted->path != NULL; ++i) {
-    SUPINE_TRY(supine_options_check_output(wanted->path, wanted->state[i].path, error));
+  if (wanted->path != NULL) {
+    for (size_t i = 0; i < wanted->count; ++i) {
+      SUPINE_TRY(supine_options_check_output(wanted->path, wanted->state[i].path, error));
+    }
   }
   SUPINE_REFUSE_IF(supine_text_ends_in(path, ".json"), error, SUPINE_ERROR_ARGUMENT,
                    "%s is a patient model without a surface: make a basis from it first with "
                    "'supine precompute --patient'",
                    path);
-  s.moved = wanted->landmarks.rigid         ? SUPINE_PATIENT_RIGID
-            : wanted->landmarks.translation ? SUPINE_PATIENT_TRANSLATION
-                                            : SUPINE_PATIENT_STILL;
+  s.moved = supine_options_scan_motion(&wanted->landmarks);
   set_states(wanted, &s);
   SUPINE_TRY(supine_options_basis_open(path, SUPINE_STORAGE_AUTO, &basis, error));
   s.basis = basis;

@@ -45,11 +45,13 @@ supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,
                                          supine_mesh_save_options *save, supine_error *error) {
   const char *axes = supine_basis_metadata(basis, "scan_axes");
   const char *unit = supine_basis_metadata(basis, "scan_unit_mm");
-  SUPINE_REFUSE_IF(wanted && (axes == NULL || unit == NULL ||
-                              !supine_options_parse_number(unit, &save->millimetres_per_unit) ||
-                              !(save->millimetres_per_unit > 0.0) ||
-                              !supine_mesh_axes_parse(axes, &save->axes)),
-                   error, SUPINE_ERROR_FORMAT,
+  if (!wanted) {
+    return SUPINE_OK;
+  }
+  const bool known = axes != NULL && unit != NULL &&
+                     supine_options_parse_number(unit, &save->millimetres_per_unit) &&
+                     save->millimetres_per_unit > 0.0 && supine_mesh_axes_parse(axes, &save->axes);
+  SUPINE_REFUSE_IF(!known, error, SUPINE_ERROR_FORMAT,
                    "the basis does not state the axes and units of its scan: leave out "
                    "--as-scanned, or make the basis again from the scan");
   return SUPINE_OK;

@@ -51,8 +51,8 @@ supine_status supine_options_turn_read(const char *text, void *turn, supine_erro
   if (*unit == 's') {
     *unit = '\0';
   }
-  SUPINE_REFUSE_IF(!supine_options_parse_number(seconds, &made->seconds) || !(made->seconds > 0.0),
-                   error, SUPINE_ERROR_ARGUMENT,
+  const bool is_number = supine_options_parse_number(seconds, &made->seconds);
+  SUPINE_REFUSE_IF(!is_number || !(made->seconds > 0.0), error, SUPINE_ERROR_ARGUMENT,
                    "'%s': the time must be above 0 s, as in supine:left:5s", text);
   supine_state state[2] = {{.lung_count = 0}};
   SUPINE_TRY(supine_state_parse_posture(from, &state[0], error));

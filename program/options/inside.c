@@ -181,14 +181,16 @@ const char *supine_options_target_way(const supine_target *target, size_t most, 
   static const char *const names[3][2] = {{"right", "left"}, {"front", "back"}, {"feet", "head"}};
   double left[3] = {fabs(target->move[0]), fabs(target->move[1]), fabs(target->move[2])};
   (void)snprintf(way, 96, "%s", target->moved <= target->expected ? SUPINE_TARGET_UNTOLD : "");
-  for (size_t i = 0; target->moved > target->expected && i < most; ++i) {
-    size_t axis = left[0] > left[1] ? 0U : 1U;
-    axis = left[2] > left[axis] ? 2 : axis;
-    if (left[axis] >= 0.5) {
-      supine_text_add(way, 96, "%s%.0f to the %s", i > 0 ? ", " : "", left[axis],
-                      names[axis][target->move[axis] > 0]);
+  if (target->moved > target->expected) {
+    for (size_t i = 0; i < most; ++i) {
+      size_t axis = left[0] > left[1] ? 0U : 1U;
+      axis = left[2] > left[axis] ? 2 : axis;
+      if (left[axis] >= 0.5) {
+        supine_text_add(way, 96, "%s%.0f to the %s", i > 0 ? ", " : "", left[axis],
+                        names[axis][target->move[axis] > 0]);
+      }
+      left[axis] = 0;
     }
-    left[axis] = 0;
   }
   return way;
 }

@@ -98,17 +98,22 @@ static void describe_valid_values(const supine_option *option, char *text, size_
   } else if (option->choices != NULL) {
     size_t used = 0;
     for (size_t i = 0; option->choices[i] != NULL && used < size; ++i) {
-      const char *before = i == 0 ? "" : option->choices[i + 1] == NULL ? " or " : ", ";
+      const char *before = option->choices[i + 1] == NULL ? " or " : ", ";
+      if (i == 0) {
+        before = "";
+      }
       used += (size_t)snprintf(text + used, size - used, "%s%s", before, option->choices[i]);
     }
   } else if (option->range[1] > 0.0 && !option->open) {
     (void)supine_print_text(text, size, "%g to %g", option->range[0], option->range[1]);
   } else {
-    (void)snprintf(text, size, "%s",
-                   option->kind == SUPINE_OPTION_COUNT     ? "a whole number"
-                   : option->kind == SUPINE_OPTION_NUMBERS ? "numbers separated by commas"
-                   : option->open                          ? "a number above 0"
-                                                           : "a number");
+    const char *wants = option->open ? "a number above 0" : "a number";
+    if (option->kind == SUPINE_OPTION_COUNT) {
+      wants = "a whole number";
+    } else if (option->kind == SUPINE_OPTION_NUMBERS) {
+      wants = "numbers separated by commas";
+    }
+    (void)snprintf(text, size, "%s", wants);
   }
 }
 
@@ -121,10 +126,10 @@ static supine_status read_row(const row *target, const char *text, supine_error 
     describe_valid_values(option, wanted, sizeof wanted);
     return supine_error_set(error, status, "--%s takes %s, not '%s'", option->name, wanted, text);
   }
-  return status == SUPINE_ERROR_ARGUMENT
-             ? supine_error_set(error, status, "--%s: %s", option->name, reason.message)
-         : status != SUPINE_OK ? supine_error_set(error, status, "%s", reason.message)
-                               : SUPINE_OK;
+  SUPINE_REFUSE_IF(status == SUPINE_ERROR_ARGUMENT, error, status, "--%s: %s", option->name,
+                   reason.message);
+  SUPINE_REFUSE_IF(status != SUPINE_OK, error, status, "%s", reason.message);
+  return SUPINE_OK;
 }
 
 static supine_status read_given(reading *r, row *target, const char *text, supine_error *error) {
@@ -134,13 +139,15 @@ static supine_status read_given(reading *r, row *target, const char *text, supin
                    (int)strcspn(option->endings, ", "), option->endings);
     text = r->standard_output;
   }
-  for (size_t i = 0; option->rivals != NULL && i < r->count; ++i) {
-    const supine_option *other = r->rows[i].option;
-    if (r->rows[i].given && other->rivals != NULL && strcmp(other->rivals, option->rivals) == 0) {
-      return other == option
-                 ? supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give --%s once", option->name)
-                 : supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give --%s or --%s, not both",
-                                    other->name, option->name);
+  if (option->rivals != NULL) {
+    for (size_t i = 0; i < r->count; ++i) {
+      const supine_option *other = r->rows[i].option;
+      if (r->rows[i].given && other->rivals != NULL && strcmp(other->rivals, option->rivals) == 0) {
+        return other == option
+                   ? supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give --%s once", option->name)
+                   : supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give --%s or --%s, not both",
+                                      other->name, option->name);
+      }
     }
   }
   target->given = true;
@@ -312,10 +319,12 @@ static supine_status check_outputs(const reading *r, const supine_arguments *giv
     }
   }
   for (size_t i = 0; i < r->count; ++i) {
-    SUPINE_REFUSE_IF(
-        r->rows[i].given && r->rows[i].option->file == SUPINE_FILE_OUT &&
-            supine_output_is_standard(r->rows[i].value) && !supine_output_take_standard(),
-        error, SUPINE_ERROR_ARGUMENT, "standard output is closed: give a file instead of -");
+    if (r->rows[i].given && r->rows[i].option->file == SUPINE_FILE_OUT &&
+        supine_output_is_standard(r->rows[i].value)) {
+      const bool taken = supine_output_take_standard();
+      SUPINE_REFUSE_IF(!taken, error, SUPINE_ERROR_ARGUMENT,
+                       "standard output is closed: give a file instead of -");
+    }
   }
   return SUPINE_OK;
 }

@@ -79,11 +79,14 @@ static void write_text(const json_t *value, quantity kind, char text[TEXT_MAX]) 
   case JSON_REAL:
     add_real(json_real_value(value), kind, text);
     break;
+  case JSON_TRUE:
+    supine_text_add(text, TEXT_MAX, "yes");
+    break;
+  case JSON_FALSE:
+    supine_text_add(text, TEXT_MAX, "no");
+    break;
   default:
-    supine_text_add(text, TEXT_MAX, "%s",
-                    json_is_true(value)    ? "yes"
-                    : json_is_false(value) ? "no"
-                                           : "-");
+    supine_text_add(text, TEXT_MAX, "-");
   }
 }
 
@@ -264,7 +267,10 @@ static void print_table(const char *heading, const json_t *rows) {
           width[column] = length > width[column] ? length : width[column];
         } else {
           const bool last = column + 1 == json_object_size(columns);
-          const int side = json_is_true(numbers) ? 1 : last ? 0 : -1; /* align numbers right */
+          int side = last ? 0 : -1;
+          if (json_is_true(numbers)) {
+            side = 1; /* align numbers right */
+          }
           (void)printf("  %*s", side * (int)width[column], cell);
         }
         column += column + 1 < COLUMNS_MAX;

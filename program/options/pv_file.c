@@ -114,10 +114,12 @@ supine_status supine_options_pv_load(const char *path, supine_pv *pv, supine_err
     const char *name = supine_breath_limb_name((supine_pv_limb)limb);
     supine_error wrong;
     limbs[limb] = json_object_get(root, name);
-    SUPINE_REFUSE_IF(
-        limbs[limb] != NULL && read_curve(limbs[limb], &found.limb[limb], &wrong) != SUPINE_OK,
-        error, SUPINE_ERROR_FORMAT, "%s: %s: %.300s: make the file with 'supine pv fit'", path,
-        name, wrong.message);
+    if (limbs[limb] != NULL) {
+      const supine_status status = read_curve(limbs[limb], &found.limb[limb], &wrong);
+      SUPINE_REFUSE_IF(status != SUPINE_OK, error, SUPINE_ERROR_FORMAT,
+                       "%s: %s: %.300s: make the file with 'supine pv fit'", path, name,
+                       wrong.message);
+    }
   }
   SUPINE_REFUSE_IF(
       limbs[0] == NULL && limbs[1] == NULL, error, SUPINE_ERROR_FORMAT,

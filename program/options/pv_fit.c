@@ -156,8 +156,11 @@ static void describe(const problem *limb, double span, double confidence,
   const double t = gsl_cdf_tdist_Pinv(0.5 + 0.5 * confidence, freedom);
   for (size_t i = 0; i < SUPINE_PV_UNKNOWNS; ++i) {
     const double interval = t * misfit * sqrt(gsl_matrix_get(&covariance.matrix, i, i) / freedom);
-    *(i < LOW ? &report->control_interval[i] : &report->volume_interval[i - LOW]) =
-        i < LOW ? interval : span * interval;
+    if (i < LOW) {
+      report->control_interval[i] = interval;
+    } else {
+      report->volume_interval[i - LOW] = span * interval;
+    }
   }
 }
 
@@ -202,7 +205,8 @@ static supine_status fit_sorted(problem *limb, double confidence, supine_pv_curv
     limb->v[j] = (s[j].volume - s[0].volume) / span;
   }
   SUPINE_TRY(check_falls(limb, span, error));
-  SUPINE_REFUSE_IF(minimise(limb) != SUPINE_OK, error, SUPINE_ERROR_NUMERICAL,
+  const supine_status status = minimise(limb);
+  SUPINE_REFUSE_IF(status != SUPINE_OK, error, SUPINE_ERROR_NUMERICAL,
                    "%s: no pressure-volume curve fits: look for an outlier and remove it",
                    limb->name);
   const double *found = gsl_multifit_nlinear_position(limb->work)->data;

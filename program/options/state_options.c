@@ -80,7 +80,10 @@ supine_status supine_options_posture_list_parse(const char *text, const supine_s
 }
 
 const char *supine_options_posture_label(const char *name) {
-  return strcmp(name, "left") == 0 ? "left side" : strcmp(name, "right") == 0 ? "right side" : name;
+  if (strcmp(name, "left") == 0) {
+    return "left side";
+  }
+  return strcmp(name, "right") == 0 ? "right side" : name;
 }
 
 supine_status supine_options_read_volume(const char *text, void *field, supine_error *error) {
@@ -195,8 +198,10 @@ supine_status supine_options_pose_check(const supine_basis *basis, const char *c
   SUPINE_TRY(supine_posed_mesh(basis, NULL, &mesh, error));
   SUPINE_TRY(supine_posed_mesh(basis, pose, &moved, error));
   lungs.folded = supine_mesh_turned_over(&mesh, moved.vertices);
-  for (size_t lung = 0; lung < info->lung_count && info->has_rest; ++lung) {
-    lungs.full += info->reference_volume[lung];
+  if (info->has_rest) {
+    for (size_t lung = 0; lung < info->lung_count; ++lung) {
+      lungs.full += info->reference_volume[lung];
+    }
   }
   return supine_options_plausible(&lungs, error);
 }
@@ -235,12 +240,17 @@ supine_held supine_options_held(const supine_basis *basis, const supine_state *s
   const bool measured = fabs(held - in_scan[lung]) < 0.05;
   const bool assumed = !measured && other && spread != NULL;
   const double ratio = assumed ? exp(supine_number_parse(spread, NULL)) : 1.0;
+  const char *source = "computed";
+  if (measured) {
+    source = "measured";
+  } else if (assumed) {
+    source = "assumed";
+  } else if (other || kind == SUPINE_VOLUME_ABSOLUTE) {
+    source = "given";
+  }
   return (supine_held){.value = held,
                        .low = above + (held - above) / ratio,
                        .high = above + (held - above) * ratio,
                        .assumed = assumed,
-                       .source = measured                                  ? "measured"
-                                 : assumed                                 ? "assumed"
-                                 : other || kind == SUPINE_VOLUME_ABSOLUTE ? "given"
-                                                                           : "computed"};
+                       .source = source};
 }

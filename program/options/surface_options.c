@@ -60,3 +60,10 @@ void supine_options_say_findings(const char *command, const supine_findings *fin
     supine_options_say(command, "%.*s", (int)length, line);
   }
 }
+
+supine_patient_scan_motion supine_options_scan_motion(const supine_landmark_options *landmarks) {
+  if (landmarks->rigid) {
+    return SUPINE_PATIENT_RIGID;
+  }
+  return landmarks->translation ? SUPINE_PATIENT_TRANSLATION : SUPINE_PATIENT_STILL;
+}

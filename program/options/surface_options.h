@@ -7,6 +7,7 @@
 
 #include "mesh/mesh.h"
 
+#include "precompute/patient/patient.h"
 #include "program/options/command.h"
 
 /* Option table of --axes and --units, which fill a supine_mesh_load_options. */
@@ -21,6 +22,9 @@ typedef struct supine_landmark_options {
 /* Option table of --landmarks, --reverse, --translation and --rigid, which fill a
  * supine_landmark_options. */
 extern const supine_option supine_options_landmarks[];
+
+/* Return the motion between the scans that the options name. */
+supine_patient_scan_motion supine_options_scan_motion(const supine_landmark_options *landmarks);
 
 /* Print the findings about an input to stderr, one per line. */
 void supine_options_say_findings(const char *command, const supine_findings *findings);

@@ -38,9 +38,11 @@ static supine_status find_breath(const supine_comparison *c, float *xyz[2],
   (void)supine_deform(c->basis, &after, xyz[1]);
   status = supine_compare_slabs(c->basis, item->state.gravity, xyz[0], xyz[1],
                                 SUPINE_COMPARISON_SLABS, slabs, error);
-  for (size_t i = 0; status == SUPINE_OK && i < info->lung_count * SUPINE_COMPARISON_SLABS; ++i) {
-    posture->slab[i % SUPINE_COMPARISON_SLABS].volume += slabs[i].volume;
-    posture->slab[i % SUPINE_COMPARISON_SLABS].gain += slabs[i].gain;
+  if (status == SUPINE_OK) {
+    for (size_t i = 0; i < info->lung_count * SUPINE_COMPARISON_SLABS; ++i) {
+      posture->slab[i % SUPINE_COMPARISON_SLABS].volume += slabs[i].volume;
+      posture->slab[i % SUPINE_COMPARISON_SLABS].gain += slabs[i].gain;
+    }
   }
   return status;
 }
@@ -114,8 +116,10 @@ supine_status supine_report_find(supine_comparison *c, supine_error *error) {
 }
 
 void supine_report_free(supine_comparison *c) {
-  for (size_t i = 0; c->posture != NULL && i < c->postures.count; ++i) {
-    free(c->posture[i].targets);
+  if (c->posture != NULL) {
+    for (size_t i = 0; i < c->postures.count; ++i) {
+      free(c->posture[i].targets);
+    }
   }
   supine_compare_destroy(c->compare);
   free(c->posture);

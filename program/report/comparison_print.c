@@ -26,11 +26,14 @@ json_t *supine_report_held(const supine_comparison *c, size_t posture, size_t lu
   SUPINE_C_LOCALE;
   const supine_compared_posture *of = &c->posture[posture];
   const supine_held held = supine_options_held(c->basis, &of->item->state, &of->pose, lung);
-  return !as_text ? json_pack("{s:f, s:f, s:f, s:s}", "value", held.value, "low", held.low, "high",
-                              held.high, "source", held.source)
-         : held.assumed
-             ? json_sprintf("%.0f (%.0f to %.0f, %s)", held.value, held.low, held.high, held.source)
-             : json_sprintf("%.0f (%s)", held.value, held.source);
+  if (!as_text) {
+    return json_pack("{s:f, s:f, s:f, s:s}", "value", held.value, "low", held.low, "high",
+                     held.high, "source", held.source);
+  }
+  if (held.assumed) {
+    return json_sprintf("%.0f (%.0f to %.0f, %s)", held.value, held.low, held.high, held.source);
+  }
+  return json_sprintf("%.0f (%s)", held.value, held.source);
 }
 
 static json_t *volumes(const supine_comparison *c, size_t posture, bool as_text) {
@@ -105,8 +108,10 @@ static void add_tables(const supine_comparison *c, json_t *text) {
       (void)json_object_set_new(moved, "its error", json_real(p->hilum.expected));
     }
     add_row(text, "displacement, mm", "posture", p->label, moved);
-    for (size_t k = 0; c->inside != NULL && k < c->names.count; ++k) {
-      add_row(text, "targets", "posture", p->label, supine_options_target_json(&p->targets[k]));
+    if (c->inside != NULL) {
+      for (size_t k = 0; k < c->names.count; ++k) {
+        add_row(text, "targets", "posture", p->label, supine_options_target_json(&p->targets[k]));
+      }
     }
     add_row(text, "volume of each lung, mL", "posture", p->label, volumes(c, i, true));
     if (p->has_breath) {

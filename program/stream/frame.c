@@ -129,9 +129,11 @@ void supine_stream_frame_release(supine_stream_frames *frames, supine_stream_fra
 
 /* Convert points in LPS to big-endian floats, in place; also to RAS if `f->ras` is true. */
 static void encode_points(const supine_stream_frames *f, size_t count, float *xyz) {
-  for (size_t i = 0; f->ras && i < count; ++i) {
-    xyz[3 * i] = -xyz[3 * i];
-    xyz[3 * i + 1] = -xyz[3 * i + 1];
+  if (f->ras) {
+    for (size_t i = 0; i < count; ++i) {
+      xyz[3 * i] = -xyz[3 * i];
+      xyz[3 * i + 1] = -xyz[3 * i + 1];
+    }
   }
   supine_stream_encode_floats(3 * count, xyz);
 }

@@ -230,12 +230,16 @@ supine_status supine_stream_message_read(const supine_stream_header *header,
                                          supine_stream_message *message, supine_error *error) {
   *message = (supine_stream_message){0};
   const size_t size = (size_t)header->size;
-  SUPINE_REFUSE_IF(supine_stream_crc64(0, body, size) != header->crc, error, SUPINE_ERROR_FORMAT,
+  const uint64_t crc = supine_stream_crc64(0, body, size);
+  SUPINE_REFUSE_IF(crc != header->crc, error, SUPINE_ERROR_FORMAT,
                    "%s: the checksum is wrong: send the message again", header->type);
   cursor c = {body, size, 0};
-  SUPINE_REFUSE_IF(header->version == 2 && !unwrap(&c), error, SUPINE_ERROR_FORMAT,
-                   "%s: the sizes of extension and metadata exceed the body: correct the sender",
-                   header->type);
+  if (header->version == 2) {
+    const bool fits = unwrap(&c);
+    SUPINE_REFUSE_IF(!fits, error, SUPINE_ERROR_FORMAT,
+                     "%s: the sizes of extension and metadata exceed the body: correct the sender",
+                     header->type);
+  }
   const int ours = device == NULL || strcmp(header->device, device) == 0;
   if (strcmp(header->device, "VOLUME") == 0 || strcmp(header->device, "SEND") == 0) {
     const int volume = header->device[0] == 'V';

@@ -43,9 +43,11 @@ void supine_stream_peer_end(supine_stream_peer *peer, supine_stream_frames *fram
 /* Receive up to `size` bytes; return their number: 0 if none are available, -1 if disconnected. */
 static ssize_t receive_bytes(int socket, void *bytes, size_t size) {
   const ssize_t got = recv(socket, bytes, size, MSG_DONTWAIT);
-  return got > 0                                                                  ? got
-         : got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR) ? 0
-                                                                                  : -1;
+  if (got > 0) {
+    return got;
+  }
+  const bool none_yet = got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR);
+  return none_yet ? 0 : -1;
 }
 
 /* Parse a complete header; return false if it is invalid. */

@@ -313,8 +313,9 @@ supine_status supine_stream_server_run(supine_stream_server *server, supine_erro
     gather(s);
     const int timeout = find_timeout(s, end);
     s->wait_begun = supine_clock_seconds();
-    SUPINE_REFUSE_IF(poll(s->polled, POLLED, timeout) < 0 && errno != EINTR, error,
-                     SUPINE_ERROR_WRITE, "cannot wait for the sockets: %s", strerror(errno));
+    const int ready = poll(s->polled, POLLED, timeout);
+    SUPINE_REFUSE_IF(ready < 0 && errno != EINTR, error, SUPINE_ERROR_WRITE,
+                     "cannot wait for the sockets: %s", strerror(errno));
     s->woke = supine_clock_seconds();
     if (s->woke - asked >= stop_interval) {
       asked = s->woke;

@@ -317,8 +317,10 @@ void supine_stream_web_destroy(supine_stream_web *web) {
   if (web->context != NULL) {
     lws.context_destroy(web->context);
   }
-  for (size_t i = 0; i < 2 && web->poses[1] > 0; ++i) {
-    (void)close(web->poses[i]);
+  if (web->poses[1] > 0) {
+    for (size_t i = 0; i < 2; ++i) {
+      (void)close(web->poses[i]);
+    }
   }
   (void)pthread_mutex_destroy(&web->lock);
   free(web);

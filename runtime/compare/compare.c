@@ -48,8 +48,10 @@ static supine_status share_area(supine_compare *compare, supine_error *error) {
     total += 3 * piece;
   }
   compare->area = total;
-  for (size_t i = 0; i < basis->info.vertex_count && total > 0; ++i) {
-    compare->share[i] = (float)(area[i] / total);
+  if (total > 0) {
+    for (size_t i = 0; i < basis->info.vertex_count; ++i) {
+      compare->share[i] = (float)(area[i] / total);
+    }
   }
   free(area);
   return total > 0 && isfinite(total)

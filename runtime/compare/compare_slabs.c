@@ -138,10 +138,10 @@ static void add_triangle(cutter *c, const polygon *triangle, supine_slab *slabs)
  * outline to the mean point of the outline. */
 static void close_cut(const outline *cut, supine_slab *above, supine_slab *below) {
   double volume[TIMES]; /* [BEFORE, AFTER] between the origin and the triangles, signed, mL */
-  for (int time = 0; time < TIMES && cut->length > 0; ++time) {
-    volume[time] = 1e-3 / 6 * supine_dot(cut->middle[time], cut->area[time]) / cut->length;
-  }
   if (cut->length > 0) {
+    for (int time = 0; time < TIMES; ++time) {
+      volume[time] = 1e-3 / 6 * supine_dot(cut->middle[time], cut->area[time]) / cut->length;
+    }
     above->volume -= volume[BEFORE];
     above->gain -= volume[AFTER] - volume[BEFORE];
     below->volume += volume[BEFORE];

@@ -31,7 +31,12 @@ static inline uint32_t word_nearest(double value, uint32_t low, int bits) {
   const double step = (double)(UINT32_C(1) << bits);
   const double top = 0x1p31 / step - 1;
   const double above = nearest_integer((value - (double)low) / step);
-  const double held = above > top ? top : above >= -top - 1 ? above : -top - 1;
+  double held = -top - 1; /* also for NaN */
+  if (above > top) {
+    held = top;
+  } else if (above >= -top - 1) {
+    held = above;
+  }
   return (uint32_t)(int32_t)(held * step) | low;
 }
 
@@ -72,7 +77,8 @@ static inline int normal_from_bytes(const int8_t *bytes, size_t count, size_t k)
 
 /** Return number 0, 1 or 2 of the three numbers that normal_narrow packed into `word`. */
 static inline float normal_number(uint32_t word, size_t number) {
-  return (float)word_integer(word << (number == 0 ? 0 : number == 1 ? 13 : 23));
+  static const unsigned begin[] = {0, 13, 23}; /* first bit of each number, from the highest */
+  return (float)word_integer(word << begin[number]);
 }
 
 /** Pack three numbers between -2^31 and 2^31 into two words. The first two numbers get the upper 21

@@ -114,8 +114,10 @@ INLINE row dot(const supine_tiles *tiles, const unsigned char *at, const weights
     add_mode(even, weight(w, k + 1, known), at, 11, true);
     add_mode(odd, weight(w, k + 2, known), at, 22, true);
   }
-  for (size_t q = 0; q < GROUPS && CHAINS == 2; ++q) {
-    even->v[q] += odd->v[q];
+  if (CHAINS == 2) {
+    for (size_t q = 0; q < GROUPS; ++q) {
+      even->v[q] += odd->v[q];
+    }
   }
   return *even;
 }
@@ -124,15 +126,18 @@ INLINE row dot(const supine_tiles *tiles, const unsigned char *at, const weights
  * quantisation steps. */
 INLINE triples numbers(const unsigned char *at, bool compact) {
   triples n;
-  for (size_t j = 0; j < PIECES && !compact; ++j) {
-    n.v[j] = load(at + sizeof(vf) * j);
-  }
-  for (size_t q = 0; q < GROUPS && compact; ++q, at += sizeof(vf)) {
-    const vu first = (vu)load(at);
-    const vu second = (vu)load(at + 64);
-    n.v[q] = integers(first, 0);
-    n.v[GROUPS + q] = integers(second, 0);
-    n.v[2 * GROUPS + q] = integers(first << 21 | (second << 10 & 0x1FFC00), 0);
+  if (compact) {
+    for (size_t q = 0; q < GROUPS; ++q, at += sizeof(vf)) {
+      const vu first = (vu)load(at);
+      const vu second = (vu)load(at + 64);
+      n.v[q] = integers(first, 0);
+      n.v[GROUPS + q] = integers(second, 0);
+      n.v[2 * GROUPS + q] = integers(first << 21 | (second << 10 & 0x1FFC00), 0);
+    }
+  } else {
+    for (size_t j = 0; j < PIECES; ++j) {
+      n.v[j] = load(at + sizeof(vf) * j);
+    }
   }
   return n;
 }
@@ -140,8 +145,10 @@ INLINE triples numbers(const unsigned char *at, bool compact) {
 INLINE triples reference_positions(const supine_tiles *tiles, const unsigned char *tile,
                                    bool compact) {
   triples p = numbers(tile + tiles->reference_begin, compact);
-  for (size_t j = 0; j < PIECES && compact; ++j) {
-    p.v[j] = (vf)((vu)p.v[j] + tiles->reference_unit);
+  if (compact) {
+    for (size_t j = 0; j < PIECES; ++j) {
+      p.v[j] = (vf)((vu)p.v[j] + tiles->reference_unit);
+    }
   }
   return p;
 }

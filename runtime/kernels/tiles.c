@@ -65,7 +65,11 @@ const supine_kernels *supine_kernels_choose(supine_simd *simd) {
     *simd = requested();
   }
   if (*simd == SUPINE_SIMD_AUTO) {
-    *simd = avx512 ? SUPINE_SIMD_AVX512 : avx2 ? SUPINE_SIMD_AVX2 : SUPINE_SIMD_PORTABLE;
+    if (avx512) {
+      *simd = SUPINE_SIMD_AVX512;
+    } else {
+      *simd = avx2 ? SUPINE_SIMD_AVX2 : SUPINE_SIMD_PORTABLE;
+    }
   }
   switch (*simd) {
   case SUPINE_SIMD_PORTABLE:

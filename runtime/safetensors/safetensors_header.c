@@ -101,7 +101,7 @@ static uint32_t take_hex(parser *p) {
 
 static char *put_utf8(char *to, uint32_t code) {
   static const unsigned lead[] = {0, 0xC0, 0xE0, 0xF0};
-  const int more = code < 0x80 ? 0 : code < 0x800 ? 1 : code < 0x10000 ? 2 : 3;
+  const int more = (code >= 0x80) + (code >= 0x800) + (code >= 0x10000); /* bytes after the first */
   *to++ = (char)(lead[more] | code >> 6 * more);
   for (int i = more - 1; i >= 0; --i) {
     *to++ = (char)(0x80U | (code >> 6 * i & 0x3FU));

@@ -45,23 +45,25 @@ static layout layout_of(const glb *g, glb_kind kind) {
 static unsigned char *encode(glb_kind kind, const layout *l, const void *elements,
                              const uint32_t *order, size_t count) {
   unsigned char *encoded = calloc(count + 1, l->stride);
-  for (size_t i = 0; encoded != NULL && i < count; ++i) {
-    unsigned char *row = encoded + i * l->stride;
-    const size_t from = order != NULL ? order[i] : i;
-    const float *values = (const float *)elements + l->columns * from;
-    if (l->limit == 0) {
-      memcpy(row, (const unsigned char *)elements + from * l->stride, l->stride);
-      continue;
-    }
-    if (kind == GLB_NORMALS) {
-      supine_export_pack_direction(values, l->stride, row);
-      continue;
-    }
-    for (size_t k = 0; k < l->columns; ++k) {
-      const size_t bytes = l->stride / (l->columns == 3 ? 4 : 1);
-      const double value = (double)values[k] * (kind == GLB_POSITIONS ? 1 : l->limit);
-      const int32_t counts = (int32_t)rint(fmax(-l->limit, fmin(l->limit, value)));
-      memcpy(row + k * bytes, &counts, bytes);
+  if (encoded != NULL) {
+    for (size_t i = 0; i < count; ++i) {
+      unsigned char *row = encoded + i * l->stride;
+      const size_t from = order != NULL ? order[i] : i;
+      const float *values = (const float *)elements + l->columns * from;
+      if (l->limit == 0) {
+        memcpy(row, (const unsigned char *)elements + from * l->stride, l->stride);
+        continue;
+      }
+      if (kind == GLB_NORMALS) {
+        supine_export_pack_direction(values, l->stride, row);
+        continue;
+      }
+      for (size_t k = 0; k < l->columns; ++k) {
+        const size_t bytes = l->stride / (l->columns == 3 ? 4 : 1);
+        const double value = (double)values[k] * (kind == GLB_POSITIONS ? 1 : l->limit);
+        const int32_t counts = (int32_t)rint(fmax(-l->limit, fmin(l->limit, value)));
+        memcpy(row + k * bytes, &counts, bytes);
+      }
     }
   }
   return encoded;
@@ -141,10 +143,11 @@ json_int_t supine_export_glb_put(glb *g, glb_kind kind, const void *elements, co
     g->status = SUPINE_ERROR_MEMORY;
     return 0;
   }
-  json_t *view = write_encoded(g, kind, &l, encoded, count,
-                               g->options->plain || l.target == 0 ? NULL
-                               : kind == GLB_CORNERS              ? "TRIANGLES"
-                                                                  : "ATTRIBUTES");
+  const char *mode = NULL; /* of the compression by meshoptimizer */
+  if (!g->options->plain && l.target != 0) {
+    mode = kind == GLB_CORNERS ? "TRIANGLES" : "ATTRIBUTES";
+  }
+  json_t *view = write_encoded(g, kind, &l, encoded, count, mode);
   if (l.target != 0) {
     (void)json_object_set_new(view, "target", json_integer(l.target));
   }

@@ -158,11 +158,11 @@ static supine_status add_doubles(page *p) {
                                       "volume_quadratic", "volume_cubic"};
   for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
     const supine_tensor *tensor = supine_basis_tensor(p->basis, names[i]);
-    size_t bytes = sizeof(double);
-    for (size_t axis = 0; tensor != NULL && axis < tensor->rank; ++axis) {
-      bytes *= tensor->shape[axis];
-    }
     if (tensor != NULL) {
+      size_t bytes = sizeof(double);
+      for (size_t axis = 0; axis < tensor->rank; ++axis) {
+        bytes *= tensor->shape[axis];
+      }
       SUPINE_TRY(add_tensor(p, names[i], tensor->data, bytes));
     }
   }
@@ -205,9 +205,11 @@ static json_t *describe_inside(const page *p) {
   }
   const supine_tensor *rigid = supine_basis_tensor(p->shown->inside, "rigid");
   json_t *parts = json_array();
-  for (size_t i = 0; rigid != NULL && i < rigid->shape[0]; ++i) {
-    const uint32_t first = ((const uint32_t *)rigid->data)[2 * i];
-    (void)json_array_append_new(parts, json_integer((json_int_t)p->shown->names->part[first]));
+  if (rigid != NULL) {
+    for (size_t i = 0; i < rigid->shape[0]; ++i) {
+      const uint32_t first = ((const uint32_t *)rigid->data)[2 * i];
+      (void)json_array_append_new(parts, json_integer((json_int_t)p->shown->names->part[first]));
+    }
   }
   return json_pack("{s:I, s:I, s:o, s:o, s:o, s:f}", "vertices", (json_int_t)info->vertex_count,
                    "triangles", (json_int_t)info->triangle_count, "lungBegin",

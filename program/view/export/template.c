@@ -112,9 +112,11 @@ static const char *fill_section(const supine_asset *assets, const tag *open, con
                     json_is_true(value);
   const size_t count = once ? 1 : json_array_size(value);
   scope inner = {value, around};
-  for (size_t i = 0; file != NULL && i < count; ++i) {
-    inner.value = once ? value : json_array_get(value, i);
-    (void)fill(assets, open->end, end, &inner, file);
+  if (file != NULL) {
+    for (size_t i = 0; i < count; ++i) {
+      inner.value = once ? value : json_array_get(value, i);
+      (void)fill(assets, open->end, end, &inner, file);
+    }
   }
   return fill(assets, open->end, end, &inner, NULL);
 }

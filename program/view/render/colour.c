@@ -48,7 +48,10 @@ double supine_render_bar_step(double value) {
   }
   const double power = pow(10, floor(log10(value / 4)));
   const double steps = value / 4 / power;
-  return power * (steps >= 5 ? 5 : steps >= 2 ? 2 : 1);
+  if (steps >= 5) {
+    return power * 5;
+  }
+  return power * (steps >= 2 ? 2 : 1);
 }
 
 double supine_render_bar_end(double value) {
