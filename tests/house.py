@@ -376,8 +376,22 @@ def forms_of(text):
             yield found.start(), "write count == 0 instead of !(count > 0)"
 
 
+# Code that check_forms refuses, and the same written plainly.
+FORMS = (("for (i = 0; i < n && wanted; ++i) { f(i); }", "if (wanted) { for (i = 0; i < n; ++i) { f(i); } }"),
+         ("for (a = 0; p->kind == X && a < 3; ++a) { s[a] += 1; }", "for (a = 0; good && a < 3; ++a) { good = f(a); }"),
+         ("for (i = 0; i < n && left > 0; ++i) { f(i); }", "for (i = 0; i < n && left > 0; ++i) { left -= f(i); }"),
+         ("for (i = 0; i < n && c->status == 0; ++i) { f(i); }", "for (i = 0; i < n && c->status == 0; ++i) { f(c); }"),
+         ("x = a ? b : c ? d : e;", "x = a ? b : c; y = d ? e : f;"), ("x = a ? (b ? c : d) : e;", "f(a ? b : c, d ? e : g);"),
+         ("SUPINE_TRY(c ? f() : SUPINE_OK);", "SUPINE_TRY(f(c ? a : b));"), ("*(c ? &a : &b) = x;", "*a = c ? x : y;"),
+         ('SUPINE_REFUSE_IF(fread(p, 1, n, file) != n, error, X, "short");', 'SUPINE_REFUSE_IF(got != n, error, X, "short");'),
+         ('SUPINE_REFUSE_IF(!(count > 0), error, X, "none");', 'SUPINE_REFUSE_IF(!(x > 0.0) || !isfinite(x), error, X, "x");'))
+
+
 def check_forms(files):
     """Check that sources have none of the forms that save lines at the expense of the reader."""
+    for refused, plain in FORMS:
+        if not list(forms_of(refused)) or list(forms_of(plain)):
+            faults.append(f"house.py does not tell '{refused}' from '{plain}'")
     for file in files:
         with open(os.path.join(source, file), encoding="utf-8") as opened:
             text = code_of(opened.read())
