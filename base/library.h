@@ -24,7 +24,9 @@
 /** Load functions of a shared library, which stays loaded until the process ends.
  * @param library  name of its file, such as "libcairo.so.2"
  * @param names    names of the functions; NULL after the last
- * @param members  pointers to the functions, in the order of the names, written */
+ * @param members  pointers to the functions, in the order of the names; zeroed before the first call,
+ *   written by the first that succeeds
+ * Thread-safe. */
 supine_status supine_library_load(const char *library, const char *const *names, void *members,
                                   supine_error *error);
 
