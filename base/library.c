@@ -23,8 +23,8 @@ static bool is_loaded(const char *const *names, const void *members) {
   return loaded;
 }
 
-static supine_status load(const char *library, const char *const *names, void *members,
-                          supine_error *error) {
+supine_status supine_library_load_own(const char *library, const char *const *names, void *members,
+                                      supine_error *error) {
   void *handle = dlopen(library, RTLD_LAZY);
   for (size_t i = 0; names[i] != NULL; ++i) {
     void *function = handle != NULL ? dlsym(handle, names[i]) : NULL;
@@ -40,7 +40,7 @@ supine_status supine_library_load(const char *library, const char *const *names,
   supine_status status = SUPINE_OK;
   (void)pthread_mutex_lock(&loading);
   if (!is_loaded(names, members)) {
-    status = load(library, names, members, error);
+    status = supine_library_load_own(library, names, members, error);
   }
   (void)pthread_mutex_unlock(&loading);
   return status;
