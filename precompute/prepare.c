@@ -326,12 +326,8 @@ supine_status supine_precompute_prepare(const supine_model_choice *choice, char 
   supine_reference_predict_rest(&scanned, &choice->person, &predicted);
   SUPINE_TRY(supine_reference_find(lungs, &p->model, &scan, &predicted, &p->reference, error));
   summarize(choice, &resting, predicted.predicted, p);
-  char doubt[512] = "";
   if (p->reference.known) {
-    supine_reference_doubt(&p->reference, &choice->person, &resting, doubt, sizeof doubt);
-  }
-  if (doubt[0] != '\0') {
-    supine_findings_add(&p->source.findings, "warning: %s", doubt);
+    supine_reference_doubt(&p->reference, &choice->person, &resting, &p->source.findings);
   }
   return SUPINE_OK;
 }

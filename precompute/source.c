@@ -50,8 +50,9 @@ static void note_mesh(const char *path, const supine_mesh_report *report,
 static supine_status load_meshes(reading *r, supine_source *source, supine_error *error) {
   supine_parallel_for(r->count, 1, r->count, load_range, r);
   for (size_t i = 0; i < r->count; ++i) {
-    SUPINE_REFUSE_IF(r->errors[i].status != SUPINE_OK, error, r->errors[i].status, "%s",
-                     r->errors[i].message);
+    if (r->errors[i].status != SUPINE_OK) {
+      return supine_error_wrap(error, &r->errors[i], "%s", "");
+    }
     note_mesh(r->paths[i], &r->reports[i], &source->findings);
   }
   r->axes = r->reports[0].axes;

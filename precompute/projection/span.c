@@ -97,7 +97,7 @@ supine_status supine_projection_span_create(const supine_lungs *lungs, const sup
   SUPINE_REFUSE_IF(!choose(residual, count, law->soften == 0.0 ? rounding : tolerance, &span->rank,
                            rows, columns),
                    error, SUPINE_ERROR_ARGUMENT,
-                   "--soften %g is too large for a basis file: give at most 12", law->soften);
+                   "softening by %g is too large for a basis file: give at most 12", law->soften);
   for (size_t r = 0; r < span->rank; ++r) {
     memcpy(span->directions + 3 * r, directions + 3 * columns[r], 3 * sizeof *directions);
     span->vertices[r] = vertices[rows[r]];
@@ -107,11 +107,12 @@ supine_status supine_projection_span_create(const supine_lungs *lungs, const sup
   }
   const supine_status status =
       span->rank == 0 ? SUPINE_ERROR_NUMERICAL : invert(span->inverse, span->rank);
-  return status == SUPINE_OK ? status
-         : status == SUPINE_ERROR_MEMORY
-             ? supine_error_memory(error, "the forces")
-             : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                                "the force is zero everywhere: change --base or --gain");
+  if (status == SUPINE_ERROR_MEMORY) {
+    return supine_error_memory(error, "the forces");
+  }
+  SUPINE_REFUSE_ADVISE(status != SUPINE_OK, error, SUPINE_REMEDY_FORCE, SUPINE_ERROR_NUMERICAL,
+                       "the force is zero everywhere");
+  return SUPINE_OK;
 }
 
 supine_status supine_projection_span_weights(const supine_lungs *lungs, const supine_force_law *law,
