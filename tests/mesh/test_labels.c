@@ -547,7 +547,7 @@ static void refused(const char *name, const supine_labels_options *options, supi
                     const char *said) {
   const char *path = in_folder(name);
   made out = {0};
-  supine_error error = {SUPINE_OK, ""};
+  supine_error error = {.message = ""};
   assert_int_equal(supine_labels_surfaces(&path, 1, options, out.surface, &out.report, &error),
                    status);
   assert_says(error.message, said);
