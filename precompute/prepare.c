@@ -9,38 +9,48 @@
 #include "base/text.h"
 #include "base/vec3.h"
 
+#include "precompute/lungs/disease.h"
+#include "precompute/lungs/expandability.h"
 #include "precompute/prepare.h"
 
-supine_model_choice supine_precompute_choice_default(void) {
-  supine_model_choice choice = {.law = SUPINE_LAW_COUNT,
-                                .model = supine_physics_model(SUPINE_LAW_PAPER),
-                                .resting = supine_reference_resting_default()};
-  choice.model.reach = choice.model.force.base = choice.model.force.gain = NAN;
-  choice.model.force.box[0] = choice.model.direction.c[0] = NAN;
-  choice.model.direction.shear = NAN;
-  return choice;
-}
+/* What is known of the scan: completed by the patient's file and by defaults. */
+typedef struct knowledge {
+  bool has_scan; /* whether `scan` is given */
+  supine_scan scan;
+  supine_resting resting;
+  supine_person person;
+} knowledge;
 
 /* Select the displacement law. Constants that the user gives override its constants. */
-static supine_model choose_law(const supine_model_choice *choice) {
-  const bool none = choice->has_scan && !choice->scan.known;
-  const supine_model law = supine_physics_model(choice->law != SUPINE_LAW_COUNT
-                                                    ? (supine_law)choice->law
-                                                    : (none ? SUPINE_LAW_PAPER : SUPINE_LAW_DEEP));
-  supine_model model = choice->model;
-  model.law = law.law;
-  model.force.pair = law.force.pair;
-  memcpy(model.bend, law.bend, sizeof law.bend);
-  model.reach = isnan(model.reach) ? law.reach : model.reach;
-  model.force.base = isnan(model.force.base) ? law.force.base : model.force.base;
-  model.force.gain = isnan(model.force.gain) ? law.force.gain : model.force.gain;
-  model.direction.shear =
-      isnan(model.direction.shear) ? law.direction.shear : model.direction.shear;
-  if (isnan(model.force.box[0])) {
-    memcpy(model.force.box, law.force.box, sizeof law.force.box);
+static supine_model choose_law(const supine_precompute_options *options) {
+  const supine_precompute_law *given = &options->law;
+  supine_law law = SUPINE_LAW_DEEP;
+  if (given->kind != SUPINE_PRECOMPUTE_LAW_DEFAULT) {
+    law = given->kind == SUPINE_PRECOMPUTE_LAW_PAPER ? SUPINE_LAW_PAPER : SUPINE_LAW_DEEP;
+  } else if (options->scan.shown == SUPINE_SHOWN_UNKNOWN || options->fields != NULL) {
+    law = SUPINE_LAW_PAPER;
   }
-  if (isnan(model.direction.c[0])) {
-    memcpy(model.direction.c, law.direction.c, sizeof law.direction.c);
+  supine_model model = supine_physics_model(law);
+  model.force.soften = given->soften;
+  if (given->reach > 0.0) {
+    model.reach = given->reach;
+  }
+  if (given->has_base || given->base != 0.0) {
+    model.force.base = given->base;
+  }
+  if (given->has_gain || given->gain != 0.0) {
+    model.force.gain = given->gain;
+  }
+  if (given->has_shear || given->shear != 0.0) {
+    model.direction.shear = given->shear;
+  }
+  const double *box = given->box_force;
+  if (given->has_box_force || box[0] != 0.0 || box[1] != 0.0 || box[2] != 0.0) {
+    memcpy(model.force.box, box, sizeof model.force.box);
+  }
+  const double *c = given->constants;
+  if (given->has_constants || c[0] != 0.0 || c[2] != 0.0 || c[4] != 0.0) {
+    memcpy(model.direction.c, c, sizeof model.direction.c);
   }
   return model;
 }
@@ -61,12 +71,11 @@ static void tell_volume(const supine_patient_record *record, double measured,
     (void)supine_print_text(beside, sizeof beside, "; measured: %.0f mL", measured);
   }
   const double off = beside[0] != '\0' ? fabs((lung[0] + lung[1]) / measured - 1.0) : 0.0;
-  supine_findings_add(
-      findings, "%s: by the fitted law, the lungs hold %.0f mL %s%s%s",
-      off > different ? "warning" : "note", lung[0] + lung[1], state, beside,
-      off > different
-          ? ". Check that the scans show the same lungs; give --landmarks to 'supine fit'"
-          : "");
+  const bool warn = off > different;
+  supine_findings_advise(findings, warn ? SUPINE_REMEDY_FIT_LANDMARKS : SUPINE_REMEDY_NONE, NULL,
+                         "%s: by the fitted law, the lungs hold %.0f mL %s%s%s",
+                         warn ? "warning" : "note", lung[0] + lung[1], state, beside,
+                         warn ? ". Check that the scans show the same lungs" : "");
 }
 
 static void describe_fit(const supine_patient_record *record, char *text, size_t size) {
@@ -81,14 +90,13 @@ static void describe_fit(const supine_patient_record *record, char *text, size_t
       report->expected_point);
 }
 
-/* Use the displacement law and the force that were fitted to a patient.
- * @param resting  in: the chosen volumes at rest; out: those of the patient
- * @param scan     written: the state of the scan by the fit */
+/* Use the displacement law, the force and the volumes at rest that were fitted to a patient.
+ * @param scan  written: the state of the scan by the fit */
 static supine_status take_patient(const supine_patient_record *fitted, supine_prepared *p,
                                   supine_resting *resting, supine_scan *scan, supine_error *error) {
   const size_t n = p->source.lungs.mesh.vertex_count;
-  supine_patient_record *record = supine_arena_take(&p->memory, 1, sizeof *record);
   double *arrays = supine_arena_take(&p->memory, 4 * n, sizeof *arrays);
+  supine_patient_record *record = supine_arena_take(&p->memory, 1, sizeof *record);
   SUPINE_TRY(supine_arena_check(&p->memory, error, "%zu vertices", n));
   *record = *fitted;
   p->patient = record;
@@ -105,32 +113,63 @@ static supine_status take_patient(const supine_patient_record *fitted, supine_pr
 static supine_status assume_fitted_state(const supine_patient_record *record,
                                          const supine_scan *scan, supine_findings *findings,
                                          supine_error *error) {
-  supine_findings_add(
-      findings,
-      "note: the scan is assumed to be the %s of the two that were fitted; --scanned changes this",
-      record->shown == 0 ? "fuller" : "emptier");
-  SUPINE_REFUSE_IF(record->shown == 1 && !scan->known, error, SUPINE_ERROR_ARGUMENT,
-                   "this scan is the emptier of the two that were fitted, and how far it is below "
-                   "full inflation is unknown: give its state, such as --scanned supine:rest, or "
-                   "use the fuller scan");
+  supine_findings_advise(findings, SUPINE_REMEDY_SCAN_ASSUMED, NULL,
+                         "note: the scan is assumed to be the %s of the two that were fitted",
+                         record->shown == 0 ? "fuller" : "emptier");
+  SUPINE_REFUSE_ADVISE(record->shown == 1 && !scan->known, error, SUPINE_REMEDY_SCAN_GIVE,
+                       SUPINE_ERROR_ARGUMENT,
+                       "this scan is the emptier of the two that were fitted, and how far it is "
+                       "below full inflation is unknown: use the fuller scan");
   return SUPINE_OK;
 }
 
-static supine_status set_expandability(const supine_model_choice *choice, supine_prepared *p,
+/* Choose the model: the patient's, or that of the displacement law. Without a given state of the
+ * scan, also choose this state. */
+static supine_status choose_model(const supine_precompute_options *options,
+                                  const supine_patient_record *patient, supine_prepared *p,
+                                  knowledge *known, supine_error *error) {
+  if (patient != NULL) {
+    supine_scan fitted;
+    SUPINE_TRY(take_patient(patient, p, &known->resting, &fitted, error));
+    if (!known->has_scan) {
+      known->has_scan = true;
+      known->scan = fitted;
+      SUPINE_TRY(assume_fitted_state(p->patient, &fitted, &p->source.findings, error));
+    }
+    return SUPINE_OK;
+  }
+  p->model = choose_law(options);
+  if (!known->has_scan && p->model.law != SUPINE_LAW_PAPER) {
+    (void)supine_reference_scan_parse("full", &known->scan, NULL);
+  }
+  return SUPINE_OK;
+}
+
+static supine_status set_expandability(const supine_precompute_tissue *tissue, supine_prepared *p,
                                        supine_error *error) {
   const size_t n = p->source.lungs.mesh.vertex_count;
-  if (choice->expandability == NULL &&
-      choice->expandability_law.shape == SUPINE_EXPANDABILITY_UNIFORM) {
+  if (tissue->expandability == NULL && tissue->profile == SUPINE_PROFILE_UNIFORM) {
     return SUPINE_OK;
   }
   SUPINE_REFUSE_IF(p->model.stiffness != NULL, error, SUPINE_ERROR_ARGUMENT,
-                   "the file of --patient sets the stiffness: leave --expandability out");
+                   "the patient's file sets the stiffness: leave the expandability out");
   double *a = supine_arena_take(&p->memory, n, sizeof *a);
   SUPINE_TRY(supine_arena_check(&p->memory, error, "%zu vertices", n));
-  if (choice->expandability != NULL) {
-    SUPINE_TRY(supine_tissue_expandability_load(choice->expandability, n, a, error));
+  if (tissue->expandability != NULL) {
+    SUPINE_TRY(supine_tissue_expandability_load(tissue->expandability, n, a, error));
   } else {
-    supine_tissue_expandability_regional(&p->source.lungs, &choice->expandability_law, a);
+    const supine_expandability_law law = {.shape = tissue->profile == SUPINE_PROFILE_LINEAR
+                                                       ? SUPINE_EXPANDABILITY_LINEAR
+                                                       : SUPINE_EXPANDABILITY_EXPONENTIAL,
+                                          .axis = tissue->axis,
+                                          .from = tissue->from,
+                                          .to = tissue->to};
+    SUPINE_REFUSE_IF(!(law.axis >= 0 && law.axis <= 2 && law.from > 0.0 && law.to > 0.0), error,
+                     SUPINE_ERROR_ARGUMENT,
+                     "expandability along axis %d from %g to %g: give an axis 0 to 2, and values "
+                     "above 0",
+                     law.axis, law.from, law.to);
+    supine_tissue_expandability_regional(&p->source.lungs, &law, a);
   }
   for (size_t i = 0; i < n; ++i) {
     a[i] = 1.0 / a[i];
@@ -154,43 +193,55 @@ static void warn_of_lesion(const supine_lungs *lungs, const supine_lesion *lesio
       c[0], c[1], c[2], nearest, lesion->radius);
 }
 
-static supine_status set_lesions(const supine_model_choice *choice, supine_prepared *p,
+static supine_status set_lesions(const supine_precompute_tissue *tissue, supine_prepared *p,
                                  supine_error *error) {
   const supine_lungs *lungs = &p->source.lungs;
   const size_t n = lungs->mesh.vertex_count;
-  if (choice->lesion_count == 0) {
+  if (tissue->lesion_count == 0) {
     return SUPINE_OK;
   }
+  SUPINE_REFUSE_IF(tissue->lesion_count > SUPINE_PRECOMPUTE_LESIONS_MAX, error,
+                   SUPINE_ERROR_ARGUMENT, "%zu lesions: give at most %d", tissue->lesion_count,
+                   SUPINE_PRECOMPUTE_LESIONS_MAX);
   double *factors = supine_arena_take(&p->memory, n, sizeof *factors);
   SUPINE_TRY(supine_arena_check(&p->memory, error, "%zu vertices", n));
   for (size_t i = 0; i < n; ++i) {
     factors[i] = 1.0;
   }
-  for (size_t l = 0; l < choice->lesion_count; ++l) {
+  for (size_t l = 0; l < tissue->lesion_count; ++l) {
+    const supine_precompute_lesion *given = &tissue->lesions[l];
+    const double *c = given->centre;
+    const supine_lesion lesion = {{c[0], c[1], c[2]}, given->radius, given->factor};
     size_t reached = 0;
-    SUPINE_TRY(supine_tissue_add_lesion(lungs, &choice->lesions[l], factors, &reached, error));
+    SUPINE_TRY(supine_tissue_add_lesion(lungs, &lesion, factors, &reached, error));
     if (reached == 0) {
-      warn_of_lesion(lungs, &choice->lesions[l], &p->source.findings);
+      warn_of_lesion(lungs, &lesion, &p->source.findings);
     }
   }
   p->model.lesions = factors;
   return SUPINE_OK;
 }
 
-static supine_status set_shares(const supine_model_choice *choice, supine_prepared *p,
+static supine_status set_shares(const supine_precompute_tissue *tissue, supine_prepared *p,
                                 supine_error *error) {
   const supine_lungs *lungs = &p->source.lungs;
   for (size_t side = 0; side < 2; ++side) {
     const char *name = side == 0 ? "left" : "right";
+    const double share = tissue->share[side];
     size_t lung = 0;
     while (lung < lungs->lung_count && lungs->side[lung] != (side == 0 ? 1 : -1)) {
       ++lung;
     }
-    SUPINE_REFUSE_IF(choice->share[side] > 0.0 && lung == lungs->lung_count, error,
-                     SUPINE_ERROR_ARGUMENT, "--lung %s: the model has no %s lung: leave it out",
-                     name, name);
-    if (choice->share[side] > 0.0) {
-      p->model.share[lung] = choice->share[side];
+    if (share != 0.0) {
+      SUPINE_REFUSE_IF(!(share > 0.0 && share <= 1.0), error, SUPINE_ERROR_ARGUMENT,
+                       "the %s lung's share of its healthy volume, %g, must be above 0 and at most "
+                       "1",
+                       name, share);
+      SUPINE_REFUSE_IF(
+          lung == lungs->lung_count, error, SUPINE_ERROR_ARGUMENT,
+          "a share of the %s lung was given, but the model has no %s lung: leave it out", name,
+          name);
+      p->model.share[lung] = share;
     }
   }
   return SUPINE_OK;
@@ -206,18 +257,16 @@ static bool varies(const supine_model *model, size_t count) {
   return !same;
 }
 
-/* Describe what was assumed.
- * @param resting  volumes at rest before a prediction from height and sex */
-static void summarize(const supine_model_choice *choice, const supine_resting *resting,
-                      bool predicted, supine_prepared *p) {
+static void summarize(const knowledge *given, bool predicted, supine_prepared *p) {
   static const double supine[3] = {0.0, 1.0, 0.0};
+  const supine_resting *resting = &given->resting;
   const supine_reference *reference = &p->reference;
   const size_t size = sizeof p->assumed;
   char state[160];
   double ml[2];
   supine_text_add(p->assumed, size, "%s; %s law; scan ", p->source.summary,
-                  choice->patient != NULL ? "the patient's own"
-                                          : supine_physics_law_names[p->model.law]);
+                  p->patient != NULL ? "the patient's own"
+                                     : supine_physics_law_names[p->model.law]);
   if (!reference->known) {
     supine_text_add(p->assumed, size, "taken as the reference of every posture");
     return;
@@ -235,7 +284,7 @@ static void summarize(const supine_model_choice *choice, const supine_resting *r
                   : !at_rest                 ? ""
                   : known                    ? "from rest, "
                                              : "assumed from rest, ");
-  supine_reference_compare(reference, &choice->person, p->assumed, size);
+  supine_reference_compare(reference, &given->person, p->assumed, size);
   const double rest = supine_reference_rest(reference, supine, ml);
   const double ratio = exp(resting->spread / resting->assumed);
   supine_text_add(p->assumed, size, "); rest supine %.0f mL (", rest);
@@ -244,8 +293,8 @@ static void summarize(const supine_model_choice *choice, const supine_resting *r
   }
   supine_text_add(p->assumed, size, "by %s)",
                   at_rest                                 ? "the scan"
-                  : choice->patient != NULL               ? "the fit"
-                  : known                                 ? "--resting"
+                  : p->patient != NULL                    ? "the fit"
+                  : known                                 ? "the given volumes"
                   : predicted                             ? "height and sex"
                   : resting->assumed == SUPINE_REST_SHARE ? "healthy people's share"
                                                           : "the share in COPD");
@@ -256,80 +305,126 @@ static void summarize(const supine_model_choice *choice, const supine_resting *r
   }
   if (p->model.share[0] != 1.0 || p->model.share[1] != 1.0) {
     supine_text_add(p->assumed, size,
-                    "; collapsed in every state by --lung, also in the scan, which then holds %.0f "
-                    "mL: no displacement contains the collapse",
+                    "; collapsed in every state, also in the scan, which then holds %.0f mL: no "
+                    " displacement contains the collapse",
                     collapsed);
   }
 }
 
-/* Add the volume at full inflation to the state of the scan, and check that the law and --full go
- * with it. */
-static supine_status complete_scan(const supine_model_choice *choice, supine_law law,
+/* Say what is assumed of the lungs of another simulator's fields. */
+static void summarize_fields(supine_prepared *p) {
+  char posture[160] = "not displaced by gravity";
+  if (p->posture.known) {
+    (void)supine_state_describe(&p->posture.state, posture, sizeof posture);
+  }
+  supine_text_add(p->assumed, sizeof p->assumed, "%s; scan %s", p->source.summary, posture);
+}
+
+/* Add the volume at full inflation to the state of the scan, and check that the law and this volume
+ * go with it. */
+static supine_status complete_scan(const supine_precompute_volumes *volumes, supine_law law,
                                    supine_scan *scan, supine_error *error) {
-  SUPINE_REFUSE_IF(
-      law == SUPINE_LAW_PAPER && scan->known, error, SUPINE_ERROR_ARGUMENT,
-      "--law paper takes the scan as the reference: leave --scanned out, or use --law deep");
-  SUPINE_REFUSE_IF(scan->known && scan->state.volume.kind == SUPINE_VOLUME_DEFAULT, error,
+  SUPINE_REFUSE_ADVISE(
+      law == SUPINE_LAW_PAPER && scan->known, error, SUPINE_REMEDY_LAW_OR_SCAN,
+      SUPINE_ERROR_ARGUMENT,
+      "the law 'paper' takes the scan as the reference, but the state of the scan was given");
+  const supine_volume_kind kind = scan->state.volume.kind;
+  SUPINE_REFUSE_IF(scan->known && kind == SUPINE_VOLUME_DEFAULT, error, SUPINE_ERROR_ARGUMENT,
+                   "the state of the scan is a posture alone, which is only for another "
+                   "simulator's fields: add the volume, as in supine:rest, or give full or none");
+  SUPINE_REFUSE_IF(scan->known && kind != SUPINE_VOLUME_REST && kind != SUPINE_VOLUME_FULL, error,
                    SUPINE_ERROR_ARGUMENT,
-                   "--scanned: a posture alone is only for --fields: add the volume, as in "
-                   "supine:rest, or give full or none");
-  const supine_volume *full = &choice->full.volume;
-  scan->full = full->ml;
-  SUPINE_REFUSE_IF(
-      full->kind != SUPINE_VOLUME_DEFAULT &&
-          (full->kind != SUPINE_VOLUME_ABSOLUTE || scan->state.volume.kind != SUPINE_VOLUME_REST),
-      error, SUPINE_ERROR_ARGUMENT,
-      "--full is for a scan at rest: give a volume such as 4200mL, and --scanned supine:rest too");
+                   "the state of the scan must be rest or full inflation, plus or minus a volume");
+  SUPINE_REFUSE_ADVISE(
+      volumes->full != 0.0 && !(volumes->full > 0.0 && kind == SUPINE_VOLUME_REST), error,
+      SUPINE_REMEDY_FULL_AND_SCAN, SUPINE_ERROR_ARGUMENT,
+      "the volume at full inflation must be above 0, and goes only with a scan at rest");
+  scan->full = volumes->full;
   return SUPINE_OK;
 }
 
-/* Choose the model: the patient's, or that of the displacement law. Where they were not given, also
- * choose the volumes at rest and the state of the scan. */
-static supine_status choose_model(const supine_model_choice *choice, supine_prepared *p,
-                                  supine_resting *resting, supine_scan *scan, supine_error *error) {
-  if (choice->patient != NULL) {
-    supine_scan fitted;
-    SUPINE_TRY(take_patient(choice->patient, p, resting, &fitted, error));
-    if (!choice->has_scan) {
-      *scan = fitted;
-      SUPINE_TRY(assume_fitted_state(p->patient, scan, &p->source.findings, error));
+/* Read what the options tell of the scan and of the patient. */
+static supine_status read_knowledge(const supine_precompute_options *options, supine_prepared *p,
+                                    knowledge *known, supine_error *error) {
+  const supine_precompute_volumes *volumes = &options->volumes;
+  const bool has_state = options->scan.shown == SUPINE_SHOWN_STATE;
+  *known = (knowledge){.has_scan = options->scan.shown != SUPINE_SHOWN_DEFAULT,
+                       .scan = {.known = has_state, .state = options->scan.state},
+                       .resting = supine_reference_resting_default(),
+                       .person = {volumes->height, (supine_sex)volumes->sex}};
+  if (volumes->copd) {
+    SUPINE_TRY(supine_reference_resting_set(&known->resting, "copd", NULL, error));
+  }
+  for (size_t axis = 0; axis < SUPINE_REST_COUNT; ++axis) {
+    const supine_precompute_rest *rest = &volumes->rest[axis];
+    if (rest->ml != 0.0 || rest->share[0] != 0.0) {
+      SUPINE_TRY(
+          supine_reference_resting_give(&known->resting, axis, rest->ml, rest->share, error));
     }
-    return SUPINE_OK;
   }
-  p->model = choose_law(choice);
-  if (!choice->has_scan && p->model.law != SUPINE_LAW_PAPER) {
-    (void)supine_reference_scan_parse("full", scan, NULL);
+  if (options->fields != NULL) { /* they displace the surface as it is */
+    SUPINE_REFUSE_IF(has_state && options->scan.state.volume.kind != SUPINE_VOLUME_DEFAULT, error,
+                     SUPINE_ERROR_ARGUMENT,
+                     "the scan of another simulator's fields: give its posture alone, such as "
+                     "supine, as fields of gravity have no volume");
+    p->posture = known->scan;
+    known->scan = (supine_scan){.known = false};
+    known->has_scan = true;
   }
   return SUPINE_OK;
 }
 
-supine_status supine_precompute_prepare(const supine_model_choice *choice, char **paths,
-                                        size_t count, supine_prepared *prepared,
-                                        supine_error *error) {
-  supine_prepared *p = prepared;
-  supine_lungs *lungs = &p->source.lungs;
-  supine_resting resting = choice->resting;
-  supine_scan scan = choice->scan;
-  SUPINE_TRY(supine_precompute_source_load(&choice->source, paths, count, &p->source, error));
-  SUPINE_TRY(choose_model(choice, p, &resting, &scan, error));
-  SUPINE_TRY(complete_scan(choice, p->model.law, &scan, error));
-  SUPINE_TRY(set_expandability(choice, p, error));
-  SUPINE_TRY(set_lesions(choice, p, error));
-  SUPINE_TRY(set_shares(choice, p, error));
+/* Set the law, and the stiffness and collapse of the tissue. */
+static supine_status set_model(const supine_precompute_options *options,
+                               const supine_patient_record *patient, supine_prepared *p,
+                               knowledge *known, supine_error *error) {
+  const supine_lungs *lungs = &p->source.lungs;
+  SUPINE_TRY(choose_model(options, patient, p, known, error));
+  SUPINE_TRY(complete_scan(&options->volumes, p->model.law, &known->scan, error));
+  SUPINE_TRY(set_expandability(&options->tissue, p, error));
+  SUPINE_TRY(set_lesions(&options->tissue, p, error));
+  SUPINE_TRY(set_shares(&options->tissue, p, error));
   if (p->model.reach > 0.0 && varies(&p->model, lungs->mesh.vertex_count)) {
     SUPINE_TRY(supine_physics_strain_create(lungs, p->model.stiffness, p->model.lesions,
                                             &p->model.strain, error));
   }
-  const supine_reference scanned = {
-      .scan = scan, .lung_count = lungs->lung_count, .side = {lungs->side[0], lungs->side[1]}};
-  supine_resting predicted = resting;
-  supine_reference_predict_rest(&scanned, &choice->person, &predicted);
-  SUPINE_TRY(supine_reference_find(lungs, &p->model, &scan, &predicted, &p->reference, error));
-  summarize(choice, &resting, predicted.predicted, p);
+  return SUPINE_OK;
+}
+
+/* Move the scan to the reference surface, and say what is assumed. */
+static supine_status find_reference(supine_prepared *p, const knowledge *known,
+                                    supine_error *error) {
+  supine_lungs *lungs = &p->source.lungs;
+  const supine_reference scanned = {.scan = known->scan,
+                                    .lung_count = lungs->lung_count,
+                                    .side = {lungs->side[0], lungs->side[1]}};
+  supine_resting resting = known->resting;
+  supine_reference_predict_rest(&scanned, &known->person, &resting);
+  SUPINE_TRY(supine_reference_find(lungs, &p->model, &known->scan, &resting, &p->reference, error));
+  summarize(known, resting.predicted, p);
   if (p->reference.known) {
-    supine_reference_doubt(&p->reference, &choice->person, &resting, &p->source.findings);
+    supine_reference_doubt(&p->reference, &known->person, &known->resting, &p->source.findings);
   }
   return SUPINE_OK;
+}
+
+supine_status supine_precompute_prepare(const supine_precompute_options *options,
+                                        supine_prepared *prepared, supine_error *error) {
+  supine_patient_record *patient = NULL;
+  knowledge known;
+  SUPINE_TRY(read_knowledge(options, prepared, &known, error));
+  if (options->patient != NULL) {
+    patient = supine_arena_take(&prepared->memory, 1, sizeof *patient);
+    SUPINE_TRY(supine_arena_check(&prepared->memory, error, "%s", options->patient));
+    SUPINE_TRY(supine_patient_read(options->patient, patient, error));
+  }
+  SUPINE_TRY(supine_precompute_source_load_lungs(options, &prepared->source, error));
+  SUPINE_TRY(set_model(options, patient, prepared, &known, error));
+  if (options->fields != NULL) {
+    summarize_fields(prepared);
+    return SUPINE_OK;
+  }
+  return find_reference(prepared, &known, error);
 }
 
 void supine_precompute_prepared_free(supine_prepared *prepared) {

@@ -15,7 +15,7 @@
 static const char name[] = "solve";
 
 typedef struct request {
-  supine_model_choice model;
+  supine_model_options model;
   supine_orientation orientation;
   const char *path;
   supine_state state; /* the kind of its volume is SUPINE_VOLUME_DEFAULT if none is given */
@@ -200,25 +200,19 @@ static supine_status solve(const supine_prepared *prepared, const request *wante
   return write_solution(prepared, wanted, &solution, error);
 }
 
-static void begin(void *chosen) {
-  ((request *)chosen)->model = supine_precompute_choice_default();
-}
-
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
   SUPINE_FREED_BY(supine_precompute_prepared_free)
   supine_prepared prepared = {.source = {.is_map = false}};
   if (wanted->has_vertex) { /* the response is that of the surface as it is */
-    wanted->model.scan.known = false;
-    wanted->model.has_scan = true;
+    wanted->model.precompute.scan.shown = SUPINE_SHOWN_UNKNOWN;
   } else if (!supine_mesh_save_supports(wanted->path)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "%s: the name must end in " SUPINE_MESH_ENDINGS, wanted->path);
   } else {
     SUPINE_TRY(supine_options_state(&wanted->orientation, &wanted->state, error));
   }
-  SUPINE_TRY(
-      supine_command_prepare(name, &wanted->model, given->operand, given->count, &prepared, error));
+  SUPINE_TRY(supine_command_prepare(name, &wanted->model, given, &prepared, error));
   return wanted->has_vertex ? write_column(&prepared, wanted, error)
                             : solve(&prepared, wanted, error);
 }
@@ -238,5 +232,4 @@ const supine_command supine_command_solve = {
     SUPINE_SURFACES,
     .request_size = sizeof(request),
     .uses_blas = true,
-    .begin = begin,
     .run = run};

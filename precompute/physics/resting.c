@@ -133,7 +133,30 @@ supine_status supine_reference_resting_set(supine_resting *resting, const char *
   return supine_reference_resting_settle(resting, 0, NULL, NULL, error);
 }
 
-static const char *const names[] = {"left", "right", "supine", "prone", "inverted", "upright"};
+static const char *const names[6] = {"left", "right", "supine", "prone", "inverted", "upright"};
+
+supine_status supine_reference_resting_give(supine_resting *resting, size_t axis, double ml,
+                                            const double share[2], supine_error *error) {
+  double parts_of[2] = {share[0], share[1]};
+  if (share[1] == 0.0) {
+    const double both = at_rest(&usual, axis, 2, sides, parts);
+    parts_of[0] = share[0] * usual.share[0][axis] / both;
+    parts_of[1] = share[0] * usual.share[1][axis] / both;
+  }
+  const bool shares_fit = is_share(share[0]) && is_share(parts_of[0]) && is_share(parts_of[1]);
+  const bool fits = ml != 0.0 ? ml > 0.0 && isfinite(ml) : shares_fit;
+  SUPINE_REFUSE_IF(!fits, error, SUPINE_ERROR_ARGUMENT,
+                   "volume at rest in posture %s: give a volume of gas and tissue in mL, or shares "
+                   "of the full volume above %g and at most %g",
+                   names[axis], least_share, most_share);
+  resting->given[axis] = true;
+  resting->ml[axis] = ml;
+  if (ml == 0.0) {
+    resting->share[0][axis] = parts_of[0];
+    resting->share[1][axis] = parts_of[1];
+  }
+  return supine_reference_resting_settle(resting, 0, NULL, NULL, error);
+}
 
 void supine_reference_resting_print(const supine_resting *resting, char *text, size_t size) {
   size_t used = 0;

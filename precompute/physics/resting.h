@@ -60,6 +60,14 @@ supine_resting supine_reference_resting_default(void);
 supine_status supine_reference_resting_set(supine_resting *resting, const char *posture,
                                            const char *value, supine_error *error);
 
+/** Set the volume at rest with gravity along axis 0 to 5 (supine_resting), as
+ * supine_reference_resting_set does.
+ * @param ml     gas and tissue of both lungs, mL; or 0 to use `share`
+ * @param share  [2] shares of the full volume of the left and the right lung; if the second is 0,
+ *   the first is the share of both lungs together */
+supine_status supine_reference_resting_give(supine_resting *resting, size_t axis, double ml,
+                                            const double share[2], supine_error *error);
+
 /** Print the volumes at rest as shares of the full volume, left lung/right lung, in the form of the
  * option --resting: "left=0.462/0.61,...,upright=0.538/0.566". 256 characters are enough. */
 void supine_reference_resting_print(const supine_resting *resting, char *text, size_t size);

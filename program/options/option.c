@@ -330,8 +330,7 @@ static void describe_command(int argc, char **argv, char *text, size_t size) {
   (void)supine_text_make_utf8(text);
 }
 
-static supine_status read_and_run(reading *r, int argc, char **argv, const void *context,
-                                  supine_error *error) {
+static supine_status read_and_run(reading *r, int argc, char **argv, supine_error *error) {
   const supine_command *command = r->command;
   char made_by[512];
   describe_command(argc, argv, made_by, sizeof made_by);
@@ -349,22 +348,13 @@ static supine_status read_and_run(reading *r, int argc, char **argv, const void 
     supine_options_print_help(command, r->help == HELP_ALL, stdout);
     return SUPINE_OK;
   }
-  const supine_arguments given = {argv + optind, (size_t)(argc - optind), made_by, context};
+  const supine_arguments given = {argv + optind, (size_t)(argc - optind), made_by};
   SUPINE_TRY(check_given(r, given.count, argv, error));
   SUPINE_TRY(check_outputs(r, &given, error));
   if (command->uses_blas) {
     SUPINE_TRY(supine_blas_reserve(supine_thread_count(), error));
   }
   return command->run(r->request, &given, error);
-}
-
-supine_status supine_options_run_words(const supine_command *command, int argc, char **argv,
-                                       const void *context, supine_error *error) {
-  reading r = {.command = command, .request = calloc(1, command->request_size)};
-  const supine_status status =
-      r.request != NULL ? read_and_run(&r, argc, argv, context, error) : SUPINE_ERROR_MEMORY;
-  free(r.request);
-  return status;
 }
 
 static int exit_code(supine_status status) {
@@ -382,7 +372,10 @@ static int exit_code(supine_status status) {
 
 int supine_options_run(const supine_command *command, int argc, char **argv) {
   supine_error error = {.message = ""};
-  const supine_status status = supine_options_run_words(command, argc, argv, NULL, &error);
+  reading r = {.command = command, .request = calloc(1, command->request_size)};
+  const supine_status status =
+      r.request != NULL ? read_and_run(&r, argc, argv, &error) : SUPINE_ERROR_MEMORY;
+  free(r.request);
   if (status == SUPINE_OK) {
     return supine_options_finish(command->name);
   }

@@ -34,6 +34,10 @@ static const char *const words_of[] = {
     [SUPINE_REMEDY_LABELS_AXES_OR_KEEP] =
         ": if the labels are correct, add --axes {}; if the header is correct, add --axes with its "
         "axes",
+    [SUPINE_REMEDY_CLOSE] = ": --close MM closes narrow ones",
+    [SUPINE_REMEDY_MAP_UNIT] = ": leave --units out, or give --units mm to accept any size of the "
+                               "lungs",
+    [SUPINE_REMEDY_MAP_OPTIONS] = ": leave --labels, --edge, --close and --surfaces-out out",
     [SUPINE_REMEDY_EDGE] = ": give another --edge",
     [SUPINE_REMEDY_LUNGS_SEPARATE] =
         " (for a label map by --labels one). If it is a single lung, give --midline",
@@ -55,8 +59,16 @@ static const char *const words_of[] = {
                                    "in --scanned supine:rest-300",
     [SUPINE_REMEDY_SCAN_OVER_REST] = ": if the scan was fuller than rest, give --scanned full or "
                                      "supine:rest+1000, or change --resting",
+    [SUPINE_REMEDY_SCAN_GIVE] = ", or give the state of this one, such as --scanned supine:rest",
+    [SUPINE_REMEDY_SCAN_ASSUMED] = "; --scanned changes this",
+    [SUPINE_REMEDY_REST_OR_AS_IS] =
+        "; give --resting, or take the scan as it is with --scanned none",
+    [SUPINE_REMEDY_FULL_AND_SCAN] = ": give --full such as 4200mL, and --scanned supine:rest",
+    [SUPINE_REMEDY_LAW_OR_SCAN] = ": leave --scanned out, or use --law deep",
+    [SUPINE_REMEDY_BAND_OUT] = ", or leave --band out",
     [SUPINE_REMEDY_HARMONICS] = ": give --modes 16, or --band 7 or less",
     [SUPINE_REMEDY_LAW_DEEP] = ", or use --law deep",
+    [SUPINE_REMEDY_FIT_LANDMARKS] = "; give --landmarks to 'supine fit'",
     [SUPINE_REMEDY_SCAN_MOTION] = " with --translation or --rigid",
     [SUPINE_REMEDY_SCANS_EXCHANGE] = ": exchange --rest and --other, or give --reverse",
     [SUPINE_REMEDY_SCANS_VOLUMES] = ", such as --rest 2600mL --other 5400mL",

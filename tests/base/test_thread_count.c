@@ -2,6 +2,7 @@
 /* Test that a basis file has the same bytes for any number of threads. */
 #include "precompute/lungs/phantom.h"
 #include "precompute/precompute.h"
+#include "tests/helpers/basis_helpers.h"
 #include "tests/helpers/test.h"
 
 enum { VERTICES = 9000 }; /* several blocks of each parallel sum, the last incomplete */
@@ -18,11 +19,11 @@ static supine_lungs phantom(void) {
 /* Return the bytes (malloc) and the size of a basis file computed with `threads` threads. */
 static unsigned char *bytes_of(const supine_prepared *prepared, const char *threads, size_t *size) {
   char path[] = "/tmp/supine-threads-XXXXXX";
-  const supine_basis_choice choice = {.path = path, .band = 3, .modes = 8, .held_out = 20};
+  const supine_basis_choice choice = {.band = 3, .modes = 8, .held_out = 20};
   supine_error error;
   (void)close(mkstemp(path));
   assert_int_equal(setenv("SUPINE_THREADS", threads, 1), 0);
-  if (supine_precompute(prepared, &choice, NULL, &error) != SUPINE_OK) {
+  if (helper_write_basis(path, prepared, &choice, NULL, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
   unsigned char *bytes = test_read(path, size);

@@ -6,6 +6,7 @@
 #include <supine/runtime.h>
 
 #include "precompute/precompute.h"
+#include "tests/helpers/basis_helpers.h"
 
 #include "tests/helpers/lungs_helpers.h"
 
@@ -34,8 +35,8 @@ TEST(test_deform_real_lung_every_path_within_stated_error) {
   assert_true(file >= 0 && close(file) == 0);
   const supine_prepared prepared = {.source = {.lungs = lungs},
                                     .model = supine_physics_model(SUPINE_LAW_PAPER)};
-  const supine_basis_choice choice = {.path = path, .band = 3, .held_out = 5};
-  assert_int_equal(supine_precompute(&prepared, &choice, NULL, NULL), SUPINE_OK);
+  const supine_basis_choice choice = {.band = 3, .held_out = 5};
+  assert_int_equal(helper_write_basis(path, &prepared, &choice, NULL, NULL), SUPINE_OK);
   supine_basis *bases[SUPINE_STORAGE_COUNT * SUPINE_SIMD_COUNT] = {NULL};
   for (int i = 0; i < SUPINE_STORAGE_COUNT * SUPINE_SIMD_COUNT; ++i) {
     const supine_basis_options how = {sizeof how,

@@ -9,6 +9,7 @@
 #include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
+#include "tests/helpers/basis_helpers.h"
 #include <supine/runtime.h>
 #include <supine/safetensors.h>
 
@@ -87,18 +88,48 @@ static supine_fields band_limited_fields(size_t band, size_t count, const double
   return fields;
 }
 
-static void check_band_limited(const supine_fields *fields, size_t band) {
-  const supine_fit_options options = {.band = -1, .modes = 0};
+typedef struct fitted {
   supine_compression field;
   supine_fit_report report;
+  supine_accuracy accuracy;
+} fitted;
+
+/* Fit the fields, and compress the fit to at most `modes` modes, or use the harmonics if `modes` is
+ * 0. Choose the band if it is negative. */
+static supine_status fit_fields(const supine_fields *fields, int band, size_t modes, fitted *made,
+                                supine_error *error) {
+  supine_fit fit;
+  supine_gravity_field field = {.weight = NULL};
+  supine_status status = supine_fields_fit(fields, band, &fit, error);
+  made->report = fit.report;
+  if (status == SUPINE_OK) {
+    status = supine_fields_field(&fit, &field, error);
+  }
+  if (status == SUPINE_OK && modes == 0) {
+    status = supine_sh_compress_harmonics(&field.expansion, &made->field, error);
+  } else if (status == SUPINE_OK) {
+    status =
+        supine_sh_compress_modes(&field.expansion, NULL, modes, &made->field, NULL, NULL, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_fields_measure(&fit, modes == 0 ? 0 : made->field.mode_count, &made->accuracy,
+                                   error);
+  }
+  supine_projection_field_free(&field);
+  supine_fields_fit_free(&fit);
+  return status;
+}
+
+static void check_band_limited(const supine_fields *fields, size_t band) {
+  fitted made;
   supine_error error;
-  if (supine_fields_fit(fields, &options, &field, &report, &error) != SUPINE_OK) {
+  if (fit_fields(fields, -1, 0, &made, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
-  assert_int_equal(report.band, band);
-  assert_true(report.accuracy.relative_rms < 1e-6);
-  assert_int_equal(field.row_count, 3 * fields->vertex_count);
-  supine_sh_compression_free(&field);
+  assert_int_equal(made.report.band, band);
+  assert_true(made.accuracy.relative_rms < 1e-6);
+  assert_int_equal(made.field.row_count, 3 * fields->vertex_count);
+  supine_sh_compression_free(&made.field);
 }
 
 TEST(test_fit_band_limited_fields_recovered) {
@@ -118,11 +149,9 @@ TEST(test_fit_leave_one_out_error_equals_refits) {
   enum { COUNT = 24, BAND = 2 };
   supine_fields fields = physics_fields(&lungs, COUNT, 99, 1.0);
   const size_t n = fields.vertex_count;
-  const supine_fit_options options = {.band = BAND, .modes = 0};
-  supine_compression field;
-  supine_fit_report report;
-  assert_int_equal(supine_fields_fit(&fields, &options, &field, &report, NULL), SUPINE_OK);
-  supine_sh_compression_free(&field);
+  fitted made;
+  assert_int_equal(fit_fields(&fields, BAND, 0, &made, NULL), SUPINE_OK);
+  supine_sh_compression_free(&made.field);
   double error2 = 0.0;
   double field2 = 0.0;
   for (size_t out = 0; out < COUNT; ++out) {
@@ -138,24 +167,24 @@ TEST(test_fit_leave_one_out_error_equals_refits) {
         ++at;
       }
     }
-    supine_fit_report ignored;
-    assert_int_equal(supine_fields_fit(&rest, &options, &field, &ignored, NULL), SUPINE_OK);
+    fitted refit;
+    assert_int_equal(fit_fields(&rest, BAND, 0, &refit, NULL), SUPINE_OK);
     assert_int_equal(supine_sh_evaluate(BAND, fields.directions + 3 * out, y), SUPINE_OK);
     for (size_t i = 0; i < 3 * n; ++i) {
       double is = 0.0;
       for (size_t t = 0; t < 9; ++t) {
-        is += (double)field.coefficients[i * 9 + t] * y[t];
+        is += (double)refit.field.coefficients[i * 9 + t] * y[t];
       }
       const double should = fields.displacement[3 * n * out + i];
       error2 += (is - should) * (is - should);
       field2 += should * should;
     }
-    supine_sh_compression_free(&field);
+    supine_sh_compression_free(&refit.field);
     supine_fields_free(&rest);
   }
   const double direct = sqrt(error2 / field2);
-  assert_close(report.error[BAND], direct, 1e-5 * direct);
-  assert_close(report.accuracy.relative_rms, direct, 1e-5 * direct);
+  assert_close(made.report.error[BAND], direct, 1e-5 * direct);
+  assert_close(made.accuracy.relative_rms, direct, 1e-5 * direct);
   supine_fields_free(&fields);
 }
 
@@ -163,13 +192,14 @@ TEST(test_fit_leave_one_out_error_equals_refits) {
  * fit reports with the error in other directions of gravity. Free the displacements. */
 static void check_stated_error(const supine_lungs *of, supine_fields fields, supine_fields others,
                                const char *what) {
-  const supine_fit_options options = {.band = -1, .modes = 16};
   const char *path = in_folder("basis.safetensors");
-  const supine_prepared prepared = {.source = {.lungs = *of}};
-  const supine_basis_choice file = {.path = path, .modes = 16};
-  supine_fit_report report;
+  const supine_prepared prepared = {.source = {.lungs = *of},
+                                    .model = supine_physics_model(SUPINE_LAW_DEEP)};
+  const supine_basis_choice choice = {
+      .modes = 16, .fields = &fields, .choose_band = true, .keep_modes = true};
+  supine_basis_report report;
   supine_error error;
-  if (supine_fields_write(&prepared, &fields, &options, &file, &report, &error) != SUPINE_OK) {
+  if (helper_write_basis(path, &prepared, &choice, &report, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
   supine_basis *basis = NULL;
@@ -199,7 +229,7 @@ static void check_stated_error(const supine_lungs *of, supine_fields fields, sup
   }
   const double truth = sqrt(error2 / field2);
   printf("%s, band %zu: reported error %.2g %%, error in other directions %.2g %%\n", what,
-         report.band, 100.0 * report.accuracy.relative_rms, 100.0 * truth);
+         report.fit.band, 100.0 * report.accuracy.relative_rms, 100.0 * truth);
   assert_true(report.accuracy.relative_rms > truth / 1.3333 &&
               report.accuracy.relative_rms < truth * 1.3333);
   free(xyz);
@@ -249,18 +279,16 @@ static double gain_of_band_2(double amount, size_t *band) {
   }
   supine_fields fields = band_limited_fields(1, COUNT, directions);
   supine_fields more = band_limited_fields(2, COUNT, directions);
-  const supine_fit_options options = {.band = -1, .modes = 0};
-  supine_compression field;
-  supine_fit_report report;
+  fitted made;
   for (size_t i = 0; i < 3 * COUNT * fields.vertex_count; ++i) {
     fields.displacement[i] += amount * more.displacement[i] + random_signed(&seed);
   }
-  assert_int_equal(supine_fields_fit(&fields, &options, &field, &report, NULL), SUPINE_OK);
-  supine_sh_compression_free(&field);
+  assert_int_equal(fit_fields(&fields, -1, 0, &made, NULL), SUPINE_OK);
+  supine_sh_compression_free(&made.field);
   supine_fields_free(&fields);
   supine_fields_free(&more);
-  *band = report.band;
-  return report.error[2] / report.error[1];
+  *band = made.report.band;
+  return made.report.error[2] / made.report.error[1];
 }
 
 /* The fit chooses band 2 if this lowers the error by 1.5 %, but not if by only 0.5 %. */
@@ -280,13 +308,12 @@ TEST(test_fit_band_reducing_error_by_half_a_percent_not_chosen) {
 
 TEST(test_fit_vector_volumes_exact) {
   supine_fields fields = physics_fields(&lungs, 30, 21, 1.0);
-  const supine_fit_options options = {.band = -1, .modes = 8};
   const char *path = in_folder("volume.safetensors");
-  const supine_prepared prepared = {.source = {.lungs = lungs}};
-  const supine_basis_choice file = {.path = path, .modes = 8};
-  supine_fit_report report;
-  assert_int_equal(supine_fields_write(&prepared, &fields, &options, &file, &report, NULL),
-                   SUPINE_OK);
+  const supine_prepared prepared = {.source = {.lungs = lungs},
+                                    .model = supine_physics_model(SUPINE_LAW_DEEP)};
+  const supine_basis_choice choice = {
+      .modes = 8, .fields = &fields, .choose_band = true, .keep_modes = true};
+  assert_int_equal(helper_write_basis(path, &prepared, &choice, NULL, NULL), SUPINE_OK);
   const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
   supine_basis *basis = NULL;
   assert_int_equal(supine_basis_open_with(path, &exact, &basis, NULL), SUPINE_OK);
@@ -322,26 +349,20 @@ TEST(test_fit_vector_volumes_exact) {
 
 TEST(test_fit_few_directions_limit_the_band) {
   supine_fields fields = physics_fields(&lungs, 10, 4, 1.0);
-  supine_fit_options options = {.band = -1, .modes = 16};
-  supine_compression field;
-  supine_fit_report report;
+  fitted made;
   supine_error error;
-  assert_int_equal(supine_fields_fit(&fields, &options, &field, &report, NULL), SUPINE_OK);
-  assert_in_range(report.band_highest, 1, 2);
-  assert_true(report.band <= report.band_highest);
-  supine_sh_compression_free(&field);
-  options.band = 4;
-  assert_int_equal(supine_fields_fit(&fields, &options, &field, &report, &error),
-                   SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(fit_fields(&fields, -1, 16, &made, NULL), SUPINE_OK);
+  assert_in_range(made.report.band_highest, 1, 2);
+  assert_true(made.report.band <= made.report.band_highest);
+  supine_sh_compression_free(&made.field);
+  assert_int_equal(fit_fields(&fields, 4, 16, &made, &error), SUPINE_ERROR_ARGUMENT);
   assert_says(error.message, "10 directions do not determine band 4 (25 harmonics)");
   fields.direction_count = 1;
-  assert_int_equal(supine_fields_fit(&fields, &options, &field, &report, &error),
-                   SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(fit_fields(&fields, -1, 16, &made, &error), SUPINE_ERROR_ARGUMENT);
   assert_says(error.message, "at least two");
   fields.direction_count = 10;
   memset(fields.displacement, 0, 3 * 10 * fields.vertex_count * sizeof(double));
-  assert_int_equal(supine_fields_fit(&fields, &options, &field, &report, &error),
-                   SUPINE_ERROR_NUMERICAL);
+  assert_int_equal(fit_fields(&fields, -1, 16, &made, &error), SUPINE_ERROR_NUMERICAL);
   supine_fields_free(&fields);
 }
 
@@ -512,7 +533,7 @@ TEST(test_precompute_fields_every_option_used_or_refused) {
                {"output", "c.safetensors", 0, "c.safetensors: fields"},
                {"band", "0", 0, "band 0, 1 mode"},
                {"modes", "2", 0, "2 modes"},
-               {"axes", "LPS", 0, "LPS axes (by --axes)"},
+               {"axes", "LPS", 0, "LPS axes (as given)"},
                {"units", "in", 0, "25.4 mm a unit"},
                {"without-normals", "", 0, "b.safetensors: fields"},
                {"midline", "60", 2, "midline"},

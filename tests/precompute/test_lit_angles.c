@@ -8,6 +8,7 @@
 
 #include "precompute/lungs/phantom.h"
 #include "precompute/precompute.h"
+#include "tests/helpers/basis_helpers.h"
 
 #include "tests/helpers/lungs_helpers.h"
 
@@ -38,14 +39,14 @@ static supine_basis *make_basis(supine_lungs *lungs, double soften, size_t modes
   char path[] = "/tmp/supine-angles-XXXXXX";
   const int file = mkstemp(path);
   assert_true(file >= 0 && close(file) == 0);
-  const supine_basis_choice choice = {.path = path, .band = 15, .modes = modes, .held_out = 20};
+  const supine_basis_choice choice = {.band = 15, .modes = modes, .held_out = 20};
   prepared.model.force.soften = soften;
   prepared.source.lungs = *lungs;
   /* Use exact storage: rounded positions would change the normals of small triangles. */
   const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
   if (supine_reference_find(&prepared.source.lungs, &prepared.model, &full, &resting,
                             &prepared.reference, &error) != SUPINE_OK ||
-      supine_precompute(&prepared, &choice, NULL, &error) != SUPINE_OK ||
+      helper_write_basis(path, &prepared, &choice, NULL, &error) != SUPINE_OK ||
       supine_basis_open_with(path, &exact, &basis, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }

@@ -309,11 +309,13 @@ TEST(test_volume_forms_any_scale_equal_measured_volume) {
     vectors[i] = columns[i / (3 * COLUMNS) * COLUMNS + i % COLUMNS] * d[i / COLUMNS];
   }
   supine_volume_forms forms[2] = {{0}};
+  const supine_rows scalar = {SUPINE_ROWS_SCALAR, d};
+  const supine_rows vector = {.kind = SUPINE_ROWS_VECTOR};
   assert_int_equal(
-      supine_physics_volume_forms_create(&lungs, NULL, d, columns, COLUMNS, &forms[0], NULL),
+      supine_physics_volume_forms_create(&lungs, NULL, &scalar, columns, COLUMNS, &forms[0], NULL),
       SUPINE_OK);
   assert_int_equal(
-      supine_physics_volume_forms_create(&lungs, NULL, NULL, vectors, COLUMNS, &forms[1], NULL),
+      supine_physics_volume_forms_create(&lungs, NULL, &vector, vectors, COLUMNS, &forms[1], NULL),
       SUPINE_OK);
   static const double weights[COLUMNS] = {0.7, -0.2, 0.9, 0.31, 0.11};
   static const double gains[3] = {2.0, -0.7, 1.3};

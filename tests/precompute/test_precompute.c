@@ -5,6 +5,7 @@
 #include "precompute/precompute.h"
 #include "precompute/projection/projection.h"
 #include "sh/expansion.h"
+#include "tests/helpers/basis_helpers.h"
 #include "tests/helpers/test.h"
 #include <supine/runtime.h>
 #include <supine/safetensors.h>
@@ -57,17 +58,16 @@ static supine_lungs real_pair(void) {
  * [Santhanam2008]. */
 static double reach;
 
-static supine_precompute_report make_basis(const supine_lungs *lungs, size_t band, size_t modes,
-                                           double soften, size_t held_out) {
+static supine_basis_report make_basis(const supine_lungs *lungs, size_t band, size_t modes,
+                                      double soften, size_t held_out) {
   supine_prepared prepared = {.source = {.lungs = *lungs},
                               .model = supine_physics_model(SUPINE_LAW_PAPER)};
-  const supine_basis_choice choice = {
-      .path = path, .band = band, .modes = modes, .held_out = held_out};
+  const supine_basis_choice choice = {.band = band, .modes = modes, .held_out = held_out};
   prepared.model.force.soften = soften;
   prepared.model.reach = soften != 0.0 ? 10.0 : reach;
-  supine_precompute_report report;
+  supine_basis_report report;
   supine_error error;
-  if (supine_precompute(&prepared, &choice, &report, &error) != SUPINE_OK) {
+  if (helper_write_basis(path, &prepared, &choice, &report, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
   return report;
@@ -280,7 +280,7 @@ static void check_error_table(const supine_lungs *lungs, const supine_model *mod
 static void check_stated_error(const supine_lungs *lungs, size_t band, size_t modes,
                                double soften) {
   enum { HELD_OUT = 40 };
-  const supine_precompute_report report = make_basis(lungs, band, modes, soften, HELD_OUT);
+  const supine_basis_report report = make_basis(lungs, band, modes, soften, HELD_OUT);
   supine_basis *basis = open_basis();
   supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   double g[3 * HELD_OUT];
@@ -311,7 +311,7 @@ static void check_stated_error(const supine_lungs *lungs, size_t band, size_t mo
  * directions of gravity, within four standard errors of the measurement. */
 static void check_error_elsewhere(const supine_lungs *lungs, size_t band, size_t modes,
                                   double soften, const char *what) {
-  const supine_precompute_report report = make_basis(lungs, band, modes, soften, 0);
+  const supine_basis_report report = make_basis(lungs, band, modes, soften, 0);
   const supine_accuracy *stated = &report.accuracy;
   supine_basis *basis = open_basis();
   supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
@@ -362,8 +362,8 @@ static void check_best_modes(const char *name, supine_axes axes, double soften, 
     skip();
     return;
   }
-  const supine_precompute_report harmonics = make_basis(&lungs, 3, 0, soften, 0);
-  const supine_precompute_report modes = make_basis(&lungs, 23, 16, soften, 0);
+  const supine_basis_report harmonics = make_basis(&lungs, 3, 0, soften, 0);
+  const supine_basis_report modes = make_basis(&lungs, 23, 16, soften, 0);
   const double error = modes.accuracy.relative_rms;
   printf("%s, soften %g: error with harmonics %.2f %%, with %zu modes %.3f %%\n", name, soften,
          100.0 * harmonics.accuracy.relative_rms, modes.mode_count, 100.0 * error);
@@ -455,7 +455,7 @@ TEST(test_precompute_real_lungs_volumes_exact_in_every_direction) {
 
 TEST(test_precompute_paper_law_keeps_four_modes) {
   supine_lungs lungs = phantom(1000);
-  const supine_precompute_report report = make_basis(&lungs, 15, 16, 0.0, 0);
+  const supine_basis_report report = make_basis(&lungs, 15, 16, 0.0, 0);
   assert_int_equal(report.mode_count, 4);
   supine_lungs_free(&lungs);
 }
@@ -530,6 +530,7 @@ TEST(test_turned_over_one_posture_emptied_finds_more_reversed) {
   const supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   const double full = 1e-3 * supine_mesh_volume(&lungs.mesh);
   double *directions = malloc(3 * n * sizeof *directions);
+  const supine_rows rows = {SUPINE_ROWS_SCALAR, directions};
   supine_projection projection;
   supine_compression field;
   supine_volume_forms forms = {0};
@@ -538,9 +539,8 @@ TEST(test_turned_over_one_posture_emptied_finds_more_reversed) {
       SUPINE_OK);
   assert_int_equal(supine_projection_create(&lungs, &model, 3, &projection, NULL), SUPINE_OK);
   assert_int_equal(supine_sh_compress_harmonics(&projection.expansion, &field, NULL), SUPINE_OK);
-  assert_int_equal(
-      supine_projection_volume_forms(&field, &lungs, model.share, directions, &forms, NULL),
-      SUPINE_OK);
+  assert_int_equal(supine_projection_volume_forms(&field, &lungs, model.share, &rows, &forms, NULL),
+                   SUPINE_OK);
   static const int postures[] = {0, 1, 3};
   for (size_t p = 0; p < sizeof postures / sizeof *postures; ++p) {
     const int g = postures[p];
@@ -555,15 +555,14 @@ TEST(test_turned_over_one_posture_emptied_finds_more_reversed) {
     double share = 0.0;
     double least = 0.0;
     assert_int_equal(
-        supine_accuracy_turned_over(&lungs, directions, &field, &forms, resting, &share, NULL),
+        supine_accuracy_turned_over(&lungs, &rows, &field, &forms, resting, &share, NULL),
         SUPINE_OK);
-    assert_int_equal(
-        supine_accuracy_turned_over(&lungs, directions, &field, &forms, even, &least, NULL),
-        SUPINE_OK);
+    assert_int_equal(supine_accuracy_turned_over(&lungs, &rows, &field, &forms, even, &least, NULL),
+                     SUPINE_OK);
     supine_lungs dense = with_more_triangles(&lungs);
     double sampled = 0.0;
     assert_int_equal(
-        supine_accuracy_turned_over(&dense, directions, &field, &forms, resting, &sampled, NULL),
+        supine_accuracy_turned_over(&dense, &rows, &field, &forms, resting, &sampled, NULL),
         SUPINE_OK);
     free(dense.mesh.triangles);
     assert_close(sampled, share, 1e-12);
@@ -580,18 +579,18 @@ TEST(test_precompute_turned_over_share_equals_run_time) {
   supine_lungs lungs = phantom(3000);
   supine_prepared prepared = {.source = {.lungs = lungs},
                               .model = supine_physics_model(SUPINE_LAW_PAPER)};
-  const supine_basis_choice choice = {.path = path, .band = 7, .modes = 4, .held_out = 20};
+  const supine_basis_choice choice = {.band = 7, .modes = 4, .held_out = 20};
   double *stiffness = malloc(lungs.mesh.vertex_count * sizeof *stiffness);
   uint64_t seed = 3;
   for (size_t i = 0; i < lungs.mesh.vertex_count; ++i) {
     stiffness[i] = exp(8.0 * helper_random(&seed));
   }
-  supine_precompute_report report;
-  assert_int_equal(supine_precompute(&prepared, &choice, &report, NULL), SUPINE_OK);
+  supine_basis_report report;
+  assert_int_equal(helper_write_basis(path, &prepared, &choice, &report, NULL), SUPINE_OK);
   assert_true(report.turned_over < 0.001);
   assert_close(report.turned_over, turned_over_at_run_time(report.accuracy.volume), 1e-4);
   prepared.model.stiffness = stiffness; /* irregular stiffness reverses triangles */
-  assert_int_equal(supine_precompute(&prepared, &choice, &report, NULL), SUPINE_OK);
+  assert_int_equal(helper_write_basis(path, &prepared, &choice, &report, NULL), SUPINE_OK);
   assert_true(report.turned_over > 0.01);
   assert_close(report.turned_over, turned_over_at_run_time(report.accuracy.volume), 1e-3);
   free(stiffness);
@@ -600,9 +599,9 @@ TEST(test_precompute_turned_over_share_equals_run_time) {
 
 TEST(test_precompute_real_lungs_with_reach_few_reversed) {
   supine_lungs lungs = real_pair();
-  const supine_precompute_report links = make_basis(&lungs, 7, 4, 0.0, 20);
+  const supine_basis_report links = make_basis(&lungs, 7, 4, 0.0, 20);
   reach = 10.0;
-  const supine_precompute_report length = make_basis(&lungs, 7, 4, 0.0, 20);
+  const supine_basis_report length = make_basis(&lungs, 7, 4, 0.0, 20);
   reach = 0.0;
   printf("reversed triangles at %g mL: %.2f %%; with a reach of 10 mm %.4f %%\n",
          links.accuracy.volume, 100.0 * links.turned_over, 100.0 * length.turned_over);
@@ -615,18 +614,22 @@ TEST(test_precompute_bad_options_refused) {
   supine_lungs lungs = phantom(500);
   supine_prepared prepared = {.source = {.lungs = lungs},
                               .model = supine_physics_model(SUPINE_LAW_PAPER)};
-  supine_basis_choice choice = {.path = path, .band = 65, .modes = 16};
+  supine_basis_choice choice = {.band = 65, .modes = 16};
   supine_error error;
-  assert_int_equal(supine_precompute(&prepared, &choice, NULL, &error), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(helper_write_basis(path, &prepared, &choice, NULL, &error),
+                   SUPINE_ERROR_ARGUMENT);
   choice.band = 8;
   choice.modes = 0; /* all 81 harmonics: too many */
-  assert_int_equal(supine_precompute(&prepared, &choice, NULL, &error), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(helper_write_basis(path, &prepared, &choice, NULL, &error),
+                   SUPINE_ERROR_ARGUMENT);
   choice.modes = 65;
-  assert_int_equal(supine_precompute(&prepared, &choice, NULL, &error), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(helper_write_basis(path, &prepared, &choice, NULL, &error),
+                   SUPINE_ERROR_ARGUMENT);
   choice.modes = 16;
   /* Softening of lower tissue (`soften`) requires a smoothing distance of forces (`reach`) > 0. */
   prepared.model.force.soften = 1.0;
-  assert_int_equal(supine_precompute(&prepared, &choice, NULL, &error), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(helper_write_basis(path, &prepared, &choice, NULL, &error),
+                   SUPINE_ERROR_ARGUMENT);
   supine_lungs_free(&lungs);
 }
 

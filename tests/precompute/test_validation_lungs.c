@@ -5,6 +5,7 @@
 
 #include <supine/runtime.h>
 
+#include "tests/helpers/basis_helpers.h"
 #include "tests/helpers/lungs_helpers.h"
 #include "tests/helpers/validation.h"
 
@@ -31,8 +32,8 @@ TEST(test_deform_one_orientation_linear_in_volume) {
   (void)close(file);
   const supine_prepared prepared = {.source = {.lungs = lungs},
                                     .model = supine_physics_model(SUPINE_LAW_PAPER)};
-  const supine_basis_choice choice = {.path = path, .band = 7, .modes = 16, .held_out = 5};
-  assert_int_equal(supine_precompute(&prepared, &choice, NULL, NULL), SUPINE_OK);
+  const supine_basis_choice choice = {.band = 7, .modes = 16, .held_out = 5};
+  assert_int_equal(helper_write_basis(path, &prepared, &choice, NULL, NULL), SUPINE_OK);
   supine_basis *basis = NULL;
   assert_int_equal(supine_basis_open(path, &basis, NULL), SUPINE_OK);
   const size_t n = supine_basis_get_info(basis)->vertex_count;

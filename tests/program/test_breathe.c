@@ -8,6 +8,7 @@
 #include "mesh/mesh.h"
 #include "precompute/lungs/phantom.h"
 #include "precompute/precompute.h"
+#include "tests/helpers/basis_helpers.h"
 #include "tests/helpers/test.h"
 #include <supine/safetensors.h>
 
@@ -23,9 +24,9 @@ static char text[16384]; /* output of the last command on stdout and stderr toge
 static supine_status make_basis(const supine_lungs *lungs, double left_share, const char *path) {
   supine_prepared prepared = {.source = {.lungs = *lungs},
                               .model = supine_physics_model(SUPINE_LAW_PAPER)};
-  const supine_basis_choice choice = {.path = path, .band = 5, .modes = 16, .held_out = 5};
+  const supine_basis_choice choice = {.band = 5, .modes = 16, .held_out = 5};
   prepared.model.share[0] = left_share;
-  return supine_precompute(&prepared, &choice, NULL, NULL);
+  return helper_write_basis(path, &prepared, &choice, NULL, NULL);
 }
 
 static int setup(void **state) {

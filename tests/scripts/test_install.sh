@@ -106,6 +106,14 @@ done
 nm -D --defined-only "$lib/libsupine_precompute.so" | awk '$2 == "T" {print $3}' | sed 's/@@.*//' | sort >"$work/shown"
 "$cc" -std=c17 -E -P -I"$prefix/include" -include supine/precompute.h -x c /dev/null |
   grep -o 'supine_precompute_[a-z0-9_]*(' | tr -d '(' | sort -u | diff - "$work/shown"
+# The static library has no part of the program, which alone reads options.
+nm --defined-only --extern-only "$lib/libsupine_precompute.a" | awk 'NF == 3 {print $3}' >"$work/names"
+grep -q '^supine_precompute_basis$' "$work/names"
+find "$build/program" -name 'libsupine_*.a' ! -name 'libsupine_precompute.a' -exec nm --defined-only --extern-only {} + |
+  awk 'NF == 3 {print $3}' | sort -u >"$work/program"
+[ -s "$work/program" ]
+if sort -u "$work/names" | comm -12 - "$work/program" | grep .; then echo "the library has symbols of the program"; exit 1; fi
+if nm --undefined-only "$lib/libsupine_precompute.a" | grep -E ' getopt|mkdtemp|fmemopen'; then exit 1; fi
 for header in "-x c -std=c17" "-x c++"; do
   # shellcheck disable=SC2086
   "$cxx" -Wall -Wextra -Wpedantic -Werror -fsyntax-only -I"$prefix/include" -include supine/precompute.h $header /dev/null

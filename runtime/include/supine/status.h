@@ -73,6 +73,9 @@ typedef enum supine_remedy {
   SUPINE_REMEDY_LABELS_EXCHANGE, /**< exchange the labels of the sides, or correct the axes */
   SUPINE_REMEDY_LABELS_OR_AXES,  /**< correct the labels, or give the axes `value` */
   SUPINE_REMEDY_LABELS_AXES_OR_KEEP, /**< the same, or confirm the axes of the header */
+  SUPINE_REMEDY_CLOSE,               /**< close narrow channels */
+  SUPINE_REMEDY_MAP_UNIT,            /**< leave the unit of a label map out, or give mm */
+  SUPINE_REMEDY_MAP_OPTIONS,         /**< leave out what is for label maps */
   SUPINE_REMEDY_EDGE,                /**< change the length of the surface's edges */
   SUPINE_REMEDY_LUNGS_SEPARATE,      /**< separate the labels, or give the midline of one lung */
   SUPINE_REMEDY_MIDLINE,             /**< give the midline `value` to make it the other lung */
@@ -88,9 +91,16 @@ typedef enum supine_remedy {
   SUPINE_REMEDY_SCAN_OR_REST_GIVE, /**< the same, or change the volumes at rest */
   SUPINE_REMEDY_SCAN_EMPTIER,      /**< check the volumes at rest, or state that it was emptier */
   SUPINE_REMEDY_SCAN_OVER_REST,    /**< state that the scan was fuller than rest */
+  SUPINE_REMEDY_SCAN_GIVE,         /**< give the state of the scan */
+  SUPINE_REMEDY_SCAN_ASSUMED,      /**< the state of the scan changes what is assumed */
+  SUPINE_REMEDY_REST_OR_AS_IS,     /**< give the volumes at rest, or use the scan unchanged */
+  SUPINE_REMEDY_FULL_AND_SCAN,     /**< give the full volume with the state of a scan at rest */
+  SUPINE_REMEDY_LAW_OR_SCAN,       /**< leave the state of the scan out, or use the law `deep` */
+  SUPINE_REMEDY_BAND_OUT,          /**< leave the band out */
   SUPINE_REMEDY_HARMONICS,         /**< store modes, or lower the band */
   /* A patient's law, validation and content. */
   SUPINE_REMEDY_LAW_DEEP,       /**< fit the law `deep` */
+  SUPINE_REMEDY_FIT_LANDMARKS,  /**< fit the patient's law to landmarks too */
   SUPINE_REMEDY_SCAN_MOTION,    /**< fit a motion between the scans */
   SUPINE_REMEDY_SCANS_EXCHANGE, /**< exchange the states of the scans, or reverse the points */
   SUPINE_REMEDY_SCANS_VOLUMES,  /**< give the volumes of both scans */

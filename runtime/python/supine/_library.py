@@ -8,6 +8,8 @@ import os
 from ctypes import POINTER, c_bool, c_char, c_char_p, c_double, c_float, c_int, c_int16, c_size_t, c_uint32, c_uint64, c_void_p
 from typing import Any, Optional
 
+from . import _remedies
+
 MODES_MAX, LUNGS_MAX = 256, 16
 
 
@@ -65,7 +67,7 @@ for _kind in _ERRORS:
 
 class CError(ctypes.Structure):
     """The C struct supine_error."""
-    _fields_ = [("status", c_int), ("message", c_char * 512)]
+    _fields_ = [("status", c_int), ("message", c_char * 512), ("remedy", c_int), ("value", c_char * 32)]
 
 
 class Volume(ctypes.Structure):
@@ -162,17 +164,78 @@ class Surface(ctypes.Structure):
 ProgressFunction = ctypes.CFUNCTYPE(c_int, c_void_p, c_double)
 
 
-class Input(ctypes.Structure):
-    """The C struct supine_precompute_input."""
+class Lungs(ctypes.Structure):
+    """The C struct supine_precompute_lungs."""
     _fields_ = [("paths", POINTER(c_char_p)), ("path_count", c_size_t), ("surfaces", POINTER(Surface)),
-                ("surface_count", c_size_t), ("options", POINTER(c_char_p)), ("option_count", c_size_t),
-                ("output", c_char_p), ("progress", ProgressFunction), ("context", c_void_p)]
+                ("surface_count", c_size_t), ("axes", c_char_p), ("unit", c_double), ("has_midline", c_bool),
+                ("midline", c_double), ("labels", c_char_p), ("edge", c_double), ("close", c_double),
+                ("surfaces_out", c_char_p)]
+
+
+class Scan(ctypes.Structure):
+    """The C struct supine_precompute_scan."""
+    _fields_ = [("shown", c_int), ("state", State)]
+
+
+class Law(ctypes.Structure):
+    """The C struct supine_precompute_law."""
+    _fields_ = [("kind", c_int), ("has_base", c_bool), ("has_gain", c_bool), ("has_box_force", c_bool),
+                ("has_constants", c_bool), ("has_shear", c_bool), ("base", c_double), ("gain", c_double),
+                ("box_force", c_double * 3), ("soften", c_double), ("constants", c_double * 6), ("shear", c_double),
+                ("reach", c_double)]
+
+
+class Lesion(ctypes.Structure):
+    """The C struct supine_precompute_lesion."""
+    _fields_ = [("centre", c_double * 3), ("radius", c_double), ("factor", c_double)]
+
+
+class Tissue(ctypes.Structure):
+    """The C struct supine_precompute_tissue; `start` and `end` are its members from and to."""
+    _fields_ = [("profile", c_int), ("axis", c_int), ("start", c_double), ("end", c_double), ("expandability", c_char_p),
+                ("lesion_count", c_size_t), ("lesions", Lesion * 64), ("share", c_double * 2)]
+
+
+class Rest(ctypes.Structure):
+    """The C struct supine_precompute_rest."""
+    _fields_ = [("ml", c_double), ("share", c_double * 2)]
+
+
+class Volumes(ctypes.Structure):
+    """The C struct supine_precompute_volumes."""
+    _fields_ = [("full", c_double), ("rest", Rest * 6), ("copd", c_bool), ("height", c_double), ("sex", c_int)]
+
+
+class Modes(ctypes.Structure):
+    """The C struct supine_precompute_modes."""
+    _fields_ = [("has_band", c_bool), ("band", c_size_t), ("count", c_size_t), ("harmonics", c_bool),
+                ("held_out", c_size_t), ("without_normals", c_bool)]
+
+
+class PrecomputeOptions(ctypes.Structure):
+    """The C struct supine_precompute_options."""
+    _fields_ = [("size", c_size_t), ("lungs", Lungs), ("scan", Scan), ("law", Law), ("tissue", Tissue),
+                ("volumes", Volumes), ("modes", Modes), ("patient", c_char_p), ("fields", c_char_p),
+                ("made_by", c_char_p), ("progress", ProgressFunction), ("context", c_void_p)]
+
+
+class Report(ctypes.Structure):
+    """The C struct supine_precompute_report; errors are RMS, 95th percentile and largest."""
+    _fields_ = [("lung_count", c_size_t), ("vertex_count", c_size_t), ("band", c_size_t), ("mode_count", c_size_t),
+                ("direction_count", c_size_t), ("relative", c_double * 3), ("mm", c_double * 3), ("rest_known", c_bool),
+                ("rest_part", c_double), ("volume", c_double), ("turned_over", c_double), ("band_count", c_size_t),
+                ("band_error", c_double * 12)]
+
+
+class Finding(ctypes.Structure):
+    """The C struct supine_precompute_finding."""
+    _fields_ = [("is_warning", c_bool), ("text", c_char_p), ("remedy", c_int), ("value", c_char_p)]
 
 
 class Result(ctypes.Structure):
     """The C struct supine_precompute_result."""
-    _fields_ = [("bytes", c_void_p), ("size", c_size_t), ("report", c_char * 2048), ("assumed", c_char * 800),
-                ("findings", c_char * 4096)]
+    _fields_ = [("bytes", c_void_p), ("size", c_size_t), ("report", Report), ("assumptions", POINTER(c_char_p)),
+                ("assumption_count", c_size_t), ("findings", POINTER(Finding)), ("finding_count", c_size_t)]
 
 
 class Residual(ctypes.Structure):
@@ -194,7 +257,7 @@ def _checked(name: str, *arguments: Any) -> Any:
         error = CError()
         status = function(*given, error)
         if status != 0:
-            fail(status, error.message)
+            fail(status, error.message, error)
     return call
 
 
@@ -214,10 +277,12 @@ def _posed(name: str, *arguments: Any) -> Any:
     return call
 
 
-def fail(status: int, message: bytes = b"") -> None:
-    """Raise the exception for a status."""
-    text = message or status_string(status)
-    raise _ERRORS[status if 0 < status < len(_ERRORS) else 0](text.decode(errors="replace"))
+def fail(status: int, message: bytes = b"", error: Optional[CError] = None) -> None:
+    """Raise the exception for a status. If the message is that of an error, add what to do about it."""
+    text = (message or status_string(status)).decode(errors="replace")
+    if error is not None and message:
+        text += _remedies.words(error.remedy, string(error.value))
+    raise _ERRORS[status if 0 < status < len(_ERRORS) else 0](text)
 
 
 version = _declare("version", c_char_p)
@@ -263,7 +328,7 @@ def offline() -> Optional[ctypes.CDLL]:
     if path is None:
         return None
     library = ctypes.CDLL(path)
-    library.supine_precompute_basis.argtypes = POINTER(Input), POINTER(Result), POINTER(CError)
+    library.supine_precompute_basis.argtypes = POINTER(PrecomputeOptions), POINTER(POINTER(Result)), POINTER(CError)
     library.supine_precompute_result_free.argtypes = POINTER(Result),
     library.supine_precompute_result_free.restype = None
     return library

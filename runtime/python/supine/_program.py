@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _library as _c
+from . import _options, _remedies
 
 Progress = Callable[[float], Any]
 _EXITS: dict[int, type[_c.Error]] = {1: _c.ArgumentError, 2: _c.FormatError, 3: _c.UnsupportedError, 5: _c.NumericalError}
@@ -137,6 +138,15 @@ def _listen(terminal: int, command: str, progress: Optional[Progress]) -> str:
             return said
 
 
+def _own_names(text: str) -> str:
+    """Replace options of the command, such as --held-out, by the arguments that become them, such as held_out. Commands to
+    type, in quotes, stay."""
+    parts = re.split(r"('supine [^']*')", text)
+    parts[::2] = (re.sub(r"(?<![\w-])--([a-z][a-z-]*)", lambda option: option[1].replace("-", "_"), part)
+                  for part in parts[::2])
+    return "".join(parts)
+
+
 def fail(command: str, status: int, said: str) -> None:
     """Raise an exception with the error message of a command."""
     messages = re.sub(rf"^supine {command}: ", "", said, flags=re.M).splitlines()
@@ -146,7 +156,7 @@ def fail(command: str, status: int, said: str) -> None:
         kind = _c.ReadError
     elif status == 2 and command == "precompute":
         kind = _c.MeshError
-    raise kind(what or f"supine {command} ended with exit status {status}")
+    raise kind(_own_names(what) or f"supine {command} ended with exit status {status}")
 
 
 def _warn(messages: Sequence[str]) -> None:
@@ -185,7 +195,7 @@ def run(command: str, operands: Sequence[str], options: dict[str, Any], names: d
     for path, name in names.items():
         said, text = said.replace(path, name), text.replace(path, name)
     messages = re.sub(rf"^supine {command}: ", "", said, flags=re.M).splitlines()
-    _warn(messages)
+    _warn([_own_names(message) for message in messages])
     if status != 0:
         fail(command, status, "\n".join(messages))
     if progress is not None:
@@ -235,8 +245,17 @@ def make(command: str, lungs: Any, content: Sequence[Any], options: dict[str, An
             return file.read(), report
 
 
-def _texts(texts: Sequence[str]) -> Any:
-    return (ctypes.c_char_p * len(texts))(*(os.fsencode(text) for text in texts))
+def _replace(path: str, content: bytes) -> None:
+    """Write a file whole or not at all."""
+    new = f"{path}.{os.getpid()}.new"
+    try:
+        with open(new, "xb") as file:
+            file.write(content)
+        os.replace(new, path)
+    except BaseException:
+        if os.path.exists(new):
+            os.remove(new)
+        raise
 
 
 def precompute(surfaces: Sequence[Any], options: dict[str, Any], progress: Optional[Progress]) -> tuple[Any, str]:
@@ -257,27 +276,37 @@ def precompute(surfaces: Sequence[Any], options: dict[str, Any], progress: Optio
             stopped.append(exception)
         return len(stopped)
 
+    made_by = f"supine {_c.string(_c.version())} precompute " + " ".join(
+        os.path.basename(word) for word in words({**options, "fields": "fields" if "fields" in options else None}))
+    kept = options.pop("output", None)
+    to, error, result = _c.PrecomputeOptions(ctypes.sizeof(_c.PrecomputeOptions)), _c.CError(), ctypes.POINTER(_c.Result)()
     with tempfile.TemporaryDirectory(prefix="supine-") as folder:
         fields = os.path.join(folder, "fields")
         if isinstance(options.get("fields"), tuple):
             save_fields(fields, *options["fields"])
             options["fields"] = fields
-        kept = options.pop("output", None)
-        given, paths = words(options), [] if meshes else [os.fspath(path) for path in surfaces]
+        _options.fill(to, options)
         arrays = [(np.ascontiguousarray(points), np.ascontiguousarray(corners, "<u4"))
                   for points, corners in (_mesh(*item) for item in meshes)]
-        parts = (_c.Surface * len(arrays))(*((len(points), points.ctypes.data, len(corners), corners.ctypes.data)
-                                             for points, corners in arrays))
-        result, error = _c.Result(), _c.CError()
-        status = library.supine_precompute_basis(
-            _c.Input(_texts(paths), len(paths), parts, len(parts), _texts(given), len(given),
-                     None if kept is None else os.fsencode(kept), _c.ProgressFunction(tell), None), result, error)
-    made = os.fspath(kept) if kept is not None else ctypes.string_at(result.bytes, result.size) if result.bytes else None
-    findings, report = _c.string(result.findings), _c.string(result.report)
+        to.lungs.surface_count = len(arrays)
+        to.lungs.surfaces = (_c.Surface * len(arrays))(*((len(points), points.ctypes.data, len(corners), corners.ctypes.data)
+                                                         for points, corners in arrays))
+        if not meshes:
+            to.lungs.path_count = len(surfaces)
+            to.lungs.paths = (ctypes.c_char_p * len(surfaces))(*(os.fsencode(path) for path in surfaces))
+        to.made_by, to.progress = made_by.encode(errors="replace"), _c.ProgressFunction(tell)
+        status = library.supine_precompute_basis(to, result, error)
+    findings = [_c.string(each.text) + _remedies.words(each.remedy, _c.string(each.value))
+                for each in (result[0].findings[:result[0].finding_count] if result else [])]
+    made = ctypes.string_at(result[0].bytes, result[0].size) if status == 0 else b""
+    report = _options.describe(result[0]) if status == 0 else ""
     library.supine_precompute_result_free(result)
     if stopped:
         raise stopped[0]
-    _warn(findings.splitlines())
+    _warn(findings)
     if status != 0:  # the same kinds of exceptions as from the program, which calls any wrong input a mesh
-        _c.fail(5 if status in (4, 6) else status, error.message.replace(fields.encode(), b"fields"))
-    return made, report
+        _c.fail(5 if status in (4, 6) else status, error.message.replace(fields.encode(), b"fields"), error)
+    if kept is None:
+        return made, report
+    _replace(os.fspath(kept), made)
+    return os.fspath(kept), report
