@@ -338,7 +338,7 @@ static supine_status complete_scan(const supine_precompute_volumes *volumes, sup
   SUPINE_REFUSE_ADVISE(
       volumes->full != 0.0 && !(volumes->full > 0.0 && kind == SUPINE_VOLUME_REST), error,
       SUPINE_REMEDY_FULL_AND_SCAN, SUPINE_ERROR_ARGUMENT,
-      "the volume at full inflation must be above 0, and goes only with a scan at rest");
+      "the volume at full inflation is for a scan at rest, and must be above 0");
   scan->full = volumes->full;
   return SUPINE_OK;
 }
@@ -365,8 +365,8 @@ static supine_status read_knowledge(const supine_precompute_options *options, su
   if (options->fields != NULL) { /* they displace the surface as it is */
     SUPINE_REFUSE_IF(has_state && options->scan.state.volume.kind != SUPINE_VOLUME_DEFAULT, error,
                      SUPINE_ERROR_ARGUMENT,
-                     "the scan of another simulator's fields: give its posture alone, such as "
-                     "supine, as fields of gravity have no volume");
+                     "the state of the scan: with another simulator's fields, give the posture "
+                     "alone, such as supine, as fields of gravity have no volume");
     p->posture = known->scan;
     known->scan = (supine_scan){.known = false};
     known->has_scan = true;

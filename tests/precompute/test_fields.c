@@ -597,7 +597,7 @@ TEST(test_precompute_fields_scanned_posture_not_displaced) {
   EXPECT(0, "displacement, mm", "compare b.safetensors --postures supine,prone");
   assert_null(strstr(printed, "breath"));
   EXPECT(1, "give the posture alone", FIELDS "--scanned supine:rest");
-  EXPECT(1, "only for --fields",
+  EXPECT(1, "only for another simulator's fields",
          "precompute m.obj --axes RAS --units cm --scanned supine -o c.safetensors");
 }
 
