@@ -306,7 +306,7 @@ static void summarize(const knowledge *given, bool predicted, supine_prepared *p
   if (p->model.share[0] != 1.0 || p->model.share[1] != 1.0) {
     supine_text_add(p->assumed, size,
                     "; collapsed in every state, also in the scan, which then holds %.0f mL: no "
-                    " displacement contains the collapse",
+                    "displacement contains the collapse",
                     collapsed);
   }
 }
@@ -335,10 +335,9 @@ static supine_status complete_scan(const supine_precompute_volumes *volumes, sup
   SUPINE_REFUSE_IF(scan->known && kind != SUPINE_VOLUME_REST && kind != SUPINE_VOLUME_FULL, error,
                    SUPINE_ERROR_ARGUMENT,
                    "the state of the scan must be rest or full inflation, plus or minus a volume");
-  SUPINE_REFUSE_ADVISE(
-      volumes->full != 0.0 && !(volumes->full > 0.0 && kind == SUPINE_VOLUME_REST), error,
-      SUPINE_REMEDY_FULL_AND_SCAN, SUPINE_ERROR_ARGUMENT,
-      "the volume at full inflation is for a scan at rest, and must be above 0");
+  SUPINE_REFUSE_ADVISE(volumes->full != 0.0 && !(volumes->full > 0.0 && kind == SUPINE_VOLUME_REST),
+                       error, SUPINE_REMEDY_FULL_AND_SCAN, SUPINE_ERROR_ARGUMENT,
+                       "the volume at full inflation is for a scan at rest, and must be above 0");
   scan->full = volumes->full;
   return SUPINE_OK;
 }

@@ -201,12 +201,11 @@ static supine_status check_kinds(const supine_source_options *options, const cha
   *is_map = images == count;
   SUPINE_REFUSE_IF(images > 0 && images < count, error, SUPINE_ERROR_ARGUMENT,
                    "label maps and surfaces were given together: give only one kind");
-  SUPINE_REFUSE_ADVISE(
-      images == 0 && (labels->labels != NULL || labels->edge > 0.0 || labels->close > 0.0 ||
-                      options->surfaces_out != NULL),
-      error, SUPINE_REMEDY_MAP_OPTIONS, SUPINE_ERROR_ARGUMENT,
-      "labels, their edge, gaps to close, and a file for the surfaces are for label "
-      "maps (.nrrd, .nii, .nii.gz, .mha), not for surfaces");
+  SUPINE_REFUSE_ADVISE(images == 0 && (labels->labels != NULL || labels->edge > 0.0 ||
+                                       labels->close > 0.0 || options->surfaces_out != NULL),
+                       error, SUPINE_REMEDY_MAP_OPTIONS, SUPINE_ERROR_ARGUMENT,
+                       "labels, edge, close or surfaces_out, which are for label maps (.nrrd, "
+                       ".nii, .nii.gz, .mha), were given with surfaces");
   return SUPINE_OK;
 }
 

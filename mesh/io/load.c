@@ -144,7 +144,7 @@ supine_status supine_mesh_load(const char *path, const supine_mesh_load_options 
       options == NULL ? (supine_mesh_load_options){0} : *options;
   const double scale = chosen.millimetres_per_unit == 0.0 ? 1.0 : chosen.millimetres_per_unit;
   SUPINE_REFUSE_IF(!(scale > 0.0) || !isfinite(scale), error, SUPINE_ERROR_ARGUMENT,
-                   "%s: the unit of %g mm is not a positive number", path, scale);
+                   "%s: %g mm per unit is not a positive number", path, scale);
   SUPINE_ARENA arena = {0};
   SUPINE_FREED_BY(supine_mesh_free) supine_mesh loaded = {0};
   supine_mesh_report found = {0};

@@ -652,10 +652,10 @@ TEST(test_labels_bad_maps_refused) {
       {"left=0", SUPINE_ERROR_ARGUMENT, "labels must be"},
       {"left=70000", SUPINE_ERROR_ARGUMENT, "labels must be"},
       {"left=-1", SUPINE_ERROR_ARGUMENT, "labels must be"},
-      {"left=1,right=2", SUPINE_ERROR_MESH, "Exchange the labels"},
-      {"left=2,right=3", SUPINE_ERROR_MESH, "gives to the right lung"},
+      {"left=1,right=2", SUPINE_ERROR_MESH, "does not lie left of the right lung"},
+      {"left=2,right=3", SUPINE_ERROR_MESH, "given for the right lung"},
       {"totalsegmentator", SUPINE_ERROR_MESH, "the left lung; the labels present are 1, 2"},
-      {"left=9", SUPINE_ERROR_MESH, "gives to the left lung"},
+      {"left=9", SUPINE_ERROR_MESH, "given for the left lung"},
   };
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
   for (size_t i = 0; i < sizeof wrong / sizeof *wrong; ++i) {
