@@ -8,14 +8,12 @@
 #include "base/number.h"
 #include "base/text.h"
 
-void supine_findings_add(supine_findings *findings, const char *format, ...) {
+static void add(supine_findings *findings, supine_remedy remedy, const char *value,
+                const char *format, va_list arguments) {
   const size_t used = strlen(findings->text);
   const size_t room = sizeof findings->text - used;
-  va_list arguments;
-  va_start(arguments, format);
   const int length = supine_print_text_list(findings->text + used, room, format, arguments);
-  va_end(arguments);
-  if (length < 0 || (size_t)length + 1 >= room) {
+  if (length < 0 || (size_t)length + 1 >= room || findings->count == SUPINE_FINDINGS_MAX) {
     findings->text[used] = '\0';
     return;
   }
@@ -24,6 +22,24 @@ void supine_findings_add(supine_findings *findings, const char *format, ...) {
   }
   (void)supine_text_make_utf8(findings->text + used);
   (void)strcat(findings->text, "\n");
+  supine_advice *advice = &findings->advice[findings->count++];
+  advice->remedy = remedy;
+  (void)snprintf(advice->value, sizeof advice->value, "%s", value != NULL ? value : "");
+}
+
+void supine_findings_add(supine_findings *findings, const char *format, ...) {
+  va_list arguments;
+  va_start(arguments, format);
+  add(findings, SUPINE_REMEDY_NONE, NULL, format, arguments);
+  va_end(arguments);
+}
+
+void supine_findings_advise(supine_findings *findings, supine_remedy remedy, const char *value,
+                            const char *format, ...) {
+  va_list arguments;
+  va_start(arguments, format);
+  add(findings, remedy, value, format, arguments);
+  va_end(arguments);
 }
 
 const char *supine_findings_next(const char **at, size_t *length) {

@@ -26,7 +26,28 @@ supine_status supine_error_set(supine_error *error, supine_status status, const 
     (void)supine_print_text_list(message, sizeof message, format, arguments);
     va_end(arguments);
     error->status = status;
+    error->remedy = SUPINE_REMEDY_NONE;
+    error->value[0] = '\0';
     supine_utf8_escape(message, "", error->message, sizeof error->message);
   }
   return status;
+}
+
+void supine_error_advise(supine_error *error, supine_remedy remedy, const char *value) {
+  if (error != NULL) {
+    error->remedy = remedy;
+    (void)snprintf(error->value, sizeof error->value, "%s", value != NULL ? value : "");
+  }
+}
+
+supine_status supine_error_wrap(supine_error *error, const supine_error *cause, const char *format,
+                                ...) {
+  char text[sizeof cause->message];
+  va_list arguments;
+  va_start(arguments, format);
+  (void)supine_print_text_list(text, sizeof text, format, arguments);
+  va_end(arguments);
+  (void)supine_error_set(error, cause->status, "%s%s", text, cause->message);
+  supine_error_advise(error, cause->remedy, cause->value);
+  return cause->status;
 }

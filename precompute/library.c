@@ -148,19 +148,18 @@ static const char *copy(supine_arena *memory, const char *text, size_t length) {
 static void list_findings(const supine_findings *findings, owned *to) {
   const char *at = findings->text;
   size_t length;
-  size_t count = 0;
-  while (supine_findings_next(&at, &length) != NULL) {
-    ++count;
-  }
+  const size_t count = findings->count;
   supine_precompute_finding *list = supine_arena_zeros(&to->memory, count, sizeof *list);
   if (list == NULL) {
     return;
   }
-  at = findings->text;
   for (size_t i = 0; i < count; ++i) {
+    const supine_advice *advice = &findings->advice[i];
     const char *line = supine_findings_next(&at, &length);
     list[i].text = copy(&to->memory, line, length);
     list[i].is_warning = strstr(list[i].text, "warning: ") != NULL;
+    list[i].remedy = advice->remedy;
+    list[i].value = copy(&to->memory, advice->value, strlen(advice->value));
   }
   to->result.findings = list;
   to->result.finding_count = count;

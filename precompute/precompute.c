@@ -180,10 +180,14 @@ static supine_status check_rest(const supine_compression *compression,
     supine_physics_volume_forms_contract_lung(forms, lung, weights, &form);
     const supine_status status =
         supine_volume_form_gains(&form, straight, 0.0, volume[lung], gains, &inner);
-    SUPINE_REFUSE_IF(status != SUPINE_OK, error, SUPINE_ERROR_NUMERICAL,
-                     "with gravity along %g,%g,%g the volume at rest cannot be %.0f mL below full "
-                     "inflation: %s; give --resting, or take the scan as it is with --scanned none",
-                     g[0], g[1], g[2], -volume[lung], inner.message);
+    if (status != SUPINE_OK) {
+      inner.status = SUPINE_ERROR_NUMERICAL;
+      inner.remedy = SUPINE_REMEDY_REST_OR_AS_IS;
+      return supine_error_wrap(
+          error, &inner,
+          "with gravity along %g,%g,%g the volume at rest cannot be %.0f mL below full inflation: ",
+          g[0], g[1], g[2], -volume[lung]);
+    }
   }
   return SUPINE_OK;
 }

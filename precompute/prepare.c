@@ -71,12 +71,11 @@ static void tell_volume(const supine_patient_record *record, double measured,
     (void)supine_print_text(beside, sizeof beside, "; measured: %.0f mL", measured);
   }
   const double off = beside[0] != '\0' ? fabs((lung[0] + lung[1]) / measured - 1.0) : 0.0;
-  supine_findings_add(
-      findings, "%s: by the fitted law, the lungs hold %.0f mL %s%s%s",
-      off > different ? "warning" : "note", lung[0] + lung[1], state, beside,
-      off > different
-          ? ". Check that the scans show the same lungs; give --landmarks to 'supine fit'"
-          : "");
+  const bool warn = off > different;
+  supine_findings_advise(findings, warn ? SUPINE_REMEDY_FIT_LANDMARKS : SUPINE_REMEDY_NONE, NULL,
+                         "%s: by the fitted law, the lungs hold %.0f mL %s%s%s",
+                         warn ? "warning" : "note", lung[0] + lung[1], state, beside,
+                         warn ? ". Check that the scans show the same lungs" : "");
 }
 
 static void describe_fit(const supine_patient_record *record, char *text, size_t size) {
@@ -114,14 +113,13 @@ static supine_status take_patient(const supine_patient_record *fitted, supine_pr
 static supine_status assume_fitted_state(const supine_patient_record *record,
                                          const supine_scan *scan, supine_findings *findings,
                                          supine_error *error) {
-  supine_findings_add(
-      findings,
-      "note: the scan is assumed to be the %s of the two that were fitted; --scanned changes this",
-      record->shown == 0 ? "fuller" : "emptier");
-  SUPINE_REFUSE_IF(record->shown == 1 && !scan->known, error, SUPINE_ERROR_ARGUMENT,
-                   "this scan is the emptier of the two that were fitted, and how far it is below "
-                   "full inflation is unknown: give its state, such as --scanned supine:rest, or "
-                   "use the fuller scan");
+  supine_findings_advise(findings, SUPINE_REMEDY_SCAN_ASSUMED, NULL,
+                         "note: the scan is assumed to be the %s of the two that were fitted",
+                         record->shown == 0 ? "fuller" : "emptier");
+  SUPINE_REFUSE_ADVISE(record->shown == 1 && !scan->known, error, SUPINE_REMEDY_SCAN_GIVE,
+                       SUPINE_ERROR_ARGUMENT,
+                       "this scan is the emptier of the two that were fitted, and how far it is "
+                       "below full inflation is unknown: use the fuller scan");
   return SUPINE_OK;
 }
 
@@ -154,7 +152,7 @@ static supine_status set_expandability(const supine_precompute_tissue *tissue, s
     return SUPINE_OK;
   }
   SUPINE_REFUSE_IF(p->model.stiffness != NULL, error, SUPINE_ERROR_ARGUMENT,
-                   "the file of --patient sets the stiffness: leave --expandability out");
+                   "the patient's file sets the stiffness: leave the expandability out");
   double *a = supine_arena_take(&p->memory, n, sizeof *a);
   SUPINE_TRY(supine_arena_check(&p->memory, error, "%zu vertices", n));
   if (tissue->expandability != NULL) {
@@ -239,8 +237,10 @@ static supine_status set_shares(const supine_precompute_tissue *tissue, supine_p
                        "the %s lung's share of its healthy volume, %g, must be above 0 and at most "
                        "1",
                        name, share);
-      SUPINE_REFUSE_IF(lung == lungs->lung_count, error, SUPINE_ERROR_ARGUMENT,
-                       "--lung %s: the model has no %s lung: leave it out", name, name);
+      SUPINE_REFUSE_IF(
+          lung == lungs->lung_count, error, SUPINE_ERROR_ARGUMENT,
+          "a share of the %s lung was given, but the model has no %s lung: leave it out", name,
+          name);
       p->model.share[lung] = share;
     }
   }
@@ -267,7 +267,7 @@ static const char *source_of_rest(const supine_resting *resting, bool predicted,
     return "the fit";
   }
   if (supine_physics_resting_given(resting)) {
-    return "--resting";
+    return "the given volumes";
   }
   if (predicted) {
     return "height and sex";
@@ -320,8 +320,8 @@ static void summarize(const knowledge *given, bool predicted, supine_prepared *p
   }
   if (p->model.share[0] != 1.0 || p->model.share[1] != 1.0) {
     supine_text_add(p->assumed, size,
-                    "; collapsed in every state by --lung, also in the scan, which then holds %.0f "
-                    "mL: no displacement contains the collapse",
+                    "; collapsed in every state, also in the scan, which then holds %.0f mL: no "
+                    "displacement contains the collapse",
                     collapsed);
   }
 }
@@ -339,20 +339,20 @@ static void summarize_fields(supine_prepared *p) {
  * go with it. */
 static supine_status complete_scan(const supine_precompute_volumes *volumes, supine_law law,
                                    supine_scan *scan, supine_error *error) {
-  SUPINE_REFUSE_IF(
-      law == SUPINE_LAW_PAPER && scan->known, error, SUPINE_ERROR_ARGUMENT,
-      "--law paper takes the scan as the reference: leave --scanned out, or use --law deep");
+  SUPINE_REFUSE_ADVISE(
+      law == SUPINE_LAW_PAPER && scan->known, error, SUPINE_REMEDY_LAW_OR_SCAN,
+      SUPINE_ERROR_ARGUMENT,
+      "the law 'paper' takes the scan as the reference, but the state of the scan was given");
   const supine_volume_kind kind = scan->state.volume.kind;
   SUPINE_REFUSE_IF(scan->known && kind == SUPINE_VOLUME_DEFAULT, error, SUPINE_ERROR_ARGUMENT,
-                   "--scanned: a posture alone is only for --fields: add the volume, as in "
-                   "supine:rest, or give full or none");
+                   "the state of the scan is a posture alone, which is only for another "
+                   "simulator's fields: add the volume, as in supine:rest, or give full or none");
   SUPINE_REFUSE_IF(scan->known && kind != SUPINE_VOLUME_REST && kind != SUPINE_VOLUME_FULL, error,
                    SUPINE_ERROR_ARGUMENT,
                    "the state of the scan must be rest or full inflation, plus or minus a volume");
-  SUPINE_REFUSE_IF(
-      volumes->full != 0.0 && !(volumes->full > 0.0 && kind == SUPINE_VOLUME_REST), error,
-      SUPINE_ERROR_ARGUMENT,
-      "--full is for a scan at rest: give a volume such as 4200mL, and --scanned supine:rest too");
+  SUPINE_REFUSE_ADVISE(volumes->full != 0.0 && !(volumes->full > 0.0 && kind == SUPINE_VOLUME_REST),
+                       error, SUPINE_REMEDY_FULL_AND_SCAN, SUPINE_ERROR_ARGUMENT,
+                       "the volume at full inflation is for a scan at rest, and must be above 0");
   scan->full = volumes->full;
   return SUPINE_OK;
 }
@@ -378,8 +378,8 @@ static supine_status read_knowledge(const supine_precompute_options *options, su
   if (options->fields != NULL) { /* they displace the surface as it is */
     SUPINE_REFUSE_IF(has_state && options->scan.state.volume.kind != SUPINE_VOLUME_DEFAULT, error,
                      SUPINE_ERROR_ARGUMENT,
-                     "--scanned: with --fields, give the posture alone, such as supine, as fields "
-                     "of gravity have no volume");
+                     "the state of the scan: with another simulator's fields, give the posture "
+                     "alone, such as supine, as fields of gravity have no volume");
     p->posture = known->scan;
     known->scan = (supine_scan){.known = false};
     known->has_scan = true;
@@ -412,17 +412,13 @@ static supine_status find_reference(supine_prepared *p, const knowledge *known,
                                     .lung_count = lungs->lung_count,
                                     .side = {lungs->side[0], lungs->side[1]}};
   supine_resting resting = known->resting;
-  char doubt[512] = "";
   supine_physics_reference_predict_rest(&scanned, &known->person, &resting);
   SUPINE_TRY(supine_physics_reference_find(lungs, &p->model, &known->scan, &resting, &p->reference,
                                            error));
   summarize(known, resting.predicted, p);
   if (p->reference.known) {
-    supine_physics_reference_doubt(&p->reference, &known->person, &known->resting, doubt,
-                                   sizeof doubt);
-  }
-  if (doubt[0] != '\0') {
-    supine_findings_add(&p->source.findings, "warning: %s", doubt);
+    supine_physics_reference_doubt(&p->reference, &known->person, &known->resting,
+                                   &p->source.findings);
   }
   return SUPINE_OK;
 }

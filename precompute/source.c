@@ -56,8 +56,9 @@ static void note_mesh(const char *path, const supine_mesh_report *report,
 static supine_status load_meshes(reading *r, supine_source *source, supine_error *error) {
   supine_parallel_for(r->count, 1, r->count, load_range, r);
   for (size_t i = 0; i < r->count; ++i) {
-    SUPINE_REFUSE_IF(r->errors[i].status != SUPINE_OK, error, r->errors[i].status, "%s",
-                     r->errors[i].message);
+    if (r->errors[i].status != SUPINE_OK) {
+      return supine_error_wrap(error, &r->errors[i], "%s", "");
+    }
     note_mesh(r->paths[i], &r->reports[i], &source->findings);
   }
   r->axes = r->reports[0].axes;
@@ -82,10 +83,10 @@ static void note_map(const char *path, const supine_labels_report *report,
                           path, side);
     }
     if (lung->tunnels > 0) {
-      supine_findings_add(findings,
-                          "%s: note: %s lung: %ld open channel%s (a hole through the mask, or a "
-                          "hollow open to the outside): --close MM closes narrow ones",
-                          path, side, lung->tunnels, lung->tunnels == 1 ? "" : "s");
+      supine_findings_advise(findings, SUPINE_REMEDY_CLOSE, NULL,
+                             "%s: note: %s lung: %ld open channel%s (a hole through the mask, or a "
+                             "hollow open to the outside)",
+                             path, side, lung->tunnels, lung->tunnels == 1 ? "" : "s");
     }
   }
 }
@@ -137,11 +138,10 @@ static supine_status load_maps(reading *r, supine_source *source, supine_error *
   wanted.left_masks = lobes.left;
   wanted.right_masks = lobes.right;
   wanted.axes = r->options->load.axes;
-  SUPINE_REFUSE_IF(r->options->load.millimetres_per_unit != 0.0 &&
-                       r->options->load.millimetres_per_unit != 1.0,
-                   error, SUPINE_ERROR_ARGUMENT,
-                   "a label map's header states its unit: leave --units out, or give --units mm to "
-                   "accept any size of the lungs");
+  SUPINE_REFUSE_ADVISE(r->options->load.millimetres_per_unit != 0.0 &&
+                           r->options->load.millimetres_per_unit != 1.0,
+                       error, SUPINE_REMEDY_MAP_UNIT, SUPINE_ERROR_ARGUMENT,
+                       "a label map's header states its unit, but another unit was given");
   SUPINE_TRY(supine_labels_surfaces(folder ? (const char *const *)lobes.list : r->paths,
                                     folder ? lobes.left + lobes.right : r->count, &wanted,
                                     r->meshes, &source->report, error));
@@ -175,7 +175,7 @@ static void summarize(const reading *r, supine_source *source) {
   supine_mesh_axes_letters(report->axes, letters);
   const char *axes_from = report->axes_from_tag ? "the file's tag" : "assumed";
   if (load->axes != SUPINE_AXES_AUTO) {
-    axes_from = "by --axes";
+    axes_from = "as given";
   }
   supine_text_add(source->summary, size, "%s axes (%s), %g mm a unit", letters, axes_from,
                   load->millimetres_per_unit == 0.0 ? 1.0 : load->millimetres_per_unit);
@@ -202,11 +202,11 @@ static supine_status check_kinds(const supine_source_options *options, const cha
   *is_map = images == count;
   SUPINE_REFUSE_IF(images > 0 && images < count, error, SUPINE_ERROR_ARGUMENT,
                    "label maps and surfaces were given together: give only one kind");
-  SUPINE_REFUSE_IF(images == 0 && (labels->labels != NULL || labels->edge > 0.0 ||
-                                   labels->close > 0.0 || options->surfaces_out != NULL),
-                   error, SUPINE_ERROR_ARGUMENT,
-                   "--labels, --edge, --close and --surfaces-out are for label maps (.nrrd, .nii, "
-                   ".nii.gz, .mha): leave them out");
+  SUPINE_REFUSE_ADVISE(images == 0 && (labels->labels != NULL || labels->edge > 0.0 ||
+                                       labels->close > 0.0 || options->surfaces_out != NULL),
+                       error, SUPINE_REMEDY_MAP_OPTIONS, SUPINE_ERROR_ARGUMENT,
+                       "labels, edge, close or surfaces_out, which are for label maps (.nrrd, "
+                       ".nii, .nii.gz, .mha), were given with surfaces");
   return SUPINE_OK;
 }
 

@@ -260,9 +260,11 @@ static supine_status change_volume(workspace *s, double ml, supine_error *error)
     }
     ml /= 2;
   }
-  return supine_error_set(error, status,
-                          "the points need a volume that the lungs cannot hold: check their names, "
-                          "unit and axes, or give --volume");
+  (void)supine_error_set(error, status,
+                         "the points need a volume that the lungs cannot hold: check their names, "
+                         "unit and axes");
+  supine_error_advise(error, SUPINE_REMEDY_LOCATE_VOLUME, NULL);
+  return status;
 }
 
 /* Find the unknown volume and rotation by Gauss-Newton steps. */
@@ -362,12 +364,15 @@ static supine_status refuse_residuals(const workspace *s, const supine_locate_re
                             "from its prediction by the others. Check their names, unit and axes",
                             sqrt(square));
   }
-  return !s->fit->options.volume || s->found->volume >= share_least * full
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                                "the points fit lungs of %.0f mL, under %.0f %% of full inflation "
-                                "(%.0f mL): check their names, unit and axes, or give --volume",
-                                s->found->volume, 100 * share_least, full);
+  if (s->fit->options.volume && !(s->found->volume >= share_least * full)) {
+    (void)supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                           "the points fit lungs of %.0f mL, under %.0f %% of full inflation "
+                           "(%.0f mL): check their names, unit and axes",
+                           s->found->volume, 100 * share_least, full);
+    supine_error_advise(error, SUPINE_REMEDY_LOCATE_VOLUME, NULL);
+    return SUPINE_ERROR_NUMERICAL;
+  }
+  return SUPINE_OK;
 }
 
 static supine_status locate(workspace *s, supine_locate_residual *residuals, supine_error *error) {

@@ -92,11 +92,12 @@ static supine_status find_volumes(const supine_basis *basis, const double gravit
 }
 
 static supine_status refuse(const char *what, supine_error *error) {
-  return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                          "this basis has no volume at %s, as its scan was used unchanged "
-                          "(--scanned none or --law paper): give scan+ML or an absolute "
-                          "volume such as 2600mL",
-                          what);
+  (void)supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                         "this basis has no volume at %s, as its scan was used unchanged: give "
+                         "scan+ML or an absolute volume such as 2600mL",
+                         what);
+  supine_error_advise(error, SUPINE_REMEDY_BASIS_WITH_REST, NULL);
+  return SUPINE_ERROR_ARGUMENT;
 }
 
 /* Convert a volume of any kind to the volume of all lungs minus the reference volume, mL. */

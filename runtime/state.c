@@ -185,11 +185,13 @@ supine_status supine_state_parse(const char *text, supine_state *state, supine_e
   }
   if (colon == NULL) {
     const bool number = strchr("+-.0123456789", text[0]) != NULL || equals != NULL;
-    return number ? supine_error_set(error, volume_error.status, "%s", volume_error.message)
-                  : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                     "'%s' is neither a posture (did you mean '%s'?) nor a volume "
-                                     "(rest, full or scan, with +ML or -ML, or 2600mL)",
-                                     text, supine_posture_nearest(text));
+    if (number) {
+      return supine_error_wrap(error, &volume_error, "%s", "");
+    }
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "'%s' is neither a posture (did you mean '%s'?) nor a volume "
+                            "(rest, full or scan, with +ML or -ML, or 2600mL)",
+                            text, supine_posture_nearest(text));
   }
   char posture[PIECE];
   if ((size_t)(colon - text) >= sizeof posture) {

@@ -64,10 +64,10 @@ void supine_sh_compression_mix(const supine_expansion *expansion, supine_compres
 supine_status supine_sh_compress_harmonics(const supine_expansion *expansion,
                                            supine_compression *compression, supine_error *error) {
   const size_t terms = supine_sh_count(expansion->band);
-  SUPINE_REFUSE_IF(terms > SUPINE_MODES_MADE_MAX, error, SUPINE_ERROR_ARGUMENT,
-                   "band %zu has %zu harmonics, but a basis file holds at most %d: give --modes "
-                   "16, or --band 7 or less",
-                   expansion->band, terms, SUPINE_MODES_MADE_MAX);
+  SUPINE_REFUSE_ADVISE(terms > SUPINE_MODES_MADE_MAX, error, SUPINE_REMEDY_HARMONICS,
+                       SUPINE_ERROR_ARGUMENT,
+                       "band %zu has %zu harmonics, but a basis file holds at most %d",
+                       expansion->band, terms, SUPINE_MODES_MADE_MAX);
   if (supine_sh_compression_create(expansion, terms, compression) != SUPINE_OK) {
     return supine_error_memory(error, "%zu harmonics", terms);
   }

@@ -126,8 +126,7 @@ supine_status supine_sh_compress_modes(const supine_expansion *expansion, const 
   while (count < kept && values[count] > rank_tolerance * rank_tolerance * values[0]) {
     ++count;
   }
-  SUPINE_REFUSE_IF(count == 0, error, SUPINE_ERROR_NUMERICAL,
-                   "the field is zero everywhere: change --base or --gain");
+  SUPINE_REFUSE_IF(count == 0, error, SUPINE_ERROR_NUMERICAL, "the field is zero everywhere");
   if (supine_sh_compression_create(expansion, count, compression) != SUPINE_OK) {
     return supine_error_memory(error, "%zu modes", count);
   }

@@ -204,6 +204,8 @@ def check_opening(files):
                     faults.append(f"{file} calls {name}: call supine_input_open, or supine_input_open_beside for a name from a file")
 
 
+# Sources of functions that the JavaScript package calls and that have remedies.
+JAVASCRIPT = ("runtime/basis.c", "runtime/pose.c", "runtime/state.c", "runtime/expected.c")
 LOCALE_FILES = ("base/number.c", "base/locale.c", "base/locale.h")
 CALL = re.compile(r"\b((?:v|f|s|vf|vs|sn|vsn|d|as)?printf|(?:f|s)?scanf|strto[dfl]|strtold|ato[fil]|\w*locale\w*|is(?:alnum|alpha|blank|cntrl|digit|"
                   r"graph|lower|print|punct|space|upper|xdigit)|to(?:lower|upper)|strn?casecmp|strcoll|json_\w+)\s*\(")
@@ -273,6 +275,41 @@ def check_distances(files):
         with open(os.path.join(source, file), encoding="utf-8") as opened:
             for digits in re.findall(r"%\.\dg mm (?:RMS|at most|largest|apart|95th)|(?:residual|displacement|distance) %\.\dg mm", opened.read()):
                 faults.append(f"{file}: '{digits}': digits below rounding depend on the processor: use supine_text_distance")
+
+
+def check_remedies(files):
+    """Check that only the program names options, that its table of remedies names options that exist, that the tables of
+    the packages have an entry for each remedy, and that no error is set to the message of another without its remedy.
+    Comments may name options, as an option is the shortest name of what it sets."""
+    options = set()
+    for file in files:
+        with open(os.path.join(source, file), encoding="utf-8") as opened:
+            text = without_comments(opened.read())
+        options |= set(re.findall(r'\{"([a-z][a-z-]*)", (?:0|\'.\'),', text) if file.startswith("program/") else ())
+        for literal in LITERAL.finditer(text if not file.startswith("program/") else ""):
+            for name in re.findall(r"--[a-z][a-z-]*", literal[1]):
+                line = text.count("\n", 0, literal.start()) + 1
+                faults.append(f"{file}:{line}: {name}: a library's message names the argument, and has a remedy (supine/status.h)")
+        for call in re.finditer(r"\b(?:supine_error_set|SUPINE_REFUSE_IF|SUPINE_REFUSE_ADVISE)\(", text):
+            if file != "base/status.c" and re.search(r"(?:\.|->)message\b(?!\[)", "".join(arguments(text, call.end()))):
+                line = text.count("\n", 0, call.start()) + 1
+                faults.append(f"{file}:{line}: the remedy of the other error is lost: use supine_error_wrap")
+    with open(os.path.join(source, "runtime/include/supine/status.h"), encoding="utf-8") as opened:
+        names = re.findall(r"^  SUPINE_REMEDY_([A-Z_]+)[, ]", opened.read().split("typedef enum supine_remedy")[1], re.M)
+    with open(os.path.join(source, "program/options/remedy.c"), encoding="utf-8") as opened:
+        for name in set(re.findall(r"--([a-z][a-z-]*)", without_comments(opened.read()))) - options:
+            faults.append(f"program/options/remedy.c: no command has an option --{name}")
+    with open(os.path.join(source, "runtime/python/supine/_remedies.py"), encoding="utf-8") as opened:
+        words = re.findall(r'^    "(\w+)": ', opened.read(), re.M)
+    if words + ["count"] != [name.lower() for name in names]:
+        faults.append("runtime/python/supine/_remedies.py: the table is not in the order of supine_remedy")
+    with open(os.path.join(source, "runtime/js/supine.js"), encoding="utf-8") as opened:
+        table = re.search(r"const REMEDIES = \[(.*?)\];", opened.read(), re.S)[1]
+    for file in JAVASCRIPT:
+        with open(os.path.join(source, file), encoding="utf-8") as opened:
+            for name in re.findall(r"SUPINE_REMEDY_([A-Z_]+)", opened.read()):
+                if names.index(name) >= len(re.findall(r"\"[^\"]*\"|''", table)):
+                    faults.append(f"runtime/js/supine.js: REMEDIES has no words for {name}, which {file} uses")
 
 
 def check_waits():
@@ -432,6 +469,7 @@ check_sizes(files)
 check_distances(files)
 check_forms(files)
 check_waits()
+check_remedies(files)
 check_includes(folders, files)
 check_system_headers(files)
 check_opening(files)

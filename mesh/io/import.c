@@ -169,7 +169,7 @@ static struct aiFile *source_open(struct aiFileIO *io, const char *name, const c
   (void)mode;
   sources *from = (sources *)(void *)io->UserData;
   const bool itself = strcmp(name, supine_text_file_name(from->file->path)) == 0;
-  supine_error error = {SUPINE_OK, ""};
+  supine_error error = {.message = ""};
   source *made = NULL;
   if (!itself && from->alone) {
     return NULL;
@@ -325,8 +325,9 @@ static supine_status take_outcome(const char *path, FILE *stream, supine_mesh *m
                                   size_t *dropped, supine_error *error) {
   outcome result;
   if (fread(&result, sizeof result, 1, stream) == 1) {
-    SUPINE_REFUSE_IF(result.error.status != SUPINE_OK, error, result.error.status, "%s",
-                     result.error.message);
+    if (result.error.status != SUPINE_OK) {
+      return supine_error_wrap(error, &result.error, "%s", "");
+    }
     *dropped = result.dropped;
     const size_t n = result.vertex_count;
     const size_t triangles = result.triangle_count;

@@ -103,10 +103,12 @@ static supine_status choose_axes(const mesh_file *file, supine_axes asked,
     report->axes = asked;
     return SUPINE_OK;
   }
-  SUPINE_REFUSE_IF(file->tagged && file->space == SUPINE_AXES_AUTO, error, SUPINE_ERROR_FORMAT,
-                   "%s: its SPACE tag is not three letters such as LPS or RAS; give the axes, for "
-                   "example --axes LPS",
-                   file->path);
+  if (file->tagged && file->space == SUPINE_AXES_AUTO) {
+    (void)supine_error_set(error, SUPINE_ERROR_FORMAT,
+                           "%s: its SPACE tag is not three letters such as LPS or RAS", file->path);
+    supine_error_advise(error, SUPINE_REMEDY_AXES, "LPS");
+    return SUPINE_ERROR_FORMAT;
+  }
   report->axes = file->tagged ? file->space : SUPINE_AXES_LPS;
   report->axes_from_tag = file->tagged;
   return SUPINE_OK;
@@ -124,10 +126,10 @@ static supine_status convert(const char *path, double scale, supine_axes axes, s
                      SUPINE_ERROR_MESH,
                      "%s: vertex %zu of %zu has a coordinate that is not finite; repair the mesh",
                      path, i, mesh->vertex_count);
-    SUPINE_REFUSE_IF(
-        !(largest * scale <= farthest), error, SUPINE_ERROR_MESH,
-        "%s: vertex %zu of %zu has a coordinate of %.3g mm; repair the mesh, or give its --units",
-        path, i, mesh->vertex_count, largest * scale);
+    SUPINE_REFUSE_ADVISE(!(largest * scale <= farthest), error, SUPINE_REMEDY_UNIT,
+                         SUPINE_ERROR_MESH,
+                         "%s: vertex %zu of %zu has a coordinate of %.3g mm; repair the mesh", path,
+                         i, mesh->vertex_count, largest * scale);
     supine_mesh_axes_apply(axes, scale, vertex);
   }
   if (supine_mesh_axes_mirrored(axes)) {
@@ -142,7 +144,7 @@ supine_status supine_mesh_load(const char *path, const supine_mesh_load_options 
       options == NULL ? (supine_mesh_load_options){0} : *options;
   const double scale = chosen.millimetres_per_unit == 0.0 ? 1.0 : chosen.millimetres_per_unit;
   SUPINE_REFUSE_IF(!(scale > 0.0) || !isfinite(scale), error, SUPINE_ERROR_ARGUMENT,
-                   "%s: %g mm per unit is not a positive number; correct --units", path, scale);
+                   "%s: %g mm per unit is not a positive number", path, scale);
   SUPINE_ARENA arena = {0};
   SUPINE_FREED_BY(supine_mesh_free) supine_mesh loaded = {0};
   supine_mesh_report found = {0};

@@ -164,10 +164,10 @@ static supine_status choose(const char *path, const supine_image *image, const l
   }
   if (wanted == NULL) {
     list_labels(tally, NULL, 0, present, sizeof present);
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "%s: which of its labels (%s) are lungs? Give --labels, such as "
-                            "left=10+11,right=12+13+14 or totalsegmentator",
-                            path, present);
+    (void)supine_error_set(error, SUPINE_ERROR_MESH, "%s: which of its labels (%s) are lungs?",
+                           path, present);
+    supine_error_advise(error, SUPINE_REMEDY_LABELS, NULL);
+    return SUPINE_ERROR_MESH;
   }
   if (strcmp(wanted, "one") == 0) {
     memset(side + 1, LABELS_EITHER, LABELS_MAX - 1);
@@ -182,7 +182,7 @@ static supine_status choose(const char *path, const supine_image *image, const l
   }
   const bool good = read_sides(labels, side);
   SUPINE_REFUSE_IF(!good, error, SUPINE_ERROR_ARGUMENT,
-                   "--labels must be 'one', 'lungmask', 'lobes', 'totalsegmentator', "
+                   "labels must be 'one', 'lungmask', 'lobes', 'totalsegmentator', "
                    "'totalsegmentator-v1' or left=LABEL+...,right=LABEL+..., not '%s'",
                    wanted);
   return SUPINE_OK;
@@ -201,11 +201,12 @@ static supine_status check(const char *path, const supine_image *image, const la
     there[s] = centre_of(image, tally, side, sides[s], centre[s]);
     if (!there[s] && memchr(side, sides[s], LABELS_MAX) != NULL) {
       list_labels(tally, NULL, 0, present, sizeof present);
-      return supine_error_set(
+      (void)supine_error_set(
           error, SUPINE_ERROR_MESH,
-          "%s: no voxel has a label that --labels gives to the %s lung; the labels present are %s. "
-          "Correct --labels, or name only one lung, such as --labels %s=1+2",
-          path, names[s], present, names[1 - s]);
+          "%s: no voxel has a label that was given for the %s lung; the labels present are %s",
+          path, names[s], present);
+      supine_error_advise(error, SUPINE_REMEDY_LABELS_ONE_LUNG, names[1 - s]);
+      return SUPINE_ERROR_MESH;
     }
   }
   if (!(there[0] && there[1])) {

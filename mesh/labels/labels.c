@@ -228,21 +228,20 @@ static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung,
   for (int a = 0; a < 3; ++a) {
     longest = fmax(longest, (double)(mask.size[a] - 2 * margin) * mask.spacing[a]);
   }
-  SUPINE_REFUSE_IF(!(lung->mask >= least_volume && longest <= longest_lung), error,
-                   SUPINE_ERROR_MESH,
-                   "%s: the %s lung holds %.4g mL in a box %.4g mm long, which is impossible for a "
-                   "lung: check --labels and the voxel size in the header",
-                   w->path, name, lung->mask, longest);
+  SUPINE_REFUSE_ADVISE(!(lung->mask >= least_volume && longest <= longest_lung), error,
+                       SUPINE_REMEDY_LABELS_CHECK, SUPINE_ERROR_MESH,
+                       "%s: the %s lung holds %.4g mL in a box %.4g mm long, which is impossible "
+                       "for a lung: check the voxel size in the header",
+                       w->path, name, lung->mask, longest);
   const supine_status meshed = supine_labels_mask_surface(&mask, w->edge, true, mesh);
-  SUPINE_REFUSE_IF(meshed == SUPINE_ERROR_NUMERICAL, error, meshed,
-                   "%s: the %s lung keeps changing while it is made one piece: give another --edge",
-                   w->path, name);
+  SUPINE_REFUSE_ADVISE(meshed == SUPINE_ERROR_NUMERICAL, error, SUPINE_REMEDY_EDGE, meshed,
+                       "%s: the %s lung keeps changing while it is made one piece", w->path, name);
   SUPINE_TRY(meshed);
   supine_labels_mask_free(&mask);
   SUPINE_REFUSE_IF(
       mesh->triangle_count == 0, error, SUPINE_ERROR_MESH,
-      "%s: the %s lung is thinner than half of --edge %g everywhere: give a smaller edge", w->path,
-      name, w->edge);
+      "%s: the %s lung is thinner than half of the edge of %g mm everywhere: give a smaller edge",
+      w->path, name, w->edge);
   SUPINE_FREED_BY(supine_mesh_topology_free) supine_topology topology = {0};
   SUPINE_TRY(supine_mesh_topology_create(mesh, &topology));
   lung->tunnels = topology.genus;
@@ -264,15 +263,17 @@ static supine_status check_sides(const work *w, const supine_mesh *surfaces, sup
     return SUPINE_OK;
   }
   supine_mesh_axes_letters(supine_mesh_axes_after(w->report->coordinates, found.axes), letters);
-  return supine_error_set(
-      error, SUPINE_ERROR_MESH, "%s: by its header, %s (labels %s). %s%s%s", w->path,
+  (void)supine_error_set(
+      error, SUPINE_ERROR_MESH, "%s: by its header, %s (labels %s)%s", w->path,
       doubted ? "the left lung does not lie left of the right lung" : "the lungs are mirrored",
-      w->report->taken,
-      found.axes == SUPINE_AXES_LPS
-          ? "Exchange the labels, --labels left=...,right=..., or correct the axes with --axes"
-          : "The lungs' shape fits other axes: if the labels are correct, add --axes ",
-      found.axes == SUPINE_AXES_LPS ? "" : letters,
-      doubted ? "" : "; if the header is correct, add --axes with its axes");
+      w->report->taken, found.axes == SUPINE_AXES_LPS ? "" : ". The lungs' shape fits other axes");
+  if (found.axes == SUPINE_AXES_LPS) {
+    supine_error_advise(error, SUPINE_REMEDY_LABELS_EXCHANGE, NULL);
+  } else {
+    supine_error_advise(
+        error, doubted ? SUPINE_REMEDY_LABELS_OR_AXES : SUPINE_REMEDY_LABELS_AXES_OR_KEEP, letters);
+  }
+  return SUPINE_ERROR_MESH;
 }
 
 static supine_status make_surfaces(work *w, const char *const *paths, size_t count,
@@ -303,12 +304,12 @@ supine_status supine_labels_surfaces(const char *const *paths, size_t count,
   work w = {.path = paths[0], .options = options, .report = report};
   w.edge = options->edge != 0.0 ? options->edge : SUPINE_LABELS_EDGE;
   *report = (supine_labels_report){.lung_count = 0};
-  SUPINE_REFUSE_IF(!(w.edge >= least_edge && w.edge <= most_edge) ||
-                       !(options->close >= 0.0 && options->close <= most_closing_radius) ||
-                       count > FILES_MAX,
-                   error, SUPINE_ERROR_ARGUMENT,
-                   "give --edge from %g to %g mm, --close from 0 to %g mm, and at most %d images",
-                   least_edge, most_edge, most_closing_radius, FILES_MAX);
+  SUPINE_REFUSE_IF(
+      !(w.edge >= least_edge && w.edge <= most_edge) ||
+          !(options->close >= 0.0 && options->close <= most_closing_radius) || count > FILES_MAX,
+      error, SUPINE_ERROR_ARGUMENT,
+      "give an edge from %g to %g mm, close gaps of 0 to %g mm, and give at most %d images",
+      least_edge, most_edge, most_closing_radius, FILES_MAX);
   const supine_status status = make_surfaces(&w, paths, count, surfaces, error);
   supine_image_free(&w.image);
   supine_labels_mask_free(&w.both);

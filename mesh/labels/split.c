@@ -123,9 +123,10 @@ supine_status supine_labels_split(const char *path, labels_mask *both, double *n
     memcpy(both->at, eroded.at, count);
     return SUPINE_OK;
   }
-  return supine_error_set(
+  (void)supine_error_set(
       error, SUPINE_ERROR_MESH,
-      "%s: cannot split the mask into two lungs: erosion leaves no two pieces beside each other. "
-      "If it is one lung, name the side: --labels left=LABEL or right=LABEL",
+      "%s: cannot split the mask into two lungs: erosion leaves no two pieces beside each other",
       path);
+  supine_error_advise(error, SUPINE_REMEDY_LABELS_SIDE, NULL);
+  return SUPINE_ERROR_MESH;
 }

@@ -165,10 +165,11 @@ static supine_status choose_band(supine_fit *fit, int wanted, supine_error *erro
       report->band = band;
     }
   }
-  SUPINE_REFUSE_IF(fit->chosen.harmonics == NULL, error, SUPINE_ERROR_ARGUMENT,
-                   "%zu directions do not determine band %d (%d harmonics); the highest band that "
-                   "they determine is %d: give more directions, or leave --band out",
-                   m, wanted, (wanted + 1) * (wanted + 1), (int)determined_count - 1);
+  SUPINE_REFUSE_ADVISE(
+      fit->chosen.harmonics == NULL, error, SUPINE_REMEDY_BAND_OUT, SUPINE_ERROR_ARGUMENT,
+      "%zu directions do not determine band %d (%d harmonics); the highest band that "
+      "they determine is %d: give more directions",
+      m, wanted, (wanted + 1) * (wanted + 1), (int)determined_count - 1);
   report->band_highest = determined_count - 1;
   return SUPINE_OK;
 }

@@ -121,8 +121,8 @@ supine_status supine_inside_content_make_rigid(supine_inside_content *content, c
       }
     }
     SUPINE_REFUSE_IF(!found, error, SUPINE_ERROR_ARGUMENT,
-                     "--rigid: no part is named '%.*s': give a mesh's file name without its "
-                     "ending, or a label as in --labels",
+                     "rigid: no part is named '%.*s': give a mesh's file name without its "
+                     "ending, or a label of the image",
                      (int)length, at);
     at += length;
     if (*at == '\0') {

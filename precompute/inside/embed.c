@@ -77,11 +77,11 @@ static supine_status check_distance(const embedding *e, supine_error *error) {
   for (size_t i = 0; i < e->content->count; ++i) {
     nearest = fmin(nearest, -e->place[i].depth);
   }
-  SUPINE_REFUSE_IF(nearest > outside_most && !e->options->clamp, error, SUPINE_ERROR_MESH,
-                   "all points are outside the lungs, by %.0f mm or more, where the motion of the "
-                   "lungs says nothing: check the axes and units (--axes, --units), or give "
-                   "--clamp to move them like the nearest point of the surface",
-                   nearest);
+  SUPINE_REFUSE_ADVISE(nearest > outside_most && !e->options->clamp, error,
+                       SUPINE_REMEDY_POINTS_CLAMP, SUPINE_ERROR_MESH,
+                       "all points are outside the lungs, by %.0f mm or more, where the motion of "
+                       "the lungs says nothing: check the axes and units",
+                       nearest);
   return SUPINE_OK;
 }
 

@@ -27,7 +27,7 @@
 #include "precompute/inside/shells.h"
 
 /** Default maximum number of centres of a lung (vertices at which the interpolation is exact). On
- * two lungs of 20,000 vertices with a smoothing length of 10 mm (--reach), the error is 0.2 % of
+ * two lungs of 20,000 vertices with a smoothing length of 10 mm (reach), the error is 0.2 % of
  * the displacement at the other vertices, and 0.05 % inside; this takes a few seconds. */
 enum { SUPINE_INSIDE_CENTRES = 4000 };
 

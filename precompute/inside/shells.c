@@ -70,9 +70,8 @@ supine_status supine_inside_shells_create(const supine_basis *basis, supine_insi
   SUPINE_TRY(supine_basis_pose(basis, &scan, &shells->scan, error));
   (void)supine_deform(basis, &shells->scan, scanned);
   for (size_t i = 0; i < 3 * info->vertex_count; ++i) {
-    SUPINE_REFUSE_IF(!isfinite(scanned[i]), error, SUPINE_ERROR_NUMERICAL,
-                     "the basis cannot reach the scan's volume: make a new basis, and state with "
-                     "--scanned how full the lungs were in the scan");
+    SUPINE_REFUSE_ADVISE(!isfinite(scanned[i]), error, SUPINE_REMEDY_BASIS_OF_STATE,
+                         SUPINE_ERROR_NUMERICAL, "the basis cannot reach the scan's volume");
   }
   for (size_t lung = 0; lung < shells->count; ++lung) {
     SUPINE_TRY(create_shell(info, scanned, lung, &shells->shell[lung], error));
@@ -222,13 +221,9 @@ void supine_inside_shells_reading(const supine_inside_shells *shells,
     if (inside > reading->inside &&
         3 * (reading->tested - inside) < reading->tested - reading->as_read) {
       reading->inside = inside;
-      reading->other_units = millimetres != unit;
       supine_mesh_axes_letters(supine_mesh_axes_after(load->axes, axes), letters);
-      (void)snprintf(reading->options, sizeof reading->options, "%s%s%s%s%s",
-                     reading->other_units ? "--units " : "",
-                     reading->other_units ? units[i / 5] : "",
-                     reading->other_units && i % 5 > 0 ? " " : "", i % 5 > 0 ? "--axes " : "",
-                     i % 5 > 0 ? letters : "");
+      (void)strcpy(reading->unit, millimetres != unit ? units[i / 5] : "");
+      (void)strcpy(reading->axes, i % 5 > 0 ? letters : "");
     }
   }
 }

@@ -63,9 +63,9 @@ size_t supine_inside_shells_find(const supine_inside_shells *shells, const doubl
 typedef struct supine_inside_reading {
   size_t tested, as_read; /**< points tested (at most 999, evenly chosen), and those inside */
   size_t inside;          /**< largest number inside among all readings */
-  bool other_units;       /**< whether that reading is in other units */
-  char options[40];       /**< options for it, such as "--units cm"; "" if reading the points as
-                             they were leaves at most three times as many outside */
+  /** Unit and axes of that reading, such as "cm" and "RAS"; "" if they are those in which the
+   * points were read. Both are "" if these leave at most three times as many outside. */
+  char unit[4], axes[4];
 } supine_inside_reading;
 
 /** Compare the axes and units in which points were read with others: mm, cm and m; RAS, and the

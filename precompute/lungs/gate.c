@@ -83,8 +83,9 @@ typedef struct checks {
 } checks;
 
 /* Unless a condition holds, refuse the input with a status, or only warn if it is SUPINE_OK. */
-SUPINE_PRINTF(4, 5)
-static void check(checks *c, bool holds, supine_status refuse, const char *format, ...) {
+SUPINE_PRINTF(6, 7)
+static void check(checks *c, bool holds, supine_status refuse, supine_remedy remedy,
+                  const char *value, const char *format, ...) {
   char text[512];
   va_list arguments;
   if (holds || c->status != SUPINE_OK) {
@@ -95,30 +96,29 @@ static void check(checks *c, bool holds, supine_status refuse, const char *forma
   va_end(arguments);
   if (refuse != SUPINE_OK) {
     c->status = supine_error_set(c->error, refuse, "%s: %s", c->source->name, text);
+    supine_error_advise(c->error, remedy, value);
   } else {
-    supine_findings_add(c->findings, "%s: warning: %s", c->source->name, text);
+    supine_findings_advise(c->findings, remedy, value, "%s: warning: %s", c->source->name, text);
   }
 }
-
-static const char to_accept[] = ". To use this size all the same, add --units mm";
 
 /* Check the length, proportions and volume of the lungs. */
 static void check_size(checks *c, const supine_lungs *lungs, bool likely) {
   const supine_status refuse = c->source->units_given ? SUPINE_OK : SUPINE_ERROR_MESH;
-  const char *accept = refuse == SUPINE_OK ? "" : to_accept;
+  const supine_remedy accept = refuse == SUPINE_OK ? SUPINE_REMEDY_NONE : SUPINE_REMEDY_SIZE_ACCEPT;
   const double ml = lungs->volume[0] + lungs->volume[1];
   const double most = lungs->lung_count == 2 ? 1.0 : 0.6; /* largest share of a pair's volume */
   const double height = lungs->maximum[2] - lungs->minimum[2];
   const double ratio = height / (lungs->maximum[0] - lungs->minimum[0]);
-  check(c, lungs->lung_count < 2 || (ratio >= 0.55 && ratio <= 1.8), refuse,
+  check(c, lungs->lung_count < 2 || (ratio >= 0.55 && ratio <= 1.8), refuse, accept, NULL,
         "the lungs are %.2f times as high as wide, which is impossible: correct the distance of "
-        "the slices (the voxel spacing) in the header%s",
-        ratio, accept);
-  check(c, likely && ml >= 100.0 * most && ml <= 12000.0 * most, refuse,
+        "the slices (the voxel spacing) in the header",
+        ratio);
+  check(c, likely && ml >= 100.0 * most && ml <= 12000.0 * most, refuse, accept, NULL,
         "the lungs are %.0f mm high and hold %.0f mL, which is impossible: correct the voxel "
-        "spacing in the header, or the unit%s",
-        height, ml, accept);
-  check(c, ml >= 1500.0 * most, SUPINE_OK,
+        "spacing in the header, or the unit",
+        height, ml);
+  check(c, ml >= 1500.0 * most, SUPINE_OK, SUPINE_REMEDY_NONE, NULL,
         "the lungs hold %.0f mL, as a child's may: for an adult, check the voxel spacing", ml);
 }
 
@@ -173,6 +173,7 @@ static void check_tips(checks *c, const supine_lungs *lungs, size_t lung) {
     const bool stray = length >= longest_tip;
     const bool thin = length > tips[tip].most;
     check(c, !thin && length >= tips[tip].least, stray ? SUPINE_ERROR_MESH : SUPINE_OK,
+          SUPINE_REMEDY_NONE, NULL,
           "the outermost %g %% of the %s lung towards the %s are %s%.0f mm long, up to "
           "%.0f,%.0f,%.0f mm (LPS): %s",
           100.0 * tip_share, supine_lungs_name(lungs, lung), tips[tip].name,
@@ -189,7 +190,8 @@ static void check_overlap(checks *c, const supine_lungs *lungs) {
   const size_t parts = lungs->topology.component_count;
   SUPINE_ARENA arena = {0};
   uint32_t *corners = supine_arena_take(&arena, 3 * mesh->triangle_count, sizeof *corners);
-  check(c, !arena.failed, SUPINE_ERROR_MEMORY, "no memory for %zu components", parts);
+  check(c, !arena.failed, SUPINE_ERROR_MEMORY, SUPINE_REMEDY_NONE, NULL,
+        "no memory for %zu components", parts);
   if (parts > 1) {
     for (size_t of = 0; of < parts && c->status == SUPINE_OK; ++of) {
       supine_lungs_surface *surface = NULL;
@@ -212,7 +214,7 @@ static void check_overlap(checks *c, const supine_lungs *lungs) {
       }
       supine_lungs_surface_destroy(surface);
       check(
-          c, deepest.depth <= most_overlap, SUPINE_ERROR_MESH,
+          c, deepest.depth <= most_overlap, SUPINE_ERROR_MESH, SUPINE_REMEDY_NONE, NULL,
           "one of its surfaces reaches %.0f mm into another one, at %.0f,%.0f,%.0f mm (LPS): give "
           "both lungs in the axes of one scan, and remove surfaces inside a lung",
           deepest.depth, deepest.point[0], deepest.point[1], deepest.point[2]);
@@ -267,10 +269,10 @@ static void check_shape(checks *c, const supine_lungs *lungs, int *side, bool *a
   const bool given = c->source->units_given;
   char letters[4];
   check(c, likely || unit == NULL, given ? SUPINE_OK : SUPINE_ERROR_MESH,
-        "the lungs are %.3g mm long, which is impossible: add --units %s%s", length, unit,
-        given ? "" : to_accept);
+        given ? SUPINE_REMEDY_UNIT_ADD : SUPINE_REMEDY_UNIT_OR_ACCEPT, unit,
+        "the lungs are %.3g mm long, which is impossible", length);
   check(
-      c, t->closed, SUPINE_ERROR_OPEN_SURFACE,
+      c, t->closed, SUPINE_ERROR_OPEN_SURFACE, SUPINE_REMEDY_NONE, NULL,
       "the surface is open (edges: %zu boundary, %zu non-manifold, %zu inconsistent) and encloses "
       "no volume: close its holes in a mesh editor, or give the label map that it was made from",
       t->boundary_edges, t->non_manifold_edges, t->inconsistent_edges);
@@ -278,25 +280,24 @@ static void check_shape(checks *c, const supine_lungs *lungs, int *side, bool *a
     SUPINE_ARENA arena = {0};
     supine_mesh parts[2];
     const size_t count = part_lungs(lungs, &arena, parts);
-    check(c, count > 0, SUPINE_ERROR_MEMORY, "no memory for the two lungs");
+    check(c, count > 0, SUPINE_ERROR_MEMORY, SUPINE_REMEDY_NONE, NULL,
+          "no memory for the two lungs");
     found = count > 0 ? supine_mesh_anatomy_find(parts, count) : found;
   }
   *side = found.side;
   *axes_hold = found.certain && found.axes == SUPINE_AXES_LPS;
   supine_mesh_axes_letters(supine_mesh_axes_after(c->source->axes, found.axes), letters);
-  check(c, found.axes == SUPINE_AXES_LPS, SUPINE_OK,
-        "the axes are doubtful: the shape of the lungs fits %s; if those are the axes, add --axes "
-        "%s%s",
-        letters, letters,
+  check(c, found.axes == SUPINE_AXES_LPS, SUPINE_OK, SUPINE_REMEDY_AXES_IF_RIGHT, letters,
+        "the axes are doubtful: the shape of the lungs fits %s%s", letters,
         supine_mesh_axes_mirrored(found.axes)
-            ? ". A scan pitched by more than 25 degrees has such a shape, too: turn it upright"
+            ? " (a scan pitched by more than 25 degrees has such a shape, too: turn it upright)"
             : "");
   for (size_t lung = 0; lung < lungs->lung_count && c->status == SUPINE_OK; ++lung) {
     check_tips(c, lungs, lung);
   }
   check(c, !found.joined || c->source->midline != NULL || c->source->side != 0, SUPINE_ERROR_MESH,
-        "this surface looks like both lungs in one piece: separate them (for a label map by "
-        "--labels one). If it is a single lung, give --midline");
+        SUPINE_REMEDY_LUNGS_SEPARATE, NULL,
+        "this surface looks like both lungs in one piece: separate them");
   check_size(c, lungs, likely);
 }
 
@@ -315,11 +316,12 @@ static supine_status take_side(const supine_mesh *meshes, size_t count,
   }
   const double midline = taken > 0 ? low : high;
   if (source->side == 0) {
-    supine_findings_add(findings,
-                        "%s: note: one lung, taken for the %s lung by its %s; --midline %.0f would "
-                        "make it the %s lung",
-                        source->name, taken > 0 ? "left" : "right", side != 0 ? "shape" : "place",
-                        taken > 0 ? ceil(high) : floor(low), taken > 0 ? "right" : "left");
+    char other_midline[SUPINE_REMEDY_VALUE_MAX];
+    (void)supine_print_text(other_midline, sizeof other_midline, "%.0f",
+                            taken > 0 ? ceil(high) : floor(low));
+    supine_findings_advise(findings, SUPINE_REMEDY_MIDLINE, other_midline,
+                           "%s: note: one lung, taken for the %s lung by its %s", source->name,
+                           taken > 0 ? "left" : "right", side != 0 ? "shape" : "place");
   }
   if (taken == lungs->side[0] && lungs->midline == midline) {
     return SUPINE_OK;
@@ -338,7 +340,9 @@ supine_status supine_lungs_gate(supine_mesh *meshes, size_t count,
     SUPINE_TRY(mend(&meshes[m], source->name, findings, error));
   }
   const supine_status status = supine_lungs_create(meshes, count, source->midline, lungs, &inner);
-  SUPINE_REFUSE_IF(status != SUPINE_OK, error, status, "%s: %s", source->name, inner.message);
+  if (status != SUPINE_OK) {
+    return supine_error_wrap(error, &inner, "%s: ", source->name);
+  }
   checks c = {source, findings, error, SUPINE_OK};
   check_shape(&c, lungs, &side, axes_hold);
   check_overlap(&c, lungs);

@@ -321,10 +321,9 @@ supine_status supine_patient_fit(const supine_patient_fit_options *options,
   const size_t points = single + triples;
   const size_t constants = options->law == SUPINE_PATIENT_PAPER ? SUPINE_PATIENT_CONSTANTS : 1;
   const size_t unknowns = constants + options->scan_motion;
-  SUPINE_REFUSE_IF(
-      points < unknowns, error, SUPINE_ERROR_FORMAT,
-      "points: %zu, fewer than the %zu unknowns of the %s law: give more points, or use --law deep",
-      points, unknowns, supine_patient_law_names[options->law]);
+  SUPINE_REFUSE_ADVISE(points < unknowns, error, SUPINE_REMEDY_LAW_DEEP, SUPINE_ERROR_FORMAT,
+                       "points: %zu, fewer than the %zu unknowns of the %s law: give more points",
+                       points, unknowns, supine_patient_law_names[options->law]);
   SUPINE_ARENA arena = {0};
   double *ratio = supine_arena_zeros(&arena, SEEDS * triples, sizeof *ratio);
   size_t *fold = supine_arena_take(&arena, SEEDS * count, sizeof *fold);

@@ -227,10 +227,11 @@ supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool
                    "the two states differ by %sa rotation of %.0f degrees: give both in LPS axes "
                    "(x to the left, y to the back, z to the head)",
                    s.growth < 0.0 ? "a reflection and " : "", s.rotation);
-  SUPINE_REFUSE_IF(
-      !scans_moved && s.translation > apart_most * s.spread[0], error, SUPINE_ERROR_FORMAT,
+  SUPINE_REFUSE_ADVISE(
+      !scans_moved && s.translation > apart_most * s.spread[0], error, SUPINE_REMEDY_SCAN_MOTION,
+      SUPINE_ERROR_FORMAT,
       "the centres of the two states are %.0f mm apart: give all points in one coordinate frame, "
-      "or fit the motion between the scans with --translation or --rigid",
+      "or fit the motion between the scans",
       s.translation);
   SUPINE_REFUSE_IF(
       s.displacement < displacement_least, error, SUPINE_ERROR_FORMAT,

@@ -163,13 +163,13 @@ static void put_report(object *to, const supine_patient_fit_report *report) {
 
 static const char *gain_source(const supine_patient_record *record) {
   if (record->gain_undetermined) {
-    return "the deep law: the scans of --state do not determine the gain";
+    return "the deep law: the scans in other postures do not determine the gain";
   }
   if (record->gain_fitted) {
     return "the states in other postures";
   }
-  return "the deep law: scans in one posture do not determine the gain; give --state in another "
-         "posture";
+  return "the deep law: scans in one posture do not determine the gain; a state in another posture "
+         "does";
 }
 
 static object force_of(const supine_patient_record *record) {

@@ -74,10 +74,6 @@ static void complete_state(supine_patient_record *record, size_t k) {
   }
 }
 
-static char *next_note(supine_patient_scans *scans) {
-  return scans->note[scans->note[0][0] != '\0' ? 1 : 0];
-}
-
 /* If only the volumes of the scans are known, count the emptier scan as rest. Count the fuller scan
  * as full inflation, unless the other holds more of it than lungs at rest do. */
 static void name_volumes(supine_patient_scans *scans, supine_patient_record *record) {
@@ -89,9 +85,9 @@ static void name_volumes(supine_patient_scans *scans, supine_patient_record *rec
     record->state[1].volume = (supine_volume){SUPINE_VOLUME_REST, 0.0};
     record->state[0].volume = breath ? (supine_volume){SUPINE_VOLUME_REST, v[0] - v[1]}
                                      : (supine_volume){SUPINE_VOLUME_FULL, 0.0};
-    (void)supine_print_text(next_note(scans), sizeof scans->note[0],
-                            "note: the scan of %.0f mL counts as rest, that of %.0f mL as %s", v[1],
-                            v[0], breath ? "a breath above it" : "full inflation");
+    supine_findings_add(&scans->findings,
+                        "note: the scan of %.0f mL counts as rest, that of %.0f mL as %s", v[1],
+                        v[0], breath ? "a breath above it" : "full inflation");
   }
 }
 
@@ -104,11 +100,10 @@ static void warn_of_rest(supine_patient_scans *scans, const supine_patient_recor
   const double share[2] = {supine_physics_resting_total(&usual, g),
                            supine_physics_resting_total(&shown, g)};
   if (fabs(share[1] - share[0]) > SUPINE_REST_SPREAD) {
-    (void)supine_print_text(
-        next_note(scans), sizeof scans->note[0],
-        "warning: the volume at rest is %.0f %% of full inflation in the two scans, but %.0f %% in "
-        "healthy people: check --rest. 'supine precompute --patient' uses the volume in the scans",
-        100.0 * share[1], 100.0 * share[0]);
+    supine_findings_advise(&scans->findings, SUPINE_REMEDY_REST_CHECK, NULL,
+                           "warning: the volume at rest is %.0f %% of full inflation in the two "
+                           "scans, which the patient's model uses, but %.0f %% in healthy people",
+                           100.0 * share[1], 100.0 * share[0]);
   }
 }
 
@@ -159,12 +154,12 @@ supine_status supine_patient_scans_order(supine_patient_scans *scans, supine_pat
   } else if (scans->pairs.count > 0) {
     growth = supine_patient_pairs_growth(&scans->pairs);
   }
-  SUPINE_REFUSE_IF((named > 0 && growth < 1.0 - volume_error) ||
-                       (named < 0 && growth > 1.0 + volume_error),
-                   error, SUPINE_ERROR_FORMAT,
-                   "the scan given as the fuller one has only %.0f %% of the volume of the other "
-                   "scan: exchange --rest and --other, or give --reverse",
-                   100.0 * (named > 0 ? growth : 1.0 / growth));
+  SUPINE_REFUSE_ADVISE((named > 0 && growth < 1.0 - volume_error) ||
+                           (named < 0 && growth > 1.0 + volume_error),
+                       error, SUPINE_REMEDY_SCANS_EXCHANGE, SUPINE_ERROR_FORMAT,
+                       "the scan given as the fuller one has only %.0f %% of the volume of the "
+                       "other scan",
+                       100.0 * (named > 0 ? growth : 1.0 / growth));
   if (volume[0] > 0.0 && scans->pairs.count > 0) {
     SUPINE_TRY(find_sides(&scans->lungs[0], &scans->pairs, error));
   }
@@ -173,10 +168,10 @@ supine_status supine_patient_scans_order(supine_patient_scans *scans, supine_pat
   }
   set_states(scans, record);
   const bool volumes_known = record->volume[0] > 0.0 && record->volume[1] > 0.0;
-  SUPINE_REFUSE_IF(!record->from_surface && !volumes_known, error, SUPINE_ERROR_ARGUMENT,
-                   "landmarks do not show the volume of the lungs, which decides what rest and "
-                   "full inflation are: give both volumes of gas and tissue, such as --rest 2600mL "
-                   "--other 5400mL, or both surfaces");
+  SUPINE_REFUSE_ADVISE(!record->from_surface && !volumes_known, error, SUPINE_REMEDY_SCANS_VOLUMES,
+                       SUPINE_ERROR_ARGUMENT,
+                       "landmarks do not show the volume of the lungs, which decides what rest and "
+                       "full inflation are: give both surfaces, or both volumes of gas and tissue");
   return SUPINE_OK;
 }
 

@@ -4,9 +4,9 @@
 #ifndef SUPINE_PATIENT_SCANS_H
 #define SUPINE_PATIENT_SCANS_H
 
-#include "precompute/patient/patient_file.h"
+#include "base/findings.h"
 
-enum { SUPINE_PATIENT_NOTES = 2 };
+#include "precompute/patient/patient_file.h"
 
 /** What is known of two scans of one person: surfaces, landmarks, and states. Initialise to zero,
  * and release with supine_patient_scans_free. */
@@ -15,7 +15,7 @@ typedef struct supine_patient_scans {
   supine_patient_pairs pairs; /**< landmarks in both scans; may be empty */
   const double *midline;      /**< x of the plane between the lungs, mm; NULL for the middle */
   bool reordered;             /**< set by supine_patient_scans_order: they were exchanged */
-  char note[SUPINE_PATIENT_NOTES][256]; /**< set by supine_patient_scans_order, for the user */
+  supine_findings findings;   /**< set by supine_patient_scans_order, for the user */
 } supine_patient_scans;
 
 void supine_patient_scans_free(supine_patient_scans *scans);

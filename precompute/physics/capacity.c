@@ -81,7 +81,7 @@ void supine_physics_reference_compare(const supine_reference *reference,
 }
 
 void supine_physics_reference_doubt(const supine_reference *reference, const supine_person *person,
-                                    const supine_resting *given, char *text, size_t size) {
+                                    const supine_resting *given, supine_findings *findings) {
   const supine_state *state = &reference->scan.state;
   const bool at_rest = state->volume.kind == SUPINE_VOLUME_REST;
   const double part = part_of_pair(reference);
@@ -91,7 +91,6 @@ void supine_physics_reference_doubt(const supine_reference *reference, const sup
   static const double supine[3] = {0.0, 1.0, 0.0};
   double rest[2];
   char expected[64] = "";
-  text[0] = '\0';
   supine_physics_reference_capacity(person, range);
   supine_physics_reference_compare(reference, person, expected, sizeof expected);
   for (size_t lung = 0; lung < reference->lung_count; ++lung) {
@@ -103,31 +102,26 @@ void supine_physics_reference_doubt(const supine_reference *reference, const sup
       const double along = (axis % 2 == 0 ? 1.0 : -1.0) * state->gravity[axis / 2];
       const double ml = given->ml[axis] + state->volume.ml;
       if (along > 1.0 - 1e-9 && given->ml[axis] > 0.0 && fabs(held - ml) > agreement * ml) {
-        supine_text_add(
-            text, size,
-            "the scan holds %.0f mL, but --resting and --scanned say %.0f mL: change one of them",
-            held, ml);
+        supine_findings_advise(findings, SUPINE_REMEDY_SCAN_OR_REST, NULL,
+                               "warning: the scan holds %.0f mL, but its state and the volume at "
+                               "rest say %.0f mL",
+                               held, ml);
       }
     }
   }
-  const char *separator = text[0] == '\0' ? "" : "; ";
   const double gas =
       supine_physics_reference_rest(reference, supine, rest) - part * SUPINE_TISSUE_ML;
   if (full < part * fmax(least_share * range[0], least_ml) || gas < part * least_gas) {
-    supine_text_add(text, size,
-                    "%sat full inflation the lungs hold %.0f mL (%s mL), at rest %.0f mL of gas, "
-                    "where %.0f mL (SD 600 mL) remain after a full expiration: %s",
-                    separator, full, expected, gas, part * SUPINE_RESIDUAL_ML,
-                    at_rest ? "check the voxel spacing and --resting; if the scan was emptier than "
-                              "rest, say so, as in --scanned supine:rest-300"
-                            : "the scan was probably not at full inflation: give its state with "
-                              "--scanned, such as supine:rest or full-1000");
+    supine_findings_advise(
+        findings, at_rest ? SUPINE_REMEDY_SCAN_EMPTIER : SUPINE_REMEDY_SCAN_NOT_FULL, NULL,
+        "warning: at full inflation the lungs hold %.0f mL (%s mL), at rest %.0f mL of gas, where "
+        "%.0f mL (SD 600 mL) remain after a full expiration: %s",
+        full, expected, gas, part * SUPINE_RESIDUAL_ML,
+        at_rest ? "check the voxel spacing" : "the scan was probably not at full inflation");
   } else if (full > part * most_ml) {
-    supine_text_add(text, size, "%sat full inflation the lungs hold %.0f mL (%s mL): %s", separator,
-                    full, expected,
-                    at_rest
-                        ? "if the scan was fuller than rest, give --scanned full or "
-                          "supine:rest+1000, or change --resting"
-                        : "check the voxel spacing or the unit, and that all of the mask is lung");
+    supine_findings_advise(
+        findings, at_rest ? SUPINE_REMEDY_SCAN_OVER_REST : SUPINE_REMEDY_NONE, NULL,
+        "warning: at full inflation the lungs hold %.0f mL (%s mL)%s", full, expected,
+        at_rest ? "" : ": check the voxel spacing or the unit, and that all of the mask is lung");
   }
 }

@@ -125,6 +125,8 @@ supine_status supine_physics_directions(const supine_lungs *lungs, const supine_
                  : add_shear(lungs, force, law->shear, directions, error);
     }
   }
-  return supine_error_set(error, SUPINE_ERROR_MESH,
-                          "no vertex is displaced: C1, C3 and C5 of --constants must not all be 0");
+  (void)supine_error_set(error, SUPINE_ERROR_MESH,
+                         "no vertex is displaced: the constants C1, C3 and C5 are all 0");
+  supine_error_advise(error, SUPINE_REMEDY_CONSTANTS, NULL);
+  return SUPINE_ERROR_MESH;
 }

@@ -50,11 +50,10 @@ typedef struct ascent {
 
 static supine_status check_folds(const ascent *a, supine_error *error) {
   const double share = supine_mesh_turned_over(&a->scan.mesh, a->estimate.mesh.vertices);
-  SUPINE_REFUSE_IF(!(share <= folded_share), error, SUPINE_ERROR_NUMERICAL,
-                   "the scan folds on its way to full inflation: %.3g %% of its triangles turn "
-                   "over. If the scan is fuller than --scanned says, change --scanned or "
-                   "--resting; --scanned none uses the scan as it is",
-                   100.0 * share);
+  SUPINE_REFUSE_ADVISE(
+      !(share <= folded_share), error, SUPINE_REMEDY_SCAN_FULLER, SUPINE_ERROR_NUMERICAL,
+      "the scan folds on its way to full inflation: %.3g %% of its triangles turn over",
+      100.0 * share);
   return SUPINE_OK;
 }
 
@@ -98,9 +97,10 @@ static supine_status find_lung_gains(const supine_volume_form *form, const doubl
     last_miss = miss;
     sigma = next;
   }
-  return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                          "no path from full inflation through the scan to rest was found: change "
-                          "--scanned or --resting");
+  (void)supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                         "no path from full inflation through the scan to rest was found");
+  supine_error_advise(error, SUPINE_REMEDY_SCAN_OR_REST, NULL);
+  return SUPINE_ERROR_NUMERICAL;
 }
 
 supine_status supine_physics_reference_find_gains(const supine_lungs *scan, const double bend[3],
@@ -182,10 +182,8 @@ static supine_status advance(ascent *a, supine_error *error) {
     failed =
         LAPACKE_dposv(LAPACK_ROW_MAJOR, 'L', (lapack_int)n, 1, matrix, (lapack_int)n, weights, 1);
   }
-  SUPINE_REFUSE_IF(failed != 0, error, SUPINE_ERROR_NUMERICAL,
-                   "no surface at full inflation was found: the iteration does not progress. If "
-                   "the scan is fuller than --scanned says, change --scanned or --resting; "
-                   "--scanned none uses the scan as it is");
+  SUPINE_REFUSE_ADVISE(failed != 0, error, SUPINE_REMEDY_SCAN_FULLER, SUPINE_ERROR_NUMERICAL,
+                       "no surface at full inflation was found: the iteration does not progress");
   double *to = a->estimate.mesh.vertices;
   memcpy(to, a->map, a->size * sizeof *to);
   for (size_t j = 0; j < n; ++j) {
@@ -213,11 +211,12 @@ static supine_status iterate(ascent *a, supine_error *error) {
     store_differences(a);
     SUPINE_TRY(advance(a, error));
   }
-  return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                          "no surface at full inflation was found: after %d steps it still changes "
-                          "by %s mm RMS. If the scan is fuller than --scanned says, change "
-                          "--scanned or --resting; --scanned none uses the scan as it is",
-                          SOLVES_MAX, supine_text_distance(a->rms).text);
+  (void)supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                         "no surface at full inflation was found: after %d steps it still changes "
+                         "by %s mm RMS",
+                         SOLVES_MAX, supine_text_distance(a->rms).text);
+  supine_error_advise(error, SUPINE_REMEDY_SCAN_FULLER, NULL);
+  return SUPINE_ERROR_NUMERICAL;
 }
 
 supine_status supine_physics_reference_inflate(supine_lungs *lungs, const supine_model *model,

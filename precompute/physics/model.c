@@ -27,9 +27,9 @@ const char *const supine_physics_law_names[SUPINE_LAW_COUNT + 1] = {SUPINE_LAWS(
 supine_status supine_physics_model_equilibrium(const supine_lungs *lungs, const supine_model *model,
                                                supine_equilibrium **equilibrium,
                                                supine_error *error) {
-  SUPINE_REFUSE_IF(model->force.soften != 0.0 && !(model->reach > 0.0), error,
-                   SUPINE_ERROR_ARGUMENT,
-                   "--soften needs the distance --reach: give --reach 10, or leave --soften out");
+  SUPINE_REFUSE_ADVISE(model->force.soften != 0.0 && !(model->reach > 0.0), error,
+                       SUPINE_REMEDY_REACH, SUPINE_ERROR_ARGUMENT,
+                       "softening needs the distance over which a force spreads");
   /* A longer smoothing length would spread every force evenly and make the matrix singular. */
   const double longest = 0.5 * supine_distance(lungs->minimum, lungs->maximum);
   const double reach = fmin(model->reach, longest);

@@ -40,8 +40,8 @@
   LAW(DEEP, "deep", 0.875, 0.4, (0, -0.15, 0), (6, 2.6, 15, 1, 16, 1.3), 0.4, (0, -0.45, 0.45), 10,   \
       true, "displacement from full inflation, for any posture and volume")                              \
   LAW(PAPER, "paper", 0, 1, (0, 0, 0), (2, 1.5, 1.5, 1, 16, 1.4), 0, (0, 0, 0), 0, false,          \
-      "as Santhanam 2008 published it: displacement from the shape in the scan (implies "          \
-      "--scanned none)")
+      "as Santhanam 2008 published it: displacement from the shape in the scan (whose "            \
+      "state is not used)")
 /* clang-format on */
 typedef enum supine_law {
 #define SUPINE_LAW_ENUM(id, ...) SUPINE_LAW_##id,

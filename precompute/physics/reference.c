@@ -111,10 +111,12 @@ static supine_status find_full(supine_reference *found, const double *volume, su
   if (beyond_full || held < tissue_share * whole) {
     char text[160];
     (void)supine_state_print(state, text, sizeof text);
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "a scan of %.0f mL cannot be '%s': %s. Change --scanned", held, text,
-                            beyond_full ? "it is beyond full inflation"
-                                        : "it is less than the tissue, 10 % of full inflation");
+    (void)supine_error_set(error, SUPINE_ERROR_ARGUMENT, "a scan of %.0f mL cannot be '%s': %s",
+                           held, text,
+                           beyond_full ? "it is beyond full inflation"
+                                       : "it is less than the tissue, 10 % of full inflation");
+    supine_error_advise(error, SUPINE_REMEDY_SCAN_STATE, NULL);
+    return SUPINE_ERROR_ARGUMENT;
   }
   return SUPINE_OK;
 }
@@ -131,10 +133,11 @@ static supine_status find_rest(supine_reference *found, const double *volume, su
     status = find_full(found, volume, error);
   }
   SUPINE_TRY(status);
-  SUPINE_REFUSE_IF(!(fabs(off - 1.0) <= 1e-9), error, SUPINE_ERROR_ARGUMENT,
-                   "a scan of %.0f mL at rest does not belong to lungs of %.0f mL at full "
-                   "inflation: change --full, --scanned or --resting",
-                   volume[0] + volume[1], found->scan.full);
+  SUPINE_REFUSE_ADVISE(!(fabs(off - 1.0) <= 1e-9), error, SUPINE_REMEDY_SCAN_FULL_OR_REST,
+                       SUPINE_ERROR_ARGUMENT,
+                       "a scan of %.0f mL at rest does not belong to lungs of %.0f mL at full "
+                       "inflation",
+                       volume[0] + volume[1], found->scan.full);
   return SUPINE_OK;
 }
 

@@ -24,6 +24,8 @@
 
 #include <supine/state.h>
 
+#include "base/findings.h"
+
 #include "precompute/physics/model.h"
 #include "precompute/physics/resting.h"
 
@@ -119,11 +121,10 @@ void supine_physics_reference_predict_rest(const supine_reference *reference,
 void supine_physics_reference_compare(const supine_reference *reference,
                                       const supine_person *person, char *text, size_t size);
 
-/** Write a warning if the volume at full inflation is implausible for the person, or if the volume
- * of a scan at rest contradicts the volume that the user gave for rest.
- * @param given  the user's volumes at rest, before supine_physics_resting_settle
- * @param text   [size] the warning; empty if there is none */
+/** Add a warning if the volume at full inflation is implausible for the person, and one if the
+ * volume of a scan at rest contradicts the volume that the user gave for rest.
+ * @param given  the user's volumes at rest, before supine_physics_resting_settle */
 void supine_physics_reference_doubt(const supine_reference *reference, const supine_person *person,
-                                    const supine_resting *given, char *text, size_t size);
+                                    const supine_resting *given, supine_findings *findings);
 
 #endif

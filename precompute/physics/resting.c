@@ -199,12 +199,12 @@ supine_status supine_physics_resting_settle(supine_resting *resting, size_t coun
       }
       fits = fits && is_share(*share);
     }
-    SUPINE_REFUSE_IF(!relative && !fits, error, SUPINE_ERROR_ARGUMENT,
-                     "lungs with a full volume of %.0f mL do not hold %.0f mL at rest in posture "
-                     "%s: if the scan was not at full inflation, give its state, such as --scanned "
-                     "supine:rest; otherwise change --resting",
-                     full[0] + (count > 1 ? full[1] : 0.0),
-                     at_rest(resting, axis, count, side, full), names[axis]);
+    SUPINE_REFUSE_ADVISE(!relative && !fits, error, SUPINE_REMEDY_SCAN_OR_REST_GIVE,
+                         SUPINE_ERROR_ARGUMENT,
+                         "lungs with a full volume of %.0f mL do not hold %.0f mL at rest in "
+                         "posture %s",
+                         full[0] + (count > 1 ? full[1] : 0.0),
+                         at_rest(resting, axis, count, side, full), names[axis]);
     resting->ml[axis] = relative ? resting->ml[axis] : 0.0;
   }
   return SUPINE_OK;

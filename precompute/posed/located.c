@@ -72,9 +72,11 @@ static void suggest_reading(const supine_locate_task *task, bool posture_given,
   static const struct {
     const char *way;
     double factor[3];
-  } readings[] = {{"in centimetres (--units cm)", {10.0, 10.0, 10.0}},
-                  {"in RAS (--axes RAS)", {-1.0, -1.0, 1.0}},
-                  {"mirrored (--axes RPS)", {-1.0, 1.0, 1.0}}};
+    supine_remedy remedy;
+    const char *value;
+  } readings[] = {{"in centimetres", {10.0, 10.0, 10.0}, SUPINE_REMEDY_UNIT_ADD, "cm"},
+                  {"in RAS", {-1.0, -1.0, 1.0}, SUPINE_REMEDY_AXES_ADD, "RAS"},
+                  {"mirrored", {-1.0, 1.0, 1.0}, SUPINE_REMEDY_AXES_ADD, "RPS"}};
   supine_observation other[SUPINE_LOCATE_POINTS_MAX];
   supine_locate_task changed = *task;
   double most = residual_most;
@@ -92,6 +94,7 @@ static void suggest_reading(const supine_locate_task *task, bool posture_given,
           10.0 * pow(located->best->residual_rms, 2.0) < most * most) {
         supine_text_add(error->message, sizeof error->message, ". Read %s, they fit within %.1f mm",
                         readings[i].way, located->best->residual_rms);
+        supine_error_advise(error, readings[i].remedy, readings[i].value);
         return;
       }
     }

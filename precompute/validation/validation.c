@@ -47,9 +47,8 @@ static supine_status find_gains(const supine_validation *s, const supine_validat
                                 supine_error *error) {
   supine_state asked = state->state;
   if (asked.volume.kind == SUPINE_VOLUME_DEFAULT) {
-    SUPINE_REFUSE_IF(scan == NULL, error, SUPINE_ERROR_ARGUMENT,
-                     "the volume of the other state is unknown, and landmarks do not give it: give "
-                     "--to POSTURE:VOLUME");
+    SUPINE_REFUSE_ADVISE(scan == NULL, error, SUPINE_REMEDY_OTHER_STATE, SUPINE_ERROR_ARGUMENT,
+                         "the volume of the other state is unknown, and landmarks do not give it");
     asked.volume = (supine_volume){SUPINE_VOLUME_ABSOLUTE, 1e-3 * supine_mesh_volume(scan)};
   }
   SUPINE_TRY(supine_basis_gains(s->basis, &asked, &outcome->pose, error));
@@ -216,10 +215,11 @@ static supine_status check_points(const supine_validation *s, const supine_patie
     outside += p[0] < low[0] || p[0] > high[0] || p[1] < low[1] || p[1] > high[1] ||
                p[2] < low[2] || p[2] > high[2];
   }
-  SUPINE_REFUSE_IF(2 * outside > pairs->count, error, SUPINE_ERROR_FORMAT,
-                   "%zu of %zu landmarks lie outside the lungs' bounding box: check their frame, "
-                   "unit and patient, or exchange first and second points by --reverse",
-                   outside, pairs->count);
+  SUPINE_REFUSE_ADVISE(2 * outside > pairs->count, error, SUPINE_REMEDY_POINTS_REVERSE,
+                       SUPINE_ERROR_FORMAT,
+                       "%zu of %zu landmarks lie outside the lungs' bounding box: check their "
+                       "frame, unit and patient",
+                       outside, pairs->count);
   return SUPINE_OK;
 }
 

@@ -326,9 +326,9 @@ supine_status supine_warp_check_hounsfield(const supine_image *image, const char
   for (size_t i = 0; i < image->size[0] * image->size[1] * image->size[2] && !aerated; ++i) {
     aerated = supine_image_get(image, i) < supine_warp_aerated;
   }
-  SUPINE_REFUSE_IF(!aerated, error, SUPINE_ERROR_FORMAT,
-                   "%s: no voxel is below %g, so the image is not in Hounsfield units: convert it, "
-                   "or leave --density out",
-                   path, supine_warp_aerated);
+  SUPINE_REFUSE_ADVISE(
+      !aerated, error, SUPINE_REMEDY_DENSITY, SUPINE_ERROR_FORMAT,
+      "%s: no voxel is below %g, so the image is not in Hounsfield units: convert it", path,
+      supine_warp_aerated);
   return SUPINE_OK;
 }

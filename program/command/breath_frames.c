@@ -86,8 +86,9 @@ static supine_status find_volumes(playing *p, const supine_pv *pv, supine_error 
     supine_pose pose;
     supine_error cause;
     const supine_status status = find_pose(p, t, &pose, &cause);
-    SUPINE_REFUSE_IF(status != SUPINE_OK, error, status, "frame at %.3f s: %s", p->time[t],
-                     cause.message);
+    if (status != SUPINE_OK) {
+      return supine_error_wrap(error, &cause, "frame at %.3f s: ", p->time[t]);
+    }
     (void)supine_basis_volumes(p->basis, &pose, p->volumes + t * p->lung_count);
     p->total[t] = supine_posed_volume(p->basis, &pose);
   }

@@ -84,8 +84,9 @@ static supine_status read_row(const supine_csv *csv, request *row, supine_error 
   if (status == SUPINE_OK && volume != NULL && volume[0] != '\0') {
     status = supine_state_parse_volume(volume, state, &reason);
   }
-  SUPINE_REFUSE_IF(status != SUPINE_OK, error, status, "%s:%zu: %s", csv->path, csv->line,
-                   reason.message);
+  if (status != SUPINE_OK) {
+    return supine_error_wrap(error, &reason, "%s:%zu: ", csv->path, csv->line);
+  }
   const bool voxels = supine_image_supports(output);
   const bool image = row->content.image != NULL || row->content.labels != NULL;
   SUPINE_REFUSE_IF(!voxels && !supine_mesh_save_supports(output) &&

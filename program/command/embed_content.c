@@ -46,12 +46,16 @@ static supine_status check_content(const supine_inside_shells *shells,
     return status;
   }
   supine_inside_shells_reading(shells, &wanted->load, content->points, content->count, &reading);
-  if (reading.options[0] == '\0') {
+  const bool other_unit = reading.unit[0] != '\0';
+  const bool other_axes = reading.axes[0] != '\0';
+  if (!other_unit && !other_axes) {
     return SUPINE_OK;
   }
-  (void)snprintf(text, sizeof text, "%zu of %zu points are inside the lungs, but %zu with %s",
-                 reading.as_read, reading.tested, reading.inside, reading.options);
-  SUPINE_REFUSE_IF(reading.as_read == 0 && reading.tested > 2 && reading.other_units &&
+  (void)snprintf(text, sizeof text,
+                 "%zu of %zu points are inside the lungs, but %zu with %s%s%s%s%s", reading.as_read,
+                 reading.tested, reading.inside, other_unit ? "--units " : "", reading.unit,
+                 other_unit && other_axes ? " " : "", other_axes ? "--axes " : "", reading.axes);
+  SUPINE_REFUSE_IF(reading.as_read == 0 && reading.tested > 2 && other_unit &&
                        !(wanted->load.millimetres_per_unit > 0.0),
                    error, SUPINE_ERROR_MESH,
                    "%s: give that, or --units mm to embed the points as they are", text);

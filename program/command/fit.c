@@ -198,9 +198,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   SUPINE_TRY(load_scans(wanted, &scans, error));
   memcpy(record.state, wanted->state, sizeof record.state);
   SUPINE_TRY(supine_patient_scans_order(&scans, &record, error));
-  for (size_t k = 0; k < SUPINE_PATIENT_NOTES && scans.note[k][0] != '\0'; ++k) {
-    supine_options_say(name, "%s", scans.note[k]);
-  }
+  supine_options_say_findings(name, &scans.findings);
   SUPINE_TRY(supine_patient_scans_fit(&scans, &options, wanted->expandability, &record, error));
   for (size_t k = 0; k < wanted->further_count; ++k) {
     SUPINE_TRY(fit_further(wanted, k, &scans, &record, error));

@@ -16,6 +16,7 @@
 #include "base/text.h"
 
 #include "program/options/command.h"
+#include "program/options/remedy.h"
 
 /* getopt() returns FIRST_LONG + i for the long option of rows[i]. */
 enum { ROWS_MAX = 64, HELP_ALL = 256, FIRST_LONG };
@@ -126,10 +127,10 @@ static supine_status read_row(const row *target, const char *text, supine_error 
     describe_valid_values(option, wanted, sizeof wanted);
     return supine_error_set(error, status, "--%s takes %s, not '%s'", option->name, wanted, text);
   }
-  SUPINE_REFUSE_IF(status == SUPINE_ERROR_ARGUMENT, error, status, "--%s: %s", option->name,
-                   reason.message);
-  SUPINE_REFUSE_IF(status != SUPINE_OK, error, status, "%s", reason.message);
-  return SUPINE_OK;
+  if (status == SUPINE_ERROR_ARGUMENT) {
+    return supine_error_wrap(error, &reason, "--%s: ", option->name);
+  }
+  return status != SUPINE_OK ? supine_error_wrap(error, &reason, "%s", "") : SUPINE_OK;
 }
 
 static supine_status read_given(reading *r, row *target, const char *text, supine_error *error) {
@@ -388,7 +389,8 @@ int supine_options_run(const supine_command *command, int argc, char **argv) {
     return supine_options_finish(command->name);
   }
   supine_options_say(command->name, "%s",
-                     error.message[0] != '\0' ? error.message : supine_status_string(status));
+                     error.message[0] != '\0' ? supine_options_explain(&error).text
+                                              : supine_status_string(status));
   if (status == SUPINE_ERROR_ARGUMENT) {
     (void)fprintf(stderr, "Try 'supine %s --help'.\n", command->name);
   }

@@ -92,11 +92,12 @@ static supine_status read_curve(json_t *limb, supine_pv_curve *curve, supine_err
   double *p = curve->pressure;
   double *v = curve->volume;
   double *c = curve->control;
-  return json_unpack_ex(limb, &why, 0, "{s:[F, F!], s:[F, F!], s:[F, F, F, F, F!]}",
-                        "pressure_cmH2O", &p[0], &p[1], "volume_mL", &v[0], &v[1], "control", &c[0],
-                        &c[1], &c[2], &c[3], &c[4]) == 0
-             ? supine_breath_curve_check(curve, error)
-             : supine_error_set(error, SUPINE_ERROR_FORMAT, "%s", why.text);
+  const int unpacked = json_unpack_ex(limb, &why, 0, "{s:[F, F!], s:[F, F!], s:[F, F, F, F, F!]}",
+                                      "pressure_cmH2O", &p[0], &p[1], "volume_mL", &v[0], &v[1],
+                                      "control", &c[0], &c[1], &c[2], &c[3], &c[4]);
+  SUPINE_REFUSE_IF(unpacked != 0, error, SUPINE_ERROR_FORMAT,
+                   "%s: make the file with 'supine pv fit'", why.text);
+  return supine_breath_curve_check(curve, error);
 }
 
 supine_status supine_options_pv_load(const char *path, supine_pv *pv, supine_error *error) {
@@ -116,9 +117,10 @@ supine_status supine_options_pv_load(const char *path, supine_pv *pv, supine_err
     limbs[limb] = json_object_get(root, name);
     if (limbs[limb] != NULL) {
       const supine_status status = read_curve(limbs[limb], &found.limb[limb], &wrong);
-      SUPINE_REFUSE_IF(status != SUPINE_OK, error, SUPINE_ERROR_FORMAT,
-                       "%s: %s: %.300s: make the file with 'supine pv fit'", path, name,
-                       wrong.message);
+      if (status != SUPINE_OK) {
+        wrong.status = SUPINE_ERROR_FORMAT;
+        return supine_error_wrap(error, &wrong, "%s: %s: ", path, name);
+      }
     }
   }
   SUPINE_REFUSE_IF(

@@ -147,8 +147,9 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
   supine_error inner;
   const supine_status status = supine_basis_pose(basis, &state, &reference->pose, &inner);
   reference->state = state;
-  SUPINE_REFUSE_IF(status != SUPINE_OK, error, status, "%s%s", from->given ? "--from: " : "",
-                   inner.message);
+  if (status != SUPINE_OK) {
+    return supine_error_wrap(error, &inner, "%s", from->given ? "--from: " : "");
+  }
   if (state.lung_count == 0 && state.volume.kind == SUPINE_VOLUME_DEFAULT) {
     state.volume = supine_basis_default_volume(basis); /* the name states the volume */
   }

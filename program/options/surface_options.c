@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "base/ascii.h"
+#include "program/options/remedy.h"
 #include "program/options/surface_options.h"
 
 static supine_status read_axes(const char *text, void *field, supine_error *error) {
@@ -56,8 +57,11 @@ const supine_option supine_options_landmarks[] = {
 void supine_options_say_findings(const char *command, const supine_findings *findings) {
   const char *at = findings->text;
   size_t length;
-  for (const char *line; (line = supine_findings_next(&at, &length)) != NULL;) {
-    supine_options_say(command, "%.*s", (int)length, line);
+  for (size_t i = 0; i < findings->count; ++i) {
+    const char *line = supine_findings_next(&at, &length);
+    char words[SUPINE_REMEDY_WORDS];
+    supine_options_remedy_words(findings->advice[i].remedy, findings->advice[i].value, words);
+    supine_options_say(command, "%.*s%s", (int)length, line, words);
   }
 }
 

@@ -7,6 +7,7 @@
 
 #include "base/arena.h"
 #include "base/vec3.h"
+#include "program/options/remedy.h"
 #include "program/report/comparison.h"
 
 static const char command[] = "compare";
@@ -27,7 +28,9 @@ static supine_status find_breath(const supine_comparison *c, float *xyz[2],
   }
   supine_error wrong;
   supine_status status = supine_basis_gains(c->basis, &state, &after, &wrong);
-  SUPINE_REFUSE_IF(status != SUPINE_OK, error, status, "%s: %s", item->name, wrong.message);
+  if (status != SUPINE_OK) {
+    return supine_error_wrap(error, &wrong, "%s: ", item->name);
+  }
   SUPINE_TRY(
       supine_options_pose_check(c->basis, command, c->volume.allow_folds, &state, &after, error));
   (void)supine_basis_volumes(c->basis, &after, posture->gain);
@@ -52,7 +55,9 @@ static supine_status find_posture(const supine_comparison *c, float *distance, f
   const supine_posture_item *item = posture->item;
   supine_error wrong;
   supine_status status = supine_basis_pose(c->basis, &item->state, &posture->pose, &wrong);
-  SUPINE_REFUSE_IF(status != SUPINE_OK, error, status, "%s: %s", item->name, wrong.message);
+  if (status != SUPINE_OK) {
+    return supine_error_wrap(error, &wrong, "%s: ", item->name);
+  }
   (void)supine_compare_distances(c->compare, &posture->pose, &c->reference.pose, distance);
   supine_compare_statistics(c->compare, distance, &posture->displacement);
   (void)supine_basis_volumes(c->basis, &posture->pose, posture->volume);
@@ -64,7 +69,7 @@ static supine_status find_posture(const supine_comparison *c, float *distance, f
     status = find_breath(c, xyz, posture, error);
     posture->has_breath = status == SUPINE_OK;
     if (status == SUPINE_ERROR_NUMERICAL) { /* the lungs cannot hold that much more */
-      supine_options_say(command, "note: without a breath: %s", error->message);
+      supine_options_say(command, "note: without a breath: %s", supine_options_explain(error).text);
       return SUPINE_OK;
     }
   }
@@ -105,12 +110,15 @@ supine_status supine_report_find(supine_comparison *c, supine_error *error) {
   SUPINE_TRY(supine_options_reference(c->basis, &c->from, true, &c->reference, error));
   SUPINE_TRY(supine_compare_create(c->basis, &c->compare, error));
   for (size_t i = 0; i < count; ++i) {
-    supine_error wrong = {SUPINE_OK, ""};
+    supine_error wrong = {.message = ""};
     c->posture[i].item = &c->postures.item[i];
     c->posture[i].label = supine_options_posture_label(c->postures.item[i].name);
     const supine_status status = find_posture(c, distance, xyz, &c->posture[i], &wrong);
-    SUPINE_REFUSE_IF(status != SUPINE_OK, error, status, "%s: %s", c->path,
-                     wrong.message[0] != '\0' ? wrong.message : supine_status_string(status));
+    SUPINE_REFUSE_IF(status != SUPINE_OK && wrong.message[0] == '\0', error, status, "%s: %s",
+                     c->path, supine_status_string(status));
+    if (status != SUPINE_OK) {
+      return supine_error_wrap(error, &wrong, "%s: ", c->path);
+    }
   }
   return find_errors(c, error);
 }

@@ -8,6 +8,7 @@
 
 #include "base/locale.h"
 #include "program/options/basis_input.h"
+#include "program/options/remedy.h"
 #include "program/report/comparison.h"
 #include "program/view/export/template.h"
 
@@ -98,7 +99,8 @@ supine_status supine_report_html(const supine_comparison *c, FILE *file, supine_
     return error->status;
   }
   (void)(pictures != NULL ? json_object_set_new(data, "pictures", pictures)
-                          : json_object_set_new(data, "trouble", json_string(error->message)));
+                          : json_object_set_new(data, "trouble",
+                                                json_string(supine_options_explain(error).text)));
   supine_export_template_fill(supine_report_assets, data, "report.html", file);
   return SUPINE_OK;
 }

@@ -96,7 +96,7 @@ json_t *supine_report_pictures(const supine_comparison *c, supine_error *error) 
   json_auto_t *cells = json_array();
   float *value =
       supine_arena_take(&arena, supine_basis_get_info(c->basis)->vertex_count, sizeof *value);
-  *error = (supine_error){SUPINE_ERROR_MEMORY, "out of memory"};
+  (void)supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
   if (arena.failed) {
     return NULL;
   }

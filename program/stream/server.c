@@ -10,6 +10,7 @@
 
 #include "base/arena.h"
 #include "base/clock.h"
+#include "program/options/remedy.h"
 #include "program/stream/peer.h"
 #include "program/stream/server.h"
 #include "program/stream/tracked_patient.h"
@@ -139,7 +140,8 @@ static void receive(void *context, supine_stream_peer *peer) {
   if (supine_stream_message_read(&peer->header, peer->message + SUPINE_STREAM_HEADER,
                                  s->options->device, &message, &error) != SUPINE_OK) {
     ++s->results.counts.malformed;
-    supine_stream_patient_warn(&s->patient, s->woke, "a message is dropped: %s", error.message);
+    supine_stream_patient_warn(&s->patient, s->woke, "a message is dropped: %s",
+                               supine_options_explain(&error).text);
     return;
   }
   if (message.kind == SUPINE_STREAM_REQUEST) {
@@ -159,7 +161,8 @@ static void read_peer(supine_stream_server *s, supine_stream_peer *peer) {
       SUPINE_STREAM_LOST) {
     if (error.status != SUPINE_OK) {
       ++s->results.counts.lost;
-      supine_stream_patient_warn(&s->patient, s->woke, "a peer is disconnected: %s", error.message);
+      supine_stream_patient_warn(&s->patient, s->woke, "a peer is disconnected: %s",
+                                 supine_options_explain(&error).text);
     }
     end_peer(s, peer);
   }

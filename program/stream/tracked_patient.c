@@ -9,6 +9,7 @@
 #include "base/arena.h"
 #include "base/number.h"
 #include "program/options/basis_input.h"
+#include "program/options/remedy.h"
 #include "program/stream/tracked_patient.h"
 
 supine_status supine_stream_volume_breathe(supine_stream_volume *volume, const supine_pv *pv,
@@ -171,7 +172,8 @@ void supine_stream_patient_receive(supine_stream_patient *patient,
     break;
   case SUPINE_STREAM_VOLUME_TEXT:
     if (supine_stream_volume_fix(volume, message->text, &error) != SUPINE_OK) {
-      supine_stream_patient_warn(patient, received, "a volume is refused: %s", error.message);
+      supine_stream_patient_warn(patient, received, "a volume is refused: %s",
+                                 supine_options_explain(&error).text);
     } else {
       note_message(patient, received);
     }
@@ -217,7 +219,7 @@ static void find_gains(supine_stream_patient *patient, double now,
     ++patient->counts->unreachable;
     (void)supine_state_describe(&state, text, sizeof text);
     supine_stream_patient_warn(patient, now, "the state %s cannot be shown: %s", text,
-                               error.message);
+                               supine_options_explain(&error).text);
   }
   memcpy(snapshot->pose.gains, patient->gains, sizeof patient->gains);
   snapshot->volume = supine_posed_volume(basis, &snapshot->pose);
@@ -254,8 +256,9 @@ static void find_location(supine_stream_patient *patient, double now,
         supine_basis_gains(patient->basis, &supine_location_get_info(found)->state, &pose, &error);
   }
   if (status != SUPINE_OK) {
-    supine_stream_patient_warn(
-        patient, now, "the lungs cannot be fitted to the observed points: %s", error.message);
+    supine_stream_patient_warn(patient, now,
+                               "the lungs cannot be fitted to the observed points: %s",
+                               supine_options_explain(&error).text);
   } else {
     const double held = supine_location_get_info(found)->volume;
     snapshot->location = found;

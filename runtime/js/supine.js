@@ -3,7 +3,9 @@
 // memory never grows and the arrays never move.
 
 // Bytes reserved for C structs and buffers.
-const STATE = 128, POSE = 8 * (256 + 3 * 16 + 1), VOLUMES = 8 * 16, TEXT = 512, ERROR = 4 + 512;
+const STATE = 128, POSE = 8 * (256 + 3 * 16 + 1), VOLUMES = 8 * 16, TEXT = 512, VALUE = 32, ERROR = 4 + 512 + 4 + VALUE;
+// What to do about an error, after its message: words for each supine_remedy of this library, in the order of the enum.
+const REMEDIES = ['', ", or use a basis that 'supine precompute' made without --scanned none and --law paper"];
 // Byte offsets of members of the C struct supine_basis_info. Later versions of the library keep these offsets.
 const INFO = { vertices: 0, lungs: 16, begin: 20, hasVolume: 25, names: 56, normals: 100 };
 const TYPES = [Uint8Array, Uint32Array, Float32Array, Float64Array, Int16Array, Int8Array]; // in the order of supine_dtype
@@ -163,7 +165,9 @@ class Basis {
   }
 
   #check(status, message) {
-    if (status !== 0) throw new SupineError(message || this.#string(this.#error + 4), status);
+    if (status === 0) return;
+    const remedy = REMEDIES[this.#word(this.#error + 4 + TEXT)] ?? '';
+    throw new SupineError(message || this.#string(this.#error + 4) + remedy, status);
   }
 
   #evaluate(status) {

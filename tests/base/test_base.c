@@ -8,6 +8,7 @@
 #include <sys/stat.h>
 
 #include "base/arena.h"
+#include "base/findings.h"
 #include "base/output.h"
 #include "base/parallel.h"
 #include "base/text.h"
@@ -27,6 +28,50 @@ TEST(test_status_string_outside_enumeration_unknown) {
   assert_string_equal(supine_status_string(SUPINE_STATUS_COUNT), "unknown status");
   assert_string_equal(supine_status_string((supine_status)-1), "unknown status");
   assert_string_equal(supine_status_string((supine_status)1000), "unknown status");
+}
+
+TEST(test_error_wrap_cause_with_remedy_keeps_it) {
+  supine_error cause;
+  supine_error error;
+  (void)supine_error_set(&cause, SUPINE_ERROR_MESH, "the axes are doubtful");
+  assert_int_equal(cause.remedy, SUPINE_REMEDY_NONE);
+  supine_error_advise(&cause, SUPINE_REMEDY_AXES_ADD, "RAS");
+  assert_int_equal(supine_error_wrap(&error, &cause, "%s: ", "left.ply"), SUPINE_ERROR_MESH);
+  assert_int_equal(error.status, SUPINE_ERROR_MESH);
+  assert_string_equal(error.message, "left.ply: the axes are doubtful");
+  assert_int_equal(error.remedy, SUPINE_REMEDY_AXES_ADD);
+  assert_string_equal(error.value, "RAS");
+  assert_int_equal(supine_error_wrap(NULL, &cause, "x: "), SUPINE_ERROR_MESH);
+  supine_error_advise(NULL, SUPINE_REMEDY_AXES_ADD, "RAS");
+}
+
+TEST(test_error_set_after_remedy_clears_it) {
+  supine_error error;
+  (void)supine_error_set(&error, SUPINE_ERROR_MESH, "first");
+  supine_error_advise(&error, SUPINE_REMEDY_UNIT_ADD, "cm");
+  (void)supine_error_set(&error, SUPINE_ERROR_READ, "second");
+  assert_int_equal(error.remedy, SUPINE_REMEDY_NONE);
+  assert_string_equal(error.value, "");
+}
+
+/* Each line has its own remedy, also if a line before it did not fit. */
+TEST(test_findings_dropped_line_drops_its_remedy) {
+  static supine_findings findings;
+  char longer[sizeof findings.text];
+  memset(longer, 'x', sizeof longer - 1);
+  longer[sizeof longer - 1] = '\0';
+  supine_findings_add(&findings, "note: first");
+  supine_findings_advise(&findings, SUPINE_REMEDY_EDGE, NULL, "note: %s", longer);
+  supine_findings_advise(&findings, SUPINE_REMEDY_MIDLINE, "-12", "note: last");
+  assert_string_equal(findings.text, "note: first\nnote: last\n");
+  assert_int_equal(findings.count, 2);
+  assert_int_equal(findings.advice[0].remedy, SUPINE_REMEDY_NONE);
+  assert_int_equal(findings.advice[1].remedy, SUPINE_REMEDY_MIDLINE);
+  assert_string_equal(findings.advice[1].value, "-12");
+  for (size_t i = 0; i < 2 * SUPINE_FINDINGS_MAX; ++i) {
+    supine_findings_add(&findings, "n");
+  }
+  assert_int_equal(findings.count, SUPINE_FINDINGS_MAX);
 }
 
 TEST(test_error_set_long_message_truncated) {

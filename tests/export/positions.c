@@ -34,7 +34,8 @@ static bool write_positions(const supine_basis *basis, const double g[3], double
 int main(int argc, char **argv) {
   static const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
   supine_basis *basis = NULL;
-  supine_error error = {SUPINE_ERROR_ARGUMENT, "usage: positions BASIS X,Y,Z,ML..."};
+  supine_error error = {.status = SUPINE_ERROR_ARGUMENT,
+                        .message = "usage: positions BASIS X,Y,Z,ML..."};
   float *xyz = NULL;
   int result = EXIT_FAILURE;
   if (argc < 3 || supine_basis_open_with(argv[1], &exact, &basis, &error) != SUPINE_OK) {

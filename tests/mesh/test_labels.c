@@ -387,7 +387,8 @@ TEST(test_labels_flipped_header_axes_found_by_anatomy) {
   assert_int_equal(supine_image_write(path, &map, NULL, NULL), SUPINE_OK);
   assert_int_equal(supine_labels_surfaces(&path, 1, &named, out.surface, &out.report, &error),
                    SUPINE_ERROR_MESH);
-  assert_says(error.message, "--axes RPS");
+  assert_int_equal(error.remedy, SUPINE_REMEDY_LABELS_OR_AXES);
+  assert_string_equal(error.value, "RPS");
   /* So is one that mirrors front and back, or head and feet, unless the user states its axes. */
   for (int a = 1; a < 3; ++a) {
     supine_labels_options stated = {.labels = "lungmask", .axes = SUPINE_AXES_LPS};
@@ -397,7 +398,8 @@ TEST(test_labels_flipped_header_axes_found_by_anatomy) {
     assert_int_equal(supine_labels_surfaces(&path, 1, &named, out.surface, &out.report, &error),
                      SUPINE_ERROR_MESH);
     assert_says(error.message, "mirrored (labels 2 left; 1 right");
-    assert_says(error.message, a == 1 ? "--axes LAS" : "--axes LPI");
+    assert_int_equal(error.remedy, SUPINE_REMEDY_LABELS_AXES_OR_KEEP);
+    assert_string_equal(error.value, a == 1 ? "LAS" : "LPI");
     made accepted = surfaces_of(&path, 1, &stated);
     release(&accepted);
     stated = (supine_labels_options){.labels = NULL}; /* sides by position: nothing is named */
@@ -547,7 +549,7 @@ static void refused(const char *name, const supine_labels_options *options, supi
                     const char *said) {
   const char *path = in_folder(name);
   made out = {0};
-  supine_error error = {SUPINE_OK, ""};
+  supine_error error = {.message = ""};
   assert_int_equal(supine_labels_surfaces(&path, 1, options, out.surface, &out.report, &error),
                    status);
   assert_says(error.message, said);
@@ -644,16 +646,16 @@ TEST(test_labels_bad_maps_refused) {
   } wrong[] = {
       {"both", SUPINE_ERROR_ARGUMENT, "not 'both'"},
       {"left=", SUPINE_ERROR_ARGUMENT, "not 'left='"},
-      {"left=1,left=2", SUPINE_ERROR_ARGUMENT, "--labels must be"},
-      {"left=1,right=1", SUPINE_ERROR_ARGUMENT, "--labels must be"},
-      {"left=1+", SUPINE_ERROR_ARGUMENT, "--labels must be"},
-      {"left=0", SUPINE_ERROR_ARGUMENT, "--labels must be"},
-      {"left=70000", SUPINE_ERROR_ARGUMENT, "--labels must be"},
-      {"left=-1", SUPINE_ERROR_ARGUMENT, "--labels must be"},
-      {"left=1,right=2", SUPINE_ERROR_MESH, "Exchange the labels"},
-      {"left=2,right=3", SUPINE_ERROR_MESH, "gives to the right lung"},
+      {"left=1,left=2", SUPINE_ERROR_ARGUMENT, "labels must be"},
+      {"left=1,right=1", SUPINE_ERROR_ARGUMENT, "labels must be"},
+      {"left=1+", SUPINE_ERROR_ARGUMENT, "labels must be"},
+      {"left=0", SUPINE_ERROR_ARGUMENT, "labels must be"},
+      {"left=70000", SUPINE_ERROR_ARGUMENT, "labels must be"},
+      {"left=-1", SUPINE_ERROR_ARGUMENT, "labels must be"},
+      {"left=1,right=2", SUPINE_ERROR_MESH, "does not lie left of the right lung"},
+      {"left=2,right=3", SUPINE_ERROR_MESH, "given for the right lung"},
       {"totalsegmentator", SUPINE_ERROR_MESH, "the left lung; the labels present are 1, 2"},
-      {"left=9", SUPINE_ERROR_MESH, "gives to the left lung"},
+      {"left=9", SUPINE_ERROR_MESH, "given for the left lung"},
   };
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
   for (size_t i = 0; i < sizeof wrong / sizeof *wrong; ++i) {
@@ -663,7 +665,7 @@ TEST(test_labels_bad_maps_refused) {
   const supine_labels_options edges[] = {
       {.edge = 0.1}, {.edge = 30.0}, {.edge = NAN}, {.close = -1.0}, {.close = 1e3}};
   for (size_t i = 0; i < sizeof edges / sizeof *edges; ++i) {
-    refused("bad.nrrd", &edges[i], SUPINE_ERROR_ARGUMENT, "give --edge from");
+    refused("bad.nrrd", &edges[i], SUPINE_ERROR_ARGUMENT, "give an edge from");
   }
   refused("absent.nii.gz", &plain, SUPINE_ERROR_READ, "absent.nii.gz");
   refused("map.mhd", &plain, SUPINE_ERROR_FORMAT, ".nrrd");

@@ -72,7 +72,8 @@ static bool write_out(const supine_basis *basis, const supine_state *state, cons
 
 int main(int argc, char **argv) {
   static const supine_basis_options plain = {sizeof plain, .simd = SUPINE_SIMD_PORTABLE};
-  supine_error error = {SUPINE_ERROR_ARGUMENT, "usage: native BASIS STATE [OUT]"};
+  supine_error error = {.status = SUPINE_ERROR_ARGUMENT,
+                        .message = "usage: native BASIS STATE [OUT]"};
   supine_basis *basis = NULL;
   supine_state state = {.gravity = {0, 1, 0}};
   supine_pose pose;

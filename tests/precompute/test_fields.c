@@ -534,7 +534,7 @@ TEST(test_precompute_fields_every_option_used_or_refused) {
                {"output", "c.safetensors", 0, "c.safetensors: fields"},
                {"band", "0", 0, "band 0, 1 mode"},
                {"modes", "2", 0, "2 modes"},
-               {"axes", "LPS", 0, "LPS axes (by --axes)"},
+               {"axes", "LPS", 0, "LPS axes (as given)"},
                {"units", "in", 0, "25.4 mm a unit"},
                {"without-normals", "", 0, "b.safetensors: fields"},
                {"midline", "60", 2, "midline"},
@@ -598,7 +598,7 @@ TEST(test_precompute_fields_scanned_posture_not_displaced) {
   EXPECT(0, "displacement, mm", "compare b.safetensors --postures supine,prone");
   assert_null(strstr(printed, "breath"));
   EXPECT(1, "give the posture alone", FIELDS "--scanned supine:rest");
-  EXPECT(1, "only for --fields",
+  EXPECT(1, "only for another simulator's fields",
          "precompute m.obj --axes RAS --units cm --scanned supine -o c.safetensors");
 }
 

@@ -178,7 +178,7 @@ TEST(test_resting_volumes_become_shares) {
   assert_int_equal(supine_physics_resting_set(&resting, "supine", "5700mL", &error), SUPINE_OK);
   assert_int_equal(supine_physics_resting_settle(&resting, 2, side, full, &error),
                    SUPINE_ERROR_ARGUMENT);
-  assert_says(error.message, "--resting");
+  assert_int_equal(error.remedy, SUPINE_REMEDY_SCAN_OR_REST_GIVE);
 }
 
 TEST(test_scan_parse_states_accepted_or_refused) {
@@ -356,20 +356,21 @@ TEST(test_predict_rest_height_and_sex_literal) {
 
 /* The given state of a scan is reported as doubtful if full inflation is not of an adult's size, or
  * if the given volume at rest disagrees with the scan. */
-TEST(test_doubt_implausible_volume_names_option) {
+TEST(test_doubt_implausible_volume_has_remedy) {
   static const struct {
     const char *scanned;
     double full;        /* volume of each lung at full inflation, mL */
     double rest;        /* volume at rest supine given by --resting, mL; 0 if not given */
     const char *doubts; /* part of the expected warning; NULL if none is expected */
-  } known[] = {{"full", 3000.0, 0.0, NULL},
-               {"full", 1700.0, 0.0, "--scanned, such as supine:rest"},
-               {"full", 1900.0, 0.0, "962 mL of gas, where 1400 mL"},
-               {"supine:rest", 5100.0, 0.0, "--scanned full"},
-               {"supine:rest", 3000.0, 2400.0, "but --resting and --scanned say 2400 mL"},
-               {"supine:rest", 3000.0, 2600.0, NULL},
-               {"supine:rest+300", 3000.0, 2300.0, NULL},
-               {"prone:rest", 3000.0, 2000.0, NULL}};
+    supine_remedy remedy;
+  } known[] = {{"full", 3000.0, 0.0, NULL, SUPINE_REMEDY_NONE},
+               {"full", 1700.0, 0.0, "not at full inflation", SUPINE_REMEDY_SCAN_NOT_FULL},
+               {"full", 1900.0, 0.0, "962 mL of gas, where 1400 mL", SUPINE_REMEDY_SCAN_NOT_FULL},
+               {"supine:rest", 5100.0, 0.0, "hold 10200 mL", SUPINE_REMEDY_SCAN_OVER_REST},
+               {"supine:rest", 3000.0, 2400.0, "say 2400 mL", SUPINE_REMEDY_SCAN_OR_REST},
+               {"supine:rest", 3000.0, 2600.0, NULL, SUPINE_REMEDY_NONE},
+               {"supine:rest+300", 3000.0, 2300.0, NULL, SUPINE_REMEDY_NONE},
+               {"prone:rest", 3000.0, 2000.0, NULL, SUPINE_REMEDY_NONE}};
   for (size_t i = 0; i < sizeof known / sizeof *known; ++i) {
     const supine_person person = {0};
     const double full = known[i].full;
@@ -379,12 +380,14 @@ TEST(test_doubt_implausible_volume_names_option) {
                                   .side = {1, -1},
                                   .resting = resting,
                                   .full_volume = {full, full}};
-    char text[512];
+    supine_findings findings = {.count = 0};
+    const char *text = findings.text;
     if (reference.scan.state.volume.kind == SUPINE_VOLUME_REST) {
       reference.scan_volume[0] = reference.scan_volume[1] = 1300.0 - full;
     }
     resting.ml[2] = known[i].rest;
-    supine_physics_reference_doubt(&reference, &person, &resting, text, sizeof text);
+    supine_physics_reference_doubt(&reference, &person, &resting, &findings);
+    assert_int_equal(findings.advice[0].remedy, known[i].remedy);
     if (known[i].doubts == NULL ? text[0] != '\0' : strstr(text, known[i].doubts) == NULL) {
       fail_msg("%s of %g mL: '%s'", known[i].scanned, full, text);
     }
@@ -530,7 +533,7 @@ TEST(test_reference_impossible_states_refused) {
     assert_int_equal(supine_physics_reference_find(&lungs, &model, &scan, &resting, &found, &error),
                      SUPINE_ERROR_ARGUMENT);
     assert_says(error.message, bad[i].said);
-    assert_says(error.message, "--scanned");
+    assert_int_equal(error.remedy, SUPINE_REMEDY_SCAN_STATE);
     assert_false(found.known);
   }
   /* A model whose surface folds on the way to full inflation. */
@@ -546,7 +549,7 @@ TEST(test_reference_impossible_states_refused) {
   assert_int_equal(supine_physics_reference_find(&lungs, &rough, &scan, &resting, &found, &error),
                    SUPINE_ERROR_NUMERICAL);
   printf("%s\n", error.message);
-  assert_says(error.message, "--scanned");
+  assert_int_equal(error.remedy, SUPINE_REMEDY_SCAN_FULLER);
   assert_false(found.known);
   free(stiffness);
   supine_lungs_free(&lungs);

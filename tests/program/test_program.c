@@ -201,7 +201,7 @@ TEST(test_precompute_scan_state_and_frame_reproduced) {
          "deform low.safetensors --posture supine --volume scan --from scan -o low.obj");
   EXPECT(0, "displacement below 0.002 mm from supine at full inflation",
          "deform low.safetensors --posture prone --volume full --from full -o low.obj");
-  EXPECT(0, "RAS axes (by --axes), 10 mm a unit",
+  EXPECT(0, "RAS axes (as given), 10 mm a unit",
          "precompute low.ply --axes RAS --units cm --band 3 -o ras.safetensors");
   EXPECT(0, "ras.ply",
          "deform ras.safetensors --posture prone --volume scan --as-scanned -o ras.ply");
@@ -237,7 +237,7 @@ TEST(test_precompute_scan_state_and_frame_reproduced) {
          "warning: at full inflation the lungs hold 3000 mL (an adult's 4566 to 8525 mL), at rest "
          "582 mL of gas",
          "precompute lungs.ply --units 0.7937005 --band 2 -o a.safetensors");
-  EXPECT(0, "(expected 7300)\n  rest supine 3000 mL (by --resting)",
+  EXPECT(0, "(expected 7300)\n  rest supine 3000 mL (by the given volumes)",
          "precompute lungs.ply --resting supine=3000mL --height 178 --sex male --band 3 "
          "-o a.safetensors");
   EXPECT(0, "3000.00 mL (-3000.00 mL)", "deform a.safetensors --posture supine -o a.ply");

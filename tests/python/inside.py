@@ -243,7 +243,8 @@ assert warned and "an adult's" in str(warned[0].message) and warned[0].filename 
 refused(supine.MeshError, f"surface 1: face 0 names vertex {n + 3}", supine.precompute, lungs.vertices,
         lungs.triangles[:1].astype(np.int64) * 0 + n + 3)
 refused(supine.MeshError, "names vertex", supine.precompute, lungs.vertices, lungs.triangles.astype(np.int64) + 2**32)
-refused(supine.ArgumentError, "no option '--colour'", supine.precompute, lungs.vertices, lungs.triangles, colour="red")
+refused(supine.ArgumentError, "no option 'colour'", supine.precompute, lungs.vertices, lungs.triangles, colour="red")
+refused(supine.ArgumentError, "or leave soften out", supine.precompute, lungs.vertices, lungs.triangles, law="paper", soften=1)
 refused(supine.ArgumentError, "needs a reference", supine.precompute, lungs.vertices, lungs.triangles, scanned="supine:500")
 refused(supine.ReadError, "nowhere.ply: cannot read", supine.precompute, "nowhere.ply")
 refused(ValueError, "[N, 3]", supine.precompute, lungs.vertices[:, :2], lungs.triangles)

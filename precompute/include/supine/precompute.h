@@ -212,6 +212,8 @@ typedef struct supine_precompute_report {
 typedef struct supine_precompute_finding {
   bool is_warning; /**< otherwise a note */
   const char *text;
+  supine_remedy remedy; /**< what can be done about it */
+  const char *value;    /**< value of the argument that the remedy suggests; "" if it has none */
 } supine_precompute_finding;
 
 typedef struct supine_precompute_result {

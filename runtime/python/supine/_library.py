@@ -8,6 +8,8 @@ import os
 from ctypes import POINTER, c_bool, c_char, c_char_p, c_double, c_float, c_int, c_int16, c_size_t, c_uint32, c_uint64, c_void_p
 from typing import Any, Optional
 
+from . import _remedies
+
 MODES_MAX, LUNGS_MAX = 256, 16
 
 
@@ -65,7 +67,7 @@ for _kind in _ERRORS:
 
 class CError(ctypes.Structure):
     """The C struct supine_error."""
-    _fields_ = [("status", c_int), ("message", c_char * 512)]
+    _fields_ = [("status", c_int), ("message", c_char * 512), ("remedy", c_int), ("value", c_char * 32)]
 
 
 class Volume(ctypes.Structure):
@@ -227,7 +229,7 @@ class Report(ctypes.Structure):
 
 class Finding(ctypes.Structure):
     """The C struct supine_precompute_finding."""
-    _fields_ = [("is_warning", c_bool), ("text", c_char_p)]
+    _fields_ = [("is_warning", c_bool), ("text", c_char_p), ("remedy", c_int), ("value", c_char_p)]
 
 
 class Result(ctypes.Structure):
@@ -255,7 +257,7 @@ def _checked(name: str, *arguments: Any) -> Any:
         error = CError()
         status = function(*given, error)
         if status != 0:
-            fail(status, error.message)
+            fail(status, error.message, error)
     return call
 
 
@@ -275,10 +277,12 @@ def _posed(name: str, *arguments: Any) -> Any:
     return call
 
 
-def fail(status: int, message: bytes = b"") -> None:
-    """Raise the exception for a status."""
-    text = message or status_string(status)
-    raise _ERRORS[status if 0 < status < len(_ERRORS) else 0](text.decode(errors="replace"))
+def fail(status: int, message: bytes = b"", error: Optional[CError] = None) -> None:
+    """Raise the exception for a status. If the message is that of an error, add what to do about it."""
+    text = (message or status_string(status)).decode(errors="replace")
+    if error is not None and message:
+        text += _remedies.words(error.remedy, string(error.value))
+    raise _ERRORS[status if 0 < status < len(_ERRORS) else 0](text)
 
 
 version = _declare("version", c_char_p)

@@ -17,7 +17,7 @@ _LAWS = {"deep": 1, "paper": 2}
 
 
 def _refuse(name: str, wants: str, value: Any) -> _c.ArgumentError:
-    return _c.ArgumentError(f"--{name.replace('_', '-')} takes {wants}, not '{value}'")
+    return _c.ArgumentError(f"{name} takes {wants}, not '{value}'")
 
 
 def _number(name: str, value: Any, wants: str = "a number") -> float:
@@ -73,7 +73,7 @@ def _scanned(to: _c.PrecomputeOptions, value: Any) -> None:
     try:
         _c.state_parse(str(value).encode(), to.scan.state)
     except _c.ArgumentError as error:
-        raise _c.ArgumentError(f"--scanned: {error}") from None
+        raise _c.ArgumentError(f"scanned: {error}") from None
 
 
 def _resting(to: _c.PrecomputeOptions, value: Any) -> None:
@@ -83,7 +83,7 @@ def _resting(to: _c.PrecomputeOptions, value: Any) -> None:
         value = ",".join(part for part in value.split(",") if part != "copd")
     for posture, amount in _pairs("resting", value, "=", wants) if value else []:
         if posture not in _POSTURES:
-            raise _c.ArgumentError(f"--resting: '{posture}' is not one of {', '.join(_POSTURES)}")
+            raise _c.ArgumentError(f"resting: '{posture}' is not one of {', '.join(_POSTURES)}")
         rest, text = to.volumes.rest[_POSTURES.index(posture)], str(amount)
         if text.endswith("mL"):
             rest.ml = _number("resting", text[:-2], wants)
@@ -119,7 +119,7 @@ def _expandability(to: _c.PrecomputeOptions, value: Any) -> None:
 def _lesion(to: _c.PrecomputeOptions, value: Any) -> None:
     tissue, numbers = to.tissue, _numbers("lesion", value, 5)
     if tissue.lesion_count == len(tissue.lesions):
-        raise _c.ArgumentError(f"--lesion: at most {len(tissue.lesions)} lesions")
+        raise _c.ArgumentError(f"lesion: at most {len(tissue.lesions)} lesions")
     lesion = tissue.lesions[tissue.lesion_count]
     lesion.centre[:], lesion.radius, lesion.factor = numbers[:3], numbers[3], numbers[4]
     if not (lesion.radius > 0 and lesion.factor > 0):
@@ -209,9 +209,8 @@ def fill(to: _c.PrecomputeOptions, options: dict[str, Any]) -> None:
                 raise TypeError(f"{name}: an option cannot be an array: give a tuple, or a file")
             if name not in _FILL:
                 near = difflib.get_close_matches(name, _FILL, 1)
-                option = name.replace("_", "-")
-                hint = f"; did you mean '--{near[0].replace('_', '-')}'?" if near else ""
-                raise _c.ArgumentError(f"no option '--{option}'{hint}")
+                hint = f"; did you mean '{near[0]}'?" if near else ""
+                raise _c.ArgumentError(f"no option '{name}'{hint}")
             if value is not None and value is not False:
                 _FILL[name](to, value)
 

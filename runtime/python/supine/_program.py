@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _library as _c
-from . import _options
+from . import _options, _remedies
 
 Progress = Callable[[float], Any]
 _EXITS: dict[int, type[_c.Error]] = {1: _c.ArgumentError, 2: _c.FormatError, 3: _c.UnsupportedError, 5: _c.NumericalError}
@@ -138,6 +138,15 @@ def _listen(terminal: int, command: str, progress: Optional[Progress]) -> str:
             return said
 
 
+def _own_names(text: str) -> str:
+    """Replace options of the command, such as --held-out, by the arguments that become them, such as held_out. Commands to
+    type, in quotes, stay."""
+    parts = re.split(r"('supine [^']*')", text)
+    parts[::2] = (re.sub(r"(?<![\w-])--([a-z][a-z-]*)", lambda option: option[1].replace("-", "_"), part)
+                  for part in parts[::2])
+    return "".join(parts)
+
+
 def fail(command: str, status: int, said: str) -> None:
     """Raise an exception with the error message of a command."""
     messages = re.sub(rf"^supine {command}: ", "", said, flags=re.M).splitlines()
@@ -147,7 +156,7 @@ def fail(command: str, status: int, said: str) -> None:
         kind = _c.ReadError
     elif status == 2 and command == "precompute":
         kind = _c.MeshError
-    raise kind(what or f"supine {command} ended with exit status {status}")
+    raise kind(_own_names(what) or f"supine {command} ended with exit status {status}")
 
 
 def _warn(messages: Sequence[str]) -> None:
@@ -186,7 +195,7 @@ def run(command: str, operands: Sequence[str], options: dict[str, Any], names: d
     for path, name in names.items():
         said, text = said.replace(path, name), text.replace(path, name)
     messages = re.sub(rf"^supine {command}: ", "", said, flags=re.M).splitlines()
-    _warn(messages)
+    _warn([_own_names(message) for message in messages])
     if status != 0:
         fail(command, status, "\n".join(messages))
     if progress is not None:
@@ -287,7 +296,8 @@ def precompute(surfaces: Sequence[Any], options: dict[str, Any], progress: Optio
             to.lungs.paths = (ctypes.c_char_p * len(surfaces))(*(os.fsencode(path) for path in surfaces))
         to.made_by, to.progress = made_by.encode(errors="replace"), _c.ProgressFunction(tell)
         status = library.supine_precompute_basis(to, result, error)
-    findings = [_c.string(result[0].findings[i].text) for i in range(result[0].finding_count)] if result else []
+    findings = [_c.string(each.text) + _remedies.words(each.remedy, _c.string(each.value))
+                for each in (result[0].findings[:result[0].finding_count] if result else [])]
     made = ctypes.string_at(result[0].bytes, result[0].size) if status == 0 else b""
     report = _options.describe(result[0]) if status == 0 else ""
     library.supine_precompute_result_free(result)
@@ -295,7 +305,7 @@ def precompute(surfaces: Sequence[Any], options: dict[str, Any], progress: Optio
         raise stopped[0]
     _warn(findings)
     if status != 0:  # the same kinds of exceptions as from the program, which calls any wrong input a mesh
-        _c.fail(5 if status in (4, 6) else status, error.message.replace(fields.encode(), b"fields"))
+        _c.fail(5 if status in (4, 6) else status, error.message.replace(fields.encode(), b"fields"), error)
     if kept is None:
         return made, report
     _replace(os.fspath(kept), made)
