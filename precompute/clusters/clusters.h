@@ -40,8 +40,9 @@ typedef struct supine_clustered {
   size_t triangle_count;
   size_t mode_count;
   size_t part_count;
-  const size_t *part_begin;  /**< [part_count + 1] first vertex of each part (lung), then the count */
-  const float *vertices;     /**< [vertex_count, 3] positions p, mm */
+  const size_t
+      *part_begin;       /**< [part_count + 1] first vertex of each part (lung), then the count */
+  const float *vertices; /**< [vertex_count, 3] positions p, mm */
   const uint32_t *triangles; /**< [triangle_count, 3] */
   const float *coefficients; /**< [vertex_count, 3, mode_count] C, mm */
   double weight_rms; /**< RMS of the weight of a mode over all states, the same for all modes */
@@ -85,8 +86,8 @@ supine_status supine_clusters_find(const supine_clustered *surface, size_t count
  * SUPINE_CLUSTER_VERTICES_MIN vertices or more on average. If there are none, `clusters->count` is
  * 0: store modes instead. */
 supine_status supine_clusters_choose(const supine_clustered *surface,
-                                     const supine_cluster_limits *limits,
-                                     supine_clusters *clusters, supine_error *error);
+                                     const supine_cluster_limits *limits, supine_clusters *clusters,
+                                     supine_error *error);
 
 /** Compute the coefficients of the clusters by (1), [vertex_count, 3, mode_count], mm.
  * @param vertices  [vertex_count, 3] positions, mm */

@@ -16,13 +16,13 @@ enum { SETTLED = 1000 };
 
 typedef struct lloyd {
   const supine_clustered *surface;
-  size_t count;        /* number of clusters */
-  uint16_t *cluster;   /* [vertices] cluster of each vertex */
-  uint16_t *next;      /* [vertices] cluster after this iteration */
-  size_t *begin;       /* [count + 1] first member of each cluster in `members` */
-  uint32_t *members;   /* [vertices] vertices, grouped by cluster */
-  size_t *ring_begin;  /* [vertices + 1] first neighbour of each vertex in `ring` */
-  uint32_t *ring;      /* vertices that share a triangle, each twice on a closed surface */
+  size_t count;              /* number of clusters */
+  uint16_t *cluster;         /* [vertices] cluster of each vertex */
+  uint16_t *next;            /* [vertices] cluster after this iteration */
+  size_t *begin;             /* [count + 1] first member of each cluster in `members` */
+  uint32_t *members;         /* [vertices] vertices, grouped by cluster */
+  size_t *ring_begin;        /* [vertices + 1] first neighbour of each vertex in `ring` */
+  uint32_t *ring;            /* vertices that share a triangle, each twice on a closed surface */
   supine_subspace *subspace; /* [count] */
   supine_status *status;     /* [count] result of each fit */
 } lloyd;
@@ -325,8 +325,8 @@ supine_status supine_clusters_find(const supine_clustered *surface, size_t count
 }
 
 supine_status supine_clusters_choose(const supine_clustered *surface,
-                                     const supine_cluster_limits *limits,
-                                     supine_clusters *clusters, supine_error *error) {
+                                     const supine_cluster_limits *limits, supine_clusters *clusters,
+                                     supine_error *error) {
   enum { FEWEST = 16 };
   const size_t most = surface->vertex_count / SUPINE_CLUSTER_VERTICES_MIN;
   *clusters = (supine_clusters){0};

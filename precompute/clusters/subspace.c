@@ -94,10 +94,9 @@ supine_status supine_clusters_subspace_fit(const supine_clustered *surface, cons
   find_centre(surface, members, count, subspace->centre);
   add_members(surface, subspace->centre, members, count, &s);
   SUPINE_TRY(regress(width, &s, linear));
-  SUPINE_TRY(supine_lapack_status(
-      LAPACKE_dsyevr(LAPACK_ROW_MAJOR, 'V', 'I', 'L', n, s.cc, n, 0.0, 0.0,
-                     n - SUPINE_CLUSTER_SCALARS + 1, n, 0.0, &found, values, vectors,
-                     SUPINE_CLUSTER_SCALARS, support)));
+  SUPINE_TRY(supine_lapack_status(LAPACKE_dsyevr(
+      LAPACK_ROW_MAJOR, 'V', 'I', 'L', n, s.cc, n, 0.0, 0.0, n - SUPINE_CLUSTER_SCALARS + 1, n, 0.0,
+      &found, values, vectors, SUPINE_CLUSTER_SCALARS, support)));
   for (size_t k = 0; k < width; ++k) {
     for (size_t term = 0; term < TERMS; ++term) {
       subspace->linear[term][k] = (float)linear[term * width + k];

@@ -14,8 +14,8 @@ enum { SUPINE_CLUSTER_ROW_MAX = 3 * 64 };
  *
  * The patterns have length 1 and are orthogonal, so that a_s = pattern_s . (row - linear part). */
 typedef struct supine_subspace {
-  double centre[3];                                            /**< mean position, mm */
-  float linear[4][SUPINE_CLUSTER_ROW_MAX];                     /**< mean, slope_x, _y, _z */
+  double centre[3];                                              /**< mean position, mm */
+  float linear[4][SUPINE_CLUSTER_ROW_MAX];                       /**< mean, slope_x, _y, _z */
   float pattern[SUPINE_CLUSTER_SCALARS][SUPINE_CLUSTER_ROW_MAX]; /**< patterns of what is left */
 } supine_subspace;
 
