@@ -1,0 +1,184 @@
+/* SPDX-License-Identifier: MIT */
+/* Pose a basis of another simulator's fields over gravity and volume. */
+#include <math.h>
+#include <string.h>
+
+#include <supine/sh.h>
+
+#include "base/arena.h"
+#include "runtime/simulated.h"
+
+/* Difference between the volume asked and the volume of the surface that ends the search, mL. */
+static const double close_enough = 1e-6;
+
+/* How far outside the simulated range of t the search may go: the volume of the surface differs
+ * from the one that t stands for by less than that. */
+static const double beyond = 0.1;
+
+supine_status supine_simulated_limits(const supine_basis *basis, const double gravity[3],
+                                      double (*limits)[2]) {
+  double y[RESTING_TERMS];
+  SUPINE_TRY(supine_sh_evaluate(2, gravity, y));
+  for (size_t row = 0; row < 2 * basis->info.lung_count; ++row) {
+    double *limit = &limits[row / 2][row % 2];
+    *limit = 0;
+    for (size_t t = 0; t < RESTING_TERMS; ++t) {
+      *limit += basis->simulated.limits[row * RESTING_TERMS + t] * y[t];
+    }
+  }
+  return SUPINE_OK;
+}
+
+static double map_to_unit(double value, const double range[2]) {
+  return 2 * (value - range[0]) / (range[1] - range[0]) - 1;
+}
+
+/* Refuse a volume outside the range [low, high] of one lung, or of all lungs if `lung` is NULL. */
+static supine_status refuse_volume(const char *lung, double volume, double low, double high,
+                                   supine_error *error) {
+  return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                          "%s%s hold%s %.0f to %.0f mL in the simulations of this posture, not "
+                          "%.0f mL: choose a volume in this range",
+                          lung == NULL ? "the lungs" : "the lung ", lung == NULL ? "" : lung,
+                          lung == NULL ? "" : "s", low, high, volume);
+}
+
+/* Move the volume of each lung into its limits, and give what is left to lungs that have room. */
+static void keep_within(size_t count, const double (*limits)[2], double total, double *volumes) {
+  double left = total;
+  for (size_t lung = 0; lung < count; ++lung) {
+    volumes[lung] = fmin(fmax(volumes[lung], limits[lung][0]), limits[lung][1]);
+    left -= volumes[lung];
+  }
+  for (size_t lung = 0; lung < count; ++lung) {
+    const double room =
+        left > 0 ? limits[lung][1] - volumes[lung] : limits[lung][0] - volumes[lung];
+    const double moved = fabs(left) < fabs(room) ? left : room;
+    volumes[lung] += moved;
+    left -= moved;
+  }
+}
+
+supine_status supine_simulated_share(const supine_basis *basis, const double gravity[3],
+                                     double total, double *volumes, supine_error *error) {
+  const supine_simulated *s = &basis->simulated;
+  const size_t lungs = basis->info.lung_count;
+  double limits[SUPINE_LUNGS_MAX][2];
+  double products[RESTING_TERMS * (SUPINE_SH_ORDER_MAX + 1)];
+  double range[3] = {0, 0, 0}; /* lowest and highest total, and the reference volume of all lungs */
+  const size_t terms = RESTING_TERMS * s->share_count;
+  const double t = fmin(fmax(map_to_unit(total, s->total), -1), 1);
+  SUPINE_TRY(supine_simulated_limits(basis, gravity, limits));
+  SUPINE_TRY(supine_sh_evaluate_products(2, s->share_count - 1, gravity, t, products));
+  for (size_t lung = 0; lung < lungs; ++lung) {
+    range[0] += limits[lung][0];
+    range[1] += limits[lung][1];
+    range[2] += basis->info.reference_volume[lung];
+    volumes[lung] = 0;
+    for (size_t i = 0; i < terms; ++i) {
+      volumes[lung] += s->shares[lung * terms + i] * products[i];
+    }
+  }
+  if (!(total >= range[0] && total <= range[1])) {
+    return refuse_volume(NULL, range[2] + total, range[2] + range[0], range[2] + range[1], error);
+  }
+  keep_within(lungs, (const double(*)[2])limits, total, volumes);
+  return SUPINE_OK;
+}
+
+/* The modes for one direction of gravity: weights as polynomials of t. */
+typedef struct path {
+  const supine_basis *basis;
+  size_t lung;
+  double coefficient[SUPINE_MODES_MAX][SUPINE_SH_ORDER_MAX + 1];
+} path;
+
+static supine_status find_path(const supine_basis *basis, const double gravity[3], path *p) {
+  double y[(SUPINE_SH_BAND_MAX + 1) * (SUPINE_SH_BAND_MAX + 1)];
+  const size_t harmonics = supine_sh_count(basis->info.band);
+  const size_t orders = basis->simulated.order + 1;
+  SUPINE_TRY(supine_sh_evaluate(basis->info.band, gravity, y));
+  p->basis = basis;
+  for (size_t k = 0; k < basis->info.mode_count; ++k) {
+    memset(p->coefficient[k], 0, sizeof p->coefficient[k]);
+    for (size_t i = 0; i < harmonics * orders; ++i) {
+      p->coefficient[k][i % orders] +=
+          basis->info.modes[k * harmonics * orders + i] * y[i / orders];
+    }
+  }
+  return SUPINE_OK;
+}
+
+/* Compute the weights at t, [modes]. Return the volume of the lung above its reference, mL. */
+static double follow(const path *p, double t, double *weights) {
+  static const double ones[3] = {1, 1, 1};
+  const supine_basis *basis = p->basis;
+  double polynomial[SUPINE_SH_ORDER_MAX + 1] = {1, t};
+  supine_volume_form form;
+  for (size_t n = 2; n <= basis->simulated.order; ++n) {
+    polynomial[n] = 2 * t * polynomial[n - 1] - polynomial[n - 2];
+  }
+  for (size_t k = 0; k < basis->info.mode_count; ++k) {
+    weights[k] = 0;
+    for (size_t n = 0; n <= basis->simulated.order; ++n) {
+      weights[k] += p->coefficient[k][n] * polynomial[n];
+    }
+  }
+  supine_basis_contract(basis, p->lung, weights, &form);
+  return supine_volume_form_at(&form, ones);
+}
+
+/* Find the weights of a lung at which it holds `volume`, by the rule of false position with the
+ * Illinois correction, between t = low and t = high. Return whether there are any. */
+static bool solve(const path *p, double volume, double low, double high, double *weights) {
+  double below = follow(p, low, weights) - volume;
+  double above = follow(p, high, weights) - volume;
+  int side = 0;
+  if (!(below <= close_enough && above >= -close_enough)) {
+    return false;
+  }
+  for (int step = 0; step < 100; ++step) {
+    const double t = above > below ? (low * above - high * below) / (above - below) : low;
+    const double residual = follow(p, t, weights) - volume;
+    if (fabs(residual) <= close_enough || high - low < 1e-14) {
+      return true;
+    }
+    if (residual > 0) {
+      high = t;
+      above = residual;
+      below *= side > 0 ? 0.5 : 1;
+      side = 1;
+    } else {
+      low = t;
+      below = residual;
+      above *= side < 0 ? 0.5 : 1;
+      side = -1;
+    }
+  }
+  return false;
+}
+
+supine_status supine_simulated_solve(const supine_basis *basis, const double gravity[3],
+                                     const double *volumes, supine_pose *pose,
+                                     supine_error *error) {
+  double limits[SUPINE_LUNGS_MAX][2];
+  path p;
+  SUPINE_TRY(find_path(basis, gravity, &p));
+  SUPINE_TRY(supine_simulated_limits(basis, gravity, limits));
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    const double *range = basis->simulated.range + 2 * lung;
+    const double reference = basis->info.reference_volume[lung];
+    double *weights = pose->weights + lung * basis->info.mode_count;
+    p.lung = lung;
+    if (!(volumes[lung] >= limits[lung][0] && volumes[lung] <= limits[lung][1]) ||
+        !solve(&p, volumes[lung], map_to_unit(limits[lung][0], range) - beyond,
+               map_to_unit(limits[lung][1], range) + beyond, weights)) {
+      return refuse_volume(basis->info.lung_names[lung], reference + volumes[lung],
+                           reference + limits[lung][0], reference + limits[lung][1], error);
+    }
+    for (size_t axis = 0; axis < 3; ++axis) {
+      pose->gains[lung][axis] = 1;
+    }
+  }
+  return SUPINE_OK;
+}
