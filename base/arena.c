@@ -6,6 +6,7 @@
 #include <stdlib.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 
 typedef struct supine_arena_block {
   struct supine_arena_block *before;
@@ -46,7 +47,7 @@ void supine_arena_free(supine_arena *arena) {
 
 static supine_status set_error(supine_error *error, const char *what, va_list arguments) {
   char text[256];
-  (void)vsnprintf(text, sizeof text, what, arguments);
+  (void)supine_print_text_list(text, sizeof text, what, arguments);
   return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory: %s", text);
 }
 

@@ -1,47 +1,108 @@
 /* SPDX-License-Identifier: MIT */
-/* Read small CSV files. */
-#include <ctype.h>
+/* Read small CSV files, and write them. */
 #include <errno.h>
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
 #include "base/arena.h"
+#include "base/ascii.h"
 #include "base/csv.h"
+#include "base/number.h"
+#include "base/text.h"
 
 static char *trim(char *text) {
-  while (isspace((unsigned char)*text)) {
+  while (supine_ascii_is_space(*text)) {
     ++text;
   }
   size_t length = strlen(text);
-  while (length > 0 && isspace((unsigned char)text[length - 1])) {
+  while (length > 0 && supine_ascii_is_space(text[length - 1])) {
     text[--length] = '\0';
   }
   return text;
 }
 
-/* Set `text` to the next line that is neither blank nor a comment, trimmed; NULL at the end. */
-static supine_status csv_line(supine_csv *csv, char **text, supine_error *error) {
-  do {
-    errno = 0;
-    const ssize_t length = getline(&csv->text, &csv->capacity, csv->file);
-    *text = NULL;
-    if (length < 0) {
-      return errno == ENOMEM ? supine_error_memory(error, "a line of %s", csv->path)
-             : ferror(csv->file) != 0
-                 ? supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", csv->path,
-                                    strerror(errno))
-                 : SUPINE_OK;
+/* Read the next line of the file to csv->text + `used`; set `length` to its length, 0 at the end.
+ */
+static supine_status read_line(supine_csv *csv, size_t used, size_t *length, supine_error *error) {
+  errno = 0;
+  const ssize_t count = getline(&csv->next, &csv->next_size, csv->file);
+  *length = count > 0 ? (size_t)count : 0;
+  SUPINE_REFUSE_IF(count < 0 && ferror(csv->file) != 0, error, SUPINE_ERROR_READ,
+                   "%s: cannot read: %s", csv->path, strerror(errno));
+  if (count < 0 && errno == ENOMEM) {
+    return supine_error_memory(error, "a line of %s", csv->path);
+  }
+  if (used + *length + 1 > csv->text_size) {
+    const size_t size = 2 * (used + *length + 1);
+    char *more = realloc(csv->text, size);
+    if (more == NULL) {
+      return supine_error_memory(error, "a line of %s", csv->path);
     }
-    ++csv->line;
-    SUPINE_REFUSE_IF(strlen(csv->text) != (size_t)length, error, SUPINE_ERROR_FORMAT,
-                     "%s:%zu: a NUL byte: save the file as CSV text", csv->path, csv->line);
+    csv->text = more;
+    csv->text_size = size;
+  }
+  memcpy(csv->text + used, csv->next, *length);
+  csv->text[used + *length] = '\0';
+  csv->lines_read += *length > 0 ? 1 : 0;
+  SUPINE_REFUSE_IF(strlen(csv->text + used) != *length, error, SUPINE_ERROR_FORMAT,
+                   "%s:%zu: a NUL byte: save the file as CSV text", csv->path, csv->lines_read);
+  return SUPINE_OK;
+}
+
+/* Return whether a quoted field is open at the end of a line, given whether one is open at its
+ * begin. In the header, before the separator is known, `separators` are all that are possible. */
+static bool is_open_after(const char *line, const char *separators, bool open) {
+  for (const char *at = line; *at != '\0';) {
+    if (!open) {
+      at += strspn(at, " ");
+      open = *at == '"';
+      at += open ? 1 : 0;
+    }
+    while (open && *at != '\0') {
+      open = *at != '"' || at[1] == '"';
+      at += open && *at == '"' ? 2 : 1;
+    }
+    if (!open) {
+      at += strcspn(at, separators);
+      at += *at != '\0' ? 1 : 0;
+    }
+  }
+  return open;
+}
+
+/* Set `text` to the next record, trimmed; NULL at the end. It is a line that is neither blank nor a
+ * comment, with the lines after it that its quoted fields contain. */
+static supine_status csv_line(supine_csv *csv, char **text, supine_error *error) {
+  const char own[] = {csv->separator, '\0'};
+  const char *separators = csv->separator != '\0' ? own : ",;\t";
+  size_t used = 0;
+  do {
+    SUPINE_TRY(read_line(csv, 0, &used, error));
+    *text = NULL;
+    if (used == 0) {
+      return SUPINE_OK;
+    }
+    csv->line = csv->lines_read;
     static const char mark[] = "\xEF\xBB\xBF"; /* byte-order mark of UTF-8 */
     const size_t skip = csv->line == 1 && strncmp(csv->text, mark, 3) == 0 ? 3 : 0;
-    *text = trim(csv->text + skip);
+    *text = csv->text + skip + strspn(csv->text + skip, " \t\r\n\v\f");
   } while (**text == '\0' || **text == '#');
+  const size_t begin = (size_t)(*text - csv->text);
+  size_t length = used;
+  bool open = is_open_after(*text, separators, false);
+  while (open) {
+    SUPINE_TRY(read_line(csv, used, &length, error));
+    SUPINE_REFUSE_IF(length == 0, error, SUPINE_ERROR_FORMAT,
+                     "%s:%zu: a quote is not closed: add \"", csv->path, csv->line);
+    open = is_open_after(csv->text + used, separators, true);
+    used += length;
+  }
+  *text = trim(csv->text + begin);
+  SUPINE_REFUSE_IF(!supine_text_is_utf8(*text), error, SUPINE_ERROR_FORMAT,
+                   "%s:%zu: the text is not UTF-8: save the file with the encoding UTF-8",
+                   csv->path, csv->line);
   return SUPINE_OK;
 }
 
@@ -70,7 +131,7 @@ static char *csv_field(char **rest, char separator) {
   }
   *to = '\0';
   ++end;
-  end += strspn(end, " \t");
+  end += strspn(end, " ");
   if (*end != separator && *end != '\0') {
     return NULL;
   }
@@ -108,7 +169,7 @@ static supine_status csv_header(supine_csv *csv, const char *const *names, size_
   }
   for (size_t f = 0; f < csv->field_count; ++f) {
     size_t c = 0;
-    while (c < count && strcasecmp(csv->field[f], names[c]) != 0) {
+    while (c < count && !supine_ascii_same(csv->field[f], names[c])) {
       ++c;
     }
     SUPINE_REFUSE_IF(c < count && csv->column[c] != SIZE_MAX, error, SUPINE_ERROR_FORMAT,
@@ -167,7 +228,7 @@ supine_status supine_csv_number(const supine_csv *csv, size_t column, const char
   if (comma != NULL) { /* with ';' between fields, a comma is a decimal comma */
     *comma = '.';
   }
-  *number = strtod(text, &end);
+  *number = supine_number_parse(text, &end);
   SUPINE_REFUSE_IF(end == text || *end != '\0' || !isfinite(*number), error, SUPINE_ERROR_FORMAT,
                    "%s:%zu: %s \"%s\" is not a finite number: give a number", csv->path, csv->line,
                    name, text);
@@ -177,5 +238,50 @@ supine_status supine_csv_number(const supine_csv *csv, size_t column, const char
 void supine_csv_close(supine_csv *csv) {
   supine_file_close(&csv->file);
   free(csv->text);
+  free(csv->next);
   *csv = (supine_csv){0};
+}
+
+/* Return whether a reader would not find `text` as it is: it splits at separators and lines, takes
+ * off blanks, and skips lines that begin with '#'. */
+static bool needs_quotes(const char *text) {
+  const size_t length = strlen(text);
+  return strpbrk(text, ",;\t\"\r\n") != NULL || *text == '#' ||
+         (length > 0 && (supine_ascii_is_space(*text) || supine_ascii_is_space(text[length - 1])));
+}
+
+static void begin_field(supine_csv_row *row) {
+  if (row->begun) {
+    (void)putc(',', row->file);
+  }
+  row->begun = true;
+}
+
+void supine_csv_add_text(supine_csv_row *row, const char *text) {
+  begin_field(row);
+  if (!needs_quotes(text)) {
+    (void)fputs(text, row->file);
+    return;
+  }
+  (void)putc('"', row->file);
+  for (const char *at = text; *at != '\0'; ++at) {
+    if (*at == '"') {
+      (void)putc('"', row->file);
+    }
+    (void)putc(*at, row->file);
+  }
+  (void)putc('"', row->file);
+}
+
+void supine_csv_add(supine_csv_row *row, const char *format, ...) {
+  va_list arguments;
+  begin_field(row);
+  va_start(arguments, format);
+  (void)supine_print_list(row->file, format, arguments);
+  va_end(arguments);
+}
+
+void supine_csv_end_row(supine_csv_row *row) {
+  (void)putc('\n', row->file);
+  row->begun = false;
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Read small CSV files. */
+/* Read small CSV files, and write them (RFC 4180). */
 #ifndef SUPINE_CSV_H
 #define SUPINE_CSV_H
 
@@ -11,15 +11,18 @@
 
 enum { SUPINE_CSV_FIELDS_MAX = 64 };
 
-/* A CSV file being read. It has a header, and may have comments (#), blank lines and quoted fields.
- * The separator of the header, ',', ';' or tab, holds for all lines. With ';', numbers may have a
- * decimal comma. Zero-initialise. */
+/* A CSV file being read. It has a header, and may have comments (#), blank lines and quoted fields,
+ * which may contain separators and line ends. It must be UTF-8. The separator of the header, ',',
+ * ';' or tab, holds for all lines. With ';', numbers may have a decimal comma. Zero-initialise. */
 typedef struct supine_csv {
   const char *path;
   FILE *file;
-  char *text;      /* current line */
-  size_t capacity; /* allocated size of `text`, bytes */
-  size_t line;     /* number of the current line, from 1 */
+  char *text;       /* current row, with all its lines */
+  size_t text_size; /* allocated, bytes */
+  char *next;       /* line read last */
+  size_t next_size; /* allocated, bytes */
+  size_t lines_read;
+  size_t line; /* number of the first line of the current row, from 1 */
   char separator;
   size_t field_count;
   char *field[SUPINE_CSV_FIELDS_MAX];   /* fields of the current row */
@@ -49,5 +52,20 @@ supine_status supine_csv_number(const supine_csv *csv, size_t column, const char
                                 double *number, supine_error *error);
 
 void supine_csv_close(supine_csv *csv);
+
+/* A row being written: {.file = FILE}. ferror tells whether writing failed. Lines end in LF. */
+typedef struct supine_csv_row {
+  FILE *file;
+  bool begun; /* whether the row has a field */
+} supine_csv_row;
+
+/* Add a field of any text, and quote it if a reader would otherwise change it. */
+void supine_csv_add_text(supine_csv_row *row, const char *text);
+
+/* Add a number, or several separated by commas, printed like supine_print. */
+SUPINE_PRINTF(2, 3) void supine_csv_add(supine_csv_row *row, const char *format, ...);
+
+/* End the row; the next field begins another. */
+void supine_csv_end_row(supine_csv_row *row);
 
 #endif

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/findings.h"
+#include "base/number.h"
 #include "base/text.h"
 
 void supine_findings_add(supine_findings *findings, const char *format, ...) {
@@ -12,7 +13,7 @@ void supine_findings_add(supine_findings *findings, const char *format, ...) {
   const size_t room = sizeof findings->text - used;
   va_list arguments;
   va_start(arguments, format);
-  const int length = vsnprintf(findings->text + used, room, format, arguments);
+  const int length = supine_print_text_list(findings->text + used, room, format, arguments);
   va_end(arguments);
   if (length < 0 || (size_t)length + 1 >= room) {
     findings->text[used] = '\0';

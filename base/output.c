@@ -26,6 +26,10 @@ bool supine_output_is_standard(const char *path) {
 }
 
 bool supine_output_take_standard(void) {
+  const int flags = fcntl(STDOUT_FILENO, F_GETFL);
+  if (flags < 0 || (flags & O_ACCMODE) == O_RDONLY) {
+    return false;
+  }
   (void)fflush(stdout);
   if (atomic_load(&standard_output) < 0) {
     atomic_store(&standard_output, fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, STDERR_FILENO + 1));

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /** @file Write output files whole or not at all.
  *
- * A file is written under a temporary name in its folder. It gets its final name when it is complete
- * and on the disk. */
+ * A file is written under a temporary name in its folder. It gets its final name when it is
+ * complete and on the disk. */
 #ifndef SUPINE_OUTPUT_H
 #define SUPINE_OUTPUT_H
 
@@ -38,7 +38,7 @@ void supine_output_abandon(supine_output *output);
 bool supine_output_is_standard(const char *path);
 
 /** Reserve standard output for supine_output_open. From then on, all other output goes to standard
- * error. Return false if standard output is closed. */
+ * error. Return false if standard output is closed, or open for reading only. */
 bool supine_output_take_standard(void);
 
 /** Check that a file can be written. Leave no new file. */

@@ -5,6 +5,9 @@
 
 #include <supine/status.h>
 
+#include "base/number.h"
+#include "base/utf8.h"
+
 const char *supine_status_string(supine_status status) {
   static const char *const phrases[] = {
       "success",        "argument out of range", "out of memory",   "cannot read",
@@ -17,11 +20,13 @@ const char *supine_status_string(supine_status status) {
 
 supine_status supine_error_set(supine_error *error, supine_status status, const char *format, ...) {
   if (error != NULL) {
+    char message[sizeof error->message];
     va_list arguments;
     va_start(arguments, format);
-    error->status = status;
-    (void)vsnprintf(error->message, sizeof error->message, format, arguments);
+    (void)supine_print_text_list(message, sizeof message, format, arguments);
     va_end(arguments);
+    error->status = status;
+    supine_utf8_escape(message, "", error->message, sizeof error->message);
   }
   return status;
 }

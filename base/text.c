@@ -3,8 +3,9 @@
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
-#include <strings.h>
 
+#include "base/ascii.h"
+#include "base/number.h"
 #include "base/text.h"
 #include "base/utf8.h"
 
@@ -12,7 +13,7 @@ void supine_text_add(char *text, size_t size, const char *format, ...) {
   const size_t used = strlen(text);
   va_list arguments;
   va_start(arguments, format);
-  (void)vsnprintf(text + used, size - used, format, arguments);
+  (void)supine_print_text_list(text + used, size - used, format, arguments);
   va_end(arguments);
 }
 
@@ -24,7 +25,30 @@ const char *supine_text_file_name(const char *path) {
 bool supine_text_ends_in(const char *name, const char *ending) {
   const size_t length = strlen(name);
   const size_t tail = strlen(ending);
-  return length > tail && strcasecmp(name + length - tail, ending) == 0;
+  return length > tail && supine_ascii_same(name + length - tail, ending);
+}
+
+bool supine_text_is_utf8(const char *text) {
+  const char *const end = text + strlen(text);
+  for (const char *at = text; at < end;) {
+    const size_t size = supine_utf8_length(at, (size_t)(end - at));
+    if (size == 0) {
+      return false;
+    }
+    at += size;
+  }
+  return true;
+}
+
+size_t supine_text_fit(const char *text, size_t most) {
+  size_t length = strnlen(text, most + 1);
+  if (length > most) {
+    length = most;
+    while (length > 0 && ((unsigned char)text[length] & 0xC0U) == 0x80U) {
+      --length;
+    }
+  }
+  return length;
 }
 
 char *supine_text_make_utf8(char *text) {
@@ -37,4 +61,12 @@ char *supine_text_make_utf8(char *text) {
     at += size == 0 ? 1 : size;
   }
   return text;
+}
+
+supine_distance_text supine_text_distance(double mm) {
+  supine_distance_text distance = {"below 0.002"};
+  if (!(mm < SUPINE_TEXT_DISTANCE_LEAST)) { /* true if it is NaN */
+    (void)supine_print_text(distance.text, sizeof distance.text, "%.3f", mm);
+  }
+  return distance;
 }

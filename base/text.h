@@ -13,6 +13,13 @@
 SUPINE_PRINTF(3, 4)
 void supine_text_add(char *text, size_t size, const char *format, ...);
 
+/** Return whether a text is UTF-8. */
+bool supine_text_is_utf8(const char *text);
+
+/** Return the length of the longest part of `text`, from its begin, that has at most `most` bytes
+ * and does not cut a UTF-8 character. */
+size_t supine_text_fit(const char *text, size_t most);
+
 /** Replace bytes that are not UTF-8, which file names may contain, by '?'. Return `text`. */
 char *supine_text_make_utf8(char *text);
 
@@ -21,5 +28,17 @@ const char *supine_text_file_name(const char *path);
 
 /** Return whether a name ends in `ending` (".csv"), ignoring case, after at least one character. */
 bool supine_text_ends_in(const char *name, const char *ending);
+
+/** Distances below this one, in mm, are at the level of the storage of positions: their digits
+ * depend on the processor. */
+#define SUPINE_TEXT_DISTANCE_LEAST 0.002
+
+/** Text of a distance (supine_text_distance). */
+typedef struct supine_distance_text {
+  char text[32];
+} supine_distance_text;
+
+/** Format a distance in mm: with three decimals, or as "below 0.002". */
+supine_distance_text supine_text_distance(double mm);
 
 #endif

@@ -4,6 +4,7 @@
 #   sh cmake/debian.sh demo    build; make, precompute, deform and draw synthetic lungs
 #   sh cmake/debian.sh build   build the program and the tests
 #   sh cmake/debian.sh test    build, and run the tests
+#   sh cmake/debian.sh anywhere   build, and run tests as on other processors, on one, and on a busy machine
 #   sh cmake/debian.sh platforms   build the library also for musl, aarch64 and Windows, and run it
 #   sh cmake/debian.sh count   print the lines that the quick tests do not reach
 set -eu
@@ -12,10 +13,10 @@ cd "$(dirname "$0")/.."
 # Packages needed to build, and further packages needed by the tests.
 build="gcc libc6-dev cmake ninja-build pkg-config libfftw3-dev libgsl-dev libassimp-dev libjansson-dev
   libopenblas-dev liblapacke-dev libsuitesparse-dev libxxhash-dev libcairo2-dev libwebp-dev
-  libwebsockets-dev libteem-dev libnifti2-dev zlib1g-dev
+  libwebsockets-dev libnifti2-dev zlib1g-dev
   libmeshoptimizer-dev help2man"
 tests="g++ libegl-dev libgles-dev libgl1-mesa-dri poppler-utils libcmocka-dev libopenigtlink-dev mono-mcs mono-runtime
-  python3-vtk9 python3-numpy python3-nibabel python3-pip python3-setuptools python3-wheel gnuplot-nox
+  locales python3-vtk9 python3-yaml python3-numpy python3-nibabel python3-pip python3-setuptools python3-wheel gnuplot-nox
   plastimatch elastix tetgen calculix-ccx clang lld wasi-libc libclang-rt-dev-wasm32
   binaryen reuse abigail-tools gcc-aarch64-linux-gnu libc6-dev-arm64-cross doxygen dcmtk"
 platforms="clang musl-tools gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user gcc-mingw-w64-x86-64-win32 wine64 wine"
@@ -46,7 +47,7 @@ demo)
   cmake --build --preset release
   exec sh cmake/demo.sh build/release/supine demo
   ;;
-build | test | platforms)
+build | test | anywhere | platforms)
   [ "$1" != platforms ] || build="$build $platforms"
   # Tests open exported files in node and Chromium. Install each only if it is not on PATH.
   command -v npm >/dev/null || tests="$tests nodejs npm"
@@ -59,11 +60,12 @@ build | test | platforms)
   cmake --preset release -DBUILD_TESTING=ON
   cmake --build --preset release
   [ "$1" != platforms ] || exec ctest --preset release -R '^platform_'
+  [ "$1" != anywhere ] || exec sh tests/anywhere.sh
   # One test more than processors at a time, as some tests wait for servers and pages.
   [ "$1" = build ] || exec ctest --preset release -j "$(($(nproc) + 1))"
   ;;
 *)
-  echo "usage: sh cmake/debian.sh demo|build|test|platforms|count" >&2
+  echo "usage: sh cmake/debian.sh demo|build|test|anywhere|platforms|count" >&2
   exit 1
   ;;
 esac

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/number.h"
 #include "mesh/mesh.h"
 
 static const struct {
@@ -24,7 +25,7 @@ bool supine_mesh_unit_find(const char *name, double *millimetres) {
 }
 
 void supine_mesh_unit_name(double millimetres, char *text) {
-  (void)snprintf(text, 24, "%.9g mm", millimetres);
+  (void)supine_print_text(text, 24, "%.9g mm", millimetres);
   for (size_t i = 0; i < UNITS; ++i) {
     if (units[i].millimetres == millimetres) {
       (void)snprintf(text, 24, "%s", units[i].name);

@@ -5,8 +5,8 @@
 #     sh packaging/release.sh [REVISION [FOLDER]]
 #
 # REVISION is by default the tag v<version>, where runtime/include/supine/version.h has the version. A tag of a release
-# needs a date in CHANGELOG.md, which is also `date-released` in CITATION.cff; any other commit gives a trial. FOLDER,
-# by default build/dist, must not exist. The same commit gives the same bytes on the same system. The files:
+# needs a date in CHANGELOG.md, which is also `date-released` in CITATION.cff; any other commit gives a trial. While
+# CHANGELOG.md says "unreleased", CITATION.cff has no date. FOLDER, by default build/dist, must not exist. The same commit gives the same bytes on the same system. The files:
 #
 #     supine-<version>.tar.gz                            source
 #     supine_<version>_amd64.deb                         Debian package
@@ -61,10 +61,13 @@ grep -q "^#define SUPINE_VERSION_NUMBER $number\b" $header || fail "$header: SUP
 grep -qx "version: $version" CITATION.cff || fail "CITATION.cff: the version is not $version"
 heading=$(grep -m 1 '^## ' CHANGELOG.md)
 [ "${heading%%,*}" = "## [$version]" ] || fail "CHANGELOG.md: the first section is '$heading', not of $version"
+date=$(sed -n 's/^date-released: *//p' CITATION.cff)
+[ "$heading" != "## [$version], unreleased" ] || [ -z "$date" ] ||
+  fail "CHANGELOG.md says unreleased, and CITATION.cff $date: write '## [$version], $date', or remove date-released"
 case $revision in
 v[0-9]*)
   [ "$revision" = "v$version" ] || fail "the tag $revision has version $version: the tag must be v$version"
-  date=$(sed -n 's/^date-released: *//p' CITATION.cff)
+  [ -n "$date" ] || fail "CITATION.cff has no date-released: add the date of the release"
   [ "$heading" = "## [$version], $date" ] ||
     fail "CHANGELOG.md has '$heading', and CITATION.cff the date $date: write '## [$version], $date'"
   ;;

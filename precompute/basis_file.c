@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Write a basis file. */
+/* Print a basis file. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -11,6 +11,7 @@
 #include <supine/sh.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "base/text.h"
 #include "precompute/basis_file.h"
 #include "precompute/lungs/disease.h"
@@ -30,14 +31,14 @@ SUPINE_PRINTF(3, 4)
 static void add(entries *list, const char *key, const char *format, ...) {
   va_list arguments;
   va_start(arguments, format);
-  const int length = vsnprintf(NULL, 0, format, arguments);
+  const int length = supine_print_text_list(NULL, 0, format, arguments);
   va_end(arguments);
   char *text = supine_arena_take(list->memory, (size_t)length + 1, 1);
   va_start(arguments, format);
   if (list->count == ENTRIES_MAX) {
     list->memory->failed = true;
   } else if (text != NULL) {
-    (void)vsnprintf(text, (size_t)length + 1, format, arguments);
+    (void)supine_print_text_list(text, (size_t)length + 1, format, arguments);
     list->metadata[list->count++] = (supine_metadata){key, supine_text_make_utf8(text)};
   }
   va_end(arguments);
@@ -145,7 +146,7 @@ static void add_expected_error(entries *list, const supine_basis_content *conten
     add(list, "expected_error_from_mm", "%g", record->report.expected_from);
     add(list, "expected_error_source", "%s", content->prepared->fit);
   }
-  if (fitted && record->gain_error > 0.0) {
+  if (fitted && record->gain_fitted) {
     add(list, "turn_fitted", "yes");
   }
 }
@@ -180,20 +181,78 @@ static void to_float(const double *values, size_t count, float *out) {
   }
 }
 
+/* Arrays of a basis file, as they are stored. */
+typedef struct stored {
+  float *vertices;          /* [N, 3] */
+  float *directions;        /* [N, 3] of SCALAR rows, otherwise NULL */
+  unsigned char *lung;      /* [N] */
+  supine_compression field; /* coefficients for collapsed lungs */
+  supine_rows rows;         /* of `field`, in double precision */
+  supine_normals_modes normals;
+} stored;
+
+/* Shrink the displacements of VECTOR rows in collapsed lungs to the cube root of the lung's share.
+ */
+static void collapse_coefficients(const supine_lungs *lungs, const double share[2],
+                                  const supine_compression *field, float *coefficients) {
+  for (size_t i = 0; i < field->row_count; ++i) {
+    const size_t lung = lungs->lung_count == 2 && i >= 3 * lungs->lung_begin[1];
+    const float factor = (float)cbrt(share[lung]);
+    for (size_t k = 0; k < field->mode_count; ++k) {
+      const size_t at = i * field->mode_count + k;
+      coefficients[at] = factor * field->coefficients[at];
+    }
+  }
+}
+
+/* Collapse the lungs and their displacements, and round them as in the file. */
+static supine_status store(const supine_basis_content *content, supine_arena *arena, stored *made,
+                           supine_error *error) {
+  const supine_lungs *lungs = content->lungs;
+  const double *share = content->prepared->model.share;
+  const size_t n = lungs->mesh.vertex_count;
+  const supine_compression *field = content->compression;
+  double *collapsed = supine_arena_take(arena, 3 * n, sizeof *collapsed);
+  *made = (stored){.vertices = supine_arena_take(arena, 3 * n, sizeof(float)),
+                   .lung = supine_arena_take(arena, n, 1),
+                   .field = *field,
+                   .rows = content->rows};
+  SUPINE_TRY(supine_arena_check(arena, error, "%zu vertices of a basis", n));
+  supine_tissue_collapse(lungs, share, collapsed);
+  to_float(collapsed, 3 * n, made->vertices);
+  for (size_t i = 0; i < n; ++i) {
+    made->lung[i] = lungs->lung_count == 2 && i >= lungs->lung_begin[1] ? 1 : 0;
+  }
+  if (content->rows.kind == SUPINE_ROWS_SCALAR) {
+    made->directions = supine_arena_take(arena, 3 * n, sizeof(float));
+    SUPINE_TRY(supine_arena_check(arena, error, "%zu vertices of a basis", n));
+    memcpy(collapsed, content->rows.directions, 3 * n * sizeof *collapsed);
+    supine_tissue_collapse_directions(lungs, share, collapsed);
+    to_float(collapsed, 3 * n, made->directions);
+    made->rows.directions = collapsed;
+  } else if (share[0] != 1.0 || share[1] != 1.0) {
+    made->field.coefficients =
+        supine_arena_take(arena, field->row_count * field->mode_count, sizeof(float));
+    SUPINE_TRY(supine_arena_check(arena, error, "%zu vertices of a basis", n));
+    collapse_coefficients(lungs, share, field, made->field.coefficients);
+  }
+  return SUPINE_OK;
+}
+
 /* Find the modes of the vertex normals from vertices and displacements rounded as in the file. */
-static supine_status find_normals(const supine_basis_content *content, const float *vertices,
-                                  const float *directions, supine_arena *arena,
-                                  supine_normals_modes *normals, supine_error *error) {
+static supine_status find_normals(const supine_basis_content *content, supine_arena *arena,
+                                  stored *made, supine_error *error) {
   static const double straight[3] = {0.0, 0.0, 0.0};
   const supine_normals_surface surface = {
       .lungs = content->lungs,
-      .vertices = vertices,
-      .directions = directions,
-      .field = content->compression,
+      .vertices = made->vertices,
+      .kind = made->rows.kind,
+      .directions = made->directions,
+      .field = &made->field,
       .resting = content->resting,
       .forms = content->forms,
       .bend = content->reference != NULL ? content->prepared->model.bend : straight};
-  return supine_normals_modes_create(&surface, arena, normals, error);
+  return supine_normals_modes_create(&surface, arena, &made->normals, error);
 }
 
 static void add_normals(entries *list, const supine_normals_modes *normals, bool rest_known) {
@@ -229,14 +288,14 @@ static void add_texts(entries *list, const supine_prepared *prepared) {
 }
 
 /* Add all metadata in the file's order. */
-static void add_all(entries *list, const supine_basis_content *content, const double share[2],
+static void add_all(entries *list, const supine_basis_content *content,
                     const supine_normals_modes *normals) {
-  const supine_basis_choice *choice = content->choice;
+  const double *share = content->prepared->model.share;
   add(list, "format", "supine-basis");
   add(list, "version", "3");
-  add(list, "kind", "%s", content->directions == NULL ? "vector" : "scalar");
+  add(list, "kind", "%s", content->rows.kind == SUPINE_ROWS_VECTOR ? "vector" : "scalar");
   add(list, "band", "%zu", content->compression->band);
-  add(list, "modes", "%s", choice->modes == 0 ? "harmonics" : "best");
+  add(list, "modes", "%s", content->is_harmonics ? "harmonics" : "best");
   add(list, "mode_count", "%zu", content->compression->mode_count);
   add(list, "units", "mm");
   add(list, "axes", "LPS");
@@ -257,81 +316,37 @@ static void add_all(entries *list, const supine_basis_content *content, const do
   }
   add_texts(list, content->prepared);
   add_normals(list, normals, content->resting != NULL);
-  add(list, "made_by", "%s", choice->made_by != NULL ? choice->made_by : "supine_precompute");
+  add(list, "made_by", "%s", content->made_by != NULL ? content->made_by : "supine_precompute");
 }
 
-/* Add the error of storage to content->accuracy. Open the tensors as a basis in memory for that.
- * @param directions  those of the file, [N, 3], or NULL */
-static supine_status measure_storage(const supine_basis_content *content, const double *directions,
-                                     const supine_tensor *tensors, size_t count,
-                                     const entries *list, supine_error *error) {
-  const supine_basis_options options = {
-      .size = sizeof options, .simd = SUPINE_SIMD_PORTABLE, .without_normals = true};
-  supine_basis *basis = NULL;
-  char *bytes = NULL;
-  size_t size = 0;
-  FILE *memory = open_memstream(&bytes, &size);
-  if (memory != NULL) {
-    supine_safetensors_print(memory, tensors, count, list->metadata, list->count);
-  }
-  supine_status status = memory == NULL || fclose(memory) != 0
-                             ? supine_error_memory(error, "a basis in memory")
-                             : supine_basis_open_memory_with(bytes, size, &options, &basis, error);
-  if (status == SUPINE_OK) {
-    status =
-        supine_accuracy_add_storage(basis, content->compression, directions, content->accuracy);
-  }
-  supine_basis_close(basis);
-  free(bytes);
-  return status;
+enum { TENSORS_MAX = 14 };
+
+static void basis_close(supine_basis **basis) {
+  supine_basis_close(*basis);
 }
 
-/* This function has more than 60 lines: it lists all tensors in the file's order. */
-supine_status supine_writer_basis_write(const char *path, const supine_basis_content *content,
-                                        supine_error *error) {
-  static const double healthy[2] = {1.0, 1.0};
+/* List the tensors in the file's order; return their number. */
+static size_t list_tensors(const supine_basis_content *content, const stored *made,
+                           supine_tensor list[TENSORS_MAX]) {
   static const supine_error_table no_table;
   const supine_lungs *lungs = content->lungs;
-  const double *share = content->is_fields ? healthy : content->prepared->model.share;
-  const supine_compression *field = content->compression;
+  const supine_compression *field = &made->field;
   const supine_volume_forms *forms = content->forms;
   const supine_error_table *table = content->table != NULL ? content->table : &no_table;
+  const bool vector = content->rows.kind == SUPINE_ROWS_VECTOR;
   const size_t n = lungs->mesh.vertex_count;
   const size_t k = field->mode_count;
   const size_t g = lungs->lung_count;
-  const bool vector = content->directions == NULL;
-  SUPINE_ARENA arena = {0};
-  entries list = {.memory = &arena};
-  supine_normals_modes normals = {0};
-  double *collapsed = supine_arena_take(&arena, 3 * n, sizeof *collapsed);
-  float *vertices = supine_arena_take(&arena, 3 * n, sizeof *vertices);
-  float *directions = vector ? NULL : supine_arena_take(&arena, 3 * n, sizeof *directions);
-  unsigned char *lung = supine_arena_take(&arena, n, 1);
-  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices of %s", n, path));
-  supine_tissue_collapse(lungs, share, collapsed);
-  to_float(collapsed, 3 * n, vertices);
-  if (!vector) {
-    memcpy(collapsed, content->directions, 3 * n * sizeof *collapsed);
-    supine_tissue_collapse_directions(lungs, share, collapsed);
-    to_float(collapsed, 3 * n, directions);
-  }
-  for (size_t i = 0; i < n; ++i) {
-    lung[i] = g == 2 && i >= lungs->lung_begin[1] ? 1 : 0;
-  }
-  if (!content->choice->without_normals) {
-    SUPINE_TRY(find_normals(content, vertices, directions, &arena, &normals, error));
-  }
-  add_all(&list, content, share, &normals);
-  SUPINE_TRY(supine_arena_check(&arena, error, "metadata of %s", path));
-  const size_t q = normals.count;
-  const supine_tensor all[] = {
-      {"vertices", SUPINE_F32, 2, {n, 3}, vertices},
+  const size_t q = made->normals.count;
+  const supine_tensor scalars = {"coefficients", SUPINE_F32, 2, {n, k}, field->coefficients};
+  const supine_tensor vectors = {"coefficients", SUPINE_F32, 3, {n, 3, k}, field->coefficients};
+  const supine_tensor all[TENSORS_MAX] = {
+      {"vertices", SUPINE_F32, 2, {n, 3}, made->vertices},
       {"triangles", SUPINE_U32, 2, {lungs->mesh.triangle_count, 3}, lungs->mesh.triangles},
       {"modes", SUPINE_F64, 2, {k, supine_sh_count(field->band)}, field->modes},
-      {"lung", SUPINE_U8, 1, {n}, lung},
-      vector ? (supine_tensor){"coefficients", SUPINE_F32, 3, {n, 3, k}, field->coefficients}
-             : (supine_tensor){"coefficients", SUPINE_F32, 2, {n, k}, field->coefficients},
-      {"direction", SUPINE_F32, 2, {n, 3}, directions},
+      {"lung", SUPINE_U8, 1, {n}, made->lung},
+      vector ? vectors : scalars,
+      {"direction", SUPINE_F32, 2, {n, 3}, made->directions},
       {"volume_linear", SUPINE_F64, 3, {g, 3, k}, forms->linear},
       {"volume_quadratic", SUPINE_F64, 4, {g, 3, k, k}, forms->quadratic},
       {"volume_cubic", SUPINE_F64, 4, {g, k, k, k}, forms->cubic},
@@ -342,18 +357,63 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
        {table->band_count},
        table == &no_table ? NULL : table->harmonics},
       {"error_modes", SUPINE_F64, 1, {table->mode_count}, table == &no_table ? NULL : table->modes},
-      {"normals", SUPINE_I8, 3, {n, 3, q + 1}, normals.modes},
-      {"normal_weights", SUPINE_F64, 4, {g, q, 3, 1 + 2 * k + k * (k + 1) / 2}, normals.weights}};
-  supine_tensor given[sizeof all / sizeof *all];
+      {"normals", SUPINE_I8, 3, {n, 3, q + 1}, made->normals.modes},
+      {"normal_weights",
+       SUPINE_F64,
+       4,
+       {g, q, 3, 1 + 2 * k + k * (k + 1) / 2},
+       made->normals.weights}};
   size_t count = 0;
-  for (size_t i = 0; i < sizeof all / sizeof *all; ++i) {
+  for (size_t i = 0; i < TENSORS_MAX; ++i) {
     if (all[i].data != NULL) {
-      given[count++] = all[i];
+      list[count++] = all[i];
     }
   }
-  SUPINE_TRY(measure_storage(content, vector ? NULL : collapsed, given, count, &list, error));
-  list.count = 0;
-  add_all(&list, content, share, &normals);
-  SUPINE_TRY(supine_arena_check(&arena, error, "metadata of %s", path));
-  return supine_safetensors_write(path, given, count, list.metadata, list.count, error);
+  return count;
+}
+
+/* Print the metadata and the tensors into memory. */
+static supine_status print_bytes(const supine_basis_content *content, const stored *made,
+                                 supine_bytes *bytes, supine_error *error) {
+  SUPINE_ARENA arena = {0};
+  entries list = {.memory = &arena};
+  supine_tensor tensors[TENSORS_MAX];
+  const size_t count = list_tensors(content, made, tensors);
+  add_all(&list, content, &made->normals);
+  SUPINE_TRY(supine_arena_check(&arena, error, "metadata of a basis"));
+  FILE *file = open_memstream(&bytes->data, &bytes->size);
+  if (file == NULL) {
+    return supine_error_memory(error, "a basis in memory");
+  }
+  supine_safetensors_print(file, tensors, count, list.metadata, list.count);
+  const bool whole = ferror(file) == 0;
+  if (fclose(file) != 0 || !whole) {
+    return supine_error_memory(error, "a basis in memory");
+  }
+  return SUPINE_OK;
+}
+
+/* Add the error of storage to content->accuracy: open the printed basis, and evaluate it. */
+static supine_status measure_storage(const supine_basis_content *content, const stored *made,
+                                     const supine_bytes *bytes, supine_error *error) {
+  const supine_basis_options options = {
+      .size = sizeof options, .simd = SUPINE_SIMD_PORTABLE, .without_normals = true};
+  SUPINE_FREED_BY(basis_close) supine_basis *basis = NULL;
+  SUPINE_TRY(supine_basis_open_memory_with(bytes->data, bytes->size, &options, &basis, error));
+  return supine_accuracy_add_storage(basis, &made->field, &made->rows, content->accuracy);
+}
+
+supine_status supine_precompute_print(const supine_basis_content *content, supine_bytes *bytes,
+                                      supine_error *error) {
+  SUPINE_ARENA arena = {0};
+  stored made;
+  SUPINE_TRY(store(content, &arena, &made, error));
+  if (!content->without_normals) {
+    SUPINE_TRY(find_normals(content, &arena, &made, error));
+  }
+  SUPINE_TRY(print_bytes(content, &made, bytes, error));
+  SUPINE_TRY(measure_storage(content, &made, bytes, error));
+  free(bytes->data);
+  *bytes = (supine_bytes){0};
+  return print_bytes(content, &made, bytes, error); /* again, with the errors of storage */
 }

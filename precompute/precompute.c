@@ -1,18 +1,14 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Make a basis file: expand displacements in harmonics, compress, measure the error, and write. */
-#include <cblas.h>
+/* Make a basis: expand displacements in harmonics, compress them, measure the error, and print. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/arena.h"
-#include "base/vec3.h"
+#include "base/output.h"
 #include <supine/volume.h>
 
 #include "precompute/precompute.h"
-
-#include "precompute/basis_file.h"
-#include "precompute/projection/projection.h"
 
 /* The default number of held-out directions of gravity is HELD_OUT_WORK divided by the number of
  * vertices, but at least HELD_OUT_MIN and at most HELD_OUT_MAX. With 100 directions, the measured
@@ -24,91 +20,91 @@ enum { HELD_OUT_MIN = 100, HELD_OUT_MAX = 1000, HELD_OUT_WORK = 20000000 };
 static const double breath_volume = 500.0;
 static const double sqrt_4pi = 3.5449077018110321;
 
-typedef struct pipeline {
-  const supine_prepared *given;
-  const supine_model *model;
-  const supine_basis_choice *choice;
-  const supine_lungs *lungs; /* lungs in use: the given ones, or `anchored` after anchor() */
-  supine_arena memory;       /* holds the vertices of `anchored` */
-  supine_arena lengths;      /* holds the arrays `directions` and `weight` */
-  supine_lungs anchored; /* copy of the lungs whose vertices anchor() has corrected, or all zero */
-  supine_reference reference;
-  double *directions; /* [N, 3] displacement of each vertex per unit force, mm, or NULL */
-  /* [N] squared length of the vector in `directions`. With these weights, the modes minimise the
-   * error of the displacement: 0.34 % RMS for a left lung, 0.40 % without weights. */
-  double *weight;
-  supine_projection projection;
-  supine_compression compression;
-  double singular[SUPINE_MODES_MADE_MAX];
-  double square_sum; /* sum of the squared singular values, also of modes left out */
-  supine_volume_forms forms;
-  supine_truth truth;
-  supine_accuracy accuracy;
-  double turned_over;
-  /* [lungs, 9] resting volume (FRC) minus the volume of the reference surface, mL: coefficients of
-   * spherical harmonics of the direction of gravity, to degree 2 */
-  double resting[2][9];
-  /* Coefficients of the 9 spherical harmonics to degree 2 of a function of the direction of
-   * gravity: the volume at which errors are measured, minus that of the reference surface, mL. */
-  double volume[9];
-  supine_error_table table;
-} pipeline;
-
-static void pipeline_free(pipeline *p) {
-  supine_arena_free(&p->memory);
-  supine_arena_free(&p->lengths);
-  supine_projection_free(&p->projection);
-  supine_sh_compression_free(&p->compression);
-  supine_physics_volume_forms_free(&p->forms);
-  supine_accuracy_truth_free(&p->truth);
+static size_t held_out_count(const supine_lungs *lungs, size_t wanted) {
+  const size_t count = HELD_OUT_WORK / lungs->mesh.vertex_count;
+  if (wanted > 0) {
+    return wanted;
+  }
+  if (count < HELD_OUT_MIN) {
+    return HELD_OUT_MIN;
+  }
+  return count < HELD_OUT_MAX ? count : HELD_OUT_MAX;
 }
 
-static supine_status find_directions(pipeline *p, supine_error *error) {
-  const size_t n = p->lungs->mesh.vertex_count;
-  p->directions = supine_arena_take(&p->lengths, 3 * n, sizeof *p->directions);
-  p->weight = supine_arena_take(&p->lengths, n, sizeof *p->weight);
-  SUPINE_TRY(supine_arena_check(&p->lengths, error, "%zu vertices", n));
-  SUPINE_TRY(supine_physics_directions(p->lungs, &p->model->force, &p->model->direction,
-                                       p->directions, error));
-  for (size_t i = 0; i < n; ++i) {
-    const double *d = p->directions + 3 * i;
-    p->weight[i] = supine_dot(d, d);
+/* What the displacement of a basis is compared with: exact solutions of the model for held-out
+ * directions of gravity or, if another simulator computed the displacement, each of its fields
+ * predicted from the others. */
+typedef struct evidence {
+  bool is_fields;
+  supine_truth truth;       /* of the model */
+  supine_error_table table; /* error against `truth`, by number of harmonics and of modes */
+  supine_fit fit;           /* of another simulator's fields */
+} evidence;
+
+static void evidence_free(evidence *given) {
+  supine_accuracy_truth_free(&given->truth);
+  supine_fields_fit_free(&given->fit);
+}
+
+/* Lungs, model -> expansion of the force -> field of displacements, and exact solutions. */
+static supine_status solve_model(const supine_lungs *lungs, const supine_model *model,
+                                 const supine_basis_choice *choice, supine_gravity_field *field,
+                                 evidence *given, supine_error *error) {
+  SUPINE_FREED_BY(supine_projection_free) supine_projection projection = {0};
+  const size_t count = held_out_count(lungs, choice->held_out);
+  SUPINE_TRY(supine_projection_create(lungs, model, choice->band, &projection, error));
+  SUPINE_TRY(supine_projection_field(lungs, model, &projection, field, error));
+  return supine_accuracy_truth_create(lungs, model, projection.span, field, count, &given->truth,
+                                      error);
+}
+
+/* Another simulator's fields -> field of displacements, and predictions of each from the others. */
+static supine_status fit_fields(const supine_basis_choice *choice, supine_gravity_field *field,
+                                evidence *given, supine_error *error) {
+  given->is_fields = true;
+  SUPINE_TRY(supine_fields_fit(choice->fields, choice->choose_band ? -1 : (int)choice->band,
+                               &given->fit, error));
+  return supine_fields_field(&given->fit, field, error);
+}
+
+/* Field -> K modes, without those that raise the error by less than 1 % together. Or use the
+ * harmonics themselves. */
+static supine_status compress(const supine_gravity_field *field, const supine_basis_choice *choice,
+                              evidence *given, supine_compression *compression,
+                              supine_error *error) {
+  double singular[SUPINE_MODES_MADE_MAX];
+  double total = 0.0;
+  if (choice->modes == 0) {
+    SUPINE_TRY(supine_sh_compress_harmonics(&field->expansion, compression, error));
+  } else {
+    SUPINE_TRY(supine_sh_compress_modes(&field->expansion, field->weight, choice->modes,
+                                        compression, singular, &total, error));
+  }
+  const size_t count = compression->mode_count;
+  double relative = 0.0; /* relative RMS error with all modes */
+  if (given->is_fields) {
+    relative = supine_fields_fit_error(&given->fit);
+  } else {
+    SUPINE_TRY(supine_accuracy_error_table_create(&given->truth, field, compression, &given->table,
+                                                  error));
+    relative = given->table.modes[count - 1];
+  }
+  if (choice->modes > 0 && !choice->keep_modes) {
+    supine_sh_compression_truncate(compression, field->expansion.rank,
+                                   supine_sh_modes_needed(count, singular, total, relative));
   }
   return SUPINE_OK;
 }
 
-static supine_status project(pipeline *p, supine_error *error) {
-  return supine_projection_create(p->lungs, p->model, p->choice->band, &p->projection, error);
-}
+/* The surface from which displacements are measured, and the state of the scan. */
+typedef struct surface {
+  supine_lungs lungs; /* the given lungs, or a copy whose vertices anchor() has corrected */
+  supine_reference reference;
+  supine_arena memory; /* of the corrected vertices */
+} surface;
 
-/* If expandability varies, replace the forces of the projection by displacements, mm. */
-static supine_status find_strain(pipeline *p, supine_error *error) {
-  supine_expansion *expansion = &p->projection.expansion;
-  const size_t rank = expansion->rank;
-  const size_t rows = 3 * expansion->row_count;
-  if (p->model->strain == NULL) {
-    return SUPINE_OK;
-  }
-  double *columns = malloc(rows * rank * sizeof *columns);
-  if (columns == NULL) {
-    return supine_error_memory(error, "%zu vertices", rows / 3);
-  }
-  for (size_t i = 0; i < rows * rank; ++i) {
-    columns[i] = expansion->columns[i / (3 * rank) * rank + i % rank] * p->directions[i / rank];
-  }
-  free(expansion->columns);
-  supine_arena_free(&p->lengths);
-  p->directions = p->weight = NULL;
-  expansion->columns = columns;
-  expansion->row_count = rows;
-  return supine_physics_strain_apply(p->model->strain, NULL, 3 * rank, columns, error);
-}
-
-static supine_status compress(pipeline *p, supine_error *error) {
-  return p->choice->modes == 0
-             ? supine_sh_compress_harmonics(&p->projection.expansion, &p->compression, error)
-             : supine_sh_compress_modes(&p->projection.expansion, p->weight, p->choice->modes,
-                                        &p->compression, p->singular, &p->square_sum, error);
+static void surface_free(surface *of) {
+  supine_arena_free(&of->memory);
 }
 
 /* Correct the vertices of the reference surface so that the displacement computed from the modes
@@ -118,43 +114,56 @@ static supine_status compress(pipeline *p, supine_error *error) {
  *
  * A_j is the gain (factor on the displacement) at which its lung has the volume of the scan, and u
  * is the displacement computed from the modes. */
-static supine_status anchor(pipeline *p, supine_error *error) {
-  const supine_lungs *lungs = &p->given->source.lungs;
-  const supine_compression *field = &p->compression;
+static supine_status anchor(const supine_prepared *prepared, const supine_rows *rows,
+                            const supine_compression *compression, surface *made,
+                            supine_error *error) {
+  const supine_lungs *lungs = &prepared->source.lungs;
   const size_t n = lungs->mesh.vertex_count;
   double weights[SUPINE_MODES_MADE_MAX];
-  if (!p->reference.known || lungs->scanned == NULL) {
+  *made = (surface){.lungs = *lungs, .reference = prepared->reference};
+  if (!made->reference.known || lungs->scanned == NULL) {
     return SUPINE_OK;
   }
   SUPINE_ARENA arena = {0};
-  double *u = supine_arena_take(&arena, 4 * n, sizeof *u);
-  if (p->anchored.mesh.vertices == NULL) {
-    p->anchored = *lungs;
-    p->anchored.mesh.vertices = supine_arena_take(&p->memory, 3 * n, sizeof(double));
-  }
+  double *u = supine_arena_take(&arena, 3 * n, sizeof *u);
+  double *ones = supine_arena_take(&arena, n, sizeof *ones);
+  double *vertices = supine_arena_take(&made->memory, 3 * n, sizeof *vertices);
   SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
-  SUPINE_TRY(supine_arena_check(&p->memory, error, "%zu vertices", n));
-  supine_sh_compression_weights(field, p->reference.scan.state.gravity, weights);
-  supine_projection_displacement(field, p->directions, weights, u);
-  for (size_t i = 3 * n; i < 4 * n; ++i) {
-    u[i] = 1.0;
+  SUPINE_TRY(supine_arena_check(&made->memory, error, "%zu vertices", n));
+  supine_sh_compression_weights(compression, made->reference.scan.state.gravity, weights);
+  supine_projection_displacement(compression, rows, weights, u);
+  for (size_t i = 0; i < n; ++i) {
+    ones[i] = 1.0;
   }
-  memcpy(p->anchored.mesh.vertices, lungs->scanned, 3 * n * sizeof(double));
-  const supine_status status =
-      supine_reference_find_gains(&p->anchored, p->model->bend, u, u + 3 * n, &p->reference, error);
+  memcpy(vertices, lungs->scanned, 3 * n * sizeof *vertices);
+  made->lungs.mesh.vertices = vertices;
+  SUPINE_TRY(supine_reference_find_gains(&made->lungs, prepared->model.bend, u, ones,
+                                         &made->reference, error));
   for (size_t i = 0; i < 3 * n; ++i) {
     const size_t lung = lungs->lung_count == 2 && i >= 3 * lungs->lung_begin[1];
-    p->anchored.mesh.vertices[i] -= p->reference.scan_gains[lung][i % 3] * u[i];
+    vertices[i] -= made->reference.scan_gains[lung][i % 3] * u[i];
   }
-  supine_lungs_measure_volumes(&p->anchored);
-  p->lungs = &p->anchored;
-  return status;
+  supine_lungs_measure_volumes(&made->lungs);
+  return SUPINE_OK;
 }
 
-static supine_status find_forms(pipeline *p, supine_error *error) {
-  return supine_projection_volume_forms(&p->compression, p->lungs, p->model->share, p->directions,
-                                        &p->forms, error);
+/* Subtract from each mode its weight w in the posture of the scan, so that the given surface
+ * reproduces the scan. The constant harmonic is 1 / sqrt(4 pi), so that its coefficient falls by
+ * sqrt(4 pi) w. */
+static void subtract_scan(const double scan_gravity[3], supine_compression *compression) {
+  double weights[SUPINE_MODES_MADE_MAX];
+  supine_sh_compression_weights(compression, scan_gravity, weights);
+  for (size_t k = 0; k < compression->mode_count; ++k) {
+    compression->modes[k * supine_sh_count(compression->band)] -= sqrt_4pi * weights[k];
+  }
 }
+
+/* Volumes by the direction of gravity minus those of the reference surface, mL, as coefficients of
+ * the 9 spherical harmonics to degree 2. */
+typedef struct volumes {
+  double resting[2][9]; /* of each lung at rest (FRC), if known */
+  double measured[9];   /* of all lungs, at which errors are measured */
+} volumes;
 
 /* Check that each lung can reach its resting volume (FRC) with gravity along the unit vector g.
  * @param volume  [lungs] resting volume minus that of the reference surface, mL */
@@ -169,9 +178,9 @@ static supine_status check_rest(const supine_compression *compression,
     supine_volume_form form;
     double gains[3];
     supine_physics_volume_forms_contract_lung(forms, lung, weights, &form);
-    SUPINE_REFUSE_IF(supine_volume_form_gains(&form, straight, 0.0, volume[lung], gains, &inner) !=
-                         SUPINE_OK,
-                     error, SUPINE_ERROR_NUMERICAL,
+    const supine_status status =
+        supine_volume_form_gains(&form, straight, 0.0, volume[lung], gains, &inner);
+    SUPINE_REFUSE_IF(status != SUPINE_OK, error, SUPINE_ERROR_NUMERICAL,
                      "with gravity along %g,%g,%g the volume at rest cannot be %.0f mL below full "
                      "inflation: %s; give --resting, or take the scan as it is with --scanned none",
                      g[0], g[1], g[2], -volume[lung], inner.message);
@@ -179,15 +188,18 @@ static supine_status check_rest(const supine_compression *compression,
   return SUPINE_OK;
 }
 
-/* Find the resting volume (FRC) of each lung minus the volume of its reference surface, mL, as
- * coefficients of spherical harmonics of the direction of gravity. They interpolate the volumes for
- * gravity along the six axes.
+/* Find the resting volumes (FRC) if they are known, and the volume at which errors in mm are
+ * measured. Harmonics interpolate the volumes for gravity along the six axes.
  * @param share  volume of each lung divided by its healthy volume */
-static supine_status rest_harmonics(const supine_reference *reference, const double share[2],
-                                    const supine_compression *compression,
-                                    const supine_volume_forms *forms, double harmonics[2][9],
-                                    supine_error *error) {
+static supine_status find_volumes(const supine_reference *reference, const double share[2],
+                                  const supine_compression *compression,
+                                  const supine_volume_forms *forms, volumes *found,
+                                  supine_error *error) {
   double volume[2][6];
+  *found = (volumes){.measured = {breath_volume * sqrt_4pi}};
+  if (!reference->known) {
+    return SUPINE_OK;
+  }
   for (size_t axis = 0; axis < 6; ++axis) {
     double g[3] = {0.0, 0.0, 0.0};
     double rest[2];
@@ -200,116 +212,102 @@ static supine_status rest_harmonics(const supine_reference *reference, const dou
     SUPINE_TRY(check_rest(compression, forms, g, rest, error));
   }
   for (size_t lung = 0; lung < reference->lung_count; ++lung) {
-    supine_reference_harmonics(volume[lung], harmonics[lung]);
+    supine_reference_harmonics(volume[lung], found->resting[lung]);
   }
-  return SUPINE_OK;
-}
-
-/* Find the resting volumes (FRC) if known, and the volume at which errors in mm are measured. */
-static supine_status find_rest(pipeline *p, supine_error *error) {
-  p->volume[0] = breath_volume * sqrt_4pi;
-  if (!p->reference.known) {
-    return SUPINE_OK;
-  }
-  SUPINE_TRY(rest_harmonics(&p->reference, p->model->share, &p->compression, &p->forms, p->resting,
-                            error));
   for (size_t t = 0; t < 9; ++t) {
-    p->volume[t] = p->resting[0][t] + p->resting[1][t];
+    found->measured[t] = found->resting[0][t] + found->resting[1][t];
   }
   return SUPINE_OK;
 }
 
-static size_t held_out_default(const pipeline *p) {
-  const size_t count = HELD_OUT_WORK / p->lungs->mesh.vertex_count;
-  return count < HELD_OUT_MIN ? HELD_OUT_MIN : count > HELD_OUT_MAX ? HELD_OUT_MAX : count;
-}
-
-static supine_status hold_out(pipeline *p, supine_error *error) {
-  const size_t count = p->choice->held_out > 0 ? p->choice->held_out : held_out_default(p);
-  return supine_accuracy_truth_create(p->lungs, p->model, p->directions, &p->projection, count,
-                                      &p->truth, error);
-}
-
-static supine_status measure(pipeline *p, supine_error *error) {
-  const supine_status status = supine_accuracy_measure(&p->truth, &p->compression, p->directions,
-                                                       &p->forms, p->volume, &p->accuracy, error);
-  p->accuracy.volume *= p->reference.known ? 1.0 : breath_volume;
-  return status;
-}
-
-static supine_status tabulate(pipeline *p, supine_error *error) {
-  return supine_accuracy_error_table_create(&p->truth, &p->projection, &p->compression,
-                                            p->directions, &p->table, error);
-}
-
-static supine_status drop_modes(pipeline *p, supine_error *error) {
-  const size_t needed = supine_sh_modes_needed(p->compression.mode_count, p->singular,
-                                               p->square_sum, p->accuracy.relative_rms);
-  if (p->choice->modes == 0 || needed == p->compression.mode_count) {
-    return SUPINE_OK;
+/* Measure the errors of a basis and, with the model, the share of triangles that turn over. */
+static supine_status measure(const evidence *given, const supine_basis_content *basis,
+                             const volumes *at, supine_basis_report *made, supine_error *error) {
+  const supine_compression *compression = basis->compression;
+  if (given->is_fields) {
+    made->fit = given->fit.report;
+    return supine_fields_measure(&given->fit, basis->is_harmonics ? 0 : compression->mode_count,
+                                 &made->accuracy, error);
   }
-  supine_sh_compression_truncate(&p->compression, p->projection.expansion.rank, needed);
-  supine_physics_volume_forms_free(&p->forms);
-  SUPINE_TRY(anchor(p, error));
-  SUPINE_TRY(find_forms(p, error));
-  SUPINE_TRY(find_rest(p, error));
-  return measure(p, error);
+  SUPINE_TRY(supine_accuracy_measure(&given->truth, compression, &basis->rows, basis->forms,
+                                     at->measured, &made->accuracy, error));
+  made->accuracy.volume *= basis->reference != NULL ? 1.0 : breath_volume;
+  return supine_accuracy_turned_over(basis->lungs, &basis->rows, compression, basis->forms,
+                                     at->measured, &made->turned_over, error);
 }
 
-static supine_status find_turned_over(pipeline *p, supine_error *error) {
-  return supine_accuracy_turned_over(p->lungs, p->directions, &p->compression, &p->forms, p->volume,
-                                     &p->turned_over, error);
-}
-
-static supine_status write_file(pipeline *p, supine_error *error) {
-  for (size_t i = 0; i < 3 * p->lungs->mesh.vertex_count && p->directions == NULL; ++i) {
-    const size_t lung = p->lungs->lung_count == 2 && i >= 3 * p->lungs->lung_begin[1];
-    cblas_sscal((int)p->compression.mode_count, (float)cbrt(p->model->share[lung]),
-                p->compression.coefficients + i * p->compression.mode_count, 1);
-  }
-  const supine_basis_content content = {.lungs = p->lungs,
-                                        .prepared = p->given,
-                                        .choice = p->choice,
-                                        .directions = p->directions,
-                                        .compression = &p->compression,
-                                        .forms = &p->forms,
-                                        .accuracy = &p->accuracy,
-                                        .turned_over = &p->turned_over,
-                                        .table = &p->table,
-                                        .reference = p->reference.known ? &p->reference : NULL,
-                                        .resting = p->reference.known ? p->resting[0] : NULL};
-  return supine_writer_basis_write(p->choice->path, &content, error);
-}
-
-static supine_status tell_progress(const supine_basis_choice *choice, double fraction,
+/* Tell that `done` of the steps of supine_precompute are done. */
+static supine_status tell_progress(const supine_basis_choice *choice, size_t done,
                                    supine_error *error) {
-  SUPINE_REFUSE_IF(
-      !(choice->progress == NULL || choice->progress(choice->progress_context, fraction)), error,
-      SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
+  enum { STEPS = 7 };
+  bool wanted = true;
+  if (choice->progress != NULL) {
+    wanted = choice->progress(choice->progress_context, (double)done / STEPS);
+  }
+  SUPINE_REFUSE_IF(!wanted, error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
   return SUPINE_OK;
 }
 
 supine_status supine_precompute(const supine_prepared *prepared, const supine_basis_choice *choice,
-                                supine_precompute_report *report, supine_error *error) {
-  static supine_status (*const steps[])(pipeline *, supine_error *) = {
-      project,  find_directions, find_strain, compress,   anchor,           find_forms, find_rest,
-      hold_out, measure,         tabulate,    drop_modes, find_turned_over, write_file};
-  enum { STEPS = sizeof steps / sizeof *steps };
-  SUPINE_FREED_BY(pipeline_free)
-  pipeline p = {.given = prepared,
-                .model = &prepared->model,
-                .choice = choice,
-                .lungs = &prepared->source.lungs,
-                .reference = prepared->reference};
-  for (size_t i = 0; i < STEPS; ++i) {
-    SUPINE_TRY(tell_progress(choice, (double)i / STEPS, error));
-    SUPINE_TRY(steps[i](&p, error));
+                                supine_bytes *bytes, supine_basis_report *report,
+                                supine_error *error) {
+  const supine_lungs *lungs = &prepared->source.lungs;
+  const supine_model *model = &prepared->model;
+  SUPINE_FREED_BY(evidence_free) evidence given = {.is_fields = choice->fields != NULL};
+  SUPINE_FREED_BY(supine_projection_field_free) supine_gravity_field field = {0};
+  SUPINE_FREED_BY(supine_sh_compression_free) supine_compression compression = {0};
+  SUPINE_FREED_BY(surface_free) surface of = {.reference = {.known = false}};
+  SUPINE_FREED_BY(supine_physics_volume_forms_free) supine_volume_forms forms = {0};
+  volumes at;
+  supine_basis_report made = {0};
+
+  SUPINE_TRY(tell_progress(choice, 0, error));
+  if (given.is_fields) {
+    SUPINE_TRY(fit_fields(choice, &field, &given, error));
+  } else {
+    SUPINE_TRY(solve_model(lungs, model, choice, &field, &given, error));
   }
-  SUPINE_TRY(tell_progress(choice, 1.0, error));
+  SUPINE_TRY(tell_progress(choice, 2, error));
+  SUPINE_TRY(compress(&field, choice, &given, &compression, error));
+  SUPINE_TRY(tell_progress(choice, 3, error));
+  SUPINE_TRY(anchor(prepared, &field.rows, &compression, &of, error));
+  if (choice->scan_gravity != NULL) {
+    subtract_scan(choice->scan_gravity, &compression);
+  }
+  SUPINE_TRY(supine_projection_volume_forms(&compression, &of.lungs, model->share, &field.rows,
+                                            &forms, error));
+  SUPINE_TRY(find_volumes(&of.reference, model->share, &compression, &forms, &at, error));
+  SUPINE_TRY(tell_progress(choice, 4, error));
+  const supine_basis_content basis = {.lungs = &of.lungs,
+                                      .prepared = prepared,
+                                      .rows = field.rows,
+                                      .compression = &compression,
+                                      .forms = &forms,
+                                      .accuracy = &made.accuracy,
+                                      .reference = of.reference.known ? &of.reference : NULL,
+                                      .resting = of.reference.known ? at.resting[0] : NULL,
+                                      .turned_over = given.is_fields ? NULL : &made.turned_over,
+                                      .table = given.is_fields ? NULL : &given.table,
+                                      .is_fields = given.is_fields,
+                                      .scan_gravity = choice->scan_gravity,
+                                      .is_harmonics = choice->modes == 0,
+                                      .without_normals = choice->without_normals,
+                                      .made_by = choice->made_by};
+  SUPINE_TRY(measure(&given, &basis, &at, &made, error));
+  SUPINE_TRY(tell_progress(choice, 5, error));
+  SUPINE_TRY(supine_precompute_print(&basis, bytes, error));
+  made.band = compression.band;
+  made.mode_count = compression.mode_count;
   if (report != NULL) {
-    *report = (supine_precompute_report){.mode_count = p.compression.mode_count,
-                                         .accuracy = p.accuracy,
-                                         .turned_over = p.turned_over};
+    *report = made;
   }
-  return SUPINE_OK;
+  return tell_progress(choice, 7, error);
+}
+
+supine_status supine_precompute_save(const char *path, const supine_bytes *bytes,
+                                     supine_error *error) {
+  supine_output output;
+  SUPINE_TRY(supine_output_open(path, &output, error));
+  (void)fwrite(bytes->data, 1, bytes->size, output.file); /* the commit reports errors */
+  return supine_output_commit(&output, error);
 }

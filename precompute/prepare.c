@@ -5,41 +5,52 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "base/text.h"
 #include "base/vec3.h"
 
+#include "precompute/lungs/disease.h"
+#include "precompute/lungs/expandability.h"
 #include "precompute/prepare.h"
 
-supine_model_choice supine_precompute_choice_default(void) {
-  supine_model_choice choice = {.law = SUPINE_LAW_COUNT,
-                                .model = supine_physics_model(SUPINE_LAW_PAPER),
-                                .resting = supine_reference_resting_default()};
-  choice.model.reach = choice.model.force.base = choice.model.force.gain = NAN;
-  choice.model.force.box[0] = choice.model.direction.c[0] = NAN;
-  choice.model.direction.shear = NAN;
-  return choice;
-}
+/* What is known of the scan: completed by the patient's file and by defaults. */
+typedef struct knowledge {
+  bool has_scan; /* whether `scan` is given */
+  supine_scan scan;
+  supine_resting resting;
+  supine_person person;
+} knowledge;
 
 /* Select the displacement law. Constants that the user gives override its constants. */
-static supine_model choose_law(const supine_model_choice *choice) {
-  const bool none = choice->has_scan && !choice->scan.known;
-  const supine_model law = supine_physics_model(choice->law != SUPINE_LAW_COUNT
-                                                    ? (supine_law)choice->law
-                                                    : (none ? SUPINE_LAW_PAPER : SUPINE_LAW_DEEP));
-  supine_model model = choice->model;
-  model.law = law.law;
-  model.force.pair = law.force.pair;
-  memcpy(model.bend, law.bend, sizeof law.bend);
-  model.reach = isnan(model.reach) ? law.reach : model.reach;
-  model.force.base = isnan(model.force.base) ? law.force.base : model.force.base;
-  model.force.gain = isnan(model.force.gain) ? law.force.gain : model.force.gain;
-  model.direction.shear =
-      isnan(model.direction.shear) ? law.direction.shear : model.direction.shear;
-  if (isnan(model.force.box[0])) {
-    memcpy(model.force.box, law.force.box, sizeof law.force.box);
+static supine_model choose_law(const supine_precompute_options *options) {
+  const supine_precompute_law *given = &options->law;
+  supine_law law = SUPINE_LAW_DEEP;
+  if (given->kind != SUPINE_PRECOMPUTE_LAW_DEFAULT) {
+    law = given->kind == SUPINE_PRECOMPUTE_LAW_PAPER ? SUPINE_LAW_PAPER : SUPINE_LAW_DEEP;
+  } else if (options->scan.shown == SUPINE_SHOWN_UNKNOWN || options->fields != NULL) {
+    law = SUPINE_LAW_PAPER;
   }
-  if (isnan(model.direction.c[0])) {
-    memcpy(model.direction.c, law.direction.c, sizeof law.direction.c);
+  supine_model model = supine_physics_model(law);
+  model.force.soften = given->soften;
+  if (given->reach > 0.0) {
+    model.reach = given->reach;
+  }
+  if (given->has_base || given->base != 0.0) {
+    model.force.base = given->base;
+  }
+  if (given->has_gain || given->gain != 0.0) {
+    model.force.gain = given->gain;
+  }
+  if (given->has_shear || given->shear != 0.0) {
+    model.direction.shear = given->shear;
+  }
+  const double *box = given->box_force;
+  if (given->has_box_force || box[0] != 0.0 || box[1] != 0.0 || box[2] != 0.0) {
+    memcpy(model.force.box, box, sizeof model.force.box);
+  }
+  const double *c = given->constants;
+  if (given->has_constants || c[0] != 0.0 || c[2] != 0.0 || c[4] != 0.0) {
+    memcpy(model.direction.c, c, sizeof model.direction.c);
   }
   return model;
 }
@@ -50,14 +61,14 @@ static supine_model choose_law(const supine_model_choice *choice) {
 static void tell_volume(const supine_patient_record *record, double measured,
                         supine_findings *findings) {
   static const double different = 1.0 / 3.0; /* ratio of volumes minus 1 from which to warn */
-  const size_t other = record->shown == 1.0 ? 0 : 1;
+  const size_t other = 1 - record->shown;
   const double *lung = record->lung_volume[other];
   const bool both = (lung[0] > 0.0 && lung[1] > 0.0) || record->patient.frame.only_side != 0;
   char state[160];
   char beside[64] = "";
   (void)supine_state_describe(&record->state[other], state, sizeof state);
   if (measured > 0.0 && both) {
-    (void)snprintf(beside, sizeof beside, "; measured: %.0f mL", measured);
+    (void)supine_print_text(beside, sizeof beside, "; measured: %.0f mL", measured);
   }
   const double off = beside[0] != '\0' ? fabs((lung[0] + lung[1]) / measured - 1.0) : 0.0;
   supine_findings_add(
@@ -70,8 +81,8 @@ static void tell_volume(const supine_patient_record *record, double measured,
 
 static void describe_fit(const supine_patient_record *record, char *text, size_t size) {
   const supine_patient_fit_report *report = &record->report;
-  (void)snprintf(text, size,
-                 "%s: %s law%s from %.0f points; held-out residual %.1f of %.1f mm RMS, %.0f %% "
+  (void)supine_print_text(text, size,
+                 "%s: %s law%s from %zu points; held-out residual %.1f of %.1f mm RMS, %.0f %% "
                  "explained; expected error %.1f mm RMS",
                  record->name, supine_patient_law_names[record->patient.law],
                  record->patient.centre_count > 0 ? " and kriging" : "", report->points,
@@ -79,54 +90,87 @@ static void describe_fit(const supine_patient_record *record, char *text, size_t
                  report->explained, report->expected_point);
 }
 
-/* Use the displacement law and the force that were fitted to a patient. If the state of the scan is
- * not given, use the state in the fit. */
-static supine_status take_patient(supine_model_choice *choice, supine_prepared *p,
-                                  supine_error *error) {
-  const supine_patient_record *fitted = choice->patient;
+/* Use the displacement law, the force and the volumes at rest that were fitted to a patient.
+ * @param scan  written: the state of the scan by the fit */
+static supine_status take_patient(const supine_patient_record *fitted, supine_prepared *p,
+                                  supine_resting *resting, supine_scan *scan, supine_error *error) {
   const size_t n = p->source.lungs.mesh.vertex_count;
-  supine_patient_record *record = supine_arena_take(&p->memory, 1, sizeof *record);
   double *arrays = supine_arena_take(&p->memory, 4 * n, sizeof *arrays);
-  supine_scan scan;
+  supine_patient_record *record = supine_arena_take(&p->memory, 1, sizeof *record);
   SUPINE_TRY(supine_arena_check(&p->memory, error, "%zu vertices", n));
   *record = *fitted;
   p->patient = record;
   describe_fit(record, p->fit, sizeof p->fit);
   p->model = supine_physics_model(SUPINE_LAW_DEEP);
-  SUPINE_TRY(supine_patient_model(record, &p->source.lungs, &choice->resting, &scan, arrays,
-                                  &p->model, error));
-  tell_volume(record, fitted->volume[record->shown == 1.0 ? 0 : 1], &p->source.findings);
-  if (choice->has_scan) {
-    return SUPINE_OK;
-  }
-  choice->has_scan = true;
-  choice->scan = scan;
+  SUPINE_TRY(
+      supine_patient_model(record, &p->source.lungs, resting, scan, arrays, &p->model, error));
+  tell_volume(record, fitted->volume[1 - record->shown], &p->source.findings);
+  return SUPINE_OK;
+}
+
+/* Say that the state of the scan is taken from the fit. Refuse a scan whose state the fit does not
+ * tell. */
+static supine_status assume_fitted_state(const supine_patient_record *record,
+                                         const supine_scan *scan, supine_findings *findings,
+                                         supine_error *error) {
   supine_findings_add(
-      &p->source.findings,
+      findings,
       "note: the scan is assumed to be the %s of the two that were fitted; --scanned changes this",
-      record->shown == 0.0 ? "fuller" : "emptier");
-  SUPINE_REFUSE_IF(record->shown != 0.0 && !scan.known, error, SUPINE_ERROR_ARGUMENT,
+      record->shown == 0 ? "fuller" : "emptier");
+  SUPINE_REFUSE_IF(record->shown == 1 && !scan->known, error, SUPINE_ERROR_ARGUMENT,
                    "this scan is the emptier of the two that were fitted, and how far it is below "
                    "full inflation is unknown: give its state, such as --scanned supine:rest, or "
                    "use the fuller scan");
   return SUPINE_OK;
 }
 
-static supine_status set_expandability(const supine_model_choice *choice, supine_prepared *p,
+/* Choose the model: the patient's, or that of the displacement law. Without a given state of the
+ * scan, also choose this state. */
+static supine_status choose_model(const supine_precompute_options *options,
+                                  const supine_patient_record *patient, supine_prepared *p,
+                                  knowledge *known, supine_error *error) {
+  if (patient != NULL) {
+    supine_scan fitted;
+    SUPINE_TRY(take_patient(patient, p, &known->resting, &fitted, error));
+    if (!known->has_scan) {
+      known->has_scan = true;
+      known->scan = fitted;
+      SUPINE_TRY(assume_fitted_state(p->patient, &fitted, &p->source.findings, error));
+    }
+    return SUPINE_OK;
+  }
+  p->model = choose_law(options);
+  if (!known->has_scan && p->model.law != SUPINE_LAW_PAPER) {
+    (void)supine_reference_scan_parse("full", &known->scan, NULL);
+  }
+  return SUPINE_OK;
+}
+
+static supine_status set_expandability(const supine_precompute_tissue *tissue, supine_prepared *p,
                                        supine_error *error) {
   const size_t n = p->source.lungs.mesh.vertex_count;
-  if (choice->expandability == NULL &&
-      choice->expandability_law.shape == SUPINE_EXPANDABILITY_UNIFORM) {
+  if (tissue->expandability == NULL && tissue->profile == SUPINE_PROFILE_UNIFORM) {
     return SUPINE_OK;
   }
   SUPINE_REFUSE_IF(p->model.stiffness != NULL, error, SUPINE_ERROR_ARGUMENT,
                    "the file of --patient sets the stiffness: leave --expandability out");
   double *a = supine_arena_take(&p->memory, n, sizeof *a);
   SUPINE_TRY(supine_arena_check(&p->memory, error, "%zu vertices", n));
-  if (choice->expandability != NULL) {
-    SUPINE_TRY(supine_tissue_expandability_load(choice->expandability, n, a, error));
+  if (tissue->expandability != NULL) {
+    SUPINE_TRY(supine_tissue_expandability_load(tissue->expandability, n, a, error));
   } else {
-    supine_tissue_expandability_regional(&p->source.lungs, &choice->expandability_law, a);
+    const supine_expandability_law law = {.shape = tissue->profile == SUPINE_PROFILE_LINEAR
+                                                       ? SUPINE_EXPANDABILITY_LINEAR
+                                                       : SUPINE_EXPANDABILITY_EXPONENTIAL,
+                                          .axis = tissue->axis,
+                                          .from = tissue->from,
+                                          .to = tissue->to};
+    SUPINE_REFUSE_IF(!(law.axis >= 0 && law.axis <= 2 && law.from > 0.0 && law.to > 0.0), error,
+                     SUPINE_ERROR_ARGUMENT,
+                     "expandability along axis %d from %g to %g: give an axis 0 to 2, and values "
+                     "above 0",
+                     law.axis, law.from, law.to);
+    supine_tissue_expandability_regional(&p->source.lungs, &law, a);
   }
   for (size_t i = 0; i < n; ++i) {
     a[i] = 1.0 / a[i];
@@ -150,43 +194,53 @@ static void warn_of_lesion(const supine_lungs *lungs, const supine_lesion *lesio
       c[0], c[1], c[2], nearest, lesion->radius);
 }
 
-static supine_status set_lesions(const supine_model_choice *choice, supine_prepared *p,
+static supine_status set_lesions(const supine_precompute_tissue *tissue, supine_prepared *p,
                                  supine_error *error) {
   const supine_lungs *lungs = &p->source.lungs;
   const size_t n = lungs->mesh.vertex_count;
-  if (choice->lesion_count == 0) {
+  if (tissue->lesion_count == 0) {
     return SUPINE_OK;
   }
+  SUPINE_REFUSE_IF(tissue->lesion_count > SUPINE_PRECOMPUTE_LESIONS_MAX, error,
+                   SUPINE_ERROR_ARGUMENT, "%zu lesions: give at most %d", tissue->lesion_count,
+                   SUPINE_PRECOMPUTE_LESIONS_MAX);
   double *factors = supine_arena_take(&p->memory, n, sizeof *factors);
   SUPINE_TRY(supine_arena_check(&p->memory, error, "%zu vertices", n));
   for (size_t i = 0; i < n; ++i) {
     factors[i] = 1.0;
   }
-  for (size_t l = 0; l < choice->lesion_count; ++l) {
+  for (size_t l = 0; l < tissue->lesion_count; ++l) {
+    const supine_precompute_lesion *given = &tissue->lesions[l];
+    const double *c = given->centre;
+    const supine_lesion lesion = {{c[0], c[1], c[2]}, given->radius, given->factor};
     size_t reached = 0;
-    SUPINE_TRY(supine_tissue_add_lesion(lungs, &choice->lesions[l], factors, &reached, error));
+    SUPINE_TRY(supine_tissue_add_lesion(lungs, &lesion, factors, &reached, error));
     if (reached == 0) {
-      warn_of_lesion(lungs, &choice->lesions[l], &p->source.findings);
+      warn_of_lesion(lungs, &lesion, &p->source.findings);
     }
   }
   p->model.lesions = factors;
   return SUPINE_OK;
 }
 
-static supine_status set_shares(const supine_model_choice *choice, supine_prepared *p,
+static supine_status set_shares(const supine_precompute_tissue *tissue, supine_prepared *p,
                                 supine_error *error) {
   const supine_lungs *lungs = &p->source.lungs;
   for (size_t side = 0; side < 2; ++side) {
     const char *name = side == 0 ? "left" : "right";
+    const double share = tissue->share[side];
     size_t lung = 0;
     while (lung < lungs->lung_count && lungs->side[lung] != (side == 0 ? 1 : -1)) {
       ++lung;
     }
-    SUPINE_REFUSE_IF(choice->share[side] > 0.0 && lung == lungs->lung_count, error,
-                     SUPINE_ERROR_ARGUMENT, "--lung %s: the model has no %s lung: leave it out",
-                     name, name);
-    if (choice->share[side] > 0.0) {
-      p->model.share[lung] = choice->share[side];
+    if (share != 0.0) {
+      SUPINE_REFUSE_IF(!(share > 0.0 && share <= 1.0), error, SUPINE_ERROR_ARGUMENT,
+                       "the %s lung's share of its healthy volume, %g, must be above 0 and at most "
+                       "1",
+                       name, share);
+      SUPINE_REFUSE_IF(lung == lungs->lung_count, error, SUPINE_ERROR_ARGUMENT,
+                       "--lung %s: the model has no %s lung: leave it out", name, name);
+      p->model.share[lung] = share;
     }
   }
   return SUPINE_OK;
@@ -202,16 +256,16 @@ static bool varies(const supine_model *model, size_t count) {
   return !same;
 }
 
-static void summarize(const supine_model_choice *choice, bool predicted, supine_prepared *p) {
+static void summarize(const knowledge *given, bool predicted, supine_prepared *p) {
   static const double supine[3] = {0.0, 1.0, 0.0};
-  const supine_resting *resting = &choice->resting;
+  const supine_resting *resting = &given->resting;
   const supine_reference *reference = &p->reference;
   const size_t size = sizeof p->assumed;
   char state[160];
   double ml[2];
   supine_text_add(p->assumed, size, "%s; %s law; scan ", p->source.summary,
-                  choice->patient != NULL ? "the patient's own"
-                                          : supine_physics_law_names[p->model.law]);
+                  p->patient != NULL ? "the patient's own"
+                                     : supine_physics_law_names[p->model.law]);
   if (!reference->known) {
     supine_text_add(p->assumed, size, "taken as the reference of every posture");
     return;
@@ -229,7 +283,7 @@ static void summarize(const supine_model_choice *choice, bool predicted, supine_
                   : !at_rest                 ? ""
                   : known                    ? "from rest, "
                                              : "assumed from rest, ");
-  supine_reference_compare(reference, &choice->person, p->assumed, size);
+  supine_reference_compare(reference, &given->person, p->assumed, size);
   const double rest = supine_reference_rest(reference, supine, ml);
   const double ratio = exp(resting->spread / resting->assumed);
   supine_text_add(p->assumed, size, "); rest supine %.0f mL (", rest);
@@ -238,7 +292,7 @@ static void summarize(const supine_model_choice *choice, bool predicted, supine_
   }
   supine_text_add(p->assumed, size, "by %s)",
                   at_rest                                 ? "the scan"
-                  : choice->patient != NULL               ? "the fit"
+                  : p->patient != NULL                    ? "the fit"
                   : known                                 ? "--resting"
                   : predicted                             ? "height and sex"
                   : resting->assumed == SUPINE_REST_SHARE ? "healthy people's share"
@@ -256,64 +310,123 @@ static void summarize(const supine_model_choice *choice, bool predicted, supine_
   }
 }
 
-/* Decide what state the scan shows, and check that the law and --full go with it. */
-static supine_status find_scan(supine_model_choice *choice, supine_law law, supine_error *error) {
-  supine_scan *scan = &choice->scan;
-  if (!choice->has_scan && law != SUPINE_LAW_PAPER) {
-    (void)supine_reference_scan_parse("full", scan, NULL);
+/* Say what is assumed of the lungs of another simulator's fields. */
+static void summarize_fields(supine_prepared *p) {
+  char posture[160] = "not displaced by gravity";
+  if (p->posture.known) {
+    (void)supine_state_describe(&p->posture.state, posture, sizeof posture);
   }
+  supine_text_add(p->assumed, sizeof p->assumed, "%s; scan %s", p->source.summary, posture);
+}
+
+/* Add the volume at full inflation to the state of the scan, and check that the law and this volume
+ * go with it. */
+static supine_status complete_scan(const supine_precompute_volumes *volumes, supine_law law,
+                                   supine_scan *scan, supine_error *error) {
   SUPINE_REFUSE_IF(
       law == SUPINE_LAW_PAPER && scan->known, error, SUPINE_ERROR_ARGUMENT,
       "--law paper takes the scan as the reference: leave --scanned out, or use --law deep");
-  SUPINE_REFUSE_IF(scan->known && scan->state.volume.kind == SUPINE_VOLUME_DEFAULT, error,
-                   SUPINE_ERROR_ARGUMENT,
+  const supine_volume_kind kind = scan->state.volume.kind;
+  SUPINE_REFUSE_IF(scan->known && kind == SUPINE_VOLUME_DEFAULT, error, SUPINE_ERROR_ARGUMENT,
                    "--scanned: a posture alone is only for --fields: add the volume, as in "
                    "supine:rest, or give full or none");
-  const supine_volume *full = &choice->full.volume;
-  scan->full = full->ml;
+  SUPINE_REFUSE_IF(scan->known && kind != SUPINE_VOLUME_REST && kind != SUPINE_VOLUME_FULL, error,
+                   SUPINE_ERROR_ARGUMENT,
+                   "the state of the scan must be rest or full inflation, plus or minus a volume");
   SUPINE_REFUSE_IF(
-      full->kind != SUPINE_VOLUME_DEFAULT &&
-          (full->kind != SUPINE_VOLUME_ABSOLUTE || scan->state.volume.kind != SUPINE_VOLUME_REST),
-      error, SUPINE_ERROR_ARGUMENT,
+      volumes->full != 0.0 && !(volumes->full > 0.0 && kind == SUPINE_VOLUME_REST), error,
+      SUPINE_ERROR_ARGUMENT,
       "--full is for a scan at rest: give a volume such as 4200mL, and --scanned supine:rest too");
+  scan->full = volumes->full;
   return SUPINE_OK;
 }
 
-supine_status supine_precompute_prepare(const supine_model_choice *choice, char **paths,
-                                        size_t count, supine_prepared *prepared,
-                                        supine_error *error) {
-  supine_prepared *p = prepared;
-  supine_lungs *lungs = &p->source.lungs;
-  supine_model_choice chosen = *choice; /* completed by the patient's file and the scan */
-  SUPINE_TRY(supine_precompute_source_load(&choice->source, paths, count, &p->source, error));
-  if (choice->patient != NULL) {
-    SUPINE_TRY(take_patient(&chosen, p, error));
-  } else {
-    p->model = choose_law(choice);
+/* Read what the options tell of the scan and of the patient. */
+static supine_status read_knowledge(const supine_precompute_options *options, supine_prepared *p,
+                                    knowledge *known, supine_error *error) {
+  const supine_precompute_volumes *volumes = &options->volumes;
+  const bool has_state = options->scan.shown == SUPINE_SHOWN_STATE;
+  *known = (knowledge){.has_scan = options->scan.shown != SUPINE_SHOWN_DEFAULT,
+                       .scan = {.known = has_state, .state = options->scan.state},
+                       .resting = supine_reference_resting_default(),
+                       .person = {volumes->height, (supine_sex)volumes->sex}};
+  if (volumes->copd) {
+    SUPINE_TRY(supine_reference_resting_set(&known->resting, "copd", NULL, error));
   }
-  SUPINE_TRY(find_scan(&chosen, p->model.law, error));
-  SUPINE_TRY(set_expandability(choice, p, error));
-  SUPINE_TRY(set_lesions(choice, p, error));
-  SUPINE_TRY(set_shares(choice, p, error));
+  for (size_t axis = 0; axis < SUPINE_REST_COUNT; ++axis) {
+    const supine_precompute_rest *rest = &volumes->rest[axis];
+    if (rest->ml != 0.0 || rest->share[0] != 0.0) {
+      SUPINE_TRY(
+          supine_reference_resting_give(&known->resting, axis, rest->ml, rest->share, error));
+    }
+  }
+  if (options->fields != NULL) { /* they displace the surface as it is */
+    SUPINE_REFUSE_IF(has_state && options->scan.state.volume.kind != SUPINE_VOLUME_DEFAULT, error,
+                     SUPINE_ERROR_ARGUMENT,
+                     "--scanned: with --fields, give the posture alone, such as supine, as fields "
+                     "of gravity have no volume");
+    p->posture = known->scan;
+    known->scan = (supine_scan){.known = false};
+    known->has_scan = true;
+  }
+  return SUPINE_OK;
+}
+
+/* Set the law, and the stiffness and collapse of the tissue. */
+static supine_status set_model(const supine_precompute_options *options,
+                               const supine_patient_record *patient, supine_prepared *p,
+                               knowledge *known, supine_error *error) {
+  const supine_lungs *lungs = &p->source.lungs;
+  SUPINE_TRY(choose_model(options, patient, p, known, error));
+  SUPINE_TRY(complete_scan(&options->volumes, p->model.law, &known->scan, error));
+  SUPINE_TRY(set_expandability(&options->tissue, p, error));
+  SUPINE_TRY(set_lesions(&options->tissue, p, error));
+  SUPINE_TRY(set_shares(&options->tissue, p, error));
   if (p->model.reach > 0.0 && varies(&p->model, lungs->mesh.vertex_count)) {
     SUPINE_TRY(supine_physics_strain_create(lungs, p->model.stiffness, p->model.lesions,
                                             &p->model.strain, error));
   }
-  const supine_reference scanned = {.scan = chosen.scan,
+  return SUPINE_OK;
+}
+
+/* Move the scan to the reference surface, and say what is assumed. */
+static supine_status find_reference(supine_prepared *p, const knowledge *known,
+                                    supine_error *error) {
+  supine_lungs *lungs = &p->source.lungs;
+  const supine_reference scanned = {.scan = known->scan,
                                     .lung_count = lungs->lung_count,
                                     .side = {lungs->side[0], lungs->side[1]}};
-  supine_resting resting = chosen.resting;
-  supine_reference_predict_rest(&scanned, &choice->person, &resting);
-  SUPINE_TRY(supine_reference_find(lungs, &p->model, &chosen.scan, &resting, &p->reference, error));
-  summarize(&chosen, resting.ml[2] != chosen.resting.ml[2], p);
+  supine_resting resting = known->resting;
   char doubt[512] = "";
+  supine_reference_predict_rest(&scanned, &known->person, &resting);
+  SUPINE_TRY(supine_reference_find(lungs, &p->model, &known->scan, &resting, &p->reference, error));
+  summarize(known, resting.predicted, p);
   if (p->reference.known) {
-    supine_reference_doubt(&p->reference, &choice->person, &chosen.resting, doubt, sizeof doubt);
+    supine_reference_doubt(&p->reference, &known->person, &known->resting, doubt, sizeof doubt);
   }
   if (doubt[0] != '\0') {
     supine_findings_add(&p->source.findings, "warning: %s", doubt);
   }
   return SUPINE_OK;
+}
+
+supine_status supine_precompute_prepare(const supine_precompute_options *options,
+                                        supine_prepared *prepared, supine_error *error) {
+  supine_patient_record *patient = NULL;
+  knowledge known;
+  SUPINE_TRY(read_knowledge(options, prepared, &known, error));
+  if (options->patient != NULL) {
+    patient = supine_arena_take(&prepared->memory, 1, sizeof *patient);
+    SUPINE_TRY(supine_arena_check(&prepared->memory, error, "%s", options->patient));
+    SUPINE_TRY(supine_patient_read(options->patient, patient, error));
+  }
+  SUPINE_TRY(supine_precompute_source_load_lungs(options, &prepared->source, error));
+  SUPINE_TRY(set_model(options, patient, prepared, &known, error));
+  if (options->fields != NULL) {
+    summarize_fields(prepared);
+    return SUPINE_OK;
+  }
+  return find_reference(prepared, &known, error);
 }
 
 void supine_precompute_prepared_free(supine_prepared *prepared) {

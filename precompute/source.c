@@ -17,7 +17,7 @@
 /* Input files that are being read. Each array has an element for each file, and at least two. */
 typedef struct reading {
   const supine_source_options *options;
-  char **paths;
+  const char *const *paths;
   size_t count; /* number of files; after label maps are loaded, number of lungs */
   supine_mesh *meshes;
   supine_mesh_report *reports;
@@ -31,7 +31,13 @@ static void load_range(void *context, size_t begin, size_t end, size_t thread) {
   const reading *r = context;
   for (size_t i = begin; i < end; ++i) {
     supine_mesh_load_options load = r->options->load;
-    load.arrays = r->options->surfaces != NULL ? &r->options->surfaces[i] : NULL;
+    supine_mesh arrays;
+    if (r->options->surfaces != NULL) {
+      const supine_precompute_surface *given = &r->options->surfaces[i];
+      arrays = (supine_mesh){given->vertex_count, (double *)given->vertices, given->triangle_count,
+                             (uint32_t *)given->triangles}; /* only read */
+      load.arrays = &arrays;
+    }
     r->errors[i].status =
         supine_mesh_load(r->paths[i], &load, &r->meshes[i], &r->reports[i], &r->errors[i]);
   }
@@ -136,7 +142,7 @@ static supine_status load_maps(reading *r, supine_source *source, supine_error *
                    error, SUPINE_ERROR_ARGUMENT,
                    "a label map's header states its unit: leave --units out, or give --units mm to "
                    "accept any size of the lungs");
-  SUPINE_TRY(supine_labels_surfaces((const char *const *)(folder ? lobes.list : r->paths),
+  SUPINE_TRY(supine_labels_surfaces(folder ? (const char *const *)lobes.list : r->paths,
                                     folder ? lobes.left + lobes.right : r->count, &wanted,
                                     r->meshes, &source->report, error));
   r->count = source->report.lung_count;
@@ -183,12 +189,14 @@ static void summarize(const reading *r, supine_source *source) {
 }
 
 /* Check that the files are all label maps, or all surfaces without options for label maps. */
-static supine_status check_kinds(const supine_source_options *options, char **paths, size_t count,
-                                 bool *is_map, supine_error *error) {
+static supine_status check_kinds(const supine_source_options *options, const char *const *paths,
+                                 size_t count, bool *is_map, supine_error *error) {
   const supine_labels_options *labels = &options->labels;
   size_t images = 0;
-  for (size_t i = 0; i < count && options->surfaces == NULL; ++i) {
-    images += supine_image_is_named(paths[i]) || (count == 1 && is_folder(paths[i]));
+  if (options->surfaces == NULL) {
+    for (size_t i = 0; i < count; ++i) {
+      images += supine_image_is_named(paths[i]) || (count == 1 && is_folder(paths[i]));
+    }
   }
   *is_map = images == count;
   SUPINE_REFUSE_IF(images > 0 && images < count, error, SUPINE_ERROR_ARGUMENT,
@@ -204,7 +212,11 @@ static supine_status check_kinds(const supine_source_options *options, char **pa
 static supine_status read_files(reading *r, supine_source *source, supine_error *error) {
   bool is_map = false;
   SUPINE_TRY(check_kinds(r->options, r->paths, r->count, &is_map, error));
-  SUPINE_TRY(is_map ? load_maps(r, source, error) : load_meshes(r, source, error));
+  if (is_map) {
+    SUPINE_TRY(load_maps(r, source, error));
+  } else {
+    SUPINE_TRY(load_meshes(r, source, error));
+  }
   const supine_lungs_source given = {.name = r->paths[0],
                                      .axes = r->axes,
                                      .units_given = r->options->load.millimetres_per_unit != 0.0,
@@ -222,9 +234,9 @@ static supine_status read_files(reading *r, supine_source *source, supine_error 
   return SUPINE_OK;
 }
 
-supine_status supine_precompute_source_load(const supine_source_options *options, char **paths,
-                                            size_t count, supine_source *source,
-                                            supine_error *error) {
+supine_status supine_precompute_source_load(const supine_source_options *options,
+                                            const char *const *paths, size_t count,
+                                            supine_source *source, supine_error *error) {
   const size_t most = count > 2 ? count : 2;
   SUPINE_ARENA arena = {0};
   reading r = {.options = options,
@@ -239,4 +251,50 @@ supine_status supine_precompute_source_load(const supine_source_options *options
     supine_mesh_free(&r.meshes[i]);
   }
   return status;
+}
+
+static bool go_on(void *context, double fraction) {
+  const supine_precompute_options *options = context;
+  return options->progress == NULL || options->progress(options->context, fraction) == 0;
+}
+
+supine_status supine_precompute_source_load_lungs(const supine_precompute_options *options,
+                                                  supine_source *source, supine_error *error) {
+  enum { NAME = 32 };
+  const supine_precompute_lungs *given = &options->lungs;
+  const size_t count = given->path_count + given->surface_count;
+  supine_precompute_options told = *options; /* of the progress */
+  supine_source_options wanted = {.load = {.millimetres_per_unit = given->unit},
+                                  .surfaces = given->surface_count > 0 ? given->surfaces : NULL,
+                                  .labels = {.labels = given->labels,
+                                             .edge = given->edge,
+                                             .close = given->close,
+                                             .progress = go_on,
+                                             .progress_context = &told},
+                                  .surfaces_out = given->surfaces_out,
+                                  .has_midline = given->has_midline || given->midline != 0.0,
+                                  .midline = given->midline};
+  SUPINE_REFUSE_IF(count == 0, error, SUPINE_ERROR_ARGUMENT,
+                   "no lungs: give files or arrays of surfaces");
+  SUPINE_REFUSE_IF(given->path_count > 0 && given->surface_count > 0, error, SUPINE_ERROR_ARGUMENT,
+                   "give files or arrays, not both");
+  const bool axes_fit =
+      given->axes == NULL || supine_mesh_axes_parse(given->axes, &wanted.load.axes);
+  SUPINE_REFUSE_IF(!axes_fit, error, SUPINE_ERROR_ARGUMENT,
+                   "axes are three letters, one each of L or R, P or A, S or I, not '%s'",
+                   given->axes);
+  SUPINE_REFUSE_IF(!(given->unit >= 0.0 && given->edge >= 0.0 && given->close >= 0.0), error,
+                   SUPINE_ERROR_ARGUMENT, "unit, edge and close must not be negative");
+  if (given->surface_count == 0) {
+    return supine_precompute_source_load(&wanted, given->paths, count, source, error);
+  }
+  SUPINE_ARENA arena = {0};
+  const char **names = supine_arena_take(&arena, count, sizeof *names);
+  char(*texts)[NAME] = supine_arena_take(&arena, count, sizeof *texts);
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu surfaces", count));
+  for (size_t i = 0; i < count; ++i) {
+    (void)snprintf(texts[i], NAME, "surface %zu", i + 1);
+    names[i] = texts[i];
+  }
+  return supine_precompute_source_load(&wanted, names, count, source, error);
 }

@@ -4,6 +4,8 @@
 #ifndef SUPINE_SOURCE_H
 #define SUPINE_SOURCE_H
 
+#include <supine/precompute.h>
+
 #include "base/findings.h"
 
 #include "mesh/labels/labels.h"
@@ -12,7 +14,8 @@
 
 typedef struct supine_source_options {
   supine_mesh_load_options load;
-  const supine_mesh *surfaces;  /**< a surface for each path, which is then only a name; or NULL */
+  /** A surface for each path, which is then only a name; or NULL. */
+  const supine_precompute_surface *surfaces;
   supine_labels_options labels; /**< options for label maps; load.axes replaces labels.axes */
   const char *surfaces_out;     /**< path to save the surfaces of a label map to, or NULL */
   bool has_midline;
@@ -31,8 +34,12 @@ typedef struct supine_source {
 
 /** Load surfaces (in parallel) or label maps, check them and join them into lungs.
  * @param source  zeroed; release source->lungs with supine_lungs_free, also after a failure */
-supine_status supine_precompute_source_load(const supine_source_options *options, char **paths,
-                                            size_t count, supine_source *source,
-                                            supine_error *error);
+supine_status supine_precompute_source_load(const supine_source_options *options,
+                                            const char *const *paths, size_t count,
+                                            supine_source *source, supine_error *error);
+
+/** Do the same with options->lungs, which may be arrays. */
+supine_status supine_precompute_source_load_lungs(const supine_precompute_options *options,
+                                                  supine_source *source, supine_error *error);
 
 #endif

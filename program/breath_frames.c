@@ -7,6 +7,7 @@
 
 #include "base/arena.h"
 #include "base/clock.h"
+#include "base/number.h"
 #include "base/text.h"
 #include "mesh/mesh.h"
 
@@ -97,12 +98,14 @@ static void report(const playing *p) {
   double least;
   double largest;
   gsl_stats_minmax(&least, &largest, p->total, 1, p->wanted->count);
-  (void)printf("%s: %zu frame%s, %.2f s at %.4g a second; volumes of %.2f to %.2f mL\n",
-               p->wanted->path, p->wanted->count, p->wanted->count == 1 ? "" : "s",
-               p->time[p->wanted->count - 1], p->wanted->fps, least, largest);
-  (void)printf("compute time per frame: median %.3f ms, longest %.3f ms, allowed %.0f ms\n",
-               1e3 * gsl_stats_median(p->compute_time, 1, p->wanted->count),
-               1e3 * gsl_stats_max(p->compute_time, 1, p->wanted->count), 1e3 * budget);
+  (void)supine_print(stdout,
+                     "%s: %zu frame%s, %.2f s at %.4g a second; volumes of %.2f to %.2f mL\n",
+                     p->wanted->path, p->wanted->count, p->wanted->count == 1 ? "" : "s",
+                     p->time[p->wanted->count - 1], p->wanted->fps, least, largest);
+  (void)supine_print(stdout,
+                     "compute time per frame: median %.3f ms, longest %.3f ms, allowed %.0f ms\n",
+                     1e3 * gsl_stats_median(p->compute_time, 1, p->wanted->count),
+                     1e3 * gsl_stats_max(p->compute_time, 1, p->wanted->count), 1e3 * budget);
 }
 
 /* Compute frame t into p->positions. Call find_volumes first: it checks that each frame has a valid

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "mesh/image/image.h"
 #include "precompute/inside/embed.h"
 #include "precompute/patient/patient_file.h"
@@ -51,7 +52,9 @@ static const supine_option table[] = {
     {"grid", 0, "MM",
      "embed the nodes of a grid over the lungs, MM apart, for displacement fields. An image "
      "without --labels embeds a grid even without this option: nodes are centres of its voxels, "
-     "and MM is rounded to a multiple of the distance between them",
+     "continued beyond its border, and MM is rounded to a multiple of the distance between them. "
+     "The "
+     "grid reaches 60 mm past the lungs, or 1.5 times their largest displacement",
      SUPINE_FILLS(request, content.grid_spacing), SUPINE_SAYS_GIVEN(request, content.has_grid),
      .standard = "4", SUPINE_ABOVE_ZERO, .wants = "millimetres"},
     {"labels", 0, "all|N[=NAME],...",
@@ -106,10 +109,11 @@ static void print_summary(const supine_inside_shells *shells, const supine_insid
   if (report->outside > 0 && !grid) {
     char text[64];
     part_name(content, report->farthest, text, sizeof text);
-    (void)printf("outside the lungs: %zu of %zu, by at most %.1f mm (%s); motion %s\n",
-                 report->outside, report->count, report->farthest_mm, text,
-                 wanted->clamp ? "taken from the nearest point of the surface"
-                               : "extrapolated from inside (--clamp changes this)");
+    (void)supine_print(stdout,
+                       "outside the lungs: %zu of %zu, by at most %.1f mm (%s); motion %s\n",
+                       report->outside, report->count, report->farthest_mm, text,
+                       wanted->clamp ? "taken from the nearest point of the surface"
+                                     : "extrapolated from inside (--clamp changes this)");
   }
 }
 
@@ -125,7 +129,7 @@ static supine_status embed(const supine_basis *basis, const request *wanted,
   if (law != NULL && !supine_basis_get_info(basis)->vector) {
     SUPINE_TRY(supine_patient_decode(given->operand[0], law, &record, error));
     options.context = &record;
-    options.field = record.path_span[0] != 0.0 ? supine_patient_field : NULL;
+    options.field = record.in_basis ? supine_patient_field : NULL;
   }
   SUPINE_TRY(supine_command_embed_read(&shells, &wanted->content, given->operand + 1,
                                        given->count - 1, &content, error));
@@ -185,4 +189,5 @@ const supine_command supine_command_embed = {
     .operands_most = SIZE_MAX,
     .operands_missing = "name a basis file (made by 'supine precompute'), then what to embed",
     .request_size = sizeof(request),
+    .uses_blas = true,
     .run = run};

@@ -5,6 +5,7 @@
 #include <export.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "base/output.h"
 #include "base/text.h"
 
@@ -60,9 +61,9 @@ static supine_status write_glb(const supine_basis *basis, const request *wanted,
   SUPINE_TRY(supine_export_glb_write(wanted->path, basis, &wanted->glb, &bytes, error));
   const size_t lungs = supine_basis_get_info(basis)->lung_count;
   const bool small = bytes < 100000;
-  (void)printf("%s: %zu lung%s with morph targets%s, %.*f %s\n", wanted->path, lungs,
-               lungs == 1 ? "" : "s", wanted->glb.animate ? " and animations" : "", small ? 0 : 2,
-               (small ? 1e-3 : 1e-6) * (double)bytes, small ? "kB" : "MB");
+  (void)supine_print(stdout, "%s: %zu lung%s with morph targets%s, %.*f %s\n", wanted->path, lungs,
+                     lungs == 1 ? "" : "s", wanted->glb.animate ? " and animations" : "",
+                     small ? 0 : 2, (small ? 1e-3 : 1e-6) * (double)bytes, small ? "kB" : "MB");
   return SUPINE_OK;
 }
 

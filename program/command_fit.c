@@ -143,13 +143,17 @@ static supine_status load_scans(const request *wanted, supine_patient_scans *sca
 static supine_status fit_further(const request *wanted, size_t which, supine_patient_scans *scans,
                                  supine_patient_record *record, supine_error *error) {
   const char *path = wanted->further_path[which];
-  const bool landmarks = supine_text_ends_in(path, ".csv");
-  SUPINE_FREED_BY(supine_patient_pairs_free) supine_patient_pairs pairs = {0};
+  const supine_state *state = &wanted->further[which];
+  if (supine_text_ends_in(path, ".csv")) {
+    SUPINE_FREED_BY(supine_patient_pairs_free) supine_patient_pairs pairs = {0};
+    SUPINE_TRY(load_pairs(wanted, path, &pairs, error));
+    return supine_patient_scans_fit_further_landmarks(scans, state, scans_moved(wanted), &pairs,
+                                                      record, error);
+  }
   SUPINE_FREED_BY(supine_lungs_free) supine_lungs lungs = {0};
-  SUPINE_TRY(landmarks ? load_pairs(wanted, path, &pairs, error)
-                       : supine_command_load_lungs(name, path, &wanted->source, &lungs, error));
-  return supine_patient_scans_fit_further(scans, &wanted->further[which], scans_moved(wanted),
-                                          &pairs, landmarks ? NULL : &lungs.mesh, record, error);
+  SUPINE_TRY(supine_command_load_lungs(name, path, &wanted->source, &lungs, error));
+  return supine_patient_scans_fit_further_surface(scans, state, scans_moved(wanted), &lungs.mesh,
+                                                  record, error);
 }
 
 /* Take the file names from the command line, and check that they fit the options. */
@@ -187,8 +191,11 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   const char *named_for =
       wanted->landmarks.path != NULL ? wanted->landmarks.path : wanted->scan_path[1];
   SUPINE_FREED_BY(supine_patient_scans_free) supine_patient_scans scans = {0};
+  SUPINE_REFUSE_IF(wanted->name != NULL && !supine_text_is_utf8(wanted->name), error,
+                   SUPINE_ERROR_ARGUMENT, "--name is not UTF-8: give it in this encoding");
   (void)snprintf(record.name, sizeof record.name, "%s",
                  wanted->name != NULL ? wanted->name : supine_text_file_name(named_for));
+  (void)supine_text_make_utf8(record.name); /* of a file, or cut off */
   SUPINE_TRY(load_scans(wanted, &scans, error));
   memcpy(record.state, wanted->state, sizeof record.state);
   SUPINE_TRY(supine_patient_scans_order(&scans, &record, error));
@@ -244,4 +251,5 @@ const supine_command supine_command_fit = {
     .operands_most = 2,
     .operands_missing = "more than two scans: give further ones as --state STATE:FILE",
     .request_size = sizeof(request),
+    .uses_blas = true,
     .run = run};

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/csv.h"
 #include "base/output.h"
 #include "base/text.h"
 #include "mesh/io/points.h"
@@ -157,9 +158,12 @@ static supine_status finish_points(const request *wanted, const supine_basis *in
   for (size_t i = 0; i < info->vertex_count; ++i) {
     const size_t at = names->order[i];
     const float *p = located->xyz + 3 * at;
-    (void)fprintf(output.file, "%s,%s,%.3f,%.3f,%.3f,%.3f\n", names->text[names->part[at]],
-                  info->lung_names[supine_command_lung_of(info, at)], (double)p[0], (double)p[1],
-                  (double)p[2], (double)located->sigma[at]);
+    supine_csv_row row = {.file = output.file};
+    supine_csv_add_text(&row, names->text[names->part[at]]);
+    supine_csv_add_text(&row, info->lung_names[supine_command_lung_of(info, at)]);
+    supine_csv_add(&row, "%.3f,%.3f,%.3f,%.3f", (double)p[0], (double)p[1], (double)p[2],
+                   (double)located->sigma[at]);
+    supine_csv_end_row(&row);
   }
   return supine_output_commit(&output, error);
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine phantom: make synthetic lungs. */
 #include "base/arena.h"
+#include "base/number.h"
 #include "precompute/lungs/phantom.h"
 
 #include "program/options/command.h"
@@ -29,8 +30,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   (void)given;
   SUPINE_TRY(supine_phantom_create(wanted->vertices, wanted->volume, &mesh, error));
   SUPINE_TRY(supine_mesh_save(wanted->path, &mesh, &save, error));
-  (void)printf("%s: two lungs, %zu vertices, %zu triangles, %.1f mL\n", wanted->path,
-               mesh.vertex_count, mesh.triangle_count, 1e-3 * supine_mesh_volume(&mesh));
+  (void)supine_print(stdout, "%s: two lungs, %zu vertices, %zu triangles, %.1f mL\n", wanted->path,
+                     mesh.vertex_count, mesh.triangle_count, 1e-3 * supine_mesh_volume(&mesh));
   return SUPINE_OK;
 }
 

@@ -1,36 +1,232 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine precompute: make a basis file from lung surfaces or a label map. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/arena.h"
+#include "base/csv.h"
+#include "base/number.h"
+#include "base/text.h"
 #include "base/vec3.h"
-#include "program/offline/basis.h"
+#include "precompute/library.h"
 #include "program/options/model_options.h"
 
 static const char name[] = "precompute";
+
+typedef struct request {
+  supine_model_options model;
+  const char *path; /* of the basis file */
+  bool has_band, has_modes;
+  size_t band, modes; /* 0 modes: harmonics */
+  size_t directions;  /* number of directions of gravity to print; 0 to make a basis */
+} request;
+
+static supine_status read_modes(const char *text, void *field, supine_error *error) {
+  size_t *modes = field;
+  (void)error;
+  if (strcmp(text, "harmonics") == 0) {
+    *modes = 0;
+    return SUPINE_OK;
+  }
+  return supine_options_fits(supine_options_parse_count(text, modes) && *modes >= 1 &&
+                             *modes <= SUPINE_MODES_MADE_MAX);
+}
+
+#define FILLS(member) SUPINE_FILLS(request, member)
+
+static const supine_option table[] = {
+    {"output", 'o', "FILE", "basis file to write (.safetensors)", FILLS(path), .required = true,
+     .file = SUPINE_FILE_OUT},
+    {"band", 0, "L", "highest band L of the spherical harmonics, 0 to 64", FILLS(band),
+     SUPINE_SAYS_GIVEN(request, has_band), .standard = "23", .range = {0.0, SUPINE_SH_BAND_MAX},
+     .more = true},
+    {"modes", 0, "K|harmonics",
+     "basis functions to store\nharmonics: all (L+1)^2 spherical harmonics up to --band L, as in "
+     "Santhanam 2008 with --band 3\nK: the K functions (modes) that describe the displacement "
+     "best, or fewer if fewer suffice. More modes are more accurate, but each costs a "
+     "multiplication per vertex at run time",
+     FILLS(modes), SUPINE_SAYS_GIVEN(request, has_modes), .read = read_modes, .standard = "16",
+     .wants = "1 to 64 or 'harmonics'", .more = true},
+    {"held-out", 0, "N",
+     "number of held-out directions in which the error is measured; default 1000; fewer, but at "
+     "least 100, for more than 20000 vertices",
+     FILLS(model.precompute.modes.held_out), .range = {1.0, 100000.0}, .more = true},
+    {"without-normals", 0, NULL,
+     "leave out the normals: 65 bytes a vertex for 95, and programs compute them from the "
+     "triangles",
+     FILLS(model.precompute.modes.without_normals), .more = true},
+    {"patient", 0, "FILE",
+     "model of the patient's motion, made by 'supine fit', to use instead of the built-in law",
+     FILLS(model.precompute.patient), .file = SUPINE_FILE_IN, .rivals = "directions",
+     .partners = "output band modes held-out without-normals axes units midline labels edge close "
+                 "surfaces-out "
+                 "scanned resting full height sex expandability lesion lung"},
+    {.help = "Displacements from another simulator, instead of the built-in physics:"},
+    {"fields", 0, "FILE",
+     "safetensors file with three tensors: points [P,3], the positions of P points; gravity [M,3], "
+     "M directions; and displacement [M,P,3], the displacement of each point for each direction. "
+     "All three are in the axes and unit of MESH. Each vertex of MESH takes the displacement of "
+     "the point at its position, so that the points may have any order and may include inner nodes "
+     "of a volume mesh. The fields give gravity alone: the basis has no volumes and no breaths. "
+     "Without --band and --modes, cross-validation chooses both",
+     FILLS(model.precompute.fields), .file = SUPINE_FILE_IN, .rivals = "directions",
+     .partners = "output band modes without-normals axes units midline labels edge close "
+                 "surfaces-out scanned"},
+    {"directions", 0, "N",
+     "only print N directions of gravity that cover the sphere evenly, as CSV, to simulate",
+     FILLS(directions), .range = {2.0, 1000.0}, .partners = ""},
+    {.table = supine_command_model_options, FILLS(model)},
+    {.name = NULL}};
+
+/* Fraction of turned-over triangles above which a warning is printed. */
+static const double turned_over_limit = 0.01;
+
+static const char *plural(size_t count) {
+  return count == 1 ? "" : "s";
+}
+
+/* Print the assumptions, one per line, and the options that change them. */
+static void print_assumed(const char *options, const char *assumed) {
+  (void)printf("assumed (%s change it):\n", options);
+  for (const char *item = assumed, *end; item != NULL; item = end) {
+    end = strstr(item, "; ");
+    (void)printf("  %.*s\n", (int)(end != NULL ? end - item : 1000), item);
+    end = end != NULL ? end + 2 : NULL;
+  }
+}
+
+static void print_errors(const supine_precompute_report *report, const char *at,
+                         const char *state) {
+  (void)supine_print(stdout,
+                     "  %.3g %% RMS, %.3g %% 95th percentile, %.3g %% largest, of the RMS "
+                     "displacement\n"
+                     "  %s mm RMS, %s mm 95th percentile, %s mm largest%s%s\n",
+                     100.0 * report->relative.rms, 100.0 * report->relative.p95,
+                     100.0 * report->relative.largest, supine_text_distance(report->mm.rms).text,
+                     supine_text_distance(report->mm.p95).text,
+                     supine_text_distance(report->mm.largest).text, at, state);
+}
+
+static void print_report(const request *wanted, const supine_prepared *prepared,
+                         const supine_precompute_report *report) {
+  char state[64];
+  if (!report->rest_known) {
+    (void)supine_print_text(state, sizeof state, "%g mL", report->volume);
+  } else if (report->rest_part == 1.0) {
+    (void)snprintf(state, sizeof state, "rest");
+  } else {
+    (void)supine_print_text(state, sizeof state, "%g of the volume change from full to rest",
+                            report->rest_part);
+  }
+  (void)printf("%s: %s, %zu vertices, band %zu, %zu %s%s\n", wanted->path,
+               report->lung_count == 2 ? "two lungs" : "one lung", report->vertex_count,
+               report->band, report->mode_count,
+               wanted->model.precompute.modes.harmonics ? "harmonic" : "mode",
+               plural(report->mode_count));
+  print_assumed("--axes, --units, --scanned, --law and --resting", prepared->assumed);
+  (void)printf("error against the full solve, on %zu held-out direction%s:\n",
+               report->direction_count, plural(report->direction_count));
+  print_errors(report, ", at ", state);
+  if (report->turned_over > turned_over_limit) {
+    (void)supine_print(
+        stdout,
+        "the surface folds: %.3g %% of its triangles turn over at %s in the worst of six\n"
+        "postures. %s\n",
+        100.0 * report->turned_over, state,
+        prepared->model.reach == 0.0
+            ? "The paper law spreads forces over a few mesh links, however short: give --reach 10"
+            : "Give a longer --reach");
+  }
+}
+
+/* Print the highest band (degree) of spherical harmonics that the given directions of gravity
+ * determine, and the leave-one-out error of each band. */
+static void print_fit(const request *wanted, const supine_prepared *prepared,
+                      const supine_precompute_report *report) {
+  const size_t highest = report->band_count - 1;
+  (void)printf("%s: fields of gravity: %zu vertices, %zu directions, band %zu, %zu mode%s\n",
+               wanted->path, report->vertex_count, report->direction_count, report->band,
+               report->mode_count, plural(report->mode_count));
+  print_assumed("--axes, --units and --scanned", prepared->assumed);
+  (void)printf("the directions determine bands up to %zu (%zu harmonic%s); leave-one-out error:\n",
+               highest, (highest + 1) * (highest + 1), highest > 0 ? "s" : "");
+  for (size_t band = 0; band <= highest; ++band) {
+    (void)supine_print(stdout, "  band %-2zu  %8.3g %%%s\n", band, 100.0 * report->band_error[band],
+                       band == report->band ? "  <- chosen" : "");
+  }
+  if (report->band == highest && highest + 1 < SUPINE_PRECOMPUTE_BANDS_MAX) {
+    (void)printf("the error is still falling at the highest band, so detail beyond band %zu is "
+                 "missing: about\n%zu evenly spread directions would determine band %zu\n",
+                 highest, 2 * (highest + 2) * (highest + 2), highest + 1);
+  }
+  (void)printf("error of the basis, each direction predicted from the others:\n");
+  print_errors(report, "", "");
+}
 
 static void print_directions(size_t count) {
   (void)puts("x,y,z");
   for (size_t i = 0; i < count; ++i) {
     double g[3];
     supine_spiral((double)i, (double)count, 0.0, g);
-    (void)printf("%.9g,%.9g,%.9g\n", g[0], g[1], g[2]);
+    supine_csv_row row = {.file = stdout};
+    supine_csv_add(&row, "%.9g,%.9g,%.9g", g[0], g[1], g[2]);
+    supine_csv_end_row(&row);
   }
 }
 
+static int show_progress(void *progress, double fraction) {
+  return supine_options_progress_step(progress, fraction) ? 0 : 1;
+}
+
+/* Make the basis of the lungs, and write its file. */
+static supine_status write_basis(request *wanted, const supine_prepared *prepared,
+                                 supine_precompute_report *report, supine_error *error) {
+  supine_precompute_options *options = &wanted->model.precompute;
+  supine_bytes bytes = {.data = NULL};
+  supine_progress progress = supine_options_progress_begin(name);
+  options->progress = show_progress;
+  options->context = &progress;
+  supine_status status = supine_precompute_make(options, prepared, &bytes, report, error);
+  supine_options_progress_end(&progress);
+  if (status == SUPINE_OK) {
+    status = supine_precompute_save(wanted->path, &bytes, error);
+  }
+  free(bytes.data);
+  return status;
+}
+
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
-  supine_offline_request *wanted = chosen;
+  request *wanted = chosen;
+  supine_precompute_options *options = &wanted->model.precompute;
+  supine_precompute_report report;
   SUPINE_FREED_BY(supine_precompute_prepared_free) supine_prepared prepared = {.fit = ""};
   if (wanted->directions > 0) {
     print_directions(wanted->directions);
     return SUPINE_OK;
   }
-  wanted->basis.made_by = given->made_by;
-  SUPINE_TRY(supine_offline_check(wanted, error));
-  SUPINE_TRY(
-      supine_command_prepare(name, &wanted->model, given->operand, given->count, &prepared, error));
-  SUPINE_FREED_BY(supine_options_progress_end)
-  supine_progress progress = supine_options_progress_begin(name);
-  wanted->basis.progress = supine_options_progress_step;
-  wanted->basis.progress_context = &progress;
-  return supine_offline_write(wanted, &prepared, stdout, error);
+  SUPINE_REFUSE_IF(supine_mesh_save_supports(wanted->path), error, SUPINE_ERROR_ARGUMENT,
+                   "%s: this is the name of a mesh: give a name that ends in .safetensors",
+                   wanted->path);
+  options->made_by = given->made_by;
+  options->modes.has_band = wanted->has_band;
+  if (wanted->has_band) {
+    options->modes.band = wanted->band;
+  }
+  if (wanted->has_modes) {
+    options->modes.count = wanted->modes;
+    options->modes.harmonics = wanted->modes == 0;
+  }
+  SUPINE_TRY(supine_command_prepare(name, &wanted->model, given, &prepared, error));
+  if (prepared.patient != NULL) {
+    (void)printf("%s\n", prepared.fit);
+  }
+  SUPINE_TRY(write_basis(wanted, &prepared, &report, error));
+  if (options->fields != NULL) {
+    print_fit(wanted, &prepared, &report);
+  } else {
+    print_report(wanted, &prepared, &report);
+  }
+  return SUPINE_OK;
 }
 
 const supine_command supine_command_precompute = {
@@ -44,12 +240,12 @@ const supine_command supine_command_precompute = {
              "deformed lungs in real time. MESH is any surface that assimp reads (PLY, OBJ, STL, "
              "OFF, ...), with both lungs in one file or a file for each; LABELS is the label map "
              "of a segmentation (NRRD, NIfTI, MetaImage). Surfaces must be closed.",
-    .options = supine_offline_options,
+    .options = table,
     .notes = "Examples:\n"
              "  supine precompute left.ply right.ply -o lungs.safetensors\n"
              "  supine precompute lungs.nii.gz -o lungs.safetensors\n"
              "  supine precompute lungs.stl --axes RAS --units cm -o lungs.safetensors",
     SUPINE_SURFACES,
-    .request_size = sizeof(supine_offline_request),
-    .begin = supine_offline_begin,
+    .request_size = sizeof(request),
+    .uses_blas = true,
     .run = run};

@@ -7,6 +7,9 @@
 #include <jansson.h>
 
 #include "base/arena.h"
+#include "base/blas.h"
+#include "base/csv.h"
+#include "base/locale.h"
 #include "base/output.h"
 
 #include "program/options/command.h"
@@ -43,8 +46,10 @@ static json_t *json_limb(const supine_pv_curve *curve, const supine_pv_report *r
 }
 
 static supine_status run_fit(const char *path, const request *chosen, supine_error *error) {
+  SUPINE_C_LOCALE;
   supine_pv pv = {0};
   supine_pv_report reports[SUPINE_PV_LIMB_COUNT];
+  SUPINE_TRY(supine_blas_reserve(1, error)); /* the fit of many samples uses it */
   SUPINE_TRY(supine_breath_fit_file(path, confidence, &pv, reports, error));
   json_auto_t *root = json_pack("{s:f}", "confidence", confidence);
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
@@ -68,19 +73,21 @@ static supine_status run_fit(const char *path, const request *chosen, supine_err
 }
 
 static supine_status print_row(const supine_pv *pv, double pressure, supine_error *error) {
-  (void)printf("%.10g", pressure);
+  supine_csv_row row = {.file = stdout};
+  supine_csv_add(&row, "%.10g", pressure);
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     const supine_pv_curve *curve = &pv->limb[limb];
     if (pressure < curve->pressure[0] || pressure > curve->pressure[1]) {
-      (void)printf(",,");
+      supine_csv_add_text(&row, "");
+      supine_csv_add_text(&row, "");
       continue;
     }
     double volume = 0.0;
     double compliance = 0.0;
     SUPINE_TRY(supine_breath_curve_evaluate(curve, 1, &pressure, &volume, &compliance, error));
-    (void)printf(",%.7g,%.7g", volume, compliance);
+    supine_csv_add(&row, "%.7g,%.7g", volume, compliance);
   }
-  (void)putchar('\n');
+  supine_csv_end_row(&row);
   return SUPINE_OK;
 }
 

@@ -1,7 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine solve: solve the full physics for one direction of gravity. */
 #include "base/arena.h"
+#include "base/csv.h"
+#include "base/number.h"
 #include "base/output.h"
+#include "base/text.h"
 #include "precompute/lungs/disease.h"
 #include "precompute/physics/solve.h"
 
@@ -12,7 +15,7 @@
 static const char name[] = "solve";
 
 typedef struct request {
-  supine_model_choice model;
+  supine_model_options model;
   supine_orientation orientation;
   const char *path;
   supine_state state; /* the kind of its volume is SUPINE_VOLUME_DEFAULT if none is given */
@@ -65,7 +68,9 @@ static supine_status write_column(const supine_prepared *prepared, const request
   (void)fputs("vertex,x_mm,y_mm,z_mm,response\n", output.file);
   for (size_t i = 0; i < n; ++i) {
     const double *p = lungs->mesh.vertices + 3 * i;
-    (void)fprintf(output.file, "%zu,%.9g,%.9g,%.9g,%.17g\n", i, p[0], p[1], p[2], column[i]);
+    supine_csv_row row = {.file = output.file};
+    supine_csv_add(&row, "%zu,%.9g,%.9g,%.9g,%.17g", i, p[0], p[1], p[2], column[i]);
+    supine_csv_end_row(&row);
   }
   return supine_output_commit(&output, error);
 }
@@ -135,9 +140,9 @@ static supine_status find_gains(const supine_prepared *prepared, const request *
 static void print_gains(const supine_lungs *lungs, double gains[2][3]) {
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     const double *gain = gains[lung];
-    (void)printf(", %s lung's gain %.6g", supine_lungs_name(lungs, lung), gain[0]);
+    (void)supine_print(stdout, ", %s lung's gain %.6g", supine_lungs_name(lungs, lung), gain[0]);
     if (gain[1] != gain[0] || gain[2] != gain[0]) {
-      (void)printf(",%.6g,%.6g", gain[1], gain[2]);
+      (void)supine_print(stdout, ",%.6g,%.6g", gain[1], gain[2]);
     }
   }
 }
@@ -175,10 +180,11 @@ static supine_status write_solution(const supine_prepared *prepared, const reque
   const supine_mesh_save_options save = {.from = reference.vertices};
   SUPINE_TRY(supine_options_plausible(&result, error));
   SUPINE_TRY(supine_mesh_save(wanted->path, &deformed, &save, error));
-  (void)printf("%s: gravity %.4g,%.4g,%.4g", wanted->path, g[0], g[1], g[2]);
+  (void)supine_print(stdout, "%s: gravity %.4g,%.4g,%.4g", wanted->path, g[0], g[1], g[2]);
   print_gains(lungs, gains);
-  (void)printf(", largest displacement %.3f mm, %+.2f mL\n",
-               supine_physics_solution_largest(solution), volume - full);
+  (void)supine_print(stdout, ", largest displacement %s mm, %+.2f mL\n",
+                     supine_text_distance(supine_physics_solution_largest(solution)).text,
+                     volume - full);
   return SUPINE_OK;
 }
 
@@ -194,25 +200,19 @@ static supine_status solve(const supine_prepared *prepared, const request *wante
   return write_solution(prepared, wanted, &solution, error);
 }
 
-static void begin(void *chosen) {
-  ((request *)chosen)->model = supine_precompute_choice_default();
-}
-
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
   SUPINE_FREED_BY(supine_precompute_prepared_free)
   supine_prepared prepared = {.source = {.is_map = false}};
   if (wanted->has_vertex) { /* the response is that of the surface as it is */
-    wanted->model.scan.known = false;
-    wanted->model.has_scan = true;
+    wanted->model.precompute.scan.shown = SUPINE_SHOWN_UNKNOWN;
   } else if (!supine_mesh_save_supports(wanted->path)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "%s: the name must end in " SUPINE_MESH_ENDINGS, wanted->path);
   } else {
     SUPINE_TRY(supine_options_state(&wanted->orientation, &wanted->state, error));
   }
-  SUPINE_TRY(
-      supine_command_prepare(name, &wanted->model, given->operand, given->count, &prepared, error));
+  SUPINE_TRY(supine_command_prepare(name, &wanted->model, given, &prepared, error));
   return wanted->has_vertex ? write_column(&prepared, wanted, error)
                             : solve(&prepared, wanted, error);
 }
@@ -231,5 +231,5 @@ const supine_command supine_command_solve = {
              "  supine solve lungs.nii.gz --posture left -o left.vtp",
     SUPINE_SURFACES,
     .request_size = sizeof(request),
-    .begin = begin,
+    .uses_blas = true,
     .run = run};

@@ -75,8 +75,13 @@ static const supine_option table[] = {
     {.help = "A live page:"},
     {"web", 0, "[ADDRESS:]PORT",
      "serve a page that shows the lungs live. A phone on which the page is open can send its own "
-     "tilt. A port without an address can be reached from this machine only",
+     "tilt. A port without an address can be reached from this machine only. There is no access "
+     "control: whoever can reach the address sees the lungs and can send a pose",
      SUPINE_FILLS(request, session.web)},
+    {"web-host", 0, "NAME[,NAME...]",
+     "host names by which browsers may open the page, besides numeric addresses and localhost. "
+     "Other names are refused, because a web site could make them point to this machine",
+     SUPINE_FILLS(request, session.web_host), .more = true},
     {.table = supine_options_from, SUPINE_FILLS(request, session.from)},
     {"certificate", 0, "PEM",
      "certificate, with --key, to serve the page encrypted. Without encryption, browsers do not "
@@ -118,12 +123,15 @@ const supine_command supine_command_stream = {
     "stream",
     "follow a tracked patient live, over OpenIGTLink",
     .usage = "BASIS [--listen PORT | --connect HOST:PORT] [OPTIONS]",
-    .about = "Receives the pose of a tracked patient by OpenIGTLink (headers of version 1 and 2) "
-             "and sends the lungs in that pose to every connected peer. A pose is a TRANSFORM, "
-             "QTDATA or POSITION message, or an NDARRAY of three numbers, the direction of gravity "
-             "in the marker's axes, as a tilt sensor measures it. Only the newest pose counts: a "
-             "slow peer misses frames without delaying the others. At the end the command prints "
-             "how many frames were sent within 15 ms of receiving their pose.",
+    .about =
+        "Receives the pose of a tracked patient by OpenIGTLink (headers of version 1 and 2) "
+        "and sends the lungs in that pose to every connected peer. A pose is a TRANSFORM, "
+        "QTDATA or POSITION message, or an NDARRAY of three numbers, the direction of gravity "
+        "in the marker's axes, as a tilt sensor measures it. Only the newest pose counts: a "
+        "slow peer misses frames without delaying the others. A peer that sends no message and "
+        "takes "
+        "no frame for a minute is disconnected. At the end the command prints how many frames were "
+        "sent within 15 ms of receiving their pose.",
     .options = table,
     .notes =
         "Examples:\n"

@@ -200,4 +200,5 @@ const supine_command supine_command_validate = {
         "supine:mid.ply \\\n      --state supine:full:full.ply --landmarks pairs.csv",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),
+    .uses_blas = true,
     .run = run};

@@ -4,6 +4,8 @@
 #include <stdlib.h>
 
 #include "base/arena.h"
+#include "base/csv.h"
+#include "base/number.h"
 #include "base/output.h"
 #include "base/text.h"
 #include "base/vec3.h"
@@ -12,10 +14,6 @@
 #include "precompute/warp/field.h"
 #include "program/deform_content.h"
 #include "program/options/inside.h"
-
-/* Distance from the lungs at which a displacement field reaches 0, mm. Grids made by 'supine embed'
- * extend this far around the lungs. */
-static const double fade = 60.0;
 
 const supine_option supine_command_deform_content_options[] = {
     {.help = "For structures made by 'supine embed', -o FILE.csv writes a row for each named "
@@ -27,7 +25,9 @@ const supine_option supine_command_deform_content_options[] = {
      "displacement field to write (.nrrd, .nii, .nii.gz or .mha): the displacement of the tissue "
      "that is at each node in the scan, or in the state of --from. It is in mm and LPS, also in "
      "NIfTI, as ITK and ANTs expect; for NiftyReg, negate x and y. Outside the lungs it falls to 0 "
-     "within 60 mm",
+     "within 60 mm, or 1.5 times the largest displacement if that is more, and it is 0 at the "
+     "border "
+     "of the grid and beyond",
      SUPINE_FILLS(supine_deform_content, field), .file = SUPINE_FILE_OUT,
      .endings = ".nrrd, .nii, .nii.gz or .mha"},
     {"inverse", 0, NULL,
@@ -35,7 +35,10 @@ const supine_option supine_command_deform_content_options[] = {
      "where its tissue was. Resampling of an image needs the inverse",
      SUPINE_FILLS(supine_deform_content, inverse)},
     {"image", 0, "FILE",
-     "image to move and write to -o (.nrrd, .nii, .nii.gz or .mha), interpolated linearly",
+     "image to move and write to -o (.nrrd, .nii, .nii.gz or .mha), interpolated linearly. The "
+     "output "
+     "has the voxels of FILE in the same order, even if their axes are left-handed (as dcm2niix's "
+     "often are), so that the two can be compared voxel by voxel; fields are always right-handed",
      SUPINE_FILLS(supine_deform_content, image), .file = SUPINE_FILE_IN},
     {"density", 0, NULL,
      "with --image, if it is a CT in Hounsfield units: scale densities inside the lungs by the "
@@ -121,10 +124,15 @@ static void print_rows(const supine_deformation *moved, const supine_basis_info 
     double move[3];
     in_frame(frame->axes, unit, row->at, at);
     in_frame(frame->axes, unit, row->move, move);
-    (void)fprintf(file, "%s,%s,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f", row->name,
-                  info->lung_names[row->lung], at[0], at[1], at[2], move[0], move[1], move[2],
-                  row->moved);
-    (void)fprintf(file, known ? ",%.3f\n" : "\n", row->expected);
+    supine_csv_row line = {.file = file};
+    supine_csv_add_text(&line, row->name);
+    supine_csv_add_text(&line, info->lung_names[row->lung]);
+    supine_csv_add(&line, "%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f", at[0], at[1], at[2], move[0],
+                   move[1], move[2], row->moved);
+    if (known) {
+      supine_csv_add(&line, "%.3f", row->expected);
+    }
+    supine_csv_end_row(&line);
   }
 }
 
@@ -191,8 +199,9 @@ static supine_status invert(const supine_field *forward, supine_field *inverse,
                             supine_error *error) {
   supine_field_residual residual = {0};
   SUPINE_TRY(supine_field_invert(forward, inverse, &residual, error));
-  (void)printf("field followed by inverse: residual %.3g mm RMS, %.3g mm at most, inside the lungs",
-               residual.rms, residual.largest);
+  (void)printf("field followed by inverse: residual %s mm RMS, %s mm at most, inside the lungs",
+               supine_text_distance(residual.rms).text,
+               supine_text_distance(residual.largest).text);
   if (residual.lost > 0) {
     (void)printf("; the field folds and has no inverse at %zu %s", residual.lost,
                  residual.lost == 1 ? "node" : "nodes");
@@ -209,7 +218,7 @@ static supine_status find_field(const supine_basis *basis, const supine_deformat
   static const double told = 0.01;
   static const double allowed = 0.1;
   SUPINE_TRY(supine_field_between(basis, moved->from_given ? &moved->from.pose : NULL, &moved->pose,
-                                  fade, field, error));
+                                  field, error));
   double folded[2];
   supine_field_folded(field, folded);
   const double around = folded[1];
@@ -263,7 +272,7 @@ static void print_range(const supine_basis *basis, const supine_deformation *mov
     sum.assumed = sum.assumed || held.assumed;
   }
   if (sum.assumed) {
-    (void)printf("; assumed from other people: %.0f to %.0f mL", sum.low, sum.high);
+    (void)supine_print(stdout, "; assumed from other people: %.0f to %.0f mL", sum.low, sum.high);
   }
 }
 
@@ -302,11 +311,13 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
   for (size_t i = 0; i < mesh.vertex_count; ++i) {
     largest = fmax(largest, supine_distance(mesh.vertices + 3 * i, from.vertices + 3 * i));
   }
-  (void)printf("%s: gravity %.4g,%.4g,%.4g, largest displacement %.3f mm from %s", path, gravity[0],
-               gravity[1], gravity[2], largest, moved->from.name);
+  (void)supine_print(stdout, "%s: gravity %.4g,%.4g,%.4g, largest displacement %s mm from %s", path,
+                     gravity[0], gravity[1], gravity[2], supine_text_distance(largest).text,
+                     moved->from.name);
   if (supine_basis_metadata(basis, "content") == NULL) {
     const double held = 1e-3 * supine_mesh_volume(&mesh);
-    (void)printf(", %.2f mL (%+.2f mL)", held, held - 1e-3 * supine_mesh_volume(&from));
+    (void)supine_print(stdout, ", %.2f mL (%+.2f mL)", held,
+                       held - 1e-3 * supine_mesh_volume(&from));
     print_range(basis, moved);
   }
   (void)putchar('\n');
@@ -326,15 +337,16 @@ supine_status supine_command_deform_content(const supine_deform_content *wanted,
                    : write_surface(wanted->path, basis, moved, error));
   }
   if (moved->expected.sigma != NULL) {
-    (void)printf("expected error %.1f mm (RMS over the points), %.1f mm at most%s\n",
-                 moved->expected.rms, moved->expected.largest,
-                 moved->expected.turned ? "; an extrapolation, as the posture changes" : "");
+    (void)supine_print(stdout, "expected error %.1f mm (RMS over the points), %.1f mm at most%s\n",
+                       moved->expected.rms, moved->expected.largest,
+                       moved->expected.turned ? "; an extrapolation, as the posture changes" : "");
   }
   if (supine_length(moved->hilum.move) != 0.0) {
-    (void)printf("the hilum moves by %.1f, %.1f, %.1f mm (to the left, back and head)",
-                 moved->hilum.move[0], moved->hilum.move[1], moved->hilum.move[2]);
+    (void)supine_print(stdout,
+                       "the hilum moves by %.1f, %.1f, %.1f mm (to the left, back and head)",
+                       moved->hilum.move[0], moved->hilum.move[1], moved->hilum.move[2]);
     if (!isnan(moved->hilum.expected)) {
-      (void)printf(", expected error %.1f mm", moved->hilum.expected);
+      (void)supine_print(stdout, ", expected error %.1f mm", moved->hilum.expected);
     }
     (void)printf("%s\n", moved->subtract_hilum ? ", subtracted from all positions" : "");
   }

@@ -3,14 +3,12 @@
 #include "base/arena.h"
 #include "mesh/io/points.h"
 #include "mesh/labels/labels.h"
+#include "precompute/warp/field.h"
 
 #include "program/embed_content.h"
 #include "program/options/command.h"
 
 static const char name[] = "embed";
-
-/* A grid extends this far beyond the lungs, mm. Displacements fall to 0 over this distance. */
-static const double margin = 60.0;
 
 static supine_status read_labelled(const supine_embed_content *wanted, const char *path,
                                    supine_inside_content *content, supine_error *error) {
@@ -61,17 +59,27 @@ static supine_status check_content(const supine_inside_shells *shells,
   return SUPINE_OK;
 }
 
+/* Make a grid that extends so far beyond the lungs that displacements fall to 0 within it. */
+static supine_status make_grid(const supine_inside_shells *shells, const supine_image *like,
+                               double spacing, supine_inside_content *content,
+                               supine_error *error) {
+  double largest = 0.0;
+  SUPINE_TRY(supine_inside_shells_reach(shells, &largest, error));
+  return supine_inside_content_grid(shells, like, spacing, supine_field_fade(largest), content,
+                                    error);
+}
+
 supine_status supine_command_embed_read(const supine_inside_shells *shells,
                                         const supine_embed_content *wanted, char **paths,
                                         size_t count, supine_inside_content *content,
                                         supine_error *error) {
-  SUPINE_FREED_BY(supine_image_free) supine_image image = {0};
   if (count == 0) {
-    return supine_inside_content_grid(shells, NULL, wanted->grid_spacing, margin, content, error);
+    return make_grid(shells, NULL, wanted->grid_spacing, content, error);
   }
   if (!wanted->labels.given && supine_image_is_named(paths[0])) {
+    SUPINE_FREED_BY(supine_image_free) supine_image image = {0};
     SUPINE_TRY(supine_image_read(paths[0], &image, error));
-    return supine_inside_content_grid(shells, &image, wanted->grid_spacing, margin, content, error);
+    return make_grid(shells, &image, wanted->grid_spacing, content, error);
   }
   for (size_t i = 0; i < count; ++i) {
     SUPINE_TRY(supine_image_is_named(paths[i]) ? read_labelled(wanted, paths[i], content, error)

@@ -1,9 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The program: find the command and run it. */
+#include <errno.h>
+#include <fcntl.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <cblas.h>
 #include <gsl/gsl_errno.h>
@@ -83,7 +87,33 @@ static void handle_gsl(const char *reason, const char *file, int line, int code)
   }
 }
 
+/* Open those of the descriptors 0 to 2 that are closed, so that no file gets their numbers: output
+ * meant for the user would go into it. Reading standard input and writing standard output then
+ * fail, as they do with a closed descriptor; messages are dropped. */
+static void open_standard_descriptors(void) {
+  for (int descriptor = STDIN_FILENO; descriptor <= STDERR_FILENO; ++descriptor) {
+    if (fcntl(descriptor, F_GETFD) < 0 && errno == EBADF) {
+      (void)open("/dev/null", descriptor == STDOUT_FILENO ? O_RDONLY : O_WRONLY);
+    }
+  }
+}
+
+/* Under a limit of addresses (ulimit -v), start the program again without the threads of OpenBLAS.
+ * When it is loaded, it starts one for each other processor. Each maps 128 MiB, and tries for ever
+ * if it cannot; the program would wait for it at its end. */
+static void restart_without_blas_threads(char **argv) {
+  static const char name[] = "OPENBLAS_NUM_THREADS";
+  const char *threads = getenv(name); /* NOLINT(concurrency-mt-unsafe) */
+  struct rlimit addresses;
+  if (getrlimit(RLIMIT_AS, &addresses) == 0 && addresses.rlim_cur != RLIM_INFINITY &&
+      (threads == NULL || strcmp(threads, "1") != 0) && setenv(name, "1", 1) == 0) {
+    (void)execv("/proc/self/exe", argv); /* on failure, go on with these threads */
+  }
+}
+
 int main(int argc, char **argv) {
+  restart_without_blas_threads(argv);
+  open_standard_descriptors();
   (void)gsl_set_error_handler(handle_gsl);
   json_set_alloc_funcs(allocate_json, free);
   openblas_set_num_threads(1); /* OpenBLAS's threads would busy-wait beside the program's own */

@@ -6,6 +6,7 @@
 #include <supine/compare.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "base/output.h"
 #include "base/vec3.h"
 
@@ -79,8 +80,9 @@ static supine_status fill_panel(studio *s, size_t i, supine_error *error) {
   (void)supine_compare_distances(s->compare, &shown->pose, &s->from.pose, shown->value);
   supine_compare_statistics(s->compare, shown->value, &statistics);
   s->max = fmax(s->max, statistics.max);
-  (void)snprintf(shown->subtitle, sizeof shown->subtitle, "%.0f mL, mean %.1f, max %.1f mm",
-                 supine_posed_volume(s->basis, &shown->pose), statistics.mean, statistics.max);
+  (void)supine_print_text(
+      shown->subtitle, sizeof shown->subtitle, "%.0f mL, mean %.1f, max %.1f mm",
+      supine_posed_volume(s->basis, &shown->pose), statistics.mean, statistics.max);
   s->panel[i] = (supine_panel){.title = supine_options_posture_label(item->name),
                                .subtitle = shown->subtitle,
                                .note = shown->note,
@@ -111,7 +113,7 @@ static supine_status mark_panel(studio *s, size_t i, supine_error *error) {
     sigma = still ? NAN : t->expected;
   }
   if (!isnan(sigma)) {
-    (void)snprintf(shown->note, sizeof shown->note, "expected error %.1f mm", sigma);
+    (void)supine_print_text(shown->note, sizeof shown->note, "expected error %.1f mm", sigma);
   }
   return SUPINE_OK;
 }
@@ -158,8 +160,8 @@ static supine_status find_frame(studio *s, size_t frame, size_t count, supine_er
   const double angle = acos(cosine) * 180.0 / 3.14159265358979323846;
   const double share = (double)frame / (double)(count - 1);
   supine_breath_turn_gravity(turn, share * turn->seconds, item->state.gravity);
-  (void)snprintf(item->name, sizeof item->name, "turned by %.0f of %.0f degrees", share * angle,
-                 angle);
+  (void)supine_print_text(item->name, sizeof item->name, "turned by %.0f of %.0f degrees",
+                          share * angle, angle);
   return fill_panel(s, 0, error);
 }
 

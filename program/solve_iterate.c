@@ -4,7 +4,9 @@
 #include <stdio.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 
+#include "precompute/physics/network.h"
 #include "program/solve_iterate.h"
 
 /* The Pitcher/Catcher iteration of [Santhanam2008] stops when the force that remains on each vertex
@@ -16,8 +18,8 @@ static const double pitcher_tolerance = 1e-6;
 static void report_remaining(void *context, size_t steps, double remaining) {
   const size_t per_vertex = steps / *(const size_t *)context;
   if ((per_vertex & (per_vertex - 1)) == 0) {
-    (void)printf("Pitcher/Catcher: %8zu steps, %.3g of the force not yet balanced\n", steps,
-                 remaining);
+    (void)supine_print(stdout, "Pitcher/Catcher: %8zu steps, %.3g of the force not yet balanced\n",
+                       steps, remaining);
   }
 }
 
@@ -46,6 +48,7 @@ supine_status supine_command_iterate(const supine_lungs *lungs, const supine_mod
     difference = fmax(difference, fabs(caught[i] - solution->catch_[i]));
     solution->catch_[i] = caught[i];
   }
-  (void)printf("Pitcher/Catcher: largest difference from the direct solution %.2g\n", difference);
+  (void)supine_print(stdout, "Pitcher/Catcher: largest difference from the direct solution %.2g\n",
+                     difference);
   return SUPINE_OK;
 }

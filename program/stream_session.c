@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Run a server that follows a tracked patient, and report what it did. */
-#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "program/options/basis_input.h"
 #include "program/options/inside.h"
 #include "program/stream/peer.h"
@@ -31,17 +31,18 @@ static void report(const supine_stream_results *results, const supine_stream_ses
   }
   (void)printf("poses: %zu (repaired: %zu; refused: %zu); frames: %zu (sent: %zu); peers: %zu\n",
                n->poses, n->repaired, n->refused, n->frames, n->sent, n->peers);
-  if (n->malformed + n->skipped + n->lost + n->turned_away + n->unreachable > 0) {
+  if (n->malformed + n->skipped + n->lost + n->idle + n->turned_away + n->unreachable > 0) {
     (void)printf("malformed messages: %zu; messages not used: %zu; peers disconnected: %zu; peers "
                  "refused: %zu; frames whose volume is out of reach: %zu\n",
-                 n->malformed, n->skipped, n->lost, n->turned_away, n->unreachable);
+                 n->malformed, n->skipped, n->lost + n->idle, n->turned_away, n->unreachable);
   }
   for (int surfaces = 0; surfaces < 2; ++surfaces) {
     const supine_stream_latency *latency = &results->latency[surfaces];
     if (latency->count > 0) {
-      (void)printf("pose received to %s sent: %zu of %zu frames within %.0f ms, worst %.3f ms\n",
-                   surfaces != 0 ? "surface" : "weights", latency->count - latency->late,
-                   latency->count, 1e3 * SUPINE_STREAM_BUDGET, 1e3 * latency->worst);
+      (void)supine_print(
+          stdout, "pose received to %s sent: %zu of %zu frames within %.0f ms, worst %.3f ms\n",
+          surfaces != 0 ? "surface" : "weights", latency->count - latency->late, latency->count,
+          1e3 * SUPINE_STREAM_BUDGET, 1e3 * latency->worst);
     }
   }
 }
@@ -82,38 +83,75 @@ static supine_status open_points(const supine_basis *basis, const supine_stream_
   return observed->space != NULL ? SUPINE_OK : supine_error_memory(error, "%s", wanted->points);
 }
 
-#define PAGE P_tmpdir "/supine-page-XXXXXX" /* template of the name of a temporary file */
+/* The page that shows the lungs of a basis live, and its server. The page is kept in memory, so
+ * that nothing is left on the disk however the program ends. */
+typedef struct live_page {
+  char *html;
+  size_t size;
+  supine_stream_web *web;
+} live_page;
 
-/* If --web is given, serve the page that shows the lungs of the basis live, from a temporary file.
- * The caller destroys *web, then removes the file `page`. */
-static supine_status open_page(const supine_stream_session *wanted, const supine_basis *basis,
-                               char *page, supine_stream_web **web, supine_error *error) {
-  supine_stream_address address;
+static void page_close(live_page *page) {
+  supine_stream_web_destroy(page->web);
+  free(page->html);
+}
+
+static supine_status print_page(const supine_stream_session *wanted, const supine_basis *basis,
+                                live_page *page, supine_error *error) {
   supine_reference_pose from;
-  SUPINE_FREED_BY(supine_file_close) FILE *file = NULL;
-  supine_stream_site site = {.certificate = wanted->certificate, .key = wanted->key};
-  if (wanted->web == NULL) {
-    return SUPINE_OK;
-  }
-  SUPINE_TRY(supine_stream_address_read(wanted->web, true, &address, error));
   SUPINE_TRY(supine_options_reference(basis, &wanted->from, true, &from, error));
   const export_page shown = {.breath = wanted->breath.tidal,
                              .from = &from,
                              .from_count = 1,
                              .title = "Lungs, live",
                              .live = true};
-  (void)strcpy(page, PAGE);
-  const int descriptor = mkstemp(page);
-  file = descriptor < 0 ? NULL : fdopen(descriptor, "w");
-  if (file != NULL) {
-    SUPINE_TRY(supine_export_html_print(file, basis, &shown, error));
+  FILE *file = open_memstream(&page->html, &page->size);
+  if (file == NULL) {
+    return supine_error_memory(error, "the page");
   }
-  SUPINE_REFUSE_IF(file == NULL || fflush(file) != 0, error, SUPINE_ERROR_WRITE, "%s: %s", page,
-                   strerror(errno));
-  site.address = address.host;
-  site.port = address.port;
-  site.page = page;
-  SUPINE_TRY(supine_stream_web_create(&site, web, error));
+  const supine_status status = supine_export_html_print(file, basis, &shown, error);
+  const bool failed = ferror(file) != 0;
+  const bool closed = fclose(file) == 0; /* sets html and size */
+  if (status == SUPINE_OK && (failed || !closed)) {
+    return supine_error_memory(error, "the page");
+  }
+  return status;
+}
+
+/* Check the names of --web-host: letters, digits, '-', '_' and '.', separated by commas. */
+static supine_status check_names(const char *names, supine_error *error) {
+  static const char letters[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.";
+  for (const char *at = names; at != NULL; at = *at == ',' ? at + 1 : NULL) {
+    const size_t length = strspn(at, letters);
+    SUPINE_REFUSE_IF(length == 0 || length > 255 || (at[length] != ',' && at[length] != '\0'),
+                     error, SUPINE_ERROR_ARGUMENT,
+                     "--web-host '%s': give host names alone, such as lungs.example.org, without "
+                     "http:// and without a port",
+                     names);
+    at += length;
+  }
+  return SUPINE_OK;
+}
+
+/* If --web is given, serve the page that shows the lungs of the basis live. The caller closes the
+ * page. */
+static supine_status open_page(const supine_stream_session *wanted, const supine_basis *basis,
+                               live_page *page, supine_error *error) {
+  supine_stream_address address;
+  SUPINE_TRY(check_names(wanted->web_host, error));
+  if (wanted->web == NULL) {
+    return SUPINE_OK;
+  }
+  SUPINE_TRY(supine_stream_address_read(wanted->web, true, &address, error));
+  SUPINE_TRY(print_page(wanted, basis, page, error));
+  supine_stream_site site = {.address = address.host,
+                             .port = address.port,
+                             .names = wanted->web_host,
+                             .certificate = wanted->certificate,
+                             .key = wanted->key,
+                             .page = page->html,
+                             .page_size = page->size};
+  SUPINE_TRY(supine_stream_web_create(&site, &page->web, error));
   const bool ipv6 = strchr(address.host, ':') != NULL;
   (void)printf("page at http%s://%s%s%s:%d/\n", site.certificate != NULL ? "s" : "",
                ipv6 ? "[" : "", address.host, ipv6 ? "]" : "", site.port);
@@ -147,15 +185,13 @@ static supine_status set_volume(const supine_basis *basis, const supine_stream_s
 typedef struct running {
   supine_arena arena;
   observed_points points;
-  char page[sizeof PAGE];
-  supine_stream_web *web;
+  live_page page;
   supine_stream_server *server;
 } running;
 
 static void end(running *s) {
   supine_stream_server_destroy(s->server);
-  supine_stream_web_destroy(s->web);
-  (void)remove(s->page); /* has no effect if there is no page */
+  page_close(&s->page);
   supine_command_names_close(&s->points.names);
   supine_basis_close(s->points.inside);
   supine_arena_free(&s->arena);
@@ -174,15 +210,15 @@ supine_status supine_command_stream_run(const supine_stream_session *wanted,
     SUPINE_TRY(open_points(basis, wanted, &s.points, &s.arena, error));
     options.observed = &s.points.observed;
   }
-  SUPINE_TRY(open_page(wanted, basis, s.page, &s.web, error));
-  options.web = s.web;
+  SUPINE_TRY(open_page(wanted, basis, &s.page, error));
+  options.web = s.page.web;
   SUPINE_TRY(supine_stream_server_create(basis, &options, &s.server, error));
   const supine_stream_results *results = supine_stream_server_results(s.server);
+  supine_options_signals_catch(true); /* before the line from which others know that it runs */
   if (results->port != 0) {
     (void)printf("listening on port %d\n", results->port);
   }
   (void)fflush(stdout);
-  supine_options_signals_catch(true);
   const supine_status status = supine_stream_server_run(s.server, error);
   report(results, wanted);
   return status;

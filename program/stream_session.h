@@ -14,6 +14,7 @@ typedef struct supine_stream_session {
   const char *pv;                /* file of the pressure-volume relation, or NULL */
   supine_pv_breath breath;
   const char *web, *certificate, *key; /* address and encryption of the page; NULL if not given */
+  const char *web_host;                /* host names of the page, separated by commas, or NULL */
   supine_from from;
   const char *points; /* file of the observed points, or NULL */
   double noise;       /* standard deviation of an observed coordinate, mm */

@@ -7,6 +7,7 @@
 #include "base/arena.h"
 #include "program/validation_report.h"
 
+#include "base/number.h"
 #include "base/vec3.h"
 #include "program/options/command.h"
 #include "program/view/render/render.h"
@@ -95,8 +96,9 @@ supine_status supine_command_draw_errors(const supine_validation *s, const char 
     }
     const supine_validation_distance *off = &outcome->surface[SUPINE_PATIENT_MAP_PREDICTED];
     bar_end = fmax(bar_end, off->p95);
-    (void)snprintf(subtitle[count], sizeof subtitle[count], "%+.0f mL, RMS %.1f, Hausdorff %.1f mm",
-                   outcome->millilitres, off->rms, off->largest);
+    (void)supine_print_text(subtitle[count], sizeof subtitle[count],
+                            "%+.0f mL, RMS %.1f, Hausdorff %.1f mm", outcome->millilitres, off->rms,
+                            off->largest);
     panel[count] =
         (supine_panel){.title = s->state[i].text[0] != '\0' ? s->state[i].text : s->state[i].path,
                        .subtitle = subtitle[count],

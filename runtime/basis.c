@@ -9,6 +9,7 @@
 #include <supine/sh.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "runtime/internal.h"
 #include "runtime/safetensors/safetensors_file.h"
 
@@ -23,7 +24,7 @@ static supine_status SUPINE_PRINTF(2, 3) refuse(const check *c, const char *form
   char detail[256];
   va_list arguments;
   va_start(arguments, format);
-  (void)vsnprintf(detail, sizeof detail, format, arguments);
+  (void)supine_print_text_list(detail, sizeof detail, format, arguments);
   va_end(arguments);
   const bool embedded = supine_safetensors_metadata(c->file, "content") != NULL;
   return supine_error_set(c->error, SUPINE_ERROR_FORMAT, "%s: %s: make the file again with '%s'",
@@ -50,10 +51,25 @@ static bool finite_doubles(const double *values, size_t count) {
   return bad == 0;
 }
 
+/* Check all numbers of all tensors of the file, also of those that this library does not read. */
+static supine_status check_numbers(const check *c, supine_basis *basis) {
+  (void)basis;
+  for (size_t i = 0; i < c->file->tensor_count; ++i) {
+    const supine_tensor *tensor = &c->file->tensors[i];
+    const size_t bytes = supine_safetensors_size(tensor);
+    if ((tensor->dtype == SUPINE_F32 && !finite_floats(tensor->data, bytes / sizeof(float))) ||
+        (tensor->dtype == SUPINE_F64 && !finite_doubles(tensor->data, bytes / sizeof(double)))) {
+      return refuse(c, "tensor '%s' has a number that is not finite, or 2^30 or more",
+                    tensor->name);
+    }
+  }
+  return SUPINE_OK;
+}
+
 /* Length to pass to require() for an axis that may have any length. */
 #define ANY SIZE_MAX
 
-/* Find a tensor and check its type, shape and numbers. Replace each ANY in `shape` by the length of
+/* Find a tensor and check its type and shape. Replace each ANY in `shape` by the length of
  * that axis. Return the numbers of the tensor; if a check fails, set the error and return NULL. */
 static const void *require(const check *c, const char *name, supine_dtype dtype, size_t rank,
                            size_t *shape) {
@@ -71,11 +87,6 @@ static const void *require(const check *c, const char *name, supine_dtype dtype,
                    shape[i]);
       return NULL;
     }
-  }
-  if ((dtype == SUPINE_F32 && !finite_floats(tensor->data, count)) ||
-      (dtype == SUPINE_F64 && !finite_doubles(tensor->data, count))) {
-    (void)refuse(c, "tensor '%s' has a number that is not finite, or 2^30 or more", name);
-    return NULL;
   }
   return tensor->data;
 }
@@ -271,7 +282,7 @@ static supine_status read_numbers(const check *c, const char *key, size_t count,
   const char *at = text;
   for (size_t i = 0; at != NULL && i < count; ++i) {
     char *end = NULL;
-    values[i] = strtod(at, &end);
+    values[i] = supine_number_parse(at, &end);
     if (end == at || *end != (i + 1 < count ? ',' : '\0') || !isfinite(values[i])) {
       return refuse(c, "metadata '%s' is not a list of %zu finite number%s: %.48s", key, count,
                     count == 1 ? "" : "s", text);
@@ -391,6 +402,48 @@ static supine_status check_normals(const check *c, supine_basis *basis) {
   return SUPINE_OK;
 }
 
+/* Check the optional metadata with the constants of expected errors (expected.c). */
+static supine_status check_errors(const check *c, supine_basis *basis) {
+  static const char *const keys[] = {"expected_error_mm", "expected_error_from_mm",
+                                     "resting_spread"};
+  static const double most = 1e3;
+  (void)basis;
+  for (size_t i = 0; i < sizeof keys / sizeof *keys; ++i) {
+    double value = 1;
+    SUPINE_TRY(read_numbers(c, keys[i], 1, &value));
+    if (!(value > 0 && value <= most)) {
+      return refuse(c, "metadata '%s' is %g: it must be above 0 and at most %g", keys[i], value,
+                    most);
+    }
+  }
+  return SUPINE_OK;
+}
+
+/* Check the optional tensors 'part' and 'names': the name of each vertex is a line of the text. */
+static supine_status check_names(const check *c, supine_basis *basis) {
+  const supine_tensor *names = supine_safetensors_find(c->file, "names");
+  const supine_tensor *part = supine_safetensors_find(c->file, "part");
+  if (names == NULL || part == NULL) {
+    return SUPINE_OK;
+  }
+  size_t size = ANY;
+  size_t n = basis->info.vertex_count;
+  const char *text = NULL;
+  const uint32_t *line = NULL;
+  size_t lines = 1;
+  REQUIRE(text, c, "names", SUPINE_U8, 1, &size);
+  REQUIRE(line, c, "part", SUPINE_U32, 1, &n);
+  for (size_t i = 0; i < size; ++i) {
+    lines += text[i] == '\n';
+  }
+  for (size_t i = 0; i < n; ++i) {
+    if (line[i] >= lines) {
+      return refuse(c, "vertex %zu has name %u, but tensor 'names' has %zu", i, line[i], lines);
+    }
+  }
+  return SUPINE_OK;
+}
+
 /* Identify what determines the meaning of a pose: the modes and the coefficients of the volumes. */
 static supine_status identify(const check *c, supine_basis *basis) {
   static const char *const names[] = {"modes", "volume_linear", "volume_quadratic", "volume_cubic"};
@@ -419,7 +472,10 @@ static supine_status prepare(const check *c, supine_basis *basis,
   if (basis->kernels == NULL) {
     return supine_error_set(
         c->error, SUPINE_ERROR_UNSUPPORTED,
-        "this processor or build lacks the instruction set: choose SUPINE_SIMD_AUTO");
+        options->simd == SUPINE_SIMD_AUTO
+            ? "the environment variable SUPINE_SIMD names no instruction set of this processor or "
+              "build: set it to portable, avx2 or avx512, or unset it"
+            : "this processor or build lacks the instruction set: choose SUPINE_SIMD_AUTO");
   }
   basis->info.simd = simd;
   const bool choose = storage == SUPINE_STORAGE_AUTO;
@@ -533,12 +589,17 @@ static supine_status open_file(const char *name, const void *bytes, size_t size,
   const check c = {file, name, error};
   SUPINE_TRY(check_metadata(&c, &basis->info));
   static supine_status (*const steps[])(const check *, supine_basis *) = {
-      check_surface, check_field, check_modes,   check_lungs, check_volume,   check_reference,
-      check_rest,    check_scan,  check_normals, check_rigid, check_expected, identify};
+      check_numbers, check_surface,   check_field,  check_modes, check_lungs,
+      check_volume,  check_reference, check_rest,   check_scan,  check_normals,
+      check_rigid,   check_expected,  check_errors, check_names, identify};
   for (size_t i = 0; i < sizeof steps / sizeof *steps; ++i) {
     SUPINE_TRY(steps[i](&c, basis));
   }
-  const supine_status status = prepare(&c, basis, &taken);
+  supine_status status = prepare(&c, basis, &taken);
+  char detail[256];
+  if (status == SUPINE_OK && !supine_basis_is_plausible(basis, detail, sizeof detail)) {
+    status = refuse(&c, "%s", detail);
+  }
   if (status == SUPINE_OK) {
     *result = basis;
     basis = NULL;

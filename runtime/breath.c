@@ -180,6 +180,11 @@ static supine_status breath_check(const supine_pv_breath *breath, supine_error *
                             "the inhale fraction is %g: give a fraction between 0 and 1",
                             breath->inhale_fraction);
   }
+  if (!isfinite(breath->rest_pressure)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "the rest pressure is %g cmH2O: give a finite pressure",
+                            breath->rest_pressure);
+  }
   if ((int)breath->course < 0 || breath->course >= SUPINE_PV_COURSE_COUNT) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "course %d is unknown: use a value of supine_pv_course",
@@ -288,9 +293,11 @@ supine_status supine_breath_evaluate(const supine_pv *pv, const supine_pv_breath
                                      double *pressures, supine_error *error) {
   SUPINE_TRY(breath_check(breath, error));
   for (size_t j = 0; j < count; ++j) {
-    if (!isfinite(times[j])) {
+    if (!isfinite(times[j] * (breath->rate / 60.0))) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "times[%zu] is not finite: give a time in s", j);
+                              "times[%zu] is not finite, or its number of breaths is not: give a "
+                              "time in s",
+                              j);
     }
   }
   if (count == 0) {

@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/number.h"
+#include "base/vec3.h"
 #include "runtime/expected.h"
 #include "runtime/internal.h"
 
@@ -22,7 +24,7 @@ static const struct {
 /* Return the positive number that the metadata `key` holds, or `usual`. */
 static double number_of(const supine_basis *basis, const char *key, double usual) {
   const char *text = supine_basis_metadata(basis, key);
-  const double stated = text == NULL ? 0 : strtod(text, NULL);
+  const double stated = text == NULL ? 0 : supine_number_parse(text, NULL);
   return stated > 0 && isfinite(stated) ? stated : usual;
 }
 
@@ -135,13 +137,11 @@ supine_status supine_expected_shifted(const supine_basis *basis, const supine_st
 static void find_turn(const supine_state *state, const supine_state *from,
                       supine_expected_model *m) {
   double change[3];
-  const double *g = state->gravity;
-  const double *f = from->gravity;
-  const double length = sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
-  const double other = sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
-  for (size_t i = 0; i < 3; ++i) {
-    change[i] = g[i] / length - f[i] / other;
-  }
+  double unit[3];
+  double other[3];
+  (void)supine_normalise(state->gravity, unit); /* supine_basis_pose has accepted both vectors */
+  (void)supine_normalise(from->gravity, other);
+  supine_subtract(unit, other, change);
   m->across = sqrt(change[0] * change[0] + change[1] * change[1]);
   m->sideways = fabs(change[0]);
 }

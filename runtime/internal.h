@@ -4,6 +4,8 @@
 #ifndef SUPINE_RUNTIME_INTERNAL_H
 #define SUPINE_RUNTIME_INTERNAL_H
 
+#include <math.h>
+
 #include <supine/runtime.h>
 #include <supine/volume.h>
 
@@ -60,9 +62,28 @@ struct supine_basis {
   double reference_size;  /**< bound on the distance of a reference position from the origin, mm */
 };
 
-/** Return whether a pose was made for this basis or by hand, or is NULL. */
+/** Limit for the weights and gains of a pose. Larger ones have no meaning, and could overflow. */
+#define SUPINE_POSE_LIMIT 0x1p20
+
+/** Return whether `count` numbers of a pose are finite and below SUPINE_POSE_LIMIT. */
+static inline bool supine_pose_is_finite(const double *numbers, size_t count) {
+  size_t bad = 0;
+  for (size_t i = 0; i < count; ++i) {
+    bad += fabs(numbers[i]) < SUPINE_POSE_LIMIT ? 0 : 1; /* the comparison is false for NaN */
+  }
+  return bad == 0;
+}
+
+/** Return whether a pose was made for this basis, or by hand for any basis. */
+static inline bool supine_basis_made_pose(const supine_basis *basis, const supine_pose *pose) {
+  return pose->basis == 0 || pose->basis == basis->info.identity;
+}
+
+/** Return whether a pose was made for this basis or by hand, and its numbers are finite. */
 static inline bool supine_basis_has_pose(const supine_basis *basis, const supine_pose *pose) {
-  return pose == NULL || pose->basis == 0 || pose->basis == basis->info.identity;
+  return supine_basis_made_pose(basis, pose) &&
+         supine_pose_is_finite(pose->weights, basis->info.mode_count) &&
+         supine_pose_is_finite(pose->gains[0], 3 * basis->info.lung_count);
 }
 
 /** Return whether a pose can be evaluated at vertices begin <= i < end of a basis. */
@@ -97,6 +118,10 @@ supine_target supine_target_after(const supine_target *target, size_t count);
 /** Compute supine_basis_info.storage_error, the bound on position errors from storage and rounding,
  * for the packed numbers of the basis, mm. */
 double supine_basis_storage_error(const supine_basis *basis);
+
+/** Return whether the numbers of a packed basis can be those of lungs. If not, write to `detail`
+ * which number is too large or too small. */
+bool supine_basis_is_plausible(const supine_basis *basis, char *detail, size_t size);
 
 /** Return w^T F w for the matrix F = `form` [count, count]. */
 double supine_volume_square(size_t count, const double *form, const double *w);

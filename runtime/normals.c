@@ -27,9 +27,9 @@ void supine_normals(const supine_basis *basis, const float *xyz, float *normals)
   for (size_t i = 0; i < basis->info.vertex_count; ++i) {
     float *n = normals + 3 * i;
     const float length = sqrtf(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-    const float inverse = length > 0 ? 1 / length : 0;
-    n[0] *= inverse;
-    n[1] *= inverse;
-    n[2] *= inverse;
+    const bool has_direction = length > 0 && length < INFINITY; /* false for NaN */
+    for (size_t j = 0; j < 3; ++j) {
+      n[j] = has_direction ? n[j] * (1 / length) : 0;
+    }
   }
 }

@@ -73,10 +73,11 @@ static supine_status find_volumes(const supine_basis *basis, const double gravit
                                   const double *weights, volumes *v, supine_error *error) {
   double y[RESTING_TERMS];
   *v = (volumes){.lung_count = basis->info.lung_count};
-  if (supine_sh_evaluate(2, gravity, y) != SUPINE_OK) {
+  double unit[3];
+  if (supine_sh_evaluate(2, gravity, y) != SUPINE_OK || !supine_normalise(gravity, unit)) {
     return refuse_gravity(error);
   }
-  const double up = fmax(0, -gravity[2] / supine_length(gravity));
+  const double up = fmax(0, -unit[2]);
   for (size_t lung = 0; lung < v->lung_count; ++lung) {
     contract(basis, lung, weights, &v->form[lung]);
     v->full[lung] = basis->upright_gain * up * up * basis->info.reference_volume[lung];
@@ -240,12 +241,35 @@ supine_volume supine_basis_default_volume(const supine_basis *basis) {
                                  : (supine_volume){SUPINE_VOLUME_SCAN, default_above_scan};
 }
 
+/* Refuse numbers of lungs and volumes that are out of range or not finite. Other functions check
+ * the kinds and the gravity. */
+static supine_status check_state(const supine_state *state, supine_error *error) {
+  bool finite = isfinite(state->lung_count > 0 ? 0 : state->volume.ml);
+  if (state->lung_count > SUPINE_STATE_LUNGS_MAX) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "the state names %zu lungs: name at most %d", state->lung_count,
+                            (int)SUPINE_STATE_LUNGS_MAX);
+  }
+  for (size_t i = 0; i < state->lung_count; ++i) {
+    finite = finite && isfinite(state->lungs[i].volume.ml);
+  }
+  return finite ? SUPINE_OK
+                : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                   "a volume of the state is not finite: give a number of mL");
+}
+
 supine_status supine_basis_gains(const supine_basis *basis, const supine_state *state,
                                  supine_pose *pose, supine_error *error) {
   supine_state asked = *state;
-  if (!supine_basis_has_pose(basis, pose)) {
+  SUPINE_TRY(check_state(state, error));
+  if (!supine_basis_made_pose(basis, pose)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "the pose was made for another basis: make it with supine_basis_pose");
+  }
+  if (!supine_pose_is_finite(pose->weights, basis->info.mode_count)) {
+    return supine_error_set(
+        error, SUPINE_ERROR_ARGUMENT,
+        "a weight of the pose is not finite: make it with supine_basis_weights");
   }
   pose->basis = basis->info.identity;
   if (asked.lung_count == 0 && asked.volume.kind == SUPINE_VOLUME_DEFAULT) {

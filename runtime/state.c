@@ -10,6 +10,7 @@
 #include <supine/state.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "base/vec3.h"
 #include "runtime/words.h"
 
@@ -35,7 +36,7 @@ enum { PIECE = 64 }; /* size of a posture or volume as text, in bytes with its N
 /* Read a number, with or without the unit "mL" or "L"; the value is then in mL. */
 static bool read_number(const char *text, double *value, bool *has_unit) {
   char *end = NULL;
-  *value = strtod(text, &end);
+  *value = supine_number_parse(text, &end);
   const bool litres = supine_words_same(end, "L");
   *has_unit = litres || supine_words_same(end, "mL");
   *value *= litres ? 1000 : 1;
@@ -128,7 +129,7 @@ static bool read_gravity(const char *text, double gravity[3]) {
   double g[3];
   for (int i = 0; i < 3; ++i) {
     char *end = NULL;
-    g[i] = strtod(text, &end);
+    g[i] = supine_number_parse(text, &end);
     if (end == text || *end != (i < 2 ? ':' : '\0')) {
       return false;
     }
@@ -143,7 +144,7 @@ static bool read_tilted(const char *text, double gravity[3]) {
   char front[PIECE];
   char *end = NULL;
   double level[3];
-  const double degrees = strtod(text + length, &end);
+  const double degrees = supine_number_parse(text + length, &end);
   if (length >= sizeof front || text[length] == '\0' || *end != '\0') {
     return false;
   }
@@ -214,8 +215,8 @@ static void add(writer *out, const char *format, ...) {
   va_list arguments;
   va_start(arguments, format);
   const size_t at = out->length < out->size ? out->length : out->size;
-  const int count =
-      vsnprintf(out->size > at ? out->text + at : NULL, out->size - at, format, arguments);
+  const int count = supine_print_text_list(out->size > at ? out->text + at : NULL, out->size - at,
+                                           format, arguments);
   va_end(arguments);
   out->length += count > 0 ? (size_t)count : 0;
 }

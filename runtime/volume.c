@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdbool.h>
 
+#include "base/arena.h"
 #include "runtime/internal.h"
 
 static double dot(size_t count, const double *a, const double *b) {
@@ -105,11 +106,15 @@ static supine_status refuse_folded(double volume, double limit, supine_error *er
 supine_status supine_volume_scale(const double cubic[3], double volume, double *scale,
                                   supine_error *error) {
   const double *c = cubic;
+  if (!isfinite(volume) || !isfinite(c[0] + c[1] + c[2])) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "the volume or a coefficient of the volume is not finite");
+  }
   if (volume == 0) {
     *scale = 0;
     return SUPINE_OK;
   }
-  if (!isfinite(volume) || !isfinite(c[0] + c[1] + c[2]) || c[0] == 0) {
+  if (c[0] == 0) {
     return refuse_constant(volume, error);
   }
   const double side = volume / c[0] > 0 ? 1 : -1;
@@ -159,6 +164,20 @@ void supine_volume_bend(const double bend[3], double sigma, double ratio[3]) {
   }
 }
 
+static bool is_finite_form(const supine_volume_form *form) {
+  double sum = 0;
+  for (size_t i = 0; i < 7; ++i) {
+    sum += fabs(form->of[i]);
+  }
+  return isfinite(sum);
+}
+
+/* Refuse gains above SUPINE_POSE_LIMIT: displacements that hardly change the volume. */
+static supine_status check_gains(double volume, const double gains[3], supine_error *error) {
+  const double largest = fmax(fabs(gains[0]), fmax(fabs(gains[1]), fabs(gains[2])));
+  return largest < SUPINE_POSE_LIMIT ? SUPINE_OK : refuse_constant(volume, error);
+}
+
 static double volume_on_path(const supine_volume_form *form, const double bend[3], double scale,
                              double sigma, double gains[3]) {
   supine_volume_bend(bend, sigma, gains);
@@ -168,18 +187,29 @@ static double volume_on_path(const supine_volume_form *form, const double bend[3
   return supine_volume_form_at(form, gains);
 }
 
+/* Limit of the position on the path: this many times the way from full inflation to rest, in steps
+ * of 1 / STEPS_EACH. */
+enum { PATH_MOST = 64, STEPS_EACH = 16 };
+
 /* Find the gains of a lung (factors of its displacement) at which it holds `volume`, mL more than
  * its reference surface. Step along the path from full inflation through rest (supine_volume_bend)
  * until the volume is passed, then bisect the last step. */
 static supine_status follow_path(const supine_volume_form *form, const double bend[3], double scale,
                                  double rest, double volume, double gains[3], supine_error *error) {
-  const double step = volume / rest > 0 ? 1.0 / 16 : -1.0 / 16;
+  const double step = volume / rest > 0 ? 1.0 / STEPS_EACH : -1.0 / STEPS_EACH;
   const double side = volume > 0 ? 1 : -1;
   double near = 0;
   double far = 0;
   double held = 0;
-  while (side * held < side * volume) {
+  for (int steps = 0; side * held < side * volume; ++steps) {
     const double before = held;
+    if (steps == PATH_MOST * STEPS_EACH) {
+      return supine_error_set(
+          error, SUPINE_ERROR_NUMERICAL,
+          "a change of the reference volume by %g mL is out of reach: at %d "
+          "times the displacement at rest, it is %g mL; choose a smaller change",
+          volume, (int)PATH_MOST, held);
+    }
     near = far;
     far += step;
     held = volume_on_path(form, bend, scale, far, gains);
@@ -202,13 +232,19 @@ supine_status supine_volume_form_gains(const supine_volume_form *form, const dou
   const bool straight = (bend[0] == 0 && bend[1] == 0 && bend[2] == 0) || volume == rest;
   double cubic[3];
   double scale = 0;
+  if (!isfinite(volume) || !isfinite(bend[0] + bend[1] + bend[2]) || !is_finite_form(form) ||
+      (!straight && !isfinite(rest))) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "a volume, a curvature or a coefficient of the volume is not finite");
+  }
   supine_volume_form_along(form, even, cubic);
-  const supine_status status = supine_volume_scale(cubic, straight ? volume : rest, &scale, error);
-  if (status == SUPINE_OK && !straight) {
-    return follow_path(form, bend, scale, rest, volume, gains, error);
+  SUPINE_TRY(supine_volume_scale(cubic, straight ? volume : rest, &scale, error));
+  if (straight) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      gains[axis] = scale;
+    }
+  } else {
+    SUPINE_TRY(follow_path(form, bend, scale, rest, volume, gains, error));
   }
-  for (size_t axis = 0; axis < 3; ++axis) {
-    gains[axis] = scale;
-  }
-  return status;
+  return check_gains(volume, gains, error);
 }

@@ -52,8 +52,8 @@ void supine_sh_grid_direction(const supine_sh_grid *grid, size_t j, size_t k, do
 
 /** Transform real fields on a grid: coefficient(l, m) = integral over all directions g of value(g)
  * Y(l, m)(g), by the quadrature rule of the grid. Coefficients are exact to rounding if a field has
- * no harmonics of degrees above the band, which cause aliasing. Only one thread of the process may
- * call this at a time, because FFTW's planner has global state.
+ * no harmonics of degrees above the band, which cause aliasing. Thread-safe, unless the program
+ * itself uses FFTW's planner at the same time.
  * @param band          0 to SUPINE_SH_BAND_MAX; the grid needs latitudes > band, longitudes > 2
  * band
  * @param values        [latitudes, longitudes, fields] value of each field at each direction

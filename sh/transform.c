@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Transform fields on a grid to coefficients: FFTs in longitude, Legendre functions in latitude. */
 #include <math.h>
+#include <pthread.h>
 #include <string.h>
 
 #include <fftw3.h>
@@ -11,10 +12,17 @@
 #include "base/arena.h"
 #include "sh/expansion.h"
 
+/* FFTW's planner keeps plans for the whole process: one thread at a time may use it. */
+static pthread_mutex_t planner = PTHREAD_MUTEX_INITIALIZER;
+
 /* Plan the FFT of one latitude. FFTW_ESTIMATE makes the same plan every time, in microseconds. */
 static fftw_plan plan_fft(int longitudes, int fields, double *ring, fftw_complex *spectrum) {
-  return fftw_plan_many_dft_r2c(1, &longitudes, fields, ring, NULL, fields, 1, spectrum, NULL,
-                                fields, 1, FFTW_ESTIMATE | FFTW_PRESERVE_INPUT | FFTW_UNALIGNED);
+  (void)pthread_mutex_lock(&planner);
+  fftw_plan made =
+      fftw_plan_many_dft_r2c(1, &longitudes, fields, ring, NULL, fields, 1, spectrum, NULL, fields,
+                             1, FFTW_ESTIMATE | FFTW_PRESERVE_INPUT | FFTW_UNALIGNED);
+  (void)pthread_mutex_unlock(&planner);
+  return made;
 }
 
 /* Add one latitude to the coefficients [fields, (band + 1)^2]. GSL normalises its SPHARM functions
@@ -68,6 +76,8 @@ supine_status supine_sh_transform(size_t band, const supine_sh_grid *grid, size_
     fftw_execute(fft);
     add_ring(band, fields, legendre, spectrum, coefficients);
   }
+  (void)pthread_mutex_lock(&planner);
   fftw_destroy_plan(fft);
+  (void)pthread_mutex_unlock(&planner);
   return SUPINE_OK;
 }

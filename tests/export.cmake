@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-supine_test(export_glb runtime_fixture supine_commands PkgConfig::JANSSON supine_gsl)
-supine_test(export_html runtime_fixture supine_commands supine_gsl ${MESHOPT_LINK_LIBRARIES})
+supine_test(program/export_glb runtime_fixture supine_commands PkgConfig::JANSSON supine_gsl)
+supine_test(program/export_html runtime_fixture supine_commands supine_gsl ${MESHOPT_LINK_LIBRARIES})
 
 # Open exported files in other programs, and compare them with the C evaluator. The tests need node, the packages in
 # tests/export/package.json (npm install in that folder) and, for pages, Chromium; otherwise they are skipped.
@@ -21,3 +21,6 @@ foreach(what colour glb pages) # pages.mjs holds all tests that need a browser
     "SUPINE=$<TARGET_FILE:supine>;POSITIONS=$<TARGET_FILE:export_positions>;MODULES=${SUPINE_NODE_MODULES};CHROMIUM=${CHROMIUM_PROGRAM}")
 endforeach()
 set_tests_properties(export_pages_node PROPERTIES COST 1000) # the longest test starts first
+add_test(NAME fuzz_page_node COMMAND ${SUPINE_NODE} ${CMAKE_CURRENT_SOURCE_DIR}/fuzz/numbers.mjs page
+  ${PROJECT_SOURCE_DIR}/program/view/page/basis.js)
+set_tests_properties(fuzz_page_node PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77 ENVIRONMENT "SUPINE=$<TARGET_FILE:supine>")

@@ -5,8 +5,10 @@
 
 Each row of the table names a folder, says what it contains, and lists folders of earlier rows. The files of a folder may
 include headers of the listed folders, and headers that those folders may include. Check also that files do not depend on
-each other in cycles, that external names have the prefix of their folder, and that functions have few lines and few
-parameters."""
+each other in cycles, that external names have the prefix of their folder, that functions have few lines and few
+parameters, that the licences name files that exist, that nothing depends on the locale of the host program, that
+distances are printed without digits below rounding, and that tests do not wait for a time."""
+import glob
 import os
 import re
 import subprocess
@@ -20,9 +22,9 @@ PREFIX = {"base": ("supine_",), "runtime": ("supine_",), "runtime/safetensors": 
           "mesh/io": ("supine_mesh_",), "precompute/lungs": ("supine_lungs_", "supine_phantom_", "supine_tissue_", "supine_inside_surface_"),
           "precompute/physics": ("supine_physics_", "supine_reference_"),
           "precompute/projection": ("supine_projection_", "supine_accuracy_"),
-          "precompute": ("supine_precompute_", "supine_writer_"), "precompute/warp": ("supine_field_",), "mesh/image": ("supine_image_",), "program/view/render": ("supine_render_",), "program/view/export": ("supine_export_", "supine_template_"), "program/options": ("supine_options_", "supine_breath_", "supine_command_"),
-          "program/offline": ("supine_offline_", "supine_precompute_"), "program": ("supine_command_",)}
-PUBLIC = ("runtime/include/supine", "program/offline/include/supine")
+          "precompute/warp": ("supine_field_",), "mesh/image": ("supine_image_",), "program/view/render": ("supine_render_",), "program/view/export": ("supine_export_", "supine_template_"), "program/options": ("supine_options_", "supine_breath_", "supine_command_"),
+          "program": ("supine_command_",)}
+PUBLIC = ("runtime/include/supine", "precompute/include/supine")
 
 
 def read_table():
@@ -161,11 +163,127 @@ def check_sizes(files):
                 faults.append(f"{file}: {name} has {lines} lines: at most 60, or give the reason above it")
 
 
+def check_licences():
+    """Check that LICENSE and .reuse/dep5 name no file and no folder that does not exist."""
+    with open(os.path.join(source, "LICENSE"), encoding="utf-8") as opened:
+        named = [("LICENSE", path) for path in re.findall(r"[\w.-]+/[\w./-]*\w", opened.read())]
+    dep5 = os.path.join(source, ".reuse", "dep5")
+    if os.path.exists(dep5):
+        with open(dep5, encoding="utf-8") as opened:
+            named += [(".reuse/dep5", path) for line in re.findall(r"^Files:(.*)$", opened.read(), re.M) for path in line.split()]
+    for file, path in named:
+        if not glob.glob(os.path.join(source, path)):
+            faults.append(f"{file}: {path} does not exist")
+
+
+# Sources that open files. All others call supine_input_open for a file that the user names, and
+# supine_input_open_beside for a file that another file names. Those after the first line read CSV and JSON, which may
+# come from a pipe, from the path that the user gives.
+OPENING = ("base/input.c", "base/output.c", "runtime/safetensors/posix.c", "runtime/safetensors/windows.c",
+           "base/csv.c", "mesh/io/points.c", "precompute/patient/patient_decode.c", "program/options/pv_file.c")
+
+
+def check_opening(files):
+    """Check that only the sources in OPENING open files, so that what a file names is never opened by its bare name."""
+    opening = re.compile(r"\b(fopen|freopen|open|openat|gzopen|json_load_file)\((?!\s*\")")
+    for file in files:
+        if file.endswith(".c") and file not in OPENING:
+            with open(os.path.join(source, file), encoding="utf-8") as text:
+                for name in opening.findall(text.read()):
+                    faults.append(f"{file} calls {name}: call supine_input_open, or supine_input_open_beside for a name from a file")
+
+
+LOCALE_FILES = ("base/number.c", "base/locale.c", "base/locale.h")
+CALL = re.compile(r"\b((?:v|f|s|vf|vs|sn|vsn|d|as)?printf|(?:f|s)?scanf|strto[dfl]|strtold|ato[fil]|\w*locale\w*|is(?:alnum|alpha|blank|cntrl|digit|"
+                  r"graph|lower|print|punct|space|upper|xdigit)|to(?:lower|upper)|strn?casecmp|strcoll|json_\w+)\s*\(")
+REAL = re.compile(r"%[-+ #0]*(?:\*|\d+)?(?:\.(?:\*|\d+)?)?[lL]?[aAeEfFgG]")
+LITERAL = re.compile(r'"((?:\\.|[^"\\])*)"')
+
+
+def without_comments(text):
+    """Replace comments by blanks, so that positions stay."""
+    return re.sub(r'"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])*\'|/\*.*?\*/|//[^\n]*',
+                  lambda found: found[0] if found[0][0] in "\"'" else re.sub(r"[^\n]", " ", found[0]), text, flags=re.S)
+
+
+def arguments(text, begin):
+    """Return the arguments of a call, of which the first begins at `begin`."""
+    parts, depth, at = [""], 0, begin
+    while depth > 0 or text[at] != ")":
+        literal = re.compile(r'"(?:\\.|[^"\\])*"|\'(?:\\.|[^\'\\])*\'').match(text, at)
+        token = literal[0] if literal else text[at]
+        depth += (token in "([{") - (token in ")]}")
+        if token == "," and depth == 0:
+            parts.append("")
+        else:
+            parts[-1] += token
+        at += len(token)
+    return parts
+
+
+def locale_fault(name, parts, function):
+    """Return what is wrong about a call, or None."""
+    literals = "".join(LITERAL.findall("".join(parts)))
+    if name.startswith("json_"):
+        prints = name in ("json_sprintf", "json_vsprintf") and REAL.search(literals)
+        if (prints or name.startswith(("json_load", "json_dump"))) and "SUPINE_C_LOCALE" not in function:
+            return "jansson uses the host's locale: begin the function with SUPINE_C_LOCALE (base/locale.h)"
+    elif name.startswith(("supine_", "is", "to", "strcase", "strncase", "strcoll")):
+        if not name.startswith("supine_"):
+            return "the result depends on the host's locale: use base/ascii.h"
+    elif name.endswith("printf"):
+        position = 2 if name == "snprintf" else 0 if name == "printf" else 1
+        if name[0] == "v" or REAL.search(literals) or (len(parts) > position and '"' not in parts[position]):
+            return "reals depend on the host's locale: use supine_print or supine_print_text (base/number.h)"
+    elif name.endswith("scanf"):
+        if REAL.search(literals):
+            return "reals depend on the host's locale: use supine_number_parse (base/number.h)"
+    elif name not in ("strtol", "atoi", "atol"):
+        return "the result depends on the host's locale: use base/number.h"
+    return None
+
+
+def check_locale(files):
+    """Check that numbers are parsed and printed, and letters compared, only by functions that ignore the locale of the host."""
+    for file in files:
+        with open(os.path.join(source, file), encoding="utf-8") as opened:
+            text = without_comments(opened.read())
+        for call in CALL.finditer(text if file not in LOCALE_FILES else ""):
+            function = text[text.rfind("\n}", 0, call.start()) + 1:call.start()]
+            fault = locale_fault(call[1], arguments(text, call.end()), function)
+            if fault is not None:
+                line = text.count("\n", 0, call.start()) + 1
+                faults.append(f"{file}:{line}: {call[1]}: {fault}")
+
+
+def check_distances(files):
+    """Check that distances in mm which may be rounding errors are printed by supine_text_distance."""
+    for file in files:
+        with open(os.path.join(source, file), encoding="utf-8") as opened:
+            for digits in re.findall(r"%\.\dg mm (?:RMS|at most|largest|apart|95th)|(?:residual|displacement|distance) %\.\dg mm", opened.read()):
+                faults.append(f"{file}: '{digits}': digits below rounding depend on the processor: use supine_text_distance")
+
+
+def check_waits():
+    """Check that tests wait for events, not for a time."""
+    for folder, below, names in os.walk(os.path.join(source, "tests")):
+        below[:] = [name for name in below if name not in ("node_modules", "bench")]
+        for name in (name for name in names if name.endswith((".c", ".cpp", ".py", ".mjs", ".sh")) and name != "house.py"):
+            with open(os.path.join(folder, name), encoding="utf-8") as opened:
+                for wait in re.findall(r"\bwaitForTimeout\(|\btime\.sleep\(|\bu?sleep\(|^ *sleep [\d$].*", opened.read(), re.M):
+                    faults.append(f"{os.path.join(folder, name)}: '{wait}': wait for an event or for the answer to a later message")
+
+
 folders = read_table()
 files = tracked()
+check_licences()
+check_locale(files)
 check_sizes(files)
+check_distances(files)
+check_waits()
 check_includes(folders, files)
 check_system_headers(files)
+check_opening(files)
 check_include_cycles(files)
 check_names(folders)
 for fault in faults:

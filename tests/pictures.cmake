@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-supine_test(compare runtime_fixture)
-supine_test(render supine_render runtime_fixture m)
-supine_test(pictures_command supine_base PkgConfig::JANSSON m)
+supine_test(runtime/compare runtime_fixture)
+supine_test(program/render supine_render runtime_fixture m)
+supine_test(program/pictures_command supine_base PkgConfig::JANSSON m)
 target_compile_definitions(test_pictures_command PRIVATE SUPINE_PROGRAM="$<TARGET_FILE:supine>"
   SUPINE_GOLDEN="${CMAKE_CURRENT_SOURCE_DIR}/golden")
 pkg_check_modules(WEBPDEMUX REQUIRED IMPORTED_TARGET libwebpdemux)

@@ -1,27 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 
 # Make synthetic bases for tests, and evaluate them independently of the library.
-add_library(runtime_fixture STATIC runtime_fixture.c)
+add_library(runtime_fixture STATIC helpers/runtime_fixture.c)
 target_link_libraries(runtime_fixture
   PRIVATE supine_build PkgConfig::CMOCKA
   PUBLIC supine_runtime)
 
-supine_test(safetensors runtime_fixture)
-supine_test(golden supine_runtime)
+supine_test(runtime/safetensors runtime_fixture)
+supine_test(runtime/golden supine_runtime)
 target_compile_definitions(test_golden PRIVATE SUPINE_GOLDEN="${CMAKE_CURRENT_SOURCE_DIR}/golden")
 find_package(Python3 COMPONENTS Interpreter)
 if(Python3_FOUND)
   add_test(NAME checksum_python COMMAND ${Python3_EXECUTABLE}
-    ${CMAKE_CURRENT_SOURCE_DIR}/test_checksum.py ${CMAKE_CURRENT_SOURCE_DIR}/golden/basis_2.safetensors)
+    ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_checksum.py ${CMAKE_CURRENT_SOURCE_DIR}/golden/basis_2.safetensors)
 endif()
-supine_test(posture runtime_fixture)
-supine_test(state supine_runtime)
-supine_test(volume runtime_fixture)
-supine_test(kriging runtime_fixture)
-supine_test(locate runtime_fixture)
-supine_test(runtime_basis runtime_fixture)
-supine_test(deform runtime_fixture)
-supine_test(deform_lit runtime_fixture)
+supine_test(runtime/posture runtime_fixture)
+supine_test(runtime/state supine_runtime)
+supine_test(runtime/volume runtime_fixture)
+supine_test(runtime/kriging runtime_fixture)
+supine_test(runtime/locate runtime_fixture)
+supine_test(runtime/runtime_basis runtime_fixture)
+supine_test(runtime/deform runtime_fixture)
+supine_test(runtime/deform_lit runtime_fixture)
 
 # Use the installed library by CMake and by pkg-config.
 add_executable(make_basis example/make_basis.c)
@@ -30,7 +30,7 @@ target_link_libraries(make_basis PRIVATE supine_build runtime_fixture PkgConfig:
 include(CheckLanguage)
 check_language(CXX)
 if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE AND CMAKE_CXX_COMPILER)
-  add_test(NAME install COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_install.sh ${CMAKE_COMMAND}
+  add_test(NAME install COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_install.sh ${CMAKE_COMMAND}
     ${PROJECT_BINARY_DIR} ${CMAKE_CURRENT_SOURCE_DIR}/example $<TARGET_FILE:make_basis>
     ${CMAKE_C_COMPILER} ${CMAKE_CXX_COMPILER})
   set_tests_properties(install PROPERTIES TIMEOUT 900)
@@ -38,7 +38,7 @@ endif()
 
 # Test the Python package with Debian's python.
 if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
-  add_test(NAME python COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/test_python.py
+  add_test(NAME python COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_python.py
     ${PROJECT_SOURCE_DIR} $<TARGET_FILE:supine_runtime_shared> $<TARGET_FILE:supine_precompute_shared>
     $<TARGET_FILE:supine> ${CMAKE_C_COMPILER})
   set_tests_properties(python PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
@@ -47,23 +47,26 @@ endif()
 # Build and run the library for other platforms, where their compilers and emulators are installed.
 if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
   foreach(platform gcc clang musl aarch64 windows)
-    add_test(NAME platform_${platform} COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_platform.sh ${platform} ${CMAKE_COMMAND}
+    add_test(NAME platform_${platform} COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_platform.sh ${platform} ${CMAKE_COMMAND}
       ${PROJECT_SOURCE_DIR} $<TARGET_FILE:supine_runtime> ${CMAKE_C_COMPILER} $<TARGET_FILE:supine>)
     set_tests_properties(platform_${platform} PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
   endforeach()
 endif()
 
-supine_test(runtime_quiet runtime_fixture)
+supine_test(runtime/runtime_quiet runtime_fixture)
 foreach(name malloc calloc realloc aligned_alloc strdup free mmap munmap open close)
   target_link_options(test_runtime_quiet PRIVATE -Wl,--wrap=${name})
 endforeach()
-supine_test(runtime_threads runtime_fixture Threads::Threads)
+supine_test(runtime/runtime_threads runtime_fixture Threads::Threads)
+if(NOT SUPINE_SANITIZE) # sanitizers use more stack
+  supine_test(runtime/runtime_stack runtime_fixture Threads::Threads)
+endif()
 
 # Test the GPU shader, if EGL can run it without a window, but not with the thread sanitizer, which does not know the
 # threads of the driver.
 pkg_check_modules(EGL IMPORTED_TARGET egl glesv2)
 if(EGL_FOUND AND NOT SUPINE_SANITIZE MATCHES "thread")
-  supine_test(glsl runtime_fixture PkgConfig::EGL)
+  supine_test(runtime/glsl runtime_fixture PkgConfig::EGL)
   target_compile_definitions(test_glsl PRIVATE SUPINE_GLSL="${PROJECT_SOURCE_DIR}/runtime/supine.glsl")
   # Ignore memory leaks of the driver.
   set_tests_properties(glsl PROPERTIES ENVIRONMENT "ASAN_OPTIONS=detect_leaks=0;LIBGL_ALWAYS_SOFTWARE=1")
@@ -73,6 +76,11 @@ endif()
 if(Python3_FOUND)
   add_test(NAME house COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/house.py
     ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR})
+  add_test(NAME workflows COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_workflows.py
+    ${PROJECT_SOURCE_DIR})
+  set_tests_properties(workflows PROPERTIES SKIP_RETURN_CODE 77)
+  # Check that the numbers of docs/model.md are those of the code, and the promises those of the headers.
+  add_test(NAME pages COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_pages.py ${PROJECT_SOURCE_DIR})
 endif()
 
 # Check that README.md shows the program that the test `install` builds.

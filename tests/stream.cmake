@@ -23,6 +23,9 @@ if(Python3_EXECUTABLE)
   add_test(NAME stream_points COMMAND ${Python3_EXECUTABLE}
     ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_points.py $<TARGET_FILE:supine> ${samples})
   set_tests_properties(stream_points PROPERTIES TIMEOUT 900)
+  add_test(NAME stream_web COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_web.py
+    $<TARGET_FILE:supine>)
+  set_tests_properties(stream_web PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
   # Test the Unity sample, compiled by Mono with stubs for the types of the engine.
   find_program(MCS_PROGRAM mcs)
   find_program(MONO_PROGRAM mono)
@@ -37,7 +40,7 @@ if(Python3_EXECUTABLE)
       ${MONO_PROGRAM} ${unity}/link.exe {port} {basis})
     set_tests_properties(stream_unity_link_compiles PROPERTIES FIXTURES_SETUP unity)
     set_tests_properties(stream_unity PROPERTIES FIXTURES_REQUIRED unity TIMEOUT 900)
-    add_test(NAME csharp COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_csharp.sh ${PROJECT_SOURCE_DIR}
+    add_test(NAME csharp COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_csharp.sh ${PROJECT_SOURCE_DIR}
       $<TARGET_FILE:supine_runtime_shared> $<TARGET_FILE:supine> ${CMAKE_C_COMPILER} ${MCS_PROGRAM} ${MONO_PROGRAM})
   endif()
   # Test the live page in headless Chromium.

@@ -121,6 +121,60 @@ void supine_image_place(const supine_image *image, size_t index, double point[3]
   }
 }
 
+double supine_image_plane_distance(const supine_image *image, size_t axis) {
+  double normal[3];
+  supine_cross(image->step[(axis + 1) % 3], image->step[(axis + 2) % 3], normal);
+  return fabs(supine_dot(image->step[axis], normal)) / supine_length(normal);
+}
+
+double supine_image_cell_diagonal(const supine_image *image) {
+  double longest = 0.0;
+  for (unsigned signs = 0; signs < 4; ++signs) {
+    double diagonal[3];
+    for (size_t k = 0; k < 3; ++k) {
+      diagonal[k] = image->step[0][k] + (signs & 1U ? -1.0 : 1.0) * image->step[1][k] +
+                    (signs & 2U ? -1.0 : 1.0) * image->step[2][k];
+    }
+    longest = fmax(longest, supine_length(diagonal));
+  }
+  return longest;
+}
+
+bool supine_image_is_left_handed(const supine_image *image) {
+  return supine_triple(image->step[0], image->step[1], image->step[2]) < 0.0;
+}
+
+static void swap_bytes(unsigned char *a, unsigned char *b, size_t size) {
+  for (size_t k = 0; k < size; ++k) {
+    const unsigned char kept = a[k];
+    a[k] = b[k];
+    b[k] = kept;
+  }
+}
+
+void supine_image_reverse(supine_image *image, size_t axis) {
+  const size_t each = image->channels * supine_image_voxel_size(image->voxel);
+  const size_t last = image->size[axis] - 1;
+  size_t stride = 1;
+  for (size_t a = 0; a < axis; ++a) {
+    stride *= image->size[a];
+  }
+  for (size_t k = 0; k < 3; ++k) {
+    image->origin[k] += (double)last * image->step[axis][k];
+    image->step[axis][k] = -image->step[axis][k];
+  }
+  if (image->values == NULL) {
+    return;
+  }
+  unsigned char *bytes = image->values;
+  for (size_t i = 0; i < image->size[0] * image->size[1] * image->size[2]; ++i) {
+    const size_t at = i / stride % image->size[axis];
+    if (2 * at < last) {
+      swap_bytes(bytes + i * each, bytes + (i + (last - 2 * at) * stride) * each, each);
+    }
+  }
+}
+
 void supine_image_locate(const supine_image *image, const double point[3], double voxel[3]) {
   const double whole = supine_triple(image->step[0], image->step[1], image->step[2]);
   double from[3];

@@ -56,7 +56,8 @@ void supine_image_free(supine_image *image);
 
 /** Write an image in the format of its name's ending; .nrrd, .nii.gz and .mha are compressed. The
  * file appears completely or not at all. An image of three channels is a field of
- * displacements, which every format stores in mm and LPS, as ITK and ANTs expect.
+ * displacements, which every format stores in mm and LPS, as ITK and ANTs expect, and on a
+ * right-handed grid: if need be, its first axis is reversed. Other images keep their voxels' order.
  * @param note  optional: one line for the header */
 supine_status supine_image_write(const char *path, const supine_image *image, const char *note,
                                  supine_error *error);
@@ -78,6 +79,22 @@ void supine_image_set_axes(supine_image *image, supine_axes axes);
 
 /** Compute the centre of voxel `index` = i + size[0] (j + size[1] k), mm, LPS. */
 void supine_image_place(const supine_image *image, size_t index, double point[3]);
+
+/** Return the distance, mm, between neighbouring planes of voxels that the axis `axis` crosses. It
+ * is less than the length of the step if the axes are not at right angles, as in a tilted CT. */
+double supine_image_plane_distance(const supine_image *image, size_t axis);
+
+/** Return the longest diagonal, mm, of the cell between eight voxels. */
+double supine_image_cell_diagonal(const supine_image *image);
+
+/** Return whether the determinant of the steps is negative, as in a file whose axes run to the
+ * left, the front and the head (LAS), which dcm2niix writes. DICOM has no such grids, and programs
+ * that convert to it mirror them. */
+bool supine_image_is_left_handed(const supine_image *image);
+
+/** Reverse an axis: the voxels, if there are any, and the frame, so that each voxel stays where it
+ * is in the patient. */
+void supine_image_reverse(supine_image *image, size_t axis);
 
 /** Convert a point, mm, LPS, to voxel coordinates: (0, 0, 0) is the centre of the first voxel. */
 void supine_image_locate(const supine_image *image, const double point[3], double voxel[3]);

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* Choose the reader of an image by the ending of the file's name, and check what it has read. */
-#include <errno.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #include "base/arena.h"
+#include "base/input.h"
+#include "base/locale.h"
 #include "base/output.h"
 #include "base/text.h"
 #include "base/vec3.h"
@@ -60,26 +61,36 @@ static bool is_frame(const supine_image *image) {
 }
 
 supine_status supine_image_read(const char *path, supine_image *image, supine_error *error) {
-  struct stat about = {0};
+  SUPINE_C_LOCALE; /* for the libraries that read headers */
   SUPINE_FREED_BY(supine_image_free) supine_image read = {.channels = 1};
   SUPINE_FREED_BY(supine_file_close) FILE *file = NULL;
+  size_t size = 0;
   image_storage storage = {0};
   SUPINE_REFUSE_IF(!supine_image_supports(path), error, SUPINE_ERROR_FORMAT,
                    "%s: an image's name must end in .nrrd, .nii, .nii.gz or .mha; convert other "
                    "formats, for example with 3D Slicer",
                    path);
-  if (stat(path, &about) != 0 || !S_ISREG(about.st_mode) || (file = fopen(path, "rb")) == NULL) {
-    const bool other = about.st_mode != 0 && !S_ISREG(about.st_mode);
-    return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path,
-                            other ? "it is not a regular file" : strerror(errno));
-  }
+  SUPINE_TRY(supine_input_open(path, &file, &size, error));
   SUPINE_TRY(formats[format_of(path)].describe(path, file, &read, &storage, error));
   SUPINE_REFUSE_IF(!is_frame(&read), error, SUPINE_ERROR_FORMAT,
                    "%s: the header's axis directions are linearly dependent: write the image again",
                    path);
-  SUPINE_TRY(supine_image_read_voxels(path, file, (size_t)about.st_size, &storage, &read, error));
+  SUPINE_TRY(supine_image_read_voxels(path, file, size, &storage, &read, error));
   *image = read;
   read.values = NULL;
+  return SUPINE_OK;
+}
+
+/* Copy a field of displacements, and reverse the first axis of the copy. */
+static supine_status reversed_copy(const supine_image *image, supine_image *copy,
+                                   supine_error *error) {
+  *copy = *image;
+  copy->values = malloc(supine_image_bytes(image));
+  if (copy->values == NULL) {
+    return supine_error_memory(error, "%zu bytes of a field", supine_image_bytes(image));
+  }
+  memcpy(copy->values, image->values, supine_image_bytes(image));
+  supine_image_reverse(copy, 0);
   return SUPINE_OK;
 }
 
@@ -87,6 +98,11 @@ supine_status supine_image_write(const char *path, const supine_image *image, co
                                  supine_error *error) {
   SUPINE_REFUSE_IF(!supine_image_supports(path), error, SUPINE_ERROR_ARGUMENT,
                    "%s: end the name of an image in .nrrd, .nii, .nii.gz or .mha", path);
+  SUPINE_FREED_BY(supine_image_free) supine_image turned = {0};
+  if (image->channels == 3 && supine_image_is_left_handed(image)) {
+    SUPINE_TRY(reversed_copy(image, &turned, error));
+    image = &turned;
+  }
   SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
   SUPINE_TRY(supine_output_open(path, &output, error));
   const supine_status status =

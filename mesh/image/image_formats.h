@@ -44,6 +44,10 @@ supine_status supine_image_read_voxels(const char *path, FILE *file, size_t file
 supine_status supine_image_pack(int format, const void *head, size_t head_size,
                                 const supine_image *image, const void *values, FILE *file);
 
+/* Parse the number at *text, which may follow blanks, and move *text behind it; return false if
+ * there is none. */
+bool supine_image_number(const char **text, double *value);
+
 /* Return the size of all voxels together, bytes. */
 size_t supine_image_bytes(const supine_image *image);
 

@@ -1,13 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /* Read and write MetaImage files that hold their voxels (.mha), as ITK, elastix and plastimatch do:
  * lines "Key = value", the last of which is ElementDataFile, then the voxels. Axes are LPS. */
+#include <math.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
 #include "base/arena.h"
+#include "base/ascii.h"
+#include "base/number.h"
 #include "base/vec3.h"
 
 #include "mesh/image/image_formats.h"
@@ -51,7 +53,7 @@ static const char *value_of(const header *h, const char *key, const char *second
 }
 
 static bool is_true(const char *value) {
-  return strcasecmp(value, "true") == 0 || strcmp(value, "1") == 0;
+  return supine_ascii_same(value, "true") || strcmp(value, "1") == 0;
 }
 
 /* Parse `count` numbers; return false if `text` is malformed. An empty `text` changes nothing. */
@@ -59,7 +61,7 @@ static bool numbers(const char *text, double *values, size_t count) {
   bool good = true;
   for (size_t i = 0; i < count && good && *text != '\0'; ++i) {
     char *end;
-    values[i] = strtod(text, &end);
+    values[i] = supine_number_parse(text, &end);
     good = end != text && (*end != '\0' || i + 1 == count);
     text = end;
   }
@@ -98,10 +100,10 @@ static const char *read_header(char *text, header *h) {
 static const char *check(const header *h) {
   const char *object = value_of(h, "ObjectType", "", "");
   const char *binary = value_of(h, "BinaryData", "", "");
-  if (*object != '\0' && strcasecmp(object, "Image") != 0) {
+  if (*object != '\0' && !supine_ascii_same(object, "Image")) {
     return "its ObjectType is not Image; give an image";
   }
-  if (strcasecmp(value_of(h, "ElementDataFile", "", ""), "LOCAL") != 0) {
+  if (!supine_ascii_same(value_of(h, "ElementDataFile", "", ""), "LOCAL")) {
     return "the voxels are in another file; save header and voxels in one .mha";
   }
   if (*binary != '\0' && !is_true(binary)) {
@@ -187,6 +189,33 @@ supine_status supine_image_describe_mha(const char *path, FILE *file, supine_ima
   return SUPINE_OK;
 }
 
+/* Name the directions from which the axes come, as MetaIO does: RAI if they are x, y and z. Each
+ * axis is named for its largest component, the largest first, so that no letter pair occurs twice.
+ */
+static void name_orientation(const supine_image *image, char name[4]) {
+  static const char from[3][2] = {{'R', 'L'}, {'A', 'P'}, {'I', 'S'}};
+  bool named[3] = {false, false, false};
+  bool used[3] = {false, false, false};
+  for (int round = 0; round < 3; ++round) {
+    size_t axis = 0;
+    size_t component = 0;
+    double largest = -1.0;
+    for (size_t i = 0; i < 9; ++i) {
+      const size_t a = i / 3;
+      const size_t k = i % 3;
+      const double share = fabs(image->step[a][k]) / supine_length(image->step[a]);
+      if (!named[a] && !used[k] && share > largest) {
+        largest = share;
+        axis = a;
+        component = k;
+      }
+    }
+    name[axis] = from[component][image->step[axis][component] < 0.0];
+    named[axis] = used[component] = true;
+  }
+  name[3] = '\0';
+}
+
 static void write_header(const supine_image *image, const char *note, size_t packed, FILE *file) {
   const char *type = NULL;
   for (size_t i = 0; i < TYPES && type == NULL; ++i) {
@@ -201,18 +230,20 @@ static void write_header(const supine_image *image, const char *note, size_t pac
                 "CompressedDataSize = %zu\nTransformMatrix =",
                 packed);
   double spacing[3];
+  char orientation[4];
+  name_orientation(image, orientation);
   for (int a = 0; a < 3; ++a) {
     spacing[a] = supine_length(image->step[a]);
     for (int k = 0; k < 3; ++k) {
-      (void)fprintf(file, " %.17g", image->step[a][k] / spacing[a]);
+      (void)supine_print(file, " %.17g", image->step[a][k] / spacing[a]);
     }
   }
-  (void)fprintf(file,
-                "\nOffset = %.17g %.17g %.17g\nCenterOfRotation = 0 0 0\n"
-                "AnatomicalOrientation = RAI\nElementSpacing = %.17g %.17g %.17g\n"
-                "DimSize = %zu %zu %zu\n",
-                image->origin[0], image->origin[1], image->origin[2], spacing[0], spacing[1],
-                spacing[2], image->size[0], image->size[1], image->size[2]);
+  (void)supine_print(file,
+                     "\nOffset = %.17g %.17g %.17g\nCenterOfRotation = 0 0 0\n"
+                     "AnatomicalOrientation = %s\nElementSpacing = %.17g %.17g %.17g\n"
+                     "DimSize = %zu %zu %zu\n",
+                     image->origin[0], image->origin[1], image->origin[2], orientation, spacing[0],
+                     spacing[1], spacing[2], image->size[0], image->size[1], image->size[2]);
   if (image->channels > 1) {
     (void)fprintf(file, "ElementNumberOfChannels = %zu\n", image->channels);
   }

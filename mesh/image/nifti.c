@@ -89,6 +89,9 @@ supine_status supine_image_describe_nifti(const char *path, FILE *file, supine_i
                                           image_storage *storage, supine_error *error) {
   (void)file;
   nifti_set_debug_level(0);
+  /* the header of a pair of files says so, but nifti_image_read takes its own bytes for voxels */
+  SUPINE_REFUSE_IF(is_nifti_file(path) == 2, error, SUPINE_ERROR_FORMAT,
+                   "%s: its voxels are in another file; save header and voxels in one .nii", path);
   nifti_image *nifti = nifti_image_read(path, 0);
   SUPINE_REFUSE_IF(nifti == NULL, error, SUPINE_ERROR_FORMAT,
                    "%s: not a NIfTI header; give a NIfTI file", path);

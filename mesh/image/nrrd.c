@@ -1,120 +1,334 @@
 /* SPDX-License-Identifier: MIT */
-/* Read NRRD headers through teem, and write NRRD. */
+/* Read and write NRRD files that hold their voxels: a magic line, lines "field: value" and
+ * "key:=value", an empty line, then the voxels (teem.sourceforge.net/nrrd/format.html). */
+#include <errno.h>
+#include <math.h>
 #include <stdlib.h>
-
-#include <teem/nrrd.h>
+#include <string.h>
+#include <sys/types.h>
 
 #include "base/arena.h"
-#include "base/library.h"
+#include "base/ascii.h"
+#include "base/number.h"
 #include "mesh/image/image_formats.h"
 
-/* clang-format off */
-#define FUNCTIONS(EACH)                                                                            \
-  EACH(, nrrdBiffKey) EACH(, nrrdType) EACH(, nrrdEncodingAscii) EACH(, nrrdEncodingGzip)          \
-  EACH(, nrrdEncodingRaw) EACH(, nrrdNew) EACH(, nrrdIoStateNew) EACH(, nrrdRead)                  \
-  EACH(, nrrdIoStateNix) EACH(, nrrdNuke) EACH(, biffGetDone) EACH(, airEnumStr)
-/* clang-format on */
-static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } teem;
+/* The names of each type of voxels. The first is the one that is written. */
+static const struct {
+  supine_image_voxel voxel;
+  int integer; /* as in image_storage */
+  const char *names[7];
+} types[] = {
+    {SUPINE_VOXEL_I8, 0, {"int8", "int8_t", "signed char"}},
+    {SUPINE_VOXEL_U8, 0, {"uint8", "uint8_t", "unsigned char", "uchar"}},
+    {SUPINE_VOXEL_I16,
+     0,
+     {"int16", "int16_t", "short", "short int", "signed short", "signed short int"}},
+    {SUPINE_VOXEL_U16, 0, {"uint16", "uint16_t", "ushort", "unsigned short", "unsigned short int"}},
+    {SUPINE_VOXEL_I32, 0, {"int32", "int32_t", "int", "signed int"}},
+    {SUPINE_VOXEL_U32, 0, {"uint32", "uint32_t", "uint", "unsigned int"}},
+    {SUPINE_VOXEL_F32, 0, {"float"}},
+    {SUPINE_VOXEL_F64, 0, {"double"}},
+    {SUPINE_VOXEL_F64,
+     1,
+     {"int64", "int64_t", "longlong", "long long", "long long int", "signed long long",
+      "signed long long int"}},
+    {SUPINE_VOXEL_F64,
+     -1,
+     {"uint64", "uint64_t", "ulonglong", "unsigned long long", "unsigned long long int"}}};
+
+enum { TYPES = sizeof types / sizeof *types, NAMES = sizeof types[0].names / sizeof(char *) };
+
+/* Fields whose values are used. */
+typedef enum field {
+  FIELD_TYPE,
+  FIELD_DIMENSION,
+  FIELD_SPACE,
+  FIELD_SIZES,
+  FIELD_DIRECTIONS,
+  FIELD_ORIGIN,
+  FIELD_ENCODING,
+  FIELD_ENDIAN,
+  FIELD_LINE_SKIP,
+  FIELD_BYTE_SKIP,
+  FIELD_DATA_FILE,
+  FIELD_UNUSED, /* any field that changes neither the voxels nor their positions */
+  FIELDS
+} field;
 
 static const struct {
-  int type;
   const char *name;
-} types[SUPINE_VOXEL_COUNT] = {{nrrdTypeChar, "int8"},   {nrrdTypeUChar, "uint8"},
-                               {nrrdTypeShort, "int16"}, {nrrdTypeUShort, "uint16"},
-                               {nrrdTypeInt, "int32"},   {nrrdTypeUInt, "uint32"},
-                               {nrrdTypeFloat, "float"}, {nrrdTypeDouble, "double"}};
+  field field;
+} fields[] = {{"type", FIELD_TYPE},
+              {"dimension", FIELD_DIMENSION},
+              {"space", FIELD_SPACE},
+              {"sizes", FIELD_SIZES},
+              {"space directions", FIELD_DIRECTIONS},
+              {"space origin", FIELD_ORIGIN},
+              {"encoding", FIELD_ENCODING},
+              {"endian", FIELD_ENDIAN},
+              {"line skip", FIELD_LINE_SKIP},
+              {"lineskip", FIELD_LINE_SKIP},
+              {"byte skip", FIELD_BYTE_SKIP},
+              {"byteskip", FIELD_BYTE_SKIP},
+              {"data file", FIELD_DATA_FILE},
+              {"datafile", FIELD_DATA_FILE},
+              {"space dimension", FIELD_UNUSED},
+              {"space units", FIELD_UNUSED},
+              {"measurement frame", FIELD_UNUSED},
+              {"content", FIELD_UNUSED},
+              {"number", FIELD_UNUSED},
+              {"block size", FIELD_UNUSED},
+              {"blocksize", FIELD_UNUSED},
+              {"spacings", FIELD_UNUSED},
+              {"thicknesses", FIELD_UNUSED},
+              {"axis mins", FIELD_UNUSED},
+              {"axismins", FIELD_UNUSED},
+              {"axis maxs", FIELD_UNUSED},
+              {"axismaxs", FIELD_UNUSED},
+              {"centers", FIELD_UNUSED},
+              {"centerings", FIELD_UNUSED},
+              {"kinds", FIELD_UNUSED},
+              {"labels", FIELD_UNUSED},
+              {"units", FIELD_UNUSED},
+              {"min", FIELD_UNUSED},
+              {"max", FIELD_UNUSED},
+              {"old min", FIELD_UNUSED},
+              {"oldmin", FIELD_UNUSED},
+              {"old max", FIELD_UNUSED},
+              {"oldmax", FIELD_UNUSED},
+              {"sample units", FIELD_UNUSED},
+              {"sampleunits", FIELD_UNUSED}};
 
-static supine_status malformed(const char *path, const char *what, supine_error *error) {
-  return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: %s", path, what);
+/* Values of the fields, "" where the header lacks a field. */
+typedef struct header {
+  const char *value[FIELDS];
+} header;
+
+/* Remove blanks from both ends of a text. */
+static char *trim(char *text) {
+  text += strspn(text, " \t");
+  size_t length = strlen(text);
+  while (length > 0 && (text[length - 1] == ' ' || text[length - 1] == '\t')) {
+    --length;
+  }
+  text[length] = '\0';
+  return text;
 }
 
-/* Set the error to the last line of teem's message. */
-static supine_status teem_fails(const char *path, supine_error *error) {
-  char *text = teem.biffGetDone(*teem.nrrdBiffKey);
-  char *last = text;
-  for (char *at = text; at != NULL && *at != '\0'; ++at) {
-    if (*at == '\n') {
-      *at = '\0';
-      last = at[1] != '\0' ? at + 1 : last;
+/* Store the value of a line "field: value", which may not set a field again. Skip "key:=value",
+ * which may hold anything. Return whether the line is one of both. */
+static bool take_line(char *line, header *h, supine_arena *arena) {
+  const char *key = strstr(line, ":=");
+  char *colon = strchr(line, ':');
+  while (colon != NULL && strchr(" \t", colon[1]) == NULL) { /* also finds the NUL after ':' */
+    colon = strchr(colon + 1, ':');
+  }
+  if (key != NULL && (colon == NULL || key < colon)) {
+    return true;
+  }
+  if (colon == NULL) {
+    return false;
+  }
+  *colon = '\0';
+  const char *name = trim(line);
+  const char *value = trim(colon + 1);
+  size_t f = 0;
+  while (f < sizeof fields / sizeof *fields && !supine_ascii_same(name, fields[f].name)) {
+    ++f;
+  }
+  if (f == sizeof fields / sizeof *fields) {
+    return false;
+  }
+  if (fields[f].field == FIELD_UNUSED) {
+    return true;
+  }
+  if (*h->value[fields[f].field] != '\0') {
+    return false;
+  }
+  const size_t size = strlen(value) + 1;
+  char *copy = supine_arena_take(arena, size, 1);
+  if (copy != NULL) {
+    memcpy(copy, value, size);
+    h->value[fields[f].field] = copy;
+  }
+  return true;
+}
+
+static void free_line(char **line) {
+  free(*line);
+}
+
+/* Read the lines up to the empty one, after which the voxels begin. */
+static supine_status read_header(const char *path, FILE *file, header *h, supine_arena *arena,
+                                 supine_error *error) {
+  char magic[16] = "";
+  SUPINE_FREED_BY(free_line) char *line = NULL;
+  size_t room = 0;
+  for (int i = 0; i < FIELDS; ++i) {
+    h->value[i] = "";
+  }
+  const bool begun = fgets(magic, sizeof magic, file) != NULL;
+  magic[strcspn(magic, "\r\n")] = '\0';
+  SUPINE_REFUSE_IF(!begun || strlen(magic) != 8 || strncmp(magic, "NRRD000", 7) != 0 ||
+                       magic[7] < '1' || magic[7] > '6',
+                   error, SUPINE_ERROR_FORMAT,
+                   "%s: its first line is not NRRD0001 to NRRD0006; give an NRRD file", path);
+  for (size_t number = 2;; ++number) {
+    const ssize_t length = getline(&line, &room, file);
+    SUPINE_REFUSE_IF(length < 0 && feof(file) == 0, error, SUPINE_ERROR_READ, "%s: cannot read: %s",
+                     path, strerror(errno));
+    SUPINE_REFUSE_IF(length < 0, error, SUPINE_ERROR_FORMAT,
+                     "%s: no empty line ends its header; write the image again", path);
+    const bool text = strlen(line) == (size_t)length;
+    line[strcspn(line, "\r\n")] = '\0';
+    if (text && *line == '\0') {
+      return supine_arena_check(arena, error, "the header of %s", path);
+    }
+    const bool known = text && (*line == '#' || take_line(line, h, arena));
+    SUPINE_REFUSE_IF(
+        !known, error, SUPINE_ERROR_FORMAT,
+        "%s: line %zu is not a field of an NRRD header, or sets one again; write the image again",
+        path, number);
+    SUPINE_REFUSE_IF(*h->value[FIELD_DATA_FILE] != '\0', error, SUPINE_ERROR_FORMAT,
+                     "%s: its voxels are in another file; save all in one file", path);
+  }
+}
+
+/* Parse `count` vectors such as "(1,0,0)"; return false if there are fewer or more. */
+static bool read_vectors(const char *text, size_t count, double vectors[][3]) {
+  static const char before[] = "(,,";
+  for (size_t i = 0; i < count; ++i) {
+    for (size_t k = 0; k < 3; ++k) {
+      text += strspn(text, " \t");
+      if (*text != before[k]) {
+        return false;
+      }
+      ++text;
+      if (!supine_image_number(&text, &vectors[i][k])) {
+        return false;
+      }
+    }
+    text += strspn(text, " \t");
+    if (*text != ')') {
+      return false;
+    }
+    ++text;
+    text += strspn(text, " \t");
+  }
+  return *text == '\0';
+}
+
+/* Parse `count` whole numbers from 1 to INT32_MAX; return false if there are fewer or more. */
+static bool read_counts(const char *text, size_t count, size_t *counts) {
+  for (size_t i = 0; i < count; ++i) {
+    double value = 0.0;
+    if (!supine_image_number(&text, &value) || !(value >= 1.0 && value <= INT32_MAX) ||
+        value != floor(value)) {
+      return false;
+    }
+    counts[i] = (size_t)value;
+  }
+  return *text == '\0';
+}
+
+/* Return whether the value is one of `count` words, ignoring case. */
+static bool is_one_of(const char *value, const char *const *words, size_t count) {
+  bool is = false;
+  for (size_t i = 0; i < count; ++i) {
+    is = is || (words[i] != NULL && supine_ascii_same(value, words[i]));
+  }
+  return is;
+}
+
+/* Find sizes, position and axes. */
+static supine_status find_frame(const char *path, const header *h, supine_image *image,
+                                supine_error *error) {
+  static const char *const lps_names[] = {"left-posterior-superior", "LPS"};
+  static const char *const ras_names[] = {"right-anterior-superior", "RAS"};
+  size_t dimension = 0;
+  const char *space = h->value[FIELD_SPACE];
+  const char *directions = h->value[FIELD_DIRECTIONS];
+  const bool stated = read_counts(h->value[FIELD_DIMENSION], 1, &dimension);
+  SUPINE_REFUSE_IF(!stated, error, SUPINE_ERROR_FORMAT,
+                   "%s: its header states no dimension; write the image again", path);
+  SUPINE_REFUSE_IF(dimension != 3, error, SUPINE_ERROR_FORMAT,
+                   "%s: dimension %zu; give an image with one number per voxel and three axes",
+                   path, dimension);
+  SUPINE_REFUSE_IF(*directions == '\0', error, SUPINE_ERROR_FORMAT,
+                   "%s: the header lacks space directions for its 3 axes; add them", path);
+  const bool lps = is_one_of(space, lps_names, 2);
+  const bool ras = is_one_of(space, ras_names, 2);
+  SUPINE_REFUSE_IF(!lps && !ras, error, SUPINE_ERROR_FORMAT,
+                   "%s: its space is neither left-posterior-superior nor right-anterior-superior; "
+                   "convert the image to one of them",
+                   path);
+  const bool sized = read_counts(h->value[FIELD_SIZES], 3, image->size);
+  const bool placed = read_vectors(directions, 3, image->step) &&
+                      read_vectors(h->value[FIELD_ORIGIN], 1, &image->origin);
+  SUPINE_REFUSE_IF(!sized, error, SUPINE_ERROR_FORMAT,
+                   "%s: its sizes are not three whole numbers; write the image again", path);
+  SUPINE_REFUSE_IF(!placed, error, SUPINE_ERROR_FORMAT,
+                   "%s: its space directions and space origin are not four vectors of three "
+                   "numbers; write the image again",
+                   path);
+  image->axes = lps ? SUPINE_AXES_LPS : SUPINE_AXES_RAS;
+  image->frame_source = "space directions";
+  if (ras) {
+    for (int k = 0; k < 2; ++k) {
+      image->origin[k] = -image->origin[k];
+      for (int a = 0; a < 3; ++a) {
+        image->step[a][k] = -image->step[a][k];
+      }
     }
   }
-  (void)supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: %s; write the image again", path,
-                         last != NULL ? last : "malformed");
-  free(text);
-  return SUPINE_ERROR_FORMAT;
+  return SUPINE_OK;
 }
 
-static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState *io,
-                           supine_image *image, image_storage *storage, supine_error *error) {
-  if (io->detachedHeader || io->dataFNFormat != NULL || io->dataFNArr->len > 0) {
-    return malformed(path, "its voxels are in another file; save all in one file", error);
-  }
-  SUPINE_REFUSE_IF(nrrd->dim != 3 || nrrd->spaceDim != 3, error, SUPINE_ERROR_FORMAT,
-                   nrrd->dim != 3
-                       ? "%s: dimension %u; give an image with one number per voxel and three axes"
-                       : "%s: the header lacks space directions for its %u axes; add them",
-                   path, nrrd->dim);
-  const double turn = nrrd->space == nrrdSpaceLeftPosteriorSuperior   ? 1.0
-                      : nrrd->space == nrrdSpaceRightAnteriorSuperior ? -1.0
-                                                                      : 0.0;
-  if (turn == 0.0) {
-    return malformed(path,
-                     "its space is neither left-posterior-superior nor right-anterior-superior; "
-                     "convert the image to one of them",
-                     error);
-  }
-  storage->packed = io->encoding == *teem.nrrdEncodingGzip;
-  storage->text = io->encoding == *teem.nrrdEncodingAscii;
-  if ((io->encoding != *teem.nrrdEncodingRaw && !storage->packed && !storage->text) ||
-      io->lineSkip != 0 || io->byteSkip != 0) {
-    return malformed(path,
-                     "its encoding is not raw, gzip or ascii, or its header skips lines or bytes; "
-                     "save the image again as gzip",
-                     error);
-  }
-  const bool wide = nrrd->type == nrrdTypeLLong || nrrd->type == nrrdTypeULLong;
+/* Find how the voxels are stored. */
+static supine_status find_storage(const char *path, const header *h, supine_image *image,
+                                  image_storage *storage, supine_error *error) {
+  static const char *const gzip[] = {"gzip", "gz"};
+  static const char *const text[] = {"ascii", "text", "txt"};
+  const char *encoding = h->value[FIELD_ENCODING];
+  const char *endian = h->value[FIELD_ENDIAN];
+  const char *lines = h->value[FIELD_LINE_SKIP];
+  const char *bytes = h->value[FIELD_BYTE_SKIP];
+  const bool skips =
+      (*lines != '\0' && strcmp(lines, "0") != 0) || (*bytes != '\0' && strcmp(bytes, "0") != 0);
+  storage->packed = is_one_of(encoding, gzip, 2);
+  storage->text = is_one_of(encoding, text, 3);
+  storage->big_endian = supine_ascii_same(endian, "big");
+  const bool raw = supine_ascii_same(encoding, "raw");
+  SUPINE_REFUSE_IF(
+      (!raw && !storage->packed && !storage->text) || skips, error, SUPINE_ERROR_FORMAT,
+      "%s: its encoding is not raw, gzip or ascii, or its header skips lines or bytes; "
+      "save the image again as gzip",
+      path);
   size_t type = 0;
-  while (type < SUPINE_VOXEL_COUNT && types[type].type != (wide ? nrrdTypeDouble : nrrd->type)) {
+  while (type < TYPES && !is_one_of(h->value[FIELD_TYPE], types[type].names, NAMES)) {
     ++type;
   }
-  SUPINE_REFUSE_IF(type == SUPINE_VOXEL_COUNT, error, SUPINE_ERROR_FORMAT,
-                   "%s: voxels of type %s are not supported; convert them to int16", path,
-                   teem.airEnumStr(*teem.nrrdType, nrrd->type));
-  image->voxel = (supine_image_voxel)type;
-  image->axes = turn > 0.0 ? SUPINE_AXES_LPS : SUPINE_AXES_RAS;
-  image->frame_source = "space directions";
-  for (unsigned a = 0; a < 3; ++a) {
-    image->size[a] = nrrd->axis[a].size;
-    for (int k = 0; k < 3; ++k) {
-      image->step[a][k] = (k < 2 ? turn : 1.0) * nrrd->axis[a].spaceDirection[k];
-    }
-    image->origin[a] = (a < 2 ? turn : 1.0) * nrrd->spaceOrigin[a];
-  }
-  storage->big_endian = io->endian == airEndianBig;
-  storage->integer = !wide ? 0 : nrrd->type == nrrdTypeLLong ? 1 : -1;
+  SUPINE_REFUSE_IF(type == TYPES, error, SUPINE_ERROR_FORMAT,
+                   "%s: its type is not a number of 8 to 64 bits; convert the voxels to int16",
+                   path);
+  image->voxel = types[type].voxel;
+  storage->integer = types[type].integer;
+  const bool ordered = storage->big_endian || supine_ascii_same(endian, "little");
+  SUPINE_REFUSE_IF(!ordered && !storage->text && supine_image_voxel_size(image->voxel) > 1, error,
+                   SUPINE_ERROR_FORMAT,
+                   "%s: its endian is neither little nor big; write the image again", path);
   return SUPINE_OK;
 }
 
 supine_status supine_image_describe_nrrd(const char *path, FILE *file, supine_image *image,
                                          image_storage *storage, supine_error *error) {
-  SUPINE_TRY(SUPINE_LIBRARY_LOAD(SUPINE_TEEM, FUNCTIONS, &teem, error));
-  Nrrd *nrrd = teem.nrrdNew();
-  NrrdIoState *io = teem.nrrdIoStateNew();
-  supine_status status = SUPINE_ERROR_MEMORY;
-  if (nrrd == NULL || io == NULL) {
-    (void)supine_error_memory(error, "the header of %s", path);
-  } else {
-    io->skipData = AIR_TRUE;
-    io->keepNrrdDataFileOpen = AIR_TRUE;
-    status = teem.nrrdRead(nrrd, file, io) != 0 ? teem_fails(path, error)
-                                                : check(path, nrrd, io, image, storage, error);
-    storage->offset = ftello(file);
-  }
-  if (io != NULL) {
-    (void)teem.nrrdIoStateNix(io);
-  }
-  (void)teem.nrrdNuke(nrrd);
-  return status;
+  SUPINE_ARENA arena = {0};
+  header h;
+  SUPINE_TRY(read_header(path, file, &h, &arena, error));
+  SUPINE_TRY(find_frame(path, &h, image, error));
+  SUPINE_TRY(find_storage(path, &h, image, storage, error));
+  storage->offset = ftello(file);
+  return SUPINE_OK;
 }
 
 supine_status supine_image_write_nrrd(const char *path, const supine_image *image, const char *note,
@@ -123,7 +337,7 @@ supine_status supine_image_write_nrrd(const char *path, const supine_image *imag
   (void)path;
   (void)error;
   (void)fprintf(file, "NRRD0004\n%s%s%stype: %s\ndimension: %d\nsizes:", note != NULL ? "# " : "",
-                note != NULL ? note : "", note != NULL ? "\n" : "", types[image->voxel].name,
+                note != NULL ? note : "", note != NULL ? "\n" : "", types[image->voxel].names[0],
                 vector ? 4 : 3);
   if (vector) {
     (void)fprintf(file, " %zu", image->channels);
@@ -135,9 +349,10 @@ supine_status supine_image_write_nrrd(const char *path, const supine_image *imag
                 vector ? " none" : "");
   for (int a = 0; a < 3; ++a) {
     const double *s = image->step[a];
-    (void)fprintf(file, " (%.17g,%.17g,%.17g)", s[0], s[1], s[2]);
+    (void)supine_print(file, " (%.17g,%.17g,%.17g)", s[0], s[1], s[2]);
   }
-  (void)fprintf(file, "\nspace origin: (%.17g,%.17g,%.17g)\nendian: little\nencoding: gzip\n\n",
-                image->origin[0], image->origin[1], image->origin[2]);
+  (void)supine_print(file,
+                     "\nspace origin: (%.17g,%.17g,%.17g)\nendian: little\nencoding: gzip\n\n",
+                     image->origin[0], image->origin[1], image->origin[2]);
   return supine_image_pack(IMAGE_GZIP, NULL, 0, image, image->values, file);
 }

@@ -9,6 +9,8 @@
 #include <zlib.h>
 
 #include "base/arena.h"
+#include "base/ascii.h"
+#include "base/number.h"
 
 #include "mesh/image/image_formats.h"
 
@@ -84,13 +86,40 @@ static supine_status rescale(const char *path, const image_storage *storage, sup
   return SUPINE_OK;
 }
 
+bool supine_image_number(const char **text, double *value) {
+  char *end = NULL;
+  *value = supine_number_parse(*text, &end);
+  const bool found = end != *text;
+  *text = end;
+  return found;
+}
+
+/* Read the next word between blanks; return false at the end of the file, or if it is too long. */
+static bool read_word(FILE *file, char *word, size_t size) {
+  size_t length = 0;
+  int c = getc(file);
+  while (c != EOF && supine_ascii_is_space((char)c)) {
+    c = getc(file);
+  }
+  while (c != EOF && !supine_ascii_is_space((char)c) && length < size - 1) {
+    word[length++] = (char)c;
+    c = getc(file);
+  }
+  word[length] = '\0';
+  return length > 0 && (c == EOF || supine_ascii_is_space((char)c));
+}
+
 static bool read_text(FILE *file, supine_image *image, size_t count) {
-  double value = 0.0;
-  size_t i = 0;
-  for (; i < count && fscanf(file, "%lf", &value) == 1; ++i) { /* NOLINT(cert-err34-c) */
+  for (size_t i = 0; i < count; ++i) {
+    char word[64];
+    const char *at = word;
+    double value = 0.0;
+    if (!read_word(file, word, sizeof word) || !supine_image_number(&at, &value) || *at != '\0') {
+      return false;
+    }
     supine_image_put(image, i, 1, &value);
   }
-  return i == count;
+  return true;
 }
 
 supine_status supine_image_read_voxels(const char *path, FILE *file, size_t file_size,

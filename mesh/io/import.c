@@ -7,24 +7,26 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
-#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <assimp/cfileio.h>
 #include <assimp/cimport.h>
 #include <assimp/config.h>
 #include <assimp/scene.h>
 
 #include "base/arena.h"
+#include "base/input.h"
 #include "base/library.h"
+#include "base/text.h"
+#include "base/locale.h"
 #include "mesh/io/read.h"
 
 /* clang-format off */
 #define FUNCTIONS(EACH)                                                                            \
   EACH(ai, CreatePropertyStore) EACH(ai, SetImportPropertyInteger) EACH(ai, ReleasePropertyStore)  \
-  EACH(ai, ImportFileExWithProperties) EACH(ai, ImportFileFromMemoryWithProperties)                \
-  EACH(ai, GetErrorString) EACH(ai, IsExtensionSupported) EACH(ai, IdentityMatrix4)                \
-  EACH(ai, MultiplyMatrix4) EACH(ai, Matrix4Determinant)
+  EACH(ai, ImportFileExWithProperties) EACH(ai, GetErrorString) EACH(ai, IsExtensionSupported)     \
+  EACH(ai, IdentityMatrix4) EACH(ai, MultiplyMatrix4) EACH(ai, Matrix4Determinant)
 /* clang-format on */
 
 /* Functions of assimp, loaded only when needed, as loading takes longer than most commands. */
@@ -63,16 +65,147 @@ static supine_status import_fail(const char *path, const char *words, supine_err
                           path, length == 0 ? "assimp gives no reason" : line);
 }
 
-/* If `kind` is NULL, import the file at file->path, else file->bytes in the format `kind`. */
-static const struct aiScene *import(const assimp *ai, const mesh_file *file, const char *kind) {
+/* What assimp may open: the file to import, and the files that it names. */
+typedef struct sources {
+  const mesh_file *file;
+  bool alone;           /* whether the files that it names are not needed */
+  supine_error refused; /* why one of them was not opened; SUPINE_OK if all were */
+} sources;
+
+/* A file that assimp reads, in memory. */
+typedef struct source {
+  struct aiFile calls;
+  const unsigned char *bytes;
+  unsigned char *owned; /* the bytes, if they are freed with the file */
+  size_t size, at;
+} source;
+
+static size_t source_read(struct aiFile *file, char *to, size_t size, size_t count) {
+  source *s = (source *)(void *)file->UserData;
+  const size_t left = size == 0 ? 0 : (s->size - s->at) / size;
+  const size_t taken = count < left ? count : left;
+  if (taken > 0) {
+    memcpy(to, s->bytes + s->at, taken * size);
+  }
+  s->at += taken * size;
+  return taken;
+}
+
+static size_t source_write(struct aiFile *file, const char *from, size_t size, size_t count) {
+  (void)file;
+  (void)from;
+  (void)size;
+  (void)count;
+  return 0;
+}
+
+static size_t source_tell(struct aiFile *file) {
+  return ((source *)(void *)file->UserData)->at;
+}
+
+static size_t source_size(struct aiFile *file) {
+  return ((source *)(void *)file->UserData)->size;
+}
+
+/* Move to a position, as fseek does. A negative offset wraps around zero, and so does the sum. */
+static enum aiReturn source_seek(struct aiFile *file, size_t offset, enum aiOrigin origin) {
+  source *s = (source *)(void *)file->UserData;
+  size_t from = 0;
+  if (origin == aiOrigin_CUR) {
+    from = s->at;
+  } else if (origin == aiOrigin_END) {
+    from = s->size;
+  }
+  if (from + offset > s->size) {
+    return aiReturn_FAILURE;
+  }
+  s->at = from + offset;
+  return aiReturn_SUCCESS;
+}
+
+static void source_flush(struct aiFile *file) {
+  (void)file;
+}
+
+/* Read a file in the folder of the imported one. */
+static supine_status read_beside(const sources *from, const char *name, source *s,
+                                 supine_error *error) {
+  SUPINE_FREED_BY(supine_file_close) FILE *stream = NULL;
+  SUPINE_TRY(supine_input_open_beside(from->file->path, name, &stream, &s->size, error));
+  s->owned = malloc(s->size + 1);
+  if (s->owned == NULL) {
+    return supine_error_memory(error, "%zu bytes of %s", s->size, name);
+  }
+  s->bytes = s->owned;
+  s->size = fread(s->owned, 1, s->size, stream);
+  return SUPINE_OK;
+}
+
+static void source_close(struct aiFileIO *io, struct aiFile *file) {
+  (void)io;
+  source *s = (source *)(void *)file->UserData;
+  free(s->owned);
+  free(s);
+}
+
+/* Open the imported file, whose bytes are in memory, or one that it names. */
+static supine_status make_source(const sources *from, const char *name, bool itself, source **made,
+                                 supine_error *error) {
+  *made = calloc(1, sizeof **made);
+  if (*made == NULL) {
+    return supine_error_memory(error, "reading %s", from->file->path);
+  }
+  (*made)->calls = (struct aiFile){source_read, source_write, source_tell,          source_size,
+                                   source_seek, source_flush, (char *)(void *)*made};
+  if (!itself) {
+    return read_beside(from, name, *made, error);
+  }
+  (*made)->bytes = from->file->bytes;
+  (*made)->size = from->file->size;
+  return SUPINE_OK;
+}
+
+static struct aiFile *source_open(struct aiFileIO *io, const char *name, const char *mode) {
+  (void)mode;
+  sources *from = (sources *)(void *)io->UserData;
+  const bool itself = strcmp(name, supine_text_file_name(from->file->path)) == 0;
+  supine_error error = {SUPINE_OK, ""};
+  source *made = NULL;
+  if (!itself && from->alone) {
+    return NULL;
+  }
+  if (make_source(from, name, itself, &made, &error) == SUPINE_OK) {
+    return &made->calls;
+  }
+  if (made != NULL) {
+    source_close(io, &made->calls);
+  }
+  /* a missing file may not be needed: another refusal takes its place */
+  if (from->refused.status == SUPINE_OK || from->refused.status == SUPINE_ERROR_READ) {
+    from->refused = error;
+  }
+  return NULL;
+}
+
+/* Import the file from memory. Files that it names are only opened in its folder. Those that an OBJ
+ * file names hold colours, and are never opened. */
+static const struct aiScene *import(const assimp *ai, const mesh_file *file, supine_error *error) {
+  sources from = {.file = file, .alone = supine_text_ends_in(file->path, ".obj")};
+  struct aiFileIO io = {source_open, source_close, (char *)(void *)&from};
   struct aiPropertyStore *properties = ai->CreatePropertyStore();
   /* Without this, importers add a surface to files that hold only a skeleton. */
   ai->SetImportPropertyInteger(properties, AI_CONFIG_IMPORT_NO_SKELETON_MESHES, 1);
+  /* without a folder, so that the files are named as they are in the file */
   const struct aiScene *scene =
-      kind != NULL ? ai->ImportFileFromMemoryWithProperties(
-                         (const char *)file->bytes, (unsigned)file->size, 0, kind, properties)
-                   : ai->ImportFileExWithProperties(file->path, 0, NULL, properties);
+      ai->ImportFileExWithProperties(supine_text_file_name(file->path), 0, &io, properties);
   ai->ReleasePropertyStore(properties);
+  /* some importers look for files that need not exist */
+  const bool not_needed = scene != NULL && from.refused.status == SUPINE_ERROR_READ;
+  if (from.refused.status != SUPINE_OK && !not_needed) {
+    *error = from.refused;
+  } else if (scene == NULL) {
+    (void)import_fail(file->path, ai->GetErrorString(), error);
+  }
   return scene;
 }
 
@@ -139,29 +272,34 @@ static void confine(size_t bytes) {
   const struct rlimit memory = {(rlim_t)GIGABYTES_MOST << 30, (rlim_t)GIGABYTES_MOST << 30};
   (void)setrlimit(RLIMIT_AS, &memory);
 #endif
-  static const int signals[] = {SIGINT, SIGTERM, SIGXCPU, SIGXFSZ, SIGALRM, SIGSEGV, SIGABRT};
+  static const int signals[] = {SIGINT,  SIGTERM, SIGHUP,  SIGXCPU,
+                                SIGXFSZ, SIGALRM, SIGSEGV, SIGABRT};
   for (size_t i = 0; i < sizeof signals / sizeof *signals; ++i) {
-    /* an inherited handler would delete the unfinished outputs of the parent */
-    (void)signal(signals[i], SIG_DFL);
+    /* An inherited handler would delete the unfinished outputs of the parent. A signal that the
+     * parent ignores stays ignored, except those of the limits above. */
+    const bool from_outside = signals[i] == SIGINT || signals[i] == SIGTERM || signals[i] == SIGHUP;
+    struct sigaction before = {0};
+    (void)sigaction(signals[i], NULL, &before);
+    if (!from_outside || before.sa_handler != SIG_IGN) {
+      (void)signal(signals[i], SIG_DFL);
+    }
   }
   (void)alarm(10 * (unsigned)seconds); /* ends the process if it hangs */
   (void)freopen("/dev/null", "w", stderr);
 }
 
-static _Noreturn void be_child(const mesh_file *file, const char *kind, size_t bytes,
-                               int pipe_end) {
+static _Noreturn void be_child(const mesh_file *file, int pipe_end) {
   FILE *stream = fdopen(pipe_end, "wb");
   outcome result = {.error = {SUPINE_OK, ""}};
   gathering out = {.error = &result.error};
   out.faces = (mesh_faces){.path = file->path, .mesh = &out.mesh};
-  confine(bytes);
+  confine(file->size);
+  (void)supine_locale_enter(); /* a child of a host program inherits its locale */
   if (SUPINE_LIBRARY_LOAD(SUPINE_ASSIMP, FUNCTIONS, &out.ai, &result.error) == SUPINE_OK) {
-    out.scene = import(&out.ai, file, kind);
+    out.scene = import(&out.ai, file, &result.error);
     struct aiMatrix4x4 identity;
     out.ai.IdentityMatrix4(&identity);
-    if (out.scene == NULL) {
-      (void)import_fail(file->path, out.ai.GetErrorString(), &result.error);
-    } else if (out.scene->mRootNode != NULL) {
+    if (result.error.status == SUPINE_OK && out.scene->mRootNode != NULL) {
       (void)take_node(out.scene->mRootNode, &identity, &out);
     }
   }
@@ -206,9 +344,8 @@ static supine_status take_outcome(const char *path, FILE *stream, supine_mesh *m
       path);
 }
 
-static supine_status import_file(const mesh_file *file, const char *kind, supine_mesh *mesh,
-                                 size_t *dropped, supine_error *error) {
-  struct stat about = {0};
+supine_status supine_mesh_import(mesh_file *file, supine_mesh *mesh, size_t *dropped,
+                                 supine_error *error) {
   int ends[2] = {-1, -1};
   FILE *stream = pipe(ends) == 0 ? fdopen(ends[0], "rb") : NULL;
   if (stream == NULL) {
@@ -216,10 +353,9 @@ static supine_status import_file(const mesh_file *file, const char *kind, supine
     (void)close(ends[1]);
     return supine_error_memory(error, "%s", file->path);
   }
-  (void)stat(file->path, &about);
   const pid_t child = fork();
   if (child == 0) {
-    be_child(file, kind, (size_t)about.st_size, ends[1]);
+    be_child(file, ends[1]);
   }
   (void)close(ends[1]);
   const supine_status status = take_outcome(file->path, stream, mesh, dropped, error);
@@ -229,15 +365,9 @@ static supine_status import_file(const mesh_file *file, const char *kind, supine
   return status;
 }
 
-supine_status supine_mesh_import(mesh_file *file, supine_mesh *mesh, size_t *dropped,
-                                 supine_error *error) {
-  return import_file(file, NULL, mesh, dropped, error);
-}
-
 /* Check that three numbers follow `keyword` in every line that begins with it, because assimp does
- * not check this. Also turn mtllib lines, which name a file of colours, into comments, and set
- * `last` to the first word of the last line. */
-static supine_status check_lines(mesh_file *file, const char *keyword, mesh_text *last,
+ * not check this. Set `last` to the first word of the last line. */
+static supine_status check_lines(const mesh_file *file, const char *keyword, mesh_text *last,
                                  supine_error *error) {
   mesh_text text = {file->bytes, file->bytes + file->size};
   mesh_text line;
@@ -248,9 +378,7 @@ static supine_status check_lines(mesh_file *file, const char *keyword, mesh_text
       continue;
     }
     *last = word;
-    if (supine_mesh_text_is(word, "mtllib")) {
-      file->bytes[word.at - file->bytes] = '#';
-    } else if (supine_mesh_text_is(word, keyword) && !supine_mesh_text_position(&line, position)) {
+    if (supine_mesh_text_is(word, keyword) && !supine_mesh_text_position(&line, position)) {
       return supine_error_set(error, SUPINE_ERROR_FORMAT,
                               "%s: line %zu: a vertex needs three numbers; save the mesh again",
                               file->path, number);
@@ -264,7 +392,7 @@ supine_status supine_mesh_read_obj(mesh_file *file, supine_mesh *mesh, size_t *d
   mesh_text last;
   SUPINE_TRY(supine_mesh_guard_text(file, error));
   SUPINE_TRY(check_lines(file, "v", &last, error));
-  return import_file(file, "obj", mesh, dropped, error);
+  return supine_mesh_import(file, mesh, dropped, error);
 }
 
 /* Read STL, as text or binary. A file with a NUL byte is binary, even if it begins with "solid". */
@@ -277,7 +405,7 @@ supine_status supine_mesh_read_stl(mesh_file *file, supine_mesh *mesh, size_t *d
                      "%s: the STL text does not end with endsolid: it is truncated; save it again",
                      file->path);
   }
-  return import_file(file, "stl", mesh, dropped, error);
+  return supine_mesh_import(file, mesh, dropped, error);
 }
 
 bool supine_mesh_import_knows(const char *ending) {

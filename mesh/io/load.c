@@ -1,23 +1,17 @@
 /* SPDX-License-Identifier: MIT */
 /* Load a file into a welded surface in millimetres, LPS. */
-#include <ctype.h>
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
-#include <sys/stat.h>
 
 #include "base/arena.h"
+#include "base/ascii.h"
+#include "base/input.h"
 #include "base/text.h"
 
 #include "mesh/io/read.h"
-
-static supine_status cannot_read(const char *path, supine_error *error) {
-  const int code = errno == 0 ? EIO : errno;
-  return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path, strerror(code));
-}
 
 static mesh_reader *find_reader(const char *path) {
   static const struct {
@@ -37,21 +31,8 @@ static mesh_reader *find_reader(const char *path) {
   return ending != NULL && supine_mesh_import_knows(ending) ? supine_mesh_import : NULL;
 }
 
-/* Check that the path names a file that is not empty, and return its size in *size. */
-static supine_status check_file(const char *path, size_t *size, supine_error *error) {
-  struct stat about;
-  errno = 0;
-  if (stat(path, &about) != 0) {
-    return cannot_read(path, error);
-  }
-  SUPINE_REFUSE_IF(S_ISDIR(about.st_mode), error, SUPINE_ERROR_READ,
-                   "%s: is a folder; give the mesh file inside it", path);
-  SUPINE_REFUSE_IF(!S_ISREG(about.st_mode), error, SUPINE_ERROR_READ,
-                   "%s: not a regular file; save the mesh to a file first", path);
-  *size = (size_t)about.st_size;
-  return *size == 0 ? supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                       "%s: the file is empty; save the mesh again", path)
-                    : SUPINE_OK;
+static bool is_letter_or_digit(char c) {
+  return supine_ascii_is_letter(c) || supine_ascii_is_digit(c);
 }
 
 /* Find the axes in the first 4095 bytes of the file, where 3D Slicer writes a tag such as
@@ -61,14 +42,14 @@ static void find_space(mesh_file *file) {
   char letters[4] = "";
   (void)snprintf(head, sizeof head, "%s", (const char *)file->bytes);
   const char *tag = head;
-  while (*tag != '\0' &&
-         (strncasecmp(tag, "SPACE=", 6) != 0 || (tag > head && isalnum((unsigned char)tag[-1])))) {
+  while (*tag != '\0' && (!supine_ascii_same_begin(tag, "SPACE=", 6) ||
+                          (tag > head && is_letter_or_digit(tag[-1])))) {
     ++tag;
   }
   file->tagged = *tag != '\0';
-  if (file->tagged && !isalnum((unsigned char)tag[strnlen(tag, 9)])) {
+  if (file->tagged && !is_letter_or_digit(tag[strnlen(tag, 9)])) {
     for (size_t k = 0; k < 3; ++k) {
-      letters[k] = (char)toupper((unsigned char)tag[strnlen(tag, 6 + k)]);
+      letters[k] = supine_ascii_upper(tag[strnlen(tag, 6 + k)]);
     }
     (void)supine_mesh_axes_parse(letters, &file->space);
   }
@@ -77,19 +58,17 @@ static void find_space(mesh_file *file) {
 static supine_status read_file(mesh_file *file, supine_arena *arena, mesh_reader **reader,
                                supine_error *error) {
   size_t size = 0;
-  SUPINE_TRY(check_file(file->path, &size, error));
-  SUPINE_FREED_BY(supine_file_close) FILE *stream = fopen(file->path, "rb");
-  if (stream == NULL) {
-    return cannot_read(file->path, error);
-  }
+  SUPINE_FREED_BY(supine_file_close) FILE *stream = NULL;
+  SUPINE_TRY(supine_input_open(file->path, &stream, &size, error));
+  SUPINE_REFUSE_IF(size == 0, error, SUPINE_ERROR_FORMAT,
+                   "%s: the file is empty; save the mesh again", file->path);
   file->bytes = supine_arena_take(arena, size + 1, 1);
   SUPINE_TRY(supine_arena_check(arena, error, "%zu bytes of %s", size, file->path));
   errno = 0;
   file->size = fread(file->bytes, 1, size, stream);
   file->bytes[file->size] = '\0';
-  if (ferror(stream) != 0) {
-    return cannot_read(file->path, error);
-  }
+  SUPINE_REFUSE_IF(ferror(stream) != 0, error, SUPINE_ERROR_READ, "%s: cannot read: %s", file->path,
+                   strerror(errno == 0 ? EIO : errno));
   find_space(file);
   *reader = find_reader(file->path);
   SUPINE_REFUSE_IF(*reader == NULL, error, SUPINE_ERROR_FORMAT,

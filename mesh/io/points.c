@@ -9,6 +9,7 @@
 
 #include "base/arena.h"
 #include "base/csv.h"
+#include "base/locale.h"
 #include "base/text.h"
 
 #include "mesh/io/points.h"
@@ -109,8 +110,13 @@ static supine_status read_markup(reading *r, const json_t *markup) {
 }
 
 static supine_status read_markups(reading *r) {
+  SUPINE_C_LOCALE;
   json_error_t why;
   json_auto_t *root = json_load_file(r->path, 0, &why);
+  SUPINE_REFUSE_IF(root == NULL && json_error_code(&why) == json_error_invalid_utf8, r->error,
+                   SUPINE_ERROR_FORMAT,
+                   "%s:%d: the text is not UTF-8: save the file with the encoding UTF-8", r->path,
+                   why.line);
   SUPINE_REFUSE_IF(root == NULL, r->error, why.line < 0 ? SUPINE_ERROR_READ : SUPINE_ERROR_FORMAT,
                    "%s:%d: %s", r->path, why.line < 0 ? 0 : why.line, why.text);
   const json_t *markups = json_object_get(root, "markups");

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Write OBJ text. */
+#include "base/number.h"
 #include "mesh/io/save.h"
 
 void supine_mesh_save_obj(const mesh_writer *writer) {
@@ -11,8 +12,8 @@ void supine_mesh_save_obj(const mesh_writer *writer) {
   for (size_t i = 0; i < mesh->vertex_count; ++i) {
     float position[3];
     supine_mesh_writer_position(writer, i, position);
-    (void)fprintf(writer->out, "v %.9g %.9g %.9g\n", (double)position[0], (double)position[1],
-                  (double)position[2]);
+    (void)supine_print(writer->out, "v %.9g %.9g %.9g\n", (double)position[0], (double)position[1],
+                       (double)position[2]);
   }
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
     uint32_t corner[3];

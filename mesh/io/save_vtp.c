@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "base/output.h"
 
 #include "mesh/io/save.h"
@@ -200,7 +201,7 @@ static void write_numbers(const vtp *file, const supine_mesh_field *field, FILE 
                 "NumberOfTuples=\"%zu\" format=\"ascii\">",
                 field->name, field->count, file->frames->count);
   for (size_t i = 0; i < file->frames->count * field->count; ++i) {
-    (void)fprintf(out, "%s%.17g", i > 0 ? " " : "", field->values[i]);
+    (void)supine_print(out, "%s%.17g", i > 0 ? " " : "", field->values[i]);
   }
   (void)fputs("</DataArray>\n", out);
 }
@@ -235,8 +236,8 @@ static void vtp_head(const vtp *file) {
               "header_type=\"UInt64\">\n<PolyData",
               out);
   for (size_t frame = 0; file->frames->times != NULL && frame < file->frames->count; ++frame) {
-    (void)fprintf(out, "%s%.9g%s", frame == 0 ? " TimeValues=\"" : " ", file->frames->times[frame],
-                  frame + 1 == file->frames->count ? "\"" : "");
+    (void)supine_print(out, "%s%.9g%s", frame == 0 ? " TimeValues=\"" : " ",
+                       file->frames->times[frame], frame + 1 == file->frames->count ? "\"" : "");
   }
   (void)fputs(">\n", out);
   write_field_data(file);

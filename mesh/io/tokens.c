@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* Split a text of any content into lines, words and numbers; decode binary numbers. */
-#include <ctype.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
 #include "base/arena.h"
+#include "base/ascii.h"
+#include "base/number.h"
 
 #include "mesh/io/read.h"
 
@@ -23,11 +23,11 @@ bool supine_mesh_text_line(mesh_text *text, mesh_text *line) {
 }
 
 bool supine_mesh_text_word(mesh_text *text, mesh_text *word) {
-  while (text->at < text->end && isspace(*text->at)) {
+  while (text->at < text->end && supine_ascii_is_space((char)*text->at)) {
     ++text->at;
   }
   word->at = text->at;
-  while (text->at < text->end && !isspace(*text->at)) {
+  while (text->at < text->end && !supine_ascii_is_space((char)*text->at)) {
     ++text->at;
   }
   word->end = text->at;
@@ -37,13 +37,13 @@ bool supine_mesh_text_word(mesh_text *text, mesh_text *word) {
 bool supine_mesh_text_is(mesh_text word, const char *expected) {
   const size_t length = strlen(expected);
   return (size_t)(word.end - word.at) == length &&
-         strncasecmp((const char *)word.at, expected, length) == 0;
+         supine_ascii_same_begin((const char *)word.at, expected, length);
 }
 
 bool supine_mesh_text_count(mesh_text word, uint64_t *value) {
   *value = 0;
   for (const unsigned char *p = word.at; p < word.end; ++p) {
-    if (!isdigit(*p) || *value > (uint64_t)INT64_MAX / 10 - 1) {
+    if (!supine_ascii_is_digit((char)*p) || *value > (uint64_t)INT64_MAX / 10 - 1) {
       return false;
     }
     *value = *value * 10 + (uint64_t)(*p - '0');
@@ -58,7 +58,7 @@ bool supine_mesh_text_number(mesh_text *text, double *value) {
   if (!supine_mesh_text_word(text, &word)) {
     return false;
   }
-  *value = strtod((const char *)word.at, &end);
+  *value = supine_number_parse((const char *)word.at, &end);
   return (const unsigned char *)end == word.end;
 }
 

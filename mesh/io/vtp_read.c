@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Read VTK XML PolyData as Supine, VTK and 3D Slicer write it: one piece, whose arrays are text,
  * base64, or appended (raw or base64), and uncompressed or compressed by zlib. */
-#include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,6 +8,7 @@
 #include <zlib.h>
 
 #include "base/arena.h"
+#include "base/ascii.h"
 
 #include "mesh/io/read.h"
 
@@ -30,7 +30,7 @@ static bool find_element(const char *from, const char *to, const char *name, ele
   const size_t length = strlen(name);
   for (const char *at = from; at < to && (at = memchr(at, '<', (size_t)(to - at))) != NULL; ++at) {
     if ((size_t)(to - at) > length + 1 && strncmp(at + 1, name, length) == 0 &&
-        (isspace((unsigned char)at[1 + length]) || strchr("/>", at[1 + length]) != NULL)) {
+        (supine_ascii_is_space(at[1 + length]) || strchr("/>", at[1 + length]) != NULL)) {
       const char *end = memchr(at, '>', (size_t)(to - at));
       if (end == NULL) {
         return false;
@@ -46,7 +46,7 @@ static bool find_element(const char *from, const char *to, const char *name, ele
 static bool attribute(const element *e, const char *name, char *value, size_t size) {
   const size_t length = strlen(name);
   for (const char *at = e->at; at + length + 2 < e->end; ++at) {
-    if (isspace((unsigned char)at[-1]) && strncmp(at, name, length) == 0 && at[length] == '=' &&
+    if (supine_ascii_is_space(at[-1]) && strncmp(at, name, length) == 0 && at[length] == '=' &&
         (at[length + 1] == '"' || at[length + 1] == '\'')) {
       const char *from = at + length + 2;
       const char *to = memchr(from, at[length + 1], (size_t)(e->end - from));
@@ -84,7 +84,7 @@ static size_t base64(const char *at, const char *end, unsigned char *bytes) {
   int padding = 0;
   for (; at < end; ++at) {
     const char *digit = memchr(digits, *at, 64);
-    if (isspace((unsigned char)*at)) {
+    if (supine_ascii_is_space(*at)) {
       continue;
     }
     if (digit == NULL && *at != '=') {

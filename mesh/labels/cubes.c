@@ -6,7 +6,9 @@
 
 #include "mesh/labels/mask.h"
 
-enum { LAYERS = 2 }; /* layers of empty cubes around the bounding box of the mask */
+/* LAYERS: layers of empty cubes around the bounding box of the mask. ROUNDS_MAX: most rounds of
+ * mending. */
+enum { LAYERS = 2, ROUNDS_MAX = 1000 };
 
 /* Average `in` [outer, n, inner] along its middle axis, over intervals of `ratio` voxels, into
  * `out` [outer, m, inner]. Intervals shorter than a voxel are widened to one voxel, so that the
@@ -180,8 +182,13 @@ supine_status supine_labels_cubes_create(const labels_mask *mask, double edge, b
       supine_arena_take(arena, cubes->size[0] * cubes->size[1] * cubes->size[2], sizeof(float));
   SUPINE_TRY(supine_arena_status(arena));
   SUPINE_TRY(average_cubes(mask, cubes));
-  do {
-    SUPINE_TRY(one ? one_piece(cubes) : SUPINE_OK);
-  } while (mend(cubes->size, cubes->share));
-  return SUPINE_OK;
+  for (int round = 0; round < ROUNDS_MAX; ++round) {
+    if (one) {
+      SUPINE_TRY(one_piece(cubes));
+    }
+    if (!mend(cubes->size, cubes->share)) {
+      return SUPINE_OK;
+    }
+  }
+  return SUPINE_ERROR_NUMERICAL;
 }

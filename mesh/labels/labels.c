@@ -229,7 +229,11 @@ static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung,
                    "%s: the %s lung holds %.4g mL in a box %.4g mm long, which is impossible for a "
                    "lung: check --labels and the voxel size in the header",
                    w->path, name, lung->mask, longest);
-  SUPINE_TRY(supine_labels_mask_surface(&mask, w->edge, true, mesh));
+  const supine_status meshed = supine_labels_mask_surface(&mask, w->edge, true, mesh);
+  SUPINE_REFUSE_IF(meshed == SUPINE_ERROR_NUMERICAL, error, meshed,
+                   "%s: the %s lung keeps changing while it is made one piece: give another --edge",
+                   w->path, name);
+  SUPINE_TRY(meshed);
   supine_labels_mask_free(&mask);
   SUPINE_REFUSE_IF(
       mesh->triangle_count == 0, error, SUPINE_ERROR_MESH,

@@ -132,7 +132,8 @@ typedef struct labels_cubes {
 } labels_cubes;
 
 /** Average a mask over a grid of cubes with edges of `edge` mm. If `one` is true, keep only the
- * largest connected piece of cubes inside the mask, and fill its cavities. */
+ * largest connected piece of cubes inside the mask, and fill its cavities.
+ * @retval SUPINE_ERROR_NUMERICAL  the cubes have not settled after many rounds */
 supine_status supine_labels_cubes_create(const labels_mask *mask, double edge, bool one,
                                          supine_arena *arena, labels_cubes *cubes);
 

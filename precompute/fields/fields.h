@@ -13,7 +13,8 @@
 #define SUPINE_FIELDS_H
 
 #include "precompute/lungs/lungs.h"
-#include "precompute/precompute.h"
+#include "precompute/physics/reference.h"
+#include "precompute/projection/accuracy.h"
 
 /** Displacements of all vertices for several directions of gravity, made by another simulator. */
 typedef struct supine_fields {
@@ -39,37 +40,55 @@ void supine_fields_free(supine_fields *fields);
 
 enum { SUPINE_FIT_BAND_MAX = 11 };
 
+/** What a fit found. */
 typedef struct supine_fit_report {
-  size_t band_highest; /**< highest degree that the directions of gravity determine */
-  size_t band;         /**< highest degree of the harmonics in the chosen fit */
-  size_t mode_count;   /**< number of modes, or of harmonics instead of modes */
+  size_t direction_count; /**< number of directions of gravity */
+  size_t band_highest;    /**< highest degree that the directions of gravity determine */
+  size_t band;            /**< highest degree of the harmonics in the chosen fit */
   /** [l] relative RMS leave-one-out error with harmonics to degree l. */
   double error[SUPINE_FIT_BAND_MAX + 1];
-  supine_accuracy accuracy; /**< leave-one-out errors of the chosen fit; its member `volume` is 0 */
 } supine_fit_report;
 
-typedef struct supine_fit_options {
-  int band; /**< highest degree of the harmonics; if negative, chosen by the leave-one-out error */
-  size_t modes; /**< largest number of modes; 0 uses the harmonics instead of modes */
-  /** Whether to leave out modes that raise the leave-one-out error by less than 1 % together. */
-  bool fewest_modes;
-  /** [3] gravity in the scan, which is then not displaced in its own posture; NULL if the reference
-   * surface is not displaced by gravity */
-  const double *scan_gravity;
-} supine_fit_options;
+/** Harmonics at the directions of gravity, and the least squares with them: the coefficient of each
+ * harmonic is a field, a sum of `pinv` times the given fields. */
+typedef struct supine_fit_matrices {
+  size_t count;      /**< number of directions of gravity */
+  size_t terms;      /**< number of harmonics */
+  double *harmonics; /**< [count, terms] value of each harmonic at each direction */
+  double *pinv;      /**< [terms, count] pseudo-inverse of `harmonics` */
+  double condition;  /**< condition number of `harmonics` */
+} supine_fit_matrices;
 
-/** Fit harmonics to the fields, compress the fit, and measure its leave-one-out error.
- * @param compression  written; it has one row for each coordinate of each vertex. Release it
- *   with supine_sh_compression_free */
-supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_options *options,
-                                supine_compression *compression, supine_fit_report *report,
+/** A fit of harmonics to fields. Zero-initialise; release with supine_fields_fit_free. */
+typedef struct supine_fit {
+  const supine_fields *fields;
+  supine_fit_report report;
+  supine_fit_matrices chosen;
+  double *gram; /**< [directions, directions] scalar products of any two given fields, mm^2 */
+  supine_arena memory;
+} supine_fit;
+
+/** Fit harmonics to the fields.
+ * @param fields  must outlive the fit
+ * @param band    highest degree of the harmonics; if negative, chosen by the leave-one-out error
+ * @param fit     written; release it also after an error */
+supine_status supine_fields_fit(const supine_fields *fields, int band, supine_fit *fit,
                                 supine_error *error);
+void supine_fields_fit_free(supine_fit *fit);
 
-/** Fit the fields (supine_fields_fit), and write a basis file. Gain 1 (the factor on the
- * displacement) reproduces the given displacements. Of `prepared`, the model is not used. */
-supine_status supine_fields_write(const supine_prepared *prepared, const supine_fields *fields,
-                                  const supine_fit_options *options,
-                                  const supine_basis_choice *basis, supine_fit_report *report,
+/** Return the relative RMS leave-one-out error of the fit, or 1e-4 if it is smaller: modes that
+ * lower the error below that are not worth keeping. */
+double supine_fields_fit_error(const supine_fit *fit);
+
+/** Make the field of the fit: VECTOR rows whose columns are the given fields.
+ * @param field  zeroed; release with supine_projection_field_free, also after an error */
+supine_status supine_fields_field(const supine_fit *fit, supine_gravity_field *field,
                                   supine_error *error);
+
+/** Measure the errors of a basis of the fit: each field predicted from the others, in mm and
+ * relative to the RMS displacement. The member `volume` is 0, as nothing is scaled to a volume.
+ * @param modes  number of modes of the basis, or 0 if it has the harmonics themselves */
+supine_status supine_fields_measure(const supine_fit *fit, size_t modes, supine_accuracy *accuracy,
+                                    supine_error *error);
 
 #endif

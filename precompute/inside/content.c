@@ -36,7 +36,9 @@ static char *add_name(supine_inside_content *content, const char *name, size_t l
   if (content->part_count++ > 0) {
     *end++ = '\n';
   }
-  memcpy(end, name, length);
+  for (size_t i = 0; i < length; ++i) { /* line feeds separate the names */
+    end[i] = (char)((unsigned char)name[i] < ' ' ? ' ' : name[i]);
+  }
   end[length] = '\0';
   return end + length;
 }
@@ -70,6 +72,8 @@ static const char *part_name(const char *path, size_t *length) {
 
 static supine_status add_surface(const char *name, size_t length, const supine_mesh *mesh,
                                  supine_inside_content *content, supine_error *error) {
+  SUPINE_REFUSE_IF(!supine_text_is_utf8(name), error, SUPINE_ERROR_FORMAT,
+                   "%s: the name of this part is not UTF-8: rename the file or the label", name);
   SUPINE_TRY(reserve(content, mesh->vertex_count, mesh->triangle_count, length + 1, name, error));
   uint32_t *joined = content->triangles + 3 * content->triangle_count;
   for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {

@@ -39,13 +39,15 @@ supine_status supine_inside_content_make_rigid(supine_inside_content *content, c
                                                supine_error *error);
 
 /** Make a grid of nodes. Keep the nodes inside the lungs, and the nodes outside whose distance from
- * a lung is less than the sum of the three edges of a grid cell. Then every point inside a lung
- * lies between nodes.
+ * a lung is less than the diagonal of a grid cell. Then every point inside a lung lies between
+ * nodes.
  *
  * @param like     image whose voxels are the nodes, or every n-th voxel along an axis if `spacing`
- *                 is n voxels; if NULL, the axes of the grid are x, y and z
+ *                 is n voxels. The grid continues beyond the image where that does not reach far
+ *                 enough, has axes at right angles even if the image (a tilted CT) does not, and is
+ *                 right-handed. If NULL, the axes of the grid are x, y and z
  * @param spacing  distance between nodes, mm; with `like`, rounded to a multiple of its spacing
- * @param margin   distance, mm, by which the grid extends beyond the lungs' bounding box
+ * @param margin   distance, mm, by which the grid extends beyond the nodes around the lungs
  * @param content  zero-initialised */
 supine_status supine_inside_content_grid(const supine_inside_shells *shells,
                                          const supine_image *like, double spacing, double margin,

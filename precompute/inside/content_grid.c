@@ -11,9 +11,9 @@
 
 static const double nodes_max = 2147483648.0;
 
-/* Find the bounding box of the lungs, extended by the margin, in voxel coordinates of `grid`. */
-static void cover(const supine_inside_shells *shells, const supine_image *grid, double margin,
-                  double low[3], double high[3]) {
+/* Find the bounding box of the lungs in voxel coordinates of `grid`. */
+static void cover(const supine_inside_shells *shells, const supine_image *grid, double low[3],
+                  double high[3]) {
   supine_box_begin(low, high);
   for (size_t lung = 0; lung < shells->count; ++lung) {
     const supine_inside_shell *shell = &shells->shell[lung];
@@ -23,14 +23,37 @@ static void cover(const supine_inside_shells *shells, const supine_image *grid, 
       supine_box_add(node, low, high);
     }
   }
-  for (int k = 0; k < 3; ++k) {
-    low[k] -= margin / supine_length(grid->step[k]);
-    high[k] += margin / supine_length(grid->step[k]);
+}
+
+/* Make the axes of an image right-angled: keep the first, the plane of the first two, and the
+ * distance between slices. DICOM and ITK have no other grids; a CT with a tilted gantry has. */
+static void make_right_angled(supine_image *image) {
+  static const double rounding = 1e-5; /* of cosines, if the file stores float32 */
+  double normal[3];
+  double largest = 0.0;
+  for (size_t a = 0; a < 3; ++a) {
+    const double *s = image->step[a];
+    const double *t = image->step[(a + 1) % 3];
+    const double cosine = supine_dot(s, t) / supine_length(s) / supine_length(t);
+    largest = fmax(largest, fabs(cosine));
+  }
+  if (largest < rounding) {
+    return;
+  }
+  const double plane = supine_image_plane_distance(image, 2);
+  supine_cross(image->step[0], image->step[1], normal);
+  const double side = supine_dot(normal, image->step[2]) < 0.0 ? -1.0 : 1.0;
+  const double along =
+      supine_dot(image->step[0], image->step[1]) / supine_dot(image->step[0], image->step[0]);
+  for (size_t k = 0; k < 3; ++k) {
+    image->step[1][k] -= along * image->step[0][k];
+    image->step[2][k] = side * plane * normal[k] / supine_length(normal);
   }
 }
 
-/* Make the grid that covers the lungs. Its nodes are voxels of `like`, at about the given spacing;
- * if `like` is NULL, the axes of the grid are x, y and z. */
+/* Make the grid that covers the lungs. Its nodes are voxels of `like`, at about the given spacing,
+ * and continue beyond its border; if `like` is NULL, the axes of the grid are x, y and z. Its axes
+ * are right-handed and at right angles. */
 static supine_status make_grid(const supine_inside_shells *shells, const supine_image *like,
                                double spacing, double margin, supine_image *grid,
                                supine_error *error) {
@@ -39,31 +62,41 @@ static supine_status make_grid(const supine_inside_shells *shells, const supine_
   double low[3];
   double high[3];
   double first[3];
+  double every[3];
   double nodes = 1.0;
-  cover(shells, &from, margin, low, high);
+  double reach = margin; /* distance from the lungs to the border of the grid */
+  cover(shells, &from, low, high);
   for (int k = 0; k < 3; ++k) {
-    const double every =
-        like != NULL ? fmax(1.0, rint(spacing / supine_length(from.step[k]))) : spacing;
-    if (like != NULL) {
-      low[k] = fmax(low[k], 0.0);
-      high[k] = fmin(high[k], (double)from.size[k] - 1.0);
-    }
-    first[k] = every * floor(low[k] / every);
-    const double count = ceil((high[k] - first[k]) / every) + 1.0;
     SUPINE_REFUSE_IF(
-        like != NULL && !(high[k] >= low[k]), error, SUPINE_ERROR_MESH,
+        like != NULL && (high[k] < 0.0 || low[k] > (double)from.size[k] - 1.0), error,
+        SUPINE_ERROR_MESH,
         "the image does not show the lungs: check its axes and the axes of the meshes");
+  }
+  make_right_angled(&from);
+  cover(shells, &from, low, high);
+  for (int k = 0; k < 3; ++k) {
+    const double edge = supine_length(from.step[k]);
+    every[k] = like != NULL ? fmax(1.0, rint(spacing / edge)) : spacing;
+    reach += every[k] * edge;
+  }
+  for (int k = 0; k < 3; ++k) {
+    const double voxels = reach / supine_image_plane_distance(&from, (size_t)k);
+    first[k] = floor((low[k] - voxels) / every[k]);
+    const double count = ceil((high[k] + voxels) / every[k]) - first[k] + 1.0;
     nodes *= count;
     grid->size[k] = (size_t)fmin(count, nodes_max);
     for (int a = 0; a < 3; ++a) {
-      grid->step[k][a] = every * from.step[k][a];
+      grid->step[k][a] = every[k] * from.step[k][a];
     }
   }
   SUPINE_REFUSE_IF(!(nodes < nodes_max), error, SUPINE_ERROR_ARGUMENT,
                    "a grid of %g mm has %.3g nodes; give a larger spacing", spacing, nodes);
   for (int a = 0; a < 3; ++a) {
-    grid->origin[a] = from.origin[a] + first[0] * from.step[0][a] + first[1] * from.step[1][a] +
-                      first[2] * from.step[2][a];
+    grid->origin[a] = from.origin[a] + first[0] * grid->step[0][a] + first[1] * grid->step[1][a] +
+                      first[2] * grid->step[2][a];
+  }
+  if (supine_image_is_left_handed(grid)) {
+    supine_image_reverse(grid, 0);
   }
   return SUPINE_OK;
 }
@@ -125,10 +158,7 @@ supine_status supine_inside_content_grid(const supine_inside_shells *shells,
   SUPINE_REFUSE_IF(!(spacing > 0.0) || !isfinite(spacing), error, SUPINE_ERROR_ARGUMENT,
                    "the grid's spacing is %g mm: give one above 0", spacing);
   SUPINE_TRY(make_grid(shells, like, spacing, margin, &grid, error));
-  double diagonal = 0.0;
-  for (int k = 0; k < 3; ++k) {
-    diagonal += supine_length(grid.step[k]);
-  }
+  const double diagonal = supine_image_cell_diagonal(&grid);
   const size_t nodes = grid.size[0] * grid.size[1] * grid.size[2];
   SUPINE_ARENA arena = {0};
   search work = {shells, &grid, diagonal, supine_arena_take(&arena, nodes, 1)};

@@ -90,6 +90,48 @@ void supine_inside_shells_free(supine_inside_shells *shells) {
   *shells = (supine_inside_shells){0};
 }
 
+/* Return the largest distance of the positions `xyz` from those in the scan. */
+static double farthest(const supine_inside_shells *shells, const float *xyz) {
+  double square = 0.0;
+  for (size_t lung = 0; lung < shells->count; ++lung) {
+    const supine_inside_shell *shell = &shells->shell[lung];
+    const float *moved = xyz + 3 * shell->begin;
+    for (size_t i = 0; i < shell->vertex_count; ++i) {
+      const double now[3] = {(double)moved[3 * i], (double)moved[3 * i + 1],
+                             (double)moved[3 * i + 2]};
+      double by[3];
+      supine_subtract(now, shell->vertices + 3 * i, by);
+      square = fmax(square, supine_dot(by, by));
+    }
+  }
+  return sqrt(square);
+}
+
+supine_status supine_inside_shells_reach(const supine_inside_shells *shells, double *largest,
+                                         supine_error *error) {
+  enum { POSTURES = 24 };
+  static const supine_volume_kind volumes[] = {SUPINE_VOLUME_REST, SUPINE_VOLUME_FULL,
+                                               SUPINE_VOLUME_DEFAULT};
+  const supine_basis_info *info = supine_basis_get_info(shells->basis);
+  SUPINE_ARENA arena = {0};
+  float *xyz = supine_arena_take(&arena, 3 * info->vertex_count, sizeof *xyz);
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", info->vertex_count));
+  *largest = 0.0;
+  for (int posture = 0; posture < POSTURES; ++posture) {
+    for (size_t v = 0; v < sizeof volumes / sizeof *volumes; ++v) {
+      supine_state state = {.volume = {.kind = volumes[v]}};
+      supine_pose pose;
+      supine_spiral(posture, POSTURES, 0.0, state.gravity);
+      /* a basis may lack a volume, or not reach it in a posture */
+      if (supine_basis_pose(shells->basis, &state, &pose, NULL) == SUPINE_OK) {
+        (void)supine_deform(shells->basis, &pose, xyz);
+        *largest = fmax(*largest, farthest(shells, xyz));
+      }
+    }
+  }
+  return SUPINE_OK;
+}
+
 /* Find the displacement of a vertex by each mode at weight and gain 1: row [3, modes], mm. */
 static void move_vertex(const supine_basis_info *info, size_t vertex, double *row) {
   const size_t modes = info->mode_count;

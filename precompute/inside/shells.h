@@ -33,6 +33,12 @@ supine_status supine_inside_shells_create(const supine_basis *basis, supine_insi
                                           supine_error *error);
 void supine_inside_shells_free(supine_inside_shells *shells);
 
+/** Find the largest displacement of a vertex from the scan to the states that the basis has: rest,
+ * full inflation and the default volume, in postures all around.
+ * @param largest  written, mm */
+supine_status supine_inside_shells_reach(const supine_inside_shells *shells, double *largest,
+                                         supine_error *error);
+
 /** Find the displacement of each vertex of a lung by each mode at weight 1, not scaled further.
  * @param displacement  [vertex_count, 3, modes] output, mm */
 void supine_inside_shell_displacement(const supine_inside_shells *shells, size_t lung,

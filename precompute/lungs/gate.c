@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "base/vec3.h"
 
 #include "mesh/repair.h"
@@ -90,7 +91,7 @@ static void check(checks *c, bool holds, supine_status refuse, const char *forma
     return;
   }
   va_start(arguments, format);
-  (void)vsnprintf(text, sizeof text, format, arguments);
+  (void)supine_print_text_list(text, sizeof text, format, arguments);
   va_end(arguments);
   if (refuse != SUPINE_OK) {
     c->status = supine_error_set(c->error, refuse, "%s: %s", c->source->name, text);

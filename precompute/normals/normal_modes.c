@@ -304,7 +304,7 @@ static size_t lung_of(const supine_normals_surface *s, size_t vertex) {
 SUPINE_CLONES static void place_range(void *context, size_t begin, size_t end, size_t thread) {
   const planes_work *planes = context;
   const supine_normals_surface *s = planes->work->surface;
-  const bool vector = s->directions == NULL;
+  const bool vector = s->kind == SUPINE_ROWS_VECTOR;
   (void)thread;
   for (size_t row = begin; row < end; ++row) {
     const float *c = s->field->coefficients + (vector ? row : row / 3) * s->field->mode_count;

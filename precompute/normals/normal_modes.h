@@ -31,8 +31,8 @@
 typedef struct supine_normals_surface {
   const supine_lungs *lungs; /**< triangles, and the vertices of each lung */
   const float *vertices;     /**< [N, 3] positions on the reference surface, mm */
-  const float *directions;   /**< [N, 3] displacement of each vertex per unit force, mm; NULL if
-                                `field` holds the displacement itself */
+  supine_rows_kind kind;     /**< kind of the rows of `field` */
+  const float *directions;   /**< SCALAR: [N, 3] displacement of each vertex per unit force, mm */
   const supine_compression *field;
   /** [lungs, 9] resting volume (FRC) minus the volume of the reference surface, mL: coefficients of
    * spherical harmonics of the direction of gravity, to degree 2; NULL if unknown */

@@ -65,7 +65,7 @@ static void read_side(const supine_normals_surface *s, size_t from, size_t to,
                       double (*side)[COLUMNS]) {
   const size_t modes = s->field->mode_count;
   for (size_t axis = 0; axis < 3; ++axis) {
-    const bool vector = s->directions == NULL;
+    const bool vector = s->kind == SUPINE_ROWS_VECTOR;
     const float *c = s->field->coefficients + (vector ? (3 * to + axis) * modes : to * modes);
     const float *o = s->field->coefficients + (vector ? (3 * from + axis) * modes : from * modes);
     const double d = vector ? 1.0 : (double)s->directions[3 * to + axis];

@@ -17,7 +17,7 @@ static const double highest_mm = 60.0;
 static double largest(const supine_normals_surface *s, const double *w) {
   enum { SOME = 4096 };
   const size_t modes = s->field->mode_count;
-  const size_t axes = s->directions == NULL ? 3 : 1;
+  const size_t axes = supine_rows_per_vertex(s->kind);
   double top = 0.0;
   for (size_t i = 0; i < s->lungs->mesh.vertex_count; i += 1 + s->lungs->mesh.vertex_count / SOME) {
     double square = 0.0;
@@ -28,7 +28,7 @@ static double largest(const supine_normals_surface *s, const double *w) {
       }
       square += amount * amount;
     }
-    if (axes == 1) {
+    if (s->kind == SUPINE_ROWS_SCALAR) {
       const float *d = s->directions + 3 * i;
       square *=
           (double)d[0] * (double)d[0] + (double)d[1] * (double)d[1] + (double)d[2] * (double)d[2];

@@ -108,12 +108,13 @@ supine_status supine_patient_applied_find(supine_patient_matching *matching,
   supine_patient_matching_choose(matching, n);
   find_smoothed_force(matching, patient, spread);
   SUPINE_TRY(supine_physics_equilibrium_force(matching->equilibrium, spread, spread + n, error));
-  const size_t blocks = supine_patient_rows_block(&matching->frame, matching->rows, n, 1);
-  applied->blocks = (double)blocks;
+  SUPINE_TRY(
+      supine_patient_rows_block(&matching->frame, matching->rows, n, 1, &applied->blocks, error));
   supine_mesh_vertex_area(&matching->fuller->mesh, spread);
-  sum_products(matching, spread + n, gravity, spread, blocks, means, products);
+  sum_products(matching, spread + n, gravity, spread, applied->blocks, means, products);
+  const bool fitted = fit_force(products, applied);
   SUPINE_REFUSE_IF(
-      !fit_force(products, applied), error, SUPINE_ERROR_NUMERICAL,
+      !fitted, error, SUPINE_ERROR_NUMERICAL,
       "the displacement between the two surfaces does not determine the applied force: check that "
       "both surfaces show the same lungs, and that neither surface is cut off");
   return SUPINE_OK;

@@ -220,10 +220,12 @@ static void predict(const work *w, size_t i, double u[3], double *x) {
       x[regions + AXES + 3 + axis] = turned[axis];
     }
   }
-  for (size_t k = 0; k < regions && x != NULL; ++k) {
-    x[k] = row->axis[0] * scale[0] * response[k * AXES] +
-           row->axis[1] * scale[1] * response[k * AXES + 1] +
-           row->axis[2] * scale[2] * response[k * AXES + 2];
+  if (x != NULL) {
+    for (size_t k = 0; k < regions; ++k) {
+      x[k] = row->axis[0] * scale[0] * response[k * AXES] +
+             row->axis[1] * scale[1] * response[k * AXES + 1] +
+             row->axis[2] * scale[2] * response[k * AXES + 2];
+    }
   }
 }
 
@@ -242,8 +244,8 @@ static bool step(work *w, bool uniform, double noise, size_t without) {
     double u[3];
     const double weight = row->block % FOLDS == without ? 0.0 : row->weight / (noise * noise);
     predict(w, i, u, x);
-    for (size_t k = 0; k < regions && uniform; ++k) {
-      x[k] = 0.0;
+    if (uniform) {
+      memset(x, 0, regions * sizeof *x);
     }
     cblas_dsyr(CblasColMajor, CblasUpper, (int)size, weight, x, 1, w->matrix, (int)size);
     cblas_daxpy((int)size, weight * (row->value - supine_dot(row->axis, u)), x, 1, right, 1);
@@ -278,8 +280,9 @@ static double residual(const work *w, size_t fold, double squares[2]) {
       sums[1] += row->weight;
     }
   }
-  for (size_t k = 0; k < 2 && squares != NULL; ++k) {
-    squares[k] += sums[k];
+  if (squares != NULL) {
+    squares[0] += sums[0];
+    squares[1] += sums[1];
   }
   return sqrt(sums[0] / sums[1]);
 }
@@ -362,7 +365,9 @@ static void conclude(work *w, supine_patient_power *law, supine_patient_stiffnes
                          (lapack_int)size);
     stiffness->region[k].expandability = w->x[k];
     stiffness->region[k].determined = 1.0 - x[k];
-    report->undetermined += stiffness->region[k].determined < SUPINE_PATIENT_DETERMINED ? 1.0 : 0.0;
+    if (stiffness->region[k].determined < SUPINE_PATIENT_DETERMINED) {
+      ++report->undetermined;
+    }
   }
   for (size_t axis = 0; axis < AXES; ++axis) {
     law->c[2 * axis] *= w->x[regions + axis];
@@ -388,10 +393,10 @@ supine_status supine_patient_expand(supine_patient_matching *matching,
             .precision = supine_arena_take(&arena, n * n, sizeof(double)),
             .matrix =
                 supine_arena_take(&arena, (size_t)UNKNOWNS_MAX * UNKNOWNS_MAX, sizeof(double))};
-  if (arena.failed ||
-      supine_patient_rows_block(&matching->frame, matching->rows, matching->count, 1) == 0) {
-    return supine_error_memory(error, "%zu regions", n);
-  }
+  size_t blocks; /* not used: the folds count the cubes modulo their number */
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu regions", n));
+  SUPINE_TRY(supine_patient_rows_block(&matching->frame, matching->rows, matching->count, 1,
+                                       &blocks, error));
   SUPINE_TRY(find_responses(&w, &law, error));
   find_prior_precision(stiffness, w.precision);
   for (size_t t = 0; t < n + AXES; ++t) {

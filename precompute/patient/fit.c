@@ -91,28 +91,29 @@ static double affine_residual(const double map[AFFINE], const supine_patient_row
 }
 
 /* Group the measurements into cubes of 40 mm, and the cubes at random into folds. Write the fold of
- * each measurement into fold [count]. Return the number of cubes, or 0 if out of memory. */
-static size_t assign_folds(const supine_patient_frame *frame, supine_patient_row *rows,
-                           size_t count, unsigned long seed, size_t *fold) {
-  const size_t blocks = supine_patient_rows_block(frame, rows, count, seed + 1);
+ * each measurement into fold [count], and the number of cubes into `blocks`. */
+static supine_status assign_folds(const supine_patient_frame *frame, supine_patient_row *rows,
+                                  size_t count, unsigned long seed, size_t *fold, size_t *blocks,
+                                  supine_error *error) {
+  SUPINE_TRY(supine_patient_rows_block(frame, rows, count, seed + 1, blocks, error));
   SUPINE_ARENA arena = {0};
-  size_t *fold_of = supine_arena_take(&arena, blocks, sizeof *fold_of);
+  size_t *fold_of = supine_arena_take(&arena, *blocks, sizeof *fold_of);
   gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
   if (arena.failed || random == NULL) {
     gsl_rng_free(random);
-    return 0;
+    return supine_error_memory(error, "%zu values", count);
   }
   gsl_rng_set(random, 1000 + seed);
-  for (size_t b = 0; b < blocks; ++b) {
+  for (size_t b = 0; b < *blocks; ++b) {
     const size_t other = gsl_rng_uniform_int(random, b + 1);
     fold_of[b] = fold_of[other];
     fold_of[other] = b % FOLDS;
   }
   gsl_rng_free(random);
-  for (size_t i = 0; i < count && blocks > 0; ++i) {
+  for (size_t i = 0; i < count; ++i) {
     fold[i] = fold_of[rows[i].block];
   }
-  return blocks;
+  return SUPINE_OK;
 }
 
 /* Move a landmark, given by its three measurements, from the emptier scan back to the fuller one,
@@ -224,9 +225,12 @@ static supine_status hold_all_out(study *s, squares *held_out, supine_error *err
                      "the points outside some blocks of 40 mm do not determine the law (%s): give "
                      "more points, spread over both lungs",
                      supine_status_string(s->failed[item]));
-    for (size_t k = 0; k < sizeof *item_sums / sizeof(double); ++k) {
-      ((double *)held_out)[k] += ((const double *)item_sums)[k];
+    for (size_t k = 0; k < SCORES; ++k) {
+      held_out->residual[k] += item_sums->residual[k];
     }
+    held_out->weight += item_sums->weight;
+    held_out->back += item_sums->back;
+    held_out->path += item_sums->path;
   }
   return SUPINE_OK;
 }
@@ -264,7 +268,10 @@ static void set_expected(const study *s, const squares *held_out, const supine_p
   for (size_t i = 0; i < count; ++i) {
     within += s->ratio[i] <= bound * bound * report->expected_constant ? 1.0 : 0.0;
   }
-  report->band = count > 0 ? 100.0 * within / (double)count : 0.0;
+  report->has_band = count > 0;
+  if (report->has_band) {
+    report->band = 100.0 * within / (double)count;
+  }
   report->expected_from = fmin(full_breath, sqrt(square / points));
   report->expected_point = sqrt(report->expected_constant * mean / points);
 }
@@ -295,6 +302,9 @@ static supine_status run(study *s, supine_patient *patient, supine_patient_fit_r
   s->options.sill = krige.sill;
   s->options.uncorrected = krige.sill == 0.0;
   supine_patient_krige_errors(&krige, report->error);
+  for (size_t c = 0; c < SUPINE_PATIENT_CONSTANTS; ++c) {
+    report->has_errors = report->has_errors || report->error[c] > 0.0;
+  }
   SUPINE_TRY(hold_all_out(s, &held_out, error));
   (void)find_rms(s, &fitted, report->fitted);
   report->explained = find_rms(s, &held_out, report->held_out);
@@ -308,28 +318,29 @@ supine_status supine_patient_fit(const supine_patient_fit_options *options,
                                  supine_patient *patient, supine_patient_fit_report *report,
                                  supine_error *error) {
   const size_t count = single + 3 * triples;
-  const size_t needed = (options->law == SUPINE_PATIENT_PAPER ? 9 : 1) + options->scan_motion;
+  const size_t points = single + triples;
+  const size_t constants = options->law == SUPINE_PATIENT_PAPER ? SUPINE_PATIENT_CONSTANTS : 1;
+  const size_t unknowns = constants + options->scan_motion;
+  SUPINE_REFUSE_IF(
+      points < unknowns, error, SUPINE_ERROR_FORMAT,
+      "points: %zu, fewer than the %zu unknowns of the %s law: give more points, or use --law deep",
+      points, unknowns, supine_patient_law_names[options->law]);
   SUPINE_ARENA arena = {0};
+  double *ratio = supine_arena_zeros(&arena, SEEDS * triples, sizeof *ratio);
+  size_t *fold = supine_arena_take(&arena, SEEDS * count, sizeof *fold);
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu values", count));
+  *report = (supine_patient_fit_report){.points = triples > 0 ? triples : single};
+  for (size_t seed = 0; seed < SEEDS; ++seed) {
+    SUPINE_TRY(assign_folds(&patient->frame, rows, count, seed, fold + seed * count,
+                            &report->blocks, error));
+  }
+  patient->law = options->law;
   study s = {.options = *options,
              .frame = &patient->frame,
              .rows = rows,
              .row_count = count,
              .triples = triples,
-             .ratio = supine_arena_zeros(&arena, SEEDS * triples, sizeof(double)),
-             .fold = supine_arena_take(&arena, SEEDS * count, sizeof(size_t))};
-  *report = (supine_patient_fit_report){.points = (double)(triples > 0 ? triples : count)};
-  patient->law = options->law;
-  SUPINE_REFUSE_IF(
-      single + triples < needed, error, SUPINE_ERROR_FORMAT,
-      "points: %zu, fewer than the %zu unknowns of the %s law: give more points, or use --law deep",
-      single + triples, needed, supine_patient_law_names[options->law]);
-  for (size_t seed = 0; seed < SEEDS; ++seed) {
-    const size_t blocks =
-        arena.failed ? 0 : assign_folds(&patient->frame, rows, count, seed, s.fold + seed * count);
-    report->blocks = (double)blocks;
-    if (blocks == 0) {
-      return supine_error_memory(error, "%zu values", count);
-    }
-  }
+             .ratio = ratio,
+             .fold = fold};
   return run(&s, patient, report, error);
 }

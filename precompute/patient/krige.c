@@ -48,23 +48,33 @@ static bool shape_is_fixed(const supine_patient_krige *k) {
 
 /* Return an unknown's prior standard deviation: 0 if not fitted, INFINITY if without a prior. */
 static double prior_deviation(const supine_patient_krige *k, size_t term) {
-  const double unit = term < 3 ? fabs(k->mean.c[2 * term]) : 1.0;
   const bool shape_fixed = shape_is_fixed(k);
-  return term == SCALE   ? (k->options.size_only ? INFINITY
-                            : shape_fixed        ? scale_deviation
-                                                 : 0.0)
-         : term < MOTION ? (shape_fixed ? 0.0 : law_deviation[k->options.law][term / 3] * unit)
-         : term - MOTION < (size_t)k->options.scan_motion ? INFINITY
-                                                          : 0.0;
+  if (term == SCALE) {
+    if (k->options.size_only) {
+      return INFINITY;
+    }
+    return shape_fixed ? scale_deviation : 0.0;
+  }
+  if (term < MOTION) {
+    const double unit = term < 3 ? fabs(k->mean.c[2 * term]) : 1.0;
+    return shape_fixed ? 0.0 : law_deviation[k->options.law][term / 3] * unit;
+  }
+  return term - MOTION < (size_t)k->options.scan_motion ? INFINITY : 0.0;
 }
 
 static double offset_from_prior(const supine_patient_krige *k, size_t term) {
   const supine_patient_power *law = &k->law;
   const supine_patient_power *mean = &k->mean;
-  return term == SCALE ? law->c[0] / mean->c[0] - 1.0
-         : term < 3    ? law->c[2 * term] - mean->c[2 * term]
-         : term < 6    ? log(law->c[2 * term - 5] / mean->c[2 * term - 5])
-                       : law->c[term] - mean->c[term];
+  if (term == SCALE) {
+    return law->c[0] / mean->c[0] - 1.0;
+  }
+  if (term < 3) {
+    return law->c[2 * term] - mean->c[2 * term];
+  }
+  if (term < 6) {
+    return log(law->c[2 * term - 5] / mean->c[2 * term - 5]);
+  }
+  return law->c[term] - mean->c[term];
 }
 
 static supine_patient_power take_step(const supine_patient_power *law, const double step[TERMS]) {
@@ -219,14 +229,17 @@ static void choose_factors(supine_patient_krige *k, const supine_patient_fit_opt
   static const double choices[2][5] = {{1.0, 0.03, 0.003, 0.0}, {1.0, 0.5, 0.25, 1.5, 2.0}};
   static const size_t count[2] = {4, 5};
   const bool given[2] = {options->uncorrected || options->sill > 0.0, options->noise > 0.0};
-  double best[2] = {options->uncorrected ? 0.0
-                    : given[0]           ? options->sill
-                                         : 1.0,
-                    given[1] ? options->noise : 1.0};
+  double best[2] = {given[0] ? options->sill : 1.0, given[1] ? options->noise : 1.0};
+  if (options->uncorrected) {
+    best[0] = 0.0;
+  }
   for (int pass = 0; pass < (given[0] || given[1] ? 2 : 3); ++pass) {
     const int which = pass % 2;
     double most = -INFINITY;
-    for (size_t i = 0; i < count[which] && !given[which]; ++i) {
+    if (given[which]) {
+      continue;
+    }
+    for (size_t i = 0; i < count[which]; ++i) {
       const double tried[2] = {which == 0 ? choices[0][i] : best[0],
                                which == 1 ? choices[1][i] : best[1]};
       const double likelihood = likelihood_of(k, tried[0], tried[1]);
@@ -276,7 +289,7 @@ static supine_status krige_create(supine_patient_krige *k,
   if (!options->uncorrected && !options->size_only) {
     k->cholesky = supine_arena_take(a, count * count, sizeof *k->cholesky);
   }
-  return a->failed ? supine_error_memory(error, "%zu values", count) : SUPINE_OK;
+  return supine_arena_check(a, error, "%zu values", count);
 }
 
 void supine_patient_krige_free(supine_patient_krige *krige) {
@@ -326,11 +339,22 @@ static double variance_of(const supine_patient_krige *k, double x[TERMS]) {
   return cblas_ddot(TERMS, x, 1, x, 1);
 }
 
+/* Return the index of the constant c1 to c9 of an unknown of the displacement law. */
+static size_t constant_of(size_t term) {
+  if (term < SUPINE_PATIENT_BY_EXPONENT) {
+    return 2 * term; /* c1, c3, c5 */
+  }
+  if (term < SUPINE_PATIENT_BY_SLOPE) {
+    return 2 * term - 5; /* c2, c4, c6 */
+  }
+  return term;
+}
+
 void supine_patient_krige_errors(const supine_patient_krige *krige,
                                  double error[SUPINE_PATIENT_CONSTANTS]) {
   for (size_t t = 0; t < MOTION; ++t) {
     const bool exponent = t >= 3 && t < 6;
-    const size_t c = t < 3 ? 2 * t : exponent ? 2 * t - 5 : t;
+    const size_t c = constant_of(t);
     double x[TERMS] = {0.0};
     x[t] = exponent ? krige->law.c[c] : 1.0;
     error[c] = prior_deviation(krige, t) > 0.0 ? sqrt(variance_of(krige, x)) : 0.0;
@@ -340,7 +364,10 @@ void supine_patient_krige_errors(const supine_patient_krige *krige,
 void supine_patient_krige_copy_law(const supine_patient_krige *krige, supine_patient *patient) {
   patient->power = krige->law;
   patient->centre_count = 0;
-  for (size_t i = 0; i < krige->count && krige->sill > 0.0; ++i) {
+  if (krige->sill <= 0.0) {
+    return;
+  }
+  for (size_t i = 0; i < krige->count; ++i) {
     const supine_patient_centre centre = krige->centre[i];
     supine_patient_centre *last = patient->centre + patient->centre_count;
     if (krige->rows[i].weight <= 0.0) {

@@ -34,9 +34,10 @@ void supine_patient_rows_of_pairs(const supine_patient_frame *frame,
                                   const supine_patient_pairs *pairs, supine_patient_row *rows);
 
 /* Set the `block` of each measurement: the index of the cube of 40 mm that contains its point,
- * in a grid with a random origin. Return the number of cubes, or 0 if out of memory. */
-size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patient_row *rows,
-                                 size_t count, unsigned long seed);
+ * in a grid with a random origin. Write the number of cubes into `blocks`. */
+supine_status supine_patient_rows_block(const supine_patient_frame *frame, supine_patient_row *rows,
+                                        size_t count, unsigned long seed, size_t *blocks,
+                                        supine_error *error);
 
 /* Index of the first of the unknowns of each kind in a fit (constants c1 to c9: patient.h). */
 enum {
@@ -123,14 +124,15 @@ typedef enum supine_patient_score {
  * landmarks; otherwise, of vertices along the normals of the other surface. Scores predict the
  * emptier scan. */
 typedef struct supine_patient_fit_report {
-  double points; /**< number of landmarks or, without landmarks, of matched vertices */
-  double blocks; /**< number of cubes of 40 mm with points */
+  size_t points; /**< number of landmarks or, without landmarks, of matched vertices */
+  size_t blocks; /**< number of cubes of 40 mm with points */
   double fitted[SUPINE_PATIENT_SCORES];   /**< RMS error of each predictor at fitted points, mm */
   double held_out[SUPINE_PATIENT_SCORES]; /**< the same residuals at held-out points, mm */
   /** RMS error at held-out points, mm, of a translation, or of no displacement if no motion of the
    * body is fitted. */
   double baseline;
-  double band; /**< share of the held-out landmarks with an error below its 95 % bound, %, or 0 */
+  bool has_band;    /**< whether there are landmarks, and therefore a `band` */
+  double band;      /**< share of the held-out landmarks with an error below its 95 % bound, % */
   double explained; /**< percentage by which the law with its kriging correction reduces the squared
                        `baseline` */
   /** Errors at held-out landmarks that are moved back to the fuller scan, divided by those where
@@ -140,6 +142,7 @@ typedef struct supine_patient_fit_report {
   double expected_point;    /**< expected error of a point predicted in the fuller scan, mm */
   double expected_constant; /**< expected squared error there, mm^2, per mm of displacement */
   double expected_from; /**< RMS displacement, mm, below which this constant falls in proportion */
+  bool has_errors;      /**< whether any of c1 to c9 was fitted, and therefore has an `error` */
   double error[SUPINE_PATIENT_CONSTANTS]; /**< standard errors of c1 to c9 (patient.h) */
 } supine_patient_fit_report;
 

@@ -30,13 +30,18 @@ static double full_volume(const supine_patient_record *record, size_t state,
                           const supine_resting *resting) {
   const supine_state *shown = &record->state[state];
   const double lung_volume = record->volume[state];
-  return lung_volume <= 0.0 ? 0.0
-         : shown->volume.kind == SUPINE_VOLUME_FULL
-             ? (lung_volume - shown->volume.ml) / supine_reference_full_share(shown->gravity)
-         : shown->volume.kind == SUPINE_VOLUME_REST
-             ? (lung_volume - shown->volume.ml) /
-                   supine_reference_resting_total(resting, shown->gravity)
-             : 0.0;
+  const double end = lung_volume - shown->volume.ml; /* volume at full inflation or at rest */
+  if (lung_volume <= 0.0) {
+    return 0.0;
+  }
+  switch (shown->volume.kind) {
+  case SUPINE_VOLUME_FULL:
+    return end / supine_reference_full_share(shown->gravity);
+  case SUPINE_VOLUME_REST:
+    return end / supine_reference_resting_total(resting, shown->gravity);
+  default:
+    return 0.0;
+  }
 }
 
 static double either_full_volume(const supine_patient_record *record,
@@ -53,11 +58,15 @@ static void find_parts(const supine_patient_record *record, double part[2]) {
   const double rest = full * supine_reference_resting_total(&resting, record->state[1].gravity);
   for (size_t k = 0; k < 2; ++k) {
     const supine_volume *stated = &record->state[k].volume;
-    part[k] = stated->ml == 0.0 && stated->kind == SUPINE_VOLUME_REST   ? 1.0
-              : stated->ml == 0.0 && stated->kind == SUPINE_VOLUME_FULL ? 0.0
-              : full > 0.0 && record->volume[k] > 0.0
-                  ? (cbrt(full) - cbrt(record->volume[k])) / (cbrt(full) - cbrt(rest))
-                  : (double)k;
+    if (stated->ml == 0.0 && stated->kind == SUPINE_VOLUME_REST) {
+      part[k] = 1.0;
+    } else if (stated->ml == 0.0 && stated->kind == SUPINE_VOLUME_FULL) {
+      part[k] = 0.0;
+    } else if (full > 0.0 && record->volume[k] > 0.0) {
+      part[k] = (cbrt(full) - cbrt(record->volume[k])) / (cbrt(full) - cbrt(rest));
+    } else {
+      part[k] = (double)k;
+    }
   }
   if (part[1] - part[0] < part_least) {
     part[0] = 0.0;
@@ -94,7 +103,7 @@ static void move_range(void *context, size_t begin, size_t end, size_t thread) {
   const work *w = context;
   const supine_patient *patient = &w->record->patient;
   for (size_t i = begin; i < end; ++i) {
-    const double side = supine_patient_side_of(&w->lungs, i);
+    const int side = supine_patient_side_of(&w->lungs, i);
     const double force_factor = w->record->from_surface ? w->smoothing_ratio[i] : 1.0;
     double *at = w->lungs.mesh.vertices + 3 * i;
     if (w->scan != NULL) {
@@ -171,11 +180,11 @@ static void find_path_span(const work *w, const supine_resting *resting,
   const double full = either_full_volume(record, resting);
   const double volume[2] = {
       full, full * supine_reference_resting_total(resting, record->state[1].gravity)};
-  const bool known = full > 0.0;
+  const int rounds = full > 0.0 ? ROUNDS : 0; /* without a known volume, keep the positions */
   double part[2];
   double gains[2][3];
   find_parts(record, part);
-  for (int round = 0; round < ROUNDS && known; ++round) {
+  for (int round = 0; round < rounds; ++round) {
     const size_t k = (size_t)round % 2;
     const supine_volume *stated = &record->state[k].volume;
     if (stated->ml == 0.0 && stated->kind == (k == 0 ? SUPINE_VOLUME_FULL : SUPINE_VOLUME_REST)) {
@@ -223,7 +232,8 @@ static supine_status find_state(supine_patient_record *record, const supine_lung
           ? lungs->volume[0] + lungs->volume[1] < sqrt(record->volume[0] * record->volume[1])
           : sum[1] < sum[0];
   const size_t k = axis[state];
-  record->shown = (double)state;
+  record->in_basis = true;
+  record->shown = state;
   SUPINE_REFUSE_IF(!(off[state] <= apart_most[record->from_surface]), error, SUPINE_ERROR_MESH,
                    "the patient's law was fitted to lungs from %c = %.0f to %.0f mm, but this "
                    "surface extends from %.0f to %.0f mm: check that it has the same coordinate "
@@ -314,13 +324,13 @@ supine_status supine_patient_model(supine_patient_record *record, const supine_l
   w.lungs.mesh.vertices = supine_arena_take(&arena, 3 * n, sizeof(double));
   SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
   memcpy(w.lungs.mesh.vertices, lungs->mesh.vertices, 3 * n * sizeof(double));
-  SUPINE_TRY(displace(&w, record->shown == 1.0 ? lungs->mesh.vertices : NULL, error));
+  const double *emptier_scan = record->shown == 1 ? lungs->mesh.vertices : NULL;
+  SUPINE_TRY(displace(&w, emptier_scan, error));
   SUPINE_TRY(supine_physics_volume_of_field(&w.lungs, NULL, w.displacement, w.smoothing_ratio + n,
                                             forms, error));
   set_volumes(record, &w.lungs, forms);
   supine_patient_resting(record, resting);
-  *scan = supine_patient_scan(record, (size_t)record->shown, lungs->volume[0] + lungs->volume[1],
-                              resting);
+  *scan = supine_patient_scan(record, record->shown, lungs->volume[0] + lungs->volume[1], resting);
   for (size_t i = 0; i < sizeof forms[0].of / sizeof *forms[0].of; ++i) {
     forms[0].of[i] += forms[1].of[i];
   }
@@ -348,17 +358,18 @@ supine_status supine_patient_model(supine_patient_record *record, const supine_l
 
 double supine_patient_expected(const supine_patient_record *record) {
   const supine_patient_fit_report *report = &record->report;
-  const bool forwards = record->shown == 0.0 && report->stretch > 0.0;
+  const bool forwards = record->shown == 0 && report->stretch > 0.0;
   return report->expected_constant / (forwards ? report->stretch * report->stretch : 1.0);
 }
 
 void supine_patient_field(const void *record, const double point[3], double side, double u[3]) {
   const supine_patient_record *of = record;
+  const int lung = (side > 0.0) - (side < 0.0);
   double at[3] = {point[0], point[1], point[2]};
-  if (of->shown == 1.0) {
-    supine_patient_find_in_fuller(&of->patient, point, side, 1.0, at, u);
+  if (of->shown == 1) {
+    supine_patient_find_in_fuller(&of->patient, point, lung, 1.0, at, u);
   } else {
-    const supine_patient_place place = supine_patient_find(&of->patient.frame, point, side);
+    const supine_patient_place place = supine_patient_find(&of->patient.frame, point, lung);
     supine_patient_displacement(&of->patient, &place, 1.0, u);
   }
   for (size_t k = 0; k < 3; ++k) {

@@ -10,6 +10,7 @@
 
 #include "base/arena.h"
 #include "base/csv.h"
+#include "base/text.h"
 #include "base/vec3.h"
 #include "runtime/rigid.h"
 
@@ -209,7 +210,8 @@ supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool
   const summary s = measure(pairs, scans_moved);
   for (int state = 0; state < 2; ++state) {
     const char *unit = NULL;
-    SUPINE_REFUSE_IF(!supine_mesh_unit_is_likely(s.size[state], &unit), error, SUPINE_ERROR_FORMAT,
+    const bool likely = supine_mesh_unit_is_likely(s.size[state], &unit);
+    SUPINE_REFUSE_IF(!likely, error, SUPINE_ERROR_FORMAT,
                      "the points %s extend over %.3g mm, which is too small or too large for "
                      "lungs%s%s: give landmarks in mm, spread over the lungs",
                      state == 0 ? "of the first state" : "of the second state", s.size[state],
@@ -232,8 +234,8 @@ supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool
       s.translation);
   SUPINE_REFUSE_IF(
       s.displacement < displacement_least, error, SUPINE_ERROR_FORMAT,
-      "the points do not move between the states (%.2g mm RMS%s): give two different states",
-      s.displacement, scans_moved ? " after a translation" : "");
+      "the points do not move between the states (%s mm RMS%s): give two different states",
+      supine_text_distance(s.displacement).text, scans_moved ? " after a translation" : "");
   return SUPINE_OK;
 }
 

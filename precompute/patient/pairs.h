@@ -14,7 +14,7 @@ typedef struct supine_patient_pairs {
   size_t count;
   double *from; /**< [count, 3] points in the first state */
   double *to;   /**< [count, 3] points in the second state */
-  double *side; /**< [count] +1 left lung, -1 right lung; NULL if the midline decides */
+  int *side;    /**< [count] +1 left lung, -1 right lung; NULL if the midline decides */
 } supine_patient_pairs;
 
 /** Read pairs of points from a CSV file with the columns x,y,z,to_x,to_y,to_z (first and second

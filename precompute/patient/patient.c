@@ -19,14 +19,22 @@ static double clamp_to_box(double box) {
   return fmin(1.0, fmax(0.0, box));
 }
 
+/* Return the side of a point: that of the only lung, the given one, or the side of the midline. */
+static int choose_side(const supine_patient_frame *frame, const double point[3], int side) {
+  if (frame->only_side != 0) {
+    return frame->only_side;
+  }
+  if (side != 0) {
+    return side;
+  }
+  return point[0] > frame->midline ? 1 : -1;
+}
+
 supine_patient_place supine_patient_find(const supine_patient_frame *frame, const double point[3],
-                                         double side) {
+                                         int side) {
   supine_patient_place place = {.force = {1.0}};
-  place.side = frame->only_side != 0       ? frame->only_side
-               : side != 0.0               ? side
-               : point[0] > frame->midline ? 1.0
-                                           : -1.0;
-  const double outer = place.side > 0.0 ? frame->maximum[0] : frame->minimum[0];
+  place.side = choose_side(frame, point, side);
+  const double outer = place.side > 0 ? frame->maximum[0] : frame->minimum[0];
   for (int k = 0; k < 3; ++k) {
     place.box[k] = k == 0
                        ? (point[0] - frame->midline) / (outer - frame->midline)
@@ -150,8 +158,8 @@ void supine_patient_displacement(const supine_patient *patient, const supine_pat
   }
 }
 
-void supine_patient_find_in_fuller(const supine_patient *patient, const double point[3],
-                                   double side, double force_factor, double at[3], double u[3]) {
+void supine_patient_find_in_fuller(const supine_patient *patient, const double point[3], int side,
+                                   double force_factor, double at[3], double u[3]) {
   enum { STEPS = 60 };
   static const double converged = 1e-4; /* change below which the iteration ends, mm */
   double change = INFINITY;

@@ -57,7 +57,7 @@ typedef struct supine_patient_power {
 /** A point that adds weight * its covariance with p to the kriging correction at every point p. */
 typedef struct supine_patient_centre {
   double offset[3]; /**< position relative to the centre of the lungs' bounding box, mm */
-  double side;      /**< +1 left lung, -1 right lung */
+  int side;         /**< +1 left lung, -1 right lung */
   double size;      /**< length of the uncorrected displacement at the point, mm */
   double weight[3]; /**< [axis] factor of the covariance, 1/mm */
 } supine_patient_centre;
@@ -73,7 +73,7 @@ typedef struct supine_patient {
 /** A point of a lung, with the variables of the displacement law at this point. */
 typedef struct supine_patient_place {
   double box[3];                        /**< X, Y, Z in the lungs' bounding box, each 0 to 1 */
-  double side;                          /**< +1 left lung, -1 right lung */
+  int side;                             /**< +1 left lung, -1 right lung */
   double offset[3];                     /**< position relative to the lungs' centre, mm */
   double force[SUPINE_PATIENT_COLUMNS]; /**< values of the terms of the force here: 1, X - 1/2, Y -
                                            1/2, Z - 1/2, with X, Y and Z from 0 to 1 in the lungs'
@@ -85,7 +85,7 @@ typedef struct supine_patient_place {
  * @param point  position in the fuller of the two scanned states, mm
  * @param side   +1 left lung, -1 right lung, 0 to choose by the side of the midline */
 supine_patient_place supine_patient_find(const supine_patient_frame *frame, const double point[3],
-                                         double side);
+                                         int side);
 
 /** Make a frame from landmarks [count, 3], mm: the bounding box of the landmarks, enlarged by 10 mm
  * on every side, because lungs extend beyond landmarks.
@@ -136,8 +136,8 @@ void supine_patient_displacement(const supine_patient *patient, const supine_pat
  * @param force_factor  multiplies the force of the displacement law
  * @param at      in: initial guess; out: position in the fuller state, mm
  * @param u       written: displacement from the fuller to the emptier state, mm */
-void supine_patient_find_in_fuller(const supine_patient *patient, const double point[3],
-                                   double side, double force_factor, double at[3], double u[3]);
+void supine_patient_find_in_fuller(const supine_patient *patient, const double point[3], int side,
+                                   double force_factor, double at[3], double u[3]);
 
 /** Move points [count, 3] of the emptier scanned state to their positions in the fuller one, mm. */
 void supine_patient_points_to_fuller(const supine_patient *patient, size_t count, double *points);

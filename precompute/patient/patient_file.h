@@ -33,7 +33,7 @@ typedef struct supine_patient_further {
  *     a(p) = sum over k of w(t_k) a_k / sum over k of w(t_k),  t_k = |p - centre_k| / radius_k
  *     w(t) = 1 for t <= 1/2, 0 for t >= 1, 3 q^2 - 2 q^3 between, q = 2 (1 - t) */
 typedef struct supine_patient_region {
-  double side;          /**< +1 left lung, -1 right lung */
+  int side;             /**< +1 left lung, -1 right lung */
   double expandability; /**< 1 / relative stiffness, > 0 */
   double centre[3];     /**< centre in the reference surface, mm */
   double radius; /**< distance from the centre at which the weight of the region becomes 0, mm */
@@ -54,7 +54,7 @@ typedef struct supine_patient_expand_report {
   bool tried, kept;
   double fitted[2];    /**< [uniform, regional] RMS distance from fitted to scanned surface, mm */
   double held_out[2];  /**< [uniform, regional] the same at held-out vertices, mm */
-  double undetermined; /**< number of regions whose stiffness the surfaces hardly determine */
+  size_t undetermined; /**< number of regions whose stiffness the surfaces hardly determine */
 } supine_patient_expand_report;
 
 /** The force on the lungs, computed from the displacement of each vertex ([Santhanam2008] IV-B.3)
@@ -64,11 +64,11 @@ typedef struct supine_patient_expand_report {
  *
  * - u_i is the displacement from the fuller to the emptier surface.
  * - d_i is the displacement that a force of 1 causes, [Santhanam2008] (15)-(17).
- * - F_i is the applied force after smoothing over the surface (equilibrium.h).
+ * - F_i is the applied force after smoothing over the surface (smoothing.h).
  * - f is the applied force before smoothing; the matrix A inverts the smoothing.
  * A amplifies roughness of u, so f is averaged over the vertices in each cube of 40 mm. */
 typedef struct supine_patient_applied {
-  double blocks;      /**< number of cubes of 40 mm that contain vertices; 0: not computed */
+  size_t blocks;      /**< number of cubes of 40 mm that contain vertices; 0: not computed */
   double correlation; /**< correlation of the force with the depth along gravity */
   double slopes[3];   /**< gradient of the force along X, Y and Z (0 to 1 in the bounding box),
                          divided by the force at the lungs' centre */
@@ -77,7 +77,7 @@ typedef struct supine_patient_applied {
 } supine_patient_applied;
 
 typedef struct supine_patient_surface_report {
-  double vertices;      /**< number of matched vertices, or 0 without surfaces */
+  size_t vertices;      /**< number of matched vertices, or 0 without surfaces */
   double matched;       /**< share of vertices whose nearest point has a similar normal */
   double before, after; /**< RMS distance between the surfaces before and after the fit, mm */
 } supine_patient_surface_report;
@@ -95,15 +95,16 @@ typedef struct supine_patient_record {
   supine_patient_surface_report surface;
   supine_patient_expand_report expand;
   supine_patient_applied applied;
-  double gain_error;    /**< standard error of `force.gain`, or 0 if the gain was not fitted */
+  bool gain_fitted;     /**< whether a gain was fitted; it is that of `force` if determined */
+  double gain_error;    /**< standard error of the fitted gain */
   size_t further_count; /**< number of elements of `further`; 0 after supine_patient_read */
   supine_patient_further further[SUPINE_PATIENT_OTHERS_MAX];
   bool gain_undetermined; /**< whether the fitted gain is outside 0.01 to 2 and ignored */
-  /** @{ Set by supine_patient_model, for a basis: the state that its scan shows (0 fuller, 1
-   * emptier), and the displacement between the two states as a share of that from full inflation
-   * to rest, along x, y and z. */
-  double shown, path_span[3];
-  /** @} */
+  bool in_basis; /**< whether supine_patient_model has set `shown` and `path_span`, for a basis */
+  size_t shown;  /**< the state that the scan of the basis shows: 0 fuller, 1 emptier */
+  /** Displacement between the two states as a share of that from full inflation to rest, along x, y
+   * and z. */
+  double path_span[3];
   /** [state][left, right lung] volumes of that scan and of its surface, displaced by the law to the
    * other state, mL; 0 if unknown */
   double lung_volume[2][2];
@@ -140,9 +141,9 @@ supine_status supine_patient_read(const char *path, supine_patient_record *recor
  * whatever volume was measured. The direction of a vertex is d = -u / F:
  * - u is the patient's displacement of the vertex between the two scanned states, extrapolated to
  *   the displacement from full inflation to rest.
- * - F is the patient's force on the vertex, smoothed over the surface (equilibrium.h). The
+ * - F is the patient's force on the vertex, smoothed over the surface (smoothing.h). The
  *   unsmoothed force, and the ratio of F to it, are at least 0.2.
- * @param record   `shown`, `path_span`, `volume` and `lung_volume` are written
+ * @param record   `in_basis`, `shown`, `path_span`, `volume` and `lung_volume` are written
  * @param lungs    scan of one of the two states
  * @param resting  default volumes at rest; on return those of the patient
  * @param scan     written: the state of the scan; `known` is false if its volume relative to full
@@ -206,15 +207,22 @@ supine_status supine_patient_fit_surface(const supine_lungs *fuller, const supin
  * - f is the force on the point by this law.
  * - h and h' are its depths along gravity, 0 to 1, in the posture of the two and the third scan.
  * - g is the gain, s a factor for each lung, and t a translation; all three are fitted.
- * On a surface, f, h and h' are smoothed (equilibrium.h), and every fit starts from new matches.
- * @param fuller   surface in the fuller of the two scans; NULL if `surface` is NULL
- * @param pairs    points in the fuller and in the third scan; NULL if `surface` is given
+ * @param pairs    points in the fuller and in the third scan
  * @param scans_moved  whether to fit t; otherwise it is 0
  * @param further  in: the state of the third scan; out: the fit */
-supine_status supine_patient_gain_fit(const supine_patient_record *record,
-                                      const supine_lungs *fuller, const supine_patient_pairs *pairs,
-                                      const supine_mesh *surface, bool scans_moved,
-                                      supine_patient_further *further, supine_error *error);
+supine_status supine_patient_gain_fit_landmarks(const supine_patient_record *record,
+                                                const supine_patient_pairs *pairs, bool scans_moved,
+                                                supine_patient_further *further,
+                                                supine_error *error);
+
+/** Fit the gain as supine_patient_gain_fit_landmarks, to the surface of a third scan. f, h and h'
+ * are smoothed (smoothing.h), and every fit starts from new matches.
+ * @param fuller   surface in the fuller of the two scans
+ * @param surface  surface in the third scan */
+supine_status supine_patient_gain_fit_surface(const supine_patient_record *record,
+                                              const supine_lungs *fuller,
+                                              const supine_mesh *surface, bool scans_moved,
+                                              supine_patient_further *further, supine_error *error);
 
 /** Set record->force.gain to the mean of the gains in record->further, weighted by 1 /
  * gain_error^2. If the mean is not between 0.01 and 2, keep the previous gain. */

@@ -20,7 +20,7 @@ void supine_patient_rows_of_pairs(const supine_patient_frame *frame,
   for (size_t i = 0; i < 3 * pairs->count; ++i) {
     rows[i] = (supine_patient_row){
         .place = supine_patient_find(frame, pairs->from + i / 3 * 3,
-                                     pairs->side != NULL ? pairs->side[i / 3] : 0.0),
+                                     pairs->side != NULL ? pairs->side[i / 3] : 0),
         .value = pairs->to[i] - pairs->from[i],
         .weight = 1.0,
         .landmark = 1 + i / 3,
@@ -29,10 +29,11 @@ void supine_patient_rows_of_pairs(const supine_patient_frame *frame,
   }
 }
 
-size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patient_row *rows,
-                                 size_t count, unsigned long seed) {
+supine_status supine_patient_rows_block(const supine_patient_frame *frame, supine_patient_row *rows,
+                                        size_t count, unsigned long seed, size_t *blocks,
+                                        supine_error *error) {
   enum { CELLS = 64 }; /* number of cubes along each axis */
-  size_t blocks = 0;
+  *blocks = 0;
   double origin[3] = {0.0};
   /* [cube] index of the cube in the list of cubes with measurements, plus 1; else 0 */
   SUPINE_ARENA arena = {0};
@@ -40,7 +41,7 @@ size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patie
   gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
   if (arena.failed || random == NULL) {
     gsl_rng_free(random);
-    return 0;
+    return supine_error_memory(error, "%zu values", count);
   }
   gsl_rng_set(random, seed);
   for (int k = 0; k < 3; ++k) {
@@ -54,10 +55,12 @@ size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patie
       const double at = floor((rows[i].place.offset[k] - origin[k]) / block_side);
       cell = cell * CELLS + (size_t)fmin(CELLS - 1, fmax(0.0, at));
     }
-    number[cell] = number[cell] == 0 ? ++blocks : number[cell];
+    if (number[cell] == 0) {
+      number[cell] = ++*blocks;
+    }
     rows[i].block = number[cell] - 1;
   }
-  return blocks;
+  return SUPINE_OK;
 }
 
 /* Along axis k, a force f displaces by f c_(2k-1) d_k, where d_k is proportional to box_k^c_(2k),

@@ -7,6 +7,7 @@
 #include "precompute/patient/scans.h"
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "precompute/lungs/surface.h"
 
 void supine_patient_scans_free(supine_patient_scans *scans) {
@@ -46,9 +47,11 @@ static int named_order(const supine_state state[2]) {
   const bool turned = memcmp(state[0].gravity, state[1].gravity, sizeof state[0].gravity) != 0;
   double more = 0.0;
   if (a->kind != b->kind) {
-    more = a->kind == SUPINE_VOLUME_REST && b->kind == SUPINE_VOLUME_FULL   ? 1.0
-           : a->kind == SUPINE_VOLUME_FULL && b->kind == SUPINE_VOLUME_REST ? -1.0
-                                                                            : 0.0;
+    if (a->kind == SUPINE_VOLUME_REST && b->kind == SUPINE_VOLUME_FULL) {
+      more = 1.0;
+    } else if (a->kind == SUPINE_VOLUME_FULL && b->kind == SUPINE_VOLUME_REST) {
+      more = -1.0;
+    }
   } else if (a->kind != SUPINE_VOLUME_DEFAULT && !(a->kind == SUPINE_VOLUME_REST && turned)) {
     more = b->ml - a->ml;
   }
@@ -87,9 +90,9 @@ static void name_volumes(supine_patient_scans *scans, supine_patient_record *rec
     record->state[1].volume = (supine_volume){SUPINE_VOLUME_REST, 0.0};
     record->state[0].volume = breath ? (supine_volume){SUPINE_VOLUME_REST, v[0] - v[1]}
                                      : (supine_volume){SUPINE_VOLUME_FULL, 0.0};
-    (void)snprintf(next_note(scans), sizeof scans->note[0],
-                   "note: the scan of %.0f mL counts as rest, that of %.0f mL as %s", v[1], v[0],
-                   breath ? "a breath above it" : "full inflation");
+    (void)supine_print_text(next_note(scans), sizeof scans->note[0],
+                            "note: the scan of %.0f mL counts as rest, that of %.0f mL as %s", v[1],
+                            v[0], breath ? "a breath above it" : "full inflation");
   }
 }
 
@@ -102,7 +105,7 @@ static void warn_of_rest(supine_patient_scans *scans, const supine_patient_recor
   const double share[2] = {supine_reference_resting_total(&usual, g),
                            supine_reference_resting_total(&shown, g)};
   if (fabs(share[1] - share[0]) > SUPINE_REST_SPREAD) {
-    (void)snprintf(
+    (void)supine_print_text(
         next_note(scans), sizeof scans->note[0],
         "warning: the volume at rest is %.0f %% of full inflation in the two scans, but %.0f %% in "
         "healthy people: check --rest. 'supine precompute --patient' uses the volume in the scans",
@@ -151,9 +154,12 @@ supine_status supine_patient_scans_order(supine_patient_scans *scans, supine_pat
   const double volume[2] = {volume_of(&scans->lungs[0]), volume_of(&scans->lungs[1])};
   const int named = named_order(record->state);
   record->from_surface = volume[0] > 0.0 && volume[1] > 0.0;
-  const double growth = record->from_surface     ? volume[1] / volume[0]
-                        : scans->pairs.count > 0 ? supine_patient_pairs_growth(&scans->pairs)
-                                                 : 1.0;
+  double growth = 1.0; /* volume of the second scan / that of the first */
+  if (record->from_surface) {
+    growth = volume[1] / volume[0];
+  } else if (scans->pairs.count > 0) {
+    growth = supine_patient_pairs_growth(&scans->pairs);
+  }
   SUPINE_REFUSE_IF((named > 0 && growth < 1.0 - volume_error) ||
                        (named < 0 && growth > 1.0 + volume_error),
                    error, SUPINE_ERROR_FORMAT,
@@ -167,8 +173,8 @@ supine_status supine_patient_scans_order(supine_patient_scans *scans, supine_pat
     exchange(scans, record->state);
   }
   set_states(scans, record);
-  SUPINE_REFUSE_IF(!(record->from_surface || (record->volume[0] > 0.0 && record->volume[1] > 0.0)),
-                   error, SUPINE_ERROR_ARGUMENT,
+  const bool volumes_known = record->volume[0] > 0.0 && record->volume[1] > 0.0;
+  SUPINE_REFUSE_IF(!record->from_surface && !volumes_known, error, SUPINE_ERROR_ARGUMENT,
                    "landmarks do not show the volume of the lungs, which decides what rest and "
                    "full inflation are: give both volumes of gas and tissue, such as --rest 2600mL "
                    "--other 5400mL, or both surfaces");
@@ -201,33 +207,46 @@ supine_status supine_patient_scans_fit(const supine_patient_scans *scans,
     wanted.gravity[k] = gravity[k];
     wanted.path_span[k] = gains[1][k] - gains[0][k];
   }
-  SUPINE_TRY(record->from_surface
-                 ? supine_patient_fit_surface(&scans->lungs[0], &scans->lungs[1].mesh,
-                                              &scans->pairs, &wanted, expandability, record, error)
-                 : fit_landmarks(scans, &wanted, record, error));
+  if (record->from_surface) {
+    SUPINE_TRY(supine_patient_fit_surface(&scans->lungs[0], &scans->lungs[1].mesh, &scans->pairs,
+                                          &wanted, expandability, record, error));
+  } else {
+    SUPINE_TRY(fit_landmarks(scans, &wanted, record, error));
+  }
   record->force = supine_patient_force(&record->patient.power, deep.force.gain, gravity);
   return SUPINE_OK;
 }
 
-supine_status supine_patient_scans_fit_further(supine_patient_scans *scans,
-                                               const supine_state *state, bool scans_moved,
-                                               supine_patient_pairs *pairs,
-                                               const supine_mesh *surface,
-                                               supine_patient_record *record, supine_error *error) {
-  const supine_patient *patient = &record->patient;
-  supine_lungs *from = &scans->lungs[0];
+/* Append a further state to the record, without a result. */
+static supine_patient_further *append(supine_patient_record *record, const supine_state *state) {
   supine_patient_further *further = &record->further[record->further_count++];
   *further = (supine_patient_further){.state = *state};
-  if (from->mesh.vertex_count == 0 && surface != NULL) {
+  return further;
+}
+
+supine_status supine_patient_scans_fit_further_landmarks(
+    const supine_patient_scans *scans, const supine_state *state, bool scans_moved,
+    supine_patient_pairs *pairs, supine_patient_record *record, supine_error *error) {
+  supine_patient_further *further = append(record, state);
+  if (scans->reordered) {
+    supine_patient_points_to_fuller(&record->patient, pairs->count, pairs->from);
+  }
+  return supine_patient_gain_fit_landmarks(record, pairs, scans_moved, further, error);
+}
+
+supine_status supine_patient_scans_fit_further_surface(supine_patient_scans *scans,
+                                                       const supine_state *state, bool scans_moved,
+                                                       const supine_mesh *surface,
+                                                       supine_patient_record *record,
+                                                       supine_error *error) {
+  supine_lungs *from = &scans->lungs[0];
+  supine_patient_further *further = append(record, state);
+  if (from->mesh.vertex_count == 0) {
     /* The fuller scan has no surface: move that of the emptier one to the fuller state. */
     *from = scans->lungs[1];
     scans->lungs[1] = (supine_lungs){0};
-    supine_patient_points_to_fuller(patient, from->mesh.vertex_count, from->mesh.vertices);
+    supine_patient_points_to_fuller(&record->patient, from->mesh.vertex_count, from->mesh.vertices);
     supine_lungs_measure(from);
   }
-  if (surface == NULL && scans->reordered) {
-    supine_patient_points_to_fuller(patient, pairs->count, pairs->from);
-  }
-  return supine_patient_gain_fit(record, from, surface == NULL ? pairs : NULL, surface, scans_moved,
-                                 further, error);
+  return supine_patient_gain_fit_surface(record, from, surface, scans_moved, further, error);
 }

@@ -37,15 +37,20 @@ supine_status supine_patient_scans_fit(const supine_patient_scans *scans,
                                        bool expandability, supine_patient_record *record,
                                        supine_error *error);
 
-/** Fit a further scan by supine_patient_gain_fit, and append the result to the record. Call
- * supine_patient_scans_fit first.
- * @param pairs    points in the first of the two scans as given, and in the further scan; they may
- *   be moved. Empty if `surface` is not NULL
- * @param surface  surface in the further scan, or NULL */
-supine_status supine_patient_scans_fit_further(supine_patient_scans *scans,
-                                               const supine_state *state, bool scans_moved,
-                                               supine_patient_pairs *pairs,
-                                               const supine_mesh *surface,
-                                               supine_patient_record *record, supine_error *error);
+/** Fit landmarks of a further scan by supine_patient_gain_fit_landmarks, and append the result to
+ * the record. Call supine_patient_scans_fit first.
+ * @param pairs  points in the first of the two scans as given, and in the further scan; they may be
+ *   moved */
+supine_status supine_patient_scans_fit_further_landmarks(
+    const supine_patient_scans *scans, const supine_state *state, bool scans_moved,
+    supine_patient_pairs *pairs, supine_patient_record *record, supine_error *error);
+
+/** Fit the surface of a further scan by supine_patient_gain_fit_surface, and append the result to
+ * the record. Call supine_patient_scans_fit first. */
+supine_status supine_patient_scans_fit_further_surface(supine_patient_scans *scans,
+                                                       const supine_state *state, bool scans_moved,
+                                                       const supine_mesh *surface,
+                                                       supine_patient_record *record,
+                                                       supine_error *error);
 
 #endif

@@ -5,6 +5,7 @@
 #include "precompute/patient/matching.h"
 
 #include "base/arena.h"
+#include "base/csv.h"
 #include "base/output.h"
 #include "base/text.h"
 #include "base/vec3.h"
@@ -71,8 +72,10 @@ supine_status supine_patient_stiffness_write(const char *path,
   (void)fputs("vertex,x_mm,y_mm,z_mm,expandability,determined\n", output.file);
   for (size_t i = 0; i < n; ++i) {
     const double *p = lungs->mesh.vertices + 3 * i;
-    (void)fprintf(output.file, "%zu,%.6g,%.6g,%.6g,%.5g,%.3g\n", i, p[0], p[1], p[2], (double)a[i],
-                  (double)determined[i]);
+    supine_csv_row row = {.file = output.file};
+    supine_csv_add(&row, "%zu,%.6g,%.6g,%.6g,%.5g,%.3g", i, p[0], p[1], p[2], (double)a[i],
+                   (double)determined[i]);
+    supine_csv_end_row(&row);
   }
   return supine_output_commit(&output, error);
 }

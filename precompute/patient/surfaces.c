@@ -8,6 +8,7 @@
 #include "precompute/patient/matching.h"
 
 #include "base/arena.h"
+#include "base/text.h"
 
 enum {
   VERTICES_MAX = 600,  /* largest number of matched vertices */
@@ -79,14 +80,14 @@ static supine_status iterate(supine_patient_matching *m, const supine_patient_fi
 
 static supine_status check_apart(supine_patient_matching *m, supine_patient_surface_report *report,
                                  supine_error *error) {
-  report->vertices = (double)m->count;
+  report->vertices = m->count;
   supine_patient_matching_find(m);
   const size_t stride = sizeof *m->match / sizeof(double);
   report->before =
       sqrt(gsl_stats_tss_m(&m->match->distance, stride, m->count, 0.0) / (double)m->count);
   SUPINE_REFUSE_IF(!(report->before >= same_state), error, SUPINE_ERROR_MESH,
-                   "the two surfaces are the same (%.2g mm RMS apart): give two different states",
-                   report->before);
+                   "the two surfaces are the same (%s mm RMS apart): give two different states",
+                   supine_text_distance(report->before).text);
   return SUPINE_OK;
 }
 
@@ -103,6 +104,7 @@ static supine_status measure(supine_patient_matching *m, const supine_patient_fi
   if (record->expand.kept) {
     record->patient.power = expanding;
     record->patient.law = SUPINE_PATIENT_DEEP;
+    report->has_errors = false;
     memset(report->error, 0, sizeof report->error);
     report->held_out[SUPINE_PATIENT_SCORE_CORRECTED] = record->expand.held_out[1];
     report->explained = 100.0 * (1.0 - pow(record->expand.held_out[1] / report->baseline, 2.0));

@@ -46,9 +46,10 @@ void supine_reference_capacity(const supine_person *person, double range[2]) {
 
 /* Return the scanned lungs' usual share of the volume of both lungs: 1 if both were scanned. */
 static double part_of_pair(const supine_reference *reference) {
-  return reference->lung_count == 2 ? 1.0
-         : reference->side[0] > 0   ? SUPINE_LEFT_SHARE
-                                    : 1.0 - SUPINE_LEFT_SHARE;
+  if (reference->lung_count == 2) {
+    return 1.0;
+  }
+  return reference->side[0] > 0 ? SUPINE_LEFT_SHARE : 1.0 - SUPINE_LEFT_SHARE;
 }
 
 /* The FRC of adults upright (Hall et al. 2021, above; SD 21 % in men, 20 % in women) is
@@ -65,6 +66,7 @@ void supine_reference_predict_rest(const supine_reference *reference, const supi
       resting->assumed == SUPINE_REST_SHARE) {
     resting->ml[2] = part_of_pair(reference) * (1e3 * exp(c[0] + c[1] * log(person->height)) -
                                                 SUPINE_LYING_ML + SUPINE_TISSUE_ML);
+    resting->predicted = true;
   }
 }
 
@@ -96,14 +98,16 @@ void supine_reference_doubt(const supine_reference *reference, const supine_pers
     full += reference->full_volume[lung];
     held += reference->full_volume[lung] + reference->scan_volume[lung];
   }
-  for (size_t axis = 0; axis < 6 && at_rest; ++axis) {
-    const double along = (axis % 2 == 0 ? 1.0 : -1.0) * state->gravity[axis / 2];
-    const double ml = given->ml[axis] + state->volume.ml;
-    if (along > 1.0 - 1e-9 && given->ml[axis] > 0.0 && fabs(held - ml) > agreement * ml) {
-      supine_text_add(
-          text, size,
-          "the scan holds %.0f mL, but --resting and --scanned say %.0f mL: change one of them",
-          held, ml);
+  if (at_rest) {
+    for (size_t axis = 0; axis < 6; ++axis) {
+      const double along = (axis % 2 == 0 ? 1.0 : -1.0) * state->gravity[axis / 2];
+      const double ml = given->ml[axis] + state->volume.ml;
+      if (along > 1.0 - 1e-9 && given->ml[axis] > 0.0 && fabs(held - ml) > agreement * ml) {
+        supine_text_add(
+            text, size,
+            "the scan holds %.0f mL, but --resting and --scanned say %.0f mL: change one of them",
+            held, ml);
+      }
     }
   }
   const char *separator = text[0] == '\0' ? "" : "; ";

@@ -51,8 +51,10 @@ void supine_physics_force(const supine_lungs *lungs, const supine_force_law *law
                           const size_t *vertices, double *force) {
   const size_t n = lungs->mesh.vertex_count;
   force_work work = {lungs, law, gravities, vertices, {0.0}, force};
-  for (size_t i = 0; i < 3 * n && law->soften != 0.0; ++i) {
-    work.middle[i % 3] += lungs->mesh.vertices[i] / (double)n;
+  if (law->soften != 0.0) {
+    for (size_t i = 0; i < 3 * n; ++i) {
+      work.middle[i % 3] += lungs->mesh.vertices[i] / (double)n;
+    }
   }
   supine_parallel_for(vertex_count, GRAIN, 0, force_range, &work);
 }
@@ -109,11 +111,12 @@ supine_status supine_physics_directions(const supine_lungs *lungs, const supine_
                      k % 2 == 1 ? "it is an exponent: give a number above 0"
                                 : "give a finite number");
   }
-  for (size_t i = 0; i < n && law->vectors == NULL; ++i) {
-    box_direction(lungs, law->c, i, directions + 3 * i);
-  }
   if (law->vectors != NULL) {
     memcpy(directions, law->vectors, 3 * n * sizeof *directions);
+  } else {
+    for (size_t i = 0; i < n; ++i) {
+      box_direction(lungs, law->c, i, directions + 3 * i);
+    }
   }
   for (size_t i = 0; i < 3 * n; ++i) {
     if (directions[i] != 0.0) {

@@ -113,8 +113,11 @@ SUPINE_CLONES static void height_range(void *context, size_t begin, size_t end, 
       }
       seed[up] = search(work, seed[up], &at);
       for (size_t l = 0; l < LANES && l < left; ++l) {
-        *(up ? &work->maximum[d * LANES + l] : &work->minimum[d * LANES + l]) =
-            up ? at.best[l] : -at.best[l];
+        if (up) {
+          work->maximum[d * LANES + l] = at.best[l];
+        } else {
+          work->minimum[d * LANES + l] = -at.best[l];
+        }
       }
     }
   }

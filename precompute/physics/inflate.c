@@ -14,6 +14,7 @@
 #include <supine/volume.h>
 
 #include "base/arena.h"
+#include "base/text.h"
 #include "precompute/physics/reference.h"
 #include "precompute/physics/solve.h"
 #include "precompute/physics/volume_forms.h"
@@ -175,9 +176,12 @@ static supine_status advance(ascent *a, supine_error *error) {
     }
     matrix[j * n + j] *= 1.0 + ridge;
   }
-  SUPINE_REFUSE_IF(n > 0 && LAPACKE_dposv(LAPACK_ROW_MAJOR, 'L', (lapack_int)n, 1, matrix,
-                                          (lapack_int)n, weights, 1) != 0,
-                   error, SUPINE_ERROR_NUMERICAL,
+  lapack_int failed = 0;
+  if (n > 0) {
+    failed =
+        LAPACKE_dposv(LAPACK_ROW_MAJOR, 'L', (lapack_int)n, 1, matrix, (lapack_int)n, weights, 1);
+  }
+  SUPINE_REFUSE_IF(failed != 0, error, SUPINE_ERROR_NUMERICAL,
                    "no surface at full inflation was found: the iteration does not progress. If "
                    "the scan is fuller than --scanned says, change --scanned or --resting; "
                    "--scanned none uses the scan as it is");
@@ -210,9 +214,9 @@ static supine_status iterate(ascent *a, supine_error *error) {
   }
   return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
                           "no surface at full inflation was found: after %d steps it still changes "
-                          "by %.3g mm RMS. If the scan is fuller than --scanned says, change "
+                          "by %s mm RMS. If the scan is fuller than --scanned says, change "
                           "--scanned or --resting; --scanned none uses the scan as it is",
-                          SOLVES_MAX, a->rms);
+                          SOLVES_MAX, supine_text_distance(a->rms).text);
 }
 
 supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *model,

@@ -39,7 +39,8 @@ supine_status supine_physics_model_equilibrium(const supine_lungs *lungs, const 
   }
   SUPINE_TRY(supine_physics_equilibrium_create(&lungs->mesh, &lungs->topology, reach,
                                                model->lesions, equilibrium, error));
-  return model->stiffness != NULL
-             ? supine_physics_equilibrium_set_stiffness(*equilibrium, model->stiffness, error)
-             : SUPINE_OK;
+  if (model->stiffness != NULL) {
+    SUPINE_TRY(supine_physics_equilibrium_set_stiffness(*equilibrium, model->stiffness, error));
+  }
+  return SUPINE_OK;
 }

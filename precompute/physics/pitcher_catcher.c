@@ -4,7 +4,11 @@
 #include <string.h>
 
 #include "base/arena.h"
-#include "precompute/physics/equilibrium.h"
+#include "precompute/physics/network.h"
+#include "precompute/physics/stiffness.h"
+
+/* Most steps for each vertex. A uniform stiffness needs about 20 for a tolerance of 1e-6. */
+enum { STEPS_EACH = 100000 };
 
 /* State of the iteration. Node i < N is vertex i of a mesh of N vertices; node N + e is edge e. */
 typedef struct iteration {
@@ -124,6 +128,10 @@ supine_physics_pitcher_catcher(const supine_mesh *mesh, const supine_topology *t
     update(&it, j);
   }
   for (size_t steps = 0; fabs(it.pitcher[it.largest[1]]) > tolerance * largest; ++steps) {
+    SUPINE_REFUSE_IF(steps / STEPS_EACH >= n, error, SUPINE_ERROR_NUMERICAL,
+                     "the iteration has not converged after %d steps for each vertex: solve "
+                     "directly, or give a stiffness that varies less",
+                     (int)STEPS_EACH);
     if (progress != NULL && steps % n == 0) {
       double remaining = 0.0;
       for (size_t j = 0; j < it.node_count; ++j) {

@@ -91,7 +91,11 @@ static supine_status find_full(supine_reference *found, const double *volume, su
     if (state->volume.ml == 0.0) {
       break;
     }
-    *(beyond < state->volume.ml ? &low : &high) = t;
+    if (beyond < state->volume.ml) {
+      low = t;
+    } else {
+      high = t;
+    }
     t = 0.5 * (low + high);
   }
   double held = 0.0;
@@ -124,12 +128,12 @@ static supine_status find_rest(supine_reference *found, const double *volume, su
     (void)supine_reference_resting_settle(&found->resting, 0, NULL, NULL, NULL);
     status = find_full(found, volume, error);
   }
-  return status != SUPINE_OK || fabs(off - 1.0) <= 1e-9
-             ? status
-             : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                "a scan of %.0f mL at rest does not belong to lungs of %.0f mL at "
-                                "full inflation: change --full, --scanned or --resting",
-                                volume[0] + volume[1], found->scan.full);
+  SUPINE_TRY(status);
+  SUPINE_REFUSE_IF(!(fabs(off - 1.0) <= 1e-9), error, SUPINE_ERROR_ARGUMENT,
+                   "a scan of %.0f mL at rest does not belong to lungs of %.0f mL at full "
+                   "inflation: change --full, --scanned or --resting",
+                   volume[0] + volume[1], found->scan.full);
+  return SUPINE_OK;
 }
 
 supine_status supine_reference_find(supine_lungs *lungs, const supine_model *model,
@@ -143,8 +147,11 @@ supine_status supine_reference_find(supine_lungs *lungs, const supine_model *mod
   if (!scan->known) {
     return SUPINE_OK;
   }
-  SUPINE_TRY(scan->full > 0.0 ? find_rest(&found, lungs->volume, error)
-                              : find_full(&found, lungs->volume, error));
+  if (scan->full > 0.0) {
+    SUPINE_TRY(find_rest(&found, lungs->volume, error));
+  } else {
+    SUPINE_TRY(find_full(&found, lungs->volume, error));
+  }
   SUPINE_TRY(supine_reference_resting_settle(&found.resting, found.lung_count, found.side,
                                              found.full_volume, error));
   if (found.scan_volume[0] != 0.0 || found.scan_volume[1] != 0.0) {

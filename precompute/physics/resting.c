@@ -11,6 +11,7 @@
 #include "precompute/physics/resting.h"
 
 #include "base/arena.h"
+#include "base/number.h"
 
 /* Volumes at rest of healthy people divided by the volume at full inflation supine, both with
  * tissue. Rows: left lung, right lung. Columns: lying on the left, on the right, supine, prone,
@@ -65,7 +66,7 @@ static const double parts[2] = {SUPINE_LEFT_SHARE, 1.0 - SUPINE_LEFT_SHARE};
  * false if the text has another form or is out of range. */
 static bool read_value(supine_resting *resting, size_t axis, const char *text) {
   char *end = NULL;
-  const double first = strtod(text, &end);
+  const double first = supine_number_parse(text, &end);
   double share[2] = {first, first};
   if (end == text) {
     return false;
@@ -77,7 +78,7 @@ static bool read_value(supine_resting *resting, size_t axis, const char *text) {
   }
   if (*end == '/') {
     const char *second = end + 1;
-    share[1] = strtod(second, &end);
+    share[1] = supine_number_parse(second, &end);
     if (end == second) {
       return false;
     }
@@ -90,6 +91,17 @@ static bool read_value(supine_resting *resting, size_t axis, const char *text) {
   resting->share[1][axis] = share[1];
   resting->ml[axis] = 0.0;
   return *end == '\0' && is_share(first) && is_share(share[0]) && is_share(share[1]);
+}
+
+/* Read the volume at rest into each axis along which gravity has a component. */
+static bool read_values(supine_resting *resting, const double gravity[3], const char *text) {
+  bool read = true;
+  for (size_t k = 0; k < 3; ++k) {
+    if (gravity[k] != 0.0) {
+      read = read_value(resting, 2 * k + (gravity[k] < 0.0), text) && read;
+    }
+  }
+  return read;
 }
 
 bool supine_reference_resting_given(const supine_resting *resting) {
@@ -109,9 +121,10 @@ supine_status supine_reference_resting_set(supine_resting *resting, const char *
                             "'%s' is not a posture; did you mean '%s'?", posture,
                             supine_posture_nearest(posture));
   }
-  for (size_t k = 0; k < 3 && value != NULL; ++k) {
+  if (value != NULL) {
+    const bool read = read_values(&set, g, value);
     SUPINE_REFUSE_IF(
-        g[k] != 0.0 && !read_value(&set, 2 * k + (g[k] < 0.0), value), error, SUPINE_ERROR_ARGUMENT,
+        !read, error, SUPINE_ERROR_ARGUMENT,
         "%s=%s: give a share of the full volume above %g and at most %g (0.48, or 0.47/0.49 for "
         "the left and the right lung) or a volume of gas and tissue (2600mL)",
         posture, value, least_share, most_share);
@@ -120,13 +133,37 @@ supine_status supine_reference_resting_set(supine_resting *resting, const char *
   return supine_reference_resting_settle(resting, 0, NULL, NULL, error);
 }
 
-static const char *const names[] = {"left", "right", "supine", "prone", "inverted", "upright"};
+static const char *const names[6] = {"left", "right", "supine", "prone", "inverted", "upright"};
+
+supine_status supine_reference_resting_give(supine_resting *resting, size_t axis, double ml,
+                                            const double share[2], supine_error *error) {
+  double parts_of[2] = {share[0], share[1]};
+  if (share[1] == 0.0) {
+    const double both = at_rest(&usual, axis, 2, sides, parts);
+    parts_of[0] = share[0] * usual.share[0][axis] / both;
+    parts_of[1] = share[0] * usual.share[1][axis] / both;
+  }
+  const bool shares_fit = is_share(share[0]) && is_share(parts_of[0]) && is_share(parts_of[1]);
+  const bool fits = ml != 0.0 ? ml > 0.0 && isfinite(ml) : shares_fit;
+  SUPINE_REFUSE_IF(!fits, error, SUPINE_ERROR_ARGUMENT,
+                   "volume at rest in posture %s: give a volume of gas and tissue in mL, or shares "
+                   "of the full volume above %g and at most %g",
+                   names[axis], least_share, most_share);
+  resting->given[axis] = true;
+  resting->ml[axis] = ml;
+  if (ml == 0.0) {
+    resting->share[0][axis] = parts_of[0];
+    resting->share[1][axis] = parts_of[1];
+  }
+  return supine_reference_resting_settle(resting, 0, NULL, NULL, error);
+}
 
 void supine_reference_resting_print(const supine_resting *resting, char *text, size_t size) {
   size_t used = 0;
   for (size_t axis = 0; axis < 6 && used < size; ++axis) {
-    used += (size_t)snprintf(text + used, size - used, "%s%s=%.4g/%.4g", axis == 0 ? "" : ",",
-                             names[axis], resting->share[0][axis], resting->share[1][axis]);
+    used +=
+        (size_t)supine_print_text(text + used, size - used, "%s%s=%.4g/%.4g", axis == 0 ? "" : ",",
+                                  names[axis], resting->share[0][axis], resting->share[1][axis]);
   }
 }
 
@@ -141,9 +178,12 @@ supine_status supine_reference_resting_settle(supine_resting *resting, size_t co
   side = relative ? sides : side;
   full = relative ? parts : full;
   for (size_t axis = 0; axis < 6; ++axis) {
-    const double rest = resting->ml[axis] > 0.0 ? (relative ? 0.0 : resting->ml[axis])
-                        : resting->given[axis]  ? at_rest(resting, axis, count, side, full)
-                                                : 0.0;
+    double rest = 0.0;
+    if (resting->ml[axis] > 0.0) {
+      rest = relative ? 0.0 : resting->ml[axis];
+    } else if (resting->given[axis]) {
+      rest = at_rest(resting, axis, count, side, full);
+    }
     factor[axis] = rest / at_rest(&usual, axis, count, side, full);
     sum += factor[axis];
     known += factor[axis] > 0.0 ? 1.0 : 0.0;

@@ -44,6 +44,7 @@ typedef struct supine_resting {
   double share[2][6]; /**< [lung, posture] volume at rest / reference volume; left lung first */
   double ml[6];   /**< [posture] volume of both lungs at rest, mL; 0 if `share` gives it instead */
   bool given[6];  /**< [posture] whether the volume is the patient's own, not assumed */
+  bool predicted; /**< whether supine_reference_predict_rest has set the supine volume */
   double assumed; /**< share of both lungs, supine, from which other volumes are assumed */
   double spread;  /**< standard deviation of an assumed volume at rest / volume at full inflation */
 } supine_resting;
@@ -58,6 +59,14 @@ supine_resting supine_reference_resting_default(void);
  *   lung; "2600mL", gas and tissue of both lungs together; NULL for "copd" */
 supine_status supine_reference_resting_set(supine_resting *resting, const char *posture,
                                            const char *value, supine_error *error);
+
+/** Set the volume at rest with gravity along axis 0 to 5 (supine_resting), as
+ * supine_reference_resting_set does.
+ * @param ml     gas and tissue of both lungs, mL; or 0 to use `share`
+ * @param share  [2] shares of the full volume of the left and the right lung; if the second is 0,
+ *   the first is the share of both lungs together */
+supine_status supine_reference_resting_give(supine_resting *resting, size_t axis, double ml,
+                                            const double share[2], supine_error *error);
 
 /** Print the volumes at rest as shares of the full volume, left lung/right lung, in the form of the
  * option --resting: "left=0.462/0.61,...,upright=0.538/0.566". 256 characters are enough. */

@@ -2,10 +2,13 @@
 /* Compute displacements of tissue whose expandability varies, by least squares over edges. */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/arena.h"
 #include "base/vec3.h"
 
+#include "precompute/physics/factorisation.h"
+#include "precompute/physics/stiffness.h"
 #include "precompute/physics/strain.h"
 
 static const double shortest = 0.5; /* smallest length of an edge, mm, against infinite weights */
@@ -15,7 +18,7 @@ struct supine_strain {
   supine_arena memory;
   size_t vertex_count;
   const supine_topology *topology;
-  supine_equilibrium *equilibrium;
+  supine_factorisation *factorisation;
   double *weight;        /* [edges] 1 / length, 1/mm */
   double *hold;          /* [vertices] weight that holds the mean displacement only, 1/mm */
   double *expandability; /* [vertices] a, of geometric mean 1 before lesions */
@@ -23,10 +26,25 @@ struct supine_strain {
 
 void supine_physics_strain_destroy(supine_strain *strain) {
   if (strain != NULL) {
-    supine_physics_equilibrium_destroy(strain->equilibrium);
+    supine_physics_factorisation_destroy(strain->factorisation);
     supine_arena_free(&strain->memory);
     free(strain);
   }
+}
+
+/* Set the matrix of the least squares: w_ij off the diagonal, times -1; on it, their sum at each
+ * vertex plus `hold`. */
+static supine_status set_matrix(supine_strain *strain, supine_error *error) {
+  SUPINE_ARENA arena = {0};
+  double *diagonal = supine_arena_take(&arena, strain->vertex_count, sizeof *diagonal);
+  SUPINE_TRY(supine_arena_check(&arena, error, "the strain of %zu vertices", strain->vertex_count));
+  memcpy(diagonal, strain->hold, strain->vertex_count * sizeof *diagonal);
+  for (size_t e = 0; e < strain->topology->edge_count; ++e) {
+    diagonal[strain->topology->edges[2 * e]] += strain->weight[e];
+    diagonal[strain->topology->edges[2 * e + 1]] += strain->weight[e];
+  }
+  supine_physics_factorisation_set(strain->factorisation, diagonal, strain->weight);
+  return SUPINE_OK;
 }
 
 supine_status supine_physics_strain_create(const supine_lungs *lungs, const double *stiffness,
@@ -55,12 +73,12 @@ supine_status supine_physics_strain_create(const supine_lungs *lungs, const doub
     }
   }
   SUPINE_TRY(supine_physics_stiffness_normalise(n, stiffness, made->expandability, error));
+  SUPINE_TRY(supine_physics_factorisation_create(topology, n, &made->factorisation, error));
   for (size_t i = 0; i < n; ++i) {
     made->expandability[i] = 1.0 / (made->expandability[i] * (lesions != NULL ? lesions[i] : 1.0));
     made->hold[i] = fmax(made->hold[i], shortest / (hold_length * hold_length));
   }
-  return supine_physics_equilibrium_create_weighted(topology, n, made->hold, made->weight,
-                                                    &made->equilibrium, error);
+  return set_matrix(made, error);
 }
 
 supine_status supine_physics_strain_apply(supine_strain *strain, const double *expandability,
@@ -83,5 +101,6 @@ supine_status supine_physics_strain_apply(supine_strain *strain, const double *e
       load[j * count + c] -= part;
     }
   }
-  return supine_physics_equilibrium_solve(strain->equilibrium, count, load, displacements, error);
+  return supine_physics_factorisation_solve(strain->factorisation, count, load, displacements,
+                                            error);
 }

@@ -15,7 +15,7 @@
 #ifndef SUPINE_STRAIN_H
 #define SUPINE_STRAIN_H
 
-#include "precompute/physics/equilibrium.h"
+#include "precompute/lungs/lungs.h"
 
 /** The equations for one scan, factorised at the first use. Not thread-safe. */
 typedef struct supine_strain supine_strain;

@@ -26,10 +26,9 @@ void supine_physics_volume_forms_free(supine_volume_forms *forms) {
 
 typedef struct lung_work {
   const supine_lungs *lungs;
-  const double *directions; /* [vertices, 3] vector along which each vertex moves, mm; or NULL */
-  const double *columns;    /* [vertices, count] displacements as multiples of `directions`, or
-                               [vertices, 3, count] displacements, mm, if `directions` is NULL */
-  size_t count;             /* number of modes or other displacement fields in `columns` */
+  const supine_rows *rows; /* kind of the rows of `columns` */
+  const double *columns;   /* [rows, count] displacements by the modes */
+  size_t count;            /* number of modes or other displacement fields in `columns` */
   size_t lung;
   double centre[3]; /* centre of the box of all lungs, mm, subtracted from each vertex */
   double *sums;     /* [PARTS, size] partial sums of these coefficients, by range of triangles */
@@ -84,18 +83,18 @@ SUPINE_CLONES static void add_cubic(const lung_work *work, size_t begin, size_t 
   const size_t pairs = count * (count + 1) / 2;
   const size_t plane = 3 * n * count;
   double *third = x + n * pairs;
-  for (size_t axis = 0; axis < (work->directions == NULL ? 3 : 1); ++axis) {
+  for (size_t axis = 0; axis < supine_rows_per_vertex(work->rows->kind); ++axis) {
     const double *y = u + (axis + 1) % 3 * plane;
     const double *z = u + (axis + 2) % 3 * plane;
     memset(x, 0, n * pairs * sizeof *x);
     for (size_t t = 0; t < n; ++t) {
-      if (work->directions != NULL) {
+      if (work->rows->kind == SUPINE_ROWS_SCALAR) {
         const uint32_t *corner = work->lungs->mesh.triangles + 3 * (begin + t);
         const double *c[3];
         const double *d[3];
         for (size_t v = 0; v < 3; ++v) {
           c[v] = work->columns + corner[v] * count;
-          d[v] = work->directions + 3 * (size_t)corner[v];
+          d[v] = work->rows->directions + 3 * (size_t)corner[v];
         }
         add_pairs(count, 0.5 * supine_triple(d[0], d[1], d[2]), c[0], c[1], x + t * pairs);
         memcpy(third + t * count, c[2], count * sizeof *third);
@@ -137,9 +136,9 @@ SUPINE_CLONES static void add_block(const lung_work *work, size_t begin, size_t 
       for (size_t axis = 0; axis < 3; ++axis) {
         const size_t row = v * n + t;
         const size_t from = 3 * (size_t)corner[v] + axis;
-        const bool vector = work->directions == NULL;
+        const bool vector = work->rows->kind == SUPINE_ROWS_VECTOR;
         const double *c = work->columns + (vector ? from : corner[v]) * count;
-        const double d = vector ? 1.0 : work->directions[from];
+        const double d = vector ? 1.0 : work->rows->directions[from];
         at[axis][row] = p[v][axis];
         area[axis][row] = cross[axis];
         for (size_t i = 0; i < count; ++i) {
@@ -208,7 +207,7 @@ static void forms_collect(const lung_work *work, double unit, supine_volume_form
 }
 
 supine_status supine_physics_volume_forms_create(const supine_lungs *lungs, const double *share,
-                                                 const double *directions, const double *columns,
+                                                 const supine_rows *rows, const double *columns,
                                                  size_t count, supine_volume_forms *forms,
                                                  supine_error *error) {
   const size_t pairs = count * (count + 1) / 2;
@@ -228,7 +227,7 @@ supine_status supine_physics_volume_forms_create(const supine_lungs *lungs, cons
     return supine_error_memory(error, "volume coefficients of %zu columns", count);
   }
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-    lung_work work = {lungs, directions, columns, count, lung, {0.0}, sums, size, space, room};
+    lung_work work = {lungs, rows, columns, count, lung, {0.0}, sums, size, space, room};
     for (size_t axis = 0; axis < 3; ++axis) {
       work.centre[axis] = 0.5 * (lungs->minimum[axis] + lungs->maximum[axis]);
     }
@@ -242,9 +241,9 @@ supine_status supine_physics_volume_of_field(const supine_lungs *lungs, const do
                                              const double *directions, const double *amounts,
                                              supine_volume_form *form, supine_error *error) {
   static const double one[1] = {1.0};
+  const supine_rows rows = {SUPINE_ROWS_SCALAR, directions};
   SUPINE_FREED_BY(supine_physics_volume_forms_free) supine_volume_forms forms = {0};
-  SUPINE_TRY(
-      supine_physics_volume_forms_create(lungs, share, directions, amounts, 1, &forms, error));
+  SUPINE_TRY(supine_physics_volume_forms_create(lungs, share, &rows, amounts, 1, &forms, error));
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     supine_physics_volume_forms_contract_lung(&forms, lung, one, &form[lung]);
   }

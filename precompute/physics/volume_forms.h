@@ -19,6 +19,7 @@
 #include <supine/volume.h>
 
 #include "precompute/lungs/lungs.h"
+#include "precompute/physics/rows.h"
 
 /** Coefficients of each lung's change of volume, a polynomial of the weights of modes and of the
  * lung's gains (factors of its displacement along x, y and z). They are symmetric in the modes. */
@@ -35,20 +36,19 @@ void supine_physics_volume_forms_free(supine_volume_forms *forms);
 /** Compute the coefficients of the volume of closed lungs for `count` modes. Release them with
  * supine_physics_volume_forms_free.
  * @param share       [lungs] volume divided by healthy volume (disease.h); NULL for healthy lungs
- * @param directions  [N, 3] vector along which each vertex moves in healthy lungs, mm, or NULL
- * @param columns     [N, count] displacements by the modes as multiples of `directions`. If that is
- *                    NULL, [N, 3, count] displacement vectors, mm.
- * Uses all cores. Cost: count^3 / 2 multiplications per triangle, without directions 3 times that.
+ * @param rows        kind of the rows of `columns`; directions are those of healthy lungs
+ * @param columns     [rows, count] displacements by the modes
+ * Uses all cores. Cost: count^3 / 2 multiplications per triangle, 3 times that for VECTOR rows.
  */
 supine_status supine_physics_volume_forms_create(const supine_lungs *lungs, const double *share,
-                                                 const double *directions, const double *columns,
+                                                 const supine_rows *rows, const double *columns,
                                                  size_t count, supine_volume_forms *forms,
                                                  supine_error *error);
 
 /** Compute the volume that a displacement adds to each closed lung, as a polynomial of the lung's
  * gains (factors of its displacement along x, y and z).
- * @param amounts  [N] displacement of each vertex, as a multiple of `directions`, which are not
- * NULL
+ * @param directions  [N, 3] vector along which each vertex moves, mm
+ * @param amounts  [N] displacement of each vertex, as a multiple of `directions`
  * @param form     [lungs] output */
 supine_status supine_physics_volume_of_field(const supine_lungs *lungs, const double *share,
                                              const double *directions, const double *amounts,

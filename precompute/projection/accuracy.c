@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Measure the error of a compressed displacement field against exact solutions of the physical
- * model for held-out directions of gravity, and the share of triangles that turn over. */
+ * model for held-out directions of gravity, the share of triangles that turn over, and the
+ * error that storage adds. */
 #include <cblas.h>
 #include <math.h>
 #include <string.h>
@@ -10,6 +11,7 @@
 #include "base/parallel.h"
 #include "base/vec3.h"
 #include "precompute/projection/accuracy.h"
+#include <supine/runtime.h>
 #include <supine/sh.h>
 #include <supine/volume.h>
 
@@ -30,8 +32,8 @@ typedef struct tally {
 typedef struct accuracy_work {
   const supine_truth *truth;
   const supine_compression *compression;
-  const double *directions; /* [N, 3] displacement of each vertex per unit force, mm */
-  const double *weights;    /* [held-out directions, modes] weight of each mode */
+  const supine_rows *rows; /* kind of the rows of `compression` */
+  const double *weights;   /* [held-out directions, modes] weight of each mode */
   const double *gains; /* [held-out directions, 2] factors on exact and compressed displacement */
   tally *tallies;
   double *space; /* work space of all threads */
@@ -52,7 +54,7 @@ SUPINE_CLONES static void find_errors(size_t n, size_t axes, const double *const
 
 /* Return the number of rows of the compression for each vertex. */
 static size_t axes_of(const accuracy_work *work) {
-  return work->directions == NULL ? 3 : 1;
+  return supine_rows_per_vertex(work->rows->kind);
 }
 
 static void compare_block(const accuracy_work *work, size_t begin, size_t n, double *space,
@@ -69,7 +71,7 @@ static void compare_block(const accuracy_work *work, size_t begin, size_t n, dou
   double length[BLOCK];
   double errors[3 * BLOCK];
   for (size_t i = 0; i < n && axes == 1; ++i) {
-    length[i] = supine_length(work->directions + 3 * (begin + i));
+    length[i] = supine_length(work->rows->directions + 3 * (begin + i));
   }
   for (size_t i = 0; i < rows * modes; ++i) {
     coefficients[i] = (double)work->compression->coefficients[axes * begin * modes + i];
@@ -168,7 +170,7 @@ static void conclude(const accuracy_work *work, supine_accuracy *made) {
 
 supine_status supine_accuracy_measure(const supine_truth *truth,
                                       const supine_compression *compression,
-                                      const double *directions, const supine_volume_forms *forms,
+                                      const supine_rows *rows, const supine_volume_forms *forms,
                                       const double volume[9], supine_accuracy *accuracy,
                                       supine_error *error) {
   const size_t count = truth->direction_count;
@@ -183,7 +185,7 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
       supine_arena_take(&arena, threads * 3 * BLOCK * (modes + 2 * count), sizeof *space);
   *accuracy = (supine_accuracy){.direction_count = count};
   SUPINE_TRY(supine_arena_check(&arena, error, "errors in %zu directions", count));
-  accuracy_work work = {truth, compression, directions, weights, gains, tallies, space};
+  accuracy_work work = {truth, compression, rows, weights, gains, tallies, space};
   for (size_t d = 0; d < count; ++d) {
     const double *g = truth->directions + 3 * d;
     volumes[d] = volume_along(volume, g);
@@ -200,7 +202,7 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
   return SUPINE_OK;
 }
 
-supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const double *directions,
+supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const supine_rows *rows,
                                           const supine_compression *compression,
                                           const supine_volume_forms *forms, const double volume[9],
                                           double *share, supine_error *error) {
@@ -229,11 +231,59 @@ supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const doubl
     if (supine_volume_scale(cubic, volume_along(volume, g), &scale, NULL) != SUPINE_OK) {
       continue;
     }
-    supine_projection_displacement(compression, directions, weights, moved);
+    supine_projection_displacement(compression, rows, weights, moved);
     for (size_t i = 0; i < 3 * n; ++i) {
       moved[i] = mesh->vertices[i] + scale * moved[i];
     }
     *share = fmax(*share, supine_mesh_turned_over(&sample, moved));
   }
+  return SUPINE_OK;
+}
+
+supine_status supine_accuracy_add_storage(const supine_basis *basis,
+                                          const supine_compression *compression,
+                                          const supine_rows *rows, supine_accuracy *accuracy) {
+  enum { DIRECTIONS = 16 };
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const size_t n = info->vertex_count;
+  double gravity[3 * DIRECTIONS];
+  double square_sum = 0.0;
+  SUPINE_ARENA arena = {0};
+  float *xyz = supine_arena_take(&arena, 3 * n, sizeof *xyz);
+  double *u = supine_arena_take(&arena, 3 * n, sizeof *u);
+  supine_tally *errors = supine_arena_zeros(&arena, 1, sizeof *errors);
+  SUPINE_TRY(supine_arena_status(&arena));
+  supine_accuracy_held_out_directions(DIRECTIONS, gravity);
+  for (const double *g = gravity; g < gravity + 3 * DIRECTIONS; g += 3) {
+    const supine_state state = {.gravity = {g[0], g[1], g[2]}};
+    supine_pose pose = {.basis = 0};
+    if (supine_basis_pose(basis, &state, &pose, NULL) != SUPINE_OK ||
+        supine_deform(basis, &pose, xyz) != SUPINE_OK) {
+      continue;
+    }
+    supine_projection_displacement(compression, rows, pose.weights, u);
+    for (size_t i = 0, lung = 0; i < n; ++i) {
+      double error[3];
+      lung += i >= info->lung_begin[lung + 1];
+      for (size_t j = 3 * i; j < 3 * i + 3; ++j) {
+        u[j] *= pose.gains[lung][j % 3];
+        error[j % 3] = (double)xyz[j] - (double)info->vertices[j] - u[j];
+      }
+      square_sum += supine_dot(u + 3 * i, u + 3 * i);
+      supine_accuracy_tally_add(errors, 1, (double[]){supine_length(error)});
+    }
+  }
+  if (!(square_sum > 0.0)) {
+    return SUPINE_OK;
+  }
+  const double rms = sqrt(errors->square_sum / (double)errors->count);
+  const double p95 = supine_accuracy_tally_percentile(errors, 0.95);
+  const double size = sqrt(square_sum / (double)errors->count);
+  accuracy->relative_rms = hypot(accuracy->relative_rms, rms / size);
+  accuracy->relative_p95 = hypot(accuracy->relative_p95, p95 / size);
+  accuracy->relative_max += errors->largest / size;
+  accuracy->rms_mm = hypot(accuracy->rms_mm, rms);
+  accuracy->p95_mm = hypot(accuracy->p95_mm, p95);
+  accuracy->max_mm += errors->largest;
   return SUPINE_OK;
 }

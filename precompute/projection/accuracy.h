@@ -29,28 +29,28 @@ typedef struct supine_accuracy {
 } supine_accuracy;
 
 /** Solutions of the physical model for held-out directions of gravity. With direction d, the force
- * on vertex i is sum over r of columns[i, r] functions[d, r], up to the tolerance of span.c. */
+ * on vertex i, or the coordinate i of the displacements, is sum over r of columns[i, r]
+ * functions[d, r], up to the tolerance of span.c. */
 typedef struct supine_truth {
-  supine_arena memory; /**< of the arrays that are not owned by the projection */
+  supine_arena memory; /**< of the arrays that are not owned by the field */
   size_t direction_count;
   double *directions; /**< [direction_count, 3] unit vectors along gravity */
   size_t rank;
-  const double *columns; /**< [N, rank] solutions whose weighted sum is any other solution; owned by
-                            the projection */
+  const double *columns; /**< [rows, rank] solutions whose weighted sum is any other solution;
+                            owned by the field */
   double *functions;     /**< [direction_count, rank] weights of `columns` for each direction */
   /** [direction_count, 3] coefficients of s, s^2 and s^3 in the change of the lungs' volume, mL,
    * when the displacement is multiplied by s. */
   double *cubic;
 } supine_truth;
 
-/** Solve the physical model for `count` held-out directions of gravity. `truth` refers to
- * `projection`, which must outlive it.
- * @param directions  [N, 3] displacement of each vertex per unit force, mm; NULL if rows of the
- *   projection are coordinates of displacements
- * @param truth       release with supine_accuracy_truth_free, also after an error */
+/** Solve the physical model for `count` held-out directions of gravity. `truth` refers to `field`,
+ * which must outlive it.
+ * @param span   directions of gravity of the columns of `field`
+ * @param truth  release with supine_accuracy_truth_free, also after an error */
 supine_status supine_accuracy_truth_create(const supine_lungs *lungs, const supine_model *model,
-                                           const double *directions,
-                                           const supine_projection *projection, size_t count,
+                                           const supine_span *span,
+                                           const supine_gravity_field *field, size_t count,
                                            supine_truth *truth, supine_error *error);
 void supine_accuracy_truth_free(supine_truth *truth);
 
@@ -60,15 +60,15 @@ void supine_accuracy_held_out_directions(size_t count, double *directions);
 
 /** Measure the error of the displacement computed from the modes of `compression`, against the
  * exact solutions `truth`. Percentiles come from a histogram whose bins are at most 0.4 % wide.
- * @param directions  [N, 3] displacement of each vertex per unit force, mm
- * @param forms       volumes as polynomials of the weights of the modes (volume_forms.h)
- * @param volume      [9] change of volume from the reference surface, mL, at which errors in mm are
+ * @param rows    kind of the rows of `compression`
+ * @param forms   volumes as polynomials of the weights of the modes (volume_forms.h)
+ * @param volume  [9] change of volume from the reference surface, mL, at which errors in mm are
  *   measured: coefficients of spherical harmonics of the direction of gravity. It is halved until
  *   the lungs can reach it in every held-out direction; SUPINE_ERROR_NUMERICAL below a thousandth
  */
 supine_status supine_accuracy_measure(const supine_truth *truth,
                                       const supine_compression *compression,
-                                      const double *directions, const supine_volume_forms *forms,
+                                      const supine_rows *rows, const supine_volume_forms *forms,
                                       const double volume[9], supine_accuracy *accuracy,
                                       supine_error *error);
 
@@ -76,18 +76,18 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
  * the RMS error and of the percentile, and add the maximum. The error of storage is the difference
  * between the positions that the run time computes and the same sum of modes in double precision,
  * in 16 directions of gravity, at the default volume if the surface can have it.
- * @param basis       opened with the default storage
- * @param directions  [N, 3] displacement of each vertex per unit force, mm, or NULL */
+ * @param basis  opened with the default storage
+ * @param rows   kind of the rows of `compression` */
 supine_status supine_accuracy_add_storage(const supine_basis *basis,
                                           const supine_compression *compression,
-                                          const double *directions, supine_accuracy *accuracy);
+                                          const supine_rows *rows, supine_accuracy *accuracy);
 
 /** Find the share of triangles, 0 to 1, whose normals turn by more than 90 degrees from the
  * reference surface to a given volume. It is the largest share in the six postures with gravity
  * along an axis. Postures in which the lungs cannot reach the volume are left out. Up to 50,000
  * evenly chosen triangles are examined. Above a few in a thousand, the surface looks torn. The
  * arguments are those of supine_accuracy_measure. */
-supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const double *directions,
+supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const supine_rows *rows,
                                           const supine_compression *compression,
                                           const supine_volume_forms *forms, const double volume[9],
                                           double *share, supine_error *error);
@@ -103,9 +103,8 @@ typedef struct supine_error_table {
 
 /** Tabulate the error of the displacement by number of harmonics and by number of modes. */
 supine_status supine_accuracy_error_table_create(const supine_truth *truth,
-                                                 const supine_projection *projection,
+                                                 const supine_gravity_field *field,
                                                  const supine_compression *compression,
-                                                 const double *directions,
                                                  supine_error_table *table, supine_error *error);
 
 #endif

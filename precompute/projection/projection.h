@@ -10,6 +10,7 @@
 #ifndef SUPINE_PROJECTION_H
 #define SUPINE_PROJECTION_H
 
+#include "base/arena.h"
 #include "precompute/physics/force.h"
 #include "precompute/physics/model.h"
 #include "precompute/physics/volume_forms.h"
@@ -45,12 +46,23 @@ supine_status supine_projection_span_weights(const supine_lungs *lungs, const su
                                              const supine_span *span,
                                              const supine_gravities *gravities, double *weights);
 
+/** The force on each vertex in equilibrium, as a function of the direction of gravity. */
 typedef struct supine_projection {
   supine_span *span;          /**< directions of gravity of the columns */
-  supine_expansion expansion; /**< a row is a vertex or, if displacements vary, a coordinate */
+  supine_expansion expansion; /**< a row is a vertex */
 } supine_projection;
 
 void supine_projection_free(supine_projection *projection);
+
+/** The displacement of all vertices, as a function of the direction of gravity. */
+typedef struct supine_gravity_field {
+  supine_rows rows; /**< kind of the rows of `expansion` */
+  supine_expansion expansion;
+  double *weight;      /**< [rows] weight of each row's squared error, or NULL for 1 */
+  supine_arena memory; /**< of the directions and weights */
+} supine_gravity_field;
+
+void supine_projection_field_free(supine_gravity_field *field);
 
 /** Expand the force on each vertex in equilibrium in spherical harmonics of the direction of
  * gravity. Release the projection with supine_projection_free, also after an error. */
@@ -58,19 +70,25 @@ supine_status supine_projection_create(const supine_lungs *lungs, const supine_m
                                        size_t band, supine_projection *projection,
                                        supine_error *error);
 
-/** Compute the displacement of each vertex, mm, at mode weights: u [N, 3].
- * @param directions  as for supine_projection_volume_forms */
-void supine_projection_displacement(const supine_compression *compression, const double *directions,
+/** Make the field of displacements from the forces. Its rows are SCALAR, or VECTOR if the
+ * expandability of the tissue varies (strain.h).
+ * @param projection  keeps its span; its expansion moves to the field
+ * @param field       zeroed; release with supine_projection_field_free, also after an error */
+supine_status supine_projection_field(const supine_lungs *lungs, const supine_model *model,
+                                      supine_projection *projection, supine_gravity_field *field,
+                                      supine_error *error);
+
+/** Compute the displacement of each vertex, mm, at mode weights: u [N, 3]. */
+void supine_projection_displacement(const supine_compression *compression, const supine_rows *rows,
                                     const double *weights, double *u);
 
 /** Compute the volume of each lung as a polynomial of the weights of the modes and the gains
  * (volume_forms.h), from the coefficients in single precision that a basis file stores.
- * @param share       [lungs] volume of each lung divided by its healthy volume, or NULL for 1
- * @param directions  [N, 3] displacement of each vertex per unit force, mm; NULL if the compression
- *   holds displacements, with 3 coordinates for each vertex, instead of forces */
+ * @param share  [lungs] volume of each lung divided by its healthy volume
+ * @param rows   kind of the rows of the compression */
 supine_status supine_projection_volume_forms(const supine_compression *compression,
                                              const supine_lungs *lungs, const double *share,
-                                             const double *directions, supine_volume_forms *forms,
+                                             const supine_rows *rows, supine_volume_forms *forms,
                                              supine_error *error);
 
 #endif

@@ -7,7 +7,7 @@
 #include "base/arena.h"
 #include "base/vec3.h"
 
-#include "precompute/warp/field.h"
+#include "precompute/warp/fade.h"
 
 const double supine_field_aerated = -300.0;
 
@@ -111,75 +111,7 @@ static supine_status read_grid(const supine_basis *basis, supine_image *nodes,
   return SUPINE_OK;
 }
 
-/* Average the displacements of those neighbours of the node `at` whose displacement is known: their
- * mark in `known` is neither 0 (unknown) nor `now` (set in the layer that is being added). Return
- * false if there are none. */
-static bool mean_neighbour(const supine_image *nodes, const unsigned char *known, unsigned char now,
-                           const size_t at[3], float mean[3]) {
-  const float *u = nodes->values;
-  const size_t stride[3] = {1, nodes->size[0], nodes->size[0] * nodes->size[1]};
-  const size_t i = at[0] + stride[1] * at[1] + stride[2] * at[2];
-  size_t count = 0;
-  mean[0] = mean[1] = mean[2] = 0.0F;
-  for (size_t a = 0; a < 3; ++a) {
-    for (int side = 0; side < 2; ++side) {
-      if (side == 0 ? at[a] == 0 : at[a] + 1 == nodes->size[a]) {
-        continue;
-      }
-      const size_t j = side == 0 ? i - stride[a] : i + stride[a];
-      if (known[j] != 0 && known[j] != now) {
-        ++count;
-        for (size_t k = 0; k < 3; ++k) {
-          mean[k] += u[3 * j + k];
-        }
-      }
-    }
-  }
-  for (size_t k = 0; k < 3 && count > 0; ++k) {
-    mean[k] /= (float)count;
-  }
-  return count > 0;
-}
-
-/* Extend the field outwards in layers of nodes, so that it falls linearly to 0 over `fade` mm.
- * `known` holds a mark for each node: 0 if its displacement is not set, 1 if it was set before the
- * newest layer, and 2 or 3 (in odd or even layers) if it was set in the newest layer. */
-static void fade_out(supine_image *nodes, unsigned char *known, double fade) {
-  float *u = nodes->values;
-  const size_t count = nodes->size[0] * nodes->size[1] * nodes->size[2];
-  double step = INFINITY;
-  for (int a = 0; a < 3; ++a) {
-    step = fmin(step, supine_length(nodes->step[a]));
-  }
-  const size_t layers = (size_t)fmin(ceil(fade / step), 1000.0);
-  for (size_t layer = 1; layer < layers; ++layer) {
-    const float share = (float)(layers - layer) / (float)(layers - layer + 1);
-    const unsigned char now = layer % 2 == 1 ? 2 : 3;
-    bool any = false;
-    size_t at[3] = {0};
-    for (size_t i = 0; i < count; ++i) {
-      float mean[3];
-      if (known[i] == 0 && mean_neighbour(nodes, known, now, at, mean)) {
-        known[i] = now;
-        any = true;
-        for (size_t k = 0; k < 3; ++k) {
-          u[3 * i + k] = share * mean[k];
-        }
-      }
-      for (size_t a = 0; a < 3 && ++at[a] == nodes->size[a]; ++a) {
-        at[a] = 0;
-      }
-    }
-    if (!any) {
-      break;
-    }
-    for (size_t i = 0; i < count; ++i) {
-      known[i] = known[i] != 0 && known[i] != now ? 1 : known[i];
-    }
-  }
-}
-
-supine_status supine_field_create(const supine_basis *basis, const supine_pose *pose, double fade,
+supine_status supine_field_create(const supine_basis *basis, const supine_pose *pose,
                                   supine_field *field, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const size_t n = info->vertex_count;
@@ -203,7 +135,7 @@ supine_status supine_field_create(const supine_basis *basis, const supine_pose *
   }
   (void)supine_displace_range(basis, pose, 0, n, moved);
   for (size_t i = 0; i < count; ++i) {
-    below[i] = (float)-fade; /* nodes not in the basis count as `fade` mm outside the lungs */
+    below[i] = -INFINITY;
   }
   /* The field gives displacements from the scan, but info->vertices are at full inflation. */
   for (size_t i = 0; i < n; ++i) {
@@ -216,7 +148,7 @@ supine_status supine_field_create(const supine_basis *basis, const supine_pose *
     known[part[i]] = 1;
     below[part[i]] = depth[i];
   }
-  fade_out(&made.nodes, known, fade);
+  supine_field_fade_out(&made, known);
   *field = made;
   return SUPINE_OK;
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
  * The displacement field on the grid of a basis ('supine embed'), its inverse, and images moved by
- * it. Fields are trilinear between nodes, and constant beyond the outermost nodes. */
+ * it. Fields are trilinear between nodes, and 0 at the outermost nodes and beyond them. */
 #ifndef SUPINE_FIELD_H
 #define SUPINE_FIELD_H
 
@@ -16,10 +16,16 @@ typedef struct supine_field {
                          inverse field has no depth, and depth.values is NULL */
 } supine_field;
 
-/** Compute the displacement field from the scan to a pose. It has a physical meaning only at the
- * grid nodes that 'supine embed' stored in the basis. From these it falls to 0 over `fade` mm.
+/** Return the distance from the lungs, mm, over which a field falls to 0 if its largest
+ * displacement is `largest` mm: 60 mm, or 1.5 times the largest displacement if that is more. */
+double supine_field_fade(double largest);
+
+/** Compute the displacement field from the scan to a pose. It has a physical meaning only in the
+ * lungs, and at the grid nodes around them to which 'supine embed' extrapolated it. From the lungs
+ * it falls to 0 over the distance of supine_field_fade, and at the latest at the border of the
+ * grid.
  * @param field  release with supine_field_free */
-supine_status supine_field_create(const supine_basis *basis, const supine_pose *pose, double fade,
+supine_status supine_field_create(const supine_basis *basis, const supine_pose *pose,
                                   supine_field *field, supine_error *error);
 void supine_field_free(supine_field *field);
 
@@ -29,8 +35,7 @@ void supine_field_at(const supine_field *field, const double point[3], double u[
 /** Compute the displacement field from a pose (NULL: the scan) to another, as supine_field_create.
  * Release `field` even after a failure. */
 supine_status supine_field_between(const supine_basis *basis, const supine_pose *from,
-                                   const supine_pose *to, double fade, supine_field *field,
-                                   supine_error *error);
+                                   const supine_pose *to, supine_field *field, supine_error *error);
 
 /** Count the cells that the field u turns over (det(I + du/dx) is not positive at their centre):
  * share[0] in the lungs, share[1] in the body around them, where the field fades out. Both are

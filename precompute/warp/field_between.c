@@ -41,13 +41,13 @@ static supine_status join(const supine_field *first, supine_field *second, supin
 }
 
 supine_status supine_field_between(const supine_basis *basis, const supine_pose *from,
-                                   const supine_pose *to, double fade, supine_field *field,
+                                   const supine_pose *to, supine_field *field,
                                    supine_error *error) {
   SUPINE_FREED_BY(supine_field_free) supine_field first = {0};
-  SUPINE_TRY(supine_field_create(basis, to, fade, field, error));
+  SUPINE_TRY(supine_field_create(basis, to, field, error));
   if (from == NULL) {
     return SUPINE_OK;
   }
-  SUPINE_TRY(supine_field_create(basis, from, fade, &first, error));
+  SUPINE_TRY(supine_field_create(basis, from, &first, error));
   return join(&first, field, error);
 }

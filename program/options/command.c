@@ -11,18 +11,23 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "base/number.h"
 #include "base/output.h"
+#include "base/utf8.h"
 
 #include "program/options/command.h"
 #include "runtime/words.h"
 
 void supine_options_say(const char *command, const char *format, ...) {
+  enum { LONGEST = 4096 };
+  char text[LONGEST];
+  char printable[LONGEST];
   va_list arguments;
   va_start(arguments, format);
-  (void)fprintf(stderr, "supine %s: ", command);
-  (void)vfprintf(stderr, format, arguments);
-  (void)fputc('\n', stderr);
+  (void)supine_print_text_list(text, sizeof text, format, arguments);
   va_end(arguments);
+  supine_utf8_escape(text, "\n", printable, sizeof printable);
+  (void)fprintf(stderr, "supine %s: %s\n", command, printable);
 }
 
 int supine_options_finish(const char *command) {
@@ -42,7 +47,7 @@ bool supine_options_parse_numbers(const char *text, size_t count, double *values
   const char *at = text;
   for (size_t i = 0; i < count; ++i) {
     char *end = NULL;
-    values[i] = strtod(at, &end);
+    values[i] = supine_number_parse(at, &end);
     if (end == at || !isfinite(values[i]) || *end != (i + 1 < count ? ',' : '\0')) {
       return false;
     }
@@ -87,18 +92,18 @@ const char *supine_options_suggest(const char *text, const char *const *candidat
 }
 
 static volatile sig_atomic_t command_polls, interrupted;
-static volatile time_t interrupted_at; /* s since 1970 */
+static volatile double interrupted_at; /* s by supine_clock_seconds */
 
 /* Handle a signal. A command that polls supine_options_interrupted is told to stop, and only a
- * later signal ends it. Signals within about a second of the first are ignored, because timeout(1)
+ * later signal ends it. Signals within a second of the first are ignored, because timeout(1)
  * sends each signal twice. Any other command ends at once. */
 static void on_signal(int number) {
-  const time_t now = time(NULL);
+  const double now = supine_clock_seconds(); /* this clock never steps back */
   if (command_polls != 0 && interrupted == 0) {
     interrupted = 1;
     interrupted_at = now;
   }
-  if (command_polls != 0 && now - interrupted_at < 2) {
+  if (command_polls != 0 && now - interrupted_at < 1.0) {
     return;
   }
   supine_output_abandon_all();
@@ -113,7 +118,12 @@ void supine_options_signals_catch(bool orderly_end) {
   action.sa_flags = SA_RESTART;
   command_polls = orderly_end ? 1 : 0;
   for (size_t i = 0; i < sizeof numbers / sizeof *numbers; ++i) {
-    (void)sigaction(numbers[i], &action, NULL);
+    struct sigaction before;
+    /* A signal that nohup(1), or a shell in the background, made the program ignore stays ignored.
+     */
+    if (sigaction(numbers[i], NULL, &before) == 0 && before.sa_handler != SIG_IGN) {
+      (void)sigaction(numbers[i], &action, NULL);
+    }
   }
   (void)signal(SIGXFSZ, SIG_IGN); /* makes a write beyond the file size limit fail */
 }
@@ -135,9 +145,9 @@ bool supine_options_progress_step(void *progress, double fraction) {
   } else if (state->stderr_is_terminal && time - state->shown_at > 0.1) {
     state->shown_at = time;
     const double spent = time - state->start;
-    (void)fprintf(stderr, "\r%s: %3.0f %%", state->label, 100.0 * fraction);
+    (void)supine_print(stderr, "\r%s: %3.0f %%", state->label, 100.0 * fraction);
     if (fraction > 0.02 && spent > 1.0) {
-      (void)fprintf(stderr, ", %.0f s left ", spent * (1.0 - fraction) / fraction);
+      (void)supine_print(stderr, ", %.0f s left ", spent * (1.0 - fraction) / fraction);
     }
     (void)fflush(stderr);
   }

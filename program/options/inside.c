@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "base/text.h"
 #include "base/vec3.h"
 
@@ -44,6 +45,10 @@ supine_status supine_command_names_open(const supine_basis *basis, supine_comman
   names->text = supine_arena_take(&names->arena, length + 1, sizeof *names->text);
   SUPINE_TRY(supine_arena_check(&names->arena, error, "the names of %zu vertices", n));
   memcpy(space, text->data, length);
+  SUPINE_REFUSE_IF(strlen(space) != length || !supine_text_is_utf8(space), error,
+                   SUPINE_ERROR_FORMAT,
+                   "the names of the points are not UTF-8: save the points as UTF-8, and make the "
+                   "basis again with 'supine embed BASIS POINTS.csv'");
   names->text[names->count++] = space;
   for (size_t i = 0; i < length; ++i) {
     if (space[i] == '\n') {
@@ -233,8 +238,10 @@ supine_status supine_command_marks_make(const supine_basis *inside,
       middle->xyz[k] = (float)t->at[k];
       middle->from[k] = (float)(t->at[k] - t->move[k]);
     }
-    (void)snprintf(marks->label[part], sizeof marks->label[part],
-                   t->moved <= t->expected ? "%.30s" : "%.30s %.1f mm", t->name, t->moved);
+    const int length = (int)supine_text_fit(t->name, 30);
+    (void)supine_print_text(marks->label[part], sizeof marks->label[part],
+                            t->moved <= t->expected ? "%.*s" : "%.*s %.1f mm", length, t->name,
+                            t->moved);
     middle->label = marks->label[part];
     middle->point = count == 1;
     marks->marks.count += count > 0;

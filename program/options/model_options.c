@@ -4,33 +4,48 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "program/options/model_options.h"
 #include "program/options/state_options.h"
 #include "program/options/surface_options.h"
 
 static supine_status read_scan(const char *text, void *field, supine_error *error) {
-  supine_model_choice *choice = field;
+  supine_precompute_scan *given = &((supine_model_options *)field)->precompute.scan;
   supine_state posture = {.volume = {SUPINE_VOLUME_DEFAULT, 0.0}};
-  choice->has_scan = true;
+  supine_scan scan;
+  given->shown = SUPINE_SHOWN_STATE;
   if (supine_state_parse_posture(text, &posture, NULL) == SUPINE_OK) {
-    choice->scan = (supine_scan){.known = true, .state = posture};
+    given->state = posture;
     return SUPINE_OK;
   }
-  return supine_reference_scan_parse(text, &choice->scan, error);
+  SUPINE_TRY(supine_reference_scan_parse(text, &scan, error));
+  given->shown = scan.known ? SUPINE_SHOWN_STATE : SUPINE_SHOWN_UNKNOWN;
+  given->state = scan.state;
+  return SUPINE_OK;
 }
 
 /* Read volumes at rest, such as "supine=0.48,prone=2600mL" or "copd". */
 static supine_status read_resting(const char *text, void *field, supine_error *error) {
-  supine_model_choice *choice = field;
+  supine_precompute_volumes *volumes = &((supine_model_options *)field)->precompute.volumes;
   char piece[64];
   for (const char *at = text; supine_options_next_item(&at, piece, sizeof piece);) {
+    supine_resting read = supine_reference_resting_default();
     char *value = strchr(piece, '=');
     if (value != NULL) {
       *value++ = '\0';
     } else if (strcmp(piece, "copd") != 0) {
       return SUPINE_ERROR_ARGUMENT;
     }
-    SUPINE_TRY(supine_reference_resting_set(&choice->resting, piece, value, error));
+    SUPINE_TRY(supine_reference_resting_set(&read, piece, value, error));
+    volumes->copd = volumes->copd || strcmp(piece, "copd") == 0;
+    for (size_t axis = 0; axis < SUPINE_REST_COUNT; ++axis) {
+      if (read.given[axis] && read.ml[axis] > 0.0) {
+        volumes->rest[axis] = (supine_precompute_rest){.ml = read.ml[axis]};
+      } else if (read.given[axis]) {
+        volumes->rest[axis] =
+            (supine_precompute_rest){.share = {read.share[0][axis], read.share[1][axis]}};
+      }
+    }
   }
   return SUPINE_OK;
 }
@@ -38,47 +53,47 @@ static supine_status read_resting(const char *text, void *field, supine_error *e
 /* Read "uniform", or "linear:AXIS:FROM:TO" or "exp:AXIS:FROM:TO" with the expandability at both
  * ends of an axis x, y or z; any other text names a file. */
 static supine_status read_expandability(const char *text, void *field, supine_error *error) {
-  supine_model_choice *choice = field;
-  supine_expandability_law *law = &choice->expandability_law;
+  supine_precompute_tissue *tissue = &((supine_model_options *)field)->precompute.tissue;
   const bool linear = strncmp(text, "linear:", strlen("linear:")) == 0;
   char axis;
   char from[32];
   char to[32];
   (void)error;
-  choice->expandability = NULL;
-  *law = (supine_expandability_law){0};
+  tissue->expandability = NULL;
+  tissue->profile = SUPINE_PROFILE_UNIFORM;
   if (strcmp(text, "uniform") == 0) {
     return SUPINE_OK;
   }
   if (!linear && strncmp(text, "exp:", strlen("exp:")) != 0) {
-    choice->expandability = text;
+    tissue->expandability = text;
     return SUPINE_OK;
   }
   if (sscanf(text, "%*[a-z]:%c:%31[^:]:%31s", &axis, from, to) != 3 || axis < 'x' || axis > 'z') {
     return SUPINE_ERROR_ARGUMENT;
   }
-  law->shape = linear ? SUPINE_EXPANDABILITY_LINEAR : SUPINE_EXPANDABILITY_EXPONENTIAL;
-  law->axis = axis - 'x';
-  return supine_options_fits(supine_options_parse_number(from, &law->from) &&
-                             supine_options_parse_number(to, &law->to) && law->from > 0.0 &&
-                             law->to > 0.0);
+  tissue->profile = linear ? SUPINE_PROFILE_LINEAR : SUPINE_PROFILE_EXPONENTIAL;
+  tissue->axis = axis - 'x';
+  return supine_options_fits(supine_options_parse_number(from, &tissue->from) &&
+                             supine_options_parse_number(to, &tissue->to) && tissue->from > 0.0 &&
+                             tissue->to > 0.0);
 }
 
 static supine_status read_lesion(const char *text, void *field, supine_error *error) {
-  supine_model_choice *choice = field;
+  supine_precompute_tissue *tissue = &((supine_model_options *)field)->precompute.tissue;
   (void)error;
   double v[5];
-  if (choice->lesion_count == SUPINE_LESIONS_MAX || !supine_options_parse_numbers(text, 5, v) ||
-      !(v[3] > 0.0) || !(v[4] > 0.0)) {
+  if (tissue->lesion_count == SUPINE_PRECOMPUTE_LESIONS_MAX ||
+      !supine_options_parse_numbers(text, 5, v) || !(v[3] > 0.0) || !(v[4] > 0.0)) {
     return SUPINE_ERROR_ARGUMENT;
   }
-  choice->lesions[choice->lesion_count++] = (supine_lesion){{v[0], v[1], v[2]}, v[3], v[4]};
+  tissue->lesions[tissue->lesion_count++] =
+      (supine_precompute_lesion){{v[0], v[1], v[2]}, v[3], v[4]};
   return SUPINE_OK;
 }
 
 /* Read a collapsed lung and the share of its volume that remains, such as "left:0.3". */
 static supine_status read_lung(const char *text, void *field, supine_error *error) {
-  supine_model_choice *choice = field;
+  supine_precompute_tissue *tissue = &((supine_model_options *)field)->precompute.tissue;
   (void)error;
   const bool left = strncmp(text, "left:", strlen("left:")) == 0;
   double share;
@@ -87,7 +102,7 @@ static supine_status read_lung(const char *text, void *field, supine_error *erro
       !(share > 0.0 && share <= 1.0)) {
     return SUPINE_ERROR_ARGUMENT;
   }
-  *(left ? &choice->share[0] : &choice->share[1]) = share;
+  tissue->share[left ? 0 : 1] = share;
   return SUPINE_OK;
 }
 
@@ -104,15 +119,16 @@ static const char *const sexes[] = {"unknown", "female", "male", NULL};
   "; default " #constants " for " name
 #define LAW_SHEAR(id, name, base, gain, box, constants, shear, ...) "; default " #shear " for " name
 
-#define FILLS(member) SUPINE_FILLS(supine_model_choice, member)
+#define FILLS(member) SUPINE_FILLS(supine_model_options, member)
+#define GIVEN(member) SUPINE_SAYS_GIVEN(supine_model_options, member)
 
 const supine_option supine_command_model_options[] = {
     {.help = "Surfaces:"},
-    {.table = supine_options_surface_frame, FILLS(source.load)},
+    {.table = supine_options_surface_frame, FILLS(frame)},
     {"midline", 0, "X",
      "x of the sagittal plane between the lungs, in mm and LPS; default the middle of the bounding "
      "box of two lungs, or the medial side of a single lung",
-     FILLS(source.midline), SUPINE_SAYS_GIVEN(supine_model_choice, source.has_midline),
+     FILLS(precompute.lungs.midline), GIVEN(precompute.lungs.has_midline),
      .wants = "a number of mm", .more = true},
     {.help = "Label maps (.nrrd, .nii, .nii.gz, .mha) instead of surfaces: one map, one mask per "
              "file, or the folder of masks that TotalSegmentator writes:"},
@@ -121,14 +137,14 @@ const supine_option supine_command_model_options[] = {
      "totalsegmentator (10 to 14), totalsegmentator-v1 (13 to 17), one (every label but 0 is lung; "
      "left and right are separated), or a list such as left=10+11,right=12+13+14, or left=2 for "
      "one lung. By default, the labels in the map decide, if they are unambiguous",
-     FILLS(source.labels.labels)},
+     FILLS(precompute.lungs.labels)},
     {"edge", 0, "MM", "edge length of the surface's triangles; default 2",
-     FILLS(source.labels.edge), .range = {0.2, 20.0}, .wants = "0.2 to 20 mm", .more = true},
+     FILLS(precompute.lungs.edge), .range = {0.2, 20.0}, .wants = "0.2 to 20 mm", .more = true},
     {"close", 0, "MM",
      "close gaps and channels narrower than twice MM, which vessels leave in masks; default 0",
-     FILLS(source.labels.close), .range = {0.0, 20.0}, .wants = "0 to 20 mm"},
+     FILLS(precompute.lungs.close), .range = {0.0, 20.0}, .wants = "0 to 20 mm"},
     {"surfaces-out", 0, "FILE", "also write the surfaces: " SUPINE_MESH_ENDINGS,
-     FILLS(source.surfaces_out), .file = SUPINE_FILE_OUT, .endings = SUPINE_MESH_ENDINGS,
+     FILLS(precompute.lungs.surfaces_out), .file = SUPINE_FILE_OUT, .endings = SUPINE_MESH_ENDINGS,
      .more = true},
     {.help = "The scan:"},
     {"scanned", 0, "STATE",
@@ -157,8 +173,10 @@ const supine_option supine_command_model_options[] = {
      "height of the patient. Height and --sex give the volume expected at TLC (ECSC 1993, less 10 "
      "% for lying, plus 0.86 L of tissue), which is printed beside the volume of the scan. Without "
      "them, the range of adults is printed",
-     FILLS(person.height), .range = {50.0, 250.0}, .wants = "50 to 250 cm", .more = true},
-    {"sex", 0, "SEX", "female or male", FILLS(person.sex), .choices = sexes, .more = true},
+     FILLS(precompute.volumes.height), .range = {50.0, 250.0}, .wants = "50 to 250 cm",
+     .more = true},
+    {"sex", 0, "SEX", "female or male", FILLS(precompute.volumes.sex), .choices = sexes,
+     .more = true},
     {.help = "Law of motion. The force on a vertex is base + gain h + cx X + cy Y + cz Z. The "
              "depth h along gravity is 0 at the uppermost vertex and 1 at the lowermost. X, Y and "
              "Z are coordinates in the bounding box, from 0 to 1: X from the midline outwards, Y "
@@ -166,33 +184,36 @@ const supine_option supine_command_model_options[] = {
     {"law", 0, "LAW",
      "how gravity and volume move the surface\n" SUPINE_LAWS(
          LAW_HELP) "The options from --base to --reach change constants of the law. Default deep",
-     FILLS(law), .choices = supine_physics_law_names, .more = true},
+     FILLS(law), GIVEN(has_law), .choices = supine_physics_law_names, .more = true},
     {"base", 0, "B", "part of the force that is equal everywhere" SUPINE_LAWS(LAW_BASE),
-     FILLS(model.force.base), .more = true},
-    {"gain", 0, "G", "factor of the depth h" SUPINE_LAWS(LAW_GAIN), FILLS(model.force.gain),
-     .more = true},
+     FILLS(precompute.law.base), GIVEN(precompute.law.has_base), .more = true},
+    {"gain", 0, "G", "factor of the depth h" SUPINE_LAWS(LAW_GAIN), FILLS(precompute.law.gain),
+     GIVEN(precompute.law.has_gain), .more = true},
     {"box-force", 0, "X,Y,Z",
      "cx, cy and cz, the parts of the force that are fixed to the body" SUPINE_LAWS(LAW_BOX),
-     FILLS(model.force.box), .wants = "three numbers, CX,CY,CZ", .more = true},
+     FILLS(precompute.law.box_force), GIVEN(precompute.law.has_box_force),
+     .wants = "three numbers, CX,CY,CZ", .more = true},
     {"soften", 0, "S",
      "multiply the expandability of the tissue by exp(S (h - mean h)), so that lower tissue "
      "expands more. With --law paper, --reach must be given too. Default 0",
-     FILLS(model.force.soften), .more = true},
+     FILLS(precompute.law.soften), .more = true},
     {"constants", 0, "C1,...,C6",
      "constants of the displacement for a unit force, equations (15)-(17) of Santhanam 2008: C1 "
      "X^C2 outwards, C3 Y^C4 to the front and C5 Z^C6 to the feet, in mm. Those of deep are fitted "
      "to landmarks in ten full breaths (DIR-Lab COPDgene). Those of paper are fitted to landmarks "
      "in ten 4-D CTs (DIR-Lab), as the original ones are lost" SUPINE_LAWS(LAW_CONSTANTS),
-     FILLS(model.direction.c), .wants = "six numbers, C1,C2,C3,C4,C5,C6", .more = true},
+     FILLS(precompute.law.constants), GIVEN(precompute.law.has_constants),
+     .wants = "six numbers, C1,C2,C3,C4,C5,C6", .more = true},
     {"shear", 0, "BETA",
      "motion from back to front that grows from apex to base as lungs fill: BETA (Z - 1/2) times "
      "the RMS displacement" SUPINE_LAWS(LAW_SHEAR),
-     FILLS(model.direction.shear), .more = true},
+     FILLS(precompute.law.shear), GIVEN(precompute.law.has_shear), .more = true},
     {"reach", 0, "MM",
      "distance over which a force spreads along the surface: the force falls with the distance r "
      "about as exp(-r/MM). Without --reach, the paper law spreads it over a few edges of the mesh; "
      "in a finer mesh edges are shorter, and its surface may fold. Default 10 for deep",
-     FILLS(model.reach), SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0", .more = true},
+     FILLS(precompute.law.reach), SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0",
+     .more = true},
     {.help = "Tissue. Expandability is the inverse of stiffness. Only its ratios between parts of "
              "the lungs count: doubling it everywhere changes nothing."},
     {"expandability", 0, "WHAT",
@@ -220,24 +241,26 @@ const supine_option supine_command_model_options[] = {
 static void print_map(const char *path, const supine_source *source) {
   const supine_labels_report *report = &source->report;
   const supine_lungs *lungs = &source->lungs;
-  (void)printf("%s: %zu x %zu x %zu voxels of %.3g x %.3g x %.3g mm, %s (%s)\n  labels %s\n", path,
-               report->size[0], report->size[1], report->size[2], report->spacing[0],
-               report->spacing[1], report->spacing[2], report->axes, report->source, report->taken);
+  (void)supine_print(
+      stdout, "%s: %zu x %zu x %zu voxels of %.3g x %.3g x %.3g mm, %s (%s)\n  labels %s\n", path,
+      report->size[0], report->size[1], report->size[2], report->spacing[0], report->spacing[1],
+      report->spacing[2], report->axes, report->source, report->taken);
   if (report->neck > 0.0) {
-    (void)printf("  the lungs touch: separated at necks up to %.3g mm wide\n", report->neck);
+    (void)supine_print(stdout, "  the lungs touch: separated at necks up to %.3g mm wide\n",
+                       report->neck);
   }
   for (size_t i = 0; i < report->lung_count; ++i) {
     const supine_labels_lung *lung = &report->lung[i];
-    (void)printf("%s lung: %.1f mL", lung->side > 0 ? "left" : "right", lung->mask);
+    (void)supine_print(stdout, "%s lung: %.1f mL", lung->side > 0 ? "left" : "right", lung->mask);
     if (lung->closed > 0.0) {
-      (void)printf("; closed gaps of %.2g mL", lung->closed);
+      (void)supine_print(stdout, "; closed gaps of %.2g mL", lung->closed);
     }
-    (void)printf("; dropped %zu %s (%.2g mL), filled %zu %s (%.2g mL)\n", lung->islands,
-                 lung->islands == 1 ? "island" : "islands", lung->dropped, lung->cavities,
-                 lung->cavities == 1 ? "cavity" : "cavities", lung->filled);
-    (void)printf("  surface of %zu vertices: %.1f mL (%+.2g mL)\n",
-                 lungs->lung_begin[i + 1] - lungs->lung_begin[i], lung->surface,
-                 lung->surface - lung->mask);
+    (void)supine_print(stdout, "; dropped %zu %s (%.2g mL), filled %zu %s (%.2g mL)\n",
+                       lung->islands, lung->islands == 1 ? "island" : "islands", lung->dropped,
+                       lung->cavities, lung->cavities == 1 ? "cavity" : "cavities", lung->filled);
+    (void)supine_print(stdout, "  surface of %zu vertices: %.1f mL (%+.2g mL)\n",
+                       lungs->lung_begin[i + 1] - lungs->lung_begin[i], lung->surface,
+                       lung->surface - lung->mask);
   }
   if (source->axes_hold) {
     (void)printf("the shape of the lungs confirms the axes in the header: narrow at the head, "
@@ -245,15 +268,43 @@ static void print_map(const char *path, const supine_source *source) {
   }
 }
 
-supine_status supine_command_prepare(const char *command, supine_model_choice *choice, char **paths,
-                                     size_t count, supine_prepared *prepared, supine_error *error) {
+static int show_progress(void *progress, double fraction) {
+  return supine_options_progress_step(progress, fraction) ? 0 : 1;
+}
+
+supine_status supine_command_prepare(const char *command, supine_model_options *model,
+                                     const supine_arguments *given, supine_prepared *prepared,
+                                     supine_error *error) {
+  static const supine_precompute_law_kind kinds[SUPINE_LAW_COUNT] = {
+      [SUPINE_LAW_DEEP] = SUPINE_PRECOMPUTE_LAW_DEEP,
+      [SUPINE_LAW_PAPER] = SUPINE_PRECOMPUTE_LAW_PAPER};
+  supine_precompute_options *options = &model->precompute;
+  const supine_volume *full = &model->full.volume;
+  SUPINE_REFUSE_IF(
+      full->kind != SUPINE_VOLUME_DEFAULT && full->kind != SUPINE_VOLUME_ABSOLUTE, error,
+      SUPINE_ERROR_ARGUMENT,
+      "--full is for a scan at rest: give a volume such as 4200mL, and --scanned supine:rest too");
+  options->size = sizeof *options;
+  options->volumes.full = full->ml;
+  options->lungs.paths = (const char *const *)given->operand;
+  options->lungs.path_count = given->count;
+  options->lungs.unit = model->frame.millimetres_per_unit;
+  if (model->frame.axes != SUPINE_AXES_AUTO) {
+    supine_mesh_axes_letters(model->frame.axes, model->axes);
+    options->lungs.axes = model->axes;
+  }
+  if (model->has_law) {
+    options->law.kind = kinds[model->law];
+  }
   supine_progress progress = supine_options_progress_begin("label map");
-  choice->source.labels.progress = supine_options_progress_step;
-  choice->source.labels.progress_context = &progress;
-  const supine_status status = supine_precompute_prepare(choice, paths, count, prepared, error);
+  options->progress = show_progress;
+  options->context = &progress;
+  const supine_status status = supine_precompute_prepare(options, prepared, error);
   supine_options_progress_end(&progress);
+  options->progress = NULL;
+  options->context = NULL;
   if (prepared->source.is_map) {
-    print_map(paths[0], &prepared->source);
+    print_map(given->operand[0], &prepared->source);
   }
   supine_options_say_findings(command, &prepared->source.findings);
   return status;
@@ -268,7 +319,7 @@ supine_status supine_command_load_lungs(const char *command, const char *operand
   (void)supine_options_next_item(&second, first, sizeof first);
   SUPINE_REFUSE_IF(second != NULL && strchr(second, ',') != NULL, error, SUPINE_ERROR_ARGUMENT,
                    "'%s' names more than two surfaces: give one or two", operand);
-  char *paths[] = {first, (char *)second};
+  const char *const paths[] = {first, second};
   const supine_status status =
       supine_precompute_source_load(options, paths, second != NULL ? 2 : 1, &source, error);
   supine_options_say_findings(command, &source.findings);

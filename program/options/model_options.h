@@ -3,16 +3,30 @@
 #ifndef SUPINE_MODEL_OPTIONS_H
 #define SUPINE_MODEL_OPTIONS_H
 
+#include <supine/precompute.h>
+
 #include "precompute/prepare.h"
 
 #include "program/options/command.h"
 
-/* Option table that fills a supine_model_choice. */
+/* Options of lungs and their model. supine_command_prepare completes `precompute` from the others.
+ */
+typedef struct supine_model_options {
+  supine_precompute_options precompute;
+  supine_mesh_load_options frame; /* axes and unit */
+  char axes[4];                   /* the letters of frame.axes */
+  bool has_law;
+  int law;           /* a supine_law */
+  supine_state full; /* the kind of its volume is SUPINE_VOLUME_DEFAULT if it is not given */
+} supine_model_options;
+
+/* Option table that fills a supine_model_options. */
 extern const supine_option supine_command_model_options[];
 
-/* Load the lungs from the files `paths` and make their model. Print what the checks found. */
-supine_status supine_command_prepare(const char *command, supine_model_choice *choice, char **paths,
-                                     size_t count, supine_prepared *prepared, supine_error *error);
+/* Load the lungs from the given files and make their model. Print what the checks found. */
+supine_status supine_command_prepare(const char *command, supine_model_options *model,
+                                     const supine_arguments *given, supine_prepared *prepared,
+                                     supine_error *error);
 
 /* Load lungs from one or two surfaces, such as "left.ply,right.ply", or from a label map, and print
  * what the checks of the files found.

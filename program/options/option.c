@@ -3,13 +3,16 @@
 #include <getopt.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 #include <sys/stat.h>
 
 #include <supine/version.h>
 
 #include "base/arena.h"
+#include "base/ascii.h"
+#include "base/blas.h"
+#include "base/number.h"
 #include "base/output.h"
+#include "base/parallel.h"
 #include "base/text.h"
 
 #include "program/options/command.h"
@@ -51,7 +54,7 @@ static bool within(const supine_option *option, double number) {
 
 static supine_status read_choice(const supine_option *option, const char *text, unsigned *choice) {
   for (unsigned i = 0; option->choices[i] != NULL; ++i) {
-    if (strcasecmp(option->choices[i], text) == 0) {
+    if (supine_ascii_same(option->choices[i], text)) {
       *choice = i;
       return SUPINE_OK;
     }
@@ -99,7 +102,7 @@ static void describe_valid_values(const supine_option *option, char *text, size_
       used += (size_t)snprintf(text + used, size - used, "%s%s", before, option->choices[i]);
     }
   } else if (option->range[1] > 0.0 && !option->open) {
-    (void)snprintf(text, size, "%g to %g", option->range[0], option->range[1]);
+    (void)supine_print_text(text, size, "%g to %g", option->range[0], option->range[1]);
   } else {
     (void)snprintf(text, size, "%s",
                    option->kind == SUPINE_OPTION_COUNT     ? "a whole number"
@@ -205,7 +208,7 @@ static bool has_ending(const char *path, const char *endings) {
   }
   const size_t length = strlen(dot);
   for (const char *at = endings; (at = strchr(at, '.')) != NULL; ++at) {
-    if (strncasecmp(at, dot, length) == 0 && strchr(", ", at[length]) != NULL) {
+    if (supine_ascii_same_begin(at, dot, length) && strchr(", ", at[length]) != NULL) {
       return true;
     }
   }
@@ -326,8 +329,7 @@ static void describe_command(int argc, char **argv, char *text, size_t size) {
   (void)supine_text_make_utf8(text);
 }
 
-static supine_status read_and_run(reading *r, int argc, char **argv, const void *context,
-                                  supine_error *error) {
+static supine_status read_and_run(reading *r, int argc, char **argv, supine_error *error) {
   const supine_command *command = r->command;
   char made_by[512];
   describe_command(argc, argv, made_by, sizeof made_by);
@@ -345,19 +347,13 @@ static supine_status read_and_run(reading *r, int argc, char **argv, const void 
     supine_options_print_help(command, r->help == HELP_ALL, stdout);
     return SUPINE_OK;
   }
-  const supine_arguments given = {argv + optind, (size_t)(argc - optind), made_by, context};
+  const supine_arguments given = {argv + optind, (size_t)(argc - optind), made_by};
   SUPINE_TRY(check_given(r, given.count, argv, error));
   SUPINE_TRY(check_outputs(r, &given, error));
+  if (command->uses_blas) {
+    SUPINE_TRY(supine_blas_reserve(supine_thread_count(), error));
+  }
   return command->run(r->request, &given, error);
-}
-
-supine_status supine_options_run_words(const supine_command *command, int argc, char **argv,
-                                       const void *context, supine_error *error) {
-  reading r = {.command = command, .request = calloc(1, command->request_size)};
-  const supine_status status =
-      r.request != NULL ? read_and_run(&r, argc, argv, context, error) : SUPINE_ERROR_MEMORY;
-  free(r.request);
-  return status;
 }
 
 static int exit_code(supine_status status) {
@@ -375,7 +371,10 @@ static int exit_code(supine_status status) {
 
 int supine_options_run(const supine_command *command, int argc, char **argv) {
   supine_error error = {.message = ""};
-  const supine_status status = supine_options_run_words(command, argc, argv, NULL, &error);
+  reading r = {.command = command, .request = calloc(1, command->request_size)};
+  const supine_status status =
+      r.request != NULL ? read_and_run(&r, argc, argv, &error) : SUPINE_ERROR_MEMORY;
+  free(r.request);
   if (status == SUPINE_OK) {
     return supine_options_finish(command->name);
   }

@@ -88,7 +88,6 @@ typedef struct supine_arguments {
   char **operand; /* [count] in the order given */
   size_t count;
   const char *made_by; /* the command line, for the metadata of a file */
-  const void *context; /* from the caller of supine_options_run_words, or NULL */
 } supine_arguments;
 
 typedef struct supine_command {
@@ -101,6 +100,7 @@ typedef struct supine_command {
   size_t operands_least, operands_most;
   const char *operands_missing; /* message if the number of operands is wrong */
   size_t request_size;
+  bool uses_blas;               /* the command calls OpenBLAS, in as many threads as it starts */
   void (*begin)(void *request); /* sets defaults other than supine_option.standard; may be NULL */
   supine_status (*run)(void *request, const supine_arguments *given, supine_error *error);
 } supine_command;
@@ -114,9 +114,6 @@ typedef struct supine_command {
 
 /* Read the options and run the command; return an exit code. argv[0] names the command. */
 int supine_options_run(const supine_command *command, int argc, char **argv);
-/* Do the same, but return the status. Not thread-safe, as getopt_long() is not. */
-supine_status supine_options_run_words(const supine_command *command, int argc, char **argv,
-                                       const void *context, supine_error *error);
 
 /* Return SUPINE_ERROR_ARGUMENT if an output is the same file as an input. Commands call this for
  * inputs that are named in a list file or inside an option's value. All other inputs are checked

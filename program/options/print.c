@@ -5,20 +5,59 @@
 
 #include <jansson.h>
 
+#include "base/locale.h"
 #include "base/text.h"
+#include "base/utf8.h"
 
 #include "program/options/command.h"
 
 enum { TEXT_MAX = 4096, COLUMNS_MAX = 16, LABEL_WIDTH = 36, LIST_MAX = 9 };
 static const double zero = 1e-12; /* smaller absolute values are printed as 0 */
 
-/* Format a value, or the first LIST_MAX values of a list, as one line. */
-static void write_text(const json_t *value, char text[TEXT_MAX]) {
+/* What a number means. It decides how many digits are printed. */
+typedef enum quantity {
+  QUANTITY_OTHER,
+  QUANTITY_DISTANCE,  /* in mm */
+  QUANTITY_COORDINATE /* of a displacement, in mm */
+} quantity;
+
+/* Find what numbers mean by their label. In a table with the given heading, labels of columns may
+ * leave out the unit. */
+static quantity quantity_of(const char *heading, const char *label) {
+  if (!supine_text_ends_in(label, ", mm") && !supine_text_ends_in(heading, ", mm")) {
+    return QUANTITY_OTHER;
+  }
+  return strstr(label, "x, y, z") != NULL || strstr(label, "translation") != NULL
+             ? QUANTITY_COORDINATE
+             : QUANTITY_DISTANCE;
+}
+
+/* Append a number to `text`. Numbers have four significant digits. Those in mm have at most three
+ * decimals. */
+static void add_real(double real, quantity kind, char text[TEXT_MAX]) {
+  const double size = fabs(real);
+  if (size < zero) {
+    supine_text_add(text, TEXT_MAX, "0");
+  } else if (kind == QUANTITY_DISTANCE && size < 1.0) {
+    supine_text_add(text, TEXT_MAX, "%s", supine_text_distance(real).text);
+  } else if (kind == QUANTITY_COORDINATE && size < SUPINE_TEXT_DISTANCE_LEAST) {
+    supine_text_add(text, TEXT_MAX, "0");
+  } else if (kind == QUANTITY_COORDINATE && size < 1.0) {
+    supine_text_add(text, TEXT_MAX, "%.3f", real);
+  } else if (real == floor(real)) {
+    supine_text_add(text, TEXT_MAX, "%.0f", real);
+  } else {
+    supine_text_add(text, TEXT_MAX, size < 1000.0 ? "%.4g" : "%.1f", real);
+  }
+}
+
+/* Format a value, or the first LIST_MAX values of a list, as one line. Escape control characters of
+ * texts, which may come from files. NULL is a value that is missing. */
+static void write_text(const json_t *value, quantity kind, char text[TEXT_MAX]) {
   size_t i;
   const json_t *item;
-  double real;
   text[0] = '\0';
-  switch (json_typeof(value)) {
+  switch (value == NULL ? JSON_NULL : json_typeof(value)) {
   case JSON_ARRAY:
     json_array_foreach(value, i, item) {
       char one[TEXT_MAX];
@@ -27,23 +66,18 @@ static void write_text(const json_t *value, char text[TEXT_MAX]) {
                         json_array_size(value));
         break;
       }
-      write_text(item, one);
+      write_text(item, kind, one);
       supine_text_add(text, TEXT_MAX, "%s%s", i > 0 ? ", " : "", one);
     }
     break;
   case JSON_STRING:
-    supine_text_add(text, TEXT_MAX, "%s", json_string_value(value));
+    supine_utf8_escape(json_string_value(value), "", text, TEXT_MAX);
     break;
   case JSON_INTEGER:
     supine_text_add(text, TEXT_MAX, "%" JSON_INTEGER_FORMAT, json_integer_value(value));
     break;
   case JSON_REAL:
-    real = fabs(json_real_value(value)) < zero ? 0.0 : json_real_value(value);
-    supine_text_add(text, TEXT_MAX,
-                    real == floor(real)   ? "%.0f"
-                    : fabs(real) < 1000.0 ? "%.4g"
-                                          : "%.1f",
-                    real);
+    add_real(json_real_value(value), kind, text);
     break;
   default:
     supine_text_add(text, TEXT_MAX, "%s",
@@ -179,35 +213,59 @@ static void write_label(const char *parent, const char *key, char text[TEXT_MAX]
       length -= strlen(units[i][0]);
     }
   }
-  (void)snprintf(text, TEXT_MAX, "%.*s%s", (int)length, key, unit);
+  char plain[TEXT_MAX];
+  (void)snprintf(plain, sizeof plain, "%.*s%s", (int)length, key, unit);
+  supine_utf8_escape(plain, "", text, TEXT_MAX);
   for (char *at = text; (at = strchr(at, '_')) != NULL;) {
     *at = ' ';
   }
 }
 
-/* Print a list of objects, which have the same keys, as a table with a heading. */
-static void print_table(const json_t *rows) {
-  json_t *first = json_array_get(rows, 0);
+/* Return an object with the columns of a table: each key of any row, in the order of appearance,
+ * with the value true if its column has only numbers, which are aligned right. */
+static json_t *find_columns(const json_t *rows) {
+  json_t *columns = json_object();
+  size_t i;
+  json_t *row;
+  const char *name;
+  json_t *member;
+  json_array_foreach(rows, i, row) {
+    json_object_foreach(row, name, member) {
+      const bool numbers = json_is_number(member) || json_is_null(member);
+      const json_t *before = json_object_get(columns, name);
+      (void)json_object_set_new(columns, name,
+                                json_boolean(numbers && (before == NULL || json_is_true(before))));
+    }
+  }
+  return columns;
+}
+
+/* Print a list of objects as a table; `heading` stands above it. A row may lack the values of some
+ * columns. */
+static void print_table(const char *heading, const json_t *rows) {
+  json_auto_t *columns = find_columns(rows);
   size_t width[COLUMNS_MAX] = {0};
   char text[TEXT_MAX];
+  char label[TEXT_MAX];
   for (int pass = 0; pass < 2; ++pass) { /* first measure the columns, then print */
     for (size_t i = 0; i <= json_array_size(rows); ++i) {
       const char *name;
-      json_t *member;
+      json_t *numbers;
       size_t column = 0;
-      json_object_foreach(first, name, member) {
-        if (i == 0) {
-          write_label("", name, text);
-        } else {
-          write_text(json_object_get(json_array_get(rows, i - 1), name), text);
+      json_object_foreach(columns, name, numbers) {
+        write_label("", name, label);
+        if (i > 0) {
+          write_text(json_object_get(json_array_get(rows, i - 1), name),
+                     quantity_of(heading, label), text);
         }
-        const size_t length = strlen(text);
+        const char *cell = i == 0 ? label : text;
+        const size_t length = strlen(cell);
         if (pass == 0) {
           width[column] = length > width[column] ? length : width[column];
         } else {
-          const bool last = column + 1 == json_object_size(first);
-          const int side = json_is_number(member) ? 1 : last ? 0 : -1; /* align numbers right */
-          (void)printf("  %*s", side * (int)width[column], text);
+          const bool last = column + 1 == json_object_size(columns);
+          const int side = json_is_true(numbers) ? 1 : last ? 0 : -1; /* align numbers right */
+          (void)printf("  %*s", side * (int)width[column], cell);
         }
         column += column + 1 < COLUMNS_MAX;
       }
@@ -230,13 +288,13 @@ static void print_member(const char *parent, const char *name, json_t *value, in
       print_member(parent, name, item, indent);
     }
   } else if (!has_objects(value)) {
-    write_text(value, text);
+    write_text(value, quantity_of("", heading), text);
     if (text[0] != '\0') {
       (void)printf("%*s%-*s %s\n", indent, "", LABEL_WIDTH - indent, heading, text);
     }
   } else if (is_row(json_array_get(value, 0))) {
     (void)printf("%*s%s\n", indent, "", heading);
-    print_table(value);
+    print_table(heading, value);
   } else if (json_is_array(value)) {
     json_array_foreach(value, i, item) {
       (void)printf("%s %zu\n", heading, i + 1);
@@ -264,7 +322,7 @@ static void print_object(const char *parent, json_t *object, int indent) {
     }
   }
   if (json_array_size(rows) > 1 && json_array_size(rows) == json_object_size(object)) {
-    print_table(rows);
+    print_table("", rows);
   } else {
     json_object_foreach(object, name, member) {
       print_member(parent, name, member, indent);
@@ -288,11 +346,12 @@ json_t *supine_options_json_numbers(size_t count, const double *numbers) {
 }
 
 void supine_options_print(json_t *value, bool json) {
+  SUPINE_C_LOCALE;
   if (json) {
     (void)json_dumpf(value, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
     (void)putchar('\n');
   } else if (json_is_array(value)) {
-    print_table(value);
+    print_table("", value);
   } else {
     print_object("", value, 0);
   }

@@ -8,6 +8,7 @@
 
 #include "base/arena.h"
 #include "base/csv.h"
+#include "base/locale.h"
 
 #include "program/options/pv.h"
 
@@ -99,6 +100,7 @@ static supine_status read_curve(json_t *limb, supine_pv_curve *curve, supine_err
 }
 
 supine_status supine_breath_load(const char *path, supine_pv *pv, supine_error *error) {
+  SUPINE_C_LOCALE;
   json_error_t why;
   supine_pv found = {0};
   json_t *limbs[SUPINE_PV_LIMB_COUNT];

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "precompute/posed/posed.h"
 #include "program/options/basis_input.h"
 #include "program/options/state_options.h"
@@ -27,7 +28,8 @@ static supine_status read_gravity(const char *text, void *field, supine_error *e
   if (!supine_options_parse_numbers(text, 3, numbers)) {
     return SUPINE_ERROR_ARGUMENT;
   }
-  (void)snprintf(posture, sizeof posture, "%.17g:%.17g:%.17g", numbers[0], numbers[1], numbers[2]);
+  (void)supine_print_text(posture, sizeof posture, "%.17g:%.17g:%.17g", numbers[0], numbers[1],
+                          numbers[2]);
   return supine_state_parse_posture(posture, field, error);
 }
 
@@ -161,14 +163,14 @@ supine_status supine_options_plausible(const supine_plausible *lungs, supine_err
   const double share = lungs->full > 0.0 ? lungs->volume / lungs->full : 1.0;
   (void)supine_state_describe(lungs->state, state, sizeof state);
   if (!(share >= least_of_full && share <= most_of_full)) {
-    (void)snprintf(wrong, sizeof wrong,
-                   "%.0f mL are %.0f %% of full inflation (%.0f mL), outside the %.0f to %.0f %% "
-                   "that lungs hold",
-                   lungs->volume, 100.0 * share, lungs->full, 100.0 * least_of_full,
-                   100.0 * most_of_full);
+    (void)supine_print_text(
+        wrong, sizeof wrong,
+        "%.0f mL are %.0f %% of full inflation (%.0f mL), outside the %.0f to %.0f %% "
+        "that lungs hold",
+        lungs->volume, 100.0 * share, lungs->full, 100.0 * least_of_full, 100.0 * most_of_full);
   } else if (lungs->folded > folded_limit) {
-    (void)snprintf(wrong, sizeof wrong, "%s: %.3g %% (at most %g %%)", lungs->parts,
-                   100.0 * lungs->folded, 100.0 * folded_limit);
+    (void)supine_print_text(wrong, sizeof wrong, "%s: %.3g %% (at most %g %%)", lungs->parts,
+                            100.0 * lungs->folded, 100.0 * folded_limit);
   } else {
     return SUPINE_OK;
   }
@@ -232,7 +234,7 @@ supine_held supine_options_held(const supine_basis *basis, const supine_state *s
   const bool other = kind == (at_rest ? SUPINE_VOLUME_FULL : SUPINE_VOLUME_REST);
   const bool measured = fabs(held - in_scan[lung]) < 0.05;
   const bool assumed = !measured && other && spread != NULL;
-  const double ratio = assumed ? exp(strtod(spread, NULL)) : 1.0;
+  const double ratio = assumed ? exp(supine_number_parse(spread, NULL)) : 1.0;
   return (supine_held){.value = held,
                        .low = above + (held - above) / ratio,
                        .high = above + (held - above) * ratio,

@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Declare the options for axes, units and landmarks, for commands that read surfaces. */
-#include <ctype.h>
 #include <string.h>
 
+#include "base/ascii.h"
 #include "program/options/surface_options.h"
 
 static supine_status read_axes(const char *text, void *field, supine_error *error) {
   char letters[4] = "";
   (void)error;
   for (size_t k = 0; k < 3 && strlen(text) == 3; ++k) {
-    letters[k] = (char)toupper((unsigned char)text[k]);
+    letters[k] = supine_ascii_upper(text[k]);
   }
   return supine_options_fits(supine_mesh_axes_parse(letters, field));
 }

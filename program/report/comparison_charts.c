@@ -5,6 +5,8 @@
 #include <stdlib.h>
 
 #include "base/arena.h"
+#include "base/locale.h"
+#include "base/number.h"
 
 #include "program/report/comparison.h"
 #include "program/view/render/render.h"
@@ -33,6 +35,7 @@ static double down(double height) {
 }
 
 json_t *supine_report_profile(const supine_comparison *c) {
+  SUPINE_C_LOCALE;
   double low = 0.0;
   double high = 0.0;
   for (size_t i = 0; i < c->postures.count; ++i) {
@@ -111,7 +114,7 @@ static double trace(const supine_basis_info *info, const slice *s, double at, co
     }
     if (!isnan(up[0])) {
       twice += up[0] * down[1] - down[0] * up[1];
-      (void)fprintf(path, "M%.1f %.1fL%.1f %.1f", up[0], up[1], down[0], down[1]);
+      (void)supine_print(path, "M%.1f %.1fL%.1f %.1f", up[0], up[1], down[0], down[1]);
     }
   }
   return fabs(twice) / 2;
@@ -134,6 +137,7 @@ static json_t *outline(const supine_comparison *c, const slice *s, double at,
 }
 
 static json_t *letter(double x, double y, const char *name) {
+  SUPINE_C_LOCALE;
   return json_pack("{s:o, s:o, s:s}", "x", json_sprintf("%.0f", x), "y", json_sprintf("%.0f", y),
                    "letter", name);
 }
@@ -141,6 +145,7 @@ static json_t *letter(double x, double y, const char *name) {
 /* Return the chart of a slice; its title states how each posture changes the area. */
 static json_t *chart(const supine_comparison *c, const slice *s, const double low[3],
                      const double high[3], float *xyz) {
+  SUPINE_C_LOCALE;
   enum { MARGIN = 18, SCALE_BAR = 50 }; /* mm */
   const double at = low[s->axis] + s->share * (high[s->axis] - low[s->axis]);
   const double top = s->sign > 0 ? low[s->vertical] : -high[s->vertical];

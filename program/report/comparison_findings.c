@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Build the first sentences and the first tables of the report. */
-#include <ctype.h>
 #include <math.h>
 #include <string.h>
 
+#include "base/ascii.h"
+#include "base/locale.h"
 #include "base/text.h"
 #include "program/report/comparison.h"
 
@@ -50,8 +51,8 @@ static json_t *finding(const supine_comparison *c, size_t posture) {
   char text[512] = "";
   if (p->label != name) {
     supine_text_add(text, sizeof text, "Lying on the %s,", p->label);
-  } else if (isalpha((unsigned char)name[0])) {
-    supine_text_add(text, sizeof text, "%c%s,", toupper((unsigned char)name[0]), name + 1);
+  } else if (supine_ascii_is_letter(name[0])) {
+    supine_text_add(text, sizeof text, "%c%s,", supine_ascii_upper(name[0]), name + 1);
   } else {
     supine_text_add(text, sizeof text, "With gravity along %s,", name);
   }
@@ -84,6 +85,7 @@ json_t *supine_report_findings(const supine_comparison *c) {
 }
 
 json_t *supine_report_targets(const supine_comparison *c) {
+  SUPINE_C_LOCALE;
   json_t *list = json_array();
   for (size_t k = 0; c->inside != NULL && k < c->names.count; ++k) {
     const char *name = c->names.text[k];
@@ -106,6 +108,7 @@ json_t *supine_report_targets(const supine_comparison *c) {
 }
 
 json_t *supine_report_postures(const supine_comparison *c) {
+  SUPINE_C_LOCALE;
   const supine_basis_info *info = supine_basis_get_info(c->basis);
   json_t *list = json_array();
   for (size_t i = 0; i < c->postures.count; ++i) {

@@ -6,6 +6,7 @@
 
 #include <supine/version.h>
 
+#include "base/locale.h"
 #include "program/options/basis_input.h"
 #include "program/report/comparison.h"
 #include "program/view/export/template.h"
@@ -68,6 +69,7 @@ static json_t *outlined(const supine_comparison *c) {
 
 /* Return the values of the tags of report.html but {{pictures}} and {{trouble}}. */
 static json_t *values(const supine_comparison *c) {
+  SUPINE_C_LOCALE;
   char title[256];
   char volume[160];
   supine_options_basis_title(c->path, title, sizeof title);

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #include "base/arena.h"
+#include "base/locale.h"
 #include "program/report/comparison.h"
 #include "program/view/export/template.h"
 #include "program/view/render/render.h"
@@ -37,6 +38,7 @@ static json_t *draw(const supine_basis *basis, const supine_scene *scene, supine
  * picture, degrees, after which gravity points down. If gravity is nearly normal to the picture,
  * {{towards}} or {{away}} replaces both. */
 static void set_gravity(const double g[3], json_t *shot) {
+  SUPINE_C_LOCALE;
   const double seen[3] = {g[0], g[2], -g[1]}; /* right, up, towards the viewer in front */
   if (hypot(seen[0], seen[1]) > 0.35) {
     (void)json_object_set_new(
@@ -66,6 +68,7 @@ static json_t *picture(const supine_comparison *c, size_t posture, double larges
 
 /* Return the data of bar.html, a colour bar from 0 to `largest` with the caption `words`. */
 static json_t *make_bar(double largest, const char *words) {
+  SUPINE_C_LOCALE;
   enum { STOPS = 16 };
   const double step = supine_render_bar_step(largest);
   json_t *stops = json_array();

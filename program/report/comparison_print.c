@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/locale.h"
+#include "base/number.h"
 #include "program/report/comparison.h"
 
 static json_t *statistics(const supine_distance_statistics *d) {
@@ -21,6 +23,7 @@ static json_t *by_lung(const supine_comparison *c, const double *values) {
 }
 
 json_t *supine_report_held(const supine_comparison *c, size_t posture, size_t lung, bool as_text) {
+  SUPINE_C_LOCALE;
   const supine_compared_posture *of = &c->posture[posture];
   const supine_held held = supine_options_held(c->basis, &of->item->state, &of->pose, lung);
   return !as_text ? json_pack("{s:f, s:f, s:f, s:s}", "value", held.value, "low", held.low, "high",
@@ -88,8 +91,8 @@ static void add_row(json_t *tables, const char *heading, const char *name, const
 /* Add to `text` the tables that compare the postures. */
 static void add_tables(const supine_comparison *c, json_t *text) {
   char gained[64];
-  (void)snprintf(gained, sizeof gained, "volume (mL) that each lung gains in a breath of %.4g mL",
-                 c->breath);
+  (void)supine_print_text(gained, sizeof gained,
+                          "volume (mL) that each lung gains in a breath of %.4g mL", c->breath);
   for (size_t i = 0; i < c->postures.count; ++i) {
     const supine_compared_posture *p = &c->posture[i];
     json_t *moved = statistics(&p->displacement);

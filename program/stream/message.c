@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Read messages from untrusted bytes. Write headers, floats, and the first fields of a body. */
 #include <arpa/inet.h>
-#include <ctype.h>
 #include <stdbool.h>
 #include <string.h>
 
@@ -35,7 +34,7 @@ supine_status supine_stream_header_read(const unsigned char bytes[SUPINE_STREAM_
   SUPINE_REFUSE_IF(header->version != 1 && header->version != 2, error, SUPINE_ERROR_FORMAT,
                    "message header version %u is unknown: send version 1 or 2", header->version);
   for (const char *c = header->type; *c != '\0'; ++c) {
-    SUPINE_REFUSE_IF(!isprint((unsigned char)*c), error, SUPINE_ERROR_FORMAT,
+    SUPINE_REFUSE_IF(*c < ' ' || *c > '~', error, SUPINE_ERROR_FORMAT,
                      "the type of a message is not text: send OpenIGTLink messages");
   }
   return SUPINE_OK;

@@ -28,6 +28,8 @@ void supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connect
                                .connecting = connecting,
                                .message = message,
                                .size = SUPINE_STREAM_HEADER,
+                               .active = now,
+                               .given = now,
                                .emptied = now,
                                .content = content};
 }
@@ -90,6 +92,7 @@ supine_stream_outcome supine_stream_peer_read(supine_stream_peer *peer, double n
       if (!skips) {
         receive(context, peer);
       }
+      peer->active = now;
       peer->in_body = false;
       peer->received = 0;
       peer->size = SUPINE_STREAM_HEADER;
@@ -115,6 +118,7 @@ void supine_stream_peer_give(supine_stream_peer *peer, supine_stream_frames *fra
                          (peer->content == SUPINE_STREAM_POINTS && !peer->knows_triangles);
   supine_stream_frame_pack(frames, frame, peer->content, triangles, &peer->packet);
   peer->knows_triangles = peer->content == SUPINE_STREAM_POINTS;
+  peer->repeated = peer->last_frame == frame->number;
   peer->last_frame = frame->number;
   peer->frame = frame;
   ++frame->users;

@@ -44,6 +44,9 @@ typedef struct supine_stream_peer {
   uint64_t size;          /**< size of the message, bytes; until it is known, of its header */
   bool in_body;           /**< true if `header` is known */
   supine_stream_header header;
+  double active;  /**< time of the last message received or frame sent, s by supine_clock_seconds */
+  double given;   /**< time when the last frame was given to the peer, s by supine_clock_seconds */
+  bool repeated;  /**< true if the frame being sent was sent before */
   double emptied; /**< time when no received data was left to read, s by supine_clock_seconds */
   supine_stream_content content; /**< kind of content that the peer is sent */
   bool knows_triangles; /**< true if the peer has received the triangles with a frame of points */

@@ -18,6 +18,8 @@ static const double frame_interval = 15e-3; /* time between frames while no mess
 static const double send_interval = 20e-3;  /* time between checks of the peers that wait, s */
 static const double connect_interval = 1.0; /* time between attempts to connect to a peer, s */
 static const double stop_interval = 0.1;    /* time between calls of options->stop, s */
+static const double idle_standard = 60.0;   /* time after which idle peers are disconnected, s */
+static const double idle_frames = 60.0;     /* frames that a peer is sent in this time, at least */
 
 /* Indices of sockets that are polled; those of peers come first. */
 enum { LISTENER = SUPINE_STREAM_PEERS_MAX, WEB, POLLED };
@@ -43,11 +45,18 @@ struct supine_stream_server {
   double woke;                  /* time at which poll() last returned */
 };
 
-/* Return whether a peer wants frames, is sent none at the moment, and lacks the newest frame. */
+/* Return the time after which an idle peer is disconnected, s. */
+static double idle_time(const supine_stream_server *s) {
+  return s->options->idle > 0.0 ? s->options->idle : idle_standard;
+}
+
+/* Return whether a peer wants frames, is sent none at the moment, and lacks the newest frame or has
+ * not been sent any for long. */
 static bool needs_frame(const supine_stream_server *s, const supine_stream_peer *peer) {
   return peer->socket >= 0 && !peer->connecting && peer->frame == NULL &&
          peer->content != SUPINE_STREAM_SILENCE && s->latest != NULL &&
-         peer->last_frame != s->latest->number;
+         (peer->last_frame != s->latest->number ||
+          s->woke - peer->given >= idle_time(s) / idle_frames);
 }
 
 static void end_peer(supine_stream_server *s, supine_stream_peer *peer) {
@@ -105,6 +114,7 @@ static void connection_made(supine_stream_server *s, supine_stream_peer *peer) {
     return;
   }
   peer->connecting = false;
+  peer->active = s->woke;
   ++s->results.counts.peers;
 }
 
@@ -117,9 +127,9 @@ static void take_request(supine_stream_server *s, supine_stream_peer *peer, cons
       return;
     }
   }
-  supine_stream_patient_warn(
-      &s->patient, s->woke,
-      "request '%s' is unknown: give weights, points or surface, or leave it empty", text);
+  supine_stream_patient_warn(&s->patient, s->woke,
+                             "request '%s' is unknown: give weights, points, surface or nothing",
+                             text);
 }
 
 static void receive(void *context, supine_stream_peer *peer) {
@@ -196,6 +206,7 @@ static void add_latency(supine_stream_latency *latency, double seconds) {
 static void send_peer(supine_stream_server *s, supine_stream_peer *peer) {
   if (needs_frame(s, peer) && supine_stream_peer_ready(peer)) {
     supine_stream_peer_give(peer, s->frames, s->latest);
+    peer->given = s->woke;
   }
   if (peer->frame == NULL) {
     return;
@@ -205,7 +216,8 @@ static void send_peer(supine_stream_server *s, supine_stream_peer *peer) {
     end_peer(s, peer);
   } else if (outcome == SUPINE_STREAM_DONE) {
     const double received = peer->frame->snapshot.received;
-    if (received >= 0.0) {
+    peer->active = s->woke;
+    if (received >= 0.0 && !peer->repeated) {
       add_latency(&s->results.latency[peer->content != SUPINE_STREAM_WEIGHTS],
                   supine_clock_seconds() - received);
     }
@@ -223,6 +235,22 @@ static void send_peers(supine_stream_server *s) {
       if (peer->socket >= 0 && surface == (surfaces == 1)) {
         send_peer(s, peer);
       }
+    }
+  }
+}
+
+/* Disconnect peers that have neither sent a message nor taken a frame for long. Call this after
+ * send_peers, so that a peer is not idle because the server itself was late. */
+static void end_idle_peers(supine_stream_server *s) {
+  for (size_t i = 0; i < SUPINE_STREAM_PEERS_MAX; ++i) {
+    supine_stream_peer *peer = &s->peer[i];
+    if (peer->socket >= 0 && !peer->connecting && s->woke - peer->active >= idle_time(s)) {
+      ++s->results.counts.idle;
+      supine_stream_patient_warn(&s->patient, s->woke,
+                                 "a peer is disconnected: for %.3g s it sent no message and took "
+                                 "no frame",
+                                 idle_time(s));
+      end_peer(s, peer);
     }
   }
 }
@@ -259,6 +287,8 @@ static void receive_all(supine_stream_server *s) {
       } else if ((s->polled[i].revents & (POLLIN | POLLHUP | POLLERR)) != 0) {
         read_peer(s, &s->peer[i]);
       }
+    } else {
+      s->peer[i].emptied = s->woke; /* nothing has arrived so far */
     }
   }
   if (s->polled[LISTENER].revents != 0) {
@@ -300,6 +330,7 @@ supine_status supine_stream_server_run(supine_stream_server *server, supine_erro
       return supine_error_memory(error, "a frame");
     }
     send_peers(s);
+    end_idle_peers(s);
   }
   return SUPINE_OK;
 }

@@ -37,6 +37,7 @@ typedef struct supine_stream_counts {
   size_t sent;        /**< frames sent, summed over peers */
   size_t peers;       /**< peers accepted */
   size_t lost;        /**< peers disconnected because of invalid messages */
+  size_t idle;        /**< peers disconnected because they were idle */
   size_t turned_away; /**< connections refused, as there were SUPINE_STREAM_PEERS_MAX peers */
 } supine_stream_counts;
 
@@ -67,7 +68,11 @@ typedef struct supine_stream_options {
   bool ras;                         /**< send points in RAS */
   double rate;                      /**< maximum number of frames a second */
   double seconds;                   /**< duration, s; 0 to run until `stop` returns true */
-  supine_stream_web *web;           /**< live page; NULL if none */
+  /** Time after which a peer is disconnected that neither sends a message nor takes a frame, s;
+   * 0 selects 60 s. If there is no new frame for 1/60 of this time, the newest is sent again, so
+   * that a peer that only shows frames is not idle. */
+  double idle;
+  supine_stream_web *web; /**< live page; NULL if none */
   void (*warn)(void *context, const char *text);
   bool (*stop)(void *context); /**< called every 100 ms or so; true ends the run */
   void *context;

@@ -7,6 +7,7 @@
 #include <time.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "program/options/basis_input.h"
 #include "program/stream/tracked_patient.h"
 
@@ -62,7 +63,7 @@ void supine_stream_patient_warn(supine_stream_patient *patient, double now, cons
   char text[512];
   va_list arguments;
   va_start(arguments, format);
-  (void)vsnprintf(text, sizeof text, format, arguments);
+  (void)supine_print_text_list(text, sizeof text, format, arguments);
   va_end(arguments);
   patient->warned_at = now;
   patient->options->warn(patient->options->context, text);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Serve the live page and its WebSocket with libwebsockets, in a thread of its own. */
+#include <arpa/inet.h>
 #include <fcntl.h>
 #include <jansson.h>
 #include <libwebsockets.h>
@@ -11,21 +12,25 @@
 #include <unistd.h>
 
 #include "base/arena.h"
+#include "base/ascii.h"
 #include "base/clock.h"
 #include "base/library.h"
+#include "base/locale.h"
+#include "base/number.h"
+#include "program/options/command.h"
 #include "program/stream/peer.h"
 #include "program/stream/web.h"
 
 /* clang-format off */
 #define FUNCTIONS(EACH)                                                                            \
-  EACH(lws_, callback_http_dummy) EACH(lws_, callback_on_writable)                                 \
-  EACH(lws_, callback_on_writable_all_protocol) EACH(lws_, cancel_service)                         \
-  EACH(lws_, context_destroy) EACH(lws_, context_user) EACH(lws_, create_context)                  \
-  EACH(lws_, get_context) EACH(lws_, get_protocol) EACH(lws_, get_vhost_by_name)                   \
-  EACH(lws_, get_vhost_listen_port) EACH(lws_, hdr_copy) EACH(lws_, hdr_total_length)              \
-  EACH(lws_, http_transaction_completed) EACH(lws_, is_final_fragment)                             \
-  EACH(lws_, is_first_fragment) EACH(lws_, serve_http_file) EACH(lws_, service)                    \
-  EACH(lws_, set_log_level) EACH(lws_, write)
+  EACH(lws_, add_http_common_headers) EACH(lws_, callback_http_dummy)                              \
+  EACH(lws_, callback_on_writable) EACH(lws_, callback_on_writable_all_protocol)                   \
+  EACH(lws_, cancel_service) EACH(lws_, context_destroy) EACH(lws_, context_user)                  \
+  EACH(lws_, create_context) EACH(lws_, finalize_write_http_header) EACH(lws_, get_context)        \
+  EACH(lws_, get_protocol) EACH(lws_, get_vhost_by_name) EACH(lws_, get_vhost_listen_port)         \
+  EACH(lws_, hdr_copy) EACH(lws_, hdr_total_length) EACH(lws_, http_transaction_completed)         \
+  EACH(lws_, is_final_fragment) EACH(lws_, is_first_fragment) EACH(lws_, return_http_status)       \
+  EACH(lws_, service) EACH(lws_, set_log_level) EACH(lws_, set_timeout) EACH(lws_, write)
 /* clang-format on */
 
 /* Functions of libwebsockets. The library is loaded at run time: linking it would also require
@@ -35,7 +40,10 @@ static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } lws;
 enum {
   CONNECTIONS_MAX = 128, /* viewers, and browsers that load the page */
   TEXT = 256,            /* size of the buffer for a state as JSON, bytes */
-  RECEIVED = 512         /* size of the buffer for received bytes */
+  RECEIVED = 512,        /* size of the buffer for received bytes */
+  HEADERS = 1024,        /* size of the buffer for the headers of an answer, bytes */
+  PIECE = 1 << 14,       /* part of the page that is sent at once, bytes */
+  PIECE_SECONDS = 60     /* time after which a browser is disconnected that takes no piece, s */
 };
 
 struct supine_stream_web {
@@ -61,25 +69,59 @@ static supine_stream_web *web_of(struct lws *wsi) {
   return lws.context_user(lws.get_context(wsi));
 }
 
-/* Return whether to accept a WebSocket. Its Origin header must name this host, so that no other
- * web site connects; programs other than browsers send no Origin and are accepted. */
+bool supine_stream_web_is_host(const char *host, const char *names) {
+  char name[256];
+  struct in6_addr address;
+  const bool bracketed = host[0] == '[';
+  const char *begin = host + (bracketed ? 1 : 0);
+  const size_t length = strcspn(begin, bracketed ? "]" : ":");
+  if (length == 0 || length >= sizeof name || (bracketed && begin[length] != ']')) {
+    return false;
+  }
+  memcpy(name, begin, length);
+  name[length] = '\0';
+  if (bracketed) {
+    return inet_pton(AF_INET6, name, &address) == 1;
+  }
+  if (inet_pton(AF_INET, name, &address) == 1 || supine_ascii_same(name, "localhost")) {
+    return true;
+  }
+  for (char given[256]; supine_options_next_item(&names, given, sizeof given);) {
+    if (supine_ascii_same(name, given)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/* Read the Host header of a request; return whether it may name this server. */
+static bool read_host(struct lws *wsi, char *host, size_t size) {
+  return lws.hdr_copy(wsi, host, (int)size, WSI_TOKEN_HOST) > 0 &&
+         supine_stream_web_is_host(host, web_of(wsi)->site.names);
+}
+
+/* Return whether to accept a WebSocket. Its Origin header must name the same host as its Host
+ * header, so that no other web site connects; programs other than browsers send no Origin. */
 static bool is_ours(struct lws *wsi) {
   char origin[256] = "";
   char host[256] = "";
+  if (!read_host(wsi, host, sizeof host)) {
+    return false;
+  }
   if (lws.hdr_total_length(wsi, WSI_TOKEN_ORIGIN) == 0) {
     return true;
   }
-  if (lws.hdr_copy(wsi, origin, sizeof origin, WSI_TOKEN_ORIGIN) < 0 ||
-      lws.hdr_copy(wsi, host, sizeof host, WSI_TOKEN_HOST) < 0) {
+  if (lws.hdr_copy(wsi, origin, sizeof origin, WSI_TOKEN_ORIGIN) < 0) {
     return false;
   }
   const char *from = strstr(origin, "://");
-  return from != NULL && strcmp(from + 3, host) == 0;
+  return from != NULL && supine_ascii_same(from + 3, host);
 }
 
 /* Parse a viewer's message {"gravity":[x,y,z]} and pass its pose to the server's thread. Ignore all
  * other messages. */
 static void receive(supine_stream_web *web, const char *bytes, size_t size) {
+  SUPINE_C_LOCALE;
   json_t *pose = json_loadb(bytes, size, 0, NULL);
   const json_t *gravity = json_object_get(pose, "gravity");
   web_pose taken = {.received = supine_clock_seconds()};
@@ -104,7 +146,7 @@ static int send_state(supine_stream_web *web, struct lws *wsi, uint64_t *sent) {
   const uint64_t number = web->number;
   const double age = web->pose_received >= 0 ? supine_clock_seconds() - web->pose_received : -1;
   const int size =
-      snprintf((char *)bytes + LWS_PRE, TEXT + AGE, "%s,\"age\":%.3f}", web->text, age);
+      supine_print_text((char *)bytes + LWS_PRE, TEXT + AGE, "%s,\"age\":%.3f}", web->text, age);
   (void)pthread_mutex_unlock(&web->lock);
   if (number == *sent) {
     return 0;
@@ -137,18 +179,75 @@ static int view(struct lws *wsi, enum lws_callback_reasons reason, void *user, v
   }
 }
 
+/* Send the headers of the page; return 0, or -1 to disconnect. */
+static int begin_page(struct lws *wsi, size_t *sent) {
+  unsigned char bytes[LWS_PRE + HEADERS];
+  unsigned char *start = bytes + LWS_PRE;
+  unsigned char *end = start;
+  *sent = 0;
+  if (lws.add_http_common_headers(wsi, HTTP_STATUS_OK, "text/html; charset=utf-8",
+                                  web_of(wsi)->site.page_size, &end, bytes + sizeof bytes) != 0 ||
+      lws.finalize_write_http_header(wsi, start, &end, bytes + sizeof bytes) != 0) {
+    return -1;
+  }
+  lws.set_timeout(wsi, PENDING_TIMEOUT_HTTP_CONTENT, PIECE_SECONDS);
+  (void)lws.callback_on_writable(wsi);
+  return 0;
+}
+
+/* Send the next piece of the page; return 0, or -1 to disconnect.
+ * @param sent  number of bytes sent before, updated */
+static int send_page(struct lws *wsi, size_t *sent) {
+  const supine_stream_site *site = &web_of(wsi)->site;
+  unsigned char bytes[LWS_PRE + PIECE];
+  const size_t left = site->page_size - *sent;
+  const size_t size = left < PIECE ? left : PIECE;
+  memcpy(bytes + LWS_PRE, site->page + *sent, size);
+  if (lws.write(wsi, bytes + LWS_PRE, size, size == left ? LWS_WRITE_HTTP_FINAL : LWS_WRITE_HTTP) !=
+      (int)size) {
+    return -1;
+  }
+  *sent += size;
+  if (size == left) {
+    return lws.http_transaction_completed(wsi) != 0 ? -1 : 0;
+  }
+  lws.set_timeout(wsi, PENDING_TIMEOUT_HTTP_CONTENT, PIECE_SECONDS);
+  (void)lws.callback_on_writable(wsi);
+  return 0;
+}
+
+/* Refuse a request whose Host header does not name this server. */
+static int refuse_host(struct lws *wsi) {
+  static const char words[] = "This host name is not known here: open the page by its address, or "
+                              "start supine stream with --web-host NAME.";
+  return lws.return_http_status(wsi, HTTP_STATUS_FORBIDDEN, words) != 0 ||
+                 lws.http_transaction_completed(wsi) != 0
+             ? -1
+             : 0;
+}
+
 static int serve(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in,
                  size_t size) {
-  if (reason != LWS_CALLBACK_HTTP || strcmp(in, "/") != 0) {
-    return lws.callback_http_dummy(wsi, reason, user, in, size); /* refuses other pages */
+  char host[256];
+  switch (reason) {
+  case LWS_CALLBACK_HTTP:
+    if (!read_host(wsi, host, sizeof host)) {
+      return refuse_host(wsi);
+    }
+    if (strcmp(in, "/") == 0) {
+      return begin_page(wsi, user);
+    }
+    break;
+  case LWS_CALLBACK_HTTP_WRITEABLE:
+    return send_page(wsi, user);
+  default:
+    break;
   }
-  const int done =
-      lws.serve_http_file(wsi, web_of(wsi)->site.page, "text/html; charset=utf-8", NULL, 0);
-  return done < 0 || (done > 0 && lws.http_transaction_completed(wsi) != 0) ? -1 : 0;
+  return lws.callback_http_dummy(wsi, reason, user, in, size); /* refuses other pages */
 }
 
 static const struct lws_protocols protocols[] = {
-    {"http", serve, 0, 0, 0, NULL, 0},
+    {"http", serve, sizeof(size_t), 0, 0, NULL, 0},
     {"supine", view, sizeof(uint64_t), RECEIVED, 0, NULL, 0},
     {NULL, NULL, 0, 0, 0, NULL, 0}};
 
@@ -242,10 +341,10 @@ bool supine_stream_web_take(supine_stream_web *web, double gravity[3], double *r
 
 void supine_stream_web_send(supine_stream_web *web, const supine_stream_snapshot *snapshot) {
   (void)pthread_mutex_lock(&web->lock);
-  (void)snprintf(web->text, sizeof web->text,
-                 "{\"gravity\":[%.9g,%.9g,%.9g],\"volume\":%.9g,\"above\":%.9g",
-                 snapshot->gravity[0], snapshot->gravity[1], snapshot->gravity[2], snapshot->volume,
-                 snapshot->above);
+  (void)supine_print_text(web->text, sizeof web->text,
+                          "{\"gravity\":[%.9g,%.9g,%.9g],\"volume\":%.9g,\"above\":%.9g",
+                          snapshot->gravity[0], snapshot->gravity[1], snapshot->gravity[2],
+                          snapshot->volume, snapshot->above);
   web->pose_received = snapshot->pose_received;
   ++web->number;
   (void)pthread_mutex_unlock(&web->lock);

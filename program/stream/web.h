@@ -17,13 +17,23 @@
 
 typedef struct supine_stream_web supine_stream_web;
 
-/** Address and content of the web server. There is no access control. */
+/** Address and content of the web server. There is no access control: whoever reaches the address
+ * sees the lungs and can send a pose. A web site in somebody's browser cannot, because requests
+ * must name this server (supine_stream_web_is_host) and come from its own page. */
 typedef struct supine_stream_site {
   const char *address;           /**< numeric address to listen on */
   int port;                      /**< 0 to choose a free port; set to the port in use */
+  const char *names;             /**< host names of the server, separated by commas, or NULL */
   const char *certificate, *key; /**< paths of PEM files; NULL for no encryption */
-  const char *page;              /**< path of the HTML file, which is read for each request */
+  const char *page;              /**< HTML, which must outlive the server */
+  size_t page_size;              /**< bytes */
 } supine_stream_site;
+
+/** Return whether the Host header of a request may name this server: a numeric address, localhost
+ * or one of `names`, with or without a port. Any other name may have been made to point to this
+ * machine by a web site, whose page could then read the answers (DNS rebinding).
+ * @param names  separated by commas, or NULL */
+bool supine_stream_web_is_host(const char *host, const char *names);
 
 /** Start a thread that serves a site. */
 supine_status supine_stream_web_create(supine_stream_site *site, supine_stream_web **web,

@@ -128,7 +128,7 @@ double supine_compare_area(const supine_compare *compare) {
 
 /* For each lung, axis and mode, write the displacement factor times the weight of `pose` to `q`.
  * Unless `from` is NULL, subtract the same product of `from`. Return false if a pose is of another
- * basis. */
+ * basis, or has a number that is not finite. */
 static bool products_of(const supine_compare *compare, const supine_pose *pose,
                         const supine_pose *from, double *q) {
   for (size_t i = 0; i < 3 * compare->basis->info.lung_count; ++i) {
@@ -137,7 +137,8 @@ static bool products_of(const supine_compare *compare, const supine_pose *pose,
              (from == NULL ? 0 : from->gains[i / 3][i % 3] * from->weights[k]);
     }
   }
-  return supine_basis_has_pose(compare->basis, pose) && supine_basis_has_pose(compare->basis, from);
+  return supine_basis_has_pose(compare->basis, pose) &&
+         (from == NULL || supine_basis_has_pose(compare->basis, from));
 }
 
 void supine_compare_energy(const supine_compare *compare, double *energy) {

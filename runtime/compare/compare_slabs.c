@@ -188,6 +188,11 @@ supine_status supine_compare_slabs(const supine_basis *basis, const double gravi
   double highest = INFINITY;
   for (size_t i = 0; i < basis->info.vertex_count; ++i) {
     const double level = read_corner(&c, xyz, i).level;
+    const float *p = xyz + 3 * i;
+    if (!isfinite(level) || !isfinite(p[0] + p[1] + p[2])) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "the position of vertex %zu is not finite", i);
+    }
     highest = fmin(highest, level);
     lowest = fmax(lowest, level);
   }

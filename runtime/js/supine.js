@@ -6,7 +6,7 @@
 const STATE = 128, POSE = 8 * (256 + 3 * 16 + 1), VOLUMES = 8 * 16, TEXT = 512, ERROR = 4 + 512;
 // Byte offsets of members of the C struct supine_basis_info. Later versions of the library keep these offsets.
 const INFO = { vertices: 0, lungs: 16, begin: 20, hasVolume: 25, names: 56, normals: 100 };
-const TYPES = [Uint8Array, Uint32Array, Float32Array, Float64Array, Int16Array]; // in the order of supine_dtype
+const TYPES = [Uint8Array, Uint32Array, Float32Array, Float64Array, Int16Array, Int8Array]; // in the order of supine_dtype
 const STATUS = ['ok', 'argument', 'memory', 'read', 'format', 'mesh', 'open surface', 'unsupported', 'write', 'numerical'];
 
 export class SupineError extends Error {
@@ -74,6 +74,7 @@ class Basis {
   pose(state) {
     this.#read(state);
     const fixed = state.gain !== undefined;
+    if (fixed) this.#number(state.gain, 'gain');
     this.#check(fixed ? this.#c.supine_basis_weights(this.#basis, this.#nextState, this.#nextPose)
       : this.#c.supine_basis_pose(this.#basis, this.#nextState, this.#nextPose, this.#error),
     fixed && 'gravity is zero or not finite: give a vector with a direction');
@@ -83,15 +84,15 @@ class Basis {
   }
 
   deform() {
-    this.#c.supine_deform(this.#basis, this.#pose, this.#positions);
+    this.#evaluate(this.#c.supine_deform(this.#basis, this.#pose, this.#positions));
     return this.positions;
   }
 
   deformLit() {
     if (this.#lit) {
-      this.#c.supine_deform_lit(this.#basis, this.#pose, this.#positions, this.#normals);
+      this.#evaluate(this.#c.supine_deform_lit(this.#basis, this.#pose, this.#positions, this.#normals));
     } else {
-      this.#c.supine_deform(this.#basis, this.#pose, this.#positions);
+      this.deform();
       this.#c.supine_normals(this.#basis, this.#positions, this.#normals);
     }
     return this.positions;
@@ -99,7 +100,7 @@ class Basis {
 
   get volumes() {
     if (!this.#hasVolume) throw new SupineError('the surface is open and encloses no volume', STATUS.indexOf('open surface'));
-    this.#c.supine_basis_volumes(this.#basis, this.#pose, this.#volumes);
+    this.#evaluate(this.#c.supine_basis_volumes(this.#basis, this.#pose, this.#volumes));
     const volumes = this.#view(Float64Array, this.#volumes, 16);
     return Object.fromEntries(Object.keys(this.lungs).map((name, i) => [name, volumes[i]]));
   }
@@ -120,7 +121,7 @@ class Basis {
     const sigma = this.expectedError(since);
     if (since === undefined) this.#c.supine_basis_scan(this.#nextState, this.#basis);
     this.#check(this.#c.supine_basis_pose(this.#basis, this.#nextState, this.#nextPose, this.#error));
-    this.#c.supine_deform(this.#basis, this.#nextPose, this.#positions);
+    this.#evaluate(this.#c.supine_deform(this.#basis, this.#nextPose, this.#positions));
     const [part, names] = [this.tensor('part')?.data ?? [], this.tensor('names')?.data ?? new Uint8Array()];
     const made = new TextDecoder().decode(names).split('\n').map((name) => ({ name, lung: '', at: [0, 0, 0], move: [0, 0, 0], mm: 0, expectedError: 0, count: 0 }));
     part.forEach((index, v) => {
@@ -143,7 +144,9 @@ class Basis {
   #read(state) {
     const { gravity = [0, 1, 0], volume = '' } = typeof state === 'string' ? { volume: state } : state;
     this.#view(Uint8Array, this.#nextState, STATE).fill(0);
-    this.#view(Float64Array, this.#nextState, 3).set(Array.from(gravity).slice(0, 3));
+    const three = Array.from(gravity, Number);
+    if (three.length !== 3) throw new SupineError('gravity must be three numbers', STATUS.indexOf('argument'));
+    this.#view(Float64Array, this.#nextState, 3).set(three);
     if (volume !== '') this.#check(this.#c.supine_state_parse(this.#write(volume), this.#nextState, this.#error));
   }
 
@@ -161,6 +164,14 @@ class Basis {
 
   #check(status, message) {
     if (status !== 0) throw new SupineError(message || this.#string(this.#error + 4), status);
+  }
+
+  #evaluate(status) {
+    this.#check(status, 'the pose has a weight or a gain that is not finite: give a smaller gain');
+  }
+
+  #number(value, name) {
+    if (!Number.isFinite(value)) throw new SupineError(`${name} is ${value}: give a finite number`, STATUS.indexOf('argument'));
   }
 
   #allocate(size) {

@@ -4,6 +4,8 @@
 
 #if defined(__x86_64__)
 #include <cpuid.h>
+#include <stdlib.h>
+#include <string.h>
 
 static bool has_avx2(void) {
   return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
@@ -35,12 +37,29 @@ supine_prefetch supine_kernels_prefetch_choose(void) {
   const bool far = family == 26 || (family == 25 && is_zen3(model));
   return amd && known && far ? SUPINE_PREFETCH_FAR : SUPINE_PREFETCH_NEAR;
 }
+
+/* Return the instruction set that the environment variable SUPINE_SIMD names: AUTO if it is not
+ * set, COUNT if it names none. */
+static supine_simd requested(void) {
+  static const char *const names[SUPINE_SIMD_COUNT] = {"auto", "portable", "avx2", "avx512"};
+  const char *name = getenv("SUPINE_SIMD"); /* NOLINT(concurrency-mt-unsafe) */
+  supine_simd simd = SUPINE_SIMD_AUTO;
+  if (name != NULL) {
+    while (simd < SUPINE_SIMD_COUNT && strcmp(name, names[simd]) != 0) {
+      ++simd;
+    }
+  }
+  return simd;
+}
 #else
 static bool has_avx2(void) {
   return false;
 }
 static bool has_avx512(void) {
   return false;
+}
+static supine_simd requested(void) {
+  return SUPINE_SIMD_AUTO;
 }
 supine_prefetch supine_kernels_prefetch_choose(void) {
   return SUPINE_PREFETCH_NONE;
@@ -50,6 +69,9 @@ supine_prefetch supine_kernels_prefetch_choose(void) {
 const supine_kernels *supine_kernels_choose(supine_simd *simd) {
   const bool avx2 = supine_kernels_avx2.deform != NULL && has_avx2();
   const bool avx512 = supine_kernels_avx512.deform != NULL && has_avx512();
+  if (*simd == SUPINE_SIMD_AUTO) {
+    *simd = requested();
+  }
   if (*simd == SUPINE_SIMD_AUTO) {
     *simd = avx512 ? SUPINE_SIMD_AVX512 : avx2 ? SUPINE_SIMD_AVX2 : SUPINE_SIMD_PORTABLE;
   }

@@ -168,7 +168,8 @@ extern const supine_kernels supine_kernels_avx2;   /**< members are NULL if buil
 extern const supine_kernels supine_kernels_avx512; /**< members are NULL if built without AVX-512 */
 
 /** Return the kernels of an instruction set, or NULL if the processor or the build lacks it.
- * Replace AUTO in *simd by the widest set of this processor. */
+ * Replace AUTO in *simd by the set that the environment variable SUPINE_SIMD names, which may be
+ * none (COUNT), or by the widest set of this processor. */
 const supine_kernels *supine_kernels_choose(supine_simd *simd);
 
 supine_prefetch supine_kernels_prefetch_choose(void);

@@ -16,7 +16,8 @@ supine_status supine_platform_map(const char *path, supine_platform_file *file,
   supine_status status = SUPINE_OK;
   struct stat about = {0};
   *file = (supine_platform_file){NULL, 0};
-  const int descriptor = open(path, O_RDONLY | O_CLOEXEC);
+  /* without O_NONBLOCK, opening a pipe waits for a writer */
+  const int descriptor = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (descriptor < 0 || fstat(descriptor, &about) != 0) {
     status =
         supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path, strerror(errno));

@@ -7,6 +7,7 @@
 #include <xxhash.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "runtime/safetensors/safetensors_file.h"
 
 static uint64_t hash(const void *bytes, size_t size, uint64_t seed) {
@@ -100,9 +101,9 @@ supine_status supine_safetensors_verify(const supine_safetensors *file, supine_e
         "%s: no checksum, so another program wrote the file: make it with Supine", file->name);
   }
   char found[CHECKSUM_SIZE];
-  (void)snprintf(found, sizeof found, CHECKSUM_FORMAT,
-                 supine_safetensors_checksum(file->tensors, file->tensor_count, file->metadata,
-                                             file->metadata_count));
+  (void)supine_print_text(found, sizeof found, CHECKSUM_FORMAT,
+                          supine_safetensors_checksum(file->tensors, file->tensor_count,
+                                                      file->metadata, file->metadata_count));
   return strcmp(stated, found) == 0
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_FORMAT,

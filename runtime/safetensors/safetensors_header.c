@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/number.h"
 #include "base/utf8.h"
 #include "runtime/safetensors/safetensors_file.h"
 
@@ -60,7 +61,7 @@ static void SUPINE_PRINTF(2, 3) fail(parser *p, const char *format, ...) {
   char detail[256];
   va_list arguments;
   va_start(arguments, format);
-  (void)vsnprintf(detail, sizeof detail, format, arguments);
+  (void)supine_print_text_list(detail, sizeof detail, format, arguments);
   va_end(arguments);
   if (p->status == SUPINE_OK) {
     p->status = supine_error_set(p->error, SUPINE_ERROR_FORMAT, "%s: %s", p->file->name, detail);

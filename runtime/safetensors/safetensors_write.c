@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "base/output.h"
 #include "base/utf8.h"
 #include "runtime/safetensors/safetensors_file.h"
@@ -75,8 +76,8 @@ static supine_status check_metadata(const content *c, const char *path, supine_e
 static size_t SUPINE_PRINTF(2, 3) put(FILE *file, const char *format, ...) {
   va_list arguments;
   va_start(arguments, format);
-  const int size =
-      file != NULL ? vfprintf(file, format, arguments) : vsnprintf(NULL, 0, format, arguments);
+  const int size = file != NULL ? supine_print_list(file, format, arguments)
+                                : supine_print_text_list(NULL, 0, format, arguments);
   va_end(arguments);
   return size > 0 ? (size_t)size : 0;
 }
@@ -138,8 +139,9 @@ static size_t put_header(const content *c, FILE *file) {
 void supine_safetensors_print(FILE *file, const supine_tensor *tensors, size_t tensor_count,
                               const supine_metadata *metadata, size_t metadata_count) {
   content c = {tensors, tensor_count, metadata, metadata_count, ""};
-  (void)snprintf(c.checksum, sizeof c.checksum, CHECKSUM_FORMAT,
-                 supine_safetensors_checksum(tensors, tensor_count, metadata, metadata_count));
+  (void)supine_print_text(
+      c.checksum, sizeof c.checksum, CHECKSUM_FORMAT,
+      supine_safetensors_checksum(tensors, tensor_count, metadata, metadata_count));
   const size_t header = put_header(&c, NULL);
   const size_t padded = (header + 7) / 8 * 8;
   const uint64_t length = padded;

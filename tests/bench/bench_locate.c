@@ -27,7 +27,7 @@
 #include "base/csv.h"
 #include "precompute/physics/model.h"
 #include "runtime/kriging.h"
-#include "tests/runtime_fixture.h"
+#include "tests/helpers/runtime_fixture.h"
 
 enum { PEOPLE = 5, POINTS_MAX = 128, DRAWN = 10, DRAWS = 40, STEPS = 4 };
 

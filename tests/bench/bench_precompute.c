@@ -17,6 +17,7 @@
 #include "base/clock.h"
 #include "base/parallel.h"
 #include "precompute/precompute.h"
+#include "tests/helpers/basis_helpers.h"
 
 static const char *const sizes[][2] = {
     {"chaste_left_5k.obj", "chaste_right_5k.obj"},
@@ -76,8 +77,8 @@ static double run_ours(pair *files, const char *out, double times[STAGES], size_
                                    &prepared.reference, &error);
   }
   if (status == SUPINE_OK) {
-    const supine_basis_choice choice = {.path = out, .band = 23, .modes = 16};
-    status = supine_precompute(&prepared, &choice, NULL, &error);
+    const supine_basis_choice choice = {.band = 23, .modes = 16};
+    status = helper_write_basis(out, &prepared, &choice, NULL, &error);
   }
   supine_precompute_prepared_free(&prepared);
   const double end = supine_clock_seconds();

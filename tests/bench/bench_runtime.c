@@ -24,8 +24,8 @@
 
 #include "base/clock.h"
 #include "base/parallel.h"
-#include "tests/runtime_fixture.h"
-#include "tests/test.h"
+#include "tests/helpers/runtime_fixture.h"
+#include "tests/helpers/test.h"
 
 enum { TILE = 16, ENTRIES_MAX = 64, REPEATS = 9, ENOUGH = 2000000 };
 

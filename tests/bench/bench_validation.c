@@ -15,7 +15,7 @@
 
 #include "precompute/lungs/phantom.h"
 
-#include "tests/validation.h"
+#include "tests/helpers/validation.h"
 
 static const char *folder = "validation";
 static const char *data = SUPINE_TEST_DATA;

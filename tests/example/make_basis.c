@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Write a small synthetic basis to the given path. */
-#include "runtime_fixture.h"
+#include "tests/helpers/runtime_fixture.h"
 
 int main(int argc, char **argv) {
   if (argc != 2) {

@@ -46,23 +46,24 @@ int main(int argc, char **argv) {
   }
   (void)fclose(file);
   const supine_precompute_surface surface = {n, vertices, m, triangles};
-  const char *options[] = {"--modes", "8", "--held-out", "20", "--lesion", "60,-20,0,40,3"};
   calls seen = {.stop_at = 2.0};
-  supine_precompute_input input = {.surface_count = 1,
-                                   .surfaces = &surface,
-                                   .options = options,
-                                   .option_count = 6,
-                                   .progress = progress,
-                                   .context = &seen};
-  supine_precompute_result result;
-  CHECK(supine_precompute_basis(&input, &result, &error) == SUPINE_OK);
+  supine_precompute_options options = {
+      .size = sizeof options,
+      .lungs = {.surfaces = &surface, .surface_count = 1},
+      .tissue = {.lesion_count = 1, .lesions = {{{60.0, -20.0, 0.0}, 40.0, 3.0}}},
+      .modes = {.count = 8, .held_out = 20},
+      .progress = progress,
+      .context = &seen};
+  supine_precompute_result *result = NULL;
+  CHECK(supine_precompute_basis(&options, &result, &error) == SUPINE_OK);
   CHECK(seen.last == 1.0 && seen.backwards == 0);
-  CHECK(strstr(result.report, "two lungs") != NULL && strstr(result.assumed, "deep law") != NULL);
-  CHECK(strstr(result.findings, "the lesion at 60,-20,0 is") != NULL);
+  CHECK(result->report.lung_count == 2 && result->report.mm.rms > 0.0);
+  CHECK(result->assumption_count > 0 && result->finding_count > 0);
+  CHECK(strstr(result->findings[0].text, "the lesion at 60,-20,0 is") != NULL);
   supine_basis *basis = NULL;
   supine_state state;
   supine_pose pose;
-  CHECK(supine_basis_open_memory(result.bytes, result.size, &basis, &error) == SUPINE_OK);
+  CHECK(supine_basis_open_memory(result->bytes, result->size, &basis, &error) == SUPINE_OK);
   CHECK(supine_state_parse("prone:rest", &state, &error) == SUPINE_OK);
   CHECK(supine_basis_pose(basis, &state, &pose, &error) == SUPINE_OK);
   float *xyz = malloc(3 * n * sizeof *xyz);
@@ -70,20 +71,22 @@ int main(int argc, char **argv) {
         supine_deform(basis, &pose, xyz) == SUPINE_OK);
   printf("%zu vertices, %zu modes\n", n, supine_basis_get_info(basis)->mode_count);
   supine_basis_close(basis);
-  supine_precompute_result_free(&result);
+  supine_precompute_result_free(result);
 
   seen = (calls){.stop_at = 0.5};
-  CHECK(supine_precompute_basis(&input, &result, &error) == SUPINE_ERROR_INTERRUPTED);
-  CHECK(result.bytes == NULL && seen.last >= 0.5 && seen.last < 1.0);
-  supine_precompute_result_free(&result);
+  CHECK(supine_precompute_basis(&options, &result, &error) == SUPINE_ERROR_INTERRUPTED);
+  CHECK(result->bytes == NULL && seen.last >= 0.5 && seen.last < 1.0);
+  supine_precompute_result_free(result);
   seen = (calls){.stop_at = 2.0};
-  options[1] = "65";
-  CHECK(supine_precompute_basis(&input, &result, &error) == SUPINE_ERROR_ARGUMENT);
-  CHECK(strcmp(error.message, "--modes takes 1 to 64 or 'harmonics', not '65'") == 0);
-  options[1] = "8";
+  options.modes.count = 65;
+  CHECK(supine_precompute_basis(&options, &result, &error) == SUPINE_ERROR_ARGUMENT);
+  CHECK(strstr(error.message, "give 1 to 64") != NULL);
+  supine_precompute_result_free(result);
+  options.modes.count = 8;
   triangles[0] = (uint32_t)n;
-  CHECK(supine_precompute_basis(&input, &result, &error) == SUPINE_ERROR_FORMAT);
-  CHECK(strstr(error.message, "surface 1: face 0 names vertex") != NULL && result.bytes == NULL);
+  CHECK(supine_precompute_basis(&options, &result, &error) == SUPINE_ERROR_FORMAT);
+  CHECK(strstr(error.message, "surface 1: face 0 names vertex") != NULL && result->bytes == NULL);
+  supine_precompute_result_free(result);
   free(vertices);
   free(triangles);
   free(xyz);

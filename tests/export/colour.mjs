@@ -55,7 +55,7 @@ for (const stops of bars) {
   assert.ok(Math.min(...off) <= 3, `colours of a bar differ by ${off}: ${stops}`);
 }
 
-// Ranges end at the same round numbers as those of pictures and reports: the cases are from tests/test_render.c.
+// Ranges end at the same round numbers as those of pictures and reports: the cases are from tests/program/test_render.c.
 for (const [value, step, end] of [[31.6, 5, 35], [18.7, 2, 20], [20, 5, 20], [0.043, 0.01, 0.05], [7.99, 1, 8], [8, 2, 8], [0, 0.2, 1]]) {
   assert.ok(Math.abs(tickStep(value) - step) < 1e-12 && Math.abs(rangeEnd(value) - end) < 1e-12, `${value}: ${tickStep(value)}, ${rangeEnd(value)}`);
 }

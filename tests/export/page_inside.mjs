@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Test how the page shows targets, the structures inside the lungs: they have the positions of `supine deform`, the
-// sentence is about the chosen one, a table usable by keyboard lists all, and they can be hidden. Pictures are kept in
-// the folder tests/page_inside of the build folder.
+// sentence is about the chosen one, a table usable by keyboard lists all, and they can be hidden. The lens is right during
+// breaths. Pictures are kept in the folder tests/page_inside of the build folder.
 import assert from 'node:assert/strict';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -78,7 +78,7 @@ async function checkTable(page) {
       assert.ok(far > 0.5 && Math.abs(far - parseFloat(mm)) < WRITTEN_MM, `${name}: ${mm}, not ${far}`);
       assert.equal(words === 'no change that the model can tell', far <= parseFloat(error), `${name}: ${words} ${error}`);
     }
-    const told = await page.evaluate(() => { const { sentenceOf, movedBetween, targetOf, basis: b, state } = window.supine; const moved = movedBetween(b, state.moment, state.depth, state.from); return b.inside.names.map((_, part) => { const target = targetOf(b.inside, part, moved); return [target.mm > target.error, sentenceOf(b, moved, target, state.gravity, '').told !== '']; }); });
+    const told = await page.evaluate(() => { const { sentenceOf, movedBetween, targetOf, basis: b, state } = window.supine; const moved = movedBetween(b, state.moment, state.from); return b.inside.names.map((_, part) => { const target = targetOf(b.inside, part, moved); return [target.mm > target.error, sentenceOf(b, moved, target, state.gravity, '').told !== '']; }); });
     for (const [above, emphasised] of told) assert.equal(emphasised, above); // nothing is emphasised below its expected error
     const [name, mm] = rows[0];
     const finding = await page.locator('#finding').textContent();
@@ -214,6 +214,45 @@ async function checkMany() {
   await close(page);
 }
 
+/** Check that, in the middle of a breath and after a jump, the lens has the displacement and the expected error that
+ * `supine deform` states for the volume that is drawn. The texts of the picture are recorded as they are drawn. */
+async function checkLens() {
+  const { page: breathing, complaints: told } = await openLungs(files['inside.html'], { viewport: { width: 1400, height: 900 } }, '#posture=supine&depth=0&tidal=500&show=contours&room=0');
+  await breathing.evaluate(() => {
+    window.drawn = [];
+    const fillText = CanvasRenderingContext2D.prototype.fillText;
+    CanvasRenderingContext2D.prototype.fillText = function record(words, ...rest) {
+      if (this.canvas.id === 'notes') window.drawn.push(words);
+      return fillText.call(this, words, ...rest);
+    };
+  });
+  /** Return the texts of the first frame that has a lens, and the volume above rest that it shows. */
+  const frame = (act) => breathing.evaluate((text) => new Promise((done) => {
+    new Function(text)();
+    const look = () => {
+      const at = window.drawn.findLastIndex((words) => /^halo: /.test(words));
+      if (at >= 0 && window.supine.state.depth > 100) done({ words: window.drawn.slice(0, at + 1), depth: window.supine.state.depth });
+      else { window.drawn = []; requestAnimationFrame(look); }
+    };
+    window.drawn = [];
+    requestAnimationFrame(look);
+  }), act);
+  const acts = { 'in mid-breath': 'window.supine.state.phase = 0.2; window.supine.state.playing = true; window.supine.touch();', 'after a jump': 'Object.assign(window.supine.state, { playing: false, depth: 430 }); window.supine.touch();' };
+  for (const [when, act] of Object.entries(acts)) {
+    const { words, depth } = await frame(act);
+    const name = await breathing.evaluate(() => window.supine.basis.inside.names[window.supine.state.chosen]);
+    supine('deform', files['inside.safetensors'], '--from', 'supine:rest', '--posture', 'supine', '--volume', `rest+${depth}`, '-o', files['moved.csv']);
+    const row = readFileSync(files['moved.csv'], 'utf8').split('\n').find((line) => line.startsWith(`${name},`)).split(',');
+    const [mm, error] = [row.at(-2), row.at(-1)].map(Number);
+    const [halo, length] = [words.at(-1), words.findLast((text) => /^[\d.]+ mm$/.test(text))].map((text) => Number(/([\d.]+) mm/.exec(text)[1]));
+    console.log(`lens ${when}, rest + ${depth.toFixed(0)} mL: ${length} mm with an error of ${halo} mm; supine deform: ${mm}, ${error} mm`);
+    assert.ok(Math.abs(length - mm) < WRITTEN_MM, `${when}: ${length} mm, not ${mm}`);
+    assert.ok(Math.abs(halo - error) < (error < 3 ? 0.05 : 0.5) + 0.02, `${when}: an error of ${halo} mm, not ${error}`);
+  }
+  assert.deepEqual(told, []);
+  await close(breathing);
+}
+
 const { page, complaints } = await openLungs(files['inside.html'], { viewport: { width: 840, height: 630 } });
 await checkPositions(page);
 await checkPointer(page, await checkTable(page));
@@ -221,5 +260,6 @@ await checkControls(page);
 assert.deepEqual(complaints, []);
 await checkLoss(page);
 await close(page);
+await checkLens();
 await checkSizes();
 await checkMany();

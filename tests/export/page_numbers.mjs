@@ -92,7 +92,7 @@ for (const [i, g] of directions.entries()) {
     state.depth = 0;
     state.settle(q, 0, 0);
     state.compute();
-    return { held: state.moment.held, largest: movedBetween(b, state.moment, 0, state.from).largest };
+    return { held: state.moment.held, largest: movedBetween(b, state.moment, state.from).largest };
   }, g);
   lungs.forEach((lung, j) => assert.ok(Math.abs(held[j] - enclosed(places[i + 1], j)) < 0.5, `${lung}: ${held[j]} mL, the surface holds ${enclosed(places[i + 1], j)}`));
   const far = Math.max(...Array.from({ length: places[0].length / 3 }, (_, v) => Math.hypot(...[0, 1, 2].map((k) => places[i + 1][3 * v + k] - places[0][3 * v + k]))));

@@ -9,11 +9,11 @@
 #include <supine/runtime.h>
 
 #include "runtime/safetensors/safetensors_file.h"
-#include "tests/runtime_fixture.h"
+#include "tests/helpers/runtime_fixture.h"
 
 #include "fuzz.h"
 
-#include "tests/poses.h"
+#include "tests/helpers/poses.h"
 
 /* Largest number of vertices to evaluate, because a small file may claim to have very many. */
 enum { VERTICES_MOST = 4096 };

@@ -59,7 +59,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
 }
 
 /* Make a label map of two boxes with labels 1 and 2. The type of the voxels depends on `index`. */
-uint8_t *supine_fuzz_seed(size_t index, size_t *size) {
+static uint8_t *saved(size_t index, size_t *size) {
   static const supine_image_voxel voxels[] = {SUPINE_VOXEL_U8, SUPINE_VOXEL_I16, SUPINE_VOXEL_F32};
   enum { SEEDS = sizeof voxels / sizeof *voxels, X = 16, Y = 9, Z = 10 };
   if (index >= SEEDS) {
@@ -86,4 +86,21 @@ uint8_t *supine_fuzz_seed(size_t index, size_t *size) {
   const supine_status status = supine_image_write(path, &image, "a seed", NULL);
   supine_image_free(&image);
   return status == SUPINE_OK ? supine_fuzz_take(path, size) : NULL;
+}
+
+/* Headers with what supine_image_write does not write. */
+static const char *const texts[] = {
+    "NRRD0004\ntype: uchar\ndimension: 3\nspace: RAS\nsizes: 2 2 1\nspace directions: (2,0,0) "
+    "(0,2,0) (0,0,2)\nspace origin: (0,0,0)\nencoding: ascii\n\n1 2 0 3\n",
+    "NRRD0005\r\n# a comment\r\ntype: double\r\ndimension: 3\r\nspace: "
+    "left-posterior-superior\r\nsizes: 1 1 1\r\nspace directions: (1,0,0) (0,1,0) (0,0,1)\r\n"
+    "kinds: domain domain domain\r\nendian: big\r\nencoding: raw\r\nspace origin: "
+    "(0,0,0)\r\nSegment0_Name:=left lung\r\n\r\nabcdefgh",
+    "NRRD0004\ntype: int64\ndimension: 3\nspace: LPS\nsizes: 1 1 2\nspace directions: (1,0,0) "
+    "(0,1,0) (0,0,1)\nspace origin: (0,0,0)\nencoding: raw\nendian: little\n"
+    "data file: LIST\nvoxels.raw\n\nabcdefghabcdefgh"};
+
+uint8_t *supine_fuzz_seed(size_t index, size_t *size) {
+  const size_t count = strcmp(FUZZ_ENDING, ".nrrd") == 0 ? sizeof texts / sizeof *texts : 0;
+  return index < count ? supine_fuzz_text(texts[index], size) : saved(index - count, size);
 }

@@ -13,7 +13,7 @@ folder=${2:-$source/build/fuzz}
 cmake -S "$source" -B "$folder" -G Ninja -DCMAKE_C_COMPILER=clang -DCMAKE_BUILD_TYPE=RelWithDebInfo \
   -DSUPINE_FUZZ=ON -DSUPINE_SANITIZE=address,undefined > "$folder.log" 2>&1
 targets=""
-readers="ply stl vtp obj nrrd nii mha points_csv points_json message text basis"
+readers="ply stl vtp obj nrrd nii mha points_csv points_json message text basis numbers"
 for reader in $readers; do
   targets="$targets fuzz_$reader libfuzzer_$reader"
 done
@@ -22,7 +22,7 @@ cd "$folder"
 export LSAN_OPTIONS="suppressions=$source/tests/lsan.supp:print_suppressions=0"
 failed=0
 for reader in $readers; do
-  case $reader in ply | stl | vtp | obj) dictionary=mesh ;; nrrd | nii | mha) dictionary=image ;; message | points_*) dictionary=text ;; *) dictionary=$reader ;; esac
+  case $reader in ply | stl | vtp | obj) dictionary=mesh ;; nrrd | nii | mha) dictionary=image ;; message | points_*) dictionary=text ;; numbers) dictionary=basis ;; *) dictionary=$reader ;; esac
   mkdir -p "corpus/$reader"
   "tests/fuzz/fuzz_$reader" -seeds "corpus/$reader" > /dev/null
   if "tests/fuzz/libfuzzer_$reader" -dict="$source/tests/fuzz/$dictionary.dict" -max_total_time="$seconds" \

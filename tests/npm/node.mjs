@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Test the JavaScript package in node: its results equal those of plain C, its size and speed are within limits, wrong
+// Test the JavaScript package in node: its results equal those of plain C, its size is within limits, wrong
 // input is refused, and its examples and types are correct.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
@@ -61,6 +61,8 @@ assert.equal(lungs.metadata.format, 'supine-basis');
 assert.equal(Math.max(...lungs.triangles), lungs.vertexCount - 1);
 assert.deepEqual(lungs.tensor('coefficients').shape[0], lungs.vertexCount);
 assert.equal(lungs.tensor('none'), undefined);
+assert.ok(lungs.tensor('normals').data instanceof Int8Array); // numbers.mjs reads every tensor of a file
+for (const gain of [NaN, Infinity]) assert.throws(() => lungs.pose({ gravity: [0, 1, 0], gain }), { status: 'argument' });
 assert.equal((await open(readFileSync(inside))).tensor('names').data.length > 0, true);
 
 /* The targets are the rows of 'supine deform': a row for each name, also of a mesh. */
@@ -107,21 +109,3 @@ const compile = (text) => {
 writeFileSync(join(folder, 'package.json'), '{ "type": "module" }');
 assert.deepEqual(compile(use), []);
 for (const line of wrong) assert.equal(compile(use + line).length, 1, line);
-
-/* The package takes at most 2.5 times as long per vertex as plain C, in the fastest of several alternating runs. */
-const fastest = [[Infinity, Infinity], [Infinity, Infinity]];
-const calls = Math.ceil(1000000 / lungs.vertexCount);
-for (let round = 0; round < 5; ++round) {
-  const c = execFileSync(process.env.NATIVE, [demo, 'prone'], { encoding: 'utf8' }).split(' ').map(Number);
-  for (const [i, call] of ['deform', 'deformLit'].entries()) {
-    for (let again = 0; again < 9; ++again) {
-      const begin = performance.now();
-      for (let j = 0; j < calls; ++j) lungs[call]();
-      fastest[0][i] = Math.min(fastest[0][i], (1e6 * (performance.now() - begin)) / calls / lungs.vertexCount);
-    }
-    fastest[1][i] = Math.min(fastest[1][i], c[i]);
-  }
-}
-const ratios = fastest[0].map((taken, i) => taken / fastest[1][i]);
-console.log(`ns per vertex of deform and deformLit: ${fastest[0].map((x) => x.toFixed(2))}; in plain C ${fastest[1]}; ratios ${ratios.map((x) => x.toFixed(2))}`);
-assert.ok(Math.max(...ratios) <= 2.5);

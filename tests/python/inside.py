@@ -4,6 +4,7 @@
     inside.py REFERENCE BASIS        REFERENCE is the program reference.c, which computes expected results"""
 import ctypes
 import gc
+import locale
 import os
 import shutil
 import subprocess
@@ -16,6 +17,7 @@ import numpy as np
 
 import supine
 
+locale.setlocale(locale.LC_ALL, "")  # as host programs do: results must not depend on it
 reference, path, maker = sys.argv[1:4]  # maker: "program" or "library", which makes bases
 
 
@@ -112,6 +114,16 @@ refused(supine.ArgumentError, "did you mean 'prone'", lungs.pose, "pron")
 refused(supine.ArgumentError, "", lungs.pose, "prone:500")
 refused(supine.ArgumentError, "gravity", lungs.pose, (0, 0, 0))
 refused(supine.ArgumentError, "gravity", lungs.pose, (0, 0, float("nan")))
+for wrong in (float("nan"), float("inf")):
+    refused(supine.ArgumentError, "gain is", lungs.pose("prone").fill, wrong)
+    refused(supine.ArgumentError, "xyz", lungs.normals, np.full((lungs.vertex_count, 3), wrong, np.float32))
+    own = lungs.pose("prone")
+    own.gains[0][1] = wrong
+    for use in (lungs.deform, lungs.displace, lungs.volumes):
+        refused(supine.ArgumentError, "not finite", use, own)
+    own = lungs.pose("prone")
+    own.weights[0] = wrong
+    refused(supine.ArgumentError, "not finite", lungs.deform, own)
 refused(supine.NumericalError, "volume", lungs.pose, "rest-1e6")
 refused(supine.UnsupportedError, "without normals", supine.open(path, normals=False).deform_lit, pose)
 assert issubclass(supine.NumericalError, supine.Error) and issubclass(supine.Error, Exception)

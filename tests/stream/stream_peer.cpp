@@ -177,7 +177,7 @@ int main(int count, char **word) {
   expect(supine_basis_open(word[2], &basis, &error) == SUPINE_OK, error.message);
   peer = igtl::ClientSocket::New();
   expect(peer->ConnectToServer("127.0.0.1", std::atoi(word[1])) == 0, "a connection");
-  peer->SetReceiveTimeout(10000);
+  peer->SetReceiveTimeout(100000);
   double gravity[3];
   for (const Lie &lie : lies) {
     send_transform(lie);

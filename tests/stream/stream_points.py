@@ -72,7 +72,7 @@ with tempfile.TemporaryDirectory(prefix="supine-stream-") as folder:
     with open(at("seen.csv"), encoding="ascii") as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
     seen = {r["name"]: [float(r[k]) + s for k, s in zip("xyz", SHIFT, strict=True)] for r in rows}
-    server = subprocess.Popen([supine, "stream", at("lungs.safetensors"), "--listen", "0", "--seconds", "100",
+    server = subprocess.Popen([supine, "stream", at("lungs.safetensors"), "--listen", "0", "--seconds", "600",
                                "--points", at("inside.safetensors"), "--send", "surface", "--device", "Patient"],
                               stdout=subprocess.PIPE, text=True)
     try:
@@ -92,10 +92,12 @@ with tempfile.TemporaryDirectory(prefix="supine-stream-") as folder:
             body = b"".join(point(n, p) for n, p in wrong.items()) + point("stranger", (0, 0, 0))
             check(answer(link, 8, lambda: link.send("POINT", "Tracker", body, 8)), truth, len(truth))
             link.send("POINT", "Tracker", body[:-1], 9)  # a truncated message, which the server must drop
+            # Wait until the server has read it: closing a socket with unread data discards what was sent.
+            answer(link, 10, lambda: link.send_pose(LEFT, stamp=10))
             link.close()
     finally:
         server.terminate()
-        said = server.communicate(timeout=30)[0]
+        said = server.communicate(timeout=100)[0]
     print(said, end="")
     assert server.returncode == 0
     assert said.startswith("received positions of observed points: 81\n"), said

@@ -3,10 +3,9 @@
 
     stream_slicer.py SAMPLES PORT BASIS"""
 import sys
-import time
 
 sys.path.insert(0, sys.argv[1])
-from answers import faces  # noqa: E402
+from answers import faces, number_messages, wait_for  # noqa: E402
 from slicer_lung import SERVER_OPTIONS, Surface  # noqa: E402
 from supine_link import Basis, Link, array  # noqa: E402
 
@@ -25,23 +24,16 @@ TURNS = {
 }
 
 
-def settle(read):
-    """Read messages until none arrives for half a second; return the last one."""
-    last, end = None, time.monotonic() + 10
-    quiet = time.monotonic()
-    while time.monotonic() < end and time.monotonic() - quiet < 0.5:
-        found = read()
-        if found is not None:
-            last, quiet = found, time.monotonic()
-    assert last is not None, "no message arrived"
-    return last
+def far(a, b):
+    return max(abs(x - y) for x, y in zip(a, b, strict=True))
 
 
 seen = {}
+surface_sent, weights_sent = number_messages(surface.link, 1000), number_messages(weights, 2000)
 for name, (matrix, gravity) in TURNS.items():
     surface.send(matrix)
-    _, points = settle(lambda: surface.newest(0.05))
-    _, frame = settle(lambda: weights.newest(0.05))
+    points = wait_for(lambda: surface.newest(0.05), lambda stamp, _: stamp == surface_sent())
+    frame = wait_for(lambda: weights.newest(0.05), lambda stamp, _: stamp == surface_sent())
     wanted = basis.deform(frame)
     for i in range(0, len(wanted), 3):  # LPS to RAS: x and y change their sign
         assert abs(points[i] + wanted[i]) < 5e-3 and abs(points[i + 1] + wanted[i + 1]) < 5e-3
@@ -49,8 +41,8 @@ for name, (matrix, gravity) in TURNS.items():
     seen[name] = frame
     # The same gravity, sent as the reading of a tilt sensor in the patient's axes (RAS), gives the same weights.
     weights.send("NDARRAY", "Patient", array((-gravity[0], -gravity[1], gravity[2])))
-    _, same = settle(lambda: weights.newest(0.05))
-    assert max(abs(a - b) for a, b in zip(same, frame)) < 1e-5, name
+    same = wait_for(lambda: weights.newest(0.05), lambda stamp, _: stamp == weights_sent())
+    assert far(same, frame) < 1e-5, name
 assert faces(surface.triangles) == faces(basis.triangles)
 assert max(abs(a - b) for a, b in zip(seen["supine"], seen["prone"])) > 0.05
 assert max(abs(a - b) for a, b in zip(seen["supine"], seen["left"])) > 0.05
@@ -116,8 +108,7 @@ widget.host.text, widget.port.text = "127.0.0.1", str(port)
 widget.toggled(True)
 node = widget.node.currentNode()
 assert widget.follow is not None and node.AddObserver.called and not slicer.util.errorDisplay.called
-_, posed = settle(lambda: weights.newest(0.05))
-assert max(abs(a - b) for a, b in zip(posed, seen["supine"])) < 1e-5  # the identity is a patient on the back
+wait_for(lambda: weights.newest(0.05), lambda _, frame: far(frame, seen["supine"]) < 1e-5)  # the identity: on the back
 widget.cleanup()
 assert widget.follow is None and node.RemoveObserver.called
 widget.port.text = "1"

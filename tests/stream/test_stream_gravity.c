@@ -2,7 +2,7 @@
 /* Test directions of gravity from trackers' matrices and quaternions, refused poses. */
 #include "base/vec3.h"
 #include "program/stream/gravity.h"
-#include "tests/test.h"
+#include "tests/helpers/test.h"
 #include <supine/posture.h>
 
 /* several times the rounding error of a 32-bit float */

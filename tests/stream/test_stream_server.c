@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The server with peers on loopback: regular, slow, stuck, vanishing, hostile, and many. */
-#include "tests/test.h"
+#include "tests/helpers/test.h"
 
 #include <endian.h>
 #include <errno.h>
@@ -14,9 +14,9 @@
 #include "base/clock.h"
 #include "program/stream/peer.h"
 #include "program/stream/tracked_patient.h"
-#include "tests/runtime_fixture.h"
+#include "tests/helpers/runtime_fixture.h"
 
-#include "tests/poses.h"
+#include "tests/helpers/poses.h"
 
 enum { VERTICES = 6000, MODES = 6, LUNGS = 2, FLOATS = MODES + 3 * LUNGS };
 
@@ -83,7 +83,7 @@ static stage *stage_create(void) {
                                        .setup = supine_stream_setup_default(),
                                        .volume = &s->volume,
                                        .rate = 1000.0,
-                                       .seconds = 60.0, /* ends a test that hangs */
+                                       .seconds = 600.0, /* ends a test that hangs */
                                        .warn = count_warning,
                                        .stop = is_ending,
                                        .context = s};
@@ -129,7 +129,7 @@ static int connect_peer(int port) {
   const struct sockaddr_in here = {.sin_family = AF_INET,
                                    .sin_port = htons((uint16_t)port),
                                    .sin_addr = {htonl(INADDR_LOOPBACK)}};
-  const struct timeval limit = {10, 0}; /* 10 s, so that no call blocks for ever */
+  const struct timeval limit = {100, 0}; /* s; ends a test that hangs */
   assert_true(s >= 0);
   assert_int_equal(setsockopt(s, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit), 0);
   assert_int_equal(setsockopt(s, SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof limit), 0);
@@ -291,37 +291,45 @@ TEST(test_server_each_pose_answered_by_weights) {
   const int peer = connect_peer(stage_run(s));
   supine_stream_header header;
   unsigned char body[4096];
+  double longest = 0.0; /* time from sending a message to its answer, s */
   for (uint64_t i = 0; i < 40; ++i) {
+    const double begin = supine_clock_seconds();
     assert_true(send_pose(peer, poses[i % 4], 100 + i));
     (void)receive_stamp(peer, 100 + i, &header, body);
+    longest = fmax(longest, supine_clock_seconds() - begin);
     assert_string_equal(header.type, "NDARRAY");
     assert_string_equal(header.device, "SUPINE");
     assert_int_equal(header.version, 1);
     expect_weights(s, poses[i % 4], 30.0, body);
   }
+  double begin = supine_clock_seconds();
   assert_true(send_text(peer, "VOLUME", "rest-12"));
   assert_true(send_pose(peer, poses[1], 200));
   (void)receive_stamp(peer, 200, &header, body);
   expect_weights(s, poses[1], -12.0, body);
   unsigned char bytes[128]; /* a message whose last byte is sent later */
   const size_t size = make_pose(poses[2], 300, bytes);
-  const struct timespec later = {0, 50000000};
   assert_true(send_bytes(peer, bytes, size - 1));
-  (void)nanosleep(&later, NULL);
+  sleep_for(0.05);
   assert_true(send_bytes(peer, bytes + size - 1, 1));
   (void)receive_stamp(peer, 300, &header, body);
   expect_weights(s, poses[2], -12.0, body);
-  sleep_for(1.0); /* the latency of the next message must not include this second */
+  longest = fmax(longest, supine_clock_seconds() - begin);
+  sleep_for(2.0 * longest + 0.5); /* the latency of the next message must not include this time */
+  begin = supine_clock_seconds();
   assert_true(send_text(peer, "VOLUME", "rest-11"));
   assert_true(receive(peer, &header, body));
   expect_weights(s, poses[2], -11.0, body);
+  longest = fmax(longest, supine_clock_seconds() - begin);
   (void)close(peer);
   const supine_stream_counts counts = stage_end(s);
   assert_int_equal(counts.poses, 42);
   assert_int_equal(counts.refused + counts.malformed + counts.lost, 0);
   const supine_stream_latency *latency = &supine_stream_server_results(s->server)->latency[0];
   assert_true(latency->count >= 43);
-  assert_true(latency->worst > 0.0 && latency->worst < 1.0);
+  /* The latency of a message may begin when the socket was last empty, after the answer to the
+   * message before. */
+  assert_true(latency->worst > 0.0 && latency->worst <= 2.0 * longest);
   assert_int_equal(latency->late > 0, latency->worst > SUPINE_STREAM_BUDGET);
   stage_destroy(s);
 }
@@ -361,7 +369,8 @@ TEST(test_server_volume_above_rest_equals_basis_pose) {
  * every frame has them. */
 TEST(test_server_send_request_switches_content) {
   stage *s = stage_create();
-  const int peer = connect_peer(stage_run(s));
+  const int port = stage_run(s);
+  const int peer = connect_peer(port);
   const supine_basis_info *info = supine_basis_get_info(s->basis);
   supine_stream_header header;
   unsigned char body[4096];
@@ -395,19 +404,26 @@ TEST(test_server_send_request_switches_content) {
   }
   assert_true(send_text(peer, "SEND", "nothing"));
   assert_true(send_text(peer, "SEND", "everything")); /* an unknown request changes nothing */
-  assert_true(send_pose(peer, poses[0], 77));
-  sleep_for(0.1);
+  /* When another peer has the answer to the second pose, everything that the server sends after the
+   * first has arrived. */
+  const int other = connect_peer(port);
   struct pollfd quiet = {peer, POLLIN, 0};
-  assert_int_equal(poll(&quiet, 1, 200), 0);
+  for (uint64_t stamp = 77; stamp < 79; ++stamp) {
+    assert_true(send_pose(peer, poses[stamp % 4], stamp));
+    (void)receive_stamp(other, stamp, &header, body);
+  }
+  assert_int_equal(poll(&quiet, 1, 0), 0);
+  (void)close(other);
   (void)close(peer);
   stage_destroy(s);
 }
 
-/* Of a thousand poses sent at once, the server answers only a few, but always the last one. */
+/* Of a thousand poses sent at once, the server answers no more than its rate allows, but always the
+ * last one. */
 TEST(test_server_many_poses_newest_answered) {
   enum { BURST = 1000 };
   stage *s = stage_create();
-  s->options.rate = 100.0;
+  s->options.rate = 10.0;
   const int peer = connect_peer(stage_run(s));
   supine_stream_header header;
   unsigned char body[4096];
@@ -418,32 +434,30 @@ TEST(test_server_many_poses_newest_answered) {
     const double down[3] = {sin(angle), cos(angle), 0};
     size += make_pose(down, i + 1, burst + size);
   }
+  const double begin = supine_clock_seconds();
   assert_true(send_bytes(peer, burst, size));
   const int passed = receive_stamp(peer, BURST, &header, body);
-  assert_true(passed < BURST / 10);
+  /* one frame at the start, and one before the first pose */
+  const double most = 2.0 + s->options.rate * (supine_clock_seconds() - begin);
+  assert_true(passed <= most);
   const double last[3] = {sin(0.999), cos(0.999), 0};
   expect_weights(s, last, 30.0, body);
   free(burst);
   (void)close(peer);
   const supine_stream_counts counts = stage_end(s);
   assert_int_equal(counts.poses, BURST);
-  assert_true(counts.frames < BURST / 10);
+  assert_true((double)counts.frames <= most);
   stage_destroy(s);
 }
 
-/* Send up to `count` poses, one every 2 ms. Stop if more than 60 other frames arrive before the
- * answer to a pose. Return the number of poses answered earlier. */
-static int keep_rate(int peer, int count, uint64_t stamp) {
+/* Send `count` poses, each after the answer to the one before. */
+static void expect_answers(int peer, int count, uint64_t stamp) {
   supine_stream_header header;
   unsigned char body[4096];
   for (int i = 0; i < count; ++i) {
     assert_true(send_pose(peer, poses[i % 4], stamp + (uint64_t)i));
-    if (receive_stamp(peer, stamp + (uint64_t)i, &header, body) > 60) {
-      return i;
-    }
-    sleep_for(2e-3);
+    (void)receive_stamp(peer, stamp + (uint64_t)i, &header, body);
   }
-  return count;
 }
 
 /* A regular peer is always answered, although one peer asks for surfaces and never reads, one
@@ -460,17 +474,63 @@ TEST(test_server_stuck_or_vanished_peers_delay_nobody) {
   assert_true(send_text(vanished, "SEND", "surface"));
   const int half = connect_peer(port);
   assert_true(send_bytes(half, "\0\1TRANS", 7));
-  assert_int_equal(keep_rate(regular, 20, 1000), 20);
+  expect_answers(regular, 20, 1000);
   const struct linger reset = {1, 0};
   assert_int_equal(setsockopt(vanished, SOL_SOCKET, SO_LINGER, &reset, sizeof reset), 0);
   (void)close(vanished);
-  assert_int_equal(keep_rate(regular, 100, 2000), 100);
+  expect_answers(regular, 100, 2000);
   (void)close(regular);
   const supine_stream_counts counts = stage_end(s);
   assert_int_equal(counts.peers, 4);
   assert_int_equal(counts.lost, 0); /* `lost` excludes peers that close the connection */
   (void)close(stuck);
   (void)close(half);
+  stage_destroy(s);
+}
+
+static const double idle_seconds = 0.5;
+
+/* A peer that asked for no frames and sends nothing is disconnected. One that only reads stays,
+ * although there is no new frame. */
+TEST(test_server_idle_peer_disconnected_reader_stays) {
+  enum { MORE = 15 }; /* frames that the reader gets; without a new frame, ten a second or fewer */
+  stage *s = stage_create();
+  s->options.idle = idle_seconds;
+  const int port = stage_run(s);
+  const int reader = connect_peer(port);
+  const int idle = connect_peer(port);
+  supine_stream_header header;
+  unsigned char body[4096];
+  assert_true(send_text(idle, "SEND", "nothing"));
+  assert_true(closed_by_server(idle));
+  for (int i = 0; i < MORE; ++i) {
+    assert_true(receive(reader, &header, body));
+  }
+  const supine_stream_counts counts = stage_end(s);
+  assert_int_equal(counts.idle, 1);
+  assert_int_equal(counts.frames, 1);
+  assert_true(counts.sent >= MORE);
+  const supine_stream_latency *latency = supine_stream_server_results(s->server)->latency;
+  assert_int_equal(latency[0].count + latency[1].count, 0); /* a repeated frame answers no pose */
+  (void)close(reader);
+  (void)close(idle);
+  stage_destroy(s);
+}
+
+/* A peer that does not read its frames is disconnected. */
+TEST(test_server_peer_that_never_reads_disconnected) {
+  stage *s = stage_create();
+  s->options.idle = idle_seconds;
+  const int stuck = connect_peer(stage_run(s));
+  const int small = 4096;
+  assert_int_equal(setsockopt(stuck, SOL_SOCKET, SO_RCVBUF, &small, sizeof small), 0);
+  assert_true(send_text(stuck, "SEND", "surface"));
+  for (int i = 0; i < 6000 && atomic_load(&s->warnings) == 0; ++i) {
+    sleep_for(0.01);
+  }
+  const supine_stream_counts counts = stage_end(s);
+  assert_int_equal(counts.idle, 1);
+  (void)close(stuck);
   stage_destroy(s);
 }
 
@@ -497,8 +557,8 @@ TEST(test_server_full_of_peers_one_more_refused) {
   assert_true(closed_by_server(extra));
   (void)close(extra);
   (void)close(peer[0]);
-  sleep_for(0.2);
-  peer[0] = connect_peer(port); /* This connection takes the place of the closed one. */
+  expect_answers(peer[1], 2, 700); /* by now, the server has seen that the connection is closed */
+  peer[0] = connect_peer(port);    /* This connection takes the place of the closed one. */
   assert_true(send_pose(peer[0], poses[0], 900));
   (void)receive_stamp(peer[0], 900, &header, body);
   for (int i = 0; i < MANY; ++i) {
@@ -604,11 +664,11 @@ TEST(test_server_absurd_sizes_refused) {
   for (int i = 0; i < 2048; ++i) {
     assert_true(send_bytes(peer, piece, sizeof piece));
   }
-  assert_int_equal(keep_rate(peer, 2, 1), 2);
+  expect_answers(peer, 2, 1);
   header.size = 0; /* a TRANSFORM without a body */
   supine_stream_header_write(&header, bytes);
   assert_true(send_bytes(peer, bytes, sizeof bytes));
-  assert_int_equal(keep_rate(peer, 2, 11), 2);
+  expect_answers(peer, 2, 11);
   (void)close(peer);
   const supine_stream_counts counts = stage_end(s);
   assert_int_equal(counts.lost, 1);
@@ -633,12 +693,12 @@ TEST(test_server_tracker_gone_reconnects) {
   assert_int_equal(stage_run(s), 0);
   for (uint64_t round = 0; round < 2; ++round) {
     struct pollfd waiting = {listener, POLLIN, 0};
-    assert_int_equal(poll(&waiting, 1, 10000), 1);
+    assert_int_equal(poll(&waiting, 1, 100000), 1);
     const int peer = accept(listener, NULL, NULL);
-    const struct timeval limit = {10, 0};
+    const struct timeval limit = {100, 0};
     assert_true(peer >= 0);
     assert_int_equal(setsockopt(peer, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit), 0);
-    assert_int_equal(keep_rate(peer, 3, 10 * (round + 1)), 3);
+    expect_answers(peer, 3, 10 * (round + 1));
     (void)close(peer);
   }
   (void)close(listener);
@@ -656,19 +716,22 @@ TEST(test_server_breathing_lungs_send_frames) {
   assert_int_equal(
       supine_stream_volume_breathe(&s->volume, supine_breath_normal(), &breath, &error), SUPINE_OK);
   const int other = connect_peer(stage_run(s));
-  float low = INFINITY;
-  float high = -INFINITY;
-  for (int i = 0; i < 100; ++i) { /* one frame every 15 ms, for 1.5 breaths */
-    assert_true(receive(other, &header, body));
-    const float gain = float_at(body + 4 + 4 * MODES);
-    low = fminf(low, gain);
-    high = fmaxf(high, gain);
-  }
   const double supine[3] = {0, 1, 0};
-  const double deep = pose_of(s, supine, 60.0).gains[0][0] - pose_of(s, supine, 0.0).gains[0][0];
-  /* During the breath, the factor of the displacements has the same range, within 5 %, as between
-   * still poses at rest and at peak inspiration. */
-  assert_true(fabs((double)(high - low) - fabs(deep)) < 0.05 * fabs(deep));
+  const double rest = pose_of(s, supine, 0.0).gains[0][0];
+  const double deep = pose_of(s, supine, 60.0).gains[0][0];
+  const double margin = 0.05 * fabs(deep - rest);
+  double low = INFINITY;
+  double high = -INFINITY;
+  /* During breaths, the factor of the displacements reaches those of still poses at rest and at
+   * peak inspiration, within 5 %, and does not go beyond. */
+  for (int i = 0; low > fmin(rest, deep) + margin || high < fmax(rest, deep) - margin; ++i) {
+    assert_true(i < 100000);
+    assert_true(receive(other, &header, body));
+    const double gain = (double)float_at(body + 4 + 4 * MODES);
+    low = fmin(low, gain);
+    high = fmax(high, gain);
+    assert_true(low > fmin(rest, deep) - margin && high < fmax(rest, deep) + margin);
+  }
   (void)close(other);
   stage_destroy(s);
 }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Test volumes given as text, and volumes of a breath. */
 #include "program/stream/tracked_patient.h"
-#include "tests/runtime_fixture.h"
-#include "tests/test.h"
+#include "tests/helpers/runtime_fixture.h"
+#include "tests/helpers/test.h"
 
 static void expect_volume(const supine_stream_volume *volume, const supine_basis *basis,
                           const double gravity[3], double time, supine_volume wanted) {

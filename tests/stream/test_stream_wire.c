@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Messages compared with those of the public OpenIGTLink library. */
-#include "tests/test.h"
+#include "tests/helpers/test.h"
 
 #include <igtl_header.h>
 #include <igtl_ndarray.h>
@@ -14,7 +14,7 @@
 
 #include "base/vec3.h"
 #include "program/stream/frame.h"
-#include "tests/runtime_fixture.h"
+#include "tests/helpers/runtime_fixture.h"
 
 static void fill(unsigned char *bytes, size_t size, uint64_t seed) {
   for (size_t i = 0; i < size; ++i) {

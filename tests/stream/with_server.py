@@ -4,7 +4,7 @@
     with_server.py SUPINE VERTICES "SERVER OPTIONS" PROGRAM [ARGUMENTS]
 
 In the arguments, {port} is replaced by the server's port, {page} by the address of its page, and {basis} by the path of
-its basis, which is made in a temporary folder. The server ends after two minutes at the latest."""
+its basis, which is made in a temporary folder. The server ends after ten minutes at the latest."""
 import os
 import re
 import shlex
@@ -18,7 +18,7 @@ with tempfile.TemporaryDirectory(prefix="supine-stream-") as folder:
     for words in (["phantom", "-o", mesh, "--vertices", vertices], ["precompute", mesh, "-o", basis]):
         subprocess.run([supine, *words], check=True, stdout=subprocess.DEVNULL,
                        stderr=subprocess.DEVNULL)
-    server = subprocess.Popen([supine, "stream", basis, "--listen", "0", "--seconds", "120",
+    server = subprocess.Popen([supine, "stream", basis, "--listen", "0", "--seconds", "600",
                                *shlex.split(options)], stdout=subprocess.PIPE, text=True)
     try:
         places = {"basis": basis, "page": ""}
@@ -32,12 +32,12 @@ with tempfile.TemporaryDirectory(prefix="supine-stream-") as folder:
         else:
             sys.exit("the server does not listen")
         result = subprocess.run([word.format(**places) if "{" in word else word for word in program],
-                                timeout=240, check=False).returncode
+                                timeout=600, check=False).returncode
         alive = server.poll() is None
     finally:
         server.terminate()
         try:
-            rest = server.communicate(timeout=30)[0]
+            rest = server.communicate(timeout=100)[0]
         except subprocess.TimeoutExpired:
             server.kill()
             raise

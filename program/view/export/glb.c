@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/locale.h"
 #include "base/output.h"
 #include "program/view/export/packed.h"
 
@@ -90,6 +91,7 @@ static supine_status write_file(const char *path, const char *text, const char *
 
 /* Build both chunks in memory, then write the file. Set `total` to the size of the file, bytes. */
 static supine_status make_and_write(glb *g, const char *path, size_t *total, supine_error *error) {
+  SUPINE_C_LOCALE;
   char *numbers = NULL;
   size_t bytes = 0;
   json_t *roots = NULL;

@@ -5,6 +5,7 @@
 
 #include <supine/sh.h>
 
+#include "base/number.h"
 #include "program/view/export/glb.h"
 
 /* With more morph targets, the extras omit the volume formula: it has too many constants then. */
@@ -83,7 +84,8 @@ json_t *supine_export_glb_extras(const glb *g) {
       supine_options_json_metadata(g->basis), "gains", fields ? fields_text : NULL, "breathVolume",
       fields ? NULL : json_real(g->options->breath), "volume", has_volume(g) ? volume_text : NULL,
       "rest", rest ? resting_text : NULL, "byLung", rest ? json_boolean(by_lung(g)) : NULL,
-      "fullUprightGain", rest ? json_real(full != NULL ? strtod(full, NULL) : 0) : NULL);
+      "fullUprightGain",
+      rest ? json_real(full != NULL ? supine_number_parse(full, NULL) : 0) : NULL);
 }
 
 json_t *supine_export_glb_lung_extras(const glb *g, size_t lung) {

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/locale.h"
 
 #include "program/view/export/export.h"
 #include "program/view/export/packed.h"
@@ -298,6 +299,7 @@ static void free_page(page *p) {
 
 supine_status supine_export_html_print(FILE *file, const supine_basis *basis,
                                        const export_page *shown, supine_error *error) {
+  SUPINE_C_LOCALE;
   SUPINE_FREED_BY(free_page)
   page p = {.basis = basis,
             .info = supine_basis_get_info(basis),

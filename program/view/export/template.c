@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "program/view/export/template.h"
+#include "base/locale.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -75,6 +76,7 @@ static void escape(const char *text, FILE *file) {
 }
 
 static void write_value(const json_t *value, FILE *file) {
+  SUPINE_C_LOCALE;
   if (json_is_string(value)) {
     escape(json_string_value(value), file);
   } else if (json_is_integer(value)) {

@@ -22,7 +22,12 @@ function takeBytes(name) {
   return fromBase64(text);
 }
 
-const takeTensor = (name, Numbers) => new Numbers(takeBytes(name).buffer);
+/** Return a tensor of numbers. Refuse those that are not finite, or 2^30 or more, like the run-time library. */
+function takeTensor(name, Numbers) {
+  const numbers = new Numbers(takeBytes(name).buffer);
+  if (!numbers.every((x) => Math.abs(x) < 2 ** 30)) throw new Error(`tensor '${name}' has a number that is not finite, or 2^30 or more: make the page again`);
+  return numbers;
+}
 
 /** Decompress a tensor of 16-bit integers. Its rows are padded to an even number of columns. */
 function takeCounts(name, rows, columns, filter) {
@@ -186,7 +191,7 @@ function scaleForVolume(c, volume) {
     if (Math.abs(cubicAt(c, far)) < Math.abs(volume)) return NaN;
   } else {
     far = volume / c[0];
-    while (Number.isFinite(far) && Math.abs(cubicAt(c, far)) < Math.abs(volume)) far *= 2;
+    while (Number.isFinite(far) && Math.abs(cubicAt(c, far)) < Math.abs(volume)) far *= 2; // ends at infinity
     if (!Number.isFinite(far)) return NaN;
     far *= 2;
   }
@@ -215,14 +220,19 @@ function pathAt(bend, sigma) {
   return bend.map((c) => sigma + 2 * c * e);
 }
 
+// Limit of the position on the path of pathAt, and limit of gains, like those of the run-time library.
+const [pathMost, gainMost] = [64, 2 ** 20];
+
 /** Return the gains (factors of the displacement along x, y and z) at which a lung has the volume `volume`; NaN if its
- * surface folds before. pathAt gives their ratios, with the constant bend[axis] of each axis. At rest, the lung has the
+ * surface folds before, or if it is out of reach. pathAt gives their ratios, with the constant bend[axis] of each axis. At rest, the lung has the
  * volume `rest`. Both volumes are mL above the reference volume. `form` is the result of lungForm. */
 function gainsForVolume(form, bend, rest, volume) {
   const straight = bend.every((c) => c === 0) || volume === rest;
   const scale = scaleForVolume(cubicOf(form), straight ? volume : rest);
   const at = (sigma) => pathAt(bend, sigma).map((ratio) => scale * ratio);
-  if (straight || !Number.isFinite(scale)) return [scale, scale, scale];
+  const none = [NaN, NaN, NaN];
+  if (!Number.isFinite(volume) || !(Math.abs(scale) < gainMost)) return none;
+  if (straight) return [scale, scale, scale];
   const side = Math.sign(volume);
   const step = volume / rest > 0 ? 1 / 16 : -1 / 16;
   let [near, far, held] = [0, 0, 0];
@@ -231,7 +241,7 @@ function gainsForVolume(form, bend, rest, volume) {
     near = far;
     far += step;
     held = formAt(form, at(far));
-    if (!(side * held > side * before)) return [NaN, NaN, NaN];
+    if (!(side * held > side * before) || Math.abs(far) > pathMost) return none;
   }
   for (let halving = 0; halving < 60; ++halving) {
     const middle = (near + far) / 2;
@@ -278,7 +288,8 @@ function gainsFor(basis, forms, volumes, total) {
 
 /** Return a moment: {gravity, weights, gains, held, folds}, the state of the lungs for a direction of gravity and a
  * volume `depth` mL above rest. `weights` are those of the modes, `gains` the factors of the displacement of each lung
- * along x, y, z, and `held` the volume (gas and tissue) of each lung, mL. `folds`: whether the surface folds before.
+ * along x, y, z, `held` the volume (gas and tissue) of each lung, mL, and `above` is `depth`. `folds`: whether the
+ * surface folds before.
  * Another simulator's fields are not scaled to a volume. */
 function momentFor(basis, gravity, depth) {
   const weights = weightsFor(basis, gravity);
@@ -286,7 +297,7 @@ function momentFor(basis, gravity, depth) {
   const volumes = volumesFor(basis, gravity);
   const gains = basis.fields ? forms.map(() => [1, 1, 1]) : gainsFor(basis, forms, volumes, sumOf(volumes.rest) + depth);
   const held = gains.map((gain, lung) => basis.references[lung] + formAt(forms[lung], gain));
-  return { gravity, weights, gains: Float64Array.from(gains.flat()), held, folds: !gains.flat().every(Number.isFinite) };
+  return { gravity, weights, gains: Float64Array.from(gains.flat()), held, above: depth, folds: !gains.flat().every(Number.isFinite) };
 }
 
 function lungOf({ lungBegin }, vertex) {

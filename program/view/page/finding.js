@@ -20,17 +20,16 @@ function areasOf({ surface, corners, vertices }) {
 }
 
 /** Return statistics of the distance of the surface's vertices between positions `after` and `before`, mm: the mean over
- * the area, the 95th percentile (rounded up to a multiple of 1/2000 of the largest), the largest, the vertex where it is,
- * and the RMS over the vertices. */
+ * the area, the 95th percentile (rounded up to a multiple of 1/2000 of the largest), the largest, and the vertex where
+ * it is. */
 function distancesOf(basis, after, before) {
   basis.areas ??= areasOf(basis);
   const { areas } = basis;
   const far = new Float32Array(basis.vertices);
-  let [sum, area, squares, at] = [0, 0, 0, 0];
+  let [sum, area, at] = [0, 0, 0];
   for (let v = 0; v < far.length; ++v) {
     far[v] = Math.hypot(after[3 * v] - before[3 * v], after[3 * v + 1] - before[3 * v + 1], after[3 * v + 2] - before[3 * v + 2]);
     sum += areas[v] * far[v];
-    squares += far[v] * far[v];
     area += areas[v];
     if (far[v] > far[at]) at = v;
   }
@@ -38,14 +37,44 @@ function distancesOf(basis, after, before) {
   far.forEach((mm, v) => { bins[Math.ceil((2000 * mm) / (far[at] || 1))] += areas[v]; });
   let [bin, within] = [0, bins[0]];
   while (within < 0.95 * area && bin < 2000) within += bins[++bin];
-  return { mean: sum / area, p95: (bin / 2000) * far[at], largest: far[at], at, rms: Math.sqrt(squares / far.length) };
+  return { mean: sum / area, p95: (bin / 2000) * far[at], largest: far[at], at };
+}
+
+/** Return, for each lung and axis, the sums over its vertices of the products of their displacements by two modes at
+ * weight and gain 1, divided by the number of all vertices: matrices [lungs, 3, modes, modes], mm^2. */
+function squaresOf(basis) {
+  const { modes, vertices } = basis;
+  const sums = new Float64Array(basis.lungs * 3 * modes * modes);
+  const unitWeights = Array.from({ length: modes }, (_, k) => Float64Array.from({ length: modes }, (__, i) => (i === k ? 1 : 0)));
+  const by = unitWeights.map(() => [0, 0, 0]);
+  for (let v = 0, lung = 0; v < vertices; ++v) {
+    while (v >= basis.lungBegin[lung + 1]) ++lung;
+    unitWeights.forEach((weights, k) => fieldOf(basis, weights, v, by[k]));
+    for (let axis = 0, at = 3 * lung * modes * modes; axis < 3; ++axis) {
+      for (let k = 0; k < modes; ++k) for (let l = 0; l < modes; ++l, ++at) sums[at] += (by[k][axis] * by[l][axis]) / vertices;
+    }
+  }
+  return sums;
+}
+
+/** Return the RMS over the vertices of the surface of their distance between two states of the lungs, mm, without a pass
+ * over the vertices. */
+function rmsBetween(basis, now, from) {
+  basis.squares ??= squaresOf(basis);
+  const { modes, squares } = basis;
+  let sum = 0;
+  for (let row = 0, at = 0; row < 3 * basis.lungs; ++row) {
+    const by = Float64Array.from({ length: modes }, (_, k) => now.gains[row] * now.weights[k] - from.gains[row] * from.weights[k]);
+    for (let k = 0; k < modes; ++k) for (let l = 0; l < modes; ++l, ++at) sum += by[k] * by[l] * squares[at];
+  }
+  return Math.sqrt(Math.max(0, sum));
 }
 
 /** Return the RMS over points of the expected error of their displacement u, mm. The squared error of a point is the
  * sum of the terms of supine/locate.h: of u itself; of u minus its part `level`, without a turn; of a volume at rest that
  * is only assumed, by the change of u if the volumes of the states that count from rest grow by 1 % of the reference
  * volume; beside the heart; and sideways. `places(moment)` returns the points in a state of the lungs, `reference` has
- * their reference positions, and `terms` is the result of movedBetween. */
+ * their reference positions, and `terms` is the result of termsBetween. */
 function expectedError({ now, from, law, turn: turning, level, perStep, fuller, heart, sliding }, places, reference) {
   const [a, b] = [places(now), places(from)];
   const [more, flat] = [fuller?.map(places), level?.map(places)];
@@ -75,26 +104,33 @@ function heartError({ metadata, expected, torso: { low, high } }, across) {
   };
 }
 
-/** Return how the lungs move from the state `from` to the state `now`, which has `depth` mL above rest: the statistics of
- * distancesOf, and what expectedError needs. `error` is that of the surface, mm; null if it is unknown. */
-function movedBetween(basis, now, depth, from) {
+/** Return what expectedError needs for the displacement from the state `from` to the state `now`. `known`: whether the
+ * error is known. The cost does not depend on the number of vertices, so that every frame can have its own terms. */
+function termsBetween(basis, now, from) {
   const { metadata, expected } = basis;
-  const surface = distancesOf(basis, placesOf(basis, now), placesOf(basis, from));
+  const rms = rmsBetween(basis, now, from);
   const number = (key, usual) => (Number(metadata[key]) > 0 ? Number(metadata[key]) : usual);
-  const full = Math.min(1, surface.rms / expected.fullBreath);
-  const law = number('expected_error_mm', expected.constant) * Math.min(1, surface.rms / number('expected_error_from_mm', expected.fullBreath));
+  const full = Math.min(1, rms / expected.fullBreath);
+  const law = number('expected_error_mm', expected.constant) * Math.min(1, rms / number('expected_error_from_mm', expected.fullBreath));
   const turning = metadata.turn_fitted ? 0 : Math.max(0, expected.constant * full - law);
   const scan = (metadata.scan_gravity ?? '0,1,0').split(',').map(Number);
   const volume = sumOf(basis.references);
   const assumed = basis.hasResting && !metadata.resting_known && metadata.scanned !== 'rest' && !metadata.scan_state?.includes('rest');
-  const at = (gravity, more) => [momentFor(basis, gravity ?? now.gravity, depth + more), from.above === null ? from : momentFor(basis, gravity ?? from.gravity, from.above + more)];
+  const at = (gravity, more) => [momentFor(basis, gravity ?? now.gravity, now.above + more), from.above === null ? from : momentFor(basis, gravity ?? from.gravity, from.above + more)];
   const change = unit(now.gravity).map((x, i) => x - unit(from.gravity)[i]);
-  const terms = {
+  return {
     now, from, law, turn: turning, level: turning > 0 ? at(scan, 0) : null, fuller: assumed ? at(null, 0.01 * volume) : null,
     perStep: assumed ? (number('resting_spread', expected.spread) * (volume + restFor(basis, scan))) / volume / 0.01 : 0, heart: heartError(basis, Math.hypot(change[0], change[1])), sliding: expected.sliding * Math.abs(change[0]),
+    known: Boolean(metadata.expected_error_mm && now.held),
   };
-  const known = metadata.expected_error_mm && now.held;
-  return { ...surface, ...terms, known, error: known ? expectedError(terms, (moment) => placesOf(basis, moment), basis.surface) : null };
+}
+
+/** Return how the lungs move from the state `from` to the state `now`: the statistics of distancesOf, and the result of
+ * termsBetween. `error` is that of the surface, mm; null if it is unknown. */
+function movedBetween(basis, now, from) {
+  const places = (moment) => placesOf(basis, moment);
+  const terms = termsBetween(basis, now, from);
+  return { ...distancesOf(basis, places(now), places(from)), ...terms, error: terms.known ? expectedError(terms, places, basis.surface) : null };
 }
 
 /** Return how a structure inside the lungs moves: the mean position of its vertices `at` and before, `was`, its

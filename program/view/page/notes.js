@@ -86,7 +86,8 @@ class Notes {
     const side = at[0] + 70 + wide < width ? 1 : -1;
     const place = [at[0] + side * 60, at[1] + 4];
     const box = () => [place[0] - (side < 0 ? wide : 0), place[1] - 9, place[0] + (side > 0 ? wide : 0), place[1] + 16 * lines.length - 7];
-    while (taken.some(([left, top, right, bottom]) => left < box()[2] && right > box()[0] && top < box()[3] && bottom > box()[1])) place[1] += 8;
+    const covers = ([left, top, right, bottom]) => left < box()[2] && right > box()[0] && top < box()[3] && bottom > box()[1];
+    for (let steps = 0; steps < 1000 && taken.some(covers); ++steps) place[1] += 8;
     taken.push(box());
     context.strokeStyle = css('--soft');
     context.lineWidth = 1;

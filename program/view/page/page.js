@@ -162,6 +162,7 @@ function start() {
 
   /** Return the state from which displacements are measured. */
   const originMoment = () => (state.kind === 'difference' ? state.pinned : state.from);
+  const originName = () => (state.kind === 'difference' ? postureWords(gravityOf(state.pinnedQ)) : state.from.name);
   /** Return the value that the colour at a marked vertex shows; null if it has none. */
   function probeValue(vertex) {
     if (state.kind === 'expansion') return null;
@@ -225,12 +226,12 @@ function start() {
     const small = width < 520;
     notes.gravity(pane, small ? 34 : width - 44, height - (small ? 100 : 92));
     if (inside && state.inside && state.moment && !state.turning) {
-      const moved = { ...(told ? table.moved : {}), now: state.moment, from: originMoment() };
+      const terms = termsBetween(basis, state.moment, originMoment());
       const few = inside.names.length <= 6;
       for (const part of inside.names.map((_, i) => i).sort((a, b) => (b === state.chosen) - (a === state.chosen))) {
         if (!few && part !== state.chosen) break;
-        const target = targetOf(inside, part, moved);
-        if (part === state.chosen && target.mm > 0.05) notes.lens(pane, target, radii[part], state.from.name, ratio(), { width, height });
+        const target = targetOf(inside, part, terms);
+        if (part === state.chosen && target.mm > 0.05) notes.lens(pane, target, radii[part], originName(), ratio(), { width, height });
         else {
           const [was, at] = [target.was, target.at].map((p) => project(pane, p, ratio()));
           if (!was || !at) continue;
@@ -290,7 +291,7 @@ function start() {
     told = wish;
     const moment = momentFor(basis, state.gravity, depth);
     if (moment.folds) return;
-    const moved = movedBetween(basis, moment, depth, state.from);
+    const moved = movedBetween(basis, moment, state.from);
     const target = inside ? targetOf(inside, state.chosen, moved) : null;
     const above = Math.round(depth) ? `${amount(depth)} above ${restOrScan}` : '';
     const sentence = sentenceOf(basis, moved, target, state.gravity, above);
@@ -305,7 +306,7 @@ function start() {
     write('outlines-text', `Dashed: ${state.from.name}. Solid: ${postureWords(state.gravity)}${above && `, ${above}`}. Drag to move a slice.`);
     for (const { posture, answer } of buttons) {
       const there = momentFor(basis, gravityOf(tilted(posture.q, posture.tilt)), depth);
-      const far = there.folds ? null : movedBetween(basis, there, depth, state.from);
+      const far = there.folds ? null : movedBetween(basis, there, state.from);
       answer.textContent = far ? answerOf(far, inside ? targetOf(inside, state.chosen, far) : null) : 'out of reach';
       answer.classList.toggle('told', !/error|reach|reference/.test(answer.textContent));
     }

@@ -8,6 +8,7 @@
 
 #include "base/arena.h"
 #include "base/library.h"
+#include "base/number.h"
 #include "base/output.h"
 #include "program/view/render/render.h"
 
@@ -413,7 +414,7 @@ static void colour_bar(const painter *by) {
   for (int i = 0; i * step <= picture->largest * (1 + 1e-9); ++i) {
     char number[32];
     const double tick = x + width * i * step / picture->largest;
-    (void)snprintf(number, sizeof number, "%g", i * step);
+    (void)supine_print_text(number, sizeof number, "%g", i * step);
     cairo.move_to(cr, tick, y + height + at->font * 0.15);
     cairo.line_to(cr, tick, y + height + at->font * 0.4);
     cairo.stroke(cr);

@@ -19,8 +19,9 @@
  * In the shapes of arrays, N is the number of vertices, and M the number of triangles.
  *
  * After opening, no function allocates, reads files or locks; any number of threads may use one
- * basis. Gravity is a direction in body axes (DICOM LPS) that points where things fall: supine
- * (0,1,0), prone (0,-1,0), left lateral (1,0,0), right lateral (-1,0,0), upright (0,0,-1).
+ * basis. A thread that calls this library needs a stack of 128 kB, the default of musl. Gravity is
+ * a direction in body axes (DICOM LPS) that points where things fall: supine (0,1,0), prone
+ * (0,-1,0), left lateral (1,0,0), right lateral (-1,0,0), upright (0,0,-1).
  *
  * A compiled program works with newer versions of the shared library of the same name:
  * supine_basis_info only grows at its end, supine_basis_options begins with its size, and no other
@@ -62,7 +63,10 @@ typedef enum supine_storage {
 /** The instruction set of the evaluation. Positions from different sets differ by at most twice
  * supine_basis_error. */
 typedef enum supine_simd {
-  SUPINE_SIMD_AUTO = 0, /**< the widest instruction set that this processor has */
+  /** The widest instruction set that this processor has. On x86-64 the environment variable
+   * SUPINE_SIMD (portable, avx2 or avx512) can name a narrower one, to get the numbers of another
+   * processor. */
+  SUPINE_SIMD_AUTO = 0,
   SUPINE_SIMD_PORTABLE, /**< vectors of four numbers: SSE2, NEON, WebAssembly */
   SUPINE_SIMD_AVX2,     /**< AVX2 and FMA */
   SUPINE_SIMD_AVX512,   /**< AVX-512 F and BW */
@@ -144,7 +148,8 @@ typedef struct supine_pose {
   double gains[SUPINE_LUNGS_MAX][3]; /**< factor of each lung's displacement along x, y and z */
   /** supine_basis_info.identity of the basis that made the pose. For a basis with another identity,
    * functions that return a status return SUPINE_ERROR_ARGUMENT, and write nothing. The identity 0
-   * is not checked: a program may set the weights of a pose itself. */
+   * is not checked: a program may set the weights of a pose itself. Weights and gains must be
+   * finite and below 2^20; otherwise the status is SUPINE_ERROR_ARGUMENT too. */
   uint64_t basis;
 } supine_pose;
 
@@ -154,7 +159,8 @@ typedef struct supine_pose {
  * @param options  NULL for the defaults
  * @param basis    written; NULL on failure
  * @retval SUPINE_ERROR_READ         the file is missing or unreadable
- * @retval SUPINE_ERROR_FORMAT       the file is truncated, corrupted or not a basis file
+ * @retval SUPINE_ERROR_FORMAT       the file is truncated, corrupted or not a basis file, or a
+ *                                   number in it is not finite or cannot be that of lungs
  * @retval SUPINE_ERROR_ARGUMENT     an option is out of range, options->size is not set, or only
  * one function of the allocator is set
  * @retval SUPINE_ERROR_UNSUPPORTED  the processor or the library lacks the instruction set
@@ -215,12 +221,12 @@ SUPINE_API supine_status supine_basis_weights(const supine_basis *basis, const d
  * over the vertices.
  * @param state  its gravity has any length but 0
  * @param pose   written
- * @retval SUPINE_ERROR_ARGUMENT      gravity is zero or not finite; the volume is relative to rest
- *                                    or to full inflation, which the file lacks; or the lungs
- *                                    named in the state are not exactly those of the basis
+ * @retval SUPINE_ERROR_ARGUMENT      gravity is zero or not finite; a volume is not finite, or is
+ *                                    relative to rest or to full inflation, which the file lacks;
+ * or the lungs named in the state are not exactly those of the basis
  * @retval SUPINE_ERROR_OPEN_SURFACE  the surface is open and has no volumes
- * @retval SUPINE_ERROR_NUMERICAL     the surface folds before it holds that volume; single
- *                                    triangles that turn over earlier are not detected
+ * @retval SUPINE_ERROR_NUMERICAL     the surface folds before it holds that volume, or the volume
+ * is out of reach; single triangles that turn over earlier are not detected
  *
  * [MilicEmili1966]  Milic-Emili, Henderson, Dolovich, Trop, Kaneko, J. Appl. Physiol. 21, 1966,
  *                   749-759 */
@@ -253,7 +259,7 @@ SUPINE_API supine_status supine_basis_volumes(const supine_basis *basis, const s
 
 /** Return a bound, mm, on the position error that storage and rounding cause in a pose: the
  * distance of any deformed vertex from the position that exact arithmetic computes from the
- * numbers of the file. Return infinity for a pose of another basis. */
+ * numbers of the file. Return infinity for a pose of another basis, or one that is not finite. */
 SUPINE_API double supine_basis_error(const supine_basis *basis, const supine_pose *pose);
 
 /** Compute the deformed position of every vertex, in the caller's thread.
@@ -360,7 +366,8 @@ SUPINE_API supine_status supine_deform_lit_range(const supine_basis *basis, cons
 /** Compute the unit normals of a deformed surface in one pass over its triangles, in the caller's
  * thread. The normal of a vertex is the mean of its triangles' normals, weighted by area.
  * @param xyz      [N, 3] positions of all vertices, mm
- * @param normals  [N, 3], written; 0 for a vertex without a triangle of positive area */
+ * @param normals  [N, 3], written; 0 for a vertex without a triangle of positive area, or with a
+ *                 triangle whose positions are not finite */
 SUPINE_API void supine_normals(const supine_basis *basis, const float *xyz, float *normals);
 
 /** Limits of supine.glsl: the largest number of modes, and the number of floats of a vertex before

@@ -55,6 +55,7 @@ typedef struct supine_error {
 } supine_error;
 
 /** Set the status and the message of `error` unless it is NULL. A long message is cut off.
+ * Control characters, which texts of files may have, are escaped as \\xHH.
  * @param format  printf format of the message
  * @return `status` */
 SUPINE_API supine_status supine_error_set(supine_error *error, supine_status status,

@@ -58,6 +58,7 @@ SUPINE_API void supine_volume_form_along(const supine_volume_form *form, const d
 
 /** Find the scale s at which cubic[0] s + cubic[1] s^2 + cubic[2] s^3 is `volume`, mL, in the
  * interval around 0 in which this polynomial is monotone.
+ * @retval SUPINE_ERROR_ARGUMENT   the volume or a coefficient is not finite
  * @retval SUPINE_ERROR_NUMERICAL  no such scale: the surface folds before it holds the volume, or
  *                                 the volume does not change with the scale */
 SUPINE_API supine_status supine_volume_scale(const double cubic[3], double volume, double *scale,
@@ -83,8 +84,10 @@ SUPINE_API void supine_volume_bend(const double bend[3], double sigma, double ra
  * @param rest    volume at rest minus that of the reference surface, mL; unused if `bend` is 0
  * @param volume  volume to reach minus that of the reference surface, mL
  * @param gains   [3], written
- * @retval SUPINE_ERROR_NUMERICAL  no such gains: the surface folds before it holds the volume,
- *                                 or the volume does not change with the gains */
+ * @retval SUPINE_ERROR_ARGUMENT   a number is not finite
+ * @retval SUPINE_ERROR_NUMERICAL  no such gains: the surface folds before it holds the volume, the
+ *                                 volume does not change with the gains, a gain would be 2^20 or
+ *                                 more, or the volume is beyond 64 times the way to rest */
 SUPINE_API supine_status supine_volume_form_gains(const supine_volume_form *form,
                                                   const double bend[3], double rest, double volume,
                                                   double gains[3], supine_error *error);

@@ -63,6 +63,8 @@ def _numbers(values: ArrayLike, count: int, name: str) -> Any:
     flat = np.asarray(values, np.float64).ravel()
     if flat.size != count:
         raise ValueError(f"{name} must be {count} numbers")
+    if not np.isfinite(flat).all():
+        raise ArgumentError(f"{name} has a number that is not finite")
     return (ctypes.c_double * count)(*flat)
 
 
@@ -123,6 +125,8 @@ class Pose(_c.CPose):
 
     def fill(self, gain: float) -> Pose:
         """Multiply all displacements by `gain`. Use this where no volume is known, such as for open surfaces."""
+        if not np.isfinite(gain):
+            raise ArgumentError(f"the gain is {gain}: give a finite number")
         np.ctypeslib.as_array(self.gains)[:] = gain
         return self
 
@@ -343,8 +347,8 @@ class Basis:
             with io.open(scan, "wb") as file:
                 file.write(header)
                 file.write(image.data)
-            with io.open(table, "w") as file:
-                file.writelines(["posture,output\n", *(f'"{state}",{i}.nrrd\n' for i, state in enumerate(wanted))])
+            with io.open(table, "wb") as file:
+                file.write(_program.table([["posture", "output"], *([state, f"{i}.nrrd"] for i, state in enumerate(wanted))]))
             options = {"states": table, "labels" if labels else "image": scan, "density": density, "from": since or None}
             _program.run("deform", [basis], options, {basis: "basis", scan: "image"}, None)
             moved = []
@@ -413,6 +417,8 @@ class Basis:
     def normals(self, xyz: Floats, out: Optional[Floats] = None) -> Floats:
         """Compute the unit normals [N, 3] of a deformed surface from its triangles."""
         out = np.empty((self.vertex_count, 3), _FLOAT) if out is None else out
+        if not np.isfinite(np.asarray(xyz)).all():
+            raise ArgumentError("xyz has a number that is not finite")
         _c.normals(self._c, _address(xyz, self._size, "xyz", False), _address(out, self._size, "out"))
         return out
 

@@ -144,13 +144,13 @@ def augment(lungs: Any, image: Optional[NDArray[Any]] = None, *, labels: Optiona
         # Every output is a name of one pipe: fields and images come in the order in which the program writes them.
         os.mkfifo(os.path.join(folder, "pipe"))
         columns = [["output"], ["output", "field"], ["output", "labels", "field"]][(image is not None) + (labels is not None)]
-        rows = [",".join(["posture", *columns])]
+        rows = [["posture", *columns]]
         for i, state in enumerate(wanted):
             outputs = [f"{i}-{column}.nii" for column in columns]
             for output in outputs:
                 os.symlink("pipe", os.path.join(folder, output))
-            rows.append(",".join([f'"{state}"', *outputs]))
-        options["states"] = _in_memory(stack, folder, "states.csv", "\n".join(rows).encode())
+            rows.append([state, *outputs])
+        options["states"] = _in_memory(stack, folder, "states.csv", _program.table(rows))
         said = stack.enter_context(os.fdopen(os.memfd_create("said"), "w+b"))
         process = subprocess.Popen([_program.find(), "deform", *_program.words(options), "--", basis],
                                    stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=said)

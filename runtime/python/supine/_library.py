@@ -162,17 +162,78 @@ class Surface(ctypes.Structure):
 ProgressFunction = ctypes.CFUNCTYPE(c_int, c_void_p, c_double)
 
 
-class Input(ctypes.Structure):
-    """The C struct supine_precompute_input."""
+class Lungs(ctypes.Structure):
+    """The C struct supine_precompute_lungs."""
     _fields_ = [("paths", POINTER(c_char_p)), ("path_count", c_size_t), ("surfaces", POINTER(Surface)),
-                ("surface_count", c_size_t), ("options", POINTER(c_char_p)), ("option_count", c_size_t),
-                ("output", c_char_p), ("progress", ProgressFunction), ("context", c_void_p)]
+                ("surface_count", c_size_t), ("axes", c_char_p), ("unit", c_double), ("has_midline", c_bool),
+                ("midline", c_double), ("labels", c_char_p), ("edge", c_double), ("close", c_double),
+                ("surfaces_out", c_char_p)]
+
+
+class Scan(ctypes.Structure):
+    """The C struct supine_precompute_scan."""
+    _fields_ = [("shown", c_int), ("state", State)]
+
+
+class Law(ctypes.Structure):
+    """The C struct supine_precompute_law."""
+    _fields_ = [("kind", c_int), ("has_base", c_bool), ("has_gain", c_bool), ("has_box_force", c_bool),
+                ("has_constants", c_bool), ("has_shear", c_bool), ("base", c_double), ("gain", c_double),
+                ("box_force", c_double * 3), ("soften", c_double), ("constants", c_double * 6), ("shear", c_double),
+                ("reach", c_double)]
+
+
+class Lesion(ctypes.Structure):
+    """The C struct supine_precompute_lesion."""
+    _fields_ = [("centre", c_double * 3), ("radius", c_double), ("factor", c_double)]
+
+
+class Tissue(ctypes.Structure):
+    """The C struct supine_precompute_tissue; `start` and `end` are its members from and to."""
+    _fields_ = [("profile", c_int), ("axis", c_int), ("start", c_double), ("end", c_double), ("expandability", c_char_p),
+                ("lesion_count", c_size_t), ("lesions", Lesion * 64), ("share", c_double * 2)]
+
+
+class Rest(ctypes.Structure):
+    """The C struct supine_precompute_rest."""
+    _fields_ = [("ml", c_double), ("share", c_double * 2)]
+
+
+class Volumes(ctypes.Structure):
+    """The C struct supine_precompute_volumes."""
+    _fields_ = [("full", c_double), ("rest", Rest * 6), ("copd", c_bool), ("height", c_double), ("sex", c_int)]
+
+
+class Modes(ctypes.Structure):
+    """The C struct supine_precompute_modes."""
+    _fields_ = [("has_band", c_bool), ("band", c_size_t), ("count", c_size_t), ("harmonics", c_bool),
+                ("held_out", c_size_t), ("without_normals", c_bool)]
+
+
+class PrecomputeOptions(ctypes.Structure):
+    """The C struct supine_precompute_options."""
+    _fields_ = [("size", c_size_t), ("lungs", Lungs), ("scan", Scan), ("law", Law), ("tissue", Tissue),
+                ("volumes", Volumes), ("modes", Modes), ("patient", c_char_p), ("fields", c_char_p),
+                ("made_by", c_char_p), ("progress", ProgressFunction), ("context", c_void_p)]
+
+
+class Report(ctypes.Structure):
+    """The C struct supine_precompute_report; errors are RMS, 95th percentile and largest."""
+    _fields_ = [("lung_count", c_size_t), ("vertex_count", c_size_t), ("band", c_size_t), ("mode_count", c_size_t),
+                ("direction_count", c_size_t), ("relative", c_double * 3), ("mm", c_double * 3), ("rest_known", c_bool),
+                ("rest_part", c_double), ("volume", c_double), ("turned_over", c_double), ("band_count", c_size_t),
+                ("band_error", c_double * 12)]
+
+
+class Finding(ctypes.Structure):
+    """The C struct supine_precompute_finding."""
+    _fields_ = [("is_warning", c_bool), ("text", c_char_p)]
 
 
 class Result(ctypes.Structure):
     """The C struct supine_precompute_result."""
-    _fields_ = [("bytes", c_void_p), ("size", c_size_t), ("report", c_char * 2048), ("assumed", c_char * 800),
-                ("findings", c_char * 4096)]
+    _fields_ = [("bytes", c_void_p), ("size", c_size_t), ("report", Report), ("assumptions", POINTER(c_char_p)),
+                ("assumption_count", c_size_t), ("findings", POINTER(Finding)), ("finding_count", c_size_t)]
 
 
 class Residual(ctypes.Structure):
@@ -198,7 +259,7 @@ def _checked(name: str, *arguments: Any) -> Any:
     return call
 
 
-_POSED = {1: b"the pose was made by another basis: make it by Basis.pose of this basis",
+_POSED = {1: b"the pose was made by another basis, or has a number that is not finite: make it by Basis.pose of this basis",
           6: b"the surface is open and encloses no volume",
           7: b"the basis was made or opened without normals: normals() computes them from the triangles"}
 
@@ -263,7 +324,7 @@ def offline() -> Optional[ctypes.CDLL]:
     if path is None:
         return None
     library = ctypes.CDLL(path)
-    library.supine_precompute_basis.argtypes = POINTER(Input), POINTER(Result), POINTER(CError)
+    library.supine_precompute_basis.argtypes = POINTER(PrecomputeOptions), POINTER(POINTER(Result)), POINTER(CError)
     library.supine_precompute_result_free.argtypes = POINTER(Result),
     library.supine_precompute_result_free.restype = None
     return library

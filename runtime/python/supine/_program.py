@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import ctypes
+import io
 import json
 import os
 import re
@@ -12,12 +13,13 @@ import subprocess
 import sys
 import tempfile
 import warnings
-from typing import Any, Callable, Mapping, Optional, Sequence, Union
+from typing import Any, Callable, Iterable, Mapping, Optional, Sequence, Union
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _library as _c
+from . import _options
 
 Progress = Callable[[float], Any]
 _EXITS: dict[int, type[_c.Error]] = {1: _c.ArgumentError, 2: _c.FormatError, 3: _c.UnsupportedError, 5: _c.NumericalError}
@@ -73,6 +75,13 @@ def _write_mesh(path: str, points: np.ndarray[Any, Any], corners: np.ndarray[Any
         file.write(points.tobytes() + records.tobytes())
 
 
+def table(rows: Iterable[Sequence[Any]]) -> bytes:
+    """Return rows as the content of a CSV file."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue().encode()
+
+
 def _write_points(path: str, points: Union[ArrayLike, Mapping[str, Sequence[float]]]) -> None:
     """Write points [n, 3], or a dict from names to points, as CSV."""
     names = [[name] for name in points] if isinstance(points, Mapping) else None
@@ -80,10 +89,9 @@ def _write_points(path: str, points: Union[ArrayLike, Mapping[str, Sequence[floa
     if places.size == 0 or places.shape[-1] != 3:
         raise ValueError(f"points must be [n, 3], not {list(places.shape)}")
     rows = places.reshape(-1, 3).tolist()
-    with open(path, "w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["x", "y", "z", "name"] if names else ["x", "y", "z"])
-        writer.writerows([row + name for row, name in zip(rows, names)] if names else rows)
+    with open(path, "wb") as file:
+        file.write(table([["x", "y", "z", "name"], *(row + name for row, name in zip(rows, names))] if names
+                         else [["x", "y", "z"], *rows]))
 
 
 def save_fields(path: Union[str, "os.PathLike[str]"], points: ArrayLike, gravity: ArrayLike,
@@ -228,8 +236,17 @@ def make(command: str, lungs: Any, content: Sequence[Any], options: dict[str, An
             return file.read(), report
 
 
-def _texts(texts: Sequence[str]) -> Any:
-    return (ctypes.c_char_p * len(texts))(*(os.fsencode(text) for text in texts))
+def _replace(path: str, content: bytes) -> None:
+    """Write a file whole or not at all."""
+    new = f"{path}.{os.getpid()}.new"
+    try:
+        with open(new, "xb") as file:
+            file.write(content)
+        os.replace(new, path)
+    except BaseException:
+        if os.path.exists(new):
+            os.remove(new)
+        raise
 
 
 def precompute(surfaces: Sequence[Any], options: dict[str, Any], progress: Optional[Progress]) -> tuple[Any, str]:
@@ -250,27 +267,36 @@ def precompute(surfaces: Sequence[Any], options: dict[str, Any], progress: Optio
             stopped.append(exception)
         return len(stopped)
 
+    made_by = f"supine {_c.string(_c.version())} precompute " + " ".join(
+        os.path.basename(word) for word in words({**options, "fields": "fields" if "fields" in options else None}))
+    kept = options.pop("output", None)
+    to, error, result = _c.PrecomputeOptions(ctypes.sizeof(_c.PrecomputeOptions)), _c.CError(), ctypes.POINTER(_c.Result)()
     with tempfile.TemporaryDirectory(prefix="supine-") as folder:
         fields = os.path.join(folder, "fields")
         if isinstance(options.get("fields"), tuple):
             save_fields(fields, *options["fields"])
             options["fields"] = fields
-        kept = options.pop("output", None)
-        given, paths = words(options), [] if meshes else [os.fspath(path) for path in surfaces]
+        _options.fill(to, options)
         arrays = [(np.ascontiguousarray(points), np.ascontiguousarray(corners, "<u4"))
                   for points, corners in (_mesh(*item) for item in meshes)]
-        parts = (_c.Surface * len(arrays))(*((len(points), points.ctypes.data, len(corners), corners.ctypes.data)
-                                             for points, corners in arrays))
-        result, error = _c.Result(), _c.CError()
-        status = library.supine_precompute_basis(
-            _c.Input(_texts(paths), len(paths), parts, len(parts), _texts(given), len(given),
-                     None if kept is None else os.fsencode(kept), _c.ProgressFunction(tell), None), result, error)
-    made = os.fspath(kept) if kept is not None else ctypes.string_at(result.bytes, result.size) if result.bytes else None
-    findings, report = _c.string(result.findings), _c.string(result.report)
+        to.lungs.surface_count = len(arrays)
+        to.lungs.surfaces = (_c.Surface * len(arrays))(*((len(points), points.ctypes.data, len(corners), corners.ctypes.data)
+                                                         for points, corners in arrays))
+        if not meshes:
+            to.lungs.path_count = len(surfaces)
+            to.lungs.paths = (ctypes.c_char_p * len(surfaces))(*(os.fsencode(path) for path in surfaces))
+        to.made_by, to.progress = made_by.encode(errors="replace"), _c.ProgressFunction(tell)
+        status = library.supine_precompute_basis(to, result, error)
+    findings = [_c.string(result[0].findings[i].text) for i in range(result[0].finding_count)] if result else []
+    made = ctypes.string_at(result[0].bytes, result[0].size) if status == 0 else b""
+    report = _options.describe(result[0]) if status == 0 else ""
     library.supine_precompute_result_free(result)
     if stopped:
         raise stopped[0]
-    _warn(findings.splitlines())
+    _warn(findings)
     if status != 0:  # the same kinds of exceptions as from the program, which calls any wrong input a mesh
         _c.fail(5 if status in (4, 6) else status, error.message.replace(fields.encode(), b"fields"))
-    return made, report
+    if kept is None:
+        return made, report
+    _replace(os.fspath(kept), made)
+    return os.fspath(kept), report

@@ -1,0 +1,241 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The library: from options to a basis in memory, with a report and what was found in the input. */
+#include <cblas.h>
+#include <gsl/gsl_errno.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <supine/precompute.h>
+
+#include "base/arena.h"
+#include "precompute/library.h"
+
+enum { BAND = 23, MODES = 16 }; /* defaults */
+
+static bool go_on(void *context, double fraction) {
+  const supine_precompute_options *options = context;
+  return options->progress == NULL || options->progress(options->context, fraction) == 0;
+}
+
+/* Choose what the basis contains. */
+static supine_status choose(const supine_precompute_modes *wanted, bool is_fields,
+                            supine_basis_choice *choice, supine_error *error) {
+  const bool has_band = wanted->has_band || wanted->band > 0;
+  const bool has_modes = wanted->harmonics || wanted->count > 0;
+  const size_t standard = is_fields ? SUPINE_MODES_MADE_MAX : MODES;
+  SUPINE_REFUSE_IF(wanted->harmonics && wanted->count > 0, error, SUPINE_ERROR_ARGUMENT,
+                   "give a number of modes or harmonics, not both");
+  *choice = (supine_basis_choice){.band = has_band ? wanted->band : BAND,
+                                  .modes = standard,
+                                  .held_out = wanted->held_out,
+                                  .without_normals = wanted->without_normals,
+                                  .choose_band = is_fields && !has_band,
+                                  .keep_modes = is_fields && has_modes};
+  if (has_modes) {
+    choice->modes = wanted->count; /* 0: harmonics */
+  }
+  return SUPINE_OK;
+}
+
+static void fill_report(const supine_prepared *prepared, const supine_basis_report *made,
+                        supine_precompute_report *report) {
+  const supine_lungs *lungs = &prepared->source.lungs;
+  const supine_accuracy *accuracy = &made->accuracy;
+  const bool rest_known = prepared->reference.known;
+  *report = (supine_precompute_report){
+      .lung_count = lungs->lung_count,
+      .vertex_count = lungs->mesh.vertex_count,
+      .band = made->band,
+      .mode_count = made->mode_count,
+      .direction_count = accuracy->direction_count,
+      .relative = {accuracy->relative_rms, accuracy->relative_p95, accuracy->relative_max},
+      .mm = {accuracy->rms_mm, accuracy->p95_mm, accuracy->max_mm},
+      .rest_known = rest_known,
+      .rest_part = rest_known ? accuracy->volume : 0.0,
+      .volume = rest_known ? 0.0 : accuracy->volume,
+      .turned_over = made->turned_over};
+}
+
+supine_status supine_precompute_make(const supine_precompute_options *options,
+                                     const supine_prepared *prepared, supine_bytes *bytes,
+                                     supine_precompute_report *report, supine_error *error) {
+  supine_precompute_options told = *options; /* of the progress */
+  SUPINE_FREED_BY(supine_fields_free) supine_fields fields = {0};
+  supine_basis_choice choice;
+  supine_basis_report made;
+  SUPINE_TRY(choose(&options->modes, options->fields != NULL, &choice, error));
+  choice.made_by = options->made_by;
+  choice.progress = go_on;
+  choice.progress_context = &told;
+  if (options->fields != NULL) {
+    const supine_source *source = &prepared->source;
+    SUPINE_TRY(supine_fields_load(options->fields, &source->lungs, &source->frame, &fields, error));
+    choice.fields = &fields;
+    choice.scan_gravity = prepared->posture.known ? prepared->posture.state.gravity : NULL;
+  }
+  SUPINE_TRY(supine_precompute(prepared, &choice, bytes, &made, error));
+  fill_report(prepared, &made, report);
+  if (options->fields != NULL) {
+    report->band_count = made.fit.band_highest + 1;
+    memcpy(report->band_error, made.fit.error, sizeof made.fit.error);
+  }
+  return SUPINE_OK;
+}
+
+/* Settings of the process that are changed while at least one basis is being made. */
+static struct {
+  pthread_mutex_t lock;
+  size_t makers; /* number of bases being made */
+  gsl_error_handler_t *handler;
+  int blas_threads;
+} process = {.lock = PTHREAD_MUTEX_INITIALIZER};
+
+/* Let GSL return its errors, and OpenBLAS use one thread: its threads would wait busily beside
+ * those of this library. The first of several calls keeps the settings of the process. */
+static void process_enter(void) {
+  (void)pthread_mutex_lock(&process.lock);
+  if (process.makers++ == 0) {
+    process.handler = gsl_set_error_handler_off();
+    process.blas_threads = openblas_get_num_threads();
+    openblas_set_num_threads(1);
+  }
+  (void)pthread_mutex_unlock(&process.lock);
+}
+
+static void process_leave(void) {
+  (void)pthread_mutex_lock(&process.lock);
+  if (--process.makers == 0) {
+    openblas_set_num_threads(process.blas_threads);
+    (void)gsl_set_error_handler(process.handler);
+  }
+  (void)pthread_mutex_unlock(&process.lock);
+}
+
+/* A result and its memory. */
+typedef struct owned {
+  supine_precompute_result result; /* first, so that its address is that of the struct */
+  supine_bytes bytes;
+  supine_arena memory;
+} owned;
+
+/* The progress of one of the two steps: the lungs, and the basis. */
+typedef struct step {
+  const supine_precompute_options *options;
+  double before, share; /* fraction of the work before the step, and its share */
+} step;
+
+static int tell(void *context, double fraction) {
+  const step *s = context;
+  const supine_precompute_options *options = s->options;
+  if (options->progress == NULL) {
+    return 0;
+  }
+  return options->progress(options->context, s->before + s->share * fraction);
+}
+
+/* Copy the first `length` bytes of a text; return "" if memory is short. */
+static const char *copy(supine_arena *memory, const char *text, size_t length) {
+  char *made = supine_arena_zeros(memory, length + 1, 1);
+  if (made == NULL) {
+    return "";
+  }
+  memcpy(made, text, length);
+  return made;
+}
+
+/* List the findings: their text holds one in each line. */
+static void list_findings(const supine_findings *findings, owned *to) {
+  const char *at = findings->text;
+  size_t length;
+  size_t count = 0;
+  while (supine_findings_next(&at, &length) != NULL) {
+    ++count;
+  }
+  supine_precompute_finding *list = supine_arena_zeros(&to->memory, count, sizeof *list);
+  if (list == NULL) {
+    return;
+  }
+  at = findings->text;
+  for (size_t i = 0; i < count; ++i) {
+    const char *line = supine_findings_next(&at, &length);
+    list[i].text = copy(&to->memory, line, length);
+    list[i].is_warning = strstr(list[i].text, "warning: ") != NULL;
+  }
+  to->result.findings = list;
+  to->result.finding_count = count;
+}
+
+/* List the assumptions, which "; " separates. */
+static void list_assumptions(const char *assumed, owned *to) {
+  static const char separator[] = "; ";
+  size_t count = 1;
+  for (const char *at = assumed; (at = strstr(at, separator)) != NULL; at += strlen(separator)) {
+    ++count;
+  }
+  const char **list = supine_arena_zeros(&to->memory, count, sizeof *list);
+  if (list == NULL) {
+    return;
+  }
+  const char *at = assumed;
+  for (size_t i = 0; i < count; ++i) {
+    const char *end = strstr(at, separator);
+    const size_t length = end != NULL ? (size_t)(end - at) : strlen(at);
+    list[i] = copy(&to->memory, at, length);
+    at += length + (end != NULL ? strlen(separator) : 0);
+  }
+  to->result.assumptions = list;
+  to->result.assumption_count = count;
+}
+
+static supine_status make(const supine_precompute_options *options, owned *to,
+                          supine_error *error) {
+  static const double loading = 0.3; /* share of the work that reads a label map, assumed */
+  SUPINE_FREED_BY(supine_precompute_prepared_free) supine_prepared prepared = {.fit = ""};
+  const step lungs = {options, 0.0, loading};
+  const step basis = {options, loading, 1.0 - loading};
+  supine_precompute_options told = *options;
+  told.progress = tell;
+  told.context = (void *)&lungs; /* only read */
+  supine_status status = supine_precompute_prepare(&told, &prepared, error);
+  if (status == SUPINE_OK) {
+    told.context = (void *)&basis;
+    list_assumptions(prepared.assumed, to);
+    status = supine_precompute_make(&told, &prepared, &to->bytes, &to->result.report, error);
+  }
+  list_findings(&prepared.source.findings, to);
+  SUPINE_TRY(status);
+  to->result.bytes = to->bytes.data;
+  to->result.size = to->bytes.size;
+  return supine_arena_check(&to->memory, error, "a report");
+}
+
+supine_status supine_precompute_basis(const supine_precompute_options *options,
+                                      supine_precompute_result **result, supine_error *error) {
+  /* Programs that were built with an earlier header have a shorter struct. */
+  const size_t oldest = offsetof(supine_precompute_options, context) + sizeof options->context;
+  supine_precompute_options given = {.size = 0};
+  owned *to = calloc(1, sizeof *to);
+  *result = NULL;
+  if (to == NULL) {
+    return supine_error_memory(error, "a basis");
+  }
+  *result = &to->result;
+  SUPINE_REFUSE_IF(options->size < oldest, error, SUPINE_ERROR_ARGUMENT,
+                   "the size of the options is %zu: set it to sizeof(supine_precompute_options)",
+                   options->size);
+  memcpy(&given, options, options->size < sizeof given ? options->size : sizeof given);
+  process_enter();
+  const supine_status status = make(&given, to, error);
+  process_leave();
+  return status;
+}
+
+void supine_precompute_result_free(supine_precompute_result *result) {
+  owned *from = (owned *)result;
+  if (from != NULL) {
+    free(from->bytes.data);
+    supine_arena_free(&from->memory);
+    free(from);
+  }
+}

@@ -1,0 +1,17 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file
+ * Make a basis of prepared lungs, as options say: the part of the library that the program shares,
+ * as it prints what was found between both steps. */
+#ifndef SUPINE_PRECOMPUTE_LIBRARY_H
+#define SUPINE_PRECOMPUTE_LIBRARY_H
+
+#include "precompute/precompute.h"
+
+/** Make a basis. Of the options, those of the lungs and their model were used before, by
+ * supine_precompute_prepare.
+ * @param bytes  release bytes->data with free(), also after an error */
+supine_status supine_precompute_make(const supine_precompute_options *options,
+                                     const supine_prepared *prepared, supine_bytes *bytes,
+                                     supine_precompute_report *report, supine_error *error);
+
+#endif

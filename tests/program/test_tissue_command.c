@@ -1,0 +1,247 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Test the options of `solve` and `precompute` for tissue: accepted and refused values, warnings,
+ * output. */
+#include "mesh/mesh.h"
+#include "precompute/lungs/phantom.h"
+#include "tests/helpers/test.h"
+#include <supine/runtime.h>
+
+#include "tests/helpers/command_helpers.h"
+
+#include "tests/helpers/poses.h"
+
+static char folder[] = "/tmp/supine-tissue-XXXXXX";
+static char lungs[64], csv[64], out[64], other[64];
+static char text[16384]; /* stderr of the last command */
+
+static int setup(void **state) {
+  (void)state;
+  if (mkdtemp(folder) == NULL) {
+    return -1;
+  }
+  (void)snprintf(lungs, sizeof lungs, "%s/lungs.ply", folder);
+  (void)snprintf(csv, sizeof csv, "%s/a.csv", folder);
+  (void)snprintf(out, sizeof out, "%s/out.ply", folder);
+  (void)snprintf(other, sizeof other, "%s/other", folder);
+  supine_mesh mesh = {0};
+  const bool made = supine_phantom_create(2000, 3000.0, &mesh, NULL) == SUPINE_OK &&
+                    supine_mesh_save(lungs, &mesh, NULL, NULL) == SUPINE_OK;
+  supine_mesh_free(&mesh);
+  return made ? 0 : -1;
+}
+
+static int teardown(void **state) {
+  (void)state;
+  (void)unlink(lungs);
+  (void)unlink(csv);
+  (void)unlink(out);
+  (void)unlink(other);
+  return rmdir(folder);
+}
+
+static int solve(const char *option, const char *value, const char *path) {
+  return COMMAND_RUN(&supine_command_solve, KEPT_ERR, text, lungs, "--posture", "supine",
+                     "--volume", "scan+400", "-o", path, option, value);
+}
+
+static bool same_bytes(const char *first, const char *second) {
+  FILE *a = fopen(first, "rb");
+  FILE *b = fopen(second, "rb");
+  assert_true(a != NULL && b != NULL);
+  int x;
+  int y;
+  do {
+    x = fgetc(a);
+    y = fgetc(b);
+  } while (x == y && x != EOF);
+  (void)fclose(a);
+  (void)fclose(b);
+  return x == y;
+}
+
+TEST(test_solve_neutral_tissue_options_same_bytes) {
+  char ply[80];
+  (void)snprintf(ply, sizeof ply, "%s.ply", other);
+  assert_int_equal(solve(NULL, NULL, out), SUPINE_EXIT_OK);
+  assert_int_equal(solve("--lesion", "120,-150,-100,40,1", ply), SUPINE_EXIT_OK);
+  assert_null(strstr(text, "lesion"));
+  assert_true(same_bytes(out, ply));
+  assert_int_equal(solve("--lung", "left:1", ply), SUPINE_EXIT_OK);
+  assert_true(same_bytes(out, ply));
+  assert_int_equal(solve("--expandability", "uniform", ply), SUPINE_EXIT_OK);
+  assert_true(same_bytes(out, ply));
+  assert_int_equal(solve("--lesion", "120,-150,-100,90,3", ply), SUPINE_EXIT_OK);
+  assert_false(same_bytes(out, ply));
+  assert_int_equal(solve("--expandability", "exp:z:0.5:2", ply), SUPINE_EXIT_OK);
+  assert_false(same_bytes(out, ply));
+  assert_int_equal(solve("--reach", "15", ply), SUPINE_EXIT_OK);
+  assert_false(same_bytes(out, ply));
+  (void)unlink(ply);
+}
+
+TEST(test_solve_lesion_outside_warns) {
+  assert_int_equal(solve("--lesion", "900,0,0,30,4", out), SUPINE_EXIT_OK);
+  assert_says(text, "warning: the lesion at 900,0,0 is ");
+  assert_says(text, "mm from the nearest vertex");
+}
+
+TEST(test_solve_lesion_deep_inside_explains_no_change) {
+  assert_int_equal(solve("--lesion", "56,-111,-79,5,4", out), SUPINE_EXIT_OK);
+  assert_says(text, "the lesion at 56,-111,-79 is");
+  assert_says(text, "with a radius of 5 mm it changes nothing");
+}
+
+TEST(test_solve_bad_tissue_options_usage_error) {
+  static const char *const bad[][2] = {{"--lesion", "1,2,3,4"},
+                                       {"--lesion", "1,2,3,0,4"},
+                                       {"--lesion", "1,2,3,4,0"},
+                                       {"--lesion", "1,2,3,4,-1"},
+                                       {"--lesion", "a,2,3,4,5"},
+                                       {"--lung", "left"},
+                                       {"--lung", "left:0"},
+                                       {"--lung", "left:1.5"},
+                                       {"--lung", "middle:0.5"},
+                                       {"--lung", "left:x"},
+                                       {"--reach", "0"},
+                                       {"--reach", "-4"},
+                                       {"--reach", "far"},
+                                       {"--expandability", "linear:w:1:2"},
+                                       {"--expandability", "linear:z:1"},
+                                       {"--expandability", "linear:z:0:1"},
+                                       {"--expandability", "exp:z:1:-1"},
+                                       {"--expandability", "linear:"}};
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
+    if (solve(bad[i][0], bad[i][1], out) != SUPINE_EXIT_USAGE) {
+      fail_msg("%s %s", bad[i][0], bad[i][1]);
+    }
+    assert_says(text, bad[i][0]);
+    assert_says(text, "supine solve --help");
+  }
+}
+
+TEST(test_solve_bad_expandability_file_message_names_vertex) {
+  test_write(csv, "expandability\n1\n1\n-3\n");
+  assert_int_equal(solve("--expandability", csv, out), SUPINE_EXIT_INPUT);
+  assert_says(text, "a.csv:4: expandability -3 of vertex 2: it must be positive");
+  test_write(csv, "expandability\n1\n1\n");
+  assert_int_equal(solve("--expandability", csv, out), SUPINE_EXIT_INPUT);
+  assert_says(text, "vertex 2 of");
+  assert_int_equal(solve("--expandability", "/nowhere/a.csv", out), SUPINE_EXIT_INPUT);
+}
+
+TEST(test_solve_expandability_file_of_ones_equals_uniform) {
+  char ply[80];
+  (void)snprintf(ply, sizeof ply, "%s.ply", other);
+  supine_mesh mesh = {0};
+  assert_int_equal(supine_mesh_load(lungs, NULL, &mesh, NULL, NULL), SUPINE_OK);
+  FILE *file = fopen(csv, "wb");
+  assert_non_null(file);
+  (void)fputs("vertex,expandability\n", file);
+  for (size_t i = mesh.vertex_count; i-- > 0;) {
+    (void)fprintf(file, "%zu,1\n", i);
+  }
+  assert_int_equal(fclose(file), 0);
+  supine_mesh_free(&mesh);
+  assert_int_equal(solve(NULL, NULL, out), SUPINE_EXIT_OK);
+  assert_int_equal(solve("--expandability", csv, ply), SUPINE_EXIT_OK);
+  assert_true(same_bytes(out, ply));
+  (void)unlink(ply);
+}
+
+/* If a lung is collapsed, the volumes of the deformed surface still equal the stated volumes of
+ * each lung and of both. */
+TEST(test_precompute_collapsed_lung_volumes_exact) {
+  double volumes[2][2]; /* mL gained: [healthy, collapsed left lung][left, right] */
+  double rests[2][2];
+  supine_basis *healthy = NULL;
+  static const char *const shares[] = {"left:1", "left:0.3"};
+  for (int ill = 0; ill < 2; ++ill) {
+    assert_int_equal(COMMAND_RUN(&supine_command_precompute, KEPT_ERR, text, lungs, "-o", other,
+                                 "--band", "5", "--lung", shares[ill]),
+                     SUPINE_EXIT_OK);
+    supine_basis *basis = NULL;
+    supine_error error = {0};
+    if (supine_basis_open(other, &basis, &error) != SUPINE_OK) {
+      fail_msg("%s", error.message);
+    }
+    const supine_basis_info *info = supine_basis_get_info(basis);
+    const double gravity[3] = {0.6, 0.64, -0.48};
+    double weights[SUPINE_MODES_MAX];
+    double scales[2];
+    assert_int_equal(supine_basis_weights(basis, gravity, weights), SUPINE_OK);
+    assert_int_equal(posed_scale(basis, weights, 400.0, &scales[0], NULL), SUPINE_OK);
+    scales[1] = scales[0];
+    float *xyz = malloc(3 * info->vertex_count * sizeof *xyz);
+    supine_deform(basis, POSED(basis, weights, scales), xyz);
+    double whole = 0.0;
+    for (size_t lung = 0; lung < 2; ++lung) {
+      const float *shapes[] = {supine_basis_vertices(basis), xyz};
+      double measured[2] = {0.0, 0.0};
+      for (int s = 0; s < 2; ++s) {
+        for (size_t t = 0; t < info->triangle_count; ++t) {
+          const uint32_t *corner = supine_basis_triangles(basis) + 3 * t;
+          if (corner[0] < info->lung_begin[lung] || corner[0] >= info->lung_begin[lung + 1]) {
+            continue;
+          }
+          double p[3][3];
+          for (size_t c = 0; c < 3; ++c) {
+            for (size_t k = 0; k < 3; ++k) {
+              p[c][k] = (double)shapes[s][3 * (size_t)corner[c] + k];
+            }
+          }
+          measured[s] += (p[0][0] * (p[1][1] * p[2][2] - p[1][2] * p[2][1]) +
+                          p[0][1] * (p[1][2] * p[2][0] - p[1][0] * p[2][2]) +
+                          p[0][2] * (p[1][0] * p[2][1] - p[1][1] * p[2][0])) /
+                         6000.0;
+        }
+      }
+      const double stated = posed_lung_volume(basis, lung, weights, scales[lung]);
+      rests[ill][lung] = measured[0];
+      volumes[ill][lung] = stated;
+      whole += measured[1] - measured[0];
+      assert_true(fabs(measured[1] - measured[0] - stated) < 0.05);
+    }
+    assert_true(fabs(whole - 400.0) < 0.05);
+    if (ill == 1) {
+      assert_string_equal(supine_basis_metadata(basis, "lung_share"), "0.3,1");
+    } else {
+      assert_null(supine_basis_metadata(basis, "lung_share"));
+    }
+    free(xyz);
+    if (ill == 0) {
+      healthy = basis;
+    } else {
+      /* At equal factors on the displacement, a collapsed lung gains 0.3 times the volume of a
+       * healthy one. */
+      const double healthy_gain = posed_lung_volume(healthy, 0, weights, scales[0]);
+      assert_true(fabs(volumes[1][0] - 0.3 * healthy_gain) < 1e-4);
+      supine_basis_close(basis);
+    }
+  }
+  supine_basis_close(healthy);
+  assert_true(fabs(rests[1][0] - 0.3 * rests[0][0]) < 0.05);
+  assert_true(fabs(rests[1][1] - rests[0][1]) < 0.05);
+  /* The right lung gains over 50 mL more if the left lung is collapsed. */
+  assert_true(volumes[1][1] > volumes[0][1] + 50.0);
+  assert_true(volumes[1][0] < 0.6 * volumes[0][0]);
+}
+
+TEST(test_solve_missing_lung_refused) {
+  supine_mesh mesh = {0};
+  supine_mesh left = {0};
+  char one[80];
+  (void)snprintf(one, sizeof one, "%s.ply", other);
+  assert_int_equal(supine_mesh_load(lungs, NULL, &mesh, NULL, NULL), SUPINE_OK);
+  left = mesh;
+  left.vertex_count = mesh.vertex_count / 2; /* both lungs have equally many vertices */
+  left.triangle_count = mesh.triangle_count / 2;
+  assert_int_equal(supine_mesh_save(one, &left, NULL, NULL), SUPINE_OK);
+  supine_mesh_free(&mesh);
+  assert_int_equal(COMMAND_RUN(&supine_command_solve, KEPT_ERR, text, one, "--posture", "prone",
+                               "-o", out, "--lung", "right:0.5"),
+                   SUPINE_EXIT_USAGE);
+  assert_says(text, "no right lung");
+  (void)unlink(one);
+}
+
+TEST_GROUP(setup, teardown)

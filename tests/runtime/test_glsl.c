@@ -1,0 +1,356 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Run supine.glsl without a window, in GLSL ES 3.00 and GLSL 3.30 core. Assert that positions and
+ * normals, read back by transform feedback, equal those of the C library except for rounding. One
+ * draw call contains both lungs, each with its own factors on the displacement. The tests are
+ * skipped if EGL has no context without a surface. */
+#include <EGL/egl.h>
+#include <EGL/eglext.h>
+#include <GLES3/gl3.h>
+
+#include "tests/helpers/test.h"
+
+#include <supine/runtime.h>
+
+#include "tests/helpers/runtime_fixture.h"
+
+#include "tests/helpers/poses.h"
+
+enum { VERTICES = 1003, LUNGS = 2, NORMALS = 8, WORDS = 3 };
+enum { DIRECTION_AT = 5, NORMALS_AT = 13 }; /* locations of attributes */
+
+/* Type and name of each OpenGL function that is loaded at run time. */
+#define GL_FUNCTIONS(F)                                                                            \
+  F(PFNGLATTACHSHADERPROC, AttachShader)                                                           \
+  F(PFNGLBEGINTRANSFORMFEEDBACKPROC, BeginTransformFeedback)                                       \
+  F(PFNGLBINDATTRIBLOCATIONPROC, BindAttribLocation)                                               \
+  F(PFNGLBINDBUFFERPROC, BindBuffer)                                                               \
+  F(PFNGLBINDBUFFERBASEPROC, BindBufferBase)                                                       \
+  F(PFNGLBINDFRAMEBUFFERPROC, BindFramebuffer)                                                     \
+  F(PFNGLBINDRENDERBUFFERPROC, BindRenderbuffer)                                                   \
+  F(PFNGLBINDVERTEXARRAYPROC, BindVertexArray)                                                     \
+  F(PFNGLBUFFERDATAPROC, BufferData)                                                               \
+  F(PFNGLCOMPILESHADERPROC, CompileShader)                                                         \
+  F(PFNGLCREATEPROGRAMPROC, CreateProgram)                                                         \
+  F(PFNGLCREATESHADERPROC, CreateShader)                                                           \
+  F(PFNGLDRAWARRAYSPROC, DrawArrays)                                                               \
+  F(PFNGLENABLEPROC, Enable)                                                                       \
+  F(PFNGLENABLEVERTEXATTRIBARRAYPROC, EnableVertexAttribArray)                                     \
+  F(PFNGLENDTRANSFORMFEEDBACKPROC, EndTransformFeedback)                                           \
+  F(PFNGLFINISHPROC, Finish)                                                                       \
+  F(PFNGLFRAMEBUFFERRENDERBUFFERPROC, FramebufferRenderbuffer)                                     \
+  F(PFNGLGENBUFFERSPROC, GenBuffers)                                                               \
+  F(PFNGLGENFRAMEBUFFERSPROC, GenFramebuffers)                                                     \
+  F(PFNGLGENRENDERBUFFERSPROC, GenRenderbuffers)                                                   \
+  F(PFNGLGENVERTEXARRAYSPROC, GenVertexArrays)                                                     \
+  F(PFNGLGETERRORPROC, GetError)                                                                   \
+  F(PFNGLGETPROGRAMINFOLOGPROC, GetProgramInfoLog)                                                 \
+  F(PFNGLGETPROGRAMIVPROC, GetProgramiv)                                                           \
+  F(PFNGLGETSHADERINFOLOGPROC, GetShaderInfoLog)                                                   \
+  F(PFNGLGETSHADERIVPROC, GetShaderiv)                                                             \
+  F(PFNGLGETSTRINGPROC, GetString)                                                                 \
+  F(PFNGLGETUNIFORMLOCATIONPROC, GetUniformLocation)                                               \
+  F(PFNGLLINKPROGRAMPROC, LinkProgram)                                                             \
+  F(PFNGLMAPBUFFERRANGEPROC, MapBufferRange)                                                       \
+  F(PFNGLRENDERBUFFERSTORAGEPROC, RenderbufferStorage)                                             \
+  F(PFNGLSHADERSOURCEPROC, ShaderSource)                                                           \
+  F(PFNGLTRANSFORMFEEDBACKVARYINGSPROC, TransformFeedbackVaryings)                                 \
+  F(PFNGLUNIFORM3FVPROC, Uniform3fv)                                                               \
+  F(PFNGLUNIFORM4FVPROC, Uniform4fv)                                                               \
+  F(PFNGLUSEPROGRAMPROC, UseProgram)                                                               \
+  F(PFNGLVERTEXATTRIBIPOINTERPROC, VertexAttribIPointer)                                           \
+  F(PFNGLVERTEXATTRIBPOINTERPROC, VertexAttribPointer)
+
+typedef struct gl_api {
+#define MEMBER(type, name) type name;
+  GL_FUNCTIONS(MEMBER)
+#undef MEMBER
+} gl_api;
+
+/* Create an OpenGL context without a surface. Return false if that is not possible. */
+static bool make_context(EGLenum api, EGLDisplay *display, EGLContext *context, gl_api *gl) {
+  const EGLint renderable = api == EGL_OPENGL_API ? EGL_OPENGL_BIT : EGL_OPENGL_ES3_BIT;
+  const EGLint wanted[] = {EGL_SURFACE_TYPE, 0, EGL_RENDERABLE_TYPE, renderable, EGL_NONE};
+  const EGLint core[] = {EGL_CONTEXT_MAJOR_VERSION,
+                         3,
+                         EGL_CONTEXT_MINOR_VERSION,
+                         3,
+                         EGL_CONTEXT_OPENGL_PROFILE_MASK,
+                         EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
+                         EGL_NONE};
+  const EGLint es[] = {EGL_CONTEXT_MAJOR_VERSION, 3, EGL_NONE};
+  EGLConfig config = NULL;
+  EGLint count = 0;
+  *context = EGL_NO_CONTEXT;
+  *display = eglGetPlatformDisplay(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, NULL);
+  if (*display == EGL_NO_DISPLAY || !eglInitialize(*display, NULL, NULL)) {
+    return false;
+  }
+  if (!eglBindAPI(api) || !eglChooseConfig(*display, wanted, &config, 1, &count) || count < 1) {
+    return false;
+  }
+  *context = eglCreateContext(*display, config, EGL_NO_CONTEXT, api == EGL_OPENGL_API ? core : es);
+  if (*context == EGL_NO_CONTEXT ||
+      !eglMakeCurrent(*display, EGL_NO_SURFACE, EGL_NO_SURFACE, *context)) {
+    return false;
+  }
+#define LOAD(type, name)                                                                           \
+  gl->name = (type)eglGetProcAddress("gl" #name);                                                  \
+  if (gl->name == NULL) {                                                                          \
+    return false;                                                                                  \
+  }
+  GL_FUNCTIONS(LOAD)
+#undef LOAD
+  return true;
+}
+
+static GLuint make_shader(const gl_api *gl, GLenum kind, const char *version, const char *defines,
+                          const char *library, const char *text) {
+  const char *const parts[] = {version, defines, library, text};
+  const GLuint shader = gl->CreateShader(kind);
+  gl->ShaderSource(shader, 4, parts, NULL);
+  gl->CompileShader(shader);
+  GLint good = 0;
+  gl->GetShaderiv(shader, GL_COMPILE_STATUS, &good);
+  if (!good) {
+    char log[2048] = "";
+    gl->GetShaderInfoLog(shader, sizeof log, NULL, log);
+    fail_msg("%s", log);
+  }
+  return shader;
+}
+
+/* Link an OpenGL program that displaces vertices by coefficients in `vectors` vec4s along the
+ * vertex's direction or, if `axes` is 3, along each axis. */
+static GLuint make_program(const gl_api *gl, const char *version, const char *library,
+                           size_t vectors, size_t axes) {
+  static const char *const arguments[][4] = {
+      {"direction, c0", "direction, c0, c1", "direction, c0, c1, c2", "direction, c0, c1, c2, c3"},
+      {"vec3(supine_amount(c0), supine_amount(y0), supine_amount(z0))",
+       "vec3(supine_amount(c0, c1), supine_amount(y0, y1), supine_amount(z0, z1))",
+       "vec3(supine_amount(c0, c1, c2), supine_amount(y0, y1, y2), supine_amount(z0, z1, z2))",
+       "vec3(supine_amount(c0, c1, c2, c3), supine_amount(y0, y1, y2, y3),\n"
+       "     supine_amount(z0, z1, z2, z3))"}};
+  static const char fragment[] = "out vec4 colour; void main() { colour = vec4(1.0); }\n";
+  /* Attributes by location. OpenGL has at least 16. */
+  static const char *const scalar[] = {"rest", "c0", "c1", "c2", "c3", "direction", "",   "",
+                                       "",     "",   "",   "",   "",   "n0",        "n1", "n2"};
+  static const char *const vector[] = {"rest", "c0", "c1", "c2", "c3", "y0", "y1", "y2",
+                                       "y3",   "z0", "z1", "z2", "z3", "n0", "n1", "n2"};
+  const char *const *names = axes == 3 ? vector : scalar;
+  static const char *const varyings[] = {"position", "normal"};
+  char vertex[2048];
+  char defines[256];
+  (void)snprintf(defines, sizeof defines,
+                 "#define SUPINE_LUNGS %d\n#define SUPINE_VECTORS %zu\n#define SUPINE_WORDS %d\n",
+                 LUNGS, vectors, WORDS);
+  (void)snprintf(vertex, sizeof vertex,
+                 "in vec4 rest; in vec4 c0; in vec4 c1; in vec4 c2; in vec4 c3; %s\n"
+                 "in uvec3 n0; in uvec3 n1; in uvec3 n2;\n"
+                 "out vec3 position;\n"
+                 "out vec3 normal;\n"
+                 "void main() {\n"
+                 "  position = supine_displace(rest, %s);\n"
+                 "  normal = normalize(supine_normal(rest, 0, n0) + supine_normal(rest, 1, n1) +\n"
+                 "                     supine_normal(rest, 2, n2));\n"
+                 "  gl_Position = vec4(position, 1.0);\n"
+                 "}\n",
+                 axes == 3 ? "in vec4 y0; in vec4 y1; in vec4 y2; in vec4 y3;\n"
+                             "in vec4 z0; in vec4 z1; in vec4 z2; in vec4 z3;"
+                           : "in vec3 direction;",
+                 arguments[axes / 2][vectors - 1]);
+  const GLuint program = gl->CreateProgram();
+  gl->AttachShader(program, make_shader(gl, GL_VERTEX_SHADER, version, defines, library, vertex));
+  gl->AttachShader(program, make_shader(gl, GL_FRAGMENT_SHADER, version, "", "", fragment));
+  for (GLuint i = 0; i < NORMALS_AT + WORDS; ++i) {
+    if (names[i][0] != '\0') {
+      gl->BindAttribLocation(program, i, names[i]);
+    }
+  }
+  gl->TransformFeedbackVaryings(program, 2, varyings, GL_INTERLEAVED_ATTRIBS);
+  gl->LinkProgram(program);
+  GLint good = 0;
+  gl->GetProgramiv(program, GL_LINK_STATUS, &good);
+  if (!good) {
+    char log[2048] = "";
+    gl->GetProgramInfoLog(program, sizeof log, NULL, log);
+    fail_msg("%s", log);
+  }
+  return program;
+}
+
+/* Create a framebuffer to draw into, as a context without a surface has none. */
+static void make_framebuffer(const gl_api *gl) {
+  GLuint framebuffer = 0;
+  GLuint renderbuffer = 0;
+  gl->GenFramebuffers(1, &framebuffer);
+  gl->BindFramebuffer(GL_FRAMEBUFFER, framebuffer);
+  gl->GenRenderbuffers(1, &renderbuffer);
+  gl->BindRenderbuffer(GL_RENDERBUFFER, renderbuffer);
+  gl->RenderbufferStorage(GL_RENDERBUFFER, GL_RGBA8, 1, 1);
+  gl->FramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, renderbuffer);
+}
+
+/* Inputs of the vertex shader. */
+typedef struct model {
+  size_t modes;
+  size_t axes;       /* 3 for a basis with three coefficients for each mode, otherwise 1 */
+  size_t head;       /* floats of a vertex before its coefficients */
+  float *attributes; /* [VERTICES, head + axes * modes] vertex attributes from supine_gl_pack */
+  uint32_t *words;   /* [VERTICES, WORDS, 3] packed normals from supine_gl_pack_normals */
+  float weights[SUPINE_GL_MODES];
+  float gains[3 * LUNGS];
+  float normal_weights[LUNGS * WORDS * 3];
+} model;
+
+/* Create the vertex arrays of the model. */
+static void load_model(const gl_api *gl, const model *m) {
+  const size_t floats = m->head + m->axes * m->modes;
+  const GLsizei stride = (GLsizei)(floats * sizeof(float));
+  GLuint array = 0;
+  GLuint buffers[2] = {0, 0};
+  gl->GenVertexArrays(1, &array);
+  gl->BindVertexArray(array);
+  gl->GenBuffers(2, buffers);
+  gl->BindBuffer(GL_ARRAY_BUFFER, buffers[0]);
+  gl->BufferData(GL_ARRAY_BUFFER, (GLsizeiptr)VERTICES * stride, m->attributes, GL_STATIC_DRAW);
+  gl->EnableVertexAttribArray(0);
+  gl->VertexAttribPointer(0, 4, GL_FLOAT, GL_FALSE, stride, NULL);
+  if (m->axes == 1) {
+    gl->EnableVertexAttribArray(DIRECTION_AT);
+    gl->VertexAttribPointer(DIRECTION_AT, 3, GL_FLOAT, GL_FALSE, stride,
+                            (const void *)(4 * sizeof(float)));
+  }
+  for (size_t axis = 0; axis < m->axes; ++axis) {
+    for (size_t k = 0; k < m->modes; k += 4) {
+      const uintptr_t offset = (m->head + axis * m->modes + k) * sizeof(float);
+      const GLuint location = (GLuint)(1 + 4 * axis + k / 4);
+      gl->EnableVertexAttribArray(location);
+      gl->VertexAttribPointer(location, m->modes - k < 4 ? (GLint)(m->modes - k) : 4, GL_FLOAT,
+                              GL_FALSE, stride, (const void *)offset);
+    }
+  }
+  gl->BindBuffer(GL_ARRAY_BUFFER, buffers[1]);
+  gl->BufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(VERTICES * WORDS * 3 * sizeof *m->words), m->words,
+                 GL_STATIC_DRAW);
+  for (GLuint j = 0; j < WORDS; ++j) {
+    gl->EnableVertexAttribArray(NORMALS_AT + j);
+    gl->VertexAttribIPointer(NORMALS_AT + j, 3, GL_UNSIGNED_INT,
+                             (GLsizei)(WORDS * 3 * sizeof *m->words),
+                             (const void *)((uintptr_t)j * 3 * sizeof *m->words));
+  }
+}
+
+/* Set captured [VERTICES, 6] to the position and normal of each vertex after one draw. */
+static void run_shader(const gl_api *gl, GLuint program, const model *m, float *captured) {
+  const GLsizeiptr output = (GLsizeiptr)(6 * VERTICES * sizeof(float));
+  const GLsizei vectors = (GLsizei)((m->modes + 3) / 4);
+  GLuint buffer = 0;
+  load_model(gl, m);
+  gl->GenBuffers(1, &buffer);
+  gl->BindBuffer(GL_TRANSFORM_FEEDBACK_BUFFER, buffer);
+  gl->BufferData(GL_TRANSFORM_FEEDBACK_BUFFER, output, NULL, GL_DYNAMIC_READ);
+  gl->BindBufferBase(GL_TRANSFORM_FEEDBACK_BUFFER, 0, buffer);
+  gl->UseProgram(program);
+  gl->Uniform4fv(gl->GetUniformLocation(program, "supine_weights"), vectors, m->weights);
+  gl->Uniform3fv(gl->GetUniformLocation(program, "supine_gains"), LUNGS, m->gains);
+  gl->Uniform3fv(gl->GetUniformLocation(program, "supine_normal_weights"), LUNGS * WORDS,
+                 m->normal_weights);
+  gl->Enable(GL_RASTERIZER_DISCARD);
+  gl->BeginTransformFeedback(GL_POINTS);
+  gl->DrawArrays(GL_POINTS, 0, VERTICES);
+  gl->EndTransformFeedback();
+  gl->Finish();
+  assert_int_equal(gl->GetError(), GL_NO_ERROR);
+  const void *mapped = gl->MapBufferRange(GL_TRANSFORM_FEEDBACK_BUFFER, 0, output, GL_MAP_READ_BIT);
+  assert_non_null(mapped);
+  memcpy(captured, mapped, (size_t)output);
+}
+
+/* Tolerance for normals. The shader uses the same packed numbers as the C library but rounds
+ * differently. The random modes nearly cancel in some sums, which loses a digit. */
+static const double normal_rounding = 1e-4;
+
+static void check_modes(const gl_api *gl, const char *version, const char *library, size_t modes,
+                        bool vector) {
+  model m = {.modes = modes,
+             .axes = vector ? 3 : 1,
+             .head = vector ? SUPINE_GL_VECTOR_FLOATS : SUPINE_GL_FLOATS};
+  const GLuint program = make_program(gl, version, library, (modes + 3) / 4, m.axes);
+  fixture *f = fixture_create(VERTICES, modes, 3, LUNGS, vector, false, 9, 21);
+  fixture_add_normals(f, NORMALS, 5);
+  size_t size = 0;
+  unsigned char *bytes = fixture_bytes(f, &size);
+  const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
+  supine_basis *basis = NULL;
+  assert_int_equal(supine_basis_open_memory_with(bytes, size, &exact, &basis, NULL), SUPINE_OK);
+  m.attributes = fixture_allocate(VERTICES * (m.head + m.axes * modes), sizeof *m.attributes);
+  m.words = fixture_allocate((size_t)VERTICES * WORDS * 3, sizeof *m.words);
+  float *gpu = fixture_allocate(6 * VERTICES, sizeof *gpu);
+  float *cpu = fixture_allocate(6 * VERTICES, sizeof *cpu);
+  assert_int_equal(supine_gl_pack(basis, 0, VERTICES, m.attributes), SUPINE_OK);
+  assert_int_equal(supine_gl_pack_normals(basis, 0, VERTICES, m.words), SUPINE_OK);
+  const double gravity[3] = {0.6, -0.3, 0.2};
+  const double scales[LUNGS] = {1.7, -0.9};
+  double weights[SUPINE_GL_MODES];
+  assert_int_equal(supine_basis_weights(basis, gravity, weights), SUPINE_OK);
+  assert_int_equal(supine_gl_weights(basis, POSED(basis, weights, scales), m.weights, m.gains),
+                   SUPINE_OK);
+  assert_int_equal(supine_gl_normal_weights(basis, POSED(basis, weights, scales), m.normal_weights),
+                   SUPINE_OK);
+  run_shader(gl, program, &m, gpu);
+  assert_int_equal(supine_deform_lit(basis, POSED(basis, weights, scales), cpu, cpu + 3 * VERTICES),
+                   SUPINE_OK);
+  double moved = 0;
+  /* The shader and the C library err by at most supine_basis_error each. */
+  const double bound = 2 * supine_basis_error(basis, POSED(basis, weights, scales));
+  assert_true(bound < 1e-3);
+  for (size_t i = 0; i < VERTICES; ++i) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const float *normal = cpu + 3 * VERTICES;
+      assert_true(fabs((double)gpu[6 * i + axis] - (double)cpu[3 * i + axis]) <= bound);
+      assert_true(fabs((double)gpu[6 * i + 3 + axis] - (double)normal[3 * i + axis]) <=
+                  normal_rounding);
+      moved = fmax(moved, fabs((double)gpu[6 * i + axis] - (double)f->vertex[3 * i + axis]));
+    }
+  }
+  assert_true(moved > 1);
+  free(m.attributes);
+  free(m.words);
+  free(gpu);
+  free(cpu);
+  supine_basis_close(basis);
+  free(bytes);
+  fixture_destroy(f);
+}
+
+static void check_glsl(EGLenum api, const char *version) {
+  EGLDisplay display = EGL_NO_DISPLAY;
+  EGLContext context = EGL_NO_CONTEXT;
+  gl_api gl = {0};
+  if (!make_context(api, &display, &context, &gl)) {
+    print_message("skipped: EGL has no OpenGL context without a surface\n");
+    skip();
+    return;
+  }
+  print_message("%s\n", (const char *)gl.GetString(GL_VERSION));
+  make_framebuffer(&gl);
+  size_t length = 0;
+  unsigned char *library = test_read(SUPINE_GLSL, &length);
+  static const size_t modes[] = {1, 4, 6, 11, 16};
+  for (size_t i = 0; i < sizeof modes / sizeof *modes; ++i) {
+    check_modes(&gl, version, (const char *)library, modes[i], false);
+    check_modes(&gl, version, (const char *)library, modes[i], true);
+  }
+  free(library);
+  (void)eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+  (void)eglDestroyContext(display, context);
+  (void)eglTerminate(display);
+}
+
+TEST(test_glsl_es300_equals_evaluator) {
+  check_glsl(EGL_OPENGL_ES_API, "#version 300 es\nprecision highp float;\n");
+}
+
+TEST(test_glsl_330_core_equals_evaluator) {
+  check_glsl(EGL_OPENGL_API, "#version 330 core\n");
+}

@@ -1,0 +1,370 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Test the expected errors of positions, and the location of lungs from observed points. */
+#include "tests/helpers/test.h"
+
+#include <supine/locate.h>
+
+#include "tests/helpers/runtime_fixture.h"
+
+enum { VERTICES = 400, SEEN = 20 };
+
+typedef struct world {
+  unsigned char *bytes;
+  supine_basis *basis;
+  supine_observation seen[SEEN];
+  double *space;
+  supine_locate_residual residuals[SEEN];
+} world;
+
+static int setup(void **state) {
+  static const double resting[9] = {1700 * -3.5449077018110318};
+  world *w = fixture_allocate(1, sizeof *w);
+  fixture *f = fixture_create_shrinking(VERTICES, 2, 77);
+  supine_error error = {0};
+  size_t size = 0;
+  f->resting = resting;
+  w->bytes = fixture_bytes(f, &size);
+  fixture_destroy(f);
+  if (supine_basis_open_memory(w->bytes, size, &w->basis, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  w->space = fixture_allocate(supine_locate_space(SEEN), sizeof *w->space);
+  *state = w;
+  return 0;
+}
+
+static int teardown(void **state) {
+  world *w = *state;
+  supine_basis_close(w->basis);
+  free(w->bytes);
+  free(w->space);
+  free(w);
+  return 0;
+}
+
+static supine_state state_of(const char *text) {
+  supine_state state = {.gravity = {0, 1, 0}};
+  assert_int_equal(supine_state_parse(text, &state, NULL), SUPINE_OK);
+  return state;
+}
+
+/* Set xyz [VERTICES, 3] to the positions of all vertices in a state, mm. */
+static void deform(const supine_basis *basis, const supine_state *state, float *xyz) {
+  supine_pose pose;
+  supine_error error = {0};
+  if (supine_basis_pose(basis, state, &pose, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  supine_deform(basis, &pose, xyz);
+}
+
+/* Convert the point x to another frame of reference: if `turned`, rotate x by 0.7 rad (40 degrees)
+ * about the axis (1, 2, 2) / 3. Then shift it. */
+static void move(bool turned, const double x[3], double moved[3]) {
+  static const double shift[3] = {512, -207, 1020};
+  const double c = turned ? cos(0.7) : 1;
+  const double s = turned ? sin(0.7) : 0;
+  const double a[3] = {1 / 3.0, 2 / 3.0, 2 / 3.0};
+  const double along = a[0] * x[0] + a[1] * x[1] + a[2] * x[2];
+  for (size_t i = 0; i < 3; ++i) {
+    const size_t j = (i + 1) % 3;
+    const size_t k = (i + 2) % 3;
+    moved[i] = c * x[i] + s * (a[j] * x[k] - a[k] * x[j]) + (1 - c) * along * a[i] + shift[i];
+  }
+}
+
+/* Observe one in twenty vertices, at their exact positions in a state. */
+static void observe(world *w, const supine_state *state, bool turned) {
+  float xyz[3 * VERTICES];
+  deform(w->basis, state, xyz);
+  for (size_t j = 0; j < SEEN; ++j) {
+    /* With the offset 19, the sample includes a tip of each lung. */
+    const size_t at = j * VERTICES / SEEN + (j % 2) * 19;
+    const double x[3] = {(double)xyz[3 * at], (double)xyz[3 * at + 1], (double)xyz[3 * at + 2]};
+    w->seen[j] = (supine_observation){.vertex = at, .noise = 1};
+    move(turned, x, w->seen[j].position);
+  }
+}
+
+/* Return the RMS distance between the located and the true positions of all vertices, mm. */
+static double miss(const world *w, const supine_location *found, const supine_state *state,
+                   bool turned) {
+  float truth[3 * VERTICES];
+  float xyz[3 * VERTICES];
+  float sigma[VERTICES];
+  double sum = 0;
+  deform(w->basis, state, truth);
+  assert_int_equal(supine_locate_positions(found, w->basis, xyz, sigma, NULL), SUPINE_OK);
+  for (size_t i = 0; i < VERTICES; ++i) {
+    const double x[3] = {(double)truth[3 * i], (double)truth[3 * i + 1], (double)truth[3 * i + 2]};
+    double moved[3];
+    move(turned, x, moved);
+    assert_true(sigma[i] > 0 && sigma[i] < 60);
+    for (size_t k = 0; k < 3; ++k) {
+      sum += pow((double)xyz[3 * i + k] - moved[k], 2);
+    }
+  }
+  return sqrt(sum / VERTICES);
+}
+
+static const supine_location *locate(world *w, const supine_state *state, bool rigid) {
+  const supine_locate_task task = {
+      .inside = w->basis, .count = SEEN, .observed = w->seen, .state = *state, .rigid = rigid};
+  const supine_location *found = NULL;
+  supine_error error = {0};
+  if (supine_locate(&task, w->residuals, w->space, &found, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  return found;
+}
+
+TEST(test_locate_points_moved_by_law_positions_and_volume_recovered) {
+  world *w = *state;
+  const supine_state truth = state_of("prone:rest+300");
+  const supine_state posture = state_of("prone");
+  double held[2];
+  supine_pose pose;
+  assert_int_equal(supine_basis_pose(w->basis, &truth, &pose, NULL), SUPINE_OK);
+  supine_basis_volumes(w->basis, &pose, held);
+  for (int rigid = 0; rigid < 2; ++rigid) {
+    observe(w, &truth, rigid == 1);
+    const supine_location *const found = locate(w, &posture, rigid == 1);
+    const supine_location_info *const about = supine_location_get_info(found);
+    print_message("positions err by %.2f mm RMS, volume errs by %.0f mL (expected error %.0f mL), "
+                  "residuals %.2f mm RMS\n",
+                  miss(w, found, &truth, rigid == 1), about->volume - held[0] - held[1],
+                  about->volume_error, about->residual_rms);
+    assert_true(miss(w, found, &truth, rigid == 1) < 2.5);
+    assert_true(fabs(about->volume - held[0] - held[1]) < about->volume_error);
+    assert_true(about->volume_error < about->volume_prior_error);
+    assert_int_equal(about->outlier_count, 0);
+    assert_true(about->rotation[0] > (rigid == 1 ? 0.7 : 0.999));
+  }
+}
+
+TEST(test_locate_given_volume_kept) {
+  world *w = *state;
+  const supine_state truth = state_of("prone:rest+300");
+  observe(w, &truth, false);
+  const supine_location *const found = locate(w, &truth, false);
+  const supine_location_info *const about = supine_location_get_info(found);
+  assert_int_equal(about->state.volume.kind, SUPINE_VOLUME_REST);
+  assert_true(about->volume_error == 0);
+  assert_true(miss(w, found, &truth, false) < 0.05);
+}
+
+/* Three points, the fewest that determine a rotation, give the exact one. */
+TEST(test_locate_rotation_from_three_points_exact) {
+  world *w = *state;
+  const supine_state truth = state_of("prone:rest+300");
+  observe(w, &truth, true);
+  w->seen[1] = w->seen[9];
+  w->seen[2] = w->seen[18];
+  const supine_locate_task task = {
+      .inside = w->basis, .count = 3, .observed = w->seen, .state = truth, .rigid = true};
+  const supine_location *found = NULL;
+  assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, NULL), SUPINE_OK);
+  assert_true(miss(w, found, &truth, true) < 0.05);
+}
+
+TEST(test_locate_wrong_point_reported_and_ignored) {
+  world *w = *state;
+  const supine_state truth =
+      state_of("left:full-700"); /* a state in which expected errors are about 10 mm */
+  const supine_state posture = state_of("left");
+  observe(w, &truth, false);
+  const supine_location *const before = locate(w, &posture, false);
+  float xyz[2][3 * VERTICES];
+  float sigma[VERTICES];
+  assert_int_equal(supine_locate_positions(before, w->basis, xyz[0], sigma, NULL), SUPINE_OK);
+  for (size_t wrong = 0; wrong < SEEN; ++wrong) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      w->seen[wrong].position[axis] += 30;
+      const supine_location *const found = locate(w, &posture, false);
+      w->seen[wrong].position[axis] -= 30;
+      assert_int_equal(supine_location_get_info(found)->outlier_count, 1);
+      assert_true(w->residuals[wrong].outlier);
+      assert_true(w->residuals[wrong].distance > 20);
+      assert_int_equal(supine_locate_positions(found, w->basis, xyz[1], sigma, NULL), SUPINE_OK);
+      double square = 0;
+      for (size_t i = 0; i < (size_t)3 * VERTICES; ++i) {
+        square += pow((double)(xyz[1][i] - xyz[0][i]), 2) / VERTICES;
+      }
+      assert_true(sqrt(square) < 1);
+    }
+  }
+}
+
+TEST(test_locate_any_number_of_points_error_at_most_prior) {
+  world *w = *state;
+  const supine_state truth = state_of("supine:scan-900");
+  float expected[VERTICES];
+  float xyz[3 * VERTICES];
+  float sigma[VERTICES];
+  observe(w, &truth, false);
+  assert_int_equal(supine_expected_error(w->basis, &truth, NULL, expected, NULL), SUPINE_OK);
+  for (size_t count = 3; count <= SEEN; ++count) {
+    const supine_locate_task task = {
+        .inside = w->basis, .count = count, .observed = w->seen, .state = truth};
+    const supine_location *found = NULL;
+    assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, NULL), SUPINE_OK);
+    assert_int_equal(supine_locate_positions(found, w->basis, xyz, sigma, NULL), SUPINE_OK);
+    for (size_t i = 0; i < VERTICES; ++i) {
+      /* Observing points must not increase the expected error. Only an error below 3 mm may rise,
+       * up to 3 mm: supine_locate treats displacements below 2 mm as 2 mm, for which the expected
+       * error is sqrt(4.5 mm * 2 mm) = 3 mm. */
+      assert_true(sigma[i] <= fmaxf(3.01F, 1.0001F * expected[i]));
+    }
+  }
+}
+
+TEST(test_locate_one_point_no_residual) {
+  world *w = *state;
+  const supine_state truth = state_of("supine:scan-900");
+  observe(w, &truth, false);
+  for (size_t count = 1; count < 3; ++count) {
+    const supine_locate_task task = {
+        .inside = w->basis, .count = count, .observed = w->seen, .state = truth};
+    const supine_location *found = NULL;
+    assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, NULL), SUPINE_OK);
+    assert_int_equal(w->residuals[0].sigma > 0, count > 1);
+    assert_true(miss(w, found, &truth, false) < 0.05);
+  }
+}
+
+TEST(test_locate_bad_task_refused) {
+  world *w = *state;
+  const supine_state truth = state_of("supine:rest");
+  observe(w, &truth, false);
+  const supine_observation good = w->seen[0];
+  const supine_observation bad[] = {{VERTICES, {0, 0, 0}, 1},
+                                    {0, {0, (double)NAN, 0}, 1},
+                                    {0, {0, 0, (double)INFINITY}, 1},
+                                    {0, {0, 0, 0}, 0},
+                                    {0, {0, 0, 0}, (double)NAN}};
+  const supine_location *found = NULL;
+  supine_error error;
+  supine_locate_task task = {
+      .inside = w->basis, .count = SEEN, .observed = w->seen, .state = truth};
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
+    w->seen[0] = bad[i];
+    assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, &error),
+                     SUPINE_ERROR_ARGUMENT);
+    assert_null(found);
+  }
+  w->seen[0] = good;
+  const size_t counts[] = {0, SUPINE_LOCATE_POINTS_MAX + 1};
+  for (size_t i = 0; i < 2; ++i) {
+    task.count = counts[i];
+    assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, &error),
+                     SUPINE_ERROR_ARGUMENT);
+  }
+  task.rigid = true;
+  task.count = 2;
+  assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, &error),
+                   SUPINE_ERROR_ARGUMENT);
+}
+
+/* The formula of supine/locate.h, written again: displacement, assumed volume at rest, heart and
+ * sliding. The terms that supine_expected_parts returns add up to the error. */
+TEST(test_expected_error_any_state_equals_formula) {
+  world *w = *state;
+  const supine_basis_info *info = supine_basis_get_info(w->basis);
+  const double full = info->reference_volume[0] + info->reference_volume[1];
+  const char *const states[] = {"prone:scan-900", "supine:scan-20", "left:rest+100"};
+  double low[3] = {INFINITY, INFINITY, INFINITY};
+  double high[3] = {-INFINITY, -INFINITY, -INFINITY};
+  for (size_t i = 0; i < (size_t)3 * VERTICES; ++i) {
+    low[i % 3] = fmin(low[i % 3], (double)info->vertices[i]);
+    high[i % 3] = fmax(high[i % 3], (double)info->vertices[i]);
+  }
+  for (size_t s = 0; s < 3; ++s) {
+    const supine_state asked = state_of(states[s]);
+    const supine_state scan = supine_basis_scan(w->basis);
+    supine_state fuller = asked;
+    fuller.volume.ml += 0.08 * full;
+    float x[3][3 * VERTICES];
+    float sigma[VERTICES];
+    supine_expected_part parts[SUPINE_EXPECTED_TERMS];
+    double squares = 0;
+    double sum[2] = {0, 0};
+    deform(w->basis, &asked, x[0]);
+    deform(w->basis, &scan, x[1]);
+    deform(w->basis, &fuller, x[2]);
+    for (size_t i = 0; i < (size_t)3 * VERTICES; ++i) {
+      squares += pow((double)(x[0][i] - x[1][i]), 2) / VERTICES;
+    }
+    const double c = fmin(4.5, 0.25 * sqrt(squares));
+    const double turn[2] = {fabs(asked.gravity[0]), fabs(asked.gravity[1] - 1)};
+    assert_int_equal(supine_expected_error(w->basis, &asked, NULL, sigma, NULL), SUPINE_OK);
+    for (size_t i = 0; i < VERTICES; ++i) {
+      const float *p = info->vertices + 3 * i;
+      const double middle = 0.5 * (low[0] + high[0]);
+      const double side = fabs((double)p[0] - middle) / (high[0] - middle);
+      const double back = (high[1] - (double)p[1]) / (high[1] - low[1]);
+      const double apex = (high[2] - (double)p[2]) / (high[2] - low[2]);
+      const double heart = 12 * hypot(turn[0], turn[1]) * fmax(0, 1 - side / 0.7) * 4 * back *
+                           (1 - back) * fmax(0, 1 - fabs(apex - 0.65) / 0.35);
+      double u = 0;
+      double slope = 0;
+      for (size_t j = 3 * i; j < 3 * i + 3; ++j) {
+        u += pow((double)(x[0][j] - x[1][j]), 2);
+        slope += asked.volume.kind == SUPINE_VOLUME_REST ? pow((double)(x[2][j] - x[0][j]), 2) : 0;
+      }
+      const double expected = sqrt(c * sqrt(u) + slope + heart * heart + pow(3 * turn[0], 2));
+      assert_true(fabs((double)sigma[i] - expected) < 1e-3 + 0.03 * expected);
+      sum[0] += pow((double)sigma[i], 2) / VERTICES;
+    }
+    assert_int_equal(supine_expected_parts(w->basis, &asked, NULL, parts, NULL), SUPINE_OK);
+    for (size_t k = 0; k < SUPINE_EXPECTED_TERMS; ++k) {
+      assert_true(strlen(parts[k].name) > 0 && strlen(parts[k].source) > 0);
+      sum[1] += parts[k].rms * parts[k].rms;
+    }
+    assert_true(fabs(sum[1] - sum[0]) < 1e-5 * sum[0]);
+  }
+  const supine_state scan = supine_basis_scan(w->basis);
+  float sigma[VERTICES];
+  assert_int_equal(supine_expected_error(w->basis, &scan, NULL, sigma, NULL), SUPINE_OK);
+  for (size_t i = 0; i < VERTICES; ++i) {
+    assert_true(sigma[i] == 0);
+  }
+}
+
+/* A random wrong half of the points must raise the stated errors; what no patient has is refused.
+ */
+TEST(test_locate_residuals_beyond_stated_errors_raise_them_or_are_refused) {
+  world *w = *state;
+  const supine_state truth = state_of("supine:full-700");
+  float xyz[3 * VERTICES];
+  float sigma[2][VERTICES];
+  const supine_location *found = NULL;
+  supine_error error;
+  for (int off = 0; off < 2; ++off) {
+    observe(w, &truth, false);
+    for (size_t j = 0; j < SEEN; ++j) {
+      w->seen[j].position[j % 3] += off * (j % 2 == 0 ? 20 : -20);
+    }
+    found = locate(w, &truth, false);
+    assert_int_equal(supine_locate_positions(found, w->basis, xyz, sigma[off], NULL), SUPINE_OK);
+  }
+  assert_true(sigma[1][0] > 1.5F * sigma[0][0]);
+  const supine_locate_task task = {
+      .inside = w->basis, .count = SEEN, .observed = w->seen, .state = state_of("supine")};
+  const struct {
+    double factor; /* on the positions that were observed */
+    const char *said;
+  } bad[] = {{0, "at one place"}, {-1, "do not fit"}, {0.2, "under 10 %"}};
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
+    observe(w, &truth, false);
+    for (size_t j = 0; j < SEEN; ++j) {
+      w->seen[j].position[0] *= bad[i].factor;
+      w->seen[j].position[1] *= fabs(bad[i].factor);
+      w->seen[j].position[2] *= fabs(bad[i].factor);
+    }
+    assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, &error),
+                     SUPINE_ERROR_NUMERICAL);
+    assert_says(error.message, bad[i].said);
+  }
+}
+
+TEST_GROUP(setup, teardown)

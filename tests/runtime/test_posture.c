@@ -1,0 +1,162 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Test directions of gravity from names of postures, quaternions and tilts. */
+#include <float.h>
+
+#include "tests/helpers/test.h"
+
+#include <supine/posture.h>
+
+#include "tests/helpers/runtime_fixture.h"
+
+static const double tolerance = 8 * DBL_EPSILON;
+
+static void assert_vector(const double v[3], double x, double y, double z) {
+  assert_true(fabs(v[0] - x) <= tolerance);
+  assert_true(fabs(v[1] - y) <= tolerance);
+  assert_true(fabs(v[2] - z) <= tolerance);
+}
+
+TEST(test_gravity_named_postures_literal) {
+  static const struct {
+    const char *name;
+    double x, y, z;
+  } cases[] = {
+      {"supine", 0, 1, 0},       {"prone", 0, -1, 0},
+      {"left", 1, 0, 0},         {"right", -1, 0, 0},
+      {"left-lateral", 1, 0, 0}, {"right-lateral", -1, 0, 0},
+      {"upright", 0, 0, -1},     {"inverted", 0, 0, 1},
+      {"HFS", 0, 1, 0},          {"FFS", 0, 1, 0},
+      {"HFP", 0, -1, 0},         {"FFP", 0, -1, 0},
+      {"HFDL", 1, 0, 0},         {"FFDL", 1, 0, 0},
+      {"HFDR", -1, 0, 0},        {"FFDR", -1, 0, 0},
+      {"hfs", 0, 1, 0},          {"SUPINE", 0, 1, 0},
+      {"ffDr", -1, 0, 0},        {"Right-Lateral", -1, 0, 0},
+  };
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+    double g[3] = {9, 9, 9};
+    assert_int_equal(supine_posture_gravity(cases[i].name, g), SUPINE_OK);
+    assert_vector(g, cases[i].x, cases[i].y, cases[i].z);
+  }
+}
+
+TEST(test_gravity_unknown_name_refused_output_unchanged) {
+  static const char *const names[] = {"", "supin", "supines", "HF", "left_lateral", " prone"};
+  for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
+    double g[3] = {9, 8, 7};
+    assert_int_equal(supine_posture_gravity(names[i], g), SUPINE_ERROR_ARGUMENT);
+    assert_vector(g, 9, 8, 7);
+  }
+}
+
+TEST(test_posture_name_every_index_known) {
+  assert_int_equal(supine_posture_count(), 16);
+  for (size_t i = 0; i < supine_posture_count(); ++i) {
+    double g[3];
+    assert_int_equal(supine_posture_gravity(supine_posture_name(i), g), SUPINE_OK);
+    assert_string_equal(supine_posture_nearest(supine_posture_name(i)), supine_posture_name(i));
+  }
+  assert_null(supine_posture_name(supine_posture_count()));
+}
+
+TEST(test_nearest_misspelling_gives_name) {
+  static const char *const cases[][2] = {
+      {"suppine", "supine"},
+      {"spuine", "supine"},
+      {"pron", "prone"},
+      {"lef", "left"},
+      {"rigth", "right"},
+      {"upwright", "upright"},
+      {"invert", "inverted"},
+      {"HFDD", "HFDL"},
+      {"leftlateral", "left-lateral"},
+      {"Right_Lateral", "right-lateral"},
+  };
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+    assert_string_equal(supine_posture_nearest(cases[i][0]), cases[i][1]);
+  }
+  assert_non_null(supine_posture_nearest(""));
+  char text[5000];
+  memset(text, 'q', sizeof text - 1);
+  text[sizeof text - 1] = '\0';
+  assert_non_null(supine_posture_nearest(text));
+}
+
+TEST(test_quaternion_known_orientations_literal) {
+  const double h = sqrt(0.5);
+  double g[3];
+  assert_int_equal(supine_posture_quaternion((double[]){1, 0, 0, 0}, g), SUPINE_OK);
+  assert_vector(g, 0, 0, -1); /* upright: the axes of body and world are equal */
+  assert_false(signbit(g[0]) || signbit(g[1]));
+  /* Prone: after a rotation by +90 degrees about x, the back (y of the body) points up (z of the
+   * world). */
+  assert_int_equal(supine_posture_quaternion((double[]){h, h, 0, 0}, g), SUPINE_OK);
+  assert_vector(g, 0, -1, 0);
+  assert_int_equal(supine_posture_quaternion((double[]){-3 * h, 3 * h, 0, 0}, g), SUPINE_OK);
+  /* Supine: -90 degrees about x. Sign and length of the quaternion do not matter. */
+  assert_vector(g, 0, 1, 0);
+  /* On the left side: +90 degrees about y rotates the head (z of the body) to x of the world, and
+   * left (x) to -z. */
+  assert_int_equal(supine_posture_quaternion((double[]){h, 0, h, 0}, g), SUPINE_OK);
+  assert_vector(g, 1, 0, 0);
+  assert_int_equal(supine_posture_quaternion((double[]){h, 0, 0, h}, g), SUPINE_OK);
+  assert_vector(g, 0, 0, -1); /* a turn about the body's axis z: still upright */
+}
+
+/* Rotate v by the quaternion q: out = q v q*, written with cross products. */
+static void rotate(const double q[4], const double v[3], double out[3]) {
+  const double t[3] = {2 * (q[2] * v[2] - q[3] * v[1]), 2 * (q[3] * v[0] - q[1] * v[2]),
+                       2 * (q[1] * v[1] - q[2] * v[0])};
+  out[0] = v[0] + q[0] * t[0] + q[2] * t[2] - q[3] * t[1];
+  out[1] = v[1] + q[0] * t[1] + q[3] * t[0] - q[1] * t[2];
+  out[2] = v[2] + q[0] * t[2] + q[1] * t[1] - q[2] * t[0];
+}
+
+TEST(test_quaternion_random_maps_gravity_to_world_down) {
+  uint64_t random = 20080321;
+  for (int i = 0; i < 1000; ++i) {
+    double q[4];
+    double square = 0;
+    for (int j = 0; j < 4; ++j) {
+      q[j] = fixture_random(&random);
+      square += q[j] * q[j];
+    }
+    double g[3];
+    assert_int_equal(supine_posture_quaternion(q, g), SUPINE_OK);
+    for (int j = 0; j < 4; ++j) {
+      q[j] /= sqrt(square);
+    }
+    double world[3];
+    rotate(q, g, world);
+    assert_vector(world, 0, 0, -1);
+  }
+}
+
+TEST(test_quaternion_zero_or_not_finite_refused) {
+  double g[3];
+  assert_int_equal(supine_posture_quaternion((double[]){0, 0, 0, 0}, g), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_posture_quaternion((double[]){1, NAN, 0, 0}, g), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_posture_quaternion((double[]){INFINITY, 0, 0, 0}, g),
+                   SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_posture_quaternion((double[]){1e300, 0, 0, 0}, g), SUPINE_OK);
+  assert_vector(g, 0, 0, -1);
+  assert_int_equal(supine_posture_quaternion((double[]){5e-324, 0, 0, 0}, g), SUPINE_OK);
+  assert_vector(g, 0, 0, -1);
+}
+
+TEST(test_tilt_postures_literal) {
+  const double c = 0.96592582628906831; /* cosine of 15 degrees, Abramowitz & Stegun 4.3.128 */
+  const double s = 0.25881904510252074; /* sine of 15 degrees */
+  double g[3] = {0, 1, 0};
+  assert_int_equal(supine_posture_tilt(g, 15, g), SUPINE_OK);
+  assert_vector(g, 0, c, s); /* Trendelenburg: the head is lower */
+  assert_int_equal(supine_posture_tilt((double[]){0, -1, 0}, 15, g), SUPINE_OK);
+  assert_vector(g, 0, -c, -s);
+  assert_int_equal(supine_posture_tilt((double[]){0, 0, -1}, 15, g), SUPINE_OK);
+  assert_vector(g, 0, s, -c); /* leaning backwards */
+  assert_int_equal(supine_posture_tilt((double[]){1, 0, 0}, 37, g), SUPINE_OK);
+  assert_vector(g, 1, 0, 0);
+  assert_int_equal(supine_posture_tilt((double[]){0, 1, 0}, 360 * 1e6 + 90, g), SUPINE_OK);
+  assert_vector(g, 0, 0, 1);
+  assert_int_equal(supine_posture_tilt((double[]){0, 1, 0}, NAN, g), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_posture_tilt((double[]){0, INFINITY, 0}, 1, g), SUPINE_ERROR_ARGUMENT);
+}
