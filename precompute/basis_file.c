@@ -292,7 +292,7 @@ static void add_all(entries *list, const supine_basis_content *content,
                     const supine_normals_modes *normals) {
   const double *share = content->prepared->model.share;
   add(list, "format", "supine-basis");
-  add(list, "version", "3");
+  add(list, "version", "4");
   add(list, "kind", "%s", content->rows.kind == SUPINE_ROWS_VECTOR ? "vector" : "scalar");
   add(list, "band", "%zu", content->compression->band);
   add(list, "modes", "%s", content->is_harmonics ? "harmonics" : "best");
@@ -343,7 +343,7 @@ static size_t list_tensors(const supine_basis_content *content, const stored *ma
   const supine_tensor all[TENSORS_MAX] = {
       {"vertices", SUPINE_F32, 2, {n, 3}, made->vertices},
       {"triangles", SUPINE_U32, 2, {lungs->mesh.triangle_count, 3}, lungs->mesh.triangles},
-      {"modes", SUPINE_F64, 2, {k, supine_sh_count(field->band)}, field->modes},
+      {"modes", SUPINE_F64, 3, {k, supine_sh_count(field->band), field->order + 1}, field->modes},
       {"lung", SUPINE_U8, 1, {n}, made->lung},
       vector ? vectors : scalars,
       {"direction", SUPINE_F32, 2, {n, 3}, made->directions},

@@ -53,7 +53,7 @@ SUPINE_CLONES void supine_clusters_pose(const supine_basis *basis, const supine_
   }
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     for (size_t k = 0; k < modes; ++k) {
-      weights[k] = (float)supine_basis_pose_weights(basis, pose, lung)[k];
+      weights[k] = (float)supine_basis_lung_weights(basis, pose, lung)[k];
     }
     for (size_t c = 0; c < info->cluster_count; ++c) {
       if (basis->cluster_lung[c] == lung && (needed[c] || end - begin >= ALL_CLUSTERS)) {
@@ -86,10 +86,29 @@ void supine_clusters_coefficients(const supine_basis *basis, size_t begin, size_
   }
 }
 
-supine_status supine_clusters_pack(supine_basis *basis) {
+/* Bound what enters the sum of a vertex for each mode, by the largest of all clusters. */
+static void bound_modes(supine_basis *basis) {
+  static const double scalar_most = 32768; /* of a 16-bit integer */
   const supine_basis_info *info = &basis->info;
+  const size_t modes = info->mode_count;
+  memset(basis->mode_size, 0, modes * sizeof *basis->mode_size);
+  for (size_t row = 0; row < info->cluster_count * modes; ++row) {
+    const float *v = info->cluster_vectors + row * SUPINE_CLUSTER_NUMBERS;
+    double square[3] = {0, 0, 0}; /* of m, of all of B, and of both P */
+    for (size_t i = 0; i < SUPINE_CLUSTER_NUMBERS; ++i) {
+      square[(i >= SLOPE) + (i >= PATTERN)] += (double)v[i] * (double)v[i];
+    }
+    const double size = sqrt(square[0]) + sqrt(square[1]) * basis->reference_size +
+                        2 * scalar_most * sqrt(square[2]);
+    double *most = &basis->mode_size[row % modes];
+    *most = fmax(*most, size);
+  }
+}
+
+supine_status supine_clusters_pack(supine_basis *basis) {
+  supine_basis_info *info = &basis->info;
   supine_tiles *tiles = &basis->tiles;
-  supine_safetensors_release(basis->file, tiles->bytes);
+  double farthest = 0;
   supine_tiles_layout_clusters(tiles, (info->vertex_count + TILE - 1) / TILE);
   tiles->bytes = supine_safetensors_allocate(basis->file, tiles->count * tiles->stride);
   if (tiles->bytes == NULL) {
@@ -103,6 +122,42 @@ supine_status supine_clusters_pack(supine_basis *basis) {
     memcpy(vertex + 3 * sizeof(float), info->cluster_scalars + 2 * i, 2 * sizeof(int16_t));
     memcpy(tile + tiles->reference_begin + v % TILE * sizeof(uint16_t), &info->cluster[i],
            sizeof(uint16_t));
+  }
+  for (size_t i = 0; i < 6 * info->lung_count; ++i) {
+    farthest = fmax(farthest, fabs((double)info->bounds[i]));
+  }
+  basis->reference_size = sqrt(3) * farthest;
+  basis->reference_error = 6 * 0x1p-24 * basis->reference_size; /* of the products A p */
+  bound_modes(basis);
+  info->storage = SUPINE_STORAGE_EXACT;
+  info->packed = tiles->bytes;
+  info->bytes_per_vertex = (double)tiles->stride / TILE;
+  return SUPINE_OK;
+}
+
+const float *supine_basis_rows(const supine_basis *basis, size_t i, float *computed) {
+  const supine_basis_info *info = &basis->info;
+  if (info->cluster_count == 0) {
+    return info->coefficients + i * (info->vector ? 3 : 1) * info->mode_count;
+  }
+  supine_clusters_coefficients(basis, i, i + 1, computed);
+  return computed;
+}
+
+supine_status supine_basis_coefficients(const supine_basis *basis, size_t begin, size_t end,
+                                        float *coefficients) {
+  const size_t row = 3 * basis->info.mode_count;
+  if (!basis->info.vector) {
+    return SUPINE_ERROR_UNSUPPORTED;
+  }
+  if (begin > end || end > basis->info.vertex_count) {
+    return SUPINE_ERROR_ARGUMENT;
+  }
+  if (basis->info.cluster_count > 0) {
+    supine_clusters_coefficients(basis, begin, end, coefficients);
+  } else {
+    memcpy(coefficients, basis->info.coefficients + begin * row,
+           (end - begin) * row * sizeof *coefficients);
   }
   return SUPINE_OK;
 }

@@ -2,6 +2,7 @@
 /* Compute deformed positions. One call of a kernel evaluates many tiles of 16 vertices. */
 #include <string.h>
 
+#include "runtime/clusters.h"
 #include "runtime/rigid.h"
 
 /* Compute the numbers by which a kernel multiplies packed numbers of a lung: for each mode, the
@@ -10,8 +11,9 @@
  * @param scales  [modes + 3], written */
 static void weigh(const supine_basis *basis, const supine_pose *pose, size_t lung, float *scales) {
   const size_t modes = basis->info.mode_count;
+  const double *weights = supine_basis_lung_weights(basis, pose, lung);
   for (size_t k = 0; k < modes; ++k) {
-    scales[k] = (float)(pose->weights[k] * basis->mode_scale[k]);
+    scales[k] = (float)(weights[k] * basis->mode_scale[k]);
   }
   for (size_t axis = 0; axis < 3; ++axis) {
     scales[modes + axis] = (float)pose->gains[lung][axis];
@@ -89,10 +91,22 @@ static void deform_rigid(const supine_basis *basis, const supine_pose *pose, siz
   }
 }
 
+/* Evaluate vertices begin <= i < end of a basis of clusters, of which each belongs to one lung. */
+static void deform_clusters(const supine_basis *basis, const supine_pose *pose, size_t begin,
+                            size_t end, const supine_target *target) {
+  supine_cluster_frames frames;
+  supine_clusters_pose(basis, pose, begin, end, frames);
+  supine_deform_lung(basis->kernels->cluster, &basis->tiles, frames, begin, end, target);
+}
+
 /* Evaluate vertices begin <= i < end of all lungs as if no part were rigid. */
 static void deform_lungs(const supine_basis *basis, const supine_pose *pose, size_t begin,
                          size_t end, const supine_target *target) {
   float scales[SUPINE_MODES_MAX + 3];
+  if (basis->info.cluster_count > 0) {
+    deform_clusters(basis, pose, begin, end, target);
+    return;
+  }
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     const size_t first = basis->lung_begin[lung] > begin ? basis->lung_begin[lung] : begin;
     const size_t last = basis->lung_begin[lung + 1] < end ? basis->lung_begin[lung + 1] : end;

@@ -28,7 +28,8 @@ supine_status supine_gl_pack(const supine_basis *basis, size_t begin, size_t end
     if (!vector) {
       memcpy(to + 4, basis->info.direction + 3 * i, 3 * sizeof *to);
     }
-    memcpy(to + head, basis->info.coefficients + i * count, count * sizeof *to);
+    float computed[3 * SUPINE_MODES_MAX];
+    memcpy(to + head, supine_basis_rows(basis, i, computed), count * sizeof *to);
   }
   return SUPINE_OK;
 }

@@ -39,10 +39,11 @@ static bool plausible_positions(const supine_basis *basis, char *detail, size_t 
     ordered = ordered && low <= high;
   }
   if (!ordered || farthest > farthest_mm) {
-    (void)supine_print_text(detail, size,
-                   "a position, the box of the lungs or the midline is %g mm from the origin, more "
-                   "than %g mm, or the box is empty",
-                   farthest, farthest_mm);
+    (void)supine_print_text(
+        detail, size,
+        "a position, the box of the lungs or the midline is %g mm from the origin, more "
+        "than %g mm, or the box is empty",
+        farthest, farthest_mm);
     return false;
   }
   return true;
@@ -52,9 +53,12 @@ static bool plausible_positions(const supine_basis *basis, char *detail, size_t 
  * any posture. By Cauchy's inequality, and because the squares of all harmonics up to band L add up
  * to (L + 1)^2 / (4 pi), a weight is at most
  *
- *     |w_k| <= |modes_k| (L + 1) / sqrt(4 pi) */
+ *     |w_k| <= |modes_k| (L + 1) / sqrt(4 pi) sqrt(N)
+ *
+ * with N polynomials of the volume, each at most 1. */
 static bool plausible_modes(const supine_basis *basis, char *detail, size_t size) {
-  const size_t count = supine_sh_count(basis->info.band);
+  const size_t orders = basis->info.order + 1;
+  const size_t count = supine_sh_count(basis->info.band) * orders;
   double weight = 0;
   double moved = 0;
   for (size_t k = 0; k < basis->info.mode_count; ++k) {
@@ -63,15 +67,17 @@ static bool plausible_modes(const supine_basis *basis, char *detail, size_t size
       const double x = basis->info.modes[k * count + i];
       square += x * x;
     }
-    const double most = sqrt(square) * (double)(basis->info.band + 1) * 0.28209479177387814;
+    const double most =
+        sqrt(square * (double)orders) * (double)(basis->info.band + 1) * 0.28209479177387814;
     weight = fmax(weight, most);
     moved += most * basis->mode_size[k];
   }
   if (!(weight <= largest_weight) || !(moved <= largest_move_mm)) {
-    (void)supine_print_text(detail, size,
-                   "modes have weights of up to %g and displacements of up to %g mm, more than %g "
-                   "and %g mm",
-                   weight, moved, largest_weight, largest_move_mm);
+    (void)supine_print_text(
+        detail, size,
+        "modes have weights of up to %g and displacements of up to %g mm, more than %g "
+        "and %g mm",
+        weight, moved, largest_weight, largest_move_mm);
     return false;
   }
   return true;
@@ -80,19 +86,20 @@ static bool plausible_modes(const supine_basis *basis, char *detail, size_t size
 static bool plausible_forms(const supine_basis *basis, char *detail, size_t size) {
   const supine_basis_info *info = &basis->info;
   const size_t k = info->mode_count;
-  const size_t rows = info->lung_count * info->volume_axes;
+  const size_t rows = info->lung_count * 3;
   const double form = fmax(fmax(largest_of(info->volume_linear, rows * k),
                                 largest_of(info->volume_quadratic, rows * k * k)),
                            largest_of(info->volume_cubic, info->lung_count * k * k * k));
-  const size_t normals = info->lung_count * info->normal_count * (info->volume_axes == 3 ? 3 : 1) *
-                         supine_basis_normal_terms(basis);
+  const size_t normals =
+      info->lung_count * info->normal_count * 3 * supine_basis_normal_terms(basis);
   if (form > largest_form_ml) {
-    (void)supine_print_text(detail, size, "a coefficient of the volumes is %g mL, above %g mL", form,
-                   largest_form_ml);
+    (void)supine_print_text(detail, size, "a coefficient of the volumes is %g mL, above %g mL",
+                            form, largest_form_ml);
     return false;
   }
   if (largest_of(info->normal_weights, normals) > largest_normal) {
-    (void)supine_print_text(detail, size, "tensor 'normal_weights' has a number above %g", largest_normal);
+    (void)supine_print_text(detail, size, "tensor 'normal_weights' has a number above %g",
+                            largest_normal);
     return false;
   }
   return true;
@@ -104,23 +111,25 @@ static bool plausible_scan(const supine_basis *basis, char *detail, size_t size)
   const double length = sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     if (!(fabs(basis->reference_volume[lung]) <= largest_ml)) {
-      (void)supine_print_text(detail, size, "the reference volume of lung '%s' is %g mL, above %g mL",
-                     basis->info.lung_names[lung], basis->reference_volume[lung], largest_ml);
+      (void)supine_print_text(
+          detail, size, "the reference volume of lung '%s' is %g mL, above %g mL",
+          basis->info.lung_names[lung], basis->reference_volume[lung], largest_ml);
       return false;
     }
   }
   if (!(fabs(basis->scan_volume) <= largest_ml)) {
-    (void)supine_print_text(detail, size, "metadata 'scan_volume_ml' is %g, above %g", basis->scan_volume,
-                   largest_ml);
+    (void)supine_print_text(detail, size, "metadata 'scan_volume_ml' is %g, above %g",
+                            basis->scan_volume, largest_ml);
     return false;
   }
   if (!(fabs(length - 1) <= 1e-3)) {
-    (void)supine_print_text(detail, size, "metadata 'scan_gravity' has the length %g, not 1", length);
+    (void)supine_print_text(detail, size, "metadata 'scan_gravity' has the length %g, not 1",
+                            length);
     return false;
   }
   if (!(basis->upright_gain >= 0 && basis->upright_gain <= 1)) {
     (void)supine_print_text(detail, size, "metadata 'full_upright_gain' is %g, not 0 to 1",
-                   basis->upright_gain);
+                            basis->upright_gain);
     return false;
   }
   if (largest_of(basis->info.bend, 3) > largest_bend) {
@@ -145,39 +154,52 @@ static bool plausible_row(const double *row, double reference, char *detail, siz
       change += row[t] * y[t];
     }
     if (!(change > -reference && change < reference)) {
-      (void)supine_print_text(detail, size,
-                     "tensor 'resting_volume' has %g mL at rest in a posture, for lungs with a "
-                     "reference volume of %g mL",
-                     reference + change, reference);
+      (void)supine_print_text(
+          detail, size,
+          "tensor 'resting_volume' has %g mL at rest in a posture, for lungs with a "
+          "reference volume of %g mL",
+          reference + change, reference);
       return false;
     }
     farthest = fmax(farthest, fabs(change));
   }
   if (farthest < least_rest_share * reference) {
-    (void)supine_print_text(detail, size,
-                   "tensor 'resting_volume' differs from the reference volume by only %g mL",
-                   farthest);
+    (void)supine_print_text(
+        detail, size, "tensor 'resting_volume' differs from the reference volume by only %g mL",
+        farthest);
     return false;
   }
   return true;
 }
 
 static bool plausible_rest(const supine_basis *basis, char *detail, size_t size) {
-  double all = 0;
-  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
-    const double reference = basis->reference_volume[lung];
-    all += reference;
-    if (basis->rest_by_lung &&
-        !plausible_row(basis->resting + lung * RESTING_TERMS, reference, detail, size)) {
+  for (size_t lung = 0; basis->resting != NULL && lung < basis->info.lung_count; ++lung) {
+    if (!plausible_row(basis->resting + lung * RESTING_TERMS, basis->reference_volume[lung], detail,
+                       size)) {
       return false;
     }
   }
-  return basis->resting == NULL || basis->rest_by_lung ||
-         plausible_row(basis->resting, all, detail, size);
+  return true;
+}
+
+/* Check the volumes that another simulator computed. */
+static bool plausible_simulated(const supine_basis *basis, char *detail, size_t size) {
+  const supine_simulated *s = &basis->simulated;
+  const size_t lungs = basis->info.lung_count;
+  const double most =
+      fmax(fmax(largest_of(s->range, 2 * lungs), largest_of(s->limits, 2 * lungs * RESTING_TERMS)),
+           fmax(largest_of(s->shares, lungs * RESTING_TERMS * s->share_count),
+                largest_of(s->full, lungs * RESTING_TERMS)));
+  if (!(most <= largest_ml) || !(largest_of(s->total, 2) <= largest_ml)) {
+    (void)supine_print_text(detail, size, "a simulated volume is %g mL, above %g mL", most,
+                            largest_ml);
+    return false;
+  }
+  return true;
 }
 
 bool supine_basis_is_plausible(const supine_basis *basis, char *detail, size_t size) {
   return plausible_positions(basis, detail, size) && plausible_modes(basis, detail, size) &&
          plausible_forms(basis, detail, size) && plausible_scan(basis, detail, size) &&
-         plausible_rest(basis, detail, size);
+         plausible_rest(basis, detail, size) && plausible_simulated(basis, detail, size);
 }

@@ -15,16 +15,22 @@ static const double close_enough = 1e-6;
  * from the one that t stands for by less than that. */
 static const double beyond = 0.1;
 
+/* Sum the harmonics of bands 0 to 2 with the coefficients of a row. */
+static double sum_harmonics(const double *row, const double *y) {
+  double sum = 0;
+  for (size_t t = 0; t < RESTING_TERMS; ++t) {
+    sum += row[t] * y[t];
+  }
+  return sum;
+}
+
 supine_status supine_simulated_limits(const supine_basis *basis, const double gravity[3],
                                       double (*limits)[2]) {
   double y[RESTING_TERMS];
   SUPINE_TRY(supine_sh_evaluate(2, gravity, y));
   for (size_t row = 0; row < 2 * basis->info.lung_count; ++row) {
     double *limit = &limits[row / 2][row % 2];
-    *limit = 0;
-    for (size_t t = 0; t < RESTING_TERMS; ++t) {
-      *limit += basis->simulated.limits[row * RESTING_TERMS + t] * y[t];
-    }
+    *limit = sum_harmonics(basis->simulated.limits + row * RESTING_TERMS, y);
   }
   return SUPINE_OK;
 }
@@ -39,7 +45,7 @@ static supine_status refuse_volume(const char *lung, double volume, double low, 
   return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
                           "%s%s hold%s %.0f to %.0f mL in the simulations of this posture, not "
                           "%.0f mL: choose a volume in this range",
-                          lung == NULL ? "the lungs" : "the lung ", lung == NULL ? "" : lung,
+                          lung == NULL ? "the lungs" : "lung ", lung == NULL ? "" : lung,
                           lung == NULL ? "" : "s", low, high, volume);
 }
 
@@ -59,8 +65,12 @@ static void keep_within(size_t count, const double (*limits)[2], double total, d
   }
 }
 
-supine_status supine_simulated_share(const supine_basis *basis, const double gravity[3],
-                                     double total, double *volumes, supine_error *error) {
+/* Divide a total volume among the lungs as the simulator did.
+ * @param total    mL above the reference surfaces
+ * @param volumes  [lungs] mL above the reference surface of each lung, written; they add up to the
+ *   total */
+static supine_status share_out(const supine_basis *basis, const double gravity[3], double total,
+                               double *volumes, supine_error *error) {
   const supine_simulated *s = &basis->simulated;
   const size_t lungs = basis->info.lung_count;
   double limits[SUPINE_LUNGS_MAX][2];
@@ -96,7 +106,7 @@ typedef struct path {
 static supine_status find_path(const supine_basis *basis, const double gravity[3], path *p) {
   double y[(SUPINE_SH_BAND_MAX + 1) * (SUPINE_SH_BAND_MAX + 1)];
   const size_t harmonics = supine_sh_count(basis->info.band);
-  const size_t orders = basis->simulated.order + 1;
+  const size_t orders = basis->info.order + 1;
   SUPINE_TRY(supine_sh_evaluate(basis->info.band, gravity, y));
   p->basis = basis;
   for (size_t k = 0; k < basis->info.mode_count; ++k) {
@@ -115,12 +125,12 @@ static double follow(const path *p, double t, double *weights) {
   const supine_basis *basis = p->basis;
   double polynomial[SUPINE_SH_ORDER_MAX + 1] = {1, t};
   supine_volume_form form;
-  for (size_t n = 2; n <= basis->simulated.order; ++n) {
+  for (size_t n = 2; n <= basis->info.order; ++n) {
     polynomial[n] = 2 * t * polynomial[n - 1] - polynomial[n - 2];
   }
   for (size_t k = 0; k < basis->info.mode_count; ++k) {
     weights[k] = 0;
-    for (size_t n = 0; n <= basis->simulated.order; ++n) {
+    for (size_t n = 0; n <= basis->info.order; ++n) {
       weights[k] += p->coefficient[k][n] * polynomial[n];
     }
   }
@@ -158,9 +168,10 @@ static bool solve(const path *p, double volume, double low, double high, double 
   return false;
 }
 
-supine_status supine_simulated_solve(const supine_basis *basis, const double gravity[3],
-                                     const double *volumes, supine_pose *pose,
-                                     supine_error *error) {
+/* Compute the weights of all lungs at which each holds its volume.
+ * @param volumes  [lungs] mL above the reference surface */
+static supine_status solve_lungs(const supine_basis *basis, const double gravity[3],
+                                 const double *volumes, supine_pose *pose, supine_error *error) {
   double limits[SUPINE_LUNGS_MAX][2];
   path p;
   SUPINE_TRY(find_path(basis, gravity, &p));
@@ -181,4 +192,124 @@ supine_status supine_simulated_solve(const supine_basis *basis, const double gra
     }
   }
   return SUPINE_OK;
+}
+
+static supine_status refuse_kind(const char *what, supine_error *error) {
+  return supine_error_set(
+      error, SUPINE_ERROR_ARGUMENT,
+      "the simulations do not say which volume is %s: name it when the basis is "
+      "made, or use an absolute volume such as 2600mL",
+      what);
+}
+
+/* Compute the volume of each lung, mL above its reference surface, to which volumes of a kind are
+ * relative: at rest, at full inflation, in the scan, or 0 mL. */
+static supine_status find_origin(const supine_basis *basis, const double gravity[3],
+                                 supine_volume_kind kind, double *volumes, supine_error *error) {
+  double y[RESTING_TERMS];
+  SUPINE_TRY(supine_sh_evaluate(2, gravity, y));
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    switch (kind) {
+    case SUPINE_VOLUME_REST:
+      if (!basis->info.has_rest) {
+        return refuse_kind("rest", error);
+      }
+      volumes[lung] = sum_harmonics(basis->resting + lung * RESTING_TERMS, y);
+      break;
+    case SUPINE_VOLUME_FULL:
+      if (!basis->info.has_full) {
+        return refuse_kind("full inflation", error);
+      }
+      volumes[lung] = sum_harmonics(basis->simulated.full + lung * RESTING_TERMS, y);
+      break;
+    case SUPINE_VOLUME_ABSOLUTE:
+      volumes[lung] = -basis->info.reference_volume[lung];
+      break;
+    default: /* the reference surface is the scan */
+      volumes[lung] = 0;
+      break;
+    }
+  }
+  return SUPINE_OK;
+}
+
+/* Find the lung that a state names, or return the number of lungs. */
+static size_t find_lung(const supine_basis *basis, const char *name) {
+  size_t lung = 0;
+  while (lung < basis->info.lung_count && strcmp(name, basis->info.lung_names[lung]) != 0) {
+    ++lung;
+  }
+  return lung;
+}
+
+/* Find the volumes of a state that names its lungs. */
+static supine_status named_volumes(const supine_basis *basis, const supine_state *state,
+                                   double *volumes, supine_error *error) {
+  bool named[SUPINE_LUNGS_MAX] = {false};
+  for (size_t i = 0; i < state->lung_count; ++i) {
+    const size_t lung = find_lung(basis, state->lungs[i].name);
+    double origin[SUPINE_LUNGS_MAX];
+    if (lung == basis->info.lung_count || named[lung] ||
+        state->lung_count != basis->info.lung_count) {
+      return supine_error_set(
+          error, SUPINE_ERROR_ARGUMENT,
+          "lung '%s' is unknown or named twice, or not all %zu lungs are named: "
+          "name each lung once, such as %s",
+          state->lungs[i].name, basis->info.lung_count, basis->info.lung_names[0]);
+    }
+    SUPINE_TRY(find_origin(basis, state->gravity, state->lungs[i].volume.kind, origin, error));
+    volumes[lung] = origin[lung] + state->lungs[i].volume.ml;
+    named[lung] = true;
+  }
+  return SUPINE_OK;
+}
+
+/* Find the volumes of a state without a volume: those of the scan or, if they were not simulated,
+ * the middle of the range. */
+static supine_status default_volumes(const supine_basis *basis, const double gravity[3],
+                                     double *volumes) {
+  double limits[SUPINE_LUNGS_MAX][2];
+  bool simulated = true;
+  SUPINE_TRY(supine_simulated_limits(basis, gravity, limits));
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    simulated = simulated && limits[lung][0] <= 0 && limits[lung][1] >= 0;
+  }
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    volumes[lung] = simulated ? 0 : 0.5 * (limits[lung][0] + limits[lung][1]);
+  }
+  return SUPINE_OK;
+}
+
+static supine_status find_volumes(const supine_basis *basis, const supine_state *state,
+                                  double *volumes, supine_error *error) {
+  const supine_volume *asked = &state->volume;
+  double total = asked->ml;
+  if (state->lung_count > 0) {
+    return named_volumes(basis, state, volumes, error);
+  }
+  if (asked->kind == SUPINE_VOLUME_DEFAULT && !basis->info.has_rest) {
+    return default_volumes(basis, state->gravity, volumes);
+  }
+  SUPINE_TRY(find_origin(basis, state->gravity,
+                         asked->kind == SUPINE_VOLUME_DEFAULT ? SUPINE_VOLUME_REST : asked->kind,
+                         volumes, error));
+  if (asked->ml == 0 && asked->kind != SUPINE_VOLUME_ABSOLUTE) {
+    return SUPINE_OK; /* the volumes of all lungs are known */
+  }
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    total += volumes[lung];
+  }
+  return share_out(basis, state->gravity, total, volumes, error);
+}
+
+supine_status supine_simulated_pose(const supine_basis *basis, const supine_state *state,
+                                    supine_pose *pose, supine_error *error) {
+  double volumes[SUPINE_LUNGS_MAX];
+  double y[RESTING_TERMS];
+  if (supine_sh_evaluate(2, state->gravity, y) != SUPINE_OK) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "gravity is zero or not finite: give a vector with a direction");
+  }
+  SUPINE_TRY(find_volumes(basis, state, volumes, error));
+  return solve_lungs(basis, state->gravity, volumes, pose, error);
 }

@@ -25,13 +25,12 @@
 #include <stdint.h>
 #include <stdlib.h>
 
+#include <supine/runtime.h>
 #include <supine/status.h>
 
 enum {
-  SUPINE_CLUSTER_SCALARS = 2,  /**< scalars of a vertex, and patterns of a cluster */
-  SUPINE_CLUSTER_NUMBERS = 18, /**< numbers of a cluster for each mode: m [3], B [3, 3], P [2, 3] */
-  SUPINE_CLUSTER_VERTICES_MIN = 64, /**< fewest vertices per cluster, on average */
-  SUPINE_CLUSTERS_MAX = 65535       /**< most clusters, as an index has 16 bits */
+  SUPINE_CLUSTER_SCALARS = 2,      /**< scalars of a vertex, and patterns of a cluster */
+  SUPINE_CLUSTER_VERTICES_MIN = 64 /**< fewest vertices per cluster, on average */
 };
 
 /** A surface in parts that do not share clusters, and the coefficients of its vertices. */

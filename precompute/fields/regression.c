@@ -194,22 +194,30 @@ static supine_status find_modes(const supine_regression *r, const double *pinv, 
   return supine_sh_leading_eigenpairs(r->terms, sum, modes, values, vectors);
 }
 
+/* Principal modes to which a fit is compressed, and work space of a row of terms. */
+typedef struct principal {
+  size_t count;    /* 0 for none */
+  double *vectors; /* [count, terms] */
+  double *target;  /* [terms] work space */
+} principal;
+
 /* Compute the error of run `run` as a sum of the displacements of all runs: 1 for itself, minus
- * its terms, on the modes if there are any, times the pseudo-inverse. */
+ * its terms, on the modes if there are any, times the pseudo-inverse of its part. */
 static void find_residual(const supine_regression *r, size_t part, size_t run, const double *pinv,
-                          size_t modes, const double *vectors, double *target, double *residual) {
+                          const principal *modes, double *residual) {
   const int m = (int)r->run_count;
   const int p = (int)r->terms;
   const double *y = r->values + (part * r->run_count + run) * r->terms;
-  memcpy(target, y, r->terms * sizeof *target);
-  if (modes > 0) {
-    memset(target, 0, r->terms * sizeof *target);
+  if (modes->count > 0) {
+    memset(modes->target, 0, r->terms * sizeof *modes->target);
+  } else {
+    memcpy(modes->target, y, r->terms * sizeof *modes->target);
   }
-  for (size_t k = 0; k < modes; ++k) {
-    const double *mode = vectors + k * r->terms;
-    cblas_daxpy(p, cblas_ddot(p, mode, 1, y, 1), mode, 1, target, 1);
+  for (size_t k = 0; k < modes->count; ++k) {
+    const double *mode = modes->vectors + k * r->terms;
+    cblas_daxpy(p, cblas_ddot(p, mode, 1, y, 1), mode, 1, modes->target, 1);
   }
-  cblas_dgemv(CblasRowMajor, CblasTrans, p, m, -1.0, pinv, m, target, 1, 0.0, residual, 1);
+  cblas_dgemv(CblasRowMajor, CblasTrans, p, m, -1.0, pinv, m, modes->target, 1, 0.0, residual, 1);
   residual[run] += 1.0;
 }
 
@@ -220,18 +228,19 @@ supine_status supine_fields_regression_predict(const supine_regression *regressi
   const supine_regression *r = regression;
   const size_t m = r->run_count;
   const size_t size = m * r->terms;
-  const size_t kept = modes < r->terms ? modes : r->terms;
   SUPINE_ARENA arena = {0};
   double *pinv = supine_arena_take(&arena, r->part_count * size, sizeof *pinv);
-  double *vectors = supine_arena_take(&arena, (kept + 1) * r->terms, sizeof *vectors);
+  principal kept = {.count = modes < r->terms ? modes : r->terms};
+  kept.vectors = supine_arena_take(&arena, kept.count * r->terms, sizeof *kept.vectors);
+  kept.target = supine_arena_take(&arena, r->terms, sizeof *kept.target);
   double *product = supine_arena_take(&arena, m, sizeof *product);
   SUPINE_TRY(supine_arena_status(&arena));
   for (size_t part = 0; part < r->part_count; ++part) {
     const left_out s = leave(r, groups, group, part);
     SUPINE_TRY(invert_without(&s, pinv + part * size));
   }
-  if (kept > 0) {
-    SUPINE_TRY(find_modes(r, pinv, gram, kept, vectors));
+  if (kept.count > 0) {
+    SUPINE_TRY(find_modes(r, pinv, gram, kept.count, kept.vectors));
   }
   const left_out s = leave(r, groups, group, 0);
   memset(square, 0, s.count * sizeof *square);

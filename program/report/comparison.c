@@ -26,7 +26,7 @@ static supine_status find_breath(const supine_comparison *c, float *xyz[2],
     state.volume.ml += posture->volume[lung];
   }
   supine_error wrong;
-  supine_status status = supine_basis_gains(c->basis, &state, &after, &wrong);
+  supine_status status = supine_basis_pose(c->basis, &state, &after, &wrong);
   SUPINE_REFUSE_IF(status != SUPINE_OK, error, status, "%s: %s", item->name, wrong.message);
   SUPINE_TRY(
       supine_options_pose_check(c->basis, command, c->volume.allow_folds, &state, &after, error));

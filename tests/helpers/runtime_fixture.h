@@ -25,7 +25,7 @@ typedef struct fixture {
   bool fields;     /* whether the metadata says that another simulator computed the displacements */
   size_t normals;  /* number of modes from which normals are computed, set by fixture_add_normals */
   int16_t *normal; /* [vertices, 3, normals] coefficients of vertex normals, as integers */
-  int8_t *normal_byte;   /* `normal` as supine_basis_info.normal_bytes, or NULL */
+  int8_t *normal_byte;   /* `normal` as supine_basis_info.normals, or NULL */
   double *normal_weight; /* [lungs, normals, terms] coefficients of the weight of each normal mode:
                             a quadratic polynomial in the weights of the displacement modes */
 } fixture;
