@@ -21,11 +21,20 @@
   supine_library_load(library, (const char *const[]){LIST(SUPINE_LIBRARY_NAME) NULL}, members,     \
                       error)
 
+/** Do the same with a struct of the caller's own, such as a variable of a function: it need not be
+ * zeroed, and nothing is locked, so that a child process may call this. */
+#define SUPINE_LIBRARY_LOAD_OWN(library, LIST, members, error)                                     \
+  supine_library_load_own(library, (const char *const[]){LIST(SUPINE_LIBRARY_NAME) NULL}, members, \
+                          error)
+
 /** Load functions of a shared library, which stays loaded until the process ends.
  * @param library  name of its file, such as "libcairo.so.2"
  * @param names    names of the functions; NULL after the last
- * @param members  pointers to the functions, in the order of the names, written */
+ * @param members  pointers to the functions, in the order of the names; zeroed before the first
+ * call, written by the first that succeeds Thread-safe. */
 supine_status supine_library_load(const char *library, const char *const *names, void *members,
                                   supine_error *error);
+supine_status supine_library_load_own(const char *library, const char *const *names, void *members,
+                                      supine_error *error);
 
 #endif

@@ -295,7 +295,7 @@ static _Noreturn void be_child(const mesh_file *file, int pipe_end) {
   out.faces = (mesh_faces){.path = file->path, .mesh = &out.mesh};
   confine(file->size);
   (void)supine_locale_enter(); /* a child of a host program inherits its locale */
-  if (SUPINE_LIBRARY_LOAD(SUPINE_ASSIMP, FUNCTIONS, &out.ai, &result.error) == SUPINE_OK) {
+  if (SUPINE_LIBRARY_LOAD_OWN(SUPINE_ASSIMP, FUNCTIONS, &out.ai, &result.error) == SUPINE_OK) {
     out.scene = import(&out.ai, file, &result.error);
     struct aiMatrix4x4 identity;
     out.ai.IdentityMatrix4(&identity);
@@ -410,6 +410,6 @@ supine_status supine_mesh_read_stl(mesh_file *file, supine_mesh *mesh, size_t *d
 
 bool supine_mesh_import_knows(const char *ending) {
   assimp ai;
-  return SUPINE_LIBRARY_LOAD(SUPINE_ASSIMP, FUNCTIONS, &ai, NULL) == SUPINE_OK &&
+  return SUPINE_LIBRARY_LOAD_OWN(SUPINE_ASSIMP, FUNCTIONS, &ai, NULL) == SUPINE_OK &&
          ai.IsExtensionSupported(ending) == AI_TRUE;
 }
