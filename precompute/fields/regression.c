@@ -247,8 +247,7 @@ supine_status supine_fields_regression_predict(const supine_regression *regressi
   for (size_t part = 0; part < r->part_count; ++part) {
     for (size_t i = 0; i < s.count; ++i) {
       double *row = residual + (part * s.count + i) * m;
-      find_residual(r, part, s.run[i], pinv + part * size, kept, vectors, vectors + kept * r->terms,
-                    row);
+      find_residual(r, part, s.run[i], pinv + part * size, &kept, row);
       cblas_dsymv(CblasRowMajor, CblasUpper, (int)m, 1.0, gram + part * m * m, (int)m, row, 1, 0.0,
                   product, 1);
       square[i] += fmax(cblas_ddot((int)m, product, 1, row, 1), 0.0);
