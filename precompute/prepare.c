@@ -81,13 +81,14 @@ static void tell_volume(const supine_patient_record *record, double measured,
 
 static void describe_fit(const supine_patient_record *record, char *text, size_t size) {
   const supine_patient_fit_report *report = &record->report;
-  (void)supine_print_text(text, size,
-                 "%s: %s law%s from %zu points; held-out residual %.1f of %.1f mm RMS, %.0f %% "
-                 "explained; expected error %.1f mm RMS",
-                 record->name, supine_patient_law_names[record->patient.law],
-                 record->patient.centre_count > 0 ? " and kriging" : "", report->points,
-                 report->held_out[SUPINE_PATIENT_SCORE_CORRECTED], report->baseline,
-                 report->explained, report->expected_point);
+  (void)supine_print_text(
+      text, size,
+      "%s: %s law%s from %zu points; held-out residual %.1f of %.1f mm RMS, %.0f %% "
+      "explained; expected error %.1f mm RMS",
+      record->name, supine_patient_law_names[record->patient.law],
+      record->patient.centre_count > 0 ? " and kriging" : "", report->points,
+      report->held_out[SUPINE_PATIENT_SCORE_CORRECTED], report->baseline, report->explained,
+      report->expected_point);
 }
 
 /* Use the displacement law, the force and the volumes at rest that were fitted to a patient.
