@@ -41,7 +41,7 @@ static const struct {
     {"vertices", FLOATS, OF(vertices), 2, {N, 3}},
     {"direction", FLOATS, OF(direction), 2, {N, 3}},
     {"coefficients", FLOATS, OF(coefficients), 2, {N, 1}},
-    {"modes", DOUBLES, OF(modes), 2, {1, 1}},
+    {"modes", DOUBLES, OF(modes), 3, {1, 1, 1}},
     {"volume_linear", DOUBLES, OF(linear), 3, {LUNGS, 3, 1}},
     {"volume_quadratic", DOUBLES, OF(quadratic), 4, {LUNGS, 3, 1, 1}},
     {"volume_cubic", DOUBLES, OF(cubic), 4, {LUNGS, 1, 1, 1}},
@@ -171,7 +171,7 @@ static char *write_basis(const numbers *x, size_t *size) {
       {"names", SUPINE_U8, 1, {sizeof names - 1}, names},
   };
   supine_metadata metadata[QUANTITIES + 5] = {{"format", "supine-basis"},
-                                              {"version", "3"},
+                                              {"version", "4"},
                                               {"kind", "scalar"},
                                               {"lungs", "left,right"},
                                               {"scanned", "full"}};
