@@ -295,7 +295,7 @@ static supine_status find_volumes(const supine_basis *basis, const supine_state 
     if (!basis->info.has_rest) {
       return default_volumes(basis, state->gravity, volumes);
     }
-    asked = supine_basis_default_volume(basis);
+    asked = (supine_volume){SUPINE_VOLUME_REST, 0};
   }
   SUPINE_TRY(find_origin(basis, state->gravity, asked.kind, volumes, error));
   if (asked.ml == 0 && asked.kind != SUPINE_VOLUME_ABSOLUTE) {
