@@ -440,6 +440,7 @@ static supine_status check_simulated(const check *c, supine_basis *basis) {
   REQUIRE(s->limits, c, "simulated_limits", SUPINE_F64, 3, limits);
   REQUIRE(s->shares, c, "simulated_shares", SUPINE_F64, 3, shares);
   s->share_count = shares[2];
+  basis->info.is_fields = true;
   basis->info.has_full = s->full != NULL;
   SUPINE_TRY(read_numbers(c, "simulated_total_ml", 2, s->total));
   bool rising = s->total[0] < s->total[1];

@@ -47,7 +47,9 @@ SUPINE_CLONES void supine_clusters_pose(const supine_basis *basis, const supine_
   bool needed[SUPINE_CLUSTERS_MAX] = {false};
   float weights[SUPINE_MODES_MAX];
   if (end - begin < ALL_CLUSTERS) {
-    for (size_t i = begin; i < end; ++i) {
+    const size_t whole = (end + TILE - 1) / TILE * TILE; /* kernels evaluate whole tiles */
+    const size_t last = whole < info->vertex_count ? whole : info->vertex_count;
+    for (size_t i = begin / TILE * TILE; i < last; ++i) {
       needed[info->cluster[i]] = true;
     }
   }

@@ -9,9 +9,8 @@
  * and a vertex costs 15 multiplications and 15 additions:
  *
  *     x_i = b + A p_i + a_i0 Q_0 + a_i1 Q_1
- *     b_j = A_j sum_k w_k m_jk,   A_jl = [j = l] + A_j sum_k w_k B_jlk,   Q_sj = A_j sum_k w_k
- * P_sjk
- */
+ *     b_j = A_j sum_k w_k m_jk,   A_jl = [j = l] + A_j sum_k w_k B_jlk,
+ *     Q_sj = A_j sum_k w_k P_sjk */
 #ifndef SUPINE_RUNTIME_CLUSTERS_H
 #define SUPINE_RUNTIME_CLUSTERS_H
 
@@ -20,7 +19,8 @@
 /** Frames of all clusters, on the stack of the caller: 48 kB. */
 typedef float supine_cluster_frames[SUPINE_CLUSTERS_MAX * SUPINE_CLUSTER_FRAME];
 
-/** Compute the frames of the clusters to which vertices begin <= i < end belong. */
+/** Compute the frames of the clusters to which the vertices of the tiles that hold vertices
+ * begin <= i < end belong. */
 void supine_clusters_pose(const supine_basis *basis, const supine_pose *pose, size_t begin,
                           size_t end, float *frames);
 

@@ -53,44 +53,6 @@ void supine_deform_lung(supine_deform_tiles *kernel, const supine_tiles *tiles, 
   }
 }
 
-enum { RIGID_BLOCK = 256 };
-
-/* Overwrite the positions or displacements of the vertices begin <= i < end that belong to rigid
- * parts. Each part moves by its rigid motion (rigid.h). */
-static void deform_rigid(const supine_basis *basis, const supine_pose *pose, size_t begin,
-                         size_t end, const supine_target *target) {
-  for (size_t part = 0; part < basis->rigid_count; ++part) {
-    const size_t first = basis->rigid[2 * part];
-    const size_t last = basis->rigid[2 * part + 1];
-    supine_rigid_motion m = {.count = 0};
-    if (first >= end || last <= begin) {
-      continue;
-    }
-    float scales[SUPINE_MODES_MAX + 3];
-    size_t lung = 0;
-    while (first >= basis->lung_begin[lung + 1]) {
-      ++lung;
-    }
-    weigh(basis, pose, lung, scales);
-    for (size_t at = first; at < last; at += RIGID_BLOCK) {
-      float x[3 * RIGID_BLOCK];
-      const size_t next = last - at < RIGID_BLOCK ? last : at + RIGID_BLOCK;
-      const supine_target block = {.xyz = x, .add_reference = true};
-      supine_deform_lung(basis->kernels->deform, &basis->tiles, scales, at, next, &block);
-      supine_rigid_add(&m, basis->info.vertices + 3 * at, x, next - at);
-    }
-    supine_rigid_finish(&m);
-    for (size_t i = first > begin ? first : begin; i < last && i < end; ++i) {
-      const float *p = basis->info.vertices + 3 * i;
-      for (size_t a = 0; a < 3; ++a) {
-        const double value =
-            supine_rigid_move(&m, p, a) - (target->add_reference ? 0 : (double)p[a]);
-        target->xyz[3 * (i - begin) + a] = (float)value;
-      }
-    }
-  }
-}
-
 /* Evaluate vertices begin <= i < end of a basis of clusters, of which each belongs to one lung. */
 static void deform_clusters(const supine_basis *basis, const supine_pose *pose, size_t begin,
                             size_t end, const supine_target *target) {
@@ -114,6 +76,38 @@ static void deform_lungs(const supine_basis *basis, const supine_pose *pose, siz
       const supine_target here = supine_target_after(target, first - begin);
       weigh(basis, pose, lung, scales);
       supine_deform_lung(basis->kernels->deform, &basis->tiles, scales, first, last, &here);
+    }
+  }
+}
+
+enum { RIGID_BLOCK = 256 };
+
+/* Overwrite the positions or displacements of the vertices begin <= i < end that belong to rigid
+ * parts. Each part moves by its rigid motion (rigid.h). */
+static void deform_rigid(const supine_basis *basis, const supine_pose *pose, size_t begin,
+                         size_t end, const supine_target *target) {
+  for (size_t part = 0; part < basis->rigid_count; ++part) {
+    const size_t first = basis->rigid[2 * part];
+    const size_t last = basis->rigid[2 * part + 1];
+    supine_rigid_motion m = {.count = 0};
+    if (first >= end || last <= begin) {
+      continue;
+    }
+    for (size_t at = first; at < last; at += RIGID_BLOCK) {
+      float x[3 * RIGID_BLOCK];
+      const size_t next = last - at < RIGID_BLOCK ? last : at + RIGID_BLOCK;
+      const supine_target block = {.xyz = x, .add_reference = true};
+      deform_lungs(basis, pose, at, next, &block);
+      supine_rigid_add(&m, basis->info.vertices + 3 * at, x, next - at);
+    }
+    supine_rigid_finish(&m);
+    for (size_t i = first > begin ? first : begin; i < last && i < end; ++i) {
+      const float *p = basis->info.vertices + 3 * i;
+      for (size_t a = 0; a < 3; ++a) {
+        const double value =
+            supine_rigid_move(&m, p, a) - (target->add_reference ? 0 : (double)p[a]);
+        target->xyz[3 * (i - begin) + a] = (float)value;
+      }
     }
   }
 }

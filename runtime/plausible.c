@@ -172,8 +172,13 @@ static bool plausible_row(const double *row, double reference, char *detail, siz
   return true;
 }
 
+/* Check the volumes at rest, but not those that another simulator computed: its reference surface
+ * may be at rest or far below. */
 static bool plausible_rest(const supine_basis *basis, char *detail, size_t size) {
-  for (size_t lung = 0; basis->resting != NULL && lung < basis->info.lung_count; ++lung) {
+  if (basis->resting == NULL || basis->info.order > 0) {
+    return true;
+  }
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     if (!plausible_row(basis->resting + lung * RESTING_TERMS, basis->reference_volume[lung], detail,
                        size)) {
       return false;
@@ -186,11 +191,20 @@ static bool plausible_rest(const supine_basis *basis, char *detail, size_t size)
 static bool plausible_simulated(const supine_basis *basis, char *detail, size_t size) {
   const supine_simulated *s = &basis->simulated;
   const size_t lungs = basis->info.lung_count;
-  const double most =
-      fmax(fmax(largest_of(s->range, 2 * lungs), largest_of(s->limits, 2 * lungs * RESTING_TERMS)),
-           fmax(largest_of(s->shares, lungs * RESTING_TERMS * s->share_count),
-                largest_of(s->full, lungs * RESTING_TERMS)));
-  if (!(most <= largest_ml) || !(largest_of(s->total, 2) <= largest_ml)) {
+  const struct {
+    const double *numbers;
+    size_t count;
+  } volumes[] = {{s->range, 2 * lungs},
+                 {s->limits, 2 * lungs * RESTING_TERMS},
+                 {s->shares, lungs * RESTING_TERMS * s->share_count},
+                 {s->full, lungs * RESTING_TERMS},
+                 {s->total, 2},
+                 {basis->resting, lungs * RESTING_TERMS}};
+  double most = 0;
+  for (size_t i = 0; i < sizeof volumes / sizeof *volumes; ++i) {
+    most = fmax(most, largest_of(volumes[i].numbers, volumes[i].count));
+  }
+  if (!(most <= largest_ml)) {
     (void)supine_print_text(detail, size, "a simulated volume is %g mL, above %g mL", most,
                             largest_ml);
     return false;

@@ -203,7 +203,7 @@ static supine_status refuse_kind(const char *what, supine_error *error) {
 }
 
 /* Compute the volume of each lung, mL above its reference surface, to which volumes of a kind are
- * relative: at rest, at full inflation, in the scan, or 0 mL. */
+ * relative: at rest, at full inflation, in the scan (the reference surface), or 0 mL. */
 static supine_status find_origin(const supine_basis *basis, const double gravity[3],
                                  supine_volume_kind kind, double *volumes, supine_error *error) {
   double y[RESTING_TERMS];
@@ -225,9 +225,14 @@ static supine_status find_origin(const supine_basis *basis, const double gravity
     case SUPINE_VOLUME_ABSOLUTE:
       volumes[lung] = -basis->info.reference_volume[lung];
       break;
-    default: /* the reference surface is the scan */
+    case SUPINE_VOLUME_SCAN:
       volumes[lung] = 0;
       break;
+    default:
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "volume kind %d has no meaning here: use another value of "
+                              "supine_volume_kind",
+                              (int)kind);
     }
   }
   return SUPINE_OK;
@@ -282,20 +287,21 @@ static supine_status default_volumes(const supine_basis *basis, const double gra
 
 static supine_status find_volumes(const supine_basis *basis, const supine_state *state,
                                   double *volumes, supine_error *error) {
-  const supine_volume *asked = &state->volume;
-  double total = asked->ml;
+  supine_volume asked = state->volume;
   if (state->lung_count > 0) {
     return named_volumes(basis, state, volumes, error);
   }
-  if (asked->kind == SUPINE_VOLUME_DEFAULT && !basis->info.has_rest) {
-    return default_volumes(basis, state->gravity, volumes);
+  if (asked.kind == SUPINE_VOLUME_DEFAULT) {
+    if (!basis->info.has_rest) {
+      return default_volumes(basis, state->gravity, volumes);
+    }
+    asked = (supine_volume){SUPINE_VOLUME_REST, 0};
   }
-  SUPINE_TRY(find_origin(basis, state->gravity,
-                         asked->kind == SUPINE_VOLUME_DEFAULT ? SUPINE_VOLUME_REST : asked->kind,
-                         volumes, error));
-  if (asked->ml == 0 && asked->kind != SUPINE_VOLUME_ABSOLUTE) {
+  SUPINE_TRY(find_origin(basis, state->gravity, asked.kind, volumes, error));
+  if (asked.ml == 0 && asked.kind != SUPINE_VOLUME_ABSOLUTE) {
     return SUPINE_OK; /* the volumes of all lungs are known */
   }
+  double total = asked.ml;
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     total += volumes[lung];
   }

@@ -136,8 +136,8 @@ supine_status supine_inside_shells_reach(const supine_inside_shells *shells, dou
 static void move_vertex(const supine_basis *basis, size_t vertex, double *row) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const size_t modes = info->mode_count;
-  float vectors[3 * SUPINE_MODES_MAX];
   if (info->vector) {
+    float vectors[3 * SUPINE_MODES_MAX];
     (void)supine_basis_coefficients(basis, vertex, vertex + 1, vectors);
     for (size_t i = 0; i < 3 * modes; ++i) {
       row[i] = (double)vectors[i];

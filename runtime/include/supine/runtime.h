@@ -407,7 +407,8 @@ enum { SUPINE_GL_MODES = 16, SUPINE_GL_FLOATS = 7, SUPINE_GL_VECTOR_FLOATS = 4 }
  * @param attributes  [end - begin, SUPINE_GL_FLOATS + K], or, if `vector` is true,
  *                    [end - begin, SUPINE_GL_VECTOR_FLOATS + 3 K], written; 44 or 64 bytes per
  *                    vertex if K is 4
- * @retval SUPINE_ERROR_UNSUPPORTED  the basis has more than SUPINE_GL_MODES modes */
+ * @retval SUPINE_ERROR_UNSUPPORTED  the basis has more than SUPINE_GL_MODES modes, or each lung has
+ *                                   weights of its own (supine_basis_info.order is above 0) */
 SUPINE_API supine_status supine_gl_pack(const supine_basis *basis, size_t begin, size_t end,
                                         float *attributes);
 
