@@ -2,6 +2,7 @@
 /* Print a basis file. */
 #include <math.h>
 #include <stdarg.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -152,9 +153,24 @@ static void add_expected_error(entries *list, const supine_basis_content *conten
   }
 }
 
-static void add_fields(entries *list, const double *g) {
+static void add_fields(entries *list, const supine_basis_content *content,
+                       const supine_simulated_volumes *simulated) {
+  const double *g = content->scan_gravity;
+  const supine_clusters *clusters = content->clusters;
   add(list, "route", "fields");
   add(list, "error_method", "leave-one-out");
+  if (content->compression->order > 0) {
+    add(list, "simulated_total_ml", "%.17g,%.17g", simulated->total[0], simulated->total[1]);
+    add(list, "simulated_runs", "%zu", content->fit->fields->run_count);
+    if (content->fit->report.extrapolated > 0.0) {
+      add(list, "error_extrapolated_percent", "%.6g", 100.0 * content->fit->report.extrapolated);
+    }
+  }
+  if (clusters->count > 0) {
+    add(list, "clusters", "%zu", clusters->count);
+    add(list, "clusters_rms_mm", "%.6g", clusters->rms);
+    add(list, "clusters_seam_percent", "%.6g", 100.0 * clusters->seam);
+  }
   if (g != NULL) {
     add(list, "scan_gravity", "%.9g,%.9g,%.9g", g[0], g[1], g[2]);
   }
@@ -190,6 +206,8 @@ typedef struct stored {
   supine_compression field; /* coefficients for collapsed lungs */
   supine_rows rows;         /* of `field`, in double precision */
   supine_normals_modes normals;
+  supine_simulated_volumes simulated;                /* of fields over volume */
+  double shares[2 * 9 * (SUPINE_FIT_ORDER_MAX + 1)]; /* simulated.shares without gaps */
 } stored;
 
 /* Shrink the displacements of VECTOR rows in collapsed lungs to the cube root of the lung's share.
@@ -236,6 +254,16 @@ static supine_status store(const supine_basis_content *content, supine_arena *ar
         supine_arena_take(arena, field->row_count * field->mode_count, sizeof(float));
     SUPINE_TRY(supine_arena_check(arena, error, "%zu vertices of a basis", n));
     collapse_coefficients(lungs, share, field, made->field.coefficients);
+  }
+  return SUPINE_OK;
+}
+
+/* Find the numbers by which a basis over volume finds its parameters. */
+static supine_status store_volumes(const supine_fit *fit, stored *made, supine_error *error) {
+  SUPINE_TRY(supine_fields_volumes_fit(fit, &made->simulated, error));
+  const size_t count = made->simulated.share_count;
+  for (size_t i = 0; i < 2 * 9 * count; ++i) {
+    made->shares[i] = made->simulated.shares[i / count / 9][i / count % 9][i % count];
   }
   return SUPINE_OK;
 }
@@ -289,11 +317,10 @@ static void add_texts(entries *list, const supine_prepared *prepared) {
 }
 
 /* Add all metadata in the file's order. */
-static void add_all(entries *list, const supine_basis_content *content,
-                    const supine_normals_modes *normals) {
+static void add_all(entries *list, const supine_basis_content *content, const stored *made) {
   const double *share = content->prepared->model.share;
   add(list, "format", "supine-basis");
-  add(list, "version", "3");
+  add(list, "version", "4");
   add(list, "kind", "%s", content->rows.kind == SUPINE_ROWS_VECTOR ? "vector" : "scalar");
   add(list, "band", "%zu", content->compression->band);
   add(list, "modes", "%s", content->is_harmonics ? "harmonics" : "best");
@@ -309,18 +336,18 @@ static void add_all(entries *list, const supine_basis_content *content,
   }
   add_expected_error(list, content);
   if (content->is_fields) {
-    add_fields(list, content->scan_gravity);
+    add_fields(list, content, &made->simulated);
   }
   add_accuracy(list, content->accuracy, content->reference != NULL);
   if (content->turned_over != NULL) {
     add(list, "turned_over_percent", "%.3g", 100.0 * *content->turned_over);
   }
   add_texts(list, content->prepared);
-  add_normals(list, normals, content->resting != NULL);
+  add_normals(list, &made->normals, content->resting != NULL);
   add(list, "made_by", "%s", content->made_by != NULL ? content->made_by : "supine_precompute");
 }
 
-enum { TENSORS_MAX = 14 };
+enum { TENSORS_MAX = 20 };
 
 static void basis_close(supine_basis **basis) {
   supine_basis_close(*basis);
@@ -341,12 +368,26 @@ static size_t list_tensors(const supine_basis_content *content, const stored *ma
   const size_t q = made->normals.count;
   const supine_tensor scalars = {"coefficients", SUPINE_F32, 2, {n, k}, field->coefficients};
   const supine_tensor vectors = {"coefficients", SUPINE_F32, 3, {n, 3, k}, field->coefficients};
+  const supine_clusters *clusters = content->clusters;
+  const size_t c = clusters->count;
+  supine_tensor coefficients = vector ? vectors : scalars;
+  if (c > 0) {
+    coefficients.data = NULL; /* they follow from the clusters */
+  }
+  const bool simulated = field->order > 0;
+  const size_t shares = made->simulated.share_count;
   const supine_tensor all[TENSORS_MAX] = {
       {"vertices", SUPINE_F32, 2, {n, 3}, made->vertices},
       {"triangles", SUPINE_U32, 2, {lungs->mesh.triangle_count, 3}, lungs->mesh.triangles},
-      {"modes", SUPINE_F64, 2, {k, supine_sh_count(field->band)}, field->modes},
+      {"modes", SUPINE_F64, 3, {k, supine_sh_count(field->band), field->order + 1}, field->modes},
       {"lung", SUPINE_U8, 1, {n}, made->lung},
-      vector ? vectors : scalars,
+      coefficients,
+      {"clusters", SUPINE_U16, 1, {n}, clusters->cluster},
+      {"cluster_scalars", SUPINE_I16, 2, {n, 2}, clusters->scalars},
+      {"cluster_vectors", SUPINE_F32, 3, {c, k, SUPINE_CLUSTER_NUMBERS}, clusters->vectors},
+      {"simulated_range", SUPINE_F64, 2, {g, 2}, simulated ? content->fit->range : NULL},
+      {"simulated_limits", SUPINE_F64, 3, {g, 2, 9}, simulated ? made->simulated.limits : NULL},
+      {"simulated_shares", SUPINE_F64, 3, {g, 9, shares}, simulated ? made->shares : NULL},
       {"direction", SUPINE_F32, 2, {n, 3}, made->directions},
       {"volume_linear", SUPINE_F64, 3, {g, 3, k}, forms->linear},
       {"volume_quadratic", SUPINE_F64, 4, {g, 3, k, k}, forms->quadratic},
@@ -380,7 +421,7 @@ static supine_status print_bytes(const supine_basis_content *content, const stor
   entries list = {.memory = &arena};
   supine_tensor tensors[TENSORS_MAX];
   const size_t count = list_tensors(content, made, tensors);
-  add_all(&list, content, &made->normals);
+  add_all(&list, content, made);
   SUPINE_TRY(supine_arena_check(&arena, error, "metadata of a basis"));
   FILE *file = open_memstream(&bytes->data, &bytes->size);
   if (file == NULL) {
@@ -401,8 +442,11 @@ static supine_status measure_storage(const supine_basis_content *content, const 
       .size = sizeof options, .simd = SUPINE_SIMD_PORTABLE, .without_normals = true};
   SUPINE_FREED_BY(basis_close) supine_basis *basis = NULL;
   SUPINE_TRY(supine_basis_open_memory_with(bytes->data, bytes->size, &options, &basis, error));
-  return supine_projection_accuracy_add_storage(basis, &made->field, &made->rows,
-                                                content->accuracy);
+  supine_compression exact = made->field;
+  if (content->clusters->count > 0) {
+    exact.coefficients = (float *)(uintptr_t)content->exact; /* only read */
+  }
+  return supine_projection_accuracy_add_storage(basis, &exact, &made->rows, content->accuracy);
 }
 
 supine_status supine_precompute_print(const supine_basis_content *content, supine_bytes *bytes,
@@ -410,7 +454,10 @@ supine_status supine_precompute_print(const supine_basis_content *content, supin
   SUPINE_ARENA arena = {0};
   stored made;
   SUPINE_TRY(store(content, &arena, &made, error));
-  if (!content->without_normals) {
+  if (content->compression->order > 0) {
+    SUPINE_TRY(store_volumes(content->fit, &made, error));
+  }
+  if (!content->without_normals && content->compression->order == 0) {
     SUPINE_TRY(find_normals(content, &arena, &made, error));
   }
   SUPINE_TRY(print_bytes(content, &made, bytes, error));

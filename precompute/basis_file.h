@@ -3,6 +3,7 @@
 #ifndef SUPINE_BASIS_FILE_H
 #define SUPINE_BASIS_FILE_H
 
+#include "precompute/fields/storage.h"
 #include "precompute/prepare.h"
 #include "precompute/projection/accuracy.h"
 
@@ -27,8 +28,11 @@ typedef struct supine_basis_content {
   const double *turned_over;       /**< share of triangles that turn over, or NULL if unknown */
   const supine_error_table *table; /**< NULL if `is_fields` */
   bool is_fields;                  /**< whether another simulator computed the displacements */
-  const double *scan_gravity;      /**< if so, [3] gravity in the scan, or NULL if unknown */
-  bool is_harmonics;               /**< whether the modes are the harmonics themselves */
+  const supine_fit *fit;           /**< of these displacements, if `is_fields` */
+  const supine_clusters *clusters; /**< `count` is 0 if the basis stores modes */
+  const float *exact;         /**< [rows, modes] coefficients of `compression` before clusters */
+  const double *scan_gravity; /**< if so, [3] gravity in the scan, or NULL if unknown */
+  bool is_harmonics;          /**< whether the modes are the harmonics themselves */
   bool without_normals;
   const char *made_by; /**< command line that makes the basis, or NULL */
 } supine_basis_content;

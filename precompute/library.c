@@ -31,7 +31,8 @@ static supine_status choose(const supine_precompute_modes *wanted, bool is_field
                                   .held_out = wanted->held_out,
                                   .without_normals = wanted->without_normals,
                                   .choose_band = is_fields && !has_band,
-                                  .keep_modes = is_fields && has_modes};
+                                  .keep_modes = is_fields && has_modes,
+                                  .storage = (supine_field_storage)wanted->storage};
   if (has_modes) {
     choice->modes = wanted->count; /* 0: harmonics */
   }
@@ -78,7 +79,12 @@ supine_status supine_precompute_make(const supine_precompute_options *options,
   fill_report(prepared, &made, report);
   if (options->fields != NULL) {
     report->band_count = made.fit.band_highest + 1;
-    memcpy(report->band_error, made.fit.error, sizeof made.fit.error);
+    memcpy(report->band_error, made.fit.error[made.fit.order], sizeof report->band_error);
+    report->direction_count = made.fit.direction_count;
+    report->volume_count = made.fit.volume_count;
+    report->order = made.fit.order;
+    report->extrapolated = made.fit.extrapolated;
+    report->cluster_count = made.cluster_count;
   }
   return SUPINE_OK;
 }

@@ -8,6 +8,7 @@
 #include "base/output.h"
 #include <supine/volume.h>
 
+#include "precompute/clusters/clusters.h"
 #include "precompute/precompute.h"
 
 /* The default number of held-out directions of gravity is HELD_OUT_WORK divided by the number of
@@ -59,10 +60,10 @@ static supine_status solve_model(const supine_lungs *lungs, const supine_model *
 }
 
 /* Another simulator's fields -> field of displacements, and predictions of each from the others. */
-static supine_status fit_fields(const supine_basis_choice *choice, supine_gravity_field *field,
-                                evidence *given, supine_error *error) {
+static supine_status fit_fields(const supine_lungs *lungs, const supine_basis_choice *choice,
+                                supine_gravity_field *field, evidence *given, supine_error *error) {
   given->is_fields = true;
-  SUPINE_TRY(supine_fields_fit(choice->fields, choice->choose_band ? -1 : (int)choice->band,
+  SUPINE_TRY(supine_fields_fit(choice->fields, lungs, choice->choose_band ? -1 : (int)choice->band,
                                &given->fit, error));
   return supine_fields_field(&given->fit, field, error);
 }
@@ -94,6 +95,38 @@ static supine_status compress(const supine_gravity_field *field, const supine_ba
                                    supine_sh_modes_needed(count, singular, total, relative));
   }
   return SUPINE_OK;
+}
+
+/* Compression of fields -> clusters of vertices that move alike, if the basis stores them. Their
+ * coefficients then replace those of the compression, so that all that follows is of what is
+ * stored.
+ * @param exact  written: the coefficients that were replaced; NULL if none were */
+static supine_status cluster(const supine_lungs *lungs, const supine_basis_choice *choice,
+                             const evidence *given, supine_compression *compression,
+                             supine_clusters *clusters, float **exact, supine_error *error) {
+  const size_t n = lungs->mesh.vertex_count;
+  SUPINE_ARENA arena = {0};
+  float *vertices = supine_arena_take(&arena, 3 * n, sizeof *vertices);
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
+  SUPINE_TRY(supine_fields_cluster(&given->fit, compression, choice->storage, clusters, error));
+  if (clusters->count == 0) {
+    return SUPINE_OK;
+  }
+  float *stored = malloc(3 * n * compression->mode_count * sizeof *stored);
+  if (stored == NULL) {
+    return supine_error_memory(error, "%zu vertices", n);
+  }
+  for (size_t i = 0; i < 3 * n; ++i) {
+    vertices[i] = (float)lungs->mesh.vertices[i];
+  }
+  supine_clusters_expand(clusters, vertices, stored);
+  *exact = compression->coefficients;
+  compression->coefficients = stored;
+  return SUPINE_OK;
+}
+
+static void free_floats(float **array) {
+  free(*array);
 }
 
 /* The surface from which displacements are measured, and the state of the scan. */
@@ -147,15 +180,24 @@ static supine_status anchor(const supine_prepared *prepared, const supine_rows *
   return SUPINE_OK;
 }
 
-/* Subtract from each mode its weight w in the posture of the scan, so that the given surface
- * reproduces the scan. The constant harmonic is 1 / sqrt(4 pi), so that its coefficient falls by
- * sqrt(4 pi) w. */
-static void subtract_scan(const double scan_gravity[3], supine_compression *compression) {
+/* Let displacements count from the scan, whose gravity is known: subtract from each mode its weight
+ * w in this posture, so that the given surface reproduces the scan. The constant harmonic is
+ * 1 / sqrt(4 pi), so that its coefficient falls by sqrt(4 pi) w.
+ * @param scan_gravity  [3], or NULL if gravity does not displace the given surface */
+static supine_status count_from_scan(const supine_fit *fit, const double *scan_gravity,
+                                     supine_compression *compression, supine_error *error) {
   double weights[SUPINE_MODES_MADE_MAX];
+  if (scan_gravity == NULL) {
+    return SUPINE_OK;
+  }
+  SUPINE_REFUSE_IF(fit->report.order > 0, error, SUPINE_ERROR_ARGUMENT,
+                   "displacements over gravity and volume count from the given surface, whatever "
+                   "its posture: leave the state of the scan out");
   supine_sh_compression_weights(compression, scan_gravity, weights);
   for (size_t k = 0; k < compression->mode_count; ++k) {
     compression->modes[k * supine_sh_count(compression->band)] -= sqrt_4pi * weights[k];
   }
+  return SUPINE_OK;
 }
 
 /* Volumes by the direction of gravity minus those of the reference surface, mL, as coefficients of
@@ -257,31 +299,32 @@ supine_status supine_precompute(const supine_prepared *prepared, const supine_ba
                                 supine_bytes *bytes, supine_basis_report *report,
                                 supine_error *error) {
   const supine_lungs *lungs = &prepared->source.lungs;
-  const supine_model *model = &prepared->model;
   SUPINE_FREED_BY(evidence_free) evidence given = {.is_fields = choice->fields != NULL};
   SUPINE_FREED_BY(supine_projection_field_free) supine_gravity_field field = {0};
   SUPINE_FREED_BY(supine_sh_compression_free) supine_compression compression = {0};
+  SUPINE_FREED_BY(supine_clusters_free) supine_clusters clusters = {0};
+  SUPINE_FREED_BY(free_floats) float *exact = NULL;
   SUPINE_FREED_BY(surface_free) surface of = {.reference = {.known = false}};
   SUPINE_FREED_BY(supine_physics_volume_forms_free) supine_volume_forms forms = {0};
   volumes at;
   supine_basis_report made = {0};
-
   SUPINE_TRY(tell_progress(choice, 0, error));
   if (given.is_fields) {
-    SUPINE_TRY(fit_fields(choice, &field, &given, error));
+    SUPINE_TRY(fit_fields(lungs, choice, &field, &given, error));
   } else {
-    SUPINE_TRY(solve_model(lungs, model, choice, &field, &given, error));
+    SUPINE_TRY(solve_model(lungs, &prepared->model, choice, &field, &given, error));
   }
   SUPINE_TRY(tell_progress(choice, 2, error));
   SUPINE_TRY(compress(&field, choice, &given, &compression, error));
   SUPINE_TRY(tell_progress(choice, 3, error));
   SUPINE_TRY(anchor(prepared, &field.rows, &compression, &of, error));
-  if (choice->scan_gravity != NULL) {
-    subtract_scan(choice->scan_gravity, &compression);
+  if (given.is_fields) {
+    SUPINE_TRY(count_from_scan(&given.fit, choice->scan_gravity, &compression, error));
+    SUPINE_TRY(cluster(&of.lungs, choice, &given, &compression, &clusters, &exact, error));
   }
-  SUPINE_TRY(supine_projection_volume_forms(&compression, &of.lungs, model->share, &field.rows,
-                                            &forms, error));
-  SUPINE_TRY(find_volumes(&of.reference, model->share, &compression, &forms, &at, error));
+  SUPINE_TRY(supine_projection_volume_forms(&compression, &of.lungs, prepared->model.share,
+                                            &field.rows, &forms, error));
+  SUPINE_TRY(find_volumes(&of.reference, prepared->model.share, &compression, &forms, &at, error));
   SUPINE_TRY(tell_progress(choice, 4, error));
   const supine_basis_content basis = {.lungs = &of.lungs,
                                       .prepared = prepared,
@@ -294,6 +337,9 @@ supine_status supine_precompute(const supine_prepared *prepared, const supine_ba
                                       .turned_over = given.is_fields ? NULL : &made.turned_over,
                                       .table = given.is_fields ? NULL : &given.table,
                                       .is_fields = given.is_fields,
+                                      .fit = &given.fit,
+                                      .clusters = &clusters,
+                                      .exact = exact != NULL ? exact : compression.coefficients,
                                       .scan_gravity = choice->scan_gravity,
                                       .is_harmonics = choice->modes == 0,
                                       .without_normals = choice->without_normals,
@@ -301,10 +347,11 @@ supine_status supine_precompute(const supine_prepared *prepared, const supine_ba
   SUPINE_TRY(measure(&given, &basis, &at, &made, error));
   SUPINE_TRY(tell_progress(choice, 5, error));
   SUPINE_TRY(supine_precompute_print(&basis, bytes, error));
-  made.band = compression.band;
-  made.mode_count = compression.mode_count;
   if (report != NULL) {
     *report = made;
+    report->band = compression.band;
+    report->mode_count = compression.mode_count;
+    report->cluster_count = clusters.count;
   }
   return tell_progress(choice, 7, error);
 }

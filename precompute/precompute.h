@@ -5,7 +5,7 @@
 #define SUPINE_PRECOMPUTE_H
 
 #include "precompute/basis_file.h"
-#include "precompute/fields/fields.h"
+#include "precompute/fields/storage.h"
 #include "precompute/prepare.h"
 #include "precompute/projection/accuracy.h"
 
@@ -18,10 +18,11 @@ typedef struct supine_basis_choice {
   const char *made_by;  /**< for the metadata: the command line that makes the basis, or NULL */
   /** Displacements that another simulator computed, in place of the model's; or NULL. With them: */
   const supine_fields *fields;
-  bool choose_band;           /**< choose the band by the leave-one-out error, instead of `band` */
-  bool keep_modes;            /**< keep all `modes`, even those that hardly lower the error */
-  const double *scan_gravity; /**< [3] gravity in the scan, which is then not displaced in its own
-                                 posture; NULL if gravity does not displace the scan */
+  bool choose_band; /**< choose the band by the leave-one-out error, instead of `band` */
+  bool keep_modes;  /**< keep all `modes`, even those that hardly lower the error */
+  supine_field_storage storage; /**< how displacements are stored */
+  const double *scan_gravity;   /**< [3] gravity in the scan, which is then not displaced in its own
+                                   posture; NULL if gravity does not displace the scan */
   /** Receives the fraction of the work done, 0 to 1; returns false to stop. NULL: none. */
   bool (*progress)(void *context, double fraction);
   void *progress_context;
@@ -29,6 +30,7 @@ typedef struct supine_basis_choice {
 
 typedef struct supine_basis_report {
   size_t band, mode_count;
+  size_t cluster_count; /**< 0 if the basis stores modes */
   supine_accuracy accuracy;
   double turned_over;    /**< share of triangles, 0 to 1 (supine_projection_turned_over) */
   supine_fit_report fit; /**< of another simulator's fields */

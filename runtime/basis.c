@@ -10,7 +10,7 @@
 
 #include "base/arena.h"
 #include "base/number.h"
-#include "runtime/internal.h"
+#include "runtime/clusters.h"
 #include "runtime/safetensors/safetensors_file.h"
 
 /* A file to check, and the name of the file in messages. */
@@ -101,8 +101,7 @@ static const void *require(const check *c, const char *name, supine_dtype dtype,
     }                                                                                              \
   } while (0)
 
-/* Check the metadata "format", "version" and "kind", and the checksum. Do not check a checksum of
- * 16 digits in a file of version 1: it has an older form. */
+/* Check the metadata "format", "version" and "kind", and the checksum. */
 static supine_status check_metadata(const check *c, supine_basis_info *info) {
   const char *format = supine_safetensors_metadata(c->file, "format");
   const char *version = supine_safetensors_metadata(c->file, "version");
@@ -113,18 +112,15 @@ static supine_status check_metadata(const check *c, supine_basis_info *info) {
                             "precompute'",
                             c->name);
   }
-  if (version == NULL || strlen(version) != 1 || strchr("123", version[0]) == NULL) {
-    return refuse(c, "the file format has version %.16s, but this program reads versions 1 to 3",
+  if (version == NULL || strcmp(version, "4") != 0) {
+    return refuse(c, "the file format has version %.16s, but this library reads version 4",
                   version == NULL ? "unknown" : version);
   }
-  info->volume_axes = version[0] == '3' ? 3 : 1;
   if (kind == NULL || (strcmp(kind, "scalar") != 0 && strcmp(kind, "vector") != 0)) {
     return refuse(c, "metadata 'kind' is neither scalar nor vector");
   }
   info->vector = strcmp(kind, "vector") == 0;
-  const char *stated = supine_safetensors_metadata(c->file, "checksum");
-  const bool old = version[0] == '1' && stated != NULL && strlen(stated) == 16;
-  return old ? SUPINE_OK : supine_safetensors_verify(c->file, c->error);
+  return supine_safetensors_verify(c->file, c->error);
 }
 
 static supine_status check_surface(const check *c, supine_basis *basis) {
@@ -149,14 +145,43 @@ static supine_status check_surface(const check *c, supine_basis *basis) {
   return SUPINE_OK;
 }
 
+/* Check the tensors of a basis of clusters, whose coefficients are not stored. */
+static supine_status check_clusters(const check *c, supine_basis *basis) {
+  supine_basis_info *info = &basis->info;
+  size_t cluster[] = {info->vertex_count};
+  size_t scalars[] = {info->vertex_count, 2};
+  size_t vectors[] = {ANY, ANY, SUPINE_CLUSTER_NUMBERS};
+  REQUIRE(info->cluster, c, "clusters", SUPINE_U16, 1, cluster);
+  REQUIRE(info->cluster_scalars, c, "cluster_scalars", SUPINE_I16, 2, scalars);
+  REQUIRE(info->cluster_vectors, c, "cluster_vectors", SUPINE_F32, 3, vectors);
+  info->cluster_count = vectors[0];
+  info->mode_count = vectors[1];
+  if (!info->vector || info->cluster_count < 1 || info->cluster_count > SUPINE_CLUSTERS_MAX) {
+    return refuse(c, "%zu clusters of a basis of kind %s, not 1 to %d of kind vector",
+                  info->cluster_count, info->vector ? "vector" : "scalar", SUPINE_CLUSTERS_MAX);
+  }
+  for (size_t i = 0; i < info->vertex_count; ++i) {
+    if (info->cluster[i] >= info->cluster_count) {
+      return refuse(c, "vertex %zu is in cluster %u of %zu", i, info->cluster[i],
+                    info->cluster_count);
+    }
+  }
+  return SUPINE_OK;
+}
+
+/* Check the tensors of the coefficients, and the number of modes. */
 static supine_status check_field(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
   const size_t n = info->vertex_count;
   const size_t rank = info->vector ? 3 : 2;
   size_t shape[] = {n, info->vector ? 3 : ANY, ANY};
   size_t direction[] = {n, 3};
-  REQUIRE(info->coefficients, c, "coefficients", SUPINE_F32, rank, shape);
-  info->mode_count = shape[rank - 1];
+  if (supine_safetensors_find(c->file, "clusters") != NULL) {
+    SUPINE_TRY(check_clusters(c, basis));
+  } else {
+    REQUIRE(info->coefficients, c, "coefficients", SUPINE_F32, rank, shape);
+    info->mode_count = shape[rank - 1];
+  }
   if (info->mode_count < 1 || info->mode_count > SUPINE_MODES_MAX) {
     return refuse(c, "the number of modes is %zu, not 1 to %d", info->mode_count, SUPINE_MODES_MAX);
   }
@@ -168,15 +193,50 @@ static supine_status check_field(const check *c, supine_basis *basis) {
 
 static supine_status check_modes(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
-  size_t shape[] = {info->mode_count, ANY};
-  REQUIRE(info->modes, c, "modes", SUPINE_F64, 2, shape);
+  size_t shape[] = {info->mode_count, ANY, ANY};
+  REQUIRE(info->modes, c, "modes", SUPINE_F64, 3, shape);
   while (info->band < SUPINE_SH_BAND_MAX && supine_sh_count(info->band) < shape[1]) {
     ++info->band;
   }
-  return shape[1] == supine_sh_count(info->band)
-             ? SUPINE_OK
-             : refuse(c, "tensor 'modes' has %zu columns, not (L + 1)^2 for an L from 0 to %d",
-                      shape[1], SUPINE_SH_BAND_MAX);
+  if (shape[1] != supine_sh_count(info->band)) {
+    return refuse(c, "tensor 'modes' has %zu harmonics, not (L + 1)^2 for an L from 0 to %d",
+                  shape[1], SUPINE_SH_BAND_MAX);
+  }
+  if (shape[2] < 1 || shape[2] > SUPINE_SH_ORDER_MAX + 1) {
+    return refuse(c, "tensor 'modes' has %zu polynomials of the volume, not 1 to %d", shape[2],
+                  SUPINE_SH_ORDER_MAX + 1);
+  }
+  info->order = shape[2] - 1;
+  return SUPINE_OK;
+}
+
+/* Find the lung of each cluster. All vertices of a cluster must belong to one lung. */
+static supine_status find_lungs_of_clusters(const check *c, supine_basis *basis) {
+  const supine_basis_info *info = &basis->info;
+  memset(basis->cluster_lung, SUPINE_LUNGS_MAX, sizeof basis->cluster_lung);
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    for (size_t i = info->lung_begin[lung]; i < info->lung_begin[lung + 1]; ++i) {
+      unsigned char *of = &basis->cluster_lung[info->cluster[i]];
+      if (*of != SUPINE_LUNGS_MAX && *of != lung) {
+        return refuse(c, "cluster %u has vertices of two lungs", info->cluster[i]);
+      }
+      *of = (unsigned char)lung;
+    }
+  }
+  return SUPINE_OK;
+}
+
+/* Check that a pose has room for the weights of every lung, and find the lungs of clusters. */
+static supine_status check_weights(const check *c, supine_basis *basis) {
+  const supine_basis_info *info = &basis->info;
+  if (info->cluster_count > 0) {
+    SUPINE_TRY(find_lungs_of_clusters(c, basis));
+  }
+  if (supine_basis_weight_count(basis) > SUPINE_MODES_MAX) {
+    return refuse(c, "%zu modes for each of %zu lungs are more than %d weights", info->mode_count,
+                  info->lung_count, SUPINE_MODES_MAX);
+  }
+  return SUPINE_OK;
 }
 
 static void bound_lungs(supine_basis *basis) {
@@ -255,15 +315,13 @@ static supine_status check_lungs(const check *c, supine_basis *basis) {
 }
 
 /* Check the tensors volume_linear, volume_quadratic and volume_cubic. Either all or none must
- * exist. In files of version 3, the first two have an additional axis for x, y and z. */
+ * exist. */
 static supine_status check_volume(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
   const size_t g = info->lung_count;
   const size_t k = info->mode_count;
-  const size_t axes = info->volume_axes;
+  size_t by_axis[] = {g, 3, k, k};
   size_t cubic[] = {g, k, k, k};
-  size_t by_axis[] = {g, axes, k, k};
-  size_t *shape = axes == 3 ? by_axis : cubic;
   static const char *const names[] = {"volume_linear", "volume_quadratic", "volume_cubic"};
   for (size_t i = 0; i < 3; ++i) {
     info->has_volume = info->has_volume || supine_safetensors_find(c->file, names[i]) != NULL;
@@ -271,8 +329,8 @@ static supine_status check_volume(const check *c, supine_basis *basis) {
   if (!info->has_volume) {
     return SUPINE_OK;
   }
-  REQUIRE(info->volume_linear, c, names[0], SUPINE_F64, axes == 3 ? 3 : 2, shape);
-  REQUIRE(info->volume_quadratic, c, names[1], SUPINE_F64, axes == 3 ? 4 : 3, shape);
+  REQUIRE(info->volume_linear, c, names[0], SUPINE_F64, 3, by_axis);
+  REQUIRE(info->volume_quadratic, c, names[1], SUPINE_F64, 4, by_axis);
   REQUIRE(info->volume_cubic, c, names[2], SUPINE_F64, 4, cubic);
   return SUPINE_OK;
 }
@@ -357,25 +415,52 @@ static supine_status check_scan(const check *c, supine_basis *basis) {
   for (size_t i = 0; i < count; ++i) {
     basis->scan_volume += by_lung[i];
   }
-  return supine_safetensors_metadata(c->file, "bend") == NULL || basis->rest_by_lung
-             ? SUPINE_OK
-             : refuse(
-                   c,
-                   "metadata 'bend' requires a tensor 'resting_volume' with a row for each lung");
+  if (supine_safetensors_metadata(c->file, "bend") != NULL && !basis->info.has_rest) {
+    return refuse(c, "metadata 'bend' requires a tensor 'resting_volume'");
+  }
+  return SUPINE_OK;
 }
 
-/* Check the optional tensor 'resting_volume': spherical-harmonic coefficients of the volume at
- * rest, for each lung or for all lungs together. */
+/* Check the optional tensors 'resting_volume' and 'full_volume': spherical-harmonic coefficients of
+ * the volumes of each lung at rest and, of simulated volumes, at full inflation. */
 static supine_status check_rest(const check *c, supine_basis *basis) {
-  const supine_tensor *tensor = supine_safetensors_find(c->file, "resting_volume");
-  if (tensor == NULL) {
+  size_t shape[2] = {basis->info.lung_count, RESTING_TERMS};
+  if (supine_safetensors_find(c->file, "resting_volume") != NULL) {
+    REQUIRE(basis->resting, c, "resting_volume", SUPINE_F64, 2, shape);
+    basis->info.has_rest = true;
+  }
+  if (supine_safetensors_find(c->file, "full_volume") != NULL) {
+    REQUIRE(basis->simulated.full, c, "full_volume", SUPINE_F64, 2, shape);
+  }
+  return SUPINE_OK;
+}
+
+/* Check the tensors and metadata of fields that depend on volume. Only they know full inflation by
+ * a tensor of its own. */
+static supine_status check_simulated(const check *c, supine_basis *basis) {
+  const size_t lungs = basis->info.lung_count;
+  supine_simulated *s = &basis->simulated;
+  size_t range[] = {lungs, 2};
+  size_t limits[] = {lungs, 2, RESTING_TERMS};
+  size_t shares[] = {lungs, RESTING_TERMS, ANY};
+  if (basis->info.order == 0) {
     return SUPINE_OK;
   }
-  size_t shape[2] = {basis->info.lung_count, RESTING_TERMS};
-  basis->rest_by_lung = tensor->rank == 2;
-  const size_t rank = basis->rest_by_lung ? 2 : 1;
-  REQUIRE(basis->resting, c, "resting_volume", SUPINE_F64, rank, shape + 2 - rank);
-  basis->info.has_rest = true;
+  REQUIRE(s->range, c, "simulated_range", SUPINE_F64, 2, range);
+  REQUIRE(s->limits, c, "simulated_limits", SUPINE_F64, 3, limits);
+  REQUIRE(s->shares, c, "simulated_shares", SUPINE_F64, 3, shares);
+  s->share_count = shares[2];
+  basis->info.is_fields = true;
+  basis->info.has_full = s->full != NULL;
+  SUPINE_TRY(read_numbers(c, "simulated_total_ml", 2, s->total));
+  bool rising = s->total[0] < s->total[1];
+  for (size_t lung = 0; lung < lungs; ++lung) {
+    rising = rising && s->range[2 * lung] < s->range[2 * lung + 1];
+  }
+  if (!rising || s->share_count < 1 || s->share_count > SUPINE_SH_ORDER_MAX + 1 ||
+      !basis->info.has_volume) {
+    return refuse(c, "the simulated volumes have no range, or the surface has no volume");
+  }
   return SUPINE_OK;
 }
 
@@ -388,19 +473,14 @@ static supine_status check_normals(const check *c, supine_basis *basis) {
   if (tensor == NULL && supine_safetensors_find(c->file, "normal_weights") == NULL) {
     return SUPINE_OK;
   }
-  const bool bytes = tensor != NULL && tensor->dtype == SUPINE_I8;
-  const void *vectors = NULL;
-  REQUIRE(vectors, c, "normals", bytes ? SUPINE_I8 : SUPINE_I16, 3, shape);
-  info->normals = bytes ? NULL : vectors;
-  info->normal_bytes = bytes ? vectors : NULL;
-  info->normal_count = shape[2] - (bytes && shape[2] > 0);
+  REQUIRE(info->normals, c, "normals", SUPINE_I8, 3, shape);
+  info->normal_count = shape[2] > 0 ? shape[2] - 1 : 0;
   if (info->normal_count < 1 || info->normal_count > SUPINE_NORMAL_MODES_MAX) {
     return refuse(c, "the basis of vertex normals has %zu modes, not 1 to %d", info->normal_count,
                   SUPINE_NORMAL_MODES_MAX);
   }
-  const bool by_axis = info->volume_axes == 3;
-  size_t weights[] = {info->lung_count, info->normal_count, by_axis ? 3 : terms, terms};
-  REQUIRE(info->normal_weights, c, "normal_weights", SUPINE_F64, by_axis ? 4 : 3, weights);
+  size_t weights[] = {info->lung_count, info->normal_count, 3, terms};
+  REQUIRE(info->normal_weights, c, "normal_weights", SUPINE_F64, 4, weights);
   return SUPINE_OK;
 }
 
@@ -448,7 +528,9 @@ static supine_status check_names(const check *c, supine_basis *basis) {
 
 /* Identify what determines the meaning of a pose: the modes and the coefficients of the volumes. */
 static supine_status identify(const check *c, supine_basis *basis) {
-  static const char *const names[] = {"modes", "volume_linear", "volume_quadratic", "volume_cubic"};
+  static const char *const names[] = {"modes",           "volume_linear",   "volume_quadratic",
+                                      "volume_cubic",    "simulated_range", "simulated_limits",
+                                      "simulated_shares"};
   for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
     const supine_tensor *tensor = supine_safetensors_find(c->file, names[i]);
     basis->info.identity += supine_safetensors_checksum(tensor, tensor == NULL ? 0 : 1, NULL, 0);
@@ -480,13 +562,18 @@ static supine_status prepare(const check *c, supine_basis *basis,
             : "this processor or build lacks the instruction set: choose SUPINE_SIMD_AUTO");
   }
   basis->info.simd = simd;
-  const bool choose = storage == SUPINE_STORAGE_AUTO;
+  const bool clusters = basis->info.cluster_count > 0;
+  const bool choose = storage == SUPINE_STORAGE_AUTO && !clusters;
   if (choose || storage == SUPINE_STORAGE_MIXED) {
     const bool thirds = supine_tiles_thirds(SUPINE_STORAGE_MIXED, basis->info.mode_count) > 0;
     storage = thirds ? SUPINE_STORAGE_MIXED : SUPINE_STORAGE_INT16;
   }
   for (;;) {
-    SUPINE_TRY(supine_basis_pack(basis, storage));
+    if (clusters) {
+      SUPINE_TRY(supine_clusters_pack(basis));
+    } else {
+      SUPINE_TRY(supine_basis_pack(basis, storage));
+    }
     basis->info.storage_error = supine_basis_storage_error(basis);
     if (!choose || storage == SUPINE_STORAGE_EXACT || basis->info.storage_error <= error_limit_mm) {
       break;
@@ -496,7 +583,6 @@ static supine_status prepare(const check *c, supine_basis *basis,
   if (options->without_normals) {
     basis->info.normal_count = 0;
     basis->info.normals = NULL;
-    basis->info.normal_bytes = NULL;
     basis->info.normal_weights = NULL;
   }
   if (basis->info.normal_count > 0) {
@@ -591,8 +677,8 @@ static supine_status open_file(const char *name, const void *bytes, size_t size,
   const check c = {file, name, error};
   SUPINE_TRY(check_metadata(&c, &basis->info));
   static supine_status (*const steps[])(const check *, supine_basis *) = {
-      check_numbers, check_surface,   check_field,  check_modes, check_lungs,
-      check_volume,  check_reference, check_rest,   check_scan,  check_normals,
+      check_numbers, check_surface,   check_field,  check_modes, check_lungs,     check_weights,
+      check_volume,  check_reference, check_rest,   check_scan,  check_simulated, check_normals,
       check_rigid,   check_expected,  check_errors, check_names, identify};
   for (size_t i = 0; i < sizeof steps / sizeof *steps; ++i) {
     SUPINE_TRY(steps[i](&c, basis));

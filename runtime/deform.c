@@ -2,6 +2,7 @@
 /* Compute deformed positions. One call of a kernel evaluates many tiles of 16 vertices. */
 #include <string.h>
 
+#include "runtime/clusters.h"
 #include "runtime/rigid.h"
 
 /* Compute the numbers by which a kernel multiplies packed numbers of a lung: for each mode, the
@@ -10,8 +11,9 @@
  * @param scales  [modes + 3], written */
 static void weigh(const supine_basis *basis, const supine_pose *pose, size_t lung, float *scales) {
   const size_t modes = basis->info.mode_count;
+  const double *weights = supine_basis_lung_weights(basis, pose, lung);
   for (size_t k = 0; k < modes; ++k) {
-    scales[k] = (float)(pose->weights[k] * basis->mode_scale[k]);
+    scales[k] = (float)(weights[k] * basis->mode_scale[k]);
   }
   for (size_t axis = 0; axis < 3; ++axis) {
     scales[modes + axis] = (float)pose->gains[lung][axis];
@@ -51,6 +53,33 @@ void supine_deform_lung(supine_deform_tiles *kernel, const supine_tiles *tiles, 
   }
 }
 
+/* Evaluate vertices begin <= i < end of a basis of clusters, of which each belongs to one lung. */
+static void deform_clusters(const supine_basis *basis, const supine_pose *pose, size_t begin,
+                            size_t end, const supine_target *target) {
+  supine_cluster_frames frames;
+  supine_clusters_pose(basis, pose, begin, end, frames);
+  supine_deform_lung(basis->kernels->cluster, &basis->tiles, frames, begin, end, target);
+}
+
+/* Evaluate vertices begin <= i < end of all lungs as if no part were rigid. */
+static void deform_lungs(const supine_basis *basis, const supine_pose *pose, size_t begin,
+                         size_t end, const supine_target *target) {
+  float scales[SUPINE_MODES_MAX + 3];
+  if (basis->info.cluster_count > 0) {
+    deform_clusters(basis, pose, begin, end, target);
+    return;
+  }
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    const size_t first = basis->lung_begin[lung] > begin ? basis->lung_begin[lung] : begin;
+    const size_t last = basis->lung_begin[lung + 1] < end ? basis->lung_begin[lung + 1] : end;
+    if (first < last) {
+      const supine_target here = supine_target_after(target, first - begin);
+      weigh(basis, pose, lung, scales);
+      supine_deform_lung(basis->kernels->deform, &basis->tiles, scales, first, last, &here);
+    }
+  }
+}
+
 enum { RIGID_BLOCK = 256 };
 
 /* Overwrite the positions or displacements of the vertices begin <= i < end that belong to rigid
@@ -64,17 +93,11 @@ static void deform_rigid(const supine_basis *basis, const supine_pose *pose, siz
     if (first >= end || last <= begin) {
       continue;
     }
-    float scales[SUPINE_MODES_MAX + 3];
-    size_t lung = 0;
-    while (first >= basis->lung_begin[lung + 1]) {
-      ++lung;
-    }
-    weigh(basis, pose, lung, scales);
     for (size_t at = first; at < last; at += RIGID_BLOCK) {
       float x[3 * RIGID_BLOCK];
       const size_t next = last - at < RIGID_BLOCK ? last : at + RIGID_BLOCK;
       const supine_target block = {.xyz = x, .add_reference = true};
-      supine_deform_lung(basis->kernels->deform, &basis->tiles, scales, at, next, &block);
+      deform_lungs(basis, pose, at, next, &block);
       supine_rigid_add(&m, basis->info.vertices + 3 * at, x, next - at);
     }
     supine_rigid_finish(&m);
@@ -85,21 +108,6 @@ static void deform_rigid(const supine_basis *basis, const supine_pose *pose, siz
             supine_rigid_move(&m, p, a) - (target->add_reference ? 0 : (double)p[a]);
         target->xyz[3 * (i - begin) + a] = (float)value;
       }
-    }
-  }
-}
-
-/* Evaluate vertices begin <= i < end of all lungs as if no part were rigid. */
-static void deform_lungs(const supine_basis *basis, const supine_pose *pose, size_t begin,
-                         size_t end, const supine_target *target) {
-  float scales[SUPINE_MODES_MAX + 3];
-  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
-    const size_t first = basis->lung_begin[lung] > begin ? basis->lung_begin[lung] : begin;
-    const size_t last = basis->lung_begin[lung + 1] < end ? basis->lung_begin[lung + 1] : end;
-    if (first < last) {
-      const supine_target here = supine_target_after(target, first - begin);
-      weigh(basis, pose, lung, scales);
-      supine_deform_lung(basis->kernels->deform, &basis->tiles, scales, first, last, &here);
     }
   }
 }

@@ -9,9 +9,16 @@ double supine_basis_error(const supine_basis *basis, const supine_pose *pose) {
   const size_t modes = basis->info.mode_count;
   double stored = 0;
   double moved = 0;
-  for (size_t k = 0; k < modes; ++k) {
-    stored += fabs(pose->weights[k]) * basis->mode_error[k];
-    moved += fabs(pose->weights[k]) * basis->mode_size[k];
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    const double *weights = supine_basis_lung_weights(basis, pose, lung);
+    double error = 0;
+    double size = 0;
+    for (size_t k = 0; k < modes; ++k) {
+      error += fabs(weights[k]) * basis->mode_error[k];
+      size += fabs(weights[k]) * basis->mode_size[k];
+    }
+    stored = fmax(stored, error);
+    moved = fmax(moved, size);
   }
   double scale = 0;
   for (size_t i = 0; i < 3 * basis->info.lung_count; ++i) {
@@ -51,10 +58,15 @@ double supine_basis_storage_error(const supine_basis *basis) {
     supine_pose pose = {.basis = 0};
     const int cell[3] = {number % 3 - 1, number / 3 % 3 - 1, number / 9 - 1};
     const supine_state state = {.gravity = {cell[0], cell[1], cell[2]}};
-    if (supine_basis_weights(basis, state.gravity, pose.weights) != SUPINE_OK) {
+    if (basis->info.order > 0) { /* in the default volume */
+      if (supine_basis_pose(basis, &state, &pose, NULL) != SUPINE_OK) {
+        continue;
+      }
+    } else if (supine_basis_weights(basis, state.gravity, pose.weights) == SUPINE_OK) {
+      supine_pose_fill(&pose, 1);
+    } else {
       continue; /* the zero vector has no direction */
     }
-    supine_pose_fill(&pose, 1);
     if (!basis->info.has_volume && !basis->info.is_fields) {
       const double largest = largest_displacement(basis, &pose);
       supine_pose_fill(&pose, largest > 0 ? distance / largest : 0);

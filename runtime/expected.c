@@ -66,12 +66,13 @@ static double mean_square_of_lungs(const supine_basis *basis, const supine_pose 
   const size_t k = basis->info.mode_count;
   double sum = 0;
   for (size_t row = 0; row < basis->info.lung_count * 3 * k; ++row) {
-    const double *gain[2] = {&pose->gains[row / k / 3][row / k % 3],
-                             &from->gains[row / k / 3][row / k % 3]};
-    const double a = *gain[0] * pose->weights[row % k] - *gain[1] * from->weights[row % k];
+    const size_t lung = row / k / 3;
+    const double *gain[2] = {&pose->gains[lung][row / k % 3], &from->gains[lung][row / k % 3]};
+    const double *to = supine_basis_lung_weights(basis, pose, lung);
+    const double *before = supine_basis_lung_weights(basis, from, lung);
+    const double a = *gain[0] * to[row % k] - *gain[1] * before[row % k];
     for (size_t l = 0; l < k; ++l) {
-      sum += basis->squares[row * k + l] * a *
-             (*gain[0] * pose->weights[l] - *gain[1] * from->weights[l]);
+      sum += basis->squares[row * k + l] * a * (*gain[0] * to[l] - *gain[1] * before[l]);
     }
   }
   return fmax(0, sum);

@@ -5,8 +5,9 @@
 #include "runtime/internal.h"
 #include "runtime/kernels/compact.h"
 
+/* Return whether the shader can hold the modes. It has one weight of each mode for all lungs. */
 static bool fits(const supine_basis *basis) {
-  return basis->info.mode_count <= SUPINE_GL_MODES;
+  return basis->info.mode_count <= SUPINE_GL_MODES && basis->info.order == 0;
 }
 
 supine_status supine_gl_pack(const supine_basis *basis, size_t begin, size_t end,
@@ -28,7 +29,8 @@ supine_status supine_gl_pack(const supine_basis *basis, size_t begin, size_t end
     if (!vector) {
       memcpy(to + 4, basis->info.direction + 3 * i, 3 * sizeof *to);
     }
-    memcpy(to + head, basis->info.coefficients + i * count, count * sizeof *to);
+    float computed[3 * SUPINE_MODES_MAX];
+    memcpy(to + head, supine_basis_rows(basis, i, computed), count * sizeof *to);
   }
   return SUPINE_OK;
 }

@@ -78,3 +78,21 @@ supine_status supine_sh_evaluate_many(size_t band, size_t count, const double *d
   }
   return SUPINE_OK;
 }
+
+supine_status supine_sh_evaluate_products(size_t band, size_t order, const double direction[3],
+                                          double t, double *products) {
+  double polynomial[SUPINE_SH_ORDER_MAX + 1] = {1, t};
+  if (order > SUPINE_SH_ORDER_MAX || supine_sh_evaluate(band, direction, products) != SUPINE_OK) {
+    return SUPINE_ERROR_ARGUMENT;
+  }
+  for (size_t n = 2; n <= order; ++n) {
+    polynomial[n] = 2 * t * polynomial[n - 1] - polynomial[n - 2];
+  }
+  for (size_t h = supine_sh_count(band); h-- > 0;) { /* from the end: products replace harmonics */
+    const double y = products[h];
+    for (size_t n = 0; n <= order; ++n) {
+      products[h * (order + 1) + n] = y * polynomial[n];
+    }
+  }
+  return SUPINE_OK;
+}

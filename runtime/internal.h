@@ -24,6 +24,23 @@ enum {
 
 enum { LUNG_NAME_SIZE = 32 }; /**< largest size of a lung's name in bytes, with its NUL */
 
+/** What a basis of another simulator's fields knows of the simulated volumes, mL above the
+ * reference surface (runtime/simulated.h). All pointers are NULL if the fields do not depend on
+ * volume. */
+typedef struct supine_simulated {
+  const double *range; /**< [lungs, 2] volumes at t = -1 and t = 1 */
+  /** [lungs, 2, RESTING_TERMS] lowest and highest volume for a direction of gravity, as harmonics.
+   */
+  const double *limits;
+  /** [lungs, RESTING_TERMS, share_count] volume of each lung, as products of harmonics and
+   * Chebyshev polynomials of the total volume, mapped to -1 to 1. */
+  const double *shares;
+  size_t share_count;
+  /** [lungs, RESTING_TERMS] volume at full inflation as harmonics, or NULL. */
+  const double *full;
+  double total[2]; /**< total volumes that are mapped to -1 and 1 */
+} supine_simulated;
+
 struct supine_basis {
   supine_basis_info info;
   size_t lung_begin[SUPINE_LUNGS_MAX + 1];
@@ -49,10 +66,11 @@ struct supine_basis {
   double mode_error[SUPINE_MODES_MAX], mode_size[SUPINE_MODES_MAX];
   double reference_volume[SUPINE_LUNGS_MAX]; /**< array that info.reference_volume points to, mL */
   /** Volume at rest minus the volume of the reference surface, mL, as spherical-harmonic
-   * coefficients over directions of gravity: [lung_count, RESTING_TERMS], or [RESTING_TERMS] for
-   * all lungs together. NULL if the file has no volume at rest. */
+   * coefficients over directions of gravity, [lung_count, RESTING_TERMS]. NULL if the file has no
+   * volume at rest. */
   const double *resting;
-  bool rest_by_lung;   /**< `resting` has coefficients for each lung */
+  supine_simulated simulated;
+  unsigned char cluster_lung[SUPINE_CLUSTERS_MAX]; /**< lung of the vertices of each cluster */
   double upright_gain; /**< (full volume upright - full volume supine) / reference volume */
   double scan_volume;  /**< volume in the scan minus that of the reference surface, mL */
   double scan_gravity[3];
@@ -74,6 +92,12 @@ static inline bool supine_pose_is_finite(const double *numbers, size_t count) {
   return bad == 0;
 }
 
+/** Return how many weights a pose has: one for each mode or, if the weights depend on the volume of
+ * a lung, for each lung and mode. */
+static inline size_t supine_basis_weight_count(const supine_basis *basis) {
+  return basis->info.mode_count * (basis->info.order > 0 ? basis->info.lung_count : 1);
+}
+
 /** Return whether a pose was made for this basis, or by hand for any basis. */
 static inline bool supine_basis_made_pose(const supine_basis *basis, const supine_pose *pose) {
   return pose->basis == 0 || pose->basis == basis->info.identity;
@@ -82,7 +106,7 @@ static inline bool supine_basis_made_pose(const supine_basis *basis, const supin
 /** Return whether a pose was made for this basis or by hand, and its numbers are finite. */
 static inline bool supine_basis_has_pose(const supine_basis *basis, const supine_pose *pose) {
   return supine_basis_made_pose(basis, pose) &&
-         supine_pose_is_finite(pose->weights, basis->info.mode_count) &&
+         supine_pose_is_finite(pose->weights, supine_basis_weight_count(basis)) &&
          supine_pose_is_finite(pose->gains[0], 3 * basis->info.lung_count);
 }
 
@@ -101,10 +125,10 @@ supine_status supine_basis_pack_normals(supine_basis *basis);
 
 /** Return the number of terms that supine_basis_normal_weights adds for each vector and axis: 1
  * constant, 2 K products of a gain and a weight, and K (K + 1) / 2 products with two weights, for K
- * modes. Files of versions 1 and 2 have one gain (factor of displacement) and only K of the 2 K. */
+ * modes. */
 static inline size_t supine_basis_normal_terms(const supine_basis *basis) {
   const size_t k = basis->info.mode_count;
-  return 1 + (basis->info.volume_axes == 3 ? 2 : 1) * k + k * (k + 1) / 2;
+  return 1 + 2 * k + k * (k + 1) / 2;
 }
 
 /** Evaluate vertices begin <= i < end of one lung. Write the first of them to target->xyz.
@@ -122,6 +146,15 @@ double supine_basis_storage_error(const supine_basis *basis);
 /** Return whether the numbers of a packed basis can be those of lungs. If not, write to `detail`
  * which number is too large or too small. */
 bool supine_basis_is_plausible(const supine_basis *basis, char *detail, size_t size);
+
+/** Return the coefficients of the modes at vertex i: one row for each axis, or one row along its
+ * direction if supine_basis_info.vector is false.
+ * @param computed  [3 mode_count] work space, for a basis of clusters */
+const float *supine_basis_rows(const supine_basis *basis, size_t i, float *computed);
+
+/** Compute the volume of a lung, at given weights, as a polynomial of its gains. */
+void supine_basis_contract(const supine_basis *basis, size_t lung, const double *weights,
+                           supine_volume_form *form);
 
 /** Return w^T F w for the matrix F = `form` [count, count]. */
 double supine_volume_square(size_t count, const double *form, const double *w);

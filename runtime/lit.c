@@ -7,7 +7,7 @@
 #include "runtime/kernels/compact.h"
 #include "runtime/safetensors/safetensors_file.h"
 
-/* Pack the vectors of 16 vertices (supine_basis_info.normals or normal_bytes), from vertex `begin`
+/* Pack the vectors of 16 vertices (supine_basis_info.normals), from vertex `begin`
  * on. After the last vertex, repeat it. */
 SUPINE_CLONES static void pack_tile(const supine_basis_info *info, const supine_tiles *tiles,
                                     size_t begin, unsigned char *to) {
@@ -23,9 +23,7 @@ SUPINE_CLONES static void pack_tile(const supine_basis_info *info, const supine_
       for (size_t v = 0; v < TILE; ++v) {
         const size_t row = 3 * (begin + v < last ? begin + v : last) + axis;
         const int number =
-            info->normals != NULL
-                ? info->normals[row * tiles->modes + k]
-                : normal_from_bytes(info->normal_bytes + row * (tiles->modes + 1), tiles->modes, k);
+            normal_from_bytes(info->normals + row * (tiles->modes + 1), tiles->modes, k);
         three[which][v] = number * (1 / normal_unit());
       }
     }
@@ -67,23 +65,22 @@ static void lung_weights(const supine_basis *basis, size_t lung, const supine_po
                          double *v) {
   const size_t modes = basis->info.mode_count;
   const size_t count = basis->info.normal_count;
-  const size_t axes = basis->info.volume_axes;
-  const size_t sides = axes == 3 ? 2 : 1;
   const size_t terms = supine_basis_normal_terms(basis);
   const double *gain = pose->gains[lung];
-  const double *form = basis->info.normal_weights + lung * count * axes * terms;
+  const double *weights = supine_basis_lung_weights(basis, pose, lung);
+  const double *form = basis->info.normal_weights + lung * count * 3 * terms;
   for (size_t j = 0; j < count; ++j) {
     v[j] = 0;
-    for (size_t axis = 0; axis < axes; ++axis) {
+    for (size_t axis = 0; axis < 3; ++axis) {
       v[j] += *form++;
-      for (size_t side = 1; side <= sides; ++side) {
+      for (size_t side = 1; side <= 2; ++side) {
         double sum = 0;
         for (size_t k = 0; k < modes; ++k) {
-          sum += *form++ * pose->weights[k];
+          sum += *form++ * weights[k];
         }
         v[j] += gain[(axis + side) % 3] * sum;
       }
-      v[j] += gain[(axis + 1) % 3] * gain[(axis + 2) % 3] * triangle(modes, form, pose->weights);
+      v[j] += gain[(axis + 1) % 3] * gain[(axis + 2) % 3] * triangle(modes, form, weights);
       form += modes * (modes + 1) / 2;
     }
   }

@@ -55,9 +55,12 @@ static bool plausible_positions(const supine_basis *basis, char *detail, size_t 
  * any posture. By Cauchy's inequality, and because the squares of all harmonics up to band L add up
  * to (L + 1)^2 / (4 pi), a weight is at most
  *
- *     |w_k| <= |modes_k| (L + 1) / sqrt(4 pi) */
+ *     |w_k| <= |modes_k| (L + 1) / sqrt(4 pi) sqrt(N)
+ *
+ * with N polynomials of the volume, each at most 1. */
 static bool plausible_modes(const supine_basis *basis, char *detail, size_t size) {
-  const size_t count = supine_sh_count(basis->info.band);
+  const size_t orders = basis->info.order + 1;
+  const size_t count = supine_sh_count(basis->info.band) * orders;
   double weight = 0;
   double moved = 0;
   for (size_t k = 0; k < basis->info.mode_count; ++k) {
@@ -66,7 +69,8 @@ static bool plausible_modes(const supine_basis *basis, char *detail, size_t size
       const double x = basis->info.modes[k * count + i];
       square += x * x;
     }
-    const double most = sqrt(square) * (double)(basis->info.band + 1) * 0.28209479177387814;
+    const double most =
+        sqrt(square * (double)orders) * (double)(basis->info.band + 1) * 0.28209479177387814;
     weight = fmax(weight, most);
     moved += most * basis->mode_size[k];
   }
@@ -84,12 +88,12 @@ static bool plausible_modes(const supine_basis *basis, char *detail, size_t size
 static bool plausible_forms(const supine_basis *basis, char *detail, size_t size) {
   const supine_basis_info *info = &basis->info;
   const size_t k = info->mode_count;
-  const size_t rows = info->lung_count * info->volume_axes;
+  const size_t rows = info->lung_count * 3;
   const double form = fmax(fmax(largest_of(info->volume_linear, rows * k),
                                 largest_of(info->volume_quadratic, rows * k * k)),
                            largest_of(info->volume_cubic, info->lung_count * k * k * k));
-  const size_t normals = info->lung_count * info->normal_count * (info->volume_axes == 3 ? 3 : 1) *
-                         supine_basis_normal_terms(basis);
+  const size_t normals =
+      info->lung_count * info->normal_count * 3 * supine_basis_normal_terms(basis);
   if (form > largest_form_ml) {
     (void)supine_print_text(detail, size, "a coefficient of the volumes is %g mL, above %g mL",
                             form, largest_form_ml);
@@ -170,22 +174,48 @@ static bool plausible_row(const double *row, double reference, char *detail, siz
   return true;
 }
 
+/* Check the volumes at rest, but not those that another simulator computed: its reference surface
+ * may be at rest or far below. */
 static bool plausible_rest(const supine_basis *basis, char *detail, size_t size) {
-  double all = 0;
+  if (basis->resting == NULL || basis->info.order > 0) {
+    return true;
+  }
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
-    const double reference = basis->reference_volume[lung];
-    all += reference;
-    if (basis->rest_by_lung &&
-        !plausible_row(basis->resting + lung * RESTING_TERMS, reference, detail, size)) {
+    if (!plausible_row(basis->resting + lung * RESTING_TERMS, basis->reference_volume[lung], detail,
+                       size)) {
       return false;
     }
   }
-  return basis->resting == NULL || basis->rest_by_lung ||
-         plausible_row(basis->resting, all, detail, size);
+  return true;
+}
+
+/* Check the volumes that another simulator computed. */
+static bool plausible_simulated(const supine_basis *basis, char *detail, size_t size) {
+  const supine_simulated *s = &basis->simulated;
+  const size_t lungs = basis->info.lung_count;
+  const struct {
+    const double *numbers;
+    size_t count;
+  } volumes[] = {{s->range, 2 * lungs},
+                 {s->limits, 2 * lungs * RESTING_TERMS},
+                 {s->shares, lungs * RESTING_TERMS * s->share_count},
+                 {s->full, lungs * RESTING_TERMS},
+                 {s->total, 2},
+                 {basis->resting, lungs * RESTING_TERMS}};
+  double most = 0;
+  for (size_t i = 0; i < sizeof volumes / sizeof *volumes; ++i) {
+    most = fmax(most, largest_of(volumes[i].numbers, volumes[i].count));
+  }
+  if (!(most <= largest_ml)) {
+    (void)supine_print_text(detail, size, "a simulated volume is %g mL, above %g mL", most,
+                            largest_ml);
+    return false;
+  }
+  return true;
 }
 
 bool supine_basis_is_plausible(const supine_basis *basis, char *detail, size_t size) {
   return plausible_positions(basis, detail, size) && plausible_modes(basis, detail, size) &&
          plausible_forms(basis, detail, size) && plausible_scan(basis, detail, size) &&
-         plausible_rest(basis, detail, size);
+         plausible_rest(basis, detail, size) && plausible_simulated(basis, detail, size);
 }

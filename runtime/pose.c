@@ -7,7 +7,7 @@
 
 #include "base/arena.h"
 #include "base/vec3.h"
-#include "runtime/internal.h"
+#include "runtime/simulated.h"
 
 static const double default_above_scan = 500; /* default volume minus the volume in the scan, mL */
 
@@ -15,6 +15,9 @@ supine_status supine_basis_weights(const supine_basis *basis, const double gravi
                                    double *weights) {
   double y[(SUPINE_SH_BAND_MAX + 1) * (SUPINE_SH_BAND_MAX + 1)];
   const size_t count = supine_sh_count(basis->info.band);
+  if (basis->info.order > 0) {
+    return SUPINE_ERROR_UNSUPPORTED;
+  }
   SUPINE_TRY(supine_sh_evaluate(basis->info.band, gravity, y));
   for (size_t k = 0; k < basis->info.mode_count; ++k) {
     double sum = 0;
@@ -26,23 +29,12 @@ supine_status supine_basis_weights(const supine_basis *basis, const double gravi
   return SUPINE_OK;
 }
 
-static void contract(const supine_basis *basis, size_t lung, const double *weights,
-                     supine_volume_form *form) {
-  const size_t k = basis->info.mode_count;
-  const size_t axes = basis->info.volume_axes;
-  *form = (supine_volume_form){{0}};
-  supine_volume_contract(k, axes, basis->info.volume_linear + lung * axes * k,
-                         basis->info.volume_quadratic + lung * axes * k * k,
-                         basis->info.volume_cubic + lung * k * k * k, weights, form);
-}
-
-/* Return the volume at rest minus that of the reference surface, mL, from the spherical harmonics y
- * of the direction of gravity.
- * @param row  row of the coefficients `resting`: a lung, or 0 if they are for all lungs together */
-static double resting(const supine_basis *basis, size_t row, const double *y) {
+/* Return the volume of a lung at rest minus that of its reference surface, mL, from the spherical
+ * harmonics y of the direction of gravity. */
+static double resting(const supine_basis *basis, size_t lung, const double *y) {
   double volume = 0;
   for (size_t t = 0; t < RESTING_TERMS; ++t) {
-    volume += basis->resting[row * RESTING_TERMS + t] * y[t];
+    volume += basis->resting[lung * RESTING_TERMS + t] * y[t];
   }
   return volume;
 }
@@ -59,7 +51,7 @@ static double sum_of(const double *values, size_t count) {
 typedef struct volumes {
   size_t lung_count;
   supine_volume_form form[SUPINE_LUNGS_MAX];
-  double rest[SUPINE_LUNGS_MAX]; /* volumes at rest; 0 if the file has only the sum of all lungs */
+  double rest[SUPINE_LUNGS_MAX]; /* volumes at rest; 0 if the file has none */
   double full[SUPINE_LUNGS_MAX];
   double rest_total;
 } volumes;
@@ -79,15 +71,13 @@ static supine_status find_volumes(const supine_basis *basis, const double gravit
   }
   const double up = fmax(0, -unit[2]);
   for (size_t lung = 0; lung < v->lung_count; ++lung) {
-    contract(basis, lung, weights, &v->form[lung]);
+    supine_basis_contract(basis, lung, weights, &v->form[lung]);
     v->full[lung] = basis->upright_gain * up * up * basis->info.reference_volume[lung];
-    if (basis->rest_by_lung) {
+    if (basis->info.has_rest) {
       v->rest[lung] = resting(basis, lung, y);
     }
   }
-  if (basis->info.has_rest) {
-    v->rest_total = basis->rest_by_lung ? sum_of(v->rest, v->lung_count) : resting(basis, 0, y);
-  }
+  v->rest_total = sum_of(v->rest, v->lung_count);
   return SUPINE_OK;
 }
 
@@ -160,7 +150,7 @@ static supine_status common_gains(const volumes *v, double total, supine_pose *p
  * than the reference surface. */
 static supine_status total_gains(const supine_basis *basis, const volumes *v, double total,
                                  supine_pose *pose, supine_error *error) {
-  if (!basis->rest_by_lung) {
+  if (!basis->info.has_rest) {
     return common_gains(v, total, pose, error);
   }
   double lung_ml[SUPINE_LUNGS_MAX];
@@ -237,9 +227,16 @@ static supine_status reference_gains(const supine_basis *basis, const supine_sta
 }
 
 supine_volume supine_basis_default_volume(const supine_basis *basis) {
-  return basis->info.has_rest    ? (supine_volume){SUPINE_VOLUME_REST, 0}
-         : basis->info.is_fields ? (supine_volume){SUPINE_VOLUME_DEFAULT, 0}
-                                 : (supine_volume){SUPINE_VOLUME_SCAN, default_above_scan};
+  if (basis->info.has_rest) {
+    return (supine_volume){SUPINE_VOLUME_REST, 0};
+  }
+  if (basis->info.order > 0) {
+    return (supine_volume){SUPINE_VOLUME_SCAN, 0};
+  }
+  if (basis->info.is_fields) {
+    return (supine_volume){SUPINE_VOLUME_DEFAULT, 0};
+  }
+  return (supine_volume){SUPINE_VOLUME_SCAN, default_above_scan};
 }
 
 /* Refuse numbers of lungs and volumes that are out of range or not finite. Other functions check
@@ -259,20 +256,13 @@ static supine_status check_state(const supine_state *state, supine_error *error)
                                    "a volume of the state is not finite: give a number of mL");
 }
 
-supine_status supine_basis_gains(const supine_basis *basis, const supine_state *state,
-                                 supine_pose *pose, supine_error *error) {
+/* Find the gains (factors of the displacement) at which the lungs hold the volume of a state, in a
+ * pose that has the weights for its gravity. */
+static supine_status find_gains(const supine_basis *basis, const supine_state *state,
+                                supine_pose *pose, supine_error *error) {
   supine_state asked = *state;
-  SUPINE_TRY(check_state(state, error));
-  if (!supine_basis_made_pose(basis, pose)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "the pose was made for another basis: make it with supine_basis_pose");
-  }
-  if (!supine_pose_is_finite(pose->weights, basis->info.mode_count)) {
-    return supine_error_set(
-        error, SUPINE_ERROR_ARGUMENT,
-        "a weight of the pose is not finite: make it with supine_basis_weights");
-  }
-  pose->basis = basis->info.identity;
+  volumes v;
+  double total = 0;
   if (asked.lung_count == 0 && asked.volume.kind == SUPINE_VOLUME_DEFAULT) {
     asked.volume = supine_basis_default_volume(basis);
     if (asked.volume.kind == SUPINE_VOLUME_DEFAULT) {
@@ -283,8 +273,6 @@ supine_status supine_basis_gains(const supine_basis *basis, const supine_state *
   if (!basis->info.has_volume || basis->info.is_fields) {
     return reference_gains(basis, &asked, pose, error);
   }
-  volumes v;
-  double total = 0;
   SUPINE_TRY(find_volumes(basis, asked.gravity, pose->weights, &v, error));
   if (asked.lung_count > 0) {
     return named_gains(basis, &v, &asked, pose, error);
@@ -295,11 +283,15 @@ supine_status supine_basis_gains(const supine_basis *basis, const supine_state *
 
 supine_status supine_basis_pose(const supine_basis *basis, const supine_state *state,
                                 supine_pose *pose, supine_error *error) {
+  SUPINE_TRY(check_state(state, error));
+  pose->basis = basis->info.identity;
+  if (basis->info.order > 0) {
+    return supine_simulated_pose(basis, state, pose, error);
+  }
   if (supine_basis_weights(basis, state->gravity, pose->weights) != SUPINE_OK) {
     return refuse_gravity(error);
   }
-  pose->basis = basis->info.identity;
-  return supine_basis_gains(basis, state, pose, error);
+  return find_gains(basis, state, pose, error);
 }
 
 void supine_pose_fill(supine_pose *pose, double gain) {
@@ -323,7 +315,7 @@ supine_status supine_basis_volumes(const supine_basis *basis, const supine_pose 
   }
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     supine_volume_form form;
-    contract(basis, lung, pose->weights, &form);
+    supine_basis_contract(basis, lung, supine_basis_lung_weights(basis, pose, lung), &form);
     volumes_ml[lung] =
         basis->info.reference_volume[lung] + supine_volume_form_at(&form, pose->gains[lung]);
   }
@@ -333,7 +325,7 @@ supine_status supine_basis_volumes(const supine_basis *basis, const supine_pose 
 supine_status supine_basis_add_volume(const supine_basis *basis, double volume, supine_pose *pose) {
   volumes v = {.lung_count = basis->info.lung_count};
   for (size_t lung = 0; lung < v.lung_count; ++lung) {
-    contract(basis, lung, pose->weights, &v.form[lung]);
+    supine_basis_contract(basis, lung, pose->weights, &v.form[lung]);
   }
   return common_gains(&v, volume, pose, NULL);
 }

@@ -23,10 +23,9 @@ double supine_volume_square(size_t count, const double *form, const double *w) {
   return sum;
 }
 
-void supine_volume_contract(size_t count, size_t axes, const double *linear,
-                            const double *quadratic, const double *third, const double *weights,
-                            supine_volume_form *form) {
-  for (size_t axis = 0; axis < axes; ++axis) {
+void supine_volume_contract(size_t count, const double *linear, const double *quadratic,
+                            const double *third, const double *weights, supine_volume_form *form) {
+  for (size_t axis = 0; axis < 3; ++axis) {
     form->of[axis] += dot(count, linear + axis * count, weights);
     form->of[3 + axis] += supine_volume_square(count, quadratic + axis * count * count, weights);
   }

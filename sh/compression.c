@@ -19,10 +19,13 @@ void supine_sh_compression_free(supine_compression *compression) {
 
 supine_status supine_sh_compression_create(const supine_expansion *expansion, size_t mode_count,
                                            supine_compression *made) {
-  *made = (supine_compression){
-      .row_count = expansion->row_count, .band = expansion->band, .mode_count = mode_count};
+  *made = (supine_compression){.row_count = expansion->row_count,
+                               .band = expansion->band,
+                               .order = expansion->order,
+                               .mode_count = mode_count};
   made->coefficients = malloc(expansion->row_count * mode_count * sizeof(float));
-  made->modes = calloc(mode_count * supine_sh_count(expansion->band), sizeof(double));
+  made->modes =
+      calloc(mode_count * supine_sh_terms(expansion->band, expansion->order), sizeof(double));
   made->mix = calloc(expansion->rank * mode_count, sizeof(double));
   return made->coefficients != NULL && made->modes != NULL && made->mix != NULL
              ? SUPINE_OK
@@ -53,7 +56,7 @@ static void mix_range(void *context, size_t begin, size_t end, size_t thread) {
 }
 
 void supine_sh_compression_mix(const supine_expansion *expansion, supine_compression *made) {
-  const int terms = (int)supine_sh_count(expansion->band);
+  const int terms = (int)supine_sh_terms(expansion->band, expansion->order);
   const int count = (int)made->mode_count;
   mix_work work = {expansion, made};
   cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)expansion->rank, count, terms, 1.0,
@@ -63,10 +66,10 @@ void supine_sh_compression_mix(const supine_expansion *expansion, supine_compres
 
 supine_status supine_sh_compress_harmonics(const supine_expansion *expansion,
                                            supine_compression *compression, supine_error *error) {
-  const size_t terms = supine_sh_count(expansion->band);
+  const size_t terms = supine_sh_terms(expansion->band, expansion->order);
   SUPINE_REFUSE_ADVISE(terms > SUPINE_MODES_MADE_MAX, error, SUPINE_REMEDY_HARMONICS,
                        SUPINE_ERROR_ARGUMENT,
-                       "band %zu has %zu harmonics, but a basis file holds at most %d",
+                       "band %zu has %zu functions, but a basis file holds at most %d",
                        expansion->band, terms, SUPINE_MODES_MADE_MAX);
   if (supine_sh_compression_create(expansion, terms, compression) != SUPINE_OK) {
     return supine_error_memory(error, "%zu harmonics", terms);
@@ -108,13 +111,20 @@ void supine_sh_compression_truncate(supine_compression *compression, size_t rank
 
 void supine_sh_compression_weights(const supine_compression *compression, const double g[3],
                                    double *weights) {
+  supine_sh_compression_weights_at(compression, g, 0.0, weights);
+}
+
+void supine_sh_compression_weights_at(const supine_compression *compression, const double g[3],
+                                      double t, double *weights) {
   double y[(SUPINE_SH_BAND_MAX + 1) * (SUPINE_SH_BAND_MAX + 1)] = {0.0};
-  const size_t terms = supine_sh_count(compression->band);
-  (void)supine_sh_evaluate(compression->band, g, y); /* cannot fail: g is a unit vector */
+  const size_t terms = supine_sh_terms(compression->band, compression->order);
+  /* This cannot fail: g is a unit vector, and expansions of an order have at most as many terms as
+   * harmonics of the highest band. */
+  (void)supine_sh_evaluate_products(compression->band, compression->order, g, t, y);
   for (size_t k = 0; k < compression->mode_count; ++k) {
     weights[k] = 0.0;
-    for (size_t t = 0; t < terms; ++t) {
-      weights[k] += compression->modes[k * terms + t] * y[t];
+    for (size_t i = 0; i < terms; ++i) {
+      weights[k] += compression->modes[k * terms + i] * y[i];
     }
   }
 }

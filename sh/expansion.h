@@ -9,6 +9,8 @@
  *   matrix C is therefore stored as a product, C = columns x functions. Here, a row i is a vertex
  * or one coordinate of a vertex, a column is its value for one direction, and g is a direction of
  *   gravity; nothing in this folder depends on that.
+ * - A function may also depend on a scalar t, -1 to 1: then each harmonic stands for its products
+ *   with the Chebyshev polynomials T_0(t) to T_order(t) (supine_sh_evaluate_products).
  * - An expansion is compressed to K functions of the direction, its modes: the first harmonics, as
  *   [Santhanam2008] does, or the K functions that give the least squared error. */
 #ifndef SUPINE_EXPANSION_H
@@ -17,6 +19,7 @@
 #include <stddef.h>
 #include <stdlib.h>
 
+#include <supine/sh.h>
 #include <supine/status.h>
 
 /** Largest number of latitudes, and of longitudes, of a quadrature rule on the sphere. */
@@ -61,10 +64,16 @@ supine_status supine_sh_transform(size_t band, const supine_sh_grid *grid, size_
 typedef struct supine_expansion {
   size_t row_count;  /**< N */
   size_t band;       /**< highest degree of the harmonics */
+  size_t order;      /**< highest degree of the polynomials of t; 0 if rows do not depend on t */
   size_t rank;       /**< number of functions whose sums are all rows */
   double *columns;   /**< [row_count, rank] P: weight of each function in each row */
-  double *functions; /**< [rank, (band + 1)^2] Q: harmonic coefficients of each function */
+  double *functions; /**< [rank, terms] Q: coefficients of each function */
 } supine_expansion;
+
+/** Return the number of products of a harmonic and a polynomial: (band + 1)^2 (order + 1). */
+static inline size_t supine_sh_terms(size_t band, size_t order) {
+  return supine_sh_count(band) * (order + 1);
+}
 
 static inline void supine_sh_expansion_free(supine_expansion *expansion) {
   free(expansion->columns);
@@ -80,15 +89,17 @@ enum { SUPINE_MODES_MADE_MAX = 64 };
 typedef struct supine_compression {
   size_t row_count;
   size_t band;
+  size_t order;
   size_t mode_count;
   float *coefficients; /**< [row_count, mode_count] coefficient of each mode in each row */
-  double *modes;       /**< [mode_count, (band + 1)^2] harmonic coefficients of each mode */
+  double *modes;       /**< [mode_count, terms] coefficients of each mode */
   double *mix; /**< [rank, mode_count] matrix: coefficients = (supine_expansion.columns) mix */
 } supine_compression;
 
 void supine_sh_compression_free(supine_compression *compression);
 
-/** Use the (band + 1)^2 harmonics, at most SUPINE_MODES_MADE_MAX, as modes, as [Santhanam2008]. */
+/** Use the harmonics, times polynomials if order is not 0, at most SUPINE_MODES_MADE_MAX, as modes,
+ * as [Santhanam2008]. */
 supine_status supine_sh_compress_harmonics(const supine_expansion *expansion,
                                            supine_compression *compression, supine_error *error);
 
@@ -127,8 +138,13 @@ void supine_sh_compression_mix(const supine_expansion *expansion, supine_compres
 supine_status supine_sh_leading_eigenpairs(size_t n, double *matrix, size_t count, double *values,
                                            double *vectors);
 
-/** Compute the value of each mode at the unit vector g, weights [mode_count]. */
+/** Compute the value of each mode at the unit vector g, weights [mode_count]. Modes that depend on
+ * t take it as 0. */
 void supine_sh_compression_weights(const supine_compression *compression, const double g[3],
                                    double *weights);
+
+/** Compute the value of each mode at the unit vector g and the scalar t, weights [mode_count]. */
+void supine_sh_compression_weights_at(const supine_compression *compression, const double g[3],
+                                      double t, double *weights);
 
 #endif

@@ -76,7 +76,7 @@ supine_status supine_sh_leading_eigenpairs(size_t n, double *matrix, size_t coun
 static supine_status find_modes(const supine_expansion *expansion, double *gram, size_t count,
                                 double *values, double *modes, double *total) {
   const size_t rank = expansion->rank;
-  const size_t terms = supine_sh_count(expansion->band);
+  const size_t terms = supine_sh_terms(expansion->band, expansion->order);
   SUPINE_ARENA arena = {0};
   double *vectors = supine_arena_take(&arena, rank * rank, sizeof *vectors);
   double *reduced = supine_arena_take(&arena, rank * terms, sizeof *reduced);
@@ -106,7 +106,7 @@ supine_status supine_sh_compress_modes(const supine_expansion *expansion, const 
                                        size_t mode_max, supine_compression *compression,
                                        double *singular, double *total, supine_error *error) {
   const size_t rank = expansion->rank;
-  const size_t terms = supine_sh_count(expansion->band);
+  const size_t terms = supine_sh_terms(expansion->band, expansion->order);
   const size_t most = mode_max < rank ? mode_max : rank;
   const size_t kept = most < terms ? most : terms;
   double energy = 0.0;

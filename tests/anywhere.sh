@@ -13,7 +13,7 @@ trap 'exit 1' INT TERM
 
 # Return whether this processor has an instruction set of the library.
 has() {
-  SUPINE_SIMD=$1 build/release/supine info tests/golden/basis_2.safetensors >/dev/null 2>&1
+  SUPINE_SIMD=$1 build/release/supine info tests/golden/basis_lungs.safetensors >/dev/null 2>&1
 }
 
 # run NAME COMMAND...: run the tests by a command, such as "env NAME=VALUE ctest".

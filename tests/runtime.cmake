@@ -11,8 +11,10 @@ supine_test(runtime/golden supine_runtime)
 target_compile_definitions(test_golden PRIVATE SUPINE_GOLDEN="${CMAKE_CURRENT_SOURCE_DIR}/golden")
 find_package(Python3 COMPONENTS Interpreter)
 if(Python3_FOUND)
+  set(bases basis_lungs basis_scalar basis_vector basis_clusters basis_simulated open_surface)
+  list(TRANSFORM bases REPLACE "(.+)" "${CMAKE_CURRENT_SOURCE_DIR}/golden/\\1.safetensors")
   add_test(NAME checksum_python COMMAND ${Python3_EXECUTABLE}
-    ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_checksum.py ${CMAKE_CURRENT_SOURCE_DIR}/golden/basis_2.safetensors)
+    ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_checksum.py ${bases})
 endif()
 supine_test(runtime/posture runtime_fixture)
 supine_test(runtime/state supine_runtime)
@@ -22,6 +24,12 @@ supine_test(runtime/locate runtime_fixture)
 supine_test(runtime/runtime_basis runtime_fixture)
 supine_test(runtime/deform runtime_fixture)
 supine_test(runtime/deform_lit runtime_fixture)
+supine_test(runtime/clusters runtime_fixture)
+supine_test(runtime/simulated runtime_fixture)
+
+# Make the synthetic bases among the golden files.
+add_executable(make_golden helpers/make_golden.c)
+target_link_libraries(make_golden PRIVATE supine_build runtime_fixture PkgConfig::CMOCKA)
 
 # Use the installed library by CMake and by pkg-config.
 add_executable(make_basis install/make_basis.c)

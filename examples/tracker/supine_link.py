@@ -193,6 +193,8 @@ class Basis:
             header = json.loads(file.read(size))
             data = file.read()
         self.metadata = header.pop("__metadata__", {})
+        if self.metadata.get("version") != "4" or "direction" not in header or "coefficients" not in header:
+            raise ValueError(path + ": not a basis of format 4 with directions: make it with 'supine precompute'")
         self.header = header
         self._data = data
         self.vertices = self.tensor("vertices")

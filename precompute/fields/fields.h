@@ -1,34 +1,37 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Fit spherical harmonics of the direction of gravity to the displacement fields of another
- * simulator, and compress the fit. The field u(g_j) holds the displacements of all vertices for the
- * direction of gravity g_j, and Y(g_j) holds the values of the harmonics at g_j. The coefficients C
- * minimise
+ * Fit functions of gravity and volume to the displacement fields of another simulator
+ * (regression.h), and compress the fit.
  *
- *     sum over j of |u(g_j) - C Y(g_j)|^2
+ * If the simulator ran at several volumes for one direction of gravity, each lung's volume in each
+ * run is measured on its displaced surface, and mapped to a parameter t from -1 to 1. Otherwise the
+ * fit is of gravity alone (order 0).
  *
- * The band of a fit is the highest degree of its harmonics. By default, bands are tried in rising
- * order, and a higher band is chosen if it reduces the leave-one-out error by more than 1 %. */
+ * The band and the order of a fit are the highest degrees of its harmonics and of its polynomials.
+ * By default they are chosen by the error of runs that are left out: all runs of one direction, and
+ * the runs of one volume between the smallest and the largest. More terms are chosen if they reduce
+ * this error by more than 1 %. */
 #ifndef SUPINE_FIELDS_H
 #define SUPINE_FIELDS_H
 
+#include "precompute/fields/regression.h"
 #include "precompute/lungs/lungs.h"
 #include "precompute/physics/reference.h"
 #include "precompute/projection/accuracy.h"
 
-/** Displacements of all vertices for several directions of gravity, made by another simulator. */
+/** Displacements of all vertices in several runs of another simulator. */
 typedef struct supine_fields {
-  size_t direction_count; /**< number of directions of gravity */
+  size_t run_count;
   size_t vertex_count;
-  double *directions;   /**< [direction_count, 3] unit vectors along gravity */
-  double *displacement; /**< [direction_count, vertex_count, 3] displacement of each vertex, mm */
+  double *directions; /**< [run_count, 3] unit vectors along gravity; several runs may share one */
+  double *displacement; /**< [run_count, vertex_count, 3] displacement of each vertex, mm */
 } supine_fields;
 
 /** Read displacement fields from a safetensors file with three tensors, F32 or F64: points [P, 3],
- * the positions of P points; gravity [M, 3], M directions of gravity; and displacement [M, P, 3],
- * the displacement of each point for each direction. All are in the same axes and unit. Each vertex
- * of `lungs` takes the displacement of the point at its position, within 1e-4 of the diagonal of
- * the bounding box. Other points, such as inner nodes of a volume mesh, are left out.
+ * the positions of P points; gravity [M, 3], the directions of gravity of M runs; and displacement
+ * [M, P, 3], the displacement of each point in each run. All are in the same axes and unit. Each
+ * vertex of `lungs` takes the displacement of the point at its position, within 1e-4 of the
+ * diagonal of the bounding box. Other points, such as inner nodes of a volume mesh, are left out.
  * @param lungs   the reference surface
  * @param frame   axes and unit of the file, which are those of the files of the lungs; a frame of
  *   zeros stands for LPS and mm
@@ -38,57 +41,77 @@ supine_status supine_fields_load(const char *path, const supine_lungs *lungs,
                                  supine_error *error);
 void supine_fields_free(supine_fields *fields);
 
-enum { SUPINE_FIT_BAND_MAX = 11 };
+enum { SUPINE_FIT_BAND_MAX = 11, SUPINE_FIT_ORDER_MAX = 4 };
 
 /** What a fit found. */
 typedef struct supine_fit_report {
-  size_t direction_count; /**< number of directions of gravity */
-  size_t band_highest;    /**< highest degree that the directions of gravity determine */
-  size_t band;            /**< highest degree of the harmonics in the chosen fit */
-  /** [l] relative RMS leave-one-out error with harmonics to degree l. */
-  double error[SUPINE_FIT_BAND_MAX + 1];
+  size_t direction_count; /**< number of different directions of gravity */
+  size_t volume_count; /**< most volumes for one direction; 1 if fields do not depend on volume */
+  size_t band_highest; /**< highest band that the runs determine, with the chosen order */
+  size_t band;         /**< highest degree of the harmonics in the chosen fit */
+  size_t order;        /**< highest degree of the polynomials of volume */
+  /** [order][band] relative RMS error of the runs left out; 0 if the runs do not determine it. */
+  double error[SUPINE_FIT_ORDER_MAX + 1][SUPINE_FIT_BAND_MAX + 1];
+  /** Relative RMS error of the smallest and the largest volumes of each direction, predicted from
+   * the others: an extrapolation; 0 if the others do not determine the fit. */
+  double extrapolated;
 } supine_fit_report;
 
-/** Harmonics at the directions of gravity, and the least squares with them: the coefficient of each
- * harmonic is a field, a sum of `pinv` times the given fields. */
-typedef struct supine_fit_matrices {
-  size_t count;      /**< number of directions of gravity */
-  size_t terms;      /**< number of harmonics */
-  double *harmonics; /**< [count, terms] value of each harmonic at each direction */
-  double *pinv;      /**< [terms, count] pseudo-inverse of `harmonics` */
-  double condition;  /**< condition number of `harmonics` */
-} supine_fit_matrices;
-
-/** A fit of harmonics to fields. Zero-initialise; release with supine_fields_fit_free. */
+/** A fit to fields. Zero-initialise; release with supine_fields_fit_free. */
 typedef struct supine_fit {
   const supine_fields *fields;
+  const supine_lungs *lungs;
   supine_fit_report report;
-  supine_fit_matrices chosen;
-  double *gram; /**< [directions, directions] scalar products of any two given fields, mm^2 */
+  double *volume;     /**< [lungs, runs] volume of each lung minus that of the surface, mL */
+  double *parameter;  /**< [lungs, runs] t */
+  double range[2][2]; /**< [lungs] volumes at t = -1 and 1, mL above the surface */
+  supine_run_groups
+      groups;              /**< runs that are left out together: of a direction, then of a volume */
+  size_t direction_groups; /**< how many of them are of a direction */
+  supine_run_groups ends; /**< all runs of the smallest volume of their direction; of the largest */
+  supine_regression chosen;
+  double *gram; /**< [lungs, runs, runs] scalar products of any two fields in each lung, mm^2 */
   supine_arena memory;
 } supine_fit;
 
-/** Fit harmonics to the fields.
- * @param fields  must outlive the fit
- * @param band    highest degree of the harmonics; if negative, chosen by the leave-one-out error
+/** Fit functions of gravity and volume to the fields.
+ * @param fields  must outlive the fit, as `lungs`
+ * @param band    highest degree of the harmonics; if negative, chosen by the error
  * @param fit     written; release it also after an error */
-supine_status supine_fields_fit(const supine_fields *fields, int band, supine_fit *fit,
-                                supine_error *error);
+supine_status supine_fields_fit(const supine_fields *fields, const supine_lungs *lungs, int band,
+                                supine_fit *fit, supine_error *error);
 void supine_fields_fit_free(supine_fit *fit);
 
-/** Return the relative RMS leave-one-out error of the fit, or 1e-4 if it is smaller: modes that
+/** Return the relative RMS error of the fit in runs left out, or 1e-4 if it is smaller: modes that
  * lower the error below that are not worth keeping. */
 double supine_fields_fit_error(const supine_fit *fit);
 
-/** Make the field of the fit: VECTOR rows whose columns are the given fields.
+/** Return the RMS displacement of the fields, mm. */
+double supine_fields_size(const supine_fit *fit);
+
+/** Make the field of the fit: VECTOR rows.
  * @param field  zeroed; release with supine_projection_field_free, also after an error */
 supine_status supine_fields_field(const supine_fit *fit, supine_gravity_field *field,
                                   supine_error *error);
 
-/** Measure the errors of a basis of the fit: each field predicted from the others, in mm and
- * relative to the RMS displacement. The member `volume` is 0, as nothing is scaled to a volume.
+/** Measure the errors of a basis of the fit: each run predicted from the others, in mm and relative
+ * to the RMS displacement. The member `volume` is 0, as nothing is scaled to a volume.
  * @param modes  number of modes of the basis, or 0 if it has the harmonics themselves */
 supine_status supine_fields_measure(const supine_fit *fit, size_t modes, supine_accuracy *accuracy,
                                     supine_error *error);
+
+/** What a basis needs to find the parameter of each lung from volumes (runtime/simulated.h).
+ * Volumes are mL above the given surface. */
+typedef struct supine_simulated_volumes {
+  size_t share_count;     /**< number of polynomials of the total volume */
+  double limits[2][2][9]; /**< [lungs] smallest and largest volume, as harmonics to degree 2 */
+  double shares[2][9][SUPINE_FIT_ORDER_MAX + 1]; /**< [lungs][harmonic][polynomial] */
+  double total[2];                               /**< total volumes mapped to -1 and 1 */
+} supine_simulated_volumes;
+
+/** Find these numbers by least squares over the runs. All simulated volumes lie within the limits.
+ * @param fit  of order 1 or more */
+supine_status supine_fields_volumes_fit(const supine_fit *fit, supine_simulated_volumes *made,
+                                        supine_error *error);
 
 #endif

@@ -11,8 +11,6 @@
 #include "precompute/fields/fields.h"
 #include "precompute/lungs/surface.h"
 
-/* Largest distance between unit vectors that count as the same direction. */
-static const double same_direction = 1e-6;
 /* Largest distance of a vertex from its point, as a fraction of the diagonal of the lungs' box. */
 static const double farthest_point = 1e-4;
 
@@ -40,7 +38,7 @@ void supine_fields_free(supine_fields *fields) {
 }
 
 static supine_status allocate(reading *r) {
-  const size_t m = r->fields.direction_count = r->gravity->shape[0];
+  const size_t m = r->fields.run_count = r->gravity->shape[0];
   const size_t n = r->fields.vertex_count = r->lungs->mesh.vertex_count;
   r->point_of = supine_arena_take(&r->arena, n, sizeof *r->point_of);
   r->apart = supine_arena_take(&r->arena, n, sizeof *r->apart);
@@ -64,8 +62,7 @@ static bool read_row(const reading *r, const supine_tensor *tensor, size_t row, 
   return isfinite(out[0]) && isfinite(out[1]) && isfinite(out[2]);
 }
 
-/* Read direction of gravity `row`, and normalise it. Refuse a repeated direction: when held out, it
- * would be predicted from its duplicate, and the leave-one-out error would be too small. */
+/* Read direction of gravity `row`, and normalise it. */
 static supine_status read_direction(const reading *r, size_t row) {
   double *g = r->fields.directions + 3 * row;
   double given[3];
@@ -74,12 +71,6 @@ static supine_status read_direction(const reading *r, size_t row) {
       !good, r->error, SUPINE_ERROR_FORMAT,
       "%s: row %zu: gravity %g,%g,%g has no direction: give a vector that is finite and not 0",
       r->path, row, given[0], given[1], given[2]);
-  for (size_t earlier = 0; earlier < row; ++earlier) {
-    SUPINE_REFUSE_IF(supine_distance(g, r->fields.directions + 3 * earlier) < same_direction,
-                     r->error, SUPINE_ERROR_FORMAT,
-                     "%s: rows %zu and %zu have the same direction of gravity: keep one of them",
-                     r->path, earlier, row);
-  }
   return SUPINE_OK;
 }
 
@@ -167,11 +158,11 @@ static supine_status check_tensors(const reading *r) {
 static supine_status take_tensors(reading *r) {
   SUPINE_TRY(check_tensors(r));
   SUPINE_TRY(allocate(r));
-  for (size_t d = 0; d < r->fields.direction_count; ++d) {
+  for (size_t d = 0; d < r->fields.run_count; ++d) {
     SUPINE_TRY(read_direction(r, d));
   }
   SUPINE_TRY(match_points(r));
-  for (size_t d = 0; d < r->fields.direction_count; ++d) {
+  for (size_t d = 0; d < r->fields.run_count; ++d) {
     SUPINE_TRY(read_field(r, d));
   }
   return SUPINE_OK;

@@ -132,14 +132,20 @@ supine_status supine_inside_shells_reach(const supine_inside_shells *shells, dou
 }
 
 /* Find the displacement of a vertex by each mode at weight and gain 1: row [3, modes], mm. */
-static void move_vertex(const supine_basis_info *info, size_t vertex, double *row) {
+static void move_vertex(const supine_basis *basis, size_t vertex, double *row) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
   const size_t modes = info->mode_count;
-  for (size_t axis = 0; axis < 3; ++axis) {
-    for (size_t k = 0; k < modes; ++k) {
-      *row++ = info->vector ? (double)info->coefficients[(3 * vertex + axis) * modes + k]
-                            : (double)info->direction[3 * vertex + axis] *
-                                  (double)info->coefficients[vertex * modes + k];
+  if (info->vector) {
+    float vectors[3 * SUPINE_MODES_MAX];
+    (void)supine_basis_coefficients(basis, vertex, vertex + 1, vectors);
+    for (size_t i = 0; i < 3 * modes; ++i) {
+      row[i] = (double)vectors[i];
     }
+    return;
+  }
+  for (size_t i = 0; i < 3 * modes; ++i) {
+    row[i] = (double)info->direction[3 * vertex + i / modes] *
+             (double)info->coefficients[vertex * modes + i % modes];
   }
 }
 
@@ -148,7 +154,7 @@ void supine_inside_shell_displacement(const supine_inside_shells *shells, size_t
   const supine_basis_info *info = supine_basis_get_info(shells->basis);
   const supine_inside_shell *shell = &shells->shell[lung];
   for (size_t i = 0; i < shell->vertex_count; ++i) {
-    move_vertex(info, shell->begin + i, displacement + 3 * i * info->mode_count);
+    move_vertex(shells->basis, shell->begin + i, displacement + 3 * i * info->mode_count);
   }
 }
 
@@ -257,7 +263,7 @@ bool supine_inside_hilum(const supine_basis *basis, double *mean) {
       if (is_hilar(info->vertices + 3 * i, info->bounds + 6 * lung,
                    info->lung_names[lung][0] == 'l')) {
         count += 1.0;
-        move_vertex(info, i, row);
+        move_vertex(basis, i, row);
         for (size_t k = 0; k < columns; ++k) {
           mean[lung * columns + k] += row[k];
         }

@@ -188,7 +188,7 @@ static void pack(const int8_t *modes, size_t count, double *packed) {
   }
 }
 
-/* Round the modes of n vertices to bytes (supine_basis_info.normal_bytes), in multiples of
+/* Round the modes of n vertices to bytes (supine_basis_info.normals), in multiples of
  * unit[mode].
  * @param values   [n, 3, count] modes, first divided in place by `lengths`; x / 0 = 0
  * @param lengths  [n] length of each normal on the reference surface

@@ -45,7 +45,7 @@ typedef struct supine_normals_surface {
 /** Modes from which vertex normals are computed, and the error of these normals. */
 typedef struct supine_normals_modes {
   size_t count;  /**< number of modes; may be 0 */
-  int8_t *modes; /**< [N, 3, count + 1] scaled to integers (supine_basis_info.normal_bytes);
+  int8_t *modes; /**< [N, 3, count + 1] scaled to integers (supine_basis_info.normals);
                     `weights` include the inverse scale; NULL without modes */
   /** [lungs, count, 3, monomials] coefficients V_jc of each mode's weight (top of this file). */
   double *weights;

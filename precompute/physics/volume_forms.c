@@ -254,7 +254,7 @@ void supine_physics_volume_forms_contract_lung(const supine_volume_forms *forms,
                                                const double *weights, supine_volume_form *form) {
   const size_t n = forms->column_count;
   *form = (supine_volume_form){{0.0}};
-  supine_volume_contract(n, 3, forms->linear + 3 * lung * n, forms->quadratic + 3 * lung * n * n,
+  supine_volume_contract(n, forms->linear + 3 * lung * n, forms->quadratic + 3 * lung * n * n,
                          forms->cubic + lung * n * n * n, weights, form);
 }
 

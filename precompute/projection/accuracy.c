@@ -4,6 +4,7 @@
  * error that storage adds. */
 #include <cblas.h>
 #include <math.h>
+#include <stdint.h>
 #include <string.h>
 
 #include "base/arena.h"
@@ -268,10 +269,13 @@ supine_status supine_projection_accuracy_add_storage(const supine_basis *basis,
         supine_deform(basis, &pose, xyz) != SUPINE_OK) {
       continue;
     }
-    supine_projection_displacement(compression, rows, pose.weights, u);
-    for (size_t i = 0, lung = 0; i < n; ++i) {
+    for (size_t i = 0, lung = SIZE_MAX; i < n; ++i) {
       double error[3];
-      lung += i >= info->lung_begin[lung + 1];
+      if (lung == SIZE_MAX || i >= info->lung_begin[lung + 1]) {
+        ++lung;
+        supine_projection_displacement(compression, rows,
+                                       supine_basis_lung_weights(basis, &pose, lung), u);
+      }
       for (size_t j = 3 * i; j < 3 * i + 3; ++j) {
         u[j] *= pose.gains[lung][j % 3];
         error[j % 3] = (double)xyz[j] - (double)info->vertices[j] - u[j];

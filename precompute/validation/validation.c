@@ -40,9 +40,9 @@ supine_status supine_validation_begin(supine_validation *subject, supine_error *
   return supine_posed_mesh(s->basis, &pose, &s->start, error);
 }
 
-/* Compute the gains (factors on the displacement of each lung) that give the volume of a state or,
- * if the state has no volume, the volume of `scan`, its scanned surface. */
-static supine_status find_gains(const supine_validation *s, const supine_validation_state *state,
+/* Compute the pose of a state or, if the state has no volume, of its posture and the volume of
+ * `scan`, its scanned surface. */
+static supine_status find_pose(const supine_validation *s, const supine_validation_state *state,
                                 const supine_mesh *scan, supine_validation_outcome *outcome,
                                 supine_error *error) {
   supine_state asked = state->state;
@@ -51,7 +51,7 @@ static supine_status find_gains(const supine_validation *s, const supine_validat
                          "the volume of the other state is unknown, and landmarks do not give it");
     asked.volume = (supine_volume){SUPINE_VOLUME_ABSOLUTE, 1e-3 * supine_mesh_volume(scan)};
   }
-  SUPINE_TRY(supine_basis_gains(s->basis, &asked, &outcome->pose, error));
+  SUPINE_TRY(supine_basis_pose(s->basis, &asked, &outcome->pose, error));
   outcome->state = asked;
   outcome->scale = outcome->pose.gains[0][0];
   outcome->millilitres = supine_posed_volume(s->basis, &outcome->pose) - s->from_millilitres;
@@ -65,8 +65,7 @@ static supine_status predict_surface(supine_validation *s, const supine_validati
   outcome->nearest = supine_arena_take(&s->arena, n, 3 * sizeof(double));
   outcome->predicted = supine_arena_take(&s->arena, n, 3 * sizeof(double));
   SUPINE_TRY(supine_arena_check(&s->arena, error, "%zu vertices", n));
-  SUPINE_TRY(supine_basis_weights(s->basis, state->state.gravity, outcome->pose.weights));
-  SUPINE_TRY(find_gains(s, state, scan, outcome, error));
+  SUPINE_TRY(find_pose(s, state, scan, outcome, error));
   return supine_posed_positions(s->basis, &outcome->pose, outcome->predicted, error);
 }
 

@@ -130,10 +130,25 @@ static void add_errors(json_t *root, const supine_basis *basis, const char *key)
                                   : json_array());
 }
 
+/* Operations of supine_deform for one vertex. */
+typedef struct cost {
+  size_t products, sums;
+} cost;
+
+static cost cost_of(const supine_basis_info *info) {
+  if (info->cluster_count > 0) {
+    return (cost){15, 15}; /* b + A p + a_0 Q_0 + a_1 Q_1 */
+  }
+  if (info->vector) {
+    return (cost){3 * info->mode_count + 3, 3 * info->mode_count};
+  }
+  return (cost){info->mode_count + 6, info->mode_count + 2};
+}
+
 static supine_status describe(const char *path, const supine_basis *basis, const double *energy,
                               json_t **described, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
-  const size_t products = info->mode_count * (info->vector ? 3 : 1) + (info->vector ? 3 : 6);
+  const cost per_vertex = cost_of(info);
   const char *lungs = supine_basis_metadata(basis, "lungs");
   const char *at = supine_basis_metadata(basis, "warnings");
   json_t *of = json_object();
@@ -145,8 +160,8 @@ static supine_status describe(const char *path, const supine_basis *basis, const
                 (json_int_t)info->vertex_count, "triangles", (json_int_t)info->triangle_count,
                 "modes", (json_int_t)info->mode_count, "band", (json_int_t)info->band, "lung_count",
                 (json_int_t)info->lung_count, "has_volume", (int)info->has_volume, "kind",
-                info->vector ? "vector" : "scalar", "multiplications", (json_int_t)products,
-                "additions", (json_int_t)(products - (info->vector ? 3 : 4)));
+                info->vector ? "vector" : "scalar", "multiplications",
+                (json_int_t)per_vertex.products, "additions", (json_int_t)per_vertex.sums);
   for (size_t i = 0; i < sizeof facts / sizeof *facts; ++i) {
     add_fact(root, facts[i], basis, facts[i]);
   }

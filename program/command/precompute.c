@@ -20,6 +20,7 @@ typedef struct request {
   bool has_band, has_modes;
   size_t band, modes; /* 0 modes: harmonics */
   size_t directions;  /* number of directions of gravity to print; 0 to make a basis */
+  size_t volumes;     /* number of volumes to print for each direction; 0 for none */
 } request;
 
 static supine_status read_modes(const char *text, void *field, supine_error *error) {
@@ -34,6 +35,8 @@ static supine_status read_modes(const char *text, void *field, supine_error *err
 }
 
 #define FILLS(member) SUPINE_FILLS(request, member)
+
+static const char *const storages[] = {"best", "modes", "clusters", NULL};
 
 static const supine_option table[] = {
     {"output", 'o', "FILE", "basis file to write (.safetensors)", FILLS(path), .required = true,
@@ -65,17 +68,35 @@ static const supine_option table[] = {
     {.help = "Displacements from another simulator, instead of the built-in physics:"},
     {"fields", 0, "FILE",
      "safetensors file with three tensors: points [P,3], the positions of P points; gravity [M,3], "
-     "M directions; and displacement [M,P,3], the displacement of each point for each direction. "
-     "All three are in the axes and unit of MESH. Each vertex of MESH takes the displacement of "
-     "the point at its position, so that the points may have any order and may include inner nodes "
-     "of a volume mesh. The fields give gravity alone: the basis has no volumes and no breaths. "
-     "Without --band and --modes, cross-validation chooses both",
+     "the directions of M runs; and displacement [M,P,3], the displacement of each point in each "
+     "run. All three are in the axes and unit of MESH. Each vertex of MESH takes the displacement "
+     "of the point at its position, so that the points may have any order and may include inner "
+     "nodes of a volume mesh.\nRuns of one direction at several volumes: the basis has gravity and "
+     "volume, and takes any volume between the smallest and the largest that were simulated. One "
+     "run for each direction: it has gravity alone, no volumes and no breaths. Without --band and "
+     "--modes, cross-validation chooses both",
      FILLS(model.precompute.fields), .file = SUPINE_FILE_IN, .rivals = "directions",
-     .partners = "output band modes without-normals axes units midline labels edge close "
+     .partners = "output band modes storage without-normals axes units midline labels edge close "
                  "surfaces-out scanned"},
+    {"storage", 0, "best|modes|clusters",
+     "how the displacements of --fields are stored\nmodes: a vector for each mode and vertex, "
+     "which "
+     "costs 3 K + 3 multiplications a vertex\nclusters: vertices that move alike share vectors, "
+     "which costs 15 multiplications and 15 additions a vertex, whatever K\nbest: clusters, if "
+     "they "
+     "raise the error by half at most",
+     .offset = offsetof(request, model.precompute.modes.storage), .kind = SUPINE_OPTION_CHOICE,
+     .size = sizeof(supine_precompute_storage), .choices = storages, .standard = "best",
+     .partners = "output fields band modes without-normals axes units midline labels edge close "
+                 "surfaces-out scanned",
+     .more = true},
     {"directions", 0, "N",
      "only print N directions of gravity that cover the sphere evenly, as CSV, to simulate",
-     FILLS(directions), .range = {2.0, 1000.0}, .partners = ""},
+     FILLS(directions), .range = {2.0, 1000.0}, .partners = "volumes", .alone = true},
+    {"volumes", 0, "N",
+     "with --directions: print N rows for each direction, with a column 'fill' from 0, the smallest "
+     "volume to simulate, to 1, the largest. Four are enough for most tissue",
+     FILLS(volumes), .range = {2.0, 100.0}, .partners = "directions"},
     {.table = supine_options_model, FILLS(model)},
     {.name = NULL}};
 
@@ -145,9 +166,23 @@ static void print_report(const request *wanted, const supine_prepared *prepared,
 static void print_fit(const request *wanted, const supine_prepared *prepared,
                       const supine_precompute_report *report) {
   const size_t highest = report->band_count - 1;
-  (void)printf("%s: fields of gravity: %zu vertices, %zu directions, band %zu, %zu mode%s\n",
-               wanted->path, report->vertex_count, report->direction_count, report->band,
-               report->mode_count, plural(report->mode_count));
+  (void)printf("%s: fields of gravity", wanted->path);
+  if (report->volume_count > 1) {
+    (void)printf(" and volume");
+  }
+  (void)printf(": %zu vertices, %zu directions", report->vertex_count, report->direction_count);
+  if (report->volume_count > 1) {
+    (void)printf(", %zu volumes each", report->volume_count);
+  }
+  (void)printf(", band %zu", report->band);
+  if (report->volume_count > 1) {
+    (void)printf(", order %zu of volume", report->order);
+  }
+  (void)printf(", %zu mode%s", report->mode_count, plural(report->mode_count));
+  if (report->cluster_count > 0) {
+    (void)printf(", %zu clusters", report->cluster_count);
+  }
+  (void)puts("");
   print_assumed("--axes, --units and --scanned", prepared->assumed);
   (void)printf("the directions determine bands up to %zu (%zu harmonic%s); leave-one-out error:\n",
                highest, (highest + 1) * (highest + 1), highest > 0 ? "s" : "");
@@ -160,18 +195,32 @@ static void print_fit(const request *wanted, const supine_prepared *prepared,
                  "missing: about\n%zu evenly spread directions would determine band %zu\n",
                  highest, 2 * (highest + 2) * (highest + 2), highest + 1);
   }
-  (void)printf("error of the basis, each direction predicted from the others:\n");
+  (void)printf("error of the basis, each direction%s predicted from the others:\n",
+               report->volume_count > 2 ? " and each inner volume" : "");
   print_errors(report, "", "");
+  if (report->extrapolated > 0.0) {
+    (void)supine_print(stdout,
+                       "the smallest and the largest volumes, predicted from the others (an "
+                       "extrapolation): %.3g %% RMS\n",
+                       100.0 * report->extrapolated);
+  }
 }
 
-static void print_directions(size_t count) {
-  (void)puts("x,y,z");
-  for (size_t i = 0; i < count; ++i) {
+/* Print a plan of simulations: directions of gravity and, if `volumes` is not 0, parts of the way
+ * from the smallest to the largest volume. */
+static void print_plan(size_t directions, size_t volumes) {
+  (void)puts(volumes > 0 ? "x,y,z,fill" : "x,y,z");
+  for (size_t i = 0; i < directions; ++i) {
     double g[3];
-    supine_spiral((double)i, (double)count, 0.0, g);
-    supine_csv_row row = {.file = stdout};
-    supine_csv_add(&row, "%.9g,%.9g,%.9g", g[0], g[1], g[2]);
-    supine_csv_end_row(&row);
+    supine_spiral((double)i, (double)directions, 0.0, g);
+    for (size_t v = 0; v < (volumes > 0 ? volumes : 1); ++v) {
+      supine_csv_row row = {.file = stdout};
+      supine_csv_add(&row, "%.9g,%.9g,%.9g", g[0], g[1], g[2]);
+      if (volumes > 0) {
+        supine_csv_add(&row, "%.9g", (double)v / (double)(volumes - 1));
+      }
+      supine_csv_end_row(&row);
+    }
   }
 }
 
@@ -202,7 +251,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   supine_precompute_report report;
   SUPINE_FREED_BY(supine_precompute_prepared_free) supine_prepared prepared = {.fit = ""};
   if (wanted->directions > 0) {
-    print_directions(wanted->directions);
+    print_plan(wanted->directions, wanted->volumes);
     return SUPINE_OK;
   }
   SUPINE_REFUSE_IF(supine_mesh_save_supports(wanted->path), error, SUPINE_ERROR_ARGUMENT,
@@ -235,7 +284,7 @@ const supine_command supine_command_precompute = {
     "solve the physics once, and write a basis file for any posture",
     .usage = "MESH... -o FILE [OPTIONS]\n"
              "LABELS... -o FILE [OPTIONS]\n"
-             "--directions N",
+             "--directions N [--volumes N]",
     .about = "Solves the physics of one or two lungs for all directions of gravity, and writes a "
              "basis file. From this file, 'supine deform' and the run-time library compute "
              "deformed lungs in real time. MESH is any surface that assimp reads (PLY, OBJ, STL, "

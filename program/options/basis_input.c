@@ -80,15 +80,18 @@ const supine_option supine_options_hilum_frame[] = {
 
 /* Add to u the mean displacement of the hila from pose[1] to pose[0], mm.
  * @param mean  [lungs, 3, modes] mean displacement by each mode at weight and gain 1, mm */
-static void add_motion(const supine_basis_info *info, const double *mean, const supine_pose pose[2],
+static void add_motion(const supine_basis *basis, const double *mean, const supine_pose pose[2],
                        double u[3]) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
   const size_t modes = info->mode_count;
   for (size_t i = 0; i < info->lung_count * 3 * modes; ++i) {
     const size_t axis = i / modes % 3;
     const size_t lung = i / modes / 3;
     u[axis] += mean[i] / (double)info->lung_count *
-               (pose[0].gains[lung][axis] * pose[0].weights[i % modes] -
-                pose[1].gains[lung][axis] * pose[1].weights[i % modes]);
+               (pose[0].gains[lung][axis] *
+                    supine_basis_lung_weights(basis, &pose[0], lung)[i % modes] -
+                pose[1].gains[lung][axis] *
+                    supine_basis_lung_weights(basis, &pose[1], lung)[i % modes]);
   }
 }
 
@@ -114,7 +117,7 @@ supine_status supine_options_hilum(const supine_basis *basis, const supine_state
   }
   SUPINE_TRY(supine_expected_prepare(basis, state, from, 0.0, 0.0, &model, error));
   for (size_t pair = 0; pair < PAIRS; ++pair) {
-    add_motion(info, mean, &model.pose[2 * pair], u[pair]);
+    add_motion(basis, mean, &model.pose[2 * pair], u[pair]);
   }
   memcpy(hilum->move, u[0], sizeof hilum->move);
   supine_expected_squares(&model, u, hilum_beside_heart, square);

@@ -251,8 +251,10 @@ static supine_status check_given(const reading *r, size_t operands, char **argv,
       if (check_partners(r, option, error) != SUPINE_OK) {
         return SUPINE_ERROR_ARGUMENT;
       }
-      alone = option->partners[0] == '\0';
-      most = alone ? 0 : most;
+    }
+    if (option->alone && r->rows[i].given) {
+      alone = true;
+      most = 0;
     }
   }
   SUPINE_REFUSE_IF(operands > most && most == 0, error, SUPINE_ERROR_ARGUMENT,

@@ -59,8 +59,8 @@ typedef struct supine_option {
   const char *wants;    /* description of valid values; NULL to derive it from kind and range */
   const char *const *choices; /* valid words, then NULL; if `read` is set, for completion only */
   const char *rivals;         /* name of a group of which the user may give one option, once */
-  const char *partners; /* names of the only options that may be given with this one; NULL: any. If
-                           empty, operands and required options are left out too */
+  const char *partners; /* names of the only options that may be given with this one; NULL: any */
+  bool alone;           /* given without operands and without required options */
   bool required;
   bool more; /* shown by --help-all only */
   supine_option_file file;

@@ -27,7 +27,7 @@ static supine_status find_breath(const supine_comparison *c, float *xyz[2],
     state.volume.ml += posture->volume[lung];
   }
   supine_error wrong;
-  supine_status status = supine_basis_gains(c->basis, &state, &after, &wrong);
+  supine_status status = supine_basis_pose(c->basis, &state, &after, &wrong);
   if (status != SUPINE_OK) {
     return supine_error_wrap(error, &wrong, "%s: ", item->name);
   }

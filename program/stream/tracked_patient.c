@@ -200,28 +200,39 @@ static uint64_t stamp_now(void) {
   return ((uint64_t)now.tv_sec << 32) | (((uint64_t)now.tv_nsec << 32) / 1000000000u);
 }
 
-/* Compute the gains, the factors of each lung's displacement, for the current volume. If the lungs
- * cannot reach this volume, keep the last gains. Then compute the resulting volumes. */
-static void find_gains(supine_stream_patient *patient, double now,
+/* Keep the last pose that was found, in the present direction of gravity: with its gains, the factors
+ * of each lung's displacement, unless the weights depend on the volume too. */
+static void keep_pose(supine_stream_patient *patient, supine_stream_snapshot *snapshot) {
+  double weights[SUPINE_MODES_MAX];
+  const supine_basis_info *info = supine_basis_get_info(patient->basis);
+  snapshot->pose = patient->last;
+  if (supine_basis_weights(patient->basis, snapshot->gravity, weights) == SUPINE_OK) {
+    memcpy(snapshot->pose.weights, weights, info->mode_count * sizeof *weights);
+  }
+}
+
+/* Compute the pose for the current volume. If the lungs cannot reach this volume, keep the last one
+ * that they could. Then compute the resulting volumes. */
+static void find_pose(supine_stream_patient *patient, double now,
                        supine_stream_snapshot *snapshot) {
   const supine_basis *basis = patient->basis;
   const supine_state state = supine_stream_volume_at(
       patient->options->volume, basis, snapshot->gravity, now - patient->breath_begun);
   const supine_state rest = supine_options_breath_state(basis, snapshot->gravity, 0.0);
   supine_error error;
-  if (supine_basis_gains(basis, &rest, &snapshot->pose, NULL) == SUPINE_OK) {
+  if (supine_basis_pose(basis, &rest, &snapshot->pose, NULL) == SUPINE_OK) {
     snapshot->above = -supine_posed_volume(basis, &snapshot->pose);
   }
-  if (supine_basis_gains(basis, &state, &snapshot->pose, &error) == SUPINE_OK) {
-    memcpy(patient->gains, snapshot->pose.gains, sizeof patient->gains);
+  if (supine_basis_pose(basis, &state, &snapshot->pose, &error) == SUPINE_OK) {
+    patient->last = snapshot->pose;
   } else {
     char text[96];
     ++patient->counts->unreachable;
     (void)supine_state_describe(&state, text, sizeof text);
     supine_stream_patient_warn(patient, now, "the state %s cannot be shown: %s", text,
                                supine_options_explain(&error).text);
+    keep_pose(patient, snapshot);
   }
-  memcpy(snapshot->pose.gains, patient->gains, sizeof patient->gains);
   snapshot->volume = supine_posed_volume(basis, &snapshot->pose);
   snapshot->above += snapshot->volume;
 }
@@ -253,7 +264,7 @@ static void find_location(supine_stream_patient *patient, double now,
   supine_status status = supine_locate(&task, residuals, observed->space, &found, &error);
   if (status == SUPINE_OK) {
     status =
-        supine_basis_gains(patient->basis, &supine_location_get_info(found)->state, &pose, &error);
+        supine_basis_pose(patient->basis, &supine_location_get_info(found)->state, &pose, &error);
   }
   if (status != SUPINE_OK) {
     supine_stream_patient_warn(patient, now,
@@ -275,8 +286,7 @@ void supine_stream_patient_snapshot(supine_stream_patient *patient, double now,
   snapshot->received = patient->pending ? patient->received : -1.0;
   snapshot->pose_received = patient->pose_received;
   snapshot->stamp = patient->stamp != 0 ? patient->stamp : stamp_now();
-  (void)supine_basis_weights(patient->basis, snapshot->gravity, snapshot->pose.weights);
-  find_gains(patient, now, snapshot);
+  find_pose(patient, now, snapshot);
   if (patient->options->observed != NULL) {
     find_location(patient, now, snapshot);
   }

@@ -39,8 +39,7 @@ typedef struct supine_stream_patient {
   uint64_t stamp;       /* time stamp of the newest pose or point, 2^-32 s since 1970; 0 if none */
   double gravity[3];    /* direction of gravity in the newest pose */
   double warned_at;
-  double gains[SUPINE_LUNGS_MAX][3]; /* factors of the displacement of each lung along x, y
-                                        and z, at the last volume that could be reached */
+  supine_pose last; /* last pose whose volume the lungs could reach */
 } supine_stream_patient;
 
 /* Return a patient who lies supine until a pose is received. */

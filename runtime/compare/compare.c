@@ -85,8 +85,9 @@ static void add_gram(supine_compare *compare, size_t lung, size_t axis, double *
   for (size_t i = basis->lung_begin[lung]; i < basis->lung_begin[lung + 1]; ++i) {
     const double share = (double)compare->share[i];
     const double d = basis->info.vector ? 1 : (double)basis->info.direction[3 * i + axis];
-    const size_t row = basis->info.vector ? 3 * i + axis : i;
-    add_row(basis->info.coefficients + row * count, share * d * d, count, part);
+    float computed[3 * SUPINE_MODES_MAX];
+    const float *rows = supine_basis_rows(basis, i, computed);
+    add_row(rows + (basis->info.vector ? axis * count : 0), share * d * d, count, part);
   }
   for (size_t k = 0; k < count; ++k) {
     for (size_t l = 0; l < count; ++l) {
@@ -133,10 +134,15 @@ double supine_compare_area(const supine_compare *compare) {
  * basis, or has a number that is not finite. */
 static bool products_of(const supine_compare *compare, const supine_pose *pose,
                         const supine_pose *from, double *q) {
-  for (size_t i = 0; i < 3 * compare->basis->info.lung_count; ++i) {
-    for (size_t k = 0; k < compare->basis->info.mode_count; ++k) {
-      *q++ = pose->gains[i / 3][i % 3] * pose->weights[k] -
-             (from == NULL ? 0 : from->gains[i / 3][i % 3] * from->weights[k]);
+  const supine_basis *basis = compare->basis;
+  for (size_t i = 0; i < 3 * basis->info.lung_count; ++i) {
+    const double *to = supine_basis_lung_weights(basis, pose, i / 3);
+    for (size_t k = 0; k < basis->info.mode_count; ++k) {
+      *q = pose->gains[i / 3][i % 3] * to[k];
+      if (from != NULL) {
+        *q -= from->gains[i / 3][i % 3] * supine_basis_lung_weights(basis, from, i / 3)[k];
+      }
+      ++q;
     }
   }
   return supine_basis_has_pose(compare->basis, pose) &&
@@ -145,11 +151,12 @@ static bool products_of(const supine_compare *compare, const supine_pose *pose,
 
 void supine_compare_energy(const supine_compare *compare, double *energy) {
   const size_t count = compare->basis->info.mode_count;
-  const size_t terms = supine_sh_count(compare->basis->info.band);
+  const size_t orders = compare->basis->info.order + 1; /* products of each harmonic */
+  const size_t terms = supine_sh_count(compare->basis->info.band) * orders;
   size_t term = 0;
   for (size_t l = 0; l <= compare->basis->info.band; ++l) {
     energy[l] = 0;
-    for (; term < (l + 1) * (l + 1); ++term) {
+    for (; term < (l + 1) * (l + 1) * orders; ++term) {
       double column[SUPINE_MODES_MAX];
       for (size_t k = 0; k < count; ++k) {
         column[k] = compare->basis->info.modes[k * terms + term];
@@ -171,10 +178,11 @@ static double dot(const double *weights, const float *coefficients, size_t count
  * weight [3, modes] for one lung (products_of). */
 static double displacement(const supine_basis *basis, const double *q, size_t i) {
   const size_t count = basis->info.mode_count;
+  float computed[3 * SUPINE_MODES_MAX];
+  const float *rows = supine_basis_rows(basis, i, computed);
   double u[3];
   for (size_t axis = 0; axis < 3; ++axis) {
-    const size_t row = basis->info.vector ? 3 * i + axis : i;
-    u[axis] = dot(q + axis * count, basis->info.coefficients + row * count, count) *
+    u[axis] = dot(q + axis * count, rows + (basis->info.vector ? axis * count : 0), count) *
               (basis->info.vector ? 1 : (double)basis->info.direction[3 * i + axis]);
   }
   return supine_length(u);

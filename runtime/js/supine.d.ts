@@ -8,7 +8,7 @@ export type State = string | { gravity?: ArrayLike<number>; volume?: string; gai
 /** The numbers of a tensor of the file: a view, row-major. */
 export interface Tensor {
   shape: number[];
-  data: Uint8Array | Uint32Array | Float32Array | Float64Array | Int16Array | Int8Array;
+  data: Uint8Array | Uint32Array | Float32Array | Float64Array | Int16Array | Int8Array | Uint16Array;
 }
 
 /** A named structure: the mean position `at` of its vertices, its displacement `move`, the length `mm` of this

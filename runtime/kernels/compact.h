@@ -70,7 +70,7 @@ static inline double normal_unit(void) {
 }
 
 /** Return number k of `count` numbers of 16 bits that a file stores in count + 1 bytes
- * (supine_basis_info.normal_bytes). */
+ * (supine_basis_info.normals). */
 static inline int normal_from_bytes(const int8_t *bytes, size_t count, size_t k) {
   return 256 * bytes[k] + (k == 0 ? bytes[count] : 0);
 }

@@ -6,6 +6,7 @@
  *     KERNELS          name of its table of kernels (supine_kernels)
  *     LANES            4, 8 or 16
  *     FMA(a, b, c)     a * b + c
+ *     FMA4(a, b, c)    the same for four numbers
  *     RSQRT(x)         an estimate of 1 / sqrt(x), accurate to 12 bits at least
  *     STREAM(to, v)    store a vector and bypass the caches
  *     OWN_WRITER       instead of STREAM, if kernel_*.c has its own struct `writer` */
@@ -351,4 +352,84 @@ static void light(const supine_tiles *tiles, const float *w, size_t first, size_
   }
 }
 
-const supine_kernels KERNELS = {deform, light};
+/* Four numbers of a vertex or of a cluster. */
+typedef float quad __attribute__((vector_size(16)));
+typedef int32_t quad_int __attribute__((vector_size(16)));
+
+INLINE quad load_quad(const void *at) {
+  quad v;
+  memcpy(&v, at, sizeof v);
+  return v;
+}
+
+#define REPEAT(v, i) __builtin_shufflevector(v, v, i, i, i, i)
+
+/* Evaluate x = b + A p + a_0 Q_0 + a_1 Q_1 for one vertex, as x y z and an unused number. Without
+ * the reference, subtract p. */
+INLINE quad cluster_vertex(const unsigned char *vertex, const float *frame, bool add_reference) {
+  const quad p = load_quad(vertex);
+  const quad_int words = (quad_int)p;
+  const quad first = __builtin_convertvector((words << 16) >> 16, quad);
+  const quad second = __builtin_convertvector(words >> 16, quad);
+  quad x = add_reference ? load_quad(frame) : load_quad(frame) - p;
+  x = FMA4(REPEAT(p, 0), load_quad(frame + 4), x);
+  x = FMA4(REPEAT(p, 1), load_quad(frame + 8), x);
+  x = FMA4(REPEAT(p, 2), load_quad(frame + 12), x);
+  x = FMA4(REPEAT(first, 3), load_quad(frame + 16), x);
+  x = FMA4(REPEAT(second, 3), load_quad(frame + 20), x);
+  return x;
+}
+
+/* Pack the coordinates of four vertices into three vectors x y z x, y z x y, z x y z. */
+INLINE void pack_quads(const quad x[4], quad packed[3]) {
+  packed[0] = __builtin_shufflevector(x[0], x[1], 0, 1, 2, 4);
+  packed[1] = __builtin_shufflevector(x[1], x[2], 1, 2, 4, 5);
+  packed[2] = __builtin_shufflevector(x[2], x[3], 2, 4, 5, 6);
+}
+
+#if LANES == 4
+#define JOIN(at) ((at)[0])
+#elif LANES == 8
+#define JOIN(at) __builtin_shufflevector((at)[0], (at)[1], 0, 1, 2, 3, 4, 5, 6, 7)
+#else
+#define JOIN_TWO(a, b) __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7)
+#define JOIN(at)                                                                                   \
+  __builtin_shufflevector(JOIN_TWO((at)[0], (at)[1]), JOIN_TWO((at)[2], (at)[3]), 0, 1, 2, 3, 4,   \
+                          5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
+#endif
+
+INLINE void cluster_tiles(const supine_tiles *tiles, const float *frames, size_t first,
+                          size_t count, const supine_target *target, bool add_reference) {
+  const unsigned char *tile = tiles->bytes + first * tiles->stride;
+  writer out = writer_open(target);
+  for (size_t t = 0; t < count; ++t, tile += tiles->stride) {
+    uint16_t cluster[TILE];
+    quad packed[TILE_NUMBERS / 4];
+    memcpy(cluster, tile + tiles->reference_begin, sizeof cluster);
+    supine_prefetch_tile(tile, tiles->stride, target->prefetch);
+    for (size_t four = 0; four < TILE / 4; ++four) {
+      quad x[4];
+      for (size_t v = 0; v < 4; ++v) {
+        x[v] = cluster_vertex(tile + (4 * four + v) * sizeof(quad),
+                              frames + (size_t)SUPINE_CLUSTER_FRAME * cluster[4 * four + v],
+                              add_reference);
+      }
+      pack_quads(x, packed + 3 * four);
+    }
+    for (size_t j = 0; j < TILE_NUMBERS / 4; j += LANES / 4) {
+      writer_put(&out, JOIN(packed + j));
+    }
+  }
+  writer_close(&out);
+}
+
+static void cluster(const supine_tiles *tiles, const float *frames, size_t first, size_t count,
+                    const supine_target *target) {
+  if (target->add_reference) {
+    cluster_tiles(tiles, frames, first, count, target, true);
+  } else {
+    cluster_tiles(tiles, frames, first, count, target, false);
+  }
+}
+
+const supine_kernels KERNELS = {deform, light, cluster};

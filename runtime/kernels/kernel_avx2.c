@@ -21,9 +21,10 @@ static inline __attribute__((always_inline)) void stream8(float *to, __m256 v) {
 #define KERNELS supine_kernels_avx2
 #define LANES 8
 #define FMA(a, b, c) ((vf)_mm256_fmadd_ps(a, b, c))
+#define FMA4(a, b, c) ((quad)_mm_fmadd_ps(a, b, c))
 #define RSQRT(x) ((vf)_mm256_rsqrt_ps(x))
 #define STREAM(to, v) stream8(to, v)
 #include "runtime/kernels/kernel.h"
 #else
-const supine_kernels supine_kernels_avx2 = {NULL, NULL};
+const supine_kernels supine_kernels_avx2 = {NULL, NULL, NULL};
 #endif

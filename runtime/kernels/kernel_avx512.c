@@ -52,9 +52,10 @@ static inline __attribute__((always_inline)) void writer_close(const writer *w) 
 #define KERNELS supine_kernels_avx512
 #define LANES 16
 #define FMA(a, b, c) ((vf)_mm512_fmadd_ps(a, b, c))
+#define FMA4(a, b, c) ((quad)_mm_fmadd_ps(a, b, c))
 #define RSQRT(x) ((vf)_mm512_rsqrt14_ps(x))
 #define OWN_WRITER
 #include "runtime/kernels/kernel.h"
 #else
-const supine_kernels supine_kernels_avx512 = {NULL, NULL};
+const supine_kernels supine_kernels_avx512 = {NULL, NULL, NULL};
 #endif

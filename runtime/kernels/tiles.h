@@ -13,6 +13,10 @@
  *     INT16  32-bit words (compact.h): one for two coefficients, two for three coordinates
  *     MIXED  like INT16, but one word for three coefficients of the last 3 floor(K / 8) of K modes
  *
+ * A basis of clusters has other tiles. A vertex is four words: its reference position as floats,
+ * and its two scalars as 16-bit integers of one word; then follow the 16-bit indices of the 16
+ * clusters.
+ *
  * Integers count quantisation steps. A step is as small as the largest number allows. Within half a
  * metre of the origin, a reference position errs by at most 0.0005 mm in each coordinate. Once a
  * frame, the weights of modes are multiplied by the steps of coefficients and directions. */
@@ -92,6 +96,17 @@ static inline void supine_tiles_layout_lit(supine_tiles *tiles, size_t vectors, 
   tiles->stride = 3 * tiles->axis_bytes;
 }
 
+/** Numbers of a cluster in a pose, four words each so that one load fetches them: b, the columns of
+ * A, Q_0 and Q_1 (runtime/clusters.h). The fourth number of each is not used. */
+enum { SUPINE_CLUSTER_FRAME = 24 };
+
+/** Fill in the layout of tiles of a basis of clusters. */
+static inline void supine_tiles_layout_clusters(supine_tiles *tiles, size_t count) {
+  *tiles = (supine_tiles){.axes = 3, .count = count};
+  tiles->reference_begin = TILE * 4 * sizeof(float); /* of the indices */
+  tiles->stride = tiles->reference_begin + TILE * sizeof(uint16_t);
+}
+
 typedef enum supine_prefetch {
   SUPINE_PREFETCH_NONE, /**< no prefetching, because the tiles are in the cache */
   SUPINE_PREFETCH_NEAR, /**< every other cache line, 640 bytes ahead, to the second-level cache */
@@ -143,6 +158,9 @@ typedef struct supine_kernels {
   /** Evaluate unit normals from packed vectors (supine_tiles_layout_lit). `scales` holds the
    * weight of each vector, padded with zeros to a multiple of three. */
   supine_deform_tiles *light;
+  /** Evaluate vertices of clusters (supine_tiles_layout_clusters). `scales` holds the clusters,
+   * [clusters, SUPINE_CLUSTER_FRAME]. */
+  supine_deform_tiles *cluster;
 } supine_kernels;
 
 extern const supine_kernels supine_kernels_portable;

@@ -22,6 +22,7 @@ static const struct {
 } dtypes[SUPINE_DTYPE_COUNT] = {
     [SUPINE_U8] = {"U8", 1},   [SUPINE_U32] = {"U32", 4}, [SUPINE_F32] = {"F32", 4},
     [SUPINE_F64] = {"F64", 8}, [SUPINE_I16] = {"I16", 2}, [SUPINE_I8] = {"I8", 1},
+    [SUPINE_U16] = {"U16", 2},
 };
 
 const char *supine_safetensors_dtype_name(supine_dtype dtype) {
@@ -212,7 +213,7 @@ static supine_dtype take_dtype(parser *p, const char *tensor) {
     ++dtype;
   }
   if (dtype == SUPINE_DTYPE_COUNT) {
-    fail(p, "tensor '%.64s': dtype '%.16s' is none of U8, I8, I16, U32, F32, F64", tensor, name);
+    fail(p, "tensor '%.64s': dtype '%.16s' is none of U8, I8, U16, I16, U32, F32, F64", tensor, name);
   }
   return (supine_dtype)dtype;
 }

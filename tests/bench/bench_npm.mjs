@@ -3,7 +3,7 @@
 // alternating runs. With the package built (target npm) and B=build/release:
 //
 //   SUPINE=$B/supine NATIVE=$B/tests/npm_native TARBALL=$(ls $PWD/$B/runtime/js/supine-*.tgz) LUNGS=. \
-//     GOLDEN=tests/golden/basis_1.safetensors node tests/bench/bench_npm.mjs
+//     GOLDEN=tests/golden/basis_lungs.safetensors node tests/bench/bench_npm.mjs
 import { execFileSync } from 'node:child_process';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';

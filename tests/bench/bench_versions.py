@@ -5,13 +5,13 @@
     bench_versions.py path/to/old/supine path/to/new/supine [--vertices N] [--rounds R] [--folder F]
                       [--stream path/to/bench_stream]
 
-The old version makes the inputs. Print the least wall and processor seconds and the largest memory
+The old version makes the meshes, and each version its own bases. Print the least wall and processor seconds and the largest memory
 of R rounds for both versions, and the ratios of new to old. Count the bytes in which outputs differ,
 except in VTP. A row is missing if a version lacks the command. The library of a program must be runtime/libsupine_runtime.so in the
 program's folder. --stream adds the median time from sending a pose to receiving its last point, the
 least of R rounds.
 
-Expected differences from version 0.2.0:
+Versions before 0.3.0 wrote basis files of other formats. Expected differences from version 0.2.0:
 - deform --image, --labels: the factors of a lung's displacement now differ between axes, which changes
   the order in which products are rounded. Displacements differ by one unit in the last place (3e-5 mm). About 1 %
   of the voxels of 16-bit noise therefore differ by 1, and 5 of 65 million labels differ.
@@ -79,20 +79,21 @@ def count_differences(first, second):
 
 
 def compare(name, programs, arguments, rounds, output=None):
-    """Run both programs in turn with these arguments, of which `output` is the file written. Print a row of results."""
+    """Run both programs in turn in their folders, 0 and 1, with these arguments, of which `output` is the file written.
+    Print a row of results."""
     best = [[float("inf"), float("inf"), 0.0] for _ in programs]
     for _ in range(rounds):
         for which, program in enumerate(programs):
+            os.chdir(str(which))  # outputs contain the command line, so both programs use the same names
             used = run([program] + arguments)
+            os.chdir("..")
             if used is None:
                 print(f"{name:28} fails in {program}")
                 return
             wall, cpu, memory = used
             best[which] = [min(best[which][0], wall), min(best[which][1], cpu),
                            max(best[which][2], memory)]
-            if output is not None:  # outputs contain the command line, so both programs first write the same name
-                os.replace(output, f"{which}-{output}")
-    differing = 0 if output is None else count_differences("0-" + output, "1-" + output)
+    differing = 0 if output is None else count_differences("0/" + output, "1/" + output)
     old, new = best
     print(f"{name:28} {old[0]:8.3f} {new[0]:8.3f} {new[0] / old[0]:6.2f}   "
           f"{old[1]:8.3f} {new[1]:8.3f} {new[1] / old[1]:6.2f}   "
@@ -126,6 +127,36 @@ def compare_numbers(name, commands, rounds, number):
     print(f"{name:28} {best[0]:8.4f} {best[1]:8.4f} {best[1] / best[0]:6.2f}", flush=True)
 
 
+def write_inputs(programs, vertices):
+    """Write the inputs of all commands to the folders 0 and 1 of the programs. They share the files that the first
+    program makes, but not the bases."""
+    def make(which, *arguments):
+        subprocess.run([programs[which], *arguments], check=True, stdout=subprocess.DEVNULL, cwd=str(which))
+
+    for which in range(len(programs)):
+        os.mkdir(str(which))
+    for name, count in (("large.ply", vertices), ("middle.ply", "100000"), ("small.ply", "20000")):
+        make(0, "phantom", "--vertices", count, "-o", name)
+    for count in (1, 4):
+        with open(f"0/states{count}.csv", "w", encoding="ascii") as file:
+            file.write("posture,volume,output\n")
+            for posture in ("prone", "supine", "left", "right")[:count]:
+                file.write(f"{posture},rest,{posture}.nii\n")
+    write_image("0/image.nii", False)
+    write_image("0/labels.nii", True)
+    with open("0/points.csv", "w", encoding="ascii") as file:
+        file.write("x,y,z\n")
+        for i in range(20000):  # each point is in the left lung
+            file.write(f"{40 + i % 61},{-200 + i // 61 % 61},{-170 + i // 3721 * 10}\n")
+    for name in os.listdir("0"):
+        os.link(f"0/{name}", f"1/{name}")
+    for which in range(len(programs)):
+        for size in ("large", "small"):
+            make(which, "precompute", size + ".ply", "-o", size + ".safetensors")
+        make(which, "deform", "large.safetensors", "--posture", "prone", "-o", "state.ply")
+        make(which, "embed", "small.safetensors", "--grid", "4", "-o", "grid.safetensors")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("old")
@@ -140,39 +171,19 @@ def main():
     with tempfile.TemporaryDirectory(dir=chosen.folder) as folder:
         os.chdir(folder)
 
-        def make(*arguments):
-            subprocess.run([programs[0], *arguments], check=True, stdout=subprocess.DEVNULL)
-
-        make("phantom", "--vertices", chosen.vertices, "-o", "large.ply")
-        make("phantom", "--vertices", "100000", "-o", "middle.ply")
-        make("phantom", "--vertices", "20000", "-o", "small.ply")
-        for size in ("large", "small"):
-            make("precompute", size + ".ply", "-o", size + ".safetensors")
-        make("deform", "large.safetensors", "--posture", "prone", "-o", "state.ply")
-        make("embed", "small.safetensors", "--grid", "4", "-o", "grid.safetensors")
-        for count in (1, 4):
-            with open(f"states{count}.csv", "w", encoding="ascii") as file:
-                file.write("posture,volume,output\n")
-                for posture in ("prone", "supine", "left", "right")[:count]:
-                    file.write(f"{posture},rest,{posture}.nii\n")
-        write_image("image.nii", False)
-        write_image("labels.nii", True)
-        with open("points.csv", "w", encoding="ascii") as file:
-            file.write("x,y,z\n")
-            for i in range(20000):  # each point is in the left lung
-                file.write(f"{40 + i % 61},{-200 + i // 61 % 61},{-170 + i // 3721 * 10}\n")
+        write_inputs(programs, chosen.vertices)
 
         print(f"{'':28} {'wall, s':^24}   {'processors, s':^24}   {'memory, MB':^22}")
         print(f"{'':28}" + 3 * f" {'old':>8} {'new':>8} {'ratio':>6}  ")
         libraries = [os.path.join(os.path.dirname(program), "runtime", "libsupine_runtime.so")
                      for program in programs]
         compare_numbers("opening, processor s",
-                        [[sys.executable, "-c", OPEN, library, "large.safetensors"]
-                         for library in libraries], chosen.rounds, float)
+                        [[sys.executable, "-c", OPEN, library, f"{which}/large.safetensors"]
+                         for which, library in enumerate(libraries)], chosen.rounds, float)
         if stream is not None:
             compare_numbers("stream of points, median ms",
-                            [[stream, program, "large.safetensors", "3", "points"]
-                             for program in programs], chosen.rounds,
+                            [[stream, program, f"{which}/large.safetensors", "3", "points"]
+                             for which, program in enumerate(programs)], chosen.rounds,
                             lambda said: float(said.splitlines()[1].split()[5]))
         rows = [
             ("--help", ["--help"], None),

@@ -21,7 +21,7 @@
 
 #include "fuzz.h"
 
-enum { SEEDS_MAX = 2048, WORDS_MAX = 256, WORD_MAX = 64, SIZE_MOST = 1 << 16 };
+enum { SEEDS_MAX = 8192, WORDS_MAX = 256, WORD_MAX = 64, SIZE_MOST = 1 << 16 };
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 static const double seconds_most = 5.0;
 #else
@@ -204,7 +204,7 @@ int main(int argc, char **argv) {
          (seeds[seed_count] = supine_fuzz_seed(seed_count, &seed_size[seed_count])) != NULL) {
     ++seed_count;
   }
-  supine_fuzz_expect(seed_count > 0, "at least one seed");
+  supine_fuzz_expect(seed_count > 0 && seed_count < SEEDS_MAX, "1 to SEEDS_MAX - 1 seeds");
   state = 20080312;
   for (int i = 1; i < argc; ++i) {
     const bool has_value = i + 1 < argc;

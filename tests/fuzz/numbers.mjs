@@ -10,7 +10,7 @@ import { join } from 'node:path';
 import { pathToFileURL } from 'node:url';
 import { isMainThread, parentPort, Worker, workerData } from 'node:worker_threads';
 
-const NUMBERS = { F32: Float32Array, F64: Float64Array, U32: Uint32Array, U8: Uint8Array, I8: Int8Array, I16: Int16Array };
+const NUMBERS = { F32: Float32Array, F64: Float64Array, U32: Uint32Array, U8: Uint8Array, I8: Int8Array, I16: Int16Array, U16: Uint16Array };
 const VALUES = [NaN, Infinity, -Infinity, 0, -1, 1, 5e-324, 1e-300, -1e-300, 1e-30, 1e-9, 1000, 1e9, 1e30, 1e300];
 const WAYS = {
   set: (numbers, value) => numbers.fill(value),
@@ -160,7 +160,7 @@ async function tryPage(path) {
     const [modes, terms] = tensors.modes.shape;
     const basis = {
       metadata, modes, band: Math.sqrt(terms) - 1, mixes: numbers('modes'), linear: numbers('volume_linear'),
-      quadratic: numbers('volume_quadratic'), cubic: numbers('volume_cubic'), volumeAxes: 3, fields: false,
+      quadratic: numbers('volume_quadratic'), cubic: numbers('volume_cubic'), fields: false,
       resting: numbers('resting_volume'), byLung: true, scanVolume: 0, references: listed('reference_volume_ml'), bend: listed('bend'),
     };
     for (const gravity of GRAVITIES) {

@@ -71,24 +71,24 @@ static inline void helper_write_scanned_basis(const char *path, size_t frequency
     modes[4 * k] = 0.5 + 0.1 * (double)k;
     modes[4 * k + 1] = 0.3;
   }
-  double linear[2 * HELPER_MODES];
-  double quadratic[2 * HELPER_MODES * HELPER_MODES] = {0};
+  double linear[2 * 3 * HELPER_MODES] = {0}; /* on the first axis alone */
+  double quadratic[2 * 3 * HELPER_MODES * HELPER_MODES] = {0};
   double cubic[2 * HELPER_MODES * HELPER_MODES * HELPER_MODES] = {0};
-  for (size_t i = 0; i < sizeof linear / sizeof *linear; ++i) {
-    linear[i] = 200.0 + 10.0 * (double)i;
+  for (size_t i = 0; i < (size_t)2 * HELPER_MODES; ++i) {
+    linear[i / HELPER_MODES * 3 * HELPER_MODES + i % HELPER_MODES] = 200.0 + 10.0 * (double)i;
   }
   const supine_tensor tensors[] = {
       {"vertices", SUPINE_F32, 2, {n, 3}, vertices},
       {"triangles", SUPINE_U32, 2, {m, 3}, triangles},
       {"lung", SUPINE_U8, 1, {n}, lung},
       {"coefficients", SUPINE_F32, 3, {n, 3, HELPER_MODES}, coefficients},
-      {"modes", SUPINE_F64, 2, {HELPER_MODES, 4}, modes},
-      {"volume_linear", SUPINE_F64, 2, {lungs, HELPER_MODES}, linear},
-      {"volume_quadratic", SUPINE_F64, 3, {lungs, HELPER_MODES, HELPER_MODES}, quadratic},
+      {"modes", SUPINE_F64, 3, {HELPER_MODES, 4, 1}, modes},
+      {"volume_linear", SUPINE_F64, 3, {lungs, 3, HELPER_MODES}, linear},
+      {"volume_quadratic", SUPINE_F64, 4, {lungs, 3, HELPER_MODES, HELPER_MODES}, quadratic},
       {"volume_cubic", SUPINE_F64, 4, {lungs, HELPER_MODES, HELPER_MODES, HELPER_MODES}, cubic},
   };
   const supine_metadata metadata[] = {{"format", "supine-basis"},
-                                      {"version", "1"},
+                                      {"version", "4"},
                                       {"kind", "vector"},
                                       {"lungs", lungs == 2 ? "left,right" : "left"},
                                       {"a key of tomorrow", "kept"},

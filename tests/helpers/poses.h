@@ -42,11 +42,10 @@ static inline void posed_cubic(const supine_basis *basis, size_t lung, const dou
                                double cubic[3]) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const size_t k = info->mode_count;
-  const size_t axes = info->volume_axes;
   supine_volume_form form = {{0.0}};
   double part[3];
-  supine_volume_contract(k, axes, info->volume_linear + lung * axes * k,
-                         info->volume_quadratic + lung * axes * k * k,
+  supine_volume_contract(k, info->volume_linear + lung * 3 * k,
+                         info->volume_quadratic + lung * 3 * k * k,
                          info->volume_cubic + lung * k * k * k, weights, &form);
   supine_volume_form_along(&form, (const double[3]){1.0, 1.0, 1.0}, part);
   for (size_t i = 0; i < 3; ++i) {

@@ -60,8 +60,17 @@ static double det(const double *a, const double *b, const double *c) {
          a[2] * (b[0] * c[1] - b[1] * c[0]);
 }
 
+/* Copy one coordinate of a vector, and set the others to 0. */
+static void keep_axis(const double *vector, size_t axis, double *kept) {
+  for (size_t i = 0; i < 3; ++i) {
+    kept[i] = i == axis ? vector[i] : 0;
+  }
+}
+
 /* Add the contribution of one triangle to the volume of a lung, mL: a sixth of the determinant of
- * its displaced corners. Split it into terms of degree 1, 2 and 3 in the weights of the modes. */
+ * its displaced corners. Split it into terms of degree 1, 2 and 3 in the weights of the modes. Each
+ * product in a determinant has one coordinate along each axis. Terms of degree 1 are summed by the
+ * axis of the displaced coordinate, and those of degree 2 by that of the other coordinate. */
 static void add_forms(fixture *f, const uint32_t *corner, size_t lung) {
   const size_t K = f->modes;
   double r[3][3];
@@ -75,15 +84,26 @@ static void add_forms(fixture *f, const uint32_t *corner, size_t lung) {
     for (size_t v = 0; v < 3; ++v) {
       mode_displacement(f, corner[v], i, a[v]);
     }
-    f->linear[lung * K + i] +=
-        (det(a[0], r[1], r[2]) + det(r[0], a[1], r[2]) + det(r[0], r[1], a[2])) / 6000;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      for (size_t v = 0; v < 3; ++v) {
+        double along[3];
+        keep_axis(a[v], axis, along);
+        f->linear[(3 * lung + axis) * K + i] += det(along, r[(v + 1) % 3], r[(v + 2) % 3]) / 6000;
+      }
+    }
     for (size_t j = 0; j < K; ++j) {
       double b[3][3];
       for (int v = 0; v < 3; ++v) {
         mode_displacement(f, corner[v], j, b[v]);
       }
-      f->quadratic[(lung * K + i) * K + j] +=
-          (det(a[0], b[1], r[2]) + det(a[0], r[1], b[2]) + det(r[0], a[1], b[2])) / 6000;
+      for (size_t axis = 0; axis < 3; ++axis) {
+        for (size_t v = 0; v < 3; ++v) {
+          double along[3];
+          keep_axis(r[v], axis, along);
+          f->quadratic[((3 * lung + axis) * K + i) * K + j] +=
+              det(along, a[(v + 1) % 3], b[(v + 2) % 3]) / 6000;
+        }
+      }
       for (size_t m = 0; m < K; ++m) {
         double c[3];
         mode_displacement(f, corner[2], m, c);
@@ -137,8 +157,11 @@ fixture *fixture_create(size_t vertices, size_t modes, size_t band, size_t lungs
 void fixture_add_forms(fixture *f) {
   const size_t k = f->modes;
   f->volume = true;
-  f->linear = calloc(f->lungs * k + 1, sizeof *f->linear);
-  f->quadratic = calloc(f->lungs * k * k + 1, sizeof *f->quadratic);
+  free(f->linear);
+  free(f->quadratic);
+  free(f->cubic);
+  f->linear = calloc(3 * f->lungs * k + 1, sizeof *f->linear);
+  f->quadratic = calloc(3 * f->lungs * k * k + 1, sizeof *f->quadratic);
   f->cubic = calloc(f->lungs * k * k * k + 1, sizeof *f->cubic);
   assert_true(f->linear && f->quadratic && f->cubic);
   for (size_t t = 0; t < f->triangles; ++t) {
@@ -165,6 +188,93 @@ fixture *fixture_create_shrinking(size_t vertices, size_t modes, uint64_t seed) 
   return f;
 }
 
+/* Set the numbers of one cluster for one mode so that each part of a displacement is about
+ * `size` mm. Positions are up to 250 mm from the origin, and scalars up to 32767. */
+static void make_cluster(float *numbers, double size, uint64_t *random) {
+  static const double farthest[3] = {1, 250, 32767}; /* what m, B and P are multiplied by */
+  for (size_t i = 0; i < 18; ++i) {
+    const size_t part = (i >= 3 ? 1U : 0U) + (i >= 12 ? 1U : 0U);
+    numbers[i] = (float)(size / farthest[part] * fixture_random(random));
+  }
+}
+
+void fixture_add_clusters(fixture *f, size_t clusters, double amplitude, uint64_t seed) {
+  uint64_t random = seed;
+  const size_t modes = f->modes;
+  assert_true(f->vector && clusters >= f->lungs && clusters <= f->vertices);
+  f->clusters = clusters;
+  f->cluster = fixture_allocate(f->vertices, sizeof *f->cluster);
+  f->scalar = fixture_allocate(2 * f->vertices, sizeof *f->scalar);
+  f->cluster_vector = fixture_allocate(clusters * modes * 18, sizeof *f->cluster_vector);
+  for (size_t row = 0; row < clusters * modes; ++row) {
+    make_cluster(f->cluster_vector + 18 * row, amplitude / (double)(1 + row % modes), &random);
+  }
+  for (size_t i = 0; i < f->vertices; ++i) {
+    const size_t own = f->lung[i] + 7 * i % clusters / f->lungs * f->lungs;
+    f->cluster[i] = (uint16_t)(own < clusters ? own : f->lung[i]);
+    for (size_t s = 0; s < 2; ++s) {
+      f->scalar[2 * i + s] = (int16_t)(32767 * fixture_random(&random));
+    }
+    for (size_t k = 0; k < modes; ++k) {
+      const float *v = f->cluster_vector + (f->cluster[i] * modes + k) * 18;
+      for (size_t axis = 0; axis < 3; ++axis) {
+        double u = (double)v[axis];
+        for (size_t j = 0; j < 3; ++j) {
+          u += (double)v[3 + 3 * axis + j] * (double)f->vertex[3 * i + j];
+        }
+        for (size_t s = 0; s < 2; ++s) {
+          u += f->scalar[2 * i + s] * (double)v[12 + 3 * s + axis];
+        }
+        f->coefficient[(3 * i + axis) * modes + k] = (float)u;
+      }
+    }
+  }
+  if (f->volume) {
+    fixture_add_forms(f);
+  }
+}
+
+fixture *fixture_create_simulated(size_t vertices, uint64_t seed) {
+  static const double constant = 1 / 0.28209479177387814; /* Y(0, 0) times this is 1 */
+  static const double along_y = 1 / 0.48860251190291992;  /* Y(1, -1) times this is g_y */
+  fixture *f = fixture_create(vertices, 2, 1, 2, true, false, 1, seed);
+  free(f->mode);
+  f->orders = 3;
+  f->fields = true;
+  f->mode = fixture_allocate(2 * 4 * f->orders, sizeof *f->mode);
+  f->mode[1] = 0.1 * constant;
+  f->mode[12 + 3] = 0.2 * along_y;
+  f->mode[12 + 5] = 0.05 * along_y;
+  double *reference = fixture_allocate(3 * vertices, sizeof *reference);
+  for (size_t i = 0; i < vertices; ++i) {
+    const float *p = f->vertex + 3 * i;
+    float *u = f->coefficient + 6 * i; /* [3, 2] */
+    memset(u, 0, 6 * sizeof *u);
+    u[0] = p[0] - (float)(150.3 * ((double)f->lung[i] - 0.5));
+    u[1] = p[1];
+    u[2] = p[1];
+    u[4] = p[2];
+    for (size_t axis = 0; axis < 3; ++axis) {
+      reference[3 * i + axis] = (double)p[axis];
+    }
+  }
+  fixture_add_forms(f);
+  for (size_t lung = 0; lung < 2; ++lung) {
+    const double v = fixture_volume(f, lung, reference);
+    for (size_t side = 0; side < 2; ++side) {
+      const double sign = side == 0 ? -1 : 1;
+      f->range[lung][side] = v * (pow(1 + 0.1 * sign, 3) - 1);
+      f->limits[lung][side][0] = 0.2 * sign * v * constant;
+      f->limits[lung][side][1] = 0.02 * v * along_y;
+      f->total[side] += 0.25 * sign * v;
+    }
+    /* of the total, 0.22 or 0.28 times the reference volume for each of T_1 = 1 */
+    f->shares[lung][0][1] = (lung == 0 ? 0.22 : 0.28) * v * constant;
+  }
+  free(reference);
+  return f;
+}
+
 void fixture_destroy(fixture *f) {
   free(f->vertex);
   free(f->triangle);
@@ -176,8 +286,10 @@ void fixture_destroy(fixture *f) {
   free(f->quadratic);
   free(f->cubic);
   free(f->normal);
-  free(f->normal_byte);
   free(f->normal_weight);
+  free(f->cluster);
+  free(f->scalar);
+  free(f->cluster_vector);
   free(f);
 }
 
@@ -189,70 +301,139 @@ void fixture_add_normals(fixture *f, size_t modes, uint64_t seed) {
   f->normal_weight = calloc(f->lungs * modes * terms, sizeof *f->normal_weight);
   assert_true(f->normal && f->normal_weight);
   for (size_t i = 0; i < 3 * f->vertices * modes; ++i) {
-    f->normal[i] = (int16_t)(32767 * fixture_random(&state));
+    const int number = (int)(32767 * fixture_random(&state));
+    f->normal[i] = (int16_t)(number / 256 * 256 + (i % modes == 0 ? number % 256 / 2 : 0));
   }
   for (size_t i = 0; i < f->lungs * modes * terms; ++i) {
     f->normal_weight[i] = 1e-5 * fixture_random(&state);
   }
 }
 
-void fixture_round_normals(fixture *f) {
-  const size_t modes = f->normals;
-  f->normal_byte = fixture_allocate(3 * f->vertices * (modes + 1), 1);
-  for (size_t i = 0; i < 3 * f->vertices; ++i) {
-    int8_t *bytes = f->normal_byte + i * (modes + 1);
-    int16_t *row = f->normal + i * modes;
-    for (size_t j = 0; j < modes; ++j) {
-      bytes[j] = (int8_t)(row[j] / 256);
-      bytes[modes] = j == 0 ? (int8_t)(row[0] % 256 / 2) : bytes[modes];
-      row[j] = (int16_t)(256 * bytes[j] + (j == 0 ? bytes[modes] : 0));
-    }
+/* Return the number j of byte j of a row of `modes` vectors, or for j = modes the last byte
+ * (supine_basis_info.normals). */
+static int8_t normal_byte(const int16_t *row, size_t modes, size_t j) {
+  return (int8_t)(j < modes ? row[j] / 256 : row[0] % 256);
+}
+
+/* Return the coefficients of the weights of normals, for three axes. On the first axis, the terms
+ * of the gain of the third are 0. */
+static double *wide_normal_weights(const fixture *f) {
+  const size_t k = f->modes;
+  const size_t narrow = (k + 1) * (k + 2) / 2;
+  const size_t terms = narrow + k;
+  double *wide = fixture_allocate(3 * f->lungs * f->normals * terms, sizeof *wide);
+  for (size_t i = 0; i < f->lungs * f->normals; ++i) {
+    const double *from = f->normal_weight + i * narrow;
+    double *to = wide + 3 * i * terms;
+    memcpy(to, from, (1 + k) * sizeof *to);
+    memcpy(to + 1 + 2 * k, from + 1 + k, (narrow - 1 - k) * sizeof *to);
   }
+  return wide;
+}
+
+/* The tensors of a file, and the memory that they need beside that of the fixture. */
+typedef struct tensors {
+  supine_tensor list[16];
+  size_t count;
+  void *memory[8];
+  size_t memory_count;
+} tensors;
+
+static void add_tensor(tensors *t, supine_tensor tensor) {
+  t->list[t->count++] = tensor;
+}
+
+static void *owned(tensors *t, void *memory) {
+  t->memory[t->memory_count++] = memory;
+  return memory;
+}
+
+static void add_field(const fixture *f, tensors *t) {
+  const size_t n = f->vertices;
+  const size_t k = f->modes;
+  if (f->clusters > 0) {
+    add_tensor(t, (supine_tensor){"clusters", SUPINE_U16, 1, {n}, f->cluster});
+    add_tensor(t, (supine_tensor){"cluster_scalars", SUPINE_I16, 2, {n, 2}, f->scalar});
+    add_tensor(t, (supine_tensor){
+                      "cluster_vectors", SUPINE_F32, 3, {f->clusters, k, 18}, f->cluster_vector});
+  } else if (f->vector) {
+    add_tensor(t, (supine_tensor){"coefficients", SUPINE_F32, 3, {n, 3, k}, f->coefficient});
+  } else {
+    add_tensor(t, (supine_tensor){"coefficients", SUPINE_F32, 2, {n, k}, f->coefficient});
+    add_tensor(t, (supine_tensor){"direction", SUPINE_F32, 2, {n, 3}, f->direction});
+  }
+}
+
+static void add_volumes(const fixture *f, tensors *t) {
+  const size_t k = f->modes;
+  const size_t g = f->lungs;
+  if (f->volume) {
+    add_tensor(t, (supine_tensor){"volume_linear", SUPINE_F64, 3, {g, 3, k}, f->linear});
+    add_tensor(t, (supine_tensor){"volume_quadratic", SUPINE_F64, 4, {g, 3, k, k}, f->quadratic});
+    add_tensor(t, (supine_tensor){"volume_cubic", SUPINE_F64, 4, {g, k, k, k}, f->cubic});
+  }
+  if (f->resting != NULL) {
+    add_tensor(t, (supine_tensor){"resting_volume", SUPINE_F64, 2, {g, 9}, f->resting});
+  }
+  if (f->orders > 1) {
+    add_tensor(t, (supine_tensor){"simulated_range", SUPINE_F64, 2, {g, 2}, f->range});
+    add_tensor(t, (supine_tensor){"simulated_limits", SUPINE_F64, 3, {g, 2, 9}, f->limits});
+    add_tensor(t, (supine_tensor){"simulated_shares", SUPINE_F64, 3, {g, 9, 2}, f->shares});
+  }
+  if (f->full != NULL) {
+    add_tensor(t, (supine_tensor){"full_volume", SUPINE_F64, 2, {g, 9}, f->full});
+  }
+}
+
+static void add_normals(const fixture *f, tensors *t) {
+  const size_t k = f->modes;
+  const size_t q = f->normals;
+  const size_t terms = 1 + 2 * k + k * (k + 1) / 2;
+  int8_t *bytes = owned(t, fixture_allocate(3 * f->vertices * (q + 1), 1));
+  for (size_t i = 0; i < 3 * f->vertices * (q + 1); ++i) {
+    bytes[i] = normal_byte(f->normal + i / (q + 1) * q, q, i % (q + 1));
+  }
+  const double *weights = owned(t, wide_normal_weights(f));
+  add_tensor(t, (supine_tensor){"normals", SUPINE_I8, 3, {f->vertices, 3, q + 1}, bytes});
+  add_tensor(t, (supine_tensor){"normal_weights", SUPINE_F64, 4, {f->lungs, q, 3, terms}, weights});
 }
 
 void fixture_write(const fixture *f, const char *path) {
   const size_t n = f->vertices;
-  const size_t k = f->modes;
-  const size_t g = f->lungs;
-  supine_tensor tensors[12] = {
-      {"vertices", SUPINE_F32, 2, {n, 3}, f->vertex},
-      {"triangles", SUPINE_U32, 2, {f->triangles, 3}, f->triangle},
-      {"coefficients", SUPINE_F32, 2, {n, k}, f->coefficient},
-      {"modes", SUPINE_F64, 2, {k, (f->band + 1) * (f->band + 1)}, f->mode},
-      {"lung", SUPINE_U8, 1, {n}, f->lung},
-  };
-  size_t count = 5;
-  if (f->vector) {
-    tensors[2] = (supine_tensor){"coefficients", SUPINE_F32, 3, {n, 3, k}, f->coefficient};
-  } else {
-    tensors[count++] = (supine_tensor){"direction", SUPINE_F32, 2, {n, 3}, f->direction};
-  }
-  if (f->volume) {
-    tensors[count++] = (supine_tensor){"volume_linear", SUPINE_F64, 2, {g, k}, f->linear};
-    tensors[count++] = (supine_tensor){"volume_quadratic", SUPINE_F64, 3, {g, k, k}, f->quadratic};
-    tensors[count++] = (supine_tensor){"volume_cubic", SUPINE_F64, 4, {g, k, k, k}, f->cubic};
-  }
-  if (f->resting != NULL) {
-    tensors[count++] = (supine_tensor){"resting_volume", SUPINE_F64, 1, {9}, f->resting};
-  }
+  const size_t harmonics = (f->band + 1) * (f->band + 1);
+  const size_t orders = f->orders > 1 ? f->orders : 1;
+  char total[64];
+  tensors t = {.count = 0};
+  add_tensor(&t, (supine_tensor){"vertices", SUPINE_F32, 2, {n, 3}, f->vertex});
+  add_tensor(&t, (supine_tensor){"triangles", SUPINE_U32, 2, {f->triangles, 3}, f->triangle});
+  add_tensor(&t, (supine_tensor){"modes", SUPINE_F64, 3, {f->modes, harmonics, orders}, f->mode});
+  add_tensor(&t, (supine_tensor){"lung", SUPINE_U8, 1, {n}, f->lung});
+  add_field(f, &t);
+  add_volumes(f, &t);
   if (f->normals > 0) {
-    tensors[count++] =
-        f->normal_byte != NULL
-            ? (supine_tensor){"normals", SUPINE_I8, 3, {n, 3, f->normals + 1}, f->normal_byte}
-            : (supine_tensor){"normals", SUPINE_I16, 3, {n, 3, f->normals}, f->normal};
-    tensors[count++] = (supine_tensor){
-        "normal_weights", SUPINE_F64, 3, {g, f->normals, (k + 1) * (k + 2) / 2}, f->normal_weight};
+    add_normals(f, &t);
   }
-  const supine_metadata metadata[] = {
+  (void)snprintf(total, sizeof total, "%.17g,%.17g", f->total[0], f->total[1]);
+  supine_metadata metadata[7] = {
       {"format", "supine-basis"},
-      {"version", "2"},
+      {"version", "4"},
       {"kind", f->vector ? "vector" : "scalar"},
       {"units", "mm"},
       {"route", f->fields ? "fields" : "linear"},
   };
+  size_t metadata_count = 5;
+  if (orders > 1) {
+    metadata[metadata_count++] = (supine_metadata){"simulated_total_ml", total};
+  }
+  if (f->bend != NULL) {
+    metadata[metadata_count++] = (supine_metadata){"bend", f->bend};
+  }
   supine_error error = {0};
-  const supine_status status = supine_safetensors_write(path, tensors, count, metadata,
-                                                        sizeof metadata / sizeof *metadata, &error);
+  const supine_status status =
+      supine_safetensors_write(path, t.list, t.count, metadata, metadata_count, &error);
+  for (size_t i = 0; i < t.memory_count; ++i) {
+    free(t.memory[i]);
+  }
   if (status != SUPINE_OK) {
     fail_msg("%s", error.message);
   }

@@ -17,17 +17,31 @@ typedef struct fixture {
   float *direction; /* [vertices, 3] displacement for a coefficient of 1, mm; unused if `vector` */
   float *coefficient;  /* [vertices, modes] factor of `direction` for each mode. If `vector` is
                           true: [vertices, 3, modes] displacement by each mode, mm */
-  double *mode;        /* [modes, (band + 1)^2] harmonic coefficients of the weight of each mode */
+  size_t orders;       /* polynomials of the volume in each weight: 1, or 0 for 1 */
+  double *mode;        /* [modes, (band + 1)^2, orders] coefficients of the weight of each mode */
   unsigned char *lung; /* [vertices] index of the lung */
+  /* Volume of each lung, mL, as a polynomial of the weights (supine_volume_contract): [lungs, 3,
+     modes], [lungs, 3, modes, modes] and [lungs, modes, modes, modes] */
   double *linear, *quadratic, *cubic;
-  /* [9] harmonic coefficients, mL, of the volume at rest as a function of gravity; may be NULL */
+  /* [lungs, 9] harmonic coefficients, mL, of the volume at rest as a function of gravity, or NULL
+   */
   const double *resting;
+  const char *bend; /* metadata "bend", or NULL */
   bool fields;     /* whether the metadata says that another simulator computed the displacements */
   size_t normals;  /* number of modes from which normals are computed, set by fixture_add_normals */
-  int16_t *normal; /* [vertices, 3, normals] coefficients of vertex normals, as integers */
-  int8_t *normal_byte;   /* `normal` as supine_basis_info.normal_bytes, or NULL */
+  int16_t *normal; /* [vertices, 3, normals] coefficients of vertex normals, as integers. They are
+                      multiples of 256 but for the first vector, so that bytes can hold them. */
   double *normal_weight; /* [lungs, normals, terms] coefficients of the weight of each normal mode:
-                            a quadratic polynomial in the weights of the displacement modes */
+                            a quadratic polynomial in the weights of the displacement modes. The
+                            file has them for its first axis, and 0 for the others. */
+  size_t clusters;       /* number of clusters, set by fixture_add_clusters */
+  uint16_t *cluster;     /* [vertices] */
+  int16_t *scalar;       /* [vertices, 2] */
+  float *cluster_vector; /* [clusters, modes, 18] (supine_basis_info.cluster_vectors) */
+  /* Volumes of another simulator, mL above the reference surface, if `orders` is above 1 */
+  double range[17][2], limits[17][2][9], shares[17][9][2];
+  double total[2];
+  const double *full; /* [lungs, 9] volume at full inflation, or NULL */
 } fixture;
 
 /* Return zeroed memory. Abort if the allocation fails. */
@@ -53,8 +67,17 @@ void fixture_add_forms(fixture *f);
 /* Add `modes` modes of vertex normals, with random vectors. */
 void fixture_add_normals(fixture *f, size_t modes, uint64_t seed);
 
-/* Round the vectors of the normals so that the file stores them in bytes. */
-void fixture_round_normals(fixture *f);
+/* Replace the coefficients of a fixture of vectors by those of `clusters` clusters, at least one in
+ * each lung, with random numbers, of about `amplitude` mm. Compute the coefficients of volumes anew
+ * if there are any. */
+void fixture_add_clusters(fixture *f, size_t clusters, double amplitude, uint64_t seed);
+
+/* Create two closed lungs of fields over gravity and volume, in `vertices` vertices and 2 modes.
+ * Mode 0 multiplies a lung, around its centre, by 1 + w_0, and mode 1 shears it without a change of
+ * its volume, so that a lung with the reference volume V holds V (1 + w_0)^3. The weights of mode 0
+ * are 0.1 t, and those of mode 1 depend on gravity. In a posture, a lung can hold
+ * V (0.8 + 0.02 g_y) to V (1.2 + 0.02 g_y). */
+fixture *fixture_create_simulated(size_t vertices, uint64_t seed);
 
 /* Write the basis file, and assert that this succeeds. */
 void fixture_write(const fixture *f, const char *path);

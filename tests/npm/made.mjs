@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Make what tests of the JavaScript package need: a folder with the package in node_modules, bases, and the results of
 // plain C for these bases. The environment variables NATIVE (program npm_native), TARBALL (the package), GOLDEN (a
-// basis file of version 1) and LUNGS (folder of real lungs) are paths.
+// basis file without volumes at rest) and LUNGS (folder of real lungs) are paths.
 import { execFileSync } from 'node:child_process';
 import { copyFileSync, existsSync, mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -12,16 +12,16 @@ export const packed = join(folder, 'node_modules/supine');
 mkdirSync(packed, { recursive: true });
 execFileSync('tar', ['xzf', process.env.TARBALL, '-C', packed, '--strip-components=1']);
 
-export const [mesh, demo, content, inside, old] = ['lungs.ply', 'lungs.safetensors', 'content.csv', 'inside.safetensors', 'old.safetensors'].map((name) => join(folder, name));
-copyFileSync(process.env.GOLDEN, old);
+export const [mesh, demo, content, inside, unrested] = ['lungs.ply', 'lungs.safetensors', 'content.csv', 'inside.safetensors', 'unrested.safetensors'].map((name) => join(folder, name));
+copyFileSync(process.env.GOLDEN, unrested);
 supine('phantom', '-o', mesh);
 supine('precompute', mesh, '-o', demo);
 writeFileSync(content, 'name,x,y,z\nnodule,-80,-120,-90\nother,70,-150,-120\n');
 supine('embed', demo, content, mesh, '-o', inside);
 const states = ['supine', 'prone:rest+500', 'left:full-1500', 'supine+35:rest+120', '0.6:0.2:-0.7:2600mL', 'upright:full'];
-const ofScan = ['supine:scan+200', 'prone:scan+500', '0.6:0.2:-0.7:scan-100']; // for a basis of version 1, which does not store the volume at rest
+const ofScan = ['supine:scan+200', 'prone:scan+500', '0.6:0.2:-0.7:scan-100']; // for a basis without volumes at rest
 /** Paths of bases, each with the states to test. */
-export const bases = [[demo, states], [inside, states], [old, ofScan]];
+export const bases = [[demo, states], [inside, states], [unrested, ofScan]];
 const real = ['left', 'right'].map((side) => join(process.env.LUNGS, `lungs/chaste_${side}.ply`));
 if (real.every(existsSync)) {
   bases.push([join(folder, 'real.safetensors'), states]);

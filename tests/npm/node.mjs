@@ -75,7 +75,7 @@ for (const [since, from] of [['supine:rest', ['--from', 'supine:rest']], [undefi
   targets.forEach(({ at, move, mm, expectedError }, i) => [...at, ...move, mm, expectedError].forEach((x, k) => assert.ok(Math.abs(x - rows[i][2 + k]) < 5e-3, `${rows[i]}: ${x}`)));
 }
 
-/* A basis of an open surface, made by an older version, has no volumes. A pose needs a gain, the displacement factor. */
+/* A basis of an open surface has no volumes. A pose needs a gain, the displacement factor. */
 const opened = await open(readFileSync(join(dirname(process.env.GOLDEN), 'open_surface.safetensors')));
 assert.throws(() => opened.volumes, { status: 'open surface' });
 assert.throws(() => opened.pose('prone:rest+500'), SupineError);

@@ -662,7 +662,7 @@ TEST(test_field_malformed_grids_refused) {
         {"part", SUPINE_U32, 1, {n}, part},     {"grid", SUPINE_F64, 2, {4, 3}, frame},
         {"grid_size", SUPINE_U32, 1, {3}, size}};
     const supine_metadata metadata[] = {
-        {"format", "supine-basis"}, {"version", "2"}, {"kind", "vector"}};
+        {"format", "supine-basis"}, {"version", "4"}, {"kind", "vector"}};
     assert_int_equal(supine_safetensors_write(in_folder("lie"), tensors, 9, metadata, 3, NULL),
                      SUPINE_OK);
     supine_basis *bad = helper_open(in_folder("lie"));

@@ -176,8 +176,8 @@ TEST(test_page_tensors_equal_basis) {
   check_motion(page, s, order.vertex);
   check_corners(page, order.corners, 3 * s->triangle_count);
   check_tensor(page, "modes", s->modes, 6 * 16 * sizeof(double));
-  check_tensor(page, "volume_linear", s->volume_linear, 2 * 6 * sizeof(double));
-  check_tensor(page, "volume_quadratic", s->volume_quadratic, 2 * 36 * sizeof(double));
+  check_tensor(page, "volume_linear", s->volume_linear, (size_t)2 * 3 * 6 * sizeof(double));
+  check_tensor(page, "volume_quadratic", s->volume_quadratic, (size_t)2 * 3 * 36 * sizeof(double));
   check_tensor(page, "volume_cubic", s->volume_cubic, 2 * 216 * sizeof(double));
   assert_null(strstr(page, "{{"));
   assert_null(strstr(page, "src="));

@@ -618,7 +618,6 @@ TEST(test_evaluate_pose_of_another_basis_refused) {
   assert_int_equal(supine_basis_volumes(basis, foreign, numbers), bad);
   assert_int_equal(supine_basis_normal_weights(basis, foreign, numbers), bad);
   assert_true(isinf(supine_basis_error(basis, foreign)));
-  assert_int_equal(supine_basis_gains(basis, &asked, &poses[1], NULL), bad);
   assert_int_equal(supine_deform_range(basis, poses, 5, 4, xyz), bad);
   assert_int_equal(supine_deform_range(basis, poses, 0, N + 1, xyz), bad);
   assert_memory_equal(xyz, clean, sizeof xyz);

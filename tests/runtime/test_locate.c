@@ -17,7 +17,8 @@ typedef struct world {
 } world;
 
 static int setup(void **state) {
-  static const double resting[9] = {1700 * -3.5449077018110318};
+  static const double resting[18] = {850 * -3.5449077018110318, 0, 0, 0, 0, 0, 0, 0, 0,
+                                     850 * -3.5449077018110318};
   world *w = fixture_allocate(1, sizeof *w);
   fixture *f = fixture_create_shrinking(VERTICES, 2, 77);
   supine_error error = {0};

@@ -194,11 +194,11 @@ static void spoil_cubic(fixture *f) {
   f->cubic[53] = (double)NAN;
 }
 static void spoil_resting(fixture *f) {
-  static const double resting[9] = {-900, 0, 0, 0, 0, 0, 0, 0, (double)NAN};
+  static const double resting[18] = {-900, 0, 0, 0, 0, 0, 0, 0, (double)NAN, -900};
   f->resting = resting;
 }
 static void spoil_resting_size(fixture *f) {
-  static const double resting[9] = {-900, 0x1p30};
+  static const double resting[18] = {-900, 0x1p30, 0, 0, 0, 0, 0, 0, 0, -900};
   f->resting = resting;
 }
 static void spoil_lung_order(fixture *f) {
@@ -258,13 +258,13 @@ static parts sound(void) {
                              {"triangles", SUPINE_U32, 2, {4, 3}, faces},
                              {"direction", SUPINE_F32, 2, {4, 3}, zeros},
                              {"coefficients", SUPINE_F32, 2, {4, 1}, zeros},
-                             {"modes", SUPINE_F64, 2, {1, 4}, zeros64},
+                             {"modes", SUPINE_F64, 3, {1, 4, 1}, zeros64},
                              {"lung", SUPINE_U8, 1, {4}, zeros},
-                             {"volume_linear", SUPINE_F64, 2, {1, 1}, zeros64},
-                             {"volume_quadratic", SUPINE_F64, 3, {1, 1, 1}, zeros64},
+                             {"volume_linear", SUPINE_F64, 3, {1, 3, 1}, zeros64},
+                             {"volume_quadratic", SUPINE_F64, 4, {1, 3, 1, 1}, zeros64},
                              {"volume_cubic", SUPINE_F64, 4, {1, 1, 1, 1}, zeros64}},
                  .tensor_count = 9,
-                 .metadata = {{"format", "supine-basis"}, {"version", "2"}, {"kind", "scalar"}},
+                 .metadata = {{"format", "supine-basis"}, {"version", "4"}, {"kind", "scalar"}},
                  .metadata_count = 3};
 }
 
@@ -312,18 +312,24 @@ TEST(test_open_wrong_structure_refused) {
     p.metadata[i].key = "other";
     assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
   }
-  p = sound(); /* Volumes at rest are optional. They have nine coefficients. */
-  p.tensors[p.tensor_count++] = (supine_tensor){"resting_volume", SUPINE_F64, 1, {9}, resting};
+  for (char version = '0'; version <= '9'; ++version) {
+    const char text[2] = {version, '\0'};
+    p = sound();
+    p.metadata[1].value = text;
+    p.message = "this library reads version 4";
+    assert_int_equal(open_parts(&p), version == '4' ? SUPINE_OK : SUPINE_ERROR_FORMAT);
+  }
+  p = sound(); /* Volumes at rest are optional. They have nine coefficients for each lung. */
+  p.tensors[p.tensor_count++] = (supine_tensor){"resting_volume", SUPINE_F64, 2, {1, 9}, resting};
   assert_int_equal(open_parts(&p), SUPINE_OK);
   p.tensors[9].dtype = SUPINE_F32;
   assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
   for (size_t terms = 4; terms <= 16; terms += 4) {
-    p.tensors[9] = (supine_tensor){"resting_volume", SUPINE_F64, 1, {terms}, resting};
+    p.tensors[9] = (supine_tensor){"resting_volume", SUPINE_F64, 2, {1, terms}, resting};
     assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
   }
-  /* Volumes at rest may have one row for each lung. */
-  p.tensors[9] = (supine_tensor){"resting_volume", SUPINE_F64, 2, {1, 9}, resting};
-  assert_int_equal(open_parts(&p), SUPINE_OK);
+  p.tensors[9] = (supine_tensor){"resting_volume", SUPINE_F64, 1, {9}, resting};
+  assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
   p.tensors[9] = (supine_tensor){"resting_volume", SUPINE_F64, 2, {2, 9}, resting};
   assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
   /* If the modes are of the kind `vector`, coefficients are [N, 3, modes], not [N, modes]. */

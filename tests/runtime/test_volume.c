@@ -97,6 +97,8 @@ TEST(test_scale_random_volumes_reached) {
 static supine_basis *open_cubic(double a, double b, double c, unsigned char **bytes) {
   fixture *f = fixture_create(5, 1, 0, 1, false, true, 1, 3);
   f->mode[0] = 1 / 0.28209479177387814;
+  memset(f->linear, 0, 3 * sizeof *f->linear);
+  memset(f->quadratic, 0, 3 * sizeof *f->quadratic);
   f->linear[0] = a;
   f->quadratic[0] = b;
   f->cubic[0] = c;

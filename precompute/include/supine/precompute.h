@@ -156,6 +156,13 @@ typedef struct supine_precompute_volumes {
   supine_precompute_sex sex;
 } supine_precompute_volumes;
 
+/** How a basis of another simulator's fields stores the displacements of its vertices. */
+typedef enum supine_precompute_storage {
+  SUPINE_PRECOMPUTE_STORAGE_BEST = 0, /**< clusters if their error is small beside that of modes */
+  SUPINE_PRECOMPUTE_STORAGE_MODES,    /**< a vector for each mode: 3 K + 3 products a vertex */
+  SUPINE_PRECOMPUTE_STORAGE_CLUSTERS  /**< clusters of vertices that move alike: 15 products */
+} supine_precompute_storage;
+
 /** What the basis is to contain. */
 typedef struct supine_precompute_modes {
   bool has_band;
@@ -166,6 +173,7 @@ typedef struct supine_precompute_modes {
   bool harmonics;  /**< store all (band + 1)^2 harmonics instead of modes */
   size_t held_out; /**< number of directions in which the error is measured; default 100 to 1000 */
   bool without_normals; /**< leave out the normals: a third of the file */
+  supine_precompute_storage storage; /**< of fields */
 } supine_precompute_modes;
 
 typedef struct supine_precompute_options {
@@ -206,6 +214,12 @@ typedef struct supine_precompute_report {
   size_t band_count;  /**< of fields: number of bands that the directions determine */
   double
       band_error[SUPINE_PRECOMPUTE_BANDS_MAX]; /**< of fields: error by band in cross-validation */
+  /** Of fields: number of volumes for one direction of gravity, 1 if the fields do not depend on
+   * volume; and the highest degree of the polynomials of volume. */
+  size_t volume_count, order;
+  double extrapolated;  /**< of fields over volume: relative RMS error of the smallest and the largest
+                           volumes, predicted from the others; 0 if unknown */
+  size_t cluster_count; /**< clusters of vertices that move alike; 0 if modes are stored */
 } supine_precompute_report;
 
 /** Something found in the input, in one line. */

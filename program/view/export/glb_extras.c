@@ -18,12 +18,6 @@ static bool has_volume(const glb *g) {
   return g->targets.count <= VOLUME_TARGETS_MAX && !g->info->is_fields;
 }
 
-/* Return whether the basis has the volume at rest of each lung, and not only of all together. */
-static bool by_lung(const glb *g) {
-  const supine_tensor *resting = supine_basis_tensor(g->basis, "resting_volume");
-  return resting->rank == 2 && resting->shape[0] > 1;
-}
-
 static const char frame_text[] =
     "Vertices of a lung's mesh are in the patient's axes, LPS (x left, y back, z head), from "
     "'middle', mm: position = middle + millimetresPerUnit * vertex. The mesh's node converts them "
@@ -83,7 +77,7 @@ json_t *supine_export_glb_extras(const glb *g) {
       supine_options_json_numbers(3, g->targets.middle), "millimetresPerUnit", g->step, "basis",
       supine_options_json_metadata(g->basis), "gains", fields ? fields_text : NULL, "breathVolume",
       fields ? NULL : json_real(g->options->breath), "volume", has_volume(g) ? volume_text : NULL,
-      "rest", rest ? resting_text : NULL, "byLung", rest ? json_boolean(by_lung(g)) : NULL,
+      "rest", rest ? resting_text : NULL, "byLung", rest ? json_true() : NULL,
       "fullUprightGain",
       rest ? json_real(full != NULL ? supine_number_parse(full, NULL) : 0) : NULL);
 }
@@ -91,7 +85,6 @@ json_t *supine_export_glb_extras(const glb *g) {
 json_t *supine_export_glb_lung_extras(const glb *g, size_t lung) {
   const supine_basis_info *info = g->info;
   const size_t k = info->mode_count;
-  const size_t axes = info->volume_axes;
   json_t *supine =
       json_pack("{s:I, s:o, s:o}", "lung", (json_int_t)lung, "offset",
                 supine_options_json_numbers(g->targets.count, g->targets.lung[lung].offset), "unit",
@@ -100,17 +93,16 @@ json_t *supine_export_glb_lung_extras(const glb *g, size_t lung) {
     const double *resting = supine_basis_tensor(g->basis, "resting_volume")->data;
     (void)json_object_set_new(
         supine, "resting",
-        supine_options_json_numbers(RESTING_TERMS,
-                                    resting + (by_lung(g) ? lung * RESTING_TERMS : 0)));
+        supine_options_json_numbers(RESTING_TERMS, resting + lung * RESTING_TERMS));
   }
   if (has_volume(g)) {
     (void)json_object_update_new(
         supine,
         json_pack(
             "{s:f, s:o, s:o, s:o}", "referenceVolume", info->reference_volume[lung], "linear",
-            supine_options_json_numbers(axes * k, info->volume_linear + lung * axes * k),
+            supine_options_json_numbers(3 * k, info->volume_linear + lung * 3 * k),
             "quadratic",
-            supine_options_json_numbers(axes * k * k, info->volume_quadratic + lung * axes * k * k),
+            supine_options_json_numbers(3 * k * k, info->volume_quadratic + lung * 3 * k * k),
             "cubic",
             supine_options_json_numbers(k * k * k, info->volume_cubic + lung * k * k * k)));
   }

@@ -258,7 +258,7 @@ static json_t *describe(const page *p) {
   const supine_basis_info *info = p->info;
   return json_pack(
       "{s:I, s:I, s:I, s:I, s:b, s:o, s:o, s:b, s:o, s:f, s:o, s:o, s:o, s:f, s:f, s:o, s:o, s:o, "
-      "s:f, s:I, s:o, s:{s:f, s:f, s:f, s:f, s:f}}",
+      "s:f, s:o, s:{s:f, s:f, s:f, s:f, s:f}}",
       "vertices", (json_int_t)info->vertex_count, "triangles", (json_int_t)info->triangle_count,
       "modes", (json_int_t)info->mode_count, "band", (json_int_t)info->band, "vector",
       (int)info->vector, "lungBegin", begins(info, info->lung_begin), "cornerBegin",
@@ -268,7 +268,7 @@ static json_t *describe(const page *p) {
       supine_options_json_numbers(3, p->middle), "placeUnit", p->position_step, "unit",
       p->coefficient_step, "inside", describe_inside(p), "froms", describe_froms(p), "references",
       supine_options_json_numbers(info->lung_count, info->reference_volume), "scanVolume",
-      scan_volume(p), "volumeAxes", (json_int_t)info->volume_axes, "bend",
+      scan_volume(p), "bend",
       supine_options_json_numbers(3, info->bend), "expected", "constant", SUPINE_EXPECTED_ERROR_MM,
       "fullBreath", EXPECTED_FULL_BREATH, "heart", EXPECTED_HEART, "sliding", EXPECTED_SLIDING,
       "spread", EXPECTED_SPREAD);

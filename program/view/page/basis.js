@@ -146,15 +146,14 @@ function weightsFor(basis, gravity) {
 }
 
 /** Return the coefficients f of the volume of a lung at the weights `w` of the modes. At the gains x, y, z, the volume
- * of the lung minus that of its reference surface is f . (x, y, z, yz, xz, xy, xyz), mL. If a lung has only one gain s
- * (volumeAxes 1), the coefficients of x, yz and xyz are those of s, s^2 and s^3, and the others are 0. */
+ * of the lung minus that of its reference surface is f . (x, y, z, yz, xz, xy, xyz), mL. */
 function lungForm(basis, lung, w) {
   const k = basis.modes;
   const dot = (tensor, at) => { let sum = 0; for (let i = 0; i < k; ++i) sum += tensor[at + i] * w[i]; return sum; };
   const square = (tensor, at) => { let sum = 0; for (let i = 0; i < k; ++i) sum += w[i] * dot(tensor, at + i * k); return sum; };
   const form = new Float64Array(7);
-  for (let axis = 0; axis < basis.volumeAxes; ++axis) {
-    const row = lung * basis.volumeAxes + axis;
+  for (let axis = 0; axis < 3; ++axis) {
+    const row = lung * 3 + axis;
     form[axis] = dot(basis.linear, row * k);
     form[3 + axis] = square(basis.quadratic, row * k * k);
   }

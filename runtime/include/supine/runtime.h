@@ -5,6 +5,9 @@
  *     x_ij   = p_ij + A_j (sum over k of w_k(g) c_ik) d_ij
  *     w_k(g) = sum over l, m of modes[k, lm] Y_lm(g)
  *
+ * A basis of another simulator's fields over gravity and volume has weights of each lung: products
+ * of Y_lm(g) and polynomials of the lung's volume (supine/sh.h, supine_basis_info.order).
+ *
  *     x_ij       coordinate j (x, y, z) of vertex i, mm
  *     p_ij       its coordinate on the reference surface, mm
  *     A_j        gain: factor of the displacement of a lung along axis j, set by the lung's volume
@@ -48,6 +51,10 @@ extern "C" {
 enum { SUPINE_MODES_MAX = 256 };
 enum { SUPINE_LUNGS_MAX = 16 };
 enum { SUPINE_NORMAL_MODES_MAX = 64 };
+enum { SUPINE_CLUSTERS_MAX = 512 };
+
+/** Numbers of a cluster for each mode (supine_basis_info.cluster_vectors). */
+enum { SUPINE_CLUSTER_NUMBERS = 18 };
 
 typedef struct supine_basis supine_basis;
 
@@ -90,6 +97,9 @@ typedef struct supine_basis_info {
   size_t triangle_count;
   size_t mode_count;
   size_t band; /**< highest band of the spherical harmonics */
+  /** Highest degree of the polynomials of a lung's volume, in a basis of another simulator's fields
+   * over gravity and volume; 0 in all others. Above 0, each lung has weights of its own. */
+  size_t order;
   size_t lung_count;
   const size_t *lung_begin; /**< [lung_count + 1] first vertex of each lung, then vertex_count */
   bool vector;     /**< each vertex has 3 coefficients per mode, instead of 1 along `direction` */
@@ -108,9 +118,19 @@ typedef struct supine_basis_info {
   const uint32_t *triangles; /**< [triangle_count, 3] vertices of each triangle */
   const float *direction; /**< [vertex_count, 3] vectors along which vertices move, mm; or NULL */
   /** Coefficients of the modes at each vertex. If `vector` is false: [vertex_count, mode_count],
-   * factors of `direction`. If it is true: [vertex_count, 3, mode_count] along x, y and z, mm. */
+   * factors of `direction`. If it is true: [vertex_count, 3, mode_count] along x, y and z, mm. NULL
+   * in a basis of clusters: supine_basis_coefficients computes them. */
   const float *coefficients;
-  /** [mode_count, (band + 1)^2] spherical-harmonic coefficients of the weight of each mode. */
+  size_t cluster_count; /**< number of clusters of vertices that move alike; 0 if there are none */
+  const uint16_t *cluster; /**< [vertex_count] cluster of each vertex, or NULL */
+  /** [vertex_count, 2] scalars of each vertex, or NULL. */
+  const int16_t *cluster_scalars;
+  /** [cluster_count, mode_count, SUPINE_CLUSTER_NUMBERS] a vector m, the rows of a matrix B, and two
+   * vectors P, mm. The coefficients of a vertex at p with the scalars a are m + B p + a_0 P_0 +
+   * a_1 P_1. NULL if there are no clusters. */
+  const float *cluster_vectors;
+  /** [mode_count, (band + 1)^2, order + 1] coefficients of the weight of each mode: of the
+   * harmonics, times polynomials of the volume. */
   const double *modes;
   /** Coefficients of the polynomial that gives the volume of each lung from the weights and gains,
    * mL: L, Q and T of supine_volume_contract, each with the lung as an additional first axis. NULL
@@ -120,21 +140,16 @@ typedef struct supine_basis_info {
    * memory traffic, as the layout changes between versions. */
   const void *packed;
   size_t normal_count; /**< vectors per vertex whose weighted sum is the normal; 0 if none */
-  /** [vertex_count, 3, normal_count] vectors whose weighted and normalised sum is the normal; NULL
-   * if `normal_bytes` has them. */
-  const int16_t *normals;
-  /** [vertex_count, 3, normal_count + 1] bytes: vector j is 256 times byte j, and vector 0 has the
-   * last byte added; NULL if `normals` has the vectors, as in files of versions 1 and 2. */
-  const int8_t *normal_bytes;
+  /** [vertex_count, 3, normal_count + 1] bytes of the vectors whose weighted and normalised sum is
+   * the normal: vector j is 256 times byte j, and vector 0 has the last byte added; NULL if none. */
+  const int8_t *normals;
   /** Coefficients of the polynomials that supine_basis_normal_weights evaluates. With K =
-   * mode_count, the shape is [lung_count, normal_count, 3, 1 + 2 K + K (K + 1) / 2], or
-   * [lung_count, normal_count, (K + 1) (K + 2) / 2] in files of versions 1 and 2. */
+   * mode_count, the shape is [lung_count, normal_count, 3, 1 + 2 K + K (K + 1) / 2]. */
   const double *normal_weights;
   const double *reference_volume; /**< [lung_count] volume of reference surface, mL; 0 if open */
   bool has_rest;                  /**< the file has the volume at rest for every posture */
   bool has_full;                  /**< the reference surface is at full inflation */
   bool is_fields;     /**< made from another simulator's displacements; factor 1 reproduces them */
-  size_t volume_axes; /**< factors of displacement per lung: 3, or 1 in files of versions 1 and 2 */
   double bend[3];     /**< constant of the path along each axis (supine_volume_bend) */
   /** Hash of the modes, the coefficients of the volumes, and the names of the lungs. Bases that
    * share it have the same poses: a basis, and those that `supine embed` makes from it. */
@@ -144,6 +159,7 @@ typedef struct supine_basis_info {
 /** The weights of modes and the gains of a state (supine_basis_pose). All zeros mean the reference
  * surface of any basis. */
 typedef struct supine_pose {
+  /** [mode_count] weights or, if supine_basis_info.order is above 0, [lung_count, mode_count]. */
   double weights[SUPINE_MODES_MAX];
   double gains[SUPINE_LUNGS_MAX][3]; /**< factor of each lung's displacement along x, y and z */
   /** supine_basis_info.identity of the basis that made the pose. For a basis with another identity,
@@ -201,7 +217,9 @@ SUPINE_API const uint32_t *supine_basis_triangles(const supine_basis *basis);
  * mode_count (band + 1)^2 multiplications.
  * @param gravity  [3], any length but 0
  * @param weights  [mode_count] written, such as the weights of a pose that is zero otherwise
- * @retval SUPINE_ERROR_ARGUMENT  gravity is zero or not finite */
+ * @retval SUPINE_ERROR_ARGUMENT     gravity is zero or not finite
+ * @retval SUPINE_ERROR_UNSUPPORTED  the weights depend on the volume too (supine_basis_info.order):
+ *                                   call supine_basis_pose */
 SUPINE_API supine_status supine_basis_weights(const supine_basis *basis, const double gravity[3],
                                               double *weights);
 
@@ -211,8 +229,7 @@ SUPINE_API supine_status supine_basis_weights(const supine_basis *basis, const d
  * A volume of all lungs is divided among them. Above rest, every lung is inflated by the same
  * fraction of the difference between its volumes at rest and at full inflation [MilicEmili1966].
  * Below rest, all lungs hold the same fraction of their volumes at rest. The three gains of a lung
- * then follow from its volume (supine_volume_bend). Files of versions 1 and 2 have one gain for
- * all lungs and axes.
+ * then follow from its volume (supine_volume_bend).
  *
  * SUPINE_VOLUME_DEFAULT means the volume at rest if the file has one. Otherwise, it means gains of
  * 1 for a file made from another simulator's displacements, and 500 mL above the volume in the
@@ -233,11 +250,18 @@ SUPINE_API supine_status supine_basis_weights(const supine_basis *basis, const d
 SUPINE_API supine_status supine_basis_pose(const supine_basis *basis, const supine_state *state,
                                            supine_pose *pose, supine_error *error);
 
-/** Compute only the gains of a state. `pose` must already have the weights for the gravity of the
- * state. This is enough during a breath, as gravity stays the same. Statuses: as
- * supine_basis_pose, and SUPINE_ERROR_ARGUMENT for a pose of another basis. */
-SUPINE_API supine_status supine_basis_gains(const supine_basis *basis, const supine_state *state,
-                                            supine_pose *pose, supine_error *error);
+/** Return the weights of the modes of a lung in a pose, [mode_count]: the same for all lungs, unless
+ * supine_basis_info.order is above 0. */
+SUPINE_API const double *supine_basis_lung_weights(const supine_basis *basis,
+                                                   const supine_pose *pose, size_t lung);
+
+/** Compute the coefficients of the modes at vertices begin <= i < end of a basis of vectors, whether
+ * the file stores them or clusters.
+ * @param coefficients  [end - begin, 3, mode_count] mm, written
+ * @retval SUPINE_ERROR_ARGUMENT     the range does not lie within 0 to N
+ * @retval SUPINE_ERROR_UNSUPPORTED  supine_basis_info.vector is false */
+SUPINE_API supine_status supine_basis_coefficients(const supine_basis *basis, size_t begin,
+                                                   size_t end, float *coefficients);
 
 /** Return the default volume of a basis (supine_basis_pose). If the default is to multiply
  * displacements by 1, whatever the volume, the kind of the result is SUPINE_VOLUME_DEFAULT. */
@@ -332,7 +356,6 @@ SUPINE_API void supine_step(size_t count, const float *step, float *xyz);
  *     w_k           weight of mode k of the pose
  *     a, b          gains (factors of displacement) on the next two axes, in cyclic order
  *
- * In files of versions 1 and 2, v = V_0 + a sum_k A_k w_k + a^2 sum_(k <= l) C_kl w_k w_l.
  * Cost: 1.5 Q K^2 multiplications for each lung, once a frame, for K modes and Q vectors.
  * @param normal_weights  [lung_count, normal_count] v, written */
 SUPINE_API supine_status supine_basis_normal_weights(const supine_basis *basis,
@@ -384,7 +407,8 @@ enum { SUPINE_GL_MODES = 16, SUPINE_GL_FLOATS = 7, SUPINE_GL_VECTOR_FLOATS = 4 }
  * @param attributes  [end - begin, SUPINE_GL_FLOATS + K], or, if `vector` is true,
  *                    [end - begin, SUPINE_GL_VECTOR_FLOATS + 3 K], written; 44 or 64 bytes per
  *                    vertex if K is 4
- * @retval SUPINE_ERROR_UNSUPPORTED  the basis has more than SUPINE_GL_MODES modes */
+ * @retval SUPINE_ERROR_UNSUPPORTED  the basis has more than SUPINE_GL_MODES modes, or each lung has
+ *                                   weights of its own (supine_basis_info.order is above 0) */
 SUPINE_API supine_status supine_gl_pack(const supine_basis *basis, size_t begin, size_t end,
                                         float *attributes);
 

@@ -44,6 +44,7 @@ typedef enum supine_dtype {
   SUPINE_F64,
   SUPINE_I16,
   SUPINE_I8,
+  SUPINE_U16,
   SUPINE_DTYPE_COUNT
 } supine_dtype;
 

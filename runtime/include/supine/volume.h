@@ -35,12 +35,11 @@ typedef struct supine_volume_form {
  *     of[3 + j] += sum_kl Q_jkl w_k w_l       for the product of the gains of the other two axes
  *     of[6]     += sum_klm T_klm w_k w_l w_m
  * @param count      number K of modes
- * @param axes       3, or 1 if one gain serves all axes: then only of[0], of[3] and of[6] change
- * @param linear     [axes, K] L, mL
- * @param quadratic  [axes, K, K] Q, mL
+ * @param linear     [3, K] L, mL
+ * @param quadratic  [3, K, K] Q, mL
  * @param third      [K, K, K] T, mL
  * @param weights    [K] w */
-SUPINE_API void supine_volume_contract(size_t count, size_t axes, const double *linear,
+SUPINE_API void supine_volume_contract(size_t count, const double *linear,
                                        const double *quadratic, const double *third,
                                        const double *weights, supine_volume_form *form);
 

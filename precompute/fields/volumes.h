@@ -1,0 +1,17 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file
+ * Measure the volume of each lung in each run of a simulator, and find which runs share a direction
+ * of gravity and which are the n-th smallest volume of their direction. */
+#ifndef SUPINE_FIELDS_VOLUMES_H
+#define SUPINE_FIELDS_VOLUMES_H
+
+#include "precompute/fields/fields.h"
+
+/** Measure the volumes of the runs, map them to -1 to 1, and group the runs.
+ * @param fit  its members fields and lungs are read; its members volume, range, parameter, groups,
+ *   and the counts of the report are written
+ * @retval SUPINE_ERROR_ARGUMENT      two runs have the same direction and the same volume
+ * @retval SUPINE_ERROR_OPEN_SURFACE  directions are repeated, but the surface has no volume */
+supine_status supine_fields_volumes_measure(supine_fit *fit, supine_error *error);
+
+#endif

@@ -1,0 +1,321 @@
+/* SPDX-License-Identifier: MIT */
+/* Pose a basis of another simulator's fields over gravity and volume. */
+#include <math.h>
+#include <string.h>
+
+#include <supine/sh.h>
+
+#include "base/arena.h"
+#include "runtime/simulated.h"
+
+/* Difference between the volume asked and the volume of the surface that ends the search, mL. */
+static const double close_enough = 1e-6;
+
+/* How far outside the simulated range of t the search may go: the volume of the surface differs
+ * from the one that t stands for by less than that. */
+static const double beyond = 0.1;
+
+/* Sum the harmonics of bands 0 to 2 with the coefficients of a row. */
+static double sum_harmonics(const double *row, const double *y) {
+  double sum = 0;
+  for (size_t t = 0; t < RESTING_TERMS; ++t) {
+    sum += row[t] * y[t];
+  }
+  return sum;
+}
+
+supine_status supine_simulated_limits(const supine_basis *basis, const double gravity[3],
+                                      double (*limits)[2]) {
+  double y[RESTING_TERMS];
+  SUPINE_TRY(supine_sh_evaluate(2, gravity, y));
+  for (size_t row = 0; row < 2 * basis->info.lung_count; ++row) {
+    double *limit = &limits[row / 2][row % 2];
+    *limit = sum_harmonics(basis->simulated.limits + row * RESTING_TERMS, y);
+  }
+  return SUPINE_OK;
+}
+
+static double map_to_unit(double value, const double range[2]) {
+  return 2 * (value - range[0]) / (range[1] - range[0]) - 1;
+}
+
+/* Refuse a volume outside the range [low, high] of one lung, or of all lungs if `lung` is NULL. */
+static supine_status refuse_volume(const char *lung, double volume, double low, double high,
+                                   supine_error *error) {
+  return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                          "%s%s hold%s %.0f to %.0f mL in the simulations of this posture, not "
+                          "%.0f mL: choose a volume in this range",
+                          lung == NULL ? "the lungs" : "lung ", lung == NULL ? "" : lung,
+                          lung == NULL ? "" : "s", low, high, volume);
+}
+
+/* Move the volume of each lung into its limits, and give what is left to lungs that have room. */
+static void keep_within(size_t count, const double (*limits)[2], double total, double *volumes) {
+  double left = total;
+  for (size_t lung = 0; lung < count; ++lung) {
+    volumes[lung] = fmin(fmax(volumes[lung], limits[lung][0]), limits[lung][1]);
+    left -= volumes[lung];
+  }
+  for (size_t lung = 0; lung < count; ++lung) {
+    const double room =
+        left > 0 ? limits[lung][1] - volumes[lung] : limits[lung][0] - volumes[lung];
+    const double moved = fabs(left) < fabs(room) ? left : room;
+    volumes[lung] += moved;
+    left -= moved;
+  }
+}
+
+/* Divide a total volume among the lungs as the simulator did.
+ * @param total    mL above the reference surfaces
+ * @param volumes  [lungs] mL above the reference surface of each lung, written; they add up to the
+ *   total */
+static supine_status share_out(const supine_basis *basis, const double gravity[3], double total,
+                               double *volumes, supine_error *error) {
+  const supine_simulated *s = &basis->simulated;
+  const size_t lungs = basis->info.lung_count;
+  double limits[SUPINE_LUNGS_MAX][2];
+  double products[RESTING_TERMS * (SUPINE_SH_ORDER_MAX + 1)];
+  double range[3] = {0, 0, 0}; /* lowest and highest total, and the reference volume of all lungs */
+  const size_t terms = RESTING_TERMS * s->share_count;
+  const double t = fmin(fmax(map_to_unit(total, s->total), -1), 1);
+  SUPINE_TRY(supine_simulated_limits(basis, gravity, limits));
+  SUPINE_TRY(supine_sh_evaluate_products(2, s->share_count - 1, gravity, t, products));
+  for (size_t lung = 0; lung < lungs; ++lung) {
+    range[0] += limits[lung][0];
+    range[1] += limits[lung][1];
+    range[2] += basis->info.reference_volume[lung];
+    volumes[lung] = 0;
+    for (size_t i = 0; i < terms; ++i) {
+      volumes[lung] += s->shares[lung * terms + i] * products[i];
+    }
+  }
+  if (!(total >= range[0] && total <= range[1])) {
+    return refuse_volume(NULL, range[2] + total, range[2] + range[0], range[2] + range[1], error);
+  }
+  keep_within(lungs, (const double(*)[2])limits, total, volumes);
+  return SUPINE_OK;
+}
+
+/* The modes for one direction of gravity: weights as polynomials of t. */
+typedef struct path {
+  const supine_basis *basis;
+  size_t lung;
+  double coefficient[SUPINE_MODES_MAX][SUPINE_SH_ORDER_MAX + 1];
+} path;
+
+static supine_status find_path(const supine_basis *basis, const double gravity[3], path *p) {
+  double y[(SUPINE_SH_BAND_MAX + 1) * (SUPINE_SH_BAND_MAX + 1)];
+  const size_t harmonics = supine_sh_count(basis->info.band);
+  const size_t orders = basis->info.order + 1;
+  SUPINE_TRY(supine_sh_evaluate(basis->info.band, gravity, y));
+  p->basis = basis;
+  for (size_t k = 0; k < basis->info.mode_count; ++k) {
+    memset(p->coefficient[k], 0, sizeof p->coefficient[k]);
+    for (size_t i = 0; i < harmonics * orders; ++i) {
+      p->coefficient[k][i % orders] +=
+          basis->info.modes[k * harmonics * orders + i] * y[i / orders];
+    }
+  }
+  return SUPINE_OK;
+}
+
+/* Compute the weights at t, [modes]. Return the volume of the lung above its reference, mL. */
+static double follow(const path *p, double t, double *weights) {
+  static const double ones[3] = {1, 1, 1};
+  const supine_basis *basis = p->basis;
+  double polynomial[SUPINE_SH_ORDER_MAX + 1] = {1, t};
+  supine_volume_form form;
+  for (size_t n = 2; n <= basis->info.order; ++n) {
+    polynomial[n] = 2 * t * polynomial[n - 1] - polynomial[n - 2];
+  }
+  for (size_t k = 0; k < basis->info.mode_count; ++k) {
+    weights[k] = 0;
+    for (size_t n = 0; n <= basis->info.order; ++n) {
+      weights[k] += p->coefficient[k][n] * polynomial[n];
+    }
+  }
+  supine_basis_contract(basis, p->lung, weights, &form);
+  return supine_volume_form_at(&form, ones);
+}
+
+/* Find the weights of a lung at which it holds `volume`, by the rule of false position with the
+ * Illinois correction, between t = low and t = high. Return whether there are any. */
+static bool solve(const path *p, double volume, double low, double high, double *weights) {
+  double below = follow(p, low, weights) - volume;
+  double above = follow(p, high, weights) - volume;
+  int side = 0;
+  if (!(below <= close_enough && above >= -close_enough)) {
+    return false;
+  }
+  for (int step = 0; step < 100; ++step) {
+    const double t = above > below ? (low * above - high * below) / (above - below) : low;
+    const double residual = follow(p, t, weights) - volume;
+    if (fabs(residual) <= close_enough || high - low < 1e-14) {
+      return true;
+    }
+    if (residual > 0) {
+      high = t;
+      above = residual;
+      below *= side > 0 ? 0.5 : 1;
+      side = 1;
+    } else {
+      low = t;
+      below = residual;
+      above *= side < 0 ? 0.5 : 1;
+      side = -1;
+    }
+  }
+  return false;
+}
+
+/* Compute the weights of all lungs at which each holds its volume.
+ * @param volumes  [lungs] mL above the reference surface */
+static supine_status solve_lungs(const supine_basis *basis, const double gravity[3],
+                                 const double *volumes, supine_pose *pose, supine_error *error) {
+  double limits[SUPINE_LUNGS_MAX][2];
+  path p;
+  SUPINE_TRY(find_path(basis, gravity, &p));
+  SUPINE_TRY(supine_simulated_limits(basis, gravity, limits));
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    const double *range = basis->simulated.range + 2 * lung;
+    const double reference = basis->info.reference_volume[lung];
+    double *weights = pose->weights + lung * basis->info.mode_count;
+    p.lung = lung;
+    if (!(volumes[lung] >= limits[lung][0] && volumes[lung] <= limits[lung][1]) ||
+        !solve(&p, volumes[lung], map_to_unit(limits[lung][0], range) - beyond,
+               map_to_unit(limits[lung][1], range) + beyond, weights)) {
+      return refuse_volume(basis->info.lung_names[lung], reference + volumes[lung],
+                           reference + limits[lung][0], reference + limits[lung][1], error);
+    }
+    for (size_t axis = 0; axis < 3; ++axis) {
+      pose->gains[lung][axis] = 1;
+    }
+  }
+  return SUPINE_OK;
+}
+
+static supine_status refuse_kind(const char *what, supine_error *error) {
+  return supine_error_set(
+      error, SUPINE_ERROR_ARGUMENT,
+      "the simulations do not say which volume is %s: name it when the basis is "
+      "made, or use an absolute volume such as 2600mL",
+      what);
+}
+
+/* Compute the volume of each lung, mL above its reference surface, to which volumes of a kind are
+ * relative: at rest, at full inflation, in the scan (the reference surface), or 0 mL. */
+static supine_status find_origin(const supine_basis *basis, const double gravity[3],
+                                 supine_volume_kind kind, double *volumes, supine_error *error) {
+  double y[RESTING_TERMS];
+  SUPINE_TRY(supine_sh_evaluate(2, gravity, y));
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    switch (kind) {
+    case SUPINE_VOLUME_REST:
+      if (!basis->info.has_rest) {
+        return refuse_kind("rest", error);
+      }
+      volumes[lung] = sum_harmonics(basis->resting + lung * RESTING_TERMS, y);
+      break;
+    case SUPINE_VOLUME_FULL:
+      if (!basis->info.has_full) {
+        return refuse_kind("full inflation", error);
+      }
+      volumes[lung] = sum_harmonics(basis->simulated.full + lung * RESTING_TERMS, y);
+      break;
+    case SUPINE_VOLUME_ABSOLUTE:
+      volumes[lung] = -basis->info.reference_volume[lung];
+      break;
+    case SUPINE_VOLUME_SCAN:
+      volumes[lung] = 0;
+      break;
+    default:
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "volume kind %d has no meaning here: use another value of "
+                              "supine_volume_kind",
+                              (int)kind);
+    }
+  }
+  return SUPINE_OK;
+}
+
+/* Find the lung that a state names, or return the number of lungs. */
+static size_t find_lung(const supine_basis *basis, const char *name) {
+  size_t lung = 0;
+  while (lung < basis->info.lung_count && strcmp(name, basis->info.lung_names[lung]) != 0) {
+    ++lung;
+  }
+  return lung;
+}
+
+/* Find the volumes of a state that names its lungs. */
+static supine_status named_volumes(const supine_basis *basis, const supine_state *state,
+                                   double *volumes, supine_error *error) {
+  bool named[SUPINE_LUNGS_MAX] = {false};
+  for (size_t i = 0; i < state->lung_count; ++i) {
+    const size_t lung = find_lung(basis, state->lungs[i].name);
+    double origin[SUPINE_LUNGS_MAX];
+    if (lung == basis->info.lung_count || named[lung] ||
+        state->lung_count != basis->info.lung_count) {
+      return supine_error_set(
+          error, SUPINE_ERROR_ARGUMENT,
+          "lung '%s' is unknown or named twice, or not all %zu lungs are named: "
+          "name each lung once, such as %s",
+          state->lungs[i].name, basis->info.lung_count, basis->info.lung_names[0]);
+    }
+    SUPINE_TRY(find_origin(basis, state->gravity, state->lungs[i].volume.kind, origin, error));
+    volumes[lung] = origin[lung] + state->lungs[i].volume.ml;
+    named[lung] = true;
+  }
+  return SUPINE_OK;
+}
+
+/* Find the volumes of a state without a volume: those of the scan or, if they were not simulated,
+ * the middle of the range. */
+static supine_status default_volumes(const supine_basis *basis, const double gravity[3],
+                                     double *volumes) {
+  double limits[SUPINE_LUNGS_MAX][2];
+  bool simulated = true;
+  SUPINE_TRY(supine_simulated_limits(basis, gravity, limits));
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    simulated = simulated && limits[lung][0] <= 0 && limits[lung][1] >= 0;
+  }
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    volumes[lung] = simulated ? 0 : 0.5 * (limits[lung][0] + limits[lung][1]);
+  }
+  return SUPINE_OK;
+}
+
+static supine_status find_volumes(const supine_basis *basis, const supine_state *state,
+                                  double *volumes, supine_error *error) {
+  supine_volume asked = state->volume;
+  if (state->lung_count > 0) {
+    return named_volumes(basis, state, volumes, error);
+  }
+  if (asked.kind == SUPINE_VOLUME_DEFAULT) {
+    if (!basis->info.has_rest) {
+      return default_volumes(basis, state->gravity, volumes);
+    }
+    asked = (supine_volume){SUPINE_VOLUME_REST, 0};
+  }
+  SUPINE_TRY(find_origin(basis, state->gravity, asked.kind, volumes, error));
+  if (asked.ml == 0 && asked.kind != SUPINE_VOLUME_ABSOLUTE) {
+    return SUPINE_OK; /* the volumes of all lungs are known */
+  }
+  double total = asked.ml;
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    total += volumes[lung];
+  }
+  return share_out(basis, state->gravity, total, volumes, error);
+}
+
+supine_status supine_simulated_pose(const supine_basis *basis, const supine_state *state,
+                                    supine_pose *pose, supine_error *error) {
+  double volumes[SUPINE_LUNGS_MAX];
+  double y[RESTING_TERMS];
+  if (supine_sh_evaluate(2, state->gravity, y) != SUPINE_OK) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "gravity is zero or not finite: give a vector with a direction");
+  }
+  SUPINE_TRY(find_volumes(basis, state, volumes, error));
+  return solve_lungs(basis, state->gravity, volumes, pose, error);
+}

@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: MIT */
+/** @file
+ * Bases of another simulator's fields over gravity and volume. The weights of the modes are
+ * functions of the direction of gravity g and of a parameter t of each lung, which the simulated
+ * volumes mapped to -1 to 1:
+ *
+ *     w_k(g, t) = sum over lm, n of modes[k, lm, n] Y_lm(g) T_n(t)
+ *
+ * The surface holds nearly the volume that t stands for. Solve for the t at which it holds exactly
+ * the volume that is asked. */
+#ifndef SUPINE_RUNTIME_SIMULATED_H
+#define SUPINE_RUNTIME_SIMULATED_H
+
+#include "runtime/internal.h"
+
+/** Compute the lowest and the highest simulated volume of each lung for a direction of gravity.
+ * @param limits  [lungs, 2] mL above the reference surface, written
+ * @retval SUPINE_ERROR_ARGUMENT  gravity is zero or not finite */
+supine_status supine_simulated_limits(const supine_basis *basis, const double gravity[3],
+                                      double (*limits)[2]);
+
+/** Compute the weights of a state (supine_basis_pose) for a basis whose order is above 0. A state
+ * without a volume has the volume of the scan, or the middle of the simulated range if that volume
+ * was not simulated in its posture. A volume of all lungs is divided among them as the simulator
+ * did.
+ * @param pose  written: weights by lung and mode; gains of 1
+ * @retval SUPINE_ERROR_ARGUMENT   gravity is zero or not finite; the volume is relative to rest or
+ *                                 full inflation, which the file lacks; or a lung is unknown
+ * @retval SUPINE_ERROR_NUMERICAL  the volume is outside what was simulated; the message has the
+ *                                 range */
+supine_status supine_simulated_pose(const supine_basis *basis, const supine_state *state,
+                                    supine_pose *pose, supine_error *error);
+
+#endif

@@ -1,0 +1,372 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Pose bases of fields over gravity and volume. The volumes of the lungs of
+ * fixture_create_simulated are known functions of their weights. */
+#include "tests/helpers/test.h"
+
+#include <supine/runtime.h>
+
+#include "tests/helpers/runtime_fixture.h"
+
+static const double constant = 1 / 0.28209479177387814; /* Y(0, 0) times this is 1 */
+
+/* Gravity in these tests, of the length 1. */
+static const double oblique[3] = {0.48, 0.6, -0.64};
+
+static fixture *f;
+static unsigned char *bytes;
+static supine_basis *basis;
+static const supine_basis_info *info;
+static double reference[2]; /* volumes of the lungs, mL */
+
+/* Close the basis, and open that of the changed fixture. */
+static void open_again(void) {
+  size_t size = 0;
+  supine_error error = {0};
+  supine_basis_close(basis);
+  free(bytes);
+  bytes = fixture_bytes(f, &size);
+  if (supine_basis_open_memory(bytes, size, &basis, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  info = supine_basis_get_info(basis);
+  memcpy(reference, info->reference_volume, sizeof reference);
+}
+
+/* Make the basis of one test. */
+static void begin(void) {
+  f = fixture_create_simulated(60, 91);
+  open_again();
+}
+
+static void end(void) {
+  supine_basis_close(basis);
+  free(bytes);
+  fixture_destroy(f);
+  basis = NULL;
+  bytes = NULL;
+}
+
+/* Return a state of all lungs. */
+static supine_state state_of(const double gravity[3], supine_volume_kind kind, double ml) {
+  return (supine_state){.gravity = {gravity[0], gravity[1], gravity[2]}, .volume = {kind, ml}};
+}
+
+/* Return a state that names both lungs, the second first. */
+static supine_state named(supine_volume_kind kind, double first, double second) {
+  supine_state state = state_of(oblique, SUPINE_VOLUME_DEFAULT, 0);
+  state.lung_count = 2;
+  (void)strcpy(state.lungs[0].name, "1");
+  (void)strcpy(state.lungs[1].name, "0");
+  state.lungs[0].volume = (supine_volume){kind, second};
+  state.lungs[1].volume = (supine_volume){kind, first};
+  return state;
+}
+
+/* Pose a state that must be accepted. Write the volumes of the lungs, and assert that the weights
+ * are those at which the lungs hold them. */
+static supine_pose pose_of(const supine_state *state, double volumes[2]) {
+  supine_pose pose;
+  supine_error error = {0};
+  if (supine_basis_pose(basis, state, &pose, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  assert_int_equal(supine_basis_volumes(basis, &pose, volumes), SUPINE_OK);
+  const double *g = state->gravity;
+  const double y = g[1] / sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+  for (size_t lung = 0; lung < 2; ++lung) {
+    const double *w = supine_basis_lung_weights(basis, &pose, lung);
+    const double t = w[0] / 0.1;
+    const double held = reference[lung] * pow(1 + w[0], 3);
+    assert_true(fabs(volumes[lung] - held) < 1e-3); /* vertices are floats */
+    assert_true(fabs(w[1] - y * (0.2 + 0.05 * (2 * t * t - 1))) < 1e-12);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      assert_true(pose.gains[lung][axis] == 1);
+    }
+  }
+  return pose;
+}
+
+static void assert_pose_refused(const supine_state *state, supine_status status,
+                                const char *reason) {
+  supine_pose pose = {.basis = 0};
+  supine_error error = {0};
+  assert_int_equal(supine_basis_pose(basis, state, &pose, &error), status);
+  assert_says(error.message, reason);
+}
+
+TEST(test_pose_simulated_total_volume_held) {
+  begin();
+  const double all = reference[0] + reference[1];
+  assert_int_equal(info->order, 2);
+  assert_true(info->is_fields && info->has_volume && !info->has_rest && !info->has_full);
+  uint64_t random = 3;
+  for (int trial = 0; trial < 200; ++trial) {
+    const double gravity[3] = {fixture_random(&random), fixture_random(&random),
+                               3 * fixture_random(&random)};
+    const double volume = all * (1 + 0.18 * fixture_random(&random));
+    const supine_state kinds[2] = {state_of(gravity, SUPINE_VOLUME_ABSOLUTE, volume),
+                                   state_of(gravity, SUPINE_VOLUME_SCAN, volume - all)};
+    for (size_t i = 0; i < 2; ++i) {
+      double held[2];
+      (void)pose_of(&kinds[i], held);
+      assert_true(fabs(held[0] + held[1] - volume) <= 2e-6); /* each lung within 1e-6 mL */
+    }
+  }
+  end();
+}
+
+/* The lungs share a volume as the simulator said: 0.22 and 0.28 times their reference volumes for
+ * half of the simulated range. */
+TEST(test_pose_simulated_total_volume_shared_as_simulated) {
+  begin();
+  const double want[2] = {0.22 * reference[0], 0.28 * reference[1]};
+  const double half = 0.25 * (reference[0] + reference[1]);
+  for (int percent = -60; percent <= 60; percent += 20) {
+    const double part = 0.01 * percent;
+    const supine_state asked = state_of(oblique, SUPINE_VOLUME_SCAN, part * half);
+    const double left = part * (half - want[0] - want[1]); /* goes to the first lung */
+    double held[2];
+    (void)pose_of(&asked, held);
+    assert_true(fabs(held[0] - reference[0] - part * want[0] - left) <= 1e-5);
+    assert_true(fabs(held[1] - reference[1] - part * want[1]) <= 1e-5);
+  }
+  end();
+}
+
+/* A lung at its limit passes the rest of a total volume on. */
+TEST(test_pose_simulated_lung_at_limit_other_takes_rest) {
+  begin();
+  const double limit = reference[1] * (0.2 + 0.02 * oblique[1]);
+  const double total = (reference[0] + reference[1]) * 0.205;
+  const supine_state asked = state_of(oblique, SUPINE_VOLUME_SCAN, total);
+  double held[2];
+  (void)pose_of(&asked, held);
+  assert_true(fabs(held[1] - reference[1] - limit) <= 1e-5);
+  assert_true(fabs(held[0] - reference[0] - (total - limit)) <= 1e-5);
+  end();
+}
+
+TEST(test_pose_simulated_named_lungs_hold_their_volumes) {
+  begin();
+  const double ml[2] = {reference[0] * 1.13, reference[1] * 0.87};
+  const supine_state absolute = named(SUPINE_VOLUME_ABSOLUTE, ml[0], ml[1]);
+  const supine_state scan = named(SUPINE_VOLUME_SCAN, ml[0] - reference[0], ml[1] - reference[1]);
+  const supine_state *const states[] = {&absolute, &scan};
+  for (size_t i = 0; i < 2; ++i) {
+    double held[2];
+    (void)pose_of(states[i], held);
+    assert_true(fabs(held[0] - ml[0]) <= 1.001e-6);
+    assert_true(fabs(held[1] - ml[1]) <= 1.001e-6);
+  }
+  end();
+}
+
+TEST(test_pose_simulated_wrong_lungs_refused) {
+  begin();
+  supine_state asked = named(SUPINE_VOLUME_SCAN, 10, 10);
+  (void)strcpy(asked.lungs[1].name, "1");
+  assert_pose_refused(&asked, SUPINE_ERROR_ARGUMENT, "lung '1' is unknown or named twice");
+  (void)strcpy(asked.lungs[1].name, "heart");
+  assert_pose_refused(&asked, SUPINE_ERROR_ARGUMENT, "lung 'heart' is unknown");
+  asked.lung_count = 1;
+  assert_pose_refused(&asked, SUPINE_ERROR_ARGUMENT, "not all 2 lungs are named");
+  end();
+}
+
+TEST(test_pose_simulated_outside_range_refused_with_range) {
+  begin();
+  char range[128];
+  const double all = reference[0] + reference[1];
+  const double low = all * (0.8 + 0.02 * oblique[1]);
+  const double high = all * (1.2 + 0.02 * oblique[1]);
+  (void)snprintf(range, sizeof range, "the lungs hold %.0f to %.0f mL", low, high);
+  const double wrong[] = {low - 1, high + 1, -1e9, 1e300};
+  for (size_t i = 0; i < sizeof wrong / sizeof *wrong; ++i) {
+    const supine_state asked = state_of(oblique, SUPINE_VOLUME_ABSOLUTE, wrong[i]);
+    assert_pose_refused(&asked, SUPINE_ERROR_NUMERICAL, range);
+  }
+  double held[2];
+  const supine_state lowest = state_of(oblique, SUPINE_VOLUME_ABSOLUTE, low + 1e-3);
+  const supine_state highest = state_of(oblique, SUPINE_VOLUME_ABSOLUTE, high - 1e-3);
+  (void)pose_of(&lowest, held);
+  (void)pose_of(&highest, held);
+  (void)snprintf(range, sizeof range, "lung 1 holds %.0f to %.0f mL",
+                 reference[1] * (0.8 + 0.02 * oblique[1]),
+                 reference[1] * (1.2 + 0.02 * oblique[1]));
+  const supine_state one = named(SUPINE_VOLUME_ABSOLUTE, reference[0], reference[1] * 1.3);
+  assert_pose_refused(&one, SUPINE_ERROR_NUMERICAL, range);
+  end();
+}
+
+TEST(test_pose_simulated_default_volume_is_that_of_scan) {
+  begin();
+  double held[2];
+  const supine_state asked = state_of(oblique, SUPINE_VOLUME_DEFAULT, 0);
+  const supine_volume volume = supine_basis_default_volume(basis);
+  assert_true(volume.kind == SUPINE_VOLUME_SCAN && volume.ml == 0);
+  (void)pose_of(&asked, held);
+  assert_true(fabs(held[0] - reference[0]) <= 1.001e-6);
+  assert_true(fabs(held[1] - reference[1]) <= 1.001e-6);
+  end();
+}
+
+/* If the volume in the scan was not simulated in a posture, the default is the middle of what
+ * was. */
+TEST(test_pose_simulated_default_volume_outside_range_is_middle) {
+  begin();
+  double held[2];
+  const supine_state asked = state_of(oblique, SUPINE_VOLUME_DEFAULT, 0);
+  f->limits[1][0][0] = 0.1 * reference[1] * constant;
+  open_again();
+  (void)pose_of(&asked, held);
+  for (size_t lung = 0; lung < 2; ++lung) {
+    const double low = lung == 1 ? 0.1 : -0.2;
+    const double middle = 1 + 0.5 * (low + 0.2) + 0.02 * oblique[1];
+    assert_true(fabs(held[lung] - middle * reference[lung]) <= 1.001e-6 + 1e-9 * reference[lung]);
+  }
+  end();
+}
+
+TEST(test_pose_simulated_rest_and_full_need_tensors) {
+  begin();
+  double resting[18] = {0};
+  double full[18] = {0};
+  double held[2];
+  const supine_state rest = state_of(oblique, SUPINE_VOLUME_REST, 0);
+  const supine_state inflated = state_of(oblique, SUPINE_VOLUME_FULL, 0);
+  assert_pose_refused(&rest, SUPINE_ERROR_ARGUMENT, "do not say which volume is rest");
+  assert_pose_refused(&inflated, SUPINE_ERROR_ARGUMENT,
+                      "do not say which volume is full inflation");
+  for (size_t lung = 0; lung < 2; ++lung) {
+    resting[9 * lung] = (lung == 0 ? -0.1 : 0) * reference[lung] * constant; /* 0: of the scan */
+    full[9 * lung] = (lung == 0 ? 0.15 : 0.17) * reference[lung] * constant;
+  }
+  f->resting = resting;
+  f->full = full;
+  open_again();
+  assert_true(info->has_rest && info->has_full);
+  (void)pose_of(&rest, held);
+  assert_true(fabs(held[0] - 0.9 * reference[0]) <= 2e-6);
+  assert_true(fabs(held[1] - reference[1]) <= 2e-6);
+  (void)pose_of(&inflated, held);
+  assert_true(fabs(held[0] - 1.15 * reference[0]) <= 2e-6);
+  assert_true(fabs(held[1] - 1.17 * reference[1]) <= 2e-6);
+  const supine_state usual = state_of(oblique, SUPINE_VOLUME_DEFAULT, 0);
+  (void)pose_of(&usual, held);
+  assert_true(fabs(held[0] - 0.9 * reference[0]) <= 2e-6);
+  const supine_state breath = state_of(oblique, SUPINE_VOLUME_REST, 100);
+  (void)pose_of(&breath, held);
+  assert_true(fabs(held[0] + held[1] - 0.9 * reference[0] - reference[1] - 100) <= 3e-6);
+  const supine_state by_lung = named(SUPINE_VOLUME_REST, 50, -60);
+  (void)pose_of(&by_lung, held);
+  assert_true(fabs(held[0] - 0.9 * reference[0] - 50) <= 2e-6);
+  assert_true(fabs(held[1] - reference[1] + 60) <= 2e-6);
+  end();
+}
+
+TEST(test_pose_simulated_wrong_state_refused) {
+  begin();
+  const double none[3] = {0, 0, 0};
+  const supine_state fallen = state_of(none, SUPINE_VOLUME_SCAN, 0);
+  assert_pose_refused(&fallen, SUPINE_ERROR_ARGUMENT, "gravity is zero");
+  const supine_state unknown = state_of(oblique, SUPINE_VOLUME_KIND_COUNT, 0);
+  assert_pose_refused(&unknown, SUPINE_ERROR_ARGUMENT, "volume kind 5");
+  const supine_state infinite = state_of(oblique, SUPINE_VOLUME_SCAN, (double)NAN);
+  assert_pose_refused(&infinite, SUPINE_ERROR_ARGUMENT, "not finite");
+  end();
+}
+
+/* Each lung moves by its own weights. */
+TEST(test_deform_simulated_each_lung_by_its_weights) {
+  begin();
+  const supine_state asked = named(SUPINE_VOLUME_ABSOLUTE, reference[0] * 1.15, reference[1] * 0.9);
+  double held[2];
+  float xyz[180];
+  float half[180];
+  const supine_pose pose = pose_of(&asked, held);
+  assert_int_equal(supine_deform(basis, &pose, xyz), SUPINE_OK);
+  assert_int_equal(supine_deform_range(basis, &pose, 20, 45, half), SUPINE_OK);
+  assert_memory_equal(half, xyz + 60, 75 * sizeof *half);
+  const double error = supine_basis_error(basis, &pose);
+  assert_true(error <= 0.0101);
+  for (size_t i = 0; i < 60; ++i) {
+    const double *w = supine_basis_lung_weights(basis, &pose, f->lung[i]);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const float *c = f->coefficient + (3 * i + axis) * 2;
+      const double want =
+          (double)f->vertex[3 * i + axis] + w[0] * (double)c[0] + w[1] * (double)c[1];
+      assert_true(fabs((double)xyz[3 * i + axis] - want) <= error);
+    }
+  }
+  end();
+}
+
+/* Functions for one weight of each mode say that they do not support this basis. */
+TEST(test_weights_simulated_unsupported) {
+  begin();
+  double weights[2];
+  float numbers[64 * 16];
+  const supine_pose pose = {.basis = 0};
+  assert_int_equal(supine_basis_weights(basis, oblique, weights), SUPINE_ERROR_UNSUPPORTED);
+  assert_int_equal(supine_gl_weights(basis, &pose, numbers, numbers), SUPINE_ERROR_UNSUPPORTED);
+  assert_int_equal(supine_gl_pack(basis, 0, 60, numbers), SUPINE_ERROR_UNSUPPORTED);
+  end();
+}
+
+/* Write the changed fixture, and assert that it is refused for this reason. */
+static void assert_refused(const char *reason) {
+  size_t size = 0;
+  unsigned char *changed = fixture_bytes(f, &size);
+  supine_basis *refused = NULL;
+  supine_error error = {0};
+  assert_int_equal(supine_basis_open_memory(changed, size, &refused, &error), SUPINE_ERROR_FORMAT);
+  assert_null(refused);
+  assert_says(error.message, reason);
+  free(changed);
+}
+
+TEST(test_open_wrong_simulated_volumes_refused_with_reason) {
+  begin();
+  const double low = f->range[1][0];
+  f->range[1][0] = f->range[1][1];
+  assert_refused("the simulated volumes have no range");
+  f->range[1][0] = low;
+  const double first = f->total[0];
+  f->total[0] = f->total[1];
+  assert_refused("the simulated volumes have no range");
+  f->total[0] = (double)NAN;
+  assert_refused("metadata 'simulated_total_ml' is not a list of 2 finite numbers");
+  f->total[0] = first;
+  f->limits[0][1][8] = 1e9;
+  assert_refused("a simulated volume is 1e+09 mL");
+  f->limits[0][1][8] = 0;
+  f->volume = false;
+  assert_refused("the surface has no volume");
+  f->volume = true;
+  f->orders = 9;
+  free(f->mode);
+  f->mode = fixture_allocate((size_t)2 * 4 * 9, sizeof *f->mode);
+  assert_refused("tensor 'modes' has 9 polynomials of the volume, not 1 to 8");
+  end();
+}
+
+/* A pose has room for 256 weights of all lungs. */
+TEST(test_open_too_many_weights_refused) {
+  begin();
+  fixture *many = fixture_create(60, 129, 0, 2, true, false, 1, 3);
+  fixture *own = f;
+  size_t size = 0;
+  unsigned char *copy = fixture_bytes(many, &size);
+  supine_basis *opened = NULL;
+  assert_int_equal(supine_basis_open_memory(copy, size, &opened, NULL), SUPINE_OK);
+  supine_basis_close(opened);
+  free(copy);
+  free(many->mode);
+  many->orders = 2;
+  many->mode = fixture_allocate((size_t)129 * 2, sizeof *many->mode);
+  f = many;
+  assert_refused("129 modes for each of 2 lungs are more than 256 weights");
+  f = own;
+  fixture_destroy(many);
+  end();
+}
