@@ -65,9 +65,10 @@ static supine_status rank_run(const supine_fit *fit, const size_t *direction, si
     if (direction[other] != direction[run]) {
       continue;
     }
-    const double apart = total_of(fit, other) - total_of(fit, run);
+    const double total = total_of(fit, run);
+    const double apart = total_of(fit, other) - total;
     SUPINE_REFUSE_IF(
-        other < run && fabs(apart) < same_volume * total_of(fit, run), error, SUPINE_ERROR_FORMAT,
+        other < run && fabs(apart) < same_volume * total, error, SUPINE_ERROR_FORMAT,
         "rows %zu and %zu have the same direction of gravity and volumes within %g %%: "
         "keep one of them, or displacements of other volumes",
         other, run, 100.0 * same_volume);
