@@ -4,7 +4,7 @@
 
 #include "base/locale.h"
 #include "base/number.h"
-#include "base/text.h"
+#include "base/utf8.h"
 
 double supine_number_parse(const char *text, char **end) {
   SUPINE_C_LOCALE;
@@ -15,7 +15,7 @@ int supine_print_text_list(char *text, size_t size, const char *format, va_list 
   SUPINE_C_LOCALE;
   const int length = vsnprintf(text, size, format, arguments);
   if (length > 0 && (size_t)length >= size && size > 0) {
-    supine_text_whole(text);
+    supine_utf8_whole(text);
   }
   return length;
 }

@@ -51,22 +51,6 @@ size_t supine_text_fit(const char *text, size_t most) {
   return length;
 }
 
-void supine_text_whole(char *text) {
-  const size_t length = strlen(text);
-  size_t begin = length;
-  while (begin > 0 && length - begin < 3 && ((unsigned char)text[begin - 1] & 0xC0U) == 0x80U) {
-    --begin;
-  }
-  const unsigned lead = begin > 0 ? (unsigned char)text[begin - 1] : 0U;
-  size_t wanted = 1;
-  if (lead >= 0xC0U) {
-    wanted = lead >= 0xF0U ? 4 : 2U + (lead >= 0xE0U);
-  }
-  if (length - begin + 1 < wanted) {
-    text[begin - 1] = '\0';
-  }
-}
-
 const char *supine_text_shorten(const char *text, size_t size, char *shortened) {
   static const char ellipsis[] = "\xE2\x80\xA6";
   size_t length = strlen(text);

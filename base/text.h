@@ -20,10 +20,6 @@ bool supine_text_is_utf8(const char *text);
  * and does not cut a UTF-8 character. */
 size_t supine_text_fit(const char *text, size_t most);
 
-/** Remove the first bytes of a UTF-8 character from the end of `text`, if the rest of the character
- * is missing because the text was cut. */
-void supine_text_whole(char *text);
-
 /** Copy `text` to `shortened`, which has room for `size` bytes, 4 or more. If it is too long, cut
  * it between two UTF-8 characters and end it with "...", an ellipsis of one character. Return
  * `shortened`. */

@@ -93,8 +93,6 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   const bool film = supine_text_ends_in(wanted->output, ".webp");
   SUPINE_REFUSE_IF(!wanted->turns && wanted->postures == NULL, error, SUPINE_ERROR_ARGUMENT,
                    "the posture is missing: give --posture or --turn");
-  SUPINE_REFUSE_IF(wanted->turns && wanted->postures != NULL, error, SUPINE_ERROR_ARGUMENT,
-                   "--posture and --turn exclude each other: give one");
   SUPINE_REFUSE_IF(wanted->turns && !film, error, SUPINE_ERROR_ARGUMENT,
                    "--turn draws a film: give -o a name that ends in .webp");
   SUPINE_REFUSE_IF(
