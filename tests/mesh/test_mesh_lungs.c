@@ -122,7 +122,9 @@ TEST(test_topology_damaged_real_lung_edges_counted) {
 
 /* An STL file repeats a vertex in every triangle that has it. Loading merges these copies. */
 TEST(test_save_real_lung_as_stl_loads_same_surface) {
-  supine_mesh mesh = lung_load("lungs/chaste_left.ply", NULL);
+  supine_mesh mesh = {0};
+  assert_int_equal(supine_mesh_load(SUPINE_EXAMPLE_LUNGS "/left.ply", NULL, &mesh, NULL, NULL),
+                   SUPINE_OK);
   char path[256];
   const supine_mesh_save_options options = {.axes = SUPINE_AXES_RAS};
   assert_int_equal(supine_mesh_save(sample_path(state, "lung.stl", path), &mesh, &options, NULL),
