@@ -463,12 +463,23 @@ TEST(test_render_long_names_of_any_script_picture_whole) {
   static const char *const name[] = {
       "a name of 134 characters, which is far longer than there is room for in any picture, and "
       "goes on, and on, until nobody wants to read it",
-      "\u0639\u0642\u062F\u0629 \u0631\u0626\u0648\u064A\u0629 \u0639\u0642\u062F\u0629 "
-      "\u0631\u0626\u0648\u064A\u0629 \u0639\u0642\u062F\u0629",
+      "\u0639\u0642\u062F\u0629 \u0631\u0626\u0648\u064A\u0629 "
+      "\u0639\u0642\u062F\u0629 \u0631\u0626\u0648\u064A\u0629 "
+      "\u0639\u0642\u062F\u0629 \u0631\u0626\u0648\u064A\u0629 "
+      "\u0639\u0642\u062F\u0629 \u0631\u0626\u0648\u064A\u0629 "
+      "\u0639\u0642\u062F\u0629 \u0631\u0626\u0648\u064A\u0629 "
+      "\u0639\u0642\u062F\u0629 \u0631\u0626\u0648\u064A\u0629 "
+      "\u0639\u0642\u062F\u0629 \u0631\u0626\u0648\u064A\u0629 "
+      "\u0639\u0642\u062F\u0629 \u0631\u0626\u0648\u064A\u0629 "
+      "\u0639\u0642\u062F\u0629 \u0631\u0626\u0648\u064A\u0629 "
+      "\u0639\u0642\u062F\u0629 \u0631\u0626\u0648\u064A\u0629 "
+      "\u0639\u0642\u062F\u0629 \u0631\u0626\u0648\u064A\u0629 "
+      "\u0639\u0642\u062F\u0629 \u0631\u0626\u0648\u064A\u0629 "
+      "\u0639\u0642\u062F\u0629",
       "29 letters and then an uml\u00E4\u00E4\u00E4\u00E4\u00E4"};
   for (size_t i = 0; i < sizeof name / sizeof *name; ++i) {
     static const char *const ending[] = {"png", "pdf", "svg"};
-    char csv[600];
+    char csv[800];
     (void)snprintf(csv, sizeof csv, "name,x,y,z\n\"%s\",-80,-120,-90\n", name[i]);
     test_write(in_folder("long.csv"), csv);
     EXPECT(0, "", "embed lungs.safetensors long.csv -o long.safetensors");
