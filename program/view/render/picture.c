@@ -23,6 +23,7 @@
   EACH(cairo_, image_surface_get_stride) EACH(cairo_, line_to) EACH(cairo_, move_to)               \
   EACH(cairo_, new_path) EACH(cairo_, new_sub_path) EACH(cairo_, paint)                            \
   EACH(cairo_, pattern_add_color_stop_rgb) EACH(cairo_, pdf_surface_create_for_stream)             \
+  EACH(cairo_, pdf_surface_set_metadata)                                                           \
   EACH(cairo_, pattern_create_linear) EACH(cairo_, pattern_destroy) EACH(cairo_, rectangle)        \
   EACH(cairo_, restore) EACH(cairo_, save) EACH(cairo_, scale)                                     \
   EACH(cairo_, select_font_face) EACH(cairo_, set_font_size) EACH(cairo_, set_line_width)          \
@@ -567,6 +568,8 @@ static supine_status write_picture(const char *path, FILE *file, const supine_ba
   SUPINE_FREED_BY(free_surface) cairo_surface_t *surface = NULL;
   if (supine_text_ends_in(path, ".pdf")) {
     surface = cairo.pdf_surface_create_for_stream(to_file, file, width, height);
+    /* No date: the same picture has the same bytes. */
+    cairo.pdf_surface_set_metadata(surface, CAIRO_PDF_METADATA_CREATE_DATE, "");
     return write_vector(surface, basis, picture, error);
   }
   if (supine_text_ends_in(path, ".svg")) {
