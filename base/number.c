@@ -4,6 +4,7 @@
 
 #include "base/locale.h"
 #include "base/number.h"
+#include "base/utf8.h"
 
 double supine_number_parse(const char *text, char **end) {
   SUPINE_C_LOCALE;
@@ -12,7 +13,11 @@ double supine_number_parse(const char *text, char **end) {
 
 int supine_print_text_list(char *text, size_t size, const char *format, va_list arguments) {
   SUPINE_C_LOCALE;
-  return vsnprintf(text, size, format, arguments);
+  const int length = vsnprintf(text, size, format, arguments);
+  if (length > 0 && (size_t)length >= size && size > 0) {
+    supine_utf8_whole(text);
+  }
+  return length;
 }
 
 int supine_print_text(char *text, size_t size, const char *format, ...) {

@@ -51,6 +51,19 @@ size_t supine_text_fit(const char *text, size_t most) {
   return length;
 }
 
+const char *supine_text_shorten(const char *text, size_t size, char *shortened) {
+  static const char ellipsis[] = "\xE2\x80\xA6";
+  size_t length = strlen(text);
+  if (length < size) {
+    memcpy(shortened, text, length + 1);
+  } else {
+    length = supine_text_fit(text, size - sizeof ellipsis);
+    memcpy(shortened, text, length);
+    memcpy(shortened + length, ellipsis, sizeof ellipsis);
+  }
+  return shortened;
+}
+
 char *supine_text_make_utf8(char *text) {
   const char *const end = text + strlen(text);
   for (char *at = text; at < end;) {

@@ -20,6 +20,11 @@ bool supine_text_is_utf8(const char *text);
  * and does not cut a UTF-8 character. */
 size_t supine_text_fit(const char *text, size_t most);
 
+/** Copy `text` to `shortened`, which has room for `size` bytes, 4 or more. If it is too long, cut
+ * it between two UTF-8 characters and end it with "...", an ellipsis of one character. Return
+ * `shortened`. */
+const char *supine_text_shorten(const char *text, size_t size, char *shortened);
+
 /** Replace bytes that are not UTF-8, which file names may contain, by '?'. Return `text`. */
 char *supine_text_make_utf8(char *text);
 

@@ -42,8 +42,26 @@ static inline size_t supine_utf8_control(const char *text) {
   return u[0] == 0xC2 && u[1] >= 0x80 && u[1] <= 0x9F ? 2 : 0;
 }
 
-/** Copy a text to `out`, with each control character but those in `kept` as \xHH. Cut off what does
- * not fit into `size` > 0 bytes. */
+/** Remove the first bytes of a character from the end of a text that was cut, if the rest of the
+ * character is missing. */
+static inline void supine_utf8_whole(char *text) {
+  const size_t length = strlen(text);
+  size_t begin = length; /* of the last character */
+  while (begin > 0 && length - begin < 3 && ((unsigned char)text[begin - 1] & 0xC0U) == 0x80U) {
+    --begin;
+  }
+  const unsigned lead = begin > 0 ? (unsigned char)text[begin - 1] : 0U;
+  size_t wanted = 1;
+  if (lead >= 0xC0U) {
+    wanted = lead >= 0xF0U ? 4U : 2U + (lead >= 0xE0U);
+  }
+  if (begin > 0 && length - begin + 1 < wanted) {
+    text[begin - 1] = '\0';
+  }
+}
+
+/** Copy a text to `out`, with each control character but those in `kept` as \xHH. Cut off
+ * characters that do not fit into `size` > 0 bytes. */
 static inline void supine_utf8_escape(const char *text, const char *kept, char *out, size_t size) {
   static const char digits[] = "0123456789ABCDEF";
   size_t at = 0;
@@ -60,6 +78,9 @@ static inline void supine_utf8_escape(const char *text, const char *kept, char *
     text += control > 0 ? control : 1;
   }
   out[at] = '\0';
+  if (*text != '\0') {
+    supine_utf8_whole(out);
+  }
 }
 
 #endif

@@ -1,7 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
 # On a bare Debian 12, as root, install the packages that are needed, and then
-#   sh cmake/debian.sh demo    build; make, precompute, deform and draw synthetic lungs
+#   sh cmake/debian.sh demo    build; precompute, deform and draw real lungs
 #   sh cmake/debian.sh build   build the program and the tests
 #   sh cmake/debian.sh test    build, and run the tests
 #   sh cmake/debian.sh anywhere   build, and run tests as on other processors, on one, and on a busy machine

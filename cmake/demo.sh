@@ -1,32 +1,38 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Make synthetic lungs, precompute their basis, and deform and draw them: demo.sh PROGRAM FOLDER
+# Precompute the basis of real lungs, and deform, draw and export them: demo.sh PROGRAM FOLDER
 set -eu
 supine=$1
 folder=$2
+lungs=$(dirname "$0")/../examples/lungs
 mkdir -p "$folder"
-"$supine" phantom -o "$folder/lungs.ply"
-"$supine" precompute "$folder/lungs.ply" -o "$folder/lungs.safetensors"
+"$supine" precompute "$lungs/left.ply" "$lungs/right.ply" -o "$folder/lungs.safetensors"
+"$supine" embed "$folder/lungs.safetensors" "$lungs/targets.csv" "$lungs/airways.ply" -o "$folder/inside.safetensors"
+"$supine" export "$folder/lungs.safetensors" --inside "$folder/inside.safetensors" \
+  --title "Lungs: test data of Chaste, University of Oxford (BSD-3-Clause). Targets and airways are fictitious." \
+  -o "$folder/lungs.html"
 for posture in supine prone left right; do
   "$supine" deform "$folder/lungs.safetensors" --posture $posture -o "$folder/$posture.vtp"
 done
-"$supine" export "$folder/lungs.safetensors" -o "$folder/lungs.html"
-picture=""
-if "$supine" render "$folder/lungs.safetensors" --posture supine,prone,left,right \
-  -o "$folder/postures.png"; then
-  picture="  postures.png         the four postures side by side"
+pictures=""
+if "$supine" render "$folder/lungs.safetensors" --inside "$folder/inside.safetensors" --posture supine,left,prone \
+  -o "$folder/postures.png" &&
+  "$supine" render "$folder/lungs.safetensors" --inside "$folder/inside.safetensors" \
+    --posture supine,left,prone,left,supine --size 600x450 -o "$folder/postures.webp"; then
+  pictures="  postures.png         three postures side by side
+  postures.webp        a film: the lungs turn from the back to the left side and the belly, and back"
 fi
 cat <<END
 
-Made in $folder/:
-  lungs.ply            a pair of lungs at full inflation
-  lungs.safetensors    their basis, for every direction of gravity and every volume
+Made in $folder/, from the lungs of an adult (test data of Chaste, University of Oxford, BSD-3-Clause;
+the tumour, the nodule and the airways are fictitious):
+  lungs.html           a page for a browser: where the tumour goes in any posture
+  lungs.safetensors    the basis of the lungs, for every direction of gravity and every volume
+  inside.safetensors   the tumour, the nodule and the airways, which move with the lungs
   supine.vtp prone.vtp left.vtp right.vtp
                        the lungs at rest, lying on the back, the belly and either side
-  lungs.html           a page for a browser, in which the lungs turn and breathe
-$picture
+$pictures
 
-To view them, open $folder/lungs.html in any browser, or the four .vtp files in ParaView,
-coloured by displacement_magnitude.
+Open $folder/lungs.html in any browser, or the four .vtp files in ParaView, coloured by displacement_magnitude.
 A further example: $supine deform $folder/lungs.safetensors --posture 0.6:0:-0.8:rest+800 -o mine.ply
 END

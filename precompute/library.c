@@ -32,7 +32,7 @@ static supine_status choose(const supine_precompute_modes *wanted, bool is_field
                                   .without_normals = wanted->without_normals,
                                   .choose_band = is_fields && !has_band,
                                   .keep_modes = is_fields && has_modes,
-                                  .storage = (supine_field_storage)wanted->storage};
+                                  .storage = (supine_warp_storage)wanted->storage};
   if (has_modes) {
     choice->modes = wanted->count; /* 0: harmonics */
   }

@@ -20,7 +20,7 @@ typedef struct supine_basis_choice {
   const supine_fields *fields;
   bool choose_band; /**< choose the band by the leave-one-out error, instead of `band` */
   bool keep_modes;  /**< keep all `modes`, even those that hardly lower the error */
-  supine_field_storage storage; /**< how displacements are stored */
+  supine_warp_storage storage; /**< how displacements are stored */
   const double *scan_gravity;   /**< [3] gravity in the scan, which is then not displaced in its own
                                    posture; NULL if gravity does not displace the scan */
   /** Receives the fraction of the work done, 0 to 1; returns false to stop. NULL: none. */

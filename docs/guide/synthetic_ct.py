@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Make a CT and a segmentation of synthetic lungs, for trials without a patient's scan:
+"""Make a CT and a segmentation from surfaces of lungs (binary PLY), for trials without a patient's scan:
 
-    supine phantom --vertices 3000 -o lungs.ply
-    python3 synthetic_ct.py lungs.ply
+    python3 synthetic_ct.py left.ply right.ply
 
 This writes ct.nii.gz, in Hounsfield units, and the folder segmentation with one mask for each lobe, in the files and with
 the names that TotalSegmentator writes. Voxels have sides of 4 mm. The program needs numpy and nibabel."""
@@ -14,45 +13,54 @@ import numpy as np
 
 STEP = 4.0  # mm
 
-header, body = open(sys.argv[1], "rb").read().split(b"end_header\n", 1)
-counts = [int(line.split()[-1]) for line in header.decode().splitlines() if line.startswith("element")]
-vertices = np.frombuffer(body, "<f4", 3 * counts[0]).reshape(-1, 3).astype(float)
-faces = np.frombuffer(body, [("n", "u1"), ("v", "<i4", 3)], counts[1], vertices.nbytes // 2)["v"]
 
-# Find the voxels inside: walk along z, and change sides at every triangle that the line through the voxels meets.
-low = vertices.min(axis=0) - 20
-size = np.ceil((vertices.max(axis=0) + 20 - low) / STEP).astype(int)
-crossed = np.zeros(size, int)
-corners = (vertices[faces] - low) / STEP
-for a, b, c in corners:
-    first = np.ceil(np.min([a, b, c], axis=0)[:2]).astype(int)
-    last = np.floor(np.max([a, b, c], axis=0)[:2]).astype(int)
-    x, y = np.mgrid[first[0]:last[0] + 1, first[1]:last[1] + 1]
-    area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
-    if x.size == 0 or area == 0:
-        continue
-    s = ((x - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (y - a[1])) / area
-    t = ((b[0] - a[0]) * (y - a[1]) - (x - a[0]) * (b[1] - a[1])) / area
-    met = (s >= 0) & (t >= 0) & (s + t <= 1)
-    z = np.ceil(a[2] + s * (b[2] - a[2]) + t * (c[2] - a[2]))[met].astype(int)
-    np.add.at(crossed, (x[met], y[met], z), 1)
-inside = np.cumsum(crossed, axis=2) % 2 == 1
+def read(path):
+    """Return the corners of each triangle of a surface, mm."""
+    header, body = open(path, "rb").read().split(b"end_header\n", 1)
+    counts = [int(line.split()[-1]) for line in header.decode().splitlines() if line.startswith("element")]
+    vertices = np.frombuffer(body, "<f4", 3 * counts[0]).reshape(-1, 3)
+    return vertices[np.frombuffer(body, [("n", "u1"), ("v", "<i4", 3)], counts[1], vertices.nbytes)["v"]].astype(float)
+
+
+def voxels_inside(corners):
+    """Walk along z, and change sides at every triangle that the line through the voxels meets."""
+    crossed = np.zeros(size, int)
+    for a, b, c in (corners - low) / STEP:
+        first = np.ceil(np.min([a, b, c], axis=0)[:2]).astype(int)
+        last = np.floor(np.max([a, b, c], axis=0)[:2]).astype(int)
+        x, y = np.mgrid[first[0]:last[0] + 1, first[1]:last[1] + 1]
+        area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
+        if x.size == 0 or area == 0:
+            continue
+        s = ((x - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (y - a[1])) / area
+        t = ((b[0] - a[0]) * (y - a[1]) - (x - a[0]) * (b[1] - a[1])) / area
+        met = (s >= 0) & (t >= 0) & (s + t <= 1)
+        z = np.ceil(a[2] + s * (b[2] - a[2]) + t * (c[2] - a[2]))[met].astype(int)
+        np.add.at(crossed, (x[met], y[met], z), 1)
+    return np.cumsum(crossed, axis=2) % 2 == 1
+
+
+surfaces = [read(path) for path in sys.argv[1:3]]  # left, right
+low = np.min([surface.min(axis=(0, 1)) for surface in surfaces], axis=0) - 20
+high = np.max([surface.max(axis=(0, 1)) for surface in surfaces], axis=0) + 20
+size = np.ceil((high - low) / STEP).astype(int)
+left, right = map(voxels_inside, surfaces)
+inside = left | right
 
 # Divide each lung into lobes by horizontal planes, which is enough for a trial.
-x, y, z = (low[k] + STEP * np.arange(size[k]).reshape([-1 if i == k else 1 for i in range(3)]) for k in range(3))
+y = low[1] + STEP * np.arange(size[1]).reshape(1, -1, 1)
 heights = np.nonzero(inside.any(axis=(0, 1)))[0]
 height = (np.arange(size[2]) - heights[0]) / np.ptp(heights) + np.zeros(size)
-left = x + np.zeros(size) > -3
 lobes = {"lung_upper_lobe_left": left & (height >= 0.5), "lung_lower_lobe_left": left & (height < 0.5),
-         "lung_upper_lobe_right": ~left & (height >= 0.6), "lung_middle_lobe_right": ~left & (height < 0.6) & (height >= 0.4),
-         "lung_lower_lobe_right": ~left & (height < 0.4)}
+         "lung_upper_lobe_right": right & (height >= 0.6), "lung_middle_lobe_right": right & (height < 0.6) & (height >= 0.4),
+         "lung_lower_lobe_right": right & (height < 0.4)}
 
 # Write the images with NIfTI's axes (RAS), like every program that reads them expects.
 affine = np.diag([-STEP, -STEP, STEP, 1])
 affine[:3, 3] = [-low[0], -low[1], low[2]]
 os.makedirs("segmentation", exist_ok=True)
 for name, where in lobes.items():
-    nibabel.save(nibabel.Nifti1Image((inside & where).astype(np.uint8), affine), f"segmentation/{name}.nii.gz")
+    nibabel.save(nibabel.Nifti1Image(where.astype(np.uint8), affine), f"segmentation/{name}.nii.gz")
 density = np.where(inside, -870 + 0.3 * (y - y.mean()), 40)  # denser towards the back
 nibabel.save(nibabel.Nifti1Image(density.astype(np.int16), affine), "ct.nii.gz")
 print(f"ct.nii.gz and 5 masks, {size[0]} x {size[1]} x {size[2]} voxels, {inside.sum() * STEP ** 3 / 1000:.0f} mL of lung")

@@ -46,7 +46,7 @@ static void rescale(const double *sizes, supine_clusters *clusters) {
   }
 }
 
-static supine_status choose(const supine_clustered *surface, supine_field_storage storage,
+static supine_status choose(const supine_clustered *surface, supine_warp_storage storage,
                             double error_mm, supine_clusters *clusters, supine_error *error) {
   const supine_cluster_limits limits = {.rms = fmin(largest_mm, beside_fit * error_mm),
                                         .seam = largest_seam};
@@ -60,7 +60,7 @@ static supine_status choose(const supine_clustered *surface, supine_field_storag
 }
 
 supine_status supine_fields_cluster(const supine_fit *fit, const supine_compression *compression,
-                                    supine_field_storage storage, supine_clusters *clusters,
+                                    supine_warp_storage storage, supine_clusters *clusters,
                                     supine_error *error) {
   const supine_lungs *lungs = fit->lungs;
   const size_t n = lungs->mesh.vertex_count;

@@ -7,11 +7,11 @@
 #include "precompute/fields/fields.h"
 
 /** How a basis stores the displacements of its vertices. */
-typedef enum supine_field_storage {
+typedef enum supine_warp_storage {
   SUPINE_FIELD_STORAGE_BEST,    /**< clusters if their error is small beside that of the modes */
   SUPINE_FIELD_STORAGE_MODES,   /**< a vector for each mode and vertex */
   SUPINE_FIELD_STORAGE_CLUSTERS /**< clusters, whatever their error */
-} supine_field_storage;
+} supine_warp_storage;
 
 /** Find clusters for the modes of a fit. Those of BEST raise the error of the fit by half at most,
  * to 0.2 mm at most, and their seams are at most 1 % of an edge.
@@ -19,7 +19,7 @@ typedef enum supine_field_storage {
  * @param clusters     written: `count` is 0 if the basis stores modes; release it with
  *   supine_clusters_free, also after an error */
 supine_status supine_fields_cluster(const supine_fit *fit, const supine_compression *compression,
-                                    supine_field_storage storage, supine_clusters *clusters,
+                                    supine_warp_storage storage, supine_clusters *clusters,
                                     supine_error *error);
 
 #endif

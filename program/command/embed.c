@@ -172,17 +172,23 @@ const supine_command supine_command_embed = {
     "make points, meshes or a grid move with the lungs",
     .usage = "BASIS CONTENT... -o FILE\n"
              "BASIS --grid MM -o FILE",
-    .about = "Makes a basis of structures that move with the lungs of BASIS: points (.mrk.json of "
-             "3D Slicer, or CSV with the columns x, y, z and name), meshes (airways, vessels, "
-             "nodules), the parts of a label map, or the nodes of a grid, which may be that of an "
-             "image (.nrrd, .nii, .nii.gz). 'supine deform', 'breathe', 'compare', 'info' and "
-             "'stream' read the file like any basis; 'render' and 'export' show it with --inside.\n"
-             "\n"
-             "Displacements inside are interpolated from the displacements of each lung's surface "
-             "by biharmonic splines, which are exact on the surface and for affine motion.",
+    .about =
+        "Makes nodules, airways and images move with the lungs of BASIS: points (.mrk.json of "
+        "3D Slicer, or CSV with the columns x, y, z and name), meshes (airways, vessels, "
+        "nodules), the parts of a label map, or the nodes of a grid, which may be that of an "
+        "image (.nrrd, .nii, .nii.gz). The file is a basis: 'supine deform', 'breathe', "
+        "'compare', 'info' and 'stream' read it; 'render' and 'export' show it with --inside.\n"
+        "\n"
+        "Displacements inside are interpolated from the displacements of each lung's surface "
+        "by biharmonic splines, which are exact on the surface and for affine motion.",
     .options = table,
-    .notes = "Examples:\n"
+    .notes = "A file nodules.csv, in mm:\n"
+             "  name,x,y,z\n"
+             "  nodule,-80,-120,-90\n"
+             "\n"
+             "Examples:\n"
              "  supine embed lungs.safetensors nodules.csv airways.ply -o inside.safetensors\n"
+             "  supine export lungs.safetensors --inside inside.safetensors -o lungs.html\n"
              "  supine deform inside.safetensors --posture prone -o prone.csv\n"
              "  supine embed lungs.safetensors labels.nii.gz --labels 7=nodule --rigid nodule -o "
              "inside.safetensors\n"

@@ -145,17 +145,20 @@ const supine_command supine_command_export = {
     name,
     "write a basis as a page or as glTF morph targets",
     .usage = "BASIS -o lungs.html [OPTIONS]\nBASIS -o lungs.glb [OPTIONS]",
-    .about = "Writes a basis file as a page for the browser or as a glTF model; the ending of the "
-             "output's name selects the format.",
+    .about =
+        "Writes a page that shows, in any browser, how the lungs deform as the patient turns and "
+        "breathes and, with --inside, where each target goes and how sure that is; or a glTF "
+        "model for engines. The ending of the output's name selects the format.",
     .options = table,
     .notes = "In a .glb file, each lung is a mesh with its own weights; the file's extras say how "
              "to compute them from gravity and volume.\n"
              "\n"
              "Examples:\n"
              "  supine export lungs.safetensors -o lungs.html\n"
+             "  supine embed lungs.safetensors nodules.csv -o inside.safetensors\n"
+             "  supine export lungs.safetensors --inside inside.safetensors -o lungs.html\n"
              "  supine export lungs.safetensors -o lungs.html --from scan\n"
              "  supine export lungs.safetensors -o lungs.glb --animate\n"
-             "  supine export lungs.safetensors --inside nodules.safetensors -o lungs.html\n"
              "  supine export lungs.safetensors -o lungs.glb --plain --breath 1000",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),

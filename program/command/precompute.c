@@ -286,8 +286,9 @@ const supine_command supine_command_precompute = {
              "LABELS... -o FILE [OPTIONS]\n"
              "--directions N [--volumes N]",
     .about = "Solves the physics of one or two lungs for all directions of gravity, and writes a "
-             "basis file. From this file, 'supine deform' and the run-time library compute "
-             "deformed lungs in real time. MESH is any surface that assimp reads (PLY, OBJ, STL, "
+             "basis file. From this file, 'supine export' makes a page, and 'supine deform' and "
+             "the run-time library compute deformed lungs in real time. MESH is any surface that "
+             "assimp reads (PLY, OBJ, STL, "
              "OFF, ...), with both lungs in one file or a file for each; LABELS is the label map "
              "of a segmentation (NRRD, NIfTI, MetaImage). Surfaces must be closed.",
     .options = table,

@@ -16,6 +16,14 @@ static supine_status read_size(const char *text, void *field, supine_error *erro
                              size[0] > 0 && size[1] > 0 && size[0] <= 16384 && size[1] <= 16384);
 }
 
+static supine_status read_look(const char *text, void *field, supine_error *error) {
+  supine_look *look = field;
+  const bool shell = strcmp(text, "shell") == 0;
+  (void)error;
+  *look = shell ? SUPINE_LOOK_SHELL : SUPINE_LOOK_MAP;
+  return supine_options_fits(shell || strcmp(text, "displacement") == 0);
+}
+
 static supine_status read_views(const char *text, void *field, supine_error *error) {
   supine_pictures *wanted = field;
   const char *names[SUPINE_VIEW_COUNT + 1] = {[SUPINE_VIEW_COUNT] = "lateral"};
@@ -45,70 +53,75 @@ static supine_status read_views(const char *text, void *field, supine_error *err
 #define FILLS(member) SUPINE_FILLS(supine_pictures, member)
 
 static const supine_option table[] = {
-    {"posture", 0, "LIST", "comma-separated postures, up to 8", FILLS(postures),
-     .rivals = "gravity"},
+    {"posture", 0, "LIST",
+     "comma-separated postures: up to 8 side by side or, in a .webp, up to 32 that a film turns "
+     "through, with a stop at each",
+     FILLS(postures), .rivals = "gravity"},
     {"turn", 0, "FROM:TO:SECONDS",
-     "draw an animation instead: gravity turns from one posture to another at constant speed, "
-     "pauses for a second, and starts again. For example, supine:left:5s turns for 5 s",
-     FILLS(turn), .read = supine_options_turn_read, .wants = "FROM:TO:SECONDS",
+     "draw a film of one turn at constant speed, such as supine:left:5s", FILLS(turn),
+     .read = supine_options_turn_read, .wants = "FROM:TO:SECONDS",
      SUPINE_SAYS_GIVEN(supine_pictures, turns), .rivals = "gravity"},
     {.table = supine_options_volume, FILLS(volume)},
-    {"output", 'o', "FILE", ".png for --posture; .webp for --turn, an animation that browsers play",
-     FILLS(output), .required = true, .file = SUPINE_FILE_OUT, .endings = ".png or .webp"},
+    {"output", 'o', "FILE",
+     ".png, .pdf or .svg for postures side by side; .webp for a film, which browsers play",
+     FILLS(output), .required = true, .file = SUPINE_FILE_OUT,
+     .endings = ".png, .pdf, .svg or .webp"},
     {"size", 0, "WxH",
      "size of the whole picture, in pixels; default 440 x 480 for each posture and view, plus "
      "margins",
      FILLS(size), .read = read_size, .wants = "WIDTHxHEIGHT, up to 16384 each"},
     {"view", 0, "LIST",
      "views to draw, one below another, separated by commas: anterior, posterior, left (or "
-     "lateral), right, head, feet, lying (gravity down, head left). With --turn, lying is anterior",
+     "lateral), right, head, feet, lying (gravity down, head left)",
      .read = read_views, .standard = "lying"},
     {.table = supine_options_from, FILLS(from)},
-    {"largest", 0, "MM",
-     "end of the colour bar. If values exceed it, the bar has a pointed end. Default the largest "
-     "displacement, rounded up",
-     FILLS(largest), SUPINE_ABOVE_ZERO, .wants = "millimetres above 0", .more = true},
     {"inside", 0, "FILE",
-     "structures made by 'supine embed' from the same basis, shown inside transparent lungs with "
-     "their names and displacements",
+     "structures made by 'supine embed' from the same basis: targets, such as nodules, with their "
+     "names and displacements, and airways or lobes (longer than 70 mm) around them",
      FILLS(inside), .file = SUPINE_FILE_IN},
-    {"opacity", 0, "SHARE",
-     "opacity of the lungs, 0.05 to 1 (opaque); default 1, or 0.35 with --inside", FILLS(opacity),
-     .range = {0.05, 1.0}, .wants = "a share from 0.05 to 1", .more = true},
+    {"look", 0, "LOOK",
+     "shell: translucent lungs, so that what is inside is seen; displacement: opaque lungs in the "
+     "colours of the displacement, with a colour bar",
+     FILLS(look), .read = read_look, .wants = "shell or displacement", .standard = "shell"},
+    {"largest", 0, "MM",
+     "with --look displacement, the end of the colour bar. If values exceed it, the bar has a "
+     "pointed end. Default the largest displacement, rounded up",
+     FILLS(largest), SUPINE_ABOVE_ZERO, .wants = "millimetres above 0", .more = true},
     {.name = NULL}};
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   supine_pictures *wanted = chosen;
+  const bool film = supine_text_ends_in(wanted->output, ".webp");
   SUPINE_REFUSE_IF(!wanted->turns && wanted->postures == NULL, error, SUPINE_ERROR_ARGUMENT,
                    "the posture is missing: give --posture or --turn");
+  SUPINE_REFUSE_IF(wanted->turns && !film, error, SUPINE_ERROR_ARGUMENT,
+                   "--turn draws a film: give -o a name that ends in .webp");
   SUPINE_REFUSE_IF(
-      wanted->turns != supine_text_ends_in(wanted->output, ".webp"), error, SUPINE_ERROR_ARGUMENT,
-      wanted->turns ? "--turn writes an animation: give -o a name that ends in .webp"
-                    : "--posture writes a still picture: give -o a name that ends in .png");
-  if (wanted->turns && wanted->view[0] == SUPINE_VIEW_LYING) {
-    wanted->view[0] = SUPINE_VIEW_ANTERIOR; /* the camera of a film stays where it is */
-  }
+      wanted->largest > 0.0 && wanted->look == SUPINE_LOOK_SHELL, error, SUPINE_ERROR_ARGUMENT,
+      "--largest sets the colour bar, which a shell has not: give --look displacement");
   return supine_command_pictures_draw(wanted, given->operand[0], error);
 }
 
 const supine_command supine_command_render = {
     "render",
-    "draw the lungs: postures side by side, or an animated turn",
-    .usage = "BASIS --posture STATE[,STATE...] -o lung.png [OPTIONS]\n"
+    "draw the lungs and their targets: postures side by side, or a film of a turn",
+    .usage = "BASIS --posture STATE[,STATE...] -o lungs.png [OPTIONS]\n"
+             "BASIS --posture STATE,STATE[,STATE...] -o lungs.webp [OPTIONS]\n"
              "BASIS --turn FROM:TO:SECONDS -o turn.webp [OPTIONS]",
-    .about = "Draws the lungs in each posture, side by side; no display is needed. Colours show "
-             "the displacement, with contour lines at the ticks of the colour bar. A ball shows "
-             "the body's axes (left, right, anterior, posterior, head, feet) and gravity: an "
-             "arrow, a dot if it points towards you, or a cross if it points away from you.",
+    .about = "Draws the lungs in each posture as a translucent shell, with what is inside: where "
+             "each target is (orange), where it was (a white ghost), and an arrow between. No "
+             "display is needed. A ball shows the body's axes (left, right, anterior, posterior, "
+             "head, feet) and gravity: an arrow, a dot if it points towards you, or a cross if it "
+             "points away from you.",
     .options = table,
     .notes = SUPINE_POSTURE_LIST_HELP
     "\n\nExamples:\n"
     "  supine render lungs.safetensors --posture supine,prone,left,right -o postures.png\n"
-    "  supine render lungs.safetensors --turn supine:left:5s -o turn.webp\n"
-    "  supine render lungs.safetensors --inside nodules.safetensors --posture supine,prone \\\n"
-    "      -o inside.png\n"
-    "  supine render lungs.safetensors --posture prone --from supine:rest \\\n"
-    "      --view anterior,lateral,posterior -o prone.png",
+    "  supine render lungs.safetensors --inside nodules.safetensors --posture supine,left \\\n"
+    "      -o nodules.png\n"
+    "  supine render lungs.safetensors --posture supine,left,prone,left,supine -o film.webp\n"
+    "  supine render lungs.safetensors --posture prone --from supine:rest --look displacement \\\n"
+    "      --view anterior,lateral,posterior -o prone.pdf",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(supine_pictures),
     .run = run};

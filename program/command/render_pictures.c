@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Draw the lungs in several postures as a picture, or during a turn as an animation. */
+/* Draw the lungs in several postures as a picture, or while they turn as a film. */
 #include <math.h>
 #include <string.h>
 
@@ -8,6 +8,7 @@
 #include "base/arena.h"
 #include "base/number.h"
 #include "base/output.h"
+#include "base/text.h"
 #include "base/vec3.h"
 
 #include "program/command/render_pictures.h"
@@ -15,9 +16,17 @@
 #include "program/options/inside.h"
 
 static const char name[] = "render";
-static const double inside_opacity = 0.35; /* default opacity of the lungs with --inside */
+static const double turn_seconds = 1.2; /* duration of a turn between two postures of a list, s */
 
-enum { FPS = 15, FRAMES_MAX = 10000, LAST_FRAME_MS = 1000 };
+enum { FPS = 15, FRAMES_MAX = 10000, STOP_MS = 1000 };
+
+/* A film: turns from one posture to the next, with a stop after each. */
+typedef struct film {
+  size_t turn_count;
+  breath_turn turn[SUPINE_POSTURE_LIST_MAX];
+  const char *title[SUPINE_POSTURE_LIST_MAX + 1]; /* of each posture; NULL: print the angle */
+  supine_state state;                             /* its volume is that of all frames */
+} film;
 
 /* A state of the lungs that a panel of the picture shows. */
 typedef struct drawn {
@@ -31,6 +40,7 @@ typedef struct drawn {
 /* The panels of a picture or of one frame of an animation, and the objects that draw them. */
 typedef struct studio {
   const supine_pictures *wanted;
+  supine_view view[SUPINE_VIEWS_MAX];
   supine_basis *basis;
   supine_options_reference_pose from;
   supine_compare *compare;
@@ -107,9 +117,12 @@ static supine_status mark_panel(studio *s, size_t i, supine_error *error) {
                                          error));
     const supine_target *t = &shown->marks.first;
     char way[96];
+    char target[40];
     const bool still = t->moved < 0.05;
-    (void)snprintf(shown->subtitle, sizeof shown->subtitle, "%s: %s", t->name,
-                   still ? "where arrows begin" : supine_options_target_way(t, 2, way));
+    (void)supine_print_text(
+        shown->subtitle, sizeof shown->subtitle, still ? "the reference" : "%s: %s",
+        supine_text_shorten(t->name, sizeof target, target), supine_options_target_way(t, 2, way));
+    s->panel[i].about_target = !still;
     sigma = still ? NAN : t->expected;
   }
   if (!isnan(sigma)) {
@@ -121,21 +134,17 @@ static supine_status mark_panel(studio *s, size_t i, supine_error *error) {
 static supine_picture make_picture(studio *s) {
   const supine_pictures *wanted = s->wanted;
   const size_t count = s->postures.count;
-  double opacity = wanted->inside != NULL ? inside_opacity : 1.0;
-  if (wanted->opacity > 0.0) {
-    opacity = wanted->opacity;
-  }
   const double largest = wanted->largest > 0.0 ? wanted->largest : supine_render_bar_end(s->max);
   (void)snprintf(s->label, sizeof s->label, "displacement from %s, mm", s->from.name);
   return (supine_picture){.panel = s->panel,
                           .panel_count = count,
-                          .view = wanted->view,
+                          .view = s->view,
                           .view_count = wanted->view_count,
                           .bar_label = s->label,
                           .colours = SUPINE_COLOURS_DISPLACEMENT,
                           .largest = largest,
                           .beyond = s->max > largest,
-                          .transparency = 1.0 - opacity,
+                          .look = wanted->look,
                           .width = wanted->size[0] != 0 ? wanted->size[0] : 20 + 440 * count,
                           .height = wanted->size[1] != 0 ? wanted->size[1]
                                                          : 120 + 480 * wanted->view_count};
@@ -152,60 +161,104 @@ static supine_status draw_postures(studio *s, supine_error *error) {
   return SUPINE_OK;
 }
 
-/* Compute frame `frame` of the `count` frames of an animation, and fill its only panel. */
-static supine_status find_frame(studio *s, size_t frame, size_t count, supine_error *error) {
-  const breath_turn *turn = &s->wanted->turn;
-  supine_posture_item *item = &s->postures.item[0];
-  item->state = s->wanted->volume.state;
+/* Return the number of frames of a turn, with those in its first and its last posture. */
+static double frames_of(const breath_turn *turn) {
+  return fmax(2.0, floor(turn->seconds * FPS * (1.0 + 1e-12)) + 1.0);
+}
+
+/* A frame of a film: frame `at` of the `count` frames of a turn. */
+typedef struct moment {
+  size_t turn;
+  size_t at, count;
+} moment;
+
+/* Advance to the next frame; begin with a zeroed moment. Return false after the last. The first
+ * frame of a turn is the last of the turn before, and is not repeated. */
+static bool next_moment(const film *shot, moment *m) {
+  if (m->count == 0) {
+    m->count = (size_t)frames_of(&shot->turn[0]);
+    return true;
+  }
+  if (++m->at == m->count) {
+    ++m->turn;
+    m->at = 1;
+    m->count = m->turn < shot->turn_count ? (size_t)frames_of(&shot->turn[m->turn]) : 0;
+  }
+  return m->turn < shot->turn_count;
+}
+
+static void find_gravity(const film *shot, const moment *m, double gravity[3]) {
+  const breath_turn *turn = &shot->turn[m->turn];
+  supine_options_turn_gravity(turn, (double)m->at / (double)(m->count - 1) * turn->seconds, gravity);
+}
+
+/* Write what the panel of a film is called: the posture, or the angle of the turn. */
+static void find_title(const film *shot, const moment *m, char *title, size_t size) {
+  const breath_turn *turn = &shot->turn[m->turn];
   const double cosine = fmax(-1.0, fmin(1.0, supine_dot(turn->from, turn->to)));
   const double angle = acos(cosine) * 180.0 / 3.14159265358979323846;
-  const double share = (double)frame / (double)(count - 1);
-  supine_options_turn_gravity(turn, share * turn->seconds, item->state.gravity);
-  (void)supine_print_text(item->name, sizeof item->name, "turned by %.0f of %.0f degrees",
-                          share * angle, angle);
+  const double share = (double)m->at / (double)(m->count - 1);
+  if (shot->title[0] == NULL) {
+    (void)supine_print_text(title, size, "turned by %.0f of %.0f degrees", share * angle, angle);
+  } else if (m->at == 0 || m->at + 1 == m->count) {
+    (void)supine_print_text(title, size, "%s", shot->title[m->turn + (m->at > 0)]);
+  } else {
+    (void)supine_print_text(title, size, "to %s", shot->title[m->turn + 1]);
+  }
+}
+
+/* Compute a frame of a film, and fill its only panel. */
+static supine_status find_frame(studio *s, const film *shot, const moment *m, supine_error *error) {
+  supine_posture_item *item = &s->postures.item[0];
+  item->state = shot->state;
+  find_gravity(shot, m, item->state.gravity);
+  find_title(shot, m, item->name, sizeof item->name);
   return fill_panel(s, 0, error);
 }
 
-/* Append all frames of a body's turn to an animation.
- * @param extent  for each view, the limits of x and y of the lungs over the whole turn, mm */
-static supine_status add_frames(studio *s, size_t count, const double (*extent)[4],
-                                supine_animation *animation, supine_error *error) {
+/* Append all frames of a film to an animation.
+ * @param extent  for each view, the limits of x and y of the lungs over the whole film, mm */
+static supine_status add_frames(studio *s, const film *shot, size_t count,
+                                const double (*extent)[4], supine_animation *animation,
+                                supine_error *error) {
   SUPINE_FREED_BY(supine_options_progress_end)
   supine_progress progress = supine_options_progress_begin(name);
-  for (size_t frame = 0; frame < count; ++frame) {
-    SUPINE_TRY(find_frame(s, frame, count, error));
+  size_t done = 0;
+  for (moment m = {0}; next_moment(shot, &m);) {
+    SUPINE_TRY(find_frame(s, shot, &m, error));
     SUPINE_TRY(mark_panel(s, 0, error));
     supine_picture picture = make_picture(s);
     picture.extent = extent;
     SUPINE_TRY(supine_render_animation_add(animation, s->basis, &picture,
-                                           frame + 1 < count ? 1000 / FPS : LAST_FRAME_MS, error));
-    const bool goes_on =
-        supine_options_progress_step(&progress, (double)(frame + 1) / (double)count);
+                                           m.at + 1 < m.count ? 1000 / FPS : STOP_MS, error));
+    ++done;
+    const bool goes_on = supine_options_progress_step(&progress, (double)done / (double)count);
     SUPINE_REFUSE_IF(!goes_on, error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
   }
   return SUPINE_OK;
 }
 
-/* Draw an animation of the body's turn from one posture to another. A first pass over the frames
- * finds the largest displacement and the extents of the lungs, so that the colour bar and the scale
- * are the same in all frames. */
-static supine_status draw_turn(studio *s, supine_error *error) {
+/* Draw a film. A first pass over the frames finds the largest displacement and the extents of the
+ * lungs, so that the colour bar and the scale are the same in all frames. */
+static supine_status draw_film(studio *s, const film *shot, supine_error *error) {
   static const double none[4] = SUPINE_EXTENT_NONE;
   const char *path = s->wanted->output;
-  const double seconds = s->wanted->turn.seconds;
-  const double frames = fmax(2.0, floor(seconds * FPS * (1.0 + 1e-12)) + 1.0);
   double extent[SUPINE_VIEWS_MAX][4];
+  size_t count = 0;
   SUPINE_FREED_BY(supine_render_animation_close) supine_animation *animation = NULL;
   SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
-  SUPINE_REFUSE_IF(!(frames <= FRAMES_MAX), error, SUPINE_ERROR_ARGUMENT,
-                   "a turn of %g s has more than %d frames: give a shorter turn", seconds,
-                   FRAMES_MAX);
-  const size_t count = (size_t)frames;
   for (size_t view = 0; view < SUPINE_VIEWS_MAX; ++view) {
     memcpy(extent[view], none, sizeof none);
   }
-  for (size_t frame = 0; frame < count; ++frame) {
-    SUPINE_TRY(find_frame(s, frame, count, error));
+  for (moment m = {0}; next_moment(shot, &m); ++count) {
+    double gravity[3];
+    find_gravity(shot, &m, gravity);
+    if (s->view[0] == SUPINE_VIEW_LYING && fabs(gravity[2]) > SUPINE_VIEW_LYING_TILT) {
+      s->view[0] = SUPINE_VIEW_ANTERIOR; /* the camera of a patient who gets up stays where it is */
+    }
+  }
+  for (moment m = {0}; next_moment(shot, &m);) {
+    SUPINE_TRY(find_frame(s, shot, &m, error));
     const supine_picture picture = make_picture(s);
     supine_render_picture_extent(s->basis, &picture, extent);
   }
@@ -213,7 +266,7 @@ static supine_status draw_turn(studio *s, supine_error *error) {
   SUPINE_TRY(supine_output_open(path, &output, error));
   SUPINE_TRY(supine_render_animation_open(picture.width, picture.height, &animation, error));
   supine_options_signals_catch(true);
-  SUPINE_TRY(add_frames(s, count, (const double(*)[4])extent, animation, error));
+  SUPINE_TRY(add_frames(s, shot, count, (const double(*)[4])extent, animation, error));
   const supine_status status = supine_render_animation_write(animation, output.file, error);
   if (ferror(output.file) == 0) {
     SUPINE_TRY(status);
@@ -223,15 +276,67 @@ static supine_status draw_turn(studio *s, supine_error *error) {
   return SUPINE_OK;
 }
 
+static bool same_volume(const supine_state *a, const supine_state *b) {
+  bool same = a->lung_count == b->lung_count && a->volume.kind == b->volume.kind &&
+              a->volume.ml == b->volume.ml;
+  for (size_t i = 0; i < a->lung_count && same; ++i) {
+    same = strcmp(a->lungs[i].name, b->lungs[i].name) == 0 &&
+           a->lungs[i].volume.kind == b->lungs[i].volume.kind &&
+           a->lungs[i].volume.ml == b->lungs[i].volume.ml;
+  }
+  return same;
+}
+
+/* Make a film that turns from each posture of a list to the next. */
+static supine_status film_of(const supine_posture_list *stops, film *shot, supine_error *error) {
+  SUPINE_REFUSE_IF(stops->count < 2, error, SUPINE_ERROR_ARGUMENT,
+                   "a film needs two postures or more: name where to turn, or give -o a name that "
+                   "ends in .png");
+  shot->state = stops->item[0].state;
+  shot->turn_count = stops->count - 1;
+  for (size_t i = 0; i < stops->count; ++i) {
+    shot->title[i] = supine_options_posture_label(stops->item[i].name);
+    SUPINE_REFUSE_IF(!same_volume(&stops->item[i].state, &shot->state), error,
+                     SUPINE_ERROR_ARGUMENT,
+                     "a film turns at one volume: give it once, with --volume");
+    if (i > 0) {
+      breath_turn *turn = &shot->turn[i - 1];
+      memcpy(turn->from, stops->item[i - 1].state.gravity, sizeof turn->from);
+      memcpy(turn->to, stops->item[i].state.gravity, sizeof turn->to);
+      turn->seconds = turn_seconds;
+    }
+  }
+  return SUPINE_OK;
+}
+
+/* Draw a film of --turn, or of the postures of a list. */
+static supine_status film_draw(studio *s, const char *path, supine_error *error) {
+  const supine_pictures *wanted = s->wanted;
+  supine_posture_list stops = {.count = 0};
+  film shot = {.turn_count = 1, .turn = {wanted->turn}, .state = wanted->volume.state};
+  if (wanted->postures != NULL) {
+    SUPINE_TRY(
+        supine_options_posture_list_parse(wanted->postures, &wanted->volume.state, &stops, error));
+    SUPINE_TRY(film_of(&stops, &shot, error));
+  }
+  SUPINE_REFUSE_IF(!(frames_of(&shot.turn[0]) <= FRAMES_MAX), error, SUPINE_ERROR_ARGUMENT,
+                   "a turn of %g s has more than %d frames: give a shorter turn",
+                   shot.turn[0].seconds, FRAMES_MAX);
+  SUPINE_TRY(open_studio(s, path, error));
+  return draw_film(s, &shot, error);
+}
+
 supine_status supine_command_pictures_draw(const supine_pictures *wanted, const char *path,
                                            supine_error *error) {
   SUPINE_FREED_BY(close_studio) studio s = {.wanted = wanted, .postures.count = 1};
-  if (!wanted->turns) {
-    SUPINE_TRY(supine_options_posture_list_parse(wanted->postures, &wanted->volume.state,
-                                                 &s.postures, error));
+  memcpy(s.view, wanted->view, sizeof s.view);
+  if (supine_text_ends_in(wanted->output, ".webp")) {
+    return film_draw(&s, path, error);
   }
+  SUPINE_TRY(supine_options_posture_list_parse(wanted->postures, &wanted->volume.state, &s.postures,
+                                               error));
   SUPINE_REFUSE_IF(s.postures.count > SUPINE_PANELS_MAX, error, SUPINE_ERROR_ARGUMENT,
                    "a picture holds at most %d postures: name fewer", SUPINE_PANELS_MAX);
   SUPINE_TRY(open_studio(&s, path, error));
-  return wanted->turns ? draw_turn(&s, error) : draw_postures(&s, error);
+  return draw_postures(&s, error);
 }

@@ -8,16 +8,16 @@
 #include "program/view/render/render.h"
 
 typedef struct supine_pictures {
-  const char *output;   /* .png for postures, .webp for a turn */
-  const char *postures; /* list of states, side by side; NULL for a turn */
+  const char *output;   /* .png, .pdf or .svg for pictures side by side, .webp for a film */
+  const char *postures; /* list of states, side by side or one after another; NULL for a turn */
   bool turns;
   breath_turn turn;
   supine_volume_options volume;
   supine_from from;   /* state from which displacements are measured */
   const char *inside; /* file of structures inside the lungs; NULL if not given */
   double largest;     /* value at the end of the colour bar, mm; 0 if automatic */
-  double opacity;     /* opacity of the lungs, 0 to 1; 0 if not given */
-  size_t size[2];     /* width and height of the picture, pixels; 0 if automatic */
+  supine_look look;
+  size_t size[2]; /* width and height of the picture, pixels; 0 if automatic */
   supine_view view[SUPINE_VIEWS_MAX];
   size_t view_count;
 } supine_pictures;

@@ -90,6 +90,10 @@ supine_status supine_options_inside_open(const supine_basis *lungs, const char *
   return SUPINE_OK;
 }
 
+/* Length of a structure above which it is anatomy and not a target, mm: tumours above 70 mm are of
+ * the largest class, T4 (TNM, 8th edition), while lobes and airways are longer. */
+static const double anatomy_size = 70.0;
+
 /* Average the vertices order[begin] to order[end - 1] to a target; [N, 3] positions before and
  * after.
  */
@@ -98,8 +102,11 @@ static supine_target average(const supine_options_names *names, size_t begin, si
   const double count = (double)(end - begin);
   supine_target target = {.name = names->text[names->part[names->order[begin]]]};
   double square = 0;
+  double low[3] = {INFINITY, INFINITY, INFINITY};
+  double high[3] = {-INFINITY, -INFINITY, -INFINITY};
   for (size_t i = begin; i < end; ++i) {
     const size_t vertex = names->order[i];
+    supine_render_box(before + 3 * vertex, 1, low, high);
     for (size_t k = 0; k < 3; ++k) {
       const double x = (double)after[3 * vertex + k];
       target.at[k] += x / count;
@@ -109,6 +116,7 @@ static supine_target average(const supine_options_names *names, size_t begin, si
   }
   target.moved = supine_length(target.move);
   target.expected = sqrt(square);
+  target.anatomy = fmax(high[0] - low[0], fmax(high[1] - low[1], high[2] - low[2])) > anatomy_size;
   return target;
 }
 
@@ -210,6 +218,52 @@ json_t *supine_options_target_json(const supine_target *t) {
                    t->volume[0] != 0 ? supine_options_json_numbers(2, t->volume) : NULL);
 }
 
+size_t supine_options_targets_first(const supine_target *targets, size_t count) {
+  size_t first = 0;
+  for (size_t i = 1; i < count; ++i) {
+    const supine_target *a = &targets[first];
+    const supine_target *b = &targets[i];
+    const bool known = a->expected > 0.0 && b->expected > 0.0;
+    const bool farther = known ? b->moved * a->expected > a->moved * b->expected
+                               : b->moved > a->moved; /* expected errors may be unknown */
+    if (a->anatomy != b->anatomy ? a->anatomy : farther) {
+      first = i;
+    }
+  }
+  return first;
+}
+
+/* Make the marks of a structure: of its vertices, and of its middle, which has the label. */
+static void fill_marks(const supine_options_names *names, size_t part, const supine_target *t,
+                       const float *after, const float *before, supine_options_marks *marks) {
+  static const float point_radius = 7.0F; /* radius of the ball of a single point, mm */
+  static const float cloud_radius = 1.5F; /* of each of several points of one name, mm */
+  static const double least = 0.05;       /* smallest displacement that is shown, mm */
+  const size_t count = names->begin[part + 1] - names->begin[part];
+  for (size_t i = names->begin[part]; i < names->begin[part + 1]; ++i) {
+    const size_t vertex = names->order[i];
+    supine_mark *mark = &marks->mark[vertex];
+    memcpy(mark->xyz, after + 3 * vertex, sizeof mark->xyz);
+    memcpy(mark->from, before + 3 * vertex, sizeof mark->from);
+    mark->radius = count == 1 ? point_radius : cloud_radius;
+    mark->anatomy = t->anatomy;
+    mark->moved = t->moved >= least;
+  }
+  if (count == 0 || t->anatomy) {
+    return;
+  }
+  supine_mark *middle = &marks->mark[marks->marks.count++];
+  for (size_t k = 0; k < 3; ++k) {
+    middle->xyz[k] = (float)t->at[k];
+    middle->from[k] = (float)(t->at[k] - t->move[k]);
+  }
+  char label[32];
+  (void)supine_print_text(marks->label[part], sizeof marks->label[part],
+                          t->moved <= t->expected ? "%s" : "%s %.1f mm",
+                          supine_text_shorten(t->name, sizeof label, label), t->moved);
+  middle->label = marks->label[part];
+}
+
 supine_status supine_options_marks_make(const supine_basis *inside,
                                         const supine_options_names *names,
                                         const supine_pose *const pose[2], const float *sigma,
@@ -219,6 +273,7 @@ supine_status supine_options_marks_make(const supine_basis *inside,
   SUPINE_ARENA arena = {0};
   SUPINE_FREED_BY(supine_options_targets_free) supine_target *targets = NULL;
   float *xyz = supine_arena_take(&arena, 3 * n, sizeof *xyz);
+  float *before = supine_arena_take(&arena, 3 * n, sizeof *before);
   supine_options_marks_free(marks);
   marks->mark = supine_arena_zeros(&marks->arena, n + names->count, sizeof *marks->mark);
   marks->label = supine_arena_zeros(&marks->arena, names->count, sizeof *marks->label);
@@ -228,26 +283,14 @@ supine_status supine_options_marks_make(const supine_basis *inside,
   SUPINE_TRY(supine_options_targets_find(inside, names, pose, sigma, false, &targets, error));
   (void)supine_deform(inside, pose[1], xyz);
   marks->marks = (supine_marks){n, marks->mark, info->triangle_count, info->triangles};
-  marks->first = targets[0];
-  for (size_t i = 0; i < n; ++i) {
-    memcpy(marks->mark[i].xyz, xyz + 3 * i, sizeof marks->mark[i].xyz);
-  }
+  (void)supine_deform(inside, pose[0], before);
   for (size_t part = 0; part < names->count; ++part) {
-    const supine_target *t = &targets[part];
-    const size_t count = names->begin[part + 1] - names->begin[part];
-    supine_mark *middle = &marks->mark[marks->marks.count];
-    for (size_t k = 0; k < 3; ++k) {
-      middle->xyz[k] = (float)t->at[k];
-      middle->from[k] = (float)(t->at[k] - t->move[k]);
-    }
-    const int length = (int)supine_text_fit(t->name, 30);
-    (void)supine_print_text(marks->label[part], sizeof marks->label[part],
-                            t->moved <= t->expected ? "%.*s" : "%.*s %.1f mm", length, t->name,
-                            t->moved);
-    middle->label = marks->label[part];
-    middle->point = count == 1;
-    marks->marks.count += count > 0;
+    fill_marks(names, part, &targets[part], xyz, before, marks);
   }
+  for (size_t i = 0; i < 3 * info->triangle_count; ++i) {
+    marks->mark[info->triangles[i]].radius = 0.0F; /* corners of meshes are not drawn as balls */
+  }
+  marks->first = targets[supine_options_targets_first(targets, names->count)];
   return SUPINE_OK;
 }
 

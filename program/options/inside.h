@@ -41,6 +41,7 @@ typedef struct supine_target {
   double move[3];   /* displacement of the mean position, mm */
   double moved;     /* length of `move`, mm */
   double volume[2]; /* volume before and after, mL; NAN if it is no closed mesh; 0 without meshes */
+  bool anatomy;     /* whether it is larger than targets are: airways, or a lobe */
   double expected;  /* RMS of the vertices' expected errors, mm; NAN if unknown */
 } supine_target;
 
@@ -52,6 +53,10 @@ supine_status supine_options_targets_find(const supine_basis *inside,
                                           const supine_options_names *names,
                                           const supine_pose *const pose[2], const float *sigma,
                                           bool each, supine_target **targets, supine_error *error);
+
+/* Return the index of the target to tell of first: that with the largest displacement, in multiples
+ * of its expected error. Targets come before anatomy. */
+size_t supine_options_targets_first(const supine_target *targets, size_t count);
 
 /* Free *targets; for SUPINE_FREED_BY. */
 void supine_options_targets_free(supine_target **targets);
@@ -75,7 +80,7 @@ typedef struct supine_options_marks {
   supine_marks marks;
   supine_mark *mark;
   char (*label)[64];
-  supine_target first; /* the first structure */
+  supine_target first; /* the structure of which a caption tells */
   supine_arena arena;
 } supine_options_marks;
 

@@ -9,6 +9,7 @@
 
 #include "base/arena.h"
 #include "base/findings.h"
+#include "base/number.h"
 #include "base/output.h"
 #include "base/parallel.h"
 #include "base/text.h"
@@ -108,6 +109,23 @@ static void read_text(const char *path, char *text, size_t size) {
   assert_non_null(file);
   text[fread(text, 1, size - 1, file)] = '\0';
   (void)fclose(file);
+}
+
+TEST(test_text_cut_ends_between_characters) {
+  static const char *const texts[] = {"abcdefgh", "abc\u00E4\u00E4\u00E4",
+                                      "\u0639\u0642\u062F\u0629", "\u20AC\u20AC\u20AC",
+                                      "\U0001FAC1\U0001FAC1"};
+  for (size_t i = 0; i < sizeof texts / sizeof *texts; ++i) {
+    for (size_t size = 4; size < 16; ++size) {
+      char cut[16];
+      (void)supine_print_text(cut, size, "%s", texts[i]);
+      assert_true(supine_text_is_utf8(cut) && strncmp(cut, texts[i], strlen(cut)) == 0);
+      assert_true(strlen(cut) + 4 >= size || strcmp(cut, texts[i]) == 0);
+      (void)supine_text_shorten(texts[i], size, cut);
+      assert_true(supine_text_is_utf8(cut) && strlen(cut) < size);
+      assert_true(strcmp(cut, texts[i]) == 0 || strcmp(cut + strlen(cut) - 3, "\xE2\x80\xA6") == 0);
+    }
+  }
 }
 
 TEST(test_output_commit_replaces_file_abandon_keeps_it) {

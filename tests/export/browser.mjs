@@ -58,7 +58,7 @@ export async function close(page) {
 /** Open the page of a basis, wait until it is drawn and its texts, which move the picture, are written, and show all
  * controls. By default the patient is supine and
  * does not breathe, as tests point at fixed places in the picture. */
-export async function openLungs(path, options, hash = '#posture=supine&depth=500&show=contours&room=0') {
+export async function openLungs(path, options, hash = '#posture=supine&depth=500&show=contours&room=0&colour=displacement') {
   const opened = await open(path, options, hash);
   await opened.page.waitForFunction(() => window.supine?.panes().length > 0 && document.getElementById('finding').textContent);
   await opened.page.evaluate(() => { document.getElementById('more').open = true; });

@@ -14,6 +14,7 @@ const TOLERANCE_MM = 0.02; // the page stores 16-bit numbers
 const PRINTED_MM = 0.001;   // tolerance: numbers in text files have three decimals
 const WRITTEN_MM = 0.071;   // tolerance: displacements in the table have one decimal, and the page stores 16-bit numbers
 const NAMES = ['nodule <b>&amp;</data>', 'carina', 'upper lobe', 'lower lobe'];
+const HASH = '#posture=supine&depth=500&show=contours&room=0'; // lungs without colours, whose bar would cover a structure
 const PARTS = [...NAMES, 'tumour', 'metastasis'];
 const files = Object.fromEntries(['tumour.obj', 'metastasis.obj', 'points.csv', 'inside.safetensors', 'inside.html', 'many.html', 'moved.csv'].map((name) => [name, join(folder, name)]));
 
@@ -33,7 +34,7 @@ function deformed(posture, volume) {
   const places = {};
   for (const line of readFileSync(files['moved.csv'], 'utf8').trim().split('\n').filter((row) => !row.startsWith('#')).slice(1)) {
     const [name, , ...place] = line.split(',');
-    (places[name] ??= []).push(place.slice(0, 3).map(Number));
+    (places[name.replace(/^"(.*)"$/, '$1')] ??= []).push(place.slice(0, 3).map(Number));
   }
   return places;
 }
@@ -201,7 +202,7 @@ async function checkMany() {
   writeFileSync(files['points.csv'], `name,x,y,z\n${Array.from({ length: count }, (_, i) => `node ${i},${60 + (i % 10)},${-150 + (i % 7)},${-110 + (i % 13)}\n`).join('')}`);
   supine('embed', basis, files['points.csv'], '-o', files['inside.safetensors']);
   supine('export', basis, '--inside', files['inside.safetensors'], '-o', files['many.html']);
-  const { page, complaints } = await openLungs(files['many.html'], { viewport: { width: 500, height: 320 } });
+  const { page, complaints } = await openLungs(files['many.html'], { viewport: { width: 500, height: 320 } }, HASH);
   const rows = () => page.evaluate(() => [...document.querySelectorAll('#inside-rows button')].map((e) => e.textContent));
   assert.equal((await rows()).length, 200);
   assert.equal(await page.locator('#inside-count').textContent(), `listed: 200 of ${count}`);
@@ -242,7 +243,7 @@ async function checkLens() {
     const { words, depth } = await frame(act);
     const name = await breathing.evaluate(() => window.supine.basis.inside.names[window.supine.state.chosen]);
     supine('deform', files['inside.safetensors'], '--from', 'supine:rest', '--posture', 'supine', '--volume', `rest+${depth}`, '-o', files['moved.csv']);
-    const row = readFileSync(files['moved.csv'], 'utf8').split('\n').find((line) => line.startsWith(`${name},`)).split(',');
+    const row = readFileSync(files['moved.csv'], 'utf8').split('\n').find((line) => line.replaceAll('"', '').startsWith(`${name},`)).split(',');
     const [mm, error] = [row.at(-2), row.at(-1)].map(Number);
     const [halo, length] = [words.at(-1), words.findLast((text) => /^[\d.]+ mm$/.test(text))].map((text) => Number(/([\d.]+) mm/.exec(text)[1]));
     console.log(`lens ${when}, rest + ${depth.toFixed(0)} mL: ${length} mm with an error of ${halo} mm; supine deform: ${mm}, ${error} mm`);
@@ -253,7 +254,7 @@ async function checkLens() {
   await close(breathing);
 }
 
-const { page, complaints } = await openLungs(files['inside.html'], { viewport: { width: 840, height: 630 } });
+const { page, complaints } = await openLungs(files['inside.html'], { viewport: { width: 840, height: 630 } }, HASH);
 await checkPositions(page);
 await checkPointer(page, await checkTable(page));
 await checkControls(page);

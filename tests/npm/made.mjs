@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Make what tests of the JavaScript package need: a folder with the package in node_modules, bases, and the results of
 // plain C for these bases. The environment variables NATIVE (program npm_native), TARBALL (the package), GOLDEN (a
-// basis file without volumes at rest) and LUNGS (folder of real lungs) are paths.
+// basis file without volumes at rest) and LUNGS (folder examples/lungs) are paths.
 import { execFileSync } from 'node:child_process';
 import { copyFileSync, existsSync, mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -22,11 +22,9 @@ const states = ['supine', 'prone:rest+500', 'left:full-1500', 'supine+35:rest+12
 const ofScan = ['supine:scan+200', 'prone:scan+500', '0.6:0.2:-0.7:scan-100']; // for a basis without volumes at rest
 /** Paths of bases, each with the states to test. */
 export const bases = [[demo, states], [inside, states], [unrested, ofScan]];
-const real = ['left', 'right'].map((side) => join(process.env.LUNGS, `lungs/chaste_${side}.ply`));
-if (real.every(existsSync)) {
-  bases.push([join(folder, 'real.safetensors'), states]);
-  supine('precompute', ...real, '-o', bases.at(-1)[0]);
-}
+const real = ['left', 'right'].map((side) => join(process.env.LUNGS, `${side}.ply`));
+bases.push([join(folder, 'real.safetensors'), states]);
+supine('precompute', ...real, '-o', bases.at(-1)[0]);
 
 /** Run npm_native, the program in plain C, for one state. In its results, `expected` [N] are expected errors, mm. */
 export function native(basis, state, lungs) {

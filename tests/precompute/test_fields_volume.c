@@ -68,7 +68,7 @@ static supine_fields simulate(size_t directions, size_t volumes) {
 }
 
 /* Make a basis of fields in memory. */
-static supine_basis *make(const supine_fields *fields, supine_field_storage storage,
+static supine_basis *make(const supine_fields *fields, supine_warp_storage storage,
                           supine_bytes *bytes, supine_basis_report *report) {
   supine_prepared prepared = {.fit = "", .source = {.lungs = lungs}};
   prepared.model.share[0] = prepared.model.share[1] = 1.0;
@@ -145,7 +145,7 @@ static void check_states(const supine_basis *basis, double limit) {
   assert_true(sqrt(error2 / size2) < limit);
 }
 
-static void check_storage(supine_field_storage storage, bool clusters) {
+static void check_storage(supine_warp_storage storage, bool clusters) {
   supine_fields fields = simulate(DIRECTIONS, VOLUMES);
   supine_bytes bytes = {.data = NULL};
   supine_basis_report report;

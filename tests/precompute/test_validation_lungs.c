@@ -118,7 +118,8 @@ TEST(test_solve_all_postures_dependent_zones_ventilate_more) {
 TEST(test_solve_reach_reduces_change_with_resolution) {
   supine_lungs coarse = {0};
   supine_lungs fine = {0};
-  if (!load("lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj", &coarse) ||
+  if (!helper_has_resolutions() ||
+      !load("lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj", &coarse) ||
       !load("lungs/chaste_left.ply", "lungs/chaste_right.ply", &fine)) {
     supine_lungs_free(&coarse);
     skip();

@@ -249,6 +249,47 @@ TEST(test_project_outer_vertices_match_drawing) {
   drawing_destroy(&m);
 }
 
+/* Return the coverage of a pixel, 0 to 255. */
+static int coverage(uint32_t pixel) {
+  return (int)(pixel >> 24);
+}
+
+/* A shell is clear in the middle and dense at its rim, and what is inside is seen through it. */
+TEST(test_draw_shell_clear_inside_dense_at_rim_content_seen) {
+  static uint32_t pixels[2][PIXELS];
+  drawing m = drawing_create(fixture_create(900, 5, 2, 1, false, true, 1, 61));
+  const supine_basis_info *info = supine_basis_get_info(m.basis);
+  const double weights[5] = {0};
+  const double scales[2] = {1, 1};
+  supine_mark target = {.radius = 12.0F};
+  double low[3] = {INFINITY, INFINITY, INFINITY};
+  double high[3] = {-INFINITY, -INFINITY, -INFINITY};
+  supine_render_box(info->vertices, info->vertex_count, low, high);
+  for (int k = 0; k < 3; ++k) {
+    target.xyz[k] = (float)(0.5 * (low[k] + high[k]));
+  }
+  const supine_marks marks = {.count = 1, .mark = &target};
+  for (int i = 0; i < 2; ++i) {
+    const supine_scene scene = {.pose = POSED(m.basis, weights, scales),
+                                .look = SUPINE_LOOK_SHELL,
+                                .largest = 1,
+                                .gravity = gravity,
+                                .content = i == 1 ? &marks : NULL,
+                                .width = WIDTH,
+                                .height = HEIGHT};
+    assert_int_equal(supine_render_draw(m.basis, &scene, pixels[i], NULL), SUPINE_OK);
+  }
+  const size_t middle = PIXELS / 2 + WIDTH / 2;
+  int most = 0;
+  for (size_t i = 0; i < PIXELS; ++i) {
+    most = coverage(pixels[0][i]) > most ? coverage(pixels[0][i]) : most;
+  }
+  assert_in_range(coverage(pixels[0][middle]), 20, 130); /* two layers of 0.10 or more */
+  assert_true(most > 190);                               /* 0.85 at the rim */
+  assert_int_equal(coverage(pixels[1][middle]), 255);
+  drawing_destroy(&m);
+}
+
 TEST(test_draw_impossible_size_refused) {
   uint32_t pixel = 0;
   drawing m = drawing_create(fixture_create(100, 3, 2, 1, false, false, 1, 65));

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run each command that README.md and tests/FIGURES.md quote, and check that each quoted program exists.
+"""Run each command that README.md and tests/FIGURES.md quote, and check that each quoted program exists. README may have up
+to 1,300 words.
 
     test_quoted.py SUPINE SOURCE BUILD
 """
@@ -75,6 +76,52 @@ def check(code):
             failures.append(f"{code}: no such file")
 
 
+def write_mask(name):
+    """Write a label map in NIfTI with two ellipsoids, the lungs, in voxels of 8 mm."""
+    size = 48
+    header = bytearray(352)
+    struct.pack_into("<i", header, 0, 348)
+    struct.pack_into("<8h", header, 40, 3, size, size, size, 1, 1, 1, 1)
+    struct.pack_into("<hh", header, 70, 2, 8)
+    struct.pack_into("<8f", header, 76, 1, 8, 8, 8, 0, 0, 0, 352)
+    struct.pack_into("<fbb", header, 112, 1, 0, 2)
+    struct.pack_into("<hh", header, 252, 0, 1)
+    struct.pack_into("<12f", header, 280, 8, 0, 0, -190, 0, 8, 0, -190, 0, 0, 8, -330)
+    header[344:347] = b"n+1"
+    voxels = bytearray(size ** 3)
+    for z in range(size):
+        for y in range(size):
+            for x in range(size):
+                p = (8 * x - 190, 8 * y - 190, 8 * z - 330)
+                for side in (-85, 85):
+                    if ((p[0] - side) / 65) ** 2 + ((p[1] + 10) / 95) ** 2 + ((p[2] + 140) / 130) ** 2 < 1:
+                        voxels[(z * size + y) * size + x] = 1
+    with gzip.open(name, "wb") as file:
+        file.write(bytes(header) + bytes(voxels))
+
+
+def check_readme():
+    """Run the commands of README's first screen in their order, and count its words."""
+    with open(os.path.join(source, "README.md"), encoding="utf-8") as file:
+        text = file.read()
+    words = len(text.split())
+    if words > 1300:
+        failures.append(f"README.md has {words} words, more than 1300")
+    os.mkdir("readme")
+    os.chdir("readme")
+    write_mask("lungs.nii.gz")
+    with open("nodule.csv", "w", encoding="ascii") as file:
+        file.write("name,x,y,z\nnodule,85,10,-140\n")
+    lines = re.findall(r"^    (supine .*)$", text, re.M)
+    if len(lines) < 3:
+        failures.append("README.md shows no commands from a CT to a page")
+    for line in lines:
+        done = run(*line.split()[1:])
+        if done.returncode != 0:
+            failures.append(f"{line}: {done.stderr}")
+    os.chdir("..")
+
+
 commands = []
 for page in ("README.md", "tests/FIGURES.md"):
     with open(os.path.join(source, page), encoding="utf-8") as text:
@@ -84,6 +131,7 @@ with tempfile.TemporaryDirectory() as folder:
     make_inputs()
     for command in dict.fromkeys(commands):
         check(command)
+    check_readme()
     os.chdir(source)
 print("\n".join(failures) if failures else f"{len(set(commands))} quoted words and commands checked")
 sys.exit(1 if failures else 0)

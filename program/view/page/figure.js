@@ -57,14 +57,26 @@ function freshContext(canvas) {
   return context;
 }
 
-/** Colours of the current theme, set by readTheme. */
-const theme = {};
+/** Colours of the page in the current theme, and of the picture, which has a ground of its own. readTheme sets them. */
+const themes = { page: {}, stage: {} };
+let theme = themes.page; // colours that css() returns
 function readTheme() {
-  const style = getComputedStyle(document.documentElement);
-  const get = (name) => style.getPropertyValue(`--${name}`).trim();
-  for (const name of ['ink', 'soft', 'line', 'gravity', 'paper-solid', 'accent', 'table', 'change', 'field', 'figure']) theme[name] = get(name);
+  for (const [name, element] of [['page', document.documentElement], ['stage', $('stage')]]) {
+    const style = getComputedStyle(element);
+    for (const colour of ['ink', 'soft', 'line', 'edge', 'gravity', 'back', 'paper-solid', 'accent', 'table', 'change', 'field', 'figure']) themes[name][colour] = style.getPropertyValue(`--${colour}`).trim();
+  }
 }
 const css = (name) => theme[name.slice(2)];
+
+/** Call `draw` while css() returns the colours of the picture. */
+function onStage(draw) {
+  theme = themes.stage;
+  try {
+    return draw();
+  } finally {
+    theme = themes.page;
+  }
+}
 
 /** Draw the silhouette of the patient on a table, seen as the picture shows the patient. The quaternion `toEye` rotates
  * the patient's axes to the eye's axes. */

@@ -2,7 +2,7 @@
 // Read and show the structures inside the lungs: named parts, which are points or meshes. A vertex is displaced along
 // an axis by the sum over the modes of weight times fields[axis][vertex][mode], times a factor of its lung ("gain").
 
-const BALL_RADIUS = 4; // radius of the ball drawn at a point, mm
+const BALL_RADIUS = 7; // radius of the ball drawn at a point, mm
 
 /** Read the parts inside the lungs from the page. Sort points before meshes, so that each kind needs one draw call. */
 function takeInside({ inside, modes: k, placeUnit, middle }) {

@@ -13,7 +13,7 @@ function linkOf(state) {
     posture: postureText(gravityOf(state.goal)), depth: round(state.depth, 1), tidal: round(state.tidal, 1),
     colour: state.kind, reference: postureText(gravityOf(state.pinnedQ)), room: state.room ? '' : '0',
     show: SHOWN.filter((name) => state[name]).join('.') || 'nothing',
-    lungs: state.opacity.every((x) => x === (state.basis.inside ? FADED : 1)) ? '' : state.opacity.join(':'),
+    lungs: state.opacity.every((x) => x === state.usualOpacity()) ? '' : state.opacity.join(':'),
     cut: state.cut.axis < 0 ? '' : `${'xyz'[state.cut.axis]}:${round(state.cut.at)}`,
     range: state.ownRanges[state.kind] ? `${state.ownRanges[state.kind].begin}:${state.ownRanges[state.kind].end}` : '',
     camera: [camera.azimuth, camera.elevation, camera.zoom, ...camera.pan, ...(camera.pivot ?? [])].map((x) => round(x)).join(':'),
@@ -39,6 +39,7 @@ function takeLink(text, state) {
   state.roomBlend = state.room ? 1 : 0;
   const shown = (link.get('show') ?? (state.basis.inside ? 'contours' : 'contours.ghost')).split('.');
   for (const name of SHOWN) state[name] = shown.includes(name);
+  state.opacity = state.opacity.map(() => state.usualOpacity());
   const opacity = numbers('lungs');
   if (opacity.length === state.opacity.length && opacity.every((x) => x >= 0 && x <= 1)) state.opacity = opacity;
   const [axis, at] = (link.get('cut') ?? '').split(':');
@@ -66,12 +67,12 @@ function savePicture(canvas, draw, title, lines, range, colours) {
   const paper = document.createElement('canvas');
   [paper.width, paper.height] = [canvas.width, canvas.height];
   const context = paper.getContext('2d');
-  context.fillStyle = theme['paper-solid'];
+  context.fillStyle = themes.stage.back;
   context.fillRect(0, 0, paper.width, paper.height);
   for (const layer of [canvas, $('notes')]) context.drawImage(layer, 0, 0, paper.width, paper.height);
   context.scale(ratio, ratio);
   const text = (words, x, y, font, align = 'left') => {
-    Object.assign(context, { font: `${font} system-ui, sans-serif`, textAlign: align, fillStyle: theme.ink });
+    Object.assign(context, { font: `${font} system-ui, sans-serif`, textAlign: align, fillStyle: themes.stage.ink });
     context.fillText(words, x, y);
   };
   text(title, 20, 34, '600 18px');

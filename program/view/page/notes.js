@@ -45,6 +45,9 @@ function drawTrace(context, was, at, radius, halo) {
   context.lineWidth = 1.2;
   context.setLineDash([3, 2.5]);
   circle(was, radius);
+  context.globalAlpha = 0.22;
+  context.fill();
+  context.globalAlpha = 1;
   context.stroke();
   context.setLineDash([]);
   context.lineWidth = radius > 20 ? 2.5 : 1.5;

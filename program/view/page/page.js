@@ -85,11 +85,21 @@ function start() {
       name, distance, state: name, origin: state.kind === 'difference' ? 'pinned' : 'from', box, canvasHeight: canvas.height,
       toEye: rigid(toRoom, offset), turn: toRoom, projection: perspective(VIEW_ANGLE, aspect, Math.max(distance - reach, distance * 0.02), distance + reach),
       gravity, measure: kind.measure, map: kind.map, plain: state.kind === 'plain', range: state.range, fade: [-3.6, -1.2].map((z) => torso.centre[2] + z * torso.half[2]),
-      pixel: (2 * tangent * distance * ratio()) / box[3], inside: state.inside, chosen: state.chosen, targetTints: ['accent', 'change'].map((tint) => rgb(theme[tint])), contours: state.contours && state.kind !== 'plain', dark: isDark(), ink: [...rgb(theme.ink), 1], radius,
+      pixel: (2 * tangent * distance * ratio()) / box[3], inside: state.inside, chosen: state.chosen, targetTints: ['accent', 'change'].map((tint) => rgb(themes.stage[tint])), contours: state.contours && state.kind !== 'plain',
+      dark: rgb(themes.stage.back)[1] < 0.5, ink: [...rgb(themes.stage.ink), 1], radius, rise: riseOf(gravity),
       opacity: state.opacity, wires: state.wires, ghost: state.ghost, arrows: state.arrows,
-      tableToEye, tableTint: [...rgb(theme.table), 0.3],
+      tableToEye, tableTint: [...rgb(themes.stage.table), 0.3],
       cut: axis < 0 ? NO_CUT : [...[0, 1, 2].map((i) => (i === axis ? 1 : 0)), low[axis] + at * (high[axis] - low[axis])],
     };
+  }
+
+  /** Return the height of points above the lowest of the lungs, as a share of the lungs' height: a vector and an offset
+   * (surface.frag.glsl). */
+  function riseOf(gravity) {
+    const { centre, half } = state.body;
+    const reach = gravity.reduce((sum, g, i) => sum + Math.abs(g) * half[i], 0);
+    const up = gravity.map((g) => -g / (2 * reach));
+    return [...up, 0.5 - dot(up, centre)];
   }
 
   /** Return the matrix from the box [-1, 1]^3 to the table under the patient's body, in camera coordinates; null if the
@@ -356,7 +366,7 @@ function start() {
     const held = state.moment?.held?.map((ml, lung) => `${basis.lungNames[lung]} ${ml.toFixed(0)} mL`).join('   ');
     write('held', `${held} (gas and tissue)`);
     const eye = compose(cameraTurn(), modelTurn());
-    changed('patient', [...eye, isDark()].join(), () => drawSilhouette($('patient'), eye));
+    changed('patient', [...eye, isDark()].join(), () => onStage(() => drawSilhouette($('patient'), eye)));
     const [side, share] = Object.entries(ENDS).map(([letter, end]) => [letter, rotate(eye, end)[2]]).sort((a, b) => b[1] - a[1])[0];
     write('seen', share > 0.8 ? `seen ${VIEWS[side].toLowerCase()}` : '');
   }
@@ -443,7 +453,7 @@ function start() {
   function draw() {
     panes = makePanes();
     picture.draw(panes);
-    drawNotes();
+    onStage(drawNotes);
     if (state.probes.length || $('probes').children.length || !$('probes-text').textContent) showProbes();
   }
 
@@ -596,7 +606,7 @@ function start() {
   };
   const change = (act) => () => { act(); showLegend(); touch(); };
   const pin = change(() => { state.pinnedQ = state.goal; });
-  const colourBy = (kind) => change(() => { state.kind = kind; })();
+  const colourBy = (kind) => change(() => state.colourBy(kind))();
   const measureFrom = (from) => change(() => {
     state.from = from;
     kept = null;
@@ -763,7 +773,7 @@ function start() {
     insidePositions: (gravity, volume) => picture.readInside(momentFor(basis, unit(gravity), volume)),
     moment: (gravity, volume) => momentFor(basis, unit(gravity), volume),
     /** Do the CPU part of the work of one frame. */
-    frameScript: () => { state.compute(); panes = makePanes(); drawNotes(); showState(); },
+    frameScript: () => { state.compute(); panes = makePanes(); onStage(drawNotes); showState(); },
     sentenceOf, movedBetween, targetOf, planesFor, linesAcross, placesOf, rangeEnd, tickStep, postureText, postureFrom, gravityOf, picturePng, basis, state, touch,
   };
 }

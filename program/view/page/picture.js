@@ -418,14 +418,16 @@ class Picture {
 
   /** Draw the surface: opaque lungs first, then the nearest layer of translucent ones. */
   drawLungs(pane) {
-    const { gl, surface } = this;
-    const lungs = pane.opacity.map((opacity, lung) => ({ opacity, lung })).filter((l) => l.opacity > 0).sort((a, b) => b.opacity - a.opacity);
+    const { gl, basis, surface } = this;
+    const depth = (lung) => [2, 6, 10].reduce((sum, i, k) => sum + pane.toEye[i] * basis.lungBoxes[lung].centre[k], 0); // rises towards the viewer
+    const lungs = pane.opacity.map((opacity, lung) => ({ opacity, lung })).filter((l) => l.opacity > 0).sort((a, b) => b.opacity - a.opacity || depth(a.lung) - depth(b.lung));
     const set = (name, value) => gl.uniform1f(surface.at[name], value);
     this.usePane(surface, pane, [0, 0, 1, 1]);
     gl.uniform2f(surface.at.range, pane.range.begin, pane.range.end);
     set('spacing', pane.contours ? pane.range.step : 0);
     set('dark', pane.dark ? 1 : 0);
     set('flatly', 0);
+    gl.uniform4fv(surface.at.rise, pane.rise);
     /** Draw the lungs in the state from which displacements are measured: a translucent shell (1) or its outline (2).
      * */
     const ghost = (how) => {
@@ -449,7 +451,12 @@ class Picture {
       if (opacity < 1 && pane.plain) { // a shell through which its own folds and the content are seen
         set('ghost', 4);
         gl.depthMask(false);
-        this.drawLung(lung, gl.TRIANGLES);
+        gl.enable(gl.CULL_FACE);
+        for (const side of [gl.FRONT, gl.BACK]) { // the far side first
+          gl.cullFace(side);
+          this.drawLung(lung, gl.TRIANGLES);
+        }
+        gl.disable(gl.CULL_FACE);
         gl.depthMask(true);
         continue;
       }
@@ -507,6 +514,7 @@ class Picture {
     gl.uniform1f(content.at.spacing, 0);
     gl.uniform1f(content.at.dark, pane.dark ? 1 : 0);
     gl.uniform1f(content.at.opacity, 1);
+    gl.uniform1f(content.at.ghost, 5);
     this.drawInside(content, pane, Math.max(BALL_RADIUS, 4 * pane.pixel)); // radius of at least 4 pixels
   }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // If WebGL 2 is missing, draw the surface on a 2-D canvas, farthest triangles first. Unlike Picture, a Poster has no
-// shading, lines, arrows, structures inside the lungs or picking.
+// light, lines, arrows, structures inside the lungs or picking.
 
 class Poster {
   constructor(canvas, basis) {
@@ -24,7 +24,7 @@ class Poster {
     for (const pane of panes) this.paint(pane);
   }
 
-  paint({ state, origin, toEye: m, projection, box: [left, bottom, width, height], canvasHeight, range, map, opacity, measure }) {
+  paint({ state, origin, toEye: m, projection, box: [left, bottom, width, height], canvasHeight, range, map, opacity, measure, plain }) {
     const { context, basis: { corners, cornerBegin, vertices, colours } } = this;
     const [now, from] = [this.places[state], this.places[origin]];
     const screen = new Float32Array(3 * vertices);
@@ -42,19 +42,28 @@ class Poster {
       const at = 3 * corners[t];
       return Math.hypot(now[at] - from[at], now[at + 1] - from[at + 1], now[at + 2] - from[at + 2]);
     };
+    /** Return how far a triangle turns away from the viewer, 0 to 1. */
+    const edge = (t) => {
+      const n = normal(now, t);
+      const eye = [0, 1, 2].map((i) => m[i] * n[0] + m[4 + i] * n[1] + m[8 + i] * n[2]);
+      return 1 - Math.abs(eye[2]) / (Math.hypot(...eye) || 1);
+    };
     const seen = [];
     opacity.forEach((amount, lung) => {
-      if (amount > 0) for (let t = cornerBegin[lung]; t < cornerBegin[lung + 1]; t += 3) if (across(screen, t, 0) * down(screen, t, 1) < across(screen, t, 1) * down(screen, t, 0)) seen.push(t);
+      if (amount > 0) for (let t = cornerBegin[lung]; t < cornerBegin[lung + 1]; t += 3) if (plain || across(screen, t, 0) * down(screen, t, 1) < across(screen, t, 1) * down(screen, t, 0)) seen.push(t);
     });
     seen.sort((a, b) => screen[3 * corners[a] + 2] - screen[3 * corners[b] + 2]);
     for (const t of seen) {
+      const f = plain ? edge(t) : 0;
       const at = 4 * Math.round(255 * Math.max(0, Math.min(1, (value(t) - range.begin) / (range.end - range.begin))));
-      context.fillStyle = context.strokeStyle = `rgb(${colours[map].subarray(at, at + 3).join(' ')})`;
+      context.fillStyle = context.strokeStyle = plain // the shell of surface.frag.glsl
+        ? `rgb(${[[235, 255], [168, 242], [158, 237]].map(([pink, white]) => Math.round(pink + f * (white - pink))).join(' ')} / ${(0.1 + 0.75 * f ** 2.2).toFixed(3)})`
+        : `rgb(${colours[map].subarray(at, at + 3).join(' ')})`;
       context.beginPath();
       for (let i = 0; i < 3; ++i) context[i ? 'lineTo' : 'moveTo'](screen[3 * corners[t + i]], screen[3 * corners[t + i] + 1]);
       context.closePath();
       context.fill();
-      context.stroke(); // closes the gaps between neighbouring triangles
+      if (!plain) context.stroke(); // closes the gaps between neighbouring triangles
     }
   }
 }

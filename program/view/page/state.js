@@ -75,7 +75,7 @@ class State {
     this.rate = 12;
     this.phase = 0.5;
     this.playing = false;
-    this.kind = basis.inside ? 'plain' : 'displacement';
+    this.kind = 'plain';
     this.pinnedQ = POSTURES[0].q;
     this.contours = true;
     this.ghost = !basis.inside;
@@ -84,7 +84,7 @@ class State {
     this.beside = false;                           // whether the other posture is shown beside the chosen one
     this.inside = Boolean(basis.inside);           // whether structures inside the lungs are shown
     this.chosen = 0;                               // structure inside the lungs that the sentence is about
-    this.opacity = Array(basis.lungs).fill(basis.inside ? FADED : 1);
+    this.opacity = Array(basis.lungs).fill(FADED);
     this.cut = { axis: -1, at: 0.5 };              // cutting plane: axis, or -1 for no cut; position as a fraction of the lungs' extent
     this.ownRanges = {};                           // for each of KINDS, the range {begin, end} of the colour bar if the user typed one
     this.probes = [];                              // marked vertices
@@ -96,6 +96,18 @@ class State {
     this.live = false;                             // whether a tracker moves the patient
     this.measure();
     this.slices = null;                            // x, y, z of the sagittal, coronal and axial plane, mm; null for those through the chosen structure
+  }
+
+  /** Return the opacity that the lungs have unless it was chosen: a shell, and lungs with something inside, are seen
+   * through, and colours need whole lungs. */
+  usualOpacity() {
+    return this.basis.inside || this.kind === 'plain' ? FADED : 1;
+  }
+
+  colourBy(kind) {
+    const usual = this.usualOpacity();
+    this.kind = kind;
+    this.opacity = this.opacity.map((opacity) => (opacity === usual ? this.usualOpacity() : opacity));
   }
 
   get gravity() {

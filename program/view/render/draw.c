@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Draw the lungs: project the vertices, find the nearest triangle at each sample, and shade it. */
+/* Draw the lungs and what is inside them: opaque surfaces by the nearest triangle at each sample,
+ * then translucent ones from the farthest to the nearest. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,218 +8,56 @@
 #include "base/arena.h"
 #include "base/parallel.h"
 #include "base/vec3.h"
-#include "program/view/render/render.h"
+#include "program/view/render/canvas.h"
 
-/* Names of the views, and rotations from the body's axes (LPS) to the viewer's axes. */
-static const struct {
-  const char *name;
-  double axes[3][3]; /* rows: right, up, towards the viewer */
-} views[SUPINE_VIEW_COUNT] = {
-    {"anterior", {{1, 0, 0}, {0, 0, 1}, {0, -1, 0}}},
-    {"posterior", {{-1, 0, 0}, {0, 0, 1}, {0, 1, 0}}},
-    {"left", {{0, 1, 0}, {0, 0, 1}, {1, 0, 0}}},
-    {"right", {{0, -1, 0}, {0, 0, 1}, {-1, 0, 0}}},
-    {"head", {{-1, 0, 0}, {0, -1, 0}, {0, 0, 1}}},
-    {"feet", {{1, 0, 0}, {0, -1, 0}, {0, 0, -1}}},
-    {"lying", {{1, 0, 0}, {0, 0, 1}, {0, -1, 0}}}, /* of a patient who stands */
-};
+enum { SIDE_MAX = 16384, ROWS_PER_JOB = 16 };
 
-const char *supine_render_view_name(supine_view view) {
-  return view < SUPINE_VIEW_COUNT ? views[view].name : NULL;
-}
+static const float ball_pixels = 4.0F; /* smallest radius of a ball, pixels */
 
-void supine_render_view_axes(supine_view view, const double gravity[3], double axes[3][3]) {
-  memcpy(axes, views[view].axes, sizeof views[view].axes);
-  if (view != SUPINE_VIEW_LYING || fabs(gravity[2]) > 0.8) {
-    return;
-  }
-  const double flat = sqrt(1 - gravity[2] * gravity[2]);
-  for (size_t k = 0; k < 3; ++k) {
-    axes[1][k] = -gravity[k];
-    axes[0][k] = ((k == 2 ? -1 : 0) + gravity[2] * gravity[k]) / flat; /* towards the feet */
-  }
-  supine_cross(axes[0], axes[1], axes[2]);
-}
+/* Surfaces that are drawn. */
+typedef enum layer_name { LAYER_LUNGS, LAYER_NOW, LAYER_BEFORE, LAYER_COUNT } layer_name;
 
-enum { SIDE_MAX = 16384, SHADES = 4096, NO_TRIANGLE = UINT32_MAX, ROWS_PER_JOB = 16 };
-enum { OVERSAMPLE = 2 }; /* each pixel is the mean of OVERSAMPLE x OVERSAMPLE samples */
+typedef struct layer {
+  const corner *corners;
+  const uint32_t *triangles;
+  size_t triangle_count;
+} layer;
 
-/* Distances, in half diagonals of the lungs' bounding box. */
-static const double viewer_distance = 5.0; /* from the viewer to the centre of the lungs */
-static const double drawn_depth = 3.0;     /* largest distance from the centre towards the viewer at
-                                              which points are drawn, in radii */
-static const double margin = 1.03; /* size of the picture divided by the size of the lungs in it */
-static const float gamma_exponent = 2.2F;
-
-typedef struct corner {
-  float x, y;      /* position, samples from the left and upper edges of the picture */
-  float nearness;  /* 1 / (depth from the viewer), 1/mm; 0 if too near to be drawn */
-  float normal[3]; /* unit normal in the viewer's axes: right, up, towards the viewer */
-  float eye[3];    /* vector from the vertex to the viewer, mm, in the viewer's axes */
-  float value;
-} corner;
-
-void supine_render_box(const float *xyz, size_t count, double low[3], double high[3]) {
-  for (size_t i = 0; i < 3 * count; ++i) {
-    low[i % 3] = fmin(low[i % 3], (double)xyz[i]);
-    high[i % 3] = fmax(high[i % 3], (double)xyz[i]);
-  }
-}
-
-/* A viewer, who looks at the centre of the reference surface in every state. */
-typedef struct camera {
-  double axes[3][3];
-  double centre[3];
-  double radius; /* half the diagonal of the bounding box of the reference surface, mm */
-  double away;   /* distance from the viewer to the centre, mm */
-} camera;
-
-static camera find_camera(const supine_basis_info *info, const supine_scene *scene) {
-  camera c = {.radius = 1e-3};
-  double low[3] = {INFINITY, INFINITY, INFINITY};
-  double high[3] = {-INFINITY, -INFINITY, -INFINITY};
-  supine_render_view_axes(scene->view, scene->gravity, c.axes);
-  supine_render_box(info->vertices, info->vertex_count, low, high);
-  for (int axis = 0; axis < 3; ++axis) {
-    c.centre[axis] = (low[axis] + high[axis]) / 2;
-    c.radius = hypot(c.radius, (high[axis] - low[axis]) / 2);
-  }
-  c.away = viewer_distance * c.radius;
-  return c;
-}
-
-/* Rotate a vector `v` from the body's axes to the viewer's axes. */
-static void turn(const camera *c, const double v[3], double seen[3]) {
-  for (size_t row = 0; row < 3; ++row) {
-    seen[row] = c->axes[row][0] * v[0] + c->axes[row][1] * v[1] + c->axes[row][2] * v[2];
-  }
-}
-
-/* Transform a position, mm, to the viewer's axes, with the lungs' centre as the origin. */
-static void place(const camera *c, const float xyz[3], double seen[3]) {
-  const double from[3] = {(double)xyz[0] - c->centre[0], (double)xyz[1] - c->centre[1],
-                          (double)xyz[2] - c->centre[2]};
-  turn(c, from, seen);
-}
-
-void supine_render_extent(const supine_basis *basis, const supine_scene *scene, double extent[4]) {
-  enum { CHUNK = 512 };
-  const supine_basis_info *info = supine_basis_get_info(basis);
-  const camera c = find_camera(info, scene);
-  const double closest = c.away - 0.98 * drawn_depth * c.radius;
-  float xyz[3 * CHUNK];
-  for (size_t i = 0; i < info->vertex_count; ++i) {
-    double p[3];
-    if (i % CHUNK == 0) {
-      const size_t end = i + CHUNK < info->vertex_count ? i + CHUNK : info->vertex_count;
-      (void)supine_deform_range(basis, scene->pose, i, end, xyz);
-    }
-    place(&c, xyz + 3 * (i % CHUNK), p);
-    for (int side = 0; side < 2; ++side) {
-      const double at = p[side] * c.away / fmax(closest, c.away - p[2]);
-      extent[2 * side] = fmin(extent[2 * side], at);
-      extent[2 * side + 1] = fmax(extent[2 * side + 1], at);
-    }
-  }
-}
-
-/* Fit the lungs into the picture. Set frame[0] and frame[1] to the centre of their extent, mm, and
- * frame[2] and frame[3] to the scales, in half widths and half heights of the picture per mm. */
-static void find_frame(const supine_basis *basis, const supine_scene *scene, double frame[4]) {
-  double extent[4] = SUPINE_EXTENT_NONE;
-  if (scene->extent != NULL) {
-    memcpy(extent, scene->extent, sizeof extent);
-  } else {
-    supine_render_extent(basis, scene, extent);
-  }
-  const double aspect = (double)scene->width / (double)scene->height;
-  const double wide = fmax(1e-3, margin * (extent[1] - extent[0]) / 2);
-  const double high = fmax(1e-3, margin * (extent[3] - extent[2]) / 2);
-  const double tall = fmax(high, wide / aspect);
-  frame[0] = (extent[0] + extent[1]) / 2;
-  frame[1] = (extent[2] + extent[3]) / 2;
-  frame[2] = 1 / (tall * aspect);
-  frame[3] = 1 / tall;
-}
-
-/* Project a point `p` in the viewer's axes, mm, to a position `at`, measured from the left and
- * upper edges of a picture of `size` pixels or samples. */
-static void project(const camera *c, const double frame[4], const double p[3], const double size[2],
-                    double at[2]) {
-  for (int side = 0; side < 2; ++side) {
-    const double off = (p[side] * c->away / (c->away - p[2]) - frame[side]) * frame[2 + side];
-    at[side] = 0.5 * (1 + (side == 0 ? off : -off)) * size[side];
-  }
-}
-
-void supine_render_project(const supine_basis *basis, const supine_scene *scene,
-                           const supine_marks *marks, bool from, double (*pixel)[2]) {
-  const camera c = find_camera(supine_basis_get_info(basis), scene);
-  const double size[2] = {(double)scene->width, (double)scene->height};
-  double frame[4];
-  find_frame(basis, scene, frame);
-  for (size_t i = 0; i < marks->count; ++i) {
-    double p[3];
-    place(&c, from ? marks->mark[i].from : marks->mark[i].xyz, p);
-    project(&c, frame, p, size, pixel[i]);
-  }
-}
+/* A translucent triangle of a layer, or the ball around its corner. */
+typedef struct item {
+  float nearness;
+  uint32_t index; /* of the triangle or the corner */
+  layer_name layer;
+  bool ball;
+} item;
 
 typedef struct canvas {
-  const supine_basis_info *info;
   const supine_scene *scene;
-  corner *corners;                  /* [N] the projected vertices */
-  size_t width, height;             /* size of the picture, samples */
-  uint32_t *nearest;                /* [height, width] nearest triangle, or NO_TRIANGLE */
-  float *nearness;                  /* [height, width] 1 / (depth of the nearest triangle), 1/mm */
-  float colours[SHADES + 1][3];     /* colour map, linear RGB, 0 to 1 */
-  unsigned char encode[SHADES + 1]; /* [i] byte that encodes the linear light i / SHADES */
-  float line_step;                  /* difference of the value between contour lines, mm */
+  camera camera;
+  size_t width, height; /* size of the picture, samples */
+  layer layers[LAYER_COUNT];
+  size_t item_count;
+  item *items;      /* [item_count] translucent triangles and balls, the farthest first */
+  float *nearness;  /* [height, width] 1 / (depth of the nearest opaque surface), 1/mm */
+  float (*rgba)[4]; /* [height, width] premultiplied colour and coverage, 0 to 1 */
+  float line_step;  /* difference of the value between contour lines, mm */
+  shades *shades;
   uint32_t *pixels;
 } canvas;
 
-/* Project the vertices of the deformed surface. */
-static supine_status find_corners(const canvas *c, const supine_basis *basis, supine_error *error) {
-  const size_t n = c->info->vertex_count;
-  const camera cam = find_camera(c->info, c->scene);
-  const double size[2] = {(double)c->width, (double)c->height};
-  const double near = cam.away - drawn_depth * cam.radius;
-  double frame[4];
-  SUPINE_ARENA arena = {0};
-  float *xyz = supine_arena_take(&arena, 3 * n, sizeof *xyz);
-  float *normals = supine_arena_take(&arena, 3 * n, sizeof *normals);
-  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
-  find_frame(basis, c->scene, frame);
-  (void)supine_deform(basis, c->scene->pose, xyz);
-  supine_normals(basis, xyz, normals);
-  for (size_t i = 0; i < n; ++i) {
-    const double normal[3] = {(double)normals[3 * i], (double)normals[3 * i + 1],
-                              (double)normals[3 * i + 2]};
-    double p[3];
-    double seen[3];
-    double at[2];
-    place(&cam, xyz + 3 * i, p);
-    turn(&cam, normal, seen);
-    project(&cam, frame, p, size, at);
-    const double away = cam.away - p[2];
-    c->corners[i] = (corner){.x = (float)at[0],
-                             .y = (float)at[1],
-                             .nearness = away > near ? (float)(1.0 / away) : 0.0F,
-                             .normal = {(float)seen[0], (float)seen[1], (float)seen[2]},
-                             .eye = {(float)-p[0], (float)-p[1], (float)away},
-                             .value = c->scene->value[i]};
-  }
-  return SUPINE_OK;
-}
+/* Rows of samples that a thread draws. */
+typedef struct rows {
+  size_t begin, end;
+} rows;
 
 typedef struct face {
   const corner *at[3];
   float area; /* twice the triangle's area, samples^2; negative if seen from inside the lung */
 } face;
 
-static face face_of(const canvas *c, size_t triangle) {
-  const uint32_t *v = c->info->triangles + 3 * triangle;
-  const corner *all = c->corners;
+static face face_of(const layer *l, size_t triangle) {
+  const uint32_t *v = l->triangles + 3 * triangle;
+  const corner *all = l->corners;
   face f = {{&all[v[0]], &all[v[1]], &all[v[2]]}, 0.0F};
   f.area = (f.at[2]->x - f.at[0]->x) * (f.at[1]->y - f.at[0]->y) -
            (f.at[1]->x - f.at[0]->x) * (f.at[2]->y - f.at[0]->y);
@@ -239,46 +78,13 @@ static float nearness_at(const face *f, const float share[3]) {
          share[2] * f->at[2]->nearness;
 }
 
-/* Record a triangle in rows `begin` to `end` - 1, at samples where it is the nearest so far. */
-static void draw_face(const canvas *c, size_t triangle, size_t begin, size_t end) {
-  const face f = face_of(c, triangle);
-  const float left = fminf(f.at[0]->x, fminf(f.at[1]->x, f.at[2]->x));
-  const float right = fmaxf(f.at[0]->x, fmaxf(f.at[1]->x, f.at[2]->x));
-  const float top = fminf(f.at[0]->y, fminf(f.at[1]->y, f.at[2]->y));
-  const float bottom = fmaxf(f.at[0]->y, fmaxf(f.at[1]->y, f.at[2]->y));
-  if (!(f.area != 0.0F) || !(bottom >= (float)begin && top <= (float)end) ||
-      !(right >= 0.0F && left <= (float)c->width)) {
-    return;
-  }
-  const size_t first = top > (float)begin ? (size_t)top : begin;
-  const size_t last = bottom < (float)end ? (size_t)bottom + 1 : end;
-  const size_t from = left > 0.0F ? (size_t)left : 0;
-  const size_t to = right < (float)c->width ? (size_t)right + 1 : c->width;
-  for (size_t y = first; y < last && y < end; ++y) {
-    for (size_t x = from; x < to && x < c->width; ++x) {
-      float share[3];
-      shares_at(&f, (float)x + 0.5F, (float)y + 0.5F, share);
-      const float nearness = nearness_at(&f, share);
-      const size_t at = y * c->width + x;
-      if (share[0] >= 0.0F && share[1] >= 0.0F && share[2] >= 0.0F && nearness > c->nearness[at]) {
-        c->nearness[at] = nearness;
-        c->nearest[at] = (uint32_t)triangle;
-      }
-    }
-  }
-}
-
 static float smoothstep(float low, float high, float x) {
   const float t = fminf(1.0F, fmaxf(0.0F, (x - low) / (high - low)));
   return t * t * (3.0F - 2.0F * t);
 }
 
-static float dot(const float a[3], const float b[3]) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 static void normalise(float v[3]) {
-  const float length = sqrtf(dot(v, v));
+  const float length = sqrtf(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
   for (int k = 0; k < 3; ++k) {
     v[k] /= length > 0.0F ? length : 1.0F;
   }
@@ -305,89 +111,188 @@ static float contour(const face *f, float x, float y, float value, float spacing
              : (1.0F - smoothstep(0.5F, 1.7F, away)) * (1.0F - smoothstep(0.3F, 0.8F, width));
 }
 
-/* Return the diffuse light, 0 to 1, on a surface with unit normal `n` from the direction `from`, a
- * vector of any length. */
-static float lambert(const float n[3], const float from[3]) {
-  float to[3] = {from[0], from[1], from[2]};
-  normalise(to);
-  return fmaxf(0.0F, dot(n, to));
-}
-
-/* Compute the colour of a triangle at a sample: premultiplied RGB and coverage, 0 to 255. */
-static void shade(const canvas *c, size_t triangle, float x, float y, unsigned char rgba[4]) {
-  static const float key[3] = {-0.55F, 0.75F, 0.8F};
-  static const float fill[3] = {0.9F, -0.1F, 0.5F};
-  const supine_scene *scene = c->scene;
-  const face f = face_of(c, triangle);
-  float share[3];
-  float n[3] = {0.0F, 0.0F, 0.0F};
-  float eye[3] = {0.0F, 0.0F, 0.0F};
-  float half[3] = {key[0], key[1], key[2]};
-  shares_at(&f, x, y, share);
-  for (int k = 0; k < 3; ++k) {
-    for (int v = 0; v < 3; ++v) {
-      const float weight = share[v] * f.at[v]->nearness;
-      n[k] += weight * f.at[v]->normal[k] * (f.area > 0.0F ? 1.0F : -1.0F);
-      eye[k] += weight * f.at[v]->eye[k];
+/* Interpolate the corners of a triangle. */
+static fragment fragment_at(const face *f, const float share[3]) {
+  fragment at = {.value = 0.0F};
+  float sum = 0.0F;
+  for (int v = 0; v < 3; ++v) {
+    const float weight = share[v] * f->at[v]->nearness;
+    sum += weight;
+    at.value += weight * f->at[v]->value;
+    at.height += weight * f->at[v]->height;
+    for (int k = 0; k < 3; ++k) {
+      at.normal[k] += weight * f->at[v]->normal[k] * (f->area > 0.0F ? 1.0F : -1.0F);
+      at.eye[k] += weight * f->at[v]->eye[k];
     }
   }
-  normalise(n);
-  normalise(eye);
-  normalise(half);
-  for (int k = 0; k < 3; ++k) {
-    half[k] += eye[k];
+  at.value /= sum;
+  at.height /= sum;
+  normalise(at.normal);
+  normalise(at.eye);
+  return at;
+}
+
+/* Draw a fragment over what the sample shows. Only opaque fragments hide what is behind them. */
+static void blend(const canvas *c, size_t sample, material what, const fragment *at,
+                  float nearness) {
+  float rgba[4];
+  float *under = c->rgba[sample];
+  supine_render_shade(c->shades, what, at, rgba);
+  for (int k = 0; k < 4; ++k) {
+    under[k] = rgba[k] + (1.0F - rgba[3]) * under[k];
   }
-  const float value = value_at(&f, x, y);
-  const float facing = fmaxf(0.0F, dot(n, eye));
-  float light = 0.46F + 0.14F * n[1] + 0.58F * lambert(n, key) + 0.16F * lambert(n, fill);
-  light *= 0.72F + 0.28F * smoothstep(0.0F, 0.45F, facing); /* darken the outline */
-  light *= 1.0F - 0.275F * contour(&f, x, y, value, c->line_step);
-  if (scene->shell) {
-    const float cover = 0.12F + 0.7F * powf(1.0F - facing, 2.5F);
-    rgba[3] = (unsigned char)lrintf(255.0F * cover);
-    memset(rgba, (int)lrintf(cover * 70.0F), 3);
+  if (rgba[3] >= 1.0F) {
+    c->nearness[sample] = nearness;
+  }
+}
+
+/* Set `box` to the first column, the first row, and the columns and rows after the last, of the
+ * samples that a box {left, top, right, bottom} may cover. Return false if there are none. */
+static bool samples_of(const canvas *c, const rows *drawn, const float edge[4], size_t box[4]) {
+  if (!(edge[3] >= (float)drawn->begin && edge[1] <= (float)drawn->end) ||
+      !(edge[2] >= 0.0F && edge[0] <= (float)c->width)) {
+    return false;
+  }
+  box[0] = edge[0] > 0.0F ? (size_t)edge[0] : 0;
+  box[1] = edge[1] > (float)drawn->begin ? (size_t)edge[1] : drawn->begin;
+  box[2] = edge[2] < (float)c->width - 1.0F ? (size_t)edge[2] + 1 : c->width;
+  box[3] = edge[3] < (float)drawn->end - 1.0F ? (size_t)edge[3] + 1 : drawn->end;
+  return true;
+}
+
+static void draw_triangle(const canvas *c, const layer *from, size_t triangle, material what,
+                          const rows *drawn) {
+  const face f = face_of(from, triangle);
+  const corner *a = f.at[0];
+  const corner *b = f.at[1];
+  const corner *d = f.at[2];
+  const float edge[4] = {fminf(a->x, fminf(b->x, d->x)), fminf(a->y, fminf(b->y, d->y)),
+                         fmaxf(a->x, fmaxf(b->x, d->x)), fmaxf(a->y, fmaxf(b->y, d->y))};
+  const bool near = a->nearness > 0.0F && b->nearness > 0.0F && d->nearness > 0.0F;
+  size_t box[4];
+  if (!near || f.area == 0.0F || !samples_of(c, drawn, edge, box)) {
     return;
   }
-  rgba[3] = 255;
-  const float shine = 0.08F * powf(lambert(n, half), 48.0F);
-  const float t = fminf(1.0F, fmaxf(0.0F, value / (float)scene->largest));
-  const float *base = c->colours[(size_t)lrintf(t * SHADES)];
-  for (int k = 0; k < 3; ++k) {
-    const float lit = base[k] * light + shine;
-    rgba[k] = c->encode[(size_t)lrintf(fminf(1.0F, fmaxf(0.0F, lit)) * SHADES)];
+  for (size_t y = box[1]; y < box[3]; ++y) {
+    for (size_t x = box[0]; x < box[2]; ++x) {
+      const float at[2] = {(float)x + 0.5F, (float)y + 0.5F};
+      const size_t sample = y * c->width + x;
+      float share[3];
+      shares_at(&f, at[0], at[1], share);
+      const float nearness = nearness_at(&f, share);
+      if (share[0] >= 0.0F && share[1] >= 0.0F && share[2] >= 0.0F &&
+          nearness > c->nearness[sample]) {
+        fragment seen = fragment_at(&f, share);
+        if (what == MATERIAL_MAP) {
+          seen.contour = contour(&f, at[0], at[1], seen.value, c->line_step);
+        }
+        blend(c, sample, what, &seen, nearness);
+      }
+    }
   }
+}
+
+/* Draw a ball around a corner; in the picture it is a disc. */
+static void draw_ball(const canvas *c, const corner *centre, float mm, material what,
+                      const rows *drawn) {
+  const float scale = supine_render_camera_scale(&c->camera, centre);
+  const float radius = fmaxf(mm * scale, OVERSAMPLE * ball_pixels);
+  const float edge[4] = {centre->x - radius, centre->y - radius, centre->x + radius,
+                         centre->y + radius};
+  size_t box[4];
+  if (!(centre->nearness > 0.0F) || !samples_of(c, drawn, edge, box)) {
+    return;
+  }
+  for (size_t y = box[1]; y < box[3]; ++y) {
+    for (size_t x = box[0]; x < box[2]; ++x) {
+      const float off[2] = {((float)x + 0.5F - centre->x) / radius,
+                            (centre->y - (float)y - 0.5F) / radius};
+      const float square = off[0] * off[0] + off[1] * off[1];
+      const size_t sample = y * c->width + x;
+      if (square <= 1.0F) {
+        fragment seen = {.normal = {off[0], off[1], sqrtf(1.0F - square)},
+                         .eye = {0.0F, 0.0F, 1.0F}};
+        const float depth = 1.0F / centre->nearness - seen.normal[2] * radius / scale;
+        if (1.0F / depth > c->nearness[sample]) {
+          blend(c, sample, what, &seen, 1.0F / depth);
+        }
+      }
+    }
+  }
+}
+
+static material solid_of(const supine_mark *mark) {
+  return mark->anatomy ? MATERIAL_ANATOMY : MATERIAL_TARGET;
+}
+
+/* Draw the structures inside the lungs where they are now. */
+static void draw_content(const canvas *c, const rows *drawn) {
+  const supine_marks *marks = c->scene->content;
+  const layer *now = &c->layers[LAYER_NOW];
+  for (size_t t = 0; t < now->triangle_count; ++t) {
+    draw_triangle(c, now, t, solid_of(&marks->mark[now->triangles[3 * t]]), drawn);
+  }
+  for (size_t i = 0; marks != NULL && i < marks->count; ++i) {
+    if (marks->mark[i].radius > 0.0F) {
+      draw_ball(c, &now->corners[i], marks->mark[i].radius, solid_of(&marks->mark[i]), drawn);
+    }
+  }
+}
+
+/* Draw a translucent shell of the lungs, what is inside, and ghosts of the targets. */
+static void draw_shell(const canvas *c, const rows *drawn) {
+  draw_content(c, drawn);
+  for (size_t i = 0; i < c->item_count; ++i) {
+    const item *it = &c->items[i];
+    const layer *from = &c->layers[it->layer];
+    const material what = it->layer == LAYER_LUNGS ? MATERIAL_SHELL : MATERIAL_GHOST;
+    if (it->ball) {
+      draw_ball(c, &from->corners[it->index], c->scene->content->mark[it->index].radius, what,
+                drawn);
+    } else {
+      draw_triangle(c, from, it->index, what, drawn);
+    }
+  }
+}
+
+/* Draw opaque lungs in the colours of their values, and over them what is inside. */
+static void draw_map(const canvas *c, const rows *drawn) {
+  const layer *lungs = &c->layers[LAYER_LUNGS];
+  for (size_t t = 0; t < lungs->triangle_count; ++t) {
+    draw_triangle(c, lungs, t, MATERIAL_MAP, drawn);
+  }
+  memset(c->nearness + drawn->begin * c->width, 0,
+         (drawn->end - drawn->begin) * c->width * sizeof *c->nearness);
+  draw_content(c, drawn);
 }
 
 /* Return the mean of a pixel's samples as premultiplied ARGB; samples without lungs count as 0. */
 static uint32_t mean_of(const canvas *c, size_t x, size_t y) {
   enum { COUNT = OVERSAMPLE * OVERSAMPLE };
-  uint32_t sum[4] = {COUNT / 2, COUNT / 2, COUNT / 2, COUNT / 2};
+  float sum[4] = {0.0F, 0.0F, 0.0F, 0.0F};
+  uint32_t byte[4];
   for (size_t sub = 0; sub < COUNT; ++sub) {
     const size_t row = OVERSAMPLE * y + sub / OVERSAMPLE;
-    const size_t column = OVERSAMPLE * x + sub % OVERSAMPLE;
-    const uint32_t triangle = c->nearest[row * c->width + column];
-    unsigned char rgba[4];
-    if (triangle != NO_TRIANGLE) {
-      shade(c, triangle, (float)column + 0.5F, (float)row + 0.5F, rgba);
-      for (int k = 0; k < 4; ++k) {
-        sum[k] += rgba[k];
-      }
+    const float *rgba = c->rgba[row * c->width + OVERSAMPLE * x + sub % OVERSAMPLE];
+    for (int k = 0; k < 4; ++k) {
+      sum[k] += rgba[k];
     }
   }
-  return (sum[3] / COUNT) << 24 | (sum[0] / COUNT) << 16 | (sum[1] / COUNT) << 8 | sum[2] / COUNT;
+  for (int k = 3; k >= 0; --k) {
+    byte[k] = (uint32_t)lrintf(fminf(sum[k] / COUNT, 1.0F) * 255.0F);
+    byte[k] = byte[k] < byte[3] ? byte[k] : byte[3];
+  }
+  return byte[3] << 24 | byte[0] << 16 | byte[1] << 8 | byte[2];
 }
 
 static void draw_rows(void *context, size_t begin, size_t end, size_t thread) {
   const canvas *c = context;
-  const supine_basis_info *info = c->info;
-  const corner *corners = c->corners;
+  const rows drawn = {OVERSAMPLE * begin, OVERSAMPLE * end};
   (void)thread;
-  for (size_t t = 0; t < info->triangle_count; ++t) {
-    const uint32_t *v = info->triangles + 3 * t;
-    if (corners[v[0]].nearness > 0.0F && corners[v[1]].nearness > 0.0F &&
-        corners[v[2]].nearness > 0.0F) {
-      draw_face(c, t, OVERSAMPLE * begin, OVERSAMPLE * end);
-    }
+  if (c->scene->look == SUPINE_LOOK_SHELL) {
+    draw_shell(c, &drawn);
+  } else {
+    draw_map(c, &drawn);
   }
   for (size_t y = begin; y < end; ++y) {
     for (size_t x = 0; x < c->scene->width; ++x) {
@@ -396,16 +301,126 @@ static void draw_rows(void *context, size_t begin, size_t end, size_t thread) {
   }
 }
 
-static void find_colours(canvas *c) {
-  for (int i = 0; i <= SHADES; ++i) {
-    const float share = (float)i / SHADES;
-    double rgb[3];
-    supine_render_colour(c->scene->colours, (double)share, rgb);
-    for (int k = 0; k < 3; ++k) {
-      c->colours[i][k] = powf((float)rgb[k], gamma_exponent);
+/* Set the height of each corner: 0 at the lowest vertex along gravity, 1 at the highest. */
+static void set_heights(const double *gravity, size_t n, const float *xyz, corner *corners) {
+  double low = INFINITY;
+  double high = -INFINITY;
+  for (int pass = 0; pass < 2 && gravity != NULL; ++pass) {
+    for (size_t i = 0; i < n; ++i) {
+      const double at = -((double)xyz[3 * i] * gravity[0] + (double)xyz[3 * i + 1] * gravity[1] +
+                          (double)xyz[3 * i + 2] * gravity[2]);
+      low = fmin(low, at);
+      high = fmax(high, at);
+      corners[i].height = pass == 0 ? 0.0F : (float)((at - low) / fmax(high - low, 1e-3));
     }
-    c->encode[i] = (unsigned char)lrintf(255.0F * powf(share, 1.0F / gamma_exponent));
   }
+}
+
+/* Project the vertices of the deformed surface. */
+static supine_status add_lungs(canvas *c, const supine_basis *basis, supine_arena *keep,
+                               supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const size_t n = info->vertex_count;
+  SUPINE_ARENA arena = {0};
+  corner *corners = supine_arena_take(keep, n, sizeof *corners);
+  float *xyz = supine_arena_take(&arena, 3 * n, sizeof *xyz);
+  float *normals = supine_arena_take(&arena, 3 * n, sizeof *normals);
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
+  SUPINE_TRY(supine_arena_check(keep, error, "%zu vertices", n));
+  (void)supine_deform(basis, c->scene->pose, xyz);
+  supine_normals(basis, xyz, normals);
+  for (size_t i = 0; i < n; ++i) {
+    corners[i] = supine_render_camera_project(&c->camera, xyz + 3 * i, normals + 3 * i);
+    corners[i].value = c->scene->value != NULL ? c->scene->value[i] : 0.0F;
+  }
+  set_heights(c->scene->gravity, n, xyz, corners);
+  c->layers[LAYER_LUNGS] = (layer){corners, info->triangles, info->triangle_count};
+  return SUPINE_OK;
+}
+
+/* Compute normals at marks that are corners of triangles. The array `normals` begins with zeros. */
+static void find_normals(const supine_marks *marks, bool before, float *normals) {
+  for (size_t t = 0; t < marks->triangle_count; ++t) {
+    const uint32_t *v = marks->triangles + 3 * t;
+    double x[3][3];
+    double normal[3];
+    for (size_t k = 0; k < 9; ++k) {
+      const supine_mark *mark = &marks->mark[v[k / 3]];
+      x[k / 3][k % 3] = (double)(before ? mark->from[k % 3] : mark->xyz[k % 3]);
+    }
+    supine_normal(x[0], x[1], x[2], normal);
+    for (size_t k = 0; k < 9; ++k) {
+      normals[3 * v[k / 3] + k % 3] += (float)normal[k % 3];
+    }
+  }
+  for (size_t i = 0; i < marks->count; ++i) {
+    normalise(normals + 3 * i);
+  }
+}
+
+/* Project the structures inside the lungs where they are, or where they were before. */
+static supine_status add_content(canvas *c, bool before, supine_arena *keep, supine_error *error) {
+  const supine_marks *marks = c->scene->content;
+  SUPINE_ARENA arena = {0};
+  corner *corners = supine_arena_take(keep, marks->count, sizeof *corners);
+  float *normals = supine_arena_zeros(&arena, 3 * marks->count, sizeof *normals);
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu points", marks->count));
+  SUPINE_TRY(supine_arena_check(keep, error, "%zu points", marks->count));
+  find_normals(marks, before, normals);
+  for (size_t i = 0; i < marks->count; ++i) {
+    const supine_mark *mark = &marks->mark[i];
+    corners[i] =
+        supine_render_camera_project(&c->camera, before ? mark->from : mark->xyz, normals + 3 * i);
+  }
+  c->layers[before ? LAYER_BEFORE : LAYER_NOW] =
+      (layer){corners, marks->triangles, marks->triangle_count};
+  return SUPINE_OK;
+}
+
+static int by_nearness(const void *a, const void *b) {
+  const item *p = a;
+  const item *q = b;
+  if (p->nearness != q->nearness) {
+    return p->nearness < q->nearness ? -1 : 1;
+  }
+  return (p->index > q->index) - (p->index < q->index);
+}
+
+/* A ghost is drawn where a target was, if it has moved; anatomy has none. */
+static bool has_ghost(const supine_mark *mark) {
+  return mark->moved && !mark->anatomy;
+}
+
+static void add_triangles(canvas *c, layer_name name) {
+  const layer *from = &c->layers[name];
+  for (size_t t = 0; t < from->triangle_count; ++t) {
+    const uint32_t *v = from->triangles + 3 * t;
+    if (name == LAYER_LUNGS || has_ghost(&c->scene->content->mark[v[0]])) {
+      const float nearness = from->corners[v[0]].nearness + from->corners[v[1]].nearness +
+                             from->corners[v[2]].nearness;
+      c->items[c->item_count++] = (item){nearness / 3.0F, (uint32_t)t, name, false};
+    }
+  }
+}
+
+/* List the translucent triangles and balls of a shell from the farthest to the nearest. */
+static supine_status add_items(canvas *c, supine_arena *keep, supine_error *error) {
+  const supine_marks *marks = c->scene->content;
+  const size_t points = marks != NULL ? marks->count : 0;
+  const size_t most =
+      c->layers[LAYER_LUNGS].triangle_count + c->layers[LAYER_BEFORE].triangle_count + points;
+  c->items = supine_arena_take(keep, most, sizeof *c->items);
+  SUPINE_TRY(supine_arena_check(keep, error, "%zu triangles", most));
+  add_triangles(c, LAYER_LUNGS);
+  add_triangles(c, LAYER_BEFORE);
+  for (size_t i = 0; i < points; ++i) {
+    if (marks->mark[i].radius > 0.0F && has_ghost(&marks->mark[i])) {
+      c->items[c->item_count++] =
+          (item){c->layers[LAYER_BEFORE].corners[i].nearness, (uint32_t)i, LAYER_BEFORE, true};
+    }
+  }
+  qsort(c->items, c->item_count, sizeof *c->items, by_nearness);
+  return SUPINE_OK;
 }
 
 supine_status supine_render_draw(const supine_basis *basis, const supine_scene *scene,
@@ -417,20 +432,26 @@ supine_status supine_render_draw(const supine_basis *basis, const supine_scene *
                    scene->height, SIDE_MAX);
   SUPINE_ARENA arena = {0};
   const size_t count = OVERSAMPLE * OVERSAMPLE * scene->width * scene->height;
-  const supine_basis_info *info = supine_basis_get_info(basis);
-  canvas c = {.info = info,
-              .corners = supine_arena_take(&arena, info->vertex_count, sizeof *c.corners),
+  canvas c = {.camera = supine_render_camera(supine_basis_get_info(basis), scene),
               .scene = scene,
               .width = OVERSAMPLE * scene->width,
               .height = OVERSAMPLE * scene->height,
-              .nearest = supine_arena_take(&arena, count, sizeof *c.nearest),
               .nearness = supine_arena_zeros(&arena, count, sizeof *c.nearness),
+              .rgba = supine_arena_zeros(&arena, count, sizeof *c.rgba),
+              .shades = supine_arena_take(&arena, 1, sizeof *c.shades),
               .line_step = (float)supine_render_bar_step(scene->largest),
               .pixels = pixels};
   SUPINE_TRY(supine_arena_check(&arena, error, "%zu samples", count));
-  memset(c.nearest, 0xFF, count * sizeof *c.nearest);
-  find_colours(&c);
-  SUPINE_TRY(find_corners(&c, basis, error));
+  supine_render_shades(scene, c.shades);
+  supine_render_camera_aim(&c.camera, basis, scene, (double)c.width, (double)c.height);
+  SUPINE_TRY(add_lungs(&c, basis, &arena, error));
+  if (scene->content != NULL) {
+    SUPINE_TRY(add_content(&c, false, &arena, error));
+    SUPINE_TRY(add_content(&c, true, &arena, error));
+  }
+  if (scene->look == SUPINE_LOOK_SHELL) {
+    SUPINE_TRY(add_items(&c, &arena, error));
+  }
   supine_parallel_for(scene->height, ROWS_PER_JOB, 0, draw_rows, &c);
   return SUPINE_OK;
 }

@@ -4,12 +4,15 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <cairo-pdf.h>
+#include <cairo-svg.h>
 #include <cairo.h>
 
 #include "base/arena.h"
 #include "base/library.h"
 #include "base/number.h"
 #include "base/output.h"
+#include "base/text.h"
 #include "program/view/render/render.h"
 
 /* clang-format off */
@@ -19,13 +22,16 @@
   EACH(cairo_, image_surface_create_for_data) EACH(cairo_, image_surface_get_data)                 \
   EACH(cairo_, image_surface_get_stride) EACH(cairo_, line_to) EACH(cairo_, move_to)               \
   EACH(cairo_, new_path) EACH(cairo_, new_sub_path) EACH(cairo_, paint)                            \
-  EACH(cairo_, paint_with_alpha) EACH(cairo_, pattern_add_color_stop_rgb)                          \
+  EACH(cairo_, pattern_add_color_stop_rgb) EACH(cairo_, pdf_surface_create_for_stream)             \
+  EACH(cairo_, pdf_surface_set_metadata)                                                           \
   EACH(cairo_, pattern_create_linear) EACH(cairo_, pattern_destroy) EACH(cairo_, rectangle)        \
+  EACH(cairo_, restore) EACH(cairo_, save) EACH(cairo_, scale)                                     \
   EACH(cairo_, select_font_face) EACH(cairo_, set_font_size) EACH(cairo_, set_line_width)          \
   EACH(cairo_, set_source) EACH(cairo_, set_source_rgb) EACH(cairo_, set_source_rgba)              \
   EACH(cairo_, set_source_surface) EACH(cairo_, show_text) EACH(cairo_, status)                    \
   EACH(cairo_, status_to_string) EACH(cairo_, stroke) EACH(cairo_, stroke_preserve)                \
-  EACH(cairo_, surface_destroy) EACH(cairo_, surface_flush) EACH(cairo_, surface_mark_dirty)       \
+  EACH(cairo_, surface_destroy) EACH(cairo_, surface_finish) EACH(cairo_, surface_flush)           \
+  EACH(cairo_, surface_mark_dirty) EACH(cairo_, svg_surface_create_for_stream)                     \
   EACH(cairo_, surface_status) EACH(cairo_, surface_write_to_png_stream)                           \
   EACH(cairo_, text_extents) EACH(cairo_, text_path) EACH(cairo_, translate)
 /* clang-format on */
@@ -36,13 +42,30 @@ static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cairo;
 
 static const double pi = 3.14159265358979323846;
 
-static const double ground[3] = {0.955, 0.965, 0.975};
-static const double card[3] = {1, 1, 1};
-static const double edge[3] = {0.86, 0.885, 0.91};
-static const double ink[3] = {0.09, 0.13, 0.18};
-static const double faint[3] = {0.37, 0.43, 0.49};
+/* Colours of a picture's background, frames and letters. */
+typedef struct theme {
+  double ground[3];
+  double card[3];
+  double edge[3];
+  double ink[3];
+  double faint[3];
+  double target[3]; /* of words about a target */
+} theme;
+
+/* The shell is bright at its rim, so it needs a dark ground. Colours of values are for paper. */
+static const theme themes[2] = {[SUPINE_LOOK_MAP] = {.ground = {0.955, 0.965, 0.975},
+                                                     .card = {1, 1, 1},
+                                                     .edge = {0.86, 0.885, 0.91},
+                                                     .ink = {0.09, 0.13, 0.18},
+                                                     .faint = {0.37, 0.43, 0.49},
+                                                     .target = {0.69, 0.24, 0.05}},
+                                [SUPINE_LOOK_SHELL] = {.ground = {0.043, 0.071, 0.125},
+                                                       .card = {0.043, 0.071, 0.125},
+                                                       .edge = {0.043, 0.071, 0.125},
+                                                       .ink = {0.96, 0.97, 1.0},
+                                                       .faint = {0.63, 0.70, 0.80},
+                                                       .target = {1.0, 0.69, 0.46}}};
 static const double gravity_colour[3] = {0.91, 0.33, 0.17};
-static const double mark_colour[3] = {0.69, 0.24, 0.05};
 
 /* Layout of the picture, pixels. */
 typedef struct layout {
@@ -58,6 +81,8 @@ typedef struct painter {
   cairo_t *cr;
   const supine_basis *basis;
   const supine_picture *picture;
+  const theme *theme;
+  double detail; /* pixels of the drawn lungs per unit of the picture: above 1 in vector files */
   layout at;
 } painter;
 
@@ -151,9 +176,12 @@ static void gravity_arrow(cairo_t *cr, double x, double y, double radius, const 
 }
 
 /* Draw the ball that shows the body's axes and gravity. */
-static void ball(cairo_t *cr, double x, double y, double radius, supine_view view,
+static void ball(const painter *by, double x, double y, double radius, supine_view view,
                  const double gravity[3]) {
   static const char *const ends[3][2] = {{"L", "R"}, {"P", "A"}, {"H", "F"}};
+  cairo_t *cr = by->cr;
+  const double *faint = by->theme->faint;
+  const double *ink = by->theme->ink;
   double axes[3][3];
   double seen[3] = {0, 0, 0};
   supine_render_view_axes(view, gravity, axes);
@@ -200,10 +228,12 @@ static void place_name(double (*box)[3], size_t count, double line) {
 }
 
 /* Draw a label at `box`, which is as in place_name, and a line from it to its mark at `at`. */
-static void name(cairo_t *cr, const char *label, const double at[2], const double box[3],
+static void name(const painter *by, const char *label, const double at[2], const double box[3],
                  double size) {
+  cairo_t *cr = by->cr;
+  const double *card = by->theme->card;
   const bool right = box[0] > at[0];
-  colour(cr, faint);
+  colour(cr, by->theme->faint);
   cairo.set_line_width(cr, size * 0.06);
   cairo.move_to(cr, at[0] + (right ? 0.5 : -0.5) * size, at[1]);
   cairo.line_to(cr, box[0] + (right ? -0.2 * size : box[2] + 0.2 * size), box[1] - 0.25 * size);
@@ -213,13 +243,15 @@ static void name(cairo_t *cr, const char *label, const double at[2], const doubl
   cairo.set_source_rgba(cr, card[0], card[1], card[2], 0.85);
   cairo.set_line_width(cr, size * 0.25);
   cairo.stroke_preserve(cr);
-  colour(cr, ink);
+  colour(cr, by->theme->ink);
   cairo.fill(cr);
 }
 
 /* Draw labels on the outer side of their marks at `pixel`, so that lines to them do not cross. */
-static void draw_names(cairo_t *cr, const supine_marks *marks, double (*pixel)[2], double (*box)[3],
-                       double size, double width) {
+static void draw_names(const painter *by, const supine_marks *marks, double (*pixel)[2],
+                       double (*box)[3], double width) {
+  cairo_t *cr = by->cr;
+  const double size = by->at.font;
   const double margin = 0.5 * size; /* part of that between the scene and the edge of its card */
   double sum = 0.0;
   size_t count = 0;
@@ -240,15 +272,18 @@ static void draw_names(cairo_t *cr, const supine_marks *marks, double (*pixel)[2
                    : fmax(-margin, left);
       own[1] = pixel[i][1] - size * 0.6;
       place_name(box, placed++, size);
-      name(cr, marks->mark[i].label, pixel[i], own, size);
+      name(by, marks->mark[i].label, pixel[i], own, size);
     }
   }
 }
 
-/* Draw triangles, discs and dots at the marks, then arrows, then labels. The origin of the picture
- * is the upper left corner of the scene; `size` is the size of the font, pixels. */
-static supine_status draw_marks(cairo_t *cr, const supine_basis *basis, const supine_scene *scene,
-                                const supine_marks *marks, double size) {
+/* Draw an arrow from the old place of each target to its place, then labels. Arrows are drawn over
+ * the balls, with an edge in the colour of the ground, so that they are seen on any of them. The
+ * origin is the upper left corner of the scene. */
+static supine_status draw_marks(const painter *by, const supine_scene *scene,
+                                const supine_marks *marks) {
+  cairo_t *cr = by->cr;
+  const double size = by->at.font;
   SUPINE_ARENA arena = {0};
   double(*pixel)[2] = supine_arena_take(&arena, marks->count, 2 * sizeof *pixel);
   double(*box)[3] = supine_arena_take(&arena, marks->count, sizeof *box);
@@ -256,35 +291,20 @@ static supine_status draw_marks(cairo_t *cr, const supine_basis *basis, const su
     return SUPINE_ERROR_MEMORY;
   }
   double(*from)[2] = pixel + marks->count;
-  supine_render_project(basis, scene, marks, false, pixel);
-  supine_render_project(basis, scene, marks, true, from);
+  supine_render_project(by->basis, scene, marks, false, pixel);
+  supine_render_project(by->basis, scene, marks, true, from);
   cairo.new_path(cr);
-  colour(cr, mark_colour);
-  cairo.set_line_width(cr, 1.0); /* closes the seams between triangles */
-  for (size_t t = 0; t < marks->triangle_count; ++t) {
-    for (size_t k = 0; k < 3; ++k) {
-      const double *at = pixel[marks->triangles[3 * t + k]];
-      cairo.line_to(cr, at[0], at[1]);
-    }
-    cairo.close_path(cr);
-    cairo.fill_preserve(cr);
-    cairo.stroke(cr);
-  }
-  for (size_t i = 0; i < marks->count; ++i) {
-    const supine_mark *mark = &marks->mark[i];
-    if (mark->point || mark->label == NULL) {
-      cairo.arc(cr, pixel[i][0], pixel[i][1], size * (mark->point ? 0.32 : 0.1), 0, 2 * pi);
-      cairo.fill(cr);
-    }
-  }
-  colour(cr, ink);
   for (size_t i = 0; i < marks->count; ++i) {
     const double moved = hypot(pixel[i][0] - from[i][0], pixel[i][1] - from[i][1]);
-    if (marks->mark[i].label != NULL && moved > 0.3 * size) {
-      arrow(cr, from[i], pixel[i], fmin(size * 0.55, 0.6 * moved), size * 0.12);
+    if (marks->mark[i].label != NULL && moved > 0.25 * size) {
+      const double head = fmin(size * 0.5, 0.6 * moved);
+      colour(cr, by->theme->card);
+      arrow(cr, from[i], pixel[i], 1.35 * head, size * 0.26);
+      colour(cr, by->theme->ink);
+      arrow(cr, from[i], pixel[i], head, size * 0.12);
     }
   }
-  draw_names(cr, marks, pixel, box, size, (double)scene->width);
+  draw_names(by, marks, pixel, box, (double)scene->width);
   return SUPINE_OK;
 }
 
@@ -309,18 +329,18 @@ static supine_status draw_scene(const supine_basis *basis, const supine_scene *s
 /* Draw the lungs and the marks of a panel in a box {x, y, width, height}, pixels. */
 static supine_status lungs(const painter *by, const supine_panel *panel, supine_view view,
                            const double box[4], const double extent[4], supine_error *error) {
-  const double transparency = by->picture->transparency;
   double shown[4] = {extent[0], extent[1], extent[2], extent[3]};
   double own[4] = SUPINE_EXTENT_NONE;
   supine_scene scene = {.pose = panel->pose,
+                        .look = by->picture->look,
                         .value = panel->value,
                         .largest = by->picture->largest,
                         .colours = by->picture->colours,
                         .view = view,
                         .gravity = panel->gravity,
-                        .shell = transparency > 0,
-                        .width = (size_t)box[2],
-                        .height = (size_t)box[3],
+                        .content = panel->marks,
+                        .width = (size_t)(by->detail * box[2]),
+                        .height = (size_t)(by->detail * box[3]),
                         .extent = shown};
   if (view == SUPINE_VIEW_LYING) { /* put the lungs of every posture on the table */
     supine_render_extent(by->basis, &scene, own);
@@ -329,11 +349,17 @@ static supine_status lungs(const painter *by, const supine_panel *panel, supine_
   }
   SUPINE_FREED_BY(free_surface) cairo_surface_t *image = NULL;
   SUPINE_TRY(draw_scene(by->basis, &scene, &image, error));
-  cairo.set_source_surface(by->cr, image, floor(box[0]), floor(box[1]));
-  cairo.paint_with_alpha(by->cr, transparency > 0 ? fmin(1, 2 * (1 - transparency)) : 1);
+  cairo.save(by->cr);
+  cairo.translate(by->cr, floor(box[0]), floor(box[1]));
+  cairo.scale(by->cr, 1 / by->detail, 1 / by->detail);
+  cairo.set_source_surface(by->cr, image, 0, 0);
+  cairo.paint(by->cr);
+  cairo.restore(by->cr);
   if (panel->marks != NULL) {
+    scene.width = (size_t)box[2];
+    scene.height = (size_t)box[3];
     cairo.translate(by->cr, floor(box[0]), floor(box[1]));
-    SUPINE_TRY(draw_marks(by->cr, by->basis, &scene, panel->marks, by->at.font));
+    SUPINE_TRY(draw_marks(by, &scene, panel->marks));
     cairo.translate(by->cr, -floor(box[0]), -floor(box[1]));
   }
   return SUPINE_OK;
@@ -353,26 +379,28 @@ static supine_status cell(const painter *by, size_t column, size_t row, const do
   const double words = x + 2 * radius + at->font * 1.5;
   const double room = x + at->cell_width - words - at->font;
   rounded(cr, x, y, at->cell_width, at->cell_height, at->font * 0.7);
-  colour(cr, card);
+  colour(cr, by->theme->card);
   cairo.fill_preserve(cr);
-  colour(cr, edge);
+  colour(cr, by->theme->edge);
   cairo.set_line_width(cr, 1);
   cairo.stroke(cr);
-  ball(cr, x + radius + at->font * 0.7, y + at->heading_height / 2 + at->font * 0.2, radius, view,
+  ball(by, x + radius + at->font * 0.7, y + at->heading_height / 2 + at->font * 0.2, radius, view,
        panel->gravity);
-  colour(cr, ink);
+  colour(cr, by->theme->ink);
   (void)fitted_text(cr, words, y + at->heading_height / 2 - at->font * 0.25, at->font * 1.3, true,
                     room, panel->title);
-  colour(cr, faint);
+  colour(cr, panel->about_target ? by->theme->target : by->theme->faint);
   const double size = fitted_text(cr, words, y + at->heading_height / 2 + at->font * 0.95,
                                   at->font * 0.82, false, room, panel->subtitle);
+  colour(cr, by->theme->faint);
   (void)fitted_text(cr, words, y + at->heading_height / 2 + at->font * 2.0, size, false, room,
                     view == SUPINE_VIEW_LYING ? panel->note : supine_render_view_name(view));
   double below = at->font * 0.5; /* height of the space below the lungs */
-  if (view == SUPINE_VIEW_LYING && fabs(panel->gravity[2]) < 0.8) { /* the table */
+  if (view == SUPINE_VIEW_LYING &&
+      fabs(panel->gravity[2]) < SUPINE_VIEW_LYING_TILT) { /* the table */
     cairo.rectangle(cr, x + at->font, y + at->cell_height - 2 * at->font,
                     at->cell_width - 2 * at->font, at->font * 0.9);
-    cairo.set_source_rgba(cr, faint[0], faint[1], faint[2], 0.35);
+    cairo.set_source_rgba(cr, by->theme->faint[0], by->theme->faint[1], by->theme->faint[2], 0.35);
     cairo.fill(cr);
     below = at->font * 3;
   }
@@ -407,9 +435,9 @@ static void colour_bar(const painter *by) {
   cairo.fill(cr);
   cairo.pattern_destroy(fade);
   font(cr, at->font * 0.85, false);
-  colour(cr, ink);
+  colour(cr, by->theme->ink);
   text(cr, x + width / 2, y - at->font * 0.5, 0.5, picture->bar_label);
-  colour(cr, faint);
+  colour(cr, by->theme->faint);
   cairo.set_line_width(cr, 1);
   for (int i = 0; i * step <= picture->largest * (1 + 1e-9); ++i) {
     char number[32];
@@ -431,7 +459,7 @@ static layout make_layout(const supine_picture *picture) {
   at.font = fmin(28, at.font);
   at.margin = at.font * 0.9;
   at.heading_height = at.font * 5.2;
-  at.footer_height = picture->transparency == 0 ? at.font * 4.6 : at.margin;
+  at.footer_height = picture->look == SUPINE_LOOK_MAP ? at.font * 4.6 : at.margin;
   const double gap = at.margin / 2;
   at.cell_width = (width - 2 * at.margin - gap * (double)(picture->panel_count - 1)) /
                   (double)picture->panel_count;
@@ -462,7 +490,7 @@ static supine_status compose(const painter *by, supine_error *error) {
       "%zu x %zu pixels are too few for %zu posture%s and %zu view%s: give a larger --size",
       picture->width, picture->height, picture->panel_count, picture->panel_count == 1 ? "" : "s",
       picture->view_count, picture->view_count == 1 ? "" : "s");
-  colour(by->cr, ground);
+  colour(by->cr, by->theme->ground);
   cairo.paint(by->cr);
   for (size_t row = 0; row < picture->view_count; ++row) {
     memcpy(extent[row], picture->extent != NULL ? picture->extent[row] : none, sizeof none);
@@ -474,7 +502,7 @@ static supine_status compose(const painter *by, supine_error *error) {
     const size_t row = i / picture->panel_count;
     SUPINE_TRY(cell(by, i % picture->panel_count, row, extent[row], error));
   }
-  if (picture->transparency == 0) { /* a shell has no colours */
+  if (picture->look == SUPINE_LOOK_MAP) {
     colour_bar(by);
   }
   return SUPINE_OK;
@@ -484,25 +512,34 @@ static cairo_status_t to_file(void *file, const unsigned char *bytes, unsigned l
   return fwrite(bytes, 1, length, file) == length ? CAIRO_STATUS_SUCCESS : CAIRO_STATUS_WRITE_ERROR;
 }
 
-static supine_status write_png(cairo_surface_t *surface, FILE *file, supine_error *error) {
-  const cairo_status_t written = cairo.surface_write_to_png_stream(surface, to_file, file);
-  SUPINE_REFUSE_IF(written != CAIRO_STATUS_SUCCESS, error, SUPINE_ERROR_WRITE, "PNG: %s",
-                   cairo.status_to_string(written));
+/* Refuse what cairo could not draw or write. `what` names the picture or the format. */
+static supine_status check(cairo_status_t drawn, const char *what, supine_error *error) {
+  SUPINE_REFUSE_IF(drawn == CAIRO_STATUS_NO_MEMORY, error, SUPINE_ERROR_MEMORY, "out of memory");
+  SUPINE_REFUSE_IF(drawn != CAIRO_STATUS_SUCCESS, error, SUPINE_ERROR_WRITE, "%s: cairo: %s", what,
+                   cairo.status_to_string(drawn));
   return SUPINE_OK;
 }
 
-static supine_status draw_on(cairo_surface_t *surface, const supine_basis *basis,
+static supine_status write_png(cairo_surface_t *surface, FILE *file, supine_error *error) {
+  return check(cairo.surface_write_to_png_stream(surface, to_file, file), "PNG", error);
+}
+
+static void free_context(cairo_t **cr) {
+  cairo.destroy(*cr);
+}
+
+/* Compose a picture on a surface. After an error, such as text that is not UTF-8, cairo draws
+ * nothing more: so its status is checked at the end. */
+static supine_status draw_on(cairo_surface_t *surface, double detail, const supine_basis *basis,
                              const supine_picture *picture, supine_error *error) {
-  supine_status status = SUPINE_ERROR_MEMORY;
-  const painter by = {cairo.create(surface), basis, picture, make_layout(picture)};
-  if (cairo.status(by.cr) == CAIRO_STATUS_SUCCESS) {
-    status = compose(&by, error);
-    cairo.surface_flush(surface);
-  } else {
-    (void)supine_error_set(error, status, "out of memory");
-  }
-  cairo.destroy(by.cr);
-  return status;
+  SUPINE_FREED_BY(free_context) cairo_t *cr = cairo.create(surface);
+  const painter by = {
+      cr, basis, picture, &themes[picture->look], detail, make_layout(picture),
+  };
+  SUPINE_TRY(check(cairo.status(cr), "picture", error));
+  SUPINE_TRY(compose(&by, error));
+  cairo.surface_flush(surface);
+  return check(cairo.status(cr), "picture", error);
 }
 
 supine_status supine_render_picture_draw(const supine_basis *basis, const supine_picture *picture,
@@ -512,19 +549,44 @@ supine_status supine_render_picture_draw(const supine_basis *basis, const supine
   cairo_surface_t *surface = cairo.image_surface_create_for_data(
       (unsigned char *)pixels, CAIRO_FORMAT_RGB24, (int)picture->width, (int)picture->height,
       (int)(4 * picture->width));
-  return draw_on(surface, basis, picture, error);
+  return draw_on(surface, 1.0, basis, picture, error);
+}
+
+/* Draw a picture on a surface whose bytes go to a file: PDF or SVG. */
+static supine_status write_vector(cairo_surface_t *surface, const supine_basis *basis,
+                                  const supine_picture *picture, supine_error *error) {
+  static const double detail = 3.0; /* pixels of the lungs per unit, 1/72 inch */
+  SUPINE_TRY(draw_on(surface, detail, basis, picture, error));
+  cairo.surface_finish(surface);
+  return check(cairo.surface_status(surface), "picture", error);
+}
+
+static supine_status write_picture(const char *path, FILE *file, const supine_basis *basis,
+                                   const supine_picture *picture, supine_error *error) {
+  const double width = (double)picture->width;
+  const double height = (double)picture->height;
+  SUPINE_FREED_BY(free_surface) cairo_surface_t *surface = NULL;
+  if (supine_text_ends_in(path, ".pdf")) {
+    surface = cairo.pdf_surface_create_for_stream(to_file, file, width, height);
+    /* No date: the same picture has the same bytes. */
+    cairo.pdf_surface_set_metadata(surface, CAIRO_PDF_METADATA_CREATE_DATE, "");
+    return write_vector(surface, basis, picture, error);
+  }
+  if (supine_text_ends_in(path, ".svg")) {
+    surface = cairo.svg_surface_create_for_stream(to_file, file, width, height);
+    return write_vector(surface, basis, picture, error);
+  }
+  surface = cairo.image_surface_create(CAIRO_FORMAT_RGB24, (int)width, (int)height);
+  SUPINE_TRY(draw_on(surface, 1.0, basis, picture, error));
+  return write_png(surface, file, error);
 }
 
 supine_status supine_render_picture_save(const supine_basis *basis, const supine_picture *picture,
                                          const char *path, supine_error *error) {
   SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
   SUPINE_TRY(SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error));
-  SUPINE_FREED_BY(free_surface)
-  cairo_surface_t *surface =
-      cairo.image_surface_create(CAIRO_FORMAT_RGB24, (int)picture->width, (int)picture->height);
-  SUPINE_TRY(draw_on(surface, basis, picture, error));
   SUPINE_TRY(supine_output_open(path, &output, error));
-  const supine_status status = write_png(surface, output.file, error);
+  const supine_status status = write_picture(path, output.file, basis, picture, error);
   return status == SUPINE_OK || ferror(output.file) != 0 ? supine_output_commit(&output, error)
                                                          : status;
 }

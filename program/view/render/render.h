@@ -27,6 +27,9 @@ typedef enum supine_view {
   SUPINE_VIEW_COUNT
 } supine_view;
 
+/** Largest component of gravity along the body, head or feet, at which a patient lies. */
+#define SUPINE_VIEW_LYING_TILT 0.8
+
 /** Return the name of a view; NULL if `view` is SUPINE_VIEW_COUNT or above. */
 const char *supine_render_view_name(supine_view view);
 
@@ -50,17 +53,44 @@ void supine_render_colour(supine_colours map, double t, double rgb[3]);
 /** Write the colour of a map at t as the six hexadecimal digits of HTML. */
 void supine_render_hex(supine_colours map, double t, char text[7]);
 
+/** How the lungs are drawn. */
+typedef enum supine_look {
+  SUPINE_LOOK_MAP = 0, /**< opaque, in the colours of a value; what is inside is drawn over them */
+  SUPINE_LOOK_SHELL    /**< a translucent shell, bright where it turns away from the viewer and
+                          darker towards gravity; what is inside is seen through it, with a white
+                          ghost of each target where it was */
+} supine_look;
+
+/** A point, or a vertex of a mesh, inside the lungs. */
+typedef struct supine_mark {
+  float xyz[3];      /**< position, mm */
+  float from[3];     /**< position from which displacements are measured, mm */
+  float radius;      /**< radius of the ball that shows it, mm; 0 for no ball */
+  bool anatomy;      /**< whether it is part of a large structure, such as airways or a lobe, which
+                        has another colour than targets, and neither a ghost nor an arrow */
+  bool moved;        /**< whether its structure is elsewhere than it was */
+  const char *label; /**< text written beside the mark, or NULL */
+} supine_mark;
+
+typedef struct supine_marks {
+  size_t count;
+  const supine_mark *mark;
+  size_t triangle_count;
+  const uint32_t *triangles; /**< [triangle_count, 3] indices of marks: meshes */
+} supine_marks;
+
 /** One drawing: the lungs in one state from one side. */
 typedef struct supine_scene {
   const supine_pose *pose;
-  const float *value; /**< [N] value that the colour of each vertex shows, mm */
+  supine_look look;
+  const float *value; /**< [N] value that the colour of each vertex shows, mm; a shell needs none */
   double largest;     /**< value that the last colour shows, mm; above 0. Contour lines are at the
                            ticks of its colour bar (supine_render_bar_step) */
   supine_colours colours;
   supine_view view;
-  const double *gravity; /**< [3] unit vector; needed if `view` is SUPINE_VIEW_LYING */
-  bool shell; /**< whether to draw a grey, transparent shell with an outline instead of colours */
-  size_t width, height; /**< size of the drawing, pixels */
+  const double *gravity;       /**< [3] unit vector; needed if `view` is SUPINE_VIEW_LYING */
+  const supine_marks *content; /**< structures inside the lungs, or NULL */
+  size_t width, height;        /**< size of the drawing, pixels */
   const double *extent; /**< [4] smallest and largest x, then y, mm; NULL: those of this scene */
 } supine_scene;
 
@@ -85,21 +115,6 @@ supine_status supine_render_draw(const supine_basis *basis, const supine_scene *
 supine_status supine_render_png(const supine_basis *basis, const supine_scene *scene, FILE *file,
                                 supine_error *error);
 
-/** A point, or a vertex of a mesh, inside the lungs. */
-typedef struct supine_mark {
-  float xyz[3];  /**< position, mm */
-  float from[3]; /**< position from which an arrow points to a mark with a label, mm */
-  bool point;    /**< true: a point, drawn as a disc; false: a vertex of a mesh, drawn as a dot */
-  const char *label; /**< text written beside the mark, or NULL */
-} supine_mark;
-
-typedef struct supine_marks {
-  size_t count;
-  const supine_mark *mark;
-  size_t triangle_count;
-  const uint32_t *triangles; /**< [triangle_count, 3] indices of marks: meshes, which are filled */
-} supine_marks;
-
 /** Compute the positions of marks in the drawing of a scene, or those of supine_mark.from.
  * @param pixel  [count, 2] pixels from the left and upper edges; output */
 void supine_render_project(const supine_basis *basis, const supine_scene *scene,
@@ -109,11 +124,13 @@ void supine_render_project(const supine_basis *basis, const supine_scene *scene,
 typedef struct supine_panel {
   const char *title;
   const char *subtitle;
+  bool
+      about_target; /**< whether `subtitle` is about a target, so that it has the targets' colour */
   const char *note; /**< third line, in place of the name of the view SUPINE_VIEW_LYING */
   double gravity[3];
   const supine_pose *pose;
   const float *value;
-  const supine_marks *marks; /**< marks drawn over the lungs, or NULL */
+  const supine_marks *marks; /**< structures inside the lungs, or NULL */
 } supine_panel;
 
 enum { SUPINE_PANELS_MAX = 8, SUPINE_VIEWS_MAX = 8 };
@@ -125,8 +142,8 @@ typedef struct supine_picture {
   const supine_view *view;
   size_t view_count; /**< 1 to SUPINE_VIEWS_MAX */
   const char *bar_label;
+  supine_look look;          /**< a shell has a dark background, and no colour bar */
   double largest;            /**< value that the last colour shows, mm */
-  double transparency;       /**< 0 for coloured lungs; above 0 for grey shells, invisible at 1 */
   const double (*extent)[4]; /**< [view_count] smallest and largest x, then y, of each view, mm;
                                 NULL: those of this picture */
   supine_colours colours;
@@ -151,7 +168,9 @@ void supine_render_picture_extent(const supine_basis *basis, const supine_pictur
 supine_status supine_render_picture_draw(const supine_basis *basis, const supine_picture *picture,
                                          uint32_t *pixels, supine_error *error);
 
-/** Compose a picture and write it as a PNG file. */
+/** Compose a picture and write it to a file: PDF if its name ends in .pdf, SVG if in .svg, else
+ * PNG. A unit of PDF and SVG, 1/72 inch, is a pixel of the picture; the lungs have three times as
+ * many pixels. */
 supine_status supine_render_picture_save(const supine_basis *basis, const supine_picture *picture,
                                          const char *path, supine_error *error);
 
