@@ -45,28 +45,11 @@ static supine_model choose_law(const supine_model_choice *choice) {
   return model;
 }
 
-/* Say what volume the law gives the lungs in the state that was not scanned, beside the measured
- * one. The law is not rescaled to the latter.
- * @param measured  volume of both lungs in this state when the law was fitted, mL, or 0 */
-static void tell_volume(const supine_patient_record *record, double measured,
-                        supine_findings *findings) {
-  static const double different = 1.0 / 3.0; /* ratio of volumes minus 1 from which to warn */
-  const size_t other = 1 - record->shown;
-  const double *lung = record->lung_volume[other];
-  const bool both = (lung[0] > 0.0 && lung[1] > 0.0) || record->patient.frame.only_side != 0;
-  char state[160];
-  char beside[64] = "";
-  (void)supine_state_describe(&record->state[other], state, sizeof state);
-  if (measured > 0.0 && both) {
-    (void)supine_print_text(beside, sizeof beside, "; measured: %.0f mL", measured);
-  }
-  const double off = beside[0] != '\0' ? fabs((lung[0] + lung[1]) / measured - 1.0) : 0.0;
-  supine_findings_add(
-      findings, "%s: by the fitted law, the lungs hold %.0f mL %s%s%s",
-      off > different ? "warning" : "note", lung[0] + lung[1], state, beside,
-      off > different
-          ? ". Check that the scans show the same lungs; give --landmarks to 'supine fit'"
-          : "");
+/* Say what volume the law gives the lungs in the state that was not scanned. */
+static void tell_volume(const supine_patient_record *record, supine_findings *findings) {
+  char text[512];
+  const bool doubted = supine_patient_describe_volume(record, text, sizeof text);
+  supine_findings_add(findings, "%s: %s", doubted ? "warning" : "note", text);
 }
 
 static void describe_fit(const supine_patient_record *record, char *text, size_t size) {
@@ -96,7 +79,7 @@ static supine_status take_patient(const supine_patient_record *fitted, supine_pr
   p->model = supine_physics_model(SUPINE_LAW_DEEP);
   SUPINE_TRY(
       supine_patient_model(record, &p->source.lungs, resting, scan, arrays, &p->model, error));
-  tell_volume(record, fitted->volume[1 - record->shown], &p->source.findings);
+  tell_volume(record, &p->source.findings);
   return SUPINE_OK;
 }
 

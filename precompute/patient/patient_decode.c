@@ -164,6 +164,7 @@ static void read_scan(const object *root, size_t state, supine_patient_record *r
     fail(&from, "state");
   }
   record->volume[state] = read_real_if(&from, "volume_ml");
+  read_reals_if(&from, "left_right_ml", 2, record->measured_lung[state]);
 }
 
 /* Return the array `key`, of at most `most` objects, or NULL. */

@@ -103,6 +103,9 @@ static object scan_of(const supine_patient_record *record, size_t state) {
   if (record->volume[state] > 0.0) {
     put_real(&to, "volume_ml", record->volume[state]);
   }
+  if (record->measured_lung[state][0] > 0.0 || record->measured_lung[state][1] > 0.0) {
+    put_reals(&to, "left_right_ml", 2, record->measured_lung[state]);
+  }
   return to;
 }
 

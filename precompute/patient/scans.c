@@ -119,7 +119,11 @@ static void set_states(supine_patient_scans *scans, supine_patient_record *recor
       supine_patient_frame_of_points(scans->pairs.count, scans->pairs.to, NULL);
   for (size_t k = 0; k < 2; ++k) {
     const supine_volume *volume = &record->state[k].volume;
-    record->volume[k] = volume_of(&scans->lungs[k]);
+    const supine_lungs *lungs = &scans->lungs[k];
+    record->volume[k] = volume_of(lungs);
+    for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+      record->measured_lung[k][lungs->side[lung] > 0 ? 0 : 1] = lungs->volume[lung];
+    }
     if (record->volume[k] == 0.0 && volume->kind == SUPINE_VOLUME_ABSOLUTE) {
       record->volume[k] = volume->ml;
     }
