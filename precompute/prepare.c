@@ -238,10 +238,12 @@ static void summarize(const supine_model_choice *choice, const supine_resting *r
         p->model.share[lung] * (reference->full_volume[lung] + reference->scan_volume[lung]);
   }
   if (p->model.share[0] != 1.0 || p->model.share[1] != 1.0) {
-    supine_text_add(p->assumed, size,
-                    "; collapsed in every state by --lung, also in the scan, which then holds %.0f "
-                    "mL: no displacement contains the collapse",
-                    collapsed);
+    supine_text_add(
+        p->assumed, size,
+        "; collapsed in every state by --lung, also in the scan, which then holds %.0f "
+        "mL: no displacement contains the collapse. For one that does, leave --lung out and "
+        "give 'supine deform' a volume for each lung",
+        collapsed);
   }
 }
 

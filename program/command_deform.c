@@ -11,6 +11,7 @@
 
 #include "program/deform_content.h"
 #include "program/options/basis_input.h"
+#include "program/options/state_notes.h"
 #include "program/options/state_options.h"
 
 static const char name[] = "deform";
@@ -61,6 +62,7 @@ static supine_status deform(const supine_basis *basis, const request *wanted, su
   SUPINE_TRY(supine_options_reference(basis, &wanted->from, false, &moved.from, error));
   SUPINE_TRY(supine_options_pose(basis, name, wanted->volume.allow_folds, &moved.state, &moved.pose,
                                  error));
+  supine_options_tell_state(name, basis, &moved.state, &moved.pose);
   SUPINE_TRY(supine_posed_expected(basis, &moved.state, &moved.from.state, &expected, error));
   SUPINE_TRY(supine_options_hilum(basis, &moved.state, &moved.from.state, wanted->frame == 1,
                                   &moved.hilum, error));
