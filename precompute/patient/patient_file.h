@@ -66,12 +66,15 @@ typedef struct supine_patient_expand_report {
  * - d_i is the displacement that a force of 1 causes, [Santhanam2008] (15)-(17).
  * - F_i is the applied force after smoothing over the surface (smoothing.h).
  * - f is the applied force before smoothing; the matrix A inverts the smoothing.
- * A amplifies roughness of u, so f is averaged over the vertices in each cube of 40 mm. */
+ * A amplifies roughness of u, so f is averaged over the vertices in each cube of 40 mm. Surfaces of
+ * real people do not show f: their motion along the surface is unknown. Where landmarks are given,
+ * f = F is computed from their u instead. */
 typedef struct supine_patient_applied {
-  size_t blocks;      /**< number of cubes of 40 mm that contain vertices; 0: not computed */
-  double correlation; /**< correlation of the force with the depth along gravity */
-  double slopes[3];   /**< gradient of the force along X, Y and Z (0 to 1 in the bounding box),
-                         divided by the force at the lungs' centre */
+  bool from_landmarks; /**< computed from landmarks; from surfaces, it is unreliable */
+  size_t blocks;       /**< number of cubes of 40 mm that contain vertices; 0: not computed */
+  double correlation;  /**< correlation of the force with the depth along gravity */
+  double slopes[3];    /**< gradient of the force along X, Y and Z (0 to 1 in the bounding box),
+                          divided by the force at the lungs' centre */
   double residual; /**< RMS residual of the linear fit, divided by the force at the lungs' centre */
   double spread;   /**< standard deviation of the cubes' forces / force at the lungs' centre */
 } supine_patient_applied;
@@ -90,8 +93,8 @@ typedef struct supine_patient_record {
   double volume[2];       /**< lung volumes in the fuller and the emptier state, mL; 0 if unknown */
   /** [state][left, right lung] volume of each lung in the scans, mL; 0 if only the sum is known */
   double measured_lung[2][2];
-  double emptier[2][3];   /**< minimum and maximum of the emptier state's bounding box, mm */
-  bool from_surface;      /**< whether the bounding boxes are those of surfaces, not of landmarks */
+  double emptier[2][3]; /**< minimum and maximum of the emptier state's bounding box, mm */
+  bool from_surface;    /**< whether the bounding boxes are those of surfaces, not of landmarks */
   supine_patient_fit_report report;
   supine_patient_stiffness stiffness;
   supine_patient_surface_report surface;

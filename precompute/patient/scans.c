@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "precompute/patient/matching.h"
 #include "precompute/patient/scans.h"
 
 #include "base/arena.h"
@@ -194,8 +195,10 @@ static supine_status fit_landmarks(const supine_patient_scans *scans,
   SUPINE_TRY(supine_arena_check(&arena, error, "%zu landmarks", pairs->count));
   record->patient.frame = supine_patient_frame_of_points(pairs->count, pairs->from, scans->midline);
   supine_patient_rows_of_pairs(&record->patient.frame, pairs, rows);
-  return supine_patient_fit(options, rows, 0, pairs->count, &record->patient, &record->report,
-                            error);
+  SUPINE_TRY(
+      supine_patient_fit(options, rows, 0, pairs->count, &record->patient, &record->report, error));
+  return supine_patient_applied_find_landmarks(rows, pairs->count, &record->patient,
+                                               options->gravity, &record->applied, error);
 }
 
 supine_status supine_patient_scans_fit(const supine_patient_scans *scans,
