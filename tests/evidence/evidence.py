@@ -141,7 +141,8 @@ class Lungs:
         down = self.reference[:, 2] < -0.8 * np.linalg.norm(self.reference, axis=1)
         right = full[self.faces][:, :, 0].mean(1) < (full[:, 0].min() + full[:, 0].max()) / 2
         moved = {p: np.abs((after[p][0] - rest[p][0])[self.faces].mean(1)[:, 2]) for p in ("supine", "prone", "upright")}
-        dome = down & right
+        dome = down & right  # its highest quarter
+        dome &= full[self.faces].mean(1)[:, 2] > np.quantile(full[self.faces].mean(1)[dome, 2], 0.75)
         out["dome's motion in a breath, prone / supine"] = moved["prone"][dome].mean() / moved["supine"][dome].mean()
         out["diaphragm's motion, supine / upright"] = moved["supine"][down].mean() / moved["upright"][down].mean()
         out["largest displacement, supine to side, rest"] = max(
