@@ -56,6 +56,25 @@ def off_line():
 POSTURES = ("supine", "prone", "left", "right")
 
 
+def enclosed(faces):
+    """Return the volume that triangles enclose, mL."""
+    return abs(sum(a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+                   for a, b, c in faces) / 6000)
+
+
+def part_share(faces_of, left):
+    """Return the volume of one lung divided by the volume of its bounding box."""
+    faces = [face for face in faces_of.faces if (face[0][0] > 0) == left]
+    box = math.prod(max(p[k] for f in faces for p in f) - min(p[k] for f in faces for p in f) for k in range(3)) / 1000
+    return enclosed(faces) / box
+
+
+class Surface(list):
+    """The vertices of a surface, and its triangles as lists of corners."""
+
+    faces = ()
+
+
 def surface(posture, volume):
     """Return the vertices of the basis in a state, and the state's volume in mL."""
     run("deform", "basis.safetensors", "--posture", posture, "--volume", volume, "-o", "state.obj")
@@ -63,20 +82,26 @@ def surface(posture, volume):
         lines = [line.split() for line in file]
     at = [tuple(map(float, words[1:4])) for words in lines if words[:1] == ["v"]]
     faces = [[at[int(w.split("/")[0]) - 1] for w in words[1:4]] for words in lines if words[:1] == ["f"]]
-    volume = sum(a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
-                 for a, b, c in faces) / 6000
-    return at, abs(volume)
+    at = Surface(at)
+    at.faces = faces
+    return at, enclosed(faces)
 
 
-def lengths():
-    """Return the smallest and the largest length (feet to head) per volume, cm / dL, in a breath of 500 mL in four postures."""
-    ratios = []
+def shares():
+    """Return the least and the greatest volume of a lung divided by that of its box, and the largest distance of the box's
+    length (feet to head) at 250 mL from the mean of those at 0 and 500 mL, in percent of their difference, in a breath of
+    500 mL in four postures."""
+    found, bent = [], []
     for posture in POSTURES:
+        length = []
         for volume in ("scan", "scan+250", "scan+500"):
-            at, ml = surface(posture, volume)
+            at, _ = surface(posture, volume)
             z = [p[2] for p in at]
-            ratios.append((max(z) - min(z)) / 10 / (ml / 100))
-    return min(ratios), max(ratios)
+            length.append(max(z) - min(z))
+            for left in (True, False):
+                found.append(part_share(at, left))
+        bent.append(100 * abs(length[1] - (length[0] + length[2]) / 2) / abs(length[2] - length[0]))
+    return min(found), max(found), max(bent)
 
 
 def bends():
@@ -95,7 +120,7 @@ def bends():
 os.chdir(tempfile.mkdtemp())
 run("phantom", "-o", "lungs.ply", "--vertices", "5000")
 run("precompute", "lungs.ply", "--law", "paper", "-o", "basis.safetensors")
-shortest, longest = lengths()
+least_share, most_share, box_bend = shares()
 run("precompute", "lungs.ply", "-o", "basis.safetensors")
 straightest, most_bent = bends()
 fewest = json.loads(run("info", "basis.safetensors", "--json"))
@@ -115,11 +140,15 @@ plane = [name for name in rows("fig8_plane")[0] if name != "x_mm"]
 ring = rows("fig9_ring")
 
 
-def radius(column):
-    """Return the mean radius of the ring whose x is in the given column and whose y is in the next one."""
+def radius(column, stiff=None):
+    """Return the mean radius of the ring whose x is in the given column and whose y is in the next one: of all points, of
+    the third that one ring has stiffer, or of the others. The last row of the table repeats the first."""
     keys = list(ring[0])
     x, y = keys[keys.index(column)], keys[keys.index(column) + 1]
-    return sum(math.hypot(float(row[x]), float(row[y])) for row in ring) / len(ring)
+    points = ring[:-1]
+    third = range(len(points) // 3, 2 * len(points) // 3)
+    of = [math.hypot(float(row[x]), float(row[y])) for i, row in enumerate(points) if stiff is None or (i in third) == stiff]
+    return sum(of) / len(of)
 
 
 reached = "; ".join(f"{method}: {visits(method):,}" for method in methods
@@ -144,12 +173,13 @@ print(f"""# The paper, row by row
 Santhanam, Imielinska, Davenport, Kupelian and Rolland, "Modeling Real-Time 3-D Lung Deformations for Medical
 Visualization", IEEE Trans. Inf. Technol. Biomed. 12(2), 2008. Each row names the command or program that
 reproduces a part of the paper, its result, and what differs here. `python3 docs/paper.py build/release > docs/paper.md`
-makes this file from synthetic lungs of {best['vertices']:,} vertices.
+makes this file from synthetic lungs of {best['vertices']:,} vertices. Ranges of real lungs are from the programs that a row
+names.
 
 | in the paper | reproduced by | result | difference |
 |---|---|---|---|
 | III-B, pressure and volume: a second-order equation with five control parameters | `supine pv fit`, `supine pv show`, `supine breathe` | the built-in adult relation; other curves are fitted with errors below 1 % (`test_pv_fit`) | the paper does not define the control functions; here they are Legendre polynomials (`<supine/breath.h>`) |
-| III-C, displacement as a function of volume at one orientation | `tests/bench/bench_validation`, linearity.csv; `supine validate` with several `--state` | `paper`: at most {off_line():.1f} % of the displacement at 500 mL away from a straight line, from 0 to 500 mL in four postures | with `deep`, the default law, the path bends: its middle is {straightest:.1f} to {most_bent:.1f} % of the chord away from it, so that steps of equal displacement (`supine_step`) are wrong |
+| III-C, displacement as a function of volume at one orientation | `tests/bench/bench_validation`, linearity.csv; `supine validate` with several `--state` | `paper`: at most {off_line():.1f} % of the displacement at 500 mL away from a straight line, from 0 to 500 mL in four postures | with `deep`, the default law, the path bends: its middle is {straightest:.1f} to {most_bent:.1f} % of the chord away from it (up to 11 % in real lungs), so that steps of equal displacement (`supine_step`) are wrong |
 | III-E, mass and spring nodes, expandability, local transfer; (3), (8) | `supine precompute --law paper`, `--expandability`, `--lesion` | every column of the transfer sums to 1 (`test_equilibrium`) | the spring nodes are eliminated exactly; `deep` spreads the force over 10 mm and has no spring nodes; expandability acts on its strain (`strain.h`) |
 | (2), a column of the transfer matrix | `supine solve --unit-force VERTEX` | CSV, one row per vertex | |
 | (5), (6), Pitcher/Catcher | `tests/bench/bench_validation`, fig7_convergence.csv | link visits until the error is 1e-6: {reached} | the program factorises the matrix (CHOLMOD); tests compare the solution with the paper's iteration |
@@ -157,20 +187,21 @@ makes this file from synthetic lungs of {best['vertices']:,} vertices.
 | (9)-(14), all paths | `supine solve --law paper` | the fixed point of (5), (6) (`test_equilibrium`) | the paths are not enumerated; the linear system is solved |
 | (15)-(17), directions | `--law`, `--constants`, `supine fit` | {best['direction_constants']} | **Table I is not available**: these constants were fitted to the 4-D CT of ten patients (DIR-Lab); `supine fit` fits those of a person |
 | (18), applied force | `--base`, `--gain`, `--box-force`, `supine fit` | {best['force']} | in `deep` only a part of the gradient of the force follows gravity |
-| (18), its result: the force grows with the height along gravity | `supine fit REST STATE` estimates the force from a measured displacement | a force of known gain is recovered (`test_patient_surface`) | not compared with the paper's gradients, whose 4-D CT is not available |
-| Fig. 4, length of the bounding box divided by volume; the paper: 0.32 to 0.40 | `supine deform --law paper`, breath of 500 mL in four postures | {shortest:.3f} to {longest:.3f} cm per 100 mL | the unit is inferred from the size of the number |
-| Figs. 1 to 3 and 10 to 13 | | | not reproduced |
+| IV-B.3, (18), its result: the force grows with the height along gravity | `supine fit REST STATE --landmarks PAIRS.csv` computes the force from a measured displacement | a force of known gain is recovered from surfaces of one material (`test_patient_surface`). In five people with COPD (`tests/evidence/figures.py`): from landmarks the force grows with height in four of five, correlation -0.47 to 0.69; from surfaces it does not, -0.28 to 0.03, and (18) leaves 67 to 143 % of the force at the centre | surfaces do not show the motion along them, so that the report calls their force unreliable; not compared with the paper's gradients, whose 4-D CT is not available |
+| Fig. 4, volume divided by that of the bounding box; the paper: 0.32 to 0.40 | `supine deform --law paper`, breath of 500 mL in four postures | {least_share:.3f} to {most_share:.3f} for each lung; real lungs 0.29 to 0.44, steady within each lung | the length of the box from feet to head is {box_bend:.0f} % away from a straight line at half the breath (7 to 15 % in real lungs) |
+| Figs. 3 and 13, lungs in several orientations | `supine render` | one picture each | with other lungs |
+| Figs. 1, 2 and 10 to 12 | | | not reproduced |
 | IV, Fig. 7, convergence | `tests/bench/bench_validation`, fig7_convergence.png | as for (5), (6) | |
-| IV, Fig. 8, a plane | `tests/bench/bench_validation`, fig8_plane.png | {plane[0]} and {plane[1]} differ by {apart('fig8_plane', plane[0], plane[1]):.1g} of the displacement, in the nine digits written | |
-| IV, Fig. 9, a ring with a stiffer third | `tests/bench/bench_validation`, fig9_ring.png | mean radius {radius('x0'):.1f} mm before, {radius('x1'):.1f} with uniform stiffness, {radius('x2'):.1f} with a third twice as stiff, {radius('x4'):.1f} with a third four times as stiff | |
+| IV, Fig. 8, a plane | `tests/bench/bench_validation`, fig8_plane.png | {plane[0]} and {plane[1]} differ by {apart('fig8_plane', plane[0], plane[1]):.1g} of the displacement, in the nine digits written | a test of the solver: the springs are built to have its equilibrium, so that they are no independent simulation |
+| IV, Fig. 9, a ring with a stiffer third | `tests/bench/bench_validation`, fig9_ring.png | mean radius {radius('x0'):.1f} mm before, {radius('x1'):.1f} with uniform stiffness; with a third four times as stiff, this third {radius('x4', True):.1f} and the rest {radius('x4', False):.1f} | |
 | IV-B, expandability from displacement | `supine fit --expandability` | correlation with the true log stiffness of a real lung: 0.98 for a threefold gradient (slope 0.96), 0.87 for a lesion, found 2.1 times as stiff instead of 3; of synthetic lungs of 1,600 vertices: 0.97 (slope 1.03), and 0.79 for a lesion, below the 0.85 aimed at (`test_patient_expand`; 0.83 with 4,000 vertices). Not used to choose anything, four real pairs of 10,000 vertices: gradients 0.98 (slope 0.96 to 0.99), 16 lesions of 60 mm at four places 0.56 to 0.82, four of them not found | found for regions, by ridge least squares, because surfaces do not determine it for single vertices. Surfaces with errors of 0.5 mm hold no more: of 14 lesions, 13 have less than 0.85 with the best prior of this form, and the regions could show 0.87 to 0.96 |
 | IV-B, distance between surfaces, landmarks under 2 mm apart, deformation RMS below 1 % | `supine validate`, error pictures by `-o errors.png` | see `tests/FIGURES.md`, measured in larger breaths of other people | |
 | V, spherical harmonics of the orientation, l <= 3 | `supine precompute --law paper --band 3 --modes harmonics` | error {percent(first)} RMS on held-out directions ({percent(default_first)} with the default law); {operations(first)} per vertex | |
 | V, with at most the same number of operations | `supine precompute --law paper` | error {percent(best)} with {best['modes']} modes of band {best['band']} ({percent(fewest)} with {fewest['modes']} and the default law); {operations(best)} per vertex | uses the best functions of orientation instead of the first harmonics |
 | V, with stiffness that follows gravity | `--reach 10 --soften 1` | {percent(soft_first)} with the first 16 harmonics, {percent(soft_best)} with {soft_best['modes']} modes | |
 | V, FFTW | `supine precompute` | the force on a grid of directions, by FFTW along longitude and Legendre functions along latitude | the force is transformed, not the displacement; the transfer is applied once, to the few functions whose sums are all forces, before modes are chosen |
-| V, a breath of 500 mL over 5 s in steps of 4.5 and 2.25 mL, 15 ms per frame | `supine breathe --course flow`, `supine_step` | three additions per vertex and step (`test_deform`) | only for a straight path (`paper`) |
+| V, a breath of 500 mL over 5 s in steps of 4.5 and 2.25 mL, 15 ms per frame (500 mL / (66.66 frames/s x 5 s) = 1.5 mL) | `supine breathe --course flow`, `supine_step` | three additions per vertex and step (`test_deform`) | only for a straight path (`paper`) |
 | V, evaluation in a vertex shader | `runtime/supine.glsl`, `supine export` | positions equal those of the library within 0.001 mm (`test_glsl`) | |
 | VI, a loop of augmented reality: tracked pose in, deformed lungs out | `supine stream` (OpenIGTLink, live page), the page's headset mode | `stream_*` tests | tried with simulated trackers and an emulated headset only |
-| VI, a patient's own lungs, disease | `supine fit`, `--lesion`, `--lung` | | |
+| VI, a patient's own lungs, disease | `supine fit`, `--lesion`, `--lung` | | a collapsed lung is the reference of its basis, so that the collapse is in no displacement; with a volume for each lung (`--volume left=700mL,right=1400mL`) it is, but the law moves the lung to the back and the head, not to its hilum |
 """.rstrip())

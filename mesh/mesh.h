@@ -141,6 +141,23 @@ void supine_mesh_vertex_area(const supine_mesh *mesh, double *area);
  * its triangles, weighted by area. It is 0 where the mean is 0. */
 void supine_mesh_vertex_normals(const supine_mesh *mesh, double *normals);
 
+/** Compute the unit normal of each vertex as supine_mesh_vertex_normals, then replace each normal ten
+ * times by the normalised mean of its own and its neighbours'. A surface that moves along smoothed
+ * normals does not fold at its edges.
+ * @param normals  [vertex_count, 3] output
+ * @param space    [vertex_count, 3] work space */
+void supine_mesh_smooth_normals(const supine_mesh *mesh, const supine_topology *topology,
+                                double *normals, double *space);
+
+/** Compute the volume, mm^3, that a surface gains if all vertices move by h times `direction`, as
+ * change[0] h + change[1] h^2 + change[2] h^3.
+ * @param direction  [vertex_count, 3] */
+void supine_mesh_volume_along(const supine_mesh *mesh, const double *direction, double change[3]);
+
+/** Find the distance h at which the polynomial of supine_mesh_volume_along is `volume`, mm^3, by
+ * Newton's method from h = 0. Return false if it does not converge. */
+bool supine_mesh_offset_to(const double change[3], double volume, double *distance);
+
 /** Return the fraction of triangles, 0 to 1, whose normal turns by more than a right angle when the
  * vertices move to `vertices`. Above a few in a thousand the folds are visible. */
 double supine_mesh_turned_over(const supine_mesh *mesh, const double *vertices);

@@ -55,27 +55,12 @@ static supine_model choose_law(const supine_precompute_options *options) {
   return model;
 }
 
-/* Say what volume the law gives the lungs in the state that was not scanned, beside the measured
- * one. The law is not rescaled to the latter.
- * @param measured  volume of both lungs in this state when the law was fitted, mL, or 0 */
-static void tell_volume(const supine_patient_record *record, double measured,
-                        supine_findings *findings) {
-  static const double different = 1.0 / 3.0; /* ratio of volumes minus 1 from which to warn */
-  const size_t other = 1 - record->shown;
-  const double *lung = record->lung_volume[other];
-  const bool both = (lung[0] > 0.0 && lung[1] > 0.0) || record->patient.frame.only_side != 0;
-  char state[160];
-  char beside[64] = "";
-  (void)supine_state_describe(&record->state[other], state, sizeof state);
-  if (measured > 0.0 && both) {
-    (void)supine_print_text(beside, sizeof beside, "; measured: %.0f mL", measured);
-  }
-  const double off = beside[0] != '\0' ? fabs((lung[0] + lung[1]) / measured - 1.0) : 0.0;
-  const bool warn = off > different;
-  supine_findings_advise(findings, warn ? SUPINE_REMEDY_FIT_LANDMARKS : SUPINE_REMEDY_NONE, NULL,
-                         "%s: by the fitted law, the lungs hold %.0f mL %s%s%s",
-                         warn ? "warning" : "note", lung[0] + lung[1], state, beside,
-                         warn ? ". Check that the scans show the same lungs" : "");
+/* Say what volume the law gives the lungs in the state that was not scanned. */
+static void tell_volume(const supine_patient_record *record, supine_findings *findings) {
+  char text[512];
+  const bool doubted = supine_patient_describe_volume(record, text, sizeof text);
+  supine_findings_advise(findings, doubted ? SUPINE_REMEDY_FIT_LANDMARKS : SUPINE_REMEDY_NONE, NULL,
+                         "%s: %s", doubted ? "warning" : "note", text);
 }
 
 static void describe_fit(const supine_patient_record *record, char *text, size_t size) {
@@ -104,7 +89,7 @@ static supine_status take_patient(const supine_patient_record *fitted, supine_pr
   p->model = supine_physics_model(SUPINE_LAW_DEEP);
   SUPINE_TRY(
       supine_patient_model(record, &p->source.lungs, resting, scan, arrays, &p->model, error));
-  tell_volume(record, fitted->volume[1 - record->shown], &p->source.findings);
+  tell_volume(record, &p->source.findings);
   return SUPINE_OK;
 }
 
@@ -321,7 +306,8 @@ static void summarize(const knowledge *given, bool predicted, supine_prepared *p
   if (p->model.share[0] != 1.0 || p->model.share[1] != 1.0) {
     supine_text_add(p->assumed, size,
                     "; collapsed in every state, also in the scan, which then holds %.0f mL: no "
-                    "displacement contains the collapse",
+                    "displacement contains the collapse. For one that does, make the basis without "
+                    "the collapse, and ask for a volume of each lung",
                     collapsed);
   }
 }

@@ -215,6 +215,97 @@ void supine_expected_squares(const supine_expected_model *m, double u[EXPECTED_P
   square[SUPINE_EXPECTED_SLIDING] = pow(EXPECTED_SLIDING * m->sideways, 2);
 }
 
+void supine_expected_relate(supine_expected_model *m, const double *mean) {
+  static const double outwards = 0.175;
+  const supine_basis_info *info = supine_basis_get_info(m->basis);
+  const double *low = m->basis->box[0];
+  const double *high = m->basis->box[1];
+  const double midline = m->basis->midline;
+  const size_t modes = info->mode_count;
+  m->anchor_count = info->lung_count;
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    supine_expected_anchor *a = &m->anchor[lung];
+    const double face = info->lung_names[lung][0] == 'l' ? high[0] : low[0];
+    *a = (supine_expected_anchor){.position = {midline + outwards * (face - midline),
+                                               0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2])}};
+    const float at[3] = {(float)a->position[0], (float)a->position[1], (float)a->position[2]};
+    a->beside_heart = near_heart(m->basis, at);
+    for (size_t i = 0; i < EXPECTED_POSES / 2 * 3 * modes; ++i) {
+      const size_t pair = i / modes / 3;
+      const size_t axis = i / modes % 3;
+      const size_t k = i % modes;
+      const supine_pose *pose = &m->pose[2 * pair];
+      const double to =
+          pose[0].gains[lung][axis] * supine_basis_lung_weights(m->basis, &pose[0], lung)[k];
+      const double from =
+          pose[1].gains[lung][axis] * supine_basis_lung_weights(m->basis, &pose[1], lung)[k];
+      a->u[pair][axis] += mean[(3 * lung + axis) * modes + k] * (to - from);
+    }
+  }
+}
+
+/* Return the length of a displacement of a pair of poses: of all of it, or of the part that a turn
+ * adds. */
+static double length_of(const supine_expected_model *m, double u[EXPECTED_POSES / 2][3],
+                        bool turned) {
+  double part[3];
+  if (turned) {
+    supine_subtract(u[0], u[2], part);
+    return supine_length(part);
+  }
+  return fmax(m->least, supine_length(u[0]));
+}
+
+/* Return V_i + V_h - 2 C_ih (supine_expected_relate), mm^2, for a vertex.
+ * @param per_mm  squared error per mm of displacement of the term, mm
+ * @param turned  whether the term belongs to the part of the displacement that a turn adds */
+static double relative_square(const supine_expected_model *m, double per_mm, bool turned,
+                              size_t vertex, double u[EXPECTED_POSES / 2][3]) {
+  const supine_basis_info *info = supine_basis_get_info(m->basis);
+  const float *p = supine_basis_vertices(m->basis) + 3 * vertex;
+  const double at[3] = {(double)p[0], (double)p[1], (double)p[2]};
+  const double count = (double)m->anchor_count;
+  supine_kriging_model model = supine_kriging_default;
+  model.sill = 4.0 / 3.0 * per_mm;
+  model.least = 0.0;
+  double square = model.sill * length_of(m, u, turned);
+  for (size_t j = 0; j < m->anchor_count; ++j) {
+    supine_expected_anchor anchor = m->anchor[j];
+    const double size = length_of(m, anchor.u, turned);
+    const bool same = vertex >= info->lung_begin[j] && vertex < info->lung_begin[j + 1];
+    square -=
+        3.0 * 2.0 / count *
+        supine_kriging_covariance(&model, at, length_of(m, u, turned), anchor.position, size, same);
+    for (size_t k = 0; k < m->anchor_count; ++k) {
+      supine_expected_anchor other = m->anchor[k];
+      square += 3.0 / count / count *
+                supine_kriging_covariance(&model, anchor.position, size, other.position,
+                                          length_of(m, other.u, turned), j == k);
+    }
+  }
+  return fmax(0, square);
+}
+
+/* Replace the squared errors of a vertex by those relative to the mean of the anchors. */
+static void relate_squares(const supine_expected_model *m, size_t vertex,
+                           double u[EXPECTED_POSES / 2][3], double beside_heart,
+                           double square[SUPINE_EXPECTED_TERMS]) {
+  double slope[3];
+  double b = beside_heart;
+  supine_subtract(u[1], u[0], slope);
+  for (size_t j = 0; j < m->anchor_count; ++j) {
+    const supine_expected_anchor *anchor = &m->anchor[j];
+    b -= anchor->beside_heart / (double)m->anchor_count;
+    for (size_t k = 0; k < 3; ++k) {
+      slope[k] -= (anchor->u[1][k] - anchor->u[0][k]) / (double)m->anchor_count;
+    }
+  }
+  square[SUPINE_EXPECTED_DISPLACEMENT] = relative_square(m, m->law, false, vertex, u);
+  square[SUPINE_EXPECTED_TURN] = relative_square(m, m->turn, true, vertex, u);
+  square[SUPINE_EXPECTED_VOLUME] = m->per_step * m->per_step * supine_dot(slope, slope);
+  square[SUPINE_EXPECTED_HEART] = pow(EXPECTED_HEART * m->across * b, 2);
+}
+
 void supine_expected_evaluate(const supine_expected_model *m, size_t begin, size_t end,
                               supine_expected_block *b) {
   const float *vertices = supine_basis_vertices(m->basis);
@@ -232,43 +323,50 @@ void supine_expected_evaluate(const supine_expected_model *m, size_t begin, size
       const size_t at = 3 * i + j % 3;
       u[j / 3][j % 3] = (double)b->x[j / 3 * 2][at] - (double)b->x[j / 3 * 2 + 1][at];
     }
-    supine_expected_squares(m, u, near_heart(m->basis, vertices + 3 * (begin + i)), b->square[i]);
+    const double beside_heart = near_heart(m->basis, vertices + 3 * (begin + i));
+    supine_expected_squares(m, u, beside_heart, b->square[i]);
+    if (m->anchor_count > 0) {
+      relate_squares(m, begin + i, u, beside_heart, b->square[i]);
+    }
   }
 }
 
-/* Write the expected error of every vertex to `sigma`, if it is not NULL, and the mean squared
- * error of each term to `mean`. */
+void supine_expected_all(const supine_expected_model *m, float *sigma,
+                         double mean[SUPINE_EXPECTED_TERMS]) {
+  const size_t n = supine_basis_get_info(m->basis)->vertex_count;
+  supine_expected_block block;
+  memset(mean, 0, SUPINE_EXPECTED_TERMS * sizeof *mean);
+  for (size_t begin = 0; begin < n; begin += LOCATE_BLOCK) {
+    const size_t count = n - begin < LOCATE_BLOCK ? n - begin : LOCATE_BLOCK;
+    supine_expected_evaluate(m, begin, begin + count, &block);
+    for (size_t i = 0; i < count; ++i) {
+      double square = 0;
+      for (size_t k = 0; k < SUPINE_EXPECTED_TERMS; ++k) {
+        square += block.square[i][k];
+        mean[k] += block.square[i][k] / (double)n;
+      }
+      if (sigma != NULL) {
+        sigma[begin + i] = (float)sqrt(square);
+      }
+    }
+  }
+}
+
+/* Compute what supine_expected_all writes, or refuse. */
 static supine_status evaluate_all(const supine_basis *basis, const supine_state *state,
                                   const supine_state *from, float *sigma,
                                   double mean[SUPINE_EXPECTED_TERMS], supine_error *error) {
-  const supine_basis_info *info = supine_basis_get_info(basis);
   const supine_state scan = supine_basis_scan(basis);
   supine_expected_model model;
-  supine_expected_block block;
-  if (info->is_fields) {
+  if (supine_basis_get_info(basis)->is_fields) {
     return supine_error_set(
         error, SUPINE_ERROR_UNSUPPORTED,
         "the basis holds another simulator's displacements, whose error is unknown");
   }
   const supine_status status =
       supine_expected_prepare(basis, state, from == NULL ? &scan : from, 0, 0, &model, error);
-  memset(mean, 0, SUPINE_EXPECTED_TERMS * sizeof *mean);
   if (status == SUPINE_OK) {
-    for (size_t begin = 0; begin < info->vertex_count; begin += LOCATE_BLOCK) {
-      const size_t left = info->vertex_count - begin;
-      const size_t count = left < LOCATE_BLOCK ? left : LOCATE_BLOCK;
-      supine_expected_evaluate(&model, begin, begin + count, &block);
-      for (size_t i = 0; i < count; ++i) {
-        double square = 0;
-        for (size_t k = 0; k < SUPINE_EXPECTED_TERMS; ++k) {
-          square += block.square[i][k];
-          mean[k] += block.square[i][k] / (double)info->vertex_count;
-        }
-        if (sigma != NULL) {
-          sigma[begin + i] = (float)sqrt(square);
-        }
-      }
-    }
+    supine_expected_all(&model, sigma, mean);
   }
   return status;
 }

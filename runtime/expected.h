@@ -54,6 +54,13 @@ enum {
   EXPECTED_POSES
 };
 
+/** A place of the body to which errors are relative, such as the hilum of a lung. */
+typedef struct supine_expected_anchor {
+  double position[3];              /**< on the reference surface, mm */
+  double u[EXPECTED_POSES / 2][3]; /**< displacement by each pair of poses, mm */
+  double beside_heart;             /**< the number b of the formula */
+} supine_expected_anchor;
+
 /** All numbers of the formula that are the same for all vertices. */
 typedef struct supine_expected_model {
   const supine_basis *basis;
@@ -64,6 +71,10 @@ typedef struct supine_expected_model {
   double per_step; /**< standard deviation of the volume / volume added in EXPECTED_FULLER */
   double across;   /**< length of the change of unit gravity in the x-y plane */
   double sideways; /**< length of the change of unit gravity along x */
+  /** If not 0, the squared errors are those of the displacement minus the mean displacement of the
+   * anchors, of which each lung has one. */
+  size_t anchor_count;
+  supine_expected_anchor anchor[SUPINE_LUNGS_MAX];
 } supine_expected_model;
 
 /** Displacements of vertices in each pose of a model, and their squared errors by term, mm^2. */
@@ -86,6 +97,25 @@ supine_status supine_expected_prepare(const supine_basis *basis, const supine_st
  * @param beside_heart  the number b of the formula */
 void supine_expected_squares(const supine_expected_model *model, double u[EXPECTED_POSES / 2][3],
                              double beside_heart, double square[SUPINE_EXPECTED_TERMS]);
+
+/** Add an anchor in the middle of the hilum of each lung, at the box coordinates 0.175, 0.5 and
+ * 0.5. The error of a displacement relative to the hila, u_i - u_h with u_h the mean of theirs, has
+ * the terms
+ *
+ *     displacement, turn  V_i + V_h - 2 C_ih, with the covariance of kriging (kriging.h) and the
+ *                         sill 4/3 c s: taking out the best translation leaves 3/4 of the variance
+ *     volume              |d(u_i - u_h)/dV| s_V
+ *     heart               12 mm |Dg_xy| (b_i - b_h), as the heart moves the hilum too
+ *     sliding             as in the body
+ *
+ * @param mean  [lungs, 3, modes] displacement of each hilum by each mode at weight and gain 1, mm
+ */
+void supine_expected_relate(supine_expected_model *model, const double *mean);
+
+/** Write the expected error of every vertex to `sigma`, if it is not NULL, and the mean squared
+ * error of each term to `mean`. */
+void supine_expected_all(const supine_expected_model *model, float *sigma,
+                         double mean[SUPINE_EXPECTED_TERMS]);
 
 /** Evaluate vertices begin <= i < end, at most LOCATE_BLOCK. */
 void supine_expected_evaluate(const supine_expected_model *model, size_t begin, size_t end,

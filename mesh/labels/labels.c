@@ -210,6 +210,30 @@ static supine_status clean(const work *w, uint8_t value, size_t margin, labels_m
   return SUPINE_OK;
 }
 
+/* Move the surface of a lung along its smoothed normals until it encloses the volume of its voxels,
+ * mm^3: averaging over cubes and smoothing lose some 0.5 %. Leave it alone if that takes more than
+ * half an edge, as in a lung of a few cubes. */
+static supine_status hold_mask(const supine_topology *topology, double volume, double edge,
+                               supine_mesh *mesh) {
+  SUPINE_ARENA arena = {0};
+  const size_t size = 3 * mesh->vertex_count;
+  double *normals = supine_arena_take(&arena, 2 * size, sizeof *normals);
+  double change[3];
+  double h = 0.0;
+  if (arena.failed) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  supine_mesh_smooth_normals(mesh, topology, normals, normals + size);
+  supine_mesh_volume_along(mesh, normals, change);
+  const bool found = supine_mesh_offset_to(change, volume - supine_mesh_volume(mesh), &h);
+  if (found && fabs(h) <= 0.5 * edge) {
+    for (size_t i = 0; i < size; ++i) {
+      mesh->vertices[i] += h * normals[i];
+    }
+  }
+  return SUPINE_OK;
+}
+
 /* Make the surface of one lung; do nothing if the lung has no voxels. */
 static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung, supine_mesh *mesh,
                                supine_error *error) {
@@ -245,6 +269,7 @@ static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung,
   SUPINE_FREED_BY(supine_mesh_topology_free) supine_topology topology = {0};
   SUPINE_TRY(supine_mesh_topology_create(mesh, &topology));
   lung->tunnels = topology.genus;
+  SUPINE_TRY(hold_mask(&topology, 1e3 * lung->mask, w->edge, mesh));
   lung->surface = 1e-3 * supine_mesh_volume(mesh);
   return SUPINE_OK;
 }

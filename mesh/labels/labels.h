@@ -67,6 +67,7 @@ typedef struct supine_labels_report {
  * at least half of it is filled. More cubes are filled until no two cubes inside, and no two
  * outside, meet only in an edge or a corner: then the surface net [Gibson1998] is a closed
  * manifold. It is smoothed without shrinking [Taubin1995]; no vertex moves by more than a cube.
+ * Then it moves along its smoothed normals until it encloses the volume of the voxels.
  *
  * @param surfaces  [2] zero-initialised; surface i is that of report->lung[i] and faces outwards
  * Memory: the image, 1 byte per voxel, and up to 18 bytes for each voxel of the lungs' box. */

@@ -39,21 +39,30 @@ static void find_smoothed_force(supine_patient_matching *m, const supine_patient
   }
 }
 
-/* Average six quantities over the vertices in each cube of 40 mm, weighted by area: 1; X - 1/2,
- * Y - 1/2 and Z - 1/2, where X, Y and Z are coordinates 0 to 1 in the bounding box; the depth along
- * gravity; and the force. For each pair of quantities, multiply the two means of each cube by each
- * other and by the cube's area, and sum the results into `products`. */
-static void sum_products(const supine_patient_matching *m, const double *force,
-                         const double gravity[3], const double *vertex_area, size_t blocks,
-                         double *means, double products[ALL * ALL]) {
+/* The force at a vertex or landmark. */
+typedef struct sample {
+  double weight; /* area of the vertex, or 1 */
+  size_t block;  /* cube of 40 mm */
+  const supine_patient_place *place;
+  double height; /* along gravity, mm */
+  double force;
+} sample;
+
+/* Average six quantities over the samples in each cube of 40 mm: 1; X - 1/2, Y - 1/2 and Z - 1/2,
+ * where X, Y and Z are coordinates 0 to 1 in the bounding box; the depth along gravity; and the
+ * force. For each pair of quantities, multiply the two means of each cube by each other and by the
+ * cube's weight, and sum the results into `products`.
+ * @param means  [blocks, ALL + 1] work space */
+static void sum_products(const sample *samples, size_t count, size_t blocks, double *means,
+                         double products[ALL * ALL]) {
   memset(means, 0, (ALL + 1) * blocks * sizeof *means);
-  for (size_t v = 0; v < m->count; ++v) {
-    double *mean = means + (ALL + 1) * m->rows[v].block;
-    const supine_patient_place place = supine_patient_find_vertex(m->fuller, v);
-    cblas_daxpy(COLUMNS, vertex_area[v], place.force, 1, mean, 1);
-    mean[HEIGHT] += vertex_area[v] * supine_dot(gravity, m->fuller->mesh.vertices + 3 * v);
-    mean[FORCE] += vertex_area[v] * force[v];
-    mean[ALL] += vertex_area[v];
+  for (size_t i = 0; i < count; ++i) {
+    const sample *at = &samples[i];
+    double *mean = means + (ALL + 1) * at->block;
+    cblas_daxpy(COLUMNS, at->weight, at->place->force, 1, mean, 1);
+    mean[HEIGHT] += at->weight * at->height;
+    mean[FORCE] += at->weight * at->force;
+    mean[ALL] += at->weight;
   }
   memset(products, 0, ALL * ALL * sizeof *products);
   for (size_t b = 0; b < blocks; ++b) {
@@ -104,6 +113,7 @@ supine_status supine_patient_applied_find(supine_patient_matching *matching,
   SUPINE_ARENA arena = {0};
   double *spread = supine_arena_take(&arena, 2 * n, sizeof *spread);
   double *means = supine_arena_take(&arena, (ALL + 1) * n, sizeof *means);
+  sample *samples = supine_arena_take(&arena, n, sizeof *samples);
   SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
   supine_patient_matching_choose(matching, n);
   find_smoothed_force(matching, patient, spread);
@@ -111,11 +121,59 @@ supine_status supine_patient_applied_find(supine_patient_matching *matching,
   SUPINE_TRY(
       supine_patient_rows_block(&matching->frame, matching->rows, n, 1, &applied->blocks, error));
   supine_mesh_vertex_area(&matching->fuller->mesh, spread);
-  sum_products(matching, spread + n, gravity, spread, applied->blocks, means, products);
+  for (size_t v = 0; v < n; ++v) {
+    samples[v] = (sample){.weight = spread[v],
+                          .block = matching->rows[v].block,
+                          .place = &matching->rows[v].place,
+                          .height = supine_dot(gravity, matching->fuller->mesh.vertices + 3 * v),
+                          .force = spread[n + v]};
+  }
+  sum_products(samples, n, applied->blocks, means, products);
   const bool fitted = fit_force(products, applied);
+  applied->from_landmarks = false;
   SUPINE_REFUSE_IF(
       !fitted, error, SUPINE_ERROR_NUMERICAL,
       "the displacement between the two surfaces does not determine the applied force: check that "
       "both surfaces show the same lungs, and that neither surface is cut off");
+  return SUPINE_OK;
+}
+
+supine_status supine_patient_applied_find_landmarks(supine_patient_row *rows, size_t count,
+                                                    const supine_patient *patient,
+                                                    const double gravity[3],
+                                                    supine_patient_applied *applied,
+                                                    supine_error *error) {
+  double products[ALL * ALL];
+  double damping = 0.0;
+  supine_patient_applied found = {.from_landmarks = true};
+  SUPINE_ARENA arena = {0};
+  double *means = supine_arena_take(&arena, (ALL + 1) * count, sizeof *means);
+  sample *samples = supine_arena_take(&arena, count, sizeof *samples);
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu landmarks", count));
+  SUPINE_TRY(supine_patient_rows_block(&patient->frame, rows, 3 * count, 1, &found.blocks, error));
+  for (size_t i = 0; i < count; ++i) {
+    double d[3];
+    supine_patient_direction(&patient->power, &rows[3 * i].place, 1.0, d);
+    damping += damping_ratio * damping_ratio * supine_dot(d, d) / (double)count;
+  }
+  for (size_t i = 0; i < count; ++i) {
+    const supine_patient_row *row = &rows[3 * i]; /* along x; those along y and z follow */
+    double d[3];
+    double u[3];
+    supine_patient_direction(&patient->power, &row->place, 1.0, d);
+    supine_patient_motion(&patient->power, &row->place, u);
+    for (size_t k = 0; k < 3; ++k) {
+      u[k] = row[k].value - u[k];
+    }
+    samples[i] = (sample){.weight = 1.0,
+                          .block = row->block,
+                          .place = &row->place,
+                          .height = supine_dot(gravity, row->place.offset),
+                          .force = supine_dot(u, d) / (supine_dot(d, d) + damping)};
+  }
+  sum_products(samples, count, found.blocks, means, products);
+  if (fit_force(products, &found)) {
+    *applied = found;
+  }
   return SUPINE_OK;
 }

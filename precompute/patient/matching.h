@@ -120,4 +120,15 @@ supine_status supine_patient_applied_find(supine_patient_matching *matching,
                                           const supine_patient *patient, const double gravity[3],
                                           supine_patient_applied *applied, supine_error *error);
 
+/** Compute the force from landmarks instead, F = u.d / |d|^2 without a smoothing, as the law's d is
+ * the displacement of tissue inside the lungs too. If they do not determine the linear function, as
+ * when they lie in four cubes or fewer, leave `applied` as it is.
+ * @param rows  [3 count] measurements of each landmark along x, y and z; their `block` is changed
+ */
+supine_status supine_patient_applied_find_landmarks(supine_patient_row *rows, size_t count,
+                                                    const supine_patient *patient,
+                                                    const double gravity[3],
+                                                    supine_patient_applied *applied,
+                                                    supine_error *error);
+
 #endif

@@ -326,6 +326,7 @@ supine_status supine_patient_model(supine_patient_record *record, const supine_l
   memcpy(w.lungs.mesh.vertices, lungs->mesh.vertices, 3 * n * sizeof(double));
   const double *emptier_scan = record->shown == 1 ? lungs->mesh.vertices : NULL;
   SUPINE_TRY(displace(&w, emptier_scan, error));
+  SUPINE_TRY(supine_patient_hold_volume(record, &w.lungs, directions, error));
   SUPINE_TRY(supine_physics_volume_of_field(&w.lungs, NULL, w.displacement, w.smoothing_ratio + n,
                                             forms, error));
   set_volumes(record, &w.lungs, forms);

@@ -164,6 +164,7 @@ static void read_scan(const object *root, size_t state, supine_patient_record *r
     fail(&from, "state");
   }
   record->volume[state] = read_real_if(&from, "volume_ml");
+  read_reals_if(&from, "left_right_ml", 2, record->measured_lung[state]);
 }
 
 /* Return the array `key`, of at most `most` objects, or NULL. */
@@ -294,6 +295,9 @@ static void read_expandability(const object *root, supine_patient_record *record
 static void read_applied(const object *root, supine_patient_applied *applied) {
   const object from = find(root, "applied_force");
   if (from.json != NULL) {
+    applied->from_landmarks =
+        has(&from, "computed_from") &&
+        read_word(&from, "computed_from", supine_patient_applied_words, 2) == 1;
     applied->blocks = read_count(&from, "blocks");
     applied->correlation = read_real_if(&from, "correlation_with_height");
     read_reals_if(&from, "c7_to_c9", 3, applied->slopes);

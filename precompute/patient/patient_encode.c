@@ -16,6 +16,8 @@ const char *const supine_patient_score_keys[SUPINE_PATIENT_SCORES] = {"none", "t
                                                                       "affine", "law", "corrected"};
 const char *const supine_patient_lungs_words[3] = {"right", "both", "left"};
 const char *const supine_patient_state_words[2] = {"fuller", "emptier"};
+const char *const supine_patient_applied_words[2] = {"surfaces, unreliable in real people",
+                                                     "landmarks"};
 
 /* An object of the JSON text, and whether memory ran out in it or in an object that it contains. */
 typedef struct object {
@@ -102,6 +104,9 @@ static object scan_of(const supine_patient_record *record, size_t state) {
   put_state(&to, &record->state[state]);
   if (record->volume[state] > 0.0) {
     put_real(&to, "volume_ml", record->volume[state]);
+  }
+  if (record->measured_lung[state][0] > 0.0 || record->measured_lung[state][1] > 0.0) {
+    put_reals(&to, "left_right_ml", 2, record->measured_lung[state]);
   }
   return to;
 }
@@ -243,6 +248,7 @@ static object expandability_of(const supine_patient_record *record) {
 
 static object applied_of(const supine_patient_applied *applied) {
   object to = begin();
+  put_text(&to, "computed_from", supine_patient_applied_words[applied->from_landmarks]);
   put_count(&to, "blocks", applied->blocks);
   put_real(&to, "correlation_with_height", applied->correlation);
   put_reals(&to, "c7_to_c9", 3, applied->slopes);

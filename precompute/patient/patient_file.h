@@ -66,12 +66,15 @@ typedef struct supine_patient_expand_report {
  * - d_i is the displacement that a force of 1 causes, [Santhanam2008] (15)-(17).
  * - F_i is the applied force after smoothing over the surface (smoothing.h).
  * - f is the applied force before smoothing; the matrix A inverts the smoothing.
- * A amplifies roughness of u, so f is averaged over the vertices in each cube of 40 mm. */
+ * A amplifies roughness of u, so f is averaged over the vertices in each cube of 40 mm. Surfaces of
+ * real people do not show f: their motion along the surface is unknown. Where landmarks are given,
+ * f = F is computed from their u instead. */
 typedef struct supine_patient_applied {
-  size_t blocks;      /**< number of cubes of 40 mm that contain vertices; 0: not computed */
-  double correlation; /**< correlation of the force with the depth along gravity */
-  double slopes[3];   /**< gradient of the force along X, Y and Z (0 to 1 in the bounding box),
-                         divided by the force at the lungs' centre */
+  bool from_landmarks; /**< computed from landmarks; from surfaces, it is unreliable */
+  size_t blocks;       /**< number of cubes of 40 mm that contain vertices; 0: not computed */
+  double correlation;  /**< correlation of the force with the depth along gravity */
+  double slopes[3];    /**< gradient of the force along X, Y and Z (0 to 1 in the bounding box),
+                          divided by the force at the lungs' centre */
   double residual; /**< RMS residual of the linear fit, divided by the force at the lungs' centre */
   double spread;   /**< standard deviation of the cubes' forces / force at the lungs' centre */
 } supine_patient_applied;
@@ -88,8 +91,10 @@ typedef struct supine_patient_record {
   supine_force_law force; /**< applied force as a function of posture */
   supine_state state[2];  /**< the two scanned states: the fuller, then the emptier */
   double volume[2];       /**< lung volumes in the fuller and the emptier state, mL; 0 if unknown */
-  double emptier[2][3];   /**< minimum and maximum of the emptier state's bounding box, mm */
-  bool from_surface;      /**< whether the bounding boxes are those of surfaces, not of landmarks */
+  /** [state][left, right lung] volume of each lung in the scans, mL; 0 if only the sum is known */
+  double measured_lung[2][2];
+  double emptier[2][3]; /**< minimum and maximum of the emptier state's bounding box, mm */
+  bool from_surface;    /**< whether the bounding boxes are those of surfaces, not of landmarks */
   supine_patient_fit_report report;
   supine_patient_stiffness stiffness;
   supine_patient_surface_report surface;
@@ -108,6 +113,10 @@ typedef struct supine_patient_record {
   /** [state][left, right lung] volumes of that scan and of its surface, displaced by the law to the
    * other state, mL; 0 if unknown */
   double lung_volume[2][2];
+  /** Whether the displaced surface has been moved by `offset` to hold the volume measured there
+   * (supine_patient_hold_volume). */
+  bool holds_measured;
+  double offset[2]; /**< [left, right lung] distance along the outward normals, mm */
 } supine_patient_record;
 
 /** Write the record to a JSON file. A failure leaves no incomplete file.
@@ -138,9 +147,9 @@ supine_status supine_patient_read(const char *path, supine_patient_record *recor
  * patient. Set the volumes at rest and the state of the scan, so that the fitted displacement
  * between the two states is neither enlarged nor reduced: if one of them is full inflation, the
  * other state has the volume of the scan's surface after this displacement, record->lung_volume,
- * whatever volume was measured. The direction of a vertex is d = -u / F:
- * - u is the patient's displacement of the vertex between the two scanned states, extrapolated to
- *   the displacement from full inflation to rest.
+ * which is the measured one (supine_patient_hold_volume). The direction of a vertex is d = -u / F:
+ * - u is the patient's displacement of the vertex between the two scanned states, with the
+ *   correction for the volume, extrapolated to the displacement from full inflation to rest.
  * - F is the patient's force on the vertex, smoothed over the surface (smoothing.h). The
  *   unsmoothed force, and the ratio of F to it, are at least 0.2.
  * @param record   `in_basis`, `shown`, `path_span`, `volume` and `lung_volume` are written
@@ -153,6 +162,23 @@ supine_status supine_patient_read(const char *path, supine_patient_record *recor
 supine_status supine_patient_model(supine_patient_record *record, const supine_lungs *lungs,
                                    supine_resting *resting, supine_scan *scan, double *arrays,
                                    supine_model *model, supine_error *error);
+
+/** Correct a patient's displacement so that the surface of the scan, displaced to the other state,
+ * encloses the volume that was measured there: add h n to the displaced positions. n are the
+ * normals of the displaced surface, smoothed ten times; h is one distance for each lung, or the
+ * same for both if only the sum of their volumes was measured. Do nothing if the volume of these
+ * lungs was not measured.
+ * @param record        `shown` is read; `holds_measured` and `offset` are written
+ * @param fuller        lungs in the fuller state; moved if the scan shows the emptier one
+ * @param displacement  [N, 3] displacement from the fuller to the emptier state, mm, changed */
+supine_status supine_patient_hold_volume(supine_patient_record *record, supine_lungs *fuller,
+                                         double *displacement, supine_error *error);
+
+/** Describe the volume that the lungs hold in the state that the scan does not show, and how the
+ * surface was moved to hold it.
+ * @param text  [size] output
+ * @return whether the surface was moved by more than 3 mm, so that the volume is doubtful */
+bool supine_patient_describe_volume(const supine_patient_record *record, char *text, size_t size);
 
 /** Return the constant c of the expected error (supine/locate.h), mm, for a basis of the scan that
  * supine_patient_model has found: smaller for the fuller scan, as it predicts the emptier state. */

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "precompute/patient/matching.h"
 #include "precompute/patient/scans.h"
 
 #include "base/arena.h"
@@ -113,7 +114,11 @@ static void set_states(supine_patient_scans *scans, supine_patient_record *recor
       supine_patient_frame_of_points(scans->pairs.count, scans->pairs.to, NULL);
   for (size_t k = 0; k < 2; ++k) {
     const supine_volume *volume = &record->state[k].volume;
-    record->volume[k] = volume_of(&scans->lungs[k]);
+    const supine_lungs *lungs = &scans->lungs[k];
+    record->volume[k] = volume_of(lungs);
+    for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+      record->measured_lung[k][lungs->side[lung] > 0 ? 0 : 1] = lungs->volume[lung];
+    }
     if (record->volume[k] == 0.0 && volume->kind == SUPINE_VOLUME_ABSOLUTE) {
       record->volume[k] = volume->ml;
     }
@@ -184,8 +189,10 @@ static supine_status fit_landmarks(const supine_patient_scans *scans,
   SUPINE_TRY(supine_arena_check(&arena, error, "%zu landmarks", pairs->count));
   record->patient.frame = supine_patient_frame_of_points(pairs->count, pairs->from, scans->midline);
   supine_patient_rows_of_pairs(&record->patient.frame, pairs, rows);
-  return supine_patient_fit(options, rows, 0, pairs->count, &record->patient, &record->report,
-                            error);
+  SUPINE_TRY(
+      supine_patient_fit(options, rows, 0, pairs->count, &record->patient, &record->report, error));
+  return supine_patient_applied_find_landmarks(rows, pairs->count, &record->patient,
+                                               options->gravity, &record->applied, error);
 }
 
 supine_status supine_patient_scans_fit(const supine_patient_scans *scans,

@@ -109,7 +109,13 @@ static supine_status measure(supine_patient_matching *m, const supine_patient_fi
     report->held_out[SUPINE_PATIENT_SCORE_CORRECTED] = record->expand.held_out[1];
     report->explained = 100.0 * (1.0 - pow(record->expand.held_out[1] / report->baseline, 2.0));
   }
-  return supine_patient_applied_find(m, &record->patient, wanted->gravity, &record->applied, error);
+  const size_t landmarks = m->landmark_row_count / 3;
+  if (landmarks == 0) {
+    return supine_patient_applied_find(m, &record->patient, wanted->gravity, &record->applied,
+                                       error);
+  }
+  return supine_patient_applied_find_landmarks(m->rows + m->count, landmarks, &record->patient,
+                                               wanted->gravity, &record->applied, error);
 }
 
 static supine_status run(supine_patient_matching *m, const supine_patient_fit_options *wanted,

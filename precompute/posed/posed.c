@@ -43,12 +43,21 @@ supine_status supine_posed_mesh(const supine_basis *basis, const supine_pose *po
   return supine_posed_positions(basis, pose, mesh->vertices, error);
 }
 
+void supine_posed_expected_measure(size_t count, supine_expected *expected) {
+  double square = 0.0;
+  expected->largest = 0.0;
+  for (size_t i = 0; i < count; ++i) {
+    square += (double)expected->sigma[i] * (double)expected->sigma[i];
+    expected->largest = fmax(expected->largest, (double)expected->sigma[i]);
+  }
+  expected->rms = sqrt(square / (double)count);
+}
+
 supine_status supine_posed_expected(const supine_basis *basis, const supine_state *state,
                                     const supine_state *from, supine_expected *expected,
                                     supine_error *error) {
   const size_t n = supine_basis_get_info(basis)->vertex_count;
   float *sigma = malloc(n * sizeof *sigma);
-  double square = 0.0;
   double along = 0.0;
   if (sigma == NULL) {
     return supine_error_memory(error, "%zu vertices", n);
@@ -59,15 +68,11 @@ supine_status supine_posed_expected(const supine_basis *basis, const supine_stat
     return status == SUPINE_ERROR_UNSUPPORTED || status == SUPINE_ERROR_OPEN_SURFACE ? SUPINE_OK
                                                                                      : status;
   }
-  for (size_t i = 0; i < n; ++i) {
-    square += (double)sigma[i] * (double)sigma[i];
-    expected->largest = fmax(expected->largest, (double)sigma[i]);
-  }
   for (size_t i = 0; i < 3; ++i) {
     along += state->gravity[i] * from->gravity[i];
   }
   expected->sigma = sigma;
-  expected->rms = sqrt(square / (double)n);
+  supine_posed_expected_measure(n, expected);
   expected->turned = along < 1.0 - 1e-9;
   return SUPINE_OK;
 }

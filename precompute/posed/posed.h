@@ -34,6 +34,9 @@ typedef struct supine_expected {
 supine_status supine_posed_expected(const supine_basis *basis, const supine_state *state,
                                     const supine_state *from, supine_expected *expected,
                                     supine_error *error);
+
+/* Set `rms` and `largest` from `sigma` of `count` vertices. */
+void supine_posed_expected_measure(size_t count, supine_expected *expected);
 void supine_posed_expected_free(supine_expected *expected);
 
 #endif

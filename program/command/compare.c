@@ -10,6 +10,7 @@
 
 #include "program/command/list.h"
 #include "program/options/basis_input.h"
+#include "program/options/hilum.h"
 #include "program/options/inside.h"
 #include "program/options/state_options.h"
 #include "program/report/comparison.h"
@@ -72,6 +73,10 @@ static supine_status add_pair(const supine_basis *basis, const supine_options_na
     SUPINE_TRY(supine_basis_pose(basis, &item[i]->state, &pose[i], error));
   }
   SUPINE_TRY(supine_posed_expected(basis, &item[1]->state, &item[0]->state, &expected, error));
+  if (in_hilum) {
+    SUPINE_TRY(
+        supine_options_hilum_expected(basis, &item[1]->state, &item[0]->state, &expected, error));
+  }
   SUPINE_TRY(supine_options_targets_find(basis, names,
                                          (const supine_pose *const[2]){&pose[0], &pose[1]},
                                          expected.sigma, false, &targets, error));

@@ -12,6 +12,7 @@
 #include "program/command/deform_content.h"
 #include "program/command/list.h"
 #include "program/options/basis_input.h"
+#include "program/options/state_notes.h"
 #include "program/options/state_options.h"
 
 static const char name[] = "deform";
@@ -62,10 +63,15 @@ static supine_status deform(const supine_basis *basis, const request *wanted, su
   SUPINE_TRY(supine_options_reference(basis, &wanted->from, false, &moved.from, error));
   SUPINE_TRY(supine_options_pose(basis, name, wanted->volume.allow_folds, &moved.state, &moved.pose,
                                  error));
+  supine_options_tell_state(name, basis, &moved.state, &moved.pose);
   SUPINE_TRY(supine_posed_expected(basis, &moved.state, &moved.from.state, &expected, error));
-  moved.expected = expected;
   SUPINE_TRY(supine_options_hilum(basis, &moved.state, &moved.from.state, wanted->frame == 1,
                                   &moved.hilum, error));
+  if (wanted->frame == 1) {
+    SUPINE_TRY(
+        supine_options_hilum_expected(basis, &moved.state, &moved.from.state, &expected, error));
+  }
+  moved.expected = expected;
   (void)snprintf(comment, sizeof comment, "displacement from %s%s", moved.from.name,
                  wanted->frame == 1 ? ", in the frame of the hilum" : "");
   moved.save.comment = comment;

@@ -352,9 +352,11 @@ supine_status supine_command_deform_content(const supine_deform_content *wanted,
                        "the hilum moves by %.1f, %.1f, %.1f mm (to the left, back and head)",
                        moved->hilum.move[0], moved->hilum.move[1], moved->hilum.move[2]);
     if (!isnan(moved->hilum.expected)) {
-      (void)supine_print(stdout, ", expected error %.1f mm", moved->hilum.expected);
+      (void)supine_print(stdout, ", expected error in the body %.1f mm", moved->hilum.expected);
     }
-    (void)printf("%s\n", moved->subtract_hilum ? ", subtracted from all positions" : "");
+    (void)printf("%s\n", moved->subtract_hilum ? "; subtracted from all positions, whose expected "
+                                                 "errors are those relative to the hilum"
+                                               : "");
   }
   return SUPINE_OK;
 }

@@ -8,6 +8,7 @@
 #include "mesh/image/image.h"
 
 #include "program/options/basis_input.h"
+#include "program/options/hilum.h"
 #include "program/options/state_options.h"
 
 typedef struct supine_deform_content {

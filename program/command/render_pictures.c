@@ -189,7 +189,8 @@ static bool next_moment(const film *shot, moment *m) {
 
 static void find_gravity(const film *shot, const moment *m, double gravity[3]) {
   const breath_turn *turn = &shot->turn[m->turn];
-  supine_options_turn_gravity(turn, (double)m->at / (double)(m->count - 1) * turn->seconds, gravity);
+  supine_options_turn_gravity(turn, (double)m->at / (double)(m->count - 1) * turn->seconds,
+                              gravity);
 }
 
 /* Write what the panel of a film is called: the posture, or the angle of the turn. */
@@ -319,7 +320,8 @@ static supine_status film_draw(studio *s, const char *path, supine_error *error)
         supine_options_posture_list_parse(wanted->postures, &wanted->volume.state, &stops, error));
     SUPINE_TRY(film_of(&stops, &shot, error));
   }
-  SUPINE_REFUSE_IF(!(frames_of(&shot.turn[0]) <= FRAMES_MAX), error, SUPINE_ERROR_ARGUMENT,
+  const double frames = frames_of(&shot.turn[0]);
+  SUPINE_REFUSE_IF(!(frames <= FRAMES_MAX), error, SUPINE_ERROR_ARGUMENT,
                    "a turn of %g s has more than %d frames: give a shorter turn",
                    shot.turn[0].seconds, FRAMES_MAX);
   SUPINE_TRY(open_studio(s, path, error));

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Open a basis, and find the axes of its scan and the displacement of its hilum. */
+/* Open a basis, and find the axes of its scan. */
 #ifndef SUPINE_BASIS_INPUT_H
 #define SUPINE_BASIS_INPUT_H
 
@@ -30,22 +30,6 @@ supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,
 
 /* Write the name of a basis file without its folder and the ending .safetensors, as UTF-8. */
 void supine_options_basis_title(const char *path, char *title, size_t size);
-
-/* Option table that holds only --frame, which sets an int: 1 to subtract the displacement of the
- * hilum, else 0. */
-extern const supine_option supine_options_hilum_frame[];
-
-/* Displacement of the hilum between two states. */
-typedef struct supine_hilum {
-  double move[3];  /* LPS, mm; 0 if the file does not say how the hilum moves */
-  double expected; /* expected error, mm; NAN if unknown */
-} supine_hilum;
-
-/* Find the displacement of the hilum. If the file does not say how the hilum moves, fail only if it
- * is needed. Other statuses: as supine_basis_pose. */
-supine_status supine_options_hilum(const supine_basis *basis, const supine_state *state,
-                                   const supine_state *from, bool needed, supine_hilum *hilum,
-                                   supine_error *error);
 
 /* Return the metadata of a basis as a JSON object. */
 json_t *supine_options_json_metadata(const supine_basis *basis);

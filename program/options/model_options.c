@@ -258,9 +258,12 @@ static void print_map(const char *path, const supine_source *source) {
     (void)supine_print(stdout, "; dropped %zu %s (%.2g mL), filled %zu %s (%.2g mL)\n",
                        lung->islands, lung->islands == 1 ? "island" : "islands", lung->dropped,
                        lung->cavities, lung->cavities == 1 ? "cavity" : "cavities", lung->filled);
-    (void)supine_print(stdout, "  surface of %zu vertices: %.1f mL (%+.2g mL)\n",
-                       lungs->lung_begin[i + 1] - lungs->lung_begin[i], lung->surface,
-                       lung->surface - lung->mask);
+    (void)supine_print(stdout, "  surface of %zu vertices: %.1f mL",
+                       lungs->lung_begin[i + 1] - lungs->lung_begin[i], lung->surface);
+    if (fabs(lung->surface - lung->mask) >= 0.05) {
+      (void)supine_print(stdout, " (%+.2g mL)", lung->surface - lung->mask);
+    }
+    (void)putchar('\n');
   }
   if (source->axes_hold) {
     (void)printf("the shape of the lungs confirms the axes in the header: narrow at the head, "

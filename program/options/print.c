@@ -117,6 +117,7 @@ static const struct {
               {NULL, "band_95_percent_holds", "points within the 95 % band, %"},
               {NULL, "blocks", "blocks of 40 mm"},
               {"force", "box", "cx, cy, cz"},
+              {NULL, "computed_from", "computed from"},
               {NULL, "confidence", "confidence level"},
               {NULL, "constants_percent", "error of constants, at most, %"},
               {NULL, "control", "control parameters c1 to c5"},

@@ -10,6 +10,7 @@
 #include <supine/compare.h>
 
 #include "program/options/basis_input.h"
+#include "program/options/hilum.h"
 #include "program/options/inside.h"
 #include "program/options/state_options.h"
 

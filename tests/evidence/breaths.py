@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Print how much of the motion in real breaths the default law explains, with and without its shear.
 
-    tests/evidence/breaths.py BUILD [--copd FOLDER] [--landmarks FOLDER] [--quiet FOLDER]
+    tests/evidence/breaths.py BUILD [--copd FOLDER] [--landmarks FOLDER] [--quiet FOLDER] [--terms]
 
 BUILD is the folder of the build. Each folder holds pairs of corresponding points in CSV files of six columns, mm,
 LPS. --copd: caseNN.csv from the exhaled to the inhaled state, caseNN_exp.nii.gz and caseNN_insp.nii.gz with label maps
@@ -10,7 +10,8 @@ of the lungs. A basis of the inhaled lungs predicts the exhaled points; the volu
 --landmarks: points from the inhaled to the exhaled state, without lungs. The law is evaluated in the box of the points,
 10 mm larger on each side, with one factor per patient. --quiet: the same from rest to the end of a quiet inspiration.
 A translation is free. 'explained' is the part of the squared displacement that the law predicts. 'own beta' is the
-shear of least squares. 'others' predicts each patient with the mean of the other patients' own betas."""
+shear of least squares. 'others' predicts each patient with the mean of the other patients' own betas. --terms: leave
+one patient out of the full breaths in turn, fit further terms of the law to the others, and print what is left."""
 import argparse
 import csv
 import glob
@@ -70,14 +71,19 @@ def numbers(metadata, key):
     return [float(word.split("=")[1]) for word in metadata[key].split()]
 
 
+def box_of(points):
+    """Return the side (+1 left) and the coordinates X, Y and Z of (18) in the box of points, 10 mm larger."""
+    low, high = points.min(0) - 10, points.max(0) + 10
+    middle = (low[0] + high[0]) / 2
+    y, z = ((high[k] - points[:, k]) / (high[k] - low[k]) for k in (1, 2))
+    return np.where(points[:, 0] > middle, 1, -1), np.abs(points[:, 0] - middle) * 2 / (high[0] - low[0]), y, z
+
+
 def law_at(points, metadata):
     """Return the supine displacement of points as lungs empty, mm, and that of a shear of 1, by the closed formulas."""
     base, gain, *box_force, _ = numbers(metadata, "force")
     c = numbers(metadata, "direction_constants")
-    low, high = points.min(0) - 10, points.max(0) + 10
-    side = np.where(points[:, 0] > (low[0] + high[0]) / 2, 1, -1)
-    x = np.abs(2 * points[:, 0] - low[0] - high[0]) / (high[0] - low[0])
-    y, z = ((high[k] - points[:, k]) / (high[k] - low[k]) for k in (1, 2))
+    side, x, y, z = box_of(points)
     force = base + gain * (1 - y) + np.c_[x, y, z] @ box_force
     u = force[:, None] * np.c_[-side * c[0] * x ** c[1], c[2] * y ** c[3], c[4] * z ** c[5]]
     shear = np.zeros_like(u)
@@ -88,7 +94,8 @@ def law_at(points, metadata):
 class Patient:
     """Displacement of a patient's points, and that of the law as a function of the shear."""
 
-    def __init__(self, name, moved, plain, shear, free):
+    def __init__(self, name, points, moved, plain, shear, free):
+        self.box = box_of(points)
         self.name, self.moved, self.free = name, centred(moved), free
         self.plain, self.shear = centred(plain), centred(shear)
         basis = np.stack([self.plain.ravel(), self.shear.ravel()], 1)
@@ -106,6 +113,60 @@ class Patient:
         return 1 - left / (self.moved ** 2).sum(), np.sqrt(left / len(law))
 
 
+TERMS = {  # displacement as lungs fill, as a multiple of the RMS displacement by the law
+    "each lung away from the midline": ["s"],
+    "shear along the fissure": ["fissure"],
+    "both": ["s", "fissure"],
+    "shear linear in Z and in Y": ["Z", "Y"],
+    "both, and linear in Z and in Y": ["s", "fissure", "Z", "Y"],
+}
+
+
+def term(patient, name, beta):
+    """Return a term of TERMS at the points of a patient as lungs empty, for a coefficient of 1, mm."""
+    side, _, y, z = patient.box
+    axis, value = {"s": (0, side), "fissure": (1, np.tanh((z - 0.45 - 0.5 * (y - 0.3)) / 0.1) / 2),
+                   "Z": (1, z - 0.5), "Y": (1, y - 0.5)}[name]
+    u = np.zeros_like(patient.plain)
+    u[:, axis] = -value * np.sqrt(((patient.plain + beta * patient.shear) ** 2).sum(1).mean())
+    return centred(u)
+
+
+def fit_terms(people, names, beta):
+    """Fit one coefficient for each term to all people, weighted by 1 / squared motion."""
+    matrix, right = np.zeros((len(names), len(names))), np.zeros(len(names))
+    for p in people:
+        law = p.plain + beta * p.shear
+        columns = np.stack([term(p, name, beta).ravel() for name in names], 1)
+        scale = 1
+        if p.free:  # of the law and the terms together
+            scale = np.linalg.lstsq(np.column_stack([law.ravel(), columns]), p.moved.ravel(), rcond=None)[0][0]
+        weight = 1 / (p.moved ** 2).sum()
+        matrix += weight * scale ** 2 * columns.T @ columns
+        right += weight * scale * columns.T @ (p.moved - scale * law).ravel()
+    return np.linalg.solve(matrix, right)
+
+
+def left_by(p, names, c, beta):
+    """Return the RMS residual of a patient, mm, by the law with terms of coefficients c."""
+    law = p.plain + beta * p.shear + sum((k * term(p, name, beta) for k, name in zip(c, names)), 0 * p.plain)
+    scale = (law * p.moved).sum() / (law ** 2).sum() if p.free else 1
+    return np.sqrt(((p.moved - scale * law) ** 2).sum(1).mean())
+
+
+def print_terms(people, beta):
+    """Print what each set of further terms leaves of the motion of a patient who was left out of its fit."""
+    kinds = sorted({p.name[:4] for p in people})
+    mean = lambda rms: "  ".join("%s %5.2f" % (k, np.mean([r for r, p in zip(rms, people) if p.name[:4] == k])) for k in kinds)
+    now = [left_by(p, [], [], beta) for p in people]
+    print("\nleave one of %d out, RMS mm\n%-32s %s" % (len(people), "the law", mean(now)))
+    for title, names in TERMS.items():
+        left = [left_by(p, names, fit_terms([q for q in people if q is not p], names, beta), beta) for p in people]
+        print("%-32s %s  %+.1f %%, better in %d; all: %s" % (
+            title, mean(left), 100 * (np.mean(left) / np.mean(now) - 1), sum(a < b for a, b in zip(left, now)),
+            ", ".join("%s %.2f" % t for t in zip(names, fit_terms(people, names, beta)))))
+
+
 def patients(options, folder):
     """Yield the patients of all folders, and whether they count for beta."""
     program = Program(options.build, folder)
@@ -113,15 +174,15 @@ def patients(options, folder):
     usual = numbers(metadata, "direction_constants")[6]
     for path in sorted(glob.glob(os.path.join(options.landmarks or "-", "*.csv"))):
         points, to = read(path)
-        yield usual, True, Patient(os.path.basename(path)[:7], to - points, *law_at(points, metadata), True)
+        yield usual, True, Patient(os.path.basename(path)[:7], points, to - points, *law_at(points, metadata), True)
     for path in sorted(glob.glob(os.path.join(options.copd or "-", "case*.csv"))):
         to, points = read(path)
         plain, sheared = (program.predict(shear, path[:-4], points) for shear in (0, 0.5))
-        yield usual, True, Patient("copd " + os.path.basename(path)[4:6], to - points, plain, 2 * (sheared - plain), False)
+        yield usual, True, Patient("copd " + os.path.basename(path)[4:6], points, to - points, plain, 2 * (sheared - plain), False)
     for path in sorted(glob.glob(os.path.join(options.quiet or "-", "*.csv"))):
         points, to = read(path)
         plain, shear = (SLOPE_AT_REST * u for u in law_at(points, metadata))
-        yield usual, False, Patient("quiet " + os.path.basename(path)[4:6], to - points, plain, shear, True)
+        yield usual, False, Patient("quiet " + os.path.basename(path)[4:6], points, to - points, plain, shear, True)
 
 
 def main():
@@ -129,8 +190,10 @@ def main():
     parser.add_argument("build")
     for name in ("--copd", "--landmarks", "--quiet"):
         parser.add_argument(name, metavar="FOLDER")
+    parser.add_argument("--terms", action="store_true")
+    options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        found = list(patients(parser.parse_args(), folder))
+        found = list(patients(options, folder))
     if not found:
         print("skipped: no patients")
         return
@@ -149,6 +212,8 @@ def main():
         print("%-9s %6.1f" % (kind + " mean", row[0]) + "".join(" | %4.0f %% %5.2f mm" % (100 * a, b) for a, b in zip(row[1::2], row[2::2])) + " |")
     print("own beta: mean %.2f, SD %.2f, standard error of the mean %.2f, n %d" % (
         np.mean(betas), np.std(betas, ddof=1), np.std(betas, ddof=1) / len(betas) ** 0.5, len(betas)))
+    if options.terms:
+        print_terms(full, usual)
 
 
 if __name__ == "__main__":

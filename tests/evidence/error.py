@@ -7,7 +7,8 @@
 BUILD is the folder of the build. COPD holds scans of full breaths: label maps NAME_exp.nii.gz and NAME_insp.nii.gz,
 and NAME.csv with matched landmarks, exhaled then inhaled. QUIET holds NAME.csv with landmarks at the end of
 expiration and of inspiration of a quiet breath, without scans: the lungs are the landmarks of each side, closed by
-30 mm. All in mm and LPS. Distances are RMS after the translation that fits best, but for 'locate', which finds it.
+30 mm. All in mm and LPS. Distances are RMS after the translation that fits best, but for 'locate', which finds it, and
+relative to the hilum.
 Of a fit to landmarks, whole cubes of 40 mm are held out, as 'fit' does; of one to surfaces too, single landmarks.
 
 needed: the constant c of <supine/locate.h> at which the stated error is the true one, with the other terms as stated.
@@ -72,12 +73,41 @@ def judge(found, sigma, truth, points=slice(None), free=True):
     return np.sqrt((off ** 2).mean()), np.sqrt((sigma[points] ** 2).mean()), 100 * (off <= 1.8 * sigma[points]).mean()
 
 
+def hila(points, lung):
+    """Return the middle of the hilum of each lung, at the box coordinates 0.175, 0.5 and 0.5 of <supine/locate.h>."""
+    low, high = points.min(0) - 10, points.max(0) + 10
+    middle = (points[lung == "left", 0].min() + points[lung == "right", 0].max()) / 2
+    return {side: np.array([middle + 0.175 * (face - middle), *(low + high)[1:] / 2])
+            for side, face in (("left", high[0]), ("right", low[0]))}
+
+
+def relative(p, state):
+    """Judge errors relative to the hilum. The truth there is the mean of ten landmarks nearest to the hilum of each lung.
+
+    Fail if the nearer third of the landmarks is not stated better than the farther third."""
+    p.run("deform", "i.safetensors", "--posture", "supine", "--volume", state, "-o", "body.csv")
+    p.run("deform", "i.safetensors", "--posture", "supine", "--volume", state, "--frame", "hilum", "-o", "o.csv")
+    body, sigma = p.read("body.csv")[0], p.read()[1]
+    lines = (line for line in open(p.folder / "o.csv", encoding="utf-8") if line[0] != "#")
+    lung = np.array([row["lung"] for row in csv.DictReader(lines)])
+    off, away, there = body - p.exhaled, np.zeros(len(body)), []
+    for side, hilum in hila(p.inhaled, lung).items():
+        own = np.flatnonzero(lung == side)
+        away[own] = np.linalg.norm(p.inhaled[own] - hilum, axis=1)
+        there.append(off[own[np.argsort(away[own])[:10]]].mean(0))
+    thirds = [np.sqrt((sigma[which] ** 2).mean()) for which in (away < np.quantile(away, 1 / 3), away > np.quantile(away, 2 / 3))]
+    if thirds[0] >= thirds[1]:
+        raise RuntimeError("relative to the hilum, near landmarks are stated at %.1f mm, far ones at %.1f" % tuple(thirds))
+    return judge(off - np.mean(there, 0), sigma, np.zeros_like(off), free=False)
+
+
 def full_breath(p, exp, insp):
     """Yield the path, the constant that was used, and what 'judge' returns, for each path of a full breath."""
     made = [p.run("precompute", scan, "--edge", 6, "--held-out", 20, "-o", "b.safetensors") for scan in (exp, insp)]
     volume = [sum(float(ml) for ml in re.findall(r"vertices: ([0-9.]+) mL", text)) for text in made]
     p.basis(insp, p.inhaled)
     yield "law", 4.5, *judge(*p.deform(f"{volume[0]:.0f}mL"), p.exhaled)
+    yield "law, relative to the hilum", 4.5, *relative(p, f"{volume[0]:.0f}mL")
     seen, others = p.order[:SEEN], p.order[SEEN:]
     p.write("seen.csv", p.exhaled)
     lines = (p.folder / "seen.csv").read_text(encoding="utf-8").splitlines()
@@ -129,12 +159,12 @@ def main():
                 scans = [pairs.with_name(f"{pairs.stem}_{k}.nii.gz").resolve() for k in ("exp", "insp")]
                 for path, c, *row in way(Patient(build.resolve(), work, pairs), *(scans if way is full_breath else [])):
                     paths.setdefault(path, []).append((c, *row, c * (row[0] / row[1]) ** 2))
-                    print("%-24s %-8s true %5.1f stated %5.1f mm, within the band %3.0f %%, needed %.1f mm of %.1f"
+                    print("%-26s %-8s true %5.1f stated %5.1f mm, within the band %3.0f %%, needed %.1f mm of %.1f"
                           % (path, pairs.stem, *row, paths[path][-1][4], c), flush=True)
     for path, rows in paths.items():
         c, true, stated, _, need = np.array(rows).T
         other = [np.exp(np.log(np.delete(need, i)).mean()) for i in range(len(need))] if len(need) > 1 else [np.nan]
-        print("%-24s stated / true %.2f (%.2f to %.2f); needed %.1f; of the others %s, ratio %s" % (
+        print("%-26s stated / true %.2f (%.2f to %.2f); needed %.1f; of the others %s, ratio %s" % (
             path, np.median(stated / true), (stated / true).min(), (stated / true).max(), np.exp(np.log(need).mean()),
             np.round(other, 1), np.round(np.sqrt(other / need), 2)))
     sys.exit(0 if paths else 77)

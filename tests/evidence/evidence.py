@@ -51,6 +51,13 @@ ROWS = (
     ("lower half / upper third, to prone", 2, 10, "", "lesions move below the carina (Yankelevitz 1995)"),
     ("expansion of upper / lower lobes, supine", 0.61, 0.94, "", "0.61 to 0.94 (Shin 2020, n 56)"),
     ("expansion of upper / lower lobes, prone", 0.93, 1.06, "", "0.98 to 1.06 (Shin 2020, n 34)"),
+    ("SD to upright at rest, left-right", None, 6.2, "mm", "at most 6.2 (MRI, AAPM 2021 abstract 58775, n not given)"),
+    ("SD to upright at rest, front-back", None, 7.2, "mm", "at most 7.2 (AAPM 2021): probably too small here"),
+    ("SD to upright at rest, head-feet", None, 9.9, "mm", "at most 9.9 (AAPM 2021): probably too small here"),
+    ("stated error to upright at rest", None, None, "mm", ""),
+    ("dome's motion in a breath, prone / supine", None, None, "", "0.75 (hepatic dome, n 9)"),
+    ("diaphragm's motion, supine / upright", None, None, "", "above 1 at 15 of 18 points (Takazakura 2004, n 10)"),
+    ("largest displacement, supine to side, rest", None, None, "mm", "up to 40, sliding up to 30 (Alvarez 2023, n 6): no sliding"),
     ("reversed triangles, at most", 0, 0, "%", ""),
     ("reversed triangles added by the bend", None, 2, "", ""),
 )
@@ -121,6 +128,26 @@ class Lungs:
             gains *= ((1 + (wanted - held) / slope) / 1.0001)[:, None]
         return self.basis.deform(pose)
 
+    def measure_turns(self, out, full, rest, after):
+        """Add what imaging of several postures has shown.
+
+        The published standard deviations include breathing and the error of registration, and are upper bounds. The
+        diaphragm is where the surface faces the feet."""
+        upright = rest["upright"][0] - rest["supine"][0]
+        for axis, name in enumerate(("left-right", "front-back", "head-feet")):
+            out[f"SD to upright at rest, {name}"] = upright[:, axis].std()
+        sigma = np.asarray(self.basis.expected_error("upright:rest", since="supine:rest"))
+        out["stated error to upright at rest"] = np.sqrt((sigma ** 2).mean())
+        down = self.reference[:, 2] < -0.8 * np.linalg.norm(self.reference, axis=1)
+        right = full[self.faces][:, :, 0].mean(1) < (full[:, 0].min() + full[:, 0].max()) / 2
+        moved = {p: np.abs((after[p][0] - rest[p][0])[self.faces].mean(1)[:, 2]) for p in ("supine", "prone", "upright")}
+        dome = down & right  # its highest quarter
+        dome &= full[self.faces].mean(1)[:, 2] > np.quantile(full[self.faces].mean(1)[dome, 2], 0.75)
+        out["dome's motion in a breath, prone / supine"] = moved["prone"][dome].mean() / moved["supine"][dome].mean()
+        out["diaphragm's motion, supine / upright"] = moved["supine"][down].mean() / moved["upright"][down].mean()
+        out["largest displacement, supine to side, rest"] = max(
+            np.linalg.norm(rest[p][0] - rest["supine"][0], axis=1).max() for p in ("left", "right"))
+
     def measure(self):
         """Return the values of all quantities in ROWS, by name."""
         out = {}
@@ -153,6 +180,7 @@ class Lungs:
         height /= height.max()
         out["mean displacement to prone, rest"] = move.mean()
         out["lower half / upper third, to prone"] = move[height < 1 / 2].mean() / move[height > 2 / 3].mean()
+        self.measure_turns(out, full, rest, after)
         over, more = 0, 0
         for p in POSTURES:
             for share in (0.3, 0.5, 0.7, 0.9, 1.1):
@@ -220,7 +248,7 @@ def main(arguments):
             columns[title] = Lungs(supine, basis).measure()
             for path in glob.glob(os.path.join(os.path.dirname(left), f"lobes_{title[-3:]}.nii.gz")):
                 columns[title] |= lobes(str(build / "supine"), path, folder)
-    print("%-36s" % "" + "".join("%16s" % title for title in columns) + "  range          published")
+    print("%-44s" % "" + "".join("%16s" % title for title in columns) + "  range          published")
     misses = 0
     for what, low, high, unit, published in ROWS:
         values = [column.get(what, float("nan")) for column in columns.values()]
@@ -228,7 +256,7 @@ def main(arguments):
         misses += sum(bad)
         held = "shown" if high is None else f"{'' if low is None else low}..{high}"
         text = "".join("%16s" % ("-" if v != v else f"{v:.3g}" + "!" * int(b)) for v, b in zip(values, bad))
-        print("%-36s%s  %-14s %s" % (what + (f", {unit}" if unit else ""), text, held, published))
+        print("%-44s%s  %-14s %s" % (what + (f", {unit}" if unit else ""), text, held, published))
     print(f"values outside their range (marked !): {misses}")
     return 1 if check and misses else 0
 

@@ -2,6 +2,8 @@
 /* Compare the volume, box and areas of surfaces with closed forms. */
 #include <float.h>
 
+#include "base/vec3.h"
+
 #include "tests/helpers/mesh_samples.h"
 
 /* Return the tolerance of a sum of `terms` terms of about `size`, each rounded a few times. */
@@ -99,6 +101,38 @@ TEST(test_vertex_area_sums_to_surface) {
     sum += area[i];
   }
   assert_close(sum, 2.0 * (100.0 * 110.0 + 110.0 * 130.0 + 130.0 * 100.0), rounding(36, 76600.0));
+  supine_mesh_free(&box);
+}
+
+/* A surface that moves along its smoothed normals gains the volume that was asked, inwards and
+ * outwards, and its normals stay unit vectors. */
+TEST(test_offset_smoothed_normals_gains_volume) {
+  supine_mesh box = sample_box();
+  supine_topology topology = {0};
+  double normals[24];
+  double space[24];
+  double change[3];
+  assert_int_equal(supine_mesh_topology_create(&box, &topology), SUPINE_OK);
+  supine_mesh_smooth_normals(&box, &topology, normals, space);
+  for (size_t i = 0; i < 8; ++i) {
+    assert_close(supine_length(normals + 3 * i), 1.0, rounding(3, 1.0));
+  }
+  supine_mesh_volume_along(&box, normals, change);
+  for (int sign = -1; sign <= 1; sign += 2) {
+    const double wanted = sign * 71500.0; /* 5 % */
+    double h = 0.0;
+    assert_true(supine_mesh_offset_to(change, wanted, &h));
+    assert_true(sign * h > 0.0);
+    supine_mesh moved = sample_box();
+    for (size_t i = 0; i < 24; ++i) {
+      moved.vertices[i] += h * normals[i];
+    }
+    assert_close(supine_mesh_volume(&moved), 1430000.0 + wanted, 1e-9 * 1430000.0);
+    supine_mesh_free(&moved);
+  }
+  double none = 0.0;
+  assert_false(supine_mesh_offset_to((const double[3]){0.0, 0.0, 0.0}, 1.0, &none));
+  supine_mesh_topology_free(&topology);
   supine_mesh_free(&box);
 }
 

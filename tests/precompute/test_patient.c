@@ -441,6 +441,8 @@ TEST(test_record_written_then_read_same) {
       (supine_patient_centre){{1.0 / 3.0, -2.0, 5.0}, 1, 12.5, {0.1, -1.0 / 9.0, 0.3}};
   patient.centre[1] = (supine_patient_centre){{-70.0, -20.0, 15.0}, -1, 7.5, {-0.2, 0.0, 1e-5}};
   supine_patient_record before = record_of(&patient);
+  before.measured_lung[0][0] = 2410.5;
+  before.measured_lung[0][1] = 2911.0;
   before.stiffness =
       (supine_patient_stiffness){.count = 2,
                                  .region = {{1, 1.0 / 3.0, {1.0, -2.0, 0.1}, 61.7, 0.0},
@@ -471,6 +473,7 @@ TEST(test_record_written_then_read_same) {
   }
   assert_memory_equal(before.state, after.state, sizeof before.state);
   assert_memory_equal(before.volume, after.volume, sizeof before.volume);
+  assert_memory_equal(before.measured_lung, after.measured_lung, sizeof before.measured_lung);
   assert_memory_equal(before.emptier, after.emptier, sizeof before.emptier);
   assert_memory_equal(before.report.held_out, after.report.held_out, sizeof before.report.held_out);
   assert_memory_equal(before.report.error, after.report.error, sizeof before.report.error);

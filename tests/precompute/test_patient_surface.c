@@ -161,6 +161,67 @@ TEST(test_fit_surface_other_law_reaches_state_and_volume) {
   supine_lungs_free(&other);
 }
 
+/* Make a model of either of two scans from a law whose displacement misses the measured volumes by
+ * 5
+ * %. The displaced surface holds exactly what was measured: `measured` of each lung, or of all. */
+static void check_held(const supine_patient_record *fit, const supine_lungs *scan, size_t shown,
+                       double other_ml, bool each) {
+  static supine_patient_record record;
+  supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
+  supine_resting resting = supine_physics_resting_default();
+  supine_scan state;
+  supine_error error = {0};
+  char text[512];
+  double *arrays = malloc(4 * scan->mesh.vertex_count * sizeof *arrays);
+  record = *fit;
+  record.volume[shown] = scan->volume[0];
+  record.volume[1 - shown] = other_ml;
+  memset(record.measured_lung, 0, sizeof record.measured_lung);
+  record.measured_lung[1 - shown][0] = each ? other_ml : 0.0;
+  if (supine_patient_model(&record, scan, &resting, &state, arrays, &model, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  const double *held = record.lung_volume[1 - shown];
+  printf("scan %zu: held %.6f of %.6f mL, moved by %.2f mm\n", shown, held[0], other_ml,
+         record.offset[0]);
+  assert_int_equal(record.shown, shown);
+  assert_true(record.holds_measured && fabs(held[0] + held[1] - other_ml) < 1e-9 * other_ml);
+  assert_true(fabs(record.offset[0]) > 0.2 && fabs(record.offset[0]) < 3.0);
+  assert_false(supine_patient_describe_volume(&record, text, sizeof text));
+  assert_says(text, "as measured");
+  free(arrays);
+}
+
+TEST(test_model_measured_volume_held_exactly) {
+  supine_mesh lump = helper_lump(9, 70.3, 5);
+  supine_lungs fuller = {0};
+  supine_lungs emptier = {0};
+  supine_error error;
+  double largest = 0.0;
+  assert_int_equal(supine_lungs_create(&lump, 1, NULL, &emptier, &error), SUPINE_OK);
+  supine_mesh moved = emptier.mesh;
+  moved.vertices = moved_by_truth(&emptier, &largest);
+  assert_int_equal(supine_lungs_create(&moved, 1, &emptier.midline, &fuller, &error), SUPINE_OK);
+  const supine_patient_fit_options options = {.gravity = {0.0, 1.0, 0.0}};
+  static supine_patient_record fit;
+  assert_int_equal(supine_patient_fit_surface(&fuller, &emptier.mesh, &no_landmarks, &options,
+                                              false, &fit, &error),
+                   SUPINE_OK);
+  fit.from_surface = true;
+  fit.state[0] = (supine_state){.gravity = {0.0, 1.0, 0.0}, .volume = {SUPINE_VOLUME_FULL, 0.0}};
+  fit.state[1] = (supine_state){.gravity = {0.0, 1.0, 0.0}, .volume = {SUPINE_VOLUME_REST, 0.0}};
+  memcpy(fit.emptier[0], emptier.minimum, sizeof emptier.minimum);
+  memcpy(fit.emptier[1], emptier.maximum, sizeof emptier.maximum);
+  fit.force = supine_patient_force(&fit.patient.power, 0.4, supine_gravity);
+  check_held(&fit, &fuller, 0, 1.05 * emptier.volume[0], true);
+  check_held(&fit, &fuller, 0, 1.05 * emptier.volume[0], false);
+  check_held(&fit, &emptier, 1, 0.95 * fuller.volume[0], true);
+  free(moved.vertices);
+  supine_mesh_free(&lump);
+  supine_lungs_free(&fuller);
+  supine_lungs_free(&emptier);
+}
+
 /* The correlation of the force with height is low for a force fixed to the body, high for a force
  * along gravity, and negative if gravity is reversed. */
 TEST(test_fit_surface_force_fixed_to_body_low_correlation) {

@@ -4,6 +4,7 @@
 
 #include <supine/locate.h>
 
+#include "runtime/expected.h"
 #include "tests/helpers/runtime_fixture.h"
 
 enum { VERTICES = 400, SEEN = 20 };
@@ -329,6 +330,65 @@ TEST(test_expected_error_any_state_equals_formula) {
   for (size_t i = 0; i < VERTICES; ++i) {
     assert_true(sigma[i] == 0);
   }
+}
+
+/* Evaluate the squared errors of vertex `of`, relative to vertex `to` as if it were the only
+ * anchor. */
+static void relate(supine_expected_model *model, size_t of, size_t to,
+                   double square[SUPINE_EXPECTED_TERMS]) {
+  static supine_expected_block block;
+  const float *p = supine_basis_vertices(model->basis) + 3 * to;
+  supine_expected_anchor *anchor = &model->anchor[0];
+  model->anchor_count = 0;
+  supine_expected_evaluate(model, to, to + 1, &block);
+  *anchor = (supine_expected_anchor){.beside_heart = 0};
+  for (size_t i = 0; i < 3; ++i) {
+    anchor->position[i] = (double)p[i];
+    for (size_t pair = 0; pair < EXPECTED_POSES / 2; ++pair) {
+      anchor->u[pair][i] = (double)block.x[2 * pair][i] - (double)block.x[2 * pair + 1][i];
+    }
+  }
+  model->anchor_count = 1;
+  supine_expected_evaluate(model, of, of + 1, &block);
+  memcpy(square, block.square[0], SUPINE_EXPECTED_TERMS * sizeof *square);
+}
+
+/* The error of a difference is 0 between a point and itself, the same both ways, smaller to a
+ * neighbour than to a distant point, and never more than the two errors of one sign added. */
+TEST(test_expected_relative_error_is_that_of_the_difference) {
+  world *w = *state;
+  const supine_state asked = state_of("supine:rest");
+  const supine_state scan = supine_basis_scan(w->basis);
+  const float *p = supine_basis_vertices(w->basis);
+  const size_t end = supine_basis_get_info(w->basis)->lung_begin[1];
+  supine_expected_model model;
+  double square[3][SUPINE_EXPECTED_TERMS];
+  assert_int_equal(supine_expected_prepare(w->basis, &asked, &scan, 0, 0, &model, NULL), SUPINE_OK);
+  size_t near = 1;
+  size_t far = 1;
+  for (size_t i = 1; i < end; ++i) {
+    const double at[3] = {(double)p[3 * i], (double)p[3 * i + 1], (double)p[3 * i + 2]};
+    double apart[3] = {0, 0, 0};
+    const size_t others[2] = {near, far};
+    for (size_t k = 0; k < 3; ++k) {
+      apart[0] += pow(at[k] - (double)p[k], 2);
+      apart[1] += pow((double)p[3 * others[0] + k] - (double)p[k], 2);
+      apart[2] += pow((double)p[3 * others[1] + k] - (double)p[k], 2);
+    }
+    near = apart[0] < apart[1] ? i : near;
+    far = apart[0] > apart[2] ? i : far;
+  }
+  relate(&model, 0, 0, square[0]);
+  assert_true(square[0][SUPINE_EXPECTED_DISPLACEMENT] < 1e-4);
+  assert_true(square[0][SUPINE_EXPECTED_VOLUME] < 1e-4);
+  relate(&model, 0, far, square[0]);
+  relate(&model, far, 0, square[1]);
+  relate(&model, 0, near, square[2]);
+  for (size_t k = 0; k < SUPINE_EXPECTED_HEART; ++k) {
+    assert_true(fabs(square[0][k] - square[1][k]) <= 1e-4 * (1 + square[0][k]));
+  }
+  assert_true(square[2][SUPINE_EXPECTED_DISPLACEMENT] <
+              0.7 * square[0][SUPINE_EXPECTED_DISPLACEMENT]);
 }
 
 /* A random wrong half of the points must raise the stated errors; what no patient has is refused.

@@ -305,7 +305,10 @@ static void draw_rows(void *context, size_t begin, size_t end, size_t thread) {
 static void set_heights(const double *gravity, size_t n, const float *xyz, corner *corners) {
   double low = INFINITY;
   double high = -INFINITY;
-  for (int pass = 0; pass < 2 && gravity != NULL; ++pass) {
+  if (gravity == NULL) {
+    return;
+  }
+  for (int pass = 0; pass < 2; ++pass) {
     for (size_t i = 0; i < n; ++i) {
       const double at = -((double)xyz[3 * i] * gravity[0] + (double)xyz[3 * i + 1] * gravity[1] +
                           (double)xyz[3 * i + 2] * gravity[2]);

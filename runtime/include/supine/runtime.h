@@ -340,7 +340,7 @@ SUPINE_API supine_status supine_displace_range(const supine_basis *basis, const 
  *
  * Each step rounds a coordinate by at most 2^-24 of its value. These errors add up, so begin each
  * breath with supine_deform. One step for a whole breath is right only for a law with straight
- * paths (`paper`): with the default law, the middle of a path of 500 mL lies 3 to 5 % of the chord
+ * paths (`paper`): with the default law, the middle of a path of 500 mL lies 3 to 11 % of the chord
  * away from it. Use supine_deform there, or a step for each volume.
  * @param count  number of vertices
  * @param step   [count, 3] displacement of each vertex in this step, mm (supine_displace_range)
