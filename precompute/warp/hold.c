@@ -1,0 +1,354 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Correct a displacement field so that it moves compact parts of soft tissue rigidly. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/arena.h"
+#include "base/parallel.h"
+#include "base/vec3.h"
+#include "runtime/rigid.h"
+
+#include "precompute/warp/tissue.h"
+
+/* Parts farther apart than this do not influence each other's motion, mm: the widest transition
+ * seen with parts of 30 mL was 25 mm. */
+static const double apart = 40.0;
+
+/* Return the distance between two parts, mm, or a bound that is at least `apart`. */
+static double gap_between(const supine_tissue_part *a, const supine_tissue_part *b) {
+  const double least = supine_distance(a->centre, b->centre) - a->reach - b->reach;
+  if (least >= apart) {
+    return least;
+  }
+  double gap = INFINITY;
+  for (size_t i = 0; i < a->outline_count; ++i) {
+    for (size_t j = 0; j < b->outline_count; ++j) {
+      gap = fmin(gap, supine_distance(a->outline + 3 * i, b->outline + 3 * j));
+    }
+  }
+  return gap;
+}
+
+/* Give the parts of group `from` the group `to`. */
+static void join_groups(supine_tissue *tissue, size_t from, size_t to) {
+  for (size_t i = 0; i < tissue->part_count; ++i) {
+    if (tissue->parts[i].group == from) {
+      tissue->parts[i].group = to;
+    }
+  }
+}
+
+/* Number the groups from 0, in the order of their first parts. */
+static void number_groups(supine_tissue *tissue) {
+  tissue->group_count = 0;
+  for (size_t i = 0; i < tissue->part_count; ++i) {
+    if (tissue->parts[i].group == i) { /* the first part of a group names it */
+      join_groups(tissue, i, tissue->group_count++);
+    }
+  }
+}
+
+supine_status supine_tissue_group(supine_tissue *tissue, supine_error *error) {
+  const size_t n = tissue->part_count;
+  SUPINE_ARENA arena = {0};
+  double *gap = supine_arena_take(&arena, n * n, sizeof *gap);
+  free(tissue->gap);
+  tissue->gap = malloc((n + 1) * sizeof *tissue->gap);
+  if (arena.failed || tissue->gap == NULL) {
+    return supine_error_memory(error, "%zu parts", n);
+  }
+  for (size_t i = 0; i < n; ++i) {
+    tissue->parts[i].group = i;
+  }
+  for (size_t i = 0; i < n; ++i) {
+    for (size_t j = 0; j < i; ++j) {
+      const supine_tissue_part *a = &tissue->parts[i];
+      const supine_tissue_part *b = &tissue->parts[j];
+      gap[i * n + j] = gap_between(a, b);
+      /* Between parts closer than that, two motions would compress the tissue until it folds. */
+      if (gap[i * n + j] < 0.5 * (a->radius + b->radius)) {
+        join_groups(tissue, a->group > b->group ? a->group : b->group,
+                    a->group > b->group ? b->group : a->group);
+      }
+    }
+  }
+  number_groups(tissue);
+  for (size_t i = 0; i < n; ++i) {
+    tissue->gap[i] = INFINITY;
+  }
+  for (size_t i = 0; i < n; ++i) {
+    for (size_t j = 0; j < i; ++j) {
+      const size_t of[2] = {tissue->parts[i].group, tissue->parts[j].group};
+      for (size_t k = 0; k < 2 && of[0] != of[1]; ++k) {
+        tissue->gap[of[k]] = fmin(tissue->gap[of[k]], gap[i * n + j]);
+      }
+    }
+  }
+  return SUPINE_OK;
+}
+
+/* The rigid motion of a group of parts: x goes to R (x - from) + to. */
+typedef struct motion {
+  double rotation[9]; /* R by rows */
+  double from[3], to[3];
+  double reach;   /* largest distance of the group's voxels from `from`, mm */
+  double plateau; /* distance from the group up to which the motion is rigid, mm */
+  double width;   /* distance over which it then changes to the field's, mm */
+} motion;
+
+/* Move a point x, or a point back if `back`. */
+static void move_rigidly(const motion *m, const double x[3], bool back, double out[3]) {
+  const double *centre = back ? m->to : m->from;
+  for (size_t k = 0; k < 3; ++k) {
+    out[k] = back ? m->from[k] : m->to[k];
+    for (size_t a = 0; a < 3; ++a) {
+      out[k] += m->rotation[back ? 3 * a + k : 3 * k + a] * (x[a] - centre[a]);
+    }
+  }
+}
+
+/* What the voxels of a group are visited for. */
+typedef struct fit {
+  motion m;
+  double count;
+  double cross[3][3];
+  double largest; /* largest |R x - x - u(x)| */
+} fit;
+
+enum { MEANS, ROTATION, MISFIT, STEPS };
+
+static void visit_point(fit *f, int step, const double x[3], const double u[3]) {
+  double moved[3];
+  for (size_t k = 0; k < 3 && step == MEANS; ++k) {
+    f->m.from[k] += x[k] / f->count;
+    f->m.to[k] += (x[k] + u[k]) / f->count;
+  }
+  for (size_t k = 0; k < 9 && step == ROTATION; ++k) {
+    f->cross[k / 3][k % 3] +=
+        (x[k / 3] - f->m.from[k / 3]) * (x[k % 3] + u[k % 3] - f->m.to[k % 3]);
+  }
+  if (step == MISFIT) {
+    move_rigidly(&f->m, x, false, moved);
+    supine_subtract(moved, x, moved);
+    f->largest = fmax(f->largest, supine_distance(moved, u));
+    f->m.reach = fmax(f->m.reach, supine_distance(x, f->m.from));
+  }
+}
+
+/* Fit a rigid motion to the field at the voxels of a group, by least squares. */
+static fit fit_motion(const supine_tissue *tissue, size_t group, const supine_field *field) {
+  fit f = {.count = 0.0};
+  for (size_t p = 0; p < tissue->part_count; ++p) {
+    f.count += tissue->parts[p].group == group ? (double)tissue->parts[p].count : 0.0;
+  }
+  for (int step = MEANS; step < STEPS; ++step) {
+    for (size_t p = 0; p < tissue->part_count; ++p) {
+      const supine_image *mask = &tissue->parts[p].mask;
+      const size_t voxels = mask->size[0] * mask->size[1] * mask->size[2];
+      for (size_t i = 0; i < voxels && tissue->parts[p].group == group; ++i) {
+        if (((const unsigned char *)mask->values)[i] == 1) {
+          double x[3];
+          double u[3];
+          supine_image_place(mask, i, x);
+          supine_field_at(field, x, u);
+          visit_point(&f, step, x, u);
+        }
+      }
+    }
+    if (step == ROTATION) {
+      supine_rigid_rotation((const double(*)[3])f.cross, f.m.rotation);
+    }
+  }
+  return f;
+}
+
+/* Return the distance of a point from a part, mm, or a bound that is at least `most`. */
+static double distance_from(const supine_tissue_part *part, const double x[3], double most) {
+  const double least = supine_distance(x, part->centre) - part->reach;
+  if (least >= most) {
+    return least;
+  }
+  double voxel[3];
+  bool within = true;
+  size_t at[3];
+  supine_image_locate(&part->mask, x, voxel);
+  for (size_t a = 0; a < 3; ++a) {
+    const double nearest = rint(voxel[a]);
+    within = within && nearest >= 0.0 && nearest < (double)part->mask.size[a];
+    at[a] = within ? (size_t)nearest : 0;
+  }
+  if (within &&
+      ((const unsigned char *)part->mask
+           .values)[at[0] + part->mask.size[0] * (at[1] + part->mask.size[1] * at[2])] == 1) {
+    return 0.0;
+  }
+  double nearest = INFINITY;
+  for (size_t i = 0; i < part->outline_count; ++i) {
+    nearest = fmin(nearest, supine_distance(x, part->outline + 3 * i));
+  }
+  return nearest;
+}
+
+typedef struct holding {
+  const supine_tissue *tissue;
+  const motion *m;
+  size_t group;
+  supine_field *field;
+  supine_field *inverse;
+  float *weight; /* [nodes] sum of the weights of the groups' motions */
+  float *shift;  /* [nodes, 3] sum of weight times correction of the inverse field, mm */
+} holding;
+
+/* Add the motion of a group to the corrections of the nodes of the inverse field. */
+static void add_rows(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  static const double least = 1e-6; /* bounds the weight in a part, where phi is 1 */
+  const holding *work = context;
+  const supine_image *nodes = &work->inverse->nodes;
+  const double around = work->m->plateau + work->m->width;
+  for (size_t i = begin * nodes->size[0]; i < end * nodes->size[0]; ++i) {
+    double y[3];
+    double x[3];
+    supine_image_place(nodes, i, y);
+    if (supine_distance(y, work->m->to) >= work->m->reach + around) {
+      continue;
+    }
+    move_rigidly(work->m, y, true, x);
+    double distance = INFINITY;
+    for (size_t p = 0; p < work->tissue->part_count; ++p) {
+      if (work->tissue->parts[p].group == work->group) {
+        distance = fmin(distance, distance_from(&work->tissue->parts[p], x, around));
+      }
+    }
+    const double t = fmax(distance - work->m->plateau, 0.0) / work->m->width;
+    if (t < 1.0) {
+      const double phi = 1.0 - t * t * t * (10.0 - t * (15.0 - 6.0 * t));
+      const double weight = phi / fmax(1.0 - phi, least);
+      const float *v = (const float *)nodes->values + 3 * i;
+      work->weight[i] += (float)weight;
+      for (size_t k = 0; k < 3; ++k) {
+        work->shift[3 * i + k] += (float)(weight * (x[k] - y[k] - (double)v[k]));
+      }
+    }
+  }
+}
+
+/* Return whether a correction changes a node of the cell. */
+static bool is_changed(const supine_image *nodes, const float *weight,
+                       const supine_field_cell *cell) {
+  bool changed = false;
+  for (size_t corner = 0; corner < 8; ++corner) {
+    size_t at[3];
+    for (size_t a = 0; a < 3; ++a) {
+      at[a] = cell->corner[a] + (corner >> a & 1U);
+    }
+    changed = changed || weight[at[0] + nodes->size[0] * (at[1] + nodes->size[1] * at[2])] > 0.0F;
+  }
+  return changed;
+}
+
+/* Find the cell above node i; return false if there is none, or if no correction changes it. */
+static bool changed_cell(const supine_image *nodes, const float *weight, size_t i,
+                         supine_field_cell *cell) {
+  *cell = (supine_field_cell){{i % nodes->size[0], i / nodes->size[0] % nodes->size[1],
+                               i / nodes->size[0] / nodes->size[1]},
+                              {0.5, 0.5, 0.5}};
+  return cell->corner[0] + 1 < nodes->size[0] && cell->corner[1] + 1 < nodes->size[1] &&
+         cell->corner[2] + 1 < nodes->size[2] && is_changed(nodes, weight, cell);
+}
+
+/* Count the changed cells that the inverse field folds. */
+static size_t count_folds(const supine_image *nodes, const float *weight) {
+  size_t folded = 0;
+  for (size_t i = 0; i < nodes->size[0] * nodes->size[1] * nodes->size[2]; ++i) {
+    supine_field_cell cell;
+    if (changed_cell(nodes, weight, i, &cell)) {
+      folded += supine_field_stretch(nodes, &cell) > 0.0 ? 0 : 1;
+    }
+  }
+  return folded;
+}
+
+/* Replace the nodes of the forward field that go to changed cells by those that the corrected
+ * inverse takes back, and mark them in work->weight. */
+static void follow_rows(void *context, size_t begin, size_t end, size_t thread) {
+  (void)thread;
+  const holding *work = context;
+  const supine_image *nodes = &work->field->nodes;
+  float *u = nodes->values;
+  for (size_t i = begin * nodes->size[0]; i < end * nodes->size[0]; ++i) {
+    double x[3];
+    double y[3];
+    supine_field_cell cell;
+    supine_image_place(nodes, i, x);
+    for (size_t k = 0; k < 3; ++k) {
+      y[k] = x[k] + (double)u[3 * i + k];
+    }
+    supine_field_find_cell(nodes, y, &cell);
+    if (is_changed(nodes, work->weight, &cell)) {
+      (void)supine_field_solve(work->inverse, x, y);
+      for (size_t k = 0; k < 3; ++k) {
+        u[3 * i + k] = (float)(y[k] - x[k]);
+      }
+    }
+  }
+}
+
+/* Add `sign` times the volume to which the field moves each lung, mL. */
+static void add_volumes(const supine_field *field, double sign, double *volume) {
+  const supine_image *nodes = &field->nodes;
+  const double whole = supine_tissue_voxel(nodes);
+  for (size_t i = 0; i < nodes->size[0] * nodes->size[1] * nodes->size[2]; ++i) {
+    const supine_field_cell cell = {{i % nodes->size[0], i / nodes->size[0] % nodes->size[1],
+                                     i / nodes->size[0] / nodes->size[1]},
+                                    {0.5, 0.5, 0.5}};
+    double depth = -1.0;
+    if (cell.corner[0] + 1 < nodes->size[0] && cell.corner[1] + 1 < nodes->size[1] &&
+        cell.corner[2] + 1 < nodes->size[2]) {
+      supine_field_interpolate(&field->depth, &cell, &depth, NULL);
+    }
+    if (depth > 0.0) {
+      volume[((const unsigned char *)field->lung.values)[i]] +=
+          sign * whole * supine_field_stretch(nodes, &cell);
+    }
+  }
+}
+
+supine_status supine_tissue_hold(const supine_tissue *tissue, supine_field *field,
+                                 supine_field *inverse, supine_tissue_held *held,
+                                 supine_error *error) {
+  static const double width_least = 10.0; /* of the transition, mm: two cells of 5 mm */
+  static const double per_misfit = 4.0;
+  const supine_image *nodes = &inverse->nodes;
+  const size_t count = nodes->size[0] * nodes->size[1] * nodes->size[2];
+  *held = (supine_tissue_held){0};
+  if (tissue->part_count == 0) {
+    return SUPINE_OK;
+  }
+  SUPINE_ARENA arena = {0};
+  holding work = {.tissue = tissue,
+                  .field = field,
+                  .inverse = inverse,
+                  .weight = supine_arena_zeros(&arena, count, sizeof *work.weight),
+                  .shift = supine_arena_zeros(&arena, count, 3 * sizeof *work.shift)};
+  SUPINE_TRY(supine_arena_check(&arena, error, "corrections of %zu nodes", count));
+  for (work.group = 0; work.group < tissue->group_count; ++work.group) {
+    fit f = fit_motion(tissue, work.group, field);
+    f.m.width = fmax(width_least, per_misfit * f.largest);
+    /* The plateaus of two groups must not meet. */
+    f.m.plateau = fmin(supine_image_cell_diagonal(nodes), tissue->gap[work.group] / 3.0);
+    held->largest = fmax(held->largest, f.largest);
+    work.m = &f.m;
+    supine_parallel_for(nodes->size[1] * nodes->size[2], 1, 0, add_rows, &work);
+  }
+  held->folded_before = count_folds(nodes, work.weight);
+  for (size_t i = 0; i < 3 * count; ++i) {
+    ((float *)nodes->values)[i] += work.shift[i] / (1.0F + work.weight[i / 3]);
+  }
+  held->folded = count_folds(nodes, work.weight);
+  add_volumes(field, -1.0, held->change);
+  supine_parallel_for(nodes->size[1] * nodes->size[2], 1, 0, follow_rows, &work);
+  add_volumes(field, 1.0, held->change);
+  return SUPINE_OK;
+}
