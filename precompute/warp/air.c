@@ -21,7 +21,7 @@ static const double bin_edge = 4.0;
  * that are not soft. */
 typedef struct sums {
   double mass[SUPINE_LUNGS_MAX];
-  double soft[SUPINE_LUNGS_MAX]; /* shares of voxels */
+  double soft[SUPINE_LUNGS_MAX]; /* number of soft voxels */
   double air[SUPINE_LUNGS_MAX], count[SUPINE_LUNGS_MAX];
 } sums;
 
@@ -31,7 +31,6 @@ typedef struct binning {
   size_t bin[3]; /* voxels of a bin along each axis */
   float *weight; /* [bins, lungs] weighted number of aerated voxels */
   sums *layers;
-  bool second; /* whether the densities are known, and soft tissue is to be counted */
 } binning;
 
 /* Add the row of voxels that begins at voxel `first` to the bins of its row. */
@@ -47,10 +46,6 @@ static void add_row(const binning *work, size_t first, size_t bins, sums *sum) {
     const size_t lung = kind[i] & SUPINE_TISSUE_LUNG_INDEX;
     const size_t at = (bins + i / work->bin[0]) * lungs + lung;
     const double density = fmax(supine_image_get(ct, first + i) + 1000.0, 0.0);
-    if (work->second) {
-      sum->soft[lung] += supine_tissue_soft_share(density, (double)air[at]);
-      continue;
-    }
     sum->mass[lung] += density;
     if (density < aerated) {
       air[at] += (float)density;
@@ -59,6 +54,8 @@ static void add_row(const binning *work, size_t first, size_t bins, sums *sum) {
     if (density < 1000.0 + supine_field_aerated) {
       sum->air[lung] += density;
       sum->count[lung] += 1.0;
+    } else {
+      sum->soft[lung] += 1.0;
     }
   }
 }
@@ -185,18 +182,12 @@ supine_status supine_tissue_find_air(const supine_image *ct, supine_tissue *tiss
     const sums *layer = &work.layers[i / SUPINE_LUNGS_MAX];
     const size_t lung = i % SUPINE_LUNGS_MAX;
     tissue->mass[lung] += layer->mass[lung];
+    tissue->soft[lung] += layer->soft[lung] * supine_tissue_voxel(ct);
     total.air[lung] += layer->air[lung];
     total.count[lung] += layer->count[lung];
   }
   smooth(air, air->values, spare);
   smooth(air, work.weight, spare);
   divide(&total, air, work.weight);
-  work.second = true;
-  supine_parallel_for(air->size[2], 1, 0, add_layers, &work);
-  const double voxel = supine_tissue_voxel(ct);
-  for (size_t i = 0; i < air->size[2] * SUPINE_LUNGS_MAX; ++i) {
-    const size_t lung = i % SUPINE_LUNGS_MAX;
-    tissue->soft[lung] += voxel * work.layers[i / SUPINE_LUNGS_MAX].soft[lung];
-  }
   return SUPINE_OK;
 }

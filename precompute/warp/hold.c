@@ -337,7 +337,7 @@ supine_status supine_tissue_hold(const supine_tissue *tissue, supine_field *fiel
     fit f = fit_motion(tissue, work.group, field);
     f.m.width = fmax(width_least, per_misfit * f.largest);
     /* The plateaus of two groups must not meet. */
-    f.m.plateau = fmin(supine_image_cell_diagonal(nodes), tissue->gap[work.group] / 3.0);
+    f.m.plateau = fmin(0.5 * supine_image_cell_diagonal(nodes), tissue->gap[work.group] / 3.0);
     held->largest = fmax(held->largest, f.largest);
     work.m = &f.m;
     supine_parallel_for(nodes->size[1] * nodes->size[2], 1, 0, add_rows, &work);

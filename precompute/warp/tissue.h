@@ -35,7 +35,7 @@ typedef struct supine_tissue {
                         around a point, on a grid of about 4 mm */
   size_t lungs;
   double mass[SUPINE_LUNGS_MAX]; /**< sum of HU + 1000 over the voxels of each lung */
-  double soft[SUPINE_LUNGS_MAX]; /**< soft tissue in each lung, mL */
+  double soft[SUPINE_LUNGS_MAX]; /**< voxels of each lung that are not aerated, mL */
   size_t part_count;
   supine_tissue_part *parts;
   size_t group_count;
