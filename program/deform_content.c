@@ -210,12 +210,11 @@ static supine_status write_image(const char *path, const supine_image *source, b
                                  supine_error *error) {
   SUPINE_FREED_BY(supine_image_free) supine_image moved = {0};
   SUPINE_TRY(supine_field_resample(inverse, tissue, labels, source, &moved, error));
-  SUPINE_TRY(supine_image_write(path, &moved,
-                                tissue != NULL
-                                    ? "HU + 1000 of aerated tissue inside the lungs scaled by the "
-                                      "local change of volume: mass is kept"
-                                    : NULL,
-                                error));
+  SUPINE_TRY(supine_image_write(
+      path, &moved,
+      tissue != NULL ? "HU + 1000 of aerated lung scaled by the change of volume: mass is kept"
+                     : NULL,
+      error));
   const size_t *size = source->size;
   (void)printf("%s: %zu x %zu x %zu voxels%s\n", path, size[0], size[1], size[2],
                tissue != NULL ? ", densities scaled inside the lungs" : "");
@@ -424,7 +423,9 @@ supine_status supine_command_deform_content(const supine_deform_content *wanted,
                        moved->expected.rms, moved->expected.largest,
                        moved->expected.turned ? "; an extrapolation, as the posture changes" : "");
   }
-  if (supine_length(moved->hilum.move) != 0.0) {
+  if (supine_length(moved->hilum.move) > 0.0 && supine_length(moved->hilum.move) < 0.1) {
+    (void)puts("the hilum moves by less than 0.1 mm");
+  } else if (supine_length(moved->hilum.move) > 0.0) {
     (void)supine_print(stdout,
                        "the hilum moves by %.1f, %.1f, %.1f mm (to the left, back and head)",
                        moved->hilum.move[0], moved->hilum.move[1], moved->hilum.move[2]);
