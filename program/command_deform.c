@@ -141,7 +141,7 @@ static void end(batch *b) {
     free(b->rows[i / 3].outputs[i % 3]);
   }
   free(b->rows);
-  supine_tissue_free(&b->tissue.soft);
+  supine_field_tissue_free(&b->tissue.soft);
   supine_image_free(&b->wanted->content.source);
   supine_image_free(&b->wanted->content.label_source);
   supine_basis_close(b->basis);

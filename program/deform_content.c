@@ -238,13 +238,13 @@ static supine_status find_tissue(const supine_deform_content *wanted, const supi
     return SUPINE_OK;
   }
   if (wanted->density) {
-    SUPINE_TRY(supine_tissue_find(forward, &wanted->source, soft, error));
+    SUPINE_TRY(supine_field_tissue_find(forward, &wanted->source, soft, error));
     (void)printf("%s: soft tissue in the lungs: ", wanted->image);
     print_lungs(basis, soft->soft, "%.1f mL");
     (void)putchar('\n');
   }
-  SUPINE_TRY(supine_tissue_add_labels(&wanted->label_source, wanted->rigid.value,
-                                      wanted->rigid.count, soft, error));
+  SUPINE_TRY(supine_field_tissue_add_labels(&wanted->label_source, wanted->rigid.value,
+                                            wanted->rigid.count, soft, error));
   for (size_t i = 0; i < soft->part_count; ++i) {
     const double *at = soft->parts[i].centre;
     (void)supine_print(stdout, "rigid part of %.1f mL at %.0f, %.0f, %.0f mm (LPS)\n",
@@ -258,7 +258,7 @@ static supine_status find_tissue(const supine_deform_content *wanted, const supi
 static supine_status hold_parts(const supine_tissue *soft, const supine_basis *basis,
                                 supine_field *forward, supine_field *inverse, supine_error *error) {
   supine_tissue_held held;
-  SUPINE_TRY(supine_tissue_hold(soft, forward, inverse, &held, error));
+  SUPINE_TRY(supine_field_tissue_hold(soft, forward, inverse, &held, error));
   if (soft->part_count == 0) {
     return SUPINE_OK;
   }

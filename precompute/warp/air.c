@@ -162,8 +162,8 @@ static void choose_bins(const supine_image *ct, size_t lungs, size_t bin[3], sup
   }
 }
 
-supine_status supine_tissue_find_air(const supine_image *ct, supine_tissue *tissue,
-                                     supine_error *error) {
+supine_status supine_field_tissue_find_air(const supine_image *ct, supine_tissue *tissue,
+                                           supine_error *error) {
   binning work = {.ct = ct, .tissue = tissue};
   supine_image *air = &tissue->air;
   choose_bins(ct, tissue->lungs, work.bin, air);
@@ -182,7 +182,7 @@ supine_status supine_tissue_find_air(const supine_image *ct, supine_tissue *tiss
     const sums *layer = &work.layers[i / SUPINE_LUNGS_MAX];
     const size_t lung = i % SUPINE_LUNGS_MAX;
     tissue->mass[lung] += layer->mass[lung];
-    tissue->soft[lung] += layer->soft[lung] * supine_tissue_voxel(ct);
+    tissue->soft[lung] += layer->soft[lung] * supine_field_tissue_voxel(ct);
     total.air[lung] += layer->air[lung];
     total.count[lung] += layer->count[lung];
   }

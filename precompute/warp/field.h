@@ -73,10 +73,10 @@ struct supine_tissue;
 
 /** Move an image: moved(y) = image(y + v(y)) at the voxels y of the image; places outside the image
  * have the value of the nearest voxel. If `tissue` is given, the mass of each lung is kept: the
- * soft share of a voxel (supine_tissue_soft_share) keeps its density (Hounsfield units + 1000), and
- * that of the aerated share is multiplied by k det(I + dv/dy). The determinant is the tissue's
- * volume before the motion, divided by its volume after the motion; k, the same for all voxels of a
- * lung, makes up for soft tissue that the field compresses.
+ * soft share of a voxel (supine_field_tissue_soft_share) keeps its density (Hounsfield units +
+ * 1000), and that of the aerated share is multiplied by k det(I + dv/dy). The determinant is the
+ * tissue's volume before the motion, divided by its volume after the motion; k, the same for all
+ * voxels of a lung, makes up for soft tissue that the field compresses.
  * @param inverse  field v, made by supine_field_invert
  * @param tissue   of this image; NULL to keep densities unscaled
  * @param labels   whether to take the value of the nearest voxel instead of interpolating

@@ -117,7 +117,7 @@ static double aerated_at(const resampling *work, const cells *in, double (*corne
  * and its source, and nor does this. */
 static double scale_density(double density, double air, double ratio, double *aerated) {
   static const double most = 1050.0; /* blood and muscle without contrast agent have up to 50 HU */
-  const double share = supine_tissue_soft_share(density, air);
+  const double share = supine_field_tissue_soft_share(density, air);
   const double soft = share < 1.0 ? share * supine_tissue_density : density;
   const double cap = density > most ? density : most;
   *aerated = (density - soft) * ratio;
@@ -128,14 +128,14 @@ static double scale_density(double density, double air, double ratio, double *ae
   return soft + *aerated;
 }
 
-/* Scale the densities of `count` voxels in the lungs, and add them to the sums.
+/* Scale the densities of the voxels in the lungs, and add them to the sums.
  * @param nodes   cells of the field around the voxels of the moved image
  * @param kind    kind of the voxel nearest to the source of each
  * @param values  HU, replaced */
 static void scale_densities(const resampling *work, const cells *nodes, const cells *in,
-                            double (*corner)[RUN], size_t count, const unsigned char *kind,
-                            double *values, tally *sum) {
-  for (size_t i = 0; i < count; ++i) {
+                            double (*corner)[RUN], const unsigned char *kind, double *values,
+                            tally *sum) {
+  for (size_t i = 0; i < RUN; ++i) {
     if ((kind[i] & SUPINE_TISSUE_LUNG) != 0) {
       const size_t lung = kind[i] & SUPINE_TISSUE_LUNG_INDEX;
       const double ratio = work->scale[lung] * volume_ratio(&work->inverse->nodes, nodes, i);
@@ -235,7 +235,8 @@ SUPINE_CLONES static bool resample_run(const resampling *work, size_t row, size_
   } else if (work->tissue != NULL) {
     lung = interpolate_density(work, &in, values, kind);
     if (lung) {
-      scale_densities(work, &nodes, &in, at, count, kind, values, sum);
+      memset(kind + count, 0, RUN - count); /* the sums are over voxels of the image only */
+      scale_densities(work, &nodes, &in, at, kind, values, sum);
     }
   } else {
     interpolate(from, &in, values);

@@ -11,83 +11,6 @@
 
 #include "precompute/warp/tissue.h"
 
-/* Parts farther apart than this do not influence each other's motion, mm: the widest transition
- * seen with parts of 30 mL was 25 mm. */
-static const double apart = 40.0;
-
-/* Return the distance between two parts, mm, or a bound that is at least `apart`. */
-static double gap_between(const supine_tissue_part *a, const supine_tissue_part *b) {
-  const double least = supine_distance(a->centre, b->centre) - a->reach - b->reach;
-  if (least >= apart) {
-    return least;
-  }
-  double gap = INFINITY;
-  for (size_t i = 0; i < a->outline_count; ++i) {
-    for (size_t j = 0; j < b->outline_count; ++j) {
-      gap = fmin(gap, supine_distance(a->outline + 3 * i, b->outline + 3 * j));
-    }
-  }
-  return gap;
-}
-
-/* Give the parts of group `from` the group `to`. */
-static void join_groups(supine_tissue *tissue, size_t from, size_t to) {
-  for (size_t i = 0; i < tissue->part_count; ++i) {
-    if (tissue->parts[i].group == from) {
-      tissue->parts[i].group = to;
-    }
-  }
-}
-
-/* Number the groups from 0, in the order of their first parts. */
-static void number_groups(supine_tissue *tissue) {
-  tissue->group_count = 0;
-  for (size_t i = 0; i < tissue->part_count; ++i) {
-    if (tissue->parts[i].group == i) { /* the first part of a group names it */
-      join_groups(tissue, i, tissue->group_count++);
-    }
-  }
-}
-
-supine_status supine_tissue_group(supine_tissue *tissue, supine_error *error) {
-  const size_t n = tissue->part_count;
-  SUPINE_ARENA arena = {0};
-  double *gap = supine_arena_take(&arena, n * n, sizeof *gap);
-  free(tissue->gap);
-  tissue->gap = malloc((n + 1) * sizeof *tissue->gap);
-  if (arena.failed || tissue->gap == NULL) {
-    return supine_error_memory(error, "%zu parts", n);
-  }
-  for (size_t i = 0; i < n; ++i) {
-    tissue->parts[i].group = i;
-  }
-  for (size_t i = 0; i < n; ++i) {
-    for (size_t j = 0; j < i; ++j) {
-      const supine_tissue_part *a = &tissue->parts[i];
-      const supine_tissue_part *b = &tissue->parts[j];
-      gap[i * n + j] = gap_between(a, b);
-      /* Between parts closer than that, two motions would compress the tissue until it folds. */
-      if (gap[i * n + j] < 0.5 * (a->radius + b->radius)) {
-        join_groups(tissue, a->group > b->group ? a->group : b->group,
-                    a->group > b->group ? b->group : a->group);
-      }
-    }
-  }
-  number_groups(tissue);
-  for (size_t i = 0; i < n; ++i) {
-    tissue->gap[i] = INFINITY;
-  }
-  for (size_t i = 0; i < n; ++i) {
-    for (size_t j = 0; j < i; ++j) {
-      const size_t of[2] = {tissue->parts[i].group, tissue->parts[j].group};
-      for (size_t k = 0; k < 2 && of[0] != of[1]; ++k) {
-        tissue->gap[of[k]] = fmin(tissue->gap[of[k]], gap[i * n + j]);
-      }
-    }
-  }
-  return SUPINE_OK;
-}
-
 /* The rigid motion of a group of parts: x goes to R (x - from) + to. */
 typedef struct motion {
   double rotation[9]; /* R by rows */
@@ -298,7 +221,7 @@ static void follow_rows(void *context, size_t begin, size_t end, size_t thread) 
 /* Add `sign` times the volume to which the field moves each lung, mL. */
 static void add_volumes(const supine_field *field, double sign, double *volume) {
   const supine_image *nodes = &field->nodes;
-  const double whole = supine_tissue_voxel(nodes);
+  const double whole = supine_field_tissue_voxel(nodes);
   for (size_t i = 0; i < nodes->size[0] * nodes->size[1] * nodes->size[2]; ++i) {
     const supine_field_cell cell = {{i % nodes->size[0], i / nodes->size[0] % nodes->size[1],
                                      i / nodes->size[0] / nodes->size[1]},
@@ -315,9 +238,9 @@ static void add_volumes(const supine_field *field, double sign, double *volume) 
   }
 }
 
-supine_status supine_tissue_hold(const supine_tissue *tissue, supine_field *field,
-                                 supine_field *inverse, supine_tissue_held *held,
-                                 supine_error *error) {
+supine_status supine_field_tissue_hold(const supine_tissue *tissue, supine_field *field,
+                                       supine_field *inverse, supine_tissue_held *held,
+                                       supine_error *error) {
   static const double width_least = 10.0; /* of the transition, mm: two cells of 5 mm */
   static const double per_misfit = 4.0;
   const supine_image *nodes = &inverse->nodes;

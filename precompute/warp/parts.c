@@ -35,7 +35,7 @@ typedef struct search {
   supine_tissue *tissue;
 } search;
 
-double supine_tissue_voxel(const supine_image *image) {
+double supine_field_tissue_voxel(const supine_image *image) {
   return 1e-3 * fabs(supine_triple(image->step[0], image->step[1], image->step[2]));
 }
 
@@ -210,7 +210,7 @@ static bool measure(const search *s, supine_tissue_part *part) {
     part->reach = fmax(part->reach, supine_length(at));
   }
   part->count = s->count;
-  part->volume = n * supine_tissue_voxel(s->frame);
+  part->volume = n * supine_field_tissue_voxel(s->frame);
   part->radius = cbrt(1e3 * part->volume * 0.2387324146378430); /* 3 / (4 pi) */
   eigenvalues((const double(*)[3])square, value);
   /* A solid ellipsoid has the semi-axes sqrt(5) SD. */
@@ -294,7 +294,7 @@ static bool make_outline(supine_tissue_part *part) {
 static bool add_part(const search *s) {
   supine_tissue *tissue = s->tissue;
   supine_tissue_part part = {.count = 0};
-  if (!s->named && (double)s->count * supine_tissue_voxel(s->frame) < volume_least) {
+  if (!s->named && (double)s->count * supine_field_tissue_voxel(s->frame) < volume_least) {
     return true;
   }
   if (!measure(s, &part)) {
@@ -326,15 +326,16 @@ static bool find_components(search *s) {
   return good;
 }
 
-supine_status supine_tissue_find_parts(supine_tissue *tissue, supine_error *error) {
+supine_status supine_field_tissue_find_parts(supine_tissue *tissue, supine_error *error) {
   search s = {.frame = &tissue->kind, .stage = tissue->kind.values, .tissue = tissue};
   SUPINE_TRY(open_by_ball(&s, error));
-  return find_components(&s) ? supine_tissue_group(tissue, error)
+  return find_components(&s) ? supine_field_tissue_group(tissue, error)
                              : supine_error_memory(error, "parts of soft tissue");
 }
 
-supine_status supine_tissue_add_labels(const supine_image *labels, const double *wanted,
-                                       size_t count, supine_tissue *tissue, supine_error *error) {
+supine_status supine_field_tissue_add_labels(const supine_image *labels, const double *wanted,
+                                             size_t count, supine_tissue *tissue,
+                                             supine_error *error) {
   const size_t voxels = labels->size[0] * labels->size[1] * labels->size[2];
   SUPINE_ARENA arena = {0};
   unsigned char *stage = supine_arena_zeros(&arena, voxels, 1);
@@ -354,10 +355,10 @@ supine_status supine_tissue_add_labels(const supine_image *labels, const double 
       return supine_error_memory(error, "parts of a label map");
     }
   }
-  return supine_tissue_group(tissue, error);
+  return supine_field_tissue_group(tissue, error);
 }
 
-void supine_tissue_free(supine_tissue *tissue) {
+void supine_field_tissue_free(supine_tissue *tissue) {
   for (size_t i = 0; i < tissue->part_count; ++i) {
     supine_image_free(&tissue->parts[i].mask);
     free(tissue->parts[i].outline);

@@ -71,8 +71,8 @@ static void mark(const supine_field *field, const supine_image *ct, unsigned cha
   supine_parallel_for(ct->size[1] * ct->size[2], 1, 0, mark_rows, &work);
 }
 
-supine_status supine_tissue_find(const supine_field *field, const supine_image *ct,
-                                 supine_tissue *tissue, supine_error *error) {
+supine_status supine_field_tissue_find(const supine_field *field, const supine_image *ct,
+                                       supine_tissue *tissue, supine_error *error) {
   const size_t count = ct->size[0] * ct->size[1] * ct->size[2];
   const unsigned char *lung = field->lung.values;
   supine_image *kind = &tissue->kind;
@@ -87,11 +87,11 @@ supine_status supine_tissue_find(const supine_field *field, const supine_image *
   }
   unsigned char *voxel = kind->values;
   mark(field, ct, voxel);
-  SUPINE_TRY(supine_tissue_find_parts(tissue, error));
+  SUPINE_TRY(supine_field_tissue_find_parts(tissue, error));
   for (size_t i = 0; i < count; ++i) { /* parts at the surface belong to the lungs */
     const bool part = (voxel[i] & SUPINE_TISSUE_STAGE) == SUPINE_TISSUE_PART;
     voxel[i] = (unsigned char)((voxel[i] & (SUPINE_TISSUE_LUNG | SUPINE_TISSUE_LUNG_INDEX)) |
                                (part ? SUPINE_TISSUE_LUNG : 0U));
   }
-  return supine_tissue_find_air(ct, tissue, error);
+  return supine_field_tissue_find_air(ct, tissue, error);
 }

@@ -28,7 +28,7 @@ enum {
 };
 
 /** Soft tissue in a CT, and what is needed to scale the densities of the lungs around it.
- * Zero-initialise; supine_tissue_free releases it. */
+ * Zero-initialise; supine_field_tissue_free releases it. */
 typedef struct supine_tissue {
   supine_image kind; /**< U8 for each voxel of the image; values NULL if there is no CT */
   supine_image air;  /**< F32, a channel for each lung: mean of HU + 1000 of the aerated tissue
@@ -49,14 +49,15 @@ typedef struct supine_tissue {
  * @param field   displacement field from the state of the CT
  * @param tissue  zero-initialised
  * Memory: a byte for each voxel. */
-supine_status supine_tissue_find(const supine_field *field, const supine_image *ct,
-                                 supine_tissue *tissue, supine_error *error);
+supine_status supine_field_tissue_find(const supine_field *field, const supine_image *ct,
+                                       supine_tissue *tissue, supine_error *error);
 
 /** Add the voxels with one of the given labels as parts, a part for each connected component. */
-supine_status supine_tissue_add_labels(const supine_image *labels, const double *wanted,
-                                       size_t count, supine_tissue *tissue, supine_error *error);
+supine_status supine_field_tissue_add_labels(const supine_image *labels, const double *wanted,
+                                             size_t count, supine_tissue *tissue,
+                                             supine_error *error);
 
-void supine_tissue_free(supine_tissue *tissue);
+void supine_field_tissue_free(supine_tissue *tissue);
 
 /** How the correction of a field has changed it. */
 typedef struct supine_tissue_held {
@@ -76,22 +77,22 @@ typedef struct supine_tissue_held {
  * part if that is more: the slope of phi is at most 15 / 8, so that the correction compresses the
  * tissue around by less than a half. With several parts, their corrections have the weights
  * phi / (1 - phi), and the uncorrected field has the weight 1. */
-supine_status supine_tissue_hold(const supine_tissue *tissue, supine_field *field,
-                                 supine_field *inverse, supine_tissue_held *held,
-                                 supine_error *error);
+supine_status supine_field_tissue_hold(const supine_tissue *tissue, supine_field *field,
+                                       supine_field *inverse, supine_tissue_held *held,
+                                       supine_error *error);
 
 /* Internal: find the compact parts among the voxels of `kind` that are soft (parts.c). */
-supine_status supine_tissue_find_parts(supine_tissue *tissue, supine_error *error);
+supine_status supine_field_tissue_find_parts(supine_tissue *tissue, supine_error *error);
 /* Internal: put parts that are close to each other into groups, and find the gaps between groups.
  */
-supine_status supine_tissue_group(supine_tissue *tissue, supine_error *error);
+supine_status supine_field_tissue_group(supine_tissue *tissue, supine_error *error);
 /* Internal: find the mean density of aerated tissue, masses and amounts of soft tissue (air.c). */
-supine_status supine_tissue_find_air(const supine_image *ct, supine_tissue *tissue,
-                                     supine_error *error);
+supine_status supine_field_tissue_find_air(const supine_image *ct, supine_tissue *tissue,
+                                           supine_error *error);
 /* Internal: return the volume of a voxel, mL. */
-double supine_tissue_voxel(const supine_image *image);
+double supine_field_tissue_voxel(const supine_image *image);
 /* Internal: return the share of a voxel of density HU + 1000 that is soft tissue. */
-static inline double supine_tissue_soft_share(double density, double air);
+static inline double supine_field_tissue_soft_share(double density, double air);
 
 /* What the upper bits of `kind` hold while parts are sought: how far the search has come. */
 enum {
@@ -106,7 +107,7 @@ enum {
 /* Density of soft tissue, HU + 1000: muscle, blood and most tumours have 20 to 60 HU. */
 static const double supine_tissue_density = 1040.0;
 
-static inline double supine_tissue_soft_share(double density, double air) {
+static inline double supine_field_tissue_soft_share(double density, double air) {
   /* Aerated tissue has small vessels and noise: it counts as aerated up to 1.25 of its mean. Tried
    * with a synthetic tree of vessels of 3.9 mL: unmixing gives 6.5 mL of voxels above -300 HU in
    * the emptied lung, and a ramp between two fixed densities 10 mL. */

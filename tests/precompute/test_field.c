@@ -506,7 +506,7 @@ TEST(test_resample_scaled_density_keeps_mass) {
       supine_image moved;
       supine_error error;
       supine_tissue tissue = {.lungs = 0};
-      if (supine_tissue_find(&field, &image, &tissue, &error) != SUPINE_OK ||
+      if (supine_field_tissue_find(&field, &image, &tissue, &error) != SUPINE_OK ||
           supine_field_resample(&inverse, &tissue, false, &image, &scaled, &error) != SUPINE_OK ||
           supine_field_resample(&inverse, NULL, false, &image, &plain, &error) != SUPINE_OK ||
           supine_field_resample(&inverse, NULL, true, &mask, &moved, &error) != SUPINE_OK) {
@@ -516,11 +516,11 @@ TEST(test_resample_scaled_density_keeps_mass) {
         supine_image_put(&image, i, 1, &(double){-850.0});
       }
       supine_image uniform;
-      supine_tissue_free(&tissue);
-      assert_int_equal(supine_tissue_find(&field, &image, &tissue, NULL), SUPINE_OK);
+      supine_field_tissue_free(&tissue);
+      assert_int_equal(supine_field_tissue_find(&field, &image, &tissue, NULL), SUPINE_OK);
       assert_int_equal(supine_field_resample(&inverse, &tissue, false, &image, &uniform, NULL),
                        SUPINE_OK);
-      supine_tissue_free(&tissue);
+      supine_field_tissue_free(&tissue);
       for (size_t i = 0; i < count; ++i) { /* 0.5: both are rounded to whole HU */
         const double scale = (supine_image_get(&uniform, i) + 1000.5) / 150.0;
         assert_true(supine_image_get(&moved, i) == 0.0 ||
