@@ -19,7 +19,7 @@ static const double volume_least = 1.0;
 static const double volume_most = 30.0;
 /* Least ratio of the smallest and the largest SD along the principal axes, and the least share of
  * the ellipsoid of these SDs that a part fills. In trials with synthetic trees of vessels, these
- * filled 0.15 to 0.55; balls and ellipsoids of voxels fill 0.95 to 1. */
+ * filled 0.15 to 0.55; a solid ellipsoid fills 1. */
 static const double slender = 1.0 / 3.0;
 static const double filled = 0.7;
 

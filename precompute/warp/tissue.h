@@ -72,11 +72,12 @@ typedef struct supine_tissue_held {
  *
  *     v + phi(d / w) (R^-1 y - y - v),    phi(t) = 1 - t^3 (10 - 15 t + 6 t^2) for 0 <= t <= 1,
  *
- * where d is the distance of R^-1 y from the part, less up to the diagonal of a cell, so that the
- * whole cells around the part are rigid. w is 10 mm, or 4 times the largest |R x - x - u(x)| in the
- * part if that is more: the slope of phi is at most 15 / 8, so that the correction compresses the
- * tissue around by less than a half. With several parts, their corrections have the weights
- * phi / (1 - phi), and the uncorrected field has the weight 1. */
+ * where d is the distance of R^-1 y from the part, less half the diagonal of a cell of the grid (or
+ * a third of the gap to the next part, if that is less), so that most cells around the part are
+ * rigid. w is 10 mm, or 4 times the largest |R x - x - u(x)| in the part if that is more: the slope
+ * of phi is at most 15 / 8, so that the correction compresses the tissue around by less than a
+ * half. With several parts, their corrections have the weights phi / (1 - phi), and the uncorrected
+ * field has the weight 1. */
 supine_status supine_field_tissue_hold(const supine_tissue *tissue, supine_field *field,
                                        supine_field *inverse, supine_tissue_held *held,
                                        supine_error *error);
