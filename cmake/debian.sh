@@ -13,7 +13,7 @@ cd "$(dirname "$0")/.."
 # Packages needed to build, and further packages needed by the tests.
 build="gcc libc6-dev cmake ninja-build pkg-config libfftw3-dev libgsl-dev libassimp-dev libjansson-dev
   libopenblas-dev liblapacke-dev libsuitesparse-dev libxxhash-dev libcairo2-dev libwebp-dev
-  libwebsockets-dev libnifti2-dev zlib1g-dev
+  libwebsockets-dev libnifti2-dev zlib1g-dev libdeflate-dev
   libmeshoptimizer-dev help2man"
 tests="g++ libegl-dev libgles-dev libgl1-mesa-dri poppler-utils libcmocka-dev libopenigtlink-dev mono-mcs mono-runtime
   locales python3-vtk9 python3-yaml python3-numpy python3-nibabel python3-pip python3-setuptools python3-wheel gnuplot-nox

@@ -51,12 +51,14 @@ static bool is_inner(const supine_image *nodes, const size_t at[3]) {
   return inner;
 }
 
-/* Take depth and displacement of the node `i` from the neighbour by which its depth is largest. */
+/* Take depth, displacement and lung of the node `i` from the neighbour by which its depth is
+ * largest. */
 static void take_from_neighbours(supine_field *field, const later *to, int sign, size_t i,
                                  const size_t at[3]) {
   const supine_image *nodes = &field->nodes;
   float *u = nodes->values;
   float *depth = field->depth.values;
+  unsigned char *lung = field->lung.values;
   const bool inner = is_inner(nodes, at);
   size_t best = i;
   for (size_t k = 0; k < 13; ++k) {
@@ -78,6 +80,7 @@ static void take_from_neighbours(supine_field *field, const later *to, int sign,
   for (size_t c = 0; c < 3; ++c) {
     u[3 * i + c] = u[3 * best + c];
   }
+  lung[i] = lung[best];
 }
 
 /* Find depth and displacement of the nodes at which they are unknown: the depth is minus the length

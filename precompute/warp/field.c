@@ -127,11 +127,15 @@ supine_status supine_warp_create(const supine_basis *basis, const supine_pose *p
   unsigned char *known = supine_arena_zeros(&arena, count, 1);
   float *u = calloc(3 * count, sizeof *u);
   float *below = malloc(count * sizeof *below);
+  unsigned char *lung = calloc(count, 1);
   made.nodes.values = u;
   made.depth = made.nodes;
   made.depth.channels = 1;
   made.depth.values = below;
-  if (arena.failed || u == NULL || below == NULL) {
+  made.lung = made.depth;
+  made.lung.voxel = SUPINE_VOXEL_U8;
+  made.lung.values = lung;
+  if (arena.failed || u == NULL || below == NULL || lung == NULL) {
     supine_warp_free(&made);
     return supine_error_memory(error, "a field of %zu nodes", count);
   }
@@ -139,6 +143,7 @@ supine_status supine_warp_create(const supine_basis *basis, const supine_pose *p
   for (size_t i = 0; i < count; ++i) {
     below[i] = -INFINITY;
   }
+  size_t of = 0; /* lung of the node; the nodes of a lung follow those of the lungs before it */
   /* The field gives displacements from the scan, but info->vertices are at full inflation. */
   for (size_t i = 0; i < n; ++i) {
     double node[3];
@@ -148,6 +153,10 @@ supine_status supine_warp_create(const supine_basis *basis, const supine_pose *p
           (float)((double)info->vertices[3 * i + k] - node[k] + (double)moved[3 * i + k]);
     }
     known[part[i]] = 1;
+    while (i >= info->lung_begin[of + 1]) {
+      ++of;
+    }
+    lung[part[i]] = (unsigned char)of;
     below[part[i]] = depth[i];
   }
   supine_warp_fade_out(&made, known);
@@ -158,6 +167,7 @@ supine_status supine_warp_create(const supine_basis *basis, const supine_pose *p
 void supine_warp_free(supine_field *field) {
   supine_image_free(&field->nodes);
   supine_image_free(&field->depth);
+  supine_image_free(&field->lung);
   *field = (supine_field){0};
 }
 

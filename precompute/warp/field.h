@@ -14,6 +14,7 @@ typedef struct supine_field {
   supine_image nodes; /**< the displacement u: three F32 channels, mm */
   supine_image depth; /**< depth below the lungs' surface, negative outside: one F32 channel, mm; an
                          inverse field has no depth, and depth.values is NULL */
+  supine_image lung;  /**< index of the nearest lung: one U8 channel; no values if depth has none */
 } supine_field;
 
 /** Return the distance from the lungs, mm, over which a field falls to 0 if its largest
@@ -55,6 +56,10 @@ typedef struct supine_warp_residual {
 supine_status supine_warp_invert(const supine_field *field, supine_field *inverse,
                                  supine_warp_residual *residual, supine_error *error);
 
+/* Find x with x + u(x) = y for the field u by Newton's method, starting from the given x. Return
+ * the length of the residual, mm. */
+double supine_warp_solve(const supine_field *field, const double y[3], double x[3]);
+
 /** Density below which a voxel near the surface of the lungs belongs to them, HU. All lungs have
  * such voxels. */
 extern const double supine_warp_aerated;
@@ -64,15 +69,19 @@ extern const double supine_warp_aerated;
 supine_status supine_warp_check_hounsfield(const supine_image *image, const char *path,
                                            supine_error *error);
 
+struct supine_tissue;
+
 /** Move an image: moved(y) = image(y + v(y)) at the voxels y of the image; places outside the image
- * have the value of the nearest voxel. If `depth` is given, densities (Hounsfield units + 1000)
- * inside the lungs are multiplied by det(I + dv/dy). This is the tissue's volume before the motion,
- * divided by its volume after the motion; it keeps the mass.
+ * have the value of the nearest voxel. If `tissue` is given, the mass of each lung is kept: the
+ * soft share of a voxel (supine_warp_tissue_soft_share) keeps its density (Hounsfield units +
+ * 1000), and that of the aerated share is multiplied by k det(I + dv/dy). The determinant is the
+ * tissue's volume before the motion, divided by its volume after the motion; k, the same for all
+ * voxels of a lung, makes up for soft tissue that the field compresses.
  * @param inverse  field v, made by supine_warp_invert
- * @param depth    depth of the nodes below the lungs' surface; NULL to keep densities unscaled
+ * @param tissue   of this image; NULL to keep densities unscaled
  * @param labels   whether to take the value of the nearest voxel instead of interpolating
  * @param moved    release with supine_image_free */
-supine_status supine_warp_resample(const supine_field *inverse, const supine_image *depth,
+supine_status supine_warp_resample(const supine_field *inverse, const struct supine_tissue *tissue,
                                    bool labels, const supine_image *image, supine_image *moved,
                                    supine_error *error);
 

@@ -37,6 +37,9 @@ static supine_status join(const supine_field *first, supine_field *second, supin
   SUPINE_TRY(supine_warp_resample(&back, NULL, false, &second->depth, &depth, error));
   supine_image_free(&second->depth);
   second->depth = depth;
+  SUPINE_TRY(supine_warp_resample(&back, NULL, true, &second->lung, &depth, error));
+  supine_image_free(&second->lung);
+  second->lung = depth;
   return SUPINE_OK;
 }
 

@@ -41,9 +41,8 @@ static bool newton(const double slope[3][3], const double residual[3], double st
   return isfinite(step[0] + step[1] + step[2]);
 }
 
-/* Find x with x + u(x) = y for the field u by Newton's method, starting from the given x. Return
- * the length of the residual, mm. Halve each step until the residual falls, as u has kinks. */
-static double solve(const supine_field *field, const double y[3], double x[3]) {
+/* Halve each step of Newton's method until the residual falls, as u has kinks. */
+double supine_warp_solve(const supine_field *field, const double y[3], double x[3]) {
   enum { STEPS = 40, HALVINGS = 6 };
   double residual[3];
   double slope[3][3];
@@ -95,11 +94,11 @@ static void invert_rows(void *context, size_t begin, size_t end, size_t thread) 
       for (size_t k = 0; k < 3; ++k) {
         x[k] = y[k] - (double)u[3 * node + k];
       }
-      double off = solve(work->field, y, x);
+      double off = supine_warp_solve(work->field, y, x);
       if (off > lost_beyond) { /* the iteration failed: restart it without the estimate -u(y) */
         double other[3];
         memcpy(other, y, sizeof other);
-        const double again = solve(work->field, y, other);
+        const double again = supine_warp_solve(work->field, y, other);
         if (again < off) {
           off = again;
           memcpy(x, other, sizeof x);

@@ -44,7 +44,8 @@ static const supine_option table[] = {
      "and --labels, the column labels has the file of the moved labels; the column field has that "
      "of the field. Each state's field is computed once. Paths are relative to the folder of LIST",
      SUPINE_FILLS(request, states), .file = SUPINE_FILE_IN,
-     .partners = "volume allow-folds from as-scanned frame vertices inverse image density labels"},
+     .partners =
+         "volume allow-folds from as-scanned frame vertices inverse image density labels rigid"},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {.table = supine_options_from_scan, SUPINE_FILLS(request, from)},
     {.table = supine_options_as_scanned, SUPINE_FILLS(request, as_scanned)},
@@ -144,6 +145,7 @@ typedef struct batch {
   supine_basis *basis;
   request *rows;
   size_t count;
+  supine_deform_tissue tissue; /* of the image */
 } batch;
 
 static void end(batch *b) {
@@ -151,6 +153,7 @@ static void end(batch *b) {
     free(b->rows[i / 3].outputs[i % 3]);
   }
   free(b->rows);
+  supine_warp_tissue_free(&b->tissue.soft);
   supine_image_free(&b->wanted->content.source);
   supine_image_free(&b->wanted->content.label_source);
   supine_basis_close(b->basis);
@@ -205,6 +208,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   for (size_t i = 0; i < b.count; ++i) {
     b.rows[i].content.source = wanted->content.source;
     b.rows[i].content.label_source = wanted->content.label_source;
+    b.rows[i].content.tissue = &b.tissue;
     SUPINE_TRY(deform(b.basis, &b.rows[i], error));
   }
   return SUPINE_OK;

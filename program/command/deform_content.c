@@ -15,6 +15,23 @@
 #include "program/command/deform_content.h"
 #include "program/options/inside.h"
 
+/* Parse a list of labels, such as "7" or "7,8". */
+static supine_status read_rigid(const char *text, void *field, supine_error *error) {
+  supine_deform_rigid *list = field;
+  (void)error;
+  char item[24];
+  list->count = 0;
+  for (const char *at = text; supine_options_next_item(&at, item, sizeof item);) {
+    char *end = NULL;
+    const double value = supine_number_parse(item, &end);
+    if (list->count == SUPINE_DEFORM_RIGID_MOST || end == item || *end != '\0') {
+      return SUPINE_ERROR_ARGUMENT;
+    }
+    list->value[list->count++] = value;
+  }
+  return list->count > 0 ? SUPINE_OK : SUPINE_ERROR_ARGUMENT;
+}
+
 const supine_option supine_command_deform_content_options[] = {
     {.help = "For structures made by 'supine embed', -o FILE.csv writes a row for each named "
              "structure: the mean position of its vertices, its displacement and expected error:"},
@@ -41,12 +58,20 @@ const supine_option supine_command_deform_content_options[] = {
      "often are), so that the two can be compared voxel by voxel; fields are always right-handed",
      SUPINE_FILLS(supine_deform_content, image), .file = SUPINE_FILE_IN},
     {"density", 0, NULL,
-     "with --image, if it is a CT in Hounsfield units: scale densities inside the lungs by the "
-     "local change of volume, so that the mass stays the same; the header of the output says so",
+     "with --image, if it is a CT in Hounsfield units: scale the density of aerated tissue in the "
+     "lungs by the local change of volume, so that each lung keeps its mass; soft tissue keeps its "
+     "density. Compact parts of soft tissue of 1 to 30 mL, such as nodules and tumours, also keep "
+     "their size and shape, in all outputs for this state; the header of the output says so",
      SUPINE_FILLS(supine_deform_content, density)},
     {"labels", 0, "FILE",
      "label map to move and write to -o; each voxel takes the label of the nearest voxel",
      SUPINE_FILLS(supine_deform_content, labels), .file = SUPINE_FILE_IN},
+    {"rigid", 0, "VALUE,...",
+     "values in the label map of --labels of parts that keep their size and shape, such as "
+     "tumours, "
+     "whatever their size",
+     SUPINE_FILLS(supine_deform_content, rigid), .read = read_rigid,
+     .wants = "at most 64 values of labels, such as 7,8"},
     {.name = NULL}};
 
 supine_status supine_command_deform_content_check(const supine_deform_content *wanted,
@@ -71,6 +96,8 @@ supine_status supine_command_deform_content_check(const supine_deform_content *w
                    "%s: the name must end in .nrrd, .nii, .nii.gz or .mha", wanted->labels_path);
   SUPINE_REFUSE_IF(wanted->inverse && wanted->field == NULL, error, SUPINE_ERROR_ARGUMENT,
                    "--inverse needs --field-out FILE: give both");
+  SUPINE_REFUSE_IF(wanted->rigid.count > 0 && wanted->labels == NULL, error, SUPINE_ERROR_ARGUMENT,
+                   "--rigid needs --labels FILE: give both");
   return wanted->density && wanted->image == NULL
              ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                                 "--density needs --image FILE: give both")
@@ -179,21 +206,74 @@ static supine_status write_field(const supine_deform_content *wanted, const char
   return SUPINE_OK;
 }
 
-/* Move an image to the file `path`. Unless `depth` is NULL, scale its densities. */
+/* Move an image to the file `path`. Unless `tissue` is NULL, scale its densities. */
 static supine_status write_image(const char *path, const supine_image *source, bool labels,
-                                 const supine_image *depth, const supine_field *inverse,
+                                 const supine_tissue *tissue, const supine_field *inverse,
                                  supine_error *error) {
   SUPINE_FREED_BY(supine_image_free) supine_image moved = {0};
-  SUPINE_TRY(supine_warp_resample(inverse, depth, labels, source, &moved, error));
+  SUPINE_TRY(supine_warp_resample(inverse, tissue, labels, source, &moved, error));
   SUPINE_TRY(supine_image_write(
       path, &moved,
-      depth != NULL
-          ? "HU + 1000 inside the lungs scaled by the local change of volume: mass is kept"
-          : NULL,
+      tissue != NULL ? "HU + 1000 of aerated lung scaled by the change of volume: mass is kept"
+                     : NULL,
       error));
   const size_t *size = source->size;
   (void)printf("%s: %zu x %zu x %zu voxels%s\n", path, size[0], size[1], size[2],
-               depth != NULL ? ", densities scaled inside the lungs" : "");
+               tissue != NULL ? ", densities scaled inside the lungs" : "");
+  return SUPINE_OK;
+}
+
+/* Print an amount for each lung, mL. */
+static void print_lungs(const supine_basis *basis, const double *amount, const char *format) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    (void)supine_print(stdout, "%s%s ", lung == 0 ? "" : ", ", info->lung_names[lung]);
+    (void)supine_print(stdout, format, amount[lung]);
+  }
+}
+
+/* Find the soft tissue of the image, and the parts that --rigid names, unless that is done. */
+static supine_status find_tissue(const supine_deform_content *wanted, const supine_basis *basis,
+                                 const supine_field *forward, supine_error *error) {
+  supine_tissue *soft = &wanted->tissue->soft;
+  if (wanted->tissue->found) {
+    return SUPINE_OK;
+  }
+  if (wanted->density) {
+    SUPINE_TRY(supine_warp_tissue_find(forward, &wanted->source, soft, error));
+    (void)printf("%s: soft tissue in the lungs: ", wanted->image);
+    print_lungs(basis, soft->soft, "%.1f mL");
+    (void)putchar('\n');
+  }
+  SUPINE_TRY(supine_warp_tissue_add_labels(&wanted->label_source, wanted->rigid.value,
+                                            wanted->rigid.count, soft, error));
+  for (size_t i = 0; i < soft->part_count; ++i) {
+    const double *at = soft->parts[i].centre;
+    (void)supine_print(stdout, "rigid part of %.1f mL at %.0f, %.0f, %.0f mm (LPS)\n",
+                       soft->parts[i].volume, at[0], at[1], at[2]);
+  }
+  wanted->tissue->found = true;
+  return SUPINE_OK;
+}
+
+/* Correct the field so that it moves the parts rigidly, and print what this changes. */
+static supine_status hold_parts(const supine_tissue *soft, const supine_basis *basis,
+                                supine_field *forward, supine_field *inverse, supine_error *error) {
+  supine_warp_tissue_held held;
+  SUPINE_TRY(supine_warp_tissue_hold(soft, forward, inverse, &held, error));
+  if (soft->part_count == 0) {
+    return SUPINE_OK;
+  }
+  (void)printf("field corrected by up to %s mm in rigid parts; it changes the volume: ",
+               supine_text_distance(held.largest).text);
+  print_lungs(basis, held.change, "%+.1f mL");
+  (void)putchar('\n');
+  if (held.folded > 0) {
+    supine_options_say("deform",
+                       "warning: around rigid parts, the field folds at %zu of its nodes, and "
+                       "without them at %zu: voxels are wrong there",
+                       held.folded, held.folded_before);
+  }
   return SUPINE_OK;
 }
 
@@ -249,13 +329,15 @@ static supine_status move_grid(const supine_deform_content *wanted, const supine
   SUPINE_TRY(find_field(basis, moved, &forward, error));
   if (image || labels || wanted->inverse) {
     SUPINE_TRY(invert(&forward, &inverse, error));
+    SUPINE_TRY(find_tissue(wanted, basis, &forward, error));
+    SUPINE_TRY(hold_parts(&wanted->tissue->soft, basis, &forward, &inverse, error));
   }
   if (wanted->field != NULL) {
     SUPINE_TRY(write_field(wanted, moved->from.name, &forward, &inverse, error));
   }
   if (image) {
     SUPINE_TRY(write_image(wanted->path, &wanted->source, false,
-                           wanted->density ? &forward.depth : NULL, &inverse, error));
+                           wanted->density ? &wanted->tissue->soft : NULL, &inverse, error));
   }
   if (labels) {
     SUPINE_TRY(write_image(image ? wanted->labels_path : wanted->path, &wanted->label_source, true,
@@ -347,7 +429,9 @@ supine_status supine_command_deform_content(const supine_deform_content *wanted,
                        moved->expected.rms, moved->expected.largest,
                        moved->expected.turned ? "; an extrapolation, as the posture changes" : "");
   }
-  if (supine_length(moved->hilum.move) != 0.0) {
+  if (supine_length(moved->hilum.move) > 0.0 && supine_length(moved->hilum.move) < 0.1) {
+    (void)puts("the hilum moves by less than 0.1 mm");
+  } else if (supine_length(moved->hilum.move) > 0.0) {
     (void)supine_print(stdout,
                        "the hilum moves by %.1f, %.1f, %.1f mm (to the left, back and head)",
                        moved->hilum.move[0], moved->hilum.move[1], moved->hilum.move[2]);

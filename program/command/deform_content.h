@@ -6,18 +6,35 @@
 #include <supine/runtime.h>
 
 #include "mesh/image/image.h"
+#include "precompute/warp/tissue.h"
 
 #include "program/options/basis_input.h"
 #include "program/options/hilum.h"
 #include "program/options/state_options.h"
+
+enum { SUPINE_DEFORM_RIGID_MOST = 64 };
+
+/* The values of --rigid. */
+typedef struct supine_deform_rigid {
+  size_t count;
+  double value[SUPINE_DEFORM_RIGID_MOST];
+} supine_deform_rigid;
+
+/* The soft tissue of the image, which is found once for all states. */
+typedef struct supine_deform_tissue {
+  bool found;
+  supine_tissue soft;
+} supine_deform_tissue;
 
 typedef struct supine_deform_content {
   /* Files of -o, --field-out, --image and --labels; NULL if not given. */
   const char *path, *field, *image, *labels;
   const char *labels_path; /* output of --labels, if --image is given, too; or NULL */
   bool inverse, density;
-  bool vertices;                     /* whether a CSV file has a row for each vertex */
+  bool vertices; /* whether a CSV file has a row for each vertex */
+  supine_deform_rigid rigid;
   supine_image source, label_source; /* the image and the label map to move, once read */
+  supine_deform_tissue *tissue;      /* shared by all states */
 } supine_deform_content;
 
 extern const supine_option supine_command_deform_content_options[];

@@ -212,10 +212,17 @@ void supine_options_target_shift(supine_target *target, const double shift[3]) {
 }
 
 json_t *supine_options_target_json(const supine_target *t) {
-  return json_pack("{s:s, s:[f, f, f], s:f, s:o, s:o*}", "name", t->name, "move", t->move[0],
-                   t->move[1], t->move[2], "mm", t->moved, "expected_error_mm",
-                   isnan(t->expected) ? json_null() : json_real(t->expected), "volumes_ml",
-                   t->volume[0] != 0 ? supine_options_json_numbers(2, t->volume) : NULL);
+  static const char *const keys[] = {"volume_before_ml", "volume_after_ml"};
+  json_t *target = json_pack("{s:s, s:[f, f, f], s:f, s:o}", "name", t->name, "move", t->move[0],
+                             t->move[1], t->move[2], "mm", t->moved, "expected_error_mm",
+                             isnan(t->expected) ? json_null() : json_real(t->expected));
+  for (size_t i = 0; i < 2; ++i) {
+    if (t->volume[0] != 0.0) {
+      (void)json_object_set_new(target, keys[i],
+                                isnan(t->volume[i]) ? json_null() : json_real(t->volume[i]));
+    }
+  }
+  return target;
 }
 
 size_t supine_options_targets_first(const supine_target *targets, size_t count) {

@@ -192,6 +192,8 @@ static const struct {
               {"states", "landmarks", "distance between landmarks"},
               {"states", "surface", "distance between surfaces"},
               {"states", "volume_ml", "volume above the start, mL"},
+              {NULL, "volume_after_ml", "volume after, mL"},
+              {NULL, "volume_before_ml", "volume before, mL"},
               {NULL, "volume_deviation_ml", "volume, standard deviation, mL"},
               {NULL, "volume_interval_mL", "  confidence interval, +- mL"},
               {NULL, "volume_mL", "volume, from and to, mL"}};

@@ -6,7 +6,7 @@
 #include "base/vec3.h"
 #include "precompute/inside/content.h"
 #include "precompute/inside/embed.h"
-#include "precompute/warp/field.h"
+#include "precompute/warp/tissue.h"
 
 #include "tests/helpers/poses.h"
 
@@ -504,8 +504,9 @@ TEST(test_resample_scaled_density_keeps_mass) {
       supine_image plain;
       supine_image moved;
       supine_error error;
-      if (supine_warp_resample(&inverse, &field.depth, false, &image, &scaled, &error) !=
-              SUPINE_OK ||
+      supine_tissue tissue = {.lungs = 0};
+      if (supine_warp_tissue_find(&field, &image, &tissue, &error) != SUPINE_OK ||
+          supine_warp_resample(&inverse, &tissue, false, &image, &scaled, &error) != SUPINE_OK ||
           supine_warp_resample(&inverse, NULL, false, &image, &plain, &error) != SUPINE_OK ||
           supine_warp_resample(&inverse, NULL, true, &mask, &moved, &error) != SUPINE_OK) {
         fail_msg("%s", error.message);
@@ -514,8 +515,11 @@ TEST(test_resample_scaled_density_keeps_mass) {
         supine_image_put(&image, i, 1, &(double){-850.0});
       }
       supine_image uniform;
-      assert_int_equal(supine_warp_resample(&inverse, &field.depth, false, &image, &uniform, NULL),
+      supine_warp_tissue_free(&tissue);
+      assert_int_equal(supine_warp_tissue_find(&field, &image, &tissue, NULL), SUPINE_OK);
+      assert_int_equal(supine_warp_resample(&inverse, &tissue, false, &image, &uniform, NULL),
                        SUPINE_OK);
+      supine_warp_tissue_free(&tissue);
       for (size_t i = 0; i < count; ++i) { /* 0.5: both are rounded to whole HU */
         const double scale = (supine_image_get(&uniform, i) + 1000.5) / 150.0;
         assert_true(supine_image_get(&moved, i) == 0.0 ||

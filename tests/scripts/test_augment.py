@@ -60,6 +60,20 @@ def test_augment_three_states_equals_warp_and_deform():
         assert np.abs(sample.field[known][found] - shift[order]).max() < 0.01
 
 
+def test_augment_rigid_label_keeps_size():
+    ball, z, y, x = labels * 0, *np.meshgrid(*(np.arange(n) * s for n, s in zip(size, step[::-1])), indexing="ij")
+    ball[np.linalg.norm([x + low[0] - 75, y + low[1] + 170, z + low[2] + 150], axis=0) < 30] = 1
+    sizes = [(next(supine.augment(lungs, labels=ball, states=["supine:rest"], grid=8.0, rigid=rigid, **scan)).labels == 1).sum() / ball.sum()
+             for rigid in ([], [1])]
+    print("volume of a ball", sizes)
+    assert sizes[0] < 0.8 and abs(sizes[1] - 1) < 0.1
+    try:
+        next(supine.augment(lungs, states=["prone"], rigid=[1], **scan))
+        raise AssertionError("rigid without labels is not refused")
+    except ValueError as error:
+        assert "labels" in str(error)
+
+
 def test_augment_missing_parts_none():
     sample, = supine.augment(lungs, labels=labels, states=["prone"], grid=8.0, **scan)
     assert sample.image is None and sample.points is None and sample.labels.shape == labels.shape

@@ -109,7 +109,7 @@ class _Pipe:
 
 def augment(lungs: Any, image: Optional[NDArray[Any]] = None, *, labels: Optional[NDArray[Any]] = None, points: Any = None,
             states: Union[int, Sequence[str]] = 100, step: ArrayLike = (1.0, 1.0, 1.0), origin: ArrayLike = (0.0, 0.0, 0.0),
-            grid: float = 4.0, density: bool = True, seed: Any = None) -> Iterator[Sample]:
+            grid: float = 4.0, density: bool = True, rigid: Sequence[int] = (), seed: Any = None) -> Iterator[Sample]:
     """Move a CT, a label map and points of the scan into each of many states. The program `supine` reads them once and
     sends each state through a pipe, when it is asked for: nothing is written to a disk, and the memory does not grow with
     the number of states. Needs Linux.
@@ -123,7 +123,11 @@ def augment(lungs: Any, image: Optional[NDArray[Any]] = None, *, labels: Optiona
     states: texts such as "prone:rest+300", or the number of states that random_states draws with `seed`
     step, origin: distances (x, y, z) between voxels, or a vector for each axis [3, 3], and the first voxel; mm, LPS
     grid: distance between the nodes of the displacement field, mm
-    density: whether to scale densities by the change of volume, so that mass is kept"""
+    density: whether to scale the density of aerated tissue by the change of volume, so that mass is kept; nodules and
+        tumours of 1 to 30 mL in the CT then keep their size and shape
+    rigid: values of labels of parts that keep their size and shape, such as tumours, whatever their size"""
+    if rigid and labels is None:
+        raise ValueError("rigid names values of labels: give labels")
     from . import embed  # the package imports this module
 
     wanted = random_states(lungs, states, seed) if isinstance(states, int) else list(states)
@@ -136,7 +140,9 @@ def augment(lungs: Any, image: Optional[NDArray[Any]] = None, *, labels: Optiona
     with contextlib.ExitStack() as stack:
         folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="supine-"))  # of links and pipes
         basis = _in_memory(stack, folder, "grid.safetensors", nodes._owner.source)
-        options = {"density": density and image is not None}
+        options: dict[str, Any] = {"density": density and image is not None}
+        if rigid:
+            options["rigid"] = tuple(rigid)
         for name, array in given.items():
             if array is not None:
                 array = np.ascontiguousarray(array, array.dtype.newbyteorder("<"))
