@@ -77,8 +77,7 @@ json_t *supine_export_glb_extras(const glb *g) {
       supine_options_json_numbers(3, g->targets.middle), "millimetresPerUnit", g->step, "basis",
       supine_options_json_metadata(g->basis), "gains", fields ? fields_text : NULL, "breathVolume",
       fields ? NULL : json_real(g->options->breath), "volume", has_volume(g) ? volume_text : NULL,
-      "rest", rest ? resting_text : NULL, "byLung", rest ? json_true() : NULL,
-      "fullUprightGain",
+      "rest", rest ? resting_text : NULL, "byLung", rest ? json_true() : NULL, "fullUprightGain",
       rest ? json_real(full != NULL ? supine_number_parse(full, NULL) : 0) : NULL);
 }
 
@@ -98,13 +97,12 @@ json_t *supine_export_glb_lung_extras(const glb *g, size_t lung) {
   if (has_volume(g)) {
     (void)json_object_update_new(
         supine,
-        json_pack(
-            "{s:f, s:o, s:o, s:o}", "referenceVolume", info->reference_volume[lung], "linear",
-            supine_options_json_numbers(3 * k, info->volume_linear + lung * 3 * k),
-            "quadratic",
-            supine_options_json_numbers(3 * k * k, info->volume_quadratic + lung * 3 * k * k),
-            "cubic",
-            supine_options_json_numbers(k * k * k, info->volume_cubic + lung * k * k * k)));
+        json_pack("{s:f, s:o, s:o, s:o}", "referenceVolume", info->reference_volume[lung], "linear",
+                  supine_options_json_numbers(3 * k, info->volume_linear + lung * 3 * k),
+                  "quadratic",
+                  supine_options_json_numbers(3 * k * k, info->volume_quadratic + lung * 3 * k * k),
+                  "cubic",
+                  supine_options_json_numbers(k * k * k, info->volume_cubic + lung * k * k * k)));
   }
   return json_pack("{s:o, s:o}", "targetNames", target_names(g), "supine", supine);
 }

@@ -24,12 +24,13 @@ typedef struct page {
   const supine_basis_info *info;   /* of `basis` */
   const supine_basis_info *inside; /* of the structures inside the lungs; NULL if there are none */
   const export_page *shown;
-  double middle[3];        /* origin of stored positions, mm: centre of the bounding box */
-  double position_step;    /* quantisation step of positions, mm */
-  double coefficient_step; /* quantisation step of the surface's displacements by modes, mm */
-  double inside_step;      /* the same for structures inside the lungs, mm */
-  export_order order;      /* order of stored vertices and triangles of the surface */
-  json_t *tensors;         /* list of objects {name, base64} for the tag {{tensors}} of page.html */
+  const float *coefficients; /* of `basis`, also if it stores clusters */
+  double middle[3];          /* origin of stored positions, mm: centre of the bounding box */
+  double position_step;      /* quantisation step of positions, mm */
+  double coefficient_step;   /* quantisation step of the surface's displacements by modes, mm */
+  double inside_step;        /* the same for structures inside the lungs, mm */
+  export_order order;        /* order of stored vertices and triangles of the surface */
+  json_t *tensors; /* list of objects {name, base64} for the tag {{tensors}} of page.html */
   supine_arena arena;
 } page;
 
@@ -79,10 +80,15 @@ static size_t axes_of(const supine_basis_info *info) {
   return info->vector ? 3 : 1;
 }
 
+/* Return the coefficients of the basis or of the structures inside the lungs. */
+static const float *coefficients_of(const page *p, const supine_basis_info *info) {
+  return info == p->info ? p->coefficients : info->coefficients;
+}
+
 static void coefficient_row(const page *p, const supine_basis_info *info, size_t vertex,
                             size_t axis, int16_t *row) {
   const size_t k = info->mode_count;
-  const float *from = info->coefficients + (vertex * axes_of(info) + axis) * k;
+  const float *from = coefficients_of(p, info) + (vertex * axes_of(info) + axis) * k;
   const double step = info == p->info ? p->coefficient_step : p->inside_step;
   for (size_t i = 0; i < k; ++i) {
     row[i] = quantise((double)from[i] * reach_of(info, vertex), step);
@@ -122,11 +128,12 @@ static supine_status add_corners(page *p, const char *name, const supine_basis_i
 }
 
 /* Return the largest displacement of a vertex along an axis by one mode, mm. */
-static double largest_coefficient(const supine_basis_info *info) {
+static double largest_coefficient(const page *p, const supine_basis_info *info) {
+  const float *coefficients = coefficients_of(p, info);
   const size_t columns = axes_of(info) * info->mode_count;
   double largest = 0;
   for (size_t i = 0; i < info->vertex_count * columns; ++i) {
-    largest = fmax(largest, fabs((double)info->coefficients[i]) * reach_of(info, i / columns));
+    largest = fmax(largest, fabs((double)coefficients[i]) * reach_of(info, i / columns));
   }
   return largest;
 }
@@ -148,8 +155,8 @@ static void find_steps(page *p) {
     p->middle[axis] = (low[axis] + high[axis]) / 2;
     p->position_step = fmax(p->position_step, (high[axis] - low[axis]) / (2 * STORED_MAX));
   }
-  p->coefficient_step = fmax(least, largest_coefficient(p->info) / STORED_MAX);
-  p->inside_step = inside == NULL ? 1 : fmax(least, largest_coefficient(inside) / STORED_MAX);
+  p->coefficient_step = fmax(least, largest_coefficient(p, p->info) / STORED_MAX);
+  p->inside_step = inside == NULL ? 1 : fmax(least, largest_coefficient(p, inside) / STORED_MAX);
 }
 
 /* Add the tensors of 64-bit floats, such as modes and volume coefficients, uncompressed. */
@@ -268,10 +275,9 @@ static json_t *describe(const page *p) {
       supine_options_json_numbers(3, p->middle), "placeUnit", p->position_step, "unit",
       p->coefficient_step, "inside", describe_inside(p), "froms", describe_froms(p), "references",
       supine_options_json_numbers(info->lung_count, info->reference_volume), "scanVolume",
-      scan_volume(p), "bend",
-      supine_options_json_numbers(3, info->bend), "expected", "constant", SUPINE_EXPECTED_ERROR_MM,
-      "fullBreath", EXPECTED_FULL_BREATH, "heart", EXPECTED_HEART, "sliding", EXPECTED_SLIDING,
-      "spread", EXPECTED_SPREAD);
+      scan_volume(p), "bend", supine_options_json_numbers(3, info->bend), "expected", "constant",
+      SUPINE_EXPECTED_ERROR_MM, "fullBreath", EXPECTED_FULL_BREATH, "heart", EXPECTED_HEART,
+      "sliding", EXPECTED_SLIDING, "spread", EXPECTED_SPREAD);
 }
 
 static supine_status add_tensors(page *p) {
@@ -294,6 +300,19 @@ static supine_status add_tensors(page *p) {
                     inside->vertex_count * sizeof *p->shown->names->part);
 }
 
+/* Find the coefficients of the basis: compute those of clusters. */
+static supine_status find_coefficients(page *p, supine_error *error) {
+  const size_t n = p->info->vertex_count;
+  p->coefficients = p->info->coefficients;
+  if (p->info->cluster_count == 0) {
+    return SUPINE_OK;
+  }
+  float *computed = supine_arena_take(&p->arena, 3 * n * p->info->mode_count, sizeof *computed);
+  SUPINE_TRY(supine_arena_check(&p->arena, error, "%zu vertices", n));
+  p->coefficients = computed;
+  return supine_basis_coefficients(p->basis, 0, n, computed);
+}
+
 static void free_page(page *p) {
   json_decref(p->tensors);
   supine_arena_free(&p->arena);
@@ -312,7 +331,12 @@ supine_status supine_export_html_print(FILE *file, const supine_basis *basis,
       p.info->mode_count > MODES_MAX, error, SUPINE_ERROR_UNSUPPORTED,
       "a page shows up to %d modes, not %zu: precompute the basis with --modes %d, or export .glb",
       MODES_MAX, p.info->mode_count, MODES_MAX);
+  SUPINE_REFUSE_IF(
+      p.info->order > 0, error, SUPINE_ERROR_UNSUPPORTED,
+      "a page shows fields over gravity alone, not over gravity and volume: draw films "
+      "with 'supine render', or export the surface of one state with 'supine deform'");
   SUPINE_TRY(supine_export_pack_begin(error));
+  SUPINE_TRY(find_coefficients(&p, error));
   SUPINE_TRY(supine_export_order_make(p.info, true, &p.arena, &p.order, error));
   find_steps(&p);
   if (add_tensors(&p) != SUPINE_OK) {

@@ -92,6 +92,8 @@ supine_status supine_export_targets_choose(const supine_basis *basis, double bre
                                            export_targets *targets, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const bool bent = info->bend[0] != 0 || info->bend[1] != 0 || info->bend[2] != 0;
+  SUPINE_REFUSE_IF(info->order > 0, error, SUPINE_ERROR_UNSUPPORTED,
+                   "morph targets show fields over gravity alone, not over gravity and volume");
   targets->basis = basis;
   targets->info = info;
   targets->breath = breath;
@@ -112,10 +114,17 @@ void supine_export_targets_field(const export_targets *targets, size_t vertex, s
                                  double u[3]) {
   const supine_basis_info *info = targets->info;
   const size_t k = info->mode_count;
+  float vectors[3 * SUPINE_MODES_MAX];
+  if (info->vector) {
+    (void)supine_basis_coefficients(targets->basis, vertex, vertex + 1, vectors);
+  }
   for (size_t axis = 0; axis < 3; ++axis) {
-    u[axis] = info->vector ? (double)info->coefficients[(3 * vertex + axis) * k + j % k]
-                           : (double)info->coefficients[vertex * k + j % k] *
-                                 (double)info->direction[3 * vertex + axis];
+    if (info->vector) {
+      u[axis] = (double)vectors[axis * k + j % k];
+    } else {
+      u[axis] = (double)info->coefficients[vertex * k + j % k] *
+                (double)info->direction[3 * vertex + axis];
+    }
     u[axis] *= j < k ? 1 : info->bend[axis];
   }
 }
