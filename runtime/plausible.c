@@ -11,8 +11,8 @@
 
 static const double farthest_mm = 1e7;     /* limit for distances from the origin, mm */
 static const double largest_move_mm = 1e6; /* limit for displacements, mm */
-static const double largest_ml = 1e6;      /* limit for the volume of a lung, mL */
-static const double largest_form_ml = 1e7; /* limit for coefficients of volumes, mL */
+static const double largest_ml = 1e9;      /* limit for the volume of a lung, mL: 10 m each way */
+static const double largest_form_ml = 1e9; /* limit for coefficients of volumes, mL */
 static const double largest_weight = 1e5;  /* limit for the weight of a mode */
 static const double largest_bend = 2;   /* limit for constants of the path (supine_volume_bend) */
 static const double largest_normal = 1; /* limit for coefficients of normals */

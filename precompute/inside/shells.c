@@ -67,12 +67,11 @@ supine_status supine_inside_shells_create(const supine_basis *basis, supine_insi
   SUPINE_ARENA arena = {0};
   float *scanned = supine_arena_take(&arena, 3 * info->vertex_count, sizeof *scanned);
   SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", info->vertex_count));
-  SUPINE_TRY(supine_basis_pose(basis, &scan, &shells->scan, error));
+  const supine_status posed = supine_basis_pose(basis, &scan, &shells->scan, error);
+  SUPINE_REFUSE_ADVISE(posed == SUPINE_ERROR_NUMERICAL, error, SUPINE_REMEDY_BASIS_OF_STATE, posed,
+                       "the basis cannot reach the scan's volume");
+  SUPINE_TRY(posed);
   (void)supine_deform(basis, &shells->scan, scanned);
-  for (size_t i = 0; i < 3 * info->vertex_count; ++i) {
-    SUPINE_REFUSE_ADVISE(!isfinite(scanned[i]), error, SUPINE_REMEDY_BASIS_OF_STATE,
-                         SUPINE_ERROR_NUMERICAL, "the basis cannot reach the scan's volume");
-  }
   for (size_t lung = 0; lung < shells->count; ++lung) {
     SUPINE_TRY(create_shell(info, scanned, lung, &shells->shell[lung], error));
   }

@@ -102,7 +102,8 @@ static void check(checks *c, bool holds, supine_status refuse, supine_remedy rem
   }
 }
 
-/* Check the length, proportions and volume of the lungs. */
+/* Check the length, proportions and volume of the lungs. A given unit turns refusals into warnings,
+ * up to a tenth of the volume that a basis file may have (runtime/plausible.c). */
 static void check_size(checks *c, const supine_lungs *lungs, bool likely) {
   const supine_status refuse = c->source->units_given ? SUPINE_OK : SUPINE_ERROR_MESH;
   const supine_remedy accept = refuse == SUPINE_OK ? SUPINE_REMEDY_NONE : SUPINE_REMEDY_SIZE_ACCEPT;
@@ -110,6 +111,10 @@ static void check_size(checks *c, const supine_lungs *lungs, bool likely) {
   const double most = lungs->lung_count == 2 ? 1.0 : 0.6; /* largest share of a pair's volume */
   const double height = lungs->maximum[2] - lungs->minimum[2];
   const double ratio = height / (lungs->maximum[0] - lungs->minimum[0]);
+  static const double most_ml = 1e8;
+  check(c, ml <= most_ml, SUPINE_ERROR_MESH, SUPINE_REMEDY_NONE, NULL,
+        "the lungs hold %.3g mL, more than the %g mL that a basis may have: correct the unit", ml,
+        most_ml);
   check(c, lungs->lung_count < 2 || (ratio >= 0.55 && ratio <= 1.8), refuse, accept, NULL,
         "the lungs are %.2f times as high as wide, which is impossible: correct the distance of "
         "the slices (the voxel spacing) in the header",

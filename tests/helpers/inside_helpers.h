@@ -30,12 +30,11 @@ static inline void helper_motion(int mode, const double p[3], double u[3]) {
   }
 }
 
-/* Write a basis of synthetic lungs. `scan_gravity` is the direction of gravity in the scan, and
- * `scan_volume` the volume in the scan minus that of the reference surface, mL, both as text for
- * the metadata. If both are NULL, the reference surface is the scan.
- * @param frequency  each lung has 10 frequency^2 + 2 vertices */
-static inline void helper_write_scanned_basis(const char *path, size_t frequency, size_t lungs,
-                                              const char *scan_gravity, const char *scan_volume) {
+/* Write a basis of synthetic lungs whose modes change the volume `slope` times as fast as usual.
+ * The other arguments are those of helper_write_scanned_basis. */
+static inline void helper_write_sloped_basis(const char *path, size_t frequency, size_t lungs,
+                                             const char *scan_gravity, const char *scan_volume,
+                                             double slope) {
   supine_mesh mesh[2] = {helper_lump(frequency, 71.3, 3), helper_lump(frequency, -72.9, 4)};
   const size_t n = lungs * mesh[0].vertex_count;
   const size_t m = lungs * mesh[0].triangle_count;
@@ -75,7 +74,8 @@ static inline void helper_write_scanned_basis(const char *path, size_t frequency
   double quadratic[2 * 3 * HELPER_MODES * HELPER_MODES] = {0};
   double cubic[2 * HELPER_MODES * HELPER_MODES * HELPER_MODES] = {0};
   for (size_t i = 0; i < (size_t)2 * HELPER_MODES; ++i) {
-    linear[i / HELPER_MODES * 3 * HELPER_MODES + i % HELPER_MODES] = 200.0 + 10.0 * (double)i;
+    linear[i / HELPER_MODES * 3 * HELPER_MODES + i % HELPER_MODES] =
+        slope * (200.0 + 10.0 * (double)i);
   }
   const supine_tensor tensors[] = {
       {"vertices", SUPINE_F32, 2, {n, 3}, vertices},
@@ -106,6 +106,15 @@ static inline void helper_write_scanned_basis(const char *path, size_t frequency
   free(lung);
   supine_mesh_free(&mesh[0]);
   supine_mesh_free(&mesh[1]);
+}
+
+/* Write a basis of synthetic lungs. `scan_gravity` is the direction of gravity in the scan, and
+ * `scan_volume` the volume in the scan minus that of the reference surface, mL, both as text for
+ * the metadata. If both are NULL, the reference surface is the scan.
+ * @param frequency  each lung has 10 frequency^2 + 2 vertices */
+static inline void helper_write_scanned_basis(const char *path, size_t frequency, size_t lungs,
+                                              const char *scan_gravity, const char *scan_volume) {
+  helper_write_sloped_basis(path, frequency, lungs, scan_gravity, scan_volume, 1.0);
 }
 
 static inline void helper_write_basis(const char *path, size_t frequency, size_t lungs) {

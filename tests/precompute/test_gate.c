@@ -388,6 +388,25 @@ TEST(test_gate_impossible_volume_or_height_refused_unless_units_given) {
   }
 }
 
+/* A given unit turns refusals into warnings, except beyond the volume that a basis may have. */
+TEST(test_gate_volume_beyond_basis_refused_even_with_units_given) {
+  static const double ml[] = {9.9e7, 1.01e8};
+  for (size_t k = 0; k < 2; ++k) {
+    const supine_lungs_source given = {
+        .name = "x.ply", .axes = SUPINE_AXES_LPS, .units_given = true};
+    supine_mesh mesh = phantom();
+    const double by = cbrt(ml[k] / (1e-3 * supine_mesh_volume(&mesh)));
+    scale(&mesh, by, by, by);
+    outcome out = pass(&mesh, &given);
+    assert_int_equal(out.status, k == 0 ? SUPINE_OK : SUPINE_ERROR_MESH);
+    if (k == 1) {
+      assert_says(out.error.message, "more than the 1e+08 mL that a basis may have");
+    }
+    supine_lungs_free(&out.lungs);
+    supine_mesh_free(&mesh);
+  }
+}
+
 TEST(test_gate_lifted_vertex_refused_at_its_place) {
   static const char *const ends[6] = {"right", "left", "front", "back", "feet", "head"};
   for (size_t end = 0; end < 6; ++end) {

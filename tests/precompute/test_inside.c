@@ -436,14 +436,17 @@ TEST(test_embed_scan_below_full_measured_from_scan) {
   free(surface_scanned);
 }
 
+/* Displacements that hardly change the volume cannot reach that of the scan. */
 TEST(test_shells_unreachable_scan_refused) {
   char path[80];
   supine_inside_shells none;
   supine_error error;
   (void)snprintf(path, sizeof path, "%s/far", folder);
-  helper_write_scanned_basis(path, 6, 2, "0,1,0", "-9e5");
+  helper_write_sloped_basis(path, 6, 2, "0,1,0", "-900", 1e-40);
   supine_basis *far = helper_open(path);
   assert_int_equal(supine_inside_shells_create(far, &none, &error), SUPINE_ERROR_NUMERICAL);
+  assert_says(error.message, "the basis cannot reach the scan's volume");
+  assert_int_equal(error.remedy, SUPINE_REMEDY_BASIS_OF_STATE);
   supine_inside_shells_free(&none);
   supine_basis_close(far);
 }
@@ -615,19 +618,8 @@ TEST(test_grid_points_inside_have_all_cell_corners) {
   }
 }
 
-/* Around the lungs, a grid reaches as far as it is asked to, even if the image ends in the lungs,
- * and if its axes are not at right angles. Its nodes are voxels of the image, or continue them. */
-TEST(test_grid_like_cropped_image_reaches_past_lungs) {
-  const double margin = 70.0;
-  supine_image like = {.size = {30, 30, 20},
-                       .origin = {90.0, -20.0, -60.0},
-                       .step = {{-1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.6, 2.0}}};
-  supine_inside_content content = {0};
-  supine_error error;
-  if (supine_inside_content_grid(&shells, &like, 6.0, margin, &content, &error) != SUPINE_OK) {
-    fail_msg("%s", error.message);
-  }
-  const supine_image *made = &content.grid;
+/* Check that every vertex of the lungs is at least `margin` mm from the border of a grid. */
+static void check_reaches(const supine_image *made, double margin) {
   for (size_t lung = 0; lung < shells.count; ++lung) {
     for (size_t i = 0; i < shells.shell[lung].vertex_count; ++i) {
       double node[3];
@@ -639,14 +631,51 @@ TEST(test_grid_like_cropped_image_reaches_past_lungs) {
       }
     }
   }
-  double voxel[3];
-  supine_image_locate(&like, made->origin, voxel);
-  for (size_t a = 0; a < 3; ++a) {
-    assert_true(fabs(voxel[a] - rint(voxel[a])) < 1e-9);
+}
+
+/* Around the lungs, a grid reaches as far as it is asked to, even if the image ends in the lungs,
+ * and if its axes are not at right angles. Its nodes are voxels of the image, or continue them. If
+ * the image is tilted, the grid is at right angles, and keeps the rows and planes of voxels: all
+ * but the second coordinate, along which slices are shifted here. */
+TEST(test_grid_like_cropped_image_reaches_past_lungs) {
+  const double margin = 70.0;
+  for (int tilted = 0; tilted < 2; ++tilted) {
+    const supine_image like = {
+        .size = {30, 30, 20},
+        .origin = {90.0, -20.0, -60.0},
+        .step = {{-1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.6 * tilted, 2.0}}};
+    supine_inside_content content = {0};
+    supine_error error;
+    if (supine_inside_content_grid(&shells, &like, 6.0, margin, &content, &error) != SUPINE_OK) {
+      fail_msg("%s", error.message);
+    }
+    const supine_image *made = &content.grid;
+    check_reaches(made, margin);
+    for (size_t node = 0; node < 4; ++node) {
+      double at[3];
+      double voxel[3];
+      memcpy(at, made->origin, sizeof at);
+      for (size_t k = 0; k < 3 && node > 0; ++k) {
+        at[k] += made->step[node - 1][k];
+      }
+      supine_image_locate(&like, at, voxel);
+      for (size_t a = 0; a < 3; ++a) {
+        assert_true((tilted == 1 && a == 1) || fabs(voxel[a] - rint(voxel[a])) < 1e-9);
+      }
+    }
+    for (size_t a = 0; a < 3; ++a) {
+      assert_true(fabs(supine_dot(made->step[a], made->step[(a + 1) % 3])) < 1e-12);
+    }
+    assert_false(supine_image_is_left_handed(made));
+    supine_inside_content_free(&content);
   }
-  assert_true(fabs(supine_image_plane_distance(&like, 1) - 2.0 / hypot(2.0, 0.6)) < 1e-12);
-  assert_true(fabs(supine_image_cell_diagonal(&like) - sqrt(1.0 + 1.6 * 1.6 + 4.0)) < 1e-12);
-  supine_inside_content_free(&content);
+}
+
+TEST(test_image_tilted_plane_distance_and_diagonal_are_of_cell) {
+  const supine_image tilted = {.size = {30, 30, 20},
+                               .step = {{-1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.6, 2.0}}};
+  assert_true(fabs(supine_image_plane_distance(&tilted, 1) - 2.0 / hypot(2.0, 0.6)) < 1e-12);
+  assert_true(fabs(supine_image_cell_diagonal(&tilted) - sqrt(1.0 + 1.6 * 1.6 + 4.0)) < 1e-12);
 }
 
 TEST(test_grid_bad_requests_refused) {

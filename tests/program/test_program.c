@@ -118,10 +118,10 @@ TEST(test_deform_volume_reached) {
          "solve lungs.ply --posture left --volume full+1300 -o b.ply");
   EXPECT(0, "nodes", "embed lungs.safetensors --grid 12 -o grid.safetensors");
   EXPECT(5, "cells that turn over, relative to those in the lungs",
-         "deform grid.safetensors --posture left --volume 620mL --field-out b.nrrd");
+         "deform grid.safetensors --posture upright --volume 620mL --field-out b.nrrd");
   assert_int_equal(count_files("b."), 0);
   EXPECT(0, "warning: the field folds in the body around the lungs",
-         "deform grid.safetensors --posture supine --volume rest-1200 --field-out a.nrrd");
+         "deform grid.safetensors --posture supine --volume 750mL --field-out a.nrrd");
   EXPECT(0, "outside the 10 to 120 %",
          "solve lungs.ply --posture left --volume full+1300 --allow-folds -o a.ply");
   EXPECT(0, "8025 mL are 134 % of",
@@ -241,11 +241,12 @@ TEST(test_precompute_scan_state_and_frame_reproduced) {
          "precompute lungs.ply --resting supine=3000mL --height 178 --sex male --band 3 "
          "-o a.safetensors");
   EXPECT(0, "3000.00 mL (-3000.00 mL)", "deform a.safetensors --posture supine -o a.ply");
-  EXPECT(0, "the scan holds 4000 mL, but --resting and --scanned say 3000 mL",
+  EXPECT(0, "the scan holds 4000 mL, but its state and the volume at rest say 3000 mL",
          "precompute low.ply --scanned rest --resting supine=3000mL --band 2 -o a.safetensors");
   EXPECT(0, "supine at rest, 4000 mL\n  full inflation 5200 mL (given",
          "precompute low.ply --scanned supine:rest --full 5200mL --band 3 -o a.safetensors");
-  EXPECT(0, "below 0.002 mm from the scan, 4000.00", "deform a.safetensors --posture supine -o a.ply");
+  EXPECT(0, "below 0.002 mm from the scan, 4000.00",
+         "deform a.safetensors --posture supine -o a.ply");
   EXPECT(0, " 5200.00 mL", "deform a.safetensors --posture prone --volume full -o a.ply");
   EXPECT(1, "does not belong to lungs of 3000 mL",
          "precompute low.ply --scanned supine:rest --full 3000mL -o b.safetensors");
