@@ -89,7 +89,7 @@ TEST(test_deform_volume_reached) {
   EXPECT(0, "pixels", "render lungs.safetensors --posture supine:full,prone:rest+500 -o a.png");
   /* A closed part has a volume in each state: the embedded surface of the lungs has theirs. */
   EXPECT(0, "504 vertices", "embed lungs.safetensors lungs.ply -o a.safetensors");
-  EXPECT(0, " 6000.0, 2884.6\n", "compare a.safetensors --postures supine:full,supine:rest");
+  EXPECT(0, " 6000.0            2884.6\n", "compare a.safetensors --postures supine:full,supine:rest");
   EXPECT(0, "+350.00 mL",
          "deform lungs.safetensors --posture left --volume left=scan+100,right=scan+250 -o a.vtp");
   EXPECT(0, "+120.00 mL", "solve lungs.ply --posture supine+15 --volume scan+120 -o a.obj");

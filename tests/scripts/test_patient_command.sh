@@ -146,7 +146,7 @@ grep -q 'full inflation 6[0-9]* mL (from rest' out || fail "full inflation is lo
   grep -q 'as a breath above it' out || fail "a breath: $(cat out)"
 "$supine" fit --landmarks full.csv --rest supine:rest --other supine:full -o x.json >out 2>&1 &&
   fail "landmarks without volumes"
-grep -q 'give both volumes' out || fail "landmarks without volumes: $(cat out)"
+grep -q 'both volumes of gas' out || fail "landmarks without volumes: $(cat out)"
 "$supine" validate known.safetensors --state s_supine_rest.ply --json >valid.json ||
   fail "validate volumes alone"
 near "$(surfaces valid.json)" 0 2 || fail "volumes alone: $(surfaces valid.json) mm"

@@ -153,8 +153,8 @@ def check_real():
 
 def check_guide():
     """A ball of 14 mm in the CT of the guide, with voxels of 4 mm."""
-    run(supine, "phantom", "--vertices", 3000, "-o", "phantom.ply")
-    run(sys.executable, os.path.join(guide, "synthetic_ct.py"), "phantom.ply")
+    lungs = os.path.join(guide, "..", "..", "examples", "lungs")
+    run(sys.executable, os.path.join(guide, "synthetic_ct.py"), *(os.path.join(lungs, f"{side}.ply") for side in ("left", "right")))
     run(supine, "precompute", "segmentation", "--scanned", "full", "--edge", 8, "--held-out", 20, "-o", "guide.safetensors")
     image = nibabel.load("ct.nii.gz")
     ct, affine = np.array(image.dataobj), image.affine
