@@ -40,7 +40,8 @@ static inline void write_frame(const float sum[SUPINE_CLUSTER_NUMBERS], const do
   }
 }
 
-SUPINE_CLONES void supine_clusters_pose(const supine_basis *basis, const supine_pose *pose,
+/* The clones must be static: the resolver of an external function would be exported. */
+SUPINE_CLONES static void pose_clusters(const supine_basis *basis, const supine_pose *pose,
                                         size_t begin, size_t end, float *frames) {
   const supine_basis_info *info = &basis->info;
   const size_t modes = info->mode_count;
@@ -65,6 +66,11 @@ SUPINE_CLONES void supine_clusters_pose(const supine_basis *basis, const supine_
       }
     }
   }
+}
+
+void supine_clusters_pose(const supine_basis *basis, const supine_pose *pose, size_t begin,
+                          size_t end, float *frames) {
+  pose_clusters(basis, pose, begin, end, frames);
 }
 
 void supine_clusters_coefficients(const supine_basis *basis, size_t begin, size_t end,

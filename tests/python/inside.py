@@ -38,7 +38,7 @@ assert lungs.has_volume and lungs.has_normals and list(lungs.lungs) == ["left", 
 # Arrays of a basis are read-only views, not copies. The basis stays open while one of its arrays exists.
 for array, shape, dtype in ((lungs.vertices, (n, 3), np.float32), (lungs.triangles, (lungs.triangle_count, 3), np.uint32),
                             (lungs.coefficients, (n, k), np.float32), (lungs.direction, (n, 3), np.float32),
-                            (lungs.modes, (k, (lungs.band + 1) ** 2), np.float64), (lungs.bounds, (2, 2, 3), np.float32),
+                            (lungs.modes, (k, (lungs.band + 1) ** 2, 1), np.float64), (lungs.bounds, (2, 2, 3), np.float32),
                             (lungs.tensor("lung"), (n,), np.uint8), (lungs.tensor("normals"), lungs.tensor("normals").shape, np.int8)):
     assert array.shape == shape and array.dtype == dtype and not array.flags.owndata
     assert not array.flags.writeable and array.flags.c_contiguous

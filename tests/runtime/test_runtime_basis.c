@@ -352,7 +352,7 @@ TEST(test_open_implausible_metadata_refused) {
       {"scan_gravity", "0,5,0"},
       {"full_upright_gain", "7"},
       {"full_upright_gain", "-0.1"},
-      {"scan_volume_ml", "1e7"},
+      {"scan_volume_ml", "1e10"},
       {"midline_mm", "-1e8"},
       {"expected_error_mm", "0"},
       {"expected_error_mm", "nan"},

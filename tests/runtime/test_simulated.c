@@ -337,8 +337,8 @@ TEST(test_open_wrong_simulated_volumes_refused_with_reason) {
   f->total[0] = (double)NAN;
   assert_refused("metadata 'simulated_total_ml' is not a list of 2 finite numbers");
   f->total[0] = first;
-  f->limits[0][1][8] = 1e9;
-  assert_refused("a simulated volume is 1e+09 mL");
+  f->limits[0][1][8] = 1.05e9;
+  assert_refused("a simulated volume is 1.05e+09 mL");
   f->limits[0][1][8] = 0;
   f->volume = false;
   assert_refused("the surface has no volume");

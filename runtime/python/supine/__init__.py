@@ -196,7 +196,8 @@ class Basis:
     triangles: uint32 [M, 3], three vertices of each triangle
     coefficients: float32 [N, K] for K modes, or [N, 3, K] if `vector` is true
     direction: float32 [N, 3], vector along which each vertex moves, mm; None if `vector` is true
-    modes: float64 [K, (band + 1)^2], spherical-harmonic coefficients of the weight of each mode
+    modes: float64 [K, (band + 1)^2, order + 1], spherical-harmonic coefficients of the weight of each mode, for each
+        polynomial of the volume; order is 0 unless the file holds another simulator's fields over volume
     bounds: float32 [lungs, 2, 3], lowest and highest corner of the box around each lung, mm
     lungs: dict from the name of each lung to the slice of its vertices
     metadata: dict from the keys of the file's metadata to the texts
