@@ -50,7 +50,8 @@ def make_inputs():
     struct.pack_into("<8h", header, 40, 3, 20, 20, 20, 1, 1, 1, 1)
     struct.pack_into("<hh", header, 70, 4, 16)
     struct.pack_into("<8f", header, 76, 1, 20, 20, 20, 0, 0, 0, 352)
-    struct.pack_into("<fbb", header, 112, 1, 0, 2)
+    struct.pack_into("<ff", header, 112, 1, 0)
+    header[123] = 2  # mm
     struct.pack_into("<hh", header, 252, 0, 1)
     struct.pack_into("<12f", header, 280, 20, 0, 0, -200, 0, 20, 0, -200, 0, 0, 20, -300)
     header[344:347] = b"n+1"
@@ -84,7 +85,8 @@ def write_mask(name):
     struct.pack_into("<8h", header, 40, 3, size, size, size, 1, 1, 1, 1)
     struct.pack_into("<hh", header, 70, 2, 8)
     struct.pack_into("<9f", header, 76, 1, 8, 8, 8, 0, 0, 0, 0, 352)
-    struct.pack_into("<fbb", header, 112, 1, 0, 2)
+    struct.pack_into("<ff", header, 112, 1, 0)
+    header[123] = 2  # mm
     struct.pack_into("<hh", header, 252, 0, 1)
     struct.pack_into("<12f", header, 280, 8, 0, 0, -190, 0, 8, 0, -190, 0, 0, 8, -330)
     header[344:347] = b"n+1"

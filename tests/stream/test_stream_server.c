@@ -20,13 +20,11 @@
 
 enum { VERTICES = 6000, MODES = 6, LUNGS = 2, FLOATS = MODES + 3 * LUNGS };
 
-/* Spherical-harmonic coefficients of the volume at rest. It exceeds the volume of the reference
- * surface by 20 mL plus 8 mL times the y component of gravity. */
-static const double resting[9] = {20.0 / 0.2820947917738781, 8.0 / 0.4886025119029199};
-
-static double resting_in(const double gravity[3]) {
-  return 20.0 + 8.0 * gravity[1];
-}
+/* Spherical-harmonic coefficients of the volume of each lung at rest. It exceeds the volume of the
+ * reference surface by 10 mL plus 4 mL times the y component of gravity. */
+static const double resting[9 * LUNGS] = {
+    [0] = 10.0 / 0.2820947917738781, [1] = 4.0 / 0.4886025119029199,
+    [9] = 10.0 / 0.2820947917738781, [10] = 4.0 / 0.4886025119029199};
 
 /* A server that runs in a thread of its own, and the basis that it uses. */
 typedef struct stage {
@@ -65,14 +63,23 @@ static stage *stage_create(void) {
   size_t size = 0;
   supine_error error;
   s->made = fixture_create(VERTICES, MODES, 2, LUNGS, false, true, 15.0, 29);
-  /* Make the constant (degree 0) coefficient of the weight of each mode dominate, so that no pose
-   * folds the surface. */
+  /* Make the constant (degree 0) coefficient of the weight of each mode dominate, and let every mode
+   * enlarge both lungs, so that no pose folds the surface. */
+  for (size_t i = 0; i < LUNGS * 3 * MODES; ++i) {
+    s->made->linear[i] = fabs(s->made->linear[i]);
+  }
+  for (size_t i = 0; i < LUNGS * 3 * MODES * MODES; ++i) {
+    s->made->quadratic[i] *= 0.01;
+  }
+  for (size_t i = 0; i < LUNGS * MODES * MODES * MODES; ++i) {
+    s->made->cubic[i] *= 0.01;
+  }
   for (size_t k = 0; k < MODES; ++k) {
     double *mode = s->made->mode + 9 * k;
     for (int i = 1; i < 9; ++i) {
       mode[i] *= 0.1;
     }
-    mode[0] = s->made->linear[k] + s->made->linear[MODES + k] > 0.0 ? 3.0 : -3.0;
+    mode[0] = 3.0;
   }
   s->made->resting = resting;
   s->bytes = fixture_bytes(s->made, &size);
@@ -265,15 +272,12 @@ static void expect_pose(const supine_pose *pose, const unsigned char *content) {
   }
 }
 
-/* Return the pose for a direction of gravity and a volume in mL above rest. One factor multiplies
- * the displacements of all lungs. */
+/* Return the pose for a direction of gravity and a volume in mL above rest. */
 static supine_pose pose_of(const stage *s, const double gravity[3], double above) {
-  supine_pose pose = {.weights = {0}};
-  double gain = 0.0;
-  assert_int_equal(supine_basis_weights(s->basis, gravity, pose.weights), SUPINE_OK);
-  assert_int_equal(posed_scale(s->basis, pose.weights, resting_in(gravity) + above, &gain, NULL),
-                   SUPINE_OK);
-  supine_pose_fill(&pose, gain);
+  const supine_state state = {.gravity = {gravity[0], gravity[1], gravity[2]},
+                              .volume = {SUPINE_VOLUME_REST, above}};
+  supine_pose pose;
+  assert_int_equal(supine_basis_pose(s->basis, &state, &pose, NULL), SUPINE_OK);
   return pose;
 }
 
