@@ -7,7 +7,7 @@ const STATE = 128, POSE = 8 * (256 + 3 * 16 + 1), VOLUMES = 8 * 16, TEXT = 512, 
 // What to do about an error, after its message: words for each supine_remedy of this library, in the order of the enum.
 const REMEDIES = ['', ", or use a basis that 'supine precompute' made without --scanned none and --law paper"];
 // Byte offsets of members of the C struct supine_basis_info in WebAssembly, where pointers and sizes have 4 bytes.
-const INFO = { vertices: 0, lungs: 20, begin: 24, hasVolume: 29, names: 56, normals: 116 };
+const INFO = { vertices: 0, lungs: 16, begin: 20, hasVolume: 25, names: 56, normals: 100 };
 const TYPES = [Uint8Array, Uint32Array, Float32Array, Float64Array, Int16Array, Int8Array, Uint16Array]; // in the order of supine_dtype
 const STATUS = ['ok', 'argument', 'memory', 'read', 'format', 'mesh', 'open surface', 'unsupported', 'write', 'numerical'];
 

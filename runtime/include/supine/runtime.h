@@ -97,9 +97,6 @@ typedef struct supine_basis_info {
   size_t triangle_count;
   size_t mode_count;
   size_t band; /**< highest band of the spherical harmonics */
-  /** Highest degree of the polynomials of a lung's volume, in a basis of another simulator's fields
-   * over gravity and volume; 0 in all others. Above 0, each lung has weights of its own. */
-  size_t order;
   size_t lung_count;
   const size_t *lung_begin; /**< [lung_count + 1] first vertex of each lung, then vertex_count */
   bool vector;     /**< each vertex has 3 coefficients per mode, instead of 1 along `direction` */
@@ -121,14 +118,6 @@ typedef struct supine_basis_info {
    * factors of `direction`. If it is true: [vertex_count, 3, mode_count] along x, y and z, mm. NULL
    * in a basis of clusters: supine_basis_coefficients computes them. */
   const float *coefficients;
-  size_t cluster_count; /**< number of clusters of vertices that move alike; 0 if there are none */
-  const uint16_t *cluster; /**< [vertex_count] cluster of each vertex, or NULL */
-  /** [vertex_count, 2] scalars of each vertex, or NULL. */
-  const int16_t *cluster_scalars;
-  /** [cluster_count, mode_count, SUPINE_CLUSTER_NUMBERS] a vector m, the rows of a matrix B, and two
-   * vectors P, mm. The coefficients of a vertex at p with the scalars a are m + B p + a_0 P_0 +
-   * a_1 P_1. NULL if there are no clusters. */
-  const float *cluster_vectors;
   /** [mode_count, (band + 1)^2, order + 1] coefficients of the weight of each mode: of the
    * harmonics, times polynomials of the volume. */
   const double *modes;
@@ -154,6 +143,17 @@ typedef struct supine_basis_info {
   /** Hash of the modes, the coefficients of the volumes, and the names of the lungs. Bases that
    * share it have the same poses: a basis, and those that `supine embed` makes from it. */
   uint64_t identity;
+  /** Highest degree of the polynomials of a lung's volume, in a basis of another simulator's fields
+   * over gravity and volume; 0 in all others. Above 0, each lung has weights of its own. */
+  size_t order;
+  size_t cluster_count; /**< number of clusters of vertices that move alike; 0 if there are none */
+  const uint16_t *cluster; /**< [vertex_count] cluster of each vertex, or NULL */
+  /** [vertex_count, 2] scalars of each vertex, or NULL. */
+  const int16_t *cluster_scalars;
+  /** [cluster_count, mode_count, SUPINE_CLUSTER_NUMBERS] a vector m, the rows of a matrix B, and two
+   * vectors P, mm. The coefficients of a vertex at p with the scalars a are m + B p + a_0 P_0 +
+   * a_1 P_1. NULL if there are no clusters. */
+  const float *cluster_vectors;
 } supine_basis_info;
 
 /** The weights of modes and the gains of a state (supine_basis_pose). All zeros mean the reference

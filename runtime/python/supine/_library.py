@@ -106,18 +106,17 @@ class Options(ctypes.Structure):
 class Info(ctypes.Structure):
     """The C struct supine_basis_info."""
     _fields_ = [("vertex_count", c_size_t), ("triangle_count", c_size_t), ("mode_count", c_size_t),
-                ("band", c_size_t), ("order", c_size_t), ("lung_count", c_size_t), ("lung_begin", POINTER(c_size_t)),
+                ("band", c_size_t), ("lung_count", c_size_t), ("lung_begin", POINTER(c_size_t)),
                 ("vector", c_bool), ("has_volume", c_bool), ("storage", c_int), ("simd", c_int),
                 ("bytes_per_vertex", c_double), ("storage_error", c_double), ("lung_names", POINTER(c_char_p)),
                 ("bounds", POINTER(c_float)), ("vertices", c_void_p), ("triangles", c_void_p),
-                ("direction", c_void_p), ("coefficients", c_void_p),
-                ("cluster_count", c_size_t), ("cluster", c_void_p), ("cluster_scalars", c_void_p),
-                ("cluster_vectors", c_void_p), ("modes", c_void_p),
+                ("direction", c_void_p), ("coefficients", c_void_p), ("modes", c_void_p),
                 ("volume_linear", c_void_p), ("volume_quadratic", c_void_p), ("volume_cubic", c_void_p),
                 ("packed", c_void_p), ("normal_count", c_size_t), ("normals", c_void_p),
                 ("normal_weights", c_void_p), ("reference_volume", c_void_p), ("has_rest", c_bool),
                 ("has_full", c_bool), ("is_fields", c_bool), ("bend", c_double * 3),
-                ("identity", c_uint64)]
+                ("identity", c_uint64), ("order", c_size_t), ("cluster_count", c_size_t), ("cluster", c_void_p),
+                ("cluster_scalars", c_void_p), ("cluster_vectors", c_void_p)]
 
 
 class Tensor(ctypes.Structure):
