@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "base/parallel.h"
 #include "base/text.h"
 
@@ -66,6 +67,9 @@ static supine_status load_meshes(reading *r, supine_source *source, supine_error
 
 static void note_map(const char *path, const supine_labels_report *report,
                      supine_findings *findings) {
+  /* share of a lung; parts of a label map that are no lung are smaller */
+  static const double most_dropped = 0.1;
+  char text[512];
   if (report->frames_differ) {
     supine_findings_add(
         findings,
@@ -80,6 +84,13 @@ static void note_map(const char *path, const supine_labels_report *report,
                           "%s: warning: the %s lung is cut off at the image's border: give a scan "
                           "that shows all of it",
                           path, side);
+    }
+    if (lung->dropped > most_dropped * lung->mask) {
+      (void)supine_print_text(text, sizeof text,
+                              "%s: warning: the %s lung is %.0f mL, without %.0f mL that are not "
+                              "connected to it: check the labels",
+                              path, side, lung->mask, lung->dropped);
+      supine_findings_add(findings, "%s", text);
     }
     if (lung->tunnels > 0) {
       supine_findings_add(findings,

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Read NIfTI through libnifti2, and write NIfTI-1. */
 #include <math.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -36,8 +37,8 @@ static bool forms_differ(const nifti_image *nifti) {
 }
 
 /* Check the image's size and type. Convert origin and steps from RAS, NIfTI's axes, to LPS. */
-static supine_status check(const char *path, const nifti_image *nifti, supine_image *image,
-                           image_storage *storage, supine_error *error) {
+static supine_status check(const char *path, const nifti_image *nifti, bool packed,
+                           supine_image *image, image_storage *storage, supine_error *error) {
   const double unit = nifti->xyz_units == NIFTI_UNITS_METER    ? 1000.0
                       : nifti->xyz_units == NIFTI_UNITS_MICRON ? 1e-3
                                                                : 1.0;
@@ -51,7 +52,7 @@ static supine_status check(const char *path, const nifti_image *nifti, supine_im
       (int)nifti->ndim);
   SUPINE_REFUSE_IF(nifti->sform_code <= 0 && nifti->qform_code <= 0, error, SUPINE_ERROR_FORMAT,
                    "%s: the header has no orientation (qform and sform are 0); give the file that "
-                   "the segmenter wrote",
+                   "the segmenter wrote, or copy qform or sform from the scan that was segmented",
                    path);
   const bool wide = nifti->datatype == DT_INT64 || nifti->datatype == DT_UINT64;
   while (type < SUPINE_VOXEL_COUNT && types[type] != (wide ? DT_FLOAT64 : nifti->datatype)) {
@@ -72,7 +73,6 @@ static supine_status check(const char *path, const nifti_image *nifti, supine_im
       image->step[a][k] = turn * m->m[k][a];
     }
   }
-  const bool packed = nifti_is_gzfile(path) != 0;
   *storage = (image_storage){.offset = packed ? 0 : nifti->iname_offset,
                              .skip = packed ? nifti->iname_offset : 0,
                              .packed = packed,
@@ -85,17 +85,41 @@ static supine_status check(const char *path, const nifti_image *nifti, supine_im
   return SUPINE_OK;
 }
 
+/* Refuse a header that does not say where the voxels begin: libnifti2 would take other bytes. */
+static supine_status check_offset(const char *path, supine_error *error) {
+  enum { NIFTI_1 = 1, LEAST_1 = 352, LEAST_2 = 544 }; /* bytes of header and extension flag */
+  int version = 0;
+  void *header = nifti_read_header(path, &version, 1);
+  SUPINE_REFUSE_IF(header == NULL, error, SUPINE_ERROR_FORMAT,
+                   "%s: not a NIfTI header; give a NIfTI file", path);
+  const bool first = version == NIFTI_1;
+  const double offset = first ? (double)((const nifti_1_header *)header)->vox_offset
+                              : (double)((const nifti_2_header *)header)->vox_offset;
+  const double least = first ? LEAST_1 : LEAST_2;
+  free(header);
+  SUPINE_REFUSE_IF(
+      !(offset >= least && offset <= (double)INT32_MAX) || offset != floor(offset), error,
+      SUPINE_ERROR_FORMAT,
+      "%s: its vox_offset is %g, but voxels begin at a whole byte from %.0f; write the "
+      "image again",
+      path, offset, least);
+  return SUPINE_OK;
+}
+
 supine_status supine_image_describe_nifti(const char *path, FILE *file, supine_image *image,
                                           image_storage *storage, supine_error *error) {
-  (void)file;
+  unsigned char head[2] = {0};
+  const size_t known = fread(head, 1, sizeof head, file);
+  const bool packed = known == sizeof head && head[0] == 0x1F && head[1] == 0x8B; /* gzip */
   nifti_set_debug_level(0);
   /* the header of a pair of files says so, but nifti_image_read takes its own bytes for voxels */
   SUPINE_REFUSE_IF(is_nifti_file(path) == 2, error, SUPINE_ERROR_FORMAT,
                    "%s: its voxels are in another file; save header and voxels in one .nii", path);
+  SUPINE_TRY(check_offset(path, error));
   nifti_image *nifti = nifti_image_read(path, 0);
   SUPINE_REFUSE_IF(nifti == NULL, error, SUPINE_ERROR_FORMAT,
                    "%s: not a NIfTI header; give a NIfTI file", path);
-  const supine_status status = check(path, nifti, image, storage, error);
+  const supine_status status = check(path, nifti, packed, image, storage, error);
   nifti_image_free(nifti);
   return status;
 }

@@ -30,6 +30,9 @@ static const struct {
 } tips[6] = {{"right", 0.0, 0.25}, {"left", 0.0, 0.25},  {"front", 0.0, 0.25},
              {"back", 0.0, 0.25},  {"feet", 0.03, 0.25}, {"head", 0.03, 0.135}};
 static const double longest_tip = 0.5;
+/* Least area of a sphere of a lung's volume, divided by the area of the lung. It was 0.61 to 0.77
+ * in 38 surfaces of the lungs of ten people; it is 0.07 for a lung that is a shell of 3 mm. */
+static const double least_compactness = 0.3;
 
 static const char *plural(size_t count) {
   return count == 1 ? "" : "s";
@@ -120,6 +123,27 @@ static void check_size(checks *c, const supine_lungs *lungs, bool likely) {
         height, ml, accept);
   check(c, ml >= 1500.0 * most, SUPINE_OK,
         "the lungs hold %.0f mL, as a child's may: for an adult, check the voxel spacing", ml);
+}
+
+/* Check that no lung is hollow: that its surface is not too large for the volume that it encloses,
+ * relative to a sphere. */
+static void check_solid(checks *c, const supine_lungs *lungs, size_t lung) {
+  static const double pi = 3.14159265358979323846;
+  const supine_mesh part = supine_lungs_part(lungs, lung);
+  const double volume = 1e3 * lungs->volume[lung];
+  double area = 0.0;
+  for (size_t t = 0; t < part.triangle_count; ++t) {
+    const uint32_t *corner = part.triangles + 3 * t;
+    double normal[3];
+    supine_normal(part.vertices + 3 * (size_t)corner[0], part.vertices + 3 * (size_t)corner[1],
+                  part.vertices + 3 * (size_t)corner[2], normal);
+    area += 0.5 * supine_length(normal);
+  }
+  const double compactness = cbrt(36.0 * pi * volume * volume) / area;
+  check(c, compactness >= least_compactness, SUPINE_ERROR_MESH,
+        "the %s lung holds %.0f mL within a surface of %.0f cm2, as a hollow shell does: fill the "
+        "mask, or remove the surface inside the lung",
+        supine_lungs_name(lungs, lung), lungs->volume[lung], 0.01 * area);
 }
 
 /* Return the volume of a surface beyond `from` on an axis, on the side of `sign`, mm^3: the
@@ -288,6 +312,7 @@ static void check_shape(checks *c, const supine_lungs *lungs, int *side, bool *a
             ? ". A scan pitched by more than 25 degrees has such a shape, too: turn it upright"
             : "");
   for (size_t lung = 0; lung < lungs->lung_count && c->status == SUPINE_OK; ++lung) {
+    check_solid(c, lungs, lung);
     check_tips(c, lungs, lung);
   }
   check(c, !found.joined || c->source->midline != NULL || c->source->side != 0, SUPINE_ERROR_MESH,
