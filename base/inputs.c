@@ -23,7 +23,7 @@ static const supine_input inputs[] = {
     .told = NAN, .refused = 90, .evidence = "definition: another posture is nearer",
     .remedy = "for a volume, write supine:rest+500; for another posture, its name", .interfaces = ALL},
   [SUPINE_INPUT_ROLL] = {
-    .name = "roll", .group = "State", .input = "a rolled posture, such as supine>30",
+    .name = "roll", .group = "State", .input = "a rolled posture, such as supine@30",
     .against = "half a turn", .measured = "roll, degrees", .told = NAN, .refused = 180,
     .evidence = "definition", .remedy = "give -180 to 180 degrees; + turns to the left", .interfaces = ALL},
   [SUPINE_INPUT_VOLUME_FINITE] = {
@@ -112,8 +112,8 @@ static const supine_input inputs[] = {
     .remedy = "let the points' frame turn", .interfaces = ALL},
   [SUPINE_INPUT_SUGGESTION] = {
     .name = "suggestion", .group = "Words", .input = "a word that is unknown",
-    .against = "the words that are known", .measured = "share of letters that differ",
-    .told = 0, .refused = NAN, .evidence = "definition",
+    .against = "the words that are known", .measured = "share of the characters that differ",
+    .told = 0.4, .refused = NAN, .evidence = "definition",
     .remedy = "nearer words are suggested, others are not", .interfaces = ALL},
 };
 /* clang-format on */
