@@ -11,6 +11,7 @@
 
 #include "precompute/lungs/disease.h"
 #include "precompute/lungs/expandability.h"
+#include "precompute/patient/checks.h"
 #include "precompute/prepare.h"
 
 /* What is known of the scan: completed by the patient's file and by defaults. */
@@ -79,15 +80,31 @@ static void tell_volume(const supine_patient_record *record, double measured,
           : "");
 }
 
+/* Say if the lungs have another size than in the scan of this state when the law was fitted. */
+static void tell_size(const supine_patient_record *fitted, size_t state, const supine_lungs *lungs,
+                      supine_findings *findings) {
+  char text[256];
+  const supine_patient_frame *frame = &fitted->patient.frame;
+  const double *low = state == 0 ? frame->minimum : fitted->emptier[0];
+  const double *high = state == 0 ? frame->maximum : fitted->emptier[1];
+  const bool both = lungs->lung_count == 2 && frame->only_side == 0;
+  if (both && fitted->from_surface &&
+      !supine_patient_same_size(lungs, low, high, fitted->volume[state], text, sizeof text)) {
+    supine_findings_add(
+        findings, "warning: %s: check that the file of the patient was fitted to this scan", text);
+  }
+}
+
 static void describe_fit(const supine_patient_record *record, char *text, size_t size) {
   const supine_patient_fit_report *report = &record->report;
-  (void)supine_print_text(text, size,
-                 "%s: %s law%s from %zu points; held-out residual %.1f of %.1f mm RMS, %.0f %% "
-                 "explained; expected error %.1f mm RMS",
-                 record->name, supine_patient_law_names[record->patient.law],
-                 record->patient.centre_count > 0 ? " and kriging" : "", report->points,
-                 report->held_out[SUPINE_PATIENT_SCORE_CORRECTED], report->baseline,
-                 report->explained, report->expected_point);
+  (void)supine_print_text(
+      text, size,
+      "%s: %s law%s from %zu points; held-out residual %.1f of %.1f mm RMS, %.0f %% "
+      "explained; expected error %.1f mm RMS",
+      record->name, supine_patient_law_names[record->patient.law],
+      record->patient.centre_count > 0 ? " and kriging" : "", report->points,
+      report->held_out[SUPINE_PATIENT_SCORE_CORRECTED], report->baseline, report->explained,
+      report->expected_point);
 }
 
 /* Use the displacement law, the force and the volumes at rest that were fitted to a patient.
@@ -105,6 +122,7 @@ static supine_status take_patient(const supine_patient_record *fitted, supine_pr
   SUPINE_TRY(
       supine_patient_model(record, &p->source.lungs, resting, scan, arrays, &p->model, error));
   tell_volume(record, fitted->volume[1 - record->shown], &p->source.findings);
+  tell_size(fitted, record->shown, &p->source.lungs, &p->source.findings);
   return SUPINE_OK;
 }
 

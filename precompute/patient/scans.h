@@ -6,7 +6,7 @@
 
 #include "precompute/patient/patient_file.h"
 
-enum { SUPINE_PATIENT_NOTES = 2 };
+enum { SUPINE_PATIENT_NOTES = 3 };
 
 /** What is known of two scans of one person: surfaces, landmarks, and states. Initialise to zero,
  * and release with supine_patient_scans_free. */

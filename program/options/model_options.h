@@ -31,6 +31,11 @@ supine_status supine_command_prepare(const char *command, supine_model_options *
 /* Load lungs from one or two surfaces, such as "left.ply,right.ply", or from a label map, and print
  * what the checks of the files found.
  * @param lungs  must be initialised to zero */
+/** Drop pairs of landmarks that were mismatched, and warn of them
+ * (supine_patient_drop_mismatched). */
+supine_status supine_command_drop_mismatched(const char *command, const char *path,
+                                             supine_patient_pairs *pairs, supine_error *error);
+
 supine_status supine_command_load_lungs(const char *command, const char *operand,
                                         const supine_source_options *options, supine_lungs *lungs,
                                         supine_error *error);
