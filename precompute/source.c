@@ -6,6 +6,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <supine/inputs.h>
+
 #include "base/arena.h"
 #include "base/number.h"
 #include "base/parallel.h"
@@ -67,8 +69,6 @@ static supine_status load_meshes(reading *r, supine_source *source, supine_error
 
 static void note_map(const char *path, const supine_labels_report *report,
                      supine_findings *findings) {
-  /* share of a lung; parts of a label map that are no lung are smaller */
-  static const double most_dropped = 0.1;
   char text[512];
   if (report->frames_differ) {
     supine_findings_add(
@@ -85,7 +85,8 @@ static void note_map(const char *path, const supine_labels_report *report,
                           "that shows all of it",
                           path, side);
     }
-    if (lung->dropped > most_dropped * lung->mask) {
+    if (supine_input_judge(SUPINE_INPUT_LUNG_PIECES, lung->dropped / lung->mask) !=
+        SUPINE_INPUT_TAKEN) {
       (void)supine_print_text(text, sizeof text,
                               "%s: warning: the %s lung is %.0f mL, without %.0f mL that are not "
                               "connected to it: check the labels",

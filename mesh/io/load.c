@@ -71,6 +71,11 @@ static supine_status read_file(mesh_file *file, supine_arena *arena, mesh_reader
                    strerror(errno == 0 ? EIO : errno));
   find_space(file);
   *reader = find_reader(file->path);
+  SUPINE_REFUSE_IF(*reader == NULL && supine_text_ends_in(file->path, ".vtk"), error,
+                   SUPINE_ERROR_FORMAT,
+                   "%s: VTK's older format is not read; save the surface as .vtp or .ply, for "
+                   "example with 3D Slicer or ParaView",
+                   file->path);
   SUPINE_REFUSE_IF(*reader == NULL, error, SUPINE_ERROR_FORMAT,
                    "%s: no importer for this ending; give the mesh as .ply, .obj, .stl or .vtp",
                    file->path);
@@ -106,6 +111,11 @@ static supine_status choose_axes(const mesh_file *file, supine_axes asked,
   SUPINE_REFUSE_IF(file->tagged && file->space == SUPINE_AXES_AUTO, error, SUPINE_ERROR_FORMAT,
                    "%s: its SPACE tag is not three letters such as LPS or RAS; give the axes, for "
                    "example --axes LPS",
+                   file->path);
+  SUPINE_REFUSE_IF(file->turned, error, SUPINE_ERROR_FORMAT,
+                   "%s: the file says which axis is up, and its coordinates were turned by that: "
+                   "save the surface as PLY, or compare it with the scan, and give the axes that "
+                   "it has after the turn",
                    file->path);
   report->axes = file->tagged ? file->space : SUPINE_AXES_LPS;
   report->axes_from_tag = file->tagged;

@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <supine/inputs.h>
+
 #include "base/arena.h"
 #include "base/text.h"
 #include "base/vec3.h"
@@ -15,15 +17,6 @@ static const double most_edge = 20.0; /* mm; with larger cubes, little of a lung
 static const double most_closing_radius = 20.0; /* mm; half the width of the widest closed gaps */
 static const double least_volume = 1.0;         /* mL; smaller lungs are refused */
 static const double longest_lung = 1000.0; /* mm; if a lung seems longer, the voxel size is wrong */
-
-/* Two labels that nobody named are the two lungs of a person if one holds at most this many times
- * as much as the other, the parts dropped from each hold at most this share of what is kept, and
- * the middle of each lies beyond the other. In five people's lungs after a deep breath and at its
- * end, and in three other people's, the larger held at most 1.28 times as much, and nothing was
- * dropped.
- */
-static const double largest_ratio = 3.0;
-static const double most_dropped = 0.1;
 
 typedef struct work {
   const char *path; /* path of the first file, for messages */
@@ -284,18 +277,20 @@ static supine_status check_sides(const work *w, const supine_mesh *surfaces, sup
 /* Return whether two labels can be the two lungs of a person. */
 static bool can_be_lungs(const supine_labels_report *report, const supine_mesh *surfaces) {
   const supine_labels_lung *lung = report->lung;
-  bool can =
-      lung[0].mask <= largest_ratio * lung[1].mask && lung[1].mask <= largest_ratio * lung[0].mask;
+  const double ratio = fmax(lung[0].mask, lung[1].mask) / fmin(lung[0].mask, lung[1].mask);
+  bool can = supine_input_judge(SUPINE_INPUT_LABELS_RATIO, ratio) == SUPINE_INPUT_TAKEN;
   double low[2][3];
   double high[2][3];
   double centre[2];
   for (int i = 0; i < 2; ++i) {
-    can = can && lung[i].dropped <= most_dropped * lung[i].mask;
+    can = can && supine_input_judge(SUPINE_INPUT_LABELS_PIECES, lung[i].dropped / lung[i].mask) ==
+                     SUPINE_INPUT_TAKEN;
     (void)supine_mesh_box(&surfaces[i], low[i], high[i]);
     centre[i] = 0.5 * (low[i][0] + high[i][0]);
   }
   /* the left lung comes first, and x grows to the left */
-  return can && centre[0] > high[1][0] && centre[1] < low[0][0];
+  const double reach = fmax(high[1][0] - centre[0], centre[1] - low[0][0]);
+  return can && supine_input_judge(SUPINE_INPUT_LABELS_SIDES, reach) == SUPINE_INPUT_TAKEN;
 }
 
 /* Refuse two labels that were assumed to be the two lungs if they hardly are. */

@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <supine/inputs.h>
+
 #include "base/arena.h"
 #include "base/vec3.h"
 
@@ -24,13 +26,11 @@ void supine_labels_mask_place(const labels_mask *mask, const double voxel[3], do
   }
 }
 
-/* Largest distance of a voxel's value from a label, as of labels that a program stored as scaled
- * integers. */
-static const double label_error = 1e-3;
+static const double label_error = 1e-3; /* of a probability that is 0 or 1 but for rounding */
 
 static bool is_label(double value) {
-  return value > -label_error && value < (double)LABELS_MAX - 1.0 + label_error &&
-         fabs(value - rint(value)) <= label_error;
+  const double nearest = fmin(LABELS_MAX - 1.0, fmax(0.0, rint(value)));
+  return supine_input_judge(SUPINE_INPUT_LABEL_VALUE, fabs(value - nearest)) == SUPINE_INPUT_TAKEN;
 }
 
 typedef struct voxels {

@@ -5,6 +5,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include <supine/inputs.h>
+
 #include "base/arena.h"
 #include "base/number.h"
 #include "base/vec3.h"
@@ -30,12 +32,26 @@ static const struct {
 } tips[6] = {{"right", 0.0, 0.25}, {"left", 0.0, 0.25},  {"front", 0.0, 0.25},
              {"back", 0.0, 0.25},  {"feet", 0.03, 0.25}, {"head", 0.03, 0.135}};
 static const double longest_tip = 0.5;
-/* Least area of a sphere of a lung's volume, divided by the area of the lung. It was 0.61 to 0.77
- * in 38 surfaces of the lungs of ten people; it is 0.07 for a lung that is a shell of 3 mm. */
-static const double least_compactness = 0.3;
 
 static const char *plural(size_t count) {
   return count == 1 ? "" : "s";
+}
+
+/* If a surface is open, join vertices that differ only by rounding, and note it. */
+static supine_status join_vertices(supine_mesh *mesh, const char *name, supine_findings *findings) {
+  static const double rounding = 1e-4; /* mm; single precision resolves 3e-5 mm at 500 mm */
+  SUPINE_FREED_BY(supine_mesh_topology_free) supine_topology topology = {0};
+  size_t joined = 0;
+  SUPINE_TRY(supine_mesh_topology_create(mesh, &topology));
+  if (topology.closed) {
+    return SUPINE_OK;
+  }
+  SUPINE_TRY(supine_mesh_join_close(mesh, rounding, &joined));
+  if (supine_input_judge(SUPINE_INPUT_VERTICES_CLOSE, (double)joined) != SUPINE_INPUT_TAKEN) {
+    supine_findings_add(findings, "%s: note: joined %zu %s within 0.0001 mm of another", name,
+                        joined, joined == 1 ? "vertex" : "vertices");
+  }
+  return SUPINE_OK;
 }
 
 /* Repair one surface, drop its small pieces, and note what was changed. */
@@ -44,7 +60,8 @@ static supine_status mend(supine_mesh *mesh, const char *name, supine_findings *
   supine_mesh_repair_report report;
   size_t pieces;
   size_t specks;
-  if (supine_mesh_repair(mesh, &report) != SUPINE_OK ||
+  if (join_vertices(mesh, name, findings) != SUPINE_OK ||
+      supine_mesh_repair(mesh, &report) != SUPINE_OK ||
       supine_mesh_drop_specks(mesh, speck_share, &pieces, &specks) != SUPINE_OK) {
     return supine_error_memory(error, "checking %s", name);
   }
@@ -140,7 +157,8 @@ static void check_solid(checks *c, const supine_lungs *lungs, size_t lung) {
     area += 0.5 * supine_length(normal);
   }
   const double compactness = cbrt(36.0 * pi * volume * volume) / area;
-  check(c, compactness >= least_compactness, SUPINE_ERROR_MESH,
+  const supine_input_verdict verdict = supine_input_judge(SUPINE_INPUT_LUNG_HOLLOW, compactness);
+  check(c, verdict != SUPINE_INPUT_REFUSED, SUPINE_ERROR_MESH,
         "the %s lung holds %.0f mL within a surface of %.0f cm2, as a hollow shell does: fill the "
         "mask, or remove the surface inside the lung",
         supine_lungs_name(lungs, lung), lungs->volume[lung], 0.01 * area);
