@@ -111,7 +111,7 @@ static supine_status initialise(workspace *s, supine_error *error) {
   const bool unknown = task->state.lung_count == 0 && info->has_volume && !info->is_fields &&
                        task->state.volume.kind == SUPINE_VOLUME_DEFAULT;
   supine_pose pose;
-  const supine_status status = supine_basis_pose(basis, &scan, &pose, error);
+  const supine_status status = supine_basis_pose_any(basis, &scan, &pose, error);
   for (size_t j = 0; j < task->count && status == SUPINE_OK; ++j) {
     supine_kriging_point *p = &s->points[j];
     *p = (supine_kriging_point){.noise = task->observed[j].noise};
@@ -145,7 +145,7 @@ static supine_status evaluate(workspace *s, supine_error *error) {
   const double step = supine_expected_shift * supine_expected_reference(task->inside);
   supine_pose pose;
   supine_pose fuller;
-  supine_status status = supine_basis_pose(task->inside, &s->found->state, &pose, error);
+  supine_status status = supine_basis_pose_any(task->inside, &s->found->state, &pose, error);
   if (status == SUPINE_OK && s->fit->options.volume) {
     status = supine_expected_shifted(task->inside, &s->found->state, &fuller, error);
   }
@@ -413,7 +413,7 @@ supine_status supine_locate(const supine_locate_task *task, supine_locate_residu
   if (info->has_volume) {
     supine_pose pose;
     double volumes[SUPINE_LUNGS_MAX];
-    (void)supine_basis_pose(task->inside, &found->state, &pose, NULL);
+    (void)supine_basis_pose_any(task->inside, &found->state, &pose, NULL);
     (void)supine_basis_volumes(task->inside, &pose, volumes);
     for (size_t lung = 0; lung < info->lung_count; ++lung) {
       found->volume += volumes[lung];

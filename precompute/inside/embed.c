@@ -350,8 +350,8 @@ static supine_status write_file(const embedding *e, const char *path, supine_ten
 }
 
 static supine_status write_content(const embedding *e, const char *path, supine_error *error) {
-  static const char *const shared[] = {"modes", "volume_linear", "volume_quadratic", "volume_cubic",
-                                       "resting_volume"};
+  static const char *const shared[] = {"modes",        "volume_linear",  "volume_quadratic",
+                                       "volume_cubic", "resting_volume", "volume_range"};
   const supine_inside_content *content = e->content;
   const supine_image *grid = &content->grid;
   const size_t n = content->count;
@@ -368,7 +368,7 @@ static supine_status write_content(const embedding *e, const char *path, supine_
     const double x = (double)info->bounds[i];
     *corner = i < 6 || (i / 3 % 2 == 0 ? x < *corner : x > *corner) ? x : *corner;
   }
-  supine_tensor tensors[16] = {
+  supine_tensor tensors[17] = {
       {"vertices", SUPINE_F32, 2, {n, 3}, e->vertices},
       {"triangles", SUPINE_U32, 2, {content->triangle_count, 3}, e->triangles},
       {"lung", SUPINE_U8, 1, {n}, e->group},

@@ -33,7 +33,7 @@ from ._library import (ArgumentError, Error, FormatError, MeshError, NumericalEr
 from ._program import save_fields
 
 __all__ = ["open", "precompute", "save_fields", "embed", "augment", "random_states", "Deform", "Sample", "Basis",
-           "Pose", "Location", "Target", "gravity", "gravity_of_quaternion", "tilt", "postures", "breath", "Gravity",
+           "Pose", "Location", "Target", "gravity", "gravity_of_quaternion", "tilt", "roll", "postures", "breath", "Gravity",
            "Error", "ArgumentError", "FormatError", "MeshError", "NumericalError", "OpenSurfaceError",
            "OutOfMemoryError", "ReadError", "UnsupportedError"]
 __version__: str = _c.string(_c.version())
@@ -84,11 +84,20 @@ def gravity_of_quaternion(quaternion: Sequence[float]) -> Doubles:
 
 
 def tilt(posture: Gravity, degrees: float) -> Doubles:
-    """Turn gravity in the sagittal plane. Supine tilted by +15 degrees is head down."""
+    """Tilt the body by -90 to 90 degrees. + lowers the head of a lying body, and leans an upright one back."""
     out = (ctypes.c_double * 3)()
     status = _c.posture_tilt(_three(posture), degrees, out)
     if status != 0:
-        _c.fail(status)
+        _c.fail(status, b"the tilt must be -90 to 90 degrees")
+    return np.array(out)
+
+
+def roll(posture: Gravity, degrees: float) -> Doubles:
+    """Roll the body about its long axis by -180 to 180 degrees, + to its left: supine rolled by 90 degrees is left."""
+    out = (ctypes.c_double * 3)()
+    status = _c.posture_roll(_three(posture), degrees, out)
+    if status != 0:
+        _c.fail(status, b"the roll must be -180 to 180 degrees")
     return np.array(out)
 
 
@@ -150,7 +159,9 @@ def _state(state: Gravity, volume: str = "") -> Any:
     else:
         wanted.gravity = _numbers(state, 3, "gravity")
     if volume:
-        _c.state_parse(volume.encode(), wanted)
+        other = _c.State()
+        _c.state_parse_volume(volume.encode(), other)
+        _c.state_join(wanted, other, wanted)
     return wanted
 
 
@@ -205,8 +216,9 @@ class Basis:
     """
     report: str = ""
 
-    def __init__(self, source: Source, *, storage: str = "auto", simd: str = "auto", normals: bool = True) -> None:
-        options = _c.Options(ctypes.sizeof(_c.Options), STORAGES.index(storage), SIMDS.index(simd), not normals)
+    def __init__(self, source: Source, *, storage: str = "auto", simd: str = "auto", normals: bool = True,
+                 allow_folds: bool = False) -> None:
+        options = _c.Options(ctypes.sizeof(_c.Options), STORAGES.index(storage), SIMDS.index(simd), not normals, allow_folds)
         self._owner = _Owner(source, options)
         self._c = self._owner.pointer
         info = _c.basis_get_info(self._c).contents
