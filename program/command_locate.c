@@ -230,7 +230,8 @@ const supine_command supine_command_locate = {
     .about = "Fits the lungs to a few points observed inside them, for example by a navigation "
              "system. Finds the volume and the translation between the frames of the scan and of "
              "the observations, and corrects the predicted positions near the points. OBSERVED is "
-             "a .mrk.json of 3D Slicer, or a CSV with the columns name,x,y,z, with the names given "
+             "a .mrk.json or .fcsv of 3D Slicer, or a CSV with the columns name,x,y,z, with the "
+             "names given "
              "to 'supine embed'.",
     .options = table,
     .notes = "Expected errors are " SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT

@@ -477,15 +477,18 @@ class Location:
         return xyz, sigma
 
 
-def open(source: Source, *, storage: str = "auto", simd: str = "auto", normals: bool = True) -> Basis:
+def open(source: Source, *, storage: str = "auto", simd: str = "auto", normals: bool = True,
+         allow_folds: bool = False) -> Basis:
     """Open a basis file, given by its path or its bytes, and check all of it.
 
     storage: kind of numbers in memory: "exact", "int16", "mixed"; or "auto", the smallest with an error of at most
         0.005 mm
     simd: instruction set: "portable", "avx2", "avx512"; or "auto", the widest set of this processor
     normals: False ignores the file's normals, to save memory
+    allow_folds: True computes poses with volumes that lungs cannot hold, or at which the surface folds, instead of
+        refusing them
     """
-    return Basis(source, storage=storage, simd=simd, normals=normals)
+    return Basis(source, storage=storage, simd=simd, normals=normals, allow_folds=allow_folds)
 
 
 def precompute(*surfaces: Any, progress: Optional[_program.Progress] = None, **options: Any) -> Basis:
