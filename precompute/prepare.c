@@ -4,6 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include <supine/inputs.h>
+
 #include "base/arena.h"
 #include "base/number.h"
 #include "base/text.h"
@@ -81,13 +83,14 @@ static void tell_volume(const supine_patient_record *record, double measured,
 
 static void describe_fit(const supine_patient_record *record, char *text, size_t size) {
   const supine_patient_fit_report *report = &record->report;
-  (void)supine_print_text(text, size,
-                 "%s: %s law%s from %zu points; held-out residual %.1f of %.1f mm RMS, %.0f %% "
-                 "explained; expected error %.1f mm RMS",
-                 record->name, supine_patient_law_names[record->patient.law],
-                 record->patient.centre_count > 0 ? " and kriging" : "", report->points,
-                 report->held_out[SUPINE_PATIENT_SCORE_CORRECTED], report->baseline,
-                 report->explained, report->expected_point);
+  (void)supine_print_text(
+      text, size,
+      "%s: %s law%s from %zu points; held-out residual %.1f of %.1f mm RMS, %.0f %% "
+      "explained; expected error %.1f mm RMS",
+      record->name, supine_patient_law_names[record->patient.law],
+      record->patient.centre_count > 0 ? " and kriging" : "", report->points,
+      report->held_out[SUPINE_PATIENT_SCORE_CORRECTED], report->baseline, report->explained,
+      report->expected_point);
 }
 
 /* Use the displacement law, the force and the volumes at rest that were fitted to a patient.
@@ -389,6 +392,33 @@ static supine_status set_model(const supine_precompute_options *options,
   return SUPINE_OK;
 }
 
+/* Warn of a height outside those of the equations. Refuse a volume at rest that it predicts if the
+ * scanned lungs, at full inflation, can hardly hold it. */
+static supine_status check_height(const knowledge *known, const supine_resting *resting,
+                                  supine_prepared *p, supine_error *error) {
+  const supine_lungs *lungs = &p->source.lungs;
+  double full = -known->scan.state.volume.ml;
+  double range[2];
+  if (supine_reference_height_is_told(&known->person, range)) {
+    supine_findings_add(&p->source.findings,
+                        "warning: the height of %g cm is outside the %.0f to %.0f cm of the adults "
+                        "for whom the equations are stated: give the volume at rest or at full "
+                        "inflation",
+                        known->person.height, range[0], range[1]);
+  }
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+    full += lungs->volume[lung];
+  }
+  const double share = resting->predicted ? resting->ml[2] / full : 0.0;
+  SUPINE_REFUSE_IF(supine_input_judge(SUPINE_INPUT_REST_SHARE, share) == SUPINE_INPUT_REFUSED,
+                   error, SUPINE_ERROR_ARGUMENT,
+                   "a height of %g cm predicts %.0f mL at rest, %.0f %% of the %.0f mL that the "
+                   "lungs hold at full inflation: check the height and the state of the scan, or "
+                   "give the volume at rest",
+                   known->person.height, resting->ml[2], 100.0 * share, full);
+  return SUPINE_OK;
+}
+
 /* Move the scan to the reference surface, and say what is assumed. */
 static supine_status find_reference(supine_prepared *p, const knowledge *known,
                                     supine_error *error) {
@@ -399,6 +429,7 @@ static supine_status find_reference(supine_prepared *p, const knowledge *known,
   supine_resting resting = known->resting;
   char doubt[512] = "";
   supine_reference_predict_rest(&scanned, &known->person, &resting);
+  SUPINE_TRY(check_height(known, &resting, p, error));
   SUPINE_TRY(supine_reference_find(lungs, &p->model, &known->scan, &resting, &p->reference, error));
   summarize(known, resting.predicted, p);
   if (p->reference.known) {

@@ -152,7 +152,8 @@ class LocationInfo(ctypes.Structure):
     """The C struct supine_location_info."""
     _fields_ = [("state", State), ("volume", c_double), ("volume_error", c_double), ("volume_prior_error", c_double),
                 ("rotation", c_double * 9), ("translation", c_double * 3), ("residual_rms", c_double),
-                ("log_evidence", c_double), ("outlier_count", c_size_t)]
+                ("log_evidence", c_double), ("outlier_count", c_size_t), ("residual_expected", c_double),
+                ("turn", c_double)]
 
 
 class Surface(ctypes.Structure):
@@ -314,6 +315,7 @@ expected_error = _checked("expected_error", c_void_p, POINTER(State), POINTER(St
 locate_space = _declare("locate_space", c_size_t, c_size_t)
 locate = _checked("locate", POINTER(LocateTask), POINTER(Residual), c_void_p, POINTER(c_void_p))
 location_info = _declare("location_get_info", POINTER(LocationInfo), c_void_p)
+location_doubt = _declare("location_doubt", c_bool, POINTER(LocationInfo), c_void_p, c_size_t)
 locate_positions = _checked("locate_positions", c_void_p, c_void_p, c_void_p, c_void_p)
 normals = _declare("normals", None, c_void_p, c_void_p, c_void_p)
 
