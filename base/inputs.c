@@ -65,7 +65,7 @@ static const supine_input inputs[] = {
     .name = "point-outside", .group = "Points", .input = "a point, such as a nodule",
     .against = "the surface of the lungs", .measured = "distance outside, mm",
     .told = NAN, .refused = 60, .evidence = "definition: beyond ribs and chest wall",
-    .remedy = "check the axes and the unit of this point, or leave it out", .interfaces = OFFLINE},
+    .remedy = "check the axes and the unit of this point, or leave it out", .interfaces = SUPINE_INPUT_BY_COMMAND | SUPINE_INPUT_BY_PYTHON},
   [SUPINE_INPUT_DEVICE_NAME] = {
     .name = "device-name", .group = "Points", .input = "the name of a tracker's device",
     .against = "OpenIGTLink", .measured = "characters", .told = NAN, .refused = 20,
@@ -104,12 +104,13 @@ static const supine_input inputs[] = {
   [SUPINE_INPUT_LOCATE_RESIDUALS] = {
     .name = "locate-residuals", .group = "Observed points", .input = "observed points and a volume",
     .against = "the error that is expected", .measured = "RMS residual / RMS expected error",
-    .told = 2, .refused = NAN, .evidence = "to be measured",
-    .remedy = "check the volume, the names of the points and their unit", .interfaces = OFFLINE},
+    .told = 1.5, .refused = NAN, .evidence = "full breaths, 6 to 20 points: told in 1 of 60 fits with right volumes, in 45 of 60 with wrong ones",
+    .people = 5, .n = 120, .remedy = "check the volume, the names of the points and their unit", .interfaces = OFFLINE},
   [SUPINE_INPUT_LOCATE_TURNED] = {
     .name = "locate-turned", .group = "Observed points", .input = "observed points without a rigid motion",
     .against = "the lungs in the state", .measured = "turn that fits best, degrees",
-    .told = 10, .refused = NAN, .evidence = "to be measured",
+    .told = 10, .refused = NAN,
+    .evidence = "definition; the residuals must halve, and a fitted rotation has an SD of 3 degrees",
     .remedy = "let the points' frame turn", .interfaces = OFFLINE},
   [SUPINE_INPUT_SUGGESTION] = {
     .name = "suggestion", .group = "Words", .input = "a word that is unknown",

@@ -315,7 +315,7 @@ static void summarize(const knowledge *given, bool predicted, supine_prepared *p
 
 /* Say what is assumed of the lungs of another simulator's fields. */
 static void summarize_fields(supine_prepared *p) {
-  char posture[160] = "not displaced by gravity";
+  char posture[160] = "taken as the lungs without gravity";
   if (p->posture.known) {
     (void)supine_state_describe(&p->posture.state, posture, sizeof posture);
   }

@@ -139,7 +139,7 @@ static void print(const request *wanted, const supine_command_names *names,
                 "deviation_without_points_ml", fitted ? json_real(best->volume_prior_error) : NULL,
                 "translation_mm", t[0], t[1], t[2], "rotation_degrees",
                 wanted->rigid ? json_real(acos(cosine) * (180.0 / 3.14159265358979)) : NULL,
-                "observed_points", (json_int_t)observed->count, "left_rms_mm", best->residual_rms,
+                "observed_points", (json_int_t)observed->count, "residual_rms_mm", best->residual_rms,
                 "outliers", outliers_of(names, observed, located->residuals)),
       wanted->json);
 }

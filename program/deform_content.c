@@ -154,8 +154,10 @@ static supine_status write_points(const char *path, const supine_basis *basis,
   }
   print_rows(moved, info, rows, count, output.file);
   SUPINE_TRY(supine_output_commit(&output, error));
-  (void)printf("%s: %zu %s%s, displacement from %s\n", path, count, each ? "point" : "structure",
-               count == 1 ? "" : "s", moved->from.name);
+  char state[160];
+  (void)supine_state_describe(&moved->state, state, sizeof state);
+  (void)printf("%s: %zu %s%s, %s, displacement from %s\n", path, count,
+               each ? "point" : "structure", count == 1 ? "" : "s", state, moved->from.name);
   return SUPINE_OK;
 }
 

@@ -33,6 +33,10 @@ static const double share_least = 0.1; /* share of full inflation without gas (r
 static const double spread_least = 0.05;
 /* The factor on the expected errors counts as 1 for this number of points before (assumed). */
 static const double prior_points = 10;
+/* The factor multiplies nothing where the law does not move the lungs, as at the volume of the
+ * scan. Variance of the residuals beyond this multiple of the expected one, without the noise, is
+ * therefore added to the errors. With right volumes, it is hardly ever reached (docs/inputs.md). */
+static const double excess_from = 1.5;
 /* Ratio of supine_kriging_model.sill, 6 mm, to the factor c of the expected error in
  * supine/locate.h, 4.5 mm. Both are variances (mm^2) per mm of displacement. c is smaller because
  * the translation that fits best had been subtracted before c was measured. */
@@ -332,6 +336,7 @@ static size_t find_worst(workspace *s, supine_locate_residual *residuals) {
   double largest = outlier_limit;
   double sum = 0;
   double expected = 0;
+  double noises = 0;
   double ratios = 0;
   size_t used = 0;
   for (size_t j = 0; j < n; ++j) {
@@ -347,6 +352,7 @@ static size_t find_worst(workspace *s, supine_locate_residual *residuals) {
     }
     sum += r->distance * r->distance;
     expected += r->sigma * r->sigma;
+    noises += 3 * noise * noise;
     ++used;
     const double ratio = r->sigma > 0 ? r->distance / r->sigma : 1;
     ratios += ratio * ratio;
@@ -358,8 +364,8 @@ static size_t find_worst(workspace *s, supine_locate_residual *residuals) {
   s->fit->factor = sqrt((prior_points + ratios) / (prior_points + (double)used));
   s->found->residual_rms = used > 0 ? sqrt(sum / (double)used) : 0;
   s->found->residual_expected = used > 0 ? sqrt(expected / (double)used) : 0;
-  const double told = supine_input_get(SUPINE_INPUT_LOCATE_RESIDUALS)->told;
-  s->fit->excess = used > 0 ? fmax(0, (sum - told * told * expected) / (double)used) : 0;
+  s->fit->excess =
+      used > 0 ? fmax(0, (sum - noises - excess_from * (expected - noises)) / (double)used) : 0;
   return worst;
 }
 

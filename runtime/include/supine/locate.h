@@ -154,8 +154,8 @@ SUPINE_API size_t supine_locate_space(size_t count);
  *
  * The expected errors are multiplied by sqrt((10 + sum of z^2) / (10 + n)). z are the distances of
  * the n points that are no outliers from their predictions by all other points, divided by the
- * expected distances. If the RMS distance exceeds twice the expected one, as with a wrong volume,
- * the variance beyond it is added to that of every position. With three or four points, an outlier
+ * expected distances. If the variance of the distances, without noise, exceeds 1.5 times the
+ * expected one, as with a wrong volume, what is beyond is added to the variance of every position. With three or four points, an outlier
  * cannot be found.
  *
  * A rotation has a prior with standard deviation 3 degrees about each axis, unless the points are
