@@ -208,7 +208,7 @@ def breath(ml):
 
 
 def field(posture):
-    return {"command": lambda: command("deform", "grid.safetensors", "--posture", posture, "-o", "field.nrrd")}
+    return {"command": lambda: command("deform", "grid.safetensors", "--posture", posture, "--field", "field.nrrd")}
 
 
 def members(value):
