@@ -16,6 +16,14 @@ void supine_locale_leave(const supine_locale *before) {
   (void)setlocale(LC_NUMERIC, before->numeric);
   (void)_configthreadlocale(before->per_thread);
 }
+#elif defined(__wasm__) /* no locale is ever set; newlocale would read the environment */
+supine_locale supine_locale_enter(void) {
+  return (locale_t)0;
+}
+
+void supine_locale_leave(const supine_locale *before) {
+  (void)before;
+}
 #else
 supine_locale supine_locale_enter(void) {
   /* In glibc and musl this locale is a constant: it is neither allocated nor freed. */

@@ -4,6 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include <supine/inputs.h>
+
 #include "base/arena.h"
 #include "base/number.h"
 #include "base/text.h"
@@ -330,7 +332,7 @@ static void summarize(const knowledge *given, bool predicted, supine_prepared *p
 
 /* Say what is assumed of the lungs of another simulator's fields. */
 static void summarize_fields(supine_prepared *p) {
-  char posture[160] = "not displaced by gravity";
+  char posture[160] = "taken as the lungs without gravity";
   if (p->posture.known) {
     (void)supine_state_describe(&p->posture.state, posture, sizeof posture);
   }
@@ -407,6 +409,33 @@ static supine_status set_model(const supine_precompute_options *options,
   return SUPINE_OK;
 }
 
+/* Warn of a height outside those of the equations. Refuse a volume at rest that it predicts if the
+ * scanned lungs, at full inflation, can hardly hold it. */
+static supine_status check_height(const knowledge *known, const supine_resting *resting,
+                                  supine_prepared *p, supine_error *error) {
+  const supine_lungs *lungs = &p->source.lungs;
+  double full = -known->scan.state.volume.ml;
+  double range[2];
+  if (supine_reference_height_is_told(&known->person, range)) {
+    supine_findings_add(&p->source.findings,
+                        "warning: the height of %g cm is outside the %.0f to %.0f cm of the adults "
+                        "for whom the equations are stated: give the volume at rest or at full "
+                        "inflation",
+                        known->person.height, range[0], range[1]);
+  }
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+    full += lungs->volume[lung];
+  }
+  const double share = resting->predicted ? resting->ml[2] / full : 0.0;
+  SUPINE_REFUSE_IF(supine_input_judge(SUPINE_INPUT_REST_SHARE, share) == SUPINE_INPUT_REFUSED,
+                   error, SUPINE_ERROR_ARGUMENT,
+                   "a height of %g cm predicts %.0f mL at rest, %.0f %% of the %.0f mL that the "
+                   "lungs hold at full inflation: check the height and the state of the scan, or "
+                   "give the volume at rest",
+                   known->person.height, resting->ml[2], 100.0 * share, full);
+  return SUPINE_OK;
+}
+
 /* Move the scan to the reference surface, and say what is assumed. */
 static supine_status find_reference(supine_prepared *p, const knowledge *known,
                                     supine_error *error) {
@@ -417,6 +446,7 @@ static supine_status find_reference(supine_prepared *p, const knowledge *known,
   supine_resting resting = known->resting;
   char doubt[512] = "";
   supine_reference_predict_rest(&scanned, &known->person, &resting);
+  SUPINE_TRY(check_height(known, &resting, p, error));
   SUPINE_TRY(supine_reference_find(lungs, &p->model, &known->scan, &resting, &p->reference, error));
   summarize(known, resting.predicted, p);
   if (p->reference.known) {

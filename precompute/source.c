@@ -3,6 +3,7 @@
 #include <limits.h>
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -184,7 +185,12 @@ static void summarize(const reading *r, supine_source *source) {
   const supine_lungs *lungs = &source->lungs;
   const size_t size = sizeof source->summary;
   char letters[4];
-  supine_mesh_axes_letters(report->axes, letters);
+  supine_mesh_axes_letters(load->axes != SUPINE_AXES_AUTO ? load->axes : report->axes, letters);
+  if (strcmp(letters, "RAI") == 0) {
+    supine_findings_add(&source->findings,
+                        "note: the axes RAI grow to the right, front and feet; what ITK calls RAI "
+                        "is LPS here");
+  }
   supine_text_add(source->summary, size, "%s axes (%s), %g mm a unit", letters,
                   load->axes != SUPINE_AXES_AUTO ? "by --axes"
                   : report->axes_from_tag        ? "the file's tag"

@@ -155,8 +155,10 @@ static supine_status write_points(const char *path, const supine_basis *basis,
   }
   print_rows(moved, info, rows, count, output.file);
   SUPINE_TRY(supine_output_commit(&output, error));
-  (void)printf("%s: %zu %s%s, displacement from %s\n", path, count, each ? "point" : "structure",
-               count == 1 ? "" : "s", moved->from.name);
+  char state[160];
+  (void)supine_state_describe(&moved->state, state, sizeof state);
+  (void)printf("%s: %zu %s%s, %s, displacement from %s\n", path, count,
+               each ? "point" : "structure", count == 1 ? "" : "s", state, moved->from.name);
   return SUPINE_OK;
 }
 
@@ -245,15 +247,15 @@ static supine_status check_images(const supine_deform_content *wanted, const sup
   const struct {
     const char *path;
     const supine_image *image;
-    supine_warp_image_kind kind;
+    supine_field_image_kind kind;
   } images[] = {
-      {wanted->image, &wanted->source, wanted->density ? SUPINE_WARP_CT : SUPINE_WARP_IMAGE},
-      {wanted->labels, &wanted->label_source, SUPINE_WARP_LABELS}};
+      {wanted->image, &wanted->source, wanted->density ? SUPINE_FIELD_CT : SUPINE_FIELD_IMAGE},
+      {wanted->labels, &wanted->label_source, SUPINE_FIELD_LABELS}};
   for (size_t i = 0; i < sizeof images / sizeof *images; ++i) {
     char text[640];
     if (images[i].path != NULL) {
-      SUPINE_TRY(supine_warp_check_image(&field->depth, images[i].image, images[i].path,
-                                         images[i].kind, text, sizeof text, error));
+      SUPINE_TRY(supine_field_check_image(&field->depth, images[i].image, images[i].path,
+                                          images[i].kind, text, sizeof text, error));
       if (text[0] != '\0') {
         supine_options_say("deform", "%s", text);
       }

@@ -225,6 +225,8 @@ supine_status supine_command_pictures_draw(const supine_pictures *wanted, const 
   if (!wanted->turns) {
     SUPINE_TRY(supine_options_posture_list_parse(wanted->postures, &wanted->volume.state,
                                                  &s.postures, error));
+    SUPINE_TRY(supine_options_posture_list_check(
+        &s.postures, wanted->volume.state.volume.kind != SUPINE_VOLUME_DEFAULT, error));
   }
   SUPINE_REFUSE_IF(s.postures.count > SUPINE_PANELS_MAX, error, SUPINE_ERROR_ARGUMENT,
                    "a picture holds at most %d postures: name fewer", SUPINE_PANELS_MAX);

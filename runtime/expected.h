@@ -19,6 +19,7 @@ struct supine_location {
   double origin[3];
   double deviation; /**< prior standard deviation of the volume, mL; 0 if the volume is known */
   double factor;    /**< factor on the expected errors, from the residuals of the points */
+  double excess;    /**< variance that the residuals leave beyond the expected errors, mm^2 */
 };
 
 /* Relative standard deviation of an assumed volume, that at rest if full inflation was scanned and

@@ -56,6 +56,10 @@ struct supine_basis {
   double upright_gain; /**< (full volume upright - full volume supine) / reference volume */
   double scan_volume;  /**< volume in the scan minus that of the reference surface, mL */
   double scan_gravity[3];
+  /** [SUPINE_RANGE_NODES, lung_count, 2] least and largest volume of each lung, mL (checks.h); NULL
+   * if the file has none */
+  const double *volume_range;
+  bool allow_folds;      /**< poses are not checked by `volume_range` */
   const uint32_t *rigid; /**< [rigid_count, 2] begin and end of the vertices of each rigid part */
   size_t rigid_count;
   double reference_error; /**< largest quantisation error of a reference position, mm */
@@ -122,6 +126,12 @@ double supine_basis_storage_error(const supine_basis *basis);
 /** Return whether the numbers of a packed basis can be those of lungs. If not, write to `detail`
  * which number is too large or too small. */
 bool supine_basis_is_plausible(const supine_basis *basis, char *detail, size_t size);
+
+/** As supine_basis_pose and supine_basis_gains, without the check that lungs can hold the volumes. */
+supine_status supine_basis_pose_any(const supine_basis *basis, const supine_state *state,
+                                    supine_pose *pose, supine_error *error);
+supine_status supine_basis_gains_any(const supine_basis *basis, const supine_state *state,
+                                     supine_pose *pose, supine_error *error);
 
 /** Return w^T F w for the matrix F = `form` [count, count]. */
 double supine_volume_square(size_t count, const double *form, const double *w);

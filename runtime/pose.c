@@ -258,7 +258,7 @@ static supine_status check_state(const supine_state *state, supine_error *error)
                                    "a volume of the state is not finite: give a number of mL");
 }
 
-supine_status supine_basis_gains(const supine_basis *basis, const supine_state *state,
+supine_status supine_basis_gains_any(const supine_basis *basis, const supine_state *state,
                                  supine_pose *pose, supine_error *error) {
   supine_state asked = *state;
   SUPINE_TRY(check_state(state, error));
@@ -292,13 +292,13 @@ supine_status supine_basis_gains(const supine_basis *basis, const supine_state *
   return total_gains(basis, &v, total, pose, error);
 }
 
-supine_status supine_basis_pose(const supine_basis *basis, const supine_state *state,
+supine_status supine_basis_pose_any(const supine_basis *basis, const supine_state *state,
                                 supine_pose *pose, supine_error *error) {
   if (supine_basis_weights(basis, state->gravity, pose->weights) != SUPINE_OK) {
     return refuse_gravity(error);
   }
   pose->basis = basis->info.identity;
-  return supine_basis_gains(basis, state, pose, error);
+  return supine_basis_gains_any(basis, state, pose, error);
 }
 
 void supine_pose_fill(supine_pose *pose, double gain) {

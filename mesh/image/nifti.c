@@ -89,12 +89,21 @@ static supine_status check(const char *path, const nifti_image *nifti, bool pack
 static supine_status check_offset(const char *path, supine_error *error) {
   enum { NIFTI_1 = 1, LEAST_1 = 352, LEAST_2 = 544 }; /* bytes of header and extension flag */
   int version = 0;
-  void *header = nifti_read_header(path, &version, 1);
-  SUPINE_REFUSE_IF(header == NULL, error, SUPINE_ERROR_FORMAT,
-                   "%s: not a NIfTI header; give a NIfTI file", path);
+  int swapped = 0;
+  double offset = NAN;
+  free(nifti_read_header(path, &version, 1)); /* does not swap all bytes of the header */
   const bool first = version == NIFTI_1;
-  const double offset = first ? (double)((const nifti_1_header *)header)->vox_offset
-                              : (double)((const nifti_2_header *)header)->vox_offset;
+  if (first) {
+    nifti_1_header *header = nifti_read_n1_hdr(path, &swapped, 1);
+    offset = header != NULL ? (double)header->vox_offset : NAN;
+    free(header);
+  } else {
+    nifti_2_header *header = nifti_read_n2_hdr(path, &swapped, 1);
+    offset = header != NULL ? (double)header->vox_offset : NAN;
+    free(header);
+  }
+  SUPINE_REFUSE_IF(isnan(offset), error, SUPINE_ERROR_FORMAT,
+                   "%s: not a NIfTI header; give a NIfTI file", path);
   const double least = first ? LEAST_1 : LEAST_2;
   free(header);
   SUPINE_REFUSE_IF(

@@ -330,13 +330,15 @@ static void check_shape(checks *c, const supine_lungs *lungs, int *side, bool *a
             ? ". A scan pitched by more than 25 degrees has such a shape, too: turn it upright"
             : "");
   for (size_t lung = 0; lung < lungs->lung_count && c->status == SUPINE_OK; ++lung) {
-    check_solid(c, lungs, lung);
     check_tips(c, lungs, lung);
   }
   check(c, !found.joined || c->source->midline != NULL || c->source->side != 0, SUPINE_ERROR_MESH,
         "this surface looks like both lungs in one piece: separate them (for a label map by "
         "--labels one). If it is a single lung, give --midline");
   check_size(c, lungs, likely);
+  for (size_t lung = 0; lung < lungs->lung_count && c->status == SUPINE_OK; ++lung) {
+    check_solid(c, lungs, lung);
+  }
 }
 
 /* Choose the side of a single lung as stated, or by its shape or, if that is unclear, by its

@@ -106,9 +106,9 @@ static void describe(const sight *s, bool ct, bool scaled, char *text, size_t si
   }
 }
 
-supine_status supine_warp_check_image(const supine_image *depth, const supine_image *image,
-                                      const char *path, supine_warp_image_kind kind, char *warning,
-                                      size_t size, supine_error *error) {
+supine_status supine_field_check_image(const supine_image *depth, const supine_image *image,
+                                       const char *path, supine_field_image_kind kind,
+                                       char *warning, size_t size, supine_error *error) {
   SUPINE_ARENA arena = {0};
   char text[512] = "";
   const size_t most = depth->size[0] * depth->size[1] * depth->size[2];
@@ -120,9 +120,9 @@ supine_status supine_warp_check_image(const supine_image *depth, const supine_im
     return SUPINE_OK;
   }
   qsort(s.value, s.seen, sizeof *s.value, compare);
-  describe(&s, kind == SUPINE_WARP_CT || (kind == SUPINE_WARP_IMAGE && is_hounsfield(image)),
-           kind == SUPINE_WARP_CT, text, sizeof text);
-  SUPINE_REFUSE_IF(kind == SUPINE_WARP_CT && text[0] != '\0', error, SUPINE_ERROR_FORMAT, "%s: %s",
+  describe(&s, kind == SUPINE_FIELD_CT || (kind == SUPINE_FIELD_IMAGE && is_hounsfield(image)),
+           kind == SUPINE_FIELD_CT, text, sizeof text);
+  SUPINE_REFUSE_IF(kind == SUPINE_FIELD_CT && text[0] != '\0', error, SUPINE_ERROR_FORMAT, "%s: %s",
                    path, text);
   if (text[0] != '\0') {
     (void)snprintf(warning, size, "%s: warning: %s", path, text);

@@ -178,6 +178,7 @@ void supine_stream_patient_receive(supine_stream_patient *patient,
     break;
   case SUPINE_STREAM_NOTHING:
   case SUPINE_STREAM_REQUEST:
+  case SUPINE_STREAM_INVALID:
     ++patient->counts->skipped;
     break;
   }

@@ -413,7 +413,8 @@ TEST(test_labels_lungs_cut_at_the_border_reported) {
   supine_image part = image;
   part.size[2] -= 20;
   part.values = (uint8_t *)image.values + 20 * layer;
-  const supine_labels_options options = {.edge = 5.0};
+  /* named, as a bed of more than a tenth of a lung would not be believed of unnamed labels */
+  const supine_labels_options options = {.edge = 5.0, .labels = "left=2,right=1"};
   made out = surfaces_of_image(&part, "cut.nrrd", &options);
   assert_true(out.report.lung[0].cut && out.report.lung[1].cut);
   check_closed(&out.surface[0]);

@@ -79,6 +79,7 @@ typedef struct supine_basis_options {
   supine_storage storage;
   supine_simd simd;
   bool without_normals; /**< do not load normals, which saves memory */
+  bool allow_folds;     /**< compute poses that supine_basis_check refuses */
   /** Functions that allocate and free all memory of the basis but the mapped file, called only
    * while it is opened or closed. Both are NULL, or neither. */
   supine_allocator allocator;
@@ -225,8 +226,9 @@ SUPINE_API supine_status supine_basis_weights(const supine_basis *basis, const d
  *                                    relative to rest or to full inflation, which the file lacks;
  * or the lungs named in the state are not exactly those of the basis
  * @retval SUPINE_ERROR_OPEN_SURFACE  the surface is open and has no volumes
- * @retval SUPINE_ERROR_NUMERICAL     the surface folds before it holds that volume, or the volume
- * is out of reach; single triangles that turn over earlier are not detected
+ * @retval SUPINE_ERROR_NUMERICAL     the volume is out of reach, or the lungs cannot hold it
+ *                                    (supine_basis_check); the latter is not checked if the basis
+ *                                    was opened with supine_basis_options.allow_folds
  *
  * [MilicEmili1966]  Milic-Emili, Henderson, Dolovich, Trop, Kaneko, J. Appl. Physiol. 21, 1966,
  *                   749-759 */
@@ -238,6 +240,16 @@ SUPINE_API supine_status supine_basis_pose(const supine_basis *basis, const supi
  * supine_basis_pose, and SUPINE_ERROR_ARGUMENT for a pose of another basis. */
 SUPINE_API supine_status supine_basis_gains(const supine_basis *basis, const supine_state *state,
                                             supine_pose *pose, supine_error *error);
+
+/** Check that lungs can hold the volumes of a pose: 10 to 120 % of full inflation, without folds in
+ * more than 1 % of the triangles of a lung. The file holds the range of volumes of each lung in 26
+ * directions of gravity; between them it is interpolated. The state of the scan, and all states of
+ * a file without these ranges, are taken. Limits: supine_input_get. Cost: mode_count^3 for each
+ * lung.
+ * @param state  the state of the pose
+ * @retval SUPINE_ERROR_NUMERICAL  lungs cannot hold these volumes; `error` says which */
+SUPINE_API supine_status supine_basis_check(const supine_basis *basis, const supine_state *state,
+                                            const supine_pose *pose, supine_error *error);
 
 /** Return the default volume of a basis (supine_basis_pose). If the default is to multiply
  * displacements by 1, whatever the volume, the kind of the result is SUPINE_VOLUME_DEFAULT. */
