@@ -218,6 +218,92 @@ def members(value):
                                                         given.get("volume", "") if isinstance(given, dict) else ""))}
 
 
+def write_nrrd(name, voxels, origin=None):
+    """Write an array [z, y, x] on the grid of the basis `nodes`."""
+    kind = {"uint8": "uchar", "int16": "short", "float32": "float"}[voxels.dtype.name]
+    vector = lambda v: "(" + ",".join(f"{x:.6f}" for x in v) + ")"
+    with open(name, "wb") as file:
+        file.write((f"NRRD0004\ntype: {kind}\ndimension: 3\nspace: left-posterior-superior\nsizes: "
+                    + " ".join(map(str, voxels.shape[::-1])) + "\nspace directions: " + " ".join(map(vector, frame[1:]))
+                    + f"\nspace origin: {vector(frame[0] if origin is None else origin)}\nencoding: raw\nendian: little\n\n").encode())
+        file.write(np.ascontiguousarray(voxels).tobytes())
+
+
+def mapped(voxels, **options):
+    """A basis made from a label map."""
+    def run(call):
+        write_nrrd("map.nrrd", voxels)
+        return call()
+    return {key: lambda call=call: run(call) for key, call in made("map.nrrd", edge=8, **options).items()}
+
+
+def nifti(offset):
+    """A basis made from a label map in NIfTI whose header says that the voxels begin at `offset`."""
+    def run(call):
+        head = bytearray(352)
+        struct.pack_into("<i", head, 0, 348)
+        struct.pack_into("<8h", head, 40, 3, *sides.shape[::-1], 1, 1, 1, 1)
+        struct.pack_into("<2h", head, 70, 2, 8)
+        struct.pack_into("<9f", head, 76, *[1, *np.linalg.norm(frame[1:], axis=1), 1, 1, 1, 1], offset)
+        struct.pack_into("<2h", head, 252, 0, 1)
+        for k in range(3):
+            struct.pack_into("<4f", head, 280 + 16 * k, *((-1 if k < 2 else 1) * np.append(frame[1:, k], frame[0, k])))
+        head[123], head[344:348] = 2, b"n+1\0"
+        with open("map.nii", "wb") as file:
+            file.write(bytes(head) + sides.tobytes())
+        return call()
+    return {key: lambda call=call: run(call) for key, call in made("map.nii", edge=8).items()}
+
+
+def imaged(voxels, *words, shift=0.0):
+    """A CT that moves with the lungs."""
+    def run():
+        write_nrrd("ct.nrrd", voxels, frame[0] + [0, 0, shift])
+        return command("deform", "grid.safetensors", "--posture", "prone:rest", "--image", "ct.nrrd", *words, "-o", "moved.nrrd")
+    return {"command": run}
+
+
+def scanned(scale, left=1.0):
+    """Validate a basis by a scan at rest that is scaled, its left lung along z."""
+    def run():
+        vertices = lungs.deform(lungs.pose("supine:rest")).astype(float)
+        mean = vertices.mean(axis=0)
+        height = np.where(np.asarray(lungs.tensor("lung")).ravel() == 0, left, 1.0)
+        vertices = (vertices - mean) * scale * np.column_stack([height ** 0, height ** 0, height]) + mean
+        write_ply("scan.ply", vertices, lungs.triangles)
+        return command("validate", "lungs.safetensors", "--state", "supine:scan.ply", "--units", "mm")
+    return {"command": run}
+
+
+def paired(*words, mismatched=0):
+    """Validate a basis by landmarks from the scan to rest."""
+    def run():
+        place = np.flatnonzero(depth > 8)[::7]
+        first = nodes.vertices[place].astype(float)
+        second = nodes.deform(nodes.pose("supine:rest"))[place].astype(float)
+        second[10:10 + mismatched] = second[-mismatched - 1:-1]
+        with open("pairs.csv", "w", encoding="utf-8") as file:
+            file.write("x,y,z,to_x,to_y,to_z\n")
+            np.savetxt(file, np.column_stack([first, second]), "%.4f", ",")
+        return command("validate", "lungs.safetensors", "--landmarks", "pairs.csv", "--to", "supine:rest", *words)
+    return {"command": run}
+
+
+def write_dae(name, up):
+    """Write the lungs as a COLLADA file that says which axis is up."""
+    points_, corners = " ".join(f"{x:.4f}" for x in lungs.vertices.ravel()), " ".join(map(str, lungs.triangles.ravel()))
+    n, t = len(lungs.vertices), len(lungs.triangles)
+    with open(name, "w", encoding="utf-8") as file:
+        file.write(f'<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset>'
+                   f'<unit meter="1"/><up_axis>{up}</up_axis></asset><library_geometries><geometry id="g"><mesh><source id="s">'
+                   f'<float_array id="f" count="{3 * n}">{points_}</float_array><technique_common><accessor source="#f" count="{n}" '
+                   'stride="3"><param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/></accessor>'
+                   '</technique_common></source><vertices id="v"><input semantic="POSITION" source="#s"/></vertices><triangles '
+                   f'count="{t}"><input semantic="VERTEX" source="#v" offset="0"/><p>{corners}</p></triangles></mesh></geometry>'
+                   '</library_geometries><library_visual_scenes><visual_scene id="c"><node id="n"><instance_geometry url="#g"/>'
+                   '</node></visual_scene></library_visual_scenes><scene><instance_visual_scene url="#c"/></scene></COLLADA>')
+
+
 # For each row: a right input, a wrong one, and the verdict on the wrong one.
 CASES = {
     "volumes-of-a-state": (state("prone", "rest"),
@@ -242,14 +328,76 @@ CASES = {
     "lungs-small": (made("lungs.ply"), made("small.ply", units="mm"), "told"),
     "locate-residuals": (lambda: located("rest"), lambda: located("full"), None),
     "locate-turned": (lambda: located("rest"), lambda: located("rest", 25.0), None),
+    "label-value": (lambda: mapped(sides.astype(np.float32) + np.float32(1e-4)), lambda: mapped(sides.astype(np.float32) * 1.5), "refused"),
+    "labels-ratio": (lambda: mapped(sides), lambda: mapped(tumour(8)), "refused"),
+    "labels-pieces": (lambda: mapped(sides), lambda: mapped(bed()), "refused"),
+    "labels-sides": (lambda: mapped(sides), lambda: mapped(np.where(sides == 0, 0, 1 + (row_of(2) < row_of(2)[sides > 0].mean() - 2))
+                                                           .astype(np.uint8)), "refused"),
+    "labels-order": (lambda: mapped(lobes((1, 2, 3, 4, 5))), lambda: mapped(lobes((4, 5, 1, 2, 3))), "refused"),
+    "lung-pieces": (lambda: mapped(sides, labels="left=1,right=2"), lambda: mapped(bed(), labels="left=1,right=2"), "told"),
+    "lung-hollow": (lambda: made("lungs.ply"), lambda: made("hollow.ply"), "refused"),
+    "voxels-begin": (lambda: nifti(352), lambda: nifti(0), "refused"),
+    "image-frame": (lambda: imaged(ct), lambda: imaged(ct, shift=900.0), "told"),
+    "ct-frame": (lambda: imaged(ct, "--density"), lambda: imaged(ct, "--density", shift=900.0), "refused"),
+    "ct-air": (lambda: imaged(ct, "--density"), lambda: imaged(-ct - 810, "--density"), "refused"),
+    "person-width-least": (lambda: scanned((1, 1, 1)), lambda: scanned((0.8, 1, 1)), "told"),
+    "person-width-most": (lambda: scanned((1, 1, 1)), lambda: scanned((1.25, 1, 0.8)), "told"),
+    "person-depth-least": (lambda: scanned((1, 1, 1)), lambda: scanned((1, 0.7, 1)), "told"),
+    "person-depth-most": (lambda: scanned((1, 1, 1)), lambda: scanned((1, 1.3, 0.75)), "told"),
+    "person-left-least": (lambda: scanned((1, 1, 1)), lambda: scanned((1, 1, 1), 0.65), "told"),
+    "person-left-most": (lambda: scanned((1, 1, 1)), lambda: scanned((1, 1, 0.8), 1.4), "told"),
+    "landmarks-order": (lambda: paired(), lambda: paired("--reverse"), "refused"),
+    "landmarks-match": (lambda: paired(), lambda: paired(mismatched=3), "told"),
+    "patient-box": (lambda: made("lungs.ply", patient="patient.json"), lambda: made("high.ply", patient="patient.json"), "told"),
+    "patient-volume": (lambda: made("lungs.ply", patient="patient.json"), lambda: made("full.ply", patient="patient.json"), "told"),
+    "surface-turned": (lambda: made("up.dae", axes="LSA"), lambda: made("up.dae"), "refused"),
     "suggestion": (suggested("pron"), suggested("Bauchlage"), "told"),
 }
 
 
-def scale(source, target, factor):
-    """Write a copy of a binary PLY file of floats or doubles with its vertices scaled."""
+def row_of(axis):
+    """The index of each voxel along x, y or z."""
+    return np.indices(sides.shape)[2 - axis]
+
+
+def tumour(radius):
+    """Label 1 holds both lungs, label 2 a ball in the left one."""
+    middle = np.argwhere(sides == 1).mean(axis=0)
+    near = np.linalg.norm(np.moveaxis(np.indices(sides.shape), 0, -1) - middle, axis=-1) * 8 < 8 * radius / 2
+    return np.where(near & (sides == 1), 2, np.minimum(sides, 1)).astype(np.uint8)
+
+
+def bed():
+    """The lungs, and a part apart from them with the label of one."""
+    voxels = sides.copy()
+    voxels[:, -2:, :] = sides.max()
+    return voxels
+
+
+def lobes(order):
+    """Two lobes of the left lung and three of the right one, from head to feet, with these labels."""
+    height = row_of(2).astype(float)
+    voxels = np.zeros_like(sides)
+    for side, labels in ((left, order[:2]), (3 - left, order[2:])):
+        part = sides == side
+        share = (height - height[part].min()) / (height[part].max() - height[part].min() + 1)
+        voxels[part] = np.array(labels)[((1 - share[part]) * len(labels) * 0.999).astype(int)]
+    return voxels
+
+
+def grid_of():
+    """Voxelise the lungs on the grid of a basis: sides of voxels, 1 and 2, depths, and an image like a CT."""
     assert command("embed", "lungs.safetensors", "--grid", 8, "-o", "grid.safetensors")[0] == "taken"
-    vertices, faces = lungs.vertices.astype(float) * factor, lungs.triangles
+    basis = supine.open("grid.safetensors")
+    steps, shape = np.asarray(basis.tensor("grid"), float), tuple(int(n) for n in basis.tensor("grid_size"))[::-1]
+    place = np.rint((basis.vertices - steps[0]) @ np.linalg.inv(steps[1:])).astype(int).T[::-1]
+    deep = np.asarray(basis.tensor("depth")).ravel()
+    voxels = np.zeros(shape, np.uint8)
+    voxels[tuple(place)] = np.where(deep > 0, 1 + np.asarray(basis.tensor("lung")).ravel(), 0)
+    return basis, steps, deep, voxels, np.where(voxels > 0, -850, 40).astype(np.int16)
+
+
+def write_ply(target, vertices, faces):
     with open(target, "w", encoding="utf-8") as file:
         file.write(f"ply\nformat ascii 1.0\nelement vertex {len(vertices)}\nproperty double x\nproperty double y\n"
                    f"property double z\nelement face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n")
@@ -274,8 +422,20 @@ def prepare():
 
 
 lungs, inside = prepare()
-scale("lungs.ply", "small.ply", 0.75)
-scale("lungs.ply", "tiny.ply", 0.4)
+nodes, frame, depth, sides, ct = grid_of()
+left = 1  # the label of the left lung, which is lung 0
+solid, corners = lungs.vertices.astype(float), lungs.triangles
+write_ply("small.ply", 0.75 * solid, corners)
+write_ply("tiny.ply", 0.4 * solid, corners)
+write_ply("high.ply", (solid - solid.mean(axis=0)) * [1, 1, 1.08] + solid.mean(axis=0), corners)
+write_ply("full.ply", (solid - solid.mean(axis=0)) * 1.04 + solid.mean(axis=0), corners)
+first_lung = np.asarray(lungs.tensor("lung")).ravel()
+middles = np.array([solid[first_lung == j].mean(axis=0) for j in (0, 1)])[first_lung]
+write_ply("hollow.ply", np.concatenate([solid, middles + 0.97 * (solid - middles)]),
+          np.concatenate([corners, corners[:, ::-1] + len(solid)]))
+write_ply("rest.ply", lungs.deform(lungs.pose("supine:rest")).astype(float), corners)
+write_dae("up.dae", "Z_UP")
+command("fit", "rest.ply", "lungs.ply", "--other", "supine:full", "-o", "patient.json")
 faults = []
 rows = table()
 print(f"{'check':20} {'input':6} " + " ".join(f"{name:11}" for name in INTERFACES))

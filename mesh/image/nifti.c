@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include <nifti2_io.h>
+#include <supine/inputs.h>
 
 #include "base/arena.h"
 #include "base/text.h"
@@ -85,15 +86,15 @@ static supine_status check(const char *path, const nifti_image *nifti, bool pack
   return SUPINE_OK;
 }
 
-/* Refuse a header that does not say where the voxels begin: libnifti2 would take other bytes. */
-static supine_status check_offset(const char *path, supine_error *error) {
-  enum { NIFTI_1 = 1, LEAST_1 = 352, LEAST_2 = 544 }; /* bytes of header and extension flag */
+/* Return where the header says that the voxels begin; NAN if there is no header. */
+static double offset_of(const char *path, bool *first) {
+  enum { NIFTI_1 = 1 };
   int version = 0;
   int swapped = 0;
   double offset = NAN;
-  free(nifti_read_header(path, &version, 1)); /* does not swap all bytes of the header */
-  const bool first = version == NIFTI_1;
-  if (first) {
+  free(nifti_read_header(path, &version, 1)); /* finds the version, but leaves bytes unswapped */
+  *first = version == NIFTI_1;
+  if (*first) {
     nifti_1_header *header = nifti_read_n1_hdr(path, &swapped, 1);
     offset = header != NULL ? (double)header->vox_offset : NAN;
     free(header);
@@ -102,16 +103,23 @@ static supine_status check_offset(const char *path, supine_error *error) {
     offset = header != NULL ? (double)header->vox_offset : NAN;
     free(header);
   }
+  return offset;
+}
+
+/* Refuse a header that does not say where the voxels begin: libnifti2 would take other bytes. */
+static supine_status check_offset(const char *path, supine_error *error) {
+  bool first = true;
+  const double offset = offset_of(path, &first);
+  const double least = first ? 352.0 : 544.0; /* bytes of the header and the extension flag */
   SUPINE_REFUSE_IF(isnan(offset), error, SUPINE_ERROR_FORMAT,
                    "%s: not a NIfTI header; give a NIfTI file", path);
-  const double least = first ? LEAST_1 : LEAST_2;
-  free(header);
-  SUPINE_REFUSE_IF(
-      !(offset >= least && offset <= (double)INT32_MAX) || offset != floor(offset), error,
-      SUPINE_ERROR_FORMAT,
-      "%s: its vox_offset is %g, but voxels begin at a whole byte from %.0f; write the "
-      "image again",
-      path, offset, least);
+  SUPINE_REFUSE_IF(supine_input_judge(SUPINE_INPUT_VOXELS_BEGIN, offset / least) !=
+                           SUPINE_INPUT_TAKEN ||
+                       offset > (double)INT32_MAX || offset != floor(offset),
+                   error, SUPINE_ERROR_FORMAT,
+                   "%s: its vox_offset is %g, but voxels begin at a whole byte from %.0f; write "
+                   "the image again",
+                   path, offset, least);
   return SUPINE_OK;
 }
 

@@ -47,7 +47,7 @@ static supine_status join_vertices(supine_mesh *mesh, const char *name, supine_f
     return SUPINE_OK;
   }
   SUPINE_TRY(supine_mesh_join_close(mesh, rounding, &joined));
-  if (supine_input_judge(SUPINE_INPUT_VERTICES_CLOSE, (double)joined) != SUPINE_INPUT_TAKEN) {
+  if (joined > 0) {
     supine_findings_add(findings, "%s: note: joined %zu %s within 0.0001 mm of another", name,
                         joined, joined == 1 ? "vertex" : "vertices");
   }

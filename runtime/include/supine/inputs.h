@@ -67,7 +67,6 @@ typedef enum supine_input_id {
   SUPINE_INPUT_PATIENT_VOLUME,
   /* Surfaces. */
   SUPINE_INPUT_SURFACE_TURNED,
-  SUPINE_INPUT_VERTICES_CLOSE,
   /* Lungs located from observed points. */
   SUPINE_INPUT_LOCATE_RESIDUALS,
   SUPINE_INPUT_LOCATE_TURNED,
