@@ -138,7 +138,7 @@ static const supine_input inputs[] = {
   [SUPINE_INPUT_LUNG_HOLLOW] = {
     .name = "lung-hollow", .group = "Label maps", .input = "the surface of a lung, also of a mesh",
     .against = "a sphere of its volume", .measured = "area of the sphere / area", .below = true,
-    .told = NAN, .refused = 0.3, .evidence = "lungs: 0.61 to 0.77; a shell of 3 mm: 0.07",
+    .told = NAN, .refused = 0.1, .evidence = "lungs: 0.61 to 0.77; a shell of 3 mm: 0.07",
     .people = 10, .n = 38,
     .remedy = "fill the mask, or remove the surface inside", .interfaces = OFFLINE},
   [SUPINE_INPUT_VOXELS_BEGIN] = {

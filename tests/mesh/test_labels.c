@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Test surfaces made from label maps: accuracy, meanings of labels, reports, refused maps. */
-#include "tests/helpers/folder.h"
 #include "mesh/labels/labels.h"
 #include "mesh/labels/mask.h"
 #include "precompute/lungs/phantom.h"
 #include "precompute/lungs/surface.h"
+#include "tests/helpers/folder.h"
 
 #include "tests/helpers/labels_helpers.h"
 #include "tests/helpers/sh_helpers.h"
@@ -630,6 +630,43 @@ TEST(test_labels_shapes_any_label_one_surface_each) {
   assert_says(error.message, "more than 256 labels");
   assert_int_equal(supine_labels_shapes(in_folder("absent.nrrd"), NULL, 0, &shapes, &count, &error),
                    SUPINE_ERROR_READ);
+  supine_image_free(&image);
+}
+
+/* Two labels that nobody named must be two lungs; probabilities and scaled integers are read. */
+TEST(test_labels_unlikely_pairs_refused_scaled_values_read) {
+  const supine_labels_options plain = {.edge = 5.0};
+  supine_image image = helper_two_lungs(4.0);
+  const size_t count = voxels(&image);
+  uint8_t *at = image.values;
+  made clean = surfaces_of_image(&image, "clean.nrrd", &plain);
+  SUPINE_ARENA arena = {0};
+  float *scaled = supine_arena_take(&arena, count, sizeof *scaled);
+  assert_non_null(scaled);
+  for (size_t i = 0; i < count; ++i) {
+    scaled[i] = (float)at[i] + (i % 2 == 0 ? 9e-4F : -9e-4F);
+  }
+  supine_image other = image;
+  other.values = scaled;
+  other.voxel = SUPINE_VOXEL_F32;
+  made out = surfaces_of_image(&other, "scaled.nrrd", &plain);
+  assert_true(out.report.lung[0].mask == clean.report.lung[0].mask);
+  release(&out);
+  for (size_t i = 0; i < count; ++i) { /* probabilities of both lungs */
+    scaled[i] = at[i] != 0 ? 0.6F : 0.4F;
+  }
+  out = surfaces_of_image(&other, "probable.nrrd", &plain);
+  assert_true(fabs(out.report.lung[0].mask + out.report.lung[1].mask - clean.report.lung[0].mask -
+                   clean.report.lung[1].mask) < 1e-9);
+  release(&out);
+  release(&clean);
+  size_t inside = 0;
+  for (size_t i = 0; i < count; ++i) { /* label 1 is both lungs, label 2 a part of one */
+    inside += at[i] == 2;
+    at[i] = at[i] == 0 ? 0 : (uint8_t)(at[i] == 2 && inside < 600 ? 2 : 1);
+  }
+  assert_int_equal(supine_image_write(in_folder("bad.nrrd"), &image, NULL, NULL), SUPINE_OK);
+  refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "hardly the two lungs");
   supine_image_free(&image);
 }
 
