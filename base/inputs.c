@@ -233,7 +233,7 @@ static const supine_input inputs[] = {
     .name = "locate-turned", .group = "Observed points", .input = "observed points without a rigid motion",
     .against = "the lungs in the state", .measured = "turn that fits best, degrees",
     .told = 10, .refused = NAN,
-    .evidence = "definition; the residuals must halve, and a fitted rotation has an SD of 3 degrees",
+    .evidence = "definition; the residuals must fall to a quarter, and a fitted rotation has an SD of 3 degrees",
     .remedy = "let the points' frame turn", .interfaces = OFFLINE},
   [SUPINE_INPUT_SUGGESTION] = {
     .name = "suggestion", .group = "Words", .input = "a word that is unknown",

@@ -231,7 +231,7 @@ static supine_rigid_motion find_motion(const workspace *s) {
 }
 
 /* Measure the turn of the points that fits best, where no rotation is to be found. It is 0 if the
- * points do not fit clearly better with it: the residuals must halve. */
+ * points do not fit clearly better with it: the residuals must fall to a quarter. */
 static void find_turn(workspace *s) {
   const size_t n = s->task->count;
   const supine_rigid_motion motion = find_motion(s);
@@ -249,7 +249,7 @@ static void find_turn(workspace *s) {
       turned += pow(observed - supine_rigid_move(&motion, law, i), 2);
     }
   }
-  s->found->turn = n > 3 && turned < 0.25 * straight ? angle_of(motion.rotation, vector) : 0;
+  s->found->turn = n > 3 && turned < straight / 16 ? angle_of(motion.rotation, vector) : 0;
 }
 
 /* Set the rotation to the one that moves the predicted positions closest to the observed ones. */
@@ -397,9 +397,9 @@ static supine_status refuse_residuals(const workspace *s, const supine_locate_re
     const double degrees = s->found->turn * (180 / 3.14159265358979);
     char turn[96] = "";
     if (supine_input_judge(SUPINE_INPUT_LOCATE_TURNED, degrees) != SUPINE_INPUT_TAKEN) {
-      (void)supine_print_text(turn, sizeof turn,
-                              "; they fit when turned by %.0f degrees: let their frame turn",
-                              degrees);
+      (void)supine_print_text(
+          turn, sizeof turn,
+          "; they fit much better when turned by %.0f degrees: let their frame turn", degrees);
     }
     return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
                             "the points do not fit these lungs: each differs by %.0f mm (RMS) "

@@ -86,33 +86,36 @@ static supine_status check(const char *path, const nifti_image *nifti, bool pack
   return SUPINE_OK;
 }
 
-/* Return where the header says that the voxels begin; NAN if there is no header. */
-static double offset_of(const char *path, bool *first) {
+/* Find where the header says that the voxels begin. Return false if there is no header. */
+static bool find_offset(const char *path, bool *first, double *offset) {
   enum { NIFTI_1 = 1 };
   int version = 0;
   int swapped = 0;
-  double offset = NAN;
+  bool found = false;
   free(nifti_read_header(path, &version, 1)); /* finds the version, but leaves bytes unswapped */
   *first = version == NIFTI_1;
   if (*first) {
     nifti_1_header *header = nifti_read_n1_hdr(path, &swapped, 1);
-    offset = header != NULL ? (double)header->vox_offset : NAN;
+    found = header != NULL;
+    *offset = found ? (double)header->vox_offset : 0.0;
     free(header);
   } else {
     nifti_2_header *header = nifti_read_n2_hdr(path, &swapped, 1);
-    offset = header != NULL ? (double)header->vox_offset : NAN;
+    found = header != NULL;
+    *offset = found ? (double)header->vox_offset : 0.0;
     free(header);
   }
-  return offset;
+  return found;
 }
 
 /* Refuse a header that does not say where the voxels begin: libnifti2 would take other bytes. */
 static supine_status check_offset(const char *path, supine_error *error) {
   bool first = true;
-  const double offset = offset_of(path, &first);
+  double offset = 0.0;
+  const bool found = find_offset(path, &first, &offset);
   const double least = first ? 352.0 : 544.0; /* bytes of the header and the extension flag */
-  SUPINE_REFUSE_IF(isnan(offset), error, SUPINE_ERROR_FORMAT,
-                   "%s: not a NIfTI header; give a NIfTI file", path);
+  SUPINE_REFUSE_IF(!found, error, SUPINE_ERROR_FORMAT, "%s: not a NIfTI header; give a NIfTI file",
+                   path);
   SUPINE_REFUSE_IF(supine_input_judge(SUPINE_INPUT_VOXELS_BEGIN, offset / least) !=
                            SUPINE_INPUT_TAKEN ||
                        offset > (double)INT32_MAX || offset != floor(offset),

@@ -3,9 +3,9 @@
 #include <arpa/inet.h>
 #include <stdbool.h>
 #include <string.h>
-#include <strings.h>
 
 #include "base/arena.h"
+#include "base/ascii.h"
 #include "base/clones.h"
 #include "base/vec3.h"
 #include "program/stream/message.h"
@@ -234,7 +234,7 @@ static bool ends_in(const unsigned char *key, size_t size, const char *end) {
 }
 
 static bool equals(const unsigned char *value, size_t size, const char *word) {
-  return size == strlen(word) && strncasecmp((const char *)value, word, size) == 0;
+  return size == strlen(word) && supine_ascii_same_begin((const char *)value, word, size);
 }
 
 /* Return whether an entry of the metadata marks a pose as invalid. The state of a tool's switch is

@@ -98,7 +98,7 @@ def check_headers(page):
         for name in re.findall(r"(\w+\.h)", cells):
             stated[name] = stability
     found = {}
-    for folder in ("runtime/include/supine", "program/offline/include/supine"):
+    for folder in ("runtime/include/supine", "precompute/include/supine"):
         for path in glob.glob(os.path.join(source, folder, "*.h")):
             said = re.search(r"Stability: (\w+)", read(os.path.relpath(path, source)))
             found[os.path.basename(path)] = said[1] if said else "not stated"

@@ -127,8 +127,8 @@ typedef struct supine_location_info {
   double log_evidence;   /**< log likelihood, for comparing tasks that differ only in the posture */
   size_t outlier_count;  /**< number of points that were left out as outliers */
   double residual_expected; /**< expected RMS of the distances in `residual_rms`, mm */
-  double turn; /**< turn of the points' frame that would halve the residuals, rad, where no rotation
-                  was to be found; 0 if there is none */
+  double turn; /**< turn of the points' frame that would quarter the residuals, rad, where no
+                  rotation was to be found; 0 if there is none */
 } supine_location_info;
 
 /** Comparison of an observed point with its prediction by all other points. */
@@ -155,8 +155,8 @@ SUPINE_API size_t supine_locate_space(size_t count);
  * The expected errors are multiplied by sqrt((10 + sum of z^2) / (10 + n)). z are the distances of
  * the n points that are no outliers from their predictions by all other points, divided by the
  * expected distances. If the variance of the distances, without noise, exceeds 1.5 times the
- * expected one, as with a wrong volume, what is beyond is added to the variance of every position. With three or four points, an outlier
- * cannot be found.
+ * expected one, as with a wrong volume, what is beyond is added to the variance of every position.
+ * With three or four points, an outlier cannot be found.
  *
  * A rotation has a prior with standard deviation 3 degrees about each axis, unless the points are
  * turned by more than 30 degrees: then their frame is another one. Cost: about 0.2 ms for 20
