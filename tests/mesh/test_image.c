@@ -376,10 +376,10 @@ TEST(test_nifti_plain_named_gz_read) {
   unsigned char bytes[472];
   supine_image image = made(SUPINE_VOXEL_I16, 5);
   supine_image read = {0};
-  assert_int_equal(supine_image_write(in_folder("p.nii"), &image, NULL, NULL), SUPINE_OK);
-  assert_int_equal(read_bytes(in_folder("p.nii"), bytes, sizeof bytes), sizeof bytes);
-  write_bytes(in_folder("p.nii.gz"), bytes, sizeof bytes);
-  assert_int_equal(supine_image_read(in_folder("p.nii.gz"), &read, NULL), SUPINE_OK);
+  assert_int_equal(supine_image_write(in_folder("plain.nii"), &image, NULL, NULL), SUPINE_OK);
+  assert_int_equal(read_bytes(in_folder("plain.nii"), bytes, sizeof bytes), sizeof bytes);
+  write_bytes(in_folder("plain.nii.gz"), bytes, sizeof bytes);
+  assert_int_equal(supine_image_read(in_folder("plain.nii.gz"), &read, NULL), SUPINE_OK);
   assert_memory_equal(read.values, image.values,
                       image.size[0] * image.size[1] * image.size[2] * sizeof(int16_t));
   supine_image_free(&image);
