@@ -413,16 +413,17 @@ TEST(test_labels_lungs_cut_at_the_border_reported) {
   supine_image part = image;
   part.size[2] -= 20;
   part.values = (uint8_t *)image.values + 20 * layer;
+  const supine_labels_options options = {.edge = 5.0};
   /* named, as a bed of more than a tenth of a lung would not be believed of unnamed labels */
-  const supine_labels_options options = {.edge = 5.0, .labels = "left=2,right=1"};
+  const supine_labels_options named = {.edge = 5.0, .labels = "left=2,right=1"};
   made out = surfaces_of_image(&part, "cut.nrrd", &options);
   assert_true(out.report.lung[0].cut && out.report.lung[1].cut);
   check_closed(&out.surface[0]);
   release(&out);
   /* Islands that are dropped do not count, and do not change the surface. */
-  made clean = surfaces_of_image(&image, "whole.nrrd", &options);
+  made clean = surfaces_of_image(&image, "whole.nrrd", &named);
   memset(image.values, 1, layer);
-  out = surfaces_of_image(&image, "bed.nrrd", &options);
+  out = surfaces_of_image(&image, "bed.nrrd", &named);
   assert_int_equal(out.report.lung[1].islands, 1);
   assert_false(out.report.lung[0].cut || out.report.lung[1].cut);
   assert_int_equal(out.surface[1].vertex_count, clean.surface[1].vertex_count);
