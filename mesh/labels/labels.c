@@ -275,8 +275,8 @@ static supine_status check_sides(const work *w, const supine_mesh *surfaces, sup
 }
 
 /* Return whether two labels can be the two lungs of a person. */
-static bool can_be_lungs(const supine_labels_report *report, const supine_mesh *surfaces) {
-  const supine_labels_lung *lung = report->lung;
+static bool can_be_lungs(const work *w, const supine_mesh *surfaces) {
+  const supine_labels_lung *lung = w->report->lung;
   const double ratio = fmax(lung[0].mask, lung[1].mask) / fmin(lung[0].mask, lung[1].mask);
   bool can = supine_input_judge(SUPINE_INPUT_LABELS_RATIO, ratio) == SUPINE_INPUT_TAKEN;
   double low[2][3];
@@ -290,18 +290,19 @@ static bool can_be_lungs(const supine_labels_report *report, const supine_mesh *
   }
   /* the left lung comes first, and x grows to the left */
   const double reach = fmax(high[1][0] - centre[0], centre[1] - low[0][0]);
-  return can && supine_input_judge(SUPINE_INPUT_LABELS_SIDES, reach) == SUPINE_INPUT_TAKEN;
+  const bool apart = supine_input_judge(SUPINE_INPUT_LABELS_SIDES, reach) == SUPINE_INPUT_TAKEN;
+  return can && (apart || w->choice.doubted); /* check_sides refuses doubted sides */
 }
 
 /* Refuse two labels that were assumed to be the two lungs if they hardly are. */
 static supine_status check_guess(const work *w, const supine_mesh *surfaces, supine_error *error) {
   const supine_labels_lung *lung = w->report->lung;
-  SUPINE_REFUSE_IF(
-      w->choice.guessed && !can_be_lungs(w->report, surfaces), error, SUPINE_ERROR_MESH,
-      "%s: its two labels are hardly the two lungs: the left one would hold %.0f mL, "
-      "and %.0f mL apart from that, the right one %.0f and %.0f mL (labels %s). Say "
-      "which labels are lung: left=LABEL+...,right=LABEL+..., or 'one' if all are",
-      w->path, lung[0].mask, lung[0].dropped, lung[1].mask, lung[1].dropped, w->report->taken);
+  SUPINE_REFUSE_IF(w->choice.guessed && !can_be_lungs(w, surfaces), error, SUPINE_ERROR_MESH,
+                   "%s: its two labels are hardly the two lungs: the left one would hold %.0f mL, "
+                   "and %.0f mL apart from that, the right one %.0f and %.0f mL (labels %s). Say "
+                   "which labels are lung: left=LABEL+...,right=LABEL+..., or 'one' if all are",
+                   w->path, lung[0].mask, lung[0].dropped, lung[1].mask, lung[1].dropped,
+                   w->report->taken);
   return SUPINE_OK;
 }
 
@@ -321,8 +322,8 @@ static supine_status make_surfaces(work *w, const char *const *paths, size_t cou
   }
   supine_labels_mask_free(&w->both);
   if (report->lung_count == 2) {
-    SUPINE_TRY(check_sides(w, surfaces, error));
     SUPINE_TRY(check_guess(w, surfaces, error));
+    SUPINE_TRY(check_sides(w, surfaces, error));
   }
   return advance(w, 1.0, error);
 }
