@@ -79,8 +79,14 @@ TEST(test_deform_all_spellings_of_prone_same_file) {
 
 TEST(test_deform_volume_reached) {
   EXPECT(0, "-300.00 mL", "deform lungs.safetensors --posture left --volume scan-300 -o a.ply");
-  EXPECT(0, "-300.00 mL",
+  EXPECT(0, "-300.00 mL", "deform lungs.safetensors --posture left:scan-300 -o a.ply");
+  EXPECT(1, "two volumes are given, by left:scan-300 and by full",
          "deform lungs.safetensors --posture left:scan-300 --volume full -o a.ply");
+  EXPECT(1, "every posture names its own volume",
+         "compare lungs.safetensors --postures supine:full,prone:rest --volume rest");
+  EXPECT(0, "the breath ends at", "compare lungs.safetensors --postures supine --breath 3500");
+  EXPECT(1, "supine:rest+500", "deform lungs.safetensors --posture supine+500 -o a.ply");
+  EXPECT(0, "gravity 0.7071,0,0.7071", "deform lungs.safetensors --posture left+45 -o a.ply");
   EXPECT(0, ", 2900.00 mL", "deform lungs.safetensors --posture left --volume 2.9L -o a.ply");
   EXPECT(1, "the posture is missing", "deform lungs.safetensors --posture rest -o b.ply");
   EXPECT(1, "a breath starts at rest", "breathe lungs.safetensors --posture left:rest -o b.vtp");
@@ -117,9 +123,11 @@ TEST(test_deform_volume_reached) {
   EXPECT(5, "choose a volume nearer to rest, or accept this with --allow-folds",
          "solve lungs.ply --posture left --volume full+1300 -o b.ply");
   EXPECT(0, "nodes", "embed lungs.safetensors --grid 12 -o grid.safetensors");
-  EXPECT(5, "cells that turn over, relative to those in the lungs",
+  EXPECT(5, "left lung: the surface folds",
          "deform grid.safetensors --posture left --volume 620mL --field-out b.nrrd");
   assert_int_equal(count_files("b."), 0);
+  EXPECT(0, "cells that turn over, relative to those in the lungs",
+         "deform grid.safetensors --posture left --volume 620mL --allow-folds --field-out c.nrrd");
   EXPECT(0, "warning: the field folds in the body around the lungs",
          "deform grid.safetensors --posture supine --volume rest-1200 --field-out a.nrrd");
   EXPECT(0, "outside the 10 to 120 %",
@@ -245,7 +253,8 @@ TEST(test_precompute_scan_state_and_frame_reproduced) {
          "precompute low.ply --scanned rest --resting supine=3000mL --band 2 -o a.safetensors");
   EXPECT(0, "supine at rest, 4000 mL\n  full inflation 5200 mL (given",
          "precompute low.ply --scanned supine:rest --full 5200mL --band 3 -o a.safetensors");
-  EXPECT(0, "below 0.002 mm from the scan, 4000.00", "deform a.safetensors --posture supine -o a.ply");
+  EXPECT(0, "below 0.002 mm from the scan, 4000.00",
+         "deform a.safetensors --posture supine -o a.ply");
   EXPECT(0, " 5200.00 mL", "deform a.safetensors --posture prone --volume full -o a.ply");
   EXPECT(1, "does not belong to lungs of 3000 mL",
          "precompute low.ply --scanned supine:rest --full 3000mL -o b.safetensors");

@@ -100,7 +100,8 @@ class GivenPose:
 
 class Options(ctypes.Structure):
     """The C struct supine_basis_options."""
-    _fields_ = [("size", c_size_t), ("storage", c_int), ("simd", c_int), ("without_normals", c_bool)]
+    _fields_ = [("size", c_size_t), ("storage", c_int), ("simd", c_int), ("without_normals", c_bool),
+                ("allow_folds", c_bool)]
 
 
 class Info(ctypes.Structure):
@@ -155,7 +156,8 @@ class LocationInfo(ctypes.Structure):
     """The C struct supine_location_info."""
     _fields_ = [("state", State), ("volume", c_double), ("volume_error", c_double), ("volume_prior_error", c_double),
                 ("rotation", c_double * 9), ("translation", c_double * 3), ("residual_rms", c_double),
-                ("log_evidence", c_double), ("outlier_count", c_size_t)]
+                ("log_evidence", c_double), ("outlier_count", c_size_t), ("residual_expected", c_double),
+                ("turn", c_double)]
 
 
 class Surface(ctypes.Structure):
@@ -292,8 +294,11 @@ status_string = _declare("status_string", c_char_p, c_int)
 posture_count = _declare("posture_count", c_size_t)
 posture_name = _declare("posture_name", c_char_p, c_size_t)
 posture_quaternion = _declare("posture_quaternion", c_int, c_double * 4, c_double * 3)
+posture_roll = _declare("posture_roll", c_int, c_double * 3, c_double, c_double * 3)
 posture_tilt = _declare("posture_tilt", c_int, c_double * 3, c_double, c_double * 3)
 state_parse = _checked("state_parse", c_char_p, POINTER(State))
+state_parse_volume = _checked("state_parse_volume", c_char_p, POINTER(State))
+state_join = _checked("state_join", POINTER(State), POINTER(State), POINTER(State))
 state_parse_posture = _checked("state_parse_posture", c_char_p, POINTER(State))
 breath_normal = _declare("breath_normal", c_void_p)
 breath_evaluate = _checked("breath_evaluate", c_void_p, POINTER(Breath), c_size_t, c_void_p, c_void_p, c_void_p)
@@ -315,6 +320,7 @@ expected_error = _checked("expected_error", c_void_p, POINTER(State), POINTER(St
 locate_space = _declare("locate_space", c_size_t, c_size_t)
 locate = _checked("locate", POINTER(LocateTask), POINTER(Residual), c_void_p, POINTER(c_void_p))
 location_info = _declare("location_get_info", POINTER(LocationInfo), c_void_p)
+location_doubt = _declare("location_doubt", c_bool, POINTER(LocationInfo), c_void_p, c_size_t)
 locate_positions = _checked("locate_positions", c_void_p, c_void_p, c_void_p, c_void_p)
 normals = _declare("normals", None, c_void_p, c_void_p, c_void_p)
 
