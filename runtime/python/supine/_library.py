@@ -213,7 +213,7 @@ class Volumes(ctypes.Structure):
 class Modes(ctypes.Structure):
     """The C struct supine_precompute_modes."""
     _fields_ = [("has_band", c_bool), ("band", c_size_t), ("count", c_size_t), ("harmonics", c_bool),
-                ("held_out", c_size_t), ("without_normals", c_bool)]
+                ("held_out", c_size_t), ("without_normals", c_bool), ("storage", c_int)]
 
 
 class PrecomputeOptions(ctypes.Structure):
@@ -228,7 +228,8 @@ class Report(ctypes.Structure):
     _fields_ = [("lung_count", c_size_t), ("vertex_count", c_size_t), ("band", c_size_t), ("mode_count", c_size_t),
                 ("direction_count", c_size_t), ("relative", c_double * 3), ("mm", c_double * 3), ("rest_known", c_bool),
                 ("rest_part", c_double), ("volume", c_double), ("turned_over", c_double), ("band_count", c_size_t),
-                ("band_error", c_double * 12)]
+                ("band_error", c_double * 12), ("volume_count", c_size_t), ("order", c_size_t), ("extrapolated", c_double),
+                ("cluster_count", c_size_t)]
 
 
 class Finding(ctypes.Structure):
