@@ -718,7 +718,7 @@ TEST(test_labels_bad_maps_refused) {
     at[i] = at[i] == 2 ? 2 : 0;
   }
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
-  refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "one lung");
+  refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "cannot split the mask");
   for (size_t i = 0; i < voxels(&image); ++i) { /* two labels, one above the other */
     at[i] = at[i] == 0 ? 0 : i < voxels(&image) / 2 ? 1 : 2;
   }
