@@ -153,20 +153,46 @@ static supine_status csv_split(supine_csv *csv, char *text, supine_error *error)
   return SUPINE_OK;
 }
 
-static supine_status csv_header(supine_csv *csv, const char *const *names, size_t count,
-                                size_t required, supine_error *error) {
-  char *text = NULL;
-  SUPINE_TRY(csv_line(csv, &text, error));
-  SUPINE_REFUSE_IF(text == NULL, error, SUPINE_ERROR_FORMAT,
-                   "%s: the file is empty; expected a header %s,...", csv->path, names[0]);
+/* Return the separator of a header: the most frequent one outside quotes. */
+static char find_separator(const char *text) {
   static const char separators[] = ",;\t";
-  csv->separator = ','; /* if there is only one column */
-  for (const char *one = separators; *one != '\0'; ++one) {
-    if (strchr(text, *one) != NULL) {
-      csv->separator = *one;
-      break;
+  size_t count[3] = {0};
+  bool quoted = false;
+  for (const char *at = text; *at != '\0'; ++at) {
+    quoted = quoted != (*at == '"');
+    if (!quoted) {
+      for (size_t i = 0; i < 3; ++i) {
+        count[i] += *at == separators[i] ? 1 : 0;
+      }
     }
   }
+  size_t best = 0;
+  for (size_t i = 1; i < 3; ++i) {
+    best = count[i] > count[best] ? i : best;
+  }
+  return separators[best];
+}
+
+/* Read the line of the header, and find the separator. */
+static supine_status read_header(supine_csv *csv, const char *name, char **text,
+                                 supine_error *error) {
+  SUPINE_TRY(csv_line(csv, text, error));
+  const bool stated = *text != NULL && strncmp(*text, "sep=", 4) == 0 && strlen(*text) == 5;
+  if (stated) { /* of Excel */
+    csv->separator = (*text)[4];
+    SUPINE_TRY(csv_line(csv, text, error));
+  }
+  SUPINE_REFUSE_IF(*text == NULL, error, SUPINE_ERROR_FORMAT,
+                   "%s: the file is empty; expected a header %s,...", csv->path, name);
+  if (!stated) {
+    csv->separator = find_separator(*text);
+  }
+  return SUPINE_OK;
+}
+
+/* Find the columns that the caller expects in the text of a header. */
+static supine_status find_columns(supine_csv *csv, char *text, const char *const *names,
+                                  size_t count, size_t required, supine_error *error) {
   SUPINE_TRY(csv_split(csv, text, error));
   for (size_t c = 0; c < SUPINE_CSV_FIELDS_MAX; ++c) {
     csv->column[c] = SIZE_MAX;
@@ -192,17 +218,45 @@ static supine_status csv_header(supine_csv *csv, const char *const *names, size_
   return SUPINE_OK;
 }
 
-supine_status supine_csv_open(const char *path, const char *const *names, size_t count,
-                              size_t required, supine_csv *csv, supine_error *error) {
+static supine_status csv_open(const char *path, supine_csv *csv, supine_error *error) {
   *csv = (supine_csv){.path = path};
   csv->file = fopen(path, "rb");
   SUPINE_REFUSE_IF(csv->file == NULL, error, SUPINE_ERROR_READ, "%s: cannot open: %s", path,
                    strerror(errno));
-  const supine_status status = csv_header(csv, names, count, required, error);
+  return SUPINE_OK;
+}
+
+supine_status supine_csv_open(const char *path, const char *const *names, size_t count,
+                              size_t required, supine_csv *csv, supine_error *error) {
+  char *text = NULL;
+  SUPINE_TRY(csv_open(path, csv, error));
+  supine_status status = read_header(csv, names[0], &text, error);
+  if (status == SUPINE_OK) {
+    status = find_columns(csv, text, names, count, required, error);
+  }
   if (status != SUPINE_OK) {
     supine_csv_close(csv);
   }
   return status;
+}
+
+supine_status supine_csv_open_bare(const char *path, const char *header, const char *const *names,
+                                   size_t count, size_t required, supine_csv *csv,
+                                   supine_error *error) {
+  char text[512];
+  SUPINE_TRY(csv_open(path, csv, error));
+  csv->separator = ',';
+  csv->may_have_more = true;
+  (void)snprintf(text, sizeof text, "%s", header);
+  const supine_status status = find_columns(csv, text, names, count, required, error);
+  if (status != SUPINE_OK) {
+    supine_csv_close(csv);
+  }
+  return status;
+}
+
+bool supine_csv_has(const supine_csv *csv, size_t column) {
+  return csv->column[column] != SIZE_MAX;
 }
 
 supine_status supine_csv_next(supine_csv *csv, bool *more, supine_error *error) {
@@ -213,10 +267,11 @@ supine_status supine_csv_next(supine_csv *csv, bool *more, supine_error *error) 
     return SUPINE_OK;
   }
   SUPINE_TRY(csv_split(csv, text, error));
-  SUPINE_REFUSE_IF(csv->field_count != csv->column_count, error, SUPINE_ERROR_FORMAT,
-                   "%s:%zu: %zu field%s, but the header has %zu: add or delete fields", csv->path,
-                   csv->line, csv->field_count, csv->field_count == 1 ? "" : "s",
-                   csv->column_count);
+  const bool more_allowed = csv->may_have_more && csv->field_count > csv->column_count;
+  SUPINE_REFUSE_IF(
+      csv->field_count != csv->column_count && !more_allowed, error, SUPINE_ERROR_FORMAT,
+      "%s:%zu: %zu field%s, but the header has %zu: add or delete fields", csv->path, csv->line,
+      csv->field_count, csv->field_count == 1 ? "" : "s", csv->column_count);
   return SUPINE_OK;
 }
 

@@ -13,7 +13,8 @@ enum { SUPINE_CSV_FIELDS_MAX = 64 };
 
 /* A CSV file being read. It has a header, and may have comments (#), blank lines and quoted fields,
  * which may contain separators and line ends. It must be UTF-8. The separator of the header, ',',
- * ';' or tab, holds for all lines. With ';', numbers may have a decimal comma. Zero-initialise. */
+ * ';' or tab, holds for all lines: the most frequent one, or that of a line "sep=;" before the
+ * header, as Excel writes it. With ';', numbers may have a decimal comma. Zero-initialise. */
 typedef struct supine_csv {
   const char *path;
   FILE *file;
@@ -24,6 +25,7 @@ typedef struct supine_csv {
   size_t lines_read;
   size_t line; /* number of the first line of the current row, from 1 */
   char separator;
+  bool may_have_more; /* rows may have more fields than the header */
   size_t field_count;
   char *field[SUPINE_CSV_FIELDS_MAX];   /* fields of the current row */
   size_t column_count;                  /* number of fields of the header */
@@ -36,6 +38,15 @@ typedef struct supine_csv {
  * @param path  must outlive the reader */
 supine_status supine_csv_open(const char *path, const char *const *names, size_t count,
                               size_t required, supine_csv *csv, supine_error *error);
+
+/* As supine_csv_open for a file without a header, whose columns are those of `header`. Rows may
+ * have further fields. */
+supine_status supine_csv_open_bare(const char *path, const char *header, const char *const *names,
+                                   size_t count, size_t required, supine_csv *csv,
+                                   supine_error *error);
+
+/* Return whether the file has a column, an index into the `names` of supine_csv_open. */
+bool supine_csv_has(const supine_csv *csv, size_t column);
 
 /* Read the next row; set *more to false at the end. */
 supine_status supine_csv_next(supine_csv *csv, bool *more, supine_error *error);

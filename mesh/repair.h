@@ -17,6 +17,11 @@ typedef struct supine_mesh_repair_report {
 /** Repair a surface in place. A surface without defects is not changed. */
 supine_status supine_mesh_repair(supine_mesh *mesh, supine_mesh_repair_report *report);
 
+/** Join each vertex with those within `distance`, mm, and drop the triangles that lose a corner by
+ * that. The lowest of the vertices stays.
+ * @param joined  output: number of vertices that were joined with a lower one */
+supine_status supine_mesh_join_close(supine_mesh *mesh, double distance, size_t *joined);
+
 /** Drop vertices that are in no triangle, and keep the order of the others. Return the number of
  * dropped vertices.
  * @param space  [vertex_count] work space */

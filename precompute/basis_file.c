@@ -17,6 +17,8 @@
 #include "precompute/basis_file.h"
 #include "precompute/lungs/disease.h"
 #include "precompute/normals/normal_modes.h"
+#include "precompute/volume_range.h"
+#include "runtime/checks.h"
 #include "runtime/safetensors/safetensors_file.h"
 
 enum { ENTRIES_MAX = 64 };
@@ -208,6 +210,7 @@ typedef struct stored {
   supine_normals_modes normals;
   supine_simulated_volumes simulated;                /* of fields over volume */
   double shares[2 * 9 * (SUPINE_FIT_ORDER_MAX + 1)]; /* simulated.shares without gaps */
+  double *volume_range; /* [SUPINE_RANGE_NODES, lungs, 2] volumes without folds, mL, or NULL */
 } stored;
 
 /* Shrink the displacements of VECTOR rows in collapsed lungs to the cube root of the lung's share.
@@ -347,7 +350,7 @@ static void add_all(entries *list, const supine_basis_content *content, const st
   add(list, "made_by", "%s", content->made_by != NULL ? content->made_by : "supine_precompute");
 }
 
-enum { TENSORS_MAX = 20 };
+enum { TENSORS_MAX = 21 };
 
 static void basis_close(supine_basis **basis) {
   supine_basis_close(*basis);
@@ -393,6 +396,7 @@ static size_t list_tensors(const supine_basis_content *content, const stored *ma
       {"volume_quadratic", SUPINE_F64, 4, {g, 3, k, k}, forms->quadratic},
       {"volume_cubic", SUPINE_F64, 4, {g, k, k, k}, forms->cubic},
       {"resting_volume", SUPINE_F64, 2, {g, 9}, content->resting},
+      {"volume_range", SUPINE_F64, 3, {SUPINE_RANGE_NODES, g, 2}, made->volume_range},
       {"error_harmonics",
        SUPINE_F64,
        1,
@@ -435,9 +439,10 @@ static supine_status print_bytes(const supine_basis_content *content, const stor
   return SUPINE_OK;
 }
 
-/* Add the error of storage to content->accuracy: open the printed basis, and evaluate it. */
-static supine_status measure_storage(const supine_basis_content *content, const stored *made,
-                                     const supine_bytes *bytes, supine_error *error) {
+/* Open the printed basis, add the error of storage to content->accuracy, and measure the volumes
+ * that the lungs can hold. */
+static supine_status measure_printed(const supine_basis_content *content, const supine_bytes *bytes,
+                                     supine_arena *arena, stored *made, supine_error *error) {
   const supine_basis_options options = {
       .size = sizeof options, .simd = SUPINE_SIMD_PORTABLE, .without_normals = true};
   SUPINE_FREED_BY(basis_close) supine_basis *basis = NULL;
@@ -446,7 +451,14 @@ static supine_status measure_storage(const supine_basis_content *content, const 
   if (content->clusters->count > 0) {
     exact.coefficients = (float *)(uintptr_t)content->exact; /* only read */
   }
-  return supine_projection_accuracy_add_storage(basis, &exact, &made->rows, content->accuracy);
+  SUPINE_TRY(supine_projection_accuracy_add_storage(basis, &exact, &made->rows, content->accuracy));
+  if (content->resting == NULL || content->compression->order > 0) {
+    return SUPINE_OK; /* the simulations give the range of fields over volume */
+  }
+  made->volume_range = supine_arena_take(arena, SUPINE_RANGE_NODES * content->lungs->lung_count * 2,
+                                         sizeof *made->volume_range);
+  SUPINE_TRY(supine_arena_check(arena, error, "the range of volumes"));
+  return supine_precompute_volume_range(basis, made->volume_range, error);
 }
 
 supine_status supine_precompute_print(const supine_basis_content *content, supine_bytes *bytes,
@@ -461,8 +473,8 @@ supine_status supine_precompute_print(const supine_basis_content *content, supin
     SUPINE_TRY(find_normals(content, &arena, &made, error));
   }
   SUPINE_TRY(print_bytes(content, &made, bytes, error));
-  SUPINE_TRY(measure_storage(content, &made, bytes, error));
+  SUPINE_TRY(measure_printed(content, bytes, &arena, &made, error));
   free(bytes->data);
   *bytes = (supine_bytes){0};
-  return print_bytes(content, &made, bytes, error); /* again, with the errors of storage */
+  return print_bytes(content, &made, bytes, error); /* again, with what was measured */
 }

@@ -4,6 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include <supine/inputs.h>
+
 #include "base/arena.h"
 #include "base/number.h"
 #include "base/text.h"
@@ -11,6 +13,7 @@
 
 #include "precompute/lungs/disease.h"
 #include "precompute/lungs/expandability.h"
+#include "precompute/patient/checks.h"
 #include "precompute/prepare.h"
 
 /* What is known of the scan: completed by the patient's file and by defaults. */
@@ -63,6 +66,21 @@ static void tell_volume(const supine_patient_record *record, supine_findings *fi
                          "%s: %s", doubted ? "warning" : "note", text);
 }
 
+/* Say if the lungs have another size than in the scan of this state when the law was fitted. */
+static void tell_size(const supine_patient_record *fitted, size_t state, const supine_lungs *lungs,
+                      supine_findings *findings) {
+  char text[256];
+  const supine_patient_frame *frame = &fitted->patient.frame;
+  const double *low = state == 0 ? frame->minimum : fitted->emptier[0];
+  const double *high = state == 0 ? frame->maximum : fitted->emptier[1];
+  const bool both = lungs->lung_count == 2 && frame->only_side == 0;
+  if (both && fitted->from_surface &&
+      !supine_patient_same_size(lungs, low, high, fitted->volume[state], text, sizeof text)) {
+    supine_findings_add(
+        findings, "warning: %s: check that the file of the patient was fitted to this scan", text);
+  }
+}
+
 static void describe_fit(const supine_patient_record *record, char *text, size_t size) {
   const supine_patient_fit_report *report = &record->report;
   (void)supine_print_text(
@@ -90,6 +108,7 @@ static supine_status take_patient(const supine_patient_record *fitted, supine_pr
   SUPINE_TRY(
       supine_patient_model(record, &p->source.lungs, resting, scan, arrays, &p->model, error));
   tell_volume(record, &p->source.findings);
+  tell_size(fitted, record->shown, &p->source.lungs, &p->source.findings);
   return SUPINE_OK;
 }
 
@@ -314,7 +333,7 @@ static void summarize(const knowledge *given, bool predicted, supine_prepared *p
 
 /* Say what is assumed of the lungs of another simulator's fields. */
 static void summarize_fields(supine_prepared *p) {
-  char posture[160] = "not displaced by gravity";
+  char posture[160] = "taken as the lungs without gravity";
   if (p->posture.known) {
     (void)supine_state_describe(&p->posture.state, posture, sizeof posture);
   }
@@ -390,6 +409,33 @@ static supine_status set_model(const supine_precompute_options *options,
   return SUPINE_OK;
 }
 
+/* Warn of a height outside those of the equations. Refuse a volume at rest that it predicts if the
+ * scanned lungs, at full inflation, can hardly hold it. */
+static supine_status check_height(const knowledge *known, const supine_resting *resting,
+                                  supine_prepared *p, supine_error *error) {
+  const supine_lungs *lungs = &p->source.lungs;
+  double full = -known->scan.state.volume.ml;
+  double range[2];
+  if (supine_physics_reference_height_is_told(&known->person, range)) {
+    supine_findings_add(&p->source.findings,
+                        "warning: the height of %g cm is outside the %.0f to %.0f cm of the adults "
+                        "for whom the equations are stated: give the volume at rest or at full "
+                        "inflation",
+                        known->person.height, range[0], range[1]);
+  }
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+    full += lungs->volume[lung];
+  }
+  const double share = resting->predicted ? resting->ml[2] / full : 0.0;
+  const supine_input_verdict verdict = supine_input_judge(SUPINE_INPUT_REST_SHARE, share);
+  SUPINE_REFUSE_IF(verdict == SUPINE_INPUT_REFUSED, error, SUPINE_ERROR_ARGUMENT,
+                   "a height of %g cm predicts %.0f mL at rest, %.0f %% of the %.0f mL that the "
+                   "lungs hold at full inflation: check the height and the state of the scan, or "
+                   "give the volume at rest",
+                   known->person.height, resting->ml[2], 100.0 * share, full);
+  return SUPINE_OK;
+}
+
 /* Move the scan to the reference surface, and say what is assumed. */
 static supine_status find_reference(supine_prepared *p, const knowledge *known,
                                     supine_error *error) {
@@ -399,6 +445,7 @@ static supine_status find_reference(supine_prepared *p, const knowledge *known,
                                     .side = {lungs->side[0], lungs->side[1]}};
   supine_resting resting = known->resting;
   supine_physics_reference_predict_rest(&scanned, &known->person, &resting);
+  SUPINE_TRY(check_height(known, &resting, p, error));
   SUPINE_TRY(supine_physics_reference_find(lungs, &p->model, &known->scan, &resting, &p->reference,
                                            error));
   summarize(known, resting.predicted, p);

@@ -3,10 +3,14 @@
 #include <limits.h>
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <supine/inputs.h>
+
 #include "base/arena.h"
+#include "base/number.h"
 #include "base/parallel.h"
 #include "base/text.h"
 
@@ -67,6 +71,7 @@ static supine_status load_meshes(reading *r, supine_source *source, supine_error
 
 static void note_map(const char *path, const supine_labels_report *report,
                      supine_findings *findings) {
+  char text[512];
   if (report->frames_differ) {
     supine_findings_add(
         findings,
@@ -81,6 +86,14 @@ static void note_map(const char *path, const supine_labels_report *report,
                           "%s: warning: the %s lung is cut off at the image's border: give a scan "
                           "that shows all of it",
                           path, side);
+    }
+    if (supine_input_judge(SUPINE_INPUT_LUNG_PIECES, lung->dropped / lung->mask) !=
+        SUPINE_INPUT_TAKEN) {
+      (void)supine_print_text(text, sizeof text,
+                              "%s: warning: the %s lung is %.0f mL, without %.0f mL that are not "
+                              "connected to it: check the labels",
+                              path, side, lung->mask, lung->dropped);
+      supine_findings_add(findings, "%s", text);
     }
     if (lung->tunnels > 0) {
       supine_findings_advise(findings, SUPINE_REMEDY_CLOSE, NULL,
@@ -172,7 +185,12 @@ static void summarize(const reading *r, supine_source *source) {
   const supine_lungs *lungs = &source->lungs;
   const size_t size = sizeof source->summary;
   char letters[4];
-  supine_mesh_axes_letters(report->axes, letters);
+  supine_mesh_axes_letters(load->axes != SUPINE_AXES_AUTO ? load->axes : report->axes, letters);
+  if (strcmp(letters, "RAI") == 0) {
+    supine_findings_add(&source->findings,
+                        "note: the axes RAI grow to the right, front and feet; what ITK calls RAI "
+                        "is LPS here");
+  }
   const char *axes_from = report->axes_from_tag ? "the file's tag" : "assumed";
   if (load->axes != SUPINE_AXES_AUTO) {
     axes_from = "as given";

@@ -10,6 +10,7 @@
 
 #include "base/arena.h"
 #include "base/number.h"
+#include "runtime/checks.h"
 #include "runtime/clusters.h"
 #include "runtime/safetensors/safetensors_file.h"
 
@@ -464,6 +465,16 @@ static supine_status check_simulated(const check *c, supine_basis *basis) {
   return SUPINE_OK;
 }
 
+/* Check the optional tensor 'volume_range': the volumes that each lung can hold. */
+static supine_status check_range(const check *c, supine_basis *basis) {
+  if (supine_safetensors_find(c->file, "volume_range") == NULL) {
+    return SUPINE_OK;
+  }
+  size_t shape[3] = {SUPINE_RANGE_NODES, basis->info.lung_count, 2};
+  REQUIRE(basis->volume_range, c, "volume_range", SUPINE_F64, 3, shape);
+  return SUPINE_OK;
+}
+
 /* Check the optional tensors 'normals' and 'normal_weights'. Both or neither must exist. */
 static supine_status check_normals(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
@@ -674,12 +685,13 @@ static supine_status open_file(const char *name, const void *bytes, size_t size,
   }
   memset(basis, 0, sizeof *basis);
   basis->file = file;
+  basis->allow_folds = taken.allow_folds;
   const check c = {file, name, error};
   SUPINE_TRY(check_metadata(&c, &basis->info));
   static supine_status (*const steps[])(const check *, supine_basis *) = {
-      check_numbers, check_surface,   check_field,  check_modes, check_lungs,     check_weights,
-      check_volume,  check_reference, check_rest,   check_scan,  check_simulated, check_normals,
-      check_rigid,   check_expected,  check_errors, check_names, identify};
+      check_numbers, check_surface,   check_field,    check_modes,  check_lungs, check_weights,
+      check_volume,  check_reference, check_rest,     check_range,  check_scan,  check_simulated,
+      check_normals, check_rigid,     check_expected, check_errors, check_names, identify};
   for (size_t i = 0; i < sizeof steps / sizeof *steps; ++i) {
     SUPINE_TRY(steps[i](&c, basis));
   }

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/number.h"
 #include "base/vec3.h"
 #include "runtime/expected.h"
@@ -100,7 +101,7 @@ static double resting_share(const supine_basis *basis) {
   double volumes[SUPINE_LUNGS_MAX];
   double sum = 0;
   rest.volume.kind = SUPINE_VOLUME_REST;
-  if (supine_basis_pose(basis, &rest, &pose, NULL) == SUPINE_OK) {
+  if (supine_basis_pose_any(basis, &rest, &pose, NULL) == SUPINE_OK) {
     (void)supine_basis_volumes(basis, &pose, volumes);
     for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
       sum += volumes[lung];
@@ -131,7 +132,7 @@ supine_status supine_expected_shifted(const supine_basis *basis, const supine_st
   for (size_t i = 0; i < shifted.lung_count; ++i) {
     shifted.lungs[i].volume.ml += ml / (double)shifted.lung_count;
   }
-  return supine_basis_pose(basis, &shifted, pose, error);
+  return supine_basis_pose_any(basis, &shifted, pose, error);
 }
 
 /* Set the change of unit gravity between two states across the body and sideways. */
@@ -158,7 +159,7 @@ supine_status supine_expected_prepare(const supine_basis *basis, const supine_st
   supine_status status = SUPINE_OK;
   *m = (supine_expected_model){.basis = basis, .least = least};
   for (size_t k = 0; k < 2 && status == SUPINE_OK; ++k) {
-    status = supine_basis_pose(basis, states[k], &m->pose[k], error);
+    status = supine_basis_pose_any(basis, states[k], &m->pose[k], error);
     m->pose[EXPECTED_FULLER + k] = m->pose[k];
     if (status == SUPINE_OK && (deviation > 0 ? k == 0 : counts_from(states[k], assumed))) {
       status = supine_expected_shifted(basis, states[k], &m->pose[EXPECTED_FULLER + k], error);
@@ -181,7 +182,7 @@ supine_status supine_expected_prepare(const supine_basis *basis, const supine_st
   for (size_t k = 0; k < 2 && m->turn > 0 && status == SUPINE_OK; ++k) {
     supine_state level = *states[k];
     memcpy(level.gravity, basis->scan_gravity, sizeof level.gravity);
-    status = supine_basis_pose(basis, &level, &m->pose[EXPECTED_LEVEL + k], error);
+    status = supine_basis_pose_any(basis, &level, &m->pose[EXPECTED_LEVEL + k], error);
   }
   return status;
 }
@@ -374,6 +375,8 @@ static supine_status evaluate_all(const supine_basis *basis, const supine_state 
 supine_status supine_expected_error(const supine_basis *basis, const supine_state *state,
                                     const supine_state *from, float *sigma, supine_error *error) {
   double mean[SUPINE_EXPECTED_TERMS];
+  supine_pose pose;
+  SUPINE_TRY(supine_basis_pose(basis, state, &pose, error)); /* checks the volumes */
   return evaluate_all(basis, state, from, sigma, mean, error);
 }
 

@@ -74,6 +74,10 @@ struct supine_basis {
   double upright_gain; /**< (full volume upright - full volume supine) / reference volume */
   double scan_volume;  /**< volume in the scan minus that of the reference surface, mL */
   double scan_gravity[3];
+  /** [SUPINE_RANGE_NODES, lung_count, 2] least and largest volume of each lung, mL (checks.h); NULL
+   * if the file has none */
+  const double *volume_range;
+  bool allow_folds;      /**< poses are not checked by `volume_range` */
   const uint32_t *rigid; /**< [rigid_count, 2] begin and end of the vertices of each rigid part */
   size_t rigid_count;
   double reference_error; /**< largest quantisation error of a reference position, mm */
@@ -155,6 +159,10 @@ const float *supine_basis_rows(const supine_basis *basis, size_t i, float *compu
 /** Compute the volume of a lung, at given weights, as a polynomial of its gains. */
 void supine_basis_contract(const supine_basis *basis, size_t lung, const double *weights,
                            supine_volume_form *form);
+
+/** As supine_basis_pose, without the check that lungs can hold the volumes. */
+supine_status supine_basis_pose_any(const supine_basis *basis, const supine_state *state,
+                                    supine_pose *pose, supine_error *error);
 
 /** Return w^T F w for the matrix F = `form` [count, count]. */
 double supine_volume_square(size_t count, const double *form, const double *w);

@@ -4,6 +4,9 @@
 #include <math.h>
 #include <string.h>
 
+#include <supine/inputs.h>
+
+#include "base/number.h"
 #include "base/vec3.h"
 #include "runtime/expected.h"
 #include "runtime/location.h"
@@ -31,6 +34,10 @@ static const double share_least = 0.1; /* share of full inflation without gas (r
 static const double spread_least = 0.05;
 /* The factor on the expected errors counts as 1 for this number of points before (assumed). */
 static const double prior_points = 10;
+/* The factor multiplies nothing where the law does not move the lungs, as at the volume of the
+ * scan. Variance of the residuals beyond this multiple of the expected one, without the noise, is
+ * therefore added to the errors. With right volumes, it is hardly ever reached (docs/inputs.md). */
+static const double excess_from = 1.5;
 /* Ratio of supine_kriging_model.sill, 6 mm, to the factor c of the expected error in
  * supine/locate.h, 4.5 mm. Both are variances (mm^2) per mm of displacement. c is smaller because
  * the translation that fits best had been subtracted before c was measured. */
@@ -112,7 +119,7 @@ static supine_status initialise(workspace *s, supine_error *error) {
   const bool unknown = task->state.lung_count == 0 && info->has_volume && !info->is_fields &&
                        task->state.volume.kind == SUPINE_VOLUME_DEFAULT;
   supine_pose pose;
-  const supine_status status = supine_basis_pose(basis, &scan, &pose, error);
+  const supine_status status = supine_basis_pose_any(basis, &scan, &pose, error);
   if (status == SUPINE_OK) {
     for (size_t j = 0; j < task->count; ++j) {
       supine_kriging_point *p = &s->points[j];
@@ -148,7 +155,7 @@ static supine_status evaluate(workspace *s, supine_error *error) {
   const double step = supine_expected_shift * supine_expected_reference(task->inside);
   supine_pose pose;
   supine_pose fuller;
-  supine_status status = supine_basis_pose(task->inside, &s->found->state, &pose, error);
+  supine_status status = supine_basis_pose_any(task->inside, &s->found->state, &pose, error);
   if (status == SUPINE_OK && s->fit->options.volume) {
     status = supine_expected_shifted(task->inside, &s->found->state, &fuller, error);
   }
@@ -212,10 +219,9 @@ static double angle_of(const double r[9], double vector[3]) {
   return angle;
 }
 
-/* Set the rotation to the one that moves the predicted positions closest to the observed ones. */
-static void rotate_roughly(workspace *s) {
+/* Find the rigid motion that moves the predicted positions closest to the observed ones. */
+static supine_rigid_motion find_motion(const workspace *s) {
   supine_rigid_motion motion = {0};
-  double vector[3];
   for (size_t j = 0; j < s->task->count; ++j) {
     float law[3];
     float observed[3];
@@ -226,6 +232,35 @@ static void rotate_roughly(workspace *s) {
     supine_rigid_add(&motion, law, observed, 1);
   }
   supine_rigid_finish(&motion);
+  return motion;
+}
+
+/* Measure the turn of the points that fits best, where no rotation is to be found. It is 0 if the
+ * points do not fit clearly better with it: the residuals must fall to a quarter. */
+static void find_turn(workspace *s) {
+  const size_t n = s->task->count;
+  const supine_rigid_motion motion = find_motion(s);
+  double vector[3];
+  double straight = 0;
+  double turned = 0;
+  for (size_t j = 0; j < n; ++j) {
+    float law[3];
+    for (size_t i = 0; i < 3; ++i) {
+      law[i] = (float)s->law[3 * j + i];
+    }
+    for (size_t i = 0; i < 3; ++i) {
+      const double observed = s->task->observed[j].position[i];
+      straight += pow(observed - (double)law[i] - motion.to[i] + motion.from[i], 2);
+      turned += pow(observed - supine_rigid_move(&motion, law, i), 2);
+    }
+  }
+  s->found->turn = n > 3 && turned < straight / 16 ? angle_of(motion.rotation, vector) : 0;
+}
+
+/* Set the rotation to the one that moves the predicted positions closest to the observed ones. */
+static void rotate_roughly(workspace *s) {
+  const supine_rigid_motion motion = find_motion(s);
+  double vector[3];
   memcpy(s->found->rotation, motion.rotation, sizeof motion.rotation);
   s->fit->options.rotation_deviation =
       angle_of(s->found->rotation, vector) > other_frame ? 0 : rotation_spread;
@@ -307,6 +342,8 @@ static size_t find_worst(workspace *s, supine_locate_residual *residuals) {
   size_t worst = n;
   double largest = outlier_limit;
   double sum = 0;
+  double expected = 0;
+  double noises = 0;
   double ratios = 0;
   size_t used = 0;
   for (size_t j = 0; j < n; ++j) {
@@ -321,6 +358,8 @@ static size_t find_worst(workspace *s, supine_locate_residual *residuals) {
       continue;
     }
     sum += r->distance * r->distance;
+    expected += r->sigma * r->sigma;
+    noises += 3 * noise * noise;
     ++used;
     const double ratio = r->sigma > 0 ? r->distance / r->sigma : 1;
     ratios += ratio * ratio;
@@ -331,6 +370,9 @@ static size_t find_worst(workspace *s, supine_locate_residual *residuals) {
   }
   s->fit->factor = sqrt((prior_points + ratios) / (prior_points + (double)used));
   s->found->residual_rms = used > 0 ? sqrt(sum / (double)used) : 0;
+  s->found->residual_expected = used > 0 ? sqrt(expected / (double)used) : 0;
+  s->fit->excess =
+      used > 0 ? fmax(0, (sum - noises - excess_from * (expected - noises)) / (double)used) : 0;
   return worst;
 }
 
@@ -359,10 +401,17 @@ static supine_status refuse_residuals(const workspace *s, const supine_locate_re
     square += residuals[j].distance * residuals[j].distance / (double)s->task->count;
   }
   if (sqrt(square) > residual_most) {
+    const double degrees = s->found->turn * (180 / 3.14159265358979);
+    char turn[96] = "";
+    if (supine_input_judge(SUPINE_INPUT_LOCATE_TURNED, degrees) != SUPINE_INPUT_TAKEN) {
+      (void)supine_print_text(
+          turn, sizeof turn,
+          "; they fit much better when turned by %.0f degrees: let their frame turn", degrees);
+    }
     return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
                             "the points do not fit these lungs: each differs by %.0f mm (RMS) "
-                            "from its prediction by the others. Check their names, unit and axes",
-                            sqrt(square));
+                            "from its prediction by the others. Check their names, unit and axes%s",
+                            sqrt(square), turn);
   }
   if (s->fit->options.volume && !(s->found->volume >= share_least * full)) {
     (void)supine_error_set(error, SUPINE_ERROR_NUMERICAL,
@@ -386,6 +435,8 @@ static supine_status locate(workspace *s, supine_locate_residual *residuals, sup
   }
   if (status == SUPINE_OK && s->task->rigid) {
     rotate_roughly(s);
+  } else if (status == SUPINE_OK) {
+    find_turn(s);
   }
   while (status == SUPINE_OK) {
     status = iterate(s, error);
@@ -401,6 +452,28 @@ static supine_status locate(workspace *s, supine_locate_residual *residuals, sup
     ++s->found->outlier_count;
   }
   return status;
+}
+
+bool supine_location_doubt(const supine_location_info *found, char *text, size_t size) {
+  const double expected = found->residual_expected;
+  const double ratio = expected > 0 ? found->residual_rms / expected : 0;
+  const double degrees = found->turn * (180 / 3.14159265358979);
+  if (supine_input_judge(SUPINE_INPUT_LOCATE_TURNED, degrees) != SUPINE_INPUT_TAKEN) {
+    (void)supine_print_text(text, size,
+                            "the points fit much better when turned by %.0f degrees: let their "
+                            "frame turn",
+                            degrees);
+    return true;
+  }
+  if (supine_input_judge(SUPINE_INPUT_LOCATE_RESIDUALS, ratio) != SUPINE_INPUT_TAKEN) {
+    (void)supine_print_text(text, size,
+                            "the points differ from their predictions by the others by %.1f mm "
+                            "(RMS), where %.1f mm are expected: check the volume, the posture, and "
+                            "the names of the points",
+                            found->residual_rms, expected);
+    return true;
+  }
+  return false;
 }
 
 supine_status supine_locate(const supine_locate_task *task, supine_locate_residual *residuals,
@@ -423,7 +496,7 @@ supine_status supine_locate(const supine_locate_task *task, supine_locate_residu
   if (info->has_volume) {
     supine_pose pose;
     double volumes[SUPINE_LUNGS_MAX];
-    (void)supine_basis_pose(task->inside, &found->state, &pose, NULL);
+    (void)supine_basis_pose_any(task->inside, &found->state, &pose, NULL);
     (void)supine_basis_volumes(task->inside, &pose, volumes);
     for (size_t lung = 0; lung < info->lung_count; ++lung) {
       found->volume += volumes[lung];

@@ -63,7 +63,7 @@ static void finish(const supine_location *fit, const block *b, size_t count, flo
       xyz[3 * i + k] =
           (float)(row[0] * body[0] + row[1] * body[1] + row[2] * body[2] + fit->origin[k]);
     }
-    sigma[i] = (float)(fit->factor * sqrt(variance));
+    sigma[i] = (float)sqrt(fit->factor * fit->factor * variance + fit->excess);
   }
 }
 

@@ -17,6 +17,7 @@ struct supine_location {
   double origin[3];
   double deviation; /**< prior standard deviation of the volume, mL; 0 if the volume is known */
   double factor;    /**< factor on the expected errors, from the residuals of the points */
+  double excess;    /**< variance that the residuals leave beyond the expected errors, mm^2 */
 };
 
 #endif

@@ -281,8 +281,8 @@ static supine_status find_gains(const supine_basis *basis, const supine_state *s
   return total_gains(basis, &v, total, pose, error);
 }
 
-supine_status supine_basis_pose(const supine_basis *basis, const supine_state *state,
-                                supine_pose *pose, supine_error *error) {
+supine_status supine_basis_pose_any(const supine_basis *basis, const supine_state *state,
+                                    supine_pose *pose, supine_error *error) {
   SUPINE_TRY(check_state(state, error));
   pose->basis = basis->info.identity;
   if (basis->info.order > 0) {

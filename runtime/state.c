@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <supine/inputs.h>
 #include <supine/state.h>
 
 #include "base/arena.h"
@@ -138,36 +139,147 @@ static bool read_gravity(const char *text, double gravity[3]) {
   return supine_normalise(g, gravity);
 }
 
-/* Read a tilted posture, such as "supine+15". */
-static bool read_tilted(const char *text, double gravity[3]) {
-  const size_t length = strcspn(text, "+-");
-  char front[PIECE];
+/* Read an angle in degrees that follows a sign, up to the end or to `stop`. */
+static bool read_angle(const char *text, char stop, double *degrees, const char **after) {
   char *end = NULL;
-  double level[3];
-  const double degrees = supine_number_parse(text + length, &end);
-  if (length >= sizeof front || text[length] == '\0' || *end != '\0') {
+  *degrees = supine_number_parse(text, &end);
+  *after = end;
+  return end != text && isfinite(*degrees) && (*end == '\0' || (stop != '\0' && *end == stop));
+}
+
+/* A posture that is turned: "supine+15" (tilted), "supine@30" (rolled), "supine@30+15" (both). */
+typedef struct turned {
+  double level[3]; /* gravity in the posture that is named */
+  bool is_rolled, is_tilted;
+  double roll, tilt; /* degrees */
+} turned;
+
+static bool read_turned(const char *text, turned *read) {
+  const size_t length = strcspn(text, "+-@>");
+  const char *at = text + length;
+  char front[PIECE];
+  *read = (turned){.is_rolled = *at == '@' || *at == '>'};
+  if (length >= sizeof front || *at == '\0') {
     return false;
   }
   (void)snprintf(front, sizeof front, "%.*s", (int)length, text);
-  return supine_posture_gravity(front, level) == SUPINE_OK &&
-         supine_posture_tilt(level, degrees, gravity) == SUPINE_OK;
+  if (supine_posture_gravity(front, read->level) != SUPINE_OK) {
+    return false;
+  }
+  if (read->is_rolled) {
+    const size_t sign = at[1] == '+' || at[1] == '-' ? 1 : 0;
+    const size_t digits = strspn(at + 1 + sign, "0123456789.");
+    const char stop = at[1 + sign + digits];
+    if (!read_angle(at + 1, stop == '-' ? '-' : '+', &read->roll, &at)) {
+      return false;
+    }
+  }
+  read->is_tilted = *at != '\0';
+  return !read->is_tilted || read_angle(at, '\0', &read->tilt, &at);
 }
 
-supine_status supine_state_parse_posture(const char *text, supine_state *state,
-                                         supine_error *error) {
-  double gravity[3];
-  if (supine_posture_gravity(text, gravity) == SUPINE_OK || read_tilted(text, gravity) ||
-      read_gravity(text, gravity)) {
-    memcpy(state->gravity, gravity, sizeof gravity);
-    return SUPINE_OK;
+/* Find gravity in a turned posture. */
+static supine_status turn(const char *text, const turned *read, double gravity[3],
+                          supine_error *error) {
+  const bool lies = read->level[0] != 0 || read->level[1] != 0;
+  if (read->is_rolled && !lies) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "'%s': a roll about the long axis changes nothing in an upright body: "
+                            "roll a lying posture, as in supine@30",
+                            text);
   }
+  if (supine_posture_roll(read->level, read->roll, gravity) != SUPINE_OK) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "'%s' is rolled by %g degrees: give -180 to 180; + turns to the left",
+                            text, read->roll);
+  }
+  if (supine_posture_tilt(gravity, read->tilt, gravity) != SUPINE_OK) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "'%s' is tilted by %g degrees, and a body by at most 90: for a volume, "
+                            "write supine:rest%+g",
+                            text, read->tilt, read->tilt);
+  }
+  return SUPINE_OK;
+}
+
+/* Refuse a text that is no posture, and suggest the posture that may be meant. */
+static supine_status refuse_posture(const char *text, supine_error *error) {
+  const char *nearest = supine_posture_nearest(text);
   if (strchr(text, ':') != NULL || strchr("+-.0123456789", text[0]) != NULL) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "'%s': gravity is three numbers X:Y:Z, not all 0; supine is 0:1:0",
                             text);
   }
-  return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "no posture '%s'; did you mean '%s'?", text,
-                          supine_posture_nearest(text));
+  if (nearest != NULL) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "no posture '%s'; did you mean '%s'?",
+                            text, nearest);
+  }
+  return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                          "no posture '%.64s': give supine, prone, left, right, upright, inverted, "
+                          "or gravity X:Y:Z",
+                          text);
+}
+
+supine_status supine_state_parse_posture(const char *text, supine_state *state,
+                                         supine_error *error) {
+  double gravity[3];
+  turned read;
+  if (read_turned(text, &read)) {
+    SUPINE_TRY(turn(text, &read, gravity, error));
+  } else if (supine_posture_gravity(text, gravity) != SUPINE_OK && !read_gravity(text, gravity)) {
+    return refuse_posture(text, error);
+  }
+  memcpy(state->gravity, gravity, sizeof gravity);
+  return SUPINE_OK;
+}
+
+/* Refuse a text without a colon that is neither a posture nor a volume.
+ * @param volume_error  why it is no volume */
+static supine_status refuse_state(const char *text, const supine_error *volume_error,
+                                  supine_error *error) {
+  const char *nearest = supine_posture_nearest(text);
+  turned read;
+  if (strchr("+-.0123456789", text[0]) != NULL || strchr(text, '=') != NULL) {
+    return supine_error_wrap(error, volume_error, "%s", "");
+  }
+  if (read_turned(text, &read)) {
+    double gravity[3];
+    return turn(text, &read, gravity, error);
+  }
+  if (nearest != NULL) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "'%s' is neither a posture (did you mean '%s'?) nor a volume (rest, "
+                            "full or scan, with +ML or -ML, or 2600mL)",
+                            text, nearest);
+  }
+  return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                          "'%.64s' is neither a posture (supine, prone, left, right, upright, "
+                          "inverted, X:Y:Z) nor a volume (rest, full or scan, with +ML or -ML, or "
+                          "2600mL)",
+                          text);
+}
+
+static bool has_volume(const supine_state *state) {
+  return state->lung_count > 0 || state->volume.kind != SUPINE_VOLUME_DEFAULT;
+}
+
+supine_status supine_state_join(const supine_state *posture, const supine_state *volume,
+                                supine_state *state, supine_error *error) {
+  supine_state joined = has_volume(posture) ? *posture : *volume;
+  const int volumes = (int)has_volume(posture) + (int)has_volume(volume);
+  if (supine_input_judge(SUPINE_INPUT_VOLUMES_OF_A_STATE, volumes) == SUPINE_INPUT_REFUSED) {
+    char text[2][160];
+    supine_state second = *volume;
+    memcpy(second.gravity, posture->gravity, sizeof second.gravity);
+    (void)supine_state_print(posture, text[0], sizeof text[0]);
+    (void)supine_state_print(&second, text[1], sizeof text[1]);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "two volumes are given, by %.100s and by %.100s: give the volume once",
+                            text[0], strchr(text[1], ':') + 1);
+  }
+  memcpy(joined.gravity, posture->gravity, sizeof joined.gravity);
+  *state = joined;
+  return SUPINE_OK;
 }
 
 supine_status supine_state_parse(const char *text, supine_state *state, supine_error *error) {
@@ -184,14 +296,7 @@ supine_status supine_state_parse(const char *text, supine_state *state, supine_e
     colon = NULL;
   }
   if (colon == NULL) {
-    const bool number = strchr("+-.0123456789", text[0]) != NULL || equals != NULL;
-    if (number) {
-      return supine_error_wrap(error, &volume_error, "%s", "");
-    }
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "'%s' is neither a posture (did you mean '%s'?) nor a volume "
-                            "(rest, full or scan, with +ML or -ML, or 2600mL)",
-                            text, supine_posture_nearest(text));
+    return refuse_state(text, &volume_error, error);
   }
   char posture[PIECE];
   if ((size_t)(colon - text) >= sizeof posture) {
@@ -223,8 +328,14 @@ static void add(writer *out, const char *format, ...) {
   out->length += count > 0 ? (size_t)count : 0;
 }
 
+/* Return whether an angle has at most one decimal. Other angles were given as gravity. */
+static bool is_round(double degrees) {
+  return fabs(10 * degrees - round(10 * degrees)) < 1e-6;
+}
+
 static void add_posture(writer *out, const double gravity[3], bool described) {
   enum { PLAIN = 6 }; /* supine, prone, left, right, upright and inverted come first */
+  const double degrees = 180 / 3.14159265358979323846;
   const double *g = gravity;
   for (size_t i = 0; i < PLAIN; ++i) {
     double named[3];
@@ -234,9 +345,19 @@ static void add_posture(writer *out, const double gravity[3], bool described) {
       return;
     }
   }
-  if (g[0] == 0) { /* print gravity without a lateral part as tilted supine or prone */
-    const double degrees = atan2(g[2], fabs(g[1])) * (180 / 3.14159265358979323846);
-    add(out, "%s%+.9g", g[1] >= 0 ? "supine" : "prone", g[1] >= 0 ? degrees : -degrees);
+  const double level = hypot(g[0], g[1]);
+  const double tilt = atan2(g[2], level) * degrees;
+  const double roll = atan2(g[0], g[1]) * degrees;
+  if (g[0] == 0) {
+    add(out, "%s%+.9g", supine_posture_name(g[1] >= 0 ? 0U : 1U), tilt);
+    return;
+  }
+  if (g[1] == 0 && is_round(tilt)) {
+    add(out, "%s%+.9g", supine_posture_name(g[0] > 0 ? 2U : 3U), tilt);
+    return;
+  }
+  if (g[2] == 0 && is_round(roll)) {
+    add(out, "supine@%.9g", roll);
     return;
   }
   add(out, described ? "gravity %.3g:%.3g:%.3g" : "%.9g:%.9g:%.9g", g[0], g[1], g[2]);

@@ -89,17 +89,19 @@ static double cubic_solve(const double c[3], double volume, double low, double h
 }
 
 static supine_status refuse_constant(double volume, supine_error *error) {
-  return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                          "the lungs cannot change their volume by %g mL in this posture: "
-                          "no displacement of the basis changes it; choose another posture",
-                          volume);
+  return supine_error_set(
+      error, SUPINE_ERROR_NUMERICAL,
+      "the lungs cannot hold %.0f mL %s than in the reference surface: nothing in "
+      "the basis changes their volume in this posture; choose another posture",
+      fabs(volume), volume < 0 ? "less" : "more");
 }
 
 static supine_status refuse_folded(double volume, double limit, supine_error *error) {
-  return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                          "a change of the reference volume by %g mL is out of reach: "
-                          "the surface folds at a change of %g mL; choose a smaller change",
-                          volume, limit);
+  return supine_error_set(
+      error, SUPINE_ERROR_NUMERICAL,
+      "%.0f mL %s than in the reference surface is out of reach: the surface folds "
+      "at %.0f mL %s; choose a volume nearer to it",
+      fabs(volume), volume < 0 ? "less" : "more", fabs(limit), volume < 0 ? "less" : "more");
 }
 
 supine_status supine_volume_scale(const double cubic[3], double volume, double *scale,
@@ -205,9 +207,9 @@ static supine_status follow_path(const supine_volume_form *form, const double be
     if (steps == PATH_MOST * STEPS_EACH) {
       return supine_error_set(
           error, SUPINE_ERROR_NUMERICAL,
-          "a change of the reference volume by %g mL is out of reach: at %d "
-          "times the displacement at rest, it is %g mL; choose a smaller change",
-          volume, (int)PATH_MOST, held);
+          "%.0f mL %s than in the reference surface is out of reach: %d times the displacement at "
+          "rest gives %.0f mL; choose a volume nearer to it",
+          fabs(volume), volume < 0 ? "less" : "more", (int)PATH_MOST, fabs(held));
     }
     near = far;
     far += step;

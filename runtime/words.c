@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include <string.h>
 
+#include <supine/inputs.h>
+
 #include "runtime/words.h"
 
 static int lower(char c) {
@@ -33,4 +35,9 @@ size_t supine_words_distance(const char *text, const char *word) {
     }
   }
   return row[length];
+}
+
+bool supine_words_close(const char *text, const char *word) {
+  const double differ = (double)supine_words_distance(text, word) / (double)strlen(word);
+  return supine_input_judge(SUPINE_INPUT_SUGGESTION, differ) == SUPINE_INPUT_TAKEN;
 }

@@ -16,4 +16,8 @@ enum { SUPINE_WORD_MAX = 63 };
  * length, into `word`, ignoring case (Levenshtein 1966). */
 size_t supine_words_distance(const char *text, const char *word);
 
+/* Return whether `text` may be a misspelling of `word`: the check `suggestion` takes the share of
+ * the word's characters that differ. */
+bool supine_words_close(const char *text, const char *word);
+
 #endif

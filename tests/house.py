@@ -442,7 +442,8 @@ def check_examples():
     defined = set()
     for path in glob.glob(os.path.join(source, "tests", "*.cmake")) + [os.path.join(source, "tests", "CMakeLists.txt")]:
         with open(path, encoding="utf-8") as opened:
-            defined |= set(re.findall(r"add_test\(NAME ([\w$\{}]+)", opened.read().replace("npm_${where}", "npm_node")))
+            rules = opened.read().replace("npm_${where}", "npm_node")
+            defined |= set(re.findall(r"(?:add_test\(NAME |supine_test\((?:\w+/)?)([\w$\{}]+)", rules))
     with open(os.path.join(source, "examples", "README.md"), encoding="utf-8") as opened:
         table = set(re.findall(r"^\| \[(\w+)\]\(\1/README\.md\) \|", opened.read(), re.M))
     present = {name for name in os.listdir(os.path.join(source, "examples")) if name != "README.md"}

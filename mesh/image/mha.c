@@ -30,12 +30,10 @@ static const struct {
 
 enum { TYPES = sizeof types / sizeof *types };
 
-enum { KEYS_MAX = 128 };
-
 /* The "Key = value" lines of a header, as pointers into its text. */
 typedef struct header {
   size_t count;
-  const char *key[KEYS_MAX], *value[KEYS_MAX];
+  const char **key, **value;
   size_t length; /* bytes before the voxels */
 } header;
 
@@ -50,6 +48,13 @@ static const char *value_of(const header *h, const char *key, const char *second
     }
   }
   return value;
+}
+
+/* Return the distances between voxels. Like MetaIO, take the sizes of voxels for them if they are
+ * not stated. */
+static const char *spacing_of(const header *h) {
+  const char *spacing = value_of(h, "ElementSpacing", "", "");
+  return *spacing != '\0' ? spacing : value_of(h, "ElementSize", "", "");
 }
 
 static bool is_true(const char *value) {
@@ -68,12 +73,12 @@ static bool numbers(const char *text, double *values, size_t count) {
   return good;
 }
 
-/* Split `text`, which is modified, into keys and values. Return NULL, or a message on failure. */
+/* Split `text`, which is modified, into keys and values. Return NULL, or a message on failure.
+ * @param h  `key` and `value` have room for each line of the text */
 static const char *read_header(char *text, header *h) {
-  *h = (header){0};
   for (char *line = text; h->count == 0 || strcmp(h->key[h->count - 1], "ElementDataFile") != 0;) {
     char *end = strchr(line, '\n');
-    if (end == NULL || h->count == KEYS_MAX) {
+    if (end == NULL) {
       return "its header does not end with ElementDataFile; write the image again";
     }
     *end = '\0';
@@ -126,8 +131,7 @@ static const char *describe(const header *h, supine_image *image, size_t *type_i
     return "its header does not say NDims = 3; give an image of three axes";
   }
   const size_t n = (size_t)dimensions;
-  if (!numbers(value_of(h, "DimSize", "", ""), size, n) ||
-      !numbers(value_of(h, "ElementSpacing", "", ""), spacing, n) ||
+  if (!numbers(value_of(h, "DimSize", "", ""), size, n) || !numbers(spacing_of(h), spacing, n) ||
       !numbers(value_of(h, "Offset", "Position", "Origin"), offset, n) ||
       !numbers(value_of(h, "TransformMatrix", "Rotation", "Orientation"), matrix, n * n) ||
       !numbers(value_of(h, "ElementNumberOfChannels", "", ""), &channels, 1)) {
@@ -174,9 +178,15 @@ supine_status supine_image_describe_mha(const char *path, FILE *file, supine_ima
   SUPINE_ARENA arena = {0};
   char *text = supine_arena_take(&arena, HEADER_MAX + 1, 1);
   SUPINE_TRY(supine_arena_check(&arena, error, "the header of %s", path));
-  header h;
   size_t type = 0;
+  size_t lines = 1;
   text[fread(text, 1, HEADER_MAX, file)] = '\0';
+  for (const char *at = strchr(text, '\n'); at != NULL; at = strchr(at + 1, '\n')) {
+    ++lines;
+  }
+  header h = {.key = supine_arena_take(&arena, lines, sizeof *h.key),
+              .value = supine_arena_take(&arena, lines, sizeof *h.value)};
+  SUPINE_TRY(supine_arena_check(&arena, error, "the header of %s", path));
   const char *wrong = read_header(text, &h);
   wrong = wrong == NULL ? check(&h) : wrong;
   wrong = wrong == NULL ? describe(&h, image, &type) : wrong;

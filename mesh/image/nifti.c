@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* Read NIfTI through libnifti2, and write NIfTI-1. */
 #include <math.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include <nifti2_io.h>
+#include <supine/inputs.h>
 
 #include "base/arena.h"
 #include "base/text.h"
@@ -36,8 +38,8 @@ static bool forms_differ(const nifti_image *nifti) {
 }
 
 /* Check the image's size and type. Convert origin and steps from RAS, NIfTI's axes, to LPS. */
-static supine_status check(const char *path, const nifti_image *nifti, supine_image *image,
-                           image_storage *storage, supine_error *error) {
+static supine_status check(const char *path, const nifti_image *nifti, bool packed,
+                           supine_image *image, image_storage *storage, supine_error *error) {
   double unit = 1.0; /* mm */
   if (nifti->xyz_units == NIFTI_UNITS_METER) {
     unit = 1000.0;
@@ -54,7 +56,7 @@ static supine_status check(const char *path, const nifti_image *nifti, supine_im
       (int)nifti->ndim);
   SUPINE_REFUSE_IF(nifti->sform_code <= 0 && nifti->qform_code <= 0, error, SUPINE_ERROR_FORMAT,
                    "%s: the header has no orientation (qform and sform are 0); give the file that "
-                   "the segmenter wrote",
+                   "the segmenter wrote, or copy qform or sform from the scan that was segmented",
                    path);
   const bool wide = nifti->datatype == DT_INT64 || nifti->datatype == DT_UINT64;
   while (type < SUPINE_VOXEL_COUNT && types[type] != (wide ? DT_FLOAT64 : nifti->datatype)) {
@@ -75,7 +77,6 @@ static supine_status check(const char *path, const nifti_image *nifti, supine_im
       image->step[a][k] = turn * m->m[k][a];
     }
   }
-  const bool packed = nifti_is_gzfile(path) != 0;
   int integer = 0; /* 1: int64, -1: uint64 */
   if (nifti->datatype == DT_INT64) {
     integer = 1;
@@ -92,17 +93,60 @@ static supine_status check(const char *path, const nifti_image *nifti, supine_im
   return SUPINE_OK;
 }
 
+/* Find where the header says that the voxels begin. Return false if there is no header. */
+static bool find_offset(const char *path, bool *first, double *offset) {
+  enum { NIFTI_1 = 1 };
+  int version = 0;
+  int swapped = 0;
+  bool found = false;
+  free(nifti_read_header(path, &version, 1)); /* finds the version, but leaves bytes unswapped */
+  *first = version == NIFTI_1;
+  if (*first) {
+    nifti_1_header *header = nifti_read_n1_hdr(path, &swapped, 1);
+    found = header != NULL;
+    *offset = found ? (double)header->vox_offset : 0.0;
+    free(header);
+  } else {
+    nifti_2_header *header = nifti_read_n2_hdr(path, &swapped, 1);
+    found = header != NULL;
+    *offset = found ? (double)header->vox_offset : 0.0;
+    free(header);
+  }
+  return found;
+}
+
+/* Refuse a header that does not say where the voxels begin: libnifti2 would take other bytes. */
+static supine_status check_offset(const char *path, supine_error *error) {
+  bool first = true;
+  double offset = 0.0;
+  const bool found = find_offset(path, &first, &offset);
+  const double least = first ? 352.0 : 544.0; /* bytes of the header and the extension flag */
+  SUPINE_REFUSE_IF(!found, error, SUPINE_ERROR_FORMAT, "%s: not a NIfTI header; give a NIfTI file",
+                   path);
+  const bool begins =
+      supine_input_judge(SUPINE_INPUT_VOXELS_BEGIN, offset / least) == SUPINE_INPUT_TAKEN &&
+      offset <= (double)INT32_MAX && offset == floor(offset);
+  SUPINE_REFUSE_IF(!begins, error, SUPINE_ERROR_FORMAT,
+                   "%s: its vox_offset is %g, but voxels begin at a whole byte from %.0f; write "
+                   "the image again",
+                   path, offset, least);
+  return SUPINE_OK;
+}
+
 supine_status supine_image_describe_nifti(const char *path, FILE *file, supine_image *image,
                                           image_storage *storage, supine_error *error) {
-  (void)file;
+  unsigned char head[2] = {0};
+  const size_t known = fread(head, 1, sizeof head, file);
+  const bool packed = known == sizeof head && head[0] == 0x1F && head[1] == 0x8B; /* gzip */
   nifti_set_debug_level(0);
   /* the header of a pair of files says so, but nifti_image_read takes its own bytes for voxels */
   SUPINE_REFUSE_IF(is_nifti_file(path) == 2, error, SUPINE_ERROR_FORMAT,
                    "%s: its voxels are in another file; save header and voxels in one .nii", path);
+  SUPINE_TRY(check_offset(path, error));
   nifti_image *nifti = nifti_image_read(path, 0);
   SUPINE_REFUSE_IF(nifti == NULL, error, SUPINE_ERROR_FORMAT,
                    "%s: not a NIfTI header; give a NIfTI file", path);
-  const supine_status status = check(path, nifti, image, storage, error);
+  const supine_status status = check(path, nifti, packed, image, storage, error);
   nifti_image_free(nifti);
   return status;
 }

@@ -2,6 +2,7 @@
 /* Run the import library assimp in a process of its own. On a corrupt file, an importer may crash,
  * leak memory, or exceed its limits of time and memory. Then only that process ends. */
 #include <errno.h>
+#include <math.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,10 +17,12 @@
 #include <assimp/scene.h>
 
 #include "base/arena.h"
+#include "base/ascii.h"
 #include "base/input.h"
 #include "base/library.h"
 #include "base/locale.h"
 #include "base/text.h"
+#include "base/vec3.h"
 #include "mesh/io/read.h"
 
 /* clang-format off */
@@ -41,6 +44,7 @@ enum { SECONDS_LEAST = 8, SECONDS_PER_MEGABYTE = 1, GIGABYTES_MOST = 4 };
 typedef struct outcome {
   supine_error error;
   size_t dropped, vertex_count, triangle_count;
+  bool turned; /* whether the importer turned the axes of the file */
 } outcome;
 
 typedef struct gathering {
@@ -48,6 +52,7 @@ typedef struct gathering {
   const struct aiScene *scene;
   supine_mesh mesh;
   mesh_faces faces;
+  bool turned;
   supine_error *error;
 } gathering;
 
@@ -247,10 +252,24 @@ static bool take_faces(const struct aiMesh *part, bool mirrored, gathering *out)
   return good;
 }
 
+/* Return whether a map turns vectors by about a right angle or more, as importers do with files
+ * whose up axis is not theirs. */
+static bool is_turned(const struct aiMatrix4x4 *to) {
+  const double column[3][3] = {{(double)to->a1, (double)to->b1, (double)to->c1},
+                               {(double)to->a2, (double)to->b2, (double)to->c2},
+                               {(double)to->a3, (double)to->b3, (double)to->c3}};
+  bool turned = false;
+  for (int k = 0; k < 3; ++k) { /* a mirrored axis is not a turn */
+    turned = turned || fabs(column[k][k]) < 0.5 * supine_length(column[k]);
+  }
+  return turned;
+}
+
 static bool take_node(const struct aiNode *node, const struct aiMatrix4x4 *above, gathering *out) {
   struct aiMatrix4x4 to = *above;
   out->ai.MultiplyMatrix4(&to, &node->mTransformation);
   const bool mirrored = out->ai.Matrix4Determinant(&to) < 0.0F;
+  out->turned = out->turned || (node->mNumMeshes > 0 && is_turned(&to));
   bool good = true;
   for (unsigned m = 0; good && m < node->mNumMeshes; ++m) {
     const struct aiMesh *part = out->scene->mMeshes[node->mMeshes[m]];
@@ -304,6 +323,7 @@ static _Noreturn void be_child(const mesh_file *file, int pipe_end) {
     }
   }
   result.dropped = out.faces.dropped;
+  result.turned = out.turned;
   result.vertex_count = out.mesh.vertex_count;
   result.triangle_count = out.mesh.triangle_count;
   if (stream == NULL) {
@@ -321,14 +341,16 @@ static _Noreturn void be_child(const mesh_file *file, int pipe_end) {
 }
 
 /* Read the outcome and the surface that the child process wrote. */
-static supine_status take_outcome(const char *path, FILE *stream, supine_mesh *mesh,
-                                  size_t *dropped, supine_error *error) {
+static supine_status take_outcome(mesh_file *file, FILE *stream, supine_mesh *mesh, size_t *dropped,
+                                  supine_error *error) {
+  const char *path = file->path;
   outcome result;
   if (fread(&result, sizeof result, 1, stream) == 1) {
     if (result.error.status != SUPINE_OK) {
       return supine_error_wrap(error, &result.error, "%s", "");
     }
     *dropped = result.dropped;
+    file->turned = result.turned;
     const size_t n = result.vertex_count;
     const size_t triangles = result.triangle_count;
     if (supine_mesh_allocate(n, triangles, mesh) != SUPINE_OK) {
@@ -359,11 +381,58 @@ supine_status supine_io_import(mesh_file *file, supine_mesh *mesh, size_t *dropp
     be_child(file, ends[1]);
   }
   (void)close(ends[1]);
-  const supine_status status = take_outcome(file->path, stream, mesh, dropped, error);
+  const supine_status status = take_outcome(file, stream, mesh, dropped, error);
   (void)fclose(stream); /* before the wait: a child that still writes ends */
   while (child > 0 && waitpid(child, NULL, 0) < 0 && errno == EINTR) {
   }
   return status;
+}
+
+/* Make the text of an OBJ file one that assimp reads: blank the byte order mark, and join lines
+ * that a backslash continues. */
+static void tidy_obj(mesh_file *file) {
+  unsigned char *at = file->bytes;
+  if (file->size >= 3 && at[0] == 0xEF && at[1] == 0xBB && at[2] == 0xBF) {
+    memset(at, '\n', 3);
+  }
+  for (size_t i = 0; i + 1 < file->size; ++i) {
+    const size_t skip = at[i + 1] == '\r' && i + 2 < file->size ? 2 : 1;
+    if (at[i] == '\\' && at[i + skip] == '\n') {
+      memset(at + i, ' ', skip + 1);
+    }
+  }
+}
+
+/* Make a binary STL file one that assimp reads: drop bytes after the last triangle, and count the
+ * triangles if the file says that there are none. Other wrong counts are left as they are. */
+static void tidy_binary_stl(mesh_file *file) {
+  enum { HEADER = 84, COUNT = 80, TRIANGLE = 50 };
+  if (file->size < HEADER) {
+    return;
+  }
+  const size_t room = (file->size - HEADER) / TRIANGLE;
+  uint64_t count = 0;
+  for (size_t k = 4; k-- > 0;) {
+    count = count << 8 | file->bytes[COUNT + k];
+  }
+  if (count == 0 && room * TRIANGLE == file->size - HEADER) {
+    for (size_t k = 0; k < 4; ++k) {
+      file->bytes[COUNT + k] = (unsigned char)(room >> 8 * k);
+    }
+  } else if (count > 0 && count <= room) {
+    file->size = HEADER + TRIANGLE * (size_t)count;
+  }
+}
+
+static unsigned char lower(char c) {
+  return (unsigned char)(supine_ascii_is_letter(c) ? c | 0x20 : c);
+}
+
+/* Write the words of an STL text in small letters, as assimp knows only these. */
+static void tidy_text_stl(mesh_file *file) {
+  for (size_t i = 0; i < file->size; ++i) {
+    file->bytes[i] = lower((char)file->bytes[i]);
+  }
 }
 
 /* Check that three numbers follow `keyword` in every line that begins with it, because assimp does
@@ -392,6 +461,7 @@ supine_status supine_io_read_obj(mesh_file *file, supine_mesh *mesh, size_t *dro
                                  supine_error *error) {
   mesh_text last;
   SUPINE_TRY(supine_io_guard_text(file, error));
+  tidy_obj(file);
   SUPINE_TRY(check_lines(file, "v", &last, error));
   return supine_io_import(file, mesh, dropped, error);
 }
@@ -405,6 +475,9 @@ supine_status supine_io_read_stl(mesh_file *file, supine_mesh *mesh, size_t *dro
     SUPINE_REFUSE_IF(!supine_io_text_is(last, "endsolid"), error, SUPINE_ERROR_FORMAT,
                      "%s: the STL text does not end with endsolid: it is truncated; save it again",
                      file->path);
+    tidy_text_stl(file);
+  } else {
+    tidy_binary_stl(file);
   }
   return supine_io_import(file, mesh, dropped, error);
 }

@@ -71,6 +71,11 @@ static supine_status read_file(mesh_file *file, supine_arena *arena, mesh_reader
                    strerror(errno == 0 ? EIO : errno));
   find_space(file);
   *reader = find_reader(file->path);
+  SUPINE_REFUSE_IF(*reader == NULL && supine_text_ends_in(file->path, ".vtk"), error,
+                   SUPINE_ERROR_FORMAT,
+                   "%s: VTK's older format is not read; save the surface as .vtp or .ply, for "
+                   "example with 3D Slicer or ParaView",
+                   file->path);
   SUPINE_REFUSE_IF(*reader == NULL, error, SUPINE_ERROR_FORMAT,
                    "%s: no importer for this ending; give the mesh as .ply, .obj, .stl or .vtp",
                    file->path);
@@ -109,6 +114,11 @@ static supine_status choose_axes(const mesh_file *file, supine_axes asked,
     supine_error_advise(error, SUPINE_REMEDY_AXES, "LPS");
     return SUPINE_ERROR_FORMAT;
   }
+  SUPINE_REFUSE_IF(file->turned, error, SUPINE_ERROR_FORMAT,
+                   "%s: the file says which axis is up, and its coordinates were turned by that: "
+                   "save the surface as PLY, or compare it with the scan, and give the axes that "
+                   "it has after the turn",
+                   file->path);
   report->axes = file->tagged ? file->space : SUPINE_AXES_LPS;
   report->axes_from_tag = file->tagged;
   return SUPINE_OK;

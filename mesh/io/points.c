@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Read points from CSV files and 3D Slicer's markups. */
+#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -60,24 +61,88 @@ static supine_status add(reading *r, const double at[3], const char *name, supin
   return SUPINE_OK;
 }
 
-static supine_status read_csv(reading *r) {
-  static const char *const columns[] = {"x", "y", "z", "name", "label"};
-  enum { NAME = 3, LABEL, COLUMNS };
-  SUPINE_FREED_BY(supine_csv_close) supine_csv csv;
-  SUPINE_TRY(supine_csv_open(r->path, columns, COLUMNS, NAME, &csv, r->error));
+/* Columns of a table of points. 3D Slicer names the coordinates by its axes, and says in `defined`
+ * whether a point was placed. */
+static const char *const columns[] = {"x", "y", "z",    "l",     "p",      "s",
+                                      "r", "a", "name", "label", "defined"};
+enum { XYZ = 0, LPS = 3, RAS = 6, NAME = 8, LABEL, DEFINED, COLUMNS };
+
+/* Add the points in the rows of a table, whose coordinates are in three columns. */
+static supine_status read_rows(reading *r, supine_csv *csv, const size_t column[3],
+                               supine_axes axes) {
   for (bool more = true;;) {
-    SUPINE_TRY(supine_csv_next(&csv, &more, r->error));
+    SUPINE_TRY(supine_csv_next(csv, &more, r->error));
     if (!more) {
       return SUPINE_OK;
     }
+    const char *defined = supine_csv_text(csv, DEFINED);
     double at[3];
-    for (size_t k = 0; k < 3; ++k) {
-      SUPINE_TRY(supine_csv_number(&csv, k, columns[k], &at[k], r->error));
+    if (defined != NULL && strcmp(defined, "0") == 0) {
+      continue; /* 3D Slicer: the point was not placed */
     }
-    const char *name = supine_csv_text(&csv, NAME);
-    name = name != NULL ? name : supine_csv_text(&csv, LABEL);
-    SUPINE_TRY(add(r, at, name, SUPINE_AXES_LPS, 1.0));
+    for (size_t k = 0; k < 3; ++k) {
+      SUPINE_TRY(supine_csv_number(csv, column[k], columns[column[k]], &at[k], r->error));
+    }
+    const char *name = supine_csv_text(csv, NAME);
+    name = name != NULL && name[0] != '\0' ? name : supine_csv_text(csv, LABEL);
+    SUPINE_TRY(add(r, at, name, axes, 1.0));
   }
+}
+
+static supine_status read_csv(reading *r) {
+  static const size_t xyz[3] = {XYZ, XYZ + 1, XYZ + 2};
+  static const size_t lps[3] = {LPS, LPS + 1, LPS + 2};
+  static const size_t ras[3] = {RAS, RAS + 1, LPS + 2}; /* both have the column s */
+  supine_axes axes = SUPINE_AXES_LPS;
+  const size_t *column = xyz;
+  SUPINE_FREED_BY(supine_csv_close) supine_csv csv = {0};
+  SUPINE_TRY(supine_csv_open(r->path, columns, COLUMNS, 0, &csv, r->error));
+  if (supine_csv_has(&csv, LPS) && supine_csv_has(&csv, LPS + 1) && supine_csv_has(&csv, LPS + 2)) {
+    column = lps;
+  } else if (supine_csv_has(&csv, RAS) && supine_csv_has(&csv, RAS + 1) &&
+             supine_csv_has(&csv, LPS + 2)) {
+    column = ras;
+    (void)supine_mesh_axes_parse("RAS", &axes);
+  }
+  for (size_t k = 0; k < 3; ++k) {
+    SUPINE_REFUSE_IF(!supine_csv_has(&csv, column[k]), r->error, SUPINE_ERROR_FORMAT,
+                     "%s:%zu: the header has no column \"%s\"; expected x,y,z,... (or l,p,s or "
+                     "r,a,s of 3D Slicer)",
+                     r->path, csv.line, columns[column[k]]);
+  }
+  return read_rows(r, &csv, column, axes);
+}
+
+/* Find the coordinate system and the columns in the comments of a .fcsv file of 3D Slicer. */
+static supine_status read_comments(const reading *r, supine_axes *axes, char *header, size_t size) {
+  char line[512];
+  FILE *file = fopen(r->path, "rb");
+  SUPINE_REFUSE_IF(file == NULL, r->error, SUPINE_ERROR_READ, "%s: cannot open: %s", r->path,
+                   strerror(errno));
+  (void)supine_mesh_axes_parse("RAS", axes);
+  while (fgets(line, sizeof line, file) != NULL) {
+    char system[16];
+    line[strcspn(line, "\r\n")] = '\0';
+    if (sscanf(line, "# CoordinateSystem = %15s", system) == 1 &&
+        (strcmp(system, "1") == 0 || strcmp(system, "LPS") == 0)) {
+      *axes = SUPINE_AXES_LPS;
+    }
+    if (strncmp(line, "# columns = ", 12) == 0) {
+      (void)snprintf(header, size, "%s", line + 12);
+    }
+  }
+  (void)fclose(file);
+  return SUPINE_OK;
+}
+
+static supine_status read_fcsv(reading *r) {
+  static const size_t xyz[3] = {XYZ, XYZ + 1, XYZ + 2};
+  char header[512] = "id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID";
+  supine_axes axes;
+  SUPINE_FREED_BY(supine_csv_close) supine_csv csv = {0};
+  SUPINE_TRY(read_comments(r, &axes, header, sizeof header));
+  SUPINE_TRY(supine_csv_open_bare(r->path, header, columns, COLUMNS, 3, &csv, r->error));
+  return read_rows(r, &csv, xyz, axes);
 }
 
 static supine_status read_markup(reading *r, const json_t *markup) {
@@ -127,13 +192,21 @@ static supine_status read_markups(reading *r) {
 }
 
 bool supine_io_points_named(const char *path) {
-  return supine_text_ends_in(path, ".csv") || supine_text_ends_in(path, ".json");
+  return supine_text_ends_in(path, ".csv") || supine_text_ends_in(path, ".fcsv") ||
+         supine_text_ends_in(path, ".json");
 }
 
 supine_status supine_io_points_read(const char *path, const supine_mesh_load_options *options,
                                     supine_io_points *points, supine_error *error) {
   reading r = {.path = path, .options = options, .error = error};
-  supine_status status = supine_text_ends_in(path, ".json") ? read_markups(&r) : read_csv(&r);
+  supine_status status = SUPINE_OK;
+  if (supine_text_ends_in(path, ".json")) {
+    status = read_markups(&r);
+  } else if (supine_text_ends_in(path, ".fcsv")) {
+    status = read_fcsv(&r);
+  } else {
+    status = read_csv(&r);
+  }
   if (status == SUPINE_OK && r.points.count == 0) {
     status = supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: no points: give at least one", path);
   }

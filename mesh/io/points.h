@@ -11,15 +11,16 @@ typedef struct supine_io_points {
   char **names; /**< [count] "1", "2", ... if the file has no names; never NULL */
 } supine_io_points;
 
-/** Read points from a CSV file with the columns x,y,z and optionally name (or label), or from 3D
- * Slicer's .mrk.json (placed control points, in the file's coordinate system).
+/** Read points from a CSV file with the columns x,y,z and optionally name (or label), or from files
+ * of 3D Slicer: .mrk.json and .fcsv (placed control points, in the file's coordinate system), and
+ * tables with the columns l,p,s or r,a,s.
  * @param options  axes and unit to use instead of the file's; NULL for the file's own
  * @param points   zero-initialised; written only on success */
 supine_status supine_io_points_read(const char *path, const supine_mesh_load_options *options,
                                     supine_io_points *points, supine_error *error);
 void supine_io_points_free(supine_io_points *points);
 
-/** Return whether the name ends in .csv or .json. */
+/** Return whether the name ends in .csv, .fcsv or .json. */
 bool supine_io_points_named(const char *path);
 
 #endif

@@ -49,7 +49,8 @@ typedef struct mesh_file {
   const char *path;
   unsigned char *bytes; /**< content of the file, then a NUL */
   size_t size;
-  bool tagged;       /**< whether the file names its axes in a SPACE tag, as 3D Slicer writes it */
+  bool tagged; /**< whether the file names its axes in a SPACE tag, as 3D Slicer writes it */
+  bool turned; /**< output of a reader: whether it turned the axes, as the file's up axis says */
   supine_axes space; /**< axes named by the SPACE tag; AUTO if there is none or it is unknown */
 } mesh_file;
 

@@ -147,6 +147,35 @@ static bool choose_by_presence(const supine_image *image, const labels_tally *ta
   return false;
 }
 
+/* Refuse five lobes of which 1 to 3 lie to the right of 4 and 5: LTRCLobes numbers those of the
+ * left lung first, other programs those of the right lung. If a lobe is missing, refuse nothing. */
+static supine_status check_lobes(const char *path, const supine_image *image,
+                                 const labels_tally *tally, supine_error *error) {
+  enum { LOBES = 5, RIGHT_LOBES = 3 };
+  double farthest = -INFINITY; /* largest x of the centres of 1 to 3 */
+  double nearest = INFINITY;   /* smallest x of the centres of 4 and 5 */
+  for (size_t lobe = 1; lobe <= LOBES; ++lobe) {
+    if (tally[lobe].count == 0) {
+      return SUPINE_OK;
+    }
+    double x = image->origin[0];
+    for (int a = 0; a < 3; ++a) {
+      x += (double)tally[lobe].sum[a] / (double)tally[lobe].count * image->step[a][0];
+    }
+    if (lobe <= RIGHT_LOBES) {
+      farthest = fmax(farthest, x);
+    } else {
+      nearest = fmin(nearest, x);
+    }
+  }
+  SUPINE_REFUSE_IF(farthest < nearest, error, SUPINE_ERROR_MESH,
+                   "%s: its lobes 1, 2 and 3 lie to the right of 4 and 5, so that they are not "
+                   "numbered from left to right, as lungmask's are: give the labels "
+                   "left=4+5,right=1+2+3",
+                   path);
+  return SUPINE_OK;
+}
+
 /* Set the left or right side of each label. Set `name` to the labelling convention, such as
  * "lungmask", if one was used. */
 static supine_status choose(const char *path, const supine_image *image, const labels_tally *tally,
@@ -225,11 +254,15 @@ supine_status supine_labels_choose(const char *path, const supine_image *image,
   char list[3][96];
   memset(side, 0, LABELS_MAX);
   SUPINE_TRY(choose(path, image, tally, options, side, &name, error));
+  if (name != NULL && strcmp(name, "lobes") == 0) {
+    SUPINE_TRY(check_lobes(path, image, tally, error));
+  }
   SUPINE_TRY(check(path, image, tally, side, &choice->doubted, error));
   for (int value = LABELS_LEFT; value <= LABELS_EITHER; ++value) {
     list_labels(tally, side, (uint8_t)value, list[value - 1], sizeof list[0]);
   }
-  choice->named = list[2][0] == '\0' && (name == NULL || strcmp(name, "their sides") != 0);
+  choice->guessed = name != NULL && strcmp(name, "their sides") == 0;
+  choice->named = list[2][0] == '\0' && !choice->guessed;
   taken[0] = '\0';
   if (list[2][0] != '\0') {
     supine_text_add(taken, 256, "%s both lungs", list[2]);

@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <supine/inputs.h>
+
 #include "base/arena.h"
 #include "base/text.h"
 #include "base/vec3.h"
@@ -60,6 +62,7 @@ static bool same_frame(const supine_image *a, const supine_image *b) {
 static supine_status read_image(const work *w, const char *path, supine_image *image,
                                 supine_error *error) {
   SUPINE_TRY(supine_image_read(path, image, error));
+  SUPINE_TRY(supine_labels_settle(path, image, error));
   supine_image_set_axes(image, w->options->axes);
   return SUPINE_OK;
 }
@@ -301,6 +304,39 @@ static supine_status check_sides(const work *w, const supine_mesh *surfaces, sup
   return SUPINE_ERROR_MESH;
 }
 
+/* Return whether two labels can be the two lungs of a person. */
+static bool can_be_lungs(const work *w, const supine_mesh *surfaces) {
+  const supine_labels_lung *lung = w->report->lung;
+  const double ratio = fmax(lung[0].mask, lung[1].mask) / fmin(lung[0].mask, lung[1].mask);
+  bool can = supine_input_judge(SUPINE_INPUT_LABELS_RATIO, ratio) == SUPINE_INPUT_TAKEN;
+  double low[2][3];
+  double high[2][3];
+  double centre[2];
+  for (int i = 0; i < 2; ++i) {
+    can = can && supine_input_judge(SUPINE_INPUT_LABELS_PIECES, lung[i].dropped / lung[i].mask) ==
+                     SUPINE_INPUT_TAKEN;
+    (void)supine_mesh_box(&surfaces[i], low[i], high[i]);
+    centre[i] = 0.5 * (low[i][0] + high[i][0]);
+  }
+  /* the left lung comes first, and x grows to the left */
+  const double reach = fmax(high[1][0] - centre[0], centre[1] - low[0][0]);
+  const bool apart = supine_input_judge(SUPINE_INPUT_LABELS_SIDES, reach) == SUPINE_INPUT_TAKEN;
+  return can && (apart || w->choice.doubted); /* check_sides refuses doubted sides */
+}
+
+/* Refuse two labels that were assumed to be the two lungs if they hardly are. */
+static supine_status check_guess(const work *w, const supine_mesh *surfaces, supine_error *error) {
+  const supine_labels_lung *lung = w->report->lung;
+  const bool can = !w->choice.guessed || can_be_lungs(w, surfaces);
+  SUPINE_REFUSE_IF(!can, error, SUPINE_ERROR_MESH,
+                   "%s: its two labels are hardly the two lungs: the left one would hold %.0f mL, "
+                   "and %.0f mL apart from that, the right one %.0f and %.0f mL (labels %s). Say "
+                   "which labels are lung: left=LABEL+...,right=LABEL+..., or 'one' if all are",
+                   w->path, lung[0].mask, lung[0].dropped, lung[1].mask, lung[1].dropped,
+                   w->report->taken);
+  return SUPINE_OK;
+}
+
 static supine_status make_surfaces(work *w, const char *const *paths, size_t count,
                                    supine_mesh *surfaces, supine_error *error) {
   supine_labels_report *report = w->report;
@@ -317,6 +353,7 @@ static supine_status make_surfaces(work *w, const char *const *paths, size_t cou
   }
   supine_labels_mask_free(&w->both);
   if (report->lung_count == 2) {
+    SUPINE_TRY(check_guess(w, surfaces, error));
     SUPINE_TRY(check_sides(w, surfaces, error));
   }
   return advance(w, 1.0, error);

@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <supine/inputs.h>
+
 #include "base/arena.h"
 #include "base/vec3.h"
 
@@ -24,18 +26,64 @@ void supine_labels_mask_place(const labels_mask *mask, const double voxel[3], do
   }
 }
 
-/* Read the labels of a row; if a voxel is not a label, set `bad` to its value and return false. */
-static bool read_row(const supine_image *image, size_t row, uint16_t *labels, double *bad) {
+static const double label_error = 1e-3; /* of a probability that is 0 or 1 but for rounding */
+
+static bool is_label(double value) {
+  const double nearest = fmin(LABELS_MAX - 1.0, fmax(0.0, rint(value)));
+  return supine_input_judge(SUPINE_INPUT_LABEL_VALUE, fabs(value - nearest)) == SUPINE_INPUT_TAKEN;
+}
+
+typedef struct voxels {
+  bool labels;        /* whether every voxel is a label */
+  bool probabilities; /* whether every voxel is a number from 0 to 1 */
+  double other;       /* value of the first voxel that is not a label */
+} voxels;
+
+static voxels inspect(const supine_image *image) {
+  voxels found = {.labels = true, .probabilities = true};
+  for (size_t i = 0; i < image->size[0] * image->size[1] * image->size[2]; ++i) {
+    const double value = supine_image_get(image, i);
+    if (!is_label(value)) {
+      found.other = found.labels ? value : found.other;
+      found.labels = false;
+    }
+    found.probabilities =
+        found.probabilities && value >= -label_error && value <= 1.0 + label_error;
+  }
+  return found;
+}
+
+supine_status supine_labels_settle(const char *path, supine_image *image, supine_error *error) {
+  static const double threshold = 0.5;
+  if (image->voxel == SUPINE_VOXEL_U8 || image->voxel == SUPINE_VOXEL_U16) {
+    return SUPINE_OK;
+  }
+  const voxels found = inspect(image);
+  SUPINE_REFUSE_IF(!found.labels && !found.probabilities, error, SUPINE_ERROR_FORMAT,
+                   found.other < 0.0
+                       ? "%s: a voxel holds %g, but labels are 0 to 65535: if this is the CT "
+                         "itself, segment it first"
+                       : "%s: a voxel holds %g, but labels are whole numbers, 0 to 65535, and "
+                         "probabilities are 0 to 1: give labels or a mask",
+                   path, found.other);
+  if (image->voxel != SUPINE_VOXEL_F32 && image->voxel != SUPINE_VOXEL_F64) {
+    return SUPINE_OK;
+  }
+  for (size_t i = 0; i < image->size[0] * image->size[1] * image->size[2]; ++i) {
+    const double value = supine_image_get(image, i);
+    const double share = value >= threshold ? 1.0 : 0.0;
+    const double label = found.labels ? rint(value) : share;
+    supine_image_put(image, i, 1, &label);
+  }
+  return SUPINE_OK;
+}
+
+/* Read the labels of a row. */
+static void read_row(const supine_image *image, size_t row, uint16_t *labels) {
   const size_t size = image->size[0];
   for (size_t i = 0; i < size; ++i) {
-    const double value = supine_image_get(image, row * size + i);
-    if (!(value >= 0.0 && value < (double)LABELS_MAX) || value != floor(value)) {
-      *bad = value;
-      return false;
-    }
-    labels[i] = (uint16_t)value;
+    labels[i] = (uint16_t)supine_image_get(image, row * size + i);
   }
-  return true;
 }
 
 /* Add the voxels of one row to the tallies of their labels. */
@@ -68,14 +116,7 @@ supine_status supine_labels_count(const char *path, const supine_image *image, l
   SUPINE_TRY(supine_arena_status(&arena));
   memset(tally, 0, LABELS_MAX * sizeof *tally);
   for (size_t row = 0; row < image->size[1] * image->size[2]; ++row) {
-    double bad = 0.0;
-    const bool good = read_row(image, row, labels, &bad);
-    SUPINE_REFUSE_IF(!good, error, SUPINE_ERROR_FORMAT,
-                     bad < 0.0 ? "%s: a voxel holds %g, but labels are 0 to 65535: if this is the "
-                                 "CT itself, segment it first"
-                               : "%s: a voxel holds %g, but labels are whole numbers, 0 to 65535: "
-                                 "threshold probabilities into a mask first",
-                     path, bad);
+    read_row(image, row, labels);
     count_row(image, row, labels, tally);
   }
   SUPINE_REFUSE_IF(tally[0].count == image->size[0] * image->size[1] * image->size[2], error,
@@ -108,8 +149,7 @@ supine_status supine_labels_mask_cut(const supine_image *image, const size_t low
   }
   for (size_t k = low[2]; k <= high[2]; ++k) {
     for (size_t j = low[1]; j <= high[1]; ++j) {
-      double bad;
-      (void)read_row(image, j + image->size[1] * k, row, &bad);
+      read_row(image, j + image->size[1] * k, row);
       uint8_t *out = mask->at + margin +
                      mask->size[0] * (j - low[1] + margin + mask->size[1] * (k - low[2] + margin));
       for (size_t i = low[0]; i <= high[0]; ++i) {

@@ -48,7 +48,13 @@ typedef struct labels_tally {
   size_t low[3], high[3]; /**< bounding box: first and last voxel index along each axis */
 } labels_tally;
 
-/** Count the voxels of each label, and find their bounding boxes.
+/** Check that every voxel is a label, and make it exactly one: values within 1e-3 of a whole number
+ * are that number. If all values are 0 to 1 and some lie between, they are probabilities: voxels of
+ * at least 0.5 become 1, the others 0.
+ * @retval SUPINE_ERROR_FORMAT  a voxel holds another number */
+supine_status supine_labels_settle(const char *path, supine_image *image, supine_error *error);
+
+/** Count the voxels of each label of an image that is settled, and find their bounding boxes.
  * @param tally  [LABELS_MAX] output */
 supine_status supine_labels_count(const char *path, const supine_image *image, labels_tally *tally,
                                   supine_error *error);
@@ -56,6 +62,7 @@ supine_status supine_labels_count(const char *path, const supine_image *image, l
 typedef struct labels_choice {
   char *taken; /**< [256] output: labels of each side, such as "2 left; 1 right" */
   bool named;  /**< output: whether the labels, not the position, tell which lung is the left one */
+  bool guessed; /**< output: whether two labels are only assumed to be the two lungs */
   bool doubted; /**< whether the left lung does not lie mainly to the left of the right lung */
 } labels_choice;
 

@@ -56,6 +56,7 @@ static supine_status make_parts(const char *path, const unsigned *wanted, size_t
   SUPINE_FREED_BY(supine_image_free) supine_image image = {0};
   SUPINE_TRY(supine_arena_status(&arena));
   SUPINE_TRY(supine_image_read(path, &image, error));
+  SUPINE_TRY(supine_labels_settle(path, &image, error));
   SUPINE_TRY(supine_labels_count(path, &image, tally, error));
   SUPINE_TRY(choose(path, tally, wanted, wanted_count, parts, count, error));
   for (size_t i = 0; i < *count; ++i) {

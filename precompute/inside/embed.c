@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include <supine/inputs.h>
 #include <supine/safetensors.h>
 
 #include "base/arena.h"
@@ -15,9 +16,6 @@
 #include "precompute/inside/embed.h"
 
 enum { BLOCK = 1024 };
-
-/* Distance from the lungs, mm, beyond which their motion is not extrapolated. */
-static const double outside_most = 60.0;
 
 /* The embedded points, sorted by lung, and their displacements. */
 typedef struct embedding {
@@ -72,16 +70,46 @@ static void gather_parts(embedding *e) {
   }
 }
 
-static supine_status check_distance(const embedding *e, supine_error *error) {
-  double nearest = INFINITY;
-  for (size_t i = 0; i < e->content->count; ++i) {
-    nearest = fmin(nearest, -e->place[i].depth);
+/* Append the name of a part to `text`, if there is room. */
+static void add_name(const char *names, size_t part, char *text, size_t size) {
+  for (; part > 0 && *names != '\0'; names += *names == '\n') {
+    names += strcspn(names, "\n");
+    --part;
   }
-  SUPINE_REFUSE_ADVISE(nearest > outside_most && !e->options->clamp, error,
-                       SUPINE_REMEDY_POINTS_CLAMP, SUPINE_ERROR_MESH,
-                       "all points are outside the lungs, by %.0f mm or more, where the motion of "
-                       "the lungs says nothing: check the axes and units",
-                       nearest);
+  const size_t length = strlen(text);
+  (void)snprintf(text + length, size - length, "%s'%.*s'", length > 0 ? ", " : "",
+                 (int)strcspn(names, "\n"), names);
+}
+
+/* Refuse parts whose nearest point is too far outside the lungs. A grid is one part. */
+static supine_status check_distance(const embedding *e, supine_error *error) {
+  const supine_inside_content *content = e->content;
+  char far[160] = "";
+  size_t far_count = 0;
+  double farthest = 0.0;
+  size_t parts = 0;
+  for (size_t begin = 0, end = 0; begin < content->count; begin = end) {
+    double nearest = INFINITY;
+    for (; end < content->count &&
+           (content->part_count == 0 || content->part[end] == content->part[begin]);
+         ++end) {
+      nearest = fmin(nearest, -e->place[end].depth);
+    }
+    ++parts;
+    if (supine_input_judge(SUPINE_INPUT_POINT_OUTSIDE, nearest) == SUPINE_INPUT_REFUSED) {
+      ++far_count;
+      farthest = fmax(farthest, nearest);
+      if (content->part_count > 0 && far_count <= 3) {
+        add_name(content->names, content->part[begin], far, sizeof far);
+      }
+    }
+  }
+  const char *more = far_count > 3 ? " and others" : "";
+  SUPINE_REFUSE_ADVISE(
+      far_count > 0 && !e->options->clamp, error, SUPINE_REMEDY_POINTS_CLAMP, SUPINE_ERROR_MESH,
+      "%zu of %zu (%s%s) are outside the lungs, by up to %.0f mm, where the motion "
+      "of the lungs says nothing: leave them out, or check their axes and unit",
+      far_count, parts, far, more, farthest);
   return SUPINE_OK;
 }
 
@@ -360,10 +388,12 @@ static supine_status write_file(const embedding *e, const char *path, supine_ten
   return supine_safetensors_write(path, tensors, tensor_count, metadata, count, error);
 }
 
+/* Tensors of the lungs' basis that the file takes over. */
+static const char *const shared[] = {
+    "modes",        "volume_linear", "volume_quadratic", "volume_cubic",     "resting_volume",
+    "volume_range", "full_volume",   "simulated_range",  "simulated_limits", "simulated_shares"};
+
 static supine_status write_content(const embedding *e, const char *path, supine_error *error) {
-  static const char *const shared[] = {"modes", "volume_linear", "volume_quadratic", "volume_cubic",
-                                       "resting_volume", "full_volume", "simulated_range", "simulated_limits",
-                                       "simulated_shares"};
   const supine_inside_content *content = e->content;
   const supine_image *grid = &content->grid;
   const size_t n = content->count;
@@ -380,7 +410,7 @@ static supine_status write_content(const embedding *e, const char *path, supine_
     const double x = (double)info->bounds[i];
     *corner = i < 6 || (i / 3 % 2 == 0 ? x < *corner : x > *corner) ? x : *corner;
   }
-  supine_tensor tensors[20] = {
+  supine_tensor tensors[21] = {
       {"vertices", SUPINE_F32, 2, {n, 3}, e->vertices},
       {"triangles", SUPINE_U32, 2, {content->triangle_count, 3}, e->triangles},
       {"lung", SUPINE_U8, 1, {n}, e->group},

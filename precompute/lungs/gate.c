@@ -5,6 +5,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include <supine/inputs.h>
+
 #include "base/arena.h"
 #include "base/number.h"
 #include "base/vec3.h"
@@ -35,13 +37,31 @@ static const char *plural(size_t count) {
   return count == 1 ? "" : "s";
 }
 
+/* If a surface is open, join vertices that differ only by rounding, and note it. */
+static supine_status join_vertices(supine_mesh *mesh, const char *name, supine_findings *findings) {
+  static const double rounding = 1e-4; /* mm; single precision resolves 3e-5 mm at 500 mm */
+  SUPINE_FREED_BY(supine_mesh_topology_free) supine_topology topology = {0};
+  size_t joined = 0;
+  SUPINE_TRY(supine_mesh_topology_create(mesh, &topology));
+  if (topology.closed) {
+    return SUPINE_OK;
+  }
+  SUPINE_TRY(supine_mesh_join_close(mesh, rounding, &joined));
+  if (joined > 0) {
+    supine_findings_add(findings, "%s: note: joined %zu %s within 0.0001 mm of another", name,
+                        joined, joined == 1 ? "vertex" : "vertices");
+  }
+  return SUPINE_OK;
+}
+
 /* Repair one surface, drop its small pieces, and note what was changed. */
 static supine_status mend(supine_mesh *mesh, const char *name, supine_findings *findings,
                           supine_error *error) {
   supine_mesh_repair_report report;
   size_t pieces;
   size_t specks;
-  if (supine_mesh_repair(mesh, &report) != SUPINE_OK ||
+  if (join_vertices(mesh, name, findings) != SUPINE_OK ||
+      supine_mesh_repair(mesh, &report) != SUPINE_OK ||
       supine_mesh_drop_specks(mesh, speck_share, &pieces, &specks) != SUPINE_OK) {
     return supine_error_memory(error, "checking %s", name);
   }
@@ -125,6 +145,28 @@ static void check_size(checks *c, const supine_lungs *lungs, bool likely) {
         height, ml);
   check(c, ml >= 1500.0 * most, SUPINE_OK, SUPINE_REMEDY_NONE, NULL,
         "the lungs hold %.0f mL, as a child's may: for an adult, check the voxel spacing", ml);
+}
+
+/* Check that no lung is hollow: that its surface is not too large for the volume that it encloses,
+ * relative to a sphere. */
+static void check_solid(checks *c, const supine_lungs *lungs, size_t lung) {
+  static const double pi = 3.14159265358979323846;
+  const supine_mesh part = supine_lungs_part(lungs, lung);
+  const double volume = 1e3 * lungs->volume[lung];
+  double area = 0.0;
+  for (size_t t = 0; t < part.triangle_count; ++t) {
+    const uint32_t *corner = part.triangles + 3 * t;
+    double normal[3];
+    supine_normal(part.vertices + 3 * (size_t)corner[0], part.vertices + 3 * (size_t)corner[1],
+                  part.vertices + 3 * (size_t)corner[2], normal);
+    area += 0.5 * supine_length(normal);
+  }
+  const double compactness = cbrt(36.0 * pi * volume * volume) / area;
+  const supine_input_verdict verdict = supine_input_judge(SUPINE_INPUT_LUNG_HOLLOW, compactness);
+  check(c, verdict != SUPINE_INPUT_REFUSED, SUPINE_ERROR_MESH, SUPINE_REMEDY_NONE, NULL,
+        "the %s lung holds %.0f mL within a surface of %.0f cm2, as a hollow shell does: fill the "
+        "mask, or remove the surface inside the lung",
+        supine_lungs_name(lungs, lung), lungs->volume[lung], 0.01 * area);
 }
 
 /* Return the volume of a surface beyond `from` on an axis, on the side of `sign`, mm^3: the
@@ -304,6 +346,9 @@ static void check_shape(checks *c, const supine_lungs *lungs, int *side, bool *a
         SUPINE_REMEDY_LUNGS_SEPARATE, NULL,
         "this surface looks like both lungs in one piece: separate them");
   check_size(c, lungs, likely);
+  for (size_t lung = 0; lung < lungs->lung_count && c->status == SUPINE_OK; ++lung) {
+    check_solid(c, lungs, lung);
+  }
 }
 
 /* Choose the side of a single lung as stated, or by its shape or, if that is unclear, by its

@@ -4,6 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <supine/inputs.h>
+
+#include "precompute/patient/checks.h"
 #include "precompute/patient/matching.h"
 #include "precompute/patient/scans.h"
 
@@ -108,6 +111,20 @@ static void warn_of_rest(supine_patient_scans *scans, const supine_patient_recor
   }
 }
 
+/* Warn if two scans in one posture hardly show one person. */
+static void warn_of_two_people(supine_patient_scans *scans, const supine_patient_record *record) {
+  supine_patient_size size[2];
+  const bool measured = supine_patient_size_of(&scans->lungs[0], &size[0]) &&
+                        supine_patient_size_of(&scans->lungs[1], &size[1]);
+  const bool turned = memcmp(record->state[0].gravity, record->state[1].gravity,
+                             sizeof record->state[0].gravity) != 0;
+  char text[256];
+  if (record->from_surface && measured && !turned &&
+      !supine_patient_one_person(&size[0], &size[1], text, sizeof text)) {
+    supine_findings_add(&scans->findings, "%s", text);
+  }
+}
+
 static void set_states(supine_patient_scans *scans, supine_patient_record *record) {
   const supine_lungs *emptier = &scans->lungs[1];
   const supine_patient_frame frame =
@@ -127,6 +144,7 @@ static void set_states(supine_patient_scans *scans, supine_patient_record *recor
   complete_state(record, 1);
   name_volumes(scans, record);
   warn_of_rest(scans, record);
+  warn_of_two_people(scans, record);
   memcpy(record->emptier[0], record->from_surface ? emptier->minimum : frame.minimum,
          sizeof record->emptier[0]);
   memcpy(record->emptier[1], record->from_surface ? emptier->maximum : frame.maximum,
@@ -154,17 +172,22 @@ supine_status supine_patient_scans_order(supine_patient_scans *scans, supine_pat
   const int named = named_order(record->state);
   record->from_surface = volume[0] > 0.0 && volume[1] > 0.0;
   double growth = 1.0; /* volume of the second scan / that of the first */
+  double doubt = volume_error;
   if (record->from_surface) {
     growth = volume[1] / volume[0];
   } else if (scans->pairs.count > 0) {
     growth = supine_patient_pairs_growth(&scans->pairs);
+    doubt += supine_input_get(SUPINE_INPUT_LANDMARKS_ORDER)->refused *
+             supine_patient_growth_error(&scans->pairs);
   }
-  SUPINE_REFUSE_ADVISE((named > 0 && growth < 1.0 - volume_error) ||
-                           (named < 0 && growth > 1.0 + volume_error),
+  SUPINE_REFUSE_ADVISE((named > 0 && growth < 1.0 - doubt) || (named < 0 && growth > 1.0 + doubt),
                        error, SUPINE_REMEDY_SCANS_EXCHANGE, SUPINE_ERROR_FORMAT,
                        "the scan given as the fuller one has only %.0f %% of the volume of the "
                        "other scan",
                        100.0 * (named > 0 ? growth : 1.0 / growth));
+  if (record->from_surface && scans->pairs.count > 0) {
+    SUPINE_TRY(supine_patient_check_order(&scans->pairs, growth, error));
+  }
   if (volume[0] > 0.0 && scans->pairs.count > 0) {
     SUPINE_TRY(find_sides(&scans->lungs[0], &scans->pairs, error));
   }

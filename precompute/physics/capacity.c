@@ -10,24 +10,42 @@
  * Respir J 57: 2000289, 2021). */
 #include <math.h>
 
+#include <supine/inputs.h>
+
+#include "base/number.h"
 #include "base/text.h"
 #include "precompute/physics/reference.h"
 
 /* The state given for a scan is doubtful if it implies a volume of both lungs at full inflation
- * below `least_share` of the expected volume, below `least_ml`, or above `most_ml`. */
+ * below `least_share` of the expected volume, below that of the check lungs-small, or above
+ * `most_ml`. */
 static const double least_share = 0.75;
-static const double least_ml = 3500.0;
 static const double most_ml = 10000.0;
 static const double least_gas = 1000.0; /* or below this gas at rest, supine, mL */
 
 /* Largest accepted relative difference between the scan's volume and that given by --resting. */
 static const double agreement = 0.05;
 
+static const struct {
+  double slope, offset; /* capacity in L is slope x height in m - offset */
+  double usual[2];      /* range of an adult's height if it is unknown, cm */
+  double measured[2];   /* range of the heights for which the equation is stated, cm */
+} of[2] = {{6.60, 5.79, {150.0, 180.0}, {145.0, 180.0}},
+           {7.99, 7.08, {160.0, 195.0}, {155.0, 195.0}}}; /* [0] women, [1] men */
+
+bool supine_physics_reference_height_is_told(const supine_person *person, double range[2]) {
+  const bool man = person->sex == SUPINE_SEX_MALE;
+  const bool woman = person->sex == SUPINE_SEX_FEMALE;
+  range[0] = of[man].measured[0];
+  range[1] = of[!woman].measured[1];
+  return person->height > 0.0 &&
+         (supine_input_judge(SUPINE_INPUT_HEIGHT_LEAST, person->height / range[0]) !=
+              SUPINE_INPUT_TAKEN ||
+          supine_input_judge(SUPINE_INPUT_HEIGHT_MOST, person->height / range[1]) !=
+              SUPINE_INPUT_TAKEN);
+}
+
 void supine_physics_reference_capacity(const supine_person *person, double range[2]) {
-  static const struct {
-    double slope, offset; /* capacity in L is slope x height in m - offset */
-    double usual[2];      /* range of an adult's height if it is unknown, cm */
-  } of[2] = {{6.60, 5.79, {150.0, 180.0}}, {7.99, 7.08, {160.0, 195.0}}}; /* [0] women, [1] men */
   range[0] = INFINITY;
   range[1] = 0.0;
   for (int sex = 0; sex < 2; ++sex) {
@@ -36,7 +54,7 @@ void supine_physics_reference_capacity(const supine_person *person, double range
     }
     for (int end = 0; end < 2; ++end) {
       const double height = person->height > 0.0 ? person->height : of[sex].usual[end];
-      const double upright = 1e3 * (of[sex].slope * 1e-2 * height - of[sex].offset);
+      const double upright = 1e3 * fmax(0.0, of[sex].slope * 1e-2 * height - of[sex].offset);
       const double full = upright / (1.0 + SUPINE_FULL_UPRIGHT_GAIN) + SUPINE_TISSUE_ML;
       range[0] = fmin(range[0], full);
       range[1] = fmax(range[1], full);
@@ -59,8 +77,8 @@ static double part_of_pair(const supine_reference *reference) {
  * 45, as the age is unknown: from 25 to 70 years, FRC changes by -7 to +6 %. */
 void supine_physics_reference_predict_rest(const supine_reference *reference,
                                            const supine_person *person, supine_resting *resting) {
-  static const double of[2][2] = {{-12.2912, 2.6049}, {-13.0669, 2.7634}}; /* [0] women, [1] men */
-  const double *c = of[person->sex == SUPINE_SEX_MALE];
+  static const double frc[2][2] = {{-12.2912, 2.6049}, {-13.0669, 2.7634}}; /* [0] women, [1] men */
+  const double *c = frc[person->sex == SUPINE_SEX_MALE];
   if (reference->scan.state.volume.kind == SUPINE_VOLUME_FULL && person->height > 0.0 &&
       person->sex != SUPINE_SEX_UNKNOWN && !supine_physics_resting_given(resting) &&
       resting->assumed == SUPINE_REST_SHARE) {
@@ -111,12 +129,19 @@ void supine_physics_reference_doubt(const supine_reference *reference, const sup
   }
   const double gas =
       supine_physics_reference_rest(reference, supine, rest) - part * SUPINE_TISSUE_ML;
-  if (full < part * fmax(least_share * range[0], least_ml) || gas < part * least_gas) {
+  const bool is_small =
+      supine_input_judge(SUPINE_INPUT_LUNGS_SMALL, full / part) != SUPINE_INPUT_TAKEN;
+  if (is_small || full < part * least_share * range[0] || gas < part * least_gas) {
+    char held_gas[32] = "no gas"; /* the tissue is an adult's: a child's lungs have less */
+    if (supine_input_judge(SUPINE_INPUT_GAS, gas) == SUPINE_INPUT_TAKEN) {
+      (void)supine_print_text(held_gas, sizeof held_gas, "%.0f mL of gas", gas);
+    }
     supine_findings_advise(
         findings, at_rest ? SUPINE_REMEDY_SCAN_EMPTIER : SUPINE_REMEDY_SCAN_NOT_FULL, NULL,
-        "warning: at full inflation the lungs hold %.0f mL (%s mL), at rest %.0f mL of gas, where "
-        "%.0f mL (SD 600 mL) remain after a full expiration: %s",
-        full, expected, gas, part * SUPINE_RESIDUAL_ML,
+        "warning: at full inflation the lungs hold %.0f mL (%s mL), at rest %s, where "
+        "%.0f mL (SD 600 mL) remain after a full expiration%s: %s",
+        full, expected, held_gas, part * SUPINE_RESIDUAL_ML,
+        is_small ? "; they are too small for an adult, and all constants are an adult's" : "",
         at_rest ? "check the voxel spacing" : "the scan was probably not at full inflation");
   } else if (full > part * most_ml) {
     supine_findings_advise(

@@ -110,6 +110,10 @@ typedef struct supine_person {
  * If both are known, the two values are equal. */
 void supine_physics_reference_capacity(const supine_person *person, double range[2]);
 
+/** Return whether a height is outside the heights of the adults for whom the equations are stated.
+ * @param range  [2] least and greatest height for the person's sex, or for either, cm, written */
+bool supine_physics_reference_height_is_told(const supine_person *person, double range[2]);
+
 /** Set resting->ml for supine to the volume at rest that height and sex predict, unless these are
  * unknown, a volume at rest is given or the scan was at rest.
  * @param reference  `scan`, `lung_count` and `side` are used */

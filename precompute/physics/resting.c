@@ -117,9 +117,13 @@ supine_status supine_physics_resting_set(supine_resting *resting, const char *po
     set.assumed = SUPINE_COPD_SHARE;
     set.spread = SUPINE_COPD_SPREAD;
   } else if (supine_posture_gravity(posture, g) != SUPINE_OK) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "'%s' is not a posture; did you mean '%s'?", posture,
-                            supine_posture_nearest(posture));
+    const char *nearest = supine_posture_nearest(posture);
+    return supine_error_set(
+        error, SUPINE_ERROR_ARGUMENT,
+        "'%s' is not a posture%s%s%s: give supine, prone, left, right, upright or "
+        "inverted",
+        posture, nearest != NULL ? "; did you mean '" : "", nearest != NULL ? nearest : "",
+        nearest != NULL ? "'" : "");
   }
   if (value != NULL) {
     const bool read = read_values(&set, g, value);

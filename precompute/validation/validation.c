@@ -8,6 +8,7 @@
 #include "base/vec3.h"
 #include "precompute/inside/biharmonic.h"
 #include "precompute/lungs/surface.h"
+#include "precompute/patient/checks.h"
 #include "precompute/validation/validation.h"
 
 enum { MEASURED_VERTICES_MAX = 1500, GOLDEN_SECTION_STEPS = 24 };
@@ -43,8 +44,8 @@ supine_status supine_validation_begin(supine_validation *subject, supine_error *
 /* Compute the pose of a state or, if the state has no volume, of its posture and the volume of
  * `scan`, its scanned surface. */
 static supine_status find_pose(const supine_validation *s, const supine_validation_state *state,
-                                const supine_mesh *scan, supine_validation_outcome *outcome,
-                                supine_error *error) {
+                               const supine_mesh *scan, supine_validation_outcome *outcome,
+                               supine_error *error) {
   supine_state asked = state->state;
   if (asked.volume.kind == SUPINE_VOLUME_DEFAULT) {
     SUPINE_REFUSE_ADVISE(scan == NULL, error, SUPINE_REMEDY_OTHER_STATE, SUPINE_ERROR_ARGUMENT,
@@ -67,6 +68,32 @@ static supine_status predict_surface(supine_validation *s, const supine_validati
   SUPINE_TRY(supine_arena_check(&s->arena, error, "%zu vertices", n));
   SUPINE_TRY(find_pose(s, state, scan, outcome, error));
   return supine_posed_positions(s->basis, &outcome->pose, outcome->predicted, error);
+}
+
+supine_status supine_validation_one_person(const supine_validation *subject, size_t i,
+                                           const supine_lungs *scan, bool *same, char *text,
+                                           size_t text_size, supine_error *error) {
+  const supine_state *from = &subject->from.state;
+  supine_patient_size size[2] = {0};
+  supine_pose pose;
+  double volumes[SUPINE_LUNGS_MAX] = {0.0};
+  double low[3];
+  double high[3];
+  *same = true;
+  text[0] = '\0';
+  if (supine_basis_get_info(subject->basis)->lung_count != 2 ||
+      !supine_patient_size_of(scan, &size[1]) ||
+      supine_distance(subject->state[i].state.gravity, from->gravity) >= same_posture) {
+    return SUPINE_OK;
+  }
+  SUPINE_TRY(supine_basis_pose(subject->basis, from, &pose, error));
+  SUPINE_TRY(supine_basis_volumes(subject->basis, &pose, volumes));
+  (void)supine_mesh_box(&subject->start, low, high);
+  size[0] = (supine_patient_size){
+      .width = high[0] - low[0], .depth = high[1] - low[1], .volume = volumes[0] + volumes[1]};
+  size[0].left = volumes[0] / size[0].volume;
+  *same = supine_patient_one_person(&size[0], &size[1], text, text_size);
+  return SUPINE_OK;
 }
 
 typedef struct search {
@@ -229,6 +256,10 @@ static supine_status validate_points(supine_validation *s, size_t which,
   SUPINE_TRY(supine_arena_check(&arena, error, "%zu landmarks", pairs->count));
   SUPINE_TRY(supine_patient_pairs_check(pairs, s->moved != SUPINE_PATIENT_STILL, error));
   SUPINE_TRY(check_points(s, pairs, error));
+  if (s->from_millilitres > 0.0) {
+    const double growth = 1.0 + s->outcome[which].millilitres / s->from_millilitres;
+    SUPINE_TRY(supine_patient_check_order(pairs, growth, error));
+  }
   SUPINE_TRY(predict_points(s, which, pairs, predicted, error));
   s->outcome[which].has_points = true;
   return supine_validation_points(pairs, predicted, predicted + 3 * pairs->count, s->moved,

@@ -138,6 +138,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   c->path = given->operand[0];
   c->made_by = given->made_by;
   SUPINE_TRY(supine_options_basis_open(c->path, SUPINE_STORAGE_AUTO, &c->basis, error));
+  const bool has_volume = state->lung_count > 0 || state->volume.kind != SUPINE_VOLUME_DEFAULT;
   state->gravity[1] = 1.0;
   if (supine_basis_get_info(c->basis)->is_fields && !wanted->has_breath) {
     c->breath = 0.0; /* fields of gravity have no volumes and no breaths */
@@ -146,6 +147,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
     state->volume = supine_basis_default_volume(c->basis);
   }
   SUPINE_TRY(supine_options_posture_list_parse(wanted->postures, state, &c->postures, error));
+  SUPINE_TRY(supine_options_posture_list_check(&c->postures, has_volume, error));
   const bool content = supine_basis_metadata(c->basis, "content") != NULL; /* by 'supine embed' */
   SUPINE_REFUSE_IF(
       content && c->from.given, error, SUPINE_ERROR_ARGUMENT,

@@ -86,10 +86,17 @@ static supine_status read_row(const supine_csv *csv, request *row, supine_error 
   const char *const volume = supine_csv_text(csv, 4);
   supine_state *state = &row->volume.state;
   supine_error reason;
-  state->gravity[1] = 1.0; /* the default posture is supine */
-  supine_status status = supine_state_parse(supine_csv_text(csv, 0), state, &reason);
+  supine_state posture = {.gravity = {0.0, 1.0, 0.0}}; /* the default posture is supine */
+  supine_state own = {.lung_count = 0};                /* the volume in the row */
+  supine_status status = supine_state_parse(supine_csv_text(csv, 0), &posture, &reason);
   if (status == SUPINE_OK && volume != NULL && volume[0] != '\0') {
-    status = supine_state_parse_volume(volume, state, &reason);
+    status = supine_state_parse_volume(volume, &own, &reason);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_state_join(&posture, &own, &posture, &reason);
+  }
+  if (status == SUPINE_OK && supine_state_join(&posture, state, state, NULL) != SUPINE_OK) {
+    *state = posture; /* the option's volume is for rows without one */
   }
   if (status != SUPINE_OK) {
     return supine_error_wrap(error, &reason, "%s:%zu: ", csv->path, csv->line);

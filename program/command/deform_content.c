@@ -11,6 +11,7 @@
 #include "base/vec3.h"
 
 #include "mesh/mesh.h"
+#include "precompute/warp/check_image.h"
 #include "precompute/warp/field.h"
 #include "program/command/deform_content.h"
 #include "program/options/inside.h"
@@ -183,8 +184,10 @@ static supine_status write_points(const char *path, const supine_basis *basis,
   }
   print_rows(moved, info, rows, count, output.file);
   SUPINE_TRY(supine_output_commit(&output, error));
-  (void)printf("%s: %zu %s%s, displacement from %s\n", path, count, each ? "point" : "structure",
-               count == 1 ? "" : "s", moved->from.name);
+  char state[160];
+  (void)supine_state_describe(&moved->state, state, sizeof state);
+  (void)printf("%s: %zu %s%s, %s, displacement from %s\n", path, count,
+               each ? "point" : "structure", count == 1 ? "" : "s", state, moved->from.name);
   return SUPINE_OK;
 }
 
@@ -246,7 +249,7 @@ static supine_status find_tissue(const supine_deform_content *wanted, const supi
     (void)putchar('\n');
   }
   SUPINE_TRY(supine_warp_tissue_add_labels(&wanted->label_source, wanted->rigid.value,
-                                            wanted->rigid.count, soft, error));
+                                           wanted->rigid.count, soft, error));
   for (size_t i = 0; i < soft->part_count; ++i) {
     const double *at = soft->parts[i].centre;
     (void)supine_print(stdout, "rigid part of %.1f mL at %.0f, %.0f, %.0f mm (LPS)\n",
@@ -320,6 +323,29 @@ static supine_status find_field(const supine_basis *basis, const supine_deformat
   return supine_options_plausible(&lungs, error);
 }
 
+/* Check that the image and the labels to move show the lungs of the field. */
+static supine_status check_images(const supine_deform_content *wanted, const supine_field *field,
+                                  supine_error *error) {
+  const struct {
+    const char *path;
+    const supine_image *image;
+    supine_warp_image_kind kind;
+  } images[] = {
+      {wanted->image, &wanted->source, wanted->density ? SUPINE_FIELD_CT : SUPINE_FIELD_IMAGE},
+      {wanted->labels, &wanted->label_source, SUPINE_FIELD_LABELS}};
+  for (size_t i = 0; i < sizeof images / sizeof *images; ++i) {
+    char text[640];
+    if (images[i].path != NULL) {
+      SUPINE_TRY(supine_warp_check_image(&field->depth, images[i].image, images[i].path,
+                                         images[i].kind, text, sizeof text, error));
+      if (text[0] != '\0') {
+        supine_options_say("deform", "%s", text);
+      }
+    }
+  }
+  return SUPINE_OK;
+}
+
 static supine_status move_grid(const supine_deform_content *wanted, const supine_basis *basis,
                                const supine_deformation *moved, supine_error *error) {
   const bool image = wanted->image != NULL;
@@ -327,6 +353,7 @@ static supine_status move_grid(const supine_deform_content *wanted, const supine
   SUPINE_FREED_BY(supine_warp_free) supine_field forward = {0};
   SUPINE_FREED_BY(supine_warp_free) supine_field inverse = {0};
   SUPINE_TRY(find_field(basis, moved, &forward, error));
+  SUPINE_TRY(check_images(wanted, &forward, error));
   if (image || labels || wanted->inverse) {
     SUPINE_TRY(invert(&forward, &inverse, error));
     SUPINE_TRY(find_tissue(wanted, basis, &forward, error));

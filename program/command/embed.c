@@ -154,7 +154,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   }
   SUPINE_REFUSE_IF(
       given->count == 1 && !wanted->content.has_grid, error, SUPINE_ERROR_ARGUMENT,
-      "nothing to embed: give points (.csv, .mrk.json), meshes or an image, or --grid MM");
+      "nothing to embed: give points (.csv, .fcsv, .mrk.json), meshes or an image, or --grid MM");
   SUPINE_REFUSE_IF(labels && (!image || wanted->content.has_grid), error, SUPINE_ERROR_ARGUMENT,
                    image ? "--labels embeds surfaces, --grid embeds nodes: give only one"
                          : "--labels needs a label map: name one (.nrrd, .nii, .nii.gz)");
@@ -173,8 +173,8 @@ const supine_command supine_command_embed = {
     .usage = "BASIS CONTENT... -o FILE\n"
              "BASIS --grid MM -o FILE",
     .about =
-        "Makes nodules, airways and images move with the lungs of BASIS: points (.mrk.json of "
-        "3D Slicer, or CSV with the columns x, y, z and name), meshes (airways, vessels, "
+        "Makes nodules, airways and images move with the lungs of BASIS: points (.mrk.json or "
+        ".fcsv of 3D Slicer, or CSV with the columns x, y, z and name), meshes (airways, vessels, "
         "nodules), the parts of a label map, or the nodes of a grid, which may be that of an "
         "image (.nrrd, .nii, .nii.gz). The file is a basis: 'supine deform', 'breathe', "
         "'compare', 'info' and 'stream' read it; 'render' and 'export' show it with --inside.\n"

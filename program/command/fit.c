@@ -7,6 +7,7 @@
 
 #include "base/text.h"
 
+#include "precompute/patient/checks.h"
 #include "precompute/patient/matching.h"
 #include "precompute/patient/scans.h"
 #include "program/command/list.h"
@@ -122,6 +123,7 @@ static bool scans_moved(const request *wanted) {
 static supine_status load_pairs(const request *wanted, const char *path,
                                 supine_patient_pairs *pairs, supine_error *error) {
   SUPINE_TRY(supine_patient_pairs_load(path, wanted->landmarks.reverse, pairs, error));
+  SUPINE_TRY(supine_options_drop_mismatched(name, path, pairs, error));
   return supine_patient_pairs_check(pairs, scans_moved(wanted), error);
 }
 

@@ -138,8 +138,8 @@ static void print(const request *wanted, const supine_options_names *names,
                 "deviation_without_points_ml", fitted ? json_real(best->volume_prior_error) : NULL,
                 "translation_mm", t[0], t[1], t[2], "rotation_degrees",
                 wanted->rigid ? json_real(acos(cosine) * (180.0 / 3.14159265358979)) : NULL,
-                "observed_points", (json_int_t)observed->count, "left_rms_mm", best->residual_rms,
-                "outliers", outliers_of(names, observed, located->residuals)),
+                "observed_points", (json_int_t)observed->count, "residual_rms_mm",
+                best->residual_rms, "outliers", outliers_of(names, observed, located->residuals)),
       wanted->json);
 }
 
@@ -214,6 +214,10 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
     return error->status = SUPINE_ERROR_FORMAT;
   }
   SUPINE_TRY(status);
+  char doubt[256];
+  if (supine_location_doubt(located.best, doubt, sizeof doubt)) {
+    supine_options_say(name, "warning: %s", doubt);
+  }
   if (observed.count < OUTLIER_POINTS) {
     supine_options_say(name, "with fewer than %d points, a wrong one cannot be found: check them",
                        (int)OUTLIER_POINTS);
@@ -229,7 +233,8 @@ const supine_command supine_command_locate = {
     .about = "Fits the lungs to a few points observed inside them, for example by a navigation "
              "system. Finds the volume and the translation between the frames of the scan and of "
              "the observations, and corrects the predicted positions near the points. OBSERVED is "
-             "a .mrk.json of 3D Slicer, or a CSV with the columns name,x,y,z, with the names given "
+             "a .mrk.json or .fcsv of 3D Slicer, or a CSV with the columns name,x,y,z, with the "
+             "names given "
              "to 'supine embed'.",
     .options = table,
     .notes = "Expected errors are " SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT

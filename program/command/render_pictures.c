@@ -318,6 +318,8 @@ static supine_status film_draw(studio *s, const char *path, supine_error *error)
   if (wanted->postures != NULL) {
     SUPINE_TRY(
         supine_options_posture_list_parse(wanted->postures, &wanted->volume.state, &stops, error));
+    SUPINE_TRY(supine_options_posture_list_check(
+        &stops, wanted->volume.state.volume.kind != SUPINE_VOLUME_DEFAULT, error));
     SUPINE_TRY(film_of(&stops, &shot, error));
   }
   const double frames = frames_of(&shot.turn[0]);
@@ -337,6 +339,8 @@ supine_status supine_command_pictures_draw(const supine_pictures *wanted, const 
   }
   SUPINE_TRY(supine_options_posture_list_parse(wanted->postures, &wanted->volume.state, &s.postures,
                                                error));
+  SUPINE_TRY(supine_options_posture_list_check(
+      &s.postures, wanted->volume.state.volume.kind != SUPINE_VOLUME_DEFAULT, error));
   SUPINE_REFUSE_IF(s.postures.count > SUPINE_PANELS_MAX, error, SUPINE_ERROR_ARGUMENT,
                    "a picture holds at most %d postures: name fewer", SUPINE_PANELS_MAX);
   SUPINE_TRY(open_studio(&s, path, error));

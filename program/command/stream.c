@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine stream: receive the poses of a tracked patient, and send the lungs in each pose. */
+#include <string.h>
+
+#include <supine/inputs.h>
+
 #include "base/arena.h"
 #include "base/vec3.h"
 
@@ -98,11 +102,23 @@ static void begin(void *chosen) {
   ((request *)chosen)->session.breath = supine_breath_default();
 }
 
+/* Refuse the name of a device that is too long for the messages. */
+static supine_status check_device(const char *device, supine_error *error) {
+  const double length = device != NULL ? (double)strlen(device) : 0.0;
+  const supine_input_verdict verdict = supine_input_judge(SUPINE_INPUT_DEVICE_NAME, length);
+  SUPINE_REFUSE_IF(verdict == SUPINE_INPUT_REFUSED, error, SUPINE_ERROR_ARGUMENT,
+                   "'%s' has %.0f characters: names of devices have at most %.0f", device, length,
+                   supine_input_get(SUPINE_INPUT_DEVICE_NAME)->refused);
+  return SUPINE_OK;
+}
+
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
   supine_stream_session *session = &wanted->session;
   supine_stream_options *options = &session->options;
   double unit[3];
+  SUPINE_TRY(check_device(options->device, error));
+  SUPINE_TRY(check_device(options->name, error));
   options->ras = wanted->space == 1;
   if (options->listen == NULL && options->connect == NULL) {
     options->listen = "18944";

@@ -31,6 +31,9 @@ static void report(const supine_stream_results *results, const supine_stream_ses
   }
   (void)printf("poses: %zu (repaired: %zu; refused: %zu); frames: %zu (sent: %zu); peers: %zu\n",
                n->poses, n->repaired, n->refused, n->frames, n->sent, n->peers);
+  if (n->invalid > 0) {
+    (void)printf("poses that the tracker marked as invalid: %zu\n", n->invalid);
+  }
   if (n->malformed + n->skipped + n->lost + n->idle + n->turned_away + n->unreachable > 0) {
     (void)printf("malformed messages: %zu; messages not used: %zu; peers disconnected: %zu; peers "
                  "refused: %zu; frames whose volume is out of reach: %zu\n",

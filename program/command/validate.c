@@ -118,6 +118,18 @@ static supine_status write_errors(const request *wanted, const supine_validation
   return supine_mesh_save(wanted->path, &shown, &save, error);
 }
 
+/* Warn if the scan of state i hardly shows the person of the basis. */
+static supine_status tell_other_person(const supine_validation *s, size_t i,
+                                       const supine_lungs *lungs, supine_error *error) {
+  char text[256];
+  bool same = true;
+  SUPINE_TRY(supine_validation_one_person(s, i, lungs, &same, text, sizeof text, error));
+  if (!same) {
+    supine_options_say(name, "%s", text);
+  }
+  return SUPINE_OK;
+}
+
 /* Compare state i with its scan, and with the landmarks if it is the first. */
 static supine_status validate_state(const request *wanted, supine_validation *s, size_t i,
                                     supine_error *error) {
@@ -130,9 +142,11 @@ static supine_status validate_state(const request *wanted, supine_validation *s,
   }
   if (landmarks != NULL) {
     SUPINE_TRY(supine_patient_pairs_load(landmarks, wanted->landmarks.reverse, &pairs, error));
+    SUPINE_TRY(supine_options_drop_mismatched(name, landmarks, &pairs, error));
   }
-  return supine_validation_compare(s, i, path != NULL ? &lungs.mesh : NULL,
-                                   landmarks != NULL ? &pairs : NULL, error);
+  SUPINE_TRY(supine_validation_compare(s, i, path != NULL ? &lungs.mesh : NULL,
+                                       landmarks != NULL ? &pairs : NULL, error));
+  return path != NULL ? tell_other_person(s, i, &lungs, error) : SUPINE_OK;
 }
 
 static supine_status validate(const request *wanted, supine_validation *s, supine_error *error) {

@@ -80,10 +80,10 @@ bool supine_options_next_item(const char **list, char *item, size_t size) {
 
 const char *supine_options_suggest(const char *text, const char *const *candidates, size_t count) {
   const char *best = NULL;
-  size_t fewest = 1 + strlen(text) / 2; /* candidates that need more edits are not suggested */
+  size_t fewest = 0;
   for (size_t i = 0; i < count; ++i) {
     const size_t edits = supine_words_distance(text, candidates[i]);
-    if (edits < fewest || (edits == fewest && best == NULL)) {
+    if (supine_words_close(text, candidates[i]) && (best == NULL || edits < fewest)) {
       fewest = edits;
       best = candidates[i];
     }

@@ -28,6 +28,11 @@ supine_status supine_options_prepare(const char *command, supine_model_options *
                                      const supine_arguments *given, supine_prepared *prepared,
                                      supine_error *error);
 
+/* Drop pairs of landmarks that were mismatched, and warn of them
+ * (supine_patient_drop_mismatched). */
+supine_status supine_options_drop_mismatched(const char *command, const char *path,
+                                             supine_patient_pairs *pairs, supine_error *error);
+
 /* Load lungs from one or two surfaces, such as "left.ply,right.ply", or from a label map, and print
  * what the checks of the files found.
  * @param lungs  must be initialised to zero */

@@ -147,6 +147,7 @@ static const struct {
               {NULL, "held_out_without_and_with_mm", "held-out: uniform, by region, mm"},
               {NULL, "kind", "kind of the modes"},
               {NULL, "left_rms", "RMS residual / force at the centre"},
+              {NULL, "residual_rms_mm", "residual, RMS, mm"},
               {NULL, "left_rms_mm", "residual, RMS, mm"},
               {NULL, "left_without_gain_mm", "residual without the gain, RMS, mm"},
               {NULL, "linearity", "linearity of displacement with volume"},

@@ -5,16 +5,14 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <supine/inputs.h>
+
 #include "base/arena.h"
 #include "base/number.h"
 #include "precompute/posed/posed.h"
 #include "program/options/basis_input.h"
 #include "program/options/state_options.h"
-
-/* Limits of plausible volumes, as fractions of full inflation; tissue alone fills about 0.1. */
-static const double least_of_full = 0.1;
-static const double most_of_full = 1.2;
-static const double folded_limit = 0.01; /* largest plausible share of triangles turned over */
+#include "runtime/checks.h"
 
 static supine_status read_state(const char *text, void *field, supine_error *error) {
   *(supine_state *)field = (supine_state){.gravity = {0.0}}; /* zero if the text has no posture */
@@ -51,10 +49,7 @@ const supine_option supine_options_orientation[] = {
 supine_status supine_options_state(const supine_orientation *orientation, supine_state *state,
                                    supine_error *error) {
   const supine_state *given = &orientation->state;
-  if (given->volume.kind != SUPINE_VOLUME_DEFAULT || given->lung_count > 0) {
-    *state = *given;
-  }
-  memcpy(state->gravity, given->gravity, sizeof given->gravity);
+  SUPINE_TRY(supine_state_join(given, state, state, error));
   SUPINE_REFUSE_IF(
       !(given->gravity[0] != 0.0 || given->gravity[1] != 0.0 || given->gravity[2] != 0.0), error,
       SUPINE_ERROR_ARGUMENT, "the posture is missing: give --posture or --gravity");
@@ -64,7 +59,7 @@ supine_status supine_options_state(const supine_orientation *orientation, supine
 supine_status supine_options_posture_list_parse(const char *text, const supine_state *standard,
                                                 supine_posture_list *list, supine_error *error) {
   char name[2 * SUPINE_POSTURE_NAME_MAX];
-  list->count = 0;
+  *list = (supine_posture_list){.count = 0};
   for (const char *at = text; supine_options_next_item(&at, name, sizeof name);) {
     SUPINE_REFUSE_IF(list->count == SUPINE_POSTURE_LIST_MAX, error, SUPINE_ERROR_ARGUMENT,
                      "more than %d postures: name fewer", SUPINE_POSTURE_LIST_MAX);
@@ -72,10 +67,19 @@ supine_status supine_options_posture_list_parse(const char *text, const supine_s
     SUPINE_REFUSE_IF(name[0] == '\0', error, SUPINE_ERROR_ARGUMENT,
                      "no posture '' in '%s': remove a comma, or name a posture", text);
     (void)snprintf(item->name, sizeof item->name, "%.*s", (int)sizeof item->name - 1, name);
-    item->state = *standard;
-    item->state.gravity[1] = 1.0; /* supine, if the state names no posture */
+    item->state = (supine_state){.gravity = {0.0, 1.0, 0.0}}; /* supine, if no posture is named */
     SUPINE_TRY(supine_state_parse(name, &item->state, error));
+    if (supine_state_join(&item->state, standard, &item->state, NULL) != SUPINE_OK) {
+      ++list->with_volume; /* the state's own volume stays */
+    }
   }
+  return SUPINE_OK;
+}
+
+supine_status supine_options_posture_list_check(const supine_posture_list *list, bool has_volume,
+                                                supine_error *error) {
+  SUPINE_REFUSE_IF(has_volume && list->with_volume == list->count, error, SUPINE_ERROR_ARGUMENT,
+                   "every posture names its own volume, and another volume is given: leave it out");
   return SUPINE_OK;
 }
 
@@ -161,34 +165,50 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
   return SUPINE_OK;
 }
 
+/* Refuse what is wrong with a state, or warn of it if that is allowed. */
+static supine_status refuse_or_warn(const char *command, const supine_state *state,
+                                    const char *wrong, bool allowed, supine_error *error) {
+  char text[160];
+  (void)supine_state_describe(state, text, sizeof text);
+  SUPINE_REFUSE_IF(!allowed, error, SUPINE_ERROR_NUMERICAL,
+                   "%s: %s: choose a volume nearer to rest, or accept this with --allow-folds",
+                   text, wrong);
+  supine_options_say(command, "warning: %s: %s", text, wrong);
+  return SUPINE_OK;
+}
+
 supine_status supine_options_plausible(const supine_plausible *lungs, supine_error *error) {
-  char state[160];
   char wrong[192];
   const double share = lungs->full > 0.0 ? lungs->volume / lungs->full : 1.0;
-  (void)supine_state_describe(lungs->state, state, sizeof state);
-  if (!(share >= least_of_full && share <= most_of_full)) {
+  const double least = supine_input_get(SUPINE_INPUT_VOLUME_LEAST)->refused;
+  const double most = supine_input_get(SUPINE_INPUT_VOLUME_MOST)->refused;
+  const double folded = supine_input_get(SUPINE_INPUT_FIELD_FOLDS)->refused;
+  if (!(share >= least && share <= most)) {
     (void)supine_print_text(
         wrong, sizeof wrong,
         "%.0f mL are %.0f %% of full inflation (%.0f mL), outside the %.0f to %.0f %% "
         "that lungs hold",
-        lungs->volume, 100.0 * share, lungs->full, 100.0 * least_of_full, 100.0 * most_of_full);
-  } else if (lungs->folded > folded_limit) {
+        lungs->volume, 100.0 * share, lungs->full, 100.0 * least, 100.0 * most);
+  } else if (lungs->folded > folded) {
     (void)supine_print_text(wrong, sizeof wrong, "%s: %.3g %% (at most %g %%)", lungs->parts,
-                            100.0 * lungs->folded, 100.0 * folded_limit);
+                            100.0 * lungs->folded, 100.0 * folded);
   } else {
     return SUPINE_OK;
   }
-  SUPINE_REFUSE_IF(!lungs->allowed, error, SUPINE_ERROR_NUMERICAL,
-                   "%s: %s: choose a volume nearer to rest, or accept this with --allow-folds",
-                   state, wrong);
-  supine_options_say(lungs->command, "warning: %s: %s", state, wrong);
-  return SUPINE_OK;
+  return refuse_or_warn(lungs->command, lungs->state, wrong, lungs->allowed, error);
 }
 
 supine_status supine_options_pose_check(const supine_basis *basis, const char *command,
                                         bool allow_folds, const supine_state *state,
                                         const supine_pose *pose, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
+  char wrong[256];
+  if (supine_basis_has_range_of_volumes(basis)) {
+    if (supine_basis_can_hold(basis, state, pose, wrong, sizeof wrong)) {
+      return SUPINE_OK;
+    }
+    return refuse_or_warn(command, state, wrong, allow_folds, error);
+  }
   supine_plausible lungs = {.command = command,
                             .state = state,
                             .volume = supine_posed_volume(basis, pose),

@@ -16,7 +16,7 @@ typedef struct supine_orientation {
 } supine_orientation;
 
 /* Copy the direction of gravity that --posture or --gravity has set, and the volume if --posture
- * names one. Other volumes stay in `state`. */
+ * names one. A volume that `state` already has stays there, and is refused beside another. */
 supine_status supine_options_state(const supine_orientation *orientation, supine_state *state,
                                    supine_error *error);
 
@@ -30,14 +30,16 @@ typedef struct supine_posture_item {
 
 typedef struct supine_posture_list {
   size_t count;
+  size_t with_volume; /* states that name a volume of their own, though `standard` has one */
   supine_posture_item item[SUPINE_POSTURE_LIST_MAX];
 } supine_posture_list;
 
 #define SUPINE_POSTURE_HELP                                                                        \
   "supine, prone, left or right (lying on that side), upright, inverted (head down), or a DICOM "  \
-  "patient position: HFS, FFS, HFP, FFP, HFDL, FFDL, HFDR, FFDR. +DEGREES turns gravity about "    \
-  "the left-right axis, from the back towards the head, and -DEGREES the other way: supine+15 "    \
-  "and prone-15 lower the head (Trendelenburg). With a volume, it is a state: prone:rest+500"
+  "patient position such as HFS. +DEGREES tilts it, up to 90: supine+15 and left+15 lower the "    \
+  "head (Trendelenburg), supine-15 raises it. @DEGREES (or >, quoted) rolls it to the left about " \
+  "the long axis: supine@30, supine@-30, supine@30+15. With a volume, it is a state: "             \
+  "prone:rest+500"
 #define SUPINE_POSTURE_LIST_HELP                                                                   \
   "A posture is a direction of gravity in body axes, X:Y:Z (0.6:0:-0.8), or " SUPINE_POSTURE_HELP  \
   "."
@@ -46,6 +48,10 @@ typedef struct supine_posture_list {
  * @param standard  its volume is that of states that name none */
 supine_status supine_options_posture_list_parse(const char *text, const supine_state *standard,
                                                 supine_posture_list *list, supine_error *error);
+
+/* Refuse a volume for states without one if every state of a list names its own. */
+supine_status supine_options_posture_list_check(const supine_posture_list *list, bool has_volume,
+                                                supine_error *error);
 
 /* Return "left side" for "left", "right side" for "right", and any other name unchanged. */
 const char *supine_options_posture_label(const char *name);

@@ -5,12 +5,32 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <supine/inputs.h>
+
 #include "base/arena.h"
 #include "base/vec3.h"
 #include "program/options/remedy.h"
 #include "program/report/comparison.h"
 
 static const char command[] = "compare";
+
+/* Warn if a breath ends above full inflation. */
+static void tell_end_of_breath(const supine_comparison *c, const char *posture, double volume) {
+  const supine_basis_info *info = supine_basis_get_info(c->basis);
+  double full = 0.0;
+  if (!info->has_rest) {
+    return;
+  }
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    full += info->reference_volume[lung];
+  }
+  if (full > 0.0 && supine_input_judge(SUPINE_INPUT_BREATH, volume / full) == SUPINE_INPUT_TOLD) {
+    supine_options_say(command,
+                       "warning: %s: the breath ends at %.0f mL, above full inflation (%.0f mL): "
+                       "choose a smaller breath",
+                       posture, volume, full);
+  }
+}
 
 /* Compute the volume that each lung and each of ten horizontal slabs gains in a breath. The breath
  * begins at the lung volumes in the posture. `xyz` [2][N, 3] is workspace. */
@@ -33,6 +53,7 @@ static supine_status find_breath(const supine_comparison *c, float *xyz[2],
   }
   SUPINE_TRY(
       supine_options_pose_check(c->basis, command, c->volume.allow_folds, &state, &after, error));
+  tell_end_of_breath(c, item->name, state.volume.ml);
   (void)supine_basis_volumes(c->basis, &after, posture->gain);
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     posture->gain[lung] -= posture->volume[lung];

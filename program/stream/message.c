@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/ascii.h"
 #include "base/clones.h"
 #include "base/vec3.h"
 #include "program/stream/message.h"
@@ -31,8 +32,8 @@ supine_status supine_stream_header_read(const unsigned char bytes[SUPINE_STREAM_
                                    .crc = number(bytes + 50, 8)};
   memcpy(header->type, bytes + 2, sizeof header->type - 1);
   memcpy(header->device, bytes + 14, sizeof header->device - 1);
-  SUPINE_REFUSE_IF(header->version != 1 && header->version != 2, error, SUPINE_ERROR_FORMAT,
-                   "message header version %u is unknown: send version 1 or 2", header->version);
+  SUPINE_REFUSE_IF(header->version < 1 || header->version > 3, error, SUPINE_ERROR_FORMAT,
+                   "message header version %u is unknown: send version 1, 2 or 3", header->version);
   for (const char *c = header->type; *c != '\0'; ++c) {
     SUPINE_REFUSE_IF(*c < ' ' || *c > '~', error, SUPINE_ERROR_FORMAT,
                      "the type of a message is not text: send OpenIGTLink messages");
@@ -211,18 +212,61 @@ static bool is(const supine_stream_header *header, const char *type) {
   return strcmp(header->type, type) == 0;
 }
 
-/* Skip the extended header of a body and cut off its metadata; return 0 if a size is invalid. */
-static int unwrap(cursor *c) {
+/* Skip the extended header of a body and cut off its metadata, which are written to `metadata`;
+ * return 0 if a size is invalid. */
+static int unwrap(cursor *c, cursor *metadata) {
   const size_t all = c->left;
   const uint64_t extension = whole(c, 2);
-  const uint64_t metadata = whole(c, 2) + whole(c, 4);
+  const uint64_t size = whole(c, 2) + whole(c, 4);
   (void)pass(c, 4);
-  if (c->overrun != 0 || extension < SUPINE_STREAM_EXTENSION || extension + metadata > all) {
+  if (c->overrun != 0 || extension < SUPINE_STREAM_EXTENSION || extension + size > all) {
     return 0;
   }
   (void)pass(c, (size_t)extension - SUPINE_STREAM_EXTENSION);
-  c->left -= (size_t)metadata;
+  c->left -= (size_t)size;
+  *metadata = (cursor){c->at + c->left, (size_t)size, 0};
   return 1;
+}
+
+static bool ends_in(const unsigned char *key, size_t size, const char *end) {
+  const size_t length = strlen(end);
+  return size >= length && memcmp(key + size - length, end, length) == 0;
+}
+
+static bool equals(const unsigned char *value, size_t size, const char *word) {
+  return size == strlen(word) && supine_ascii_same_begin((const char *)value, word, size);
+}
+
+/* Return whether an entry of the metadata marks a pose as invalid. The state of a tool's switch is
+ * also a status, of a valid pose. */
+static bool marks_invalid(const unsigned char *key, size_t key_size, const unsigned char *value,
+                          size_t value_size) {
+  if (ends_in(key, key_size, "TransformValid")) {
+    return equals(value, value_size, "false") || equals(value, value_size, "0");
+  }
+  return ends_in(key, key_size, "TransformStatus") && !equals(value, value_size, "OK") &&
+         !(value_size > 6 && equals(value, 6, "SWITCH"));
+}
+
+/* Return whether the metadata mark the pose as invalid. They are an index, which has their number
+ * (2) and for each the sizes of its key (2) and value (4) and an encoding (2), and then the texts.
+ */
+static bool is_invalid(cursor metadata) {
+  cursor index = metadata;
+  const uint64_t count = whole(&index, 2);
+  cursor texts = index;
+  (void)pass(&texts, (size_t)count * 8);
+  for (uint64_t i = 0; i < count && texts.overrun == 0; ++i) {
+    const size_t key_size = (size_t)whole(&index, 2);
+    (void)pass(&index, 2);
+    const size_t value_size = (size_t)whole(&index, 4);
+    const unsigned char *key = pass(&texts, key_size);
+    const unsigned char *value = pass(&texts, value_size);
+    if (texts.overrun == 0 && marks_invalid(key, key_size, value, value_size)) {
+      return true;
+    }
+  }
+  return false;
 }
 
 supine_status supine_stream_message_read(const supine_stream_header *header,
@@ -234,8 +278,9 @@ supine_status supine_stream_message_read(const supine_stream_header *header,
   SUPINE_REFUSE_IF(crc != header->crc, error, SUPINE_ERROR_FORMAT,
                    "%s: the checksum is wrong: send the message again", header->type);
   cursor c = {body, size, 0};
-  if (header->version == 2) {
-    const bool fits = unwrap(&c);
+  cursor metadata = {NULL, 0, 0};
+  if (header->version >= 2) {
+    const bool fits = unwrap(&c, &metadata);
     SUPINE_REFUSE_IF(!fits, error, SUPINE_ERROR_FORMAT,
                      "%s: the sizes of extension and metadata exceed the body: correct the sender",
                      header->type);
@@ -266,6 +311,10 @@ supine_status supine_stream_message_read(const supine_stream_header *header,
         error, SUPINE_ERROR_FORMAT,
         "%s: a body of %zu bytes is too short for its content: correct the sender", header->type,
         size);
+  }
+  if ((message->kind == SUPINE_STREAM_ROTATION || message->kind == SUPINE_STREAM_POSITION) &&
+      metadata.left > 0 && is_invalid(metadata)) {
+    message->kind = SUPINE_STREAM_INVALID;
   }
   return SUPINE_OK;
 }

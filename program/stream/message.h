@@ -4,7 +4,7 @@
  * sizes in bytes are in parentheses:
  *
  *     header     version (2), type (12), device (20), time (8), body size (8), body CRC (8)
- *     body       in version 1: content; in version 2: extension, content, metadata
+ *     body       in version 1: content; in versions 2 and 3: extension, content, metadata
  *     extension  its size (2), metadata index size (2), metadata size (4), message number (4)
  *
  * The extension has this layout in the OpenIGTLink library; the specification differs. Its size is
@@ -33,7 +33,7 @@ typedef struct supine_stream_header {
 } supine_stream_header;
 
 /** Read a header.
- * @retval SUPINE_ERROR_FORMAT  the version is not 1 or 2, or the type is not text. The start of
+ * @retval SUPINE_ERROR_FORMAT  the version is not 1 to 3, or the type is not text. The start of
  *                              the next message is then unknown */
 supine_status supine_stream_header_read(const unsigned char bytes[SUPINE_STREAM_HEADER],
                                         supine_stream_header *header, supine_error *error);
@@ -50,7 +50,8 @@ typedef enum supine_stream_kind {
   SUPINE_STREAM_DOWN,       /**< number[0..2]: direction of gravity in tracker axes */
   SUPINE_STREAM_VOLUME,     /**< number[0]: volume above rest in the posture, mL */
   SUPINE_STREAM_VOLUME_TEXT, /**< text: a volume such as rest+500 or 2600mL */
-  SUPINE_STREAM_REQUEST      /**< text: name of the content that the peer asks for */
+  SUPINE_STREAM_REQUEST,     /**< text: name of the content that the peer asks for */
+  SUPINE_STREAM_INVALID      /**< pose that the tracker marks as invalid */
 } supine_stream_kind;
 
 typedef struct supine_stream_message {
@@ -81,6 +82,8 @@ void supine_stream_message_point(const supine_stream_message *message, size_t po
  *     "VOLUME"     STRING        volume such as rest+500
  *     "SEND"       STRING        name of the content that the peer asks for
  *
+ * The metadata of versions 2 and 3 can mark a pose as invalid: PLUS does by the keys TransformValid
+ * and TransformStatus, alone or at the end of another key.
  * @param device  device that gives the patient's pose; NULL if every device does */
 supine_status supine_stream_message_read(const supine_stream_header *header,
                                          const unsigned char *body, const char *device,

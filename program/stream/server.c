@@ -148,6 +148,14 @@ static void receive(void *context, supine_stream_peer *peer) {
     take_request(s, peer, message.text);
     return;
   }
+  if (message.kind == SUPINE_STREAM_INVALID) {
+    ++s->results.counts.invalid;
+    supine_stream_patient_warn(&s->patient, s->woke,
+                               "the tracker marks the pose of '%s' as invalid: bring the tool back "
+                               "into view",
+                               peer->header.device);
+    return;
+  }
   /* If poll() waited, the message has just arrived. Otherwise it may have arrived at any time
    * since the socket was last empty. */
   const bool poll_waited = s->woke - s->wait_begun > 50e-6;

@@ -30,6 +30,7 @@ typedef struct supine_stream_counts {
   size_t positions;   /**< accepted positions of observed points */
   size_t repaired;    /**< poses used although they were not exact rotations */
   size_t refused;     /**< poses that were not used, such as matrices with a reflection */
+  size_t invalid;     /**< poses that the tracker marked as invalid */
   size_t malformed;   /**< messages with a wrong checksum or inconsistent lengths */
   size_t skipped;     /**< messages without use, and too large ones */
   size_t unreachable; /**< frames without the wanted volume, because it was unreachable */

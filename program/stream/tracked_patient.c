@@ -180,6 +180,7 @@ void supine_stream_patient_receive(supine_stream_patient *patient,
     break;
   case SUPINE_STREAM_NOTHING:
   case SUPINE_STREAM_REQUEST:
+  case SUPINE_STREAM_INVALID:
     ++patient->counts->skipped;
     break;
   }
@@ -200,8 +201,8 @@ static uint64_t stamp_now(void) {
   return ((uint64_t)now.tv_sec << 32) | (((uint64_t)now.tv_nsec << 32) / 1000000000u);
 }
 
-/* Keep the last pose that was found, in the present direction of gravity: with its gains, the factors
- * of each lung's displacement, unless the weights depend on the volume too. */
+/* Keep the last pose that was found, in the present direction of gravity: with its gains, the
+ * factors of each lung's displacement, unless the weights depend on the volume too. */
 static void keep_pose(supine_stream_patient *patient, supine_stream_snapshot *snapshot) {
   double weights[SUPINE_MODES_MAX];
   const supine_basis_info *info = supine_basis_get_info(patient->basis);
@@ -214,7 +215,7 @@ static void keep_pose(supine_stream_patient *patient, supine_stream_snapshot *sn
 /* Compute the pose for the current volume. If the lungs cannot reach this volume, keep the last one
  * that they could. Then compute the resulting volumes. */
 static void find_pose(supine_stream_patient *patient, double now,
-                       supine_stream_snapshot *snapshot) {
+                      supine_stream_snapshot *snapshot) {
   const supine_basis *basis = patient->basis;
   const supine_state state = supine_stream_volume_at(
       patient->options->volume, basis, snapshot->gravity, now - patient->breath_begun);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /** A posture and a volume, as text ("prone", "left:rest+500", "full-300", "2600mL") or as an object. `gravity` is the
- * direction in which things fall, in the patient's axes; the default is supine, [0, 1, 0]. `volume` is a text; the
- * default is rest if the basis has a volume at rest. `gain` replaces the volume: it multiplies all displacements from
- * the reference surface. */
+ * direction in which things fall, in the patient's axes; the default is supine, [0, 1, 0]. `volume` is a text without a
+ * posture; the default is rest if the basis has a volume at rest. `gain` replaces the volume: it multiplies all
+ * displacements from the reference surface. Other members, arrays and numbers are refused. */
 export type State = string | { gravity?: ArrayLike<number>; volume?: string; gain?: number };
 
 /** The numbers of a tensor of the file: a view, row-major. */
@@ -68,5 +68,7 @@ export class SupineError extends Error {
 
 /** Open the bytes of a basis file: check all of them, and copy them.
  * @param options.wasm supine.wasm, as bytes or compiled, if it is not beside this module
+ * @param options.allowFolds compute poses with volumes that lungs cannot hold, or at which the surface folds, instead of
+ *   refusing them
  * @throws SupineError */
-export function open(source: ArrayBufferLike | ArrayBufferView, options?: { wasm?: BufferSource | WebAssembly.Module }): Promise<Basis>;
+export function open(source: ArrayBufferLike | ArrayBufferView, options?: { wasm?: BufferSource | WebAssembly.Module; allowFolds?: boolean }): Promise<Basis>;

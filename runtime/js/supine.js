@@ -3,7 +3,7 @@
 // memory never grows and the arrays never move.
 
 // Bytes reserved for C structs and buffers.
-const STATE = 128, POSE = 8 * (256 + 3 * 16 + 1), VOLUMES = 8 * 16, TEXT = 512, VALUE = 32, ERROR = 4 + 512 + 4 + VALUE;
+const STATE = 128, POSE = 8 * (256 + 3 * 16 + 1), VOLUMES = 8 * 16, TEXT = 512, VALUE = 32, ERROR = 4 + 512 + 4 + VALUE, OPTIONS = 16;
 // What to do about an error, after its message: words for each supine_remedy of this library, in the order of the enum.
 const REMEDIES = ['', ", or use a basis that 'supine precompute' made without --scanned none and --law paper"];
 // Byte offsets of members of the C struct supine_basis_info in WebAssembly, where pointers and sizes have 4 bytes.
@@ -19,10 +19,12 @@ export class SupineError extends Error {
   }
 }
 
+const refusal = (message) => new SupineError(message, STATUS.indexOf('argument'));
+
 class Basis {
   #c; #basis; #lit; #hasVolume; #state; #pose; #nextState; #nextPose; #volumes; #text; #error; #positions; #normals; #expected;
 
-  constructor(instance, bytes) {
+  constructor(instance, bytes, { allowFolds = false }) {
     this.#c = instance.exports;
     this.#c._initialize();
     const size = 2 * (STATE + POSE) + VOLUMES + TEXT + ERROR;
@@ -36,7 +38,9 @@ class Basis {
     this.#view(Uint8Array, this.#state, size).fill(0);
     const file = this.#allocate(bytes.length);
     this.#view(Uint8Array, file, bytes.length).set(bytes);
-    this.#check(this.#c.supine_basis_open_memory_with(file, bytes.length, 0, this.#text, this.#error));
+    // A supine_basis_options: its size, then storage and simd, and the bools without_normals and allow_folds.
+    this.#view(Uint32Array, this.#volumes, 4).set([OPTIONS, 0, 0, allowFolds ? 1 << 8 : 0]);
+    this.#check(this.#c.supine_basis_open_memory_with(file, bytes.length, this.#volumes, this.#text, this.#error));
     this.#basis = this.#word(this.#text);
     const info = this.#c.supine_basis_get_info(this.#basis);
     this.vertexCount = this.#word(info + INFO.vertices);
@@ -144,12 +148,21 @@ class Basis {
 
   /** Write a state to #nextState. The default posture is supine; the default volume is the default of the basis. */
   #read(state) {
-    const { gravity = [0, 1, 0], volume = '' } = typeof state === 'string' ? { volume: state } : state;
+    const isText = typeof state === 'string';
+    if (!isText && (typeof state !== 'object' || state === null || Array.isArray(state) || ArrayBuffer.isView(state))) {
+      throw refusal('a state must be a text such as prone:rest, or an object { gravity, volume }');
+    }
+    const unknown = isText ? undefined : Object.keys(state).find((key) => !['gravity', 'volume', 'gain'].includes(key));
+    if (unknown !== undefined) throw refusal(`a state has no member '${unknown}': give a text such as prone:rest, or { gravity, volume }`);
+    const { gravity = [0, 1, 0], volume = '' } = isText ? {} : state;
+    if (typeof volume !== 'string') throw refusal('the volume of a state must be a text such as rest+500');
+    if (state.gain !== undefined && volume !== '') throw refusal('a state has a volume and a gain: give one of them');
     this.#view(Uint8Array, this.#nextState, STATE).fill(0);
     const three = Array.from(gravity, Number);
-    if (three.length !== 3) throw new SupineError('gravity must be three numbers', STATUS.indexOf('argument'));
+    if (three.length !== 3) throw refusal('gravity must be three numbers');
     this.#view(Float64Array, this.#nextState, 3).set(three);
-    if (volume !== '') this.#check(this.#c.supine_state_parse(this.#write(volume), this.#nextState, this.#error));
+    if (isText) this.#check(this.#c.supine_state_parse(this.#write(state), this.#nextState, this.#error));
+    else if (volume !== '') this.#check(this.#c.supine_state_parse_volume(this.#write(volume), this.#nextState, this.#error));
   }
 
   #write(text) {
@@ -201,11 +214,11 @@ async function load() {
   return WebAssembly.compile(files ? files.readFileSync(url) : await (await fetch(url)).arrayBuffer());
 }
 
-export async function open(source, { wasm } = {}) {
+export async function open(source, { wasm, allowFolds = false } = {}) {
   const bytes = ArrayBuffer.isView(source) ? new Uint8Array(source.buffer, source.byteOffset, source.byteLength) : new Uint8Array(source);
   const module = wasm === undefined ? await (beside ??= load()) : wasm instanceof WebAssembly.Module ? wasm : await WebAssembly.compile(wasm);
   // The C library imports functions that write to files, for printf. Refuse every call.
   const none = () => 52; // the error ENOSYS of WASI
   const instance = await WebAssembly.instantiate(module, { wasi_snapshot_preview1: { fd_close: none, fd_seek: none, fd_write: none } });
-  return new Basis(instance, bytes);
+  return new Basis(instance, bytes, { allowFolds });
 }

@@ -77,9 +77,12 @@ TEST(test_csv_written_any_name_read_same) {
 }
 
 TEST(test_csv_any_separator_reads_quotes) {
-  static const char *const texts[] = {"name,value\n\"a,b\",1.5\n", "name;value\r\n\"a,b\";1,5\r\n",
+  static const char *const texts[] = {"name,value\n\"a,b\",1.5\n",
+                                      "name;value\r\n\"a,b\";1,5\r\n",
                                       "name\tvalue\n\"a,b\"\t1.5\n",
-                                      "\xEF\xBB\xBF\"name\" , \"value\"\n \"a,b\" , 1.5"};
+                                      "\xEF\xBB\xBF\"name\" , \"value\"\n \"a,b\" , 1.5",
+                                      "sep=;\r\nname;value\r\n\"a,b\";1,5\r\n",
+                                      "name;value;notes, if any\n\"a,b\";1,5;x\n"};
   for (size_t i = 0; i < sizeof texts / sizeof *texts; ++i) {
     supine_csv csv;
     bool more = false;
@@ -123,3 +126,17 @@ TEST(test_csv_comment_in_latin_1_skipped) {
 }
 
 TEST_GROUP(make_file, remove_file)
+
+TEST(test_csv_bare_file_reads_columns_of_given_header) {
+  supine_csv csv;
+  bool more = false;
+  double value = 0.0;
+  write_text("# comment\na,1.5,further\n");
+  assert_int_equal(supine_csv_open_bare(path, "name,value", columns, 2, 2, &csv, NULL), SUPINE_OK);
+  assert_true(supine_csv_has(&csv, 1));
+  assert_int_equal(supine_csv_next(&csv, &more, NULL), SUPINE_OK);
+  assert_string_equal(supine_csv_text(&csv, 0), "a");
+  assert_int_equal(supine_csv_number(&csv, 1, "value", &value, NULL), SUPINE_OK);
+  assert_true(value == 1.5);
+  supine_csv_close(&csv);
+}

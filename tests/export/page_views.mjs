@@ -50,11 +50,18 @@ async function checkCamera(page) {
 async function checkPostures(page) {
   const texts = await page.evaluate(() => {
     const { postureText, postureFrom, gravityOf } = window.supine;
-    const turned = (text) => { const { q, tilt } = postureFrom(text); const g = gravityOf(q); const t = (tilt * Math.PI) / 180; return [g[0], g[1] * Math.cos(t) - g[2] * Math.sin(t), g[1] * Math.sin(t) + g[2] * Math.cos(t)]; };
-    return ['supine', 'prone', 'left', 'right', 'upright', 'inverted', 'supine+15', 'prone-20', '0.60:0.00:-0.80', '0:-1:0', 'HFP'].map((text) => [text, postureText(turned(text)), turned(text)]);
+    const turned = (text) => {
+      const { q, tilt } = postureFrom(text);
+      const g = gravityOf(q);
+      const [h, c, s] = [Math.hypot(g[0], g[1]), Math.cos((tilt * Math.PI) / 180), Math.sin((tilt * Math.PI) / 180)];
+      const u = h > 1e-6 ? [g[0] / h, g[1] / h] : [0, 1];
+      return [u[0] * (h * c - g[2] * s), u[1] * (h * c - g[2] * s), h * s + g[2] * c];
+    };
+    return ['supine', 'prone', 'left', 'right', 'upright', 'inverted', 'supine+15', 'prone-20', 'left+45', 'right-30', 'supine@30', '0.60:0.00:-0.80', '0:-1:0', 'HFP', 'AFDL'].map((text) => [text, postureText(turned(text)), turned(text)]);
   });
   for (const [text, again, gravity] of texts) {
-    assert.equal(again, { '0:-1:0': 'prone', HFP: 'prone' }[text] ?? text);
+    assert.equal(again, { '0:-1:0': 'prone', HFP: 'prone', AFDL: 'left' }[text] ?? text);
+    if (text === 'left+45') assert.ok(Math.abs(gravity[2] - Math.SQRT1_2) < 1e-12, 'left+45 does not lower the head');
     if (text === 'supine+15') assert.ok(Math.abs(gravity[2] - Math.sin(Math.PI / 12)) < 1e-12);
   }
   await page.locator('#posture-name').fill('0.6:0:-0.8');

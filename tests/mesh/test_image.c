@@ -3,8 +3,8 @@
 #include <sys/inotify.h>
 #include <sys/stat.h>
 
-#include "tests/helpers/folder.h"
 #include "mesh/image/image.h"
+#include "tests/helpers/folder.h"
 
 #include "tests/helpers/sh_helpers.h"
 
@@ -353,6 +353,9 @@ TEST(test_nifti_bad_files_refused) {
              {40, {4, 5, 4, 1, 3}, 5, "ndim is 4"},
              {254, {0}, 1, "orientation"},
              {70, {32}, 1, "COMPLEX"},
+             {108, {0, 0}, 2, "its vox_offset is 0"},
+             {108, {0, 0x43AE}, 2, "its vox_offset is 348"},
+             {108, {0, 0x7FC0}, 2, "vox_offset"},
              {280,
               {0, 0, 0, 0, 0, 0, 0, 0},
               8,
@@ -367,6 +370,37 @@ TEST(test_nifti_bad_files_refused) {
     write_bytes(in_folder("short.nii"), bytes, size);
     check_refused("short.nii", SUPINE_ERROR_FORMAT, "short.nii");
   }
+}
+
+TEST(test_nifti_plain_named_gz_read) {
+  unsigned char bytes[472];
+  supine_image image = made(SUPINE_VOXEL_I16, 5);
+  supine_image read = {0};
+  assert_int_equal(supine_image_write(in_folder("plain.nii"), &image, NULL, NULL), SUPINE_OK);
+  assert_int_equal(read_bytes(in_folder("plain.nii"), bytes, sizeof bytes), sizeof bytes);
+  write_bytes(in_folder("plain.nii.gz"), bytes, sizeof bytes);
+  assert_int_equal(supine_image_read(in_folder("plain.nii.gz"), &read, NULL), SUPINE_OK);
+  assert_memory_equal(read.values, image.values,
+                      image.size[0] * image.size[1] * image.size[2] * sizeof(int16_t));
+  supine_image_free(&image);
+  supine_image_free(&read);
+}
+
+TEST(test_mha_long_header_and_element_size_read) {
+  char text[8192] = "ObjectType = Image\nNDims = 3\nDimSize = 2 2 2\n";
+  size_t length = strlen(text);
+  for (int i = 0; i < 200; ++i) {
+    length += (size_t)snprintf(text + length, sizeof text - length, "Note%d = x\n", i);
+  }
+  length += (size_t)snprintf(text + length, sizeof text - length,
+                             "ElementSize = 2 3 4\nElementType = MET_UCHAR\n"
+                             "ElementDataFile = LOCAL\n");
+  supine_image read = {0};
+  write_bytes(in_folder("long.mha"), text, length + 8); /* zeros follow the text */
+  assert_int_equal(supine_image_read(in_folder("long.mha"), &read, NULL), SUPINE_OK);
+  assert_true(read.step[1][1] == 3.0);
+  assert_true(read.step[2][2] == 4.0);
+  supine_image_free(&read);
 }
 
 /* The header of a pair of files, named like a single file, is not read as voxels. */

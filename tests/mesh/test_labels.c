@@ -417,14 +417,16 @@ TEST(test_labels_lungs_cut_at_the_border_reported) {
   part.size[2] -= 20;
   part.values = (uint8_t *)image.values + 20 * layer;
   const supine_labels_options options = {.edge = 5.0};
+  /* named, as a bed of more than a tenth of a lung would not be believed of unnamed labels */
+  const supine_labels_options named = {.edge = 5.0, .labels = "left=2,right=1"};
   made out = surfaces_of_image(&part, "cut.nrrd", &options);
   assert_true(out.report.lung[0].cut && out.report.lung[1].cut);
   check_closed(&out.surface[0]);
   release(&out);
   /* Islands that are dropped do not count, and do not change the surface. */
-  made clean = surfaces_of_image(&image, "whole.nrrd", &options);
+  made clean = surfaces_of_image(&image, "whole.nrrd", &named);
   memset(image.values, 1, layer);
-  out = surfaces_of_image(&image, "bed.nrrd", &options);
+  out = surfaces_of_image(&image, "bed.nrrd", &named);
   assert_int_equal(out.report.lung[1].islands, 1);
   assert_false(out.report.lung[0].cut || out.report.lung[1].cut);
   assert_int_equal(out.surface[1].vertex_count, clean.surface[1].vertex_count);
@@ -632,6 +634,43 @@ TEST(test_labels_shapes_any_label_one_surface_each) {
   assert_says(error.message, "more than 256 labels");
   assert_int_equal(supine_labels_shapes(in_folder("absent.nrrd"), NULL, 0, &shapes, &count, &error),
                    SUPINE_ERROR_READ);
+  supine_image_free(&image);
+}
+
+/* Two labels that nobody named must be two lungs; probabilities and scaled integers are read. */
+TEST(test_labels_unlikely_pairs_refused_scaled_values_read) {
+  const supine_labels_options plain = {.edge = 5.0};
+  supine_image image = helper_two_lungs(4.0);
+  const size_t count = voxels(&image);
+  uint8_t *at = image.values;
+  made clean = surfaces_of_image(&image, "clean.nrrd", &plain);
+  SUPINE_ARENA arena = {0};
+  float *scaled = supine_arena_take(&arena, count, sizeof *scaled);
+  assert_non_null(scaled);
+  for (size_t i = 0; i < count; ++i) {
+    scaled[i] = (float)at[i] + (i % 2 == 0 ? 9e-4F : -9e-4F);
+  }
+  supine_image other = image;
+  other.values = scaled;
+  other.voxel = SUPINE_VOXEL_F32;
+  made out = surfaces_of_image(&other, "scaled.nrrd", &plain);
+  assert_true(out.report.lung[0].mask == clean.report.lung[0].mask);
+  release(&out);
+  for (size_t i = 0; i < count; ++i) { /* probabilities of both lungs */
+    scaled[i] = at[i] != 0 ? 0.6F : 0.4F;
+  }
+  out = surfaces_of_image(&other, "probable.nrrd", &plain);
+  assert_true(fabs(out.report.lung[0].mask + out.report.lung[1].mask - clean.report.lung[0].mask -
+                   clean.report.lung[1].mask) < 1e-9);
+  release(&out);
+  release(&clean);
+  size_t inside = 0;
+  for (size_t i = 0; i < count; ++i) { /* label 1 is both lungs, label 2 a part of one */
+    inside += at[i] == 2;
+    at[i] = at[i] == 0 ? 0 : (uint8_t)(at[i] == 2 && inside < 600 ? 2 : 1);
+  }
+  assert_int_equal(supine_image_write(in_folder("bad.nrrd"), &image, NULL, NULL), SUPINE_OK);
+  refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "hardly the two lungs");
   supine_image_free(&image);
 }
 

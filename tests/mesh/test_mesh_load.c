@@ -81,6 +81,66 @@ TEST(test_load_stl_equal_corners_become_one_vertex) {
 }
 
 /* Readers turn -0 into 0, so that equal positions have equal bits. */
+/* Write a text in small or capital letters. */
+static char *capitals(const char *text, char *out) {
+  size_t i = 0;
+  for (; text[i] != '\0'; ++i) {
+    out[i] = (char)(text[i] >= 'a' && text[i] <= 'z' ? text[i] - 'a' + 'A' : text[i]);
+  }
+  out[i] = '\0';
+  return out;
+}
+
+TEST(test_load_stl_capitals_spare_bytes_or_no_count_read) {
+  char path[256];
+  static char text[2048];
+  static unsigned char binary[84 + 4 * 50 + 7];
+  supine_mesh small = load(sample_text(state, "s.stl", tetrahedron_stl, path), NULL, NULL);
+  supine_mesh large =
+      load(sample_text(state, "c.stl", capitals(tetrahedron_stl, text), path), NULL, NULL);
+  assert_int_equal(large.triangle_count, small.triangle_count);
+  assert_memory_equal(large.vertices, small.vertices, 12 * sizeof(double));
+  for (uint32_t count = 0; count <= 4; count += 4) {
+    memset(binary, 0, sizeof binary);
+    memcpy(binary + 80, &count, 4);
+    for (size_t t = 0; t < small.triangle_count; ++t) {
+      for (size_t k = 0; k < 9; ++k) {
+        const float x = (float)small.vertices[3 * small.triangles[3 * t + k / 3] + k % 3];
+        memcpy(binary + 84 + 50 * t + 12 + 4 * k, &x, 4);
+      }
+    }
+    (void)sample_path(state, "b.stl", path);
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    /* a count of 0 fits whole triangles, another count may be followed by spare bytes */
+    assert_int_equal(fwrite(binary, sizeof binary - (count == 0 ? 7 : 0), 1, file), 1);
+    assert_int_equal(fclose(file), 0);
+    supine_mesh mesh = load(path, NULL, NULL);
+    assert_int_equal(mesh.triangle_count, 4);
+    assert_int_equal(mesh.vertex_count, 4);
+    supine_mesh_free(&mesh);
+  }
+  supine_mesh_free(&small);
+  supine_mesh_free(&large);
+}
+
+TEST(test_load_obj_byte_order_mark_and_continued_line_read) {
+  char path[256];
+  supine_mesh mesh = load(sample_text(state, "m.obj",
+                                      "\xEF\xBB\xBFv 0 0 0\nv 120 \\\n0 0\nv 0 120 0\nv 0 0 120\n"
+                                      "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n",
+                                      path),
+                          NULL, NULL);
+  assert_int_equal(mesh.triangle_count, 4);
+  assert_int_equal(mesh.vertex_count, 4);
+  supine_mesh_free(&mesh);
+}
+
+TEST(test_load_legacy_vtk_conversion_named) {
+  refuse_text(state, "old.vtk", "# vtk DataFile Version 4.2\n", SUPINE_ERROR_FORMAT,
+              "save the surface as .vtp or .ply");
+}
+
 TEST(test_load_negative_zero_becomes_zero) {
   static const char text[] = SAMPLE_PLY(5, 2) "-0 -0 -0\n120 -0 0\n0 120 -0\n0 -0 0\n-0 0 120\n"
                                               "3 0 2 1\n3 3 1 4\n";

@@ -40,7 +40,9 @@ lungs.pose({ gravity: [0, -1, 0], gain: 0 }).deform();
 assert.ok(largestDistance(positions, lungs.vertices) < 0.002);
 lungs.pose('prone:rest+500');
 for (const [state, status, words] of [['pron', 'argument', /did you mean 'prone'/], ['prone:500', 'argument', /500/], ['prone:full-30000', 'numerical', /folds/],
-  [{ gravity: [0, 0, 0] }, 'argument', /gravity/], [{ gravity: [0, NaN, 0], gain: 1 }, 'argument', /gravity/], [`prone:${'0'.repeat(600)}mL`, 'argument', /at most 511/]]) {
+  [{ gravity: [0, 0, 0] }, 'argument', /gravity/], [{ gravity: [0, NaN, 0], gain: 1 }, 'argument', /gravity/], [`prone:${'0'.repeat(600)}mL`, 'argument', /at most 511/],
+  [{ posture: 'prone:rest', volume: 'full' }, 'argument', /no member 'posture'/], [[0, -1, 0], 'argument', /text/], [5, 'argument', /text/], [null, 'argument', /text/],
+  [{ volume: 'prone:rest' }, 'argument', /volume/], [{ gain: 1, volume: 'full' }, 'argument', /one of them/], ['supine:90L', 'numerical', /full inflation/]]) {
   assert.throws(() => lungs.pose(state), (error) => error instanceof SupineError && error.status === status && words.test(error.message), `${JSON.stringify(state)}`);
 }
 assert.deepEqual(lungs.deform(), prone);

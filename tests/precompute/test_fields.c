@@ -565,7 +565,7 @@ TEST(test_precompute_fields_every_option_used_or_refused) {
                {"lesion", "0,0,0,9,2", 1, no_effect},
                {"lung", "left:0.3", 1, no_effect}};
   write_input();
-  EXPECT(0, "  scan not displaced by gravity\n", FIELDS);
+  EXPECT(0, "  scan taken as the lungs without gravity\n", FIELDS);
   EXPECT(0, "Usage", "precompute --help-all");
   char *help = strdup(printed);
   size_t listed = 0;

@@ -538,13 +538,26 @@ TEST(test_embed_point_outside_counted_and_clamped) {
   supine_inside_content content = made_points(50, 0.3, 0.9, 4);
   const double far[3] = {71.3, 3.1, 900.0};
   memcpy(content.points + (size_t)3 * 17, far, sizeof far);
-  supine_inside_report report = embed(&content, false, 0);
+  supine_inside_options options = {.clamp = false};
+  supine_inside_report report;
+  supine_error error;
+  /* One point far away is refused by its name, although all others are inside. */
+  assert_int_equal(supine_inside_embed(&shells, &content, &options, inside_path, &report, &error),
+                   SUPINE_ERROR_MESH);
+  assert_says(error.message, "1 of 50 ('p17') are outside");
+  /* Another, 20 mm outside, is taken. */
+  const supine_inside_place place = supine_lungs_surface_find(shells.shell[0].surface, far, NULL);
+  for (size_t k = 0; k < 3; ++k) {
+    content.points[3 * 17 + k] =
+        place.nearest[k] + 20.0 / -place.depth * (far[k] - place.nearest[k]);
+  }
+  report = embed(&content, false, 0);
   assert_int_equal(report.outside, 1);
   assert_int_equal(report.farthest, 17);
-  const supine_inside_place place = supine_lungs_surface_find(shells.shell[0].surface, far, NULL);
-  assert_true(fabs(report.farthest_mm + place.depth) < 1e-9 && report.farthest_mm > 600.0);
+  assert_true(fabs(report.farthest_mm - 20.0) < 1e-9);
   /* A point outside the lungs follows an affine motion exactly, too. */
   assert_true(farthest_from(&content, 0) < 8.0 * 0x1p-24 * 1024.0);
+  memcpy(content.points + (size_t)3 * 17, far, sizeof far);
   report = embed(&content, true, 0);
   assert_int_equal(report.outside, 1);
   supine_basis *inside = helper_open(inside_path);

@@ -79,8 +79,14 @@ TEST(test_deform_all_spellings_of_prone_same_file) {
 
 TEST(test_deform_volume_reached) {
   EXPECT(0, "-300.00 mL", "deform lungs.safetensors --posture left --volume scan-300 -o a.ply");
-  EXPECT(0, "-300.00 mL",
+  EXPECT(0, "-300.00 mL", "deform lungs.safetensors --posture left:scan-300 -o a.ply");
+  EXPECT(1, "two volumes are given, by left:scan-300 and by full",
          "deform lungs.safetensors --posture left:scan-300 --volume full -o a.ply");
+  EXPECT(1, "every posture names its own volume",
+         "compare lungs.safetensors --postures supine:full,prone:rest --volume rest");
+  EXPECT(0, "the breath ends at", "compare lungs.safetensors --postures supine --breath 3500");
+  EXPECT(1, "supine:rest+500", "deform lungs.safetensors --posture supine+500 -o a.ply");
+  EXPECT(0, "gravity 0.7071,0,0.7071", "deform lungs.safetensors --posture left+45 -o a.ply");
   EXPECT(0, ", 2900.00 mL", "deform lungs.safetensors --posture left --volume 2.9L -o a.ply");
   EXPECT(1, "the posture is missing", "deform lungs.safetensors --posture rest -o b.ply");
   EXPECT(1, "a breath starts at rest", "breathe lungs.safetensors --posture left:rest -o b.vtp");
@@ -120,6 +126,8 @@ TEST(test_deform_volume_reached) {
   EXPECT(5, "cells that turn over, relative to those in the lungs",
          "deform grid.safetensors --posture upright --volume 620mL --field-out b.nrrd");
   assert_int_equal(count_files("b."), 0);
+  EXPECT(0, "cells that turn over, relative to those in the lungs",
+         "deform grid.safetensors --posture left --volume 620mL --allow-folds --field-out c.nrrd");
   EXPECT(0, "warning: the field folds in the body around the lungs",
          "deform grid.safetensors --posture supine --volume 750mL --field-out a.nrrd");
   EXPECT(0, "outside the 10 to 120 %",

@@ -30,6 +30,10 @@ TEST(test_gravity_named_postures_literal) {
       {"HFDL", 1, 0, 0},         {"FFDL", 1, 0, 0},
       {"HFDR", -1, 0, 0},        {"FFDR", -1, 0, 0},
       {"hfs", 0, 1, 0},          {"SUPINE", 0, 1, 0},
+      {"LFP", 0, -1, 0},         {"LFS", 0, 1, 0},
+      {"RFP", 0, -1, 0},         {"RFS", 0, 1, 0},
+      {"AFDR", -1, 0, 0},        {"AFDL", 1, 0, 0},
+      {"PFDR", -1, 0, 0},        {"PFDL", 1, 0, 0},
       {"ffDr", -1, 0, 0},        {"Right-Lateral", -1, 0, 0},
   };
   for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
@@ -49,7 +53,7 @@ TEST(test_gravity_unknown_name_refused_output_unchanged) {
 }
 
 TEST(test_posture_name_every_index_known) {
-  assert_int_equal(supine_posture_count(), 16);
+  assert_int_equal(supine_posture_count(), 24);
   for (size_t i = 0; i < supine_posture_count(); ++i) {
     double g[3];
     assert_int_equal(supine_posture_gravity(supine_posture_name(i), g), SUPINE_OK);
@@ -70,15 +74,20 @@ TEST(test_nearest_misspelling_gives_name) {
       {"HFDD", "HFDL"},
       {"leftlateral", "left-lateral"},
       {"Right_Lateral", "right-lateral"},
+      {"Sitting", "upright"},
+      {"standing", "upright"},
   };
   for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
     assert_string_equal(supine_posture_nearest(cases[i][0]), cases[i][1]);
   }
-  assert_non_null(supine_posture_nearest(""));
+  static const char *const far[] = {"", "Bauchlage", "decubitus", "xyz", "rest"};
+  for (size_t i = 0; i < sizeof far / sizeof *far; ++i) {
+    assert_null(supine_posture_nearest(far[i]));
+  }
   char text[5000];
   memset(text, 'q', sizeof text - 1);
   text[sizeof text - 1] = '\0';
-  assert_non_null(supine_posture_nearest(text));
+  assert_null(supine_posture_nearest(text));
 }
 
 TEST(test_quaternion_known_orientations_literal) {
@@ -150,13 +159,32 @@ TEST(test_tilt_postures_literal) {
   assert_int_equal(supine_posture_tilt(g, 15, g), SUPINE_OK);
   assert_vector(g, 0, c, s); /* Trendelenburg: the head is lower */
   assert_int_equal(supine_posture_tilt((double[]){0, -1, 0}, 15, g), SUPINE_OK);
-  assert_vector(g, 0, -c, -s);
+  assert_vector(g, 0, -c, s);
   assert_int_equal(supine_posture_tilt((double[]){0, 0, -1}, 15, g), SUPINE_OK);
   assert_vector(g, 0, s, -c); /* leaning backwards */
-  assert_int_equal(supine_posture_tilt((double[]){1, 0, 0}, 37, g), SUPINE_OK);
-  assert_vector(g, 1, 0, 0);
-  assert_int_equal(supine_posture_tilt((double[]){0, 1, 0}, 360 * 1e6 + 90, g), SUPINE_OK);
+  assert_int_equal(supine_posture_tilt((double[]){1, 0, 0}, 15, g), SUPINE_OK);
+  assert_vector(g, c, 0, s); /* on the side too */
+  assert_int_equal(supine_posture_tilt((double[]){-1, 0, 0}, -15, g), SUPINE_OK);
+  assert_vector(g, -c, 0, -s);
+  assert_int_equal(supine_posture_tilt((double[]){0, 1, 0}, 90, g), SUPINE_OK);
   assert_vector(g, 0, 0, 1);
+  assert_int_equal(supine_posture_tilt((double[]){0, 1, 0}, 90.5, g), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_posture_tilt((double[]){0, 1, 0}, -500, g), SUPINE_ERROR_ARGUMENT);
   assert_int_equal(supine_posture_tilt((double[]){0, 1, 0}, NAN, g), SUPINE_ERROR_ARGUMENT);
   assert_int_equal(supine_posture_tilt((double[]){0, INFINITY, 0}, 1, g), SUPINE_ERROR_ARGUMENT);
+}
+
+TEST(test_roll_postures_literal) {
+  const double c = 0.86602540378443865; /* cosine of 30 degrees */
+  double g[3] = {0, 1, 0};
+  assert_int_equal(supine_posture_roll(g, 30, g), SUPINE_OK);
+  assert_vector(g, 0.5, c, 0); /* towards the left side */
+  assert_int_equal(supine_posture_roll((double[]){0, 1, 0}, 90, g), SUPINE_OK);
+  assert_vector(g, 1, 0, 0);
+  assert_int_equal(supine_posture_roll((double[]){1, 0, 0}, 90, g), SUPINE_OK);
+  assert_vector(g, 0, -1, 0);
+  assert_int_equal(supine_posture_roll((double[]){0, 0, -1}, 30, g), SUPINE_OK);
+  assert_vector(g, 0, 0, -1);
+  assert_int_equal(supine_posture_roll((double[]){0, 1, 0}, 181, g), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(supine_posture_roll((double[]){NAN, 1, 0}, 1, g), SUPINE_ERROR_ARGUMENT);
 }

@@ -30,15 +30,26 @@ TEST(test_state_parse_every_form_gives_posture_and_volume) {
       {"1e200:1e200:0:1ml",
        {0.70710678118654757, 0.70710678118654757, 0},
        {SUPINE_VOLUME_ABSOLUTE, 1},
-       "0.707106781:0.707106781:0:1mL"},
+       "supine@45:1mL"},
       {"supine+15:rest",
        {0, 0.96592582628906831, 0.25881904510252074},
        {SUPINE_VOLUME_REST, 0},
        "supine+15:rest"},
       {"prone-20",
-       {0, -0.93969262078590838, 0.34202014332566871},
+       {0, -0.93969262078590838, -0.34202014332566871},
        {SUPINE_VOLUME_DEFAULT, 0},
        "prone-20"},
+      {"left+30:full", {0.86602540378443865, 0, 0.5}, {SUPINE_VOLUME_FULL, 0}, "left+30:full"},
+      {"supine@-30", {-0.5, 0.86602540378443865, 0}, {SUPINE_VOLUME_DEFAULT, 0}, "supine@-30"},
+      {"prone>+30:rest",
+       {-0.5, -0.86602540378443865, 0},
+       {SUPINE_VOLUME_REST, 0},
+       "supine@-150:rest"},
+      {"supine@30+90", {0, 0, 1}, {SUPINE_VOLUME_DEFAULT, 0}, "inverted"},
+      {"supine@30-15",
+       {0.48296291314453416, 0.83651630373780788, -0.25881904510252074},
+       {SUPINE_VOLUME_DEFAULT, 0},
+       "0.482962913:0.836516304:-0.258819045"},
   };
   for (size_t i = 0; i < sizeof rows / sizeof *rows; ++i) {
     supine_state parsed = unset;
@@ -112,6 +123,11 @@ TEST(test_state_parse_malformed_text_refused_state_unchanged) {
       "left=rest:3",
       "scan+1e400",
       "supine+15+15",
+      "supine@",
+      "supine@30@30",
+      "supine@200",
+      "upright@30",
+      "supine+91",
       "a_name_of_a_lung_that_is_much_too_long=rest",
       "a posture whose name is longer than sixty-four characters, which none is:rest"};
   for (size_t i = 0; i < sizeof texts / sizeof *texts; ++i) {
@@ -121,6 +137,50 @@ TEST(test_state_parse_malformed_text_refused_state_unchanged) {
     assert_true(strlen(error.message) > 10);
     assert_memory_equal(&parsed, &unset, sizeof parsed);
   }
+}
+
+TEST(test_state_parse_tilt_beyond_90_refused_with_volume_as_remedy) {
+  static const char *const texts[] = {"supine+500", "left-500", "supine@20+500"};
+  for (size_t i = 0; i < sizeof texts / sizeof *texts; ++i) {
+    supine_state parsed = unset;
+    supine_error error = {0};
+    assert_int_equal(supine_state_parse(texts[i], &parsed, &error), SUPINE_ERROR_ARGUMENT);
+    assert_says(error.message, strchr(texts[i], '+') != NULL ? "supine:rest+500" : "rest-500");
+    assert_int_equal(supine_state_parse_posture(texts[i], &parsed, &error), SUPINE_ERROR_ARGUMENT);
+    assert_says(error.message, "at most 90");
+  }
+}
+
+TEST(test_state_parse_foreign_word_refused_without_suggestion) {
+  supine_state parsed = unset;
+  supine_error error = {0};
+  assert_int_equal(supine_state_parse("Bauchlage", &parsed, &error), SUPINE_ERROR_ARGUMENT);
+  assert_null(strstr(error.message, "did you mean"));
+  assert_says(error.message, "prone");
+  assert_int_equal(supine_state_parse("sitting", &parsed, &error), SUPINE_ERROR_ARGUMENT);
+  assert_says(error.message, "did you mean 'upright'");
+}
+
+TEST(test_state_join_two_volumes_refused) {
+  supine_state posture = unset;
+  supine_state volume = {.gravity = {0.0}};
+  supine_state joined = unset;
+  supine_error error = {0};
+  assert_int_equal(supine_state_parse("prone", &posture, NULL), SUPINE_OK);
+  assert_int_equal(supine_state_join(&posture, &volume, &joined, &error), SUPINE_OK);
+  assert_int_equal(joined.volume.kind, SUPINE_VOLUME_DEFAULT);
+  assert_int_equal(supine_state_parse_volume("full", &volume, NULL), SUPINE_OK);
+  assert_int_equal(supine_state_join(&posture, &volume, &joined, &error), SUPINE_OK);
+  assert_int_equal(joined.volume.kind, SUPINE_VOLUME_FULL);
+  assert_true(joined.gravity[1] < 0);
+  assert_int_equal(supine_state_parse("prone:rest", &posture, NULL), SUPINE_OK);
+  joined = unset;
+  assert_int_equal(supine_state_join(&posture, &volume, &joined, &error), SUPINE_ERROR_ARGUMENT);
+  assert_says(error.message, "prone:rest");
+  assert_says(error.message, "full");
+  assert_memory_equal(&joined, &unset, sizeof joined);
+  assert_int_equal(supine_state_parse_volume("left=rest,right=full", &volume, NULL), SUPINE_OK);
+  assert_int_equal(supine_state_join(&posture, &volume, &joined, &error), SUPINE_ERROR_ARGUMENT);
 }
 
 TEST(test_state_print_short_buffer_cut_full_length_returned) {

@@ -299,7 +299,7 @@ TEST(test_volume_form_gains_out_of_reach_refused) {
   supine_error error = {0};
   assert_int_equal(supine_volume_form_gains(&box_form, box_bend, rest, -3100, gains, &error),
                    SUPINE_ERROR_NUMERICAL);
-  assert_says(error.message, "-3100 mL is out of reach");
+  assert_says(error.message, "3100 mL less than in the reference surface is out of reach");
   assert_int_equal(supine_volume_form_gains(&box_form, box_bend, 0, -10, gains, &error),
                    SUPINE_ERROR_NUMERICAL);
 }

@@ -119,6 +119,42 @@ TEST(test_read_transform_of_library_gives_rotation_or_position) {
   assert_int_equal(m.kind, SUPINE_STREAM_NOTHING);
 }
 
+/* Read a TRANSFORM with one entry of metadata. */
+static supine_stream_kind kind_of_marked(unsigned version, const char *key, const char *value) {
+  unsigned char body[12 + 48 + 10 + 64] = {0, 12, 0, 10, 0, 0, 0, 0, 0, 0, 0, 1};
+  const size_t key_size = strlen(key);
+  const size_t value_size = strlen(value);
+  igtl_float32 transform[12];
+  make_transform(transform);
+  memcpy(body + 12, transform, 48);
+  body[7] = (unsigned char)(key_size + value_size);
+  unsigned char *index = body + 60;
+  index[1] = 1;
+  index[3] = (unsigned char)key_size;
+  index[5] = 3;
+  index[9] = (unsigned char)value_size;
+  memcpy(index + 10, key, key_size);
+  memcpy(index + 10 + key_size, value, value_size);
+  const supine_stream_header header =
+      header_of("TRANSFORM", "Patient", version, body, 70 + key_size + value_size);
+  return read_ok(&header, body, NULL).kind;
+}
+
+TEST(test_read_transform_marked_invalid_is_not_followed) {
+  for (unsigned version = 2; version <= 3; ++version) {
+    assert_int_equal(kind_of_marked(version, "TransformValid", "false"), SUPINE_STREAM_INVALID);
+    assert_int_equal(kind_of_marked(version, "TransformStatus", "INVALID"), SUPINE_STREAM_INVALID);
+    assert_int_equal(kind_of_marked(version, "TransformStatus", "MISSING"), SUPINE_STREAM_INVALID);
+    assert_int_equal(kind_of_marked(version, "ProbeToTrackerTransformStatus", "OUT_OF_VIEW"),
+                     SUPINE_STREAM_INVALID);
+    assert_int_equal(kind_of_marked(version, "TransformValid", "true"), SUPINE_STREAM_ROTATION);
+    assert_int_equal(kind_of_marked(version, "TransformStatus", "OK"), SUPINE_STREAM_ROTATION);
+    assert_int_equal(kind_of_marked(version, "TransformStatus", "SWITCH1_IS_ON"),
+                     SUPINE_STREAM_ROTATION);
+    assert_int_equal(kind_of_marked(version, "Timestamp", "0"), SUPINE_STREAM_ROTATION);
+  }
+}
+
 TEST(test_read_transform_of_version_2_gives_rotation) {
   igtl_float32 transform[12];
   make_transform(transform);
@@ -339,7 +375,7 @@ TEST(test_header_invalid_refused) {
     good.version = version;
     supine_stream_header_write(&good, bytes);
     assert_int_equal(supine_stream_header_read(bytes, &header, &error),
-                     version == 1 || version == 2 ? SUPINE_OK : SUPINE_ERROR_FORMAT);
+                     version >= 1 && version <= 3 ? SUPINE_OK : SUPINE_ERROR_FORMAT);
   }
   good.version = 1;
   good.type[2] = '\x07';

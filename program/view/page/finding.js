@@ -159,10 +159,11 @@ function wayWords(move, most, gravity) {
 /** Return the beginning of a sentence on a posture: "Lying on the left side", "Supine, 15 degrees head down". */
 function whereWords(gravity) {
   const text = postureText(gravity);
-  const [, name, tilt] = /^([a-z]+)([+-]\d+)?$/.exec(text) ?? [];
+  const [, name, roll, tilt] = /^([a-z]+)(?:@(-?\d+))?([+-]\d+)?$/.exec(text) ?? [];
   if (!name) return `With gravity along ${text.replaceAll('-', '\u2212')}`;
-  if (name === 'left' || name === 'right') return `Lying on the ${name} side`;
-  return `${name[0].toUpperCase()}${name.slice(1)}${tilt ? `, ${Math.abs(tilt)} degrees head ${tilt > 0 ? 'down' : 'up'}` : ''}`;
+  const lying = name === 'left' || name === 'right' ? `Lying on the ${name} side` : `${name[0].toUpperCase()}${name.slice(1)}`;
+  const rolled = roll ? `, rolled ${Math.abs(roll)} degrees to the ${roll > 0 ? 'left' : 'right'}` : '';
+  return `${lying}${rolled}${tilt ? `, ${Math.abs(tilt)} degrees head ${tilt > 0 ? 'down' : 'up'}` : ''}`;
 }
 
 /** Return where a vertex is on its lung: "at the base of the right lung". */

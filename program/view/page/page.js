@@ -589,7 +589,7 @@ function start() {
     const found = postureFrom($('posture-name').value);
     $('posture-trouble').hidden = Boolean(found);
     if (!found) {
-      write('posture-trouble', `No posture \u201c${$('posture-name').value}\u201d. Type supine, prone, left, right, upright, inverted, a tilt such as supine+15, or gravity such as 0.6:0:-0.8.`);
+      write('posture-trouble', `No posture \u201c${$('posture-name').value}\u201d. Type supine, prone, left, right, upright, inverted, a tilt such as supine+15, a roll such as supine@30, or gravity such as 0.6:0:-0.8.`);
       return;
     }
     state.settle(found.q, found.tilt, 0.7);

@@ -5,7 +5,13 @@
 const RIGHT_ANGLE = Math.PI / 2;
 const LYING = compose(turn([0, 0, 1], RIGHT_ANGLE), turn([1, 0, 0], -RIGHT_ANGLE)); // supine
 const rolled = (degrees) => compose(LYING, turn([0, 0, 1], (degrees * Math.PI) / 180));
-const tilted = (q, degrees) => compose(q, turn([1, 0, 0], (-degrees * Math.PI) / 180));
+/** Tilt a posture so that positive degrees lower the head of a lying body, and lean an upright one back. */
+const tilted = (q, degrees) => {
+  const [x, y] = gravityOf(q);
+  const level = Math.hypot(x, y);
+  const axis = level > 1e-6 ? [y / level, -x / level, 0] : [1, 0, 0];
+  return compose(q, turn(axis, (-degrees * Math.PI) / 180));
+};
 
 const POSTURES = [
   { name: 'supine', label: 'Supine', q: rolled(0), tilt: 0 },
@@ -16,24 +22,25 @@ const POSTURES = [
   { name: 'supine+15', label: 'Head down', q: rolled(0), tilt: 15 },
 ];
 const INVERTED = { name: 'inverted', q: compose(turn([1, 0, 0], Math.PI), IDENTITY), tilt: 0 };
-const DICOM = { HFS: 0, FFS: 0, HFP: 1, FFP: 1, HFDL: 2, FFDL: 2, HFDR: 3, FFDR: 3 };
+const DICOM = { S: 0, P: 1, DL: 2, DR: 3 }; // posture by the last letters of a patient position
 
 const gravityOf = (q) => rotate(inverse(q), [0, 0, -1]);
 const near = (a, b) => dot(a, b) > Math.cos(0.004);
+const same = (a, b) => Math.hypot(...cross(a, b)) < 0.0005 && dot(a, b) > 0; // other directions are written as numbers
 const NAMED = [...POSTURES.slice(0, 5), INVERTED].map((p) => ({ name: p.name, gravity: gravityOf(p.q) }));
 
-/** Return a direction of gravity as text, in the notation of --posture: a name, a name with a tilt in degrees, or
- * three numbers. */
+/** Return a direction of gravity as text, in the notation of --posture: a name, a name with a tilt or supine with a roll
+ * in degrees, or three numbers. */
 function postureText(gravity) {
   const named = NAMED.find((p) => near(p.gravity, gravity));
   if (named) return named.name;
-  if (Math.abs(gravity[0]) < 0.004) {
-    const degrees = Math.round((Math.atan2(gravity[2], gravity[1]) * 180) / Math.PI);
-    const [name, tilt] = Math.abs(degrees) <= 90 ? ['supine', degrees] : ['prone', degrees > 0 ? degrees - 180 : degrees + 180];
-    const tiltedGravity = rotate(turn([1, 0, 0], (tilt * Math.PI) / 180), [0, name === 'supine' ? 1 : -1, 0]);
-    if (near(tiltedGravity, gravity)) return `${name}${tilt < 0 ? '' : '+'}${tilt}`;
-  }
-  return gravity.map((x) => x.toFixed(2).replace('-0.00', '0.00')).join(':');
+  const [x, y, z] = gravity;
+  const tilt = Math.round((Math.atan2(z, Math.hypot(x, y)) * 180) / Math.PI);
+  const lying = POSTURES.slice(0, 4).find((p, i) => (i < 2 ? near : same)(gravityOf(tilted(p.q, tilt)), gravity));
+  if (lying) return `${lying.name}${tilt < 0 ? '' : '+'}${tilt}`;
+  const roll = Math.round((Math.atan2(x, y) * 180) / Math.PI);
+  if (same(gravityOf(rolled(roll)), gravity)) return `supine@${roll}`;
+  return gravity.map((v) => v.toFixed(2).replace('-0.00', '0.00')).join(':');
 }
 
 /** Return a direction of gravity as text: like postureText, but "left side" instead of "left". */
@@ -51,9 +58,11 @@ function postureFrom(text) {
     const swing = size < 1e-9 ? (now[2] < 0 ? IDENTITY : turn([1, 0, 0], Math.PI)) : turn(unit(axis), Math.atan2(size, -now[2]));
     return { q: compose(swing, LYING), tilt: 0 };
   }
-  const [, name, tilt] = /^([a-z]+)([+-][\d.]+)?$/i.exec(word) ?? [];
-  const found = [...POSTURES, INVERTED].find((p) => p.name === name?.toLowerCase()) ?? POSTURES[DICOM[name?.toUpperCase()]];
-  return found && Number.isFinite(Number(tilt ?? 0)) ? { q: found.q, tilt: Number(tilt ?? 0) } : null;
+  const [, name, roll = '0', tilt = '0'] = /^([a-z]+)(?:[@>]([+-]?[\d.]+))?([+-][\d.]+)?$/i.exec(word) ?? [];
+  const [, last] = /^(?:HF|FF|LF|RF|AF|PF)(S|P|DL|DR)$/.exec(name?.toUpperCase() ?? '') ?? [];
+  const found = [...POSTURES, INVERTED].find((p) => p.name === name?.toLowerCase()) ?? POSTURES[DICOM[last]];
+  if (!found || !(Math.abs(roll) <= 180 && Math.abs(tilt) <= 90)) return null;
+  return { q: compose(found.q, turn([0, 0, 1], (roll * Math.PI) / 180)), tilt: Number(tilt) };
 }
 
 const FADED = 0.35; // opacity of translucent lungs

@@ -126,6 +126,9 @@ typedef struct supine_location_info {
   double residual_rms;   /**< RMS distance of all points but outliers from their predictions, mm */
   double log_evidence;   /**< log likelihood, for comparing tasks that differ only in the posture */
   size_t outlier_count;  /**< number of points that were left out as outliers */
+  double residual_expected; /**< expected RMS of the distances in `residual_rms`, mm */
+  double turn; /**< turn of the points' frame that would quarter the residuals, rad, where no
+                  rotation was to be found; 0 if there is none */
 } supine_location_info;
 
 /** Comparison of an observed point with its prediction by all other points. */
@@ -151,7 +154,9 @@ SUPINE_API size_t supine_locate_space(size_t count);
  *
  * The expected errors are multiplied by sqrt((10 + sum of z^2) / (10 + n)). z are the distances of
  * the n points that are no outliers from their predictions by all other points, divided by the
- * expected distances. With three or four points, an outlier cannot be found.
+ * expected distances. If the variance of the distances, without noise, exceeds 1.5 times the
+ * expected one, as with a wrong volume, what is beyond is added to the variance of every position.
+ * With three or four points, an outlier cannot be found.
  *
  * A rotation has a prior with standard deviation 3 degrees about each axis, unless the points are
  * turned by more than 30 degrees: then their frame is another one. Cost: about 0.2 ms for 20
@@ -172,6 +177,12 @@ SUPINE_API supine_status supine_locate(const supine_locate_task *task,
 
 /** Return what supine_locate found. The struct is in the `space` given to supine_locate. */
 SUPINE_API const supine_location_info *supine_location_get_info(const supine_location *found);
+
+/** Say what is doubtful in what supine_locate found: residuals that are much larger than expected,
+ * or a frame that is turned (checks locate-residuals and locate-turned).
+ * @param text  [size] one line, written if there is a doubt; 256 bytes are enough
+ * @return whether there is a doubt */
+SUPINE_API bool supine_location_doubt(const supine_location_info *found, char *text, size_t size);
 
 /** Compute the positions of all vertices in the frame of the observations, and their expected
  * errors. Statuses: as supine_basis_pose. Cost: about 3 ms for 25,000 vertices and 20 points.

@@ -86,6 +86,7 @@ typedef struct supine_basis_options {
   supine_storage storage;
   supine_simd simd;
   bool without_normals; /**< do not load normals, which saves memory */
+  bool allow_folds;     /**< compute poses that supine_basis_check refuses */
   /** Functions that allocate and free all memory of the basis but the mapped file, called only
    * while it is opened or closed. Both are NULL, or neither. */
   supine_allocator allocator;
@@ -130,7 +131,8 @@ typedef struct supine_basis_info {
   const void *packed;
   size_t normal_count; /**< vectors per vertex whose weighted sum is the normal; 0 if none */
   /** [vertex_count, 3, normal_count + 1] bytes of the vectors whose weighted and normalised sum is
-   * the normal: vector j is 256 times byte j, and vector 0 has the last byte added; NULL if none. */
+   * the normal: vector j is 256 times byte j, and vector 0 has the last byte added; NULL if none.
+   */
   const int8_t *normals;
   /** Coefficients of the polynomials that supine_basis_normal_weights evaluates. With K =
    * mode_count, the shape is [lung_count, normal_count, 3, 1 + 2 K + K (K + 1) / 2]. */
@@ -138,8 +140,8 @@ typedef struct supine_basis_info {
   const double *reference_volume; /**< [lung_count] volume of reference surface, mL; 0 if open */
   bool has_rest;                  /**< the file has the volume at rest for every posture */
   bool has_full;                  /**< the reference surface is at full inflation */
-  bool is_fields;     /**< made from another simulator's displacements; factor 1 reproduces them */
-  double bend[3];     /**< constant of the path along each axis (supine_volume_bend) */
+  bool is_fields; /**< made from another simulator's displacements; factor 1 reproduces them */
+  double bend[3]; /**< constant of the path along each axis (supine_volume_bend) */
   /** Hash of the modes, the coefficients of the volumes, and the names of the lungs. Bases that
    * share it have the same poses: a basis, and those that `supine embed` makes from it. */
   uint64_t identity;
@@ -242,26 +244,37 @@ SUPINE_API supine_status supine_basis_weights(const supine_basis *basis, const d
  *                                    relative to rest or to full inflation, which the file lacks;
  * or the lungs named in the state are not exactly those of the basis
  * @retval SUPINE_ERROR_OPEN_SURFACE  the surface is open and has no volumes
- * @retval SUPINE_ERROR_NUMERICAL     the surface folds before it holds that volume, or the volume
- * is out of reach; single triangles that turn over earlier are not detected
+ * @retval SUPINE_ERROR_NUMERICAL     the volume is out of reach, or the lungs cannot hold it
+ *                                    (supine_basis_check); the latter is not checked if the basis
+ *                                    was opened with supine_basis_options.allow_folds
  *
  * [MilicEmili1966]  Milic-Emili, Henderson, Dolovich, Trop, Kaneko, J. Appl. Physiol. 21, 1966,
  *                   749-759 */
 SUPINE_API supine_status supine_basis_pose(const supine_basis *basis, const supine_state *state,
                                            supine_pose *pose, supine_error *error);
 
-/** Return the weights of the modes of a lung in a pose, [mode_count]: the same for all lungs, unless
- * supine_basis_info.order is above 0. */
+/** Return the weights of the modes of a lung in a pose, [mode_count]: the same for all lungs,
+ * unless supine_basis_info.order is above 0. */
 SUPINE_API const double *supine_basis_lung_weights(const supine_basis *basis,
                                                    const supine_pose *pose, size_t lung);
 
-/** Compute the coefficients of the modes at vertices begin <= i < end of a basis of vectors, whether
- * the file stores them or clusters.
+/** Compute the coefficients of the modes at vertices begin <= i < end of a basis of vectors,
+ * whether the file stores them or clusters.
  * @param coefficients  [end - begin, 3, mode_count] mm, written
  * @retval SUPINE_ERROR_ARGUMENT     the range does not lie within 0 to N
  * @retval SUPINE_ERROR_UNSUPPORTED  supine_basis_info.vector is false */
 SUPINE_API supine_status supine_basis_coefficients(const supine_basis *basis, size_t begin,
                                                    size_t end, float *coefficients);
+
+/** Check that lungs can hold the volumes of a pose: 10 to 120 % of full inflation, without folds in
+ * more than 1 % of the triangles of a lung. The file holds the range of volumes of each lung in 26
+ * directions of gravity; between them it is interpolated. The state of the scan, and all states of
+ * a file without these ranges, are taken. Limits: supine_input_get. Cost: mode_count^3 for each
+ * lung.
+ * @param state  the state of the pose
+ * @retval SUPINE_ERROR_NUMERICAL  lungs cannot hold these volumes; `error` says which */
+SUPINE_API supine_status supine_basis_check(const supine_basis *basis, const supine_state *state,
+                                            const supine_pose *pose, supine_error *error);
 
 /** Return the default volume of a basis (supine_basis_pose). If the default is to multiply
  * displacements by 1, whatever the volume, the kind of the result is SUPINE_VOLUME_DEFAULT. */

@@ -3,7 +3,8 @@
  * The state of the lungs, a posture and a volume, as text and as a struct.
  *
  *     POSTURE  supine, prone, left, right (lying on that side), upright, inverted, a DICOM patient
- *              position, any of them tilted (supine+15), or gravity X:Y:Z
+ *              position, any of them tilted (supine+15 lowers the head), rolled to the left
+ *              (supine@30, or supine>30) or both (supine@30+15), or gravity X:Y:Z
  *     VOLUME   rest   the end of a quiet expiration in that posture, with the tissue; or FRC
  *              full   full inflation, with the tissue; or TLC
  *              scan   the volume in the scan
@@ -73,6 +74,14 @@ SUPINE_API supine_status supine_state_parse_posture(const char *text, supine_sta
 /** Parse a volume without a posture. Statuses: as supine_state_parse. */
 SUPINE_API supine_status supine_state_parse_volume(const char *text, supine_state *state,
                                                    supine_error *error);
+
+/** Join a posture and a volume that were given apart, such as "prone" and "rest+500".
+ * @param posture  its gravity is taken, and its volume if it is not of the kind DEFAULT
+ * @param volume   its volume is taken, if it is not of the kind DEFAULT
+ * @param state    written; may be `posture` or `volume`
+ * @retval SUPINE_ERROR_ARGUMENT  both have a volume; `state` is unchanged */
+SUPINE_API supine_status supine_state_join(const supine_state *posture, const supine_state *volume,
+                                           supine_state *state, supine_error *error);
 
 /** Print a state as text for supine_state_parse, such as "left:rest+500". Volumes have up to 9
  * digits.

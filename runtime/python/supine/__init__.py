@@ -20,6 +20,7 @@ import gzip
 import io
 import os
 import tempfile
+import warnings
 from typing import Any, NamedTuple, Optional, Sequence, Union
 
 import numpy as np
@@ -33,7 +34,7 @@ from ._library import (ArgumentError, Error, FormatError, MeshError, NumericalEr
 from ._program import save_fields
 
 __all__ = ["open", "precompute", "save_fields", "embed", "augment", "random_states", "Deform", "Sample", "Basis",
-           "Pose", "Location", "Target", "gravity", "gravity_of_quaternion", "tilt", "postures", "breath", "Gravity",
+           "Pose", "Location", "Target", "gravity", "gravity_of_quaternion", "tilt", "roll", "postures", "breath", "Gravity",
            "Error", "ArgumentError", "FormatError", "MeshError", "NumericalError", "OpenSurfaceError",
            "OutOfMemoryError", "ReadError", "UnsupportedError"]
 __version__: str = _c.string(_c.version())
@@ -84,11 +85,20 @@ def gravity_of_quaternion(quaternion: Sequence[float]) -> Doubles:
 
 
 def tilt(posture: Gravity, degrees: float) -> Doubles:
-    """Turn gravity in the sagittal plane. Supine tilted by +15 degrees is head down."""
+    """Tilt the body by -90 to 90 degrees. + lowers the head of a lying body, and leans an upright one back."""
     out = (ctypes.c_double * 3)()
     status = _c.posture_tilt(_three(posture), degrees, out)
     if status != 0:
-        _c.fail(status)
+        _c.fail(status, b"the tilt must be -90 to 90 degrees")
+    return np.array(out)
+
+
+def roll(posture: Gravity, degrees: float) -> Doubles:
+    """Roll the body about its long axis by -180 to 180 degrees, + to its left: supine rolled by 90 degrees is left."""
+    out = (ctypes.c_double * 3)()
+    status = _c.posture_roll(_three(posture), degrees, out)
+    if status != 0:
+        _c.fail(status, b"the roll must be -180 to 180 degrees")
     return np.array(out)
 
 
@@ -150,7 +160,9 @@ def _state(state: Gravity, volume: str = "") -> Any:
     else:
         wanted.gravity = _numbers(state, 3, "gravity")
     if volume:
-        _c.state_parse(volume.encode(), wanted)
+        other = _c.State()
+        _c.state_parse_volume(volume.encode(), other)
+        _c.state_join(wanted, other, wanted)
     return wanted
 
 
@@ -206,8 +218,9 @@ class Basis:
     """
     report: str = ""
 
-    def __init__(self, source: Source, *, storage: str = "auto", simd: str = "auto", normals: bool = True) -> None:
-        options = _c.Options(ctypes.sizeof(_c.Options), STORAGES.index(storage), SIMDS.index(simd), not normals)
+    def __init__(self, source: Source, *, storage: str = "auto", simd: str = "auto", normals: bool = True,
+                 allow_folds: bool = False) -> None:
+        options = _c.Options(ctypes.sizeof(_c.Options), STORAGES.index(storage), SIMDS.index(simd), not normals, allow_folds)
         self._owner = _Owner(source, options)
         self._c = self._owner.pointer
         info = _c.basis_get_info(self._c).contents
@@ -449,6 +462,9 @@ class Location:
         task = _c.LocateTask(inside._c, count, seen, state, rigid)
         _c.locate(task, residuals, self._space.ctypes.data, self._c)
         info = _c.location_info(self._c).contents
+        doubt = ctypes.create_string_buffer(256)
+        if _c.location_doubt(info, doubt, 256):
+            warnings.warn(_c.string(doubt.value), stacklevel=3)
         self.volume: float = info.volume
         self.volume_error: float = info.volume_error
         self.rotation: Doubles = np.array(info.rotation).reshape(3, 3)
@@ -466,15 +482,18 @@ class Location:
         return xyz, sigma
 
 
-def open(source: Source, *, storage: str = "auto", simd: str = "auto", normals: bool = True) -> Basis:
+def open(source: Source, *, storage: str = "auto", simd: str = "auto", normals: bool = True,
+         allow_folds: bool = False) -> Basis:
     """Open a basis file, given by its path or its bytes, and check all of it.
 
     storage: kind of numbers in memory: "exact", "int16", "mixed"; or "auto", the smallest with an error of at most
         0.005 mm
     simd: instruction set: "portable", "avx2", "avx512"; or "auto", the widest set of this processor
     normals: False ignores the file's normals, to save memory
+    allow_folds: True computes poses with volumes that lungs cannot hold, or at which the surface folds, instead of
+        refusing them
     """
-    return Basis(source, storage=storage, simd=simd, normals=normals)
+    return Basis(source, storage=storage, simd=simd, normals=normals, allow_folds=allow_folds)
 
 
 def precompute(*surfaces: Any, progress: Optional[_program.Progress] = None, **options: Any) -> Basis:

@@ -130,6 +130,10 @@ def augment(lungs: Any, image: Optional[NDArray[Any]] = None, *, labels: Optiona
         raise ValueError("rigid names values of labels: give labels")
     from . import embed  # the package imports this module
 
+    if image is not None and labels is not None and image.shape != labels.shape:
+        raise ArgumentError(f"the shapes of image and labels differ, {image.shape} and {labels.shape}: give both on the same voxels")
+    if image is not None and labels is not None and image.shape != labels.shape:
+        raise ValueError(f"the shapes of image and labels differ, {image.shape} and {labels.shape}: give both on the same voxels")
     wanted = random_states(lungs, states, seed) if isinstance(states, int) else list(states)
     inside = None if points is None else embed(lungs, points)
     order = None if inside is None else np.argsort(inside.tensor("part"), kind="stable")  # a basis groups points by lung

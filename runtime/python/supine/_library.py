@@ -100,7 +100,8 @@ class GivenPose:
 
 class Options(ctypes.Structure):
     """The C struct supine_basis_options."""
-    _fields_ = [("size", c_size_t), ("storage", c_int), ("simd", c_int), ("without_normals", c_bool)]
+    _fields_ = [("size", c_size_t), ("storage", c_int), ("simd", c_int), ("without_normals", c_bool),
+                ("allow_folds", c_bool)]
 
 
 class Info(ctypes.Structure):
@@ -154,7 +155,8 @@ class LocationInfo(ctypes.Structure):
     """The C struct supine_location_info."""
     _fields_ = [("state", State), ("volume", c_double), ("volume_error", c_double), ("volume_prior_error", c_double),
                 ("rotation", c_double * 9), ("translation", c_double * 3), ("residual_rms", c_double),
-                ("log_evidence", c_double), ("outlier_count", c_size_t)]
+                ("log_evidence", c_double), ("outlier_count", c_size_t), ("residual_expected", c_double),
+                ("turn", c_double)]
 
 
 class Surface(ctypes.Structure):
@@ -210,7 +212,7 @@ class Volumes(ctypes.Structure):
 class Modes(ctypes.Structure):
     """The C struct supine_precompute_modes."""
     _fields_ = [("has_band", c_bool), ("band", c_size_t), ("count", c_size_t), ("harmonics", c_bool),
-                ("held_out", c_size_t), ("without_normals", c_bool)]
+                ("held_out", c_size_t), ("without_normals", c_bool), ("storage", c_int)]
 
 
 class PrecomputeOptions(ctypes.Structure):
@@ -225,7 +227,8 @@ class Report(ctypes.Structure):
     _fields_ = [("lung_count", c_size_t), ("vertex_count", c_size_t), ("band", c_size_t), ("mode_count", c_size_t),
                 ("direction_count", c_size_t), ("relative", c_double * 3), ("mm", c_double * 3), ("rest_known", c_bool),
                 ("rest_part", c_double), ("volume", c_double), ("turned_over", c_double), ("band_count", c_size_t),
-                ("band_error", c_double * 12)]
+                ("band_error", c_double * 12), ("volume_count", c_size_t), ("order", c_size_t), ("extrapolated", c_double),
+                ("cluster_count", c_size_t)]
 
 
 class Finding(ctypes.Structure):
@@ -291,8 +294,11 @@ status_string = _declare("status_string", c_char_p, c_int)
 posture_count = _declare("posture_count", c_size_t)
 posture_name = _declare("posture_name", c_char_p, c_size_t)
 posture_quaternion = _declare("posture_quaternion", c_int, c_double * 4, c_double * 3)
+posture_roll = _declare("posture_roll", c_int, c_double * 3, c_double, c_double * 3)
 posture_tilt = _declare("posture_tilt", c_int, c_double * 3, c_double, c_double * 3)
 state_parse = _checked("state_parse", c_char_p, POINTER(State))
+state_parse_volume = _checked("state_parse_volume", c_char_p, POINTER(State))
+state_join = _checked("state_join", POINTER(State), POINTER(State), POINTER(State))
 state_parse_posture = _checked("state_parse_posture", c_char_p, POINTER(State))
 breath_normal = _declare("breath_normal", c_void_p)
 breath_evaluate = _checked("breath_evaluate", c_void_p, POINTER(Breath), c_size_t, c_void_p, c_void_p, c_void_p)
@@ -314,6 +320,7 @@ expected_error = _checked("expected_error", c_void_p, POINTER(State), POINTER(St
 locate_space = _declare("locate_space", c_size_t, c_size_t)
 locate = _checked("locate", POINTER(LocateTask), POINTER(Residual), c_void_p, POINTER(c_void_p))
 location_info = _declare("location_get_info", POINTER(LocationInfo), c_void_p)
+location_doubt = _declare("location_doubt", c_bool, POINTER(LocationInfo), c_void_p, c_size_t)
 locate_positions = _checked("locate_positions", c_void_p, c_void_p, c_void_p, c_void_p)
 normals = _declare("normals", None, c_void_p, c_void_p, c_void_p)
 

@@ -1,0 +1,261 @@
+/* SPDX-License-Identifier: MIT */
+/* Hold the table of checks of every input, and judge a measured number by it. */
+#include <math.h>
+
+#include <supine/inputs.h>
+
+/* clang-format off */
+#define ALL (SUPINE_INPUT_BY_COMMAND | SUPINE_INPUT_BY_C | SUPINE_INPUT_BY_PYTHON | SUPINE_INPUT_BY_JAVASCRIPT)
+#define COMMAND SUPINE_INPUT_BY_COMMAND
+#define OFFLINE (SUPINE_INPUT_BY_COMMAND | SUPINE_INPUT_BY_C | SUPINE_INPUT_BY_PYTHON)
+
+/* Rows in the order of the enumeration. To add one, add its name there, a row here, a right and a
+ * wrong case to tests/inputs.py, and write docs/inputs.md anew (its first lines say how). */
+static const supine_input inputs[] = {
+  [SUPINE_INPUT_VOLUMES_OF_A_STATE] = {
+    .name = "volumes-of-a-state", .group = "State",
+    .input = "a posture with a volume, such as prone:rest, and another volume",
+    .against = "each other", .measured = "volumes of one state", .told = NAN, .refused = 1,
+    .evidence = "definition", .remedy = "give the volume once", .interfaces = ALL},
+  [SUPINE_INPUT_TILT] = {
+    .name = "tilt", .group = "State", .input = "a tilted posture, such as supine+15",
+    .against = "a body that turns by a quarter at most", .measured = "tilt, degrees",
+    .told = NAN, .refused = 90, .evidence = "definition: another posture is nearer",
+    .remedy = "for a volume, write supine:rest+500; for another posture, its name", .interfaces = ALL},
+  [SUPINE_INPUT_ROLL] = {
+    .name = "roll", .group = "State", .input = "a rolled posture, such as supine@30",
+    .against = "half a turn", .measured = "roll, degrees", .told = NAN, .refused = 180,
+    .evidence = "definition", .remedy = "give -180 to 180 degrees; + turns to the left", .interfaces = ALL},
+  [SUPINE_INPUT_VOLUME_FINITE] = {
+    .name = "volume-finite", .group = "State", .input = "a volume", .against = "finite numbers",
+    .measured = "numbers that are not finite", .told = NAN, .refused = 0, .evidence = "definition",
+    .remedy = "give a number of mL", .interfaces = ALL},
+  [SUPINE_INPUT_VOLUME_LEAST] = {
+    .name = "volume-least", .group = "State", .input = "a volume of the lungs",
+    .against = "full inflation", .measured = "share of full inflation", .below = true,
+    .told = NAN, .refused = 0.1, .evidence = "tissue alone fills about 0.1",
+    .remedy = "choose a volume nearer to rest, or allow folds", .interfaces = ALL},
+  [SUPINE_INPUT_VOLUME_MOST] = {
+    .name = "volume-most", .group = "State", .input = "a volume of the lungs",
+    .against = "full inflation", .measured = "share of full inflation",
+    .told = NAN, .refused = 1.2, .evidence = "definition of full inflation, and the error of a scan's volume",
+    .remedy = "choose a volume nearer to rest, or allow folds", .interfaces = ALL},
+  [SUPINE_INPUT_FOLDS] = {
+    .name = "folds", .group = "State", .input = "a state of the lungs",
+    .against = "the reference surface", .measured = "share of triangles that turn over",
+    .told = NAN, .refused = 0.01, .evidence = "single triangles turn over in right states",
+    .remedy = "choose a volume nearer to rest, or allow folds", .interfaces = ALL},
+  [SUPINE_INPUT_FIELD_FOLDS] = {
+    .name = "field-folds", .group = "State", .input = "a displacement field of a state",
+    .against = "the cells inside the lungs", .measured = "share of cells that fold",
+    .told = NAN, .refused = 0.01, .evidence = "as for the surface",
+    .remedy = "choose a volume nearer to rest, or allow folds", .interfaces = COMMAND},
+  [SUPINE_INPUT_BREATH] = {
+    .name = "breath", .group = "State", .input = "a breath from a state",
+    .against = "full inflation", .measured = "share of full inflation at the breath's end",
+    .told = 1, .refused = 1.2, .evidence = "definition of full inflation",
+    .remedy = "choose a smaller breath", .interfaces = COMMAND},
+  [SUPINE_INPUT_STATE_MEMBERS] = {
+    .name = "state-members", .group = "State", .input = "a state as an object or an array",
+    .against = "the members that a state has", .measured = "members that are unknown",
+    .told = NAN, .refused = 0, .evidence = "definition",
+    .remedy = "give a text such as prone:rest, or gravity and volume",
+    .interfaces = SUPINE_INPUT_BY_JAVASCRIPT | SUPINE_INPUT_BY_PYTHON},
+  [SUPINE_INPUT_POINT_OUTSIDE] = {
+    .name = "point-outside", .group = "Points", .input = "a point, such as a nodule",
+    .against = "the surface of the lungs", .measured = "distance outside, mm",
+    .told = NAN, .refused = 60, .evidence = "definition: beyond ribs and chest wall",
+    .remedy = "check the axes and the unit of this point, or leave it out", .interfaces = SUPINE_INPUT_BY_COMMAND | SUPINE_INPUT_BY_PYTHON},
+  [SUPINE_INPUT_DEVICE_NAME] = {
+    .name = "device-name", .group = "Points", .input = "the name of a tracker's device",
+    .against = "OpenIGTLink", .measured = "characters", .told = NAN, .refused = 20,
+    .evidence = "OpenIGTLink: 20 bytes", .remedy = "give a shorter name", .interfaces = COMMAND},
+  [SUPINE_INPUT_TRACKER_INVALID] = {
+    .name = "tracker-invalid", .group = "Points", .input = "a pose of a tracker",
+    .against = "what its message says of it", .measured = "poses marked as invalid",
+    .told = 0, .refused = NAN, .evidence = "PLUS: TransformValid, TransformStatus",
+    .remedy = "bring the tool back into view", .interfaces = COMMAND},
+  [SUPINE_INPUT_HEIGHT_LEAST] = {
+    .name = "height-least", .group = "Patient", .input = "the patient's height",
+    .against = "the adults of the equations", .measured = "height / least of these adults",
+    .below = true, .told = 1, .refused = NAN, .evidence = "heights of the equations: women 145 to 180 cm, men 155 to 195 cm (Quanjer et al. 1993)",
+    .remedy = "give the volume at rest or at full inflation", .interfaces = OFFLINE},
+  [SUPINE_INPUT_HEIGHT_MOST] = {
+    .name = "height-most", .group = "Patient", .input = "the patient's height",
+    .against = "the adults of the equations", .measured = "height / greatest of these adults",
+    .told = 1, .refused = NAN, .evidence = "heights of the equations: women 145 to 180 cm, men 155 to 195 cm (Quanjer et al. 1993)",
+    .remedy = "give the volume at rest or at full inflation", .interfaces = OFFLINE},
+  [SUPINE_INPUT_REST_SHARE] = {
+    .name = "rest-share", .group = "Patient", .input = "a volume at rest computed from the height",
+    .against = "the scan's volume at full inflation", .measured = "share of full inflation",
+    .told = NAN, .refused = 0.9, .evidence = "definition: breaths need more than a tenth",
+    .remedy = "check the height and the state of the scan, or give the volume at rest", .interfaces = OFFLINE},
+  [SUPINE_INPUT_GAS] = {
+    .name = "gas", .group = "Patient", .input = "volumes of the lungs",
+    .against = "the volume of tissue", .measured = "gas, mL", .below = true,
+    .told = 0, .refused = NAN, .evidence = "definition; the tissue of an adult is 860 mL",
+    .remedy = "check the unit and the state of the scan", .interfaces = OFFLINE},
+  [SUPINE_INPUT_LUNGS_SMALL] = {
+    .name = "lungs-small", .group = "Patient", .input = "lungs at full inflation",
+    .against = "an adult's lungs", .measured = "volume of both lungs, mL", .below = true,
+    .told = 3500, .refused = NAN,
+    .evidence = "equations: women of 145 cm, 1.64 SD below the mean, supine, with the tissue",
+    .remedy = "check the state of the scan; all constants are an adult's", .interfaces = OFFLINE},
+  [SUPINE_INPUT_LABEL_VALUE] = {
+    .name = "label-value", .group = "Label maps", .input = "a voxel of a label map, unless all are probabilities from 0 to 1",
+    .against = "whole numbers from 0 to 65535", .measured = "distance from the nearest label",
+    .told = NAN, .refused = 1e-3, .evidence = "definition; rounding of scaled integers is smaller",
+    .remedy = "give a label map; segment a CT first", .interfaces = OFFLINE},
+  [SUPINE_INPUT_LABELS_RATIO] = {
+    .name = "labels-ratio", .group = "Label maps", .input = "two labels that nobody named",
+    .against = "each other", .measured = "ratio of their volumes",
+    .told = NAN, .refused = 3, .evidence = "two lungs: at most 1.31",
+    .people = 7, .n = 12,
+    .remedy = "say which labels are the left and the right lung", .interfaces = OFFLINE},
+  [SUPINE_INPUT_LABELS_PIECES] = {
+    .name = "labels-pieces", .group = "Label maps", .input = "two labels that nobody named",
+    .against = "the largest piece of each", .measured = "share of the other pieces",
+    .told = NAN, .refused = 0.1, .evidence = "two lungs: at most 0.00005",
+    .people = 7, .n = 12,
+    .remedy = "say which labels are the left and the right lung", .interfaces = OFFLINE},
+  [SUPINE_INPUT_LABELS_SIDES] = {
+    .name = "labels-sides", .group = "Label maps", .input = "two labels that nobody named",
+    .against = "each other", .measured = "reach beyond the middle of the other, mm",
+    .told = NAN, .refused = 0, .evidence = "two lungs: -49 or less",
+    .people = 7, .n = 12,
+    .remedy = "say which labels are the left and the right lung", .interfaces = OFFLINE},
+  [SUPINE_INPUT_LABELS_ORDER] = {
+    .name = "labels-order", .group = "Label maps", .input = "five lobes numbered from 1",
+    .against = "the order of LTRCLobes, from the left", .measured = "lobes of the right lung among those numbered as left",
+    .told = NAN, .refused = 0, .evidence = "definition",
+    .remedy = "give the labels left=4+5,right=1+2+3", .interfaces = OFFLINE},
+  [SUPINE_INPUT_LUNG_PIECES] = {
+    .name = "lung-pieces", .group = "Label maps", .input = "the labels of a lung",
+    .against = "the largest piece", .measured = "share of the other pieces",
+    .told = 0.1, .refused = NAN, .evidence = "lungs: at most 0.00005",
+    .people = 7, .n = 24,
+    .remedy = "check the labels", .interfaces = OFFLINE},
+  [SUPINE_INPUT_LUNG_HOLLOW] = {
+    .name = "lung-hollow", .group = "Label maps", .input = "the surface of a lung, also of a mesh",
+    .against = "a sphere of its volume", .measured = "area of the sphere / area", .below = true,
+    .told = NAN, .refused = 0.1, .evidence = "lungs: 0.61 to 0.77; a shell of 3 mm: 0.07",
+    .people = 10, .n = 38,
+    .remedy = "fill the mask, or remove the surface inside", .interfaces = OFFLINE},
+  [SUPINE_INPUT_VOXELS_BEGIN] = {
+    .name = "voxels-begin", .group = "Label maps", .input = "vox_offset of a NIfTI header",
+    .against = "the least that the format allows", .measured = "offset / least offset", .below = true,
+    .told = NAN, .refused = 1, .evidence = "definition of NIfTI",
+    .remedy = "write the image again", .interfaces = OFFLINE},
+  [SUPINE_INPUT_IMAGE_FRAME] = {
+    .name = "image-frame", .group = "Images", .input = "an image or labels that move with the lungs",
+    .against = "the lungs of the basis", .measured = "share of the lungs in the image", .below = true,
+    .told = 0.9, .refused = NAN, .evidence = "definition",
+    .remedy = "check that the image shows the scan of the basis, in its frame", .interfaces = COMMAND},
+  [SUPINE_INPUT_CT_FRAME] = {
+    .name = "ct-frame", .group = "Images", .input = "a CT whose densities are scaled",
+    .against = "the lungs of the basis", .measured = "share of the lungs in the image", .below = true,
+    .told = NAN, .refused = 0.9, .evidence = "definition",
+    .remedy = "check that the image shows the scan of the basis, in its frame", .interfaces = COMMAND},
+  [SUPINE_INPUT_CT_AIR] = {
+    .name = "ct-air", .group = "Images", .input = "a CT",
+    .against = "air inside the lungs of the basis", .measured = "median inside the lungs, HU",
+    .told = NAN, .refused = -300, .evidence = "collapsed and consolidated tissue is above",
+    .remedy = "check that the image is a CT of these lungs", .interfaces = COMMAND},
+  [SUPINE_INPUT_PERSON_WIDTH_LEAST] = {
+    .name = "person-width-least", .group = "Two scans", .input = "two scans of one posture",
+    .against = "each other", .measured = "width in the emptier / in the fuller scan", .below = true,
+    .told = 0.83, .refused = NAN, .evidence = "own pairs: 0.87 to 0.97, and a margin of 0.04; 12 of 20 cross pairs are told by these six rows",
+    .people = 5, .n = 10,
+    .remedy = "check that both scans show one person", .interfaces = COMMAND},
+  [SUPINE_INPUT_PERSON_WIDTH_MOST] = {
+    .name = "person-width-most", .group = "Two scans", .input = "two scans of one posture",
+    .against = "each other", .measured = "width in the emptier / in the fuller scan",
+    .told = 1.04, .refused = NAN, .evidence = "equal volumes have equal width, and a margin of 0.04",
+    .people = 5, .n = 10,
+    .remedy = "check that both scans show one person", .interfaces = COMMAND},
+  [SUPINE_INPUT_PERSON_DEPTH_LEAST] = {
+    .name = "person-depth-least", .group = "Two scans", .input = "two scans of one posture",
+    .against = "each other", .measured = "depth in the emptier / in the fuller scan", .below = true,
+    .told = 0.81, .refused = NAN, .evidence = "own pairs: 0.85 to 0.98, and a margin of 0.04",
+    .people = 5, .n = 10,
+    .remedy = "check that both scans show one person", .interfaces = COMMAND},
+  [SUPINE_INPUT_PERSON_DEPTH_MOST] = {
+    .name = "person-depth-most", .group = "Two scans", .input = "two scans of one posture",
+    .against = "each other", .measured = "depth in the emptier / in the fuller scan",
+    .told = 1.04, .refused = NAN, .evidence = "equal volumes have equal depth, and a margin of 0.04",
+    .people = 5, .n = 10,
+    .remedy = "check that both scans show one person", .interfaces = COMMAND},
+  [SUPINE_INPUT_PERSON_LEFT_LEAST] = {
+    .name = "person-left-least", .group = "Two scans", .input = "two scans of one posture",
+    .against = "each other", .measured = "change of the share of the left lung, fuller to emptier", .below = true,
+    .told = -0.07, .refused = NAN, .evidence = "own pairs: -0.03 to 0.00, and a margin of 0.04",
+    .people = 5, .n = 10,
+    .remedy = "check that both scans show one person", .interfaces = COMMAND},
+  [SUPINE_INPUT_PERSON_LEFT_MOST] = {
+    .name = "person-left-most", .group = "Two scans", .input = "two scans of one posture",
+    .against = "each other", .measured = "change of the share of the left lung, fuller to emptier",
+    .told = 0.04, .refused = NAN, .evidence = "own pairs: -0.03 to 0.00, and a margin of 0.04",
+    .people = 5, .n = 10,
+    .remedy = "check that both scans show one person", .interfaces = COMMAND},
+  [SUPINE_INPUT_LANDMARKS_ORDER] = {
+    .name = "landmarks-order", .group = "Landmarks", .input = "landmarks from one state to another",
+    .against = "the growth of the lungs", .measured = "growth the other way, standard errors beyond 0.02",
+    .told = NAN, .refused = 2.5, .evidence = "right sets: none grows the other way; reversed: 6 and more, with 12 pairs three of four are refused",
+    .people = 15, .n = 30,
+    .remedy = "exchange first and second points", .interfaces = COMMAND},
+  [SUPINE_INPUT_LANDMARKS_MATCH] = {
+    .name = "landmarks-match", .group = "Landmarks", .input = "a pair of landmarks",
+    .against = "the median of its eight neighbours", .measured = "difference / median difference, if above 20 mm",
+    .told = 15, .refused = NAN, .evidence = "right pairs: at most 12.7; of 5 % mismatched ones, 97 % are above",
+    .people = 15, .n = 4277,
+    .remedy = "check these rows; they are left out", .interfaces = COMMAND},
+  [SUPINE_INPUT_PATIENT_BOX] = {
+    .name = "patient-box", .group = "Landmarks", .input = "a patient's file and lungs",
+    .against = "the scan that was fitted", .measured = "ratio of width, depth or height",
+    .told = 1.05, .refused = NAN, .evidence = "the same scan; surfaces of 2 and 8 mm edge differ by less",
+    .remedy = "give the scan that was fitted", .interfaces = OFFLINE},
+  [SUPINE_INPUT_PATIENT_VOLUME] = {
+    .name = "patient-volume", .group = "Landmarks", .input = "a patient's file and lungs",
+    .against = "the scan that was fitted", .measured = "ratio of volumes",
+    .told = 1.1, .refused = NAN, .evidence = "the same scan; surfaces of 2 and 8 mm edge differ by less",
+    .remedy = "give the scan that was fitted", .interfaces = OFFLINE},
+  [SUPINE_INPUT_SURFACE_TURNED] = {
+    .name = "surface-turned", .group = "Surfaces", .input = "a file in a format that states which axis is up",
+    .against = "unchanged coordinates", .measured = "turns by the importer",
+    .told = NAN, .refused = 0, .evidence = "definition",
+    .remedy = "give the axes of the file, after comparing it with the scan", .interfaces = OFFLINE},
+  [SUPINE_INPUT_LOCATE_RESIDUALS] = {
+    .name = "locate-residuals", .group = "Observed points", .input = "observed points and a volume",
+    .against = "the error that is expected", .measured = "RMS residual / RMS expected error",
+    .told = 1.5, .refused = NAN, .evidence = "full breaths, 6 to 20 points: told in 1 of 60 fits with right volumes, in 45 of 60 with wrong ones",
+    .people = 5, .n = 120, .remedy = "check the volume, the names of the points and their unit", .interfaces = OFFLINE},
+  [SUPINE_INPUT_LOCATE_TURNED] = {
+    .name = "locate-turned", .group = "Observed points", .input = "observed points without a rigid motion",
+    .against = "the lungs in the state", .measured = "turn that fits best, degrees",
+    .told = 10, .refused = NAN,
+    .evidence = "definition; the residuals must fall to a quarter, and a fitted rotation has an SD of 3 degrees",
+    .remedy = "let the points' frame turn", .interfaces = OFFLINE},
+  [SUPINE_INPUT_SUGGESTION] = {
+    .name = "suggestion", .group = "Words", .input = "a word that is unknown",
+    .against = "the words that are known", .measured = "share of the characters that differ",
+    .told = 0.4, .refused = NAN, .evidence = "definition",
+    .remedy = "nearer words are suggested, others are not", .interfaces = ALL},
+};
+/* clang-format on */
+_Static_assert(sizeof inputs / sizeof *inputs == SUPINE_INPUT_COUNT, "each input needs a row");
+
+const supine_input *supine_input_get(supine_input_id id) {
+  return (int)id >= 0 && id < SUPINE_INPUT_COUNT ? &inputs[id] : NULL;
+}
+
+static bool beyond(const supine_input *input, double measured, double limit) {
+  return !isnan(limit) && (input->below ? measured < limit : measured > limit);
+}
+
+supine_input_verdict supine_input_judge(supine_input_id id, double measured) {
+  const supine_input *input = supine_input_get(id);
+  if (input == NULL || isnan(measured) || beyond(input, measured, input->refused)) {
+    return SUPINE_INPUT_REFUSED;
+  }
+  return beyond(input, measured, input->told) ? SUPINE_INPUT_TOLD : SUPINE_INPUT_TAKEN;
+}

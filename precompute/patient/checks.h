@@ -1,0 +1,54 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file Compare scans and landmarks with each other before they are believed: do they show one
+ * person, in the stated order? The limits are those of docs/inputs.md. */
+#ifndef SUPINE_PATIENT_CHECKS_H
+#define SUPINE_PATIENT_CHECKS_H
+
+#include "precompute/lungs/lungs.h"
+#include "precompute/patient/pairs.h"
+
+/** Measures of two lungs by which the scans of two people can often be told apart. */
+typedef struct supine_patient_size {
+  double width, depth; /**< of the bounding box, from side to side and from front to back, mm */
+  double volume;       /**< mL */
+  double left;         /**< the left lung's share of the volume */
+} supine_patient_size;
+
+/** Measure lungs. Return false if there are not two of them. */
+bool supine_patient_size_of(const supine_lungs *lungs, supine_patient_size *size);
+
+/** Return whether two scans in one posture differ no more than scans of one person do. Otherwise
+ * write a warning that names the measure.
+ * @param text  output, if they differ more */
+bool supine_patient_one_person(const supine_patient_size *first, const supine_patient_size *second,
+                               char *text, size_t text_size);
+
+/** Return the standard error of the logarithm of supine_patient_pairs_growth, by leaving out each
+ * of 20 groups of pairs. */
+double supine_patient_growth_error(const supine_patient_pairs *pairs);
+
+/** Refuse landmarks that grow where the lungs shrink, or shrink where the lungs grow, beyond the
+ * error of the landmarks' growth: their first and second points are exchanged.
+ * @param growth  volume of the lungs in the state of the second points / that in the state of the
+ *   first */
+supine_status supine_patient_check_order(const supine_patient_pairs *pairs, double growth,
+                                         supine_error *error);
+
+/** Drop pairs whose displacement differs from the median displacement of their eight neighbours by
+ * far more than it does for half of the pairs: they were mismatched. At most one pair in five is
+ * dropped; if more differ, all are kept, and fewer than 30 pairs are not compared.
+ * @param text  output: a warning that names the pairs, counted from 1; empty if all are kept
+ * @return the number of pairs dropped */
+supine_status supine_patient_drop_mismatched(supine_patient_pairs *pairs, char *text,
+                                             size_t text_size, size_t *dropped,
+                                             supine_error *error);
+
+/** Return whether lungs have the size in which they were scanned for the fit: width, depth, and
+ * volume. Otherwise write a warning.
+ * @param low, high  bounding box of the scan that was fitted, mm
+ * @param volume     its volume, mL, or 0 if unknown
+ * @param text       output, if they differ */
+bool supine_patient_same_size(const supine_lungs *lungs, const double low[3], const double high[3],
+                              double volume, char *text, size_t text_size);
+
+#endif

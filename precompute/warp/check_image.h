@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/** @file
+ * Check that an image shows the lungs that it is to be moved with. */
+#ifndef SUPINE_FIELD_CHECK_IMAGE_H
+#define SUPINE_FIELD_CHECK_IMAGE_H
+
+#include <stdbool.h>
+
+#include "mesh/image/image.h"
+
+typedef enum supine_warp_image_kind {
+  SUPINE_FIELD_CT = 0, /**< a CT whose densities are scaled: refused if it does not fit */
+  SUPINE_FIELD_IMAGE,  /**< another image; in Hounsfield units if a voxel is below
+                         supine_warp_aerated */
+  SUPINE_FIELD_LABELS
+} supine_warp_image_kind;
+
+/** Compare an image with the lungs of a basis: do the lungs lie in the image, and does a CT show
+ * air in them? A CT that does not fit is refused; for other images a warning is written, with the
+ * two frames.
+ * @param depth    depth of the nodes of a grid below the lungs' surface (supine_field), mm
+ * @param path     names the image in the message
+ * @param warning  [size] output; empty if the image fits */
+supine_status supine_warp_check_image(const supine_image *depth, const supine_image *image,
+                                      const char *path, supine_warp_image_kind kind, char *warning,
+                                      size_t size, supine_error *error);
+
+#endif

@@ -1,0 +1,465 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Give a right and a wrong input of every row of the table of checks (docs/inputs.md) to every interface that takes it, and
+show the verdicts: taken, told (a warning) or refused. All interfaces must give the same one.
+
+    python3 tests/inputs.py [BUILD_FOLDER]
+
+The folder, build/release by default, must have the program and the shared libraries. JavaScript runs if the target `npm`
+was built and node is installed. To add a row: add it to base/inputs.c, and its cases to CASES below."""
+import ctypes
+import importlib.util
+import json
+import os
+import re
+import shutil
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import warnings
+
+if importlib.util.find_spec("numpy") is None:
+    print("skipped: this python has no numpy")
+    sys.exit(77)
+import numpy as np
+
+BUILD = os.path.abspath(sys.argv[1] if len(sys.argv) > 1 else "build/release")
+SOURCE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+SUPINE = os.path.join(BUILD, "supine")
+PACKAGE = os.path.join(BUILD, "runtime/js/package/supine.js")
+INTERFACES = ("command", "C", "Python", "JavaScript")
+folder = tempfile.TemporaryDirectory()
+os.chdir(folder.name)
+shutil.copytree(os.path.join(SOURCE, "runtime/python/supine"), "py/supine")
+for library in ("runtime/libsupine_runtime.so", "precompute/library/libsupine_precompute.so"):
+    name = os.path.join(BUILD, library)
+    if not os.path.exists(name):
+        print(f"skipped: the build has no {library}")
+        sys.exit(77)
+    shutil.copy(name, "py/supine")
+os.environ["PATH"] = BUILD + os.pathsep + os.environ["PATH"]
+sys.path.insert(0, os.path.abspath("py"))
+import supine
+from supine import _library as c
+
+
+class Row(ctypes.Structure):
+    """The C struct supine_input."""
+    _fields_ = [*((name, ctypes.c_char_p) for name in ("name", "group", "input", "against", "measured")),
+                ("below", ctypes.c_bool), ("told", ctypes.c_double), ("refused", ctypes.c_double),
+                ("evidence", ctypes.c_char_p), ("people", ctypes.c_int), ("n", ctypes.c_int),
+                ("remedy", ctypes.c_char_p), ("interfaces", ctypes.c_uint)]
+
+
+def table():
+    """Return the rows of the table, in its order."""
+    get = ctypes.CDLL(os.path.abspath("py/supine/libsupine_runtime.so")).supine_input_get
+    get.restype = ctypes.POINTER(Row)
+    rows = []
+    while get(len(rows)):
+        rows.append(get(len(rows)).contents)
+    return rows
+
+
+def command(*words):
+    """Run the program; return the verdict and what it said."""
+    done = subprocess.run([SUPINE, *map(str, words)], capture_output=True, text=True, check=False)
+    assert done.returncode in (0, 1, 2, 5), done
+    return ("refused" if done.returncode else "told" if "warning:" in done.stderr else "taken"), done.stderr
+
+
+def python(call):
+    """Call a function of the Python package; return the verdict and what it said."""
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        try:
+            call()
+        except (ValueError, TypeError, ArithmeticError, supine.Error) as error:
+            return "refused", str(error)
+    return ("told" if said else "taken"), " ".join(str(w.message) for w in said)
+
+
+def pose_in_c(posture, volume):
+    """Compute a pose as a C program does."""
+    given, other = c.State((0.0, 1.0, 0.0)), c.State()
+    c.state_parse(posture.encode(), given)
+    if volume:
+        c.state_parse_volume(volume.encode(), other)
+    c.state_join(given, other, given)
+    c.basis_pose(lungs._c, given, supine.Pose())
+
+
+JAVASCRIPT = """
+import { readFileSync } from 'node:fs';
+const { open } = await import(process.argv[1]);
+const lungs = await open(readFileSync('lungs.safetensors'));
+const say = (state) => { try { lungs.pose(state); return ['taken', '']; } catch (error) { return ['refused', error.message]; } };
+console.log(JSON.stringify(JSON.parse(process.argv[2]).map(say)));
+"""
+
+
+def javascript(state):
+    """Compute a pose in node; return None if it cannot run."""
+    node = shutil.which("node")
+    if node is None or not os.path.exists(PACKAGE):
+        return None
+    done = subprocess.run([node, "--input-type=module", "-e", JAVASCRIPT, PACKAGE, json.dumps([state])],
+                          capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return tuple(json.loads(done.stdout)[0])
+
+
+def state(posture, volume="", javascript_state=None):
+    """A state, in all interfaces. JavaScript takes posture and volume as one text."""
+    text = javascript_state or (f"{posture}:{volume}" if volume else posture)
+    return {"command": lambda: command("deform", "lungs.safetensors", "--posture", posture,
+                                       *(["--volume", volume] if volume else []), "-o", "out.ply"),
+            "C": lambda: python(lambda: pose_in_c(posture, volume)),
+            "Python": lambda: python(lambda: lungs.pose(posture, volume)),
+            "JavaScript": lambda: javascript(text)}
+
+
+def made(path, **options):
+    """A basis made from a surface. The Python package passes the options to the C library."""
+    words = [word for key, value in options.items() for word in (f"--{key}", value)]
+    return {"command": lambda: command("precompute", path, "--held-out", 20, *words, "-o", "out.safetensors"),
+            "C": lambda: python(lambda: supine.precompute(path, held_out=20, **options)),
+            "Python": lambda: python(lambda: supine.precompute(path, held_out=20, **options))}
+
+
+def points(z):
+    with open("points.csv", "w", encoding="utf-8") as file:
+        file.write(f"name,x,y,z\nin,-80,-120,-90\nother,-80,-120,{z}\n")
+
+
+def embedded(z):
+    def run(call):
+        points(z)
+        return call()
+    return {"command": lambda: run(lambda: command("embed", "lungs.safetensors", "points.csv", "-o", "out.safetensors")),
+            "Python": lambda: run(lambda: python(lambda: supine.embed(lungs, "points.csv")))}
+
+
+def located(volume, degrees=0.0):
+    """Locate the lungs from points where they are in supine posture at rest, in a frame that is turned."""
+    names = list(inside.points)
+    vertices = [inside.points[name] for name in names]
+    seen = inside.deform(inside.pose("supine:rest"))[vertices].astype(float)
+    t, mean = np.radians(degrees), seen.mean(axis=0)
+    turn = np.array([[np.cos(t), -np.sin(t), 0], [np.sin(t), np.cos(t), 0], [0, 0, 1]])
+    seen = (seen - mean) @ turn.T + mean
+
+    def by_command():
+        with open("seen.csv", "w", encoding="utf-8") as file:
+            file.write("name,x,y,z\n" + "".join(f"{name},{x:.6f},{y:.6f},{z:.6f}\n" for name, (x, y, z) in zip(names, seen)))
+        return command("locate", "lungs.safetensors", "seen.csv", "--points", "inside.safetensors", "--posture", "supine",
+                       "--volume", volume, "-o", "found.csv")
+
+    by_python = lambda: python(lambda: inside.locate(vertices, seen, "supine", volume))
+    return {"command": by_command, "C": by_python, "Python": by_python}
+
+
+def crc64(data):
+    crc = 0
+    for byte in data:
+        crc ^= byte << 56
+        for _ in range(8):
+            crc = (crc << 1 ^ (0x42F0E1EBA9EA3693 if crc >> 63 else 0)) & (1 << 64) - 1
+    return crc
+
+
+def tracked(status, device="Patient"):
+    """Send a pose with metadata to the live lungs, and stop them."""
+    key, value = b"TransformStatus", status.encode()
+    matrix = struct.pack(">12f", 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0)
+    texts = key + value
+    body = struct.pack(">HHIi", 12, 10, len(texts), 1) + matrix + struct.pack(">HHHI", 1, len(key), 3, len(value)) + texts
+    head = struct.pack(">H12s20sQQQ", 2, b"TRANSFORM", b"Patient", 0, len(body), crc64(body))
+
+    def run():
+        with subprocess.Popen([SUPINE, "stream", "lungs.safetensors", "--listen", "0", "--device", device],
+                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as server:
+            line = server.stdout.readline()
+            if "port" not in line:
+                return "refused", server.communicate()[1]
+            with socket.create_connection(("127.0.0.1", int(re.search(r"port (\d+)", line)[1]))) as peer:
+                peer.sendall(head + body)
+                peer.recv(1)  # the first frame
+            server.terminate()
+            said = "".join(server.communicate(timeout=20))
+        return ("told" if "marked as invalid: 1" in said else "taken"), said
+    return {"command": run}
+
+
+def suggested(word):
+    """The verdict is `told` if a word is suggested."""
+    def verdict(run):
+        done = run()
+        if done is None:
+            return None
+        assert done[0] == "refused", done
+        return ("taken" if "did you mean" in done[1] else "told"), done[1]
+    return {name: lambda run=run: verdict(run) for name, run in state(word).items()}
+
+
+def breath(ml):
+    return {"command": lambda: command("compare", "lungs.safetensors", "--postures", "supine", "--breath", ml)}
+
+
+def field(posture):
+    return {"command": lambda: command("deform", "grid.safetensors", "--posture", posture, "--field", "field.nrrd")}
+
+
+def members(value):
+    given = value if isinstance(value, dict) else list(value)
+    return {"JavaScript": lambda: javascript(given),
+            "Python": lambda: python(lambda: lungs.pose(given.get("gravity", given) if isinstance(given, dict) else given,
+                                                        given.get("volume", "") if isinstance(given, dict) else ""))}
+
+
+def write_nrrd(name, voxels, origin=None):
+    """Write an array [z, y, x] on the grid of the basis `nodes`."""
+    kind = {"uint8": "uchar", "int16": "short", "float32": "float"}[voxels.dtype.name]
+    vector = lambda v: "(" + ",".join(f"{x:.6f}" for x in v) + ")"
+    with open(name, "wb") as file:
+        file.write((f"NRRD0004\ntype: {kind}\ndimension: 3\nspace: left-posterior-superior\nsizes: "
+                    + " ".join(map(str, voxels.shape[::-1])) + "\nspace directions: " + " ".join(map(vector, frame[1:]))
+                    + f"\nspace origin: {vector(frame[0] if origin is None else origin)}\nencoding: raw\nendian: little\n\n").encode())
+        file.write(np.ascontiguousarray(voxels).tobytes())
+
+
+def mapped(voxels, **options):
+    """A basis made from a label map."""
+    def run(call):
+        write_nrrd("map.nrrd", voxels)
+        return call()
+    return {key: lambda call=call: run(call) for key, call in made("map.nrrd", edge=8, **options).items()}
+
+
+def nifti(offset):
+    """A basis made from a label map in NIfTI whose header says that the voxels begin at `offset`."""
+    def run(call):
+        head = bytearray(352)
+        struct.pack_into("<i", head, 0, 348)
+        struct.pack_into("<8h", head, 40, 3, *sides.shape[::-1], 1, 1, 1, 1)
+        struct.pack_into("<2h", head, 70, 2, 8)
+        struct.pack_into("<9f", head, 76, *[1, *np.linalg.norm(frame[1:], axis=1), 1, 1, 1, 1], offset)
+        struct.pack_into("<2h", head, 252, 0, 1)
+        for k in range(3):
+            struct.pack_into("<4f", head, 280 + 16 * k, *((-1 if k < 2 else 1) * np.append(frame[1:, k], frame[0, k])))
+        head[123], head[344:348] = 2, b"n+1\0"
+        with open("map.nii", "wb") as file:
+            file.write(bytes(head) + sides.tobytes())
+        return call()
+    return {key: lambda call=call: run(call) for key, call in made("map.nii", edge=8).items()}
+
+
+def imaged(voxels, *words, shift=0.0):
+    """A CT that moves with the lungs."""
+    def run():
+        write_nrrd("ct.nrrd", voxels, frame[0] + [0, 0, shift])
+        return command("deform", "grid.safetensors", "--posture", "prone:rest", "--image", "ct.nrrd", *words, "-o", "moved.nrrd")
+    return {"command": run}
+
+
+def scanned(scale, left=1.0):
+    """Validate a basis by a scan at rest that is scaled, its left lung along z."""
+    def run():
+        vertices = lungs.deform(lungs.pose("supine:rest")).astype(float)
+        mean = vertices.mean(axis=0)
+        height = np.where(np.asarray(lungs.tensor("lung")).ravel() == 0, left, 1.0)
+        vertices = (vertices - mean) * scale * np.column_stack([height ** 0, height ** 0, height]) + mean
+        write_ply("scan.ply", vertices, lungs.triangles)
+        return command("validate", "lungs.safetensors", "--state", "supine:scan.ply", "--units", "mm")
+    return {"command": run}
+
+
+def paired(*words, mismatched=0):
+    """Validate a basis by landmarks from the scan to rest."""
+    def run():
+        place = np.flatnonzero(depth > 8)[::7]
+        first = nodes.vertices[place].astype(float)
+        second = nodes.deform(nodes.pose("supine:rest"))[place].astype(float)
+        second[10:10 + mismatched] = second[-mismatched - 1:-1]
+        with open("pairs.csv", "w", encoding="utf-8") as file:
+            file.write("x,y,z,to_x,to_y,to_z\n")
+            np.savetxt(file, np.column_stack([first, second]), "%.4f", ",")
+        return command("validate", "lungs.safetensors", "--landmarks", "pairs.csv", "--to", "supine:rest", *words)
+    return {"command": run}
+
+
+def write_dae(name, up):
+    """Write the lungs as a COLLADA file that says which axis is up."""
+    points_, corners = " ".join(f"{x:.4f}" for x in lungs.vertices.ravel()), " ".join(map(str, lungs.triangles.ravel()))
+    n, t = len(lungs.vertices), len(lungs.triangles)
+    with open(name, "w", encoding="utf-8") as file:
+        file.write(f'<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset>'
+                   f'<unit meter="1"/><up_axis>{up}</up_axis></asset><library_geometries><geometry id="g"><mesh><source id="s">'
+                   f'<float_array id="f" count="{3 * n}">{points_}</float_array><technique_common><accessor source="#f" count="{n}" '
+                   'stride="3"><param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/></accessor>'
+                   '</technique_common></source><vertices id="v"><input semantic="POSITION" source="#s"/></vertices><triangles '
+                   f'count="{t}"><input semantic="VERTEX" source="#v" offset="0"/><p>{corners}</p></triangles></mesh></geometry>'
+                   '</library_geometries><library_visual_scenes><visual_scene id="c"><node id="n"><instance_geometry url="#g"/>'
+                   '</node></visual_scene></library_visual_scenes><scene><instance_visual_scene url="#c"/></scene></COLLADA>')
+
+
+# For each row: a right input, a wrong one, and the verdict on the wrong one.
+CASES = {
+    "volumes-of-a-state": (state("prone", "rest"),
+                           state("prone:rest", "full", {"posture": "prone:rest", "volume": "full"}), "refused"),
+    "tilt": (state("left+45"), state("supine+500"), "refused"),
+    "roll": (state("supine@30"), state("supine@200"), "refused"),
+    "volume-finite": (state("prone:rest+100"), state("prone:rest+nan"), "refused"),
+    "volume-least": (state("prone:2L"), state("prone:50mL"), "refused"),
+    "volume-most": (state("supine:full"), state("supine:9L"), "refused"),
+    "folds": (state("0:1:-1:2L"), state("0:1:-1:700mL"), "refused"),
+    "field-folds": (field("prone:rest"), field("0:1:-1:700mL"), "refused"),
+    "breath": (breath(500), breath(3500), "told"),
+    "state-members": (members({"gravity": [0, -1, 0], "volume": "rest"}), members({"posture": "prone", "volume": "rest"}),
+                      "refused"),
+    "point-outside": (embedded(-100), embedded(900), "refused"),
+    "device-name": (tracked("OK"), tracked("OK", "a_name_of_21_letters_"), "refused"),
+    "tracker-invalid": (tracked("OK"), tracked("INVALID"), "told"),
+    "height-least": (made("lungs.ply", height=160, sex="female"), made("lungs.ply", height=135, sex="female"), "told"),
+    "height-most": (made("lungs.ply", height=180, sex="male"), made("lungs.ply", height=200, sex="male"), "told"),
+    "rest-share": (made("lungs.ply", height=180, sex="male"), made("lungs.ply", height=230, sex="male"), "refused"),
+    "gas": (made("lungs.ply"), made("tiny.ply", units="mm"), "told"),
+    "lungs-small": (made("lungs.ply"), made("small.ply", units="mm"), "told"),
+    "locate-residuals": (lambda: located("rest"), lambda: located("full"), None),
+    "locate-turned": (lambda: located("rest"), lambda: located("rest", 25.0), None),
+    "label-value": (lambda: mapped(sides.astype(np.float32) + np.float32(1e-4)), lambda: mapped(sides.astype(np.float32) * 1.5), "refused"),
+    "labels-ratio": (lambda: mapped(sides), lambda: mapped(tumour(8)), "refused"),
+    "labels-pieces": (lambda: mapped(sides), lambda: mapped(bed()), "refused"),
+    "labels-sides": (lambda: mapped(sides), lambda: mapped(np.where(sides == 0, 0, 1 + (row_of(2) < row_of(2)[sides > 0].mean() - 2))
+                                                           .astype(np.uint8)), "refused"),
+    "labels-order": (lambda: mapped(lobes((1, 2, 3, 4, 5))), lambda: mapped(lobes((4, 5, 1, 2, 3))), "refused"),
+    "lung-pieces": (lambda: mapped(sides, labels="left=1,right=2"), lambda: mapped(bed(), labels="left=1,right=2"), "told"),
+    "lung-hollow": (lambda: made("lungs.ply"), lambda: made("hollow.ply"), "refused"),
+    "voxels-begin": (lambda: nifti(352), lambda: nifti(0), "refused"),
+    "image-frame": (lambda: imaged(ct), lambda: imaged(ct, shift=900.0), "told"),
+    "ct-frame": (lambda: imaged(ct, "--density"), lambda: imaged(ct, "--density", shift=900.0), "refused"),
+    "ct-air": (lambda: imaged(ct, "--density"), lambda: imaged(-ct - 810, "--density"), "refused"),
+    "person-width-least": (lambda: scanned((1, 1, 1)), lambda: scanned((0.8, 1, 1)), "told"),
+    "person-width-most": (lambda: scanned((1, 1, 1)), lambda: scanned((1.25, 1, 0.8)), "told"),
+    "person-depth-least": (lambda: scanned((1, 1, 1)), lambda: scanned((1, 0.7, 1)), "told"),
+    "person-depth-most": (lambda: scanned((1, 1, 1)), lambda: scanned((1, 1.2, 0.85)), "told"),
+    "person-left-least": (lambda: scanned((1, 1, 1)), lambda: scanned((1, 1, 1), 0.65), "told"),
+    "person-left-most": (lambda: scanned((1, 1, 1)), lambda: scanned((1, 1, 0.8), 1.4), "told"),
+    "landmarks-order": (lambda: paired(), lambda: paired("--reverse"), "refused"),
+    "landmarks-match": (lambda: paired(), lambda: paired(mismatched=3), "told"),
+    "patient-box": (lambda: made("lungs.ply", patient="patient.json"), lambda: made("high.ply", patient="patient.json"), "told"),
+    "patient-volume": (lambda: made("lungs.ply", patient="patient.json"), lambda: made("full.ply", patient="patient.json"), "told"),
+    "surface-turned": (lambda: made("up.dae", axes="LSA"), lambda: made("up.dae"), "refused"),
+    "suggestion": (suggested("pron"), suggested("Bauchlage"), "told"),
+}
+
+
+def row_of(axis):
+    """The index of each voxel along x, y or z."""
+    return np.indices(sides.shape)[2 - axis]
+
+
+def tumour(radius):
+    """Label 1 holds both lungs, label 2 a ball in the left one."""
+    middle = np.argwhere(sides == 1).mean(axis=0)
+    near = np.linalg.norm(np.moveaxis(np.indices(sides.shape), 0, -1) - middle, axis=-1) * 8 < 8 * radius / 2
+    return np.where(near & (sides == 1), 2, np.minimum(sides, 1)).astype(np.uint8)
+
+
+def bed():
+    """The lungs, and a part apart from them with the label of one."""
+    voxels = sides.copy()
+    voxels[5:45, -2:, 5:20] = sides[:, :, :sides.shape[2] // 2].max()
+    return voxels
+
+
+def lobes(order):
+    """Two lobes of the left lung and three of the right one, from head to feet, with these labels."""
+    height = row_of(2).astype(float)
+    voxels = np.zeros_like(sides)
+    for side, labels in ((left, order[:2]), (3 - left, order[2:])):
+        part = sides == side
+        share = (height - height[part].min()) / (height[part].max() - height[part].min() + 1)
+        voxels[part] = np.array(labels)[((1 - share[part]) * len(labels) * 0.999).astype(int)]
+    return voxels
+
+
+def grid_of():
+    """Voxelise the lungs on the grid of a basis: sides of voxels, 1 and 2, depths, and an image like a CT."""
+    assert command("embed", "lungs.safetensors", "--grid", 8, "-o", "grid.safetensors")[0] == "taken"
+    basis = supine.open("grid.safetensors")
+    steps, shape = np.asarray(basis.tensor("grid"), float), tuple(int(n) for n in basis.tensor("grid_size"))[::-1]
+    place = np.rint((basis.vertices - steps[0]) @ np.linalg.inv(steps[1:])).astype(int).T[::-1]
+    deep = np.asarray(basis.tensor("depth")).ravel()
+    voxels = np.zeros(shape, np.uint8)
+    voxels[tuple(place)] = np.where(deep > 0, 1 + np.asarray(basis.tensor("lung")).ravel(), 0)
+    return basis, steps, deep, voxels, np.where(voxels > 0, -850, 40).astype(np.int16)
+
+
+def write_ply(target, vertices, faces):
+    with open(target, "w", encoding="utf-8") as file:
+        file.write(f"ply\nformat ascii 1.0\nelement vertex {len(vertices)}\nproperty double x\nproperty double y\n"
+                   f"property double z\nelement face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n")
+        np.savetxt(file, vertices, "%.6f")
+        np.savetxt(file, np.column_stack([np.full(len(faces), 3), faces]), "%d")
+
+
+def prepare():
+    """Make the inputs that the cases share."""
+    assert command("phantom", "--vertices", 3000, "-o", "lungs.ply")[0] == "taken"
+    assert command("precompute", "lungs.ply", "--held-out", 20, "-o", "lungs.safetensors")[0] == "taken"
+    opened = supine.open("lungs.safetensors")
+    number = np.random.default_rng(1)
+    low, high = (np.array(b) for b in ([-120, -180, -200], [-60, -100, -60]))
+    with open("inside.csv", "w", encoding="utf-8") as file:
+        file.write("name,x,y,z\n")
+        for i in range(12):
+            x, y, z = low + number.random(3) * (high - low)
+            file.write(f"p{i},{x * (-1) ** i:.3f},{y:.3f},{z:.3f}\n")
+    assert command("embed", "lungs.safetensors", "inside.csv", "-o", "inside.safetensors")[0] == "taken"
+    return opened, supine.open("inside.safetensors")
+
+
+lungs, inside = prepare()
+nodes, frame, depth, sides, ct = grid_of()
+left = 1  # the label of the left lung, which is lung 0
+solid, corners = lungs.vertices.astype(float), lungs.triangles
+write_ply("small.ply", 0.75 * solid, corners)
+write_ply("tiny.ply", 0.4 * solid, corners)
+write_ply("high.ply", (solid - solid.mean(axis=0)) * [1, 1, 1.08] + solid.mean(axis=0), corners)
+write_ply("full.ply", (solid - solid.mean(axis=0)) * 1.04 + solid.mean(axis=0), corners)
+first_lung = np.asarray(lungs.tensor("lung")).ravel()
+middles = np.array([solid[first_lung == j].mean(axis=0) for j in (0, 1)])[first_lung]
+write_ply("hollow.ply", np.concatenate([solid, middles + 0.97 * (solid - middles)]),
+          np.concatenate([corners, corners[:, ::-1] + len(solid)]))
+write_ply("rest.ply", lungs.deform(lungs.pose("supine:rest")).astype(float), corners)
+write_dae("up.dae", "Z_UP")
+command("fit", "rest.ply", "lungs.ply", "--other", "supine:full", "-o", "patient.json")
+faults = []
+rows = table()
+print(f"{'check':20} {'input':6} " + " ".join(f"{name:11}" for name in INTERFACES))
+for row in rows:
+    name = row.name.decode()
+    if name not in CASES:
+        faults.append(f"{name}: no cases")
+        continue
+    right, wrong, expected = CASES[name]
+    wanted = {interface for i, interface in enumerate(INTERFACES) if row.interfaces >> i & 1}
+    for kind, case in (("right", right), ("wrong", wrong)):
+        calls = case() if callable(case) else case
+        if set(calls) != wanted:
+            faults.append(f"{name}: the table says {sorted(wanted)}, the cases {sorted(calls)}")
+        said = {interface: call() for interface, call in calls.items()}
+        verdicts = {interface: done[0] for interface, done in said.items() if done is not None}
+        print(f"{name:20} {kind:6} " + " ".join(f"{verdicts.get(interface, '-'):11}" for interface in INTERFACES))
+        good = {"taken"} if kind == "right" else {expected} if expected else {"told", "refused"}
+        if len(set(verdicts.values())) > 1 or not set(verdicts.values()) <= good:
+            faults.append(f"{name}, {kind}: {verdicts}, not {sorted(good)}: " + "; ".join(
+                done[1].strip().split("\n")[-1] for done in said.values() if done is not None))
+for name in CASES.keys() - {row.name.decode() for row in rows}:
+    faults.append(f"{name}: not in the table")
+print("\n".join(faults) if faults else f"{len(rows)} rows: the interfaces agree")
+os.chdir(SOURCE)
+folder.cleanup()
+sys.exit(1 if faults else 0)
