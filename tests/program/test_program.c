@@ -123,10 +123,10 @@ TEST(test_deform_volume_reached) {
   EXPECT(5, "choose a volume nearer to rest, or accept this with --allow-folds",
          "solve lungs.ply --posture left --volume full+1300 -o b.ply");
   EXPECT(0, "nodes", "embed lungs.safetensors --grid 12 -o grid.safetensors");
-  EXPECT(5, "cells that turn over, relative to those in the lungs",
-         "deform grid.safetensors --posture upright --volume 620mL --field-out b.nrrd");
+  EXPECT(5, "left lung: the surface folds",
+         "deform grid.safetensors --posture left --volume 620mL --field-out b.nrrd");
   assert_int_equal(count_files("b."), 0);
-  EXPECT(0, "cells that turn over, relative to those in the lungs",
+  EXPECT(0, "at most 1 % of its triangles turn over",
          "deform grid.safetensors --posture left --volume 620mL --allow-folds --field-out c.nrrd");
   EXPECT(0, "warning: the field folds in the body around the lungs",
          "deform grid.safetensors --posture supine --volume 750mL --field-out a.nrrd");
@@ -261,7 +261,7 @@ TEST(test_precompute_scan_state_and_frame_reproduced) {
   EXPECT(1, "is for a scan at rest", "precompute low.ply --full 5200mL -o b.safetensors");
   EXPECT(0, "rest supine 3553 mL (3007 to 4197 by height and sex",
          "precompute lungs.ply --height 178 --sex male --band 2 -o a.safetensors");
-  EXPECT(1, "such as --scanned supine:rest",
+  EXPECT(1, "check the height and the state of the scan",
          "precompute lungs.ply --units 0.8 --height 178 --sex male --band 2 -o b.safetensors");
   EXPECT(0, "deep law\n  scan supine at rest",
          "precompute low.ply --scanned supine:rest --band 3 -o a.safetensors");

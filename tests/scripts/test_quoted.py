@@ -49,11 +49,11 @@ def make_inputs():
     struct.pack_into("<i", header, 0, 348)
     struct.pack_into("<8h", header, 40, 3, 20, 20, 20, 1, 1, 1, 1)
     struct.pack_into("<hh", header, 70, 4, 16)
-    struct.pack_into("<8f", header, 76, 1, 20, 20, 20, 0, 0, 0, 352)
+    struct.pack_into("<9f", header, 76, 1, 20, 20, 20, 0, 0, 0, 0, 352)
     struct.pack_into("<ff", header, 112, 1, 0)
     header[123] = 2  # mm
     struct.pack_into("<hh", header, 252, 0, 1)
-    struct.pack_into("<12f", header, 280, 20, 0, 0, -200, 0, 20, 0, -200, 0, 0, 20, -300)
+    struct.pack_into("<12f", header, 280, 20, 0, 0, -200, 0, 20, 0, -10, 0, 0, 20, -300)
     header[344:347] = b"n+1"
     with gzip.open("ct.nii.gz", "wb") as file:
         file.write(bytes(header) + struct.pack("<h", -800) * 8000)
