@@ -97,10 +97,7 @@ static supine_status read_curve(json_t *limb, supine_pv_curve *curve, supine_err
                                       "control", &c[0], &c[1], &c[2], &c[3], &c[4]);
   SUPINE_REFUSE_IF(unpacked != 0, error, SUPINE_ERROR_FORMAT,
                    "%s: make the file with 'supine pv fit'", why.text);
-  supine_error wrong = {0};
-  SUPINE_REFUSE_IF(supine_breath_curve_check(curve, &wrong) != SUPINE_OK, error,
-                   SUPINE_ERROR_FORMAT, "%s: make the file with 'supine pv fit'", wrong.message);
-  return SUPINE_OK;
+  return supine_breath_curve_check(curve, error);
 }
 
 supine_status supine_options_pv_load(const char *path, supine_pv *pv, supine_error *error) {
