@@ -227,7 +227,7 @@ static const supine_input inputs[] = {
   [SUPINE_INPUT_LOCATE_RESIDUALS] = {
     .name = "locate-residuals", .group = "Observed points", .input = "observed points and a volume",
     .against = "the error that is expected", .measured = "RMS residual / RMS expected error",
-    .told = 1.5, .refused = NAN, .evidence = "full breaths, 6 to 20 points: told in 1 of 60 fits with right volumes, in 45 of 60 with wrong ones",
+    .told = 1.5, .refused = NAN, .evidence = "full breaths, 6 to 20 points: told in 1 of 60 fits with the volume unknown, in 50 of 60 with a wrong one",
     .people = 5, .n = 120, .remedy = "check the volume, the names of the points and their unit", .interfaces = OFFLINE},
   [SUPINE_INPUT_LOCATE_TURNED] = {
     .name = "locate-turned", .group = "Observed points", .input = "observed points without a rigid motion",
