@@ -692,6 +692,16 @@ function start() {
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 10000);
   });
+  window.addEventListener('beforeprint', () => {
+    draw();
+    const paper = Object.assign(document.createElement('canvas'), { width: canvas.width, height: canvas.height });
+    const context = paper.getContext('2d');
+    context.fillStyle = themes.stage.back;
+    context.fillRect(0, 0, paper.width, paper.height);
+    for (const layer of [canvas, $('notes')]) context.drawImage(layer, 0, 0, paper.width, paper.height);
+    $('stage').style.backgroundImage = `url(${paper.toDataURL()})`;
+  });
+  window.addEventListener('afterprint', () => { $('stage').style.backgroundImage = ''; });
   $('link').addEventListener('click', async () => {
     keepLink();
     try {
