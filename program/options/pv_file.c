@@ -9,6 +9,7 @@
 #include "base/arena.h"
 #include "base/csv.h"
 #include "base/locale.h"
+#include "base/number.h"
 
 #include "program/options/pv.h"
 
@@ -95,8 +96,7 @@ static supine_status read_curve(json_t *limb, supine_pv_curve *curve, supine_err
   const int unpacked = json_unpack_ex(limb, &why, 0, "{s:[F, F!], s:[F, F!], s:[F, F, F, F, F!]}",
                                       "pressure_cmH2O", &p[0], &p[1], "volume_mL", &v[0], &v[1],
                                       "control", &c[0], &c[1], &c[2], &c[3], &c[4]);
-  SUPINE_REFUSE_IF(unpacked != 0, error, SUPINE_ERROR_FORMAT,
-                   "%s: make the file with 'supine pv fit'", why.text);
+  SUPINE_REFUSE_IF(unpacked != 0, error, SUPINE_ERROR_FORMAT, "%s", why.text);
   return supine_breath_curve_check(curve, error);
 }
 
@@ -118,6 +118,9 @@ supine_status supine_options_pv_load(const char *path, supine_pv *pv, supine_err
     if (limbs[limb] != NULL) {
       const supine_status status = read_curve(limbs[limb], &found.limb[limb], &wrong);
       if (status != SUPINE_OK) {
+        const size_t length = strlen(wrong.message);
+        (void)supine_print_text(wrong.message + length, sizeof wrong.message - length,
+                                ": make the file with 'supine pv fit'");
         wrong.status = SUPINE_ERROR_FORMAT;
         return supine_error_wrap(error, &wrong, "%s: %s: ", path, name);
       }
