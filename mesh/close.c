@@ -40,7 +40,9 @@ static size_t find_same(const supine_mesh *mesh, double distance, place *places,
       const uint32_t b = places[j].vertex;
       if (supine_distance(mesh->vertices + 3 * (size_t)a, mesh->vertices + 3 * (size_t)b) <=
           distance) {
-        same[a > b ? a : b] = same[a > b ? b : a];
+        const uint32_t lower = a < b ? a : b;
+        const uint32_t higher = a < b ? b : a;
+        same[higher] = same[lower];
       }
     }
   }

@@ -216,17 +216,21 @@ supine_status supine_mesh_repair(supine_mesh *mesh, supine_mesh_repair_report *r
   uint8_t *drop = supine_arena_zeros(&arena, mesh->triangle_count, 1);
   const supine_mesh_side *sides = supine_mesh_sides_sort(mesh, &of_sides);
   *report = (supine_mesh_repair_report){0};
-  if (drop != NULL) {
-    for (size_t m = 0; m < 2 && sides != NULL; ++m) {
-      markers[m](mesh, sides, drop);
-      *counts[m] = drop_marked(mesh, drop);
-      if (*counts[m] > 0) {
-        supine_arena_free(&of_sides);
-        sides = supine_mesh_sides_sort(mesh, &of_sides);
+  if (drop == NULL || sides == NULL) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  for (size_t m = 0; m < 2; ++m) {
+    markers[m](mesh, sides, drop);
+    *counts[m] = drop_marked(mesh, drop);
+    if (*counts[m] > 0) {
+      supine_arena_free(&of_sides);
+      sides = supine_mesh_sides_sort(mesh, &of_sides);
+      if (sides == NULL) {
+        return SUPINE_ERROR_MEMORY;
       }
     }
   }
-  return drop != NULL && sides != NULL ? mend_links(mesh, sides, report) : SUPINE_ERROR_MEMORY;
+  return mend_links(mesh, sides, report);
 }
 
 size_t supine_mesh_drop_unreferenced(supine_mesh *mesh, uint32_t *space) {

@@ -83,10 +83,11 @@ static void take_from_neighbours(supine_field *field, const later *to, int sign,
   lung[i] = lung[best];
 }
 
-/* Find depth and displacement of the nodes at which they are unknown: the depth is minus the length
- * of the shortest path to the lungs along the 26 directions of the grid, which is at most a tenth
- * longer than the straight one, and the displacement is that at the start of this path. One pass
- * goes forwards through the nodes, and one backwards. */
+/* Set the depth and the displacement of the nodes outside the lungs. Follow the shortest path from
+ * the lungs to the node, in steps along the 26 directions of the grid. The depth is minus the
+ * length of this path, which is at most a tenth longer than the straight line; the displacement is
+ * that of the node where the path starts. One pass goes forwards through the nodes, and one
+ * backwards. */
 static void extend(supine_field *field, const unsigned char *known) {
   const size_t *size = field->nodes.size;
   const size_t count = size[0] * size[1] * size[2];
