@@ -155,8 +155,8 @@ static supine_status set_expandability(const supine_precompute_tissue *tissue, s
   if (tissue->expandability == NULL && tissue->profile == SUPINE_PROFILE_UNIFORM) {
     return SUPINE_OK;
   }
-  SUPINE_REFUSE_IF(p->model.stiffness != NULL, error, SUPINE_ERROR_ARGUMENT,
-                   "the patient's file sets the stiffness: leave the expandability out");
+  SUPINE_REFUSE_ADVISE(p->model.stiffness != NULL, error, SUPINE_REMEDY_EXPANDABILITY_OUT,
+                       SUPINE_ERROR_ARGUMENT, "the patient's file sets the stiffness");
   double *a = supine_arena_take(&p->memory, n, sizeof *a);
   SUPINE_TRY(supine_arena_check(&p->memory, error, "%zu vertices", n));
   if (tissue->expandability != NULL) {

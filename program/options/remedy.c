@@ -79,7 +79,8 @@ static const char *const words_of[] = {
                                      "lungs were in the scan",
     [SUPINE_REMEDY_GRID] =
         ": make one with 'supine embed BASIS --grid MM' or 'supine embed BASIS IMAGE'",
-    [SUPINE_REMEDY_DENSITY] = ", or leave --density out"};
+    [SUPINE_REMEDY_DENSITY] = ", or leave --density out",
+    [SUPINE_REMEDY_EXPANDABILITY_OUT] = ": leave --expandability out"};
 _Static_assert(sizeof words_of / sizeof *words_of == SUPINE_REMEDY_COUNT,
                "each remedy needs words");
 

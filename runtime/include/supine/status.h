@@ -99,18 +99,19 @@ typedef enum supine_remedy {
   SUPINE_REMEDY_BAND_OUT,          /**< leave the band out */
   SUPINE_REMEDY_HARMONICS,         /**< store modes, or lower the band */
   /* A patient's law, validation and content. */
-  SUPINE_REMEDY_LAW_DEEP,       /**< fit the law `deep` */
-  SUPINE_REMEDY_FIT_LANDMARKS,  /**< fit the patient's law to landmarks too */
-  SUPINE_REMEDY_SCAN_MOTION,    /**< fit a motion between the scans */
-  SUPINE_REMEDY_SCANS_EXCHANGE, /**< exchange the states of the scans, or reverse the points */
-  SUPINE_REMEDY_SCANS_VOLUMES,  /**< give the volumes of both scans */
-  SUPINE_REMEDY_REST_CHECK,     /**< check the state at rest of the patient's scan */
-  SUPINE_REMEDY_OTHER_STATE,    /**< give the other state of the validation */
-  SUPINE_REMEDY_POINTS_REVERSE, /**< exchange first and second points */
-  SUPINE_REMEDY_BASIS_OF_STATE, /**< make a new basis, with the state of the scan */
-  SUPINE_REMEDY_GRID,           /**< embed a grid in the basis */
-  SUPINE_REMEDY_DENSITY,        /**< leave the change of density out */
-  SUPINE_REMEDY_COUNT           /**< sentinel: the number of remedies above */
+  SUPINE_REMEDY_LAW_DEEP,          /**< fit the law `deep` */
+  SUPINE_REMEDY_FIT_LANDMARKS,     /**< fit the patient's law to landmarks too */
+  SUPINE_REMEDY_SCAN_MOTION,       /**< fit a motion between the scans */
+  SUPINE_REMEDY_SCANS_EXCHANGE,    /**< exchange the states of the scans, or reverse the points */
+  SUPINE_REMEDY_SCANS_VOLUMES,     /**< give the volumes of both scans */
+  SUPINE_REMEDY_REST_CHECK,        /**< check the state at rest of the patient's scan */
+  SUPINE_REMEDY_OTHER_STATE,       /**< give the other state of the validation */
+  SUPINE_REMEDY_POINTS_REVERSE,    /**< exchange first and second points */
+  SUPINE_REMEDY_BASIS_OF_STATE,    /**< make a new basis, with the state of the scan */
+  SUPINE_REMEDY_GRID,              /**< embed a grid in the basis */
+  SUPINE_REMEDY_DENSITY,           /**< leave the change of density out */
+  SUPINE_REMEDY_EXPANDABILITY_OUT, /**< leave the expandability out */
+  SUPINE_REMEDY_COUNT              /**< sentinel: the number of remedies above */
 } supine_remedy;
 
 enum { SUPINE_REMEDY_VALUE_MAX = 32 };

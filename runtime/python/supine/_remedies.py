@@ -60,6 +60,7 @@ WORDS = {
     "basis_of_state": ": make a new basis, and state by scanned how full the lungs were in the scan",
     "grid": ": make one by embed(basis, grid=MM) or embed(basis, IMAGE)",
     "density": ", or leave density out",
+    "expandability_out": ": leave expandability out",
 }
 
 
