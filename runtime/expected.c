@@ -353,17 +353,21 @@ void supine_expected_all(const supine_expected_model *m, float *sigma,
   }
 }
 
-/* Compute what supine_expected_all writes, or refuse. */
-static supine_status evaluate_all(const supine_basis *basis, const supine_state *state,
-                                  const supine_state *from, float *sigma,
-                                  double mean[SUPINE_EXPECTED_TERMS], supine_error *error) {
-  const supine_state scan = supine_basis_scan(basis);
-  supine_expected_model model;
+static supine_status refuse_fields(const supine_basis *basis, supine_error *error) {
   if (supine_basis_get_info(basis)->is_fields) {
     return supine_error_set(
         error, SUPINE_ERROR_UNSUPPORTED,
         "the basis holds another simulator's displacements, whose error is unknown");
   }
+  return SUPINE_OK;
+}
+
+/* Compute what supine_expected_all writes. */
+static supine_status evaluate_all(const supine_basis *basis, const supine_state *state,
+                                  const supine_state *from, float *sigma,
+                                  double mean[SUPINE_EXPECTED_TERMS], supine_error *error) {
+  const supine_state scan = supine_basis_scan(basis);
+  supine_expected_model model;
   const supine_status status =
       supine_expected_prepare(basis, state, from == NULL ? &scan : from, 0, 0, &model, error);
   if (status == SUPINE_OK) {
@@ -376,6 +380,7 @@ supine_status supine_expected_error(const supine_basis *basis, const supine_stat
                                     const supine_state *from, float *sigma, supine_error *error) {
   double mean[SUPINE_EXPECTED_TERMS];
   supine_pose pose;
+  SUPINE_TRY(refuse_fields(basis, error));
   SUPINE_TRY(supine_basis_pose(basis, state, &pose, error)); /* checks the volumes */
   return evaluate_all(basis, state, from, sigma, mean, error);
 }
@@ -385,6 +390,7 @@ supine_status supine_expected_parts(const supine_basis *basis, const supine_stat
                                     supine_error *error) {
   const char *own = supine_basis_metadata(basis, "expected_error_source");
   double mean[SUPINE_EXPECTED_TERMS];
+  SUPINE_TRY(refuse_fields(basis, error));
   const supine_status status = evaluate_all(basis, state, from, NULL, mean, error);
   if (status == SUPINE_OK) {
     for (size_t k = 0; k < SUPINE_EXPECTED_TERMS; ++k) {
