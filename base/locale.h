@@ -28,7 +28,7 @@ void supine_locale_leave(const supine_locale *before);
 
 /** Declare a variable that keeps the C locale in the calling thread until its scope ends. */
 #define SUPINE_C_LOCALE                                                                            \
-  __attribute__((cleanup(supine_locale_leave))) const supine_locale supine_locale_before =         \
+  __attribute__((cleanup(supine_locale_leave), unused)) const supine_locale supine_locale_before = \
       supine_locale_enter()
 
 #endif

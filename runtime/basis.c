@@ -75,14 +75,12 @@ static supine_status check_numbers(const check *c, supine_basis *basis) {
 static const void *require(const check *c, const char *name, supine_dtype dtype, size_t rank,
                            size_t *shape) {
   const supine_tensor *tensor = supine_safetensors_find(c->file, name);
-  size_t count = 1;
   if (tensor == NULL || tensor->dtype != dtype || tensor->rank != rank) {
     (void)refuse(c, "tensor '%s' is missing or has a wrong type or number of axes", name);
     return NULL;
   }
   for (size_t i = 0; i < rank; ++i) {
     shape[i] = shape[i] == ANY ? tensor->shape[i] : shape[i];
-    count *= shape[i];
     if (tensor->shape[i] != shape[i]) {
       (void)refuse(c, "axis %zu of tensor '%s' has length %zu, not %zu", i, name, tensor->shape[i],
                    shape[i]);

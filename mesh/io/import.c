@@ -309,7 +309,7 @@ static void confine(size_t bytes) {
 
 static _Noreturn void be_child(const mesh_file *file, int pipe_end) {
   FILE *stream = fdopen(pipe_end, "wb");
-  outcome result = {.error = {SUPINE_OK, ""}};
+  outcome result = {.error = {.status = SUPINE_OK}};
   gathering out = {.error = &result.error};
   out.faces = (mesh_faces){.path = file->path, .mesh = &out.mesh};
   confine(file->size);

@@ -124,14 +124,15 @@ static void grouping_add(grouping *made, const size_t *key, size_t value) {
 }
 
 /* Places of a volume among those of its direction, in place of a rank between them. */
-enum { SMALLEST = SIZE_MAX - 1, LARGEST = SIZE_MAX };
+static const size_t smallest = SIZE_MAX - 1;
+static const size_t largest = SIZE_MAX;
 
 /* Return the rank of a volume that has smaller and larger ones beside it. */
 static size_t place_of(size_t rank, size_t count) {
   if (rank == 0) {
-    return SMALLEST;
+    return smallest;
   }
-  return rank + 1 == count ? LARGEST : rank;
+  return rank + 1 == count ? largest : rank;
 }
 
 supine_status supine_fields_volumes_measure(supine_fit *fit, supine_error *error) {
@@ -174,8 +175,8 @@ supine_status supine_fields_volumes_measure(supine_fit *fit, supine_error *error
     for (size_t rank = 1; rank + 1 < levels; ++rank) {
       grouping_add(&groups, place, rank);
     }
-    grouping_add(&ends, place, SMALLEST);
-    grouping_add(&ends, place, LARGEST);
+    grouping_add(&ends, place, smallest);
+    grouping_add(&ends, place, largest);
   }
   fit->report.volume_count = levels;
   fit->groups = (supine_run_groups){groups.count, groups.begin, groups.run};
