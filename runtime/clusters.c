@@ -4,11 +4,9 @@
 #include <string.h>
 
 #include "base/clones.h"
+#include "runtime/cluster_row.h"
 #include "runtime/clusters.h"
 #include "runtime/safetensors/safetensors_file.h"
-
-/* Offsets in the numbers of a cluster for one mode: m, then the rows of B, then P_0 and P_1. */
-enum { MEAN = 0, SLOPE = 3, PATTERN = 12 };
 
 /* Ranges with fewer vertices look up which clusters they need. */
 enum { ALL_CLUSTERS = 4096 };
@@ -30,13 +28,13 @@ static inline void write_frame(const float sum[SUPINE_CLUSTER_NUMBERS], const do
   memset(frame, 0, SUPINE_CLUSTER_FRAME * sizeof *frame);
   for (size_t axis = 0; axis < 3; ++axis) {
     const float gain = (float)gains[axis];
-    frame[axis] = gain * sum[MEAN + axis];
+    frame[axis] = gain * sum[SUPINE_CLUSTER_MEAN + axis];
     for (size_t column = 0; column < 3; ++column) {
       const float one = axis == column ? 1 : 0;
-      frame[4 + 4 * column + axis] = one + gain * sum[SLOPE + 3 * axis + column];
+      frame[4 + 4 * column + axis] = one + gain * sum[SUPINE_CLUSTER_SLOPE + 3 * axis + column];
     }
-    frame[16 + axis] = gain * sum[PATTERN + axis];
-    frame[20 + axis] = gain * sum[PATTERN + 3 + axis];
+    frame[16 + axis] = gain * sum[SUPINE_CLUSTER_PATTERN + axis];
+    frame[20 + axis] = gain * sum[SUPINE_CLUSTER_PATTERN + 3 + axis];
   }
 }
 
@@ -77,21 +75,19 @@ void supine_clusters_coefficients(const supine_basis *basis, size_t begin, size_
                                   float *coefficients) {
   const supine_basis_info *info = &basis->info;
   const size_t modes = info->mode_count;
-  for (size_t i = begin; i < end; ++i, coefficients += 3 * modes) {
-    const float *p = info->vertices + 3 * i;
-    const double first = info->cluster_scalars[2 * i];
-    const double second = info->cluster_scalars[2 * i + 1];
-    const float *v = info->cluster_vectors + info->cluster[i] * modes * SUPINE_CLUSTER_NUMBERS;
-    for (size_t k = 0; k < modes; ++k, v += SUPINE_CLUSTER_NUMBERS) {
-      for (size_t axis = 0; axis < 3; ++axis) {
-        const float *slope = v + SLOPE + 3 * axis;
-        coefficients[axis * modes + k] =
-            (float)((double)v[MEAN + axis] + (double)slope[0] * (double)p[0] +
-                    (double)slope[1] * (double)p[1] + (double)slope[2] * (double)p[2] +
-                    first * (double)v[PATTERN + axis] + second * (double)v[PATTERN + 3 + axis]);
-      }
-    }
+  for (size_t i = begin; i < end; ++i) {
+    supine_cluster_row(info->cluster_vectors + info->cluster[i] * modes * SUPINE_CLUSTER_NUMBERS,
+                       modes, info->vertices + 3 * i, info->cluster_scalars + 2 * i,
+                       coefficients + 3 * modes * (i - begin));
   }
+}
+
+static double length(const float *numbers, size_t count) {
+  double square = 0;
+  for (size_t i = 0; i < count; ++i) {
+    square += (double)numbers[i] * (double)numbers[i];
+  }
+  return sqrt(square);
 }
 
 /* Bound what enters the sum of a vertex for each mode, by the largest of all clusters. */
@@ -102,12 +98,10 @@ static void bound_modes(supine_basis *basis) {
   memset(basis->mode_size, 0, modes * sizeof *basis->mode_size);
   for (size_t row = 0; row < info->cluster_count * modes; ++row) {
     const float *v = info->cluster_vectors + row * SUPINE_CLUSTER_NUMBERS;
-    double square[3] = {0, 0, 0}; /* of m, of all of B, and of both P */
-    for (size_t i = 0; i < SUPINE_CLUSTER_NUMBERS; ++i) {
-      square[(i >= SLOPE) + (i >= PATTERN)] += (double)v[i] * (double)v[i];
-    }
-    const double size = sqrt(square[0]) + sqrt(square[1]) * basis->reference_size +
-                        2 * scalar_most * sqrt(square[2]);
+    const double mean = length(v + SUPINE_CLUSTER_MEAN, 3);
+    const double slope = length(v + SUPINE_CLUSTER_SLOPE, 9);
+    const double patterns = length(v + SUPINE_CLUSTER_PATTERN, 6);
+    const double size = mean + slope * basis->reference_size + 2 * scalar_most * patterns;
     double *most = &basis->mode_size[row % modes];
     *most = fmax(*most, size);
   }
@@ -132,7 +126,10 @@ supine_status supine_clusters_pack(supine_basis *basis) {
            sizeof(uint16_t));
   }
   for (size_t i = 0; i < 6 * info->lung_count; ++i) {
-    farthest = fmax(farthest, fabs((double)info->bounds[i]));
+    const double distance = fabs((double)info->bounds[i]);
+    if (distance > farthest) { /* with fmax, GCC 12 for aarch64 ends with an internal error */
+      farthest = distance;
+    }
   }
   basis->reference_size = sqrt(3) * farthest;
   basis->reference_error = 6 * 0x1p-24 * basis->reference_size; /* of the products A p */

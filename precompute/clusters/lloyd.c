@@ -8,6 +8,7 @@
 #include "precompute/clusters/clusters.h"
 #include "precompute/clusters/cut.h"
 #include "precompute/clusters/subspace.h"
+#include "runtime/cluster_row.h"
 
 enum { ITERATIONS = 12 };
 
@@ -56,7 +57,7 @@ static void group_members(lloyd *l) {
     ++l->begin[l->cluster[i]];
   }
   size_t used = 0;
-  for (size_t c = 0; c < l->count; ++c) { /* ring_begin-like counts become new numbers */
+  for (size_t c = 0; c < l->count; ++c) { /* replace its size by its new number */
     const size_t size = l->begin[c];
     l->begin[c] = used;
     used += size > 0;
@@ -163,12 +164,14 @@ static void write_vectors(const supine_subspace *subspace, size_t modes, const d
       const size_t at = axis * modes + k;
       double mean = (double)subspace->linear[0][at];
       for (size_t j = 0; j < 3; ++j) {
-        vectors[3 + 3 * axis + j] = subspace->linear[1 + j][at];
+        vectors[SUPINE_CLUSTER_SLOPE + 3 * axis + j] = subspace->linear[1 + j][at];
         mean -= (double)subspace->linear[1 + j][at] * subspace->centre[j];
       }
-      vectors[axis] = (float)mean;
-      vectors[12 + axis] = (float)((double)subspace->pattern[0][at] * step[0]);
-      vectors[15 + axis] = (float)((double)subspace->pattern[1][at] * step[1]);
+      vectors[SUPINE_CLUSTER_MEAN + axis] = (float)mean;
+      for (size_t p = 0; p < SUPINE_CLUSTER_SCALARS; ++p) {
+        vectors[SUPINE_CLUSTER_PATTERN + 3 * p + axis] =
+            (float)((double)subspace->pattern[p][at] * step[p]);
+      }
     }
   }
 }
@@ -198,21 +201,11 @@ static void quantise(const lloyd *l, double *scalars, supine_clusters *made) {
   }
 }
 
-/* Compute (1) for one vertex, row [3, mode_count]. */
+/* Compute (1) for vertex i at p, row [3, mode_count]. */
 static void expand(const supine_clusters *clusters, const float *p, size_t i, float *row) {
   const size_t modes = clusters->mode_count;
-  const float *v = clusters->vectors + clusters->cluster[i] * modes * SUPINE_CLUSTER_NUMBERS;
-  const double a = clusters->scalars[2 * i];
-  const double b = clusters->scalars[2 * i + 1];
-  for (size_t k = 0; k < modes; ++k, v += SUPINE_CLUSTER_NUMBERS) {
-    for (size_t axis = 0; axis < 3; ++axis) {
-      const float *slope = v + 3 + 3 * axis;
-      row[axis * modes + k] =
-          (float)((double)v[axis] + (double)slope[0] * (double)p[0] +
-                  (double)slope[1] * (double)p[1] + (double)slope[2] * (double)p[2] +
-                  a * (double)v[12 + axis] + b * (double)v[15 + axis]);
-    }
-  }
+  supine_cluster_row(clusters->vectors + clusters->cluster[i] * modes * SUPINE_CLUSTER_NUMBERS,
+                     modes, p, clusters->scalars + SUPINE_CLUSTER_SCALARS * i, row);
 }
 
 void supine_clusters_expand(const supine_clusters *clusters, const float *vertices,
