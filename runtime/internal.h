@@ -96,6 +96,22 @@ static inline bool supine_pose_is_finite(const double *numbers, size_t count) {
   return bad == 0;
 }
 
+/** Return the sum of spherical harmonics y of bands 0 to 2 with the coefficients of a row; both
+ * have RESTING_TERMS elements. */
+static inline double supine_basis_sum_harmonics(const double *row, const double *y) {
+  double sum = 0;
+  for (size_t t = 0; t < RESTING_TERMS; ++t) {
+    sum += row[t] * y[t];
+  }
+  return sum;
+}
+
+/** Find the lungs that a state names.
+ * @param lungs  written: lungs[i] is the index of the lung that state->lungs[i] names
+ * @retval SUPINE_ERROR_ARGUMENT  not all lungs are named, or a name is unknown or given twice */
+supine_status supine_basis_find_lungs(const supine_basis *basis, const supine_state *state,
+                                      size_t lungs[SUPINE_LUNGS_MAX], supine_error *error);
+
 /** Return how many weights a pose has: one for each mode or, if the weights depend on the volume of
  * a lung, for each lung and mode. */
 static inline size_t supine_basis_weight_count(const supine_basis *basis) {

@@ -148,13 +148,10 @@ static bool plausible_row(const double *row, double reference, char *detail, siz
   for (int number = 0; number < 27; ++number) {
     const double gravity[3] = {number % 3 - 1, number / 3 % 3 - 1, number / 9 - 1};
     double y[RESTING_TERMS];
-    double change = 0;
     if (supine_sh_evaluate(2, gravity, y) != SUPINE_OK) {
       continue; /* the zero vector has no direction */
     }
-    for (size_t t = 0; t < RESTING_TERMS; ++t) {
-      change += row[t] * y[t];
-    }
+    const double change = supine_basis_sum_harmonics(row, y);
     if (!(change > -reference && change < reference)) {
       (void)supine_print_text(
           detail, size,

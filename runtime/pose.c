@@ -29,16 +29,6 @@ supine_status supine_basis_weights(const supine_basis *basis, const double gravi
   return SUPINE_OK;
 }
 
-/* Return the volume of a lung at rest minus that of its reference surface, mL, from the spherical
- * harmonics y of the direction of gravity. */
-static double resting(const supine_basis *basis, size_t lung, const double *y) {
-  double volume = 0;
-  for (size_t t = 0; t < RESTING_TERMS; ++t) {
-    volume += basis->resting[lung * RESTING_TERMS + t] * y[t];
-  }
-  return volume;
-}
-
 static double sum_of(const double *values, size_t count) {
   double sum = 0;
   for (size_t i = 0; i < count; ++i) {
@@ -74,7 +64,7 @@ static supine_status find_volumes(const supine_basis *basis, const double gravit
     supine_basis_contract(basis, lung, weights, &v->form[lung]);
     v->full[lung] = basis->upright_gain * up * up * basis->info.reference_volume[lung];
     if (basis->info.has_rest) {
-      v->rest[lung] = resting(basis, lung, y);
+      v->rest[lung] = supine_basis_sum_harmonics(basis->resting + lung * RESTING_TERMS, y);
     }
   }
   v->rest_total = sum_of(v->rest, v->lung_count);
@@ -168,26 +158,11 @@ static supine_status total_gains(const supine_basis *basis, const volumes *v, do
 static supine_status named_gains(const supine_basis *basis, const volumes *v,
                                  const supine_state *state, supine_pose *pose,
                                  supine_error *error) {
-  if (state->lung_count != v->lung_count) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "the state names %zu lung%s, but the basis has %zu: name all of them",
-                            state->lung_count, state->lung_count == 1 ? "" : "s", v->lung_count);
-  }
+  size_t lungs[SUPINE_LUNGS_MAX];
+  SUPINE_TRY(supine_basis_find_lungs(basis, state, lungs, error));
   for (size_t i = 0; i < state->lung_count; ++i) {
     const supine_volume *volume = &state->lungs[i].volume;
-    size_t lung = 0;
-    while (lung < v->lung_count &&
-           strcmp(state->lungs[i].name, basis->info.lung_names[lung]) != 0) {
-      ++lung;
-    }
-    if (lung == v->lung_count ||
-        (i > 0 && strcmp(state->lungs[0].name, state->lungs[i].name) == 0)) {
-      return supine_error_set(
-          error, SUPINE_ERROR_ARGUMENT,
-          "lung '%s' is unknown or named twice; name each lung of this basis once: %s%s%s",
-          state->lungs[i].name, basis->info.lung_names[0], v->lung_count > 1 ? " and " : "",
-          v->lung_count > 1 ? basis->info.lung_names[1] : "");
-    }
+    const size_t lung = lungs[i];
     double ml = volume->ml - basis->info.reference_volume[lung];
     if (volume->kind != SUPINE_VOLUME_ABSOLUTE) {
       double total = 0;
@@ -286,6 +261,10 @@ supine_status supine_basis_pose_any(const supine_basis *basis, const supine_stat
   SUPINE_TRY(check_state(state, error));
   pose->basis = basis->info.identity;
   if (basis->info.order > 0) {
+    double unit[3];
+    if (!supine_normalise(state->gravity, unit)) {
+      return refuse_gravity(error);
+    }
     return supine_simulated_pose(basis, state, pose, error);
   }
   if (supine_basis_weights(basis, state->gravity, pose->weights) != SUPINE_OK) {

@@ -15,22 +15,13 @@ static const double close_enough = 1e-6;
  * from the one that t stands for by less than that. */
 static const double beyond = 0.1;
 
-/* Sum the harmonics of bands 0 to 2 with the coefficients of a row. */
-static double sum_harmonics(const double *row, const double *y) {
-  double sum = 0;
-  for (size_t t = 0; t < RESTING_TERMS; ++t) {
-    sum += row[t] * y[t];
-  }
-  return sum;
-}
-
 supine_status supine_simulated_limits(const supine_basis *basis, const double gravity[3],
                                       double (*limits)[2]) {
   double y[RESTING_TERMS];
   SUPINE_TRY(supine_sh_evaluate(2, gravity, y));
   for (size_t row = 0; row < 2 * basis->info.lung_count; ++row) {
     double *limit = &limits[row / 2][row % 2];
-    *limit = sum_harmonics(basis->simulated.limits + row * RESTING_TERMS, y);
+    *limit = supine_basis_sum_harmonics(basis->simulated.limits + row * RESTING_TERMS, y);
   }
   return SUPINE_OK;
 }
@@ -214,13 +205,13 @@ static supine_status find_origin(const supine_basis *basis, const double gravity
       if (!basis->info.has_rest) {
         return refuse_kind("rest", error);
       }
-      volumes[lung] = sum_harmonics(basis->resting + lung * RESTING_TERMS, y);
+      volumes[lung] = supine_basis_sum_harmonics(basis->resting + lung * RESTING_TERMS, y);
       break;
     case SUPINE_VOLUME_FULL:
       if (!basis->info.has_full) {
         return refuse_kind("full inflation", error);
       }
-      volumes[lung] = sum_harmonics(basis->simulated.full + lung * RESTING_TERMS, y);
+      volumes[lung] = supine_basis_sum_harmonics(basis->simulated.full + lung * RESTING_TERMS, y);
       break;
     case SUPINE_VOLUME_ABSOLUTE:
       volumes[lung] = -basis->info.reference_volume[lung];
@@ -238,33 +229,15 @@ static supine_status find_origin(const supine_basis *basis, const double gravity
   return SUPINE_OK;
 }
 
-/* Find the lung that a state names, or return the number of lungs. */
-static size_t find_lung(const supine_basis *basis, const char *name) {
-  size_t lung = 0;
-  while (lung < basis->info.lung_count && strcmp(name, basis->info.lung_names[lung]) != 0) {
-    ++lung;
-  }
-  return lung;
-}
-
 /* Find the volumes of a state that names its lungs. */
 static supine_status named_volumes(const supine_basis *basis, const supine_state *state,
                                    double *volumes, supine_error *error) {
-  bool named[SUPINE_LUNGS_MAX] = {false};
+  size_t lungs[SUPINE_LUNGS_MAX];
+  SUPINE_TRY(supine_basis_find_lungs(basis, state, lungs, error));
   for (size_t i = 0; i < state->lung_count; ++i) {
-    const size_t lung = find_lung(basis, state->lungs[i].name);
     double origin[SUPINE_LUNGS_MAX];
-    if (lung == basis->info.lung_count || named[lung] ||
-        state->lung_count != basis->info.lung_count) {
-      return supine_error_set(
-          error, SUPINE_ERROR_ARGUMENT,
-          "lung '%s' is unknown or named twice, or not all %zu lungs are named: "
-          "name each lung once, such as %s",
-          state->lungs[i].name, basis->info.lung_count, basis->info.lung_names[0]);
-    }
     SUPINE_TRY(find_origin(basis, state->gravity, state->lungs[i].volume.kind, origin, error));
-    volumes[lung] = origin[lung] + state->lungs[i].volume.ml;
-    named[lung] = true;
+    volumes[lungs[i]] = origin[lungs[i]] + state->lungs[i].volume.ml;
   }
   return SUPINE_OK;
 }
@@ -311,11 +284,6 @@ static supine_status find_volumes(const supine_basis *basis, const supine_state 
 supine_status supine_simulated_pose(const supine_basis *basis, const supine_state *state,
                                     supine_pose *pose, supine_error *error) {
   double volumes[SUPINE_LUNGS_MAX];
-  double y[RESTING_TERMS];
-  if (supine_sh_evaluate(2, state->gravity, y) != SUPINE_OK) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "gravity is zero or not finite: give a vector with a direction");
-  }
   SUPINE_TRY(find_volumes(basis, state, volumes, error));
   return solve_lungs(basis, state->gravity, volumes, pose, error);
 }

@@ -24,7 +24,8 @@ supine_status supine_simulated_limits(const supine_basis *basis, const double gr
  * was not simulated in its posture. A volume of all lungs is divided among them as the simulator
  * did.
  * @param pose  written: weights by lung and mode; gains of 1
- * @retval SUPINE_ERROR_ARGUMENT   gravity is zero or not finite; the volume is relative to rest or
+ * @param state  gravity is neither zero nor infinite: supine_basis_pose_any checks it
+ * @retval SUPINE_ERROR_ARGUMENT   the volume is relative to rest or
  *                                 full inflation, which the file lacks; or a lung is unknown
  * @retval SUPINE_ERROR_NUMERICAL  the volume is outside what was simulated; the message has the
  *                                 range */
