@@ -113,32 +113,54 @@ static supine_status read_csv(reading *r) {
   return read_rows(r, &csv, column, axes);
 }
 
-/* Find the coordinate system and the columns in the comments of a .fcsv file of 3D Slicer. */
+/* Find the axes of a coordinate system by its name or its number in 3D Slicer. */
+static bool find_system(const char *name, supine_axes *axes) {
+  static const struct {
+    const char *name;
+    supine_axes axes;
+  } systems[] = {{"RAS", SUPINE_AXES_RAS},
+                 {"0", SUPINE_AXES_RAS},
+                 {"LPS", SUPINE_AXES_LPS},
+                 {"1", SUPINE_AXES_LPS}};
+  for (size_t i = 0; i < sizeof systems / sizeof *systems; ++i) {
+    if (strcmp(name, systems[i].name) == 0) {
+      *axes = systems[i].axes;
+      return true;
+    }
+  }
+  return false;
+}
+
+/* Find the coordinate system and the columns in the comments of a .fcsv file of 3D Slicer. Without
+ * them, both stay as they are. */
 static supine_status read_comments(const reading *r, supine_axes *axes, char *header, size_t size) {
   char line[512];
   FILE *file = fopen(r->path, "rb");
   SUPINE_REFUSE_IF(file == NULL, r->error, SUPINE_ERROR_READ, "%s: cannot open: %s", r->path,
                    strerror(errno));
-  (void)supine_mesh_axes_parse("RAS", axes);
+  bool known = true;
   while (fgets(line, sizeof line, file) != NULL) {
     char system[16];
     line[strcspn(line, "\r\n")] = '\0';
-    if (sscanf(line, "# CoordinateSystem = %15s", system) == 1 &&
-        (strcmp(system, "1") == 0 || strcmp(system, "LPS") == 0)) {
-      *axes = SUPINE_AXES_LPS;
+    if (sscanf(line, "# CoordinateSystem = %15s", system) == 1) {
+      known = find_system(system, axes);
     }
     if (strncmp(line, "# columns = ", 12) == 0) {
       (void)snprintf(header, size, "%s", line + 12);
     }
   }
   (void)fclose(file);
+  SUPINE_REFUSE_IF(!known, r->error, SUPINE_ERROR_FORMAT,
+                   "%s: the coordinate system is neither LPS nor RAS: save the points in one of "
+                   "these",
+                   r->path);
   return SUPINE_OK;
 }
 
 static supine_status read_fcsv(reading *r) {
   static const size_t xyz[3] = {XYZ, XYZ + 1, XYZ + 2};
   char header[512] = "id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID";
-  supine_axes axes;
+  supine_axes axes = SUPINE_AXES_RAS;
   SUPINE_FREED_BY(supine_csv_close) supine_csv csv = {0};
   SUPINE_TRY(read_comments(r, &axes, header, sizeof header));
   SUPINE_TRY(supine_csv_open_bare(r->path, header, columns, COLUMNS, 3, &csv, r->error));
@@ -149,9 +171,15 @@ static supine_status read_markup(reading *r, const json_t *markup) {
   const char *system = json_string_value(json_object_get(markup, "coordinateSystem"));
   const char *unit = json_string_value(json_object_get(markup, "coordinateUnits"));
   supine_axes axes = SUPINE_AXES_LPS;
-  (void)(system != NULL && supine_mesh_axes_parse(system, &axes));
   double scale = 1.0;
-  (void)(unit != NULL && supine_mesh_unit_find(unit, &scale));
+  const bool known = system == NULL || find_system(system, &axes);
+  const bool measured = unit == NULL || supine_mesh_unit_find(unit, &scale);
+  SUPINE_REFUSE_IF(!known, r->error, SUPINE_ERROR_FORMAT,
+                   "%s: the coordinate system \"%s\" is neither LPS nor RAS: save the points in "
+                   "one of these",
+                   r->path, system);
+  SUPINE_REFUSE_IF(!measured, r->error, SUPINE_ERROR_FORMAT,
+                   "%s: the unit \"%s\" is unknown: save the points in mm", r->path, unit);
   const json_t *list = json_object_get(markup, "controlPoints");
   for (size_t i = 0; i < json_array_size(list); ++i) {
     const json_t *point = json_array_get(list, i);
@@ -161,9 +189,11 @@ static supine_status read_markup(reading *r, const json_t *markup) {
     if (placed != NULL && strcmp(placed, "defined") != 0) {
       continue;
     }
-    for (size_t k = 0; k < 3 && json_array_size(position) == 3; ++k) {
-      const json_t *number = json_array_get(position, k);
-      at[k] = json_is_number(number) ? json_number_value(number) : NAN;
+    if (json_array_size(position) == 3) {
+      for (size_t k = 0; k < 3; ++k) {
+        const json_t *number = json_array_get(position, k);
+        at[k] = json_is_number(number) ? json_number_value(number) : NAN;
+      }
     }
     SUPINE_REFUSE_IF(!isfinite(at[0]) || !isfinite(at[1]) || !isfinite(at[2]), r->error,
                      SUPINE_ERROR_FORMAT,
