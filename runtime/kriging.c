@@ -139,8 +139,12 @@ static void normal_equations(const supine_kriging *fit, const supine_kriging_opt
     double mean = 0;
     const double precision = prior_of(options, k, &mean);
     right[k] = precision * mean;
-    a[k * TERMS + k] = is_known(options, k) ? 1 : precision;
-    for (size_t axis = 0; axis < 3 && !is_known(options, k); ++axis) {
+    if (is_known(options, k)) {
+      a[k * TERMS + k] = 1;
+      continue;
+    }
+    a[k * TERMS + k] = precision;
+    for (size_t axis = 0; axis < 3; ++axis) {
       double sign = 0;
       const double *x = fit->whitened + (size_t)column_of(k, axis, &sign) * n;
       right[k] += sign * dot(n, x, fit->whitened + (VALUE + axis) * n);

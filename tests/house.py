@@ -371,8 +371,9 @@ def hidden_if(text, begin):
         names = set(re.findall(r"(?<![.\w>])[A-Za-z_]\w*", part)) | set(re.findall(r"->\s*(\w+)", part))
         passed = re.findall(r"\w\(([^;{}]*)\)", turn)
         changes = any(re.search(CHANGED.format(name), turn) for name in names)
-        reached = any(re.search(r"(?<!\w)%s\b(?!\s*(?:->|\[|\.))" % name, call) for name in re.findall(r"(\w+)\s*(?:->|\[)", part) for call in passed)
-        if not changes and not reached and not re.search(r"\w\(", part.replace("sizeof(", "")):
+        reached = any(re.search(r"(?<!\w)%s\b(?!\s*(?:->|\[|\.))" % name, call) for name in re.findall(r"(\w+)\s*(?:->|\[)|\w\((\w+)\)", part) for name in name if name for call in passed)
+        works = [called for called in re.findall(r"(\w+)\(", part) if called != "sizeof" and not QUESTION.fullmatch(called)]
+        if not changes and not reached and not works:
             return part.strip()
     return None
 
@@ -404,6 +405,9 @@ def forms_of(text):
             yield found.start(), "SUPINE_TRY(c ? a : b): write if (c) { SUPINE_TRY(a); }"
     for found in re.finditer(r"\*\([^();]*\?[^();]*\)\s*=(?!=)", text):
         yield found.start(), "*(c ? &a : &b) = x: use if and else"
+    for found in re.finditer(r"\(void\)\(", text):
+        if len(split_at(text[found.end():end_of(text, found.end() - 1) - 1], "&&")) > 1:
+            yield found.start(), "(void)(a && f()): write if (a) { (void)f(); }"
     for found in re.finditer(r"\bSUPINE_REFUSE_IF\(", text):
         condition = arguments(text, found.end())[0]
         for called in re.findall(r"\b(\w+)\s*\(", condition):
@@ -419,6 +423,8 @@ FORMS = (("for (i = 0; i < n && wanted; ++i) { f(i); }", "if (wanted) { for (i =
          ("for (i = 0; i < n && left > 0; ++i) { f(i); }", "for (i = 0; i < n && left > 0; ++i) { left -= f(i); }"),
          ("for (i = 0; i < n && c->status == 0; ++i) { f(i); }", "for (i = 0; i < n && c->status == 0; ++i) { f(c); }"),
          ("x = a ? b : c ? d : e;", "x = a ? b : c; y = d ? e : f;"), ("x = a ? (b ? c : d) : e;", "f(a ? b : c, d ? e : g);"),
+         ("for (k = 0; k < 3 && json_array_size(a) == 3; ++k) { f(k); }", "for (k = 0; k < 3 && next(a); ++k) { f(k); }"),
+         ("(void)(a != NULL && f(a));", "if (a != NULL) { (void)f(a); }"),
          ("SUPINE_TRY(c ? f() : SUPINE_OK);", "SUPINE_TRY(f(c ? a : b));"), ("*(c ? &a : &b) = x;", "*a = c ? x : y;"),
          ('SUPINE_REFUSE_IF(fread(p, 1, n, file) != n, error, X, "short");', 'SUPINE_REFUSE_IF(got != n, error, X, "short");'),
          ('SUPINE_REFUSE_IF(!(count > 0), error, X, "none");', 'SUPINE_REFUSE_IF(!(x > 0.0) || !isfinite(x), error, X, "x");'))

@@ -9,8 +9,10 @@
 static supine_status read_axes(const char *text, void *field, supine_error *error) {
   char letters[4] = "";
   (void)error;
-  for (size_t k = 0; k < 3 && strlen(text) == 3; ++k) {
-    letters[k] = supine_ascii_upper(text[k]);
+  if (strlen(text) == 3) {
+    for (size_t k = 0; k < 3; ++k) {
+      letters[k] = supine_ascii_upper(text[k]);
+    }
   }
   return supine_options_fits(supine_mesh_axes_parse(letters, field));
 }

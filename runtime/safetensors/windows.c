@@ -110,7 +110,9 @@ supine_status supine_output_commit(supine_output *output, supine_error *error) {
   if (!done) {
     (void)supine_error_set(error, SUPINE_ERROR_WRITE, "%s: cannot write: Windows error %lu",
                            output->path, (unsigned long)GetLastError());
-    (void)(from != NULL && DeleteFileW(from));
+    if (from != NULL) {
+      (void)DeleteFileW(from);
+    }
   }
   free(from);
   free(to);
