@@ -67,6 +67,9 @@ static double mean_lung(const supine_inside_shells *shells) {
 supine_status supine_inside_anatomy(const supine_inside_shells *shells,
                                     const supine_inside_content *content, unsigned char *anatomy,
                                     supine_error *error) {
+  if (content->part_count == 0) { /* nodes of a grid */
+    return SUPINE_OK;
+  }
   SUPINE_ARENA arena = {0};
   part_shape *parts = supine_arena_zeros(&arena, content->part_count, sizeof *parts);
   SUPINE_TRY(supine_arena_check(&arena, error, "the sizes of %zu parts", content->part_count));

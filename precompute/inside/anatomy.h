@@ -13,6 +13,7 @@
  * size of a part is the volume of the sphere as long as the part (the longest side of its box), or
  * the volume that it encloses, if that is larger; that of a lung is the mean of the lungs in the
  * scan. A point is a target.
+ * @param content  may be a grid, which has no parts
  * @param anatomy  [part_count] output: 1 for anatomy, 0 for targets
  * @return SUPINE_ERROR_MEMORY or SUPINE_OK */
 supine_status supine_inside_anatomy(const supine_inside_shells *shells,

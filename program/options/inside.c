@@ -157,7 +157,8 @@ static void find_volumes(const supine_basis_info *info, const supine_options_nam
       sum[3] += supine_length(normal);
       sum[4] += supine_dot(x[0], normal);
     }
-    targets[part].volume[side] = supine_length(sum) < 1e-3 * sum[3] ? sum[4] / 6000.0 : (double)NAN;
+    targets[part].volume[side] =
+        supine_length(sum) < 1e-3 * sum[3] ? fabs(sum[4]) / 6000.0 : (double)NAN;
   }
 }
 

@@ -97,6 +97,7 @@ json_t *supine_report_findings(const supine_comparison *c) {
 
 /* Return a volume as text, mL; "open" for surfaces that enclose none, "" for points. */
 static json_t *volume_text(double volume) {
+  SUPINE_C_LOCALE;
   if (isnan(volume)) {
     return json_string("open");
   }
@@ -106,6 +107,7 @@ static json_t *volume_text(double volume) {
 /* Return the row of a structure in a posture. */
 static json_t *target_row(const char *name, const supine_compared_posture *p,
                           const supine_target *t) {
+  SUPINE_C_LOCALE;
   char way[96];
   return json_pack("{s:s, s:s, s:o, s:o, s:o, s:s, s:o}", "name", name, "posture", p->label,
                    "before", volume_text(t->volume[0]), "after", volume_text(t->volume[1]), "moved",
@@ -115,7 +117,6 @@ static json_t *target_row(const char *name, const supine_compared_posture *p,
 }
 
 json_t *supine_report_targets(const supine_comparison *c, bool anatomy) {
-  SUPINE_C_LOCALE;
   json_t *list = json_array();
   for (size_t k = 0; c->inside != NULL && k < c->names.count; ++k) {
     const char *name = c->names.text[k];
