@@ -101,7 +101,7 @@ static json_t *volume_text(double volume) {
   if (isnan(volume)) {
     return json_string("open");
   }
-  return json_sprintf(volume != 0.0 ? "%.1f" : "", volume);
+  return volume != 0.0 ? json_sprintf("%.1f", volume) : json_string("");
 }
 
 /* Return the row of a structure in a posture. */
