@@ -12,6 +12,7 @@
 #include "base/vec3.h"
 #include "runtime/rigid.h"
 
+#include "precompute/inside/anatomy.h"
 #include "precompute/inside/biharmonic.h"
 #include "precompute/inside/embed.h"
 
@@ -34,8 +35,9 @@ typedef struct embedding {
   uint32_t *triangles;  /* [triangles, 3] indices of vertices */
   uint32_t *rigid;      /* [rigid_count, 2] begin and end of the vertices of each rigid part */
   size_t rigid_count;
-  double *squares; /* [lungs, 3, modes, modes] the tensor lungs_squares */
-  double *hilum;   /* [lungs, 3, modes] the tensor lungs_hilum */
+  unsigned char *anatomy; /* [parts] the tensor anatomy */
+  double *squares;        /* [lungs, 3, modes, modes] the tensor lungs_squares */
+  double *hilum;          /* [lungs, 3, modes] the tensor lungs_hilum */
 } embedding;
 
 static void find_places(void *context, size_t begin, size_t end, size_t thread) {
@@ -410,7 +412,7 @@ static supine_status write_content(const embedding *e, const char *path, supine_
     const double x = (double)info->bounds[i];
     *corner = i < 6 || (i / 3 % 2 == 0 ? x < *corner : x > *corner) ? x : *corner;
   }
-  supine_tensor tensors[21] = {
+  supine_tensor tensors[22] = {
       {"vertices", SUPINE_F32, 2, {n, 3}, e->vertices},
       {"triangles", SUPINE_U32, 2, {content->triangle_count, 3}, e->triangles},
       {"lung", SUPINE_U8, 1, {n}, e->group},
@@ -437,6 +439,7 @@ static supine_status write_content(const embedding *e, const char *path, supine_
   } else {
     tensors[count++] =
         (supine_tensor){"names", SUPINE_U8, 1, {strlen(content->names)}, content->names};
+    tensors[count++] = (supine_tensor){"anatomy", SUPINE_U8, 1, {content->part_count}, e->anatomy};
   }
   if (supine_inside_hilum(e->shells->basis, e->hilum)) {
     tensors[count++] = (supine_tensor){
@@ -473,6 +476,7 @@ supine_status supine_inside_embed(const supine_inside_shells *shells,
       .group = supine_arena_take(&arena, n, 1),
       .triangles = supine_arena_take(&arena, 3 * content->triangle_count, sizeof *e.triangles),
       .rigid = supine_arena_take(&arena, 2 * content->part_count, sizeof *e.rigid),
+      .anatomy = supine_arena_take(&arena, content->part_count, 1),
       .hilum = supine_arena_take(&arena, shells->count * columns, sizeof *e.hilum),
       .squares = supine_arena_zeros(&arena, shells->count * columns * columns, sizeof *e.squares)};
   SUPINE_TRY(
@@ -480,6 +484,7 @@ supine_status supine_inside_embed(const supine_inside_shells *shells,
   supine_parallel_for(n, GRAIN, 0, find_places, &e);
   gather_parts(&e);
   SUPINE_TRY(check_distance(&e, error));
+  SUPINE_TRY(supine_inside_anatomy(shells, content, e.anatomy, error));
   SUPINE_TRY(sort_points(&e, report, error));
   for (size_t lung = 0, begin = 0; lung < shells->count; begin += report->in_lung[lung++]) {
     SUPINE_TRY(embed_lung(&e, lung, begin, begin + report->in_lung[lung], error));

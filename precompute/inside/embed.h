@@ -62,6 +62,7 @@ typedef struct supine_inside_report {
  *     part       U32 [N]     index of the named point or mesh; in a grid, index of the grid node
  *     depth      F32 [N]     mm below the surface in the scan, negative outside
  *     names      U8 [bytes]  names of points and meshes, separated by newlines (not for a grid)
+ *     anatomy    U8 [parts]  1: airways, a lobe, ...; 0: a target (anatomy.h; not for a grid)
  *     rigid      U32 [R, 2]  vertices begin <= i < end of each rigid mesh (if there are any)
  *     grid       F64 [4, 3]  position of the first node, then the three steps, mm (for a grid)
  *     grid_size  U32 [3]     number of nodes along the three steps (for a grid)

@@ -230,36 +230,83 @@ static void check_tips(checks *c, const supine_lungs *lungs, size_t lung) {
   }
 }
 
+/* Write the corners of the box in which points may be deeper than `most_overlap` inside a
+ * component: a point is at least as far from the sides of the box around the component as from its
+ * surface. */
+static void find_inner_box(const supine_lungs *lungs, size_t component, double low[3],
+                           double high[3]) {
+  supine_box_begin(low, high);
+  for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
+    if (lungs->topology.component[i] == component) {
+      supine_box_add(lungs->mesh.vertices + 3 * i, low, high);
+    }
+  }
+  for (int k = 0; k < 3; ++k) {
+    low[k] += most_overlap;
+    high[k] -= most_overlap;
+  }
+}
+
+/* List every n-th vertex of other components that lies in the box of find_inner_box, so that about
+ * SAMPLES vertices are looked at. Return their number.
+ * @param samples  [vertex_count] written */
+static size_t find_samples(const supine_lungs *lungs, size_t component, size_t *samples) {
+  const supine_mesh *mesh = &lungs->mesh;
+  double low[3];
+  double high[3];
+  size_t count = 0;
+  find_inner_box(lungs, component, low, high);
+  for (size_t i = 0; i < mesh->vertex_count; i += mesh->vertex_count / SAMPLES + 1) {
+    const double *p = mesh->vertices + 3 * i;
+    bool inside = lungs->topology.component[i] != component;
+    for (int k = 0; k < 3; ++k) {
+      inside = inside && p[k] > low[k] && p[k] < high[k];
+    }
+    if (inside) {
+      samples[count++] = i;
+    }
+  }
+  return count;
+}
+
+/* Find the deepest of some vertices inside a component of the surface.
+ * @param corners  [triangle_count, 3] work space */
+static supine_status find_deepest(const supine_lungs *lungs, size_t component, size_t count,
+                                  const size_t *samples, uint32_t *corners,
+                                  supine_inside_place *deepest, supine_error *error) {
+  const supine_mesh *mesh = &lungs->mesh;
+  SUPINE_FREED_BY(supine_lungs_surface_drop) supine_lungs_surface *surface = NULL;
+  size_t used = 0;
+  for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {
+    if (lungs->topology.component[mesh->triangles[i]] == component) {
+      corners[used++] = mesh->triangles[i];
+    }
+  }
+  SUPINE_TRY(supine_lungs_surface_create(mesh->vertices, used / 3, corners, true, &surface, error));
+  for (size_t i = 0; i < count; ++i) {
+    const supine_inside_place place =
+        supine_lungs_surface_find(surface, mesh->vertices + 3 * samples[i], NULL);
+    *deepest = place.depth > deepest->depth ? place : *deepest;
+  }
+  return SUPINE_OK;
+}
+
 /* Check that no component of the surface reaches deep into another one. */
 static void check_overlap(checks *c, const supine_lungs *lungs) {
   const supine_mesh *mesh = &lungs->mesh;
-  const uint32_t *part = lungs->topology.component;
   const size_t parts = lungs->topology.component_count;
   SUPINE_ARENA arena = {0};
   uint32_t *corners = supine_arena_take(&arena, 3 * mesh->triangle_count, sizeof *corners);
+  size_t *samples = supine_arena_take(&arena, mesh->vertex_count, sizeof *samples);
   check(c, !arena.failed, SUPINE_ERROR_MEMORY, SUPINE_REMEDY_NONE, NULL,
         "no memory for %zu components", parts);
   if (parts > 1) {
     for (size_t of = 0; of < parts && c->status == SUPINE_OK; ++of) {
-      supine_lungs_surface *surface = NULL;
       supine_inside_place deepest = {.depth = 0.0};
-      size_t count = 0;
-      for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {
-        if (part[mesh->triangles[i]] == of) {
-          corners[count++] = mesh->triangles[i];
-        }
+      const size_t count = find_samples(lungs, of, samples);
+      if (count > 0) {
+        c->status = find_deepest(lungs, of, count, samples, corners, &deepest, c->error);
       }
-      c->status =
-          supine_lungs_surface_create(mesh->vertices, count / 3, corners, true, &surface, c->error);
-      if (c->status == SUPINE_OK) {
-        for (size_t i = 0; i < mesh->vertex_count; i += mesh->vertex_count / SAMPLES + 1) {
-          const double *p = mesh->vertices + 3 * i;
-          const supine_inside_place place =
-              part[i] == of ? deepest : supine_lungs_surface_find(surface, p, NULL);
-          deepest = place.depth > deepest.depth ? place : deepest;
-        }
-      }
-      supine_lungs_surface_destroy(surface);
       check(
           c, deepest.depth <= most_overlap, SUPINE_ERROR_MESH, SUPINE_REMEDY_NONE, NULL,
           "one of its surfaces reaches %.0f mm into another one, at %.0f,%.0f,%.0f mm (LPS): give "

@@ -10,9 +10,10 @@
 #include "base/parallel.h"
 #include "precompute/physics/force.h"
 
-/* BLOCK consecutive vertices form a block. The search skips blocks whose bounding boxes cannot
- * contain a new greatest height. It handles LANES directions together. */
-enum { BLOCK = 64, LANES = 8 };
+/* BLOCK consecutive vertices form a block, GROUP blocks a group. The search skips groups and blocks
+ * whose bounding boxes cannot contain a new greatest height. It handles LANES directions together.
+ */
+enum { BLOCK = 64, GROUP = 16, LANES = 8 };
 
 typedef struct block_box {
   double centre[3];
@@ -24,6 +25,8 @@ typedef struct range_work {
   const double *vertices; /* [vertex_count, 3] mm */
   const block_box *boxes; /* [box_count] bounding box of each block of BLOCK vertices */
   size_t box_count;
+  const block_box *groups; /* [group_count] bounding box of each group of GROUP blocks */
+  size_t group_count;
   size_t direction_count;
   const double *directions;
   double *minimum, *maximum;
@@ -86,10 +89,17 @@ static inline void raise_best(const range_work *work, size_t block, lanes *at) {
  * first. Return the block searched last, a good seed for similar directions. */
 static inline size_t search(const range_work *work, size_t seed, lanes *at) {
   raise_best(work, seed, at);
-  for (size_t block = 0; block < work->box_count; ++block) {
-    if (may_improve(&work->boxes[block], at)) {
-      raise_best(work, block, at);
-      seed = block;
+  for (size_t group = 0; group < work->group_count; ++group) {
+    if (!may_improve(&work->groups[group], at)) {
+      continue;
+    }
+    const size_t end =
+        (group + 1) * GROUP < work->box_count ? (group + 1) * GROUP : work->box_count;
+    for (size_t block = group * GROUP; block < end; ++block) {
+      if (may_improve(&work->boxes[block], at)) {
+        raise_best(work, block, at);
+        seed = block;
+      }
     }
   }
   return seed;
@@ -129,13 +139,24 @@ supine_status supine_physics_height_range(const supine_lungs *lungs, bool pair, 
   const size_t single = lungs->mesh.vertex_count;
   const size_t n = pair && lungs->lung_count == 1 ? 2 * single : single;
   const size_t box_count = (n + BLOCK - 1) / BLOCK;
+  const size_t group_count = (box_count + GROUP - 1) / GROUP;
   SUPINE_ARENA arena = {0};
   block_box *boxes = supine_arena_take(&arena, box_count, sizeof *boxes);
+  block_box *groups = supine_arena_take(&arena, group_count, sizeof *groups);
   double *vertices = supine_arena_take(&arena, 3 * n, sizeof *vertices);
   if (arena.failed) {
     return SUPINE_ERROR_MEMORY;
   }
-  range_work work = {n, vertices, boxes, box_count, count, directions, minimum, maximum};
+  range_work work = {.vertex_count = n,
+                     .vertices = vertices,
+                     .boxes = boxes,
+                     .box_count = box_count,
+                     .groups = groups,
+                     .group_count = group_count,
+                     .direction_count = count,
+                     .directions = directions,
+                     .minimum = minimum,
+                     .maximum = maximum};
   memcpy(vertices, lungs->mesh.vertices, 3 * single * sizeof *vertices);
   for (size_t i = 3 * single; i < 3 * n; ++i) { /* append the mirror image of a single lung */
     const double at = vertices[i - 3 * single];
@@ -143,6 +164,10 @@ supine_status supine_physics_height_range(const supine_lungs *lungs, bool pair, 
   }
   for (size_t i = 0; i < n; i += BLOCK) {
     boxes[i / BLOCK] = box_of(vertices + 3 * i, n - i < BLOCK ? n - i : BLOCK);
+  }
+  const size_t most = (size_t)GROUP * BLOCK;
+  for (size_t i = 0; i < n; i += most) {
+    groups[i / most] = box_of(vertices + 3 * i, n - i < most ? n - i : most);
   }
   supine_parallel_for((count + LANES - 1) / LANES, 4, 0, height_range, &work);
   return SUPINE_OK;

@@ -52,18 +52,20 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, html), .file = SUPINE_FILE_OUT, .endings = ".html"},
     {.name = NULL}};
 
+/* Append a structure to the list of targets or of anatomy. */
 static void add_target(const supine_posture_item *const item[2], const supine_target *target,
-                       json_t *list) {
+                       json_t *lists) {
+  const char *const name = target->anatomy ? "anatomy" : "targets";
   json_t *entry = json_pack("{s:s, s:s}", "from", item[0]->name, "to", item[1]->name);
   (void)json_object_update_new(entry, supine_options_target_json(target));
-  (void)json_array_append_new(list, entry);
+  (void)json_array_append_new(json_object_get(lists, name), entry);
 }
 
-/* Append to a list the displacements of each named structure and of the hilum between two postures.
- * If `in_hilum`, subtract the hilum's from the others. */
+/* Append to the lists the displacements of each named structure and of the hilum between two
+ * postures. If `in_hilum`, subtract the hilum's from the others. */
 static supine_status add_pair(const supine_basis *basis, const supine_options_names *names,
-                              const supine_posture_item *const item[2], bool in_hilum, json_t *list,
-                              supine_error *error) {
+                              const supine_posture_item *const item[2], bool in_hilum,
+                              json_t *lists, supine_error *error) {
   supine_target row = {.name = in_hilum ? "hilum, subtracted" : "hilum"};
   supine_hilum hilum;
   supine_pose pose[2];
@@ -86,14 +88,14 @@ static supine_status add_pair(const supine_basis *basis, const supine_options_na
     if (in_hilum) {
       supine_options_target_shift(&targets[i], hilum.move);
     }
-    add_target(item, &targets[i], list);
+    add_target(item, &targets[i], lists);
   }
   if (supine_length(hilum.move) > 0.0) {
     memcpy(row.move, hilum.move, sizeof row.move);
     row.moved = supine_length(hilum.move);
     row.expected = hilum.expected;
     row.volume[0] = row.volume[1] = targets[0].volume[0] != 0.0 ? (double)NAN : 0.0;
-    add_target(item, &row, list);
+    add_target(item, &row, lists);
   }
   return SUPINE_OK;
 }
@@ -101,15 +103,15 @@ static supine_status add_pair(const supine_basis *basis, const supine_options_na
 /* Print the displacement of each named structure between every two postures. */
 static supine_status compare_content(supine_comparison *c, const request *wanted,
                                      supine_error *error) {
-  json_auto_t *list = json_array();
+  json_auto_t *lists = json_pack("{s:[], s:[]}", "targets", "anatomy");
   SUPINE_TRY(supine_options_names_open(c->basis, &c->names, error));
   for (size_t i = 0; i < c->postures.count; ++i) {
     for (size_t j = i + 1; j < c->postures.count; ++j) {
       const supine_posture_item *const item[2] = {&c->postures.item[i], &c->postures.item[j]};
-      SUPINE_TRY(add_pair(c->basis, &c->names, item, wanted->frame == 1, list, error));
+      SUPINE_TRY(add_pair(c->basis, &c->names, item, wanted->frame == 1, lists, error));
     }
   }
-  supine_options_print(json_incref(list), wanted->json);
+  supine_options_print(json_incref(lists), wanted->json);
   return SUPINE_OK;
 }
 
@@ -183,7 +185,11 @@ const supine_command supine_command_compare = {
     "its two cut faces enclose after the breath, minus the volume that they enclose before it. The "
     "gains sum to the volume of the breath. The regional expansion of a slab is its gain divided "
     "by its volume before the breath. For a basis of 'supine embed', the displacement is the mean "
-    "over a part, in mm to the left, to the back and to the head.\n"
+    "over a part, in mm to the left, to the back and to the head. Parts that are open surfaces, or "
+    "as "
+    "long as a ball of a fifth of a lung, such as airways, vessels and lobes, are listed as "
+    "anatomy, "
+    "not as targets.\n"
     "\n"
     "Examples:\n"
     "  supine compare lungs.safetensors --postures supine,prone:rest+500,supine+15,0.6:0:-0.8\n"

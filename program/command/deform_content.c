@@ -387,6 +387,35 @@ static void print_range(const supine_basis *basis, const supine_deformation *mov
   }
 }
 
+/* Warn of each embedded part whose surface folds between the positions `from` and `to`. */
+static supine_status tell_folds(const supine_basis *basis, const supine_mesh *from,
+                                const supine_mesh *to, supine_error *error) {
+  static const double visible = 0.002; /* share of turned triangles that is seen (mesh.h) */
+  SUPINE_FREED_BY(supine_options_names_close) supine_options_names names = {0};
+  SUPINE_ARENA arena = {0};
+  SUPINE_TRY(supine_options_names_open(basis, &names, error));
+  size_t *turned = supine_arena_zeros(&arena, names.count, sizeof *turned);
+  size_t *count = supine_arena_zeros(&arena, names.count, sizeof *count);
+  SUPINE_TRY(supine_arena_check(&arena, error, "the folds of %zu parts", names.count));
+  for (size_t t = 0; t < from->triangle_count; ++t) {
+    supine_mesh one = *from;
+    one.triangles += 3 * t;
+    one.triangle_count = 1;
+    const uint32_t part = names.part[one.triangles[0]];
+    ++count[part];
+    turned[part] += supine_mesh_turned_over(&one, to->vertices) > 0.0;
+  }
+  for (size_t part = 0; part < names.count; ++part) {
+    if ((double)turned[part] > visible * (double)count[part]) {
+      supine_options_say("deform",
+                         "warning: %s: its surface folds: %zu of its %zu triangles turn over: "
+                         "choose a volume nearer to that of the scan",
+                         names.text[part], turned[part], count[part]);
+    }
+  }
+  return SUPINE_OK;
+}
+
 /* Write a surface, and print its largest displacement and its volume. */
 static supine_status write_surface(const char *path, const supine_basis *basis,
                                    supine_deformation *moved, supine_error *error) {
@@ -427,14 +456,15 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
   (void)supine_print(stdout, "%s: gravity %.4g,%.4g,%.4g, largest displacement %s mm from %s", path,
                      gravity[0], gravity[1], gravity[2], supine_text_distance(largest).text,
                      moved->from.name);
-  if (supine_basis_metadata(basis, "content") == NULL) {
+  const bool content = supine_basis_metadata(basis, "content") != NULL;
+  if (!content) {
     const double held = 1e-3 * supine_mesh_volume(&mesh);
     (void)supine_print(stdout, ", %.2f mL (%+.2f mL)", held,
                        held - 1e-3 * supine_mesh_volume(&from));
     print_range(basis, moved);
   }
   (void)putchar('\n');
-  return SUPINE_OK;
+  return content && mesh.triangle_count > 0 ? tell_folds(basis, &from, &mesh, error) : SUPINE_OK;
 }
 
 supine_status supine_command_deform_content(const supine_deform_content *wanted,

@@ -180,7 +180,10 @@ const supine_command supine_command_embed = {
         "'compare', 'info' and 'stream' read it; 'render' and 'export' show it with --inside.\n"
         "\n"
         "Displacements inside are interpolated from the displacements of each lung's surface "
-        "by biharmonic splines, which are exact on the surface and for affine motion.",
+        "by biharmonic splines, which are exact on the surface and for affine motion.\n"
+        "\n"
+        "Parts that are open surfaces, or as long as a ball of a fifth of a lung, such as airways, "
+        "vessels and lobes, are marked as anatomy; all others are targets.",
     .options = table,
     .notes = "A file nodules.csv, in mm:\n"
              "  name,x,y,z\n"

@@ -29,6 +29,25 @@ static supine_status sort_by_name(supine_options_names *names, size_t n, supine_
   return SUPINE_OK;
 }
 
+/* Read which structures are anatomy. In files of other programs, which may lack this, all are
+ * targets. */
+static supine_status read_anatomy(const supine_basis *basis, supine_options_names *names,
+                                  supine_error *error) {
+  const supine_tensor *anatomy = supine_basis_tensor(basis, "anatomy");
+  if (anatomy == NULL) {
+    names->anatomy = supine_arena_zeros(&names->arena, names->count, 1);
+    return supine_arena_check(&names->arena, error, "%zu structures", names->count);
+  }
+  SUPINE_REFUSE_IF(
+      anatomy->dtype != SUPINE_U8 || anatomy->rank != 1 || anatomy->shape[0] != names->count, error,
+      SUPINE_ERROR_FORMAT,
+      "the tensor 'anatomy' of the basis is not a byte for each of %zu structures: make the file "
+      "again with 'supine embed'",
+      names->count);
+  names->anatomy = anatomy->data;
+  return SUPINE_OK;
+}
+
 supine_status supine_options_names_open(const supine_basis *basis, supine_options_names *names,
                                         supine_error *error) {
   const size_t n = supine_basis_get_info(basis)->vertex_count;
@@ -62,6 +81,7 @@ supine_status supine_options_names_open(const supine_basis *basis, supine_option
                      "BASIS POINTS.csv'",
                      i);
   }
+  SUPINE_TRY(read_anatomy(basis, names, error));
   return sort_by_name(names, n, error);
 }
 
@@ -90,10 +110,6 @@ supine_status supine_options_inside_open(const supine_basis *lungs, const char *
   return SUPINE_OK;
 }
 
-/* Length of a structure above which it is anatomy and not a target, mm: tumours above 70 mm are of
- * the largest class, T4 (TNM, 8th edition), while lobes and airways are longer. */
-static const double anatomy_size = 70.0;
-
 /* Average the vertices order[begin] to order[end - 1] to a target; [N, 3] positions before and
  * after.
  */
@@ -102,11 +118,8 @@ static supine_target average(const supine_options_names *names, size_t begin, si
   const double count = (double)(end - begin);
   supine_target target = {.name = names->text[names->part[names->order[begin]]]};
   double square = 0;
-  double low[3] = {INFINITY, INFINITY, INFINITY};
-  double high[3] = {-INFINITY, -INFINITY, -INFINITY};
   for (size_t i = begin; i < end; ++i) {
     const size_t vertex = names->order[i];
-    supine_render_box(before + 3 * vertex, 1, low, high);
     for (size_t k = 0; k < 3; ++k) {
       const double x = (double)after[3 * vertex + k];
       target.at[k] += x / count;
@@ -116,7 +129,7 @@ static supine_target average(const supine_options_names *names, size_t begin, si
   }
   target.moved = supine_length(target.move);
   target.expected = sqrt(square);
-  target.anatomy = fmax(high[0] - low[0], fmax(high[1] - low[1], high[2] - low[2])) > anatomy_size;
+  target.anatomy = names->anatomy[names->part[names->order[begin]]] != 0;
   return target;
 }
 
@@ -144,7 +157,8 @@ static void find_volumes(const supine_basis_info *info, const supine_options_nam
       sum[3] += supine_length(normal);
       sum[4] += supine_dot(x[0], normal);
     }
-    targets[part].volume[side] = supine_length(sum) < 1e-3 * sum[3] ? sum[4] / 6000.0 : (double)NAN;
+    targets[part].volume[side] =
+        supine_length(sum) < 1e-3 * sum[3] ? fabs(sum[4]) / 6000.0 : (double)NAN;
   }
 }
 

@@ -11,10 +11,11 @@
 
 typedef struct supine_options_names {
   size_t count;
-  char **text;          /* [count] name of each structure */
-  const uint32_t *part; /* [N] index of each vertex's name in `text` */
-  size_t *order;        /* [N] indices of the vertices, sorted by structure, then in input order */
-  size_t *begin;        /* [count + 1] index of each structure's first vertex in `order` */
+  char **text;                  /* [count] name of each structure */
+  const uint32_t *part;         /* [N] index of each vertex's name in `text` */
+  const unsigned char *anatomy; /* [count] 1: airways, a lobe, ...; 0: a target (anatomy.h) */
+  size_t *order; /* [N] indices of the vertices, sorted by structure, then in input order */
+  size_t *begin; /* [count + 1] index of each structure's first vertex in `order` */
   supine_arena arena;
 } supine_options_names;
 
@@ -41,7 +42,7 @@ typedef struct supine_target {
   double move[3];   /* displacement of the mean position, mm */
   double moved;     /* length of `move`, mm */
   double volume[2]; /* volume before and after, mL; NAN if it is no closed mesh; 0 without meshes */
-  bool anatomy;     /* whether it is larger than targets are: airways, or a lobe */
+  bool anatomy;     /* whether it is anatomy, such as airways or a lobe, and no target */
   double expected;  /* RMS of the vertices' expected errors, mm; NAN if unknown */
 } supine_target;
 

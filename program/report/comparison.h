@@ -77,9 +77,12 @@ supine_status supine_report_html(const supine_comparison *comparison, FILE *file
 /* Return the colour of a posture's line in charts. */
 const char *supine_report_line(size_t posture);
 
+/* Return the rows of the targets or of the anatomy, {{targeted}} or {{anatomical}}; NULL if there
+ * are none. */
+json_t *supine_report_targets(const supine_comparison *comparison, bool anatomy);
+
 /* Return the values of the tags of report.html that have these names. */
 json_t *supine_report_findings(const supine_comparison *comparison);
-json_t *supine_report_targets(const supine_comparison *comparison);
 json_t *supine_report_postures(const supine_comparison *comparison);
 json_t *supine_report_profile(const supine_comparison *comparison);
 json_t *supine_report_outlines(const supine_comparison *comparison);

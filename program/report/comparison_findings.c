@@ -39,11 +39,22 @@ static double lowest_over_uppermost(const supine_comparison *c, size_t posture) 
   return gain[1] / volume[1] / (gain[0] / volume[0]);
 }
 
+/* Return the first structure in a posture that is a target; NULL if there is none. */
+static const supine_target *first_target(const supine_comparison *c,
+                                         const supine_compared_posture *p) {
+  for (size_t k = 0; k < c->names.count; ++k) {
+    if (!p->targets[k].anatomy) {
+      return &p->targets[k];
+    }
+  }
+  return NULL;
+}
+
 /* Return a sentence on a posture: how far the first target or, without targets, the surface moves.
  * A displacement below its expected error is no change that the model can tell. */
 static json_t *finding(const supine_comparison *c, size_t posture) {
   const supine_compared_posture *p = &c->posture[posture];
-  const supine_target *t = p->targets;
+  const supine_target *t = p->targets != NULL ? first_target(c, p) : NULL;
   const double moved = t != NULL ? t->moved : p->displacement.mean;
   const double error = t != NULL ? t->expected : p->expected_error;
   const char *name = p->item->name;
@@ -84,27 +95,45 @@ json_t *supine_report_findings(const supine_comparison *c) {
   return list;
 }
 
-json_t *supine_report_targets(const supine_comparison *c) {
+/* Return a volume as text, mL; "open" for surfaces that enclose none, "" for points. */
+static json_t *volume_text(double volume) {
   SUPINE_C_LOCALE;
+  if (isnan(volume)) {
+    return json_string("open");
+  }
+  return volume != 0.0 ? json_sprintf("%.1f", volume) : json_string("");
+}
+
+/* Return the row of a structure in a posture. */
+static json_t *target_row(const char *name, const supine_compared_posture *p,
+                          const supine_target *t) {
+  SUPINE_C_LOCALE;
+  char way[96];
+  return json_pack("{s:s, s:s, s:o, s:o, s:o, s:s, s:o}", "name", name, "posture", p->label,
+                   "before", volume_text(t->volume[0]), "after", volume_text(t->volume[1]), "moved",
+                   json_sprintf("%.1f", t->moved), "way", supine_options_target_way(t, 3, way),
+                   "error",
+                   isnan(t->expected) ? json_string("unknown") : json_sprintf("%.1f", t->expected));
+}
+
+json_t *supine_report_targets(const supine_comparison *c, bool anatomy) {
   json_t *list = json_array();
   for (size_t k = 0; c->inside != NULL && k < c->names.count; ++k) {
     const char *name = c->names.text[k];
     for (size_t i = 0; i < c->postures.count; ++i) {
       const supine_target *t = &c->posture[i].targets[k];
-      char way[96];
-      if (c->posture[i].displacement.max < 0.05) { /* this posture is the reference */
-        continue;
+      const bool is_reference = c->posture[i].displacement.max < 0.05;
+      if (!is_reference && t->anatomy == anatomy) {
+        (void)json_array_append_new(list, target_row(name, &c->posture[i], t));
+        name = "";
       }
-      (void)json_array_append_new(
-          list, json_pack("{s:s, s:s, s:o, s:s, s:o}", "name", name, "posture", c->posture[i].label,
-                          "moved", json_sprintf("%.1f", t->moved), "way",
-                          supine_options_target_way(t, 3, way), "error",
-                          isnan(t->expected) ? json_string("unknown")
-                                             : json_sprintf("%.1f", t->expected)));
-      name = "";
     }
   }
-  return list;
+  if (json_array_size(list) > 0) {
+    return json_pack("{s:o}", anatomy ? "parts" : "targets", list);
+  }
+  json_decref(list);
+  return NULL;
 }
 
 json_t *supine_report_postures(const supine_comparison *c) {

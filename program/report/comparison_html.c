@@ -78,14 +78,15 @@ static json_t *values(const supine_comparison *c) {
   supine_report_volume(c, volume, sizeof volume);
   json_t *today = date();
   return json_pack(
-      "{s:o, s:o, s:o, s:o, s:s, s:I, s:o, s:s, s:o, s:o, s:o, s:s, s:o*, s:s*, s:b, s:o*, s:o*}",
+      "{s:o, s:o, s:o, s:o, s:s, s:I, s:o, s:s, s:o, s:o, s:o, s:s, s:o*, s:o*, s:s*, s:b, s:o*, "
+      "s:o*}",
       "provenance", provenance(c, file, today), "file", file, "date", today, "count",
       json_sprintf("%zu posture%s", c->postures.count, c->postures.count == 1 ? "" : "s"), "volume",
       volume, "vertices", (json_int_t)supine_basis_get_info(c->basis)->vertex_count, "area",
       json_sprintf("%.0f", supine_compare_area(c->compare) / 100.0), "version", SUPINE_VERSION,
       "postures", supine_report_postures(c), "findings", supine_report_findings(c), "lungs",
-      lungs(c), "reference", c->reference.name, "targeted",
-      c->inside != NULL ? json_pack("{s:o}", "targets", supine_report_targets(c)) : NULL, "meaning",
+      lungs(c), "reference", c->reference.name, "targeted", supine_report_targets(c, false),
+      "anatomical", supine_report_targets(c, true), "meaning",
       c->has_errors ? SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT : NULL, "assumed",
       supine_basis_metadata(c->basis, "resting_known") == NULL, "outlined", outlined(c),
       "ventilation",

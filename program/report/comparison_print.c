@@ -58,10 +58,14 @@ static json_t *encode_slabs(const supine_compared_posture *p) {
   return slabs;
 }
 
-static json_t *encode_targets(const supine_comparison *c, const supine_compared_posture *p) {
+/* Return the targets in a posture, or the anatomy. */
+static json_t *encode_targets(const supine_comparison *c, const supine_compared_posture *p,
+                              bool anatomy) {
   json_t *targets = json_array();
   for (size_t k = 0; k < c->names.count; ++k) {
-    (void)json_array_append_new(targets, supine_options_target_json(&p->targets[k]));
+    if (p->targets[k].anatomy == anatomy) {
+      (void)json_array_append_new(targets, supine_options_target_json(&p->targets[k]));
+    }
   }
   return targets;
 }
@@ -69,14 +73,15 @@ static json_t *encode_targets(const supine_comparison *c, const supine_compared_
 static json_t *encode_posture(const supine_comparison *c, size_t i) {
   const supine_compared_posture *p = &c->posture[i];
   return json_pack(
-      "{s:s, s:o, s:o, s:o, s:o*, s:o*, s:o, s:o*, s:o*, s:o*}", "name", p->item->name, "gravity",
-      supine_options_json_numbers(3, p->item->state.gravity), "displacement_mm",
+      "{s:s, s:o, s:o, s:o, s:o*, s:o*, s:o, s:o*, s:o*, s:o*, s:o*}", "name", p->item->name,
+      "gravity", supine_options_json_numbers(3, p->item->state.gravity), "displacement_mm",
       statistics(&p->displacement), "hilum_mm", supine_options_json_numbers(3, p->hilum.move),
       "hilum_error_mm", isnan(p->hilum.expected) ? NULL : json_real(p->hilum.expected),
       "expected_error_mm", c->has_errors ? json_real(p->expected_error) : NULL, "volume_ml",
       volumes(c, i, false), "gain_ml", p->has_breath ? by_lung(c, p->gain) : NULL, "slabs",
       p->has_breath ? encode_slabs(p) : NULL, "targets",
-      c->inside != NULL ? encode_targets(c, p) : NULL);
+      c->inside != NULL ? encode_targets(c, p, false) : NULL, "anatomy",
+      c->inside != NULL ? encode_targets(c, p, true) : NULL);
 }
 
 /* Append a row to the table named `heading`: `value` in the column `name`, then `columns`,
@@ -110,7 +115,8 @@ static void add_tables(const supine_comparison *c, json_t *text) {
     add_row(text, "displacement, mm", "posture", p->label, moved);
     if (c->inside != NULL) {
       for (size_t k = 0; k < c->names.count; ++k) {
-        add_row(text, "targets", "posture", p->label, supine_options_target_json(&p->targets[k]));
+        add_row(text, p->targets[k].anatomy ? "anatomy" : "targets", "posture", p->label,
+                supine_options_target_json(&p->targets[k]));
       }
     }
     add_row(text, "volume of each lung, mL", "posture", p->label, volumes(c, i, true));

@@ -12,7 +12,8 @@ export interface Tensor {
 }
 
 /** A named structure: the mean position `at` of its vertices, its displacement `move`, the length `mm` of this
- * displacement, and its expected error (3-D RMS). Lengths are in mm. */
+ * displacement, and its expected error (3-D RMS). Lengths are in mm. `anatomy` is true for a large part, such as airways,
+ * vessels or a lobe, of which these are means, and false for a target. */
 export interface Target {
   name: string;
   lung: string;
@@ -20,6 +21,7 @@ export interface Target {
   move: number[];
   mm: number;
   expectedError: number;
+  anatomy: boolean;
 }
 
 /** An open basis and its posed surface. Arrays are views of WebAssembly memory that never moves: write only to

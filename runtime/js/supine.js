@@ -129,7 +129,8 @@ class Basis {
     this.#check(this.#c.supine_basis_pose(this.#basis, this.#nextState, this.#nextPose, this.#error));
     this.#evaluate(this.#c.supine_deform(this.#basis, this.#nextPose, this.#positions));
     const [part, names] = [this.tensor('part')?.data ?? [], this.tensor('names')?.data ?? new Uint8Array()];
-    const made = new TextDecoder().decode(names).split('\n').map((name) => ({ name, lung: '', at: [0, 0, 0], move: [0, 0, 0], mm: 0, expectedError: 0, count: 0 }));
+    const anatomy = this.tensor('anatomy')?.data ?? [];
+    const made = new TextDecoder().decode(names).split('\n').map((name, i) => ({ name, anatomy: anatomy[i] === 1, lung: '', at: [0, 0, 0], move: [0, 0, 0], mm: 0, expectedError: 0, count: 0 }));
     part.forEach((index, v) => {
       const target = made[index];
       if (target.count++ === 0) target.lung = Object.keys(this.lungs).find((name) => v < this.lungs[name][1]);

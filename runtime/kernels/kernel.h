@@ -9,7 +9,8 @@
  *     FMA4(a, b, c)    the same for four numbers
  *     RSQRT(x)         an estimate of 1 / sqrt(x), accurate to 12 bits at least
  *     STREAM(to, v)    store a vector and bypass the caches
- *     OWN_WRITER       instead of STREAM, if kernel_*.c has its own struct `writer` */
+ *     OWN_WRITER       instead of STREAM, if kernel_*.c has its own struct `writer`
+ *     OWN_INTERLEAVE   if it is defined: f(x, y, z, out), which interleaves LANES vertices */
 #include "runtime/kernels/tiles.h"
 #include <string.h>
 
@@ -156,6 +157,13 @@ INLINE triples reference_positions(const supine_tiles *tiles, const unsigned cha
 
 /* Interleave the coordinates of 16 vertices as x y z x y z ... */
 INLINE triples interleave(const row *x, const row *y, const row *z) {
+#ifdef OWN_INTERLEAVE
+  triples t;
+  for (size_t q = 0; q < GROUPS; ++q) {
+    OWN_INTERLEAVE(x->v[q], y->v[q], z->v[q], t.v + 3 * q);
+  }
+  return t;
+#else
 #define FROM_XY(j, i) (VERTEX(j, i) + (AXIS(j, i) == 1 ? LANES : 0))
 #define FROM_Z(j, i) (AXIS(j, i) == 2 ? VERTEX(j, i) + LANES : (i))
 #define PIECE(j)                                                                                   \
@@ -171,6 +179,7 @@ INLINE triples interleave(const row *x, const row *y, const row *z) {
 #undef PIECE
 #undef FROM_Z
 #undef FROM_XY
+#endif
 }
 
 /* Repeat the value of each vertex three times, for x, y and z. */

@@ -16,7 +16,7 @@ supine('embed', basis, points, '-o', inside);
 /** Run `compare` and `deform` for a posture at the volume at rest. Return the displacement of the structure "nodule" by
  * each command, the mean and largest displacement of the surface by `compare`, and the largest by `deform`. */
 function told(posture, from) {
-  const pair = JSON.parse(supine('compare', inside, '--postures', `supine,${posture}`, '--json')).find(({ name }) => name === 'nodule');
+  const pair = JSON.parse(supine('compare', inside, '--postures', `supine,${posture}`, '--json')).targets.find(({ name }) => name === 'nodule');
   const report = JSON.parse(supine('compare', basis, '--postures', posture, '--json', '--from', from).replace(/^[^{]*/, ''));
   supine('deform', inside, '--posture', posture, '--volume', 'rest', '--from', from, '-o', moved);
   const [columns, row] = readFileSync(moved, 'utf8').trim().split('\n').slice(-2).map((line) => line.split(','));

@@ -74,6 +74,7 @@ for (const [since, from] of [['supine:rest', ['--from', 'supine:rest']], [undefi
   const rows = readFileSync(table, 'utf8').trim().split('\n').slice(2).map((line) => line.split(','));
   const targets = parts.pose('left').targets(since);
   assert.deepEqual(targets.map(({ name, lung }) => [name, lung]), rows.map((row) => row.slice(0, 2)));
+  assert.deepEqual(targets.filter(({ anatomy }) => anatomy).map(({ name }) => name), ['lungs']); // a mesh as large as the lungs
   targets.forEach(({ at, move, mm, expectedError }, i) => [...at, ...move, mm, expectedError].forEach((x, k) => assert.ok(Math.abs(x - rows[i][2 + k]) < 5e-3, `${rows[i]}: ${x}`)));
 }
 

@@ -783,6 +783,60 @@ TEST(test_content_meshes_joined_as_parts) {
   supine_inside_content_free(&content);
 }
 
+/* Append a box as one part, with or without its lid. */
+static void add_box(supine_inside_content *content, const char *name, const double size[3],
+                    bool lid) {
+  double vertices[24];
+  uint32_t triangles[] = {0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5, 0, 1, 5, 0, 5, 4,
+                          2, 6, 7, 2, 7, 3, 4, 5, 7, 4, 7, 6, 0, 2, 3, 0, 3, 1};
+  for (size_t i = 0; i < 24; ++i) {
+    vertices[i] =
+        (i % 3 == 0 ? 71.0 : 0.0) + size[i % 3] * ((i / 3 >> i % 3 & 1) != 0 ? 0.5 : -0.5);
+  }
+  const supine_mesh mesh = {.vertex_count = 8,
+                            .vertices = vertices,
+                            .triangle_count = lid ? 12 : 10,
+                            .triangles = triangles};
+  assert_int_equal(supine_inside_content_surface(name, &mesh, content, NULL), SUPINE_OK);
+}
+
+/* Parts that are open, or larger than a fifth of a lung, are anatomy: those whose longest side is
+ * the diameter of such a ball, however thin they are, and those that enclose as much. */
+TEST(test_embed_parts_large_or_open_are_anatomy) {
+  const supine_inside_shell *lung = shells.shell;
+  double mean = 0.0;
+  for (size_t i = 0; i < 2; ++i) {
+    const supine_mesh mesh = {.vertex_count = lung[i].vertex_count,
+                              .vertices = lung[i].vertices,
+                              .triangle_count = lung[i].triangle_count,
+                              .triangles = lung[i].triangles};
+    mean += supine_mesh_volume(&mesh) / 2.0;
+  }
+  const double ball = cbrt(0.2 * mean * 6.0 / acos(-1.0)); /* diameter */
+  const double cube = cbrt(0.2 * mean);
+  assert_true(cube < 0.9 * ball);
+  static const unsigned char expected[] = {0, 1, 0, 1, 1, 0};
+  char path[80];
+  (void)snprintf(path, sizeof path, "%s/one.csv", folder);
+  test_write(path, "name,x,y,z\nlandmark,71,0,0\n");
+  supine_inside_content content = {0};
+  add_box(&content, "short", (const double[]){2.0, 2.0, 0.99 * ball}, true);
+  add_box(&content, "long", (const double[]){2.0, 2.0, 1.01 * ball}, true);
+  add_box(&content, "tumour", (const double[]){0.99 * cube, 0.99 * cube, 0.99 * cube}, true);
+  add_box(&content, "lobe", (const double[]){1.01 * cube, 1.01 * cube, 1.01 * cube}, true);
+  add_box(&content, "open", (const double[]){10.0, 10.0, 10.0}, false);
+  assert_int_equal(supine_inside_content_points(path, NULL, &content, NULL), SUPINE_OK);
+  (void)embed(&content, false, 0);
+  supine_basis *inside = helper_open(inside_path);
+  const supine_tensor *anatomy = supine_basis_tensor(inside, "anatomy");
+  assert_non_null(anatomy);
+  assert_int_equal(anatomy->dtype, SUPINE_U8);
+  assert_int_equal(anatomy->shape[0], 6);
+  assert_memory_equal(anatomy->data, expected, sizeof expected);
+  supine_basis_close(inside);
+  supine_inside_content_free(&content);
+}
+
 static double part_volume(const supine_basis_info *info, uint32_t part_end, const float *xyz) {
   double sum = 0.0;
   for (size_t t = 0; t < info->triangle_count; ++t) {

@@ -457,6 +457,67 @@ TEST(test_render_target_orange_ghost_white_anatomy_teal) {
   cairo_surface_destroy(image);
 }
 
+/* `compare` lists airways and open surfaces apart from targets, with their volume and mean motion,
+ * in text, JSON and the report, which tells of the first target, not of the first part. */
+TEST(test_compare_anatomy_listed_apart_from_targets) {
+  test_write(in_folder("target.csv"), "name,x,y,z\nnodule,-90,-120,-150\n");
+  test_write(in_folder("airway.obj"), "v -90 -120 -60\nv -90 -120 -180\nv -70 -120 -180\n"
+                                      "v -90 -100 -180\nf 1 2 3\nf 1 3 4\nf 1 4 2\nf 2 4 3\n");
+  test_write(in_folder("fissure.obj"), "v -90 -120 -90\nv -90 -140 -90\nv -70 -120 -90\nf 1 2 3\n");
+  EXPECT(0, "", "embed lungs.safetensors airway.obj fissure.obj target.csv -o parts.safetensors");
+  EXPECT(0, "\nanatomy\n", "compare parts.safetensors --postures supine,prone");
+  static const char *const commands[] = {
+      "compare parts.safetensors --postures supine,prone --json",
+      "compare lungs.safetensors --inside parts.safetensors --postures prone --json"};
+  for (size_t i = 0; i < 2; ++i) {
+    EXPECT(0, "{", "%s", commands[i]);
+    json_t *root = json_loads(printed, 0, NULL);
+    assert_non_null(root);
+    json_t *lists = i == 0 ? root : json_array_get(json_object_get(root, "postures"), 0);
+    json_t *targets = json_object_get(lists, "targets");
+    json_t *anatomy = json_object_get(lists, "anatomy");
+    const json_t *airway = json_array_get(anatomy, 0);
+    const json_t *fissure = json_array_get(anatomy, 1);
+    assert_int_equal(json_array_size(anatomy), 2);
+    assert_string_equal(json_string_value(json_object_get(airway, "name")), "airway");
+    assert_true(json_number_value(json_object_get(airway, "volume_before_ml")) > 1.0);
+    assert_true(json_number_value(json_object_get(airway, "mm")) > 1.0);
+    assert_string_equal(json_string_value(json_object_get(fissure, "name")), "fissure");
+    assert_true(json_is_null(json_object_get(fissure, "volume_after_ml")));
+    const json_t *nodule = json_array_get(targets, 0);
+    assert_string_equal(json_string_value(json_object_get(nodule, "name")), "nodule");
+    json_decref(root);
+  }
+  EXPECT(0, "\nanatomy\n",
+         "compare lungs.safetensors --inside parts.safetensors --postures supine,prone "
+         "-o anatomy.html");
+  size_t size = 0;
+  char *text = test_read(in_folder("anatomy.html"), &size);
+  check_markup(text);
+  const char *targets = strstr(text, "<table class=\"targets\">");
+  const char *anatomy = strstr(text, "<table class=\"anatomy\">");
+  assert_non_null(targets);
+  assert_non_null(anatomy);
+  assert_says(text, "Prone, nodule");
+  assert_says(targets, "<b>nodule</b>");
+  assert_true(strstr(targets, "<b>airway</b>") > anatomy);
+  assert_says(anatomy, "<b>fissure</b></td><td class=\"words\">prone</td><td>open</td>");
+  free(text);
+}
+
+/* `deform` names the part whose surface folds, here between a full lung and one at rest. */
+TEST(test_deform_folded_part_named) {
+  test_write(in_folder("bridge.obj"), "v -2 -150 -60\nv 2 -150 -60\nv -2 -146 -60\n"
+                                      "v -2 -150 -56\nf 1 3 2\nf 1 4 3\nf 1 2 4\nf 2 3 4\n");
+  test_write(in_folder("body.obj"), "v -90 -120 -100\nv -80 -120 -100\nv -90 -110 -100\n"
+                                    "v -90 -120 -90\nf 1 3 2\nf 1 4 3\nf 1 2 4\nf 2 3 4\n");
+  EXPECT(0, "", "embed lungs.safetensors bridge.obj body.obj -o bridge.safetensors");
+  EXPECT(0, "warning: bridge: its surface folds: ",
+         "deform bridge.safetensors --posture left --volume left=rest,right=full --allow-folds "
+         "-o bridge.ply");
+  assert_null(strstr(printed, "body:"));
+}
+
 /* Pictures with names of any script and length are whole, in every format. Cairo would draw nothing
  * after a name that is cut inside a character. */
 TEST(test_render_long_names_of_any_script_picture_whole) {

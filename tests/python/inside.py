@@ -295,12 +295,13 @@ with open(path + ".parts", "wb") as file:
 subprocess.run(["supine", "deform", file.name, "--posture", "left", "--from", "supine:rest", "-o", table], check=True, stdout=subprocess.DEVNULL)
 with open(table) as file:
     rows = [line.split(",") for line in file.read().split("\n")[2:-1]]
-assert len(rows) == len(wanted) == 2 and all(t.mm > 0 for t in wanted)
+assert len(rows) == len(wanted) == 2 and all(t.mm > 0 and not t.anatomy for t in wanted)
 for row, t in zip(rows, wanted):
     assert row[:2] == [t.name, t.lung] and np.allclose(np.array(row[2:], float), [*t.at, *t.move, t.mm, t.expected_error], atol=2e-3), (row, t)
 refused(supine.ArgumentError, "no structures", lungs.targets, "left")
 assert supine.embed(made, place).vertex_count == 1
-assert supine.embed(made, (0.9 * lungs.vertices, lungs.triangles), np.array([place])).vertex_count == n + 1
+parts = supine.embed(made, (0.9 * lungs.vertices, lungs.triangles), np.array([place]))
+assert parts.vertex_count == n + 1 and sorted(t.anatomy for t in parts.targets("left")) == [False, True]
 assert supine.embed(made, grid=40, clamp=True).vertex_count > 100
 refused(supine.ArgumentError, "nothing to embed", supine.embed, made)
 refused(ValueError, "points must be", supine.embed, made, [(1, 2)])

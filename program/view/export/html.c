@@ -210,6 +210,12 @@ static json_t *describe_inside(const page *p) {
   for (size_t i = 0; i < p->shown->names->count; ++i) {
     (void)json_array_append_new(names, supine_options_json_text(p->shown->names->text[i]));
   }
+  json_t *anatomy = json_array();
+  for (size_t i = 0; i < p->shown->names->count; ++i) {
+    if (p->shown->names->anatomy[i] != 0) {
+      (void)json_array_append_new(anatomy, json_integer((json_int_t)i));
+    }
+  }
   const supine_tensor *rigid = supine_basis_tensor(p->shown->inside, "rigid");
   json_t *parts = json_array();
   if (rigid != NULL) {
@@ -218,10 +224,10 @@ static json_t *describe_inside(const page *p) {
       (void)json_array_append_new(parts, json_integer((json_int_t)p->shown->names->part[first]));
     }
   }
-  return json_pack("{s:I, s:I, s:o, s:o, s:o, s:f}", "vertices", (json_int_t)info->vertex_count,
-                   "triangles", (json_int_t)info->triangle_count, "lungBegin",
-                   begins(info, info->lung_begin), "names", names, "rigid", parts, "unit",
-                   p->inside_step);
+  return json_pack("{s:I, s:I, s:o, s:o, s:o, s:o, s:f}", "vertices",
+                   (json_int_t)info->vertex_count, "triangles", (json_int_t)info->triangle_count,
+                   "lungBegin", begins(info, info->lung_begin), "names", names, "rigid", parts,
+                   "anatomy", anatomy, "unit", p->inside_step);
 }
 
 /* Return the volume of all lungs in the scan minus that of the reference surface, mL; 0 if the pose

@@ -192,13 +192,15 @@ class _Owner:
 
 class Target(NamedTuple):
     """A named structure: its lung, the mean position `at` of its vertices, the displacement `move` of this position, its
-    length `mm`, and the expected error, mm (3-D RMS; NaN if unknown). Vectors are in mm, LPS."""
+    length `mm`, and the expected error, mm (3-D RMS; NaN if unknown). Vectors are in mm, LPS. `anatomy` is true for a
+    large part, such as airways, vessels or a lobe, of which these are means, and false for a target."""
     name: str
     lung: str
     at: Doubles
     move: Doubles
     mm: float
     expected_error: float
+    anatomy: bool
 
 
 class Basis:
@@ -303,6 +305,7 @@ class Basis:
             sigma: Any = self.expected_error(state, volume, since)
         except UnsupportedError:
             sigma = np.full(self.vertex_count, np.nan)
+        anatomy = self.tensor("anatomy")
         values = np.column_stack([after, after - before, sigma.astype(np.float64) ** 2])
         names_of = [name for name, lung in self.lungs.items() for _ in range(lung.start, lung.stop)]
         made = []
@@ -311,7 +314,7 @@ class Basis:
             if vertices.size:
                 mean = values[vertices].mean(axis=0)
                 made.append(Target(name, names_of[vertices[0]], mean[:3], mean[3:6], float(np.linalg.norm(mean[3:6])),
-                                   float(np.sqrt(mean[6]))))
+                                   float(np.sqrt(mean[6])), anatomy is not None and bool(anatomy[i])))
         return made
 
     @property
