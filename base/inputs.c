@@ -240,6 +240,51 @@ static const supine_input inputs[] = {
     .against = "the words that are known", .measured = "share of the characters that differ",
     .told = 0.4, .refused = NAN, .evidence = "definition",
     .remedy = "nearer words are suggested, others are not", .interfaces = ALL},
+  [SUPINE_INPUT_FIELDS_DIRECTIONS] = {
+    .name = "fields-directions", .group = "Fields", .input = "the directions of gravity of another simulator's runs",
+    .against = "the harmonics to degree 1", .measured = "condition number of these four harmonics",
+    .told = NAN, .refused = 7,
+    .evidence = "displacements of the model: even directions 1.0 to 1.2, half of the sphere 3.5 to 4.2, an empty cap of 110 degrees 6.8 to 7.8, where fits err by 20 to 68 % of the displacement and 9 times as much as stated; a circle, three axes: infinite",
+    .people = 7, .n = 56,
+    .remedy = "simulate evenly spread directions, at least 8", .interfaces = OFFLINE},
+  [SUPINE_INPUT_FIELDS_GAP] = {
+    .name = "fields-gap", .group = "Fields", .input = "the directions of gravity of another simulator's runs",
+    .against = "the whole sphere", .measured = "angle from the direction farthest from all runs to the nearest, degrees",
+    .told = 75, .refused = NAN,
+    .evidence = "displacements of the model: found / stated error in random directions with gaps of 40 to 75 degrees, median 1.0; with caps of 80 degrees left empty 3 to 7, with half of the sphere 4 to 14; six even directions have 62",
+    .people = 7, .n = 364,
+    .remedy = "simulate directions in the gap", .interfaces = OFFLINE},
+  [SUPINE_INPUT_FIELDS_POSITIONS] = {
+    .name = "fields-positions", .group = "Fields", .input = "the displacements of another simulator",
+    .against = "the positions of the vertices", .measured = "SD of the displacements between vertices / SD of the positions",
+    .told = NAN, .refused = 0.5, .evidence = "displacements of the model: from full to rest at most 0.20, between postures 0.10; positions: about 1",
+    .people = 7, .n = 294,
+    .remedy = "subtract the points from displaced positions, and use one unit", .interfaces = OFFLINE},
+  [SUPINE_INPUT_FIELDS_UNIT] = {
+    .name = "fields-unit", .group = "Fields", .input = "the displacements of another simulator",
+    .against = "lungs in gravity", .measured = "RMS displacement, mm", .below = true,
+    .told = 0.1, .refused = NAN, .evidence = "displacements of the model: between postures 5 and more, in metres 0.03 and less",
+    .people = 7, .n = 147,
+    .remedy = "write displacements in the unit of the points", .interfaces = OFFLINE},
+  [SUPINE_INPUT_FIELDS_RUN_SIZE] = {
+    .name = "fields-run-size", .group = "Fields", .input = "a run of another simulator",
+    .against = "all other runs", .measured = "RMS displacement / largest of the other runs",
+    .told = 5, .refused = NAN, .evidence = "displacements of the model: at most 1.2; ten times a run of usual size: 8 and more",
+    .people = 7, .n = 294,
+    .remedy = "check this run and its unit", .interfaces = OFFLINE},
+  [SUPINE_INPUT_FIELDS_RUN_ERROR] = {
+    .name = "fields-run-error", .group = "Fields", .input = "a run of another simulator",
+    .against = "its prediction from the other runs", .measured = "RMS error / median of all runs, if above a tenth of the RMS displacement",
+    .told = 10, .refused = NAN, .evidence = "displacements of the model: at most 8.5; one run of 32 or 40 reversed: 9 to 24",
+    .people = 7, .n = 294,
+    .remedy = "check the direction and the displacement of this run", .interfaces = OFFLINE},
+  [SUPINE_INPUT_FIELDS_LEFT_OUT] = {
+    .name = "fields-left-out", .group = "Fields", .input = "the fields of another simulator",
+    .against = "runs that are left out", .measured = "leave-one-out error / what depends on gravity",
+    .told = 0.8, .refused = 0.95,
+    .evidence = "displacements of the model: 8 even directions and more at most 0.34, the six axes 0.77; rows of 12 directions and more in a random order 0.84 and more",
+    .people = 7, .n = 294,
+    .remedy = "check that the rows of gravity and displacement are in the same order, or simulate more directions", .interfaces = OFFLINE},
 };
 /* clang-format on */
 _Static_assert(sizeof inputs / sizeof *inputs == SUPINE_INPUT_COUNT, "each input needs a row");

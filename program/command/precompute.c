@@ -11,6 +11,7 @@
 #include "precompute/library.h"
 #include "program/command/list.h"
 #include "program/options/model_options.h"
+#include "program/options/surface_options.h"
 
 static const char name[] = "precompute";
 
@@ -94,7 +95,8 @@ static const supine_option table[] = {
      "only print N directions of gravity that cover the sphere evenly, as CSV, to simulate",
      FILLS(directions), .range = {2.0, 1000.0}, .partners = "volumes", .alone = true},
     {"volumes", 0, "N",
-     "with --directions: print N rows for each direction, with a column 'fill' from 0, the smallest "
+     "with --directions: print N rows for each direction, with a column 'fill' from 0, the "
+     "smallest "
      "volume to simulate, to 1, the largest. Four are enough for most tissue",
      FILLS(volumes), .range = {2.0, 100.0}, .partners = "directions"},
     {.table = supine_options_model, FILLS(model)},
@@ -184,6 +186,11 @@ static void print_fit(const request *wanted, const supine_prepared *prepared,
   }
   (void)puts("");
   print_assumed("--axes, --units and --scanned", prepared->assumed);
+  (void)supine_print(stdout,
+                     "displacement: %.3g mm RMS; with gravity %.2f,%.2f,%.2f (LPS), the nearest to "
+                     "supine, %.3g mm\nalong gravity on average\n",
+                     report->displacement, report->nearest_supine[0], report->nearest_supine[1],
+                     report->nearest_supine[2], report->along_gravity);
   (void)printf("the directions determine bands up to %zu (%zu harmonic%s); leave-one-out error:\n",
                highest, (highest + 1) * (highest + 1), highest > 0 ? "s" : "");
   for (size_t band = 0; band <= highest; ++band) {
@@ -233,11 +240,14 @@ static supine_status write_basis(request *wanted, const supine_prepared *prepare
                                  supine_precompute_report *report, supine_error *error) {
   supine_precompute_options *options = &wanted->model.precompute;
   supine_bytes bytes = {.data = NULL};
+  supine_findings findings = {.count = 0};
   supine_progress progress = supine_options_progress_begin(name);
   options->progress = show_progress;
   options->context = &progress;
-  supine_status status = supine_precompute_make(options, prepared, &bytes, report, error);
+  supine_status status =
+      supine_precompute_make(options, prepared, &findings, &bytes, report, error);
   supine_options_progress_end(&progress);
+  supine_options_say_findings(name, &findings);
   if (status == SUPINE_OK) {
     status = supine_precompute_save(wanted->path, &bytes, error);
   }

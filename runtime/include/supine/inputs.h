@@ -72,6 +72,14 @@ typedef enum supine_input_id {
   SUPINE_INPUT_LOCATE_TURNED,
   /* Words. */
   SUPINE_INPUT_SUGGESTION,
+  /* Displacement fields of another simulator. */
+  SUPINE_INPUT_FIELDS_DIRECTIONS,
+  SUPINE_INPUT_FIELDS_GAP,
+  SUPINE_INPUT_FIELDS_POSITIONS,
+  SUPINE_INPUT_FIELDS_UNIT,
+  SUPINE_INPUT_FIELDS_RUN_SIZE,
+  SUPINE_INPUT_FIELDS_RUN_ERROR,
+  SUPINE_INPUT_FIELDS_LEFT_OUT,
   SUPINE_INPUT_COUNT /**< sentinel: the number of rows */
 } supine_input_id;
 
