@@ -18,6 +18,7 @@
 #include <supine/inputs.h>
 
 #include "base/arena.h"
+#include "base/text.h"
 #include "base/vec3.h"
 #include "precompute/fields/check.h"
 #include "precompute/fields/volumes.h"
@@ -94,7 +95,7 @@ static supine_status check_directions(const checking *c) {
   const supine_input_verdict verdict =
       supine_input_judge(SUPINE_INPUT_FIELDS_DIRECTIONS, condition);
   SUPINE_REFUSE_IF(
-      verdict == SUPINE_INPUT_REFUSED, c->error, SUPINE_ERROR_ARGUMENT,
+      verdict == SUPINE_INPUT_REFUSED, c->error, SUPINE_ERROR_FORMAT,
       "%s: the directions of gravity do not cover the sphere: there is none within %.0f degrees of "
       "%.2f,%.2f,%.2f (LPS), and they do not determine how gravity displaces the lungs in other "
       "directions. Simulate evenly spread directions, at least 8",
@@ -193,9 +194,9 @@ static void check_sizes(const checking *c, const supine_fields_motion *motion) {
   double second = 0.0;
   if (supine_input_judge(SUPINE_INPUT_FIELDS_UNIT, motion->rms_mm) != SUPINE_INPUT_TAKEN) {
     supine_findings_add(c->findings,
-                        "%s: warning: the displacements are small, %.2g mm RMS: are they in "
+                        "%s: warning: the displacements are small, %s mm RMS: are they in "
                         "metres? Write them in the unit of the points",
-                        c->name, motion->rms_mm);
+                        c->name, supine_text_distance(motion->rms_mm).text);
   }
   for (size_t run = 1; run < c->fields->run_count; ++run) {
     if (c->size[run] > c->size[largest]) {
@@ -209,9 +210,10 @@ static void check_sizes(const checking *c, const supine_fields_motion *motion) {
       supine_input_judge(SUPINE_INPUT_FIELDS_RUN_SIZE, c->size[largest] / second) !=
           SUPINE_INPUT_TAKEN) {
     supine_findings_add(c->findings,
-                        "%s: warning: row %zu: the displacement, %.3g mm RMS, is much larger than "
-                        "in all other rows, at most %.3g mm: check this run and its unit",
-                        c->name, largest, c->size[largest], second);
+                        "%s: warning: row %zu: the displacement, %s mm RMS, is much larger than "
+                        "in all other rows, at most %s mm: check this run and its unit",
+                        c->name, largest, supine_text_distance(c->size[largest]).text,
+                        supine_text_distance(second).text);
   }
 }
 
@@ -266,7 +268,7 @@ supine_status supine_fields_check_fit(const char *name, const supine_fit_report 
   const bool bad_run =
       supine_input_judge(SUPINE_INPUT_FIELDS_RUN_ERROR, report->worst_error) != SUPINE_INPUT_TAKEN;
   SUPINE_REFUSE_IF(
-      verdict == SUPINE_INPUT_REFUSED, error, SUPINE_ERROR_NUMERICAL,
+      verdict == SUPINE_INPUT_REFUSED, error, SUPINE_ERROR_FORMAT,
       "%s: the directions of gravity do not predict the displacements: runs that are left out have "
       "an error of %.0f %% of what gravity changes. Check that the rows of gravity and "
       "displacement "

@@ -19,14 +19,14 @@ typedef struct supine_fields_motion {
  * @param name      of the file, for messages
  * @param findings  warnings are added
  * @param motion    written
- * @retval SUPINE_ERROR_ARGUMENT  the directions do not determine how gravity displaces the lungs
- * @retval SUPINE_ERROR_FORMAT    the displacements are positions */
+ * @retval SUPINE_ERROR_FORMAT  the directions do not determine how gravity displaces the lungs, or
+ *   the displacements are positions */
 supine_status supine_fields_check(const char *name, const supine_fields *fields,
                                   const supine_lungs *lungs, supine_findings *findings,
                                   supine_fields_motion *motion, supine_error *error);
 
 /** Check that the fit predicts runs that it has not seen.
- * @retval SUPINE_ERROR_NUMERICAL  directions of gravity do not predict the displacements */
+ * @retval SUPINE_ERROR_FORMAT  directions of gravity do not predict the displacements */
 supine_status supine_fields_check_fit(const char *name, const supine_fit_report *report,
                                       supine_findings *findings, supine_error *error);
 

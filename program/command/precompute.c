@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine precompute: make a basis file from lung surfaces or a label map. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -186,11 +187,14 @@ static void print_fit(const request *wanted, const supine_prepared *prepared,
   }
   (void)puts("");
   print_assumed("--axes, --units and --scanned", prepared->assumed);
-  (void)supine_print(stdout,
-                     "displacement: %.3g mm RMS; with gravity %.2f,%.2f,%.2f (LPS), the nearest to "
-                     "supine, %.3g mm\nalong gravity on average\n",
-                     report->displacement, report->nearest_supine[0], report->nearest_supine[1],
-                     report->nearest_supine[2], report->along_gravity);
+  const double *nearest = report->nearest_supine;
+  (void)supine_print(
+      stdout,
+      "displacement: %s mm RMS; with gravity along %.2f,%.2f,%.2f (LPS), nearest to supine, %s mm\n"
+      "%s gravity on average\n",
+      supine_text_distance(report->displacement).text, nearest[0], nearest[1], nearest[2],
+      supine_text_distance(fabs(report->along_gravity)).text,
+      report->along_gravity < 0.0 ? "against" : "along");
   (void)printf("the directions determine bands up to %zu (%zu harmonic%s); leave-one-out error:\n",
                highest, (highest + 1) * (highest + 1), highest > 0 ? "s" : "");
   for (size_t band = 0; band <= highest; ++band) {
