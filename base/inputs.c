@@ -285,6 +285,11 @@ static const supine_input inputs[] = {
     .evidence = "displacements of the model: 8 even directions and more at most 0.34, the six axes 0.77; rows of 12 directions and more in a random order 0.84 and more",
     .people = 7, .n = 294,
     .remedy = "check that the rows of gravity and displacement are in the same order, or simulate more directions", .interfaces = OFFLINE},
+  [SUPINE_INPUT_FIELDS_VOLUME] = {
+    .name = "fields-volume", .group = "Fields", .input = "a volume of lungs whose volumes another simulator computed",
+    .against = "the simulated volumes in this direction of gravity", .measured = "distance outside their range, mL",
+    .told = NAN, .refused = 0, .evidence = "definition",
+    .remedy = "choose a volume in the range", .interfaces = ALL},
 };
 /* clang-format on */
 _Static_assert(sizeof inputs / sizeof *inputs == SUPINE_INPUT_COUNT, "each input needs a row");

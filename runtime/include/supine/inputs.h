@@ -80,6 +80,7 @@ typedef enum supine_input_id {
   SUPINE_INPUT_FIELDS_RUN_SIZE,
   SUPINE_INPUT_FIELDS_RUN_ERROR,
   SUPINE_INPUT_FIELDS_LEFT_OUT,
+  SUPINE_INPUT_FIELDS_VOLUME,
   SUPINE_INPUT_COUNT /**< sentinel: the number of rows */
 } supine_input_id;
 
