@@ -104,7 +104,7 @@ typedef struct supine_input {
   double told;          /**< limit from which the input is taken with a warning */
   double refused;       /**< limit from which the input is refused */
   const char *evidence; /**< where the limits come from */
-  int people;           /**< number of people that were measured; 0 if the limit is a definition */
+  int people;           /**< number of people that were measured; 0 if none was measured */
   int n;                /**< number of measurements */
   const char *remedy;   /**< what to do */
   unsigned interfaces;  /**< sum of SUPINE_INPUT_BY_... */
