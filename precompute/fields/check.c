@@ -6,7 +6,7 @@
  * about directions where there is no run.
  *
  *   gap        angle between the direction farthest from all runs and the nearest run. It says how
- *              far a fit must reach, whatever its band: next to an empty half, fits erred 4 to 14
+ *              far a fit must reach, whatever its band: next to an empty half, fits erred 8
  *              times as much as they stated.
  *   condition  condition number of the harmonics to degree 1 in the directions. It says whether
  *              the runs determine any dependence on gravity at all. A circle of directions has the

@@ -8,7 +8,10 @@ BUILD is the folder of the build, each MAP a label map of a person's lungs at fu
 simulator: the displacements from full inflation to rest, and from supine to other postures at rest, in several plans of
 directions. Each plan is fitted as `precompute --fields` fits it. Then caps of the sphere are left empty, and the error that
 is found in 150 other directions is divided by the leave-one-out error that would be stated."""
+import os
+import pathlib
 import sys
+import tempfile
 
 import numpy as np
 
@@ -25,15 +28,22 @@ def even(count):
     return np.column_stack([r * np.cos(t), r * np.sin(t), z])
 
 
-def terms(band, g):
+def products(band, g):
     """Products of the coordinates that span the harmonics to a band."""
     return np.array([g[:, 0] ** i * g[:, 1] ** j * g[:, 2] ** (d - i - j)
                      for d in ({band, band - 1} if band > 0 else {0}) for i in range(d + 1) for j in range(d + 1 - i)]).T
 
 
+# For each band, what makes the products orthonormal over the sphere, as harmonics are.
+SCALES = [np.linalg.inv(np.linalg.qr(products(band, even(FINE)))[1]) for band in range(6)]
+
+
+def terms(band, g):
+    return products(band, g) @ SCALES[band]
+
+
 def condition(g):
-    s = np.linalg.svd(np.column_stack([np.ones(len(g)), 3 ** 0.5 * g]), compute_uv=False)
-    return s[0] / s[-1]
+    return np.linalg.cond(terms(1, g))
 
 
 def gap(g):
@@ -45,7 +55,7 @@ def fit(g, u):
     chosen, errors, runs = 0, [], None
     for band in range(6):
         a = terms(band, g)
-        if a.shape[1] >= len(g) or np.linalg.matrix_rank(a) < a.shape[1]:
+        if a.shape[1] >= len(g) or np.linalg.cond(a) > 100:
             break
         hat = a @ np.linalg.pinv(a)
         if (1 - np.diag(hat)).min() < 1e-3:
@@ -101,14 +111,20 @@ def caps(basis, step):
 
 
 def main():
-    package = take_package(sys.argv[1])
-    rng = np.random.default_rng(1)
+    build = pathlib.Path(sys.argv[1]).resolve()
+    os.environ["PATH"] = str(build) + os.pathsep + os.environ["PATH"]
+    with tempfile.TemporaryDirectory() as folder:
+        measure(take_package(build, pathlib.Path(folder)), sys.argv[2:])
+
+
+def measure(package, paths):
+    rng = np.random.default_rng(5)
     draw = lambda n: (lambda g: g / np.linalg.norm(g, axis=1)[:, None])(rng.normal(size=(n, 3)))
     plans = {f"even {n}": even(n) for n in (6, 8, 10, 12, 16, 20, 32, 40)}
     plans |= {f"random {n}, {k}": draw(n) for n in (8, 12, 20, 40) for k in range(3)}
     plans["six axes"] = np.concatenate([np.eye(3), -np.eye(3)])
     measured, empty = [], []
-    for path in sys.argv[2:]:
+    for path in paths:
         basis = package.precompute(path, edge=10, held_out=20)
         step = max(1, basis.vertex_count // POINTS)
         measured.append(right(basis, step, plans.values(), rng))
