@@ -33,27 +33,28 @@ static const supine_input inputs[] = {
   [SUPINE_INPUT_VOLUME_LEAST] = {
     .name = "volume-least", .group = "State", .input = "a volume of the lungs",
     .against = "full inflation", .measured = "share of full inflation", .below = true,
-    .told = NAN, .refused = 0.1, .evidence = "tissue alone fills about 0.1",
+    .told = NAN, .refused = 0.1, .evidence = "assumed: tissue alone fills about 0.1",
     .remedy = "choose a volume nearer to rest, or allow folds", .interfaces = ALL},
   [SUPINE_INPUT_VOLUME_MOST] = {
     .name = "volume-most", .group = "State", .input = "a volume of the lungs",
     .against = "full inflation", .measured = "share of full inflation",
-    .told = NAN, .refused = 1.2, .evidence = "definition of full inflation, and the error of a scan's volume",
+    .told = NAN, .refused = 1.2, .evidence = "assumed: definition of full inflation, and a margin for the error of a scan's volume",
     .remedy = "choose a volume nearer to rest, or allow folds", .interfaces = ALL},
   [SUPINE_INPUT_FOLDS] = {
     .name = "folds", .group = "State", .input = "a state of the lungs",
     .against = "the reference surface", .measured = "share of triangles that turn over",
-    .told = NAN, .refused = 0.01, .evidence = "single triangles turn over in right states",
+    .told = NAN, .refused = 0.01, .evidence = "six postures at rest and at full inflation: no triangle; the margin is assumed",
+    .people = 7, .n = 144,
     .remedy = "choose a volume nearer to rest, or allow folds", .interfaces = ALL},
   [SUPINE_INPUT_FIELD_FOLDS] = {
     .name = "field-folds", .group = "State", .input = "a displacement field of a state",
     .against = "the cells inside the lungs", .measured = "share of cells that fold",
-    .told = NAN, .refused = 0.01, .evidence = "as for the surface",
+    .told = NAN, .refused = 0.01, .evidence = "assumed: as for the surface",
     .remedy = "choose a volume nearer to rest, or allow folds", .interfaces = COMMAND},
   [SUPINE_INPUT_BREATH] = {
     .name = "breath", .group = "State", .input = "a breath from a state",
     .against = "full inflation", .measured = "share of full inflation at the breath's end",
-    .told = 1, .refused = 1.2, .evidence = "definition of full inflation",
+    .told = 1, .refused = 1.2, .evidence = "told: definition of full inflation; refused: assumed, as for volumes",
     .remedy = "choose a smaller breath", .interfaces = COMMAND},
   [SUPINE_INPUT_STATE_MEMBERS] = {
     .name = "state-members", .group = "State", .input = "a state as an object or an array",
@@ -64,7 +65,7 @@ static const supine_input inputs[] = {
   [SUPINE_INPUT_POINT_OUTSIDE] = {
     .name = "point-outside", .group = "Points", .input = "a point, such as a nodule",
     .against = "the surface of the lungs", .measured = "distance outside, mm",
-    .told = NAN, .refused = 60, .evidence = "definition: beyond ribs and chest wall",
+    .told = NAN, .refused = 60, .evidence = "assumed: beyond ribs and chest wall",
     .remedy = "check the axes and the unit of this point, or leave it out", .interfaces = SUPINE_INPUT_BY_COMMAND | SUPINE_INPUT_BY_PYTHON},
   [SUPINE_INPUT_DEVICE_NAME] = {
     .name = "device-name", .group = "Points", .input = "the name of a tracker's device",
@@ -88,7 +89,7 @@ static const supine_input inputs[] = {
   [SUPINE_INPUT_REST_SHARE] = {
     .name = "rest-share", .group = "Patient", .input = "a volume at rest computed from the height",
     .against = "the scan's volume at full inflation", .measured = "share of full inflation",
-    .told = NAN, .refused = 0.9, .evidence = "definition: breaths need more than a tenth",
+    .told = NAN, .refused = 0.9, .evidence = "assumed: breaths need more than a tenth",
     .remedy = "check the height and the state of the scan, or give the volume at rest", .interfaces = OFFLINE},
   [SUPINE_INPUT_GAS] = {
     .name = "gas", .group = "Patient", .input = "volumes of the lungs",
@@ -149,17 +150,17 @@ static const supine_input inputs[] = {
   [SUPINE_INPUT_IMAGE_FRAME] = {
     .name = "image-frame", .group = "Images", .input = "an image or labels that move with the lungs",
     .against = "the lungs of the basis", .measured = "share of the lungs in the image", .below = true,
-    .told = 0.9, .refused = NAN, .evidence = "definition",
+    .told = 0.9, .refused = NAN, .evidence = "assumed: the edge of an image may cut a part of the lungs off",
     .remedy = "check that the image shows the scan of the basis, in its frame", .interfaces = COMMAND},
   [SUPINE_INPUT_CT_FRAME] = {
     .name = "ct-frame", .group = "Images", .input = "a CT whose densities are scaled",
     .against = "the lungs of the basis", .measured = "share of the lungs in the image", .below = true,
-    .told = NAN, .refused = 0.9, .evidence = "definition",
+    .told = NAN, .refused = 0.9, .evidence = "assumed: the edge of an image may cut a part of the lungs off",
     .remedy = "check that the image shows the scan of the basis, in its frame", .interfaces = COMMAND},
   [SUPINE_INPUT_CT_AIR] = {
     .name = "ct-air", .group = "Images", .input = "a CT",
     .against = "air inside the lungs of the basis", .measured = "median inside the lungs, HU",
-    .told = NAN, .refused = -300, .evidence = "collapsed and consolidated tissue is above",
+    .told = NAN, .refused = -300, .evidence = "assumed: collapsed and consolidated tissue is above",
     .remedy = "check that the image is a CT of these lungs", .interfaces = COMMAND},
   [SUPINE_INPUT_PERSON_WIDTH_LEAST] = {
     .name = "person-width-least", .group = "Two scans", .input = "two scans of one posture",
@@ -212,12 +213,14 @@ static const supine_input inputs[] = {
   [SUPINE_INPUT_PATIENT_BOX] = {
     .name = "patient-box", .group = "Landmarks", .input = "a patient's file and lungs",
     .against = "the scan that was fitted", .measured = "ratio of width, depth or height",
-    .told = 1.05, .refused = NAN, .evidence = "the same scan; surfaces of 2 and 8 mm edge differ by less",
+    .told = 1.05, .refused = NAN, .evidence = "the same scan, surfaces of 3 and 8 mm edge: at most 1.043",
+    .people = 7, .n = 12,
     .remedy = "give the scan that was fitted", .interfaces = OFFLINE},
   [SUPINE_INPUT_PATIENT_VOLUME] = {
     .name = "patient-volume", .group = "Landmarks", .input = "a patient's file and lungs",
     .against = "the scan that was fitted", .measured = "ratio of volumes",
-    .told = 1.1, .refused = NAN, .evidence = "the same scan; surfaces of 2 and 8 mm edge differ by less",
+    .told = 1.1, .refused = NAN, .evidence = "the same scan, surfaces of 3 and 8 mm edge: 1.000; the margin is assumed",
+    .people = 7, .n = 12,
     .remedy = "give the scan that was fitted", .interfaces = OFFLINE},
   [SUPINE_INPUT_SURFACE_TURNED] = {
     .name = "surface-turned", .group = "Surfaces", .input = "a file in a format that states which axis is up",
@@ -233,13 +236,63 @@ static const supine_input inputs[] = {
     .name = "locate-turned", .group = "Observed points", .input = "observed points without a rigid motion",
     .against = "the lungs in the state", .measured = "turn that fits best, degrees",
     .told = 10, .refused = NAN,
-    .evidence = "definition; the residuals must fall to a quarter, and a fitted rotation has an SD of 3 degrees",
+    .evidence = "assumed; the residuals must fall to a quarter, and a fitted rotation has an SD of 3 degrees",
     .remedy = "let the points' frame turn", .interfaces = OFFLINE},
   [SUPINE_INPUT_SUGGESTION] = {
     .name = "suggestion", .group = "Words", .input = "a word that is unknown",
     .against = "the words that are known", .measured = "share of the characters that differ",
-    .told = 0.4, .refused = NAN, .evidence = "definition",
+    .told = 0.4, .refused = NAN, .evidence = "assumed",
     .remedy = "nearer words are suggested, others are not", .interfaces = ALL},
+  [SUPINE_INPUT_FIELDS_DIRECTIONS] = {
+    .name = "fields-directions", .group = "Fields", .input = "the directions of gravity of another simulator's runs",
+    .against = "the harmonics to degree 1", .measured = "condition number of these four harmonics",
+    .told = NAN, .refused = 7,
+    .evidence = "displacements of the model: even directions 1.0 to 1.2, half of the sphere 3.5 to 4.2, an empty cap of 110 degrees 6.8 to 7.8, where fits err by 31 % of the displacement (at most 68 %) and 9 times as much as stated; a circle, three axes: infinite",
+    .people = 7, .n = 56,
+    .remedy = "simulate evenly spread directions, at least 8", .interfaces = OFFLINE},
+  [SUPINE_INPUT_FIELDS_GAP] = {
+    .name = "fields-gap", .group = "Fields", .input = "the directions of gravity of another simulator's runs",
+    .against = "the whole sphere", .measured = "angle from the direction farthest from all runs to the nearest, degrees",
+    .told = 75, .refused = NAN,
+    .evidence = "displacements of the model: found / stated error, median, with an empty cap of 50 degrees 1.0, of 80 degrees 4.1, of half of the sphere 7.9 (at most 23); six even directions have a gap of 62, the six axes 54",
+    .people = 7, .n = 728,
+    .remedy = "simulate directions in the gap", .interfaces = OFFLINE},
+  [SUPINE_INPUT_FIELDS_POSITIONS] = {
+    .name = "fields-positions", .group = "Fields", .input = "the displacements of another simulator",
+    .against = "the positions of the vertices", .measured = "SD of the displacements between vertices / SD of the positions",
+    .told = NAN, .refused = 0.5, .evidence = "displacements of the model: at most 0.20; positions: about 1",
+    .people = 7, .n = 294,
+    .remedy = "subtract the points from displaced positions, and use one unit", .interfaces = OFFLINE},
+  [SUPINE_INPUT_FIELDS_UNIT] = {
+    .name = "fields-unit", .group = "Fields", .input = "the displacements of another simulator",
+    .against = "lungs in gravity", .measured = "RMS displacement, mm", .below = true,
+    .told = 0.1, .refused = NAN, .evidence = "displacements of the model: between postures 7 and more, in metres 0.04 and less",
+    .people = 7, .n = 147,
+    .remedy = "write displacements in the unit of the points", .interfaces = OFFLINE},
+  [SUPINE_INPUT_FIELDS_RUN_SIZE] = {
+    .name = "fields-run-size", .group = "Fields", .input = "a run of another simulator",
+    .against = "all other runs", .measured = "RMS displacement / largest of the other runs",
+    .told = 5, .refused = NAN, .evidence = "displacements of the model: at most 1.2; ten times a run of usual size: 8 and more",
+    .people = 7, .n = 294,
+    .remedy = "check this run and its unit", .interfaces = OFFLINE},
+  [SUPINE_INPUT_FIELDS_RUN_ERROR] = {
+    .name = "fields-run-error", .group = "Fields", .input = "a run of another simulator",
+    .against = "its prediction from the other runs", .measured = "RMS error / median of all runs, if above a tenth of the RMS displacement",
+    .told = 10, .refused = NAN, .evidence = "displacements of the model: at most 8.5; one run of 32 or 40 reversed: 9 to 24",
+    .people = 7, .n = 294,
+    .remedy = "check the direction and the displacement of this run", .interfaces = OFFLINE},
+  [SUPINE_INPUT_FIELDS_LEFT_OUT] = {
+    .name = "fields-left-out", .group = "Fields", .input = "the fields of another simulator",
+    .against = "runs that are left out", .measured = "leave-one-out error / what depends on gravity",
+    .told = 0.8, .refused = 0.95,
+    .evidence = "displacements of the model: 8 even directions and more at most 0.34, the six axes 0.77; rows of 12 directions and more in a random order 0.90 (in further draws 0.84) and more",
+    .people = 7, .n = 294,
+    .remedy = "check that the rows of gravity and displacement are in the same order, or simulate more directions", .interfaces = OFFLINE},
+  [SUPINE_INPUT_FIELDS_VOLUME] = {
+    .name = "fields-volume", .group = "Fields", .input = "a volume of lungs whose volumes another simulator computed",
+    .against = "the simulated volumes in this direction of gravity", .measured = "distance outside their range, mL",
+    .told = NAN, .refused = 0, .evidence = "definition",
+    .remedy = "choose a volume in the range", .interfaces = ALL},
 };
 /* clang-format on */
 _Static_assert(sizeof inputs / sizeof *inputs == SUPINE_INPUT_COUNT, "each input needs a row");

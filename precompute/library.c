@@ -9,6 +9,7 @@
 #include <supine/precompute.h>
 
 #include "base/arena.h"
+#include "precompute/fields/check.h"
 #include "precompute/library.h"
 
 enum { BAND = 23, MODES = 16 }; /* defaults */
@@ -58,11 +59,36 @@ static void fill_report(const supine_prepared *prepared, const supine_basis_repo
       .turned_over = made->turned_over};
 }
 
+/* Read another simulator's fields, and question them.
+ * @param motion  written: how large the displacements are */
+static supine_status load_fields(const char *path, const supine_source *source,
+                                 supine_findings *findings, supine_fields *fields,
+                                 supine_fields_motion *motion, supine_error *error) {
+  SUPINE_TRY(supine_fields_load(path, &source->lungs, &source->frame, fields, error));
+  return supine_fields_check(path, fields, &source->lungs, findings, motion, error);
+}
+
+static void report_fields(const supine_basis_report *made, const supine_fields_motion *motion,
+                          supine_precompute_report *report) {
+  report->band_count = made->fit.band_highest + 1;
+  memcpy(report->band_error, made->fit.error[made->fit.order], sizeof report->band_error);
+  report->direction_count = made->fit.direction_count;
+  report->volume_count = made->fit.volume_count;
+  report->order = made->fit.order;
+  report->extrapolated = made->fit.extrapolated;
+  report->cluster_count = made->cluster_count;
+  report->displacement = motion->rms_mm;
+  report->along_gravity = motion->along_mm;
+  memcpy(report->nearest_supine, motion->nearest, sizeof report->nearest_supine);
+}
+
 supine_status supine_precompute_make(const supine_precompute_options *options,
-                                     const supine_prepared *prepared, supine_bytes *bytes,
-                                     supine_precompute_report *report, supine_error *error) {
+                                     const supine_prepared *prepared, supine_findings *findings,
+                                     supine_bytes *bytes, supine_precompute_report *report,
+                                     supine_error *error) {
   supine_precompute_options told = *options; /* of the progress */
   SUPINE_FREED_BY(supine_fields_free) supine_fields fields = {0};
+  supine_fields_motion motion;
   supine_basis_choice choice;
   supine_basis_report made;
   SUPINE_TRY(choose(&options->modes, options->fields != NULL, &choice, error));
@@ -70,21 +96,15 @@ supine_status supine_precompute_make(const supine_precompute_options *options,
   choice.progress = go_on;
   choice.progress_context = &told;
   if (options->fields != NULL) {
-    const supine_source *source = &prepared->source;
-    SUPINE_TRY(supine_fields_load(options->fields, &source->lungs, &source->frame, &fields, error));
+    SUPINE_TRY(load_fields(options->fields, &prepared->source, findings, &fields, &motion, error));
     choice.fields = &fields;
     choice.scan_gravity = prepared->posture.known ? prepared->posture.state.gravity : NULL;
   }
   SUPINE_TRY(supine_precompute(prepared, &choice, bytes, &made, error));
   fill_report(prepared, &made, report);
   if (options->fields != NULL) {
-    report->band_count = made.fit.band_highest + 1;
-    memcpy(report->band_error, made.fit.error[made.fit.order], sizeof report->band_error);
-    report->direction_count = made.fit.direction_count;
-    report->volume_count = made.fit.volume_count;
-    report->order = made.fit.order;
-    report->extrapolated = made.fit.extrapolated;
-    report->cluster_count = made.cluster_count;
+    SUPINE_TRY(supine_fields_check_fit(options->fields, &made.fit, findings, error));
+    report_fields(&made, &motion, report);
   }
   return SUPINE_OK;
 }
@@ -206,7 +226,8 @@ static supine_status make(const supine_precompute_options *options, owned *to,
   if (status == SUPINE_OK) {
     told.context = (void *)&basis;
     list_assumptions(prepared.assumed, to);
-    status = supine_precompute_make(&told, &prepared, &to->bytes, &to->result.report, error);
+    status = supine_precompute_make(&told, &prepared, &prepared.source.findings, &to->bytes,
+                                    &to->result.report, error);
   }
   list_findings(&prepared.source.findings, to);
   SUPINE_TRY(status);

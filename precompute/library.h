@@ -9,9 +9,11 @@
 
 /** Make a basis. Of the options, those of the lungs and their model were used before, by
  * supine_precompute_prepare.
+ * @param findings  warnings about another simulator's fields are added
  * @param bytes  release bytes->data with free(), also after an error */
 supine_status supine_precompute_make(const supine_precompute_options *options,
-                                     const supine_prepared *prepared, supine_bytes *bytes,
-                                     supine_precompute_report *report, supine_error *error);
+                                     const supine_prepared *prepared, supine_findings *findings,
+                                     supine_bytes *bytes, supine_precompute_report *report,
+                                     supine_error *error);
 
 #endif

@@ -1,11 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Load surfaces and label maps, and join them into lungs. */
-#include <limits.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <supine/inputs.h>
 
@@ -15,6 +12,7 @@
 #include "base/text.h"
 
 #include "mesh/image/image.h"
+#include "precompute/lobes.h"
 #include "precompute/lungs/gate.h"
 #include "precompute/source.h"
 
@@ -104,49 +102,16 @@ static void note_map(const char *path, const supine_labels_report *report,
   }
 }
 
-static bool is_folder(const char *path) {
-  struct stat about;
-  return stat(path, &about) == 0 && S_ISDIR(about.st_mode);
-}
-
-enum { LOBES = 5, LEFT_LOBES = 2 };
-
-/* Masks of the lobes of the lungs, in a folder made by TotalSegmentator. */
-typedef struct lobe_files {
-  char path[LOBES][PATH_MAX];
-  char *list[LOBES];  /* paths of the masks that exist, those of the left lung first */
-  size_t left, right; /* number of masks of each lung */
-} lobe_files;
-
-static supine_status find_lobes(const char *folder, lobe_files *found, supine_error *error) {
-  static const char *const names[LOBES] = {"upper_lobe_left", "lower_lobe_left", "upper_lobe_right",
-                                           "middle_lobe_right", "lower_lobe_right"};
-  static const char *const endings[] = {".nii.gz", ".nii", ".nrrd", ".mha"};
-  found->left = found->right = 0;
-  for (size_t lobe = 0; lobe < LOBES; ++lobe) {
-    for (size_t e = 0; e < sizeof endings / sizeof *endings; ++e) {
-      char *path = found->path[lobe];
-      const int length = snprintf(path, PATH_MAX, "%s/lung_%s%s", folder, names[lobe], endings[e]);
-      if (length < PATH_MAX && access(path, F_OK) == 0) {
-        found->list[found->left + found->right] = path;
-        ++*(lobe < LEFT_LOBES ? &found->left : &found->right);
-        break;
-      }
-    }
-  }
-  SUPINE_REFUSE_IF(found->left + found->right == 0, error, SUPINE_ERROR_READ,
-                   "%s: no lung_upper_lobe_left.nii.gz or other lobe of TotalSegmentator in this "
-                   "folder; give files instead of the folder",
-                   folder);
-  return SUPINE_OK;
-}
-
 static supine_status load_maps(reading *r, supine_source *source, supine_error *error) {
   supine_labels_options wanted = r->options->labels;
-  const bool folder = r->count == 1 && is_folder(r->paths[0]);
-  lobe_files lobes = {.left = 0};
+  const bool folder = r->count == 1 && supine_precompute_is_folder(r->paths[0]);
+  const char *masks[SUPINE_LOBES_MAX];
+  supine_lobe_files lobes = {.left = 0};
   if (folder) {
-    SUPINE_TRY(find_lobes(r->paths[0], &lobes, error));
+    SUPINE_TRY(supine_precompute_lobes_find(r->paths[0], &lobes, error));
+  }
+  for (size_t i = 0; i < SUPINE_LOBES_MAX; ++i) {
+    masks[i] = lobes.path[i];
   }
   wanted.left_masks = lobes.left;
   wanted.right_masks = lobes.right;
@@ -155,7 +120,7 @@ static supine_status load_maps(reading *r, supine_source *source, supine_error *
                            r->options->load.millimetres_per_unit != 1.0,
                        error, SUPINE_REMEDY_MAP_UNIT, SUPINE_ERROR_ARGUMENT,
                        "a label map's header states its unit, but another unit was given");
-  SUPINE_TRY(supine_labels_surfaces(folder ? (const char *const *)lobes.list : r->paths,
+  SUPINE_TRY(supine_labels_surfaces(folder ? masks : r->paths,
                                     folder ? lobes.left + lobes.right : r->count, &wanted,
                                     r->meshes, &source->report, error));
   r->count = source->report.lung_count;
@@ -214,7 +179,8 @@ static supine_status check_kinds(const supine_source_options *options, const cha
   size_t images = 0;
   if (options->surfaces == NULL) {
     for (size_t i = 0; i < count; ++i) {
-      images += supine_image_is_named(paths[i]) || (count == 1 && is_folder(paths[i]));
+      images +=
+          supine_image_is_named(paths[i]) || (count == 1 && supine_precompute_is_folder(paths[i]));
     }
   }
   *is_map = images == count;

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include <supine/inputs.h>
 #include <supine/sh.h>
 
 #include "base/arena.h"
@@ -38,6 +39,12 @@ static supine_status refuse_volume(const char *lung, double volume, double low, 
                           "%.0f mL: choose a volume in this range",
                           lung == NULL ? "the lungs" : "lung ", lung == NULL ? "" : lung,
                           lung == NULL ? "" : "s", low, high, volume);
+}
+
+/* Return whether a volume is outside the simulated range. */
+static bool is_outside(double volume, double low, double high) {
+  return supine_input_judge(SUPINE_INPUT_FIELDS_VOLUME, fmax(low - volume, volume - high)) !=
+         SUPINE_INPUT_TAKEN;
 }
 
 /* Move the volume of each lung into its limits, and give what is left to lungs that have room. */
@@ -80,7 +87,7 @@ static supine_status share_out(const supine_basis *basis, const double gravity[3
       volumes[lung] += s->shares[lung * terms + i] * products[i];
     }
   }
-  if (!(total >= range[0] && total <= range[1])) {
+  if (is_outside(total, range[0], range[1])) {
     return refuse_volume(NULL, range[2] + total, range[2] + range[0], range[2] + range[1], error);
   }
   keep_within(lungs, (const double(*)[2])limits, total, volumes);
@@ -172,7 +179,7 @@ static supine_status solve_lungs(const supine_basis *basis, const double gravity
     const double reference = basis->info.reference_volume[lung];
     double *weights = pose->weights + lung * basis->info.mode_count;
     p.lung = lung;
-    if (!(volumes[lung] >= limits[lung][0] && volumes[lung] <= limits[lung][1]) ||
+    if (is_outside(volumes[lung], limits[lung][0], limits[lung][1]) ||
         !solve(&p, volumes[lung], map_to_unit(limits[lung][0], range) - beyond,
                map_to_unit(limits[lung][1], range) + beyond, weights)) {
       return refuse_volume(basis->info.lung_names[lung], reference + volumes[lung],

@@ -80,31 +80,31 @@ def python(call):
     return ("told" if said else "taken"), " ".join(str(w.message) for w in said)
 
 
-def pose_in_c(posture, volume):
+def pose_in_c(posture, volume, basis=None):
     """Compute a pose as a C program does."""
     given, other = c.State((0.0, 1.0, 0.0)), c.State()
     c.state_parse(posture.encode(), given)
     if volume:
         c.state_parse_volume(volume.encode(), other)
     c.state_join(given, other, given)
-    c.basis_pose(lungs._c, given, supine.Pose())
+    c.basis_pose((basis or lungs)._c, given, supine.Pose())
 
 
 JAVASCRIPT = """
 import { readFileSync } from 'node:fs';
 const { open } = await import(process.argv[1]);
-const lungs = await open(readFileSync('lungs.safetensors'));
+const lungs = await open(readFileSync(process.argv[3]));
 const say = (state) => { try { lungs.pose(state); return ['taken', '']; } catch (error) { return ['refused', error.message]; } };
 console.log(JSON.stringify(JSON.parse(process.argv[2]).map(say)));
 """
 
 
-def javascript(state):
+def javascript(state, basis="lungs.safetensors"):
     """Compute a pose in node; return None if it cannot run."""
     node = shutil.which("node")
     if node is None or not os.path.exists(PACKAGE):
         return None
-    done = subprocess.run([node, "--input-type=module", "-e", JAVASCRIPT, PACKAGE, json.dumps([state])],
+    done = subprocess.run([node, "--input-type=module", "-e", JAVASCRIPT, PACKAGE, json.dumps([state]), basis],
                           capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return tuple(json.loads(done.stdout)[0])
@@ -122,10 +122,11 @@ def state(posture, volume="", javascript_state=None):
 
 def made(path, **options):
     """A basis made from a surface. The Python package passes the options to the C library."""
-    words = [word for key, value in options.items() for word in (f"--{key}", value)]
-    return {"command": lambda: command("precompute", path, "--held-out", 20, *words, "-o", "out.safetensors"),
-            "C": lambda: python(lambda: supine.precompute(path, held_out=20, **options)),
-            "Python": lambda: python(lambda: supine.precompute(path, held_out=20, **options))}
+    options = options if "fields" in options else {"held_out": 20, **options}
+    words = [word for key, value in options.items() for word in ("--" + key.replace("_", "-"), value)]
+    return {"command": lambda: command("precompute", path, *words, "-o", "out.safetensors"),
+            "C": lambda: python(lambda: supine.precompute(path, **options)),
+            "Python": lambda: python(lambda: supine.precompute(path, **options))}
 
 
 def points(z):
@@ -352,7 +353,66 @@ CASES = {
     "patient-volume": (lambda: made("lungs.ply", patient="patient.json"), lambda: made("full.ply", patient="patient.json"), "told"),
     "surface-turned": (lambda: made("up.dae", axes="LSA"), lambda: made("up.dae"), "refused"),
     "suggestion": (suggested("pron"), suggested("Bauchlage"), "told"),
+    "fields-directions": (lambda: simulated(), lambda: simulated(directions=np.eye(3)), "refused"),
+    "fields-gap": (lambda: simulated(), lambda: simulated(directions=even(40)[even(40)[:, 1] > 0.05]), "told"),
+    "fields-positions": (lambda: simulated(), lambda: simulated(change=lambda u: u + solid), "refused"),
+    "fields-unit": (lambda: simulated(), lambda: simulated(change=lambda u: u / 1000), "told"),
+    "fields-run-size": (lambda: simulated(), lambda: simulated(change=lambda u: with_run(u, 10)), "told"),
+    "fields-run-error": (lambda: simulated(volumes=3), lambda: simulated(change=lambda u: with_run(u, -1)), "told"),
+    "fields-left-out": (lambda: simulated(volumes=3), lambda: simulated(volumes=3, change=shuffled), "refused"),
+    "fields-volume": (lambda: simulated_volume(1.2), lambda: simulated_volume(2.0), "refused"),
 }
+
+
+def even(count):
+    """Directions spread evenly over the sphere."""
+    i = np.arange(count)
+    z = 1 - (2 * i + 1) / count
+    return np.column_stack([np.sqrt(1 - z * z) * np.cos(i * np.pi * (3 - 5 ** 0.5)),
+                            np.sqrt(1 - z * z) * np.sin(i * np.pi * (3 - 5 ** 0.5)), z])
+
+
+def simulated(directions=None, volumes=1, change=lambda u: u):
+    """Fields of another simulator: the lungs sag along gravity, the lower part more, and widen with their volume."""
+    directions = even(40) if directions is None else directions
+    place = (solid - solid.mean(axis=0)) / 100
+    filling = np.linspace(0, 1, volumes) if volumes > 1 else [0.0]
+    field = lambda g, s: (5 - (place ** 2).sum(1))[:, None] * g + 3 * np.tanh(place @ g)[:, None] * place + 12 * s * place
+    gravity = np.array([g for g in directions for s in filling])
+    displacement = change(np.array([field(g, s) for g in directions for s in filling]))
+
+    def written(call):
+        supine.save_fields("given.safetensors", solid, gravity, displacement)
+        return call()
+    return {key: lambda call=call: written(call) for key, call in made("lungs.ply", fields="given.safetensors").items()}
+
+
+def simulated_volume(factor):
+    """A total volume of lungs that were simulated at 100 to 140 % of their volume."""
+    def run(call):
+        place = (solid - solid.mean(axis=0)) / 100
+        filling = np.linspace(0, 1, 3)
+        gravity = np.array([g for g in even(20) for s in filling])
+        field = np.array([5 * g + 12 * s * place for g in even(20) for s in filling])
+        supine.save_fields("given.safetensors", solid, gravity, field)
+        basis = supine.precompute("lungs.ply", fields="given.safetensors", output="simulated.safetensors")
+        return call(basis, f"prone:{factor * sum(basis.volumes(basis.pose('prone'))):.0f}mL")
+    return {"command": lambda: run(lambda _, text: command("deform", "simulated.safetensors", "--posture", text, "-o", "out.ply")),
+            "C": lambda: run(lambda basis, text: python(lambda: pose_in_c(text, "", basis))),
+            "Python": lambda: run(lambda basis, text: python(lambda: basis.pose(text))),
+            "JavaScript": lambda: run(lambda _, text: javascript(text, "simulated.safetensors"))}
+
+
+def with_run(displacement, factor):
+    """Scale one run."""
+    displacement[7] *= factor
+    return displacement
+
+
+def shuffled(displacement):
+    """Put the runs in another order than their directions."""
+    order = np.random.default_rng(2).permutation(len(displacement) // 3)
+    return displacement.reshape(-1, 3, *displacement.shape[1:])[order].reshape(displacement.shape)
 
 
 def row_of(axis):

@@ -55,6 +55,10 @@ typedef struct supine_fit_report {
   /** Relative RMS error of the smallest and the largest volumes of each direction, predicted from
    * the others: an extrapolation; 0 if the others do not determine the fit. */
   double extrapolated;
+  /** The run that its direction predicts worst, from runs of other directions; and its RMS error
+   * divided by the median of all runs, or 0 if it is below a tenth of the RMS displacement. */
+  size_t worst_run;
+  double worst_error;
 } supine_fit_report;
 
 /** A fit to fields. Zero-initialise; release with supine_fields_fit_free. */

@@ -37,9 +37,7 @@ static double total_of(const supine_fit *fit, size_t run) {
   return total;
 }
 
-/* Number the directions of gravity of the runs in the order of their first run. Return how many
- * there are. */
-static size_t number_directions(const supine_fields *fields, size_t *direction) {
+size_t supine_fields_number_directions(const supine_fields *fields, size_t *direction) {
   size_t count = 0;
   for (size_t run = 0; run < fields->run_count; ++run) {
     direction[run] = count;
@@ -149,7 +147,7 @@ supine_status supine_fields_volumes_measure(supine_fit *fit, supine_error *error
   fit->parameter = supine_arena_zeros(&fit->memory, lungs * m, sizeof *fit->parameter);
   SUPINE_TRY(supine_arena_check(&arena, error, "%zu fields", m));
   SUPINE_TRY(supine_arena_check(&fit->memory, error, "%zu fields", m));
-  fit->report.direction_count = number_directions(fit->fields, direction);
+  fit->report.direction_count = supine_fields_number_directions(fit->fields, direction);
   SUPINE_REFUSE_IF(fit->report.direction_count < m && !closed, error, SUPINE_ERROR_OPEN_SURFACE,
                    "two runs have the same direction of gravity, but the surface is open, so that "
                    "their volumes are unknown: close it, or keep one run for each direction");

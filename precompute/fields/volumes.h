@@ -7,6 +7,11 @@
 
 #include "precompute/fields/fields.h"
 
+/** Number the directions of gravity of the runs in the order of their first run. Return how many
+ * there are.
+ * @param direction  [runs] written */
+size_t supine_fields_number_directions(const supine_fields *fields, size_t *direction);
+
 /** Measure the volumes of the runs, map them to -1 to 1, and group the runs.
  * @param fit  its members fields and lungs are read; its members volume, range, parameter, groups,
  *   and the counts of the report are written

@@ -7,6 +7,7 @@
 #include "base/number.h"
 #include "mesh/image/image.h"
 #include "precompute/inside/embed.h"
+#include "precompute/lobes.h"
 #include "precompute/patient/patient_file.h"
 
 #include "program/command/embed_content.h"
@@ -60,7 +61,9 @@ static const supine_option table[] = {
      .standard = "4", SUPINE_ABOVE_ZERO, .wants = "millimetres"},
     {"labels", 0, "all|N[=NAME],...",
      "read images as label maps, and embed the surface of each label N as a part with this NAME; "
-     "points and meshes may be embedded too",
+     "all of several maps, or of the folder of masks that TotalSegmentator writes (its lobes), "
+     "have "
+     "the names of the files. Points and meshes may be embedded too",
      SUPINE_FILLS(request, content.labels), .read = read_labels,
      .wants =
          "all, or at most 64 labels with names of up to 31 letters, such as 7=nodule,8=vessels"},
@@ -150,14 +153,20 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   SUPINE_FREED_BY(supine_options_basis_close) supine_basis *basis = NULL;
   bool image = false;
   for (size_t i = 1; i < given->count; ++i) {
-    image = image || supine_image_is_named(given->operand[i]);
+    const bool folder = supine_precompute_is_folder(given->operand[i]);
+    SUPINE_REFUSE_IF(folder && !labels, error, SUPINE_ERROR_ARGUMENT,
+                     "%s is a folder: give --labels all to embed the masks of lobes in it",
+                     given->operand[i]);
+    image = image || folder || supine_image_is_named(given->operand[i]);
   }
   SUPINE_REFUSE_IF(
       given->count == 1 && !wanted->content.has_grid, error, SUPINE_ERROR_ARGUMENT,
       "nothing to embed: give points (.csv, .fcsv, .mrk.json), meshes or an image, or --grid MM");
-  SUPINE_REFUSE_IF(labels && (!image || wanted->content.has_grid), error, SUPINE_ERROR_ARGUMENT,
-                   image ? "--labels embeds surfaces, --grid embeds nodes: give only one"
-                         : "--labels needs a label map: name one (.nrrd, .nii, .nii.gz)");
+  SUPINE_REFUSE_IF(
+      labels && (!image || wanted->content.has_grid), error, SUPINE_ERROR_ARGUMENT,
+      image ? "--labels embeds surfaces, --grid embeds nodes: give only one"
+            : "--labels needs a label map: name one (.nrrd, .nii, .nii.gz), or the folder "
+              "of masks that TotalSegmentator writes");
   SUPINE_REFUSE_IF(!labels && given->count > 1 &&
                        (image ? given->count > 2 : wanted->content.has_grid),
                    error, SUPINE_ERROR_ARGUMENT,

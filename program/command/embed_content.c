@@ -1,8 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Read what is to move with the lungs, and check its axes and units. */
+#include <string.h>
+
 #include "base/arena.h"
 #include "mesh/io/points.h"
 #include "mesh/labels/labels.h"
+#include "precompute/lobes.h"
 #include "precompute/warp/field.h"
 
 #include "program/command/embed_content.h"
@@ -10,16 +13,37 @@
 
 static const char name[] = "embed";
 
+enum { PART_NAME_SIZE = 64 };
+
+/* Name a part that nobody named: "label 7" or, if there are several maps, by the name of the file
+ * ("tumour" of tumour.nii.gz, "tumour 7" if the file has several labels). */
+static void name_part(const char *path, bool several_maps, bool several_labels, unsigned label,
+                      char text[PART_NAME_SIZE]) {
+  const char *slash = strrchr(path, '/');
+  const char *base = slash != NULL ? slash + 1 : path;
+  const int length = (int)strcspn(base, ".");
+  if (!several_maps) {
+    (void)snprintf(text, PART_NAME_SIZE, "label %u", label);
+  } else if (several_labels) {
+    (void)snprintf(text, PART_NAME_SIZE, "%.*s %u", length, base, label);
+  } else {
+    (void)snprintf(text, PART_NAME_SIZE, "%.*s", length, base);
+  }
+}
+
+/* Read the surfaces of the labels of a map.
+ * @param several_maps  whether other maps are embedded too */
 static supine_status read_labelled(const supine_embed_content *wanted, const char *path,
-                                   supine_inside_content *content, supine_error *error) {
+                                   bool several_maps, supine_inside_content *content,
+                                   supine_error *error) {
   supine_labels_shape *parts = NULL;
   size_t count = 0;
   const supine_embed_labels *list = &wanted->labels;
   supine_status status =
       supine_labels_shapes(path, list->label, list->count, &parts, &count, error);
   for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
-    char text[32];
-    (void)snprintf(text, sizeof text, "label %u", parts[i].label);
+    char text[PART_NAME_SIZE];
+    name_part(path, several_maps, count > 1, parts[i].label, text);
     const char *part = list->count > 0 ? list->name[i] : text;
     if (parts[i].surface.triangle_count == 0) {
       supine_options_say(name, "%s: %s is left out, as it is thinner than half a voxel everywhere",
@@ -32,6 +56,17 @@ static supine_status read_labelled(const supine_embed_content *wanted, const cha
   }
   supine_labels_shapes_free(parts, count);
   return status;
+}
+
+/* Read the surfaces of the masks of lobes in a folder. */
+static supine_status read_folder(const supine_embed_content *wanted, const char *path,
+                                 supine_inside_content *content, supine_error *error) {
+  supine_lobe_files lobes;
+  SUPINE_TRY(supine_precompute_lobes_find(path, &lobes, error));
+  for (size_t i = 0; i < lobes.left + lobes.right; ++i) {
+    SUPINE_TRY(read_labelled(wanted, lobes.path[i], true, content, error));
+  }
+  return SUPINE_OK;
 }
 
 /* Tell if the points lie inside the lungs only in other units or axes. Refuse points of which none
@@ -77,6 +112,7 @@ supine_status supine_command_embed_read(const supine_inside_shells *shells,
                                         const supine_embed_content *wanted, char **paths,
                                         size_t count, supine_inside_content *content,
                                         supine_error *error) {
+  size_t maps = 0; /* label maps and folders of masks */
   if (count == 0) {
     return make_grid(shells, NULL, wanted->grid_spacing, content, error);
   }
@@ -86,8 +122,13 @@ supine_status supine_command_embed_read(const supine_inside_shells *shells,
     return make_grid(shells, &image, wanted->grid_spacing, content, error);
   }
   for (size_t i = 0; i < count; ++i) {
+    maps += supine_image_is_named(paths[i]) || supine_precompute_is_folder(paths[i]);
+  }
+  for (size_t i = 0; i < count; ++i) {
     if (supine_image_is_named(paths[i])) {
-      SUPINE_TRY(read_labelled(wanted, paths[i], content, error));
+      SUPINE_TRY(read_labelled(wanted, paths[i], maps > 1, content, error));
+    } else if (supine_precompute_is_folder(paths[i])) {
+      SUPINE_TRY(read_folder(wanted, paths[i], content, error));
     } else if (supine_io_points_named(paths[i])) {
       SUPINE_TRY(supine_inside_content_points(paths[i], &wanted->load, content, error));
     } else {

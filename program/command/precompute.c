@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine precompute: make a basis file from lung surfaces or a label map. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -11,6 +12,7 @@
 #include "precompute/library.h"
 #include "program/command/list.h"
 #include "program/options/model_options.h"
+#include "program/options/surface_options.h"
 
 static const char name[] = "precompute";
 
@@ -94,7 +96,8 @@ static const supine_option table[] = {
      "only print N directions of gravity that cover the sphere evenly, as CSV, to simulate",
      FILLS(directions), .range = {2.0, 1000.0}, .partners = "volumes", .alone = true},
     {"volumes", 0, "N",
-     "with --directions: print N rows for each direction, with a column 'fill' from 0, the smallest "
+     "with --directions: print N rows for each direction, with a column 'fill' from 0, the "
+     "smallest "
      "volume to simulate, to 1, the largest. Four are enough for most tissue",
      FILLS(volumes), .range = {2.0, 100.0}, .partners = "directions"},
     {.table = supine_options_model, FILLS(model)},
@@ -184,6 +187,14 @@ static void print_fit(const request *wanted, const supine_prepared *prepared,
   }
   (void)puts("");
   print_assumed("--axes, --units and --scanned", prepared->assumed);
+  const double *nearest = report->nearest_supine;
+  (void)supine_print(
+      stdout,
+      "displacement: %s mm RMS; with gravity along %.2f,%.2f,%.2f (LPS), nearest to supine, %s mm\n"
+      "%s gravity on average\n",
+      supine_text_distance(report->displacement).text, nearest[0], nearest[1], nearest[2],
+      supine_text_distance(fabs(report->along_gravity)).text,
+      report->along_gravity < 0.0 ? "against" : "along");
   (void)printf("the directions determine bands up to %zu (%zu harmonic%s); leave-one-out error:\n",
                highest, (highest + 1) * (highest + 1), highest > 0 ? "s" : "");
   for (size_t band = 0; band <= highest; ++band) {
@@ -233,11 +244,14 @@ static supine_status write_basis(request *wanted, const supine_prepared *prepare
                                  supine_precompute_report *report, supine_error *error) {
   supine_precompute_options *options = &wanted->model.precompute;
   supine_bytes bytes = {.data = NULL};
+  supine_findings findings = {.count = 0};
   supine_progress progress = supine_options_progress_begin(name);
   options->progress = show_progress;
   options->context = &progress;
-  supine_status status = supine_precompute_make(options, prepared, &bytes, report, error);
+  supine_status status =
+      supine_precompute_make(options, prepared, &findings, &bytes, report, error);
   supine_options_progress_end(&progress);
+  supine_options_say_findings(name, &findings);
   if (status == SUPINE_OK) {
     status = supine_precompute_save(wanted->path, &bytes, error);
   }

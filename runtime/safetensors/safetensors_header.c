@@ -19,10 +19,11 @@ _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "tensors are little-en
 static const struct {
   const char *name;
   size_t size;
-} dtypes[SUPINE_DTYPE_COUNT] = {
-    [SUPINE_U8] = {"U8", 1},   [SUPINE_U32] = {"U32", 4}, [SUPINE_F32] = {"F32", 4},
-    [SUPINE_F64] = {"F64", 8}, [SUPINE_I16] = {"I16", 2}, [SUPINE_I8] = {"I8", 1},
-    [SUPINE_U16] = {"U16", 2},
+} dtypes[] = {
+    [SUPINE_U8] = {"U8", 1},   [SUPINE_U32] = {"U32", 4},      [SUPINE_F32] = {"F32", 4},
+    [SUPINE_F64] = {"F64", 8}, [SUPINE_I16] = {"I16", 2},      [SUPINE_I8] = {"I8", 1},
+    [SUPINE_U16] = {"U16", 2}, [SUPINE_DTYPE_COUNT] = {"", 1}, /* bytes of a type that is not read
+                                                                */
 };
 
 const char *supine_safetensors_dtype_name(supine_dtype dtype) {
@@ -205,21 +206,20 @@ static void parse_metadata(parser *p) {
   expect(p, '}');
 }
 
-static supine_dtype take_dtype(parser *p, const char *tensor) {
+/* Take the name of a type. Return SUPINE_DTYPE_COUNT for a type that is not read. */
+static supine_dtype take_dtype(parser *p) {
   const char *name = take_string(p);
   int dtype = 0;
   while (dtype < SUPINE_DTYPE_COUNT &&
          strcmp(name, supine_safetensors_dtype_name((supine_dtype)dtype)) != 0) {
     ++dtype;
   }
-  if (dtype == SUPINE_DTYPE_COUNT) {
-    fail(p, "tensor '%.64s': dtype '%.16s' is none of U8, I8, U16, I16, U32, F32, F64", tensor, name);
-  }
   return (supine_dtype)dtype;
 }
 
 /* Parse a tensor such as {"dtype": "F32", "shape": [2, 3], "data_offsets": [0, 24]}, with members
- * in any order. Until place_tensors() is called, supine_tensor.data holds the first offset. */
+ * in any order. Until place_tensors() is called, supine_tensor.data holds the first offset. A
+ * tensor of a type that is not read has the shape [bytes], until drop_unread() removes it. */
 static void parse_tensor(parser *p, const char *name) {
   static const char *const members[] = {"dtype", "shape", "data_offsets"};
   supine_safetensors *file = p->file;
@@ -241,7 +241,7 @@ static void parse_tensor(parser *p, const char *name) {
     }
     seen[member] = true;
     if (member == 0) {
-      tensor.dtype = take_dtype(p, name);
+      tensor.dtype = take_dtype(p);
     } else if (member == 1) {
       tensor.rank = take_counts(p, tensor.shape, SUPINE_TENSOR_RANK_MAX);
     } else if (take_counts(p, offsets, 2) != 2) {
@@ -251,6 +251,10 @@ static void parse_tensor(parser *p, const char *name) {
   expect(p, '}');
   if (p->status != SUPINE_OK) {
     return;
+  }
+  if (tensor.dtype == SUPINE_DTYPE_COUNT && tensor.rank > 0 && offsets[0] <= offsets[1]) {
+    tensor.rank = 1;
+    tensor.shape[0] = offsets[1] - offsets[0];
   }
   if (!seen[0] || !seen[1] || !seen[2] || tensor.rank < 1) {
     fail(p, "tensor '%.64s' lacks a dtype, a shape of 1 to %d axes or offsets", name,
@@ -351,6 +355,17 @@ static supine_status place_tensors(parser *p, size_t data_begin) {
   return SUPINE_OK;
 }
 
+/* Remove the tensors of types that are not read, such as I64 or BF16. */
+static void drop_unread(supine_safetensors *file) {
+  size_t kept = 0;
+  for (size_t i = 0; i < file->tensor_count; ++i) {
+    if (file->tensors[i].dtype != SUPINE_DTYPE_COUNT) {
+      file->tensors[kept++] = file->tensors[i];
+    }
+  }
+  file->tensor_count = kept;
+}
+
 supine_status supine_safetensors_parse(supine_safetensors *file, supine_error *error) {
   parser p = {.file = file, .error = error};
   uint64_t length = 0;
@@ -388,7 +403,11 @@ supine_status supine_safetensors_parse(supine_safetensors *file, supine_error *e
   p.at = file->header;
   p.end = file->header + length;
   parse_header(&p);
-  return p.status != SUPINE_OK ? p.status : place_tensors(&p, PREFIX + (size_t)length);
+  if (p.status == SUPINE_OK) {
+    p.status = place_tensors(&p, PREFIX + (size_t)length);
+  }
+  drop_unread(file);
+  return p.status;
 }
 
 const supine_tensor *supine_safetensors_find(const supine_safetensors *file, const char *name) {

@@ -5,6 +5,7 @@
 
 #include "base/number.h"
 #include "base/vec3.h"
+#include "precompute/fields/check.h"
 #include "precompute/fields/fields.h"
 #include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
@@ -367,6 +368,178 @@ TEST(test_fit_few_directions_limit_the_band) {
   supine_fields_free(&fields);
 }
 
+/* Return the displacements of lungs that sag along gravity, their lower part more, and widen by
+ * `volumes` steps of 4 %, which do not depend on gravity. */
+static supine_fields sagging(const double *directions, size_t count, size_t volumes) {
+  const size_t n = lungs.mesh.vertex_count;
+  const size_t runs = count * volumes;
+  supine_fields made = {.run_count = runs, .vertex_count = n};
+  made.directions = malloc(3 * runs * sizeof(double));
+  made.displacement = malloc(3 * runs * n * sizeof(double));
+  for (size_t run = 0; run < runs; ++run) {
+    const double *g = directions + 3 * (run / volumes);
+    memcpy(made.directions + 3 * run, g, 3 * sizeof(double));
+    for (size_t i = 0; i < n; ++i) {
+      double q[3];
+      for (size_t k = 0; k < 3; ++k) {
+        q[k] = lungs.mesh.vertices[3 * i + k] - 0.5 * (lungs.minimum[k] + lungs.maximum[k]);
+      }
+      for (size_t k = 0; k < 3; ++k) {
+        made.displacement[3 * (run * n + i) + k] = 5.0 * g[k] +
+                                                   0.03 * tanh(0.01 * supine_dot(q, g)) * q[k] +
+                                                   0.04 * (double)(1 + run % volumes) * q[k];
+      }
+    }
+  }
+  return made;
+}
+
+static void scale_run(supine_fields *fields, size_t run, double factor) {
+  const size_t row = 3 * fields->vertex_count;
+  for (size_t i = 0; i < row; ++i) {
+    fields->displacement[run * row + i] *= factor;
+  }
+}
+
+enum { EVEN = 40 };
+
+static void spread_evenly(double directions[3 * EVEN]) {
+  for (size_t d = 0; d < EVEN; ++d) {
+    supine_spiral((double)d, (double)EVEN, 0.0, directions + 3 * d);
+  }
+}
+
+/* Check fields and the fit to them. Assert that they are taken without a warning if `words` is
+ * empty, and otherwise that a warning or, if `refused`, the error has these words. */
+static void expect_verdict(const supine_fields *fields, bool refused, const char *words) {
+  supine_findings findings = {.count = 0};
+  supine_fields_motion motion;
+  supine_fit fit = {.fields = NULL};
+  supine_error error = {0};
+  supine_status status = supine_fields_check("f", fields, &lungs, &findings, &motion, &error);
+  if (status == SUPINE_OK) {
+    status = supine_fields_fit(fields, &lungs, -1, &fit, &error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_fields_check_fit("f", &fit.report, &findings, &error);
+  }
+  supine_fields_fit_free(&fit);
+  assert_int_equal(status, refused ? SUPINE_ERROR_FORMAT : SUPINE_OK);
+  if (words[0] == '\0') {
+    assert_string_equal(findings.text, "");
+  } else {
+    assert_says(refused ? error.message : findings.text, words);
+  }
+}
+
+TEST(test_fields_check_directions_without_cover_refused_or_told) {
+  double even[3 * EVEN];
+  double some[3 * EVEN];
+  for (size_t volumes = 1; volumes <= 3; volumes += 2) {
+    spread_evenly(even);
+    supine_fields fields = sagging(even, EVEN, volumes);
+    expect_verdict(&fields, false, "");
+    supine_fields_free(&fields);
+    for (size_t d = 0; d < EVEN; ++d) { /* a cone around supine */
+      some[3 * d] = 0.2 * even[3 * d];
+      some[3 * d + 1] = 1.0;
+      some[3 * d + 2] = 0.2 * even[3 * d + 2];
+      (void)supine_normalise(some + 3 * d, some + 3 * d);
+    }
+    fields = sagging(some, EVEN, volumes);
+    expect_verdict(&fields, true, "do not cover the sphere");
+    supine_fields_free(&fields);
+    for (size_t d = 0; d < EVEN; ++d) { /* a circle */
+      some[3 * d] = cos(6.283185307 * (double)d / EVEN);
+      some[3 * d + 1] = sin(6.283185307 * (double)d / EVEN);
+      some[3 * d + 2] = 0.0;
+    }
+    fields = sagging(some, EVEN, volumes);
+    expect_verdict(&fields, true, "do not cover the sphere");
+    supine_fields_free(&fields);
+    size_t count = 0;
+    for (size_t d = 0; d < EVEN; ++d) { /* half of the sphere */
+      if (even[3 * d + 1] > 0.05) {
+        memcpy(some + 3 * count++, even + 3 * d, 3 * sizeof *some);
+      }
+    }
+    fields = sagging(some, count, volumes);
+    expect_verdict(&fields, false, "leave a gap");
+    supine_fields_free(&fields);
+    static const double axes[] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+    fields = sagging(axes, 3, volumes);
+    expect_verdict(&fields, true, "there is none within 124 degrees");
+    supine_fields_free(&fields);
+  }
+}
+
+/* The same vertices in another frame: positions are recognised without their origin. */
+TEST(test_fields_check_positions_metres_and_single_runs_refused_or_told) {
+  const size_t n = lungs.mesh.vertex_count;
+  double even[3 * EVEN];
+  spread_evenly(even);
+  supine_fields fields = sagging(even, EVEN, 1);
+  for (size_t i = 0; i < 3 * n * EVEN; ++i) {
+    fields.displacement[i] += 500.0 - lungs.mesh.vertices[i % (3 * n)];
+  }
+  expect_verdict(&fields, true, "seem to be positions");
+  supine_fields_free(&fields);
+  fields = sagging(even, EVEN, 1);
+  for (size_t i = 0; i < 3 * n * EVEN; ++i) {
+    fields.displacement[i] *= 1e-3;
+  }
+  expect_verdict(&fields, false, "are they in metres?");
+  supine_fields_free(&fields);
+  fields = sagging(even, EVEN, 1);
+  scale_run(&fields, 7, 10.0);
+  expect_verdict(&fields, false, "row 7: the displacement");
+  supine_fields_free(&fields);
+  fields = sagging(even, EVEN, 1);
+  scale_run(&fields, 11, -1.0);
+  expect_verdict(&fields, false, "row 11: the other rows predict");
+  supine_fields_free(&fields);
+}
+
+/* Beside a change of volume that all runs share, the error of runs that are left out is small even
+ * if the rows are in the wrong order. */
+TEST(test_fields_check_shuffled_rows_refused) {
+  for (size_t volumes = 1; volumes <= 3; volumes += 2) {
+    double even[3 * EVEN];
+    uint64_t seed = 12;
+    spread_evenly(even);
+    supine_fields fields = sagging(even, EVEN, volumes);
+    for (size_t d = EVEN - 1; d > 0; --d) {
+      const size_t other = (size_t)(0.4999 * (random_signed(&seed) + 1.0) * (double)(d + 1));
+      for (size_t k = 0; k < 3; ++k) {
+        const double kept = even[3 * d + k];
+        even[3 * d + k] = even[3 * other + k];
+        even[3 * other + k] = kept;
+      }
+    }
+    for (size_t run = 0; run < fields.run_count; ++run) {
+      memcpy(fields.directions + 3 * run, even + 3 * (run / volumes), 3 * sizeof(double));
+    }
+    expect_verdict(&fields, true, "do not predict the displacements");
+    supine_fields_free(&fields);
+  }
+}
+
+TEST(test_fields_check_motion_of_supine_measured) {
+  static const double six[] = {1, 0, 0, -1, 0, 0, 0, 1, 0, 0, -1, 0, 0, 0, 1, 0, 0, -1};
+  const size_t n = lungs.mesh.vertex_count;
+  supine_fields fields = sagging(six, 6, 1);
+  supine_findings findings = {.count = 0};
+  supine_fields_motion motion;
+  for (size_t i = 0; i < 3 * n * 6; ++i) {
+    fields.displacement[i] = i % 3 == 1 && i / (3 * n) == 2 ? 6.0 : 2.5;
+  }
+  assert_int_equal(supine_fields_check("f", &fields, &lungs, &findings, &motion, NULL), SUPINE_OK);
+  assert_close(motion.nearest[1], 1.0, 1e-15);
+  assert_close(motion.along_mm, 6.0, 1e-9);
+  assert_close(motion.rms_mm, sqrt((17.0 * 2.5 * 2.5 + 36.0) / 6.0), 1e-9);
+  supine_fields_free(&fields);
+}
+
 /* Rows of points in the files of the tests below: an inner point and then the vertices, the last
  * one first. */
 static size_t point_row(size_t vertex) {
@@ -428,6 +601,29 @@ TEST(test_fields_load_any_order_axes_and_inner_points_each_vertex_its_own) {
   }
   assert_close(fields.directions[2], -0.8, 1e-15);
   assert_close(fields.directions[4], 1.0, 1e-15);
+  supine_fields_free(&fields);
+  free_tensors(tensors);
+}
+
+/* An array of another type beside the three, such as the numbers of the nodes, is ignored. */
+TEST(test_fields_load_unrelated_tensor_of_another_type_ignored) {
+  supine_tensor tensors[4];
+  supine_fields fields = {0};
+  const char *path = in_folder("fields.safetensors");
+  write_fields(path, 2, two_directions, tensors);
+  static const int64_t nodes[] = {7, 8};
+  tensors[3] = (supine_tensor){"nodes", SUPINE_F64, 1, {2}, nodes};
+  assert_int_equal(supine_safetensors_write(path, tensors, 4, NULL, 0, NULL), SUPINE_OK);
+  FILE *file = fopen(path, "r+b");
+  char header[1024] = "";
+  assert_non_null(file);
+  assert_true(fread(header, 1, sizeof header - 1, file) > 8);
+  const char *found = strstr(header + 8, "\"nodes\":{\"dtype\":\"F64\"");
+  assert_non_null(found);
+  assert_int_equal(fseek(file, (long)(strchr(found, 'F') - header), SEEK_SET), 0);
+  assert_int_equal(fputc('I', file), 'I');
+  assert_int_equal(fclose(file), 0);
+  assert_int_equal(supine_fields_load(path, &lungs, &ras_cm, &fields, NULL), SUPINE_OK);
   supine_fields_free(&fields);
   free_tensors(tensors);
 }

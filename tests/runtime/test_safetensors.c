@@ -169,6 +169,9 @@ TEST(test_open_valid_headers_accepted) {
       /* The data of `b` are not aligned to 4 bytes. */
       {"{\"b\":{\"dtype\":\"F32\",\"shape\":[1],\"data_offsets\":[2,6]}," A8 "}", 6},
       {"{\"e\":{\"dtype\":\"F64\",\"shape\":[0,9],\"data_offsets\":[2,2]}," A8 "}", 2},
+      /* types that are not read */
+      {"{\"a\":{\"dtype\":\"F16\",\"shape\":[1],\"data_offsets\":[0,2]}}", 2},
+      {"{" A8 ",\"b\":{\"dtype\":\"I64\",\"shape\":[2,1],\"data_offsets\":[2,18]}}", 18},
   };
   for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
     supine_error error = {0};
@@ -200,7 +203,8 @@ TEST(test_open_bad_headers_refused) {
       {"{" A8 ",\"b\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[0,2]}}", 2},
       {"{\"a\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[2,0]}}", 2},
       {"{\"a\":{\"dtype\":\"U8\",\"shape\":[3],\"data_offsets\":[0,2]}}", 2},
-      {"{\"a\":{\"dtype\":\"F16\",\"shape\":[1],\"data_offsets\":[0,2]}}", 2},
+      {"{\"a\":{\"dtype\":\"F16\",\"shape\":[1],\"data_offsets\":[2,0]}}", 2},
+      {"{" A8 ",\"b\":{\"dtype\":\"I64\",\"shape\":[1],\"data_offsets\":[2,10]}}", 9},
       {"{\"a\":{\"dtype\":\"U8\",\"shape\":[],\"data_offsets\":[0,1]}}", 1},
       {"{\"a\":{\"dtype\":\"U8\",\"shape\":[1,1,1,1,1],\"data_offsets\":[0,1]}}", 1},
       {"{\"a\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[0]}}", 2},

@@ -170,6 +170,10 @@ nibabel.save(nibabel.Nifti1Image(lungs.astype(numpy.uint8), affine), "segmentati
 said = run(supine, "solve", "segmentations", "--edge", "5", "--posture", "prone", "-o", "folder.ply")
 if "labels 1, 2 left; 3, 4, 5 right" not in said:
     faults.append(f"folder of masks: {said}")
+run(supine, "precompute", "segmentations", "--edge", "8", "--units", "mm", "--held-out", "20", "-o", "s.safetensors")
+said = run(supine, "embed", "s.safetensors", "segmentations", "--labels", "all", "-o", "lobes.safetensors")
+if any(f": lung_{name}," not in said for name in ("upper_lobe_left", "middle_lobe_right", "lower_lobe_right")):
+    faults.append(f"folder of masks that is embedded: {said}")
 for ending in ("ply", "obj", "stl", "vtp"):
     run(supine, "deform", "l.safetensors", "--posture", "prone", "-o", f"a.{ending}")
     for name in (f"-.{ending}",) + (("-",) if ending == "ply" else ()):

@@ -72,6 +72,15 @@ typedef enum supine_input_id {
   SUPINE_INPUT_LOCATE_TURNED,
   /* Words. */
   SUPINE_INPUT_SUGGESTION,
+  /* Displacement fields of another simulator. */
+  SUPINE_INPUT_FIELDS_DIRECTIONS,
+  SUPINE_INPUT_FIELDS_GAP,
+  SUPINE_INPUT_FIELDS_POSITIONS,
+  SUPINE_INPUT_FIELDS_UNIT,
+  SUPINE_INPUT_FIELDS_RUN_SIZE,
+  SUPINE_INPUT_FIELDS_RUN_ERROR,
+  SUPINE_INPUT_FIELDS_LEFT_OUT,
+  SUPINE_INPUT_FIELDS_VOLUME,
   SUPINE_INPUT_COUNT /**< sentinel: the number of rows */
 } supine_input_id;
 
@@ -95,7 +104,7 @@ typedef struct supine_input {
   double told;          /**< limit from which the input is taken with a warning */
   double refused;       /**< limit from which the input is refused */
   const char *evidence; /**< where the limits come from */
-  int people;           /**< number of people that were measured; 0 if the limit is a definition */
+  int people;           /**< number of people that were measured; 0 if none was measured */
   int n;                /**< number of measurements */
   const char *remedy;   /**< what to do */
   unsigned interfaces;  /**< sum of SUPINE_INPUT_BY_... */

@@ -36,7 +36,7 @@
 extern "C" {
 #endif
 
-/** Element types that Supine reads and writes. */
+/** Element types that Supine reads and writes. Tensors of other types in a file are ignored. */
 typedef enum supine_dtype {
   SUPINE_U8 = 0,
   SUPINE_U32,

@@ -208,7 +208,8 @@ class Basis:
 
     vertices: float32 [N, 3], reference positions, mm
     triangles: uint32 [M, 3], three vertices of each triangle
-    coefficients: float32 [N, K] for K modes, or [N, 3, K] if `vector` is true
+    coefficients: float32 [N, K] for K modes, or [N, 3, K] if `vector` is true; if the file stores clusters of vertices
+        instead, they are computed at each access
     direction: float32 [N, 3], vector along which each vertex moves, mm; None if `vector` is true
     modes: float64 [K, (band + 1)^2, order + 1], spherical-harmonic coefficients of the weight of each mode, for each
         polynomial of the volume; order is 0 unless the file holds another simulator's fields over volume
@@ -247,7 +248,6 @@ class Basis:
                                          for i in range(size.value)}
         self.vertices: Floats = self._tensor("vertices")
         self.triangles: NDArray[np.uint32] = self._tensor("triangles")
-        self.coefficients: Floats = self._tensor("coefficients")
         self.direction: Optional[Floats] = None if self.vector else self._tensor("direction")
         self.modes: Doubles = self._tensor("modes")
         self.bounds: Floats = self._owner.view(ctypes.cast(info.bounds, ctypes.c_void_p).value or 0, ctypes.c_float,
@@ -264,6 +264,15 @@ class Basis:
     def tensor(self, name: str) -> Optional[NDArray[Any]]:
         """Return a tensor of the file as a view; None if the file has no tensor of that name."""
         return self._tensor(name) if _c.basis_tensor(self._c, name.encode()) else None
+
+    @property
+    def coefficients(self) -> Floats:
+        stored: Optional[Floats] = self.tensor("coefficients")
+        if stored is not None:
+            return stored
+        made = np.empty((self.vertex_count, 3, self.mode_count), _FLOAT)
+        _c.basis_coefficients(self._c, 0, self.vertex_count, made.ctypes.data)
+        return made
 
     @property
     def faces(self) -> NDArray[np.int64]:
