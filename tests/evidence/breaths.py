@@ -11,7 +11,8 @@ of the lungs. A basis of the inhaled lungs predicts the exhaled points; the volu
 10 mm larger on each side, with one factor per patient. --quiet: the same from rest to the end of a quiet inspiration.
 A translation is free. 'explained' is the part of the squared displacement that the law predicts. 'own beta' is the
 shear of least squares. 'others' predicts each patient with the mean of the other patients' own betas. --terms: leave
-one patient out of the full breaths in turn, fit further terms of the law to the others, and print what is left."""
+one patient out of the full breaths in turn, fit further terms of the law to the others, and print what is left; of
+quiet breaths, with the terms that fit all full breaths."""
 import argparse
 import csv
 import glob
@@ -34,6 +35,10 @@ def read(path):
 
 def centred(x):
     return x - x.mean(0)
+
+
+def rms(u):
+    return np.sqrt((u ** 2).sum(1).mean())
 
 
 class Program:
@@ -87,7 +92,7 @@ def law_at(points, metadata):
     force = base + gain * (1 - y) + np.c_[x, y, z] @ box_force
     u = force[:, None] * np.c_[-side * c[0] * x ** c[1], c[2] * y ** c[3], c[4] * z ** c[5]]
     shear = np.zeros_like(u)
-    shear[:, 1] = (z - 0.5) * np.sqrt((u ** 2).sum(1).mean())
+    shear[:, 1] = (z - 0.5) * rms(u)
     return u, shear
 
 
@@ -97,6 +102,7 @@ class Patient:
     def __init__(self, name, points, moved, plain, shear, free):
         self.box = box_of(points)
         self.name, self.moved, self.free = name, centred(moved), free
+        self.size = rms(plain)  # with the common translation, as in the shear of the law
         self.plain, self.shear = centred(plain), centred(shear)
         basis = np.stack([self.plain.ravel(), self.shear.ravel()], 1)
         if free:
@@ -114,7 +120,7 @@ class Patient:
 
 
 TERMS = {  # displacement as lungs fill, as a multiple of the RMS displacement by the law
-    "each lung away from the midline": ["s"],
+    "each lung along x": ["s"],
     "shear along the fissure": ["fissure"],
     "both": ["s", "fissure"],
     "shear linear in Z and in Y": ["Z", "Y"],
@@ -122,13 +128,15 @@ TERMS = {  # displacement as lungs fill, as a multiple of the RMS displacement b
 }
 
 
-def term(patient, name, beta):
-    """Return a term of TERMS at the points of a patient as lungs empty, for a coefficient of 1, mm."""
+def term(patient, name):
+    """Return a term of TERMS at the points of a patient as lungs empty, for a coefficient of 1, mm.
+
+    A positive coefficient of s moves each lung away from the midline as it fills."""
     side, _, y, z = patient.box
     axis, value = {"s": (0, side), "fissure": (1, np.tanh((z - 0.45 - 0.5 * (y - 0.3)) / 0.1) / 2),
                    "Z": (1, z - 0.5), "Y": (1, y - 0.5)}[name]
     u = np.zeros_like(patient.plain)
-    u[:, axis] = -value * np.sqrt(((patient.plain + beta * patient.shear) ** 2).sum(1).mean())
+    u[:, axis] = -value * patient.size
     return centred(u)
 
 
@@ -137,7 +145,7 @@ def fit_terms(people, names, beta):
     matrix, right = np.zeros((len(names), len(names))), np.zeros(len(names))
     for p in people:
         law = p.plain + beta * p.shear
-        columns = np.stack([term(p, name, beta).ravel() for name in names], 1)
+        columns = np.stack([term(p, name).ravel() for name in names], 1)
         scale = 1
         if p.free:  # of the law and the terms together
             scale = np.linalg.lstsq(np.column_stack([law.ravel(), columns]), p.moved.ravel(), rcond=None)[0][0]
@@ -149,22 +157,42 @@ def fit_terms(people, names, beta):
 
 def left_by(p, names, c, beta):
     """Return the RMS residual of a patient, mm, by the law with terms of coefficients c."""
-    law = p.plain + beta * p.shear + sum((k * term(p, name, beta) for k, name in zip(c, names)), 0 * p.plain)
+    law = p.plain + beta * p.shear + sum((k * term(p, name) for k, name in zip(c, names)), 0 * p.plain)
     scale = (law * p.moved).sum() / (law ** 2).sum() if p.free else 1
-    return np.sqrt(((p.moved - scale * law) ** 2).sum(1).mean())
+    return rms(p.moved - scale * law)
 
 
-def print_terms(people, beta):
-    """Print what each set of further terms leaves of the motion of a patient who was left out of its fit."""
+def mean_by_kind(left, people):
+    """Return the mean RMS residual, mm, of each kind of patient as text."""
     kinds = sorted({p.name[:4] for p in people})
-    mean = lambda rms: "  ".join("%s %5.2f" % (k, np.mean([r for r, p in zip(rms, people) if p.name[:4] == k])) for k in kinds)
-    now = [left_by(p, [], [], beta) for p in people]
-    print("\nleave one of %d out, RMS mm\n%-32s %s" % (len(people), "the law", mean(now)))
+    return "  ".join("%s %5.2f" % (k, np.mean([r for r, p in zip(left, people) if p.name[:4] == k])) for k in kinds)
+
+
+def print_terms(people, quiet, beta):
+    """Print what each set of further terms leaves of the motion of a patient who was left out of its fit."""
+    now, now_quiet = ([left_by(p, [], [], beta) for p in them] for them in (people, quiet))
+    print("\nleave one of %d out, RMS mm\n%-32s %s  %s" % (
+        len(people), "the law", mean_by_kind(now, people), mean_by_kind(now_quiet, quiet)))
     for title, names in TERMS.items():
         left = [left_by(p, names, fit_terms([q for q in people if q is not p], names, beta), beta) for p in people]
-        print("%-32s %s  %+.1f %%, better in %d; all: %s" % (
-            title, mean(left), 100 * (np.mean(left) / np.mean(now) - 1), sum(a < b for a, b in zip(left, now)),
-            ", ".join("%s %.2f" % t for t in zip(names, fit_terms(people, names, beta)))))
+        fitted = fit_terms(people, names, beta)
+        quiet_left = [left_by(p, names, fitted, beta) for p in quiet]
+        print("%-32s %s  %s  %+.1f %%, better in %d; all: %s" % (
+            title, mean_by_kind(left, people), mean_by_kind(quiet_left, quiet), 100 * (np.mean(left) / np.mean(now) - 1),
+            sum(a < b for a, b in zip(left, now)), ", ".join("%s %.2f" % t for t in zip(names, fitted))))
+
+
+def print_outward(people, beta):
+    """Print how far the lungs move outwards as they fill, half of the difference of x between the left and right lung."""
+    print("\noutward motion as lungs fill, mm: seen, by the law; in the medial half seen, by the law")
+    for p in people:
+        law = p.plain + beta * p.shear
+        law *= (law * p.moved).sum() / (law ** 2).sum() if p.free else 1
+        row = []
+        for which in (p.box[1] <= 1, p.box[1] < 0.5):
+            left, right = (which & (p.box[0] == side) for side in (1, -1))
+            row += [(u[right, 0].mean() - u[left, 0].mean()) / 2 for u in (p.moved, law)]
+        print("%-9s %6.2f %6.2f %6.2f %6.2f" % (p.name, *row))
 
 
 def patients(options, folder):
@@ -203,7 +231,7 @@ def main():
     print("%-9s %6s | %-14s | %-14s | %-14s | own beta" % ("", "motion", "without shear", "shear %g" % usual, "others"))
     for _, counts, patient in found:
         rest = np.mean([b for b, p in zip(betas, full) if p is not patient]) if counts else usual
-        row = [np.sqrt((patient.moved ** 2).sum(1).mean())] + [v for b in (0, usual, rest) for v in patient.error(b)]
+        row = [rms(patient.moved)] + [v for b in (0, usual, rest) for v in patient.error(b)]
         kinds.setdefault(patient.name[:4], []).append(row)
         print("%-9s %6.1f" % (patient.name, row[0]) + "".join(" | %4.0f %% %5.2f mm" % (100 * a, b) for a, b in zip(row[1::2], row[2::2])) +
               (" | %.2f" % patient.beta if counts else " |"))
@@ -213,7 +241,8 @@ def main():
     print("own beta: mean %.2f, SD %.2f, standard error of the mean %.2f, n %d" % (
         np.mean(betas), np.std(betas, ddof=1), np.std(betas, ddof=1) / len(betas) ** 0.5, len(betas)))
     if options.terms:
-        print_terms(full, usual)
+        print_terms(full, [patient for _, counts, patient in found if not counts], usual)
+        print_outward(full, usual)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,9 @@ Of a fit to landmarks, whole cubes of 40 mm are held out, as 'fit' does; of one 
 
 needed: the constant c of <supine/locate.h> at which the stated error is the true one, with the other terms as stated.
 The last lines have, for each path, the median ratio of stated to true error, the geometric mean of the needed
-constants and, leaving out each patient in turn, that of the others and the ratio that it gives. Exit code 77: no data.
+constants and, leaving out each patient in turn, that of the others and the ratio that it gives. For fits of surfaces,
+they also have the share of the squared motion of the surface that is along it, as the fit has it, and the ratio if the
+logarithm of the constant were a line in this share. Exit code 77: no data.
 """
 import csv
 import pathlib
@@ -24,6 +26,8 @@ import tempfile
 
 import numpy as np
 from scipy import ndimage
+
+from evidence import take_package
 
 HELD, SEEN = 100, 10  # landmarks that are held out of a fit; landmarks that 'locate' sees
 
@@ -101,6 +105,29 @@ def relative(p, state):
     return judge(off - np.mean(there, 0), sigma, np.zeros_like(off), free=False)
 
 
+def along_surface(basis):
+    """Return the share of the squared displacement of the surface, from the scan to full inflation, that is along it."""
+    before, after = (np.asarray(basis.deform(basis.pose(state)), float) for state in ("supine:scan", "supine:full"))
+    a, b, c = (before[np.asarray(basis.faces).reshape(-1, 4)[:, k]] for k in (1, 2, 3))
+    moved = (after - before)[np.asarray(basis.faces).reshape(-1, 4)[:, 1:]].mean(1)
+    normal = np.cross(b - a, c - a)
+    area = np.linalg.norm(normal, axis=1)
+    squares = (moved ** 2).sum(1)
+    return 1 - ((moved * normal).sum(1) ** 2 / area).sum() / (squares * area).sum()
+
+
+def print_by_share(share, need):
+    """Print the ratios for a constant that depends on the share of the motion along the surface, leaving one out."""
+    share, log = np.array(share), np.log(need)
+    others = [np.arange(len(log)) != i for i in range(len(log))]
+    lines = [np.polyfit(share[o], log[o], 1) for o in others]
+    by_share = [np.polyval(line, at) for line, at in zip(lines, share)]
+    constant = [log[o].mean() for o in others]
+    print("surfaces: share of motion along them %s; ratio by this share %s; RMS of its logarithm %.2f, of a constant's %.2f" % (
+        share.round(2), np.exp((by_share - log) / 2).round(2), *(np.sqrt(np.mean((np.array(x) - log) ** 2)) / 2
+                                                                 for x in (by_share, constant))))
+
+
 def full_breath(p, exp, insp):
     """Yield the path, the constant that was used, and what 'judge' returns, for each path of a full breath."""
     made = [p.run("precompute", scan, "--edge", 6, "--held-out", 20, "-o", "b.safetensors") for scan in (exp, insp)]
@@ -125,6 +152,8 @@ def full_breath(p, exp, insp):
         record = p.run("fit", *options, "--json", "-o", "p.json")
         p.basis(exp, p.exhaled, "--patient", "p.json")
         constant = float(record.split('"expected_constant_mm":')[1].split(",")[0])
+        if path == "surfaces":
+            p.share = along_surface(p.package.open(str(p.folder / "b.safetensors")))
         yield path, constant, *judge(*p.deform("full"), p.inhaled, points)
 
 
@@ -150,23 +179,31 @@ def quiet_breath(p):
 
 def main():
     build, copd, quiet, *cases = (pathlib.Path(a) for a in sys.argv[1:])
-    paths = {}
+    paths, shares = {}, []
+    imported = tempfile.TemporaryDirectory()  # pylint: disable=consider-using-with
+    package = take_package(build, pathlib.Path(imported.name))
     for folder, way in ((copd, full_breath), (quiet, quiet_breath)):
         for pairs in sorted(folder.glob("*.csv")):
             if cases and pathlib.Path(pairs.stem) not in cases:
                 continue
             with tempfile.TemporaryDirectory() as work:
                 scans = [pairs.with_name(f"{pairs.stem}_{k}.nii.gz").resolve() for k in ("exp", "insp")]
-                for path, c, *row in way(Patient(build.resolve(), work, pairs), *(scans if way is full_breath else [])):
+                patient = Patient(build.resolve(), work, pairs)
+                patient.package = package
+                for path, c, *row in way(patient, *(scans if way is full_breath else [])):
                     paths.setdefault(path, []).append((c, *row, c * (row[0] / row[1]) ** 2))
                     print("%-26s %-8s true %5.1f stated %5.1f mm, within the band %3.0f %%, needed %.1f mm of %.1f"
                           % (path, pairs.stem, *row, paths[path][-1][4], c), flush=True)
+                if way is full_breath:
+                    shares.append(patient.share)
     for path, rows in paths.items():
         c, true, stated, _, need = np.array(rows).T
         other = [np.exp(np.log(np.delete(need, i)).mean()) for i in range(len(need))] if len(need) > 1 else [np.nan]
         print("%-26s stated / true %.2f (%.2f to %.2f); needed %.1f; of the others %s, ratio %s" % (
             path, np.median(stated / true), (stated / true).min(), (stated / true).max(), np.exp(np.log(need).mean()),
             np.round(other, 1), np.round(np.sqrt(other / need), 2)))
+    if len(shares) > 3:
+        print_by_share(shares, [row[4] for row in paths["surfaces"]])
     sys.exit(0 if paths else 77)
 
 

@@ -205,11 +205,11 @@ def lobes(program, path, folder):
     run("embed", basis, path, "--labels", names, "-o", inside)
     for volume, words in (("full", "full"), ("rest", "at rest")):
         for row in json.loads(run("compare", inside, "--postures", f"supine:{volume},upright:{volume}", "--json")):
-            before, after = row["volumes_ml"]
+            before, after = row.get("volume_before_ml"), row.get("volume_after_ml")
             if before is not None:  # the hilum has no volume
                 out[f"{row['name']} lobe {words}, upright"] = 100 * (after / before - 1)
     for posture in ("supine", "prone"):
-        ml = {row["name"]: row["volumes_ml"] for row in
+        ml = {row["name"]: (row.get("volume_before_ml"), row.get("volume_after_ml")) for row in
               json.loads(run("compare", inside, "--postures", f"{posture}:rest,{posture}:full", "--json"))}
         upper, lower = (sum(ml[f"{side} {part}"][1] for side in ("left", "right")) /
                         sum(ml[f"{side} {part}"][0] for side in ("left", "right")) for part in ("upper", "lower"))
