@@ -210,6 +210,8 @@ typedef struct stored {
   supine_normals_modes normals;
   supine_simulated_volumes simulated;                /* of fields over volume */
   double shares[2 * 9 * (SUPINE_FIT_ORDER_MAX + 1)]; /* simulated.shares without gaps */
+  bool has_rest, has_full;                           /* of fields over volume: */
+  double resting[2][9], full[2][9]; /* [lungs, 9] harmonics of named volumes, above the surface */
   double *volume_range; /* [SUPINE_RANGE_NODES, lungs, 2] volumes without folds, mL, or NULL */
 } stored;
 
@@ -350,7 +352,7 @@ static void add_all(entries *list, const supine_basis_content *content, const st
   add(list, "made_by", "%s", content->made_by != NULL ? content->made_by : "supine_precompute");
 }
 
-enum { TENSORS_MAX = 21 };
+enum { TENSORS_MAX = 22 };
 
 static void basis_close(supine_basis **basis) {
   supine_basis_close(*basis);
@@ -379,6 +381,7 @@ static size_t list_tensors(const supine_basis_content *content, const stored *ma
   }
   const bool simulated = field->order > 0;
   const size_t shares = made->simulated.share_count;
+  const double *resting = made->has_rest ? made->resting[0] : content->resting;
   const supine_tensor all[TENSORS_MAX] = {
       {"vertices", SUPINE_F32, 2, {n, 3}, made->vertices},
       {"triangles", SUPINE_U32, 2, {lungs->mesh.triangle_count, 3}, lungs->mesh.triangles},
@@ -395,7 +398,8 @@ static size_t list_tensors(const supine_basis_content *content, const stored *ma
       {"volume_linear", SUPINE_F64, 3, {g, 3, k}, forms->linear},
       {"volume_quadratic", SUPINE_F64, 4, {g, 3, k, k}, forms->quadratic},
       {"volume_cubic", SUPINE_F64, 4, {g, k, k, k}, forms->cubic},
-      {"resting_volume", SUPINE_F64, 2, {g, 9}, content->resting},
+      {"resting_volume", SUPINE_F64, 2, {g, 9}, resting},
+      {"full_volume", SUPINE_F64, 2, {g, 9}, made->has_full ? made->full[0] : NULL},
       {"volume_range", SUPINE_F64, 3, {SUPINE_RANGE_NODES, g, 2}, made->volume_range},
       {"error_harmonics",
        SUPINE_F64,
@@ -439,8 +443,55 @@ static supine_status print_bytes(const supine_basis_content *content, const stor
   return SUPINE_OK;
 }
 
+/* Find the volume of each lung, as harmonics of the direction of gravity, where all lungs hold a
+ * total volume: as the simulator divided it.
+ * @param totals      [6] with gravity along +x, -x, +y, -y, +z, -z, mL
+ * @param harmonics   [lungs] written, mL above the reference surface */
+static supine_status divide(const supine_basis *basis, const double totals[6], const char *what,
+                            double (*harmonics)[9], supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  double volume[2][6];
+  for (size_t axis = 0; axis < 6; ++axis) {
+    supine_state state = {.volume = {SUPINE_VOLUME_ABSOLUTE, totals[axis]}};
+    double held[SUPINE_LUNGS_MAX];
+    char text[160];
+    supine_pose pose;
+    supine_error inner;
+    state.gravity[axis / 2] = axis % 2 == 0 ? 1.0 : -1.0;
+    (void)supine_state_describe(&state, text, sizeof text);
+    supine_status status = supine_basis_pose(basis, &state, &pose, &inner);
+    if (status != SUPINE_OK) {
+      return supine_error_wrap(error, &inner, "%s, %s: ", what, text);
+    }
+    SUPINE_TRY(supine_basis_volumes(basis, &pose, held));
+    for (size_t lung = 0; lung < info->lung_count; ++lung) {
+      volume[lung][axis] = held[lung] - info->reference_volume[lung];
+    }
+  }
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    supine_physics_resting_harmonics(volume[lung], harmonics[lung]);
+  }
+  return SUPINE_OK;
+}
+
+/* Name rest and full inflation among the simulated volumes, where they are known. */
+static supine_status name_volumes(const supine_basis *basis, const supine_named_volumes *named,
+                                  stored *made, supine_error *error) {
+  if (named->has_rest) {
+    SUPINE_TRY(divide(basis, named->rest, "rest", made->resting, error));
+  }
+  if (named->full > 0.0) {
+    const double full = named->full;
+    const double totals[6] = {full, full, full, full, full, full};
+    SUPINE_TRY(divide(basis, totals, "full inflation", made->full, error));
+  }
+  made->has_rest = named->has_rest;
+  made->has_full = named->full > 0.0;
+  return SUPINE_OK;
+}
+
 /* Open the printed basis, add the error of storage to content->accuracy, and measure the volumes
- * that the lungs can hold. */
+ * that the lungs can hold, or those of rest and full inflation. */
 static supine_status measure_printed(const supine_basis_content *content, const supine_bytes *bytes,
                                      supine_arena *arena, stored *made, supine_error *error) {
   const supine_basis_options options = {
@@ -452,8 +503,11 @@ static supine_status measure_printed(const supine_basis_content *content, const 
     exact.coefficients = (float *)(uintptr_t)content->exact; /* only read */
   }
   SUPINE_TRY(supine_projection_accuracy_add_storage(basis, &exact, &made->rows, content->accuracy));
-  if (content->resting == NULL || content->compression->order > 0) {
-    return SUPINE_OK; /* the simulations give the range of fields over volume */
+  if (content->compression->order > 0) { /* the simulations give the range of volumes */
+    return name_volumes(basis, &content->prepared->named, made, error);
+  }
+  if (content->resting == NULL) {
+    return SUPINE_OK;
   }
   made->volume_range = supine_arena_take(arena, SUPINE_RANGE_NODES * content->lungs->lung_count * 2,
                                          sizeof *made->volume_range);

@@ -206,7 +206,7 @@ supine_volume supine_basis_default_volume(const supine_basis *basis) {
     return (supine_volume){SUPINE_VOLUME_REST, 0};
   }
   if (basis->info.order > 0) {
-    return (supine_volume){SUPINE_VOLUME_SCAN, 0};
+    return basis->simulated.usual;
   }
   if (basis->info.is_fields) {
     return (supine_volume){SUPINE_VOLUME_DEFAULT, 0};
@@ -285,6 +285,17 @@ supine_state supine_basis_scan(const supine_basis *basis) {
   return (supine_state){
       .gravity = {basis->scan_gravity[0], basis->scan_gravity[1], basis->scan_gravity[2]},
       .volume = {SUPINE_VOLUME_SCAN, 0}};
+}
+
+supine_status supine_basis_scan_pose(const supine_basis *basis, supine_pose *pose,
+                                     supine_error *error) {
+  const supine_state scan = supine_basis_scan(basis);
+  if (basis->info.is_fields) {
+    memset(pose, 0, sizeof *pose);
+    pose->basis = basis->info.identity;
+    return SUPINE_OK;
+  }
+  return supine_basis_pose(basis, &scan, pose, error);
 }
 
 supine_status supine_basis_volumes(const supine_basis *basis, const supine_pose *pose,

@@ -77,7 +77,7 @@ static const supine_option table[] = {
      "--modes, cross-validation chooses both",
      FILLS(model.precompute.fields), .file = SUPINE_FILE_IN, .rivals = "directions",
      .partners = "output band modes storage without-normals axes units midline labels edge close "
-                 "surfaces-out scanned"},
+                 "surfaces-out scanned resting full"},
     {"storage", 0, "best|modes|clusters",
      "how the displacements of --fields are stored\nmodes: a vector for each mode and vertex, "
      "which "
@@ -88,13 +88,14 @@ static const supine_option table[] = {
      .offset = offsetof(request, model.precompute.modes.storage), .kind = SUPINE_OPTION_CHOICE,
      .size = sizeof(supine_precompute_storage), .choices = storages, .standard = "best",
      .partners = "output fields band modes without-normals axes units midline labels edge close "
-                 "surfaces-out scanned",
+                 "surfaces-out scanned resting full",
      .more = true},
     {"directions", 0, "N",
      "only print N directions of gravity that cover the sphere evenly, as CSV, to simulate",
      FILLS(directions), .range = {2.0, 1000.0}, .partners = "volumes", .alone = true},
     {"volumes", 0, "N",
-     "with --directions: print N rows for each direction, with a column 'fill' from 0, the smallest "
+     "with --directions: print N rows for each direction, with a column 'fill' from 0, the "
+     "smallest "
      "volume to simulate, to 1, the largest. Four are enough for most tissue",
      FILLS(volumes), .range = {2.0, 100.0}, .partners = "directions"},
     {.table = supine_options_model, FILLS(model)},

@@ -149,7 +149,12 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
     state = in_scan;
   }
   supine_error inner;
-  const supine_status status = supine_basis_pose(basis, &state, &reference->pose, &inner);
+  supine_status status;
+  if (scan) {
+    status = supine_basis_scan_pose(basis, &reference->pose, &inner);
+  } else {
+    status = supine_basis_pose(basis, &state, &reference->pose, &inner);
+  }
   reference->state = state;
   if (status != SUPINE_OK) {
     return supine_error_wrap(error, &inner, "%s", from->given ? "--from: " : "");
@@ -245,10 +250,9 @@ supine_held supine_options_held(const supine_basis *basis, const supine_state *s
   const char *spread = supine_basis_metadata(basis, "resting_spread");
   const char *scanned = supine_basis_metadata(basis, "scan_state");
   const bool at_rest = scanned != NULL && strstr(scanned, "rest") != NULL;
-  const supine_state scan = supine_basis_scan(basis);
   double in_scan[SUPINE_LUNGS_MAX] = {0.0}, volumes[SUPINE_LUNGS_MAX] = {0.0};
   supine_pose scanned_pose;
-  if (supine_basis_pose(basis, &scan, &scanned_pose, NULL) == SUPINE_OK) {
+  if (supine_basis_scan_pose(basis, &scanned_pose, NULL) == SUPINE_OK) {
     supine_basis_volumes(basis, &scanned_pose, in_scan);
   }
   (void)supine_basis_volumes(basis, pose, volumes);
