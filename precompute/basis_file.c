@@ -478,12 +478,14 @@ static supine_status divide(const supine_basis *basis, const double totals[6], c
 static supine_status name_volumes(const supine_basis *basis, const supine_named_volumes *named,
                                   stored *made, supine_error *error) {
   if (named->has_rest) {
-    SUPINE_TRY(divide(basis, named->rest, "rest", made->resting, error));
+    SUPINE_TRY(divide(basis, named->rest,
+                      "volumes at rest (those not given are assumed from the others)",
+                      made->resting, error));
   }
   if (named->full > 0.0) {
     const double full = named->full;
     const double totals[6] = {full, full, full, full, full, full};
-    SUPINE_TRY(divide(basis, totals, "full inflation", made->full, error));
+    SUPINE_TRY(divide(basis, totals, "volume at full inflation", made->full, error));
   }
   made->has_rest = named->has_rest;
   made->has_full = named->full > 0.0;

@@ -207,6 +207,7 @@ supine_status supine_options_pose_check(const supine_basis *basis, const char *c
                                         bool allow_folds, const supine_state *state,
                                         const supine_pose *pose, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
+  const bool law = info->has_rest && !info->is_fields; /* which fields fold, a simulator decides */
   char wrong[256];
   if (supine_basis_has_range_of_volumes(basis)) {
     if (supine_basis_can_hold(basis, state, pose, wrong, sizeof wrong)) {
@@ -218,13 +219,13 @@ supine_status supine_options_pose_check(const supine_basis *basis, const char *c
                             .state = state,
                             .volume = supine_posed_volume(basis, pose),
                             .parts = "the surface folds; triangles that turn over",
-                            .allowed = allow_folds || !info->has_rest};
+                            .allowed = allow_folds || !law};
   SUPINE_FREED_BY(supine_mesh_free) supine_mesh mesh = {0};
   SUPINE_FREED_BY(supine_mesh_free) supine_mesh moved = {0};
   SUPINE_TRY(supine_posed_mesh(basis, NULL, &mesh, error));
   SUPINE_TRY(supine_posed_mesh(basis, pose, &moved, error));
   lungs.folded = supine_mesh_turned_over(&mesh, moved.vertices);
-  if (info->has_rest) {
+  if (law) {
     for (size_t lung = 0; lung < info->lung_count; ++lung) {
       lungs.full += info->reference_volume[lung];
     }
