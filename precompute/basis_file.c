@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <supine/compare.h>
 #include <supine/locate.h>
 #include <supine/safetensors.h>
 #include <supine/sh.h>
@@ -52,6 +53,9 @@ static void add_accuracy(entries *list, const supine_accuracy *accuracy, bool at
   add(list, "error_rms_percent", "%.6g", 100.0 * accuracy->relative_rms);
   add(list, "error_p95_percent", "%.6g", 100.0 * accuracy->relative_p95);
   add(list, "error_max_percent", "%.6g", 100.0 * accuracy->relative_max);
+  if (accuracy->turning_rms > 0.0) {
+    add(list, "error_turning_rms_percent", "%.6g", 100.0 * accuracy->turning_rms);
+  }
   if (accuracy->volume > 0.0) {
     add(list, at_rest ? "error_rest_part" : "error_volume_ml", "%.6g", accuracy->volume);
   }
@@ -492,6 +496,29 @@ static supine_status name_volumes(const supine_basis *basis, const supine_named_
   return SUPINE_OK;
 }
 
+/* Measure the error of the basis relative to what depends on gravity: the squared displacement
+ * without that of band 0. A surface without area has none. */
+static supine_status measure_turning(const supine_basis *basis, supine_accuracy *accuracy,
+                                     supine_error *error) {
+  const size_t bands = supine_basis_get_info(basis)->band + 1;
+  double energy[SUPINE_SH_BAND_MAX + 1];
+  double turning = 0.0;
+  supine_compare *compare = NULL;
+  const supine_status status = supine_compare_create(basis, &compare, error);
+  if (status != SUPINE_OK) {
+    return status == SUPINE_ERROR_MESH ? SUPINE_OK : status;
+  }
+  supine_compare_energy(compare, energy);
+  supine_compare_destroy(compare);
+  for (size_t l = 1; l < bands; ++l) {
+    turning += energy[l];
+  }
+  if (turning > 0.0) {
+    accuracy->turning_rms = accuracy->relative_rms * sqrt(1.0 + energy[0] / turning);
+  }
+  return SUPINE_OK;
+}
+
 /* Open the printed basis, add the error of storage to content->accuracy, and measure the volumes
  * that the lungs can hold, or those of rest and full inflation. */
 static supine_status measure_printed(const supine_basis_content *content, const supine_bytes *bytes,
@@ -505,6 +532,7 @@ static supine_status measure_printed(const supine_basis_content *content, const 
     exact.coefficients = (float *)(uintptr_t)content->exact; /* only read */
   }
   SUPINE_TRY(supine_projection_accuracy_add_storage(basis, &exact, &made->rows, content->accuracy));
+  SUPINE_TRY(measure_turning(basis, content->accuracy, error));
   if (content->compression->order > 0) { /* the simulations give the range of volumes */
     return name_volumes(basis, &content->prepared->named, made, error);
   }

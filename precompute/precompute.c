@@ -79,6 +79,7 @@ static supine_status fit_fields(const supine_prepared *prepared, const supine_ba
         supine_fields_count_from_scan(&given->fit, choice->scan_gravity, &given->counted, error));
     supine_fields_fit_free(&given->fit);
     SUPINE_TRY(supine_fields_fit(&given->counted, lungs, band, &given->fit, error));
+    SUPINE_TRY(supine_fields_check_scan(&given->fit, choice->scan_gravity, error)); /* as moved */
   }
   return supine_fields_field(&given->fit, field, error);
 }

@@ -38,6 +38,10 @@ add_test(NAME manual COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_manual.sh 
 add_test(NAME cohort COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_cohort.sh $<TARGET_FILE:supine>
   ${PROJECT_SOURCE_DIR}/cohort)
 set_tests_properties(cohort PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
+# Run a plan of simulations, and collect the fields.
+add_test(NAME simulations COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_simulations.sh $<TARGET_FILE:supine>
+  ${PROJECT_SOURCE_DIR}/cohort)
+set_tests_properties(simulations PROPERTIES TIMEOUT 900)
 # Run the BIDS app on a small dataset.
 if(Python3_FOUND)
   add_test(NAME bids COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_bids.sh $<TARGET_FILE:supine>

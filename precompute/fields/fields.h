@@ -100,6 +100,12 @@ supine_status supine_fields_field(const supine_fit *fit, supine_gravity_field *f
 supine_status supine_fields_measure(const supine_fit *fit, size_t modes, supine_accuracy *accuracy,
                                     supine_error *error);
 
+/** Refuse a posture in which a lung was not simulated at the volume of the given surface.
+ * @param fit      of order 1 or more
+ * @param gravity  [3] of the posture */
+supine_status supine_fields_check_scan(const supine_fit *fit, const double gravity[3],
+                                       supine_error *error);
+
 /** Subtract from every run the displacement, by a fit over gravity and volume, in the posture of
  * the scan and at the volumes of the given surface, which then shows that posture.
  * @param fit      of order 1 or more

@@ -9,9 +9,8 @@
 #include "base/arena.h"
 #include "precompute/fields/fields.h"
 
-/* Refuse a posture in which a lung was not simulated at the volume that it has in the scan. */
-static supine_status check_volumes(const supine_fit *fit, const double gravity[3],
-                                   supine_error *error) {
+supine_status supine_fields_check_scan(const supine_fit *fit, const double gravity[3],
+                                       supine_error *error) {
   supine_simulated_volumes simulated;
   double y[9];
   SUPINE_TRY(supine_fields_volumes_fit(fit, &simulated, error));
@@ -60,7 +59,7 @@ supine_status supine_fields_count_from_scan(const supine_fit *fit, const double 
   if (arena.failed || counted->directions == NULL || counted->displacement == NULL) {
     return supine_error_memory(error, "%zu fields of %zu vertices", m, given->vertex_count);
   }
-  SUPINE_TRY(check_volumes(fit, gravity, error));
+  SUPINE_TRY(supine_fields_check_scan(fit, gravity, error));
   for (size_t lung = 0; lung < fit->lungs->lung_count; ++lung) {
     const size_t begin = 3 * fit->lungs->lung_begin[lung];
     const int width = (int)(3 * fit->lungs->lung_begin[lung + 1] - begin);

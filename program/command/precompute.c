@@ -128,6 +128,11 @@ static void print_errors(const supine_precompute_report *report, const char *at,
                      100.0 * report->relative.largest, supine_text_distance(report->mm.rms).text,
                      supine_text_distance(report->mm.p95).text,
                      supine_text_distance(report->mm.largest).text, at, state);
+  if (report->turning_rms > 0.0) {
+    (void)supine_print(stdout,
+                       "  %.3g %% RMS, of the part of the displacement that depends on gravity\n",
+                       100.0 * report->turning_rms);
+  }
 }
 
 static void print_report(const request *wanted, const supine_prepared *prepared,

@@ -297,7 +297,10 @@ class Basis:
         if names is None or part is None:
             raise ArgumentError("the basis names no structures: make one with embed")
         origin = Pose()
-        _c.basis_pose(self._c, _c.basis_scan(self._c) if since is None else _state(since), origin)
+        if since is None:
+            _c.basis_scan_pose(self._c, origin)
+        else:
+            _c.basis_pose(self._c, _state(since), origin)
         after, before = self.deform(self.pose(state, volume)).astype(np.float64), self.deform(origin).astype(np.float64)
         try:
             sigma: Any = self.expected_error(state, volume, since)
