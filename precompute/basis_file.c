@@ -214,8 +214,9 @@ typedef struct stored {
   supine_normals_modes normals;
   supine_simulated_volumes simulated;                /* of fields over volume */
   double shares[2 * 9 * (SUPINE_FIT_ORDER_MAX + 1)]; /* simulated.shares without gaps */
-  bool has_rest, has_full;                           /* of fields over volume: */
-  double resting[2][9], full[2][9]; /* [lungs, 9] harmonics of named volumes, above the surface */
+  double named[2][2][9]; /* harmonics of rest and of full inflation, of fields over volume */
+  const double *rest,
+      *full;            /* [lungs, 9] harmonics of these volumes, mL above the surface; or NULL */
   double *volume_range; /* [SUPINE_RANGE_NODES, lungs, 2] volumes without folds, mL, or NULL */
 } stored;
 
@@ -243,6 +244,7 @@ static supine_status store(const supine_basis_content *content, supine_arena *ar
   double *collapsed = supine_arena_take(arena, 3 * n, sizeof *collapsed);
   *made = (stored){.vertices = supine_arena_take(arena, 3 * n, sizeof(float)),
                    .lung = supine_arena_take(arena, n, 1),
+                   .rest = content->resting,
                    .field = *field,
                    .rows = content->rows};
   SUPINE_TRY(supine_arena_check(arena, error, "%zu vertices of a basis", n));
@@ -362,6 +364,17 @@ static void basis_close(supine_basis **basis) {
   supine_basis_close(*basis);
 }
 
+/* Return the tensor of the coefficients, without data if they follow from clusters. */
+static supine_tensor list_coefficients(const supine_basis_content *content, const stored *made) {
+  const size_t n = content->lungs->mesh.vertex_count;
+  const size_t k = made->field.mode_count;
+  const float *data = content->clusters->count > 0 ? NULL : made->field.coefficients;
+  if (content->rows.kind == SUPINE_ROWS_VECTOR) {
+    return (supine_tensor){"coefficients", SUPINE_F32, 3, {n, 3, k}, data};
+  }
+  return (supine_tensor){"coefficients", SUPINE_F32, 2, {n, k}, data};
+}
+
 /* List the tensors in the file's order; return their number. */
 static size_t list_tensors(const supine_basis_content *content, const stored *made,
                            supine_tensor list[TENSORS_MAX]) {
@@ -370,40 +383,35 @@ static size_t list_tensors(const supine_basis_content *content, const stored *ma
   const supine_compression *field = &made->field;
   const supine_volume_forms *forms = content->forms;
   const supine_error_table *table = content->table != NULL ? content->table : &no_table;
-  const bool vector = content->rows.kind == SUPINE_ROWS_VECTOR;
   const size_t n = lungs->mesh.vertex_count;
   const size_t k = field->mode_count;
   const size_t g = lungs->lung_count;
   const size_t q = made->normals.count;
-  const supine_tensor scalars = {"coefficients", SUPINE_F32, 2, {n, k}, field->coefficients};
-  const supine_tensor vectors = {"coefficients", SUPINE_F32, 3, {n, 3, k}, field->coefficients};
   const supine_clusters *clusters = content->clusters;
-  const size_t c = clusters->count;
-  supine_tensor coefficients = vector ? vectors : scalars;
-  if (c > 0) {
-    coefficients.data = NULL; /* they follow from the clusters */
-  }
+  const supine_simulated_volumes *s = &made->simulated;
   const bool simulated = field->order > 0;
-  const size_t shares = made->simulated.share_count;
-  const double *resting = made->has_rest ? made->resting[0] : content->resting;
   const supine_tensor all[TENSORS_MAX] = {
       {"vertices", SUPINE_F32, 2, {n, 3}, made->vertices},
       {"triangles", SUPINE_U32, 2, {lungs->mesh.triangle_count, 3}, lungs->mesh.triangles},
       {"modes", SUPINE_F64, 3, {k, supine_sh_count(field->band), field->order + 1}, field->modes},
       {"lung", SUPINE_U8, 1, {n}, made->lung},
-      coefficients,
+      list_coefficients(content, made),
       {"clusters", SUPINE_U16, 1, {n}, clusters->cluster},
       {"cluster_scalars", SUPINE_I16, 2, {n, 2}, clusters->scalars},
-      {"cluster_vectors", SUPINE_F32, 3, {c, k, SUPINE_CLUSTER_NUMBERS}, clusters->vectors},
+      {"cluster_vectors",
+       SUPINE_F32,
+       3,
+       {clusters->count, k, SUPINE_CLUSTER_NUMBERS},
+       clusters->vectors},
       {"simulated_range", SUPINE_F64, 2, {g, 2}, simulated ? content->fit->range : NULL},
-      {"simulated_limits", SUPINE_F64, 3, {g, 2, 9}, simulated ? made->simulated.limits : NULL},
-      {"simulated_shares", SUPINE_F64, 3, {g, 9, shares}, simulated ? made->shares : NULL},
+      {"simulated_limits", SUPINE_F64, 3, {g, 2, 9}, simulated ? s->limits : NULL},
+      {"simulated_shares", SUPINE_F64, 3, {g, 9, s->share_count}, simulated ? made->shares : NULL},
       {"direction", SUPINE_F32, 2, {n, 3}, made->directions},
       {"volume_linear", SUPINE_F64, 3, {g, 3, k}, forms->linear},
       {"volume_quadratic", SUPINE_F64, 4, {g, 3, k, k}, forms->quadratic},
       {"volume_cubic", SUPINE_F64, 4, {g, k, k, k}, forms->cubic},
-      {"resting_volume", SUPINE_F64, 2, {g, 9}, resting},
-      {"full_volume", SUPINE_F64, 2, {g, 9}, made->has_full ? made->full[0] : NULL},
+      {"resting_volume", SUPINE_F64, 2, {g, 9}, made->rest},
+      {"full_volume", SUPINE_F64, 2, {g, 9}, made->full},
       {"volume_range", SUPINE_F64, 3, {SUPINE_RANGE_NODES, g, 2}, made->volume_range},
       {"error_harmonics",
        SUPINE_F64,
@@ -481,18 +489,18 @@ static supine_status divide(const supine_basis *basis, const double totals[6], c
 /* Name rest and full inflation among the simulated volumes, where they are known. */
 static supine_status name_volumes(const supine_basis *basis, const supine_named_volumes *named,
                                   stored *made, supine_error *error) {
+  const double full = named->full;
+  const double totals[6] = {full, full, full, full, full, full};
   if (named->has_rest) {
     SUPINE_TRY(divide(basis, named->rest,
                       "volumes at rest (those not given are assumed from the others)",
-                      made->resting, error));
+                      made->named[0], error));
+    made->rest = made->named[0][0];
   }
-  if (named->full > 0.0) {
-    const double full = named->full;
-    const double totals[6] = {full, full, full, full, full, full};
-    SUPINE_TRY(divide(basis, totals, "volume at full inflation", made->full, error));
+  if (full > 0.0) {
+    SUPINE_TRY(divide(basis, totals, "volume at full inflation", made->named[1], error));
+    made->full = made->named[1][0];
   }
-  made->has_rest = named->has_rest;
-  made->has_full = named->full > 0.0;
   return SUPINE_OK;
 }
 

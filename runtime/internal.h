@@ -39,7 +39,7 @@ typedef struct supine_simulated {
   /** [lungs, RESTING_TERMS] volume at full inflation as harmonics, or NULL. */
   const double *full;
   double total[2];     /**< total volumes that are mapped to -1 and 1 */
-  supine_volume usual; /**< of states without a volume, where rest is unknown */
+  supine_volume usual; /**< of states without a volume */
 } supine_simulated;
 
 struct supine_basis {

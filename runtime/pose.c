@@ -287,17 +287,6 @@ supine_state supine_basis_scan(const supine_basis *basis) {
       .volume = {SUPINE_VOLUME_SCAN, 0}};
 }
 
-supine_status supine_basis_scan_pose(const supine_basis *basis, supine_pose *pose,
-                                     supine_error *error) {
-  const supine_state scan = supine_basis_scan(basis);
-  if (basis->info.is_fields) {
-    memset(pose, 0, sizeof *pose);
-    pose->basis = basis->info.identity;
-    return SUPINE_OK;
-  }
-  return supine_basis_pose(basis, &scan, pose, error);
-}
-
 supine_status supine_basis_volumes(const supine_basis *basis, const supine_pose *pose,
                                    double *volumes_ml) {
   if (!basis->info.has_volume || !supine_basis_has_pose(basis, pose)) {

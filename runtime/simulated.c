@@ -266,7 +266,9 @@ supine_status supine_simulated_find_default(const supine_basis *basis, supine_vo
     reference += basis->info.reference_volume[lung];
   }
   *volume = (supine_volume){SUPINE_VOLUME_SCAN, 0};
-  if (!scan) {
+  if (basis->info.has_rest) {
+    volume->kind = SUPINE_VOLUME_REST;
+  } else if (!scan) {
     *volume =
         (supine_volume){SUPINE_VOLUME_ABSOLUTE, round(reference + 0.5 * (common[0] + common[1]))};
   }
@@ -280,7 +282,7 @@ static supine_status find_volumes(const supine_basis *basis, const supine_state 
     return named_volumes(basis, state, volumes, error);
   }
   if (asked.kind == SUPINE_VOLUME_DEFAULT) {
-    asked = supine_basis_default_volume(basis);
+    asked = basis->simulated.usual;
   }
   SUPINE_TRY(find_origin(basis, state->gravity, asked.kind, volumes, error));
   if (asked.ml == 0 && asked.kind != SUPINE_VOLUME_ABSOLUTE) {

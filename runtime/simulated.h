@@ -19,9 +19,9 @@
 supine_status supine_simulated_limits(const supine_basis *basis, const double gravity[3],
                                       double (*limits)[2]);
 
-/** Find the volume of states without one, where rest is unknown: that of the scan, if all lungs can
- * hold it in 26 directions of gravity; else, rounded to 1 mL, the middle of the total volumes that
- * were simulated in all of them. */
+/** Find the volume of states without one: rest, if it is known; else that of the scan, if all lungs
+ * can hold it in 26 directions of gravity; else, rounded to 1 mL, the middle of the total volumes
+ * that were simulated in all of them. */
 supine_status supine_simulated_find_default(const supine_basis *basis, supine_volume *volume);
 
 /** Compute the weights of a state (supine_basis_pose) for a basis whose order is above 0. A state

@@ -219,7 +219,7 @@ typedef struct supine_precompute_report {
    * volume; and the highest degree of the polynomials of volume. */
   size_t volume_count, order;
   double extrapolated;  /**< of fields over volume: relative RMS error of the smallest and the
-                           largest  volumes, predicted from the others; 0 if unknown */
+                           largest volumes, predicted from the others; 0 if unknown */
   size_t cluster_count; /**< clusters of vertices that move alike; 0 if modes are stored */
   /** RMS error as a fraction of the RMS of the part of the displacement that depends on gravity; 0
    * if there is none. */

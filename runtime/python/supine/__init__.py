@@ -245,7 +245,6 @@ class Basis:
                                          for i in range(size.value)}
         self.vertices: Floats = self._tensor("vertices")
         self.triangles: NDArray[np.uint32] = self._tensor("triangles")
-        self.coefficients: Floats = self._tensor("coefficients")
         self.direction: Optional[Floats] = None if self.vector else self._tensor("direction")
         self.modes: Doubles = self._tensor("modes")
         self.bounds: Floats = self._owner.view(ctypes.cast(info.bounds, ctypes.c_void_p).value or 0, ctypes.c_float,
@@ -258,6 +257,16 @@ class Basis:
     def _tensor(self, name: str) -> NDArray[Any]:
         tensor = _c.basis_tensor(self._c, name.encode()).contents
         return self._owner.view(tensor.data, _c.DTYPES[tensor.dtype], tensor.shape[:tensor.rank])
+
+    @functools.cached_property
+    def coefficients(self) -> Floats:
+        """The displacement of each vertex by each mode; if the file has clusters, a new array made from them."""
+        stored = self.tensor("coefficients")
+        if stored is not None:
+            return stored
+        made = np.empty((self.vertex_count, 3, self.mode_count), _FLOAT)
+        _c.basis_coefficients(self._c, 0, self.vertex_count, made.ctypes.data)
+        return made
 
     def tensor(self, name: str) -> Optional[NDArray[Any]]:
         """Return a tensor of the file as a view; None if the file has no tensor of that name."""
