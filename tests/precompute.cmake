@@ -13,7 +13,7 @@ endif()
 # Fields that CalculiX computes are compressed within the error that is stated.
 if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
   add_test(NAME fem COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/evidence/fem.py ${PROJECT_BINARY_DIR})
-  set_tests_properties(fem PROPERTIES TIMEOUT 600 SKIP_RETURN_CODE 77)
+  set_tests_properties(fem PROPERTIES TIMEOUT 1800 SKIP_RETURN_CODE 77)
 endif()
 supine_test(precompute/reference supine_precompute supine_lungs supine_mesh_io supine_gsl)
 supine_test(precompute/lungs supine_precompute supine_lungs supine_mesh_io)

@@ -16,6 +16,7 @@ each with a range of vertices.
 from __future__ import annotations
 
 import ctypes
+import functools
 import gzip
 import io
 import os
