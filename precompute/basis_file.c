@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <supine/compare.h>
 #include <supine/locate.h>
 #include <supine/safetensors.h>
 #include <supine/sh.h>
@@ -52,6 +53,9 @@ static void add_accuracy(entries *list, const supine_accuracy *accuracy, bool at
   add(list, "error_rms_percent", "%.6g", 100.0 * accuracy->relative_rms);
   add(list, "error_p95_percent", "%.6g", 100.0 * accuracy->relative_p95);
   add(list, "error_max_percent", "%.6g", 100.0 * accuracy->relative_max);
+  if (accuracy->turning_rms > 0.0) {
+    add(list, "error_turning_rms_percent", "%.6g", 100.0 * accuracy->turning_rms);
+  }
   if (accuracy->volume > 0.0) {
     add(list, at_rest ? "error_rest_part" : "error_volume_ml", "%.6g", accuracy->volume);
   }
@@ -210,6 +214,9 @@ typedef struct stored {
   supine_normals_modes normals;
   supine_simulated_volumes simulated;                /* of fields over volume */
   double shares[2 * 9 * (SUPINE_FIT_ORDER_MAX + 1)]; /* simulated.shares without gaps */
+  double named[2][2][9]; /* harmonics of rest and of full inflation, of fields over volume */
+  const double *rest,
+      *full;            /* [lungs, 9] harmonics of these volumes, mL above the surface; or NULL */
   double *volume_range; /* [SUPINE_RANGE_NODES, lungs, 2] volumes without folds, mL, or NULL */
 } stored;
 
@@ -237,6 +244,7 @@ static supine_status store(const supine_basis_content *content, supine_arena *ar
   double *collapsed = supine_arena_take(arena, 3 * n, sizeof *collapsed);
   *made = (stored){.vertices = supine_arena_take(arena, 3 * n, sizeof(float)),
                    .lung = supine_arena_take(arena, n, 1),
+                   .rest = content->resting,
                    .field = *field,
                    .rows = content->rows};
   SUPINE_TRY(supine_arena_check(arena, error, "%zu vertices of a basis", n));
@@ -350,10 +358,21 @@ static void add_all(entries *list, const supine_basis_content *content, const st
   add(list, "made_by", "%s", content->made_by != NULL ? content->made_by : "supine_precompute");
 }
 
-enum { TENSORS_MAX = 21 };
+enum { TENSORS_MAX = 22 };
 
 static void basis_close(supine_basis **basis) {
   supine_basis_close(*basis);
+}
+
+/* Return the tensor of the coefficients, without data if they follow from clusters. */
+static supine_tensor list_coefficients(const supine_basis_content *content, const stored *made) {
+  const size_t n = content->lungs->mesh.vertex_count;
+  const size_t k = made->field.mode_count;
+  const float *data = content->clusters->count > 0 ? NULL : made->field.coefficients;
+  if (content->rows.kind == SUPINE_ROWS_VECTOR) {
+    return (supine_tensor){"coefficients", SUPINE_F32, 3, {n, 3, k}, data};
+  }
+  return (supine_tensor){"coefficients", SUPINE_F32, 2, {n, k}, data};
 }
 
 /* List the tensors in the file's order; return their number. */
@@ -364,38 +383,35 @@ static size_t list_tensors(const supine_basis_content *content, const stored *ma
   const supine_compression *field = &made->field;
   const supine_volume_forms *forms = content->forms;
   const supine_error_table *table = content->table != NULL ? content->table : &no_table;
-  const bool vector = content->rows.kind == SUPINE_ROWS_VECTOR;
   const size_t n = lungs->mesh.vertex_count;
   const size_t k = field->mode_count;
   const size_t g = lungs->lung_count;
   const size_t q = made->normals.count;
-  const supine_tensor scalars = {"coefficients", SUPINE_F32, 2, {n, k}, field->coefficients};
-  const supine_tensor vectors = {"coefficients", SUPINE_F32, 3, {n, 3, k}, field->coefficients};
   const supine_clusters *clusters = content->clusters;
-  const size_t c = clusters->count;
-  supine_tensor coefficients = vector ? vectors : scalars;
-  if (c > 0) {
-    coefficients.data = NULL; /* they follow from the clusters */
-  }
+  const supine_simulated_volumes *s = &made->simulated;
   const bool simulated = field->order > 0;
-  const size_t shares = made->simulated.share_count;
   const supine_tensor all[TENSORS_MAX] = {
       {"vertices", SUPINE_F32, 2, {n, 3}, made->vertices},
       {"triangles", SUPINE_U32, 2, {lungs->mesh.triangle_count, 3}, lungs->mesh.triangles},
       {"modes", SUPINE_F64, 3, {k, supine_sh_count(field->band), field->order + 1}, field->modes},
       {"lung", SUPINE_U8, 1, {n}, made->lung},
-      coefficients,
+      list_coefficients(content, made),
       {"clusters", SUPINE_U16, 1, {n}, clusters->cluster},
       {"cluster_scalars", SUPINE_I16, 2, {n, 2}, clusters->scalars},
-      {"cluster_vectors", SUPINE_F32, 3, {c, k, SUPINE_CLUSTER_NUMBERS}, clusters->vectors},
+      {"cluster_vectors",
+       SUPINE_F32,
+       3,
+       {clusters->count, k, SUPINE_CLUSTER_NUMBERS},
+       clusters->vectors},
       {"simulated_range", SUPINE_F64, 2, {g, 2}, simulated ? content->fit->range : NULL},
-      {"simulated_limits", SUPINE_F64, 3, {g, 2, 9}, simulated ? made->simulated.limits : NULL},
-      {"simulated_shares", SUPINE_F64, 3, {g, 9, shares}, simulated ? made->shares : NULL},
+      {"simulated_limits", SUPINE_F64, 3, {g, 2, 9}, simulated ? s->limits : NULL},
+      {"simulated_shares", SUPINE_F64, 3, {g, 9, s->share_count}, simulated ? made->shares : NULL},
       {"direction", SUPINE_F32, 2, {n, 3}, made->directions},
       {"volume_linear", SUPINE_F64, 3, {g, 3, k}, forms->linear},
       {"volume_quadratic", SUPINE_F64, 4, {g, 3, k, k}, forms->quadratic},
       {"volume_cubic", SUPINE_F64, 4, {g, k, k, k}, forms->cubic},
-      {"resting_volume", SUPINE_F64, 2, {g, 9}, content->resting},
+      {"resting_volume", SUPINE_F64, 2, {g, 9}, made->rest},
+      {"full_volume", SUPINE_F64, 2, {g, 9}, made->full},
       {"volume_range", SUPINE_F64, 3, {SUPINE_RANGE_NODES, g, 2}, made->volume_range},
       {"error_harmonics",
        SUPINE_F64,
@@ -439,8 +455,80 @@ static supine_status print_bytes(const supine_basis_content *content, const stor
   return SUPINE_OK;
 }
 
+/* Find the volume of each lung, as harmonics of the direction of gravity, where all lungs hold a
+ * total volume: as the simulator divided it.
+ * @param totals      [6] with gravity along +x, -x, +y, -y, +z, -z, mL
+ * @param harmonics   [lungs] written, mL above the reference surface */
+static supine_status divide(const supine_basis *basis, const double totals[6], const char *what,
+                            double (*harmonics)[9], supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  double volume[2][6];
+  for (size_t axis = 0; axis < 6; ++axis) {
+    supine_state state = {.volume = {SUPINE_VOLUME_ABSOLUTE, totals[axis]}};
+    double held[SUPINE_LUNGS_MAX];
+    char text[160];
+    supine_pose pose;
+    supine_error inner;
+    state.gravity[axis / 2] = axis % 2 == 0 ? 1.0 : -1.0;
+    (void)supine_state_describe(&state, text, sizeof text);
+    supine_status status = supine_basis_pose(basis, &state, &pose, &inner);
+    if (status != SUPINE_OK) {
+      return supine_error_wrap(error, &inner, "%s, %s: ", what, text);
+    }
+    SUPINE_TRY(supine_basis_volumes(basis, &pose, held));
+    for (size_t lung = 0; lung < info->lung_count; ++lung) {
+      volume[lung][axis] = held[lung] - info->reference_volume[lung];
+    }
+  }
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    supine_physics_resting_harmonics(volume[lung], harmonics[lung]);
+  }
+  return SUPINE_OK;
+}
+
+/* Name rest and full inflation among the simulated volumes, where they are known. */
+static supine_status name_volumes(const supine_basis *basis, const supine_named_volumes *named,
+                                  stored *made, supine_error *error) {
+  const double full = named->full;
+  const double totals[6] = {full, full, full, full, full, full};
+  if (named->has_rest) {
+    SUPINE_TRY(divide(basis, named->rest,
+                      "volumes at rest (those not given are assumed from the others)",
+                      made->named[0], error));
+    made->rest = made->named[0][0];
+  }
+  if (full > 0.0) {
+    SUPINE_TRY(divide(basis, totals, "volume at full inflation", made->named[1], error));
+    made->full = made->named[1][0];
+  }
+  return SUPINE_OK;
+}
+
+/* Measure the error of the basis relative to what depends on gravity: the squared displacement
+ * without that of band 0. A surface without area has none. */
+static supine_status measure_turning(const supine_basis *basis, supine_accuracy *accuracy,
+                                     supine_error *error) {
+  const size_t bands = supine_basis_get_info(basis)->band + 1;
+  double energy[SUPINE_SH_BAND_MAX + 1];
+  double turning = 0.0;
+  supine_compare *compare = NULL;
+  const supine_status status = supine_compare_create(basis, &compare, error);
+  if (status != SUPINE_OK) {
+    return status == SUPINE_ERROR_MESH ? SUPINE_OK : status;
+  }
+  supine_compare_energy(compare, energy);
+  supine_compare_destroy(compare);
+  for (size_t l = 1; l < bands; ++l) {
+    turning += energy[l];
+  }
+  if (turning > 0.0) {
+    accuracy->turning_rms = accuracy->relative_rms * sqrt(1.0 + energy[0] / turning);
+  }
+  return SUPINE_OK;
+}
+
 /* Open the printed basis, add the error of storage to content->accuracy, and measure the volumes
- * that the lungs can hold. */
+ * that the lungs can hold, or those of rest and full inflation. */
 static supine_status measure_printed(const supine_basis_content *content, const supine_bytes *bytes,
                                      supine_arena *arena, stored *made, supine_error *error) {
   const supine_basis_options options = {
@@ -452,8 +540,12 @@ static supine_status measure_printed(const supine_basis_content *content, const 
     exact.coefficients = (float *)(uintptr_t)content->exact; /* only read */
   }
   SUPINE_TRY(supine_projection_accuracy_add_storage(basis, &exact, &made->rows, content->accuracy));
-  if (content->resting == NULL || content->compression->order > 0) {
-    return SUPINE_OK; /* the simulations give the range of fields over volume */
+  SUPINE_TRY(measure_turning(basis, content->accuracy, error));
+  if (content->compression->order > 0) { /* the simulations give the range of volumes */
+    return name_volumes(basis, &content->prepared->named, made, error);
+  }
+  if (content->resting == NULL) {
+    return SUPINE_OK;
   }
   made->volume_range = supine_arena_take(arena, SUPINE_RANGE_NODES * content->lungs->lung_count * 2,
                                          sizeof *made->volume_range);

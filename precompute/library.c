@@ -56,7 +56,8 @@ static void fill_report(const supine_prepared *prepared, const supine_basis_repo
       .rest_known = rest_known,
       .rest_part = rest_known ? accuracy->volume : 0.0,
       .volume = rest_known ? 0.0 : accuracy->volume,
-      .turned_over = made->turned_over};
+      .turned_over = made->turned_over,
+      .turning_rms = accuracy->turning_rms};
 }
 
 /* Read another simulator's fields, and question them.

@@ -39,12 +39,14 @@ typedef struct evidence {
   bool is_fields;
   supine_truth truth;       /* of the model */
   supine_error_table table; /* error against `truth`, by number of harmonics and of modes */
+  supine_fields counted;    /* another simulator's fields over volume, counted from the scan */
   supine_fit fit;           /* of another simulator's fields */
 } evidence;
 
 static void evidence_free(evidence *given) {
   supine_projection_truth_free(&given->truth);
   supine_fields_fit_free(&given->fit);
+  supine_fields_free(&given->counted);
 }
 
 /* Lungs, model -> expansion of the force -> field of displacements, and exact solutions. */
@@ -60,11 +62,25 @@ static supine_status solve_model(const supine_lungs *lungs, const supine_model *
 }
 
 /* Another simulator's fields -> field of displacements, and predictions of each from the others. */
-static supine_status fit_fields(const supine_lungs *lungs, const supine_basis_choice *choice,
+static supine_status fit_fields(const supine_prepared *prepared, const supine_basis_choice *choice,
                                 supine_gravity_field *field, evidence *given, supine_error *error) {
+  const supine_lungs *lungs = &prepared->source.lungs;
+  const supine_named_volumes *named = &prepared->named;
   given->is_fields = true;
   SUPINE_TRY(supine_fields_fit(choice->fields, lungs, choice->choose_band ? -1 : (int)choice->band,
                                &given->fit, error));
+  SUPINE_REFUSE_IF(given->fit.report.order == 0 && (named->has_rest || named->full > 0.0), error,
+                   SUPINE_ERROR_ARGUMENT,
+                   "the simulations have one volume for each direction of gravity: simulate "
+                   "several volumes, or leave out those at rest and at full inflation");
+  if (given->fit.report.order > 0 && choice->scan_gravity != NULL) {
+    const int band = (int)given->fit.report.band;
+    SUPINE_TRY(
+        supine_fields_count_from_scan(&given->fit, choice->scan_gravity, &given->counted, error));
+    supine_fields_fit_free(&given->fit);
+    SUPINE_TRY(supine_fields_fit(&given->counted, lungs, band, &given->fit, error));
+    SUPINE_TRY(supine_fields_check_scan(&given->fit, choice->scan_gravity, error)); /* as moved */
+  }
   return supine_fields_field(&given->fit, field, error);
 }
 
@@ -180,24 +196,21 @@ static supine_status anchor(const supine_prepared *prepared, const supine_rows *
   return SUPINE_OK;
 }
 
-/* Let displacements count from the scan, whose gravity is known: subtract from each mode its weight
- * w in this posture, so that the given surface reproduces the scan. The constant harmonic is
- * 1 / sqrt(4 pi), so that its coefficient falls by sqrt(4 pi) w.
+/* Let displacements of gravity alone count from the scan, whose gravity is known: subtract from
+ * each mode its weight w in this posture, so that the given surface reproduces the scan. The
+ * constant harmonic is 1 / sqrt(4 pi), so that its coefficient falls by sqrt(4 pi) w. fit_fields
+ * does this for displacements over gravity and volume.
  * @param scan_gravity  [3], or NULL if gravity does not displace the given surface */
-static supine_status count_from_scan(const supine_fit *fit, const double *scan_gravity,
-                                     supine_compression *compression, supine_error *error) {
+static void count_from_scan(const supine_fit *fit, const double *scan_gravity,
+                            supine_compression *compression) {
   double weights[SUPINE_MODES_MADE_MAX];
-  if (scan_gravity == NULL) {
-    return SUPINE_OK;
+  if (scan_gravity == NULL || fit->report.order > 0) {
+    return;
   }
-  SUPINE_REFUSE_IF(fit->report.order > 0, error, SUPINE_ERROR_ARGUMENT,
-                   "displacements over gravity and volume count from the given surface, whatever "
-                   "its posture: leave the state of the scan out");
   supine_sh_compression_weights(compression, scan_gravity, weights);
   for (size_t k = 0; k < compression->mode_count; ++k) {
     compression->modes[k * supine_sh_count(compression->band)] -= sqrt_4pi * weights[k];
   }
-  return SUPINE_OK;
 }
 
 /* Volumes by the direction of gravity minus those of the reference surface, mL, as coefficients of
@@ -310,7 +323,7 @@ supine_status supine_precompute(const supine_prepared *prepared, const supine_ba
   supine_basis_report made = {0};
   SUPINE_TRY(tell_progress(choice, 0, error));
   if (given.is_fields) {
-    SUPINE_TRY(fit_fields(lungs, choice, &field, &given, error));
+    SUPINE_TRY(fit_fields(prepared, choice, &field, &given, error));
   } else {
     SUPINE_TRY(solve_model(lungs, &prepared->model, choice, &field, &given, error));
   }
@@ -319,7 +332,7 @@ supine_status supine_precompute(const supine_prepared *prepared, const supine_ba
   SUPINE_TRY(tell_progress(choice, 3, error));
   SUPINE_TRY(anchor(prepared, &field.rows, &compression, &of, error));
   if (given.is_fields) {
-    SUPINE_TRY(count_from_scan(&given.fit, choice->scan_gravity, &compression, error));
+    count_from_scan(&given.fit, choice->scan_gravity, &compression);
     SUPINE_TRY(cluster(&of.lungs, choice, &given, &compression, &clusters, &exact, error));
   }
   SUPINE_TRY(supine_projection_volume_forms(&compression, &of.lungs, prepared->model.share,

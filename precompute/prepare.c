@@ -338,6 +338,14 @@ static void summarize_fields(supine_prepared *p) {
     (void)supine_state_describe(&p->posture.state, posture, sizeof posture);
   }
   supine_text_add(p->assumed, sizeof p->assumed, "%s; scan %s", p->source.summary, posture);
+  if (p->named.has_rest) {
+    supine_text_add(p->assumed, sizeof p->assumed, "; rest supine %.0f mL (given)",
+                    p->named.rest[SUPINE_REST_SUPINE]);
+  }
+  if (p->named.full > 0.0) {
+    supine_text_add(p->assumed, sizeof p->assumed,
+                    "; full inflation %.0f mL in every posture (given)", p->named.full);
+  }
 }
 
 /* Add the volume at full inflation to the state of the scan, and check that the law and this volume
@@ -359,6 +367,61 @@ static supine_status complete_scan(const supine_precompute_volumes *volumes, sup
                        error, SUPINE_REMEDY_FULL_AND_SCAN, SUPINE_ERROR_ARGUMENT,
                        "the volume at full inflation is for a scan at rest, and must be above 0");
   scan->full = volumes->full;
+  return SUPINE_OK;
+}
+
+/* Return the volume of all lungs at rest with gravity along an axis, in the usual proportion to
+ * their volumes at full inflation. */
+static double rest_along(const supine_lungs *lungs, const supine_resting *resting,
+                         const double *full, size_t axis) {
+  double g[3] = {0.0, 0.0, 0.0};
+  double sum = 0.0;
+  g[axis / 2] = axis % 2 == 0 ? 1.0 : -1.0;
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+    sum += full[lung] * supine_physics_resting_share(resting, lungs->side[lung], g);
+  }
+  return sum;
+}
+
+/* Find the volumes at rest and at full inflation of another simulator's lungs. Without the volume
+ * at full inflation, the given volumes at rest are the usual share of it. */
+static supine_status name_volumes(const supine_precompute_options *options,
+                                  const supine_resting *resting, supine_prepared *p,
+                                  supine_error *error) {
+  const supine_lungs *lungs = &p->source.lungs;
+  const supine_resting usual = supine_physics_resting_default();
+  supine_resting settled = *resting;
+  supine_named_volumes *named = &p->named;
+  bool in_ml = !options->volumes.copd;
+  double scanned = 0.0;
+  double full[2];
+  named->full = options->volumes.full;
+  named->has_rest = options->volumes.copd || supine_physics_resting_given(resting);
+  SUPINE_REFUSE_IF(!(named->full >= 0.0 && isfinite(named->full)), error, SUPINE_ERROR_ARGUMENT,
+                   "a volume of %g mL at full inflation: give a number above 0", named->full);
+  if (!named->has_rest) {
+    return SUPINE_OK;
+  }
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+    scanned += lungs->volume[lung];
+  }
+  double total = named->full;
+  for (size_t axis = 0; axis < SUPINE_REST_COUNT; ++axis) {
+    in_ml = in_ml && (!resting->given[axis] || resting->ml[axis] > 0.0);
+    if (total == 0.0 && resting->ml[axis] > 0.0) {
+      total = scanned * resting->ml[axis] / rest_along(lungs, &usual, lungs->volume, axis);
+    }
+  }
+  SUPINE_REFUSE_IF(named->full == 0.0 && !in_ml, error, SUPINE_ERROR_ARGUMENT,
+                   "the volume at rest is a share of full inflation, which is unknown: give the "
+                   "volume at full inflation too, or the volume at rest in mL");
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+    full[lung] = total * lungs->volume[lung] / scanned;
+  }
+  SUPINE_TRY(supine_physics_resting_settle(&settled, lungs->lung_count, lungs->side, full, error));
+  for (size_t axis = 0; axis < SUPINE_REST_COUNT; ++axis) {
+    named->rest[axis] = rest_along(lungs, &settled, full, axis);
+  }
   return SUPINE_OK;
 }
 
@@ -384,7 +447,7 @@ static supine_status read_knowledge(const supine_precompute_options *options, su
     SUPINE_REFUSE_IF(has_state && options->scan.state.volume.kind != SUPINE_VOLUME_DEFAULT, error,
                      SUPINE_ERROR_ARGUMENT,
                      "the state of the scan: with another simulator's fields, give the posture "
-                     "alone, such as supine, as fields of gravity have no volume");
+                     "alone, such as supine: the volume is that of the surface");
     p->posture = known->scan;
     known->scan = (supine_scan){.known = false};
     known->has_scan = true;
@@ -398,7 +461,11 @@ static supine_status set_model(const supine_precompute_options *options,
                                knowledge *known, supine_error *error) {
   const supine_lungs *lungs = &p->source.lungs;
   SUPINE_TRY(choose_model(options, patient, p, known, error));
-  SUPINE_TRY(complete_scan(&options->volumes, p->model.law, &known->scan, error));
+  if (options->fields != NULL) {
+    SUPINE_TRY(name_volumes(options, &known->resting, p, error));
+  } else {
+    SUPINE_TRY(complete_scan(&options->volumes, p->model.law, &known->scan, error));
+  }
   SUPINE_TRY(set_expandability(&options->tissue, p, error));
   SUPINE_TRY(set_lesions(&options->tissue, p, error));
   SUPINE_TRY(set_shares(&options->tissue, p, error));

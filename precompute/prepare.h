@@ -11,6 +11,13 @@
 #include "precompute/patient/patient_file.h"
 #include "precompute/source.h"
 
+/** What is known of the volumes of another simulator's lungs: gas and tissue of all lungs, mL. */
+typedef struct supine_named_volumes {
+  bool has_rest;
+  double rest[6]; /**< at rest, with gravity along +x, -x, +y, -y, +z, -z */
+  double full;    /**< at full inflation, in every posture; 0 if unknown */
+} supine_named_volumes;
+
 /** Lungs at the reference surface, and their physical model. */
 typedef struct supine_prepared {
   supine_source source; /**< what was read; its findings also hold those about the model */
@@ -18,9 +25,10 @@ typedef struct supine_prepared {
   const supine_patient_record *patient; /**< the patient's, with what these lungs add, or NULL */
   supine_reference reference;
   supine_scan posture; /**< with another simulator's fields: the posture of the scan, if known */
-  char fit[256];       /**< for the user: of which data `patient` was made, and its errors */
-  char assumed[800];   /**< for the user: axes, unit, displacement law, state and volumes */
-  supine_arena memory; /**< of the arrays of the model */
+  supine_named_volumes named; /**< with another simulator's fields */
+  char fit[256];              /**< for the user: of which data `patient` was made, and its errors */
+  char assumed[800];          /**< for the user: axes, unit, displacement law, state and volumes */
+  supine_arena memory;        /**< of the arrays of the model */
 } supine_prepared;
 
 /** Load lungs from files, select the displacement law, set stiffness and lesions, and move the

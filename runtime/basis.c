@@ -13,6 +13,7 @@
 #include "runtime/checks.h"
 #include "runtime/clusters.h"
 #include "runtime/safetensors/safetensors_file.h"
+#include "runtime/simulated.h"
 
 /* A file to check, and the name of the file in messages. */
 typedef struct check {
@@ -460,7 +461,7 @@ static supine_status check_simulated(const check *c, supine_basis *basis) {
       !basis->info.has_volume) {
     return refuse(c, "the simulated volumes have no range, or the surface has no volume");
   }
-  return SUPINE_OK;
+  return supine_simulated_find_default(basis, &s->usual);
 }
 
 /* Check the optional tensor 'volume_range': the volumes that each lung can hold. */

@@ -38,7 +38,8 @@ typedef struct supine_simulated {
   size_t share_count;
   /** [lungs, RESTING_TERMS] volume at full inflation as harmonics, or NULL. */
   const double *full;
-  double total[2]; /**< total volumes that are mapped to -1 and 1 */
+  double total[2];     /**< total volumes that are mapped to -1 and 1 */
+  supine_volume usual; /**< of states without a volume */
 } supine_simulated;
 
 struct supine_basis {

@@ -115,11 +115,10 @@ static supine_status initialise(workspace *s, supine_error *error) {
   const supine_locate_task *task = s->task;
   const supine_basis *basis = task->inside;
   const supine_basis_info *info = supine_basis_get_info(basis);
-  const supine_state scan = supine_basis_scan(basis);
   const bool unknown = task->state.lung_count == 0 && info->has_volume && !info->is_fields &&
                        task->state.volume.kind == SUPINE_VOLUME_DEFAULT;
   supine_pose pose;
-  const supine_status status = supine_basis_pose_any(basis, &scan, &pose, error);
+  const supine_status status = supine_basis_scan_pose(basis, &pose, error);
   if (status == SUPINE_OK) {
     for (size_t j = 0; j < task->count; ++j) {
       supine_kriging_point *p = &s->points[j];

@@ -206,7 +206,7 @@ supine_volume supine_basis_default_volume(const supine_basis *basis) {
     return (supine_volume){SUPINE_VOLUME_REST, 0};
   }
   if (basis->info.order > 0) {
-    return (supine_volume){SUPINE_VOLUME_SCAN, 0};
+    return basis->simulated.usual;
   }
   if (basis->info.is_fields) {
     return (supine_volume){SUPINE_VOLUME_DEFAULT, 0};

@@ -249,18 +249,35 @@ static supine_status named_volumes(const supine_basis *basis, const supine_state
   return SUPINE_OK;
 }
 
-/* Find the volumes of a state without a volume: those of the scan or, if they were not simulated,
- * the middle of the range. */
-static supine_status default_volumes(const supine_basis *basis, const double gravity[3],
-                                     double *volumes) {
-  double limits[SUPINE_LUNGS_MAX][2];
-  bool simulated = true;
-  SUPINE_TRY(supine_simulated_limits(basis, gravity, limits));
-  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
-    simulated = simulated && limits[lung][0] <= 0 && limits[lung][1] >= 0;
+supine_status supine_simulated_find_default(const supine_basis *basis, supine_volume *volume) {
+  double common[2] = {-INFINITY, INFINITY}; /* totals above the reference, in every direction */
+  double reference = 0;
+  bool scan = true; /* whether every lung can hold the volume of the scan in every direction */
+  for (int node = 0; node < 27; ++node) {
+    const double gravity[3] = {node % 3 - 1, node / 3 % 3 - 1, node / 9 - 1};
+    double limits[SUPINE_LUNGS_MAX][2];
+    double total[2] = {0, 0};
+    if (node == 27 / 2) {
+      continue; /* no direction */
+    }
+    SUPINE_TRY(supine_simulated_limits(basis, gravity, limits));
+    for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+      scan = scan && limits[lung][0] <= 0 && limits[lung][1] >= 0;
+      total[0] += limits[lung][0];
+      total[1] += limits[lung][1];
+    }
+    common[0] = fmax(common[0], total[0]);
+    common[1] = fmin(common[1], total[1]);
   }
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
-    volumes[lung] = simulated ? 0 : 0.5 * (limits[lung][0] + limits[lung][1]);
+    reference += basis->info.reference_volume[lung];
+  }
+  *volume = (supine_volume){SUPINE_VOLUME_SCAN, 0};
+  if (basis->info.has_rest) {
+    volume->kind = SUPINE_VOLUME_REST;
+  } else if (!scan) {
+    *volume =
+        (supine_volume){SUPINE_VOLUME_ABSOLUTE, round(reference + 0.5 * (common[0] + common[1]))};
   }
   return SUPINE_OK;
 }
@@ -272,10 +289,7 @@ static supine_status find_volumes(const supine_basis *basis, const supine_state 
     return named_volumes(basis, state, volumes, error);
   }
   if (asked.kind == SUPINE_VOLUME_DEFAULT) {
-    if (!basis->info.has_rest) {
-      return default_volumes(basis, state->gravity, volumes);
-    }
-    asked = (supine_volume){SUPINE_VOLUME_REST, 0};
+    asked = basis->simulated.usual;
   }
   SUPINE_TRY(find_origin(basis, state->gravity, asked.kind, volumes, error));
   if (asked.ml == 0 && asked.kind != SUPINE_VOLUME_ABSOLUTE) {

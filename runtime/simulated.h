@@ -19,10 +19,14 @@
 supine_status supine_simulated_limits(const supine_basis *basis, const double gravity[3],
                                       double (*limits)[2]);
 
+/** Find the volume of states without one: rest, if it is known; else that of the scan, if all lungs
+ * can hold it in 26 directions of gravity; else, rounded to 1 mL, the middle of the total volumes
+ * that were simulated in all of them. */
+supine_status supine_simulated_find_default(const supine_basis *basis, supine_volume *volume);
+
 /** Compute the weights of a state (supine_basis_pose) for a basis whose order is above 0. A state
- * without a volume has the volume of the scan, or the middle of the simulated range if that volume
- * was not simulated in its posture. A volume of all lungs is divided among them as the simulator
- * did.
+ * without a volume has that of supine_basis_default_volume. A volume of all lungs is divided among
+ * them as the simulator did.
  * @param pose  written: weights by lung and mode; gains of 1
  * @param state  gravity is neither zero nor infinite: supine_basis_pose_any checks it
  * @retval SUPINE_ERROR_ARGUMENT   the volume is relative to rest or

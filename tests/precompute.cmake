@@ -13,7 +13,7 @@ endif()
 # Fields that CalculiX computes are compressed within the error that is stated.
 if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
   add_test(NAME fem COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/evidence/fem.py ${PROJECT_BINARY_DIR})
-  set_tests_properties(fem PROPERTIES TIMEOUT 600 SKIP_RETURN_CODE 77)
+  set_tests_properties(fem PROPERTIES TIMEOUT 1800 SKIP_RETURN_CODE 77)
 endif()
 supine_test(precompute/reference supine_precompute supine_lungs supine_mesh_io supine_gsl)
 supine_test(precompute/lungs supine_precompute supine_lungs supine_mesh_io)
@@ -38,6 +38,10 @@ add_test(NAME manual COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_manual.sh 
 add_test(NAME cohort COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_cohort.sh $<TARGET_FILE:supine>
   ${PROJECT_SOURCE_DIR}/cohort)
 set_tests_properties(cohort PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
+# Run a plan of simulations, and collect the fields.
+add_test(NAME simulations COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_simulations.sh $<TARGET_FILE:supine>
+  ${PROJECT_SOURCE_DIR}/cohort)
+set_tests_properties(simulations PROPERTIES TIMEOUT 900)
 # Run the BIDS app on a small dataset.
 if(Python3_FOUND)
   add_test(NAME bids COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_bids.sh $<TARGET_FILE:supine>

@@ -29,8 +29,7 @@
 #include <supine/status.h>
 
 enum {
-  SUPINE_CLUSTER_SCALARS = 2,      /**< scalars of a vertex, and patterns of a cluster */
-  SUPINE_CLUSTER_VERTICES_MIN = 64 /**< fewest vertices per cluster, on average */
+  SUPINE_CLUSTER_SCALARS = 2 /**< scalars of a vertex, and patterns of a cluster */
 };
 
 /** A surface in parts that do not share clusters, and the coefficients of its vertices. */
@@ -60,10 +59,11 @@ typedef struct supine_clusters {
                           the mean length of the edges */
 } supine_clusters;
 
-/** Errors that clusters may have. */
+/** Errors and sizes that clusters may have. */
 typedef struct supine_cluster_limits {
-  double rms;  /**< largest RMS error of a displacement, mm */
-  double seam; /**< largest supine_clusters.seam */
+  double rms;      /**< largest RMS error of a displacement, mm */
+  double seam;     /**< largest supine_clusters.seam */
+  size_t vertices; /**< fewest vertices per cluster, on average */
 } supine_cluster_limits;
 
 static inline void supine_clusters_free(supine_clusters *clusters) {
@@ -82,8 +82,7 @@ supine_status supine_clusters_find(const supine_clustered *surface, size_t count
                                    supine_clusters *clusters, supine_error *error);
 
 /** Find the fewest clusters, in steps of a factor of two, that stay within the limits and have
- * SUPINE_CLUSTER_VERTICES_MIN vertices or more on average. If there are none, `clusters->count` is
- * 0: store modes instead. */
+ * enough vertices. If there are none, `clusters->count` is 0: store modes instead. */
 supine_status supine_clusters_choose(const supine_clustered *surface,
                                      const supine_cluster_limits *limits, supine_clusters *clusters,
                                      supine_error *error);

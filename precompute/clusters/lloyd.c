@@ -321,7 +321,7 @@ supine_status supine_clusters_choose(const supine_clustered *surface,
                                      const supine_cluster_limits *limits, supine_clusters *clusters,
                                      supine_error *error) {
   enum { FEWEST = 16 };
-  const size_t most = surface->vertex_count / SUPINE_CLUSTER_VERTICES_MIN;
+  const size_t most = surface->vertex_count / limits->vertices;
   *clusters = (supine_clusters){0};
   for (size_t count = FEWEST; count <= most && count <= SUPINE_CLUSTERS_MAX; count *= 2) {
     SUPINE_TRY(supine_clusters_find(surface, count, clusters, error));

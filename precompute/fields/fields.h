@@ -104,6 +104,21 @@ supine_status supine_fields_field(const supine_fit *fit, supine_gravity_field *f
 supine_status supine_fields_measure(const supine_fit *fit, size_t modes, supine_accuracy *accuracy,
                                     supine_error *error);
 
+/** Refuse a posture in which a lung was not simulated at the volume of the given surface.
+ * @param fit      of order 1 or more
+ * @param gravity  [3] of the posture */
+supine_status supine_fields_check_scan(const supine_fit *fit, const double gravity[3],
+                                       supine_error *error);
+
+/** Subtract from every run the displacement, by a fit over gravity and volume, in the posture of
+ * the scan and at the volumes of the given surface, which then shows that posture.
+ * @param fit      of order 1 or more
+ * @param gravity  [3] of the scan
+ * @param counted  written; release it with supine_fields_free, also after an error
+ * @retval SUPINE_ERROR_ARGUMENT  these volumes were not simulated in that posture */
+supine_status supine_fields_count_from_scan(const supine_fit *fit, const double gravity[3],
+                                            supine_fields *counted, supine_error *error);
+
 /** What a basis needs to find the parameter of each lung from volumes (runtime/simulated.h).
  * Volumes are mL above the given surface. */
 typedef struct supine_simulated_volumes {

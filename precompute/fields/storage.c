@@ -13,6 +13,10 @@ static const double largest_mm = 0.2;
 /* Largest jump of the error along an edge between clusters, divided by the mean edge. */
 static const double largest_seam = 0.01;
 
+/* Fewest vertices per cluster, on average: with fewer than 64, a frame spends more on its clusters
+ * than they save. If clusters are wanted whatever their cost, errors may demand smaller ones. */
+enum { VERTICES_BEST = 64, VERTICES_LEAST = 8 };
+
 /* Modes with which vectors cost no more than clusters: 3 K + 3 is 15. */
 enum { MODES_CHEAP = 4 };
 
@@ -48,11 +52,13 @@ static void rescale(const double *sizes, supine_clusters *clusters) {
 
 static supine_status choose(const supine_clustered *surface, supine_warp_storage storage,
                             double error_mm, supine_clusters *clusters, supine_error *error) {
-  const supine_cluster_limits limits = {.rms = fmin(largest_mm, beside_fit * error_mm),
-                                        .seam = largest_seam};
+  const supine_cluster_limits limits = {
+      .rms = fmin(largest_mm, beside_fit * error_mm),
+      .seam = largest_seam,
+      .vertices = storage == SUPINE_FIELD_STORAGE_CLUSTERS ? VERTICES_LEAST : VERTICES_BEST};
   SUPINE_TRY(supine_clusters_choose(surface, &limits, clusters, error));
   if (clusters->count == 0 && storage == SUPINE_FIELD_STORAGE_CLUSTERS) {
-    const size_t most = surface->vertex_count / SUPINE_CLUSTER_VERTICES_MIN;
+    const size_t most = surface->vertex_count / limits.vertices;
     const size_t count = most < SUPINE_CLUSTERS_MAX ? most : SUPINE_CLUSTERS_MAX;
     return supine_clusters_find(surface, count > 2 ? count : 2, clusters, error);
   }

@@ -26,6 +26,9 @@ typedef struct supine_accuracy {
    * requested from supine_projection_accuracy_measure. If the resting volume (FRC) is unknown,
    * supine_precompute stores the change in mL instead. 0 for another simulator's fields. */
   double volume;
+  /** relative_rms as a fraction of the RMS of the part of the displacement that depends on gravity,
+   * instead of the whole; 0 if there is no such part. */
+  double turning_rms;
 } supine_accuracy;
 
 /** Solutions of the physical model for held-out directions of gravity. With direction d, the force

@@ -300,6 +300,7 @@ static supine_status invert(const supine_field *forward, supine_field *inverse,
  * field fades out, five pairs of real lungs at rest had folds of up to 3 % of the lungs' cells. */
 static supine_status find_field(const supine_basis *basis, const supine_deformation *moved,
                                 supine_field *field, supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
   static const double told = 0.01;
   static const double allowed = 0.1;
   SUPINE_TRY(supine_warp_between(basis, moved->from_given ? &moved->from.pose : NULL, &moved->pose,
@@ -319,7 +320,7 @@ static supine_status find_field(const supine_basis *basis, const supine_deformat
       .state = &moved->state,
       .folded = around > allowed ? around : folded[0],
       .parts = "the field folds; cells that turn over, relative to those in the lungs",
-      .allowed = moved->allow_folds || !supine_basis_get_info(basis)->has_rest};
+      .allowed = moved->allow_folds || !info->has_rest || info->is_fields};
   return supine_options_plausible(&lungs, error);
 }
 

@@ -44,9 +44,16 @@ static const char *const facts[] = {"content",        "assumed",
                                     "reach_mm",       "made_by",
                                     "error_method",   "turned_over_percent"};
 /* Keys of metadata that are printed in the object "error", without the prefix "error_". */
-static const char *const errors[] = {"error_directions",  "error_rms_percent", "error_p95_percent",
-                                     "error_max_percent", "error_volume_ml",   "error_rest_part",
-                                     "error_rms_mm",      "error_p95_mm",      "error_max_mm"};
+static const char *const errors[] = {"error_directions",
+                                     "error_rms_percent",
+                                     "error_p95_percent",
+                                     "error_max_percent",
+                                     "error_turning_rms_percent",
+                                     "error_volume_ml",
+                                     "error_rest_part",
+                                     "error_rms_mm",
+                                     "error_p95_mm",
+                                     "error_max_mm"};
 
 /* Add the value of a metadata key to a JSON object, as a number if possible; skip missing keys. */
 static void add_fact(json_t *object, const char *name, const supine_basis *basis, const char *key) {

@@ -79,7 +79,7 @@ static const supine_option table[] = {
      "--modes, cross-validation chooses both",
      FILLS(model.precompute.fields), .file = SUPINE_FILE_IN, .rivals = "directions",
      .partners = "output band modes storage without-normals axes units midline labels edge close "
-                 "surfaces-out scanned"},
+                 "surfaces-out scanned resting full"},
     {"storage", 0, "best|modes|clusters",
      "how the displacements of --fields are stored\nmodes: a vector for each mode and vertex, "
      "which "
@@ -90,7 +90,7 @@ static const supine_option table[] = {
      .offset = offsetof(request, model.precompute.modes.storage), .kind = SUPINE_OPTION_CHOICE,
      .size = sizeof(supine_precompute_storage), .choices = storages, .standard = "best",
      .partners = "output fields band modes without-normals axes units midline labels edge close "
-                 "surfaces-out scanned",
+                 "surfaces-out scanned resting full",
      .more = true},
     {"directions", 0, "N",
      "only print N directions of gravity that cover the sphere evenly, as CSV, to simulate",
@@ -130,6 +130,11 @@ static void print_errors(const supine_precompute_report *report, const char *at,
                      100.0 * report->relative.largest, supine_text_distance(report->mm.rms).text,
                      supine_text_distance(report->mm.p95).text,
                      supine_text_distance(report->mm.largest).text, at, state);
+  if (report->turning_rms > 0.0) {
+    (void)supine_print(stdout,
+                       "  %.3g %% RMS, of the part of the displacement that depends on gravity\n",
+                       100.0 * report->turning_rms);
+  }
 }
 
 static void print_report(const request *wanted, const supine_prepared *prepared,

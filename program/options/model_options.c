@@ -164,11 +164,14 @@ const supine_option supine_options_model[] = {
      "The volumes of other postures keep the default proportions to these. A lung-function test "
      "gives the gas alone, seated: add about 0.9 L of tissue, and give the sum as upright. "
      "Default, from healthy people (SD 0.08): the shares that 'supine info' prints, or the mL that "
-     "--height and --sex predict (GLI 2021, less 0.806 L for lying, plus 0.86 L of tissue)",
+     "--height and --sex predict (GLI 2021, less 0.806 L for lying, plus 0.86 L of tissue)\nWith "
+     "--fields over volume: which of the simulated volumes is rest; by default it is unknown. "
+     "Shares need --full",
      .read = read_resting, .wants = "copd, POSTURE=2600mL or POSTURE=SHARE,..."},
     {"full", 0, "VOLUME",
      "for a scan at rest: volume of gas and tissue of the scanned lungs at full inflation, such as "
-     "4200mL or 4.2L. Without it, full inflation is assumed from the usual share at rest",
+     "4200mL or 4.2L. Without it, full inflation is assumed from the usual share at rest\nWith "
+     "--fields over volume: which of the simulated volumes is full inflation, in every posture",
      FILLS(full), .read = supine_options_read_volume},
     {"height", 0, "CM",
      "height of the patient. Height and --sex give the volume expected at TLC (ECSC 1993, less 10 "

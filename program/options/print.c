@@ -189,6 +189,7 @@ static const struct {
               {NULL, "states", "state"},
               {NULL, "surface_mm", "distance of surfaces, at most, mm"},
               {NULL, "turned_over_percent", "triangles turned over, %"},
+              {NULL, "turning_rms_percent", "RMS, % of what depends on gravity"},
               {NULL, "unseen_regions", "regions not determined"},
               {"states", "landmarks", "distance between landmarks"},
               {"states", "surface", "distance between surfaces"},

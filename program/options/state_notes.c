@@ -48,6 +48,9 @@ void supine_options_tell_state(const char *command, const supine_basis *basis,
     return;
   }
   tell_rest(command, basis, state, &rest, pose, &resting);
+  if (info->is_fields) {
+    return; /* the volumes of a simulator's lungs have no law */
+  }
   (void)supine_basis_volumes(basis, pose, held);
   (void)supine_basis_volumes(basis, &resting, at_rest);
   for (size_t lung = 0; lung < info->lung_count; ++lung) {

@@ -149,7 +149,12 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
     state = in_scan;
   }
   supine_error inner;
-  const supine_status status = supine_basis_pose(basis, &state, &reference->pose, &inner);
+  supine_status status;
+  if (scan) {
+    status = supine_basis_scan_pose(basis, &reference->pose, &inner);
+  } else {
+    status = supine_basis_pose(basis, &state, &reference->pose, &inner);
+  }
   reference->state = state;
   if (status != SUPINE_OK) {
     return supine_error_wrap(error, &inner, "%s", from->given ? "--from: " : "");
@@ -202,6 +207,7 @@ supine_status supine_options_pose_check(const supine_basis *basis, const char *c
                                         bool allow_folds, const supine_state *state,
                                         const supine_pose *pose, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
+  const bool law = info->has_rest && !info->is_fields; /* which fields fold, a simulator decides */
   char wrong[256];
   if (supine_basis_has_range_of_volumes(basis)) {
     if (supine_basis_can_hold(basis, state, pose, wrong, sizeof wrong)) {
@@ -213,13 +219,13 @@ supine_status supine_options_pose_check(const supine_basis *basis, const char *c
                             .state = state,
                             .volume = supine_posed_volume(basis, pose),
                             .parts = "the surface folds; triangles that turn over",
-                            .allowed = allow_folds || !info->has_rest};
+                            .allowed = allow_folds || !law};
   SUPINE_FREED_BY(supine_mesh_free) supine_mesh mesh = {0};
   SUPINE_FREED_BY(supine_mesh_free) supine_mesh moved = {0};
   SUPINE_TRY(supine_posed_mesh(basis, NULL, &mesh, error));
   SUPINE_TRY(supine_posed_mesh(basis, pose, &moved, error));
   lungs.folded = supine_mesh_turned_over(&mesh, moved.vertices);
-  if (info->has_rest) {
+  if (law) {
     for (size_t lung = 0; lung < info->lung_count; ++lung) {
       lungs.full += info->reference_volume[lung];
     }
@@ -245,10 +251,9 @@ supine_held supine_options_held(const supine_basis *basis, const supine_state *s
   const char *spread = supine_basis_metadata(basis, "resting_spread");
   const char *scanned = supine_basis_metadata(basis, "scan_state");
   const bool at_rest = scanned != NULL && strstr(scanned, "rest") != NULL;
-  const supine_state scan = supine_basis_scan(basis);
   double in_scan[SUPINE_LUNGS_MAX] = {0.0}, volumes[SUPINE_LUNGS_MAX] = {0.0};
   supine_pose scanned_pose;
-  if (supine_basis_pose(basis, &scan, &scanned_pose, NULL) == SUPINE_OK) {
+  if (supine_basis_scan_pose(basis, &scanned_pose, NULL) == SUPINE_OK) {
     supine_basis_volumes(basis, &scanned_pose, in_scan);
   }
   (void)supine_basis_volumes(basis, pose, volumes);

@@ -2,12 +2,14 @@
 /* Compare the speed of the run-time library with OpenBLAS and with plain loops. All run in turn in
  * one process.
  *
- *     OPENBLAS_CORETYPE=SAPPHIRERAPIDS bench_runtime [VERTICES | BASIS]...
+ *     OPENBLAS_CORETYPE=SAPPHIRERAPIDS bench_runtime [VERTICES | clusters:VERTICES | BASIS]...
  *
- * VERTICES is the number of vertices of a random basis with 16 modes, and 6 modes for normals.
- * A BASIS has its own modes: the default ones are 4. Print the fastest of nine runs, by processor
- * time (by time of day for two threads). OpenBLAS 0.3.21 does not recognise newer processors.
- * Therefore, OPENBLAS_CORETYPE must name a processor that it supports. */
+ * VERTICES is the number of vertices of a random basis with 16 modes, and 6 modes for normals;
+ * clusters:VERTICES is one with 16 modes of vectors, stored as 128 clusters whose vertices are
+ * scattered over the order of the file. A BASIS has its own modes: the default ones are 4. Clusters
+ * are compared with the same vectors stored as modes. Print the processor, and the fastest of nine
+ * runs, by processor time (by time of day for two threads). OpenBLAS 0.3.21 does not recognise
+ * newer processors. Therefore, OPENBLAS_CORETYPE must name a processor that it supports. */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -22,25 +24,30 @@
 
 #include <supine/runtime.h>
 
+#include "base/arena.h"
 #include "base/clock.h"
 #include "base/parallel.h"
+#include "runtime/safetensors/safetensors_file.h"
 #include "tests/helpers/runtime_fixture.h"
 #include "tests/helpers/test.h"
 
-enum { TILE = 16, ENTRIES_MAX = 64, REPEATS = 9, ENOUGH = 2000000 };
+enum { TILE = 16, ENTRIES_MAX = 64, REPEATS = 9, ENOUGH = 2000000, CLUSTERS = 128 };
 
 void openblas_set_num_threads(int threads);
 
 typedef struct bench {
-  const supine_basis_info *info;
-  supine_basis *storage[SUPINE_STORAGE_COUNT]; /* the basis for each way of storing coefficients */
+  const supine_basis_info *info; /* of a basis that stores modes */
+  size_t rows; /* coefficients of a vertex for each mode: 3 of vectors, else 1 along a direction */
+  supine_basis *storage[SUPINE_STORAGE_COUNT]; /* the basis for each way of storing coefficients;
+                                                  AUTO, the default one, only of vectors */
+  supine_basis *clusters;                      /* the basis as it stores clusters, or NULL */
   supine_basis *simd[SUPINE_SIMD_COUNT];       /* NULL if the processor lacks the instruction set */
   supine_pose pose;
   float weights[SUPINE_MODES_MAX]; /* [modes] weights of the modes, times the displacement factor */
   float *xyz, *normals;            /* [N, 3] positions, mm, and normals */
-  float *amount;   /* [N] displacement of each vertex along its unit vector in the basis, mm */
-  float *columns;  /* [modes, N] displacement of each vertex by each mode of weight 1, mm */
-  int16_t *counts; /* [modes, N] `columns` as multiples of a quantisation step for each mode */
+  float *amount;   /* [N, rows] displacement along the unit vector in the basis, or vector, mm */
+  float *columns;  /* [modes, N, rows] displacement of each vertex by each mode of weight 1, mm */
+  int16_t *counts; /* [modes, N, rows] `columns` as multiples of a step for each mode */
   float units[SUPINE_MODES_MAX]; /* [modes] quantisation step, mm, times the weight of the mode */
 } bench;
 
@@ -85,8 +92,9 @@ static void displace(const bench *work, size_t begin, size_t end) {
   const supine_basis_info *m = work->info;
   for (size_t i = begin; i < end; ++i) {
     for (size_t axis = 0; axis < 3; ++axis) {
-      work->xyz[3 * i + axis] =
-          m->vertices[3 * i + axis] + work->amount[i] * m->direction[3 * i + axis];
+      const float u =
+          m->vector ? work->amount[3 * i + axis] : work->amount[i] * m->direction[3 * i + axis];
+      work->xyz[3 * i + axis] = m->vertices[3 * i + axis] + u;
     }
   }
 }
@@ -94,15 +102,31 @@ static void displace(const bench *work, size_t begin, size_t end) {
 static void run_sgemv(void *context, size_t begin, size_t end, size_t thread) {
   const entry *e = context;
   const int modes = (int)e->work->info->mode_count;
+  const size_t rows = e->work->rows;
   (void)thread;
-  cblas_sgemv(CblasRowMajor, CblasNoTrans, (int)(end - begin), modes, 1.0F,
-              e->work->info->coefficients + begin * (size_t)modes, modes, e->work->weights, 1, 0.0F,
-              e->work->amount + begin, 1);
+  cblas_sgemv(CblasRowMajor, CblasNoTrans, (int)(rows * (end - begin)), modes, 1.0F,
+              e->work->info->coefficients + rows * begin * (size_t)modes, modes, e->work->weights,
+              1, 0.0F, e->work->amount + rows * begin, 1);
   displace(e->work, begin, end);
 }
 
-/* Compute positions by one plain loop, compiled with -march=native. The loop over 16 modes has a
- * constant length, so that the compiler unrolls it. */
+/* Sum the coefficients of one row. The loop over 16 modes has a constant length, so that the
+ * compiler unrolls it. */
+static inline float sum_row(const float *restrict w, const float *restrict c, size_t modes) {
+  float amount = 0;
+  if (modes == 16) {
+    for (size_t k = 0; k < 16; ++k) {
+      amount += w[k] * c[k];
+    }
+  } else {
+    for (size_t k = 0; k < modes; ++k) {
+      amount += w[k] * c[k];
+    }
+  }
+  return amount;
+}
+
+/* Compute positions by one plain loop, compiled with -march=native. */
 static void run_plain(void *context, size_t begin, size_t end, size_t thread) {
   const bench *work = ((const entry *)context)->work;
   const supine_basis_info *m = work->info;
@@ -110,19 +134,45 @@ static void run_plain(void *context, size_t begin, size_t end, size_t thread) {
   float *restrict xyz = work->xyz;
   (void)thread;
   for (size_t i = begin; i < end; ++i) {
-    const float *c = m->coefficients + i * m->mode_count;
-    float amount = 0;
-    if (m->mode_count == 16) {
-      for (size_t k = 0; k < 16; ++k) {
-        amount += w[k] * c[k];
+    const float *c = m->coefficients + i * work->rows * m->mode_count;
+    if (m->vector) {
+      for (size_t axis = 0; axis < 3; ++axis) {
+        xyz[3 * i + axis] =
+            m->vertices[3 * i + axis] + sum_row(w, c + axis * m->mode_count, m->mode_count);
       }
     } else {
-      for (size_t k = 0; k < m->mode_count; ++k) {
-        amount += w[k] * c[k];
+      const float amount = sum_row(w, c, m->mode_count);
+      for (size_t axis = 0; axis < 3; ++axis) {
+        xyz[3 * i + axis] = m->vertices[3 * i + axis] + amount * m->direction[3 * i + axis];
       }
     }
+  }
+}
+
+/* Compute positions from clusters by plain loops: first the 18 numbers of each cluster, then the
+ * vertices. */
+static void run_plain_clusters(void *context, size_t begin, size_t end, size_t thread) {
+  const bench *work = ((const entry *)context)->work;
+  const supine_basis_info *m = supine_basis_get_info(work->clusters);
+  float frames[SUPINE_CLUSTERS_MAX][SUPINE_CLUSTER_NUMBERS] = {{0}};
+  float *restrict xyz = work->xyz;
+  (void)thread;
+  for (size_t row = 0; row < m->cluster_count * m->mode_count; ++row) {
+    const float *vector = m->cluster_vectors + row * SUPINE_CLUSTER_NUMBERS;
+    float *frame = frames[row / m->mode_count];
+    for (size_t i = 0; i < SUPINE_CLUSTER_NUMBERS; ++i) {
+      frame[i] += work->weights[row % m->mode_count] * vector[i];
+    }
+  }
+  for (size_t i = begin; i < end; ++i) {
+    const float *f = frames[m->cluster[i]];
+    const float *p = m->vertices + 3 * i;
+    const float first = m->cluster_scalars[2 * i];
+    const float second = m->cluster_scalars[2 * i + 1];
     for (size_t axis = 0; axis < 3; ++axis) {
-      xyz[3 * i + axis] = m->vertices[3 * i + axis] + amount * m->direction[3 * i + axis];
+      const float *slope = f + 3 + 3 * axis;
+      xyz[3 * i + axis] = p[axis] + f[axis] + slope[0] * p[0] + slope[1] * p[1] + slope[2] * p[2] +
+                          first * f[12 + axis] + second * f[15 + axis];
     }
   }
 }
@@ -132,19 +182,20 @@ static void run_sgemv_columns(void *context, size_t begin, size_t end, size_t th
   const entry *e = context;
   const bench *work = e->work;
   (void)thread;
-  cblas_sgemv(CblasColMajor, CblasNoTrans, (int)(end - begin), (int)work->info->mode_count, 1.0F,
-              work->columns + begin, (int)work->info->vertex_count, work->weights, 1, 0.0F,
-              work->amount + begin, 1);
+  cblas_sgemv(CblasColMajor, CblasNoTrans, (int)(work->rows * (end - begin)),
+              (int)work->info->mode_count, 1.0F, work->columns + work->rows * begin,
+              (int)(work->rows * work->info->vertex_count), work->weights, 1, 0.0F,
+              work->amount + work->rows * begin, 1);
   displace(work, begin, end);
 }
 
 enum { BLOCK = 16384 }; /* number of vertices whose displacements fit in the second-level cache */
 
-/* Add the displacements by mode k to work->amount[i] for begin <= i < end. */
+/* Add the displacements by mode k to the numbers begin <= i < end of work->amount. */
 typedef void add_mode(const bench *work, size_t k, size_t begin, size_t end);
 
 static void add_column(const bench *work, size_t k, size_t begin, size_t end) {
-  const float *restrict c = work->columns + k * work->info->vertex_count;
+  const float *restrict c = work->columns + k * work->rows * work->info->vertex_count;
   float *restrict amount = work->amount;
   const float w = work->weights[k];
   for (size_t i = begin; i < end; ++i) {
@@ -153,7 +204,7 @@ static void add_column(const bench *work, size_t k, size_t begin, size_t end) {
 }
 
 static void add_counts(const bench *work, size_t k, size_t begin, size_t end) {
-  const int16_t *restrict c = work->counts + k * work->info->vertex_count;
+  const int16_t *restrict c = work->counts + k * work->rows * work->info->vertex_count;
   float *restrict amount = work->amount;
   const float w = work->units[k];
   for (size_t i = begin; i < end; ++i) {
@@ -165,9 +216,9 @@ static void add_counts(const bench *work, size_t k, size_t begin, size_t end) {
 static void run_blocks(const bench *work, add_mode *add, size_t begin, size_t end) {
   for (size_t at = begin; at < end; at += BLOCK) {
     const size_t last = end - at < BLOCK ? end : at + BLOCK;
-    memset(work->amount + at, 0, (last - at) * sizeof *work->amount);
+    memset(work->amount + work->rows * at, 0, work->rows * (last - at) * sizeof *work->amount);
     for (size_t k = 0; k < work->info->mode_count; ++k) {
-      add(work, k, at, last);
+      add(work, k, work->rows * at, work->rows * last);
     }
     displace(work, at, last);
   }
@@ -185,7 +236,7 @@ static void run_planar_int16(void *context, size_t begin, size_t end, size_t thr
 
 /* Store the coefficients of each mode contiguously, as float32 and as 16-bit integers. */
 static void make_columns(bench *work) {
-  const size_t n = work->info->vertex_count;
+  const size_t n = work->rows * work->info->vertex_count;
   const size_t modes = work->info->mode_count;
   work->columns = fixture_allocate(n * modes, sizeof *work->columns);
   work->counts = fixture_allocate(n * modes, sizeof *work->counts);
@@ -226,49 +277,80 @@ __attribute__((target("avx512f"))) static void run_traffic(void *context, size_t
 }
 #endif
 
-static size_t add_entries(bench *work, entry *entries) {
+static entry entry_of(bench *work, const char *what, const char *how, supine_range_function *range,
+                      const supine_basis *basis, size_t threads) {
+  const double bytes = supine_basis_get_info(basis)->bytes_per_vertex + 12.0;
+  return (entry){what, how, range, work, basis, threads, bytes, INFINITY};
+}
+
+/* List the library itself, and its loads and stores, with a number of threads. */
+static size_t add_library(bench *work, size_t threads, entry *entries) {
   static const char *const storages[] = {"auto", "exact", "int16", "mixed"};
-  const supine_basis_info *info = work->info;
   const supine_basis *usual = work->storage[SUPINE_STORAGE_INT16];
   const double packed = supine_basis_get_info(usual)->bytes_per_vertex;
-  const double plain = 4.0 * (double)info->mode_count + 36.0;
-  const double normals = 12.0 + 12.0 * (double)((info->normal_count + 2) / 3);
+  const double normals = 12.0 + 12.0 * (double)((work->info->normal_count + 2) / 3);
+  size_t count = 0;
+  for (size_t s = SUPINE_STORAGE_AUTO; s < SUPINE_STORAGE_COUNT; ++s) {
+    if (work->storage[s] != NULL) {
+      entries[count++] =
+          entry_of(work, "supine", storages[s], run_deform, work->storage[s], threads);
+    }
+  }
+  if (work->clusters != NULL) {
+    entries[count++] = entry_of(work, "supine", "clusters", run_deform, work->clusters, threads);
+  }
+#if defined(__x86_64__)
+  if (__builtin_cpu_supports("avx512f")) {
+    entries[count++] = entry_of(work, "traffic", "int16", run_traffic, usual, threads);
+  }
+#endif
+  if (work->info->normal_count > 0) {
+    entries[count++] =
+        (entry){"normals", "int16", run_normals, work, usual, threads, normals, INFINITY};
+    entries[count++] =
+        (entry){"lit", "int16", run_lit, work, usual, threads, normals + packed + 12.0, INFINITY};
+  }
+  return count;
+}
+
+/* List simple code that computes the same. */
+static size_t add_rivals(bench *work, entry *entries) {
+  const supine_basis_info *info = work->info;
+  const supine_basis *usual = work->storage[SUPINE_STORAGE_INT16];
+  const double numbers = (double)(work->rows * info->mode_count);
+  const double fixed = work->rows == 3 ? 24.0 : 36.0; /* positions in and out, and directions */
+  const double plain = 4.0 * numbers + fixed;
+  const double sums = 8.0 * (double)work->rows; /* written and read */
+  size_t count = 0;
+  entries[count++] =
+      (entry){"sgemv_displace", "float32", run_sgemv, work, usual, 1, plain + sums, INFINITY};
+  entries[count++] = (entry){"sgemv_columns", "float32", run_sgemv_columns, work,
+                             usual,           1,         plain + sums,      INFINITY};
+  entries[count++] = (entry){"plain_native", "float32", run_plain, work, usual, 1, plain, INFINITY};
+  entries[count++] = (entry){"planar", "float32", run_planar, work, usual, 1, plain, INFINITY};
+  entries[count++] =
+      (entry){"planar", "int16", run_planar_int16, work, usual, 1, 2.0 * numbers + fixed, INFINITY};
+  if (work->clusters != NULL) {
+    entries[count++] =
+        (entry){"plain_clusters", "float32", run_plain_clusters, work, usual, 1, 30.0, INFINITY};
+  }
+  return count;
+}
+
+static size_t add_entries(bench *work, entry *entries) {
+  const supine_basis_info *info = work->info;
+  const supine_basis *usual = work->storage[SUPINE_STORAGE_INT16];
   size_t count = 0;
   for (size_t threads = 1; threads <= 2; ++threads) {
-    for (size_t s = SUPINE_STORAGE_EXACT; s < SUPINE_STORAGE_COUNT; ++s) {
-      const double bytes = supine_basis_get_info(work->storage[s])->bytes_per_vertex + 12.0;
-      entries[count++] = (entry){"supine",         storages[s], run_deform, work,
-                                 work->storage[s], threads,     bytes,      INFINITY};
-    }
-#if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx512f")) {
-      entries[count++] =
-          (entry){"traffic", "int16", run_traffic, work, usual, threads, packed + 12.0, INFINITY};
-    }
-#endif
-    if (info->normal_count > 0) {
-      entries[count++] =
-          (entry){"normals", "int16", run_normals, work, usual, threads, normals, INFINITY};
-      entries[count++] =
-          (entry){"lit", "int16", run_lit, work, usual, threads, normals + packed + 12.0, INFINITY};
-    }
+    count += add_library(work, threads, entries + count);
   }
   for (size_t s = SUPINE_SIMD_PORTABLE; s < SUPINE_SIMD_COUNT; ++s) {
     static const char *const codes[SUPINE_SIMD_COUNT] = {"auto", "portable", "avx2", "avx512"};
     if (work->simd[s] != NULL) {
-      entries[count++] =
-          (entry){"supine", codes[s], run_deform, work, work->simd[s], 1, packed + 12.0, INFINITY};
+      entries[count++] = entry_of(work, "supine", codes[s], run_deform, work->simd[s], 1);
     }
   }
-  entries[count++] =
-      (entry){"sgemv_displace", "float32", run_sgemv, work, usual, 1, plain + 8.0, INFINITY};
-  entries[count++] =
-      (entry){"sgemv_columns", "float32", run_sgemv_columns, work, usual, 1, plain + 8.0, INFINITY};
-  entries[count++] = (entry){"plain_native", "float32", run_plain, work, usual, 1, plain, INFINITY};
-  entries[count++] = (entry){"planar", "float32", run_planar, work, usual, 1, plain, INFINITY};
-  entries[count++] = (entry){
-      "planar", "int16", run_planar_int16, work, usual, 1, 2.0 * (double)info->mode_count + 36.0,
-      INFINITY};
+  count += add_rivals(work, entries + count);
   if (info->normal_count > 0) {
     const double triangles = (double)info->triangle_count / (double)info->vertex_count;
     entries[count++] = (entry){"exact_normals", "float32", run_exact_normals,       work,
@@ -309,6 +391,30 @@ static double find(const entry *entries, size_t count, const char *what, const c
     }
   }
   return NAN;
+}
+
+/* Print how much faster clusters are than the same vectors stored as modes, and than the fastest
+ * simple code for these. */
+static void print_clusters(const entry *entries, size_t count, size_t modes) {
+  static const char *const storages[] = {"auto", "exact", "int16", "mixed"};
+  const double own = find(entries, count, "supine", "clusters", 1);
+  const entry *best = NULL;
+  for (size_t i = 0; i < count; ++i) {
+    const bool simple = entries[i].range == run_sgemv || entries[i].range == run_sgemv_columns ||
+                        entries[i].range == run_plain || entries[i].range == run_planar ||
+                        entries[i].range == run_planar_int16;
+    if (simple && (best == NULL || entries[i].seconds < best->seconds)) {
+      best = &entries[i];
+    }
+  }
+  const supine_basis *usual = entries[0].work->storage[SUPINE_STORAGE_AUTO];
+  (void)printf("supine clusters, 1 thread, compared with:\n"
+               "  supine auto, %zu modes of vectors as stored by default (%s): %.2f times as fast\n"
+               "  %s %s, the fastest simple code for them: %.2f times as fast\n"
+               "  plain_clusters float32: %.2f times as fast\n",
+               modes, storages[supine_basis_get_info(usual)->storage],
+               find(entries, count, "supine", "auto", 1) / own, best->what, best->how,
+               best->seconds / own, find(entries, count, "plain_clusters", "float32", 1) / own);
 }
 
 static void print(const entry *entries, size_t count, size_t vertices) {
@@ -357,7 +463,7 @@ static bool check_same(bench *work, entry *entries, size_t count) {
   for (size_t i = 0; i < count; ++i) {
     if (entries[i].range == run_deform || entries[i].range == run_sgemv ||
         entries[i].range == run_sgemv_columns || entries[i].range == run_planar ||
-        entries[i].range == run_planar_int16) {
+        entries[i].range == run_planar_int16 || entries[i].range == run_plain_clusters) {
       double apart = 0.0;
       double moved = 0.0;
       entries[i].range(&entries[i], 0, n, 0);
@@ -376,14 +482,63 @@ static bool check_same(bench *work, entry *entries, size_t count) {
   return same;
 }
 
+/* Return a basis file with the coefficients of an open basis of clusters, and without its clusters.
+ * @param size  written, bytes */
+static unsigned char *expand_clusters(const supine_basis *basis, const void *bytes, size_t length,
+                                      size_t *size) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const size_t rows = 3 * info->vertex_count;
+  SUPINE_ARENA arena = {0};
+  float *coefficients = supine_arena_take(&arena, rows * info->mode_count, sizeof *coefficients);
+  supine_safetensors *file = NULL;
+  char *made = NULL;
+  if (coefficients == NULL ||
+      supine_safetensors_open_memory(bytes, length, "clusters", &file, NULL) != SUPINE_OK) {
+    return NULL;
+  }
+  supine_tensor *list = supine_arena_take(&arena, file->tensor_count + 1, sizeof *list);
+  size_t metadata_count = 0;
+  const supine_metadata *metadata = supine_safetensors_all_metadata(file, &metadata_count);
+  supine_metadata *kept = supine_arena_take(&arena, metadata_count, sizeof *kept);
+  FILE *out = open_memstream(&made, size);
+  if (list != NULL && kept != NULL && out != NULL) {
+    size_t count = 0;
+    size_t lines = 0;
+    (void)supine_basis_coefficients(basis, 0, info->vertex_count, coefficients);
+    for (size_t i = 0; i < file->tensor_count; ++i) {
+      if (strncmp(file->tensors[i].name, "cluster", 7) != 0) {
+        list[count++] = file->tensors[i];
+      }
+    }
+    list[count++] = (supine_tensor){
+        "coefficients", SUPINE_F32, 3, {info->vertex_count, 3, info->mode_count}, coefficients};
+    for (size_t i = 0; i < metadata_count; ++i) {
+      if (strcmp(metadata[i].key, "checksum") != 0) {
+        kept[lines++] = metadata[i];
+      }
+    }
+    supine_safetensors_print(out, list, count, kept, lines);
+  }
+  if (out != NULL) {
+    (void)fclose(out);
+  }
+  supine_safetensors_close(file);
+  return (unsigned char *)made;
+}
+
+/* Open the basis in every storage and with every instruction set. */
 static bool open_all(bench *work, const void *bytes, size_t size, supine_error *error) {
   supine_basis_options options = {.size = sizeof options};
-  for (int s = SUPINE_STORAGE_EXACT; s < SUPINE_STORAGE_COUNT; ++s) {
+  for (int s = SUPINE_STORAGE_AUTO; s < SUPINE_STORAGE_COUNT; ++s) {
     options.storage = (supine_storage)s;
     options.without_normals = s != SUPINE_STORAGE_INT16;
     if (supine_basis_open_memory_with(bytes, size, &options, &work->storage[s], error) !=
         SUPINE_OK) {
       return false;
+    }
+    if (s == SUPINE_STORAGE_AUTO && !supine_basis_get_info(work->storage[s])->vector) {
+      supine_basis_close(work->storage[s]);
+      work->storage[s] = NULL;
     }
   }
   options = (supine_basis_options){
@@ -393,68 +548,145 @@ static bool open_all(bench *work, const void *bytes, size_t size, supine_error *
     (void)supine_basis_open_memory_with(bytes, size, &options, &work->simd[s], NULL);
   }
   work->info = supine_basis_get_info(work->storage[SUPINE_STORAGE_INT16]);
+  work->rows = work->info->vector ? 3 : 1;
   return true;
 }
 
-static bool run(const char *what) {
-  const size_t vertices = strtoul(what, NULL, 10);
-  const double gravity[3] = {0.6, 0.8, 0.0};
-  bench work = {.info = NULL};
-  entry entries[ENTRIES_MAX];
-  supine_error error = {0};
-  unsigned char *bytes = NULL;
-  size_t size = 0;
-  if (vertices > 0) {
-    fixture *made = fixture_create(vertices, 16, 3, 2, false, false, 5.0, 31);
-    fixture_add_normals(made, 6, 32);
-    bytes = fixture_bytes(made, &size);
-    fixture_destroy(made);
-  } else {
-    bytes = test_read(what, &size);
+/* Make a random basis, or read a file. */
+static unsigned char *load(const char *what, size_t *size) {
+  static const char prefix[] = "clusters:";
+  const bool clusters = strncmp(what, prefix, strlen(prefix)) == 0;
+  const size_t vertices = strtoul(clusters ? what + strlen(prefix) : what, NULL, 10);
+  if (vertices == 0) {
+    return test_read(what, size);
   }
-  bool good = open_all(&work, bytes, size, &error) && !work.info->vector;
+  fixture *made = fixture_create(vertices, 16, 3, 2, clusters, false, 5.0, 31);
+  if (clusters) {
+    fixture_add_clusters(made, CLUSTERS, 5.0, 33);
+  } else {
+    fixture_add_normals(made, 6, 32);
+  }
+  unsigned char *bytes = fixture_bytes(made, size);
+  fixture_destroy(made);
+  return bytes;
+}
+
+/* Find the weights of a pose, the same for all lungs. */
+static void find_pose(bench *work) {
+  const supine_state state = {.gravity = {0.6, 0.8, 0.0}};
+  const supine_basis *basis = work->storage[SUPINE_STORAGE_INT16];
+  const size_t modes = work->info->mode_count;
+  if (work->info->order > 0) {
+    (void)supine_basis_pose(basis, &state, &work->pose, NULL);
+    for (size_t k = modes; k < work->info->lung_count * modes; ++k) {
+      work->pose.weights[k] = work->pose.weights[k % modes];
+    }
+  } else {
+    (void)supine_basis_weights(basis, state.gravity, work->pose.weights);
+  }
+  work->pose.basis = 0; /* for the basis of clusters, too */
+  for (size_t i = 0; i < 3 * SUPINE_LUNGS_MAX; ++i) {
+    work->pose.gains[i / 3][i % 3] = 0.7;
+  }
+  for (size_t k = 0; k < modes; ++k) {
+    work->weights[k] = (float)(0.7 * work->pose.weights[k]);
+  }
+}
+
+/* Measure all ways to compute the positions, and print them. Return whether they agree. */
+static bool compare(const char *what, bench *work) {
+  entry entries[ENTRIES_MAX];
+  const size_t n = work->info->vertex_count;
+  find_pose(work);
+  work->xyz = aligned_alloc(64, (12 * n + 127) / 64 * 64);
+  work->normals = fixture_allocate(3 * n, sizeof *work->normals);
+  work->amount = fixture_allocate(work->rows * n, sizeof *work->amount);
+  make_columns(work);
+  const size_t count = add_entries(work, entries);
+  if (work->xyz == NULL || !check_same(work, entries, count)) {
+    return false;
+  }
+  (void)printf("%s: %zu vertices, %zu modes%s", what, n, work->info->mode_count,
+               work->info->vector ? " of vectors" : "");
+  if (work->clusters != NULL) {
+    (void)printf(", %zu clusters", supine_basis_get_info(work->clusters)->cluster_count);
+  }
+  (void)puts("");
+  measure(entries, count, n);
+  print(entries, count, n);
+  if (work->clusters != NULL) {
+    print_clusters(entries, count, work->info->mode_count);
+  }
+  return true;
+}
+
+static void close_all(bench *work) {
+  for (size_t s = 0; s < SUPINE_STORAGE_COUNT; ++s) {
+    supine_basis_close(work->storage[s]);
+  }
+  for (size_t s = 0; s < SUPINE_SIMD_COUNT; ++s) {
+    supine_basis_close(work->simd[s]);
+  }
+  supine_basis_close(work->clusters);
+  free(work->xyz);
+  free(work->normals);
+  free(work->amount);
+  free(work->columns);
+  free(work->counts);
+}
+
+static bool run(const char *what) {
+  bench work = {.info = NULL};
+  supine_error error = {0};
+  size_t size = 0;
+  size_t expanded_size = 0;
+  unsigned char *bytes = load(what, &size);
+  unsigned char *expanded = NULL;
+  supine_basis *basis = NULL;
+  bool good = supine_basis_open_memory(bytes, size, &basis, &error) == SUPINE_OK;
+  if (good && supine_basis_get_info(basis)->cluster_count > 0) {
+    work.clusters = basis;
+    expanded = expand_clusters(basis, bytes, size, &expanded_size);
+    good = expanded != NULL && open_all(&work, expanded, expanded_size, &error);
+  } else {
+    supine_basis_close(basis);
+    good = good && open_all(&work, bytes, size, &error);
+  }
   if (good) {
-    const size_t n = work.info->vertex_count;
-    (void)supine_basis_weights(work.storage[SUPINE_STORAGE_INT16], gravity, work.pose.weights);
-    for (size_t i = 0; i < 3 * SUPINE_LUNGS_MAX; ++i) {
-      work.pose.gains[i / 3][i % 3] = 0.7;
-    }
-    for (size_t k = 0; k < work.info->mode_count; ++k) {
-      work.weights[k] = (float)(0.7 * work.pose.weights[k]);
-    }
-    work.xyz = aligned_alloc(64, (12 * n + 127) / 64 * 64);
-    work.normals = fixture_allocate(3 * n, sizeof *work.normals);
-    work.amount = fixture_allocate(n, sizeof *work.amount);
-    make_columns(&work);
-    const size_t count = add_entries(&work, entries);
-    good = work.xyz != NULL && check_same(&work, entries, count);
-    if (good) {
-      (void)printf("%s: %zu vertices, %zu modes\n", what, n, work.info->mode_count);
-      measure(entries, count, n);
-      print(entries, count, n);
-    }
+    good = compare(what, &work);
   } else {
     (void)fprintf(stderr, "%s: %s\n", what, error.message);
   }
-  for (size_t s = 0; s < SUPINE_STORAGE_COUNT; ++s) {
-    supine_basis_close(work.storage[s]);
-  }
-  for (size_t s = 0; s < SUPINE_SIMD_COUNT; ++s) {
-    supine_basis_close(work.simd[s]);
-  }
-  free(work.xyz);
-  free(work.normals);
-  free(work.amount);
-  free(work.columns);
-  free(work.counts);
+  close_all(&work);
+  free(expanded);
   free(bytes);
   return good;
+}
+
+/* Print what Linux says of the processor. */
+static void print_processor(void) {
+  static const char *const keys[] = {"model name\t", "cpu family\t", "model\t"};
+  char line[256];
+  size_t next = 0;
+  FILE *file = fopen("/proc/cpuinfo", "r");
+  while (file != NULL && next < 3 && fgets(line, sizeof line, file) != NULL) {
+    for (size_t k = 0; k < 3; ++k) {
+      if (strncmp(line, keys[k], strlen(keys[k])) == 0) {
+        (void)printf("%s", line);
+        ++next;
+      }
+    }
+  }
+  if (file != NULL) {
+    (void)fclose(file);
+  }
 }
 
 int main(int argc, char **argv) {
   static const char *const usual[] = {"1000000", "16000000"};
   bool good = true;
   openblas_set_num_threads(1);
+  print_processor();
   for (int i = 0; i < (argc > 1 ? argc - 1 : 2); ++i) {
     good = run(argc > 1 ? argv[i + 1] : usual[i]) && good;
   }

@@ -719,6 +719,7 @@ static void write_input(void) {
 /* Every option that the help lists changes the result with --fields, or is refused. */
 TEST(test_precompute_fields_every_option_used_or_refused) {
   static const char no_effect[] = "has no effect with --fields";
+  static const char one_volume[] = "the simulations have one volume for each direction of gravity";
   static const struct {
     const char *name, *value;
     int code;
@@ -741,9 +742,9 @@ TEST(test_precompute_fields_every_option_used_or_refused) {
                {"patient", "m.obj", 1, "give --fields or --patient, not both"},
                {"directions", "32", 1, no_effect},
                {"held-out", "200", 1, no_effect},
-               {"resting", "supine=0.4", 1, no_effect},
-               {"full", "5000mL", 1, no_effect},
-               {"full", "6000mL", 1, no_effect},
+               {"resting", "supine=0.4", 1, "a share of full inflation, which is unknown"},
+               {"resting", "supine=2600mL", 1, one_volume},
+               {"full", "5000mL", 1, one_volume},
                {"height", "170", 1, no_effect},
                {"sex", "male", 1, no_effect},
                {"law", "paper", 1, no_effect},

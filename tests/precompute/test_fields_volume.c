@@ -67,23 +67,58 @@ static supine_fields simulate(size_t directions, size_t volumes) {
   return made;
 }
 
-/* Make a basis of fields in memory. */
-static supine_basis *make(const supine_fields *fields, supine_warp_storage storage,
-                          supine_bytes *bytes, supine_basis_report *report) {
+/* Widen every lung in every run, by a part of its size. */
+static void widen(supine_fields *fields, double part) {
+  const size_t n = fields->vertex_count;
+  for (size_t i = 0; i < n * fields->run_count; ++i) {
+    const size_t vertex = i % n;
+    const size_t lung = lungs.lung_count == 2 && vertex >= lungs.lung_begin[1];
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const double centre = 0.5 * (lungs.low[lung][axis] + lungs.high[lung][axis]);
+      fields->displacement[3 * i + axis] +=
+          part * (lungs.mesh.vertices[3 * vertex + axis] - centre);
+    }
+  }
+}
+
+/* Make the file of a basis of fields in memory.
+ * @param scan_gravity  of the scan, or NULL
+ * @param named         volumes at rest and at full inflation, or NULL */
+static supine_status make_bytes(const supine_fields *fields, supine_warp_storage storage,
+                                const double *scan_gravity, const supine_named_volumes *named,
+                                supine_bytes *bytes, supine_basis_report *report,
+                                supine_error *error) {
   supine_prepared prepared = {.fit = "", .source = {.lungs = lungs}};
   prepared.model.share[0] = prepared.model.share[1] = 1.0;
+  if (named != NULL) {
+    prepared.named = *named;
+  }
   const supine_basis_choice choice = {.modes = 16,
                                       .fields = fields,
                                       .choose_band = true,
                                       .storage = storage,
+                                      .scan_gravity = scan_gravity,
                                       .without_normals = true};
+  return supine_precompute(&prepared, &choice, bytes, report, error);
+}
+
+static supine_basis *open_bytes(const supine_bytes *bytes) {
   supine_basis *basis = NULL;
   supine_error error = {0};
-  if (supine_precompute(&prepared, &choice, bytes, report, &error) != SUPINE_OK ||
-      supine_basis_open_memory(bytes->data, bytes->size, &basis, &error) != SUPINE_OK) {
+  if (supine_basis_open_memory(bytes->data, bytes->size, &basis, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
   return basis;
+}
+
+/* Make a basis of fields in memory. */
+static supine_basis *make(const supine_fields *fields, supine_warp_storage storage,
+                          supine_bytes *bytes, supine_basis_report *report) {
+  supine_error error = {0};
+  if (make_bytes(fields, storage, NULL, NULL, bytes, report, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  return open_bytes(bytes);
 }
 
 /* Compute the volumes of the lungs in a state of displace(), mL, into a state of a basis that names
@@ -201,6 +236,175 @@ TEST(test_fields_over_volume_total_is_shared_and_range_is_refused) {
   supine_basis_close(basis);
   free(bytes.data);
   supine_fields_free(&fields);
+}
+
+/* Assert that the lungs together hold a volume in a state, and return its pose. */
+static supine_pose hold(const supine_basis *basis, supine_state state, double total) {
+  double held[SUPINE_LUNGS_MAX];
+  supine_pose pose;
+  supine_error error = {0};
+  if (supine_basis_pose(basis, &state, &pose, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  assert_int_equal(supine_basis_volumes(basis, &pose, held), SUPINE_OK);
+  assert_close(held[0] + held[1], total, 1e-2);
+  return pose;
+}
+
+TEST(test_fields_over_volume_rest_and_full_named) {
+  supine_fields fields = simulate(DIRECTIONS, VOLUMES);
+  supine_bytes bytes = {.data = NULL};
+  supine_basis_report report;
+  supine_error error;
+  const double scan = lungs.volume[0] + lungs.volume[1];
+  const double oblique[3] = {0.48, 0.6, -0.64};
+  supine_named_volumes named = {.has_rest = true, .full = 1.35 * scan};
+  for (size_t axis = 0; axis < 6; ++axis) {
+    named.rest[axis] = (1.12 + 0.01 * (double)axis) * scan;
+  }
+  assert_int_equal(
+      make_bytes(&fields, SUPINE_FIELD_STORAGE_MODES, NULL, &named, &bytes, &report, &error),
+      SUPINE_OK);
+  supine_basis *basis = open_bytes(&bytes);
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  assert_true(info->has_rest && info->has_full);
+  for (size_t axis = 0; axis < 6; ++axis) {
+    supine_state at = {.volume = {SUPINE_VOLUME_REST, 0.0}};
+    at.gravity[axis / 2] = axis % 2 == 0 ? 1.0 : -1.0;
+    (void)hold(basis, at, named.rest[axis]);
+    at.volume.kind = SUPINE_VOLUME_DEFAULT;
+    (void)hold(basis, at, named.rest[axis]);
+    at.volume = (supine_volume){SUPINE_VOLUME_REST, 40.0};
+    (void)hold(basis, at, named.rest[axis] + 40.0);
+  }
+  supine_state at = {.gravity = {oblique[0], oblique[1], oblique[2]},
+                     .volume = {SUPINE_VOLUME_FULL, -50.0}};
+  (void)hold(basis, at, named.full - 50.0);
+  supine_basis_close(basis);
+  free(bytes.data);
+  bytes = (supine_bytes){.data = NULL};
+  named.rest[3] = 3.0 * scan;
+  assert_int_equal(
+      make_bytes(&fields, SUPINE_FIELD_STORAGE_MODES, NULL, &named, &bytes, &report, &error),
+      SUPINE_ERROR_NUMERICAL);
+  assert_non_null(strstr(error.message, "volumes at rest"));
+  assert_non_null(strstr(error.message, "prone"));
+  free(bytes.data);
+  supine_fields_free(&fields);
+}
+
+TEST(test_fields_of_gravity_alone_named_volumes_refused) {
+  supine_fields fields = simulate(DIRECTIONS, 1);
+  supine_bytes bytes = {.data = NULL};
+  supine_basis_report report;
+  supine_error error;
+  const supine_named_volumes named = {.full = 5000.0};
+  assert_int_equal(
+      make_bytes(&fields, SUPINE_FIELD_STORAGE_MODES, NULL, &named, &bytes, &report, &error),
+      SUPINE_ERROR_ARGUMENT);
+  assert_non_null(strstr(error.message, "one volume for each direction"));
+  free(bytes.data);
+  supine_fields_free(&fields);
+}
+
+/* The surface shows prone lungs: in this posture and at its volumes it stays, and other states are
+ * displaced from there. */
+TEST(test_fields_over_volume_scanned_posture_keeps_surface) {
+  static const double prone[3] = {0.0, -1.0, 0.0};
+  const size_t n = lungs.mesh.vertex_count;
+  supine_fields fields = simulate(DIRECTIONS, VOLUMES);
+  supine_bytes bytes = {.data = NULL};
+  supine_basis_report report;
+  supine_error error = {0};
+  float *xyz = malloc(3 * n * sizeof *xyz);
+  widen(&fields, -0.05); /* the volume of the scan is inside the range */
+  if (make_bytes(&fields, SUPINE_FIELD_STORAGE_MODES, prone, NULL, &bytes, &report, &error) !=
+      SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  supine_basis *basis = open_bytes(&bytes);
+  const double scan = lungs.volume[0] + lungs.volume[1];
+  for (size_t flip = 0; flip < 2; ++flip) {
+    const supine_state at = {.gravity = {0.0, flip == 0 ? -1.0 : 1.0, 0.0},
+                             .volume = {SUPINE_VOLUME_SCAN, 0.0}};
+    const supine_pose pose = hold(basis, at, scan);
+    double square = 0.0;
+    assert_int_equal(supine_deform(basis, &pose, xyz), SUPINE_OK);
+    for (size_t i = 0; i < 3 * n; ++i) {
+      const double moved = (double)xyz[i] - lungs.mesh.vertices[i];
+      square += moved * moved;
+    }
+    const double rms = sqrt(square / (double)n);
+    assert_true(flip == 0 ? rms < 2.0 * report.accuracy.rms_mm : rms > 5.0);
+  }
+  supine_pose scanned;
+  assert_int_equal(supine_basis_scan_pose(basis, &scanned, NULL), SUPINE_OK);
+  assert_int_equal(supine_deform(basis, &scanned, xyz), SUPINE_OK);
+  for (size_t i = 0; i < 3 * n; ++i) {
+    assert_close((double)xyz[i], lungs.mesh.vertices[i], 1e-2);
+  }
+  supine_basis_close(basis);
+  free(bytes.data);
+  free(xyz);
+  supine_fields_free(&fields);
+}
+
+/* A smallest volume above that of the scan: the default is the middle of what was simulated. */
+TEST(test_fields_over_volume_scan_not_simulated_middle_is_default) {
+  supine_fields fields = simulate(DIRECTIONS, VOLUMES);
+  supine_bytes bytes = {.data = NULL};
+  supine_basis_report report;
+  supine_error error;
+  const double prone[3] = {0.0, -1.0, 0.0};
+  widen(&fields, 0.2); /* no lung holds its own volume in any run */
+  supine_basis *basis = make(&fields, SUPINE_FIELD_STORAGE_MODES, &bytes, &report);
+  const supine_volume usual = supine_basis_default_volume(basis);
+  supine_state at = {.gravity = {0.0, -1.0, 0.0}, .volume = {SUPINE_VOLUME_DEFAULT, 0.0}};
+  supine_pose scanned;
+  assert_int_equal(usual.kind, SUPINE_VOLUME_ABSOLUTE);
+  assert_true(usual.ml > 1.1 * (lungs.volume[0] + lungs.volume[1]));
+  (void)hold(basis, at, usual.ml);
+  assert_int_equal(supine_basis_scan_pose(basis, &scanned, NULL), SUPINE_OK);
+  supine_basis_close(basis);
+  free(bytes.data);
+  bytes = (supine_bytes){.data = NULL};
+  assert_int_equal(
+      make_bytes(&fields, SUPINE_FIELD_STORAGE_MODES, prone, NULL, &bytes, &report, &error),
+      SUPINE_ERROR_ARGUMENT);
+  assert_non_null(strstr(error.message, "in the posture of the scan"));
+  free(bytes.data);
+  supine_fields_free(&fields);
+}
+
+/* Without full inflation, shares of it say nothing, and mL give the other postures too. */
+TEST(test_prepare_fields_rest_in_ml_or_share_of_full) {
+  const supine_precompute_surface surface = {.vertex_count = lungs.mesh.vertex_count,
+                                             .vertices = lungs.mesh.vertices,
+                                             .triangle_count = lungs.mesh.triangle_count,
+                                             .triangles = lungs.mesh.triangles};
+  supine_precompute_options options = {.size = sizeof options,
+                                       .lungs = {.surfaces = &surface, .surface_count = 1},
+                                       .fields = "none.safetensors"};
+  supine_error error;
+  for (int step = 0; step < 3; ++step) {
+    SUPINE_FREED_BY(supine_precompute_prepared_free) supine_prepared prepared = {.fit = ""};
+    supine_precompute_rest *rest = &options.volumes.rest[SUPINE_REST_SUPINE];
+    rest->ml = step == 0 ? 2400.0 : 0.0;
+    rest->share[0] = step == 0 ? 0.0 : 0.5;
+    options.volumes.full = step == 2 ? 5200.0 : 0.0;
+    const supine_status status = supine_precompute_prepare(&options, &prepared, &error);
+    if (step == 1) {
+      assert_int_equal(status, SUPINE_ERROR_ARGUMENT);
+      assert_non_null(strstr(error.message, "a share of full inflation, which is unknown"));
+    } else {
+      const double supine = step == 0 ? 2400.0 : 2600.0;
+      assert_int_equal(status, SUPINE_OK);
+      assert_true(prepared.named.has_rest);
+      assert_true(fabs(prepared.named.rest[SUPINE_REST_SUPINE] - supine) < 0.02 * supine);
+      assert_true(prepared.named.rest[SUPINE_REST_UPRIGHT] > 1.05 * supine);
+      assert_close(prepared.named.full, options.volumes.full, 1e-9);
+    }
+  }
 }
 
 TEST(test_fields_of_one_direction_and_volume_twice_refused) {

@@ -147,9 +147,10 @@ typedef enum supine_precompute_sex {
   SUPINE_PRECOMPUTE_MALE
 } supine_precompute_sex;
 
-/** What is known of the patient's volumes. */
+/** What is known of the patient's volumes. With fields over gravity and volume, rest and full
+ * inflation are states that were simulated. */
 typedef struct supine_precompute_volumes {
-  double full; /**< of a scan at rest: volume of both lungs at full inflation, mL */
+  double full; /**< of a scan at rest, or of fields: volume of all lungs at full inflation, mL */
   supine_precompute_rest rest[SUPINE_REST_COUNT];
   bool copd;     /**< assume the usual share of full inflation at rest in COPD */
   double height; /**< of the patient, cm */
@@ -172,7 +173,7 @@ typedef struct supine_precompute_modes {
                       lower the error */
   bool harmonics;  /**< store all (band + 1)^2 harmonics instead of modes */
   size_t held_out; /**< number of directions in which the error is measured; default 100 to 1000 */
-  bool without_normals; /**< leave out the normals: a third of the file */
+  bool without_normals;              /**< leave out the normals: a third of the file */
   supine_precompute_storage storage; /**< of fields */
 } supine_precompute_modes;
 
@@ -217,12 +218,15 @@ typedef struct supine_precompute_report {
   /** Of fields: number of volumes for one direction of gravity, 1 if the fields do not depend on
    * volume; and the highest degree of the polynomials of volume. */
   size_t volume_count, order;
-  double extrapolated;  /**< of fields over volume: relative RMS error of the smallest and the largest
-                           volumes, predicted from the others; 0 if unknown */
+  double extrapolated;  /**< of fields over volume: relative RMS error of the smallest and the
+                           largest volumes, predicted from the others; 0 if unknown */
   size_t cluster_count; /**< clusters of vertices that move alike; 0 if modes are stored */
   /** Of fields: RMS displacement of all runs, mm; the direction of gravity nearest to that of supine
    * posture, LPS; and the mean displacement along gravity in it, mm. */
   double displacement, nearest_supine[3], along_gravity;
+  /** RMS error as a fraction of the RMS of the part of the displacement that depends on gravity; 0
+   * if there is none. */
+  double turning_rms;
 } supine_precompute_report;
 
 /** Something found in the input, in one line. */

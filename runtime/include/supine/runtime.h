@@ -152,8 +152,8 @@ typedef struct supine_basis_info {
   const uint16_t *cluster; /**< [vertex_count] cluster of each vertex, or NULL */
   /** [vertex_count, 2] scalars of each vertex, or NULL. */
   const int16_t *cluster_scalars;
-  /** [cluster_count, mode_count, SUPINE_CLUSTER_NUMBERS] a vector m, the rows of a matrix B, and two
-   * vectors P, mm. The coefficients of a vertex at p with the scalars a are m + B p + a_0 P_0 +
+  /** [cluster_count, mode_count, SUPINE_CLUSTER_NUMBERS] a vector m, the rows of a matrix B, and
+   * two vectors P, mm. The coefficients of a vertex at p with the scalars a are m + B p + a_0 P_0 +
    * a_1 P_1. NULL if there are no clusters. */
   const float *cluster_vectors;
 } supine_basis_info;
@@ -233,9 +233,11 @@ SUPINE_API supine_status supine_basis_weights(const supine_basis *basis, const d
  * Below rest, all lungs hold the same fraction of their volumes at rest. The three gains of a lung
  * then follow from its volume (supine_volume_bend).
  *
- * SUPINE_VOLUME_DEFAULT means the volume at rest if the file has one. Otherwise, it means gains of
- * 1 for a file made from another simulator's displacements, and 500 mL above the volume in the
- * scan for all other files.
+ * SUPINE_VOLUME_DEFAULT means the volume at rest if the file has one. Otherwise, it means 500 mL
+ * above the volume in the scan or, for a file made from another simulator's displacements, gains of
+ * 1 if these depend on gravity alone. If they depend on volume too, it means the volume in the scan
+ * or, if that was not simulated in all postures, the middle of the volumes that were
+ * (supine_basis_default_volume).
  * Cost: mode_count (band + 1)^2 multiplications, and mode_count^3 for each lung, without a pass
  * over the vertices.
  * @param state  its gravity has any length but 0
@@ -287,6 +289,12 @@ SUPINE_API void supine_pose_fill(supine_pose *pose, double gain);
 
 /** Return the gravity and the volume in the scan. The volume is of the kind SUPINE_VOLUME_SCAN. */
 SUPINE_API supine_state supine_basis_scan(const supine_basis *basis);
+
+/** Compute the pose of the lungs as they are in the scan. For displacements from another simulator
+ * that is the given surface, without displacement, which they need not reach in any posture; for
+ * all others it is the pose of supine_basis_scan. Statuses: as supine_basis_pose. */
+SUPINE_API supine_status supine_basis_scan_pose(const supine_basis *basis, supine_pose *pose,
+                                                supine_error *error);
 
 /** Compute the volume of each lung in a pose.
  * @param volumes  [lung_count] volumes of gas and tissue, mL, written

@@ -16,6 +16,7 @@ each with a range of vertices.
 from __future__ import annotations
 
 import ctypes
+import functools
 import gzip
 import io
 import os
@@ -209,7 +210,7 @@ class Basis:
     vertices: float32 [N, 3], reference positions, mm
     triangles: uint32 [M, 3], three vertices of each triangle
     coefficients: float32 [N, K] for K modes, or [N, 3, K] if `vector` is true; if the file stores clusters of vertices
-        instead, they are computed at each access
+        instead, a new array made from them at the first access
     direction: float32 [N, 3], vector along which each vertex moves, mm; None if `vector` is true
     modes: float64 [K, (band + 1)^2, order + 1], spherical-harmonic coefficients of the weight of each mode, for each
         polynomial of the volume; order is 0 unless the file holds another simulator's fields over volume
@@ -261,18 +262,19 @@ class Basis:
         tensor = _c.basis_tensor(self._c, name.encode()).contents
         return self._owner.view(tensor.data, _c.DTYPES[tensor.dtype], tensor.shape[:tensor.rank])
 
-    def tensor(self, name: str) -> Optional[NDArray[Any]]:
-        """Return a tensor of the file as a view; None if the file has no tensor of that name."""
-        return self._tensor(name) if _c.basis_tensor(self._c, name.encode()) else None
-
-    @property
+    @functools.cached_property
     def coefficients(self) -> Floats:
+        """The displacement of each vertex by each mode; if the file has clusters, a new array made from them."""
         stored: Optional[Floats] = self.tensor("coefficients")
         if stored is not None:
             return stored
         made = np.empty((self.vertex_count, 3, self.mode_count), _FLOAT)
         _c.basis_coefficients(self._c, 0, self.vertex_count, made.ctypes.data)
         return made
+
+    def tensor(self, name: str) -> Optional[NDArray[Any]]:
+        """Return a tensor of the file as a view; None if the file has no tensor of that name."""
+        return self._tensor(name) if _c.basis_tensor(self._c, name.encode()) else None
 
     @property
     def faces(self) -> NDArray[np.int64]:
@@ -308,7 +310,10 @@ class Basis:
         if names is None or part is None:
             raise ArgumentError("the basis names no structures: make one with embed")
         origin = Pose()
-        _c.basis_pose(self._c, _c.basis_scan(self._c) if since is None else _state(since), origin)
+        if since is None:
+            _c.basis_scan_pose(self._c, origin)
+        else:
+            _c.basis_pose(self._c, _state(since), origin)
         after, before = self.deform(self.pose(state, volume)).astype(np.float64), self.deform(origin).astype(np.float64)
         try:
             sigma: Any = self.expected_error(state, volume, since)

@@ -229,7 +229,7 @@ class Report(ctypes.Structure):
                 ("rest_part", c_double), ("volume", c_double), ("turned_over", c_double), ("band_count", c_size_t),
                 ("band_error", c_double * 12), ("volume_count", c_size_t), ("order", c_size_t), ("extrapolated", c_double),
                 ("cluster_count", c_size_t), ("displacement", c_double), ("nearest_supine", c_double * 3),
-                ("along_gravity", c_double)]
+                ("along_gravity", c_double), ("turning_rms", c_double)]
 
 
 class Finding(ctypes.Structure):
@@ -309,10 +309,10 @@ basis_close = _declare("basis_close", None, c_void_p)
 basis_get_info = _declare("basis_get_info", POINTER(Info), c_void_p)
 basis_all_metadata = _declare("basis_all_metadata", POINTER(Metadata), c_void_p, POINTER(c_size_t))
 basis_tensor = _declare("basis_tensor", POINTER(Tensor), c_void_p, c_char_p)
-basis_coefficients = _posed("basis_coefficients", c_void_p, c_size_t, c_size_t, c_void_p)
 basis_pose = _checked("basis_pose", c_void_p, POINTER(State), GivenPose)
-basis_scan = _declare("basis_scan", State, c_void_p)
+basis_scan_pose = _checked("basis_scan_pose", c_void_p, GivenPose)
 basis_volumes = _posed("basis_volumes", c_void_p, GivenPose, c_void_p)
+basis_coefficients = _posed("basis_coefficients", c_void_p, c_size_t, c_size_t, c_void_p)
 basis_error = _declare("basis_error", c_double, c_void_p, GivenPose)
 deform_range = _posed("deform_range", c_void_p, GivenPose, c_size_t, c_size_t, c_void_p)
 displace_range = _posed("displace_range", c_void_p, GivenPose, c_size_t, c_size_t, c_void_p)

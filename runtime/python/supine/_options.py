@@ -14,6 +14,7 @@ _UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 0.001, "in": 25.4}
 _POSTURES = ("left", "right", "supine", "prone", "inverted", "upright")
 _SEXES = {"unknown": 0, "female": 1, "male": 2}
 _LAWS = {"deep": 1, "paper": 2}
+_STORAGES = {"best": 0, "modes": 1, "clusters": 2}
 
 
 def _refuse(name: str, wants: str, value: Any) -> _c.ArgumentError:
@@ -198,6 +199,7 @@ _FILL: dict[str, Callable[[Any, Any], None]] = {
     "expandability": _expandability, "lesion": _lesion, "lung": _lung,
     "band": _band, "modes": _modes, "held_out": _held_out,
     "without_normals": _set("modes", "without_normals", bool),
+    "storage": _set("modes", "storage", lambda value: _choice("storage", value, _STORAGES)),
     "patient": _set("", "patient", _path), "fields": _set("", "fields", _path)}
 
 
@@ -225,5 +227,7 @@ def describe(result: _c.Result) -> str:
     errors = "".join(f"  {100 ** percent * rms:.3g} {unit} RMS, {100 ** percent * p95:.3g} {unit} 95th percentile, "
                      f"{100 ** percent * largest:.3g} {unit} largest\n"
                      for (rms, p95, largest), unit, percent in ((report.relative, "%", 1), (report.mm, "mm", 0)))
+    if report.turning_rms > 0:
+        errors += f"  {100 * report.turning_rms:.3g} % RMS, of the part of the displacement that depends on gravity\n"
     return (f"{lungs}, {report.vertex_count} vertices, band {report.band}, {report.mode_count} modes\n"
             f"assumed:\n{assumed}{against}:\n{errors}")

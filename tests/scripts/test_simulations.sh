@@ -1,0 +1,56 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Run a plan of simulations by a small program in place of a simulator, collect the fields, and make a basis of them:
+#
+#     test_simulations.sh PROGRAM COHORT
+#
+# With snakemake, as jobs; one of them fails at first. Without it, the same commands one by one.
+set -u
+supine=$1
+cohort=$2
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+export HOME="$work" # where snakemake keeps its cache
+fail() {
+  echo "FAILED: $*"
+  exit 1
+}
+"$supine" phantom --vertices 1000 -o lungs.obj >/dev/null || fail "no lungs"
+"$supine" precompute --directions 12 --volumes 3 >plan.csv || fail "no plan"
+sed -n 's/^v \([^ ]*\) \([^ ]*\) \([^ ]*\).*/\1,\2,\3/p' lungs.obj >points.csv
+cat >simulate.sh <<'SIMULATE'
+set -eu
+[ -e ready ] || [ "$4" != 1 ] || exit 3
+mkdir -p "$(dirname "$5")"
+awk -F, -v x="$1" -v y="$2" -v z="$3" -v fill="$4" '{
+  printf "%.9g,%.9g,%.9g\n", (0.02 + 0.1 * fill) * $1 + 5 * x, (0.02 + 0.1 * fill) * $2 + 5 * y, (0.02 + 0.1 * fill) * $3 + 5 * z
+}' points.csv >"$5"
+SIMULATE
+if command -v snakemake >/dev/null; then
+  flow() {
+    snakemake -s "$cohort/simulations.smk" --cores 2 --nocolor --keep-going --config plan=plan.csv points=points.csv \
+      inputs=simulate.sh simulate='sh simulate.sh' >said 2>&1
+  }
+  flow && fail "a failed simulation is not told"
+  [ "$(ls runs | wc -l)" -eq 24 ] || fail "a failed simulation stops others: $(ls runs | wc -l)"
+  touch ready
+  flow || fail "the second run: $(tail -5 said)"
+  grep -q '^simulate *12' said || fail "simulations were computed again: $(grep -A6 '^job' said)"
+else
+  touch ready
+  i=0
+  tail -n +2 plan.csv | tr , ' ' | tr -d '\r' >states
+  while read -r x y z fill; do
+    sh simulate.sh "$x" "$y" "$z" "$fill" "runs/$i.csv" || fail "row $i"
+    i=$((i + 1))
+  done <states
+  python3 "$cohort/collect.py" fields.safetensors points.csv plan.csv runs || fail "no fields"
+fi
+"$supine" precompute lungs.obj --fields fields.safetensors -o lungs.safetensors >said 2>&1 || fail "$(cat said)"
+grep -q 'fields of gravity and volume: .* 12 directions, 3 volumes each' said || fail "another plan: $(head -1 said)"
+rm -f fields.safetensors
+echo 1,2 >runs/3.csv
+python3 "$cohort/collect.py" fields.safetensors points.csv plan.csv runs 2>said && fail "a corrupt run was collected"
+grep -q 'runs/3.csv: line 1 has 2 numbers' said || fail "$(cat said)"
+[ ! -e fields.safetensors ] || fail "a file of corrupt runs"
