@@ -826,6 +826,8 @@ function tell(text) {
 
 document.documentElement.dataset.theme = matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light';
 try {
+  if (!MeshoptDecoder.supported) throw new Error('This browser has no WebAssembly, which reads the lungs. Open the page in another browser.');
+  await MeshoptDecoder.ready;
   window.supine = start();
 } catch (error) {
   tell(error.message);
